@@ -1,0 +1,409 @@
+"""Drawings of chains and of their impacts; the only room that loads matplotlib.
+
+Balls and impulses carry the paper's numbers here: ball i is B(i + 1) with velocity v(i + 1), and
+the impulse of contact c is tau(c + 2). Colours come from the palette of Okabe and Ito; a second
+cue (dash, marker or letter) always goes with them.
+
+Every function draws on the axes it is given, or on new ones, and returns them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from numpy.typing import ArrayLike
+
+from cradle.chain import Chain, Vector
+from cradle.trace import Trace
+
+__all__ = [
+    "EVENT_STYLES",
+    "PALETTE",
+    "ball_style",
+    "chain_sketch",
+    "impulse_axis",
+    "outcome_by_ball",
+    "progress",
+    "velocities",
+    "velocity_impulse",
+]
+
+#: Colours of Okabe and Ito, told apart by colour-blind readers; in an order of changing lightness.
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+
+_DASHES: tuple[Any, ...] = (
+    "solid",
+    (0, (6, 2)),
+    (0, (1.5, 1.5)),
+    (0, (6, 2, 1.5, 2)),
+    (0, (10, 3)),
+    (0, (3, 1, 1, 1, 1, 1)),
+    (0, (1, 3)),
+)
+
+#: Marker, letter and name of each kind of event.
+EVENT_STYLES = {
+    "maximum_compression": ("o", "c", "maximum compression"),
+    "end": ("s", "f", "end"),
+    "close": ("^", "s", "start of a further collision"),
+    "collapse": ("D", "l", "limit of an infinite sequence"),
+}
+
+# Labels nearer than this part of the axis would overlap.
+_CROWDED = 0.07
+
+
+def ball_style(ball: int) -> dict[str, Any]:
+    """Return colour and dash of a ball's line, the same in every figure.
+
+    Parameters
+    ----------
+    ball : int
+        Index of the ball, from 0; styles repeat after seven balls.
+
+    Returns
+    -------
+    dict
+        Keyword arguments of `matplotlib.axes.Axes.plot`.
+
+    Examples
+    --------
+    >>> ball_style(0)
+    {'color': '#0072B2', 'linestyle': 'solid'}
+    """
+    return {"color": PALETTE[ball % len(PALETTE)], "linestyle": _DASHES[ball % len(_DASHES)]}
+
+
+def progress(trace: Trace) -> Vector:
+    """Return how far an impact has come at each row of its path.
+
+    Parameters
+    ----------
+    trace : Trace
+        K events.
+
+    Returns
+    -------
+    ndarray, shape (K + 1,)
+        Sum of the impulses of all contacts, N s. It grows wherever anything happens, and all
+        velocities are linear in it between two rows.
+
+    Examples
+    --------
+    >>> from cradle import ImpulseCorrelation, collide
+    >>> progress(collide(Chain([1, 1], [1, 0], 1), ImpulseCorrelation(0))).tolist()
+    [0.0, 0.5, 1.0]
+    """
+    return np.asarray(trace.path_impulses.sum(axis=1))
+
+
+def _axes(ax: Axes | None) -> Axes:
+    return plt.subplots(figsize=(7, 4.3), layout="constrained")[1] if ax is None else ax
+
+
+def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
+    """Draw the velocities of all balls against the progress of the impact.
+
+    Parameters
+    ----------
+    trace : Trace
+        The impact.
+    ax : Axes, optional
+        Where to draw; new axes if left out.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> from cradle import ImpulseCorrelation, collide
+    >>> from matplotlib.figure import Figure
+    >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
+    >>> ax = velocities(trace, Figure().subplots())
+    >>> [line.get_label() for line in ax.get_lines()]
+    ['$v_1$', '$v_2$', '$v_3$']
+    """
+    ax = _axes(ax)
+    for ball, velocity in enumerate(trace.path.T):
+        ax.plot(progress(trace), velocity, label=f"$v_{ball + 1}$", lw=2, **ball_style(ball))
+    ax.set(xlabel="sum of all impulses (N s)", ylabel="velocity (m/s)")
+    ax.margins(x=0)
+    ax.grid(alpha=0.3)
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=len(trace.chain), frameon=False)
+    return ax
+
+
+def velocity_impulse(
+    trace: Trace, contact: int, ax: Axes | None = None, *, other: int | None = None
+) -> Axes:
+    """Draw the velocity-impulse diagram of one contact, as in the paper's Figs. 3, 5 and 8.
+
+    The velocities of the contact's two balls stand against its impulse. Where other contacts act
+    while this one rests, its impulse does not grow, and a velocity jumps. Markers and letters
+    show the contact's events (`EVENT_STYLES`); with several collisions the letter carries a number.
+
+    Parameters
+    ----------
+    trace : Trace
+        The impact.
+    contact : int
+        Contact c joins balls c and c + 1.
+    ax : Axes, optional
+        Where to draw; new axes if left out.
+    other : int, optional
+        Contact whose impulse the upper axis shows (`impulse_axis`); none if left out.
+
+    Returns
+    -------
+    Axes
+        The lower axes.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, sections 2.3, 2.4 and 3.2.
+
+    Examples
+    --------
+    >>> from cradle import ImpulseCorrelation, collide
+    >>> from matplotlib.figure import Figure
+    >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
+    >>> ax = velocity_impulse(trace, 1, Figure().subplots(), other=0)
+    >>> [line.get_label() for line in ax.get_lines()[:2]]
+    ['$v_2$', '$v_3$']
+    """
+    ax = _axes(ax)
+    impulse = trace.path_impulses[:, contact]
+    for ball in (contact, contact + 1):
+        label = f"$v_{ball + 1}$"
+        ax.plot(impulse, trace.path[:, ball], label=label, lw=2, **ball_style(ball))
+    ax.set(xlabel=rf"impulse $\tau_{contact + 2}$ (N s)", ylabel="velocity (m/s)")
+    ax.grid(alpha=0.3)
+
+    _mark_events(trace, contact, ax)
+    if other is not None:
+        impulse_axis(trace, contact, other, ax)
+    return ax
+
+
+def _mark_events(trace: Trace, contact: int, ax: Axes) -> None:
+    """Mark a contact's events on its diagram, and put all names into a legend below it."""
+    impulse = trace.path_impulses[:, contact]
+    several = trace.collisions[contact] > 1
+    collision = 1
+    kinds: list[str] = []
+    names: dict[float, list[str]] = {}
+    for row, event in enumerate(trace.events, start=1):
+        if event.contact != contact:
+            continue
+        marker, letter, _ = EVENT_STYLES[event.kind]
+        # A closing that comes before all else starts the first collision: the contact was idle.
+        collision += event.kind == "close" and bool(kinds)
+        kinds.append(event.kind)
+        x, pair = float(impulse[row]), trace.path[row, contact : contact + 2]
+        ax.plot([x, x], pair, marker, mfc="white", mec="black", ms=6, zorder=3)
+        names.setdefault(x, []).append(f"{letter}{collision}" if several else letter)
+    taken = -np.inf
+    for x, letters in names.items():
+        ax.axvline(x, color="0.6", lw=0.7, ls=":", zorder=0)
+        if x > taken:
+            ax.annotate(
+                " ".join(letters), (x, 0), (2, 3), xycoords=ax.get_xaxis_transform(),
+                textcoords="offset points", fontsize=9,
+            )  # fmt: skip
+            taken = x + 0.035 * len(letters) * float(impulse[-1])
+    marks = [
+        Line2D(
+            [], [], marker=marker, ls="none", mfc="white", mec="black", label=f"{letter}: {name}"
+        )
+        for kind, (marker, letter, name) in EVENT_STYLES.items()
+        if kind in kinds
+    ]
+    handles = [*ax.get_lines()[:2], *marks]
+    # Below the axes, where it hides no line.
+    ax.legend(
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False
+    )
+
+
+def impulse_axis(
+    trace: Trace, contact: int, other: int, ax: Axes, values: ArrayLike | None = None
+) -> Axes:
+    """Add an upper axis with another contact's impulse to a velocity-impulse diagram.
+
+    The two impulses do not grow in one fixed proportion, so each tick is placed where the path of
+    the impact has it.
+
+    Parameters
+    ----------
+    trace : Trace
+        The impact.
+    contact : int
+        Contact whose impulse is on the lower axis.
+    other : int
+        Contact whose impulse the upper axis shows.
+    ax : Axes
+        Axes drawn by `velocity_impulse`.
+    values : array_like, optional
+        Impulses to mark, N s. If left out, those at the events; where the lower contact rests
+        while the other one acts, the tick shows the impulse before and after.
+
+    Returns
+    -------
+    Axes
+        The new upper axes.
+
+    Examples
+    --------
+    >>> from cradle import ImpulseCorrelation, collide
+    >>> from matplotlib.figure import Figure
+    >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.5))
+    >>> ax = velocity_impulse(trace, 1, Figure().subplots())
+    >>> upper = impulse_axis(trace, 1, 0, ax, values=[0, 1, 4 / 3])
+    >>> upper.get_xticks().round(4).tolist()
+    [0.0, 0.5, 0.6667]
+    """
+    lower, upper = trace.path_impulses[:, contact], trace.path_impulses[:, other]
+    if values is None:
+        ticks = _event_ticks(lower, upper)
+    else:
+        marked = np.atleast_1d(np.asarray(values, dtype=np.float64))
+        places = np.interp(marked, upper, lower)
+        ticks = [(float(x), f"{value:.3g}") for x, value in zip(places, marked, strict=True)]
+    above = ax.twiny()
+    above.set_xlim(ax.get_xlim())
+    above.set_xticks([x for x, _ in ticks], [label for _, label in ticks], fontsize=9)
+    above.set_xlabel(rf"impulse $\tau_{other + 2}$ (N s)")
+    return above
+
+
+def _event_ticks(lower: Vector, upper: Vector) -> list[tuple[float, str]]:
+    """Place and label ticks at the events: ends and jumps first, others where there is room."""
+    groups: dict[float, list[float]] = {}
+    for x, value in zip(lower.tolist(), upper.tolist(), strict=True):
+        groups.setdefault(x, []).append(value)
+    edges = (float(lower[0]), float(lower[-1]))
+
+    def importance(x: float) -> tuple[bool, float]:
+        return (x not in edges, -(groups[x][-1] - groups[x][0]))
+
+    def width(x: float) -> float:
+        # The label of a jump is two numbers wide.
+        return _CROWDED * edges[1] * (2.5 if groups[x][0] != groups[x][-1] else 1.0)
+
+    kept: list[float] = []
+    for x in sorted(groups, key=importance):
+        if all(abs(x - taken) > (width(x) + width(taken)) / 2 for taken in kept):
+            kept.append(x)
+
+    def label(x: float) -> str:
+        first, last = f"{groups[x][0]:.3g}", f"{groups[x][-1]:.3g}"
+        return first if first == last else f"{first} → {last}"
+
+    return [(x, label(x)) for x in sorted(kept)]
+
+
+def outcome_by_ball(
+    traces: Trace | Sequence[Trace], ax: Axes | None = None, *, letters: str = ""
+) -> Axes:
+    r"""Draw post-impact velocities over the striker's speed by ball, as in the paper's Figs. 10-12.
+
+    Parameters
+    ----------
+    traces : Trace or sequence of Trace
+        Impacts of one chain by its first ball, at one or several speeds.
+    ax : Axes, optional
+        Where to draw; new axes if left out.
+    letters : str
+        A name for each ball, written under its number.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> from cradle import collide, paper_chain
+    >>> from matplotlib.figure import Figure
+    >>> trace = collide(*paper_chain("BABA", speed=2.0))
+    >>> ax = outcome_by_ball(trace, Figure().subplots(), letters="BABA")
+    >>> [label.get_text() for label in ax.get_xticklabels()]
+    ['1\nB', '2\nA', '3\nB', '4\nA']
+    """
+    ax = _axes(ax)
+    several = [traces] if isinstance(traces, Trace) else list(traces)
+    number = np.arange(1, len(several[0].chain) + 1)
+    ax.axhline(0, color="0.4", lw=0.8)
+    # Nested open markers: equal outcomes are seen as such, none hides another.
+    for k, trace in enumerate(several):
+        speed = trace.chain.velocities[0]
+        ax.plot(
+            number,
+            trace.velocities / speed,
+            "osDhXP*"[k % 7],
+            ms=5 + 4 * k,
+            mfc="none",
+            mew=1.5,
+            color=PALETTE[k % len(PALETTE)],
+            label=rf"$v_1^-$ = {speed:g} m/s",
+        )
+    ax.plot(number, several[0].velocities / several[0].chain.velocities[0], "0.6", lw=1, zorder=1)
+    names = (
+        [f"{n}\n{letter}" for n, letter in zip(number, letters, strict=True)] if letters else None
+    )
+    ax.set_xticks(number, names)
+    ax.margins(y=0.12)  # room for the large markers
+    ax.set(xlabel="ball number", ylabel=r"$v^+ / v_1^-$", xlim=(0, number[-1] + 1))
+    ax.grid(alpha=0.3)
+    return ax
+
+
+def chain_sketch(chain: Chain, ax: Axes | None = None, *, letters: str = "") -> Axes:
+    """Draw a chain as a row of balls: radii as for one density, arrows for velocities.
+
+    Parameters
+    ----------
+    chain : Chain
+        The balls.
+    ax : Axes, optional
+        Where to draw; new axes if left out.
+    letters : str
+        Names written in the balls; B1, B2, ... if left out.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = chain_sketch(Chain([8, 1], [1, 0], 1), Figure().subplots())
+    >>> [round(patch.get_radius(), 3) for patch in ax.patches if isinstance(patch, Circle)]
+    [0.5, 0.25]
+    """
+    ax = _axes(ax)
+    radii = 0.5 * np.cbrt(chain.masses / np.max(chain.masses))
+    left = np.concatenate([[0.0], np.cumsum(2 * radii)[:-1]])
+    fastest = np.abs(chain.velocities).max() or 1.0
+    for ball, (radius, x) in enumerate(zip(radii.tolist(), (left + radii).tolist(), strict=True)):
+        ax.add_patch(Circle((x, 0), radius, fc="0.93", ec=PALETTE[ball % len(PALETTE)], lw=2))
+        name = letters[ball] if letters else f"$B_{ball + 1}$"
+        # A name that does not fit in its ball stands above it.
+        ax.text(x, 0 if radius > 0.2 else radius + 0.12, name, ha="center", va="center")
+        ax.text(x, -0.85, f"$m_{ball + 1}$", ha="center", va="center", fontsize=9)
+        if chain.velocities[ball]:
+            length = 0.9 * chain.velocities[ball] / fastest
+            tail, tip = (x - length / 2, 0.68), (x + length / 2, 0.68)
+            ax.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": "black"})
+            ax.text(x, 0.86, f"$v_{ball + 1}$", ha="center", va="center")
+        if ball < len(chain) - 1:
+            ax.text(x + radius, -0.62, rf"$\tau_{ball + 2}$", ha="center", va="center", fontsize=9)
+    ax.set(xlim=(-0.2, left[-1] + 2 * radii[-1] + 0.2), ylim=(-1.0, 1.0), aspect="equal")
+    ax.set_axis_off()
+    return ax

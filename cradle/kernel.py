@@ -1,0 +1,949 @@
+"""The event loop: the rules of the Impulse Correlation Ratio on plain indexable sequences.
+
+One source, three runtimes.  This file runs as it stands, compiled by numba (`cradle.runtime`), and
+in MicroPython: scalars, loops, sequences and `math`; no classes, no exceptions, no allocation.
+The caller passes the work area in and turns the status code into an error.
+
+The rules are those of the chapter on N balls:
+
+R1  relations inside a run         R4  hand-over            R7  largest admissible ratio
+R2  start                          R5  closing              R8  two runs that meet
+R3  end of a contact               R6  ratio zero           R9  collapse
+
+Notation (n balls; ball i lies between contacts i - 1 and i, contact c between balls c and c + 1;
+all in the chain's own units, see `scales`):
+
+m[i]         mass                                   e[c]    restitution
+
+u[c]         closing speed, > 0 in compression
+q[c]         work that the contact can still release, e^2 W+ - W-, since it became active
+w[c]         work absorbed since it became active, W+
+p[c]         impulse, since the last snapshot       p0[c]   impulse before that
+a[c]         work absorbed, since the last snapshot a0[c]   work absorbed before that
+rate[c]      impulse per unit of progress of the contact's run; the largest of a run is about 1
+slope[c]     closing speed per unit of progress, du/ds
+pull[i]      velocity of ball i per unit of progress, dv/ds
+ratio[i]     ratio in force at ball i
+until[c]     progress to the contact's own next event
+before[c]    -u of an idle contact at the start of the round
+reach[k]     progress of run k to its own next event
+u1[c] q1[c]  snapshot of u and q                    x[i] y[i] z[i]  scratch
+
+active[c]    1 while the contact is active
+turn[i]      direction at ball i: 1 forward, -1 backward, 0 none
+fixed[c]     1 while the contact is held at u = 0   held[c] 1 if it had an impulse then
+hits[c]      how often it became active             tiny[c] how many exhausted collisions in a row
+code1[c] hits1[c]  snapshot of what is active and how it is driven, and of hits
+power[c]     binary exponent of the rate            first[k], last[k]  the contacts of run k
+"""
+
+import math
+
+# Rows of the work area.
+FLOATS = 20
+INTS = 9
+
+# Status codes.
+FINISHED, UNFINISHED = 0, 1
+# Kinds of event.
+MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE = 0, 1, 2, 3
+
+# R9: what is exhausted, relative to the largest initial closing speed; how many exhausted
+# collisions in a row are a collapse; how closely a cycle must repeat, relative to its own scale.
+EXHAUSTED = 1e-13
+REPEATS = 8
+SELF_SIMILAR = 1e-13
+# R8: meeting keys closer than this are equal; a run's events closer than this, relative to the
+# progress they need, are simultaneous.
+TIE = 1e-9
+SIMULTANEOUS = 1.0 + 64 * 2.0**-52
+# A rate below 2**CUT of its run's largest is zero: it could not change a digit.
+CUT = -200
+SMALLEST = 2.0**CUT
+# R6: one vanishing ratio, as a binary exponent far below any of a number.
+VANISHING = 1 << 40
+
+if "jit" not in globals():
+
+    def jit(function):
+        """Stand in for the compiler: `cradle.runtime` replaces this before it runs the file."""
+        return function
+
+
+@jit
+def start(n, u, active, turn, hits):
+    """R2: in each touching stretch the leftmost approaching contact is the source."""
+    c = 0
+    while c < n - 1:
+        if u[c] < 0.0:
+            c += 1
+            continue
+        left = c
+        source = -1
+        while c < n - 1 and u[c] >= 0.0:
+            if source < 0 and u[c] > 0.0:
+                source = c
+            c += 1
+        if source >= 0:
+            for k in range(left, c):
+                active[k] = 1
+                hits[k] += 1
+                if k > left:
+                    turn[k] = 1 if k > source else -1
+
+
+@jit
+def ratios_in_force(left, right, forward, backward, m, u, w, ratio, turn, fixed):
+    """R7: ratios in force in the run left..right; contacts above their bound are held.
+
+    Each chain of drives is worked from its far end towards its driver, because the bound of a
+    contact (Eq. 53) needs the ratio in force of the next one.  Only a contact at u = 0 that has
+    absorbed nothing can be held; one driven from both sides cannot open, so it never is.
+    """
+    for c in range(left, right + 1):
+        fixed[c] = 0
+    for c in range(right, left, -1):
+        if turn[c] == 1:
+            f = forward[c - 1]
+            if u[c] == 0.0 and w[c] == 0.0 and not (c < right and turn[c + 1] == -1):
+                onward = ratio[c + 1] if c < right else 0.0
+                bound = m[c + 1] / (m[c + 1] + m[c] * (1.0 - onward))
+                if f > bound:
+                    f = bound
+                    fixed[c] = 1
+            ratio[c] = f
+    for c in range(left, right):
+        if turn[c + 1] == -1:
+            f = backward[c]
+            if u[c] == 0.0 and w[c] == 0.0 and not (c > left and turn[c] == 1):
+                onward = ratio[c] if c > left else 0.0
+                bound = m[c] / (m[c] + m[c + 1] * (1.0 - onward))
+                if f > bound:
+                    f = bound
+                    fixed[c] = 1
+            ratio[c + 1] = f
+
+
+@jit
+def several_sources(left, right, rate, ratio, turn, power):
+    """R1, R6: rates of a run with more than one source, where products of ratios are divided.
+
+    Each rate is x * 2**k, so that long products neither overflow nor vanish, and a ratio of zero
+    is one more vanishing factor: of the contacts, those of the leading order move.
+    """
+    x, k = 0.5, 1
+    top = k
+    rate[left] = x
+    power[left] = k
+    for c in range(left + 1, right + 1):
+        f = ratio[c]
+        if f == 0.0:
+            k -= turn[c] * VANISHING
+        else:
+            f, j = math.frexp(f)
+            if turn[c] == 1:
+                x *= f
+                k += j
+                if x < 0.5:
+                    x *= 2.0
+                    k -= 1
+            else:
+                x /= f
+                k -= j
+                if x >= 1.0:
+                    x *= 0.5
+                    k += 1
+        rate[c] = x
+        power[c] = k
+        top = max(top, k)
+    for c in range(left, right + 1):
+        k = power[c] - top
+        rate[c] = math.ldexp(rate[c], k) if k > CUT else 0.0
+
+
+@jit
+def rates(
+    left, right, forward, backward, m, u, w, rate, slope, pull, ratio, turn, fixed, power,
+):  # fmt: skip
+    """R1, R6, R7: impulse rates and slopes of the run of contacts left..right."""
+    ratios_in_force(left, right, forward, backward, m, u, w, ratio, turn, fixed)
+    source = left
+    while source < right and turn[source + 1] == -1:
+        source += 1
+    alone = True
+    for c in range(source + 1, right + 1):
+        alone = alone and turn[c] == 1
+    if alone:
+        rate[source] = 1.0
+        for c in range(source + 1, right + 1):
+            f = rate[c - 1] * ratio[c]
+            rate[c] = f if f > SMALLEST else 0.0
+        for c in range(source - 1, left - 1, -1):
+            f = rate[c + 1] * ratio[c + 1]
+            rate[c] = f if f > SMALLEST else 0.0
+    else:
+        several_sources(left, right, rate, ratio, turn, power)
+
+    # Eqs. 47-48: m dv = dP on the left - dP on the right.
+    pull[left] = -rate[left] / m[left]
+    for c in range(left, right):
+        pull[c + 1] = (rate[c] - rate[c + 1]) / m[c + 1]
+    pull[right + 1] = rate[right] / m[right + 1]
+    for c in range(left, right + 1):
+        slope[c] = pull[c] - pull[c + 1]
+        # A held contact stays at u = 0.  A driven one within its bound cannot open either;
+        # rounding must not make it.
+        driven = (c > left and turn[c] == 1) or (c < right and turn[c + 1] == -1)
+        if fixed[c] == 1 or (driven and slope[c] < 0.0 and u[c] == 0.0 and w[c] == 0.0):
+            slope[c] = 0.0
+
+
+@jit
+def end_progress(u, q, slope, rate, e):
+    """R3: progress to the end of a contact, where all that it can release is released.
+
+    While u < 0, Q(s) = Q + rate (u s + slope s^2 / 2); the root is written without cancellation.
+    """
+    s = 0.0
+    if u > 0.0:
+        if slope >= 0.0:
+            return math.inf
+        s = -u / slope
+        q += 0.5 * e * e * rate * u * s
+        u = 0.0
+        if q <= 0.0:
+            return s
+    if q <= 0.0 or rate == 0.0:
+        return math.inf
+    square = u * u - 2.0 * slope * q / rate
+    if square < 0.0:
+        return math.inf  # recompression comes first
+    speed = math.sqrt(square) - u
+    if speed <= 0.0:
+        return math.inf
+    return s + 2.0 * q / (rate * speed)
+
+
+@jit
+def end_speed(u, q, slope, rate, e):
+    """Return the closing speed at the end of a contact, by the root of `end_progress`."""
+    if u > 0.0:
+        q += 0.5 * e * e * rate * u * (-u / slope)
+        u = 0.0
+    if q <= 0.0 or rate == 0.0:
+        return 0.0
+    return -math.sqrt(max(u * u - 2.0 * slope * q / rate, 0.0))
+
+
+@jit
+def segment(left, right, n, e, u, q, rate, slope, pull, until, before, active):
+    """R8.2: progress of the run left..right to its own next rate-changing event."""
+    s = math.inf
+    for c in range(left, right + 1):
+        until[c] = end_progress(u[c], q[c], slope[c], rate[c], e[c])
+        s = min(s, until[c])
+    # Idle neighbours close; a gap, shared with another run, is no event of this run's own.
+    c = left - 1
+    if c >= 0:
+        before[c] = -u[c]
+        until[c] = math.inf
+        if not (c > 0 and active[c - 1] == 1) and pull[left] < 0.0:
+            until[c] = u[c] / pull[left]
+            s = min(s, until[c])
+    c = right + 1
+    if c < n - 1:
+        before[c] = -u[c]
+        until[c] = math.inf
+        if not (c < n - 2 and active[c + 1] == 1) and pull[c] > 0.0:
+            until[c] = -u[c] / pull[c]
+            s = min(s, until[c])
+    return s
+
+
+@jit
+def advance(left, right, s, whole, n, e, u, q, w, p, a, rate, slope, pull, until, fixed, held):
+    """Take the run left..right straight on by s; `whole` if that is its own next event.
+
+    Velocities are linear and works quadratic in s.  What is zero at the event is stored as zero.
+    """
+    horizon = s * SIMULTANEOUS if whole else -1.0
+    for c in range(left, right + 1):
+        u0 = u[c]
+        u1 = u0 + slope[c] * s
+        done = until[c] <= horizon
+        if done:
+            u1 = end_speed(u0, q[c], slope[c], rate[c], e[c])
+        p[c] += rate[c] * s
+        if fixed[c] == 1 and rate[c] * s > 0.0:
+            held[c] = 1
+        gain = 0.0  # absorbed
+        give = 0.0  # released
+        if u0 >= 0.0 and u1 >= 0.0:
+            gain = 0.5 * rate[c] * s * (u0 + u1)
+        elif u0 <= 0.0 and u1 <= 0.0:
+            give = -0.5 * rate[c] * s * (u0 + u1)
+        else:
+            s0 = -u0 / slope[c]
+            if u0 > 0.0:
+                gain = 0.5 * rate[c] * s0 * u0
+                give = -0.5 * rate[c] * (s - s0) * u1
+            else:
+                give = -0.5 * rate[c] * s0 * u0
+                gain = 0.5 * rate[c] * (s - s0) * u1
+        u[c] = u1
+        w[c] += gain
+        a[c] += gain
+        q[c] = 0.0 if done else max(q[c] + e[c] * e[c] * gain - give, 0.0)
+    # Idle neighbours only ever close, and wait at zero.
+    c = left - 1
+    if c >= 0:
+        u[c] = 0.0 if until[c] <= horizon else min(u[c] - pull[left] * s, 0.0)
+    c = right + 1
+    if c < n - 1:
+        u[c] = 0.0 if until[c] <= horizon else min(u[c] + pull[c] * s, 0.0)
+
+
+@jit
+def activate(c, from_left, from_right, u, q, w, active, turn, hits):
+    """R4, R5: contact c becomes active, driven from the side or sides already active."""
+    u[c] = 0.0
+    q[c] = 0.0
+    w[c] = 0.0
+    active[c] = 1
+    hits[c] += 1
+    if from_left:
+        turn[c] = 1
+    if from_right:
+        turn[c + 1] = -1
+
+
+@jit
+def deactivate(c, u, q, before, active, turn):
+    """R4: contact c ends and its relations go."""
+    q[c] = 0.0
+    active[c] = 0
+    turn[c] = 0
+    turn[c + 1] = 0
+    before[c] = -u[c]
+
+
+@jit
+def velocities(u, p, out, n, v, shift, m, p0, x):
+    """Velocities from the closing speeds and the momentum of each stretch of balls that shares it.
+
+    Differences of large impulses over a light mass would lose digits; sums of closing speeds,
+    counted from the heaviest ball of the stretch, do not.  A ball without impulse keeps its
+    velocity to the last bit.
+    """
+    i = 0
+    while i < n:
+        j = i
+        k = i
+        while j < n - 1 and p0[j] + p[j] > 0.0:
+            j += 1
+            if m[j] > m[k]:
+                k = j
+        if j == i:
+            out[i] = v[i]
+        else:
+            x[k] = 0.0
+            for c in range(k - 1, i - 1, -1):
+                x[c] = x[c + 1] + u[c]
+            for c in range(k, j):
+                x[c + 1] = x[c] - u[c]
+            mass = 0.0
+            momentum = 0.0
+            origin = math.ldexp(v[k], -shift)
+            for b in range(i, j + 1):
+                mass += m[b]
+                momentum += m[b] * ((math.ldexp(v[b], -shift) - origin) - x[b])
+            for b in range(i, j + 1):
+                out[b] = v[k] + math.ldexp(momentum / mass + x[b], shift)
+        i = j + 1
+
+
+@jit
+def record(
+    count, kind, c, u, p, n, v, shift, mass_shift, m, p0, x, kinds, contacts, path_v, path_p,
+):  # fmt: skip
+    """Write an event and the state u, p after it, if there is room; return the number of events."""
+    if count < len(kinds):
+        kinds[count] = kind
+        contacts[count] = c
+        velocities(u, p, path_v[count + 1], n, v, shift, m, p0, x)
+        for j in range(n - 1):
+            path_p[count + 1][j] = math.ldexp(p0[j] + p[j], shift + mass_shift)
+    return count + 1
+
+
+@jit
+def record_compressions(
+    count, left, right, s, whole, n, v, shift, mass_shift, m, u, p, p0, rate, slope, pull, until,
+    x, y, z, power, kinds, contacts, path_v, path_p,
+):  # fmt: skip
+    """Record every maximum compression of the run within the next s, in order of progress.
+
+    It changes no rate, so the run itself does not stop for it: the state there is made on the side.
+    """
+    for c in range(left, right + 1):
+        ends = whole and until[c] <= s * SIMULTANEOUS
+        power[c] = 1 if u[c] > 0.0 and (ends or u[c] + slope[c] * s <= 0.0) else 0
+    while True:
+        k = -1
+        at = 0.0
+        for c in range(left, right + 1):
+            if power[c] == 1 and (k < 0 or -u[c] / slope[c] < at):
+                k = c
+                at = -u[c] / slope[c]
+        if k < 0:
+            return count
+        power[k] = 0
+        at = min(at, s)
+        for c in range(n - 1):
+            y[c] = u[c]
+            z[c] = p[c]
+            if left <= c <= right:
+                y[c] += slope[c] * at
+                z[c] += rate[c] * at
+        y[k] = 0.0
+        if left > 0:
+            y[left - 1] -= pull[left] * at
+        if right < n - 2:
+            y[right + 1] += pull[right + 1] * at
+        count = record(
+            count, MAXIMUM_COMPRESSION, k, y, z, n, v, shift, mass_shift, m, p0, x, kinds,
+            contacts, path_v, path_p,
+        )  # fmt: skip
+
+
+@jit
+def reduced_mass(m1, m2):
+    """Return the reduced mass of two balls."""
+    return m1 / (m1 + m2) * m2
+
+
+@jit
+def exhausted(c, work, threshold, m, u):
+    """R9: tell whether next to nothing is left of contact c, neither closing speed nor `work`."""
+    mu = reduced_mass(m[c], m[c + 1])
+    return abs(u[c]) < threshold and 2.0 * work < mu * threshold * threshold
+
+
+@jit
+def exhausted_stretch(c, threshold, n, e, m, u, q, tiny):
+    """R9: the stretch around c of exhausted contacts that only chatter, as (first, last).
+
+    Empty (last < first) if nothing in it can lose energy: elastic sequences are finite.
+    """
+    left = c
+    right = c
+    while left > 0 and tiny[left - 1] > 0 and exhausted(left - 1, q[left - 1], threshold, m, u):
+        left -= 1
+    while (
+        right < n - 2
+        and tiny[right + 1] > 0
+        and exhausted(right + 1, q[right + 1], threshold, m, u)
+    ):
+        right += 1
+    for k in range(left, right + 1):
+        if e[k] < 1.0:
+            return left, right
+    return c, c - 1
+
+
+@jit
+def merge(first, last, n, m, u, q, tiny, before, active, turn):
+    """R9: end the contacts first..last plastically: their balls take the common velocity."""
+    mass = m[first]
+    momentum = 0.0  # both counted from the velocity of ball `first`
+    speed = 0.0
+    for c in range(first, last + 1):
+        speed -= u[c]
+        mass += m[c + 1]
+        momentum += m[c + 1] * speed
+    common = momentum / mass
+    if first > 0:
+        u[first - 1] -= common
+    if last < n - 2:
+        u[last + 1] += common - speed
+    for c in range(max(first - 1, 0), min(last + 1, n - 2) + 1):
+        if first <= c <= last:
+            u[c] = 0.0
+            tiny[c] = 0
+            deactivate(c, u, q, before, active, turn)
+        elif active[c] == 0:
+            u[c] = min(u[c], 0.0)
+
+
+@jit
+def snapshot(n, u, q, p, p0, a, a0, u1, q1, active, turn, code1, hits1, hits):
+    """R9: remember the state, and count impulses and works from here."""
+    for c in range(n - 1):
+        p0[c] += p[c]
+        a0[c] += a[c]
+        p[c] = 0.0
+        a[c] = 0.0
+        u1[c] = u[c]
+        q1[c] = q[c]
+        hits1[c] = hits[c]
+        code1[c] = 9 * active[c] + 3 * turn[c] + turn[c + 1]
+
+
+@jit
+def chatterers(c, n, e, p, active, turn, code1, hits1, hits):
+    """R9: (left, first, last, right) of a possible cycle around contact c, or last < first.
+
+    Contacts left..right had an impulse since the snapshot; of these first..last collided anew and
+    the others stayed active.  All must be active and driven as they were at the snapshot.
+    """
+    left = c
+    right = c
+    while left > 0 and p[left - 1] > 0.0:
+        left -= 1
+    while right < n - 2 and p[right + 1] > 0.0:
+        right += 1
+    first = right + 1
+    last = left - 1
+    loses = False
+    for k in range(left, right + 1):
+        if code1[k] != 9 * active[k] + 3 * turn[k] + turn[k + 1]:
+            return c, c, c - 1, c
+        if hits[k] != hits1[k]:
+            first = min(first, k)
+            last = k
+            loses = loses or e[k] < 1.0
+        elif active[k] == 0:
+            return c, c, c - 1, c
+    for k in range(first, last + 1):
+        if hits[k] == hits1[k]:
+            return c, c, c - 1, c
+    # Nobody else may be at work next to them.
+    if (left > 0 and active[left - 1] == 1) or (right < n - 2 and active[right + 1] == 1):
+        return c, c, c - 1, c
+    if (left > 1 and p[left - 2] > 0.0) or (right < n - 3 and p[right + 2] > 0.0):
+        return c, c, c - 1, c
+    if not loses:
+        return c, c, c - 1, c
+    return left, first, last, right
+
+
+@jit
+def cycle(c, n, e, m, u, q, w, p, a, before, u1, q1, x, y, active, turn, tiny, code1, hits1, hits):
+    """R9: if the neighbourhood of contact c repeats itself on a smaller scale, go to the limit.
+
+    The state is compared with the snapshot of an earlier end of the same contact.  If every closing
+    speed of the chattering contacts has shrunk by one factor L, and every stored work by its
+    square, then so will the next cycle, and the sum of all cycles is a geometric series with
+    T = L / (1 - L).  T comes from the limit itself: the impulses that bring all chattering balls to
+    one velocity, over the impulses of the last cycle.  1 - L itself would lose all digits for a
+    very light ball.  Neighbours that stay active throughout receive their share; if that would
+    take one of them to an event of its own, there is no jump.  Returns (first, last) of the
+    contacts that have collapsed; empty, with nothing changed, if there is no cycle.
+    """
+    left, first, last, right = chatterers(c, n, e, p, active, turn, code1, hits1, hits)
+    if last < first:
+        return c, c - 1
+
+    # The limit: one velocity.  A steady neighbour whose impulse is h times that of the outermost
+    # chatterer makes the ball between them act as one of mass m / (1 - h), whatever its sign.
+    share_left = p[first - 1] / p[first] if first > left else 0.0
+    share_right = p[last + 1] / p[last] if last < right else 0.0
+    if share_left == 1.0 or share_right == 1.0:
+        return c, c - 1
+    scale = 0.0
+    mass = 0.0
+    momentum = 0.0
+    x[first] = 0.0
+    for k in range(first, last + 2):
+        y[k] = m[k]
+        if k == first:
+            y[k] /= 1.0 - share_left
+        if k == last + 1:
+            y[k] /= 1.0 - share_right
+        mass += y[k]
+        momentum += y[k] * x[k]
+        if k <= last:
+            x[k + 1] = x[k] - u[k]
+            mu = reduced_mass(m[k], m[k + 1])
+            scale = max(scale, abs(u[k]), math.sqrt(2.0 * q[k] / mu))
+    if mass == 0.0:
+        return c, c - 1
+    common = momentum / mass
+    impulse = 0.0
+    to_come = 0.0
+    last_cycle = 0.0
+    for k in range(first, last + 1):
+        impulse += y[k] * (x[k] - common)
+        to_come += impulse
+        last_cycle += p[k]
+        x[k] = impulse
+    if to_come <= 0.0:
+        return c, c - 1
+    total = to_come / last_cycle
+    factor = total / (1.0 + total)
+    for k in range(first, last + 1):
+        mu = reduced_mass(m[k], m[k + 1])
+        if abs(u[k] - factor * u1[k]) > SELF_SIMILAR * scale:
+            return c, c - 1
+        if abs(q[k] - factor * factor * q1[k]) > SELF_SIMILAR * mu * scale * scale:
+            return c, c - 1
+        if abs(x[k] - total * p[k]) > 0.01 * total * p[k]:
+            return c, c - 1
+    squares = total * total / (1.0 + 2.0 * total)  # sum of L^2, L^4, ...
+
+    # Neighbours: y is the work of all cycles, with the closing speed linear in the impulse so far.
+    low = max(left - 1, 0)
+    high = min(right + 1, n - 2)
+    for k in range(low, high + 1):
+        if first <= k <= last:
+            continue
+        step = u[k] - u1[k]
+        speed = u[k] + step * total
+        if u[k] * u1[k] < 0.0 or u[k] * speed < 0.0 or (u[k] == 0.0) != (speed == 0.0):
+            return c, c - 1
+        work = a[k] if u[k] > 0.0 else q[k] - q1[k]
+        y[k] = p[k] * total * (u[k] + step * squares) + (work - u1[k] * p[k]) * squares
+        if active[k] == 1 and u[k] < 0.0 and q[k] + y[k] <= 0.0:
+            return c, c - 1
+    for k in range(low, high + 1):
+        if first <= k <= last:
+            p[k] += x[k]
+            a[k] += a[k] * squares
+            u[k] = 0.0
+            tiny[k] = 0
+            deactivate(k, u, q, before, active, turn)
+            continue
+        if active[k] == 1 and u[k] > 0.0:
+            w[k] += y[k]
+            a[k] += y[k]
+            q[k] += e[k] * e[k] * y[k]
+        elif active[k] == 1:
+            q[k] += y[k]
+        p[k] += p[k] * total
+        u[k] += (u[k] - u1[k]) * total
+    return first, last
+
+
+@jit
+def scales(n, v, m):
+    """Return binary exponents of the largest velocity and the largest mass: the chain's own units.
+
+    Powers of two change no digit, and in these units nothing overflows.
+    """
+    largest = 0.0
+    heaviest = 0.0
+    for i in range(n):
+        largest = max(largest, abs(v[i]))
+        heaviest = max(heaviest, m[i])
+    return math.frexp(largest)[1], math.frexp(heaviest)[1]
+
+
+@jit
+def end_contacts(
+    low, high, count, threshold, sloped, n, v, e, shift, mass_shift, m, u, q, w, p, p0, slope,
+    before, x, active, turn, tiny, kinds, contacts, path_v, path_p,
+):  # fmt: skip
+    """R8.1: end every contact of low..high that needs no progress to end; left to right.
+
+    With nothing left to release, a contact ends if it opens: u < 0, or, once the slopes are known
+    (`sloped`), u = 0 and falling; with e = 0 also at u = 0 after compression (R3).
+    Returns the number of ends, the last contact ended, one that is worn out (R9) or -1, and count.
+    """
+    ends = 0
+    ended = -1
+    worn = -1
+    for c in range(low, high + 1):
+        if active[c] == 0 or q[c] > 0.0:
+            continue
+        if not (
+            u[c] < 0.0
+            or (u[c] == 0.0 and e[c] == 0.0 and w[c] > 0.0)
+            or (sloped and u[c] == 0.0 and slope[c] < 0.0)
+        ):
+            continue
+        # R9: a collision counts as tiny if all of it was; a genuine one clears its neighbours.
+        if not exhausted(c, w[c], threshold, m, u):
+            for k in range(max(c - 1, 0), min(c + 1, n - 2) + 1):
+                tiny[k] = 0
+        elif w[c] > 0.0:
+            tiny[c] += 1
+            if tiny[c] >= REPEATS:
+                worn = c
+        deactivate(c, u, q, before, active, turn)
+        ends += 1
+        ended = c
+        count = record(
+            count, END, c, u, p, n, v, shift, mass_shift, m, p0, x, kinds, contacts, path_v,
+            path_p,
+        )  # fmt: skip
+    return ends, ended, worn, count
+
+
+@jit
+def close_contacts(
+    low, high, count, n, v, shift, mass_shift, m, u, q, w, p, p0, rate, before, x, active, turn,
+    hits, kinds, contacts, path_v, path_p,
+):  # fmt: skip
+    """R5, R8.1: activate every idle contact of low..high at u = 0 that is about to rise.
+
+    A contact with active contacts on both sides is a gap and waits for R8.3.
+    """
+    for c in range(low, high + 1):
+        if active[c] == 1 or u[c] < 0.0:
+            continue
+        from_left = c > 0 and active[c - 1] == 1
+        from_right = c < n - 2 and active[c + 1] == 1
+        if from_left == from_right:
+            continue
+        if rate[c - 1 if from_left else c + 1] == 0.0:
+            continue
+        # R8.6: two runs close on one ball; the contact that was nearer goes first.
+        if (
+            from_left
+            and c < n - 3
+            and u[c + 1] == 0.0
+            and active[c + 2] == 1
+            and rate[c + 2] > 0.0
+            and before[c + 1] < before[c]
+        ):
+            continue
+        activate(c, from_left, from_right, u, q, w, active, turn, hits)
+        rate[c] = 0.0  # it drives nobody in this round
+        count = record(
+            count, CLOSE, c, u, p, n, v, shift, mass_shift, m, p0, x, kinds, contacts, path_v,
+            path_p,
+        )  # fmt: skip
+    return count
+
+
+@jit
+def meeting_gap(runs, meeting, u, pull, reach, first, last):
+    """R8.3-4: the gap that is reached first, as (index of its left run, left part, right part).
+
+    Index -1: no gap must meet.  Parts are fractions of the two runs' segments.  Velocities are
+    counted from that of the gap's left ball; that ball only rises and the other only falls.
+    """
+    best = -1
+    best_large = best_small = 0.0
+    best_left = best_right = 0.0
+    for k in range(runs - 1):
+        if last[k] + 2 != first[k + 1]:
+            continue
+        wide = -u[last[k] + 1]
+        rise = pull[last[k] + 1] * reach[k]
+        fall = -pull[first[k + 1]] * reach[k + 1]
+        if rise + fall <= wide:
+            continue
+        low = max(0.0, wide - fall)
+        high = min(rise, wide)
+        at = low + meeting * (high - low)
+        part_left = min(at / rise, 1.0) if rise > 0.0 else 0.0
+        part_right = min((wide - at) / fall, 1.0) if fall > 0.0 else 0.0
+        large = max(part_left, part_right)
+        small = min(part_left, part_right)
+        if (
+            best < 0
+            or large < best_large - TIE
+            or (large < best_large + TIE and small < best_small - TIE)
+        ):
+            best, best_large, best_small = k, large, small
+            best_left, best_right = part_left, part_right
+    return best, best_left, best_right
+
+
+@jit
+def impact(
+    n, masses, v, e, forward, backward, meeting, max_events,
+    out_v, out_p, out_a, hits, held, floats, ints, kinds, contacts, path_v, path_p,
+):  # fmt: skip
+    """Solve one impact; return (status, number of events, 1 if any contacts collapsed).
+
+    Inputs: n balls; `masses`, `v` (n); `e` (n - 1); `forward`, `backward` (n - 2); scalars.
+    Outputs: `out_v` (n); `out_p`, `out_a`, `hits`, `held` (n - 1).
+    Work area: `floats` (FLOATS, n), `ints` (INTS, n).
+    Record, kept while there is room: `kinds`, `contacts` (K), `path_v` (K + 1, n), `path_p`
+    (K + 1, n - 1).  Pass length 0 for the outcome alone: the run is the same.
+    """
+    shift, mass_shift = scales(n, v, masses)
+    m, u, q, w, p, p0 = floats[0], floats[1], floats[2], floats[3], floats[4], floats[5]
+    a, a0, rate, slope, pull = floats[6], floats[7], floats[8], floats[9], floats[10]
+    ratio, until, before, reach = floats[11], floats[12], floats[13], floats[14]
+    u1, q1, x, y, z = floats[15], floats[16], floats[17], floats[18], floats[19]
+    active, turn, fixed, tiny, power = ints[0], ints[1], ints[2], ints[3], ints[4]
+    first, last, code1, hits1 = ints[5], ints[6], ints[7], ints[8]
+    recording = len(kinds) > 0
+    threshold = 0.0
+    for i in range(n):
+        m[i] = math.ldexp(masses[i], -mass_shift)
+        turn[i] = 0
+        if i < n - 1:
+            u[i] = math.ldexp(v[i], -shift) - math.ldexp(v[i + 1], -shift)
+            threshold = max(threshold, EXHAUSTED * u[i])
+            q[i] = w[i] = p[i] = p0[i] = a[i] = a0[i] = 0.0
+            before[i] = abs(u[i])
+            active[i] = tiny[i] = hits[i] = held[i] = 0
+    start(n, u, active, turn, hits)
+    if recording:
+        velocities(u, p, path_v[0], n, v, shift, m, p0, x)
+        for c in range(n - 1):
+            path_p[0][c] = 0.0
+
+    count = 0
+    rounds = 0
+    # R9: how many contacts ended since the last collapse; the snapshot's contact, and `ends` at
+    # that time.  Snapshots are taken at doubling distances, so that a cycle of any length is found.
+    ends = 0
+    mark, marked_at = -1, 16
+    collapsed = 0
+    status = FINISHED
+    low, high = 0, n - 2
+    while True:
+        # R8.1, events without progress: ends, those first that are known without the slopes.
+        more, ended, worn, count = end_contacts(
+            low, high, count, threshold, False, n, v, e, shift, mass_shift, m, u, q, w, p, p0,
+            slope, before, x, active, turn, tiny, kinds, contacts, path_v, path_p,
+        )  # fmt: skip
+        while low <= high and active[low] == 0:
+            low += 1
+        while low <= high and active[high] == 0:
+            high -= 1
+        runs = 0
+        c = low
+        while c <= high:
+            if active[c] == 1:
+                first[runs] = c
+                while c < high and active[c + 1] == 1:
+                    c += 1
+                last[runs] = c
+                rates(
+                    first[runs], c, forward, backward, m, u, w, rate, slope, pull, ratio, turn,
+                    fixed, power,
+                )  # fmt: skip
+                runs += 1
+            c += 1
+        if runs > 0:
+            others, c, k, count = end_contacts(
+                low, high, count, threshold, True, n, v, e, shift, mass_shift, m, u, q, w, p, p0,
+                slope, before, x, active, turn, tiny, kinds, contacts, path_v, path_p,
+            )  # fmt: skip
+            if others > 0:
+                more += others
+                ended = c
+                worn = max(worn, k)
+                runs = -1
+        # R9, after the ends.
+        if more > 0:
+            ends += more
+            left, right = ended, ended - 1
+            if worn >= 0:
+                left, right = exhausted_stretch(worn, threshold, n, e, m, u, q, tiny)
+                if left <= right:
+                    merge(left, right, n, m, u, q, tiny, before, active, turn)
+            elif mark == ended:
+                left, right = cycle(
+                    mark, n, e, m, u, q, w, p, a, before, u1, q1, x, y, active, turn, tiny,
+                    code1, hits1, hits,
+                )  # fmt: skip
+            if left <= right:
+                collapsed = 1
+                mark, marked_at, ends = -1, 16, 0
+                for c in range(left, right + 1):
+                    count = record(
+                        count, COLLAPSE, c, u, p, n, v, shift, mass_shift, m, p0, x, kinds,
+                        contacts, path_v, path_p,
+                    )  # fmt: skip
+                runs = -1
+            elif ends >= 2 * marked_at:
+                mark, marked_at = ended, ends
+                snapshot(n, u, q, p, p0, a, a0, u1, q1, active, turn, code1, hits1, hits)
+        if runs == 0:
+            break
+        rounds += 1
+        if rounds > max_events:
+            status = UNFINISHED
+            break
+        if runs < 0:
+            continue
+        # R8.1, closings.
+        low = max(low - 1, 0)
+        high = min(high + 1, n - 2)
+        so_far = count
+        count = close_contacts(
+            low, high, count, n, v, shift, mass_shift, m, u, q, w, p, p0, rate, before, x, active,
+            turn, hits, kinds, contacts, path_v, path_p,
+        )  # fmt: skip
+        if count > so_far:
+            continue
+
+        # R8.2: each run to its own next event.
+        for k in range(runs):
+            reach[k] = segment(
+                first[k], last[k], n, e, u, q, rate, slope, pull, until, before, active,
+            )  # fmt: skip
+        meet, part_left, part_right = meeting_gap(runs, meeting, u, pull, reach, first, last)
+
+        one, other = 0, runs - 1  # the runs that advance
+        gap = -1
+        if meet >= 0:
+            one, other = meet, meet + 1
+            gap = last[meet] + 1
+            # R8.4: a gap at the far side of either run may be reached on the way.
+            beyond_left = beyond_right = math.inf
+            if meet > 0 and last[meet - 1] + 2 == first[meet]:
+                fall = -pull[first[meet]] * reach[meet]
+                if fall * part_left > -u[first[meet] - 1]:
+                    beyond_left = -u[first[meet] - 1] / fall
+            if meet + 2 < runs and last[meet + 1] + 2 == first[meet + 2]:
+                rise = pull[last[meet + 1] + 1] * reach[meet + 1]
+                if rise * part_right > -u[last[meet + 1] + 1]:
+                    beyond_right = -u[last[meet + 1] + 1] / rise
+            if beyond_left < math.inf and beyond_left <= beyond_right:
+                other = meet
+                gap = first[meet] - 1
+                part_left = beyond_left
+            elif beyond_right < math.inf:
+                one = meet + 1
+                gap = last[meet + 1] + 1
+                part_right = beyond_right
+
+        for k in range(one, other + 1):
+            part = 1.0
+            if meet >= 0:
+                part = part_left if k == meet else part_right
+            s = reach[k] * part
+            if recording:
+                count = record_compressions(
+                    count, first[k], last[k], s, part == 1.0, n, v, shift, mass_shift, m, u, p, p0,
+                    rate, slope, pull, until, x, y, z, power, kinds, contacts, path_v, path_p,
+                )  # fmt: skip
+            advance(
+                first[k], last[k], s, part == 1.0, n, e, u, q, w, p, a, rate, slope, pull, until,
+                fixed, held,
+            )  # fmt: skip
+        if gap >= 0:
+            # R8.5: driven from both sides.
+            activate(gap, True, True, u, q, w, active, turn, hits)
+            count = record(
+                count, CLOSE, gap, u, p, n, v, shift, mass_shift, m, p0, x, kinds, contacts,
+                path_v, path_p,
+            )  # fmt: skip
+
+    velocities(u, p, out_v, n, v, shift, m, p0, x)
+    for c in range(n - 1):
+        out_p[c] = math.ldexp(p0[c] + p[c], shift + mass_shift)
+        out_a[c] = math.ldexp(a0[c] + a[c], 2 * shift + mass_shift)
+    return status, count, collapsed
+
+
+@jit
+def batch(
+    rows, n, masses, v, e, forward, backward, meeting, max_events,
+    out_v, hits, status, collapsed, out_p, out_a, held, floats, ints, kinds, contacts,
+    path_v, path_p,
+):  # fmt: skip
+    """Solve `rows` impacts, outcome alone: inputs, `out_v` and `hits` have one row a chain."""
+    for k in range(rows):
+        status[k], _, collapsed[k] = impact(
+            n, masses[k], v[k], e[k], forward[k], backward[k], meeting, max_events, out_v[k],
+            out_p, out_a, hits[k], held, floats, ints, kinds, contacts, path_v, path_p,
+        )  # fmt: skip

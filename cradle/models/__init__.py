@@ -1,0 +1,53 @@
+"""The impact models, one file each, and the verb they share: `collide`."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from cradle.chain import Chain
+from cradle.trace import Trace
+
+
+class Model(Protocol):
+    """What every impact model offers: a rule from a chain to a path of contact impulses."""
+
+    def solve(self, chain: Chain) -> Trace:
+        """Return the path of the impact of `chain`."""
+        ...
+
+
+def collide(chain: Chain, model: Model) -> Trace:
+    """Solve one impact.
+
+    Parameters
+    ----------
+    chain : Chain
+        The balls at the instant before.
+    model : Model
+        The impact law, such as `ImpulseCorrelation`.
+
+    Returns
+    -------
+    Trace
+        The path and the outcome.  If no balls approach, it is empty and nothing has changed.
+
+    Raises
+    ------
+    TypeError
+        If `chain` is no `Chain` or `model` no impact model.
+    ValueError
+        If the model cannot treat this chain; the message says why.
+    ImpactNotFinished
+        If the impact takes more events than the model allows.
+
+    Examples
+    --------
+    >>> from cradle import Chain, ImpulseCorrelation, collide
+    >>> collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.0)).velocities.tolist()
+    [0.0, 0.0, 1.0]
+    """
+    if not isinstance(chain, Chain):
+        raise TypeError(f"chain is a {type(chain).__name__}; must be a Chain")
+    if not hasattr(model, "solve"):
+        raise TypeError(f"model is a {type(model).__name__}; must be an impact model")
+    return model.solve(chain)

@@ -1,0 +1,413 @@
+"""The paper's model: one Impulse Correlation Ratio at each interior ball and direction."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cradle import kernel as plain
+from cradle import runtime
+from cradle.chain import Chain, Vector, checked, checked_masses, refuse_overflow
+from cradle.closed_form import largest_ratios
+from cradle.trace import Event, ImpactNotFinished, Trace
+
+#: Events after which an impact is given up, unless told otherwise.
+MAX_EVENTS = 5_000_000
+
+# Chains of a batch that are solved at a time: the memory needed beyond inputs and outputs.
+_ROWS = 4096
+
+# A record of this length fits nearly every impact; longer ones are run again with enough room.
+_ROOM = 64
+# The longest path kept of an impact that did not finish.
+_UNFINISHED_ROOM = 100_000
+
+_KINDS = ("maximum_compression", "end", "close", "collapse")
+
+
+@dataclass(frozen=True)
+class ImpulseCorrelation:
+    """Impulse Correlation Ratio and energetic restitution (Ceanga and Hurmuzlu).
+
+    At an interior ball the impulse of the driven contact grows in proportion to that of the
+    contact that drives it.  Every contact ends when it has given back the part e^2 of the work it
+    absorbed.  Between events all velocities are linear in the impulses, so the impact is solved
+    event by event, without a step size.
+
+    Parameters
+    ----------
+    forward : float or sequence, length N - 2
+        Ratio at each interior ball when its left contact drives its right one.
+    backward : float or sequence, length N - 2, optional
+        The same when the right contact drives the left one; as `forward` if left out.
+    meeting : float
+        Where two balls meet that are driven towards each other by separate collisions, as a part
+        of the overlap of their velocities; 1/2 is the paper's midpoint.
+    excess : {"raise", "saturate"}
+        What to do with a ratio above its bound (Eq. 53): refuse it, or accept it and hold the
+        contact closed while the ratio would open it.
+    max_events : int
+        Largest number of steps before the impact is given up.
+
+    Raises
+    ------
+    ValueError
+        If a value is outside its range; the message names the value and the rule.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, Eqs. 16, 47-53.
+
+    Examples
+    --------
+    >>> from cradle import Chain, collide
+    >>> model = ImpulseCorrelation(forward=0.15)
+    >>> collide(Chain([1, 1, 1], [1, 0, 0], [1, 1]), model).velocities.round(4).tolist()
+    [-0.0811, 0.0883, 0.9928]
+    """
+
+    forward: float | tuple[float, ...]
+    backward: float | tuple[float, ...] | None = None
+    meeting: float = 0.5
+    excess: str = "raise"
+    max_events: int = MAX_EVENTS
+
+    def __init__(
+        self,
+        forward: ArrayLike,
+        backward: ArrayLike | None = None,
+        *,
+        meeting: float = 0.5,
+        excess: str = "raise",
+        max_events: int = MAX_EVENTS,
+    ) -> None:
+        _check_options(meeting, excess, max_events)
+        for name, ratios in (("forward", forward), ("backward", backward)):
+            value = None
+            if ratios is not None or name == "forward":
+                array = _checked_ratios(name, ratios)
+                if array.ndim > 1:
+                    raise ValueError(f"{name} has shape {array.shape}; must be () or (N - 2,)")
+                value = tuple(array.tolist()) if array.ndim else float(array)
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "meeting", float(meeting))
+        object.__setattr__(self, "excess", excess)
+        object.__setattr__(self, "max_events", int(max_events))
+
+    def solve(self, chain: Chain) -> Trace:
+        """Solve the impact of `chain`; see `collide`."""
+        n = len(chain)
+        ratios: list[Vector] = []
+        for name in ("forward", "backward"):
+            given = getattr(self, name)
+            if given is None:
+                ratios.append(ratios[0])
+                continue
+            if np.ndim(given) and len(given) != n - 2:
+                raise ValueError(
+                    f"{name} has {len(given)} values; {n} balls need {n - 2}, or one number"
+                )
+            ratios.append(np.broadcast_to(np.asarray(given), (n - 2,)).astype(np.float64))
+        if self.excess == "raise":
+            _refuse_excess(chain.masses, *ratios)
+
+        kernel = runtime.chosen()
+        room = _ROOM
+        while True:
+            status, count, collapsed, arrays = _run(
+                kernel, chain, ratios, self.meeting, self.max_events, room
+            )
+            kept = count if status == kernel.FINISHED else min(count, _UNFINISHED_ROOM)
+            if kept <= room:
+                break
+            room = kept
+        v, p, absorbed, hits, held, _, _, kinds, contacts, path, path_impulses = arrays
+        trace = Trace(
+            chain=chain,
+            model=self,
+            velocities=v,
+            impulses=p,
+            absorbed=absorbed,
+            collisions=hits,
+            path=path[: kept + 1],
+            path_impulses=path_impulses[: kept + 1],
+            events=tuple(
+                Event(_KINDS[kind], contact)
+                for kind, contact in zip(
+                    kinds[:kept].tolist(), contacts[:kept].tolist(), strict=True
+                )
+            ),
+            collapsed=bool(collapsed),
+            saturated=tuple(np.flatnonzero(held).tolist()),
+        )
+        if status != kernel.FINISHED:
+            raise ImpactNotFinished(
+                f"the impact was not finished after max_events = {self.max_events} steps, "
+                f"{count} events; closing speeds so far {(v[:-1] - v[1:]).tolist()}",
+                trace,
+            )
+        return trace
+
+
+def _work(kernel: ModuleType, n: int, room: int) -> list[Any]:
+    """Return outputs but the velocities, work area and record, as `kernel.impact` takes them."""
+    integer = np.int64
+    return [
+        np.zeros(n - 1),
+        np.zeros(n - 1),
+        np.zeros(n - 1, dtype=integer),
+        np.zeros(n - 1, dtype=integer),
+        np.zeros((kernel.FLOATS, n)),
+        np.zeros((kernel.INTS, n), dtype=integer),
+        np.zeros(room, dtype=integer),
+        np.zeros(room, dtype=integer),
+        np.zeros((room + 1, n)),
+        np.zeros((room + 1, n - 1)),
+    ]
+
+
+def _call(kernel: ModuleType, function: str, arrays: list[Any]) -> Any:
+    """Call a function of the kernel; it writes into the arrays among its arguments."""
+    if kernel is not plain:
+        return getattr(kernel, function)(*arrays)
+    # Python's own numbers: faster than NumPy's one at a time, and the same digits.
+    lists = [array.tolist() if isinstance(array, np.ndarray) else array for array in arrays]
+    result = getattr(kernel, function)(*lists)
+    for array, values in zip(arrays, lists, strict=True):
+        if isinstance(array, np.ndarray) and array.size:
+            array[...] = values
+    return result
+
+
+def _run(
+    kernel: ModuleType,
+    chain: Chain,
+    ratios: list[Vector],
+    meeting: float,
+    max_events: int,
+    room: int,
+) -> tuple[int, int, int, list[Any]]:
+    """Call the kernel once, with room for a record of that many events."""
+    n = len(chain)
+    # Copies: compiled code is made for arrays that may be written to.
+    inputs = [array.copy() for array in (chain.masses, chain.velocities, chain.restitution)]
+    arrays = [np.zeros(n), *_work(kernel, n, room)]
+    arguments = [n, *inputs, *ratios, meeting, max_events, *arrays]
+    return *_call(kernel, "impact", arguments), arrays
+
+
+def post_impact_velocities(
+    masses: ArrayLike,
+    velocities: ArrayLike,
+    restitution: ArrayLike,
+    forward: ArrayLike,
+    backward: ArrayLike | None = None,
+    *,
+    meeting: float = 0.5,
+    excess: str = "raise",
+    max_events: int = MAX_EVENTS,
+) -> Vector:
+    """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
+
+    The same event loop as `collide` with `ImpulseCorrelation`, without the record.
+
+    Parameters
+    ----------
+    masses, velocities : array_like, shape (..., N)
+        kg and m/s.
+    restitution : array_like, shape (..., N - 1) or ()
+        Energetic coefficients of restitution.
+    forward, backward : array_like, shape (..., N - 2) or ()
+        Ratios; `backward` as `forward` if left out.
+    meeting, excess, max_events
+        As for `ImpulseCorrelation`.
+
+    Returns
+    -------
+    ndarray, shape (..., N)
+        Velocities after the impact, m/s.
+
+    Raises
+    ------
+    ValueError
+        If a value or a shape is wrong; the message names the first value and the rule.
+    ImpactNotFinished
+        If an impact takes more than `max_events`; `trace` is that of the first such chain.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583.
+
+    Examples
+    --------
+    The two ends of Fig. 4 in one call:
+
+    >>> post_impact_velocities([1, 1, 1], [1, 0, 0], 1, [[0.0], [0.5]]).round(3)
+    array([[ 0.   ,  0.   ,  1.   ],
+           [-0.333,  0.667,  0.667]])
+    """
+    return outcomes(
+        masses,
+        velocities,
+        restitution,
+        forward,
+        backward,
+        meeting=meeting,
+        excess=excess,
+        max_events=max_events,
+    ).velocities
+
+
+class Outcomes(NamedTuple):
+    """What a batch of impacts leaves.
+
+    Examples
+    --------
+    >>> outcomes([100, 1, 100], [1, 0, 0], 1, 0.15).collisions.tolist()
+    [10, 10]
+    """
+
+    #: Velocities after the impact, shape (..., N), m/s.
+    velocities: Vector
+    #: How often each contact became active, shape (..., N - 1); before the limit, if collapsed.
+    collisions: NDArray[np.int64]
+    #: Whether an infinite sequence of impacts was taken to its limit, shape (...).
+    collapsed: NDArray[np.bool_]
+
+
+def outcomes(
+    masses: ArrayLike,
+    velocities: ArrayLike,
+    restitution: ArrayLike,
+    forward: ArrayLike,
+    backward: ArrayLike | None = None,
+    *,
+    meeting: float = 0.5,
+    excess: str = "raise",
+    max_events: int = MAX_EVENTS,
+) -> Outcomes:
+    """Solve many chains of N balls at once, and count their collisions too.
+
+    Parameters
+    ----------
+    masses, velocities, restitution, forward, backward, meeting, excess, max_events
+        As for `post_impact_velocities`.
+
+    Returns
+    -------
+    Outcomes
+        Velocities, collisions and collapses.
+
+    Raises
+    ------
+    ValueError, ImpactNotFinished
+        As `post_impact_velocities`.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583; Fig. 6 is a map of such counts.
+
+    Examples
+    --------
+    >>> outcomes([1, 1, 1], [1, 0, 0], [[1, 1], [0, 0]], 0).collapsed.tolist()
+    [False, True]
+    """
+    _check_options(meeting, excess, max_events)
+    m = checked_masses(masses)
+    n = m.shape[-1] if m.ndim else 0
+    if n < 2:
+        raise ValueError(f"masses has shape {m.shape}; must be (..., N) with N >= 2")
+    v = checked("velocities", velocities)
+    if v.shape[-1:] != (n,):
+        raise ValueError(f"velocities has shape {v.shape}; must be (..., {n}), as masses")
+    e = checked("restitution", restitution, "must lie in [0, 1]", 0.0, 1.0)
+    f = _checked_ratios("forward", forward)
+    b = f if backward is None else _checked_ratios("backward", backward)
+    sized = []
+    for name, array, size in (
+        ("restitution", e, n - 1),
+        ("forward", f, n - 2),
+        ("backward", b, n - 2),
+    ):
+        if array.ndim and array.shape[-1] != size:
+            raise ValueError(
+                f"{name} has shape {array.shape}; must be () or (..., {size}) for {n} balls"
+            )
+        sized.append(array if array.ndim else np.broadcast_to(array, (size,)))
+    e, f, b = sized
+    try:
+        lead = np.broadcast_shapes(*(array.shape[:-1] for array in (m, v, e, f, b)))
+    except ValueError:
+        named = {"masses": m, "velocities": v, "restitution": e, "forward": f, "backward": b}
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in named.items())
+        raise ValueError(f"leading axes do not broadcast: {shapes}") from None
+    refuse_overflow(v, m)
+    if excess == "raise":
+        _refuse_excess(m, f, b)
+
+    kernel = runtime.chosen()
+    count = math.prod(lead)
+    out = np.empty((count, n))
+    hits = np.zeros((count, n - 1), dtype=np.int64)
+    status, collapsed = np.zeros((2, count), dtype=np.int64)
+    p, absorbed, _, *work = _work(kernel, n, 0)
+    for begin in range(0, count, _ROWS):
+        rows = slice(begin, min(begin + _ROWS, count))
+        part = [_rows(array, lead, rows) for array in (m, v, e, f, b)]
+        results = [out[rows], hits[rows], status[rows], collapsed[rows]]
+        options = [float(meeting), int(max_events)]
+        _call(kernel, "batch", [len(out[rows]), n, *part, *options, *results, p, absorbed, *work])
+        if status[rows].any():
+            k = int(np.argmax(status[rows] != kernel.FINISHED))
+            m, v, e, f, b = (array[k] for array in part)
+            # Alone, with its record; it stops where it stopped here, and raises.
+            ImpulseCorrelation(
+                f, b, meeting=meeting, excess="saturate", max_events=max_events
+            ).solve(Chain(m, v, e))
+    return Outcomes(
+        out.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.astype(bool).reshape(lead)
+    )
+
+
+def _rows(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
+    """Return some rows of `array` broadcast to the leading shape, without making the others."""
+    full = np.broadcast_to(array, (lead or (1,)) + array.shape[-1:])
+    return full[np.unravel_index(np.arange(rows.start, rows.stop), lead or (1,))]
+
+
+def _checked_ratios(name: str, ratios: ArrayLike | None) -> Vector:
+    return checked(name, ratios, "must lie in [0, 1]", 0.0, 1.0)
+
+
+def _check_options(meeting: float, excess: str, max_events: int) -> None:
+    checked("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
+    if np.ndim(meeting):
+        raise ValueError(f"meeting = {meeting!r}; must be one number")
+    if excess not in ("raise", "saturate"):
+        raise ValueError(f"excess = {excess!r}; must be 'raise' or 'saturate'")
+    if isinstance(max_events, bool) or not isinstance(max_events, (int, np.integer)):
+        raise ValueError(f"max_events = {max_events!r}; must be a whole number")
+    if max_events < 1:
+        raise ValueError(f"max_events = {max_events!r}; must be at least 1")
+
+
+def _refuse_excess(masses: Vector, forward: Vector, backward: Vector) -> None:
+    """Raise if a ratio is above Eq. 53 or its mirror image, by more than a rounding error."""
+    bounds = largest_ratios(masses, forward, backward)
+    for name, ratios, bound in (("forward", forward, bounds[0]), ("backward", backward, bounds[1])):
+        above = ratios > bound * (1.0 + 4.0 * np.finfo(np.float64).eps)
+        if above.any():
+            at = np.unravel_index(int(np.argmax(above)), above.shape)
+            ratio = float(np.broadcast_to(ratios, above.shape)[at])
+            place = ", ".join(str(int(k)) for k in at)
+            mirrored = "" if name == "forward" else ", mirrored"
+            raise ValueError(
+                f"{name}[{place}] = {ratio!r}; at ball {int(at[-1]) + 1}, counted from 0, it must "
+                f"not exceed {float(bound[at]):.6g} (Eq. 53{mirrored}): a larger ratio would make "
+                "a contact pull; excess='saturate' holds the contact closed instead"
+            )

@@ -1,0 +1,243 @@
+"""The paper's measured parameters: ball types, Tables 1 and 2, the ten test sequences.
+
+A ball type is one letter, A to D. Coefficients of restitution belong to pairs of neighbours,
+Impulse Correlation Ratios to triplets. The numbers are read from the CSV files of ``data/``,
+whose README gives their origin, units and doubtful readings.
+"""
+
+import csv
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
+
+from cradle.chain import Chain
+from cradle.models.correlation import ImpulseCorrelation
+
+if TYPE_CHECKING:
+    # At run time pandas is imported by the two functions that return a DataFrame, and only there:
+    # `import cradle` and `paper_chain` stay light.
+    import pandas as pd
+
+__all__ = [
+    "ball_masses",
+    "data_folder",
+    "paper_chain",
+    "paper_sequences",
+    "ratio_table",
+    "restitution_table",
+]
+
+
+def data_folder() -> Traversable:
+    """Return the folder of the data files: inside the installed package, or beside it.
+
+    Returns
+    -------
+    Traversable
+        A path-like object.
+
+    Examples
+    --------
+    >>> (data_folder() / "ratios.csv").is_file()
+    True
+    """
+    installed = files("cradle") / "data"
+    return installed if installed.is_dir() else Path(__file__).parents[1] / "data"
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    with (data_folder() / name).open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+@cache
+def ball_masses() -> Mapping[str, float]:
+    """Return the mass of each ball type.
+
+    Returns
+    -------
+    Mapping of str to float
+        Ball type ("A" to "D") to mass in kg; read-only.
+
+    Examples
+    --------
+    >>> ball_masses()["D"]
+    0.166
+    """
+    return MappingProxyType({row["ball"]: float(row["mass_kg"]) for row in _rows("masses.csv")})
+
+
+@cache
+def paper_sequences() -> Mapping[str, int]:
+    """Return the ten sequences of balls with which the paper tests its parameters.
+
+    Returns
+    -------
+    Mapping of str to int
+        Sequence, first ball first, to the number of the paper's figure that shows it; read-only.
+
+    Examples
+    --------
+    >>> list(paper_sequences())
+    ['BABC', 'BABB', 'BABA', 'BBCB', 'CDAB', 'CDADB', 'ABCCA', 'ABACA', 'ABCCAB', 'BCACBA']
+    """
+    return MappingProxyType({row["sequence"]: int(row["figure"]) for row in _rows("sequences.csv")})
+
+
+@cache
+def _restitution() -> Mapping[str, float]:
+    """Table 1 as a mapping from the pair "XY" to the coefficient of restitution."""
+    return MappingProxyType(
+        {
+            row["ball"] + other: float(row[other])
+            for row in _rows("restitution.csv")
+            for other in ball_masses()
+        }
+    )
+
+
+@cache
+def _ratios() -> Mapping[str, float]:
+    """Table 2 as a mapping from the triplet "XYZ" to the Impulse Correlation Ratio."""
+    return MappingProxyType({row["triplet"]: float(row["ratio"]) for row in _rows("ratios.csv")})
+
+
+def _largest_ratio(triplet: str) -> float:
+    """Eq. 34 for the balls of a triplet: beyond it the second contact of three would pull."""
+    _, middle, right = (ball_masses()[ball] for ball in triplet)
+    return right / (middle + right)
+
+
+def restitution_table() -> "pd.DataFrame":
+    """Return Table 1, the coefficients of restitution of all pairs of ball types.
+
+    Returns
+    -------
+    pandas.DataFrame
+        4 x 4, symmetric, dimensionless; index and columns "A" to "D".
+
+    Examples
+    --------
+    >>> print(restitution_table())
+             A     B     C     D
+    ball
+    A     0.97  0.53  0.31  0.94
+    B     0.53  0.36  0.28  0.38
+    C     0.31  0.28  0.27  0.30
+    D     0.94  0.38  0.30  0.85
+    """
+    import pandas as pd
+
+    balls = list(ball_masses())
+    values = [[_restitution()[ball + other] for other in balls] for ball in balls]
+    return pd.DataFrame(values, index=pd.Index(balls, name="ball"), columns=balls)
+
+
+def ratio_table() -> "pd.DataFrame":
+    """Return Table 2, the Impulse Correlation Ratios of all triplets, with the bound of Eq. 34.
+
+    Returns
+    -------
+    pandas.DataFrame
+        64 rows in alphabetical order; columns ``triplet`` (str), ``ratio`` (float),
+        ``bound`` (float, the largest ratio that Eq. 34 admits, m_right / (m_middle + m_right)) and
+        ``admissible`` (bool, ratio <= bound).
+
+    Notes
+    -----
+    Only for three balls is Eq. 34 the whole bound. In a longer chain the ratio of the next triplet
+    enters (Eq. 53) and raises it.
+
+    Examples
+    --------
+    >>> table = ratio_table()
+    >>> print(table[~table.admissible].round(4).to_string(index=False))
+    triplet  ratio  bound  admissible
+        CCA  0.462 0.4592       False
+        DBB  0.710 0.5000       False
+        DBC  0.755 0.5000       False
+    """
+    import pandas as pd
+
+    table = pd.DataFrame(
+        {
+            "triplet": list(_ratios()),
+            "ratio": list(_ratios().values()),
+            "bound": [_largest_ratio(triplet) for triplet in _ratios()],
+        }
+    )
+    return table.assign(admissible=table.ratio <= table.bound)
+
+
+def paper_chain(
+    sequence: str,
+    speed: float = 1.0,
+    *,
+    excess: Literal["raise", "saturate"] = "raise",
+    meeting: float = 0.5,
+) -> tuple[Chain, ImpulseCorrelation]:
+    """Build a chain of the paper's balls, the first one striking the others at rest.
+
+    Parameters
+    ----------
+    sequence : str
+        Ball types, first ball first: at least two letters out of "A" to "D".
+    speed : float, optional
+        Velocity of the first ball in m/s.
+    excess : {"raise", "saturate"}, optional
+        What to do with a ratio above its largest admissible value, see `ImpulseCorrelation`.
+    meeting : float, optional
+        Where two runs of impact meet, see `ImpulseCorrelation`.
+
+    Returns
+    -------
+    chain : Chain
+        Masses in kg, velocities (speed, 0, ...) in m/s, and Table 1's coefficient of restitution
+        for each pair of neighbours.
+    model : ImpulseCorrelation
+        Table 2's ratios. The forward ratio at ball Y of the neighbours X, Y, Z is the entry XYZ;
+        the backward ratio is the entry of the reversed triplet, ZYX.
+
+    Raises
+    ------
+    ValueError
+        If a letter names no ball type, if the sequence is shorter than two balls, or if `Chain` or
+        `ImpulseCorrelation` refuses another argument.
+
+    Examples
+    --------
+    >>> chain, model = paper_chain("CDAB", speed=0.5)
+    >>> [float(m) for m in chain.masses]
+    [0.053, 0.166, 0.045, 0.053]
+    >>> [float(e) for e in chain.restitution]                 # CD, DA, AB
+    [0.3, 0.94, 0.53]
+    >>> [float(a) for a in model.forward]                     # CDA, DAB
+    [0.196, 0.09]
+    >>> [float(b) for b in model.backward]                    # ADC, BAD
+    [0.001, 0.05]
+    """
+    masses = ball_masses()
+    for position, ball in enumerate(sequence):
+        if ball not in masses:
+            raise ValueError(f"sequence[{position}] = {ball!r}; must be one of {', '.join(masses)}")
+    if len(sequence) < 2:
+        raise ValueError(f"sequence = {sequence!r}; must name at least 2 balls")
+
+    pairs = [sequence[i : i + 2] for i in range(len(sequence) - 1)]
+    triplets = [sequence[i : i + 3] for i in range(len(sequence) - 2)]
+    chain = Chain(
+        masses=[masses[ball] for ball in sequence],
+        velocities=[speed] + [0.0] * (len(sequence) - 1),
+        restitution=[_restitution()[pair] for pair in pairs],
+    )
+    model = ImpulseCorrelation(
+        forward=[_ratios()[triplet] for triplet in triplets],
+        backward=[_ratios()[triplet[::-1]] for triplet in triplets],
+        meeting=meeting,
+        excess=excess,
+    )
+    return chain, model

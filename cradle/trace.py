@@ -1,0 +1,116 @@
+"""What happened: the path of an impact from the first touch to the last separation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cradle.chain import Chain, Vector
+
+
+class Event(NamedTuple):
+    """One event of an impact.
+
+    Examples
+    --------
+    >>> Event("end", 0)
+    Event(kind='end', contact=0)
+    """
+
+    #: "maximum_compression", "end", "close" or "collapse".
+    kind: str
+    #: Index of the contact; contact c joins balls c and c + 1.
+    contact: int
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """The path of an impact and its outcome; N balls, K events.
+
+    Attributes
+    ----------
+    chain : Chain
+        The chain before the impact.
+    model : object
+        The model that was used.
+    velocities : ndarray, shape (N,)
+        Velocities after the impact, m/s.
+    impulses : ndarray, shape (N - 1,)
+        Total impulse of each contact, N s.
+    absorbed : ndarray, shape (N - 1,)
+        Work that each contact absorbed in compression, over all its collisions, J.
+    collisions : ndarray of int, shape (N - 1,)
+        How often each contact became active.
+    path : ndarray, shape (K + 1, N)
+        Velocities before the impact and at every event, m/s.  Between two rows every velocity is
+        linear in every impulse.
+    path_impulses : ndarray, shape (K + 1, N - 1)
+        Impulses so far, at the same instants, N s.
+    events : tuple of Event, length K
+        What happened at each row of the path but the first.
+    collapsed : bool
+        True if an infinite sequence of impacts was taken to its limit.
+    saturated : tuple of int
+        Contacts that were held closed at the largest admissible ratio (Eqs. 34, 53) at some time.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, Figs. 3, 5, 7, 8 show such paths.
+
+    Examples
+    --------
+    >>> from cradle import Chain, ImpulseCorrelation, collide
+    >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.5))
+    >>> trace.velocities.round(3)
+    array([-0.333,  0.667,  0.667])
+    >>> [event.kind for event in trace.events]
+    ['maximum_compression', 'end', 'end']
+    """
+
+    chain: Chain
+    model: Any
+    velocities: Vector
+    impulses: Vector
+    absorbed: Vector
+    collisions: NDArray[np.int64]
+    path: Vector
+    path_impulses: Vector
+    events: tuple[Event, ...]
+    collapsed: bool = False
+    saturated: tuple[int, ...] = ()
+
+    @property
+    def energy_loss(self) -> float:
+        """Kinetic energy lost, in joules; each contact keeps back (1 - e^2) of what it absorbed."""
+        return float(np.sum((1.0 - self.chain.restitution**2) * self.absorbed))
+
+    def __repr__(self) -> str:
+        """Return a short account."""
+        return (
+            f"Trace(velocities={self.velocities.tolist()}, "
+            f"collisions={self.collisions.tolist()}, collapsed={self.collapsed})"
+        )
+
+
+class ImpactNotFinished(RuntimeError):
+    """An impact was still going on at `max_events`; `trace` holds what was reached.
+
+    The path of that trace covers at most the first 100 000 events; its velocities, impulses and
+    works are those reached.
+
+    Examples
+    --------
+    >>> from cradle import Chain, ImpulseCorrelation, collide
+    >>> try:
+    ...     collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.1, max_events=1))
+    ... except ImpactNotFinished as stopped:
+    ...     print(stopped.trace.velocities.round(3).tolist())
+    [-0.053, 0.947, 0.105]
+    """
+
+    def __init__(self, message: str, trace: Trace) -> None:
+        super().__init__(message)
+        self.trace = trace
