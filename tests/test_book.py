@@ -1,0 +1,234 @@
+"""The built book: no warning, no request to another server, no missing file."""
+
+import csv
+import re
+import subprocess
+import sys
+import tomllib
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+# Attributes whose address a browser loads by itself. <a href> and <form action> wait for a click.
+LOADS = {
+    "audio": ("src",),
+    "embed": ("src",),
+    "iframe": ("src",),
+    "image": ("href", "xlink:href"),
+    "img": ("src", "srcset"),
+    "input": ("src",),
+    "object": ("data",),
+    "script": ("src",),
+    "source": ("src", "srcset"),
+    "track": ("src",),
+    "use": ("href", "xlink:href"),
+    "video": ("src", "poster"),
+}
+# <link> loads a file for these relations only ("next", "search", "canonical" are plain pointers).
+LOADING_LINKS = {
+    "apple-touch-icon", "dns-prefetch", "icon", "manifest", "modulepreload", "preconnect",
+    "prefetch", "preload", "shortcut", "stylesheet",
+}  # fmt: skip
+ELSEWHERE = re.compile(r"^\s*(?:https?:|wss?:)?//", re.IGNORECASE)
+# In scripts: an address from which something is loaded, as opposed to one that is only mentioned.
+SCRIPT_LOADS = re.compile(
+    r"""(?:\bfetch|\bimport|importScripts|new\s+(?:Worker|WebSocket|EventSource)|sendBeacon)
+        \s*\(?\s*["'`](?:https?:|wss?:)?//
+      | \bfrom\s*["'`]https?://
+      | \.(?:src|href)\s*=\s*["'`](?:https?:)?//
+      | \.open\(\s*["'`][A-Z]+["'`]\s*,\s*["'`]https?://""",
+    re.VERBOSE,
+)
+STYLE_LOADS = re.compile(r"(?:@import\s*(?:url\()?|url\()\s*[\"']?\s*(?:https?:)?//", re.IGNORECASE)
+
+
+class Page(HTMLParser):
+    """Collect what a page loads, and its inline scripts and styles."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.loads: list[str] = []
+        self.scripts: list[str] = []
+        self.styles: list[str] = []
+        self._inside: str | None = None
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        attributes = {name: value or "" for name, value in attrs}
+        self._inside = tag
+        names = LOADS.get(tag, ())
+        if tag == "link" and LOADING_LINKS & set(attributes.get("rel", "").lower().split()):
+            names = ("href",)
+        for name in names:
+            address = attributes.get(name, "")
+            if name == "srcset":
+                self.loads += [part.split()[0] for part in address.split(",") if part.strip()]
+            elif address:
+                self.loads.append(address)
+        if tag == "meta" and attributes.get("http-equiv", "").lower() == "refresh":
+            self.loads.append(attributes.get("content", "").partition("url=")[2].strip("'\" "))
+        self.styles.append(attributes.get("style", ""))
+        self.scripts += [value for name, value in attributes.items() if name.startswith("on")]
+
+    def handle_endtag(self, tag):
+        self._inside = None
+
+    def handle_data(self, data):
+        if self._inside == "script":
+            self.scripts.append(data)
+        elif self._inside == "style":
+            self.styles.append(data)
+
+
+def requests(text: str) -> list[str]:
+    """List the requests to other servers that a page would make when opened."""
+    page = Page(text)
+    found = [address for address in page.loads if ELSEWHERE.match(address)]
+    # An inline script of ours or of the theme has no business with any address.
+    found += re.findall(r"https?://[^\s\"'`]+", "\n".join(page.scripts))
+    found += STYLE_LOADS.findall("\n".join(page.styles))
+    return found
+
+
+def pages(html: Path) -> list[Path]:
+    """List the pages; _static/ holds fragments of the theme that are not."""
+    return [path for path in html.glob("**/*.html") if "_static" not in path.parts]
+
+
+@pytest.fixture(scope="module")
+def html(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+    """Build the book, warnings as errors."""
+    folder = tmp_path_factory.mktemp("book")
+    command = "from jupyter_book.cli.main import main; main()"
+    build = subprocess.run(
+        [sys.executable, "-c", command, "build", root, "--path-output", folder, "-W", "-n",
+         "--keep-going"],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )  # fmt: skip
+    assert build.returncode == 0, build.stdout + build.stderr
+    return folder / "_build" / "html"
+
+
+def test_every_chapter_is_built(html: Path, root: Path):
+    toc = (root / "_toc.yml").read_text(encoding="utf-8")
+    chapters = re.findall(r"(?:root|file):\s*(\S+)", toc)
+    assert chapters
+    for chapter in chapters:
+        assert (html / f"{chapter}.html").is_file(), chapter
+
+
+def test_pages_ask_nothing_of_the_network(html: Path):
+    assert html / "index.html" in pages(html)
+    for path in pages(html):
+        assert requests(path.read_text(encoding="utf-8")) == [], path
+
+
+def test_style_sheets_and_scripts_ask_nothing_of_the_network(html: Path):
+    checked = 0
+    for pattern, kind in [("**/*.css", STYLE_LOADS), ("**/*.js", SCRIPT_LOADS)]:
+        for path in html.glob(pattern):
+            # No page loads it (next test); Sphinx copies the file all the same.
+            if path.name != "sphinx-thebe.js":
+                assert kind.findall(path.read_text(encoding="utf-8")) == [], path
+                checked += 1
+    assert checked > 10
+
+
+def test_live_code_is_dropped(html: Path):
+    for path in pages(html):
+        page = Page(path.read_text(encoding="utf-8"))
+        assert "thebe" not in " ".join(page.loads + page.scripts).lower(), path
+
+
+def test_whatever_a_page_loads_is_there(html: Path):
+    for path in pages(html):
+        for address in Page(path.read_text(encoding="utf-8")).loads:
+            parts = urlsplit(address)
+            if parts.scheme != "data" and parts.path:
+                assert (path.parent / unquote(parts.path)).is_file(), f"{path.name}: {address}"
+
+
+def test_mathjax_is_served_with_the_book(html: Path):
+    texts = [path.read_text(encoding="utf-8") for path in pages(html)]
+    with_equations = [text for text in texts if "math notranslate" in text]
+    assert with_equations
+    for text in with_equations:
+        assert any(address.endswith("/mathjax/tex-svg-full.js") for address in Page(text).loads)
+    assert (html / "_static" / "mathjax" / "tex-svg-full.js").stat().st_size > 1_000_000
+
+
+def test_equations_keep_their_tags(html: Path):
+    """MathJax refuses a tag inside `split`, in which Sphinx wraps equations of several lines."""
+    for path in pages(html):
+        for equation in re.findall(
+            r"\\begin\{split\}.*?\\end\{split\}", path.read_text(encoding="utf-8"), re.DOTALL
+        ):
+            assert r"\tag" not in equation, f"{path.name}: {equation}"
+
+
+def test_every_link_of_the_ledger_leads_somewhere(html: Path, root: Path):
+    with (root / "data" / "ledger.csv").open(encoding="utf-8", newline="") as file:
+        links = [row["cell"] for row in csv.DictReader(file)]
+    table = (html / "book" / "ledger.html").read_text(encoding="utf-8")
+    for link in links:
+        page, _, label = link.partition("#")
+        assert f'href="{link}"' in table, link
+        assert f'id="{label}"' in (html / "book" / page).read_text(encoding="utf-8"), link
+
+
+def test_pages_say_what_a_link_to_them_may_show(html: Path):
+    for path in (html / "book").glob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        assert re.search(r'property="og:title" content="[^<"]+"', text), path
+        picture = re.search(r'property="og:image" content="[^"]*/(_static/[^"]+)"', text)
+        assert (html / picture[1]).is_file()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<script src="https://example.org/a.js"></script>',
+        '<script src="//example.org/a.js"></script>',
+        '<link rel="stylesheet" href="https://example.org/a.css">',
+        '<link rel="preconnect" href="https://example.org">',
+        '<img alt="a" src="http://example.org/a.png">',
+        '<img alt="a" src="a.png" srcset="https://example.org/a.png 2x">',
+        '<iframe src="https://example.org"></iframe>',
+        '<meta http-equiv="refresh" content="0; url=https://example.org">',
+        "<style>@import url(https://example.org/a.css);</style>",
+        "<p style=\"background: url('https://example.org/a.png')\">a</p>",
+        '<script>const address = "https://example.org/a.js";</script>',
+    ],
+)
+def test_a_request_is_seen(text: str):
+    assert requests(text)
+    assert not requests('<a href="https://example.org">a link waits for a click</a>')
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'fetch("https://example.org")',
+        "import('https://example.org/a.js')",
+        'import "https://example.org/a.js"',
+        'tag.src = "https://example.org/a.js"',
+        'request.open("GET", "https://example.org")',
+    ],
+)
+def test_a_request_of_a_script_is_seen(text: str):
+    assert SCRIPT_LOADS.search(text)
+    assert not SCRIPT_LOADS.search("// see https://example.org, fetch(address)")
+
+
+def test_one_address_of_the_project(root: Path):
+    with (root / "pyproject.toml").open("rb") as file:
+        address = tomllib.load(file)["project"]["urls"]["Repository"]
+    host = "/".join(address.split("/")[:3])
+    for name in ("_config.yml", "CITATION.cff", "README.md"):
+        text = (root / name).read_text(encoding="utf-8")
+        assert set(re.findall(rf"{re.escape(host)}/[\w.-]+/[\w.-]+", text)) == {address}, name

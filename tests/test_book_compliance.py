@@ -1,0 +1,330 @@
+"""Chapter 2 of the book: three balls and two springs, and the ratio (Eqs. 7-16, Fig. 2).
+
+The second route is the equations of motion with contacts that cannot pull, integrated by SciPy.
+"""
+
+import math
+from pathlib import Path
+
+import nbformat
+import numpy as np
+import pytest
+from reference import solve
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from cradle import Chain, ImpulseCorrelation, collide, ratio_table
+
+GAMMAS = (0.05, 0.5, 1.0, 2.0, 7.0, 60.0)
+THREE = Chain([1, 1, 1], [1, 0, 0], 1)
+
+
+@pytest.fixture(scope="module")
+def cells(root: Path) -> dict:
+    """The cells of the chapter by id, as stored."""
+    notebook = nbformat.read(root / "book" / "compliance.ipynb", as_version=4)
+    return {cell.id: cell for cell in notebook.cells}
+
+
+def printed(cell) -> str:
+    return "".join(output.get("text", "") for output in cell.outputs)
+
+
+def glued(cells: dict, name: str) -> str:
+    """The value that the text of the chapter shows under this name."""
+    (value,) = [
+        output.data["application/papermill.record/text/plain"]
+        for cell in cells.values()
+        for output in cell.get("outputs", [])
+        if output.get("metadata", {}).get("scrapbook", {}).get("name") == name
+    ]
+    return value.strip("'")
+
+
+def springs(*stiffness, pull=False, until=None):
+    """Integrate equal balls on springs, k = 1; with `pull`, the springs never let go.
+
+    State: positions, velocities, impulses. Ends at time `until`, or else 1 after the last contact.
+    """
+    stiffness = np.array(stiffness, dtype=float)
+    n = len(stiffness) + 1
+
+    def rates(_, y):
+        force = -stiffness * np.diff(y[:n])
+        if not pull:
+            force = force.clip(min=0)
+        return np.concatenate([y[n : 2 * n], -np.diff(force, prepend=0, append=0), force])
+
+    # All contacts are over within half a period of the softest spring and of the stiffest.
+    end = until or 3 * math.pi * sum(1 / np.sqrt(stiffness))
+    # A short step, or the integrator overlooks the kink where a contact opens.
+    start = np.concatenate([np.zeros(n), np.eye(n)[0], np.zeros(n - 1)])
+    return solve_ivp(
+        rates, (0, end), start, method="DOP853", rtol=1e-12, atol=1e-13, dense_output=True,
+        max_step=0.2 / math.sqrt(max(stiffness)),
+    )  # fmt: skip
+
+
+def outcome(*stiffness):
+    y = springs(*stiffness).y[:, -1]
+    n = len(stiffness) + 1
+    assert (np.diff(y[:n]) > 0).all()  # everything has come apart
+    return y[n : 2 * n]
+
+
+def eigenvalues(gamma):
+    """gamma_1 and gamma_2."""
+    root = math.sqrt(1 - gamma + gamma**2)
+    return 1 + gamma + root, 1 + gamma - root
+
+
+def printed_7_to_9(gamma, k, t):
+    """Eqs. 7, 8, 9, as the paper prints them."""
+    g1, g2 = eigenvalues(gamma)
+
+    def swing(lam):
+        return k * math.sin(math.sqrt(k * lam) * t) / ((k * lam) ** 1.5 * (g1 - g2))
+
+    return np.array(
+        [
+            t / 3 - (2 * gamma - g1) * swing(g1) + (2 * gamma - g2) * swing(g2),
+            t / 3 + (gamma - g1) * swing(g1) - (gamma - g2) * swing(g2),
+            t / 3 + gamma * swing(g1) - gamma * swing(g2),
+        ]
+    )
+
+
+def printed_10_and_11(gamma, k, t):
+    """The right-hand sides of Eqs. 10 and 11, as the paper prints them."""
+    g1, g2 = eigenvalues(gamma)
+    w1, w2 = math.sqrt(k * g1), math.sqrt(k * g2)
+    eq_10 = (3 * gamma - 2 * g1) * g2**2 * math.sin(w1 * t / 2) ** 2
+    eq_10 -= (3 * gamma - 2 * g2) * g1**2 * math.sin(w2 * t / 2) ** 2
+    eq_11 = (1 - math.cos(w1 * t)) * gamma * g2 - (1 - math.cos(w2 * t)) * gamma * g1
+    return np.array([eq_10 / (0.5 * g1**2 * g2**2 * (g1 - g2)), eq_11 / (g1 * g2 * (g1 - g2))])
+
+
+def printed_13(gamma, k, t, alpha_2):
+    """The right-hand side of Eq. 13, as the paper prints it."""
+    first, second = (
+        2 * (3 * alpha_2 * gamma + (gamma - 2 * alpha_2) * lam) / lam**2
+        * math.sin(math.sqrt(k * lam) * t / 2) ** 2
+        for lam in eigenvalues(gamma)
+    )  # fmt: skip
+    return (first - second) / (eigenvalues(gamma)[0] - eigenvalues(gamma)[1])
+
+
+def first_loss(gamma):
+    """Time of the first loss of contact, from Eqs. 7-9, and the contact that opens."""
+
+    def shortened(t):
+        return -np.diff(printed_7_to_9(gamma, 1, t))
+
+    step = 0.01 / math.sqrt(max(1, gamma))
+    t = step
+    while (shortened(t) > 0).all():
+        t += step
+    contact = int(np.argmin(shortened(t)))
+    return brentq(lambda x: shortened(x)[contact], t - step, t, xtol=1e-14), contact
+
+
+def constant_ratio(velocities):
+    """The ratio with this outcome, three equal elastic balls: v1 = -ratio/(2 - ratio)."""
+    return -2 * velocities[0] / (1 - velocities[0])
+
+
+@pytest.mark.parametrize("gamma", GAMMAS)
+def test_eqs_7_to_9_solve_the_motion(gamma: float):
+    path = springs(1, gamma, pull=True, until=3)
+    for t in (0.1, 0.7, 1.9, 3.0):
+        np.testing.assert_allclose(path.sol(t)[:3], printed_7_to_9(gamma, 1, t), rtol=0, atol=1e-9)
+    # k sets the unit of time.
+    np.testing.assert_allclose(
+        printed_7_to_9(gamma, 4, 0.9) * 2, printed_7_to_9(gamma, 1, 1.8), rtol=1e-13
+    )
+
+
+@pytest.mark.parametrize("gamma", GAMMAS)
+def test_eqs_10_and_11_are_minus_the_impulses(gamma: float):
+    loss, _ = first_loss(gamma)
+    path = springs(1, gamma, until=loss)
+    for t in np.linspace(0.05, 1, 8) * loss:
+        v, impulses = path.sol(t)[3:6], path.sol(t)[6:]
+        printed_ones = printed_10_and_11(gamma, 1, t)
+        np.testing.assert_allclose(printed_ones, -impulses, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(impulses, [1 - v[0], v[2]], rtol=0, atol=1e-9)  # Eqs. 1, 3
+        assert (printed_ones < 0).all()
+
+
+@pytest.mark.parametrize("gamma", GAMMAS)
+def test_eqs_12_and_13(gamma: float):
+    for t in (0.2, 1.1, 2.3):
+        for alpha_2 in (-1.0, -0.5, -gamma, 0.3):
+            minus_2, minus_3 = printed_10_and_11(gamma, 1, t)
+            delta = alpha_2 * minus_2 + minus_3  # Eq. 12
+            assert delta == pytest.approx(printed_13(gamma, 1, t, alpha_2), rel=0, abs=1e-12)
+
+
+def test_eq_13_has_no_constant_ratio(cells: dict):
+    """The alpha_2 that stops one mode lets the other go on."""
+    for gamma in GAMMAS:
+        first, second = (gamma * lam / (2 * lam - 3 * gamma) for lam in eigenvalues(gamma))
+        assert first - second == pytest.approx(2 * math.sqrt(1 - gamma + gamma**2), rel=1e-12)
+    assert "2*sqrt(gamma**2 - gamma + 1)" in printed(cells["sympy-delta"])
+
+
+def test_eq_14_is_not_the_limit(cells: dict):
+    """Printed form: gamma_2 = gamma instead of 3 gamma / 2; the ratio is never gamma."""
+    gamma, alpha_2 = 1e-6, -0.3
+    _, g2 = eigenvalues(gamma)
+    assert g2 / gamma == pytest.approx(1.5, rel=1e-5)
+
+    def slow_amplitude(lam):
+        return 2 * (3 * alpha_2 * gamma + (gamma - 2 * alpha_2) * lam) / (lam**2 * 2)
+
+    # With lam = gamma: Eq. 14, whose amplitude (with sin^2 = (1 - cos)/2) is (alpha_2+gamma)/gamma.
+    assert slow_amplitude(gamma) == pytest.approx((alpha_2 + gamma) / gamma, rel=1e-9)
+    assert slow_amplitude(g2) == pytest.approx((2 + alpha_2) / 3, rel=1e-4)
+    # At the loss of contact the ratio of the impulses is (pi^2/8 - 1/2) gamma, at the end 1.
+    factor = math.pi**2 / 8 - 0.5
+    for gamma in (1e-2, 3e-3):
+        path = springs(1, gamma)
+        tau_2, tau_3 = path.sol(first_loss(gamma)[0])[6:]
+        assert tau_3 / tau_2 / gamma == pytest.approx(factor, rel=gamma)
+        assert path.y[7, -1] / path.y[6, -1] == pytest.approx(1, abs=gamma)
+    assert glued(cells, "compliance-loss-factor") == f"{factor:.3f}"
+
+
+def test_eq_15_is_a_clean_limit():
+    """tau_3 - tau_2/2 vanishes like 1/gamma over the whole contact."""
+    errors = []
+    for gamma in (1e2, 1e3, 1e4):
+        times = np.linspace(0, first_loss(gamma)[0], 400)
+        tau = -np.array([printed_10_and_11(gamma, 1, t) for t in times])
+        errors.append(gamma * abs(tau[:, 1] - tau[:, 0] / 2).max())
+        g1, g2 = eigenvalues(gamma)
+        assert g2 == pytest.approx(1.5, rel=1 / gamma)
+        assert g1 / gamma == pytest.approx(2, rel=1 / gamma)
+        # Eq. 15 against Eq. 13, for an alpha_2 at which it does not vanish.
+        for t in (0.5, 1.5):
+            eq_15 = -2 / 3 * (1 + 2 * 0.7) * math.sin(math.sqrt(3 / 8) * t) ** 2
+            assert printed_13(gamma, 1, t, 0.7) == pytest.approx(eq_15, abs=3 / gamma)
+    assert max(errors) < 0.6
+    assert np.ptp(errors) < 0.01
+
+
+def test_eq_16_is_what_the_model_does():
+    """While the first contact lasts, the increments of the impulses keep the ratio."""
+    for ratio in (0.1, 0.3, 0.45):
+        trace = collide(THREE, ImpulseCorrelation(ratio))
+        steps = np.diff(trace.path_impulses, axis=0)
+        first = steps[:, 0] > 0
+        assert first.sum() == 2  # compression and restitution
+        np.testing.assert_allclose(steps[first, 1], ratio * steps[first, 0], rtol=1e-13)
+
+
+def test_fig_2_is_drawn_and_described(cells: dict):
+    cell = cells["draw-springs"]
+    assert any("image/svg+xml" in output.get("data", {}) for output in cell.outputs)
+    assert cell.metadata["mystnb"]["figure"]["name"] == "fig-p2"
+    alt = cell.metadata["mystnb"]["image"]["alt"]
+    assert all(word in alt for word in ("Three balls", "spring named k", "gamma k", "q1, q2, q3"))
+
+
+def test_fig_own_compliance_ratio():
+    """The plotted curves against the integrated motion, and the limit curve for a soft spring."""
+    for gamma in (0.01, 0.1, 0.5, 1, 2, 10, 100):
+        loss, _ = first_loss(gamma)
+        path = springs(1, gamma, until=loss)
+        for part in (0.25, 0.6, 1.0):
+            tau_2, tau_3 = path.sol(part * loss)[6:]
+            minus_2, minus_3 = printed_10_and_11(gamma, 1, part * loss)
+            assert minus_3 / minus_2 == pytest.approx(tau_3 / tau_2, rel=1e-8)
+            if gamma == 0.01:
+                theta = math.pi * part
+                limit = theta**2 / (4 * (1 - math.cos(theta))) - 0.5
+                assert tau_3 / tau_2 / gamma == pytest.approx(limit, rel=0.01)
+
+
+def test_table_of_limits(cells: dict):
+    lines = printed(cells["table-limits"]).splitlines()
+    assert lines[0].split() == ["gamma", "opens_first", "ratio_there", "error_Eq_14", "error_Eq_15"]
+    assert len(lines) == 8
+    for line in lines[1:]:
+        gamma, opens, ratio, error_14, error_15 = map(float, line.split())
+        loss, contact = first_loss(gamma)
+        tau = -np.array([printed_10_and_11(gamma, 1, t) for t in np.linspace(0, loss, 1500)])
+        worst = [abs(tau[:, 1] - a * tau[:, 0]).max() / tau[-1, 1] for a in (gamma, 0.5)]
+        assert opens == contact
+        # Five digits are printed; the largest value over a grid depends on the grid.
+        assert ratio == pytest.approx(tau[-1, 1] / tau[-1, 0], rel=1e-4)
+        assert [error_14, error_15] == pytest.approx(worst, rel=1e-3)
+
+
+def test_converged_outcome_of_equal_springs(cells: dict):
+    expected = (-0.130261695, 0.150229569, 0.980032126)
+    velocities = outcome(1, 1)
+    np.testing.assert_allclose(velocities, expected, rtol=0, atol=1e-8)
+    for name, v in zip(("v1", "v2", "v3"), velocities):
+        assert float(glued(cells, f"compliance-{name}")) == pytest.approx(v, rel=0, abs=5.1e-7)
+    first, last = printed(cells["equal-springs"]).splitlines()
+    stored = [float(x) for x in last.split("[")[1].rstrip("]").split()]
+    np.testing.assert_allclose(stored, expected, rtol=0, atol=1e-8)
+    loss, contact = first_loss(1)
+    assert first.startswith(f"t = {loss:.6f}: contact {contact} opens")
+
+
+def test_ratios_of_equal_springs(cells: dict):
+    loss, _ = first_loss(1)
+    minus_2, minus_3 = printed_10_and_11(1, 1, loss)
+    tau_2, tau_3 = springs(1, 1).y[6:, -1]
+    assert glued(cells, "compliance-loss") == f"{loss:.4f}"
+    assert glued(cells, "compliance-ratio-loss") == f"{minus_3 / minus_2:.4f}"
+    assert glued(cells, "compliance-ratio-end") == f"{tau_3 / tau_2:.4f}"
+    table = ratio_table()
+    (measured,) = table.loc[table["triplet"] == "AAA", "ratio"]
+    assert glued(cells, "compliance-AAA") == f"{measured:.3f}"
+
+
+def test_effective_ratio_of_equal_springs(cells: dict):
+    velocities = outcome(1, 1)
+    ratio = constant_ratio(velocities)
+    assert ratio == pytest.approx(0.230498292, rel=0, abs=1e-8)
+    assert float(glued(cells, "compliance-effective")) == pytest.approx(ratio, rel=0, abs=5.1e-7)
+    # The model with that ratio: an independent solver gives the springs' outcome.
+    again = [float(v) for v in solve([1, 1, 1], [1, 0, 0], 1, ratio).velocities]
+    np.testing.assert_allclose(again, velocities, rtol=0, atol=1e-9)
+
+
+def test_fig_own_compliance_effective(cells: dict):
+    """The three ratios of the figure at some stiffnesses, and the law for a soft second spring."""
+    for gamma in (0.1, 0.01):
+        ratio = constant_ratio(outcome(1, gamma))
+        assert ratio / gamma == pytest.approx(math.pi**2 / 8 - 1, rel=0.03 * gamma + 1e-7)
+        assert f"gamma = {gamma}: effective ratio / gamma = {ratio / gamma:.6f}" in printed(
+            cells["sympy-effective"]
+        )
+    # Towards 1/2 for a stiff second spring; all outcomes stay on the arc of chapter 1.
+    for gamma, low in ((2, 0.394), (10, 0.497), (100, 0.4999)):
+        velocities = outcome(1, gamma)
+        assert low < constant_ratio(velocities) <= 0.5
+        assert [velocities.sum(), (velocities**2).sum()] == pytest.approx([1, 1], abs=1e-9)
+
+
+def test_exercises(cells: dict):
+    gamma = float(printed(cells["solution-1"]).split("=")[1])
+    assert constant_ratio(outcome(1, gamma)) == pytest.approx(0.167, abs=2e-5)
+
+    loss, _ = first_loss(1)
+    q = printed_7_to_9(1, 1, loss)
+    assert printed(cells["solution-2"]).startswith(f"{(q[1] - q[2]) ** 2:.1%} ")
+
+    rows = [
+        [float(x) for x in line.split("[")[1].split("]")[0].split()]
+        for line in printed(cells["solution-3"]).splitlines()
+    ]
+    ratio = constant_ratio(outcome(1, 1))
+    np.testing.assert_allclose(rows[0], outcome(1, 1, 1), rtol=0, atol=6e-5)
+    for row, a in ((rows[1], ratio), (rows[2], 0)):
+        v = [float(x) for x in solve([1] * 4, [1, 0, 0, 0], 1, a).velocities]
+        np.testing.assert_allclose(row, v, rtol=0, atol=6e-5)

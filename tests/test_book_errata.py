@@ -1,0 +1,159 @@
+"""Appendix C: its numbers by a second route, and the tests that it names."""
+
+import ast
+import math
+import re
+from pathlib import Path
+
+import mpmath
+import nbformat
+import numpy as np
+import pytest
+import reference
+
+from cradle import Chain, ImpulseCorrelation, collide
+
+TESTS = Path(__file__).parent
+CELLS = nbformat.read(TESTS.parent / "book" / "errata.ipynb", as_version=4).cells
+TEXT = "\n".join(cell.source for cell in CELLS if cell.cell_type == "markdown")
+GLUED = {
+    output.metadata["scrapbook"]["name"].removeprefix("errata-"): output.data[
+        "application/papermill.record/text/plain"
+    ].strip("'")
+    for cell in CELLS
+    for output in cell.get("outputs", [])
+    if "scrapbook" in output.get("metadata", {})
+}
+
+
+def exact(*chain, **options):
+    """Outcome of the reference solver in fifty digits; strings are read as decimals."""
+    with mpmath.workdps(50):
+        outcome = reference.solve(*chain, excess="saturate", **options)
+        return np.array([float(v) for v in outcome.velocities])
+
+
+def test_every_number_is_shown_and_every_test_exists():
+    shown = re.findall(r"\{glue:text\}`errata-([\w-]+)`", TEXT)
+    assert set(shown) == set(GLUED)
+    defined = {
+        node.name
+        for path in TESTS.glob("test_*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef)
+    }
+    named = set(re.findall(r"`(test_\w+)`", TEXT))
+    assert len(named) > 10
+    assert named <= defined
+
+
+def test_entries_are_numbered_and_complete():
+    entries = re.findall(r"^\*\*(\d+)\. .*?\*\* · \*(\w+)\*$", TEXT, flags=re.MULTILINE)
+    assert [int(number) for number, _ in entries] == list(range(1, len(entries) + 1))
+    assert {kind for _, kind in entries} == {"slip", "error", "gap", "open"}
+    for part in ("Where", "In the paper", "Evidence", "Effect", "Our choice"):
+        assert TEXT.count(f"\n- *{part}:* ") == len(entries)
+
+
+def test_eq_14_factors():
+    """Soft second spring: ratio where the first contact opens, and that with the same outcome."""
+    assert float(GLUED["loss-factor"]) == pytest.approx(math.pi**2 / 8 - 0.5, abs=5e-4)
+    assert float(GLUED["effective-factor"]) == pytest.approx(math.pi**2 / 8 - 1, abs=5e-4)
+
+
+def test_eq_34_error_beyond_its_range():
+    """Eq. 30 against the reference solver at two ratios for which its radical is real."""
+    m1, m2, m3, v1, v2, e2, e3 = 1, 2, 1, 1, 0.5, 1, 0.5
+    for a in ("0.8", "0.95"):
+        ratio = float(a)
+        d = (1 - ratio) * m1 + m2
+        lead = (v1 - v2) * (1 + e2) * m1 + v2 * d
+        root = math.sqrt(
+            1 - ratio * (m2 / m3 + 1) * (1 + v2 * d / ((1 + e2) * m1 * (v1 - v2))) ** -2
+        )
+        eq_33 = lead * m2 / (d * (m2 + m3)) * (1 + e3 * root)
+        missed = abs(eq_33 - exact([1, 2, 1], [1, "0.5", 0], [1, "0.5"], a)[2])
+        assert float(GLUED[f"eq-30-at-{round(100 * ratio)}"]) == pytest.approx(missed, abs=5.1e-5)
+
+
+def test_r2_source_on_the_other_side():
+    for name, v, e, a in (
+        ("fig-5", [1, "0.8", 0], "0.3", "0.05"),
+        ("fig-8", [1, "0.5", 0, 0], 1, "0.1"),
+    ):
+        image = ["-" + x if isinstance(x, str) else -x for x in v[::-1]]
+        size = abs(exact([1] * len(v), v, e, a) + exact([1] * len(v), image, e, a)[::-1]).max()
+        assert float(GLUED[f"source-{name}"]) == pytest.approx(size, abs=5.1e-4)
+
+
+def test_r7_hold_that_drives_on():
+    held = exact([1] * 4, [1, 0, 0, 0], 1, ["0.8", "0.3"])
+    assert GLUED["hold"] == "(" + ", ".join(f"{v:.4f}" for v in held) + ")"
+    # What small steps tend to without the rule (tests/test_march.py): balls 2 to 4 as one body.
+    assert GLUED["chatter"] == f"({(1 - 3) / 4}, {2 / 4}, {2 / 4}, {2 / 4})"
+
+
+def test_r7_square_root_at_the_bound():
+    """Equal elastic balls at ratio a: v3 = 2 (1 + s) / (3 + s^2), s^2 = 1 - 2 a, and so on."""
+    for digits in (6, 8, 12):
+        s = math.sqrt(2 * 10.0**-digits)
+        after = np.array([s**2 - 1, 2 * (1 - s), 2 * (1 + s)]) / (3 + s**2)
+        moved = abs(after - np.array([-1, 2, 2]) / 3).max()
+        assert float(GLUED[f"root-{digits}"]) == pytest.approx(moved, rel=0.01)
+
+
+def test_r8_ties_go_to_the_left():
+    v = [1, "-0.1", 0, "0.1", -1]
+    assert float(GLUED["tie"]) == pytest.approx(
+        abs(exact([1] * 5, v, 1, "0.1") + exact([1] * 5, v, 1, "0.1")[::-1]).max(), abs=5.1e-4
+    )
+    masses = ["1.185", "0.439", "1.470", "1.043", "1.045"]
+    here = exact(masses, [1, "-0.1", 0, "0.1", "-0.7"], "0.7", "0.1")
+    there = -exact(masses[::-1], ["0.7", "-0.1", 0, "0.1", -1], "0.7", "0.1")[::-1]
+    assert float(GLUED["tie-generic"]) == pytest.approx(abs(here - there).max(), abs=5.1e-4)
+
+
+class OneByOne(reference.Impact):
+    """The reference rules, but of several closings due without progress the left one alone."""
+
+    closed = 0
+
+    def round(self):
+        self.closed = 0
+        return super().round()
+
+    def close(self, c):
+        if not self.closed:
+            super().close(c)
+        self.closed += 1
+
+
+def test_closings_that_are_due_together():
+    velocities = [1, -0.1, 0, 0, 0.1, -1]
+    together = collide(Chain([1] * 6, velocities, 1), ImpulseCorrelation(0.1))
+    np.testing.assert_allclose(together.velocities, -together.velocities[::-1], atol=1e-14)
+    ratio = {way: [None, *[0.1] * 4, None] for way in ("forward", "backward")}
+    impacts = [
+        kind([1.0] * 6, [float(v) for v in velocities], [1.0] * 5, ratio, 0.5, float, 1e-13)
+        for kind in (reference.Impact, OneByOne)
+    ]
+    outcomes = []
+    for impact in impacts:
+        impact.start()
+        while impact.round():
+            pass
+        outcomes.append(np.array(impact.outcome().velocities))
+    np.testing.assert_allclose(outcomes[0], together.velocities, atol=1e-14)
+    assert 0.01 < abs(outcomes[1] - outcomes[0]).max() < 0.02
+    assert abs(outcomes[1] + outcomes[1][::-1]).max() > 0.01
+
+
+def test_simultaneous_within_64_roundings():
+    """The chain of the entry: its tie, undone in one direction and in the other."""
+    rest = [1, 0, 0, 0, 0, 0], [1, "0.5", "0.25", 1, "0.75"], ["0.1", 0, 0, "0.1"]
+    rest = *rest, ["0.1", "0.25", "0.25", 0]
+    tied = exact([1] * 6, *rest)
+    lighter = exact([1, 1, 1, "0.99999999999", 1, 1], *rest)
+    heavier = exact([1, 1, 1, "1.00000000001", 1, 1], *rest)
+    assert float(GLUED["tie-broken"]) == pytest.approx(abs(tied - lighter).max(), rel=0.01)
+    assert abs(tied - heavier).max() < 1e-9

@@ -1,0 +1,186 @@
+"""The chapter on multiple impacts: Eqs. 35-42 and Fig. 5, each by a second route."""
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import mpmath
+import nbformat
+import numpy as np
+import pytest
+import reference
+
+from cradle import Chain, ImpulseCorrelation, collide
+
+SEQUENCE = [("end", 0), ("close", 0), ("end", 1), ("close", 1), ("end", 0), ("end", 1)]
+VELOCITIES = (1, "0.8", 0)
+NOTEBOOK = Path(__file__).parents[1] / "book" / "multiple_impacts.ipynb"
+# The chapter's example and others with the same sequence: masses, e2, e3, forward, backward.
+EXAMPLES = [
+    ((1, 1, 1), "0.3", "0.3", "0.05", "0.05"),
+    ((1, 1, 1), "0.2", "0.2", "0.1", "0.1"),
+    ((1, 1, 1), "0.25", "0.35", "0.08", "0.02"),
+    ((2, "1.5", "1.7"), "0.25", "0.3", "0.05", "0.1"),
+]
+
+
+def printed(cell_id):
+    """What a cell of the chapter prints, as stored."""
+    cells = nbformat.read(NOTEBOOK, as_version=4).cells
+    outputs = next(cell.outputs for cell in cells if cell["id"] == cell_id)
+    return "".join(output.text for output in outputs if output.output_type == "stream")
+
+
+def changes(events):
+    return [tuple(event) for event in events if event[0] != "maximum_compression"]
+
+
+def solved(masses, e2, e3, forward, backward):
+    """The reference solver's outcome at fifty digits, and the package's trace."""
+    with mpmath.workdps(50):
+        exact = reference.solve(masses, VELOCITIES, [e2, e3], [forward], [backward])
+    chain = Chain([float(m) for m in masses], [1, 0.8, 0], [float(e2), float(e3)])
+    return exact, collide(chain, ImpulseCorrelation([float(forward)], [float(backward)]))
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_fig_5_path_and_sequence(example):
+    exact, trace = solved(*example)
+    assert changes(trace.events) == SEQUENCE
+    assert [tuple(event) for event in trace.events] == exact.events
+    np.testing.assert_allclose(trace.path, np.array(exact.path, float), atol=1e-14)
+    np.testing.assert_allclose(
+        trace.path_impulses, np.array(exact.path_impulses, float), atol=1e-14
+    )
+
+
+def pieces(example):
+    """The six pieces of the path between changes: velocities and impulses at both ends."""
+    exact, trace = solved(*example)
+    stops = [
+        0,
+        *[k for k, event in enumerate(exact.events, 1) if event[0] != "maximum_compression"],
+    ]
+    states = np.hstack([trace.path, trace.path_impulses])
+    return dict(zip("ABCDEF", pairwise(states[stops])))
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_eqs_35_to_38_slope_of_every_piece(example):
+    (m1, m2, m3), _, _, a, b = [
+        tuple(map(float, x)) if isinstance(x, tuple) else float(x) for x in example
+    ]
+    over_tau_2 = {"A": 1 - a, "C": 1 - 1 / b, "D": 1, "E": 1 - a}
+    over_tau_3 = {"A": 1 / a - 1, "B": -1, "C": b - 1, "E": 1 / a - 1, "F": -1}
+    for piece, (start, end) in pieces(example).items():
+        dv1, dv2, dv3, d2, d3 = end - start
+        assert dv1 == pytest.approx(-d2 / m1, abs=1e-14)  # Eq. 35
+        assert dv3 == pytest.approx(d3 / m3, abs=1e-14)  # Eq. 38
+        if piece in over_tau_2:  # Eq. 36
+            assert dv2 == pytest.approx(over_tau_2[piece] * d2 / m2, abs=1e-14)
+        else:
+            assert d2 == 0
+        if piece in over_tau_3:  # Eq. 37
+            assert dv2 == pytest.approx(over_tau_3[piece] * d3 / m2, abs=1e-14)
+        else:
+            assert d3 == 0
+
+
+def test_eq_36_fourth_line_needs_its_factor():
+    # As printed (slope 1/m2) momentum is missing; the amount is the one the chapter prints.
+    for example in EXAMPLES:
+        start, end = pieces(example)["E"]
+        m2, a = float(example[0][1]), float(example[3])
+        too_fast = start[1] + (end[3] - start[3]) / m2 - end[1]
+        assert too_fast == pytest.approx(a * (end[3] - start[3]) / m2, rel=1e-9)
+        assert too_fast > 1e-3
+        if example is EXAMPLES[0]:
+            stored = re.search(r"momentum missing .*: ([\d.]+)", printed("functions"))
+            assert float(stored[1]) == pytest.approx(m2 * too_fast, abs=6e-6)
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_eqs_39_to_42_energy_balance_of_every_collision(example):
+    _, trace = solved(*example)
+    u = -np.diff(trace.path, axis=1)
+    middle = (u[1:] + u[:-1]) / 2 * np.diff(trace.path_impulses, axis=0)  # exact: u is straight
+    kinds = [tuple(event) for event in trace.events]
+    for c, e in ((0, float(example[1])), (1, float(example[2]))):
+        rows = [k for k, event in enumerate(kinds, 1) if event == ("end", c)]
+        tops = [k for k, event in enumerate(kinds, 1) if event == ("maximum_compression", c)]
+        assert len(rows) == len(tops) == 2
+        for start, top, end in zip([0, rows[0]], tops, rows):  # Eqs. 39, 41 and 40, 42
+            absorbed, released = middle[start:top, c].sum(), middle[top:end, c].sum()
+            assert absorbed > 1e-6
+            assert e**2 * absorbed + released == pytest.approx(0, abs=1e-15)
+
+
+def test_fig_5_marked_values_as_printed_in_the_chapter():
+    exact, _ = solved(*EXAMPLES[0])
+    rows, count = {}, {}
+    for row, (kind, c) in enumerate(exact.events, 1):
+        count[kind, c] = count.get((kind, c), 0) + 1
+        rows[kind[0] + str(c) + str(count[kind, c])] = row
+    # m, e, c: maximum compression, end, closing; then contact and number.
+    impulses = {
+        "2,1c": "m01", "2,1f": "e01", "2,1*": "e11", "2,2c": "m02", "2,2*": "c11", "2,2f": "e02",
+        "3,1*": "e01", "3,2*": "c01", "3,1c": "m11", "3,1f": "e11", "3,3*": "e02", "3,2c": "m12",
+        "3,2f": "e12",
+    }  # fmt: skip
+    velocities = {"1,1": "e01", "2,1": "e01", "2,2": "e11", "3,1": "e11", "1,2": "e02",
+                  "2,3": "e02", "2,4": "e12", "3,2": "e12"}  # fmt: skip
+    expected = {
+        f"tau_{name}": exact.path_impulses[rows[key]][int(name[0]) - 2]
+        for name, key in impulses.items()
+    }
+    for name, key in velocities.items():
+        expected[f"v_{name}+"] = exact.path[rows[key]][int(name[0]) - 1]
+    stored = {line.split()[0]: line.split()[1:3] for line in printed("compare").splitlines()[1:]}
+    assert stored.keys() == expected.keys()
+    for name, (by_equations, by_solver) in stored.items():
+        assert float(by_equations) == pytest.approx(float(expected[name]), abs=6e-7)
+        assert float(by_solver) == pytest.approx(float(expected[name]), abs=6e-7)
+
+
+def sequence_occurs(e, ratio):
+    outcome = reference.solve((1, 1, 1), VELOCITIES, e, ratio, number=float)
+    kinds = outcome.events
+    here = changes(kinds) == SEQUENCE
+    early = (
+        here
+        and ("maximum_compression", 0) in kinds[kinds.index(("end", 1)) : kinds.index(("close", 1))]
+    )
+    return here, early
+
+
+def test_fig_5_region_of_the_sequence():
+    numbers = re.search(r"([\d.]+) < e < ([\d.]+), as printed from ([\d.]+)", printed("edges"))
+    lower, upper, split = map(float, numbers.groups())
+    step = 1e-4  # the last digit printed
+    assert not sequence_occurs(lower - step, 0.05)[0]
+    assert sequence_occurs(lower + step, 0.05) == (True, False)
+    assert sequence_occurs(split - step, 0.05) == (True, False)
+    assert sequence_occurs(split + step, 0.05) == (True, True)
+    assert sequence_occurs(upper - step, 0.05) == (True, True)
+    assert not sequence_occurs(upper + step, 0.05)[0]
+
+
+def test_fig_5_region_share_of_the_map():
+    # The map's own grid, every sixth point, by the reference solver.
+    values = ((np.arange(120) + 0.5) / 240)[2::6].tolist()
+    found = np.array([[sequence_occurs(e, ratio) for ratio in values] for e in values])
+    share, early = found.sum(axis=(0, 1)) / len(values) ** 2
+    stored = re.search(r"share of the map: ([\d.]+), as printed ([\d.]+)", printed("edges"))
+    assert float(stored[1]) == pytest.approx(share, abs=0.02)
+    assert float(stored[2]) == pytest.approx(early, abs=0.02)
+
+
+def test_fig_5_middle_ball_turns_round():
+    # The text says that v2 continues to fall after the first end and to rise after the second; and
+    # that the process ends because v2 < v1.
+    path = pieces(EXAMPLES[0])
+    change = {piece: end[1] - start[1] for piece, (start, end) in path.items()}
+    assert change["A"] > 0 > change["B"]
+    assert change["C"] < 0 < change["D"]
+    v1, v2, v3 = path["F"][1][:3]
+    assert v1 < v2 < v3

@@ -1,0 +1,256 @@
+"""The chapter on N balls: Eqs. 47-53, Fig. 8 and the demonstrations, each by a second route."""
+
+import io
+import math
+from pathlib import Path
+
+import nbformat
+import numpy as np
+import pandas as pd
+import pytest
+import reference
+
+from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequences
+from cradle.closed_form import largest_ratios
+
+FIG_8 = Chain([1] * 4, [1, 0.5, 0, 0], 1)
+NOTEBOOK = Path(__file__).parents[1] / "book" / "n_balls.ipynb"
+
+
+def printed(cell_id):
+    """What a cell of the chapter prints, as stored."""
+    cells = nbformat.read(NOTEBOOK, as_version=4).cells
+    outputs = next(cell.outputs for cell in cells if cell["id"] == cell_id)
+    return "".join(output.text for output in outputs if output.output_type == "stream")
+
+
+def random_chain(seed, n):
+    """Masses and admissible ratios of a chain at random, worked out by Eq. 53 from the far end."""
+    rng = np.random.default_rng(seed)
+    masses = 10.0 ** rng.uniform(-1, 1, n)
+    ratios, onward = np.zeros(n - 2), 0.0
+    for i in range(n - 2, 0, -1):
+        bound = masses[i + 1] / (masses[i + 1] + masses[i] * (1 - onward))
+        onward = ratios[i - 1] = rng.uniform(0.05, 0.99) * bound
+    return masses, ratios
+
+
+@pytest.mark.parametrize("n", range(2, 8))
+def test_eqs_47_48_momentum_of_every_ball(n):
+    masses, ratios = random_chain(n, n)
+    path = reference.solve(
+        masses, np.arange(n)[::-1], 0.7, list(ratios), [0] * (n - 2), number=float
+    )
+    trace = collide(Chain(masses, np.arange(n)[::-1], 0.7), ImpulseCorrelation(ratios, 0))
+    for velocities, impulses in (
+        (path.path, path.path_impulses),
+        (trace.path, trace.path_impulses),
+    ):
+        ends = np.pad(np.array(impulses, float), ((0, 0), (1, 1)))  # Eq. 48
+        change = np.array(velocities, float) - velocities[0]
+        np.testing.assert_allclose(masses * change, -np.diff(ends, axis=1), atol=1e-12)
+
+
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+@pytest.mark.parametrize("n", range(3, 8))
+def test_eqs_49_to_52_rates_of_a_run(n, direction):
+    masses, ratios = random_chain(100 + n, n)
+    velocities = np.zeros(n)
+    if direction == "forward":
+        velocities[0] = 1
+        trace = collide(Chain(masses, velocities, 1), ImpulseCorrelation(ratios, 0))
+    else:
+        masses, ratios = masses[::-1], ratios[::-1]
+        velocities[-1] = -1
+        trace = collide(Chain(masses, velocities, 1), ImpulseCorrelation(0, ratios))
+    dv, dtau = trace.path[1] - trace.path[0], trace.path_impulses[1]
+    tolerance = {"rtol": 1e-12, "atol": 1e-15}
+    if direction == "forward":
+        np.testing.assert_allclose(dtau[1:], ratios * dtau[:-1], **tolerance)  # Eq. 49
+        kept = (1 - ratios) * dtau[:-1]
+    else:
+        np.testing.assert_allclose(dtau[:-1], ratios * dtau[1:], **tolerance)
+        kept = (ratios - 1) * dtau[1:]
+    np.testing.assert_allclose(dv[0], -dtau[0] / masses[0], **tolerance)  # Eq. 50
+    np.testing.assert_allclose(dv[1:-1], kept / masses[1:-1], **tolerance)  # Eq. 51
+    np.testing.assert_allclose(dv[-1], dtau[-1] / masses[-1], **tolerance)  # Eq. 52
+
+
+def opening(masses, ratios, ball, excess):
+    """Change of closing speed right of `ball` (from 1) per impulse on its left: Eqs. 47, 49."""
+    ratio = np.append(ratios, 0.0)
+    ratio[ball - 1] *= 1 + excess
+    impulse = np.cumprod(np.concatenate([[1.0], ratio[ball - 1 : ball + 1]]))
+    return (impulse[0] - impulse[1]) / masses[ball] - (impulse[1] - impulse[2]) / masses[ball + 1]
+
+
+@pytest.mark.parametrize("n", range(3, 8))
+def test_eq_53_bound_is_where_a_driven_contact_opens(n):
+    masses, ratios = random_chain(200 + n, n)
+    for ball in range(1, n - 1):
+        at_bound = ratios.copy()
+        at_bound[ball - 1] = largest_ratios(masses, ratios, ratios)[0][ball - 1]
+        assert opening(masses, at_bound, ball, -1e-9) > 0 > opening(masses, at_bound, ball, 1e-9)
+        mirror = largest_ratios(masses[::-1], ratios, ratios[::-1])[1][::-1]
+        assert mirror[ball - 1] == pytest.approx(at_bound[ball - 1], rel=1e-15)
+    far = masses[-1] / (masses[-2] + masses[-1])  # the last interior ball: Eq. 34
+    assert largest_ratios(masses, ratios, ratios)[0][-1] == pytest.approx(far, rel=1e-15)
+
+
+@pytest.mark.parametrize("n", range(3, 8))
+def test_eq_53_at_the_bound_the_rest_is_one_body(n):
+    masses, _ = random_chain(300 + n, n)
+    beyond = np.cumsum(masses[::-1])[::-1]
+    ratios = beyond[2:] / beyond[1:-1]
+    trace = collide(Chain(masses, [1] + [0] * (n - 1), 1), ImpulseCorrelation(ratios, 0))
+    total, rest = masses.sum(), beyond[1]
+    together = [(masses[0] - rest) / total] + [2 * masses[0] / total] * (n - 1)
+    # The outcome has a square root at the bound (Eq. 30): one rounding costs half of the digits.
+    np.testing.assert_allclose(
+        trace.velocities, together, rtol=0, atol=4 * math.sqrt(np.finfo(float).eps)
+    )
+
+
+def test_end_progress_is_as_exact_as_its_arguments():
+    rows = printed("root-cell").splitlines()[2:]
+    errors = {float(row.split()[0]): [float(x) for x in row.split()[1:]] for row in rows}
+    assert all(ours < 3e-16 for _, ours in errors.values())
+    # The school formula loses as many digits as Q is small.
+    assert all(school > 1e-19 / q for q, (school, _) in errors.items() if q < 1e-3)
+
+
+def test_r7_held_contact_and_a_bound_that_moves():
+    for ratio in (0.6, 0.7):
+        chain = Chain([1, 1, 1], [1, 0, 0], 1)
+        trace = collide(chain, ImpulseCorrelation(ratio, excess="saturate"))
+        np.testing.assert_allclose(trace.velocities, [-1 / 3, 2 / 3, 2 / 3], rtol=1e-14)
+        assert trace.saturated == (1,)
+    chain, model = paper_chain("ABCCAB")
+    exact = reference.solve(
+        chain.masses, chain.velocities, list(chain.restitution), model.forward, model.backward
+    )
+    assert exact.held == {3} == set(collide(chain, model).saturated)
+
+
+def test_r6_zero_ratio_is_the_limit():
+    chain = Chain([2, 1, 3], [1, 0, 0], 0.8)
+    exact = np.array(reference.solve([2, 1, 3], [1, 0, 0], "0.8", 0).velocities, float)
+    np.testing.assert_allclose(collide(chain, ImpulseCorrelation(0)).velocities, exact, rtol=1e-13)
+    away = [
+        abs(collide(chain, ImpulseCorrelation(ratio)).velocities - exact).max()
+        for ratio in (1e-4, 1e-6)
+    ]
+    assert away[0] / away[1] == pytest.approx(100, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("masses", "e", "ratio"), [([1, 1, 1], 0, 0), ([1, 0.01, 1], 0.5, 0), ([1, 0.01, 1], 0.5, 0.1)]
+)
+def test_r9_collapse_to_the_common_velocity(masses, e, ratio):
+    trace = collide(Chain(masses, [1, 0, 0], e), ImpulseCorrelation(ratio))
+    exact = reference.solve(masses, [1, 0, 0], e, ratio, number=float)
+    assert trace.collapsed
+    assert exact.collapsed
+    np.testing.assert_allclose(trace.velocities, [1 / sum(masses)] * 3, rtol=1e-14)
+    np.testing.assert_allclose(exact.velocities, trace.velocities, rtol=1e-11)
+    plastic = 0.5 - 0.5 / sum(masses)  # all the energy of relative motion
+    assert trace.energy_loss == pytest.approx(plastic, rel=1e-12)
+
+
+class Reading(reference.Impact):
+    """The reference rules with another direction of drive where two runs meet."""
+
+    turns: tuple[str, str]
+
+    def close(self, c):
+        gap = self.is_gap(c)
+        super().close(c)
+        if gap:
+            self.direction[c], self.direction[c + 1] = self.turns
+
+
+def outcome(turns, meeting=0.5):
+    """Outcome of Fig. 8's chain when the gap closes with these directions at its two balls."""
+    ratio = {way: [None, 0.1, 0.1, None] for way in ("forward", "backward")}
+    impact = Reading([1.0] * 4, [1.0, 0.5, 0.0, 0.0], [1.0] * 3, ratio, meeting, float, 1e-13)
+    impact.turns = turns
+    impact.start()
+    while impact.round():
+        pass
+    return impact.outcome()
+
+
+def test_fig_8_path():
+    exact = reference.solve([1] * 4, [1, "0.5", 0, 0], 1, "0.1")
+    trace = collide(FIG_8, ImpulseCorrelation(0.1))
+    assert exact.meetings == 1
+    assert [tuple(event) for event in trace.events] == exact.events
+    np.testing.assert_allclose(trace.path, np.array(exact.path, float), atol=1e-14)
+    np.testing.assert_allclose(
+        trace.path_impulses, np.array(exact.path_impulses, float), atol=1e-14
+    )
+
+
+def test_fig_8_overlap_and_midpoint():
+    # Each of the two pairs, left alone, ends with the energy of its relative motion that its
+    # contact has: absorbed so far, and what is still to be absorbed.
+    trace = collide(FIG_8, ImpulseCorrelation(0.1))
+    ends = trace.events.index(("end", 1)) + 1
+    v, impulse = trace.path[ends], trace.path_impulses
+    back = impulse[ends, 0] - impulse[trace.events.index(("close", 0)) + 1, 0]
+    left = math.hypot(v[0] - v[1], math.sqrt(4 * back * (v[0] - v[1]) / 2))
+    right = math.hypot(v[2] - v[3], math.sqrt(4 * contact_work(trace, 2, ends)))
+    high, low = (v[0] + v[1] + left) / 2, (v[2] + v[3] - right) / 2
+    met = trace.path[trace.events.index(("close", 1)) + 1]
+    assert met[1] == pytest.approx((low + high) / 2, rel=1e-13) == pytest.approx(met[2], rel=1e-15)
+    words = printed("fig8a-cell").replace(",", "").split()
+    assert float(words[words.index("overlap") + 1]) == pytest.approx(low, abs=6e-5)
+    assert float(words[words.index("midpoint") - 1]) == pytest.approx(high, abs=6e-5)
+
+
+def contact_work(trace, c, row):
+    """Work done on contact c up to a row of the path, by the trapezoidal rule (exact here)."""
+    u = trace.path[: row + 1, c] - trace.path[: row + 1, c + 1]
+    return float(np.sum((u[1:] + u[:-1]) / 2 * np.diff(trace.path_impulses[: row + 1, c])))
+
+
+def test_fig_8_three_readings():
+    table = pd.read_csv(io.StringIO(printed("readings-cell").split("spread")[0]), sep=r"\s+")
+    turns = {
+        "both": ("forward", "backward"),
+        "left": ("forward", "forward"),
+        "right": ("backward", "backward"),
+    }
+    for reading, way in turns.items():
+        exact = outcome(way)
+        np.testing.assert_allclose(
+            table.loc[reading].iloc[:7].astype(float),
+            [*exact.velocities, *exact.impulses],
+            atol=6e-5,
+        )
+        assert table.loc[reading, "collisions"] == sum(kind == "end" for kind, _ in exact.events)
+
+
+def test_fig_8_meeting_moves_two_of_ten_sequences():
+    places = np.linspace(0, 1, 5)
+    moved = {}
+    for name in paper_sequences():
+        chain, model = paper_chain(name, excess="saturate")
+        ends = []
+        for meeting in places.tolist():
+            variant = ImpulseCorrelation(
+                model.forward, model.backward, meeting=meeting, excess="saturate"
+            )
+            ends.append(collide(chain, variant).velocities)
+            exact = reference.solve(
+                chain.masses, chain.velocities, list(chain.restitution), model.forward,
+                model.backward, meeting=meeting, excess="saturate", number=float,
+            )  # fmt: skip
+            np.testing.assert_allclose(ends[-1], exact.velocities, atol=1e-12)
+        moved[name] = np.ptp(ends, axis=0).max()
+    stored = {
+        row.split()[0]: float(row.split()[-1]) for row in printed("meeting-cell").splitlines()[2:]
+    }
+    assert list(stored) == list(moved)
+    assert {name for name, size in moved.items() if size > 0} == {"ABCCAB", "BCACBA"}
+    np.testing.assert_allclose(list(stored.values()), list(moved.values()), rtol=0.02)

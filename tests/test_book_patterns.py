@@ -1,0 +1,329 @@
+"""The chapter on bouncing patterns: Eqs. 43-46, Figs. 6 and 7, and what it adds to them."""
+
+import mpmath
+import numpy as np
+import pytest
+from reference import solve
+from scipy.optimize import brentq, minimize_scalar
+
+from cradle import Chain, ImpulseCorrelation, collide
+from cradle.closed_form import back_impact_line, first_ball_stops, middle_ball_stops
+from cradle.measures import bouncing_pattern
+from cradle.models.correlation import outcomes
+
+ALPHA, E = 0.15, 0.5
+
+
+def masses(r1, r2):
+    return np.stack(np.broadcast_arrays(1 / np.asarray(r1), 1.0, 1 / np.asarray(r2)), axis=-1)
+
+
+def solved(r1, r2, e=E, alpha=ALPHA):
+    return outcomes(masses(r1, r2), [1, 0, 0], e, alpha)
+
+
+def count(r1, r2, e=E, alpha=ALPHA):
+    return solved(r1, r2, e, alpha).collisions.sum(axis=-1)
+
+
+def velocity(ball, r1, r2, e=E, alpha=ALPHA):
+    return float(solved(r1, r2, e, alpha).velocities[ball - 1])
+
+
+def reference(r1, r2, e=E, alpha=ALPHA):
+    return solve([1 / r1, 1.0, 1 / r2], [1, 0, 0], e, alpha, number=float)
+
+
+def random_cases(seed, size):
+    """Ratios of masses, restitution of both contacts, ratio within both bounds."""
+    rng = np.random.default_rng(seed)
+    r1, r2 = np.exp(rng.uniform(np.log(0.02), np.log(5), (2, size)))
+    e = rng.uniform(0.3, 1, size)
+    return r1, r2, e, rng.uniform(0, 1, size) / (1 + np.maximum(r1, r2))
+
+
+# --- the map of one turn, as derived in the chapter: no events, no impulses ------------------
+
+
+def turn(zeta, r, e, alpha):
+    b, a = 1 - alpha * (1 + r), 1 - alpha + r
+    x = (1 + r) * zeta - b
+    kappa = 1.0 if x > 0 else e * e
+    return x, e * b**0.5, ((kappa * alpha * x * x + e * e * a * b) / (1 + r)) ** 0.5, a
+
+
+def by_turns(r1, r2, e, alpha, most=10_000):
+    """Number of collisions and velocities after the impact."""
+    zeta, s, number = e * (1 - alpha + r1) / (1 + e), (1 + e) / (1 - alpha + r1), 2
+    while number < most:
+        x, limit, y, a = turn(zeta, (r2, r1)[number % 2], e, alpha)
+        if x >= limit:
+            break
+        zeta, s, number = a * y / (y - x), s * (y - x) / a, number + 1
+    r = (r2, r1)[number % 2]
+    b = 1 - alpha * (1 + r)
+    u = s * ((b + e * b**0.5) / (1 + r) - zeta), -s * e * b**0.5
+    u1, u2 = u if number % 2 == 0 else u[::-1]
+    v2 = (1 / r1 - u1 / r1 + u2 / r2) / (1 / r1 + 1 + 1 / r2)
+    return number, [v2 + u1, v2, v2 - u2]
+
+
+def excess(r1, r2, e, alpha):
+    """Smallest rise of zeta in one cycle: negative where the sequence is infinite."""
+
+    def rise(zeta):
+        end = zeta
+        for r in (r2, r1):
+            x, limit, y, a = turn(end, r, e, alpha)
+            if x >= limit:
+                return 1.0
+            end = a * y / (y - x)
+        return end - zeta
+
+    b = 1 - alpha * (1 + r2)
+    top = (b + e * b**0.5) / (1 + r2)
+    return minimize_scalar(rise, bounds=(0, top), method="bounded", options={"xatol": 1e-12}).fun
+
+
+def edge(r2, e, alpha):
+    """Largest r1 with an infinite sequence."""
+    return brentq(lambda r1: excess(r1, r2, e, alpha), 1e-9, 4.0, xtol=1e-14)
+
+
+# --- Eqs. 43 to 46 -----------------------------------------------------------------------------
+
+
+def test_eq_43_impulse_of_the_back_impact():
+    """The second contact's impulse at the moment when the first one closes again."""
+    tried = 0
+    for r1, r2, e, alpha in zip(*random_cases(43, 200)):
+        trace = collide(Chain(masses(r1, r2), [1, 0, 0], e), ImpulseCorrelation(alpha))
+        closings = [k for k, event in enumerate(trace.events, 1) if event == ("close", 0)]
+        if closings:
+            m1, m2 = 1 / r1, 1.0
+            eq_43 = m2 * (alpha * m1 + e * (m1 + m2)) / ((1 - alpha) * m1 + m2)
+            assert trace.path_impulses[closings[0], 1] == pytest.approx(eq_43, rel=1e-12)
+            # The left half of the paper's condition is empty: the difference is e2 m2 v1.
+            end = trace.path_impulses[trace.events.index(("end", 0)) + 1, 1]
+            assert eq_43 - end == pytest.approx(e, rel=1e-12)
+            tried += 1
+    assert tried > 40
+
+
+def test_eq_44_separates_one_collision_each():
+    """Both solvers, just above and just below the curve."""
+    tried = 0
+    for _, r2, e, alpha in zip(*random_cases(44, 200)):
+        r1 = float(back_impact_line(r2, e, e, alpha))
+        if 0.01 < r1 < 1 / alpha - 1:
+            above, below = r1 * (1 + 1e-9), r1 * (1 - 1e-9)
+            assert solved(above, r2, e, alpha).collisions.tolist() == [1, 1]
+            assert solved(below, r2, e, alpha).collisions.tolist() == [2, 1]
+            assert reference(above, r2, e, alpha).collisions == [1, 1]
+            assert reference(below, r2, e, alpha).collisions == [2, 1]
+            tried += 1
+    assert tried > 50
+
+
+@pytest.mark.parametrize(("e", "alpha"), [(0.5, 0.15), (0.9, 0.3), (1.0, 0.0), (0.3, 0.05)])
+def test_eqs_45_46_balls_at_rest(e, alpha):
+    """Roots of the solved velocities, above the curve of Eq. 44."""
+    r1, r2 = first_ball_stops(e, alpha), middle_ball_stops(e, alpha)
+    found_1 = brentq(lambda x: velocity(1, x, 1.2 * r2, e, alpha), 0.9 * r1, 1.1 * r1, xtol=1e-15)
+    high = min(1.5 * r1, 1 / alpha - 1 if alpha else np.inf)
+    found_2 = brentq(lambda y: velocity(2, high, y, e, alpha), 0.9 * r2, 1.1 * r2, xtol=1e-15)
+    assert found_1 == pytest.approx(r1, rel=1e-12)
+    assert found_2 == pytest.approx(r2, rel=1e-12)
+    assert count(high, r2, e, alpha) == count(r1, 1.2 * r2, e, alpha) == 2
+    # They hold only there: among multiple collisions they are no border.
+    assert abs(velocity(1, r1, 0.5 * r2, e, alpha)) > 1e-3
+
+
+def test_curves_of_fig_6_meet_in_one_point():
+    for _, _, e2, alpha in zip(*random_cases(6, 100)):
+        e3 = 1.3 - e2
+        r1, r2 = first_ball_stops(e2, alpha), middle_ball_stops(e3, alpha)
+        assert back_impact_line(r2, e2, e3, alpha) == pytest.approx(r1, rel=1e-11)
+
+
+# --- Fig. 6 ------------------------------------------------------------------------------------
+
+
+def test_fig_6_patterns_and_counts_by_the_map_of_turns():
+    """The solver's counts and velocities against the map, for random ratios and restitutions."""
+    cases = random_cases(66, 1500)
+    r1, r2, e, alpha = cases
+    found = outcomes(masses(r1, r2), [1, 0, 0], np.stack([e, e], -1), alpha[:, None])
+    finite = np.flatnonzero(~found.collapsed)
+    assert finite.size > 1400
+    turns = [by_turns(*(values[k] for values in cases)) for k in finite]
+    assert found.collisions[finite].sum(axis=-1).tolist() == [number for number, _ in turns]
+    velocities = np.array([v for _, v in turns])
+    np.testing.assert_allclose(found.velocities[finite], velocities, rtol=0, atol=1e-12)
+    assert set(bouncing_pattern(found.velocities).tolist()) == {1, 2, 3}
+
+
+@pytest.mark.parametrize(("number", "r2"), [(3, 0.5), (4, 0.5), (4, 0.1), (5, 0.1), (8, 0.05)])
+def test_fig_6_borders_of_further_collisions(number, r2):
+    """Bisection on the solver's count; the map and the reference solver on both sides."""
+    low, high = 1e-3, 4.0
+    while high - low > 1e-12:
+        middle = (low + high) / 2
+        low, high = (middle, high) if count(middle, r2) >= number else (low, middle)
+    for r1, expected in ((low - 1e-9, number), (high + 1e-9, number - 1)):
+        assert by_turns(r1, r2, E, ALPHA)[0] == expected
+        assert sum(reference(r1, r2).collisions) == expected
+    if number == 3:
+        assert low == pytest.approx(float(back_impact_line(r2, E, E, ALPHA)), abs=1e-11)
+    # The outcome does not jump.
+    left, right = solved(low, r2).velocities, solved(high, r2).velocities
+    np.testing.assert_allclose(left, right, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("number", "low", "high"), [(3, 0.2, 0.8), (5, 0.02, 0.2), (7, 0.005, 0.06)]
+)
+def test_fig_6_zero_lines_cross_on_every_border_of_contact_1(number, low, high):
+    """Where v1+ is zero on such a border of the map, v2+ is zero, too: in the solver as well."""
+
+    def border(r2):
+        a, b = 1e-3, 4.0
+        while b - a > 1e-13:
+            middle = (a + b) / 2
+            a, b = (middle, b) if by_turns(middle, r2, E, ALPHA)[0] >= number else (a, middle)
+        return a
+
+    r2 = brentq(lambda r2: by_turns(border(r2), r2, E, ALPHA)[1][0], low, high, xtol=1e-12)
+    np.testing.assert_allclose(solved(border(r2), r2).velocities[:2], 0, atol=1e-10)
+
+
+def test_fig_6_counts_at_ratio_zero():
+    """n = ceil(pi / phi) - 1, from the eigenvalues of one cycle."""
+    rng = np.random.default_rng(60)
+    for e in (0.3, 0.5, 0.8, 1.0):
+        r1, r2 = np.exp(rng.uniform(np.log(0.01), np.log(5), (2, 2000)))
+        cosine = (1 + e) / (2 * np.sqrt(e * (1 + r1) * (1 + r2)))
+        finite = cosine < np.cos(np.pi / 50)
+        expected = np.ceil(np.pi / np.arccos(cosine[finite])) - 1
+        assert finite.sum() > 1000
+        assert np.array_equal(count(r1[finite], r2[finite], e, 0.0), expected)
+
+
+@pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
+def test_fig_6_infinite_region_at_ratio_zero(e):
+    """(1 + r1)(1 + r2) <= (1 + e)^2 / (4 e): the solver's region, and the general border."""
+    total = (1 + e) ** 2 / (4 * e)
+    for share in (0.1, 0.5, 0.8):
+        r2 = total**share - 1
+        r1 = total / (1 + r2) - 1
+        assert solved(0.99 * r1, r2, e, 0.0).collapsed
+        outside = 1.2 * r1, r2, e, 0.0
+        assert bool(solved(*outside).collapsed) == (by_turns(*outside)[0] > 1000)
+        assert edge(r2, e, 0.0) == pytest.approx(r1, rel=1e-6)
+
+
+@pytest.mark.parametrize(("e", "alpha"), [(0.5, 0.15), (0.3, 0.4), (0.8, 0.05)])
+def test_fig_6_infinite_region(e, alpha):
+    """Inside the border the map never stops and the solver collapses; outside both end."""
+    for r2 in (0.001, 0.3 * edge(1e-9, e, alpha), 0.7 * edge(1e-9, e, alpha)):
+        r1 = edge(r2, e, alpha)
+        assert by_turns(r1 * (1 - 1e-6), r2, e, alpha)[0] == 10_000
+        assert 100 < by_turns(r1 * (1 + 1e-3), r2, e, alpha)[0] < 10_000
+        inside = solved(0.98 * r1, r2, e, alpha)
+        assert inside.collapsed
+        assert np.ptp(inside.velocities) < 1e-12
+        far = 1.3 * r1, r2, e, alpha
+        assert not solved(*far).collapsed
+        assert count(*far) == by_turns(*far)[0]
+
+
+def test_fig_6_is_not_kept_for_other_parameters():
+    grid = np.linspace(0, 3, 31)[1:] - 0.05
+    plastic = solved(grid[:, None], grid[None, :], 0.0)
+    assert plastic.collapsed.all()
+    assert set(bouncing_pattern(plastic.velocities).flat) == {2}
+    elastic = solved(grid[:, None], grid[None, :], 1.0)
+    assert not elastic.collapsed.any()
+    # Equal outer balls, elastic: ball 1 never goes on, ball 2 never goes back.
+    fine = np.geomspace(1e-3, 3, 2000)
+    v1, v2, v3 = solved(fine, fine, 1.0).velocities.T
+    assert v1.max() < 1e-12
+    assert v2.min() > -1e-12
+    np.testing.assert_allclose(2 * v1 * v3, -fine * v2 * (2 - (1 + fine) * v2), atol=1e-12)
+    # A vanishing middle ball: the outer two as if alone.
+    v1 = solved(3e-7, 1e-7, 1.0).velocities[0]
+    assert v1 == pytest.approx((1 / 3 - 1) / (1 / 3 + 1), abs=1e-5)
+    # For a ratio above e the meeting point is beyond the ratio's bound.
+    assert first_ball_stops(0.4, 0.5) > 1 / 0.5 - 1
+    assert first_ball_stops(0.6, 0.5) < 1 / 0.5 - 1
+
+
+# --- Fig. 7 ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def light():
+    return collide(Chain([100, 1, 100], [1, 0, 0], 1), ImpulseCorrelation(ALPHA))
+
+
+def test_fig_7_against_50_digits(light):
+    with mpmath.workdps(50):
+        exact = solve([100, 1, 100], [1, 0, 0], 1, "0.15")
+        velocities = [float(v) for v in exact.velocities]
+        path = [[float(v) for v in row] for row in exact.path]
+    assert light.collisions.tolist() == exact.collisions == [10, 10]
+    np.testing.assert_allclose(light.velocities, velocities, rtol=0, atol=1e-12)
+    ends = [k for k, event in enumerate(light.events, 1) if event.kind != "maximum_compression"]
+    others = [k for k, event in enumerate(exact.events, 1) if event[0] in ("end", "close")]
+    drawn, expected = light.path[ends], np.array(path)[others]
+    np.testing.assert_allclose(drawn, expected, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(by_turns(0.01, 0.01, 1, ALPHA)[1], velocities, rtol=0, atol=1e-12)
+
+
+def test_fig_7_printed_velocities_and_axes(light):
+    """Two of three printed numbers agree; the middle one differs by one unit of its last digit."""
+    printed = np.array([-0.003, 0.348, 0.999])
+    assert (np.round(light.velocities, 3) == printed).tolist() == [True, False, True]
+    assert 0.0005 < printed[1] - light.velocities[1] < 0.00065
+    # Impulses fill axes to 100 N s: the masses behind the figure are 100, 1, 100 kg.
+    assert 99 < light.impulses.min() < light.impulses.max() < 101
+    assert light.path[:, 1].min() == pytest.approx(-6.01, abs=0.01)
+    assert light.path[:, 1].max() == pytest.approx(6.98, abs=0.01)
+
+
+def test_fig_7_last_digit(light):
+    """What the last digit hangs on, and the arithmetic that gives the printed one."""
+
+    def middle(alpha):
+        return velocity(2, 0.01, 0.01, 1.0, alpha)
+
+    slope = (middle(ALPHA + 1e-6) - middle(ALPHA - 1e-6)) / 2e-6
+    assert slope == pytest.approx(11.57, abs=0.01)
+    needed = brentq(lambda alpha: middle(alpha) - 0.3475, 0.15, 0.1501)
+    assert needed - 0.15 == pytest.approx((0.3475 - light.velocities[1]) / slope, rel=1e-2)
+    tau_2, tau_3 = (float(f"{p:.6g}") for p in light.impulses)
+    assert (tau_2, tau_3) == (100.287, 99.9392)
+    assert np.round([1 - tau_2 / 100, tau_2 - tau_3, tau_3 / 100], 3).tolist() == [
+        -0.003,
+        0.348,
+        0.999,
+    ]
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.15, 0.5, 0.9])
+def test_micro_collisions(alpha):
+    """n = pi sqrt((1 - alpha) / (r1 + r2)) for e = 1 as the middle ball vanishes."""
+    for r1, r2 in ((1e-6, 1e-6), (1e-6, 3e-6), (4e-6, 1e-6)):
+        estimate = np.pi * np.sqrt((1 - alpha) / (r1 + r2))
+        assert abs(count(r1, r2, 1.0, alpha) - estimate) < 2.5
+
+
+def test_light_ball_has_no_limit():
+    """The heavy balls tend to 0 and 1; the light one sweeps from one to the other."""
+    for r in (1e-3, 1e-5):
+        same = np.linspace(r, 1.5 * r, 3000)
+        v1, v2, v3 = solved(same, same, 1.0).velocities.T
+        assert abs(v1).max() < r
+        assert abs(v3 - 1).max() < 2 * r
+        assert v2.min() < 0.05
+        assert v2.max() > 0.95

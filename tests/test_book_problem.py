@@ -1,0 +1,171 @@
+"""Chapter 1 of the book: momentum, restitution, and the two answers (Eqs. 1-6, Fig. 1)."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import nbformat
+import numpy as np
+import pytest
+from reference import solve
+
+from cradle import Chain, ImpulseCorrelation, collide
+
+EQUAL = Chain([1, 1, 1], [1, 0, 0], 1)
+
+
+@pytest.fixture(scope="module")
+def cells(root: Path) -> dict:
+    """The cells of the chapter by id, as stored."""
+    notebook = nbformat.read(root / "book" / "problem.ipynb", as_version=4)
+    return {cell.id: cell for cell in notebook.cells}
+
+
+def printed(cell) -> str:
+    return "".join(output.get("text", "") for output in cell.outputs)
+
+
+def glued(cells: dict, name: str) -> str:
+    """The value that the text of the chapter shows under this name."""
+    (value,) = [
+        output.data["application/papermill.record/text/plain"]
+        for cell in cells.values()
+        for output in cell.get("outputs", [])
+        if output.get("metadata", {}).get("scrapbook", {}).get("name") == name
+    ]
+    return value.strip("'")
+
+
+def elastic(m1, v1, m2, v2):
+    """Two balls, e = 1: each velocity is mirrored in that of the centre of mass."""
+    centre = (m1 * v1 + m2 * v2) / (m1 + m2)
+    return 2 * centre - v1, 2 * centre - v2
+
+
+def random_chain(rng):
+    chain = Chain(
+        rng.uniform(0.5, 2, 3), np.sort(rng.uniform(-1, 1, 3))[::-1], rng.uniform(0.2, 1, 2)
+    )
+    return chain, ImpulseCorrelation(rng.uniform(0, 0.2))
+
+
+@pytest.mark.parametrize("equation", [1, 2, 3])
+def test_eqs_1_to_3_momentum_of_each_ball(equation: int):
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        chain, model = random_chain(rng)
+        trace = collide(chain, model)
+        tau_2, tau_3 = trace.path_impulses.T
+        push = {1: -tau_2, 2: tau_2 - tau_3, 3: tau_3}[equation]
+        ball = equation - 1
+        change = chain.masses[ball] * (trace.path[:, ball] - chain.velocities[ball])
+        np.testing.assert_allclose(change, push, rtol=0, atol=1e-13)
+        # A contact can only push: what makes the signs those of Eqs. 1-3.
+        assert (np.diff(trace.path_impulses, axis=0) >= 0).all()
+        assert trace.impulses[0] > 0
+
+
+def test_eq_4_kinematic_restitution():
+    """For two balls kinematic and energetic restitution agree."""
+    rng = np.random.default_rng(4)
+    for e in rng.uniform(0, 1, 50):
+        chain = Chain(rng.uniform(0.1, 10, 2), [rng.uniform(0, 1), rng.uniform(-1, 0)], e)
+        v = collide(chain, ImpulseCorrelation(0)).velocities
+        before = chain.velocities[0] - chain.velocities[1]
+        assert v[0] - v[1] == pytest.approx(-e * before, rel=0, abs=1e-13)
+
+
+def test_eqs_1_to_4_leave_one_unknown(cells: dict):
+    """Unknown: three velocities and two impulses; rows: Eqs. 1-4 for some masses."""
+    rows = np.array(
+        [[2, 0, 0, 1, 0], [0, 3, 0, -1, 1], [0, 0, 5, 0, -1], [1, -1, 0, 0, 0]], dtype=float
+    )
+    assert [5 - np.linalg.matrix_rank(rows[:count]) for count in (3, 4)] == [2, 1]
+    assert printed(cells["sympy-count"]).splitlines() == [
+        "Eqs. 1-3: 5 unknowns, rank 3, 2 missing",
+        "Eqs. 1-4: 5 unknowns, rank 4, 1 missing",
+    ]
+
+
+def test_eq_5_fused_rest(cells: dict):
+    first, rest = elastic(Fraction(1), Fraction(1), Fraction(2), Fraction(0))
+    expected = [float(x) for x in (first, rest, rest)]
+    for velocities in (
+        solve([1, 1, 1], [1, 0, 0], 1, "0.5").velocities,
+        collide(EQUAL, ImpulseCorrelation(0.5)).velocities,
+    ):
+        np.testing.assert_allclose([float(v) for v in velocities], expected, rtol=0, atol=1e-14)
+    assert f"({first}, {rest}, {rest})" in printed(cells["sympy-answers"])
+
+
+def test_eq_6_sequential(cells: dict):
+    v1, v2 = elastic(Fraction(1), Fraction(1), Fraction(1), Fraction(0))
+    v2, v3 = elastic(Fraction(1), v2, Fraction(1), Fraction(0))
+    expected = [float(x) for x in (v1, v2, v3)]
+    for velocities in (
+        solve([1, 1, 1], [1, 0, 0], 1, 0).velocities,
+        collide(EQUAL, ImpulseCorrelation(0)).velocities,
+    ):
+        np.testing.assert_allclose([float(v) for v in velocities], expected, rtol=0, atol=1e-14)
+    assert f"({v1}, {v2}, {v3})" in printed(cells["sympy-answers"])
+
+
+def test_fig_1_is_drawn_and_described(cells: dict):
+    cell = cells["draw-impulses"]
+    assert any("image/svg+xml" in output.get("data", {}) for output in cell.outputs)
+    assert cell.metadata["mystnb"]["figure"]["name"] == "fig-p1"
+    alt = cell.metadata["mystnb"]["image"]["alt"]
+    assert all(word in alt for word in ("Three balls", "tau 2", "tau 3", "velocity before"))
+
+
+def test_fig_own_problem_family():
+    """The ellipse holds the conserving outcomes; the model walks the possible arc."""
+    rng = np.random.default_rng(6)
+    for _ in range(100):
+        m, v = rng.uniform(0.1, 10, 3), rng.normal(size=3)
+        u2, u3 = v[0] - v[1], v[1] - v[2]
+        relative = m[0] * m[1] * u2**2 + m[1] * m[2] * u3**2 + m[0] * m[2] * (u2 + u3) ** 2
+        centre = m @ v / m.sum()
+        assert m @ v**2 == pytest.approx(m.sum() * centre**2 + relative / m.sum(), rel=1e-12)
+    # The plotted curve, turned back into velocities: momentum and energy are those before.
+    for angle in np.radians(np.arange(0, 360, 5)):
+        radius = 1 / np.sqrt(1 + np.sin(angle) * np.cos(angle))
+        u2, u3 = radius * np.cos(angle), radius * np.sin(angle)
+        v3 = (1 - u2 - 2 * u3) / 3
+        v = np.array([v3 + u3 + u2, v3 + u3, v3])
+        assert v.sum() == pytest.approx(1, abs=1e-14)
+        assert (v**2).sum() == pytest.approx(1, abs=1e-14)
+    # The model's dots: on the curve, ordered from one end of the arc to the other.
+    dots = [solve([1, 1, 1], [1, 0, 0], 1, f"0.{i}").velocities for i in range(6)]
+    u2, u3 = np.array([[float(v[0] - v[1]), float(v[1] - v[2])] for v in dots]).T
+    np.testing.assert_allclose(u2**2 + u2 * u3 + u3**2, 1, rtol=0, atol=1e-14)
+    assert (np.diff(u2) < 0).all()
+    assert (np.diff(u3) > 0).all()
+    np.testing.assert_allclose([u2[0], u3[0], u2[-1], u3[-1]], [0, -1, -1, 0], rtol=0, atol=1e-14)
+
+
+def test_fig_own_problem_definitions(cells: dict):
+    """Energy left by three definitions of e = 1, in closed form (equal balls)."""
+    for a in np.linspace(0, 0.499, 12):
+        trace = collide(EQUAL, ImpulseCorrelation(a))
+        left, right = trace.impulses
+        row = 1 + trace.events.index(("maximum_compression", 1))
+        compressed = trace.path_impulses[row, 1]
+
+        def energy(right, left=left):
+            return (1 - left) ** 2 + (left - right) ** 2 + right**2
+
+        assert energy(2 * compressed) == pytest.approx((4 + a**2) / (2 - a) ** 2, rel=1e-13)
+        assert energy(left / 2) == pytest.approx((2 + a**2) / (2 - a) ** 2, rel=1e-13)
+        assert energy(right) == pytest.approx(1, rel=1e-13)
+    assert glued(cells, "problem-poisson-most") == f"{(4 + 0.499**2) / (2 - 0.499) ** 2:.3f}"
+    assert glued(cells, "problem-newton-least") == f"{2 / 4:.3f}"
+
+
+def test_exercise_2_heavy_middle(cells: dict):
+    rows = {
+        line.split()[0]: [float(x) for x in line.split()[1:]]
+        for line in cells["solution-2"].outputs[0].data["text/plain"].splitlines()[1:3]
+    }
+    for name, ratio in (("sequential", 0), ("between", 1 / 6)):
+        v = [float(x) for x in solve([1, 2, 1], [1, 0, 0], 1, ratio).velocities]
+        np.testing.assert_allclose(rows[name][1:4], v, rtol=0, atol=5e-5)

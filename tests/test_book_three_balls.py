@@ -1,0 +1,364 @@
+"""Chapter "Three balls solved": Eqs. 17-34, Figs. 3 and 4, by a second route each.
+
+The second routes are the independent solver in reference.py, the path of the package's solver
+(whose loop knows no formula of this chapter), and integrals worked out at fifty digits.
+"""
+
+import mpmath
+import numpy as np
+import pytest
+from reference import solve
+
+from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
+from cradle.closed_form import final_impulses, one_collision_each, three_balls
+
+# The chapter's example.
+EXAMPLE = ([1.0, 1.5, 1.0], [1.0, 0.2, 0.0], [0.8, 0.7], 0.25)
+CLOSE = {"rtol": 1e-12, "atol": 1e-13}
+
+
+def run(masses, velocities, restitution, ratio):
+    return collide(
+        Chain(masses, velocities, restitution), ImpulseCorrelation(ratio, excess="saturate")
+    )
+
+
+def at(trace, kind, contact):
+    """Row of the path at the first event of this kind."""
+    return trace.events.index((kind, contact)) + 1
+
+
+def random_chains(count, seed, e3=None):
+    """Three balls with v1 > v2 > v3 and any ratio."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        e = rng.uniform(0.1, 1, 2)
+        if e3 is not None:
+            e[1] = e3
+        yield rng.uniform(0.3, 4, 3), np.array([1, rng.uniform(0, 0.8), 0]), e, rng.uniform(0, 1)
+
+
+def single(count, seed):
+    """Those of them with one collision per contact, away from the edges of that range."""
+    found = []
+    for m, v, e, ratio in random_chains(100 * count, seed):
+        if one_collision_each(m, v, e, ratio):
+            found.append((m, v, e, ratio))
+        if len(found) == count:
+            return found
+    raise AssertionError("too few chains")
+
+
+def chains_above_bound(chains):
+    return sum(ratio > m[2] / (m[1] + m[2]) for m, _, _, ratio in chains)
+
+
+SINGLE = single(200, seed=17)
+
+
+def bend_numbers(m, v, e, ratio):
+    """g, X and rho of the chapter, written out on their own."""
+    g = (1 + e[0]) * m[0] * (v[0] - v[1]) / ((1 - ratio) * m[0] + m[1])
+    return g, (v[1] - v[2]) / g, m[2] / (m[1] + m[2])
+
+
+def work(trace, contact, stop):
+    """Work taken by a contact up to a row of the path: the trapezoid rule is exact there."""
+    u = trace.path[: stop + 1, contact] - trace.path[: stop + 1, contact + 1]
+    return np.trapezoid(u, trace.path_impulses[: stop + 1, contact])
+
+
+def test_the_sample_covers_both_sides_of_eq_34():
+    above = chains_above_bound(SINGLE)
+    assert 10 < above < len(SINGLE) - 10
+
+
+def test_eqs_17_18_19_rates_along_the_path():
+    for m, v, e, ratio in SINGLE:
+        trace = run(m, v, e, ratio)
+        stop = at(trace, "end", 0)
+        tau_2, tau_3 = trace.path_impulses[stop]
+        d1, d2, d3 = trace.path[stop] - v
+        np.testing.assert_allclose(tau_3, ratio * tau_2, **CLOSE)  # Eq. 16
+        np.testing.assert_allclose(d1, -tau_2 / m[0], **CLOSE)
+        np.testing.assert_allclose(d2, (1 - ratio) / m[1] * tau_2, **CLOSE)
+        np.testing.assert_allclose(d2, (1 - ratio) / (ratio * m[1]) * tau_3, **CLOSE)
+        np.testing.assert_allclose(d3, tau_3 / m[2], **CLOSE)
+
+
+def test_eqs_20_21_22_first_maximum_compression():
+    for m, v, e, ratio in SINGLE:
+        trace = run(m, v, e, ratio)
+        row = at(trace, "maximum_compression", 0)
+        tau = m[0] * m[1] * (v[0] - v[1]) / ((1 - ratio) * m[0] + m[1])
+        np.testing.assert_allclose(trace.path_impulses[row, 0], tau, **CLOSE)
+        np.testing.assert_allclose(trace.path[row, 0], v[0] - tau / m[0], **CLOSE)
+        np.testing.assert_allclose(trace.path[row, 1], v[1] + (1 - ratio) / m[1] * tau, **CLOSE)
+        np.testing.assert_allclose(trace.path[row, 0], trace.path[row, 1], **CLOSE)
+
+
+@pytest.mark.parametrize("contact", [0, 1])
+def test_eqs_23_29_work_given_back(contact):
+    for m, v, e, ratio in SINGLE:
+        trace = run(m, v, e, ratio)
+        absorbed = work(trace, contact, at(trace, "maximum_compression", contact))
+        returned = absorbed - work(trace, contact, at(trace, "end", contact))
+        np.testing.assert_allclose(returned, e[contact] ** 2 * absorbed, **CLOSE)
+        np.testing.assert_allclose(trace.absorbed[contact], absorbed, **CLOSE)
+
+
+def test_eq_24_terminal_impulse():
+    for m, v, e, ratio in SINGLE:
+        trace = run(m, v, e, ratio)
+        compressed = trace.path_impulses[at(trace, "maximum_compression", 0), 0]
+        np.testing.assert_allclose(trace.impulses[0], (1 + e[0]) * compressed, **CLOSE)
+        np.testing.assert_allclose(trace.impulses[0], final_impulses(m, v, e, ratio)[0], **CLOSE)
+
+
+def test_eqs_25_26_27_two_pieces():
+    for m, v, e, ratio in SINGLE:
+        trace = run(m, v, e, ratio)
+        stop = at(trace, "end", 0)
+        tau_2f = trace.impulses[0]
+        star = v[1] + (1 - ratio) * (1 + e[0]) * m[0] * (v[0] - v[1]) / ((1 - ratio) * m[0] + m[1])
+        np.testing.assert_allclose(trace.path[stop, 1], star, **CLOSE)  # Eq. 26
+        tau_3 = trace.path_impulses[:, 1]
+        first = v[1] + (1 - ratio) / (ratio * m[1]) * tau_3
+        second = star - (tau_3 - ratio * tau_2f) / m[1]
+        rows = np.arange(len(tau_3))
+        np.testing.assert_allclose(trace.path[:, 1], np.where(rows <= stop, first, second), **CLOSE)
+        np.testing.assert_allclose(trace.path[:, 2], v[2] + tau_3 / m[2], **CLOSE)
+
+
+def test_eq_28_second_maximum_compression():
+    for m, v, e, ratio in SINGLE:
+        trace = run(m, v, e, ratio)
+        g, _, _ = bend_numbers(m, v, e, ratio)
+        compressed = trace.path_impulses[at(trace, "maximum_compression", 1), 1]
+        extended = m[1] * m[2] / (m[1] + m[2]) * (g + v[1] - v[2])
+        np.testing.assert_allclose(compressed, extended, **CLOSE)
+
+
+def impulse_of_eq_29(m, v, e, ratio):
+    """Solve Eq. 29 with its two-piece integrand by bisection; no formula of Eq. 30 enters."""
+    m1, m2, m3, v1, v2, v3, e2, e3, a = map(mpmath.mpf, (*m, *v, *e, ratio))
+    bend = a * (1 + e2) * m1 * m2 * (v1 - v2) / ((1 - a) * m1 + m2)
+
+    def u(tau):
+        gained = (1 - a) / (a * m2) * min(tau, bend) - max(tau - bend, 0) / m2
+        return v2 + gained - v3 - tau / m3
+
+    def area(start, stop):
+        points = [start, bend, stop] if start < bend < stop else [start, stop]
+        return mpmath.quad(u, points)
+
+    def zero(function, start, stop):
+        return mpmath.findroot(function, (start, stop), solver="anderson")
+
+    compressed = zero(u, bend, mpmath.mpf(100))
+    absorbed = area(mpmath.mpf(0), compressed)
+    # The bracket goes beyond the largest end, that of e3 = 1 and ratio 0.
+    return zero(lambda x: e3**2 * absorbed + area(compressed, x), compressed, 2.5 * compressed)
+
+
+def test_eq_30_from_the_integrals_at_fifty_digits():
+    with mpmath.workdps(50):
+        for chain in SINGLE[:20]:
+            assert abs(impulse_of_eq_29(*chain) / final_impulses(*chain)[1] - 1) < 1e-13
+
+
+def test_eqs_31_32_33_against_the_independent_solver():
+    for m, v, e, ratio in SINGLE[:40]:
+        other = solve(list(m), list(v), list(e), ratio, excess="saturate")
+        outcome = [float(x) for x in other.velocities]
+        np.testing.assert_allclose(three_balls(m, v, e, ratio), outcome, **CLOSE)
+        np.testing.assert_allclose(run(m, v, e, ratio).velocities, outcome, **CLOSE)
+
+
+def test_eqs_24_to_33_on_the_grid():
+    size = [0.5, 1.0, 2.0, 4.0]
+    share = np.array([0.0, 0.25, 0.5, 0.75, 1.0, 1.2, 1.5])
+    a, b, c, p, q, part, w = np.meshgrid(
+        size, size, size, [0.4, 0.7, 1.0], [0.0, 0.5, 1.0], share, [0.0, 0.3, 0.6], indexing="ij"
+    )
+    m = np.stack([a, b, c], axis=-1)
+    v = np.stack([np.ones_like(w), w, np.zeros_like(w)], axis=-1)
+    e = np.stack([p, q], axis=-1)
+    ratio = np.minimum(part * c / (b + c), 1.0)
+    one = one_collision_each(m, v, e, ratio)
+    assert one.sum() > 5000
+    solved = post_impact_velocities(m[one], v[one], e[one], ratio[one][:, None], excess="saturate")
+    difference = np.abs(solved - three_balls(m[one], v[one], e[one], ratio[one])).max(axis=-1)
+    # At the bound with v2 = v3 the radicand is zero but for a rounding error.
+    at_zero = ((part == 1) & (w == 0))[one]
+    assert difference[~at_zero].max() < 1e-12
+    assert difference[at_zero].max() < 1e-7
+
+
+@pytest.mark.parametrize("e3", [0.2, 0.5, 1.0])
+def test_eq_34_ranges_of_the_second_contact(e3):
+    """Order of events: (1 + X) rho and (1 + (1 + e3) X) rho are the bounds, for random chains."""
+    seen = {"closes": 0, "opens": 0, "ends": 0}
+    real_but_wrong = 0
+    for m, v, e, ratio in random_chains(600, seed=34, e3=e3):
+        g, X, rho = bend_numbers(m, v, e, ratio)
+        trace = run(m, v, e, ratio)
+        before = trace.events[: trace.events.index(("end", 0))]
+        if ("end", 1) in before:
+            state, low, high = "ends", 1 + (1 + e3) * X, np.inf
+        elif ("maximum_compression", 1) in before:
+            state, low, high = "opens", 1 + X, 1 + (1 + e3) * X
+        else:
+            state, low, high = "closes", 0.0, 1 + X
+        assert low * (1 - 1e-12) <= ratio / rho <= high * (1 + 1e-12)
+        seen[state] += 1
+        row = at(trace, "maximum_compression", 1)
+        if ("close", 0) in trace.events[:row]:
+            continue  # a back impact comes before: another chapter
+        compressed = trace.path_impulses[row, 1]
+        extended = m[1] * rho * (g + v[1] - v[2])
+        if state == "closes":
+            np.testing.assert_allclose(compressed, extended, **CLOSE)  # Eq. 28 holds
+        elif trace.collisions.tolist() == [1, 1] and ratio / rho < (1 + X) ** 2:
+            assert compressed < extended  # it fails, although the radical is real
+            wrong = abs(trace.impulses[1] / final_impulses(m, v, e, ratio)[1] - 1)
+            if state == "opens" and e3 == 1:
+                assert wrong < 1e-11  # Eq. 30 asks for no net work: right all the same
+            else:
+                real_but_wrong += wrong > 1e-6
+    assert min(seen.values()) > 10
+    assert real_but_wrong > 10
+
+
+def test_eq_34_at_x_zero_all_bounds_coincide():
+    """Just below the bound the second contact still closes; just above it is held."""
+    for m, _, e, _ in random_chains(50, seed=340):
+        v, rho = np.array([1.0, 0.2, 0.2]), m[2] / (m[1] + m[2])
+        below, above = run(m, v, e, rho * (1 - 1e-6)), run(m, v, e, rho * (1 + 1e-6))
+        assert not below.saturated
+        assert ("maximum_compression", 1) not in below.events[: at(below, "end", 0)]
+        assert 1 in above.saturated
+        with pytest.raises(ValueError, match=r"Eq\. 53"):
+            collide(Chain(m, v, e), ImpulseCorrelation(rho * (1 + 1e-6), 0))
+
+
+def test_eq_34_bound_is_a_collision_with_two_balls_as_one():
+    for m, _, e, _ in random_chains(50, seed=341):
+        v, rho = np.array([1.0, 0.2, 0.2]), m[2] / (m[1] + m[2])
+        pair = collide(Chain([m[0], m[1] + m[2]], v[:2], e[0]), ImpulseCorrelation(0))
+        expected = pair.velocities[[0, 1, 1]]
+        for ratio in (rho, 0.5 * (rho + 1), 1.0):  # at the bound, and held above it
+            trace = run(m, v, e, ratio)
+            first = trace.path[at(trace, "end", 0)]
+            np.testing.assert_allclose(first, expected, rtol=0, atol=1e-12)
+
+
+def test_eq_34_held_contact_is_the_limit_of_chatter():
+    """An open contact does not push: small steps tend to the held contact, at first order."""
+
+    def chatter(ratio, step):
+        (v1, v2, v3), stored = (1.0, 0.0, 0.0), 0.0
+        while v1 > v2 or stored > 0:
+            push = ratio * step if v2 >= v3 else 0.0
+            stored += (v1 - v2) * step
+            v1, v2, v3 = v1 - step, v2 + step - push, v3 + push
+        return np.array([v1, v2, v3])
+
+    for ratio in (0.6, 0.9):
+        held = run([1, 1, 1], [1, 0, 0], [1, 1], ratio).velocities
+        np.testing.assert_allclose(held, [-1 / 3, 2 / 3, 2 / 3], rtol=0, atol=1e-14)
+        errors = [np.abs(chatter(ratio, step) - held).max() for step in (1e-2, 1e-3, 1e-4)]
+        assert errors[0] < 0.03
+        assert errors[1] < 0.003
+        assert errors[2] < 0.0003
+
+
+def test_fig_3_every_marked_impulse_and_velocity():
+    m, v, e, ratio = EXAMPLE
+    trace = run(*EXAMPLE)
+    other = solve(m, v, e, ratio)
+    assert [tuple(event) for event in trace.events] == [
+        ("maximum_compression", 0),
+        ("end", 0),
+        ("maximum_compression", 1),
+        ("end", 1),
+    ]
+    tau_2, tau_3 = trace.path_impulses.T
+    g, _, rho = bend_numbers(*EXAMPLE)
+    np.testing.assert_allclose(tau_2[1], m[1] * g / (1 + e[0]), **CLOSE)  # tau_2^c
+    np.testing.assert_allclose(tau_2[2:], m[1] * g, **CLOSE)  # tau_2^f
+    np.testing.assert_allclose(tau_3[2], ratio * m[1] * g, **CLOSE)  # alpha tau_2^f
+    np.testing.assert_allclose(tau_3[3], rho * m[1] * (g + v[1] - v[2]), **CLOSE)  # tau_3^c
+    np.testing.assert_allclose(tau_3[4], final_impulses(*EXAMPLE)[1], **CLOSE)  # tau_3^f
+    np.testing.assert_allclose(trace.path[2, 1], v[1] + (1 - ratio) * g, **CLOSE)  # v_2^*
+    np.testing.assert_allclose(trace.velocities, [float(x) for x in other.velocities], **CLOSE)
+
+
+def test_fig_4_ends_are_eqs_5_and_6():
+    ends = post_impact_velocities([1, 1, 1], [1, 0, 0], 1, [[0.0], [0.5]])
+    np.testing.assert_allclose(ends, [[0, 0, 1], [-1 / 3, 2 / 3, 2 / 3]], rtol=0, atol=1e-14)
+
+
+def test_fig_4_curves():
+    ratio = np.linspace(0, 0.5, 501)
+    outcome = post_impact_velocities([1, 1, 1], [1, 0, 0], 1, ratio[:, None])
+    s = np.sqrt(1 - 2 * ratio)
+    expected = np.stack([s**2 - 1, 2 * (1 - s), 2 * (1 + s)], axis=-1) / (3 + s**2)[:, None]
+    np.testing.assert_allclose(outcome, expected, rtol=0, atol=1e-13)
+    change = np.diff(outcome, axis=0)
+    assert (change[:, 0] < 0).all()
+    assert (change[:, 1] > 0).all()  # v2 rises throughout: its minimum is at ratio 0
+    assert (change[:, 2] < 0).all()
+    for k in (0, 150, 300, 450):  # and the independent solver
+        other = solve([1, 1, 1], [1, 0, 0], [1, 1], ratio[k])
+        np.testing.assert_allclose(outcome[k], [float(x) for x in other.velocities], atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("masses", "e", "edge"),
+    [([1, 1, 1], 0.5, (3 * np.sqrt(105) - 25) / 64), ([2, 1, 1], 1.0, np.sqrt(3) - 1.5)],
+)
+def test_fig_4_extension_least_v2_where_back_impacts_end(masses, e, edge):
+    def outcome(ratio):
+        return run(masses, [1, 0, 0], [e, e], ratio)
+
+    before, there, after = (outcome(edge + shift) for shift in (-1e-4, 1e-9, 1e-4))
+    assert before.collisions[0] == 2
+    assert there.collisions.tolist() == [1, 1]
+    assert after.collisions.tolist() == [1, 1]
+    assert abs(there.velocities[0] - there.velocities[1]) < 1e-7
+    assert there.velocities[1] < min(before.velocities[1], after.velocities[1])
+    ratios = np.linspace(0, 0.5, 301)
+    v2 = post_impact_velocities(masses, [1, 0, 0], e, ratios[:, None])[:, 1]
+    assert v2.min() >= there.velocities[1] - 1e-9
+
+
+def test_fig_4_extension_largest_v3():
+    """Equal balls, e = 0.5: v3 is largest at 2 sqrt(7) - 5, so v3 does not tell the ratio."""
+    best = 2 * np.sqrt(7) - 5
+    v3 = [run([1, 1, 1], [1, 0, 0], [0.5, 0.5], best + d).velocities[2] for d in (-0.01, 0, 0.01)]
+    assert v3[1] > max(v3[0], v3[2])
+
+
+def test_v2_rises_with_the_ratio_while_each_contact_collides_once():
+    rng = np.random.default_rng(4)
+    checked = 0
+    for _ in range(300):
+        m, e = 10 ** rng.uniform(-1.5, 1.5, 3), rng.uniform(0.02, 1, 2)
+        ratio = np.linspace(0, 0.999 * m[2] / (m[1] + m[2]), 40)
+        one = one_collision_each(m, [1, 0, 0], e, ratio)
+        v2 = three_balls(m, [1, 0, 0], e, ratio)[:, 1]
+        pairs = one[1:] & one[:-1]
+        assert (np.diff(v2)[pairs] > 0).all()
+        checked += pairs.sum()
+    assert checked > 1000
+
+
+def test_equal_front_velocities_drive_the_first_contact_backward():
+    """v1 = v2 > v3, where Eq. 24 gives no impulse between balls 1 and 2."""
+    m, v, e, ratio = [1, 1, 1], [1, 1, 0], [1, 1], 0.2
+    assert final_impulses(m, v, e, ratio)[0] == 0
+    trace = run(m, v, e, ratio)
+    assert trace.impulses[0] > 0.9
+    other = solve(m, v, e, ratio)
+    np.testing.assert_allclose(trace.velocities, [float(x) for x in other.velocities], atol=1e-13)

@@ -1,0 +1,114 @@
+"""The chain: what is accepted, what is refused, and in which words."""
+
+import re
+
+import numpy as np
+import pytest
+
+from cradle import Chain
+
+GOOD = {"masses": [1, 2, 3], "velocities": [1, 0, -1], "restitution": [0.5, 1]}
+
+
+def test_values_are_floats_and_frozen():
+    chain = Chain(**GOOD)
+    for name in GOOD:
+        values = getattr(chain, name)
+        assert values.dtype == np.float64
+        assert values.tolist() == GOOD[name]
+        with pytest.raises(ValueError, match="read-only"):
+            values[0] = 7
+    with pytest.raises(AttributeError):
+        chain.masses = np.ones(3)
+
+
+def test_later_changes_of_the_input_do_not_matter():
+    given = {name: np.array(values, float) for name, values in GOOD.items()}
+    chain = Chain(**given)
+    for values in given.values():
+        values[:] = 0.25
+    assert chain.masses.tolist() == GOOD["masses"]
+    assert chain.velocities.tolist() == GOOD["velocities"]
+    assert chain.restitution.tolist() == GOOD["restitution"]
+    given["masses"][0] = 7  # the caller's arrays stay writable
+
+
+def test_one_restitution_for_all_contacts():
+    assert Chain([1, 1, 1], [1, 0, 0], 0.25).restitution.tolist() == [0.25, 0.25]
+
+
+def test_derived_values():
+    chain = Chain(**GOOD)
+    assert len(chain) == 3
+    assert chain.closing_speeds.tolist() == [1, 1]
+    assert chain.momentum == 1 * 1 + 3 * -1
+    assert chain.kinetic_energy == 0.5 * (1 * 1 + 3 * 1)
+
+
+def test_repr_makes_the_chain_again():
+    chain = Chain([0.045, 1 / 3], [0.1, -2], 0.7)
+    again = eval(repr(chain))
+    for name in GOOD:
+        assert getattr(again, name).tolist() == getattr(chain, name).tolist()
+
+
+BAD = [
+    ({"masses": [1, 0, 1]}, "masses[1] = 0.0; must be above 0"),
+    ({"masses": [1, 1, -2]}, "masses[2] = -2.0; must be above 0"),
+    ({"masses": [1, np.nan, 1]}, "masses[1] = nan; must be finite"),
+    ({"masses": [np.inf, 1, 1]}, "masses[0] = inf; must be finite"),
+    ({"masses": [1, 1, -np.inf]}, "masses[2] = -inf; must be finite"),
+    (
+        {"masses": [1, 1e-151, 1]},
+        "masses[1] = 1e-151; must be at least 1e-150 of the heaviest ball of its chain",
+    ),
+    ({"masses": 1.0}, "masses has shape (); a chain needs (N,) with N >= 2"),
+    ({"masses": [1.0]}, "masses has shape (1,); a chain needs (N,) with N >= 2"),
+    ({"masses": []}, "masses has shape (0,); a chain needs (N,) with N >= 2"),
+    ({"masses": [[1, 1, 1]]}, "masses has shape (1, 3); a chain needs (N,) with N >= 2"),
+    ({"masses": [1, 1]}, "velocities has shape (3,); 2 masses need (2,)"),
+    ({"velocities": [1, 0]}, "velocities has shape (2,); 3 masses need (3,)"),
+    ({"velocities": 1.0}, "velocities has shape (); 3 masses need (3,)"),
+    ({"velocities": [[1], [0], [0]]}, "velocities has shape (3, 1); 3 masses need (3,)"),
+    ({"velocities": [1, np.nan, 0]}, "velocities[1] = nan; must be finite"),
+    ({"velocities": [1, 0, -np.inf]}, "velocities[2] = -inf; must be finite"),
+    (
+        {"velocities": [0, 1e200, 0]},
+        "velocities[1] = 1e+200; kinetic energy overflows: choose larger units",
+    ),
+    ({"restitution": [0.5, 1.2]}, "restitution[1] = 1.2; must lie in [0, 1]"),
+    ({"restitution": [-0.1, 1]}, "restitution[0] = -0.1; must lie in [0, 1]"),
+    ({"restitution": 1 + 2**-52}, "restitution = 1.0000000000000002; must lie in [0, 1]"),
+    ({"restitution": [np.nan, 1]}, "restitution[0] = nan; must be finite"),
+    ({"restitution": [1, 1, 1]}, "restitution has shape (3,); 3 balls need () or (2,)"),
+    ({"restitution": [1]}, "restitution has shape (1,); 3 balls need () or (2,)"),
+    ({"restitution": [[1, 1]]}, "restitution has shape (1, 2); 3 balls need () or (2,)"),
+    ({"masses": "heavy"}, "masses = 'heavy'; must be real numbers, one shape"),
+    ({"masses": ["1", "2", "3"]}, "masses = ['1', '2', '3']; must be real numbers, one shape"),
+    ({"masses": [1, [2, 3], 4]}, "masses = [1, [2, 3], 4]; must be real numbers, one shape"),
+    ({"masses": [1, None, 1]}, "masses = [1, None, 1]; must be real numbers, one shape"),
+    ({"velocities": [1j, 0, 0]}, "velocities = [1j, 0, 0]; must be real numbers, one shape"),
+    ({"velocities": None}, "velocities = None"),
+    ({"restitution": "1"}, "restitution = '1'; must be real numbers, one shape"),
+    ({"restitution": None}, "restitution = None; must be real numbers, one shape"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), BAD, ids=[message for _, message in BAD])
+def test_bad_input_names_value_and_rule(change, message):
+    with pytest.raises(ValueError, match="^" + re.escape(message)):
+        Chain(**(GOOD | change))
+
+
+def test_ragged_velocities_are_named_too():
+    with pytest.raises(ValueError, match=r"^velocities"):
+        Chain([1, 1, 1], [1, [0, 0], 0], 1)
+
+
+@pytest.mark.parametrize("mass", [1e-150, 1e-300])
+def test_lightest_and_smallest_masses(mass):
+    """Only the ratio to the heaviest ball counts."""
+    heavy = mass * 1e150
+    assert Chain([heavy, mass], [1, 0], 1).masses.tolist() == [heavy, mass]
+    with pytest.raises(ValueError, match=r"^masses\[1\] = .*; must be at least 1e-150"):
+        Chain([heavy * 2, mass], [1, 0], 1)

@@ -1,0 +1,188 @@
+"""Eqs. 17-34 and 43-46 against the event solver, which knows none of them."""
+
+import mpmath
+import numpy as np
+import pytest
+from reference import solve
+
+from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
+from cradle.closed_form import (
+    back_impact_line,
+    final_impulses,
+    first_ball_stops,
+    largest_ratios,
+    middle_ball_stops,
+    one_collision_each,
+    three_balls,
+)
+
+
+def random_three_balls(seed, count=4000):
+    """Half with v2 = v3, half with v2 > v3; e = 0 and 1 among them; ratios up to Eq. 34."""
+    rng = np.random.default_rng(seed)
+    masses = 10 ** rng.uniform(-1, 1, (count, 3))
+    velocities = np.sort(rng.normal(size=(count, 3)))[:, ::-1].copy()
+    velocities[: count // 2, 1] = velocities[: count // 2, 2]
+    e = rng.random((count, 2))
+    e = np.where(rng.random(e.shape) < 0.1, np.round(e), e)
+    ratio = rng.random(count) * masses[:, 2] / (masses[:, 1] + masses[:, 2])
+    ratio[rng.random(count) < 0.1] = 0.0
+    return masses, velocities, e, ratio
+
+
+def test_one_collision_per_contact():
+    """Eqs. 24, 30, 31-33: impulses and velocities, 1 000 chains and more."""
+    chains = random_three_balls(seed=30)
+    apply = one_collision_each(*chains)
+    masses, velocities, e, ratio = (part[apply] for part in chains)
+    approach = velocities[:, 1] > velocities[:, 2]
+    assert apply.sum() >= 1000
+    assert approach.sum() >= 400
+    assert (~approach).sum() >= 400
+
+    speed = np.abs(velocities).max(axis=1, keepdims=True)
+    # The backward ratio never acts.
+    solved = post_impact_velocities(masses, velocities, e, ratio[:, None], 0.0)
+    closed = three_balls(masses, velocities, e, ratio)
+    assert np.max(np.abs(solved - closed) / speed) < 1e-12
+
+    impulses = np.stack(final_impulses(masses, velocities, e, ratio), axis=1)
+    for m, v, restitution, alpha, tau in zip(masses, velocities, e, ratio, impulses):
+        trace = collide(Chain(m, v, restitution), ImpulseCorrelation(alpha, 0.0))
+        np.testing.assert_allclose(trace.impulses, tau, rtol=0, atol=1e-12 * m.max() * abs(v).max())
+        assert trace.collisions.tolist() == [1, 1]
+
+
+def test_where_the_closed_form_does_not_apply_the_solver_finds_more_collisions():
+    chains = random_three_balls(seed=44)
+    masses, velocities, e, ratio = chains
+    gain = (1 + e[:, 0]) * masses[:, 0] * (velocities[:, 0] - velocities[:, 1])
+    gain /= (1 - ratio) * masses[:, 0] + masses[:, 1]
+    after = three_balls(*chains)
+    # Not within rounding of the two edges: ball 2 falling back on ball 1, contact 2-3 ending first.
+    clear = np.abs(after[:, 0] - after[:, 1]) > 1e-9
+    apply = one_collision_each(*chains)
+    more = 0
+    for i in np.flatnonzero(clear):
+        model = ImpulseCorrelation(ratio[i], excess="saturate")
+        trace = collide(Chain(masses[i], velocities[i], e[i]), model)
+        once = trace.collisions.tolist() == [1, 1]
+        assert once == apply[i], i
+        more += not once
+    assert more > 300
+
+
+@pytest.mark.parametrize("v2", [0.1, 0.2, 0.5])
+def test_real_radical_is_not_enough(v2):
+    """For v2 > v3 contact 2-3 must outlast contact 1-2 (Eqs. 28, 30): a lower bound."""
+    m, v, e = np.ones(3), np.array([1.0, v2, 0.0]), np.ones(2)
+
+    def admitted(ratio):
+        x = (v2 - 0) * ((1 - ratio) * m[0] + m[1]) / ((1 + e[0]) * m[0] * (1 - v2))
+        share = m[2] / (m[1] + m[2])
+        return ratio <= (1 + x) * share, ratio <= (1 + x) ** 2 * share
+
+    ratios = np.linspace(0.3, 1, 701)
+    between = [a for a in ratios if admitted(a) == (False, True)]
+    assert between
+    for a in between:
+        assert np.isfinite(three_balls(m, v, e, a)).all()
+        assert not one_collision_each(m, v, e, a)
+
+
+# --- Eqs. 44 to 46 -------------------------------------------------------------------------
+
+FIG_6 = {"e2": 0.5, "e3": 0.5, "ratio": 0.15}
+
+
+@pytest.mark.parametrize("r2", [0.01, 0.2, 0.5, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("parameters", [FIG_6, {"e2": 0.9, "e3": 0.6, "ratio": 0.05}])
+def test_eq_44_separates_one_collision_per_contact(r2, parameters):
+    """Relative 1e-9 above the line: once per contact; as much below: ball 2 falls back."""
+    line = float(back_impact_line(r2, **parameters))
+    e = [parameters["e2"], parameters["e3"]]
+
+    def collisions(r1):
+        model = ImpulseCorrelation(parameters["ratio"], excess="saturate")
+        return collide(Chain([1, r1, r1 / r2], [1, 0, 0], e), model).collisions.tolist()
+
+    assert collisions(line * (1 + 1e-9)) == [1, 1]
+    below = collisions(line * (1 - 1e-9))
+    assert below[0] > 1
+    assert one_collision_each(
+        [1, line * (1 + 1e-9), line * (1 + 1e-9) / r2], [1, 0, 0], e, parameters["ratio"]
+    )
+
+
+def test_eq_44_on_a_map_of_both_mass_ratios():
+    """Fig. 6 as a map: 900 chains, each on the side of the line that Eq. 44 says."""
+    r1, r2 = np.meshgrid(np.geomspace(0.01, 10, 30), np.geomspace(0.01, 5.6, 30))
+    above = r1 > back_impact_line(r2, **FIG_6)
+    assert 200 < above.sum() < 700
+    for x, y, single in zip(r1.flat, r2.flat, above.flat):
+        model = ImpulseCorrelation(FIG_6["ratio"], excess="saturate")
+        trace = collide(Chain([1, x, x / y], [1, 0, 0], 0.5), model)
+        assert (trace.collisions.tolist() == [1, 1]) == single
+
+
+def test_eqs_45_and_46_leave_a_ball_at_rest():
+    r1, r2 = first_ball_stops(0.5, 0.15), middle_ball_stops(0.5, 0.15)
+    for other in (0.5, 1.0, 2.0):
+        after = post_impact_velocities([1, r1, r1 / other], [1, 0, 0], 0.5, 0.15)
+        assert abs(after[0]) < 1e-15
+    for other in (2.0, 5.0, 20.0):  # above the line of Eq. 44
+        assert other > back_impact_line(r2, **FIG_6)
+        after = post_impact_velocities([1, other, other / r2], [1, 0, 0], 0.5, 0.15, 0.0)
+        assert abs(after[1]) < 1e-15
+
+
+def test_the_three_curves_meet_in_one_point():
+    r1, r2 = first_ball_stops(0.5, 0.15), middle_ball_stops(0.5, 0.15)
+    assert float(back_impact_line(r2, **FIG_6)) == pytest.approx(r1, rel=1e-14)
+
+
+# --- largest ratios ------------------------------------------------------------------------
+
+
+def test_largest_ratios_give_zero_closing_acceleration():
+    """Eqs. 34 and 53 by what they mean, from Eqs. 47-48 and not from their own formula."""
+    rng = np.random.default_rng(53)
+    for n in range(3, 9):
+        m, ratios = 10 ** rng.uniform(-1, 1, n), rng.random(n - 2)
+        forward, backward = largest_ratios(m, ratios, ratios)
+        for i in range(1, n - 1):
+            onward = ratios[i] if i < n - 2 else 0.0
+            a = forward[i - 1]  # impulse 1 into ball i, a out of it into ball i + 1, onward * a on
+            assert (1 - a) / m[i] == pytest.approx(a * (1 - onward) / m[i + 1], rel=1e-13)
+            onward = ratios[i - 2] if i > 1 else 0.0
+            b = backward[i - 1]
+            assert (1 - b) / m[i] == pytest.approx(b * (1 - onward) / m[i - 1], rel=1e-13)
+
+
+def test_largest_ratios_broadcast():
+    m, f = np.ones((4, 1, 5)), np.full((3, 3), 0.5)
+    forward, backward = largest_ratios(m, f, f[0])
+    assert forward.shape == (4, 3, 3)
+    assert backward.shape == (4, 1, 3)
+    one, _ = largest_ratios(m[0, 0], f[0], f[0])
+    np.testing.assert_array_equal(forward[2, 1], one)
+
+
+def test_eq_34_is_where_the_solver_begins_to_hold():
+    m = [1.0, 0.7, 1.9]
+    bound = largest_ratios(m, [0.0], [0.0])[0][0]
+    for ratio, held in ((bound * (1 - 1e-9), ()), (bound * (1 + 1e-9), (1,))):
+        model = ImpulseCorrelation(ratio, 0.0, excess="saturate")
+        assert collide(Chain(m, [1, 0, 0], 0.5), model).saturated == held
+
+
+def test_closed_form_in_fifty_digits():
+    """The rounding of the closed form itself, against the reference solver."""
+    chains = random_three_balls(seed=7, count=300)
+    apply = one_collision_each(*chains)
+    with mpmath.workdps(50):
+        for m, v, e, a in zip(*(part[apply][:60] for part in chains)):
+            exact = solve(m.tolist(), v.tolist(), e.tolist(), float(a), 0).velocities
+            closed = three_balls(m, v, e, a)
+            error = max(abs(float(x - y)) for x, y in zip(exact, closed))
+            assert error < 1e-14 * max(1, m.max() / m.min()) * np.abs(v).max()

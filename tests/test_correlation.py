@@ -1,0 +1,446 @@
+"""The paper's model behind its public names: input, record, batch, and how an impact gives up."""
+
+import re
+from functools import partial
+
+import numpy as np
+import pytest
+from chains import random_chains, with_ends
+
+import cradle
+from cradle import (
+    Chain,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    collide,
+    post_impact_velocities,
+)
+
+# --- input ---------------------------------------------------------------------------------
+
+MODEL = [
+    ({"forward": -0.1}, "forward = -0.1; must lie in [0, 1]"),
+    ({"forward": [0.1, 1.5]}, "forward[1] = 1.5; must lie in [0, 1]"),
+    ({"forward": [0.1, np.nan]}, "forward[1] = nan; must be finite"),
+    ({"forward": np.inf}, "forward = inf; must be finite"),
+    ({"forward": "0.1"}, "forward = '0.1'; must be real numbers, one shape"),
+    ({"forward": 0.1j}, "forward = 0.1j; must be real numbers, one shape"),
+    ({"forward": [0.1, [0.2]]}, "forward = [0.1, [0.2]]; must be real numbers, one shape"),
+    ({"forward": None}, "forward = None; must be real numbers"),
+    ({"forward": [[0.1]]}, "forward has shape (1, 1); must be () or (N - 2,)"),
+    ({"backward": [0.1, 2]}, "backward[1] = 2.0; must lie in [0, 1]"),
+    ({"backward": -np.inf}, "backward = -inf; must be finite"),
+    ({"backward": [[0.1]]}, "backward has shape (1, 1); must be () or (N - 2,)"),
+    ({"meeting": -0.5}, "meeting = -0.5; must lie in [0, 1]"),
+    ({"meeting": 1.5}, "meeting = 1.5; must lie in [0, 1]"),
+    ({"meeting": np.nan}, "meeting = nan; must be finite"),
+    ({"meeting": "middle"}, "meeting = 'middle'; must be real numbers, one shape"),
+    ({"meeting": [0.5]}, "meeting = [0.5]; must be one number"),
+    ({"excess": "ignore"}, "excess = 'ignore'; must be 'raise' or 'saturate'"),
+    ({"excess": None}, "excess = None; must be 'raise' or 'saturate'"),
+    ({"max_events": 0}, "max_events = 0; must be at least 1"),
+    ({"max_events": -1}, "max_events = -1; must be at least 1"),
+    ({"max_events": 1e6}, "max_events = 1000000.0; must be a whole number"),
+    ({"max_events": True}, "max_events = True; must be a whole number"),
+    ({"max_events": "many"}, "max_events = 'many'; must be a whole number"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), MODEL, ids=[message for _, message in MODEL])
+@pytest.mark.parametrize("batch", [False, True], ids=["model", "batch"])
+def test_bad_options_name_value_and_rule(change, message, batch):
+    options = {"forward": 0.1} | change
+    if batch and "has shape" in message:
+        message = message.replace("(N - 2,)", "(..., 2) for 4 balls")
+    made = partial(post_impact_velocities, np.ones(4), [1, 0, 0, 0], 1)
+    with pytest.raises(ValueError, match="^" + re.escape(message)):
+        (made if batch else ImpulseCorrelation)(**options)
+
+
+@pytest.mark.parametrize("ratio", [-1e-9, 1 + 1e-9])
+@pytest.mark.parametrize("name", ["forward", "backward"])
+def test_saturate_does_not_excuse_ratios_outside_0_and_1(name, ratio):
+    options = {"forward": 0.1, name: ratio, "excess": "saturate"}
+    with pytest.raises(ValueError, match=rf"^{name} = {re.escape(repr(ratio))}; must lie in \[0"):
+        ImpulseCorrelation(**options)
+    with pytest.raises(ValueError, match=rf"^{name} = {re.escape(repr(ratio))}; must lie in \[0"):
+        post_impact_velocities([1, 1, 1], [1, 0, 0], 1, **options)
+
+
+@pytest.mark.parametrize("name", ["forward", "backward"])
+@pytest.mark.parametrize("length", [1, 3])
+def test_wrong_number_of_ratios(name, length):
+    options = {"forward": 0.1, name: [0.1] * length}
+    with pytest.raises(ValueError, match=f"^{name} has {length} values; 4 balls need 2"):
+        collide(Chain([1] * 4, [1, 0, 0, 0], 1), ImpulseCorrelation(**options))
+    with pytest.raises(ValueError, match=rf"^{name} has shape \({length},\); must be .* 4 balls"):
+        post_impact_velocities([1] * 4, [1, 0, 0, 0], 1, **options)
+
+
+def test_two_balls_take_one_number_or_none():
+    for ratio in (0.3, []):
+        after = collide(Chain([1, 3], [1, 0], 0.5), ImpulseCorrelation(ratio)).velocities
+        np.testing.assert_allclose(after, [0.25 - 0.375, 0.25 + 0.125], atol=1e-16)
+        np.testing.assert_array_equal(post_impact_velocities([1, 3], [1, 0], 0.5, ratio), after)
+    with pytest.raises(ValueError, match="forward has 1 values; 2 balls need 0"):
+        collide(Chain([1, 3], [1, 0], 0.5), ImpulseCorrelation([0.3]))
+
+
+BEYOND = [
+    (0.51, 0.1, r"forward\[1\] = 0\.51; at ball 2.* not exceed 0\.5 \(Eq\. 53\)"),
+    ([0.6, 0.2], 0.1, r"forward\[0\] = 0\.6; at ball 1.* not exceed 0\.555556 \(Eq\. 53\)"),
+    (0.1, 0.51, r"backward\[0\] = 0\.51; at ball 1.* not exceed 0\.5 \(Eq\. 53, mirrored\)"),
+    (0.1, [0.2, 0.6], r"backward\[1\] = 0\.6; at ball 2.* not exceed 0\.555556 \(Eq\. 53, mirr"),
+]
+
+
+@pytest.mark.parametrize(("forward", "backward", "message"), BEYOND)
+def test_ratios_beyond_their_bound(forward, backward, message):
+    chain, model = Chain([1] * 4, [1, 0, 0, 0], 1), ImpulseCorrelation(forward, backward)
+    with pytest.raises(ValueError, match="^" + message) as caught:
+        collide(chain, model)
+    assert "excess='saturate'" in str(caught.value)
+    with pytest.raises(ValueError, match=message.replace(r"\[", r"\[(0, )?")):
+        post_impact_velocities(np.ones((1, 4)), [1, 0, 0, 0], 1, forward, backward)
+    collide(chain, ImpulseCorrelation(forward, backward, excess="saturate"))
+
+
+def test_ratio_at_its_bound_is_admitted():
+    """To rounding: the bound as anybody computes it must not be refused."""
+    rng = np.random.default_rng(34)
+    for m in 10 ** rng.uniform(-3, 3, (200, 3)):
+        ahead, behind = m[2] / (m[1] + m[2]), 1 / (1 + m[1] / m[0])
+        collide(Chain(m, [1, 0, 0], 1), ImpulseCorrelation(ahead, behind))
+
+
+BATCH = [
+    ({"masses": [1, -1, 1]}, "masses[1] = -1.0; must be above 0"),
+    ({"masses": [[1, 1, 1], [1, 1, 0]]}, "masses[1, 2] = 0.0; must be above 0"),
+    ({"masses": [1, 1e-151, 1]}, "masses[1] = 1e-151; must be at least 1e-150"),
+    ({"masses": 1.0}, "masses has shape (); must be (..., N) with N >= 2"),
+    ({"masses": [[1.0]]}, "masses has shape (1, 1); must be (..., N) with N >= 2"),
+    ({"masses": "ABC"}, "masses = 'ABC'; must be real numbers"),
+    ({"masses": [[1, 1, 1], [1, 1]]}, "masses = [[1, 1, 1], [1, 1]]; must be real numbers"),
+    ({"velocities": [1, 0]}, "velocities has shape (2,); must be (..., 3), as masses"),
+    ({"velocities": 1.0}, "velocities has shape (); must be (..., 3), as masses"),
+    ({"velocities": [[1, 0, np.nan]]}, "velocities[0, 2] = nan; must be finite"),
+    ({"velocities": [1, 0, np.inf]}, "velocities[2] = inf; must be finite"),
+    ({"velocities": [1j, 0, 0]}, "velocities = [1j, 0, 0]; must be real numbers"),
+    ({"velocities": [[1, 0, 0], [1, 0]]}, "velocities = [[1, 0, 0], [1, 0]]; must be real"),
+    ({"velocities": [[0, 0, 0], [1, 0, 1e200]]}, "velocities[1, 2] = 1e+200; kinetic energy"),
+    ({"restitution": 1.5}, "restitution = 1.5; must lie in [0, 1]"),
+    ({"restitution": [[1, 1], [1, -1]]}, "restitution[1, 1] = -1.0; must lie in [0, 1]"),
+    ({"restitution": [np.nan, 1]}, "restitution[0] = nan; must be finite"),
+    ({"restitution": [1, 1, 1]}, "restitution has shape (3,); must be () or (..., 2) for 3 balls"),
+    ({"forward": [[0.1], [7]]}, "forward[1, 0] = 7.0; must lie in [0, 1]"),
+    ({"forward": [0.1, 0.1]}, "forward has shape (2,); must be () or (..., 1) for 3 balls"),
+    ({"backward": [[0.1], [7]]}, "backward[1, 0] = 7.0; must lie in [0, 1]"),
+    ({"backward": [0.1, 0.1]}, "backward has shape (2,); must be () or (..., 1) for 3 balls"),
+    (
+        {"masses": np.ones((2, 3)), "velocities": np.ones((3, 3))},
+        "leading axes do not broadcast: masses (2, 3), velocities (3, 3)",
+    ),
+    (
+        {"restitution": np.ones((2, 2)), "forward": np.zeros((3, 1))},
+        "leading axes do not broadcast: masses (3,), velocities (3,), restitution (2, 2)",
+    ),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), BATCH, ids=[message for _, message in BATCH])
+def test_bad_batches_name_value_and_rule(change, message):
+    good = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "restitution": 1, "forward": 0.1}
+    with pytest.raises(ValueError, match="^" + re.escape(message)):
+        post_impact_velocities(**(good | change))
+
+
+def test_collide_refuses_other_objects():
+    with pytest.raises(TypeError, match="chain is a list; must be a Chain"):
+        collide([1, 1], ImpulseCorrelation(0.1))
+    with pytest.raises(TypeError, match="model is a float; must be an impact model"):
+        collide(Chain([1, 1], [1, 0], 1), 0.1)
+
+
+def test_public_names():
+    for name in cradle.__all__:
+        assert hasattr(cradle, name)
+    assert {
+        *("Chain", "collide", "Trace", "ImpactNotFinished", "ImpulseCorrelation"),
+        *("post_impact_velocities", "paper_chain", "restitution_table", "ratio_table"),
+    } <= set(cradle.__all__)
+
+
+def test_models_compare_by_value_and_their_repr_makes_them_again():
+    model = ImpulseCorrelation([0.1, 0.2], 0.3, meeting=0.25, excess="saturate", max_events=9)
+    assert eval(repr(model)) == model
+    assert model == ImpulseCorrelation(
+        np.array([0.1, 0.2]), 0.3, meeting=0.25, excess="saturate", max_events=np.int64(9)
+    )
+    assert model != ImpulseCorrelation([0.1, 0.2], 0.3)
+
+
+# --- no impact -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("velocities", [[0.1, 0.2, 0.3], [0.1, 0.1, 0.1], [-0.3, -0.3, 1e-300]])
+def test_balls_that_do_not_approach_keep_their_velocities_to_the_last_bit(velocities):
+    chain = Chain([1 / 3, 0.7, 1e-9], velocities, 0.4)
+    trace = collide(chain, ImpulseCorrelation(0.0))
+    assert trace.velocities.tobytes() == chain.velocities.tobytes()
+    assert trace.path.tobytes() == chain.velocities.tobytes()
+    assert trace.path_impulses.tolist() == [[0, 0]]
+    assert trace.events == ()
+    assert trace.collisions.tolist() == [0, 0]
+    assert trace.impulses.tolist() == trace.absorbed.tolist() == [0, 0]
+    assert trace.energy_loss == 0
+    assert not trace.collapsed
+    assert trace.saturated == ()
+    after = post_impact_velocities(chain.masses, velocities, 0.4, 0.0)
+    assert after.tobytes() == chain.velocities.tobytes()
+
+
+def test_a_ball_that_no_impulse_reaches_keeps_its_velocity_to_the_last_bit():
+    velocities = [0.1, 1 / 3, 0.2, 5.7]
+    after = collide(Chain([0.3, 1 / 7, 1, 1], velocities, 1), ImpulseCorrelation(0.1)).velocities
+    assert after[0] == velocities[0]
+    assert after[3] == velocities[3]
+    assert after[1] != velocities[1]
+
+
+def test_touching_balls_at_rest_apart_from_the_impact_stay_idle():
+    """R2: a stretch without an approaching contact is not part of the impact."""
+    trace = collide(Chain([1] * 5, [0, 0, 1, 0.9, 2], 1), ImpulseCorrelation(0.1))
+    assert trace.collisions.tolist() == [0, 0, 1, 0]
+
+
+# --- the record ----------------------------------------------------------------------------
+
+
+def generous(n, count, seed):
+    """Random chains of moderate masses: long and short impacts, some collapsed."""
+    return zip(*random_chains(np.random.default_rng(seed), count, n, decades=2), strict=True)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 6])
+def test_rows_of_the_path(n):
+    longest = 0
+    for m, v, e, f, b in generous(n, 60, seed=n):
+        trace = collide(Chain(m, v, e), ImpulseCorrelation(f, b))
+        longest = max(longest, len(trace.events))
+        rows = len(trace.events) + 1
+        assert trace.path.shape == (rows, n)
+        assert trace.path_impulses.shape == (rows, n - 1)
+        assert trace.path[0].tobytes() == np.asarray(v).tobytes()
+        assert not trace.path_impulses[0].any()
+        assert trace.path[-1].tobytes() == trace.velocities.tobytes()
+        assert trace.path_impulses[-1].tobytes() == trace.impulses.tobytes()
+        scale = np.abs(v).max()
+        # Eqs. 1-3, 47-48 on every row: m dv = impulse on the left - impulse on the right.
+        impulses = np.pad(trace.path_impulses, ((0, 0), (1, 1)))
+        gained = m * (trace.path - v)
+        np.testing.assert_allclose(gained, -np.diff(impulses, axis=1), atol=1e-13 * scale * m.max())
+        assert (np.diff(trace.path_impulses, axis=0) >= -1e-15 * scale * m.max()).all()
+    assert longest > (64 if n > 2 else 1)  # beyond the room that the solver starts with
+
+
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_events_alternate_as_they_must(n):
+    """Closing, maximum compression, end: in this order for each contact; counts and works agree."""
+    for m, v, e, f, b in generous(n, 60, seed=20 + n):
+        trace = collide(Chain(m, v, e), ImpulseCorrelation(f, b))
+        u = -np.diff(trace.path, axis=1)
+        scale = np.abs(v).max()
+        for c in range(n - 1):
+            mine = [(row, kind) for row, (kind, other) in enumerate(trace.events, 1) if other == c]
+            kinds = [kind for _, kind in mine]
+            closings = kinds.count("close")
+            ends = kinds.count("end") + kinds.count("collapse")
+            assert trace.collisions[c] - closings in (0, 1)  # 1: it touched from the start
+            if not trace.collapsed:
+                assert ends == trace.collisions[c]
+            active = trace.collisions[c] > closings
+            for row, kind in mine:
+                if kind == "close":
+                    assert not active
+                    active = True
+                elif kind == "end":
+                    assert active
+                    active = False
+                    assert u[row, c] <= 1e-15 * scale
+                elif kind == "maximum_compression":
+                    assert active
+                else:  # "collapse": the contact may just have ended by itself
+                    active = False
+                if kind != "end":
+                    assert abs(u[row, c]) <= 1e-14 * scale
+            assert not active
+
+
+def test_between_two_rows_velocities_are_linear_in_the_impulses():
+    """Fig. 7's path: the works from straight lines between the rows are those of the result."""
+    trace = collide(Chain([1, 0.01, 1], [1, 0, 0], 0.9), ImpulseCorrelation(0.15))
+    u, p = -np.diff(trace.path, axis=1), trace.path_impulses
+    work = 0.5 * (u[1:] + u[:-1]) * np.diff(p, axis=0)
+    absorbed = np.where(work > 0, work, 0).sum(axis=0)
+    np.testing.assert_allclose(trace.absorbed, absorbed, rtol=1e-12)
+    released = -np.where(work < 0, work, 0).sum(axis=0)
+    np.testing.assert_allclose(released, 0.9**2 * absorbed, rtol=1e-12)
+
+
+def test_the_record_does_not_change_the_outcome():
+    """The batch records nothing, and runs the same loop."""
+    for n in (2, 3, 5, 8):
+        for m, v, e, f, b in generous(n, 25, seed=40 + n):
+            trace = collide(Chain(m, v, e), ImpulseCorrelation(f, b))
+            alone = post_impact_velocities(m, v, e, f, b)
+            assert alone.tobytes() == trace.velocities.tobytes()
+
+
+def test_long_records_are_whole():
+    """Several thousand events: every one is there."""
+    trace = collide(Chain([1, 1e-7, 1], [1, 0, 0], 1), ImpulseCorrelation(0.0))
+    assert len(trace.events) > 5000
+    kinds = [kind for kind, _ in trace.events]
+    assert kinds.count("end") == kinds.count("maximum_compression") == trace.collisions.sum()
+    assert trace.path[-1].tobytes() == trace.velocities.tobytes()
+
+
+# --- the batch -----------------------------------------------------------------------------
+
+
+def test_batch_is_a_loop_of_single_impacts():
+    """Every argument with its own leading axes: one broadcast against the others, bit by bit."""
+    rng = np.random.default_rng(5)
+    n = 4
+    m = 10 ** rng.uniform(-1, 1, (3, 1, 1, n))
+    v = rng.normal(size=(2, 1, n))
+    e = with_ends(rng)((2, 1, 1, n - 1))[0]
+    f, b = 0.2 * rng.random((4, n - 2)), 0.2 * rng.random((3, 1, 2, 1, n - 2))[:, 0]
+    f, b = np.minimum(f, 0.05), np.minimum(b, 0.05)
+    batch = post_impact_velocities(m, v, e, f, b, excess="saturate", meeting=0.3)
+    lead = np.broadcast_shapes(*(part.shape[:-1] for part in (m, v, e, f, b)))
+    assert batch.shape == (*lead, n)
+    full = [np.broadcast_to(part, lead + part.shape[-1:]) for part in (m, v, e, f, b)]
+    for at in np.ndindex(*lead):
+        chain = Chain(*(part[at] for part in full[:3]))
+        model = ImpulseCorrelation(full[3][at], full[4][at], excess="saturate", meeting=0.3)
+        assert batch[at].tobytes() == collide(chain, model).velocities.tobytes()
+
+
+@pytest.mark.parametrize("name", ["masses", "velocities", "restitution", "forward", "backward"])
+def test_each_argument_may_carry_the_leading_axes(name):
+    rng = np.random.default_rng(6)
+    base = {
+        "masses": rng.uniform(1, 2, 3),
+        "velocities": np.array([1.0, 0.2, 0.0]),
+        "restitution": rng.random(2),
+        "forward": np.array([0.1]),
+        "backward": np.array([0.2]),
+    }
+    many = base[name] * rng.uniform(0.5, 1, (2, 3, 1))
+    batch = post_impact_velocities(**(base | {name: many}))
+    assert batch.shape == (2, 3, 3)
+    for at in np.ndindex(2, 3):
+        one = post_impact_velocities(**(base | {name: many[at]}))
+        assert batch[at].tobytes() == one.tobytes()
+    assert len(np.unique(batch.reshape(6, 3), axis=0)) > 1  # it does matter
+
+
+def test_scalars_and_the_missing_backward_ratio():
+    full = post_impact_velocities([1, 2, 1], [1, 0, 0], [0.5, 0.5], [0.1], [0.1])
+    assert full.tobytes() == post_impact_velocities([1, 2, 1], [1, 0, 0], 0.5, 0.1).tobytes()
+    light = [[1, 0.1, 1], [1, 0, 0], 0.5, 0.1]
+    assert post_impact_velocities(*light, 0.1).tobytes() == post_impact_velocities(*light).tobytes()
+    assert post_impact_velocities(*light, 0.3).tobytes() != post_impact_velocities(*light).tobytes()
+
+
+def test_empty_batch():
+    assert post_impact_velocities(np.ones((0, 3)), [1, 0, 0], 1, 0.1).shape == (0, 3)
+
+
+def test_integers_are_numbers_too():
+    after = post_impact_velocities(np.array([1, 1], np.int8), [True, False], 1, 0)
+    assert after.tolist() == [0.0, 1.0]
+
+
+def test_inputs_are_left_alone():
+    m, v = np.array([1.0, 0.01, 1.0]), np.array([1.0, 0.0, 0.0])
+    e, f = np.array([0.5, 0.5]), np.array([0.15])
+    post_impact_velocities(m, v, e, f)
+    assert (m.tolist(), v.tolist(), e.tolist(), f.tolist()) == (
+        [1.0, 0.01, 1.0],
+        [1.0, 0.0, 0.0],
+        [0.5, 0.5],
+        [0.15],
+    )
+
+
+# --- meeting -------------------------------------------------------------------------------
+
+
+def test_meeting_moves_only_chains_whose_runs_meet():
+    four = Chain([1] * 4, [1, 0.5, 0, 0], 1), Chain([1] * 3, [1, 0, 0], 1)
+    ends = [
+        [collide(c, ImpulseCorrelation(0.1, meeting=x)).velocities for x in (0, 0.5, 1)]
+        for c in four
+    ]
+    assert np.ptp(ends[0], axis=0).max() > 0.01
+    assert np.ptp(ends[1], axis=0).max() == 0
+
+
+# --- giving up -----------------------------------------------------------------------------
+
+
+def test_impact_not_finished():
+    chain = Chain([1, 1e-6, 1], [1, 0, 0], 1)
+    with pytest.raises(ImpactNotFinished, match="max_events = 50") as caught:
+        collide(chain, ImpulseCorrelation(0.0, max_events=50))
+    trace = caught.value.trace
+    assert isinstance(caught.value, RuntimeError)
+    assert trace.chain is chain
+    assert 50 <= len(trace.events) <= 200
+    assert trace.velocities @ chain.masses == pytest.approx(1, rel=1e-15)
+    assert trace.velocities[1] != 0
+    # It went the way of the whole impact, and stands at its last event or a little beyond.
+    whole = collide(chain, ImpulseCorrelation(0.0))
+    k = len(trace.events)
+    assert whole.events[:k] == trace.events
+    assert whole.path[: k + 1].tobytes() == trace.path.tobytes()
+    assert (trace.path_impulses[-1] <= trace.impulses).all()
+    assert (trace.impulses <= whole.path_impulses[k + 2]).all()
+
+
+def test_impact_not_finished_in_a_batch():
+    masses = np.array([[1, 1, 1], [1, 1e-6, 1], [1, 1e-8, 1]])
+    with pytest.raises(ImpactNotFinished, match="max_events = 300") as caught:
+        post_impact_velocities(masses, [1, 0, 0], 1, 0.0, max_events=300)
+    assert caught.value.trace.chain.masses.tolist() == [1, 1e-6, 1]  # the first such chain
+    assert post_impact_velocities(masses[:1], [1, 0, 0], 1, 0.0, max_events=300).shape == (1, 3)
+
+
+def test_enough_events_are_enough():
+    """The limit refuses what needs more, and nothing else."""
+    chain = Chain([1, 0.01, 1], [1, 0, 0], 1)
+    expected = collide(chain, ImpulseCorrelation(0.15)).velocities
+    limits = []
+    for limit in range(1, 200):
+        try:
+            after = collide(chain, ImpulseCorrelation(0.15, max_events=limit)).velocities
+        except ImpactNotFinished:
+            limits.append(limit)
+        else:
+            assert after.tobytes() == expected.tobytes()
+    assert limits == list(range(1, len(limits) + 1))
+    assert 10 < len(limits) < 100
+
+
+def test_long_unfinished_records_are_cut():
+    chain = Chain([1, 1e-12, 1], [1, 0, 0], 1)
+    with pytest.raises(ImpactNotFinished) as caught:
+        collide(chain, ImpulseCorrelation(0.0, max_events=120_000))
+    trace = caught.value.trace
+    assert len(trace.events) == 100_000
+    assert trace.path.shape == (100_001, 3)
+    recorded = sum(event.kind == "close" for event in trace.events)
+    assert trace.collisions.sum() > recorded + 1000
+    assert trace.velocities @ chain.masses == pytest.approx(1, rel=1e-14)

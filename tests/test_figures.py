@@ -1,0 +1,150 @@
+"""The drawings show the numbers of the trace, where the trace has them."""
+
+import struct
+import subprocess
+import sys
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from cradle import Chain, ImpulseCorrelation, collide, figures, paper_chain
+
+
+@pytest.fixture
+def ax():
+    return Figure().subplots()
+
+
+@pytest.fixture
+def trace():
+    """A chain whose first contact closes again, driven by the second (as in the paper's Fig. 5)."""
+    return collide(Chain([1, 1, 1], [1, 0.8, 0], 0.2), ImpulseCorrelation(0.1))
+
+
+def test_import_of_the_package_loads_no_matplotlib():
+    script = "import cradle, sys; sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
+def test_velocities_draws_the_whole_path(ax, trace):
+    lines = figures.velocities(trace, ax).get_lines()
+    for ball, line in enumerate(lines):
+        np.testing.assert_array_equal(line.get_xdata(), trace.path_impulses.sum(axis=1))
+        np.testing.assert_array_equal(line.get_ydata(), trace.path[:, ball])
+
+
+def test_progress_grows_at_every_event(trace):
+    assert np.all(np.diff(figures.progress(trace)) >= 0)
+    assert figures.progress(trace)[-1] == pytest.approx(trace.impulses.sum())
+
+
+@pytest.mark.parametrize("contact", [0, 1])
+def test_velocity_impulse_marks_each_event_of_its_contact(ax, trace, contact):
+    figures.velocity_impulse(trace, contact, ax)
+    left, right = ax.get_lines()[:2]
+    np.testing.assert_array_equal(left.get_xdata(), trace.path_impulses[:, contact])
+    np.testing.assert_array_equal(left.get_ydata(), trace.path[:, contact])
+    np.testing.assert_array_equal(right.get_ydata(), trace.path[:, contact + 1])
+    marked = {
+        (line.get_marker(), *line.get_ydata())
+        for line in ax.get_lines()[2:]
+        if line.get_marker() != "None"
+    }
+    expected = {
+        (figures.EVENT_STYLES[event.kind][0], *trace.path[row, contact : contact + 2])
+        for row, event in enumerate(trace.events, start=1)
+        if event.contact == contact
+    }
+    assert marked == expected
+
+
+def test_a_velocity_jumps_where_another_contact_acts(ax, trace):
+    """The first contact rests while the second slows ball 2: its impulse stays, v2 changes."""
+    line = figures.velocity_impulse(trace, 0, ax).get_lines()[1]
+    x, y = line.get_data()
+    jumps = (np.diff(x) == 0) & (np.diff(y) != 0)
+    assert jumps.any()
+
+
+def test_letters_carry_the_number_of_the_collision(ax, trace):
+    figures.velocity_impulse(trace, 0, ax)
+    letters = " ".join(text.get_text() for text in ax.texts)
+    assert letters.split() == ["c1", "f1", "s2", "c2", "f2"]
+
+
+def test_a_first_closing_starts_the_first_collision(ax):
+    # Contact 1-2 is idle at first: balls 2 and 3 part from ball 1 in the beginning.
+    late = collide(Chain([1, 1, 1], [0, 1, 0], 1), ImpulseCorrelation(0.1))
+    figures.velocity_impulse(late, 1, ax)
+    assert not any(text.get_text().endswith("2") for text in ax.texts)
+
+
+def test_upper_axis_follows_the_path(ax, trace):
+    """A tick of the upper axis stands where the path has that impulse, by a second route."""
+    upper = figures.impulse_axis(trace, 0, 1, ax, values=trace.path_impulses[:, 1].mean())
+    (x,) = upper.get_xticks()
+    value = trace.path_impulses[:, 1].mean()
+    for (a0, a1), (b0, b1) in pairwise(trace.path_impulses):
+        if a1 <= value <= b1 and b1 > a1:
+            assert x == pytest.approx(a0 + (b0 - a0) * (value - a1) / (b1 - a1))
+            break
+    else:
+        raise AssertionError("the path never reaches the value")
+
+
+def test_upper_axis_keeps_both_ends_and_does_not_crowd(ax, trace):
+    figures.velocity_impulse(trace, 0, ax, other=1)
+    upper = ax.figure.axes[-1]
+    ticks = upper.get_xticks()
+    assert ticks[0] == 0
+    assert ticks[-1] == trace.impulses[0]
+    assert np.diff(ticks).min() >= 0.07 * trace.impulses[0]
+    assert upper.get_xticklabels()[-1].get_text().endswith(f"{trace.impulses[1]:.3g}")
+
+
+def test_outcome_by_ball_normalises_by_the_striker(ax):
+    traces = [collide(*paper_chain("CDAB", speed=speed)) for speed in (0.5, 2.0)]
+    figures.outcome_by_ball(traces, ax, letters="CDAB")
+    points = [line for line in ax.get_lines() if line.get_linestyle() == "None"]
+    assert len(points) == len(traces)
+    for line, trace in zip(points, traces):
+        np.testing.assert_array_equal(line.get_xdata(), [1, 2, 3, 4])
+        np.testing.assert_allclose(line.get_ydata(), trace.velocities / trace.chain.velocities[0])
+
+
+def test_chain_sketch_touches_and_scales_by_volume(ax):
+    figures.chain_sketch(Chain([1, 8, 0.001], [1, 0, -2], 1), ax)
+    balls = [patch for patch in ax.patches if isinstance(patch, Circle)]
+    radii = np.array([ball.get_radius() for ball in balls])
+    places = np.array([ball.get_center()[0] for ball in balls])
+    np.testing.assert_allclose(radii**3 / radii[1] ** 3, [1 / 8, 1, 0.001 / 8])
+    np.testing.assert_allclose(np.diff(places), radii[:-1] + radii[1:])
+    arrows = [text for text in ax.texts if text.get_text() == ""]
+    lengths = [arrow.xy[0] - arrow.xyann[0] for arrow in arrows]
+    np.testing.assert_allclose(lengths, [0.45, -0.9])  # in proportion, and in direction
+
+
+def test_chain_sketch_of_balls_at_rest(ax):
+    figures.chain_sketch(Chain([1, 1], [0, 0], 1), ax)
+    assert not [text for text in ax.texts if text.get_text() == ""]
+
+
+def test_balls_differ_in_colour_and_in_dash():
+    styles = [figures.ball_style(ball) for ball in range(7)]
+    assert len({style["color"] for style in styles}) == 7
+    assert len({str(style["linestyle"]) for style in styles}) == 7
+    # Told apart in grey as well: the first three, which most figures need.
+    grey = [np.dot(to_rgb(style["color"]), [0.2126, 0.7152, 0.0722]) for style in styles[:3]]
+    assert len(set(np.round(grey, 2))) == 3
+
+
+def test_readme_picture_is_sharp_and_small(root):
+    head = (root / "book" / "_static" / "cradle.png").read_bytes()
+    width, height = struct.unpack(">II", head[16:24])
+    assert width >= 1500
+    assert height >= 700
+    assert len(head) < 200_000

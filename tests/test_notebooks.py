@@ -1,0 +1,159 @@
+"""What nbval does not see: cleared outputs, warnings, timestamps, figures without a description.
+
+nbval runs every notebook and compares its outputs (options in pyproject.toml). It would pass a
+notebook whose outputs were cleared, so the stored form itself is checked here.
+"""
+
+import copy
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+
+BOOK = Path(__file__).parents[1] / "book"
+NOTEBOOKS = sorted(BOOK.glob("**/*.ipynb"))
+
+# Random ids (animations, styled tables) cannot be compared. A handful of cells in the whole book.
+MOST_UNCOMPARED_CELLS = 5
+UNCOMPARED = re.compile(r"nbval-ignore-output|NBVAL_IGNORE_OUTPUT|PYTEST_VALIDATE_IGNORE_OUTPUT")
+UNRUN = re.compile(
+    r"nbval-skip|NBVAL_SKIP|raises-exception|NBVAL_RAISES_EXCEPTION|nbval-check-output|skip-execution"
+)
+
+
+def marks(cell) -> str:
+    """Return all that tells nbval how to treat a cell: its tags, and comments in its source."""
+    comments = [line for line in cell.source.splitlines() if line.lstrip().startswith("#")]
+    return "\n".join([*cell.metadata.get("tags", []), *comments])
+
+
+def shows_image(cell) -> bool:
+    return any(
+        kind.startswith("image/") for output in cell.outputs for kind in output.get("data", {})
+    )
+
+
+def faults(notebook) -> list[str]:
+    """List what is wrong with the stored form of a notebook."""
+    found = []
+    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    counts = [cell.execution_count for cell in code]
+    if counts != list(range(1, len(code) + 1)):
+        found.append(f"execution counts {counts}: not run once from top to bottom")
+    if "widgets" in notebook.metadata:
+        found.append("widget state is stored")
+    for number, cell in enumerate(code, start=1):
+        where = f"code cell {number}: "
+        kinds = [output.output_type for output in cell.outputs]
+        if "error" in kinds:
+            found.append(where + "ends in an error")
+        if any(output.get("name") == "stderr" for output in cell.outputs):
+            found.append(where + "writes to stderr (a warning?)")
+        if "execution" in cell.metadata:
+            found.append(where + "stores when it ran")
+        if UNRUN.search(marks(cell)):
+            found.append(where + "is not run, or may fail")
+        if shows_image(cell):
+            settings = cell.metadata.get("mystnb", {})
+            if not settings.get("image", {}).get("alt", "").strip():
+                found.append(where + "image without alt text")
+            if not settings.get("figure", {}).get("caption", "").strip():
+                found.append(where + "image without caption")
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown" and re.search(r"!\[\s*\]\(", cell.source):
+            found.append("an image in the text has no alt text")
+    return found
+
+
+def test_the_book_has_notebooks():
+    assert NOTEBOOKS
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_stored_form(path: Path):
+    assert faults(nbformat.read(path, as_version=4)) == []
+
+
+def test_few_cells_escape_comparison():
+    escaping = [
+        f"{path.name}: {cell.source[:60]}"
+        for path in NOTEBOOKS
+        for cell in nbformat.read(path, as_version=4).cells
+        if cell.cell_type == "code" and UNCOMPARED.search(marks(cell))
+    ]
+    assert len(escaping) <= MOST_UNCOMPARED_CELLS, escaping
+
+
+def sample():
+    """Return a small notebook without a fault."""
+    picture = new_output("display_data", data={"image/png": "", "text/plain": "<Figure>"})
+    described = {"mystnb": {"image": {"alt": "A line."}, "figure": {"caption": "A line."}}}
+    return new_notebook(
+        cells=[
+            new_markdown_cell("![a ball](ball.svg)"),
+            new_code_cell(
+                "print(6 * 7)",
+                execution_count=1,
+                outputs=[new_output("stream", name="stdout", text="42\n")],
+            ),
+            new_code_cell("draw()", execution_count=2, outputs=[picture], metadata=described),
+        ]
+    )
+
+
+def change(path, value):
+    def spoil(notebook):
+        target = notebook.cells
+        for key in path[:-1]:
+            target = target[key]
+        target[path[-1]] = value
+
+    return spoil
+
+
+@pytest.mark.parametrize(
+    ("spoil", "fault"),
+    [
+        (change([1, "execution_count"], None), "not run once"),
+        (change([2, "execution_count"], 3), "not run once"),
+        (change([1, "outputs", 0], new_output("error", ename="E", evalue="")), "an error"),
+        (change([1, "outputs", 0, "name"], "stderr"), "stderr"),
+        (change([1, "metadata", "execution"], {"iopub.execute_input": "..."}), "when it ran"),
+        (change([1, "metadata", "tags"], ["nbval-skip"]), "not run"),
+        (change([1, "metadata", "tags"], ["raises-exception"]), "may fail"),
+        (change([1, "source"], "# NBVAL_SKIP\nprint(42)"), "not run"),
+        (change([2, "metadata", "mystnb", "image", "alt"], " "), "without alt text"),
+        (change([2, "metadata", "mystnb", "figure"], {}), "without caption"),
+        (change([2, "metadata"], {}), "without alt text"),
+        (change([0, "source"], "![](ball.svg)"), "no alt text"),
+        (lambda notebook: notebook.metadata.update(widgets={}), "widget state"),
+    ],
+)
+def test_each_fault_is_seen(spoil, fault):
+    notebook = copy.deepcopy(sample())
+    assert faults(notebook) == []
+    spoil(notebook)
+    assert any(fault in line for line in faults(notebook))
+
+
+@pytest.mark.parametrize(("stored", "outcome"), [("42\n", 0), ("43\n", 1)])
+def test_one_changed_digit_fails(tmp_path: Path, root: Path, stored: str, outcome: int):
+    """The project's own options compare stored outputs; a lax option would pass both."""
+    notebook = sample()
+    notebook.cells = notebook.cells[:2]
+    notebook.cells[1].outputs[0].text = stored
+    nbformat.write(notebook, tmp_path / "sample.ipynb")
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-p", "no:cacheprovider",
+         "--config-file", root / "pyproject.toml", tmp_path / "sample.ipynb"],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )  # fmt: skip
+    assert run.returncode == outcome, run.stdout
+    assert ("1 passed" if outcome == 0 else "1 failed") in run.stdout

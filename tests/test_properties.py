@@ -1,0 +1,243 @@
+"""What must hold for every chain: conservation, order, invariance, an end."""
+
+import numpy as np
+import pytest
+from chains import random_chains, within_bounds
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide
+from cradle.models.correlation import outcomes
+
+unit = st.one_of(st.sampled_from([0.0, 1.0]), st.floats(0, 1))
+exponent = st.floats(-3, 3)
+speed = st.one_of(st.sampled_from([0.0, 0.0, 1.0]), st.floats(-1, 1))
+
+
+@st.composite
+def impacts(draw, single_striker=False):
+    """Chain of 2 to 8 balls, masses over six decades, e in [0, 1], ratios up to their bounds."""
+    n = draw(st.integers(2, 8))
+    m = 10.0 ** np.array(draw(st.lists(exponent, min_size=n, max_size=n)))
+    if single_striker:
+        v = np.zeros(n)
+        v[0] = 1.0
+    else:
+        v = np.array(draw(st.lists(speed, min_size=n, max_size=n)))
+        v[np.abs(v) < 1e-100] = 0.0  # scaled by powers of two below, these would be subnormal
+    e = draw(st.lists(unit, min_size=n - 1, max_size=n - 1))
+    parts = iter([*draw(st.lists(unit, min_size=2 * n, max_size=2 * n))])
+    forward, backward = within_bounds(
+        m, lambda shape: np.array([next(parts) for _ in range(shape[-1])])
+    )
+    return Chain(m, v, e), forward, backward, draw(unit)
+
+
+def outcome(chain, forward, backward, meeting, limit=20_000):
+    """None where the impact is too long for a property: millions of impacts are legitimate."""
+    # A bound computed from masses in other units may differ by an ulp: "raise" admits that.
+    model = ImpulseCorrelation(forward, backward, meeting=meeting, max_events=limit)
+    try:
+        return collide(chain, model)
+    except ImpactNotFinished:
+        return None
+
+
+def relative_energy(chain, velocities):
+    """Kinetic energy of the motion relative to the centre of mass."""
+    centre = chain.masses @ velocities / chain.masses.sum()
+    return 0.5 * chain.masses @ (velocities - centre) ** 2
+
+
+@settings(max_examples=400)
+@given(impacts())
+def test_momentum_energy_and_order(impact):
+    trace = outcome(*impact)
+    if trace is None:
+        return
+    chain, after = trace.chain, trace.velocities
+    assert np.isfinite(after).all()
+    assert (np.diff(after) >= 0).all()  # exact
+    total = chain.masses @ np.abs(chain.velocities)
+    assert abs(chain.masses @ after - chain.momentum) <= 4e-15 * len(chain) * total
+    assert (trace.impulses >= 0).all()
+    assert (trace.absorbed >= 0).all()
+    # The ledger: loss = sum (1 - e^2) absorbed.  Its measure is the energy that the impact can
+    # touch: that of the relative motion.
+    before = relative_energy(chain, chain.velocities)
+    loss = before - relative_energy(chain, after)
+    # Near its bound a ratio is 1 - (light mass / heavy mass), so that the difference of two rates
+    # keeps as many digits fewer as the masses differ by powers of ten.
+    digits = 1e-13 + 8 * np.finfo(float).eps * chain.masses.max() / chain.masses.min()
+    rounding = digits * before * max(1.0, np.sqrt(len(trace.events)))
+    assert loss >= -rounding
+    # The limit of an infinite sequence is the sum of a geometric series.  Its factor L is known to
+    # 1e-13 (SELF_SIMILAR in the kernel), and the energy of all cycles multiplies that error by
+    # 1 / (1 - L), here up to some hundreds.  The velocities do not suffer from it.
+    assert abs(loss - trace.energy_loss) <= (300 * rounding if trace.collapsed else rounding)
+
+
+@settings(max_examples=200)
+@given(impacts(), st.integers(-40, 40), st.integers(-40, 40))
+def test_units_that_are_powers_of_two_change_no_bit(impact, speeds, masses):
+    chain, *ratios = impact
+    trace = outcome(*impact)
+    scaled = outcome(
+        Chain(
+            np.ldexp(chain.masses, masses), np.ldexp(chain.velocities, speeds), chain.restitution
+        ),
+        *ratios,
+    )
+    if trace is None:
+        assert scaled is None
+        return
+    assert scaled.velocities.tobytes() == np.ldexp(trace.velocities, speeds).tobytes()
+    assert scaled.impulses.tobytes() == np.ldexp(trace.impulses, speeds + masses).tobytes()
+    assert scaled.absorbed.tobytes() == np.ldexp(trace.absorbed, 2 * speeds + masses).tobytes()
+    assert scaled.events == trace.events
+    assert scaled.collapsed == trace.collapsed
+    assert scaled.saturated == trace.saturated
+
+
+@settings(max_examples=50)
+@given(impacts(single_striker=True), st.sampled_from([-450, 450]), st.sampled_from([-300, 300]))
+def test_nothing_overflows_in_extreme_units(impact, speeds, masses):
+    """Velocities around 1e-135 or 1e135 m/s, masses around 1e-90 or 1e90 kg."""
+    chain, *ratios = impact
+    trace = outcome(*impact)
+    m, v = np.ldexp(chain.masses, masses), np.ldexp(chain.velocities, speeds)
+    if 2 * speeds + masses > 900:  # there the kinetic energy itself overflows
+        with pytest.raises(ValueError, match="kinetic energy"):
+            Chain(m, v, chain.restitution)
+        return
+    scaled = outcome(Chain(m, v, chain.restitution), *ratios)
+    if trace is not None:
+        assert scaled.velocities.tobytes() == np.ldexp(trace.velocities, speeds).tobytes()
+        assert scaled.events == trace.events
+
+
+# Boosts, other units and mirrors round differently.  What that does to an outcome depends on the
+# chain: each impact of a light ball amplifies a rounding error, simultaneous events may change
+# places, and near the edge between two sequences of events the outcome jumps.  So these
+# invariances are tested on chains of generic numbers (no exact ties, no ratio at its bound, where
+# an ulp moves the outcome by its square root) with few events, and against a tolerance measured
+# on the chain itself: how far the outcome moves when every input moves by 1e-13 of itself.  Long
+# and collapsed sequences, which forget that much, are left out.
+
+
+def generic_chains(seed, count, striker=False):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        n = int(rng.integers(2, 9))
+        m = 10 ** rng.uniform(-3, 3, n)
+        v = np.eye(n)[0] if striker else rng.uniform(-1, 1, n)
+        e = rng.uniform(0.02, 0.98, n - 1)
+        f, b = within_bounds(m, lambda shape: rng.uniform(0.02, 0.98, shape))
+        meeting = rng.choice([0.5, rng.random()])
+        trace = outcome(Chain(m, v, e), f, b, meeting, limit=100)
+        if trace is None or trace.collapsed:
+            continue
+        # The condition of the chain.
+        moved = 0.0
+        for _ in range(4):
+            nudge = [part * (1 + 1e-13 * rng.uniform(-1, 1, np.shape(part))) for part in (m, v, e)]
+            near = outcome(Chain(*nudge), f, b, meeting)
+            same = near is not None and near.events == trace.events
+            moved = max(moved, np.abs(near.velocities - trace.velocities).max() if same else np.inf)
+        if moved < 1e-9:
+            yield trace, (m, v, e, f, b, meeting), 1e-13 + moved
+
+
+def test_boost():
+    checked = 0
+    for trace, (m, v, e, f, b, meeting), tolerance in generic_chains(1, 500):
+        boosted = outcome(Chain(m, v + 0.375, e), f, b, meeting)
+        np.testing.assert_allclose(
+            boosted.velocities - 0.375, trace.velocities, rtol=0, atol=tolerance
+        )
+        assert boosted.events == trace.events
+        checked += 1
+    assert checked > 300
+
+
+def test_units():
+    checked = 0
+    for trace, (m, v, e, f, b, meeting), tolerance in generic_chains(2, 500):
+        other = outcome(Chain(1000 * m, 3.6 * v, e), f, b, meeting)
+        np.testing.assert_allclose(other.velocities / 3.6, trace.velocities, rtol=0, atol=tolerance)
+        assert other.events == trace.events
+        checked += 1
+    assert checked > 300
+
+
+def test_mirror_of_a_single_striker():
+    """Balls reversed, velocities negated, directions exchanged, meeting -> 1 - meeting."""
+    checked = met = 0
+    for trace, (m, v, e, f, b, meeting), tolerance in generic_chains(3, 500, striker=True):
+        mirror = outcome(Chain(m[::-1], -v[::-1], e[::-1]), b[::-1], f[::-1], 1 - meeting)
+        np.testing.assert_allclose(
+            -mirror.velocities[::-1], trace.velocities, rtol=0, atol=tolerance
+        )
+        assert mirror.collisions[::-1].tolist() == trace.collisions.tolist()
+        checked += 1
+        met += any(
+            np.abs(row[c] - row[c + 1]) < 1e-13 and 0 < c < len(m) - 2
+            for row, (kind, c) in zip(trace.path[1:], trace.events)
+            if kind == "close"
+        )
+    assert checked > 200
+    assert met > 50
+
+
+def check(chains, result):
+    """Momentum, energy and order of a batch."""
+    m, v = chains[:2]
+    after, n = result.velocities, m.shape[1]
+    assert np.isfinite(after).all()
+    assert (np.diff(after, axis=1) >= 0).all()
+    momentum, size = (m * (after - v)).sum(axis=1), (m * np.abs(v)).sum(axis=1)
+    assert (np.abs(momentum) <= 4e-15 * n * size).all()
+    centre = (m * v).sum(axis=1, keepdims=True) / m.sum(axis=1, keepdims=True)
+    before, later = ((m * (x - centre) ** 2).sum(axis=1) for x in (v, after))
+    assert (later <= before * (1 + 1e-12)).all()
+
+
+def test_twenty_thousand_chains_finish():
+    """Ends of e and ratios (up to their bounds) included; none exceeds the default limit.
+
+    Masses lie within six decades for up to four balls, within four decades for five to eight.
+    """
+    rng = np.random.default_rng(2001)
+    total = collapsed = 0
+    for n in range(2, 9):
+        chains = random_chains(rng, 2900, n, decades=6 if n < 5 else 4)
+        result = outcomes(*chains)  # raises if one does not finish
+        check(chains, result)
+        total += len(result.velocities)
+        collapsed += result.collapsed.sum()
+    assert total >= 20_000
+    assert 1000 < collapsed < 19_000
+
+
+@pytest.mark.parametrize("n", [5, 6, 7, 8])
+def test_six_decades_of_mass_finish_or_say_so(n):
+    """Two light balls among heavy ones can take millions of impacts to their limit.
+
+    Such an impact is legitimate and slow, so here the limit is low: nearly all chains stay below
+    it, and the others stand, when they raise, where momentum and energy allow.
+    """
+    rng = np.random.default_rng(n)
+    stopped, chains = 0, random_chains(rng, 250, n, decades=6)
+    for m, v, e, f, b in zip(*chains):
+        chain = Chain(m, v, e)
+        try:
+            trace = collide(chain, ImpulseCorrelation(f, b, max_events=20_000))
+        except ImpactNotFinished as unfinished:
+            trace = unfinished.trace
+            stopped += 1
+        assert np.isfinite(trace.velocities).all()
+        assert abs(m @ trace.velocities - m @ v) <= 4e-15 * n * (m @ np.abs(v))
+        before = relative_energy(chain, v)
+        assert relative_energy(chain, trace.velocities) <= before * (1 + 1e-12)
+    print(f"{n} balls: {stopped} of 250 take more than 20 000 steps")
+    assert stopped < 50

@@ -1,0 +1,230 @@
+"""One collision after another, and one solid body: the two ends that the ratio bridges."""
+
+import re
+
+import numpy as np
+import pytest
+
+from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide
+from cradle.models.sequential import FusedChain, SequentialCollisions
+
+ARRAYS = ("velocities", "impulses", "absorbed", "collisions", "path", "path_impulses")
+
+
+def binary(masses, velocities, restitution, c):
+    """Velocities and impulse of one collision of balls c and c + 1 alone."""
+    m1, m2 = masses[c : c + 2]
+    impulse = (1 + restitution[c]) * m1 * m2 / (m1 + m2) * (velocities[c] - velocities[c + 1])
+    after = velocities.copy()
+    after[c] -= impulse / m1
+    after[c + 1] += impulse / m2
+    return after, impulse
+
+
+def by_rounds(chain, first):
+    """Collide pair after pair; the pairs of a round share no ball, so their order is no choice."""
+    v, impulses = chain.velocities.copy(), np.zeros(len(chain) - 1)
+    due = [first]
+    while due:
+        assert all(b - a > 1 for a, b in zip(due, due[1:]))
+        for c in due:
+            v, impulse = binary(chain.masses, v, chain.restitution, c)
+            impulses[c] += impulse
+        due = [c for c in range(len(v) - 1) if v[c] - v[c + 1] > 1e-13]
+    return v, impulses
+
+
+def test_equations_5_and_6():
+    """Han and Gilmore's two answers for three equal elastic balls."""
+    chain = Chain([1, 1, 1], [1, 0, 0], 1)
+    fused = collide(chain, FusedChain()).velocities
+    np.testing.assert_allclose(fused, [-1 / 3, 2 / 3, 2 / 3], rtol=0, atol=2e-16)
+    assert collide(chain, SequentialCollisions()).velocities.tolist() == [0, 0, 1]
+
+
+@pytest.mark.parametrize("n", range(2, 6))
+def test_one_striker_collides_pair_after_pair(n):
+    rng = np.random.default_rng(n)
+    for _ in range(50):
+        velocities = np.zeros(n)
+        velocities[0] = rng.uniform(0.1, 10)
+        chain = Chain(10 ** rng.uniform(-1, 1, n), velocities, rng.uniform(0.6, 1, n - 1))
+        trace = collide(chain, SequentialCollisions())
+        v, impulses = by_rounds(chain, 0)
+        np.testing.assert_allclose(trace.velocities, v, rtol=0, atol=1e-11 * velocities[0])
+        np.testing.assert_allclose(trace.impulses, impulses, rtol=1e-11)
+        assert not trace.collapsed
+        after = 0.5 * chain.masses @ trace.velocities**2
+        assert after + trace.energy_loss == pytest.approx(chain.kinetic_energy, rel=1e-13)
+
+
+@pytest.mark.parametrize("order", ["left", "right"])
+@pytest.mark.parametrize("n", range(2, 9))
+def test_outcome_is_that_of_its_collisions_one_by_one(n, order):
+    """Whatever the order of the collisions, each is one of two balls alone, and none is missing."""
+    rng = np.random.default_rng(n)
+    for _ in range(50):
+        e = rng.uniform(0.9, 1, n - 1)
+        chain = Chain(10 ** rng.uniform(-1, 1, n), rng.normal(size=n), e)
+        trace = collide(chain, SequentialCollisions(order))
+        assert not trace.collapsed
+        v = chain.velocities.copy()
+        for kind, c in trace.events:
+            if kind == "end":
+                assert v[c] - v[c + 1] > -1e-12
+                v, _ = binary(chain.masses, v, e, c)
+        np.testing.assert_allclose(trace.velocities, v, rtol=0, atol=1e-12)
+        assert (np.diff(v) > -1e-12).all()
+
+
+@pytest.mark.parametrize(("order", "first"), [("left", 0), ("right", 1)])
+def test_order_names_the_end_that_collides_first(order, first):
+    chain = Chain([1, 2, 1.5], [1, 0, -0.5], [1, 0.8])
+    trace = collide(chain, SequentialCollisions(order))
+    np.testing.assert_allclose(trace.velocities, by_rounds(chain, first)[0], rtol=0, atol=1e-14)
+    assert trace.events[0] == ("maximum_compression", first)
+    other = "left" if order == "right" else "right"
+    assert (
+        abs(collide(chain, SequentialCollisions(other)).velocities - trace.velocities).max() > 0.1
+    )
+
+
+def test_right_is_the_mirror_image_of_left():
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        n = int(rng.integers(2, 7))
+        m, v, e = rng.uniform(0.1, 10, n), rng.normal(size=n), rng.uniform(0.3, 1, n - 1)
+        left = collide(Chain(m, v, e), SequentialCollisions("left"))
+        right = collide(Chain(m[::-1], -v[::-1], e[::-1]), SequentialCollisions("right"))
+        for name in ARRAYS:
+            mirrored = getattr(right, name)[..., ::-1]
+            if name in ("velocities", "path"):
+                mirrored = -mirrored
+            np.testing.assert_array_equal(getattr(left, name), mirrored)
+        assert [(kind, n - 2 - c) for kind, c in right.events] == list(left.events)
+
+
+@pytest.mark.parametrize("order", ["left", "right"])
+def test_trace_belongs_to_the_chain_and_the_model(order):
+    chain, model = Chain([1, 2, 3], [1, 0, -1], 0.9), SequentialCollisions(order)
+    trace = collide(chain, model)
+    assert trace.chain is chain
+    assert trace.model is model
+    np.testing.assert_array_equal(trace.path[0], chain.velocities)
+    np.testing.assert_array_equal(trace.path[-1], trace.velocities)
+
+
+@pytest.mark.parametrize("order", ["left", "right"])
+def test_endless_sequences_reach_their_limit(order):
+    trace = collide(Chain([1, 1, 1], [2, 1, 0], 0), SequentialCollisions(order))
+    assert trace.collapsed
+    np.testing.assert_allclose(trace.velocities, 1, rtol=1e-12)
+
+
+@pytest.mark.parametrize("order", ["left", "right"])
+def test_unfinished_impact_shows_what_was_reached(order):
+    chain = Chain([100, 1, 100], [1, 0, -1], 1)
+    model = SequentialCollisions(order, max_events=3)
+    with pytest.raises(ImpactNotFinished, match="max_events = 3 steps") as stopped:
+        collide(chain, model)
+    trace = stopped.value.trace
+    assert trace.chain is chain
+    assert trace.model is model
+    assert chain.masses @ trace.velocities == pytest.approx(chain.momentum, abs=1e-13)
+    assert np.argmax(trace.collisions) == (0 if order == "left" else 1)
+
+
+def test_balls_that_do_not_approach_keep_their_velocities():
+    chain = Chain([1, 2, 3], [-1, 0, 0], 0.5)
+    for model in (SequentialCollisions("left"), SequentialCollisions("right"), FusedChain()):
+        trace = collide(chain, model)
+        assert trace.velocities.tolist() == [-1, 0, 0]
+        assert trace.path.tolist() == [[-1, 0, 0]]
+        assert not trace.events
+        assert not trace.collisions.any()
+
+
+# --- one solid body ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n", range(2, 7))
+def test_fused_bodies_collide_like_two_balls(n):
+    rng = np.random.default_rng(n)
+    for struck in range(n - 1):
+        m, e = 10 ** rng.uniform(-2, 2, n), rng.uniform(0, 1, n - 1)
+        v = np.where(np.arange(n) <= struck, 1.7, -0.4)
+        chain = Chain(m, v, e)
+        trace = collide(chain, FusedChain())
+        bodies = [m[: struck + 1].sum(), m[struck + 1 :].sum()]
+        after, impulse = binary(bodies, np.array([1.7, -0.4]), [e[struck]], 0)
+        expected = np.where(np.arange(n) <= struck, *after)
+        np.testing.assert_allclose(trace.velocities, expected, rtol=0, atol=2e-14)
+        assert trace.impulses[struck] == pytest.approx(impulse, rel=1e-14)
+        # Newton's law, ball by ball: what is passed on keeps the balls of a body together.
+        passed = np.concatenate([[0], trace.impulses, [0]])
+        np.testing.assert_allclose(
+            m * (trace.velocities - v), passed[:-1] - passed[1:], rtol=0, atol=1e-13 * m.sum()
+        )
+        lost = chain.kinetic_energy - 0.5 * m @ trace.velocities**2
+        assert trace.energy_loss == pytest.approx(lost, abs=1e-14 * chain.kinetic_energy)
+        assert trace.events[:2] == (("maximum_compression", struck), ("end", struck))
+        assert trace.path[1].tolist() == pytest.approx(np.full(n, m @ v / m.sum()).tolist())
+
+
+@pytest.mark.parametrize("n", range(2, 7))
+def test_fused_is_the_largest_admissible_ratio_everywhere(n):
+    rng = np.random.default_rng(n)
+    largest = ImpulseCorrelation(1, 1, excess="saturate")
+    for struck in range(n - 1):
+        v = np.where(np.arange(n) <= struck, 1.0, 0.0)
+        chain = Chain(10 ** rng.uniform(-1, 1, n), v, rng.uniform(0, 1, n - 1))
+        fused, expected = collide(chain, FusedChain()), collide(chain, largest)
+        for name in ARRAYS:
+            np.testing.assert_allclose(
+                getattr(fused, name), getattr(expected, name), rtol=1e-12, atol=1e-13
+            )
+        assert sorted(fused.events) == sorted(expected.events)
+        assert fused.saturated == expected.saturated
+
+
+def test_fused_masses_whose_sum_overflows():
+    trace = collide(Chain([1.5e308] * 3, [1e-3, 0, 0], 1), FusedChain())
+    np.testing.assert_allclose(trace.velocities, np.array([-1, 2, 2]) / 3e3, rtol=1e-14)
+
+
+# --- input ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("velocities", "what"),
+    [
+        ([2, 1, 0, 0], "contacts [0, 1] approach;"),
+        ([1, 0, 0, 0.5], "contacts [0] approach and [2] open;"),
+        ([0, 1, 0, 0], "contacts [1] approach and [0] open;"),
+    ],
+)
+def test_fused_refuses_where_bodies_are_undefined(velocities, what):
+    message = f"velocities leave it undefined which balls move as one body: {what} FusedChain needs"
+    with pytest.raises(ValueError, match="^" + re.escape(message)):
+        collide(Chain([1, 1, 1, 1], velocities, 1), FusedChain())
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"order": "first"}, "order = 'first'; must be 'left' or 'right'"),
+        ({"order": None}, "order = None; must be 'left' or 'right'"),
+        ({"max_events": 0}, "max_events = 0; must be at least 1"),
+        ({"max_events": 1.5}, "max_events = 1.5; must be a whole number"),
+    ],
+)
+def test_bad_options_name_value_and_rule(options, message):
+    with pytest.raises(ValueError, match="^" + re.escape(message)):
+        SequentialCollisions(**options)
+
+
+def test_repr_is_the_caption():
+    assert repr(SequentialCollisions("right")) == (
+        "SequentialCollisions(order='right', max_events=5000000)"
+    )
+    assert repr(FusedChain()) == "FusedChain()"

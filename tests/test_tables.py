@@ -1,0 +1,148 @@
+"""Tables 1 and 2 and the chains built from them."""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cradle.tables import (
+    ball_masses,
+    paper_chain,
+    paper_sequences,
+    ratio_table,
+    restitution_table,
+)
+
+# Table 2 in the order in which the paper prints it: first two balls down, last ball across.
+# A second reading of the source, independent of data/ratios.csv.
+PRINTED_TABLE_2 = """
+AA .167 .232 .218 .131    BA .374 .296 .088 .050    CA .495 .499 .400 .129    DA .215 .090 .101 .782
+AB .127 .104 .111 .600    BB .340 .310 .216 .390    CB .435 .455 .342 .390    DB .416 .710 .755 .730
+AC .262 .268 .216 .664    BC .389 .408 .319 .731    CC .462 .414 .338 .744    DC .430 .449 .441 .744
+AD .101 .055 .001 .329    BD .041 .046 .001 .446    CD .196 .171 .122 .495    DD .056 .058 .001 .080
+"""
+
+
+def test_table_1_is_symmetric_and_has_the_printed_entries():
+    table = restitution_table()
+    assert list(table.index) == list(table.columns) == list("ABCD")
+    np.testing.assert_array_equal(table, table.T)
+    upper = [table.loc[a, b] for i, a in enumerate("ABCD") for b in "ABCD"[i:]]
+    assert upper == [0.97, 0.53, 0.31, 0.94, 0.36, 0.28, 0.38, 0.27, 0.30, 0.85]
+
+
+def test_table_2_equals_a_second_reading():
+    fields = PRINTED_TABLE_2.split()
+    printed = {
+        fields[i] + last: float(value)
+        for i in range(0, len(fields), 5)
+        for last, value in zip("ABCD", fields[i + 1 : i + 5], strict=True)
+    }
+    table = ratio_table()
+    assert len(printed) == 64
+    assert dict(zip(table.triplet, table.ratio, strict=True)) == printed
+    assert len(table) == 64
+
+
+def test_bound_is_eq_34_and_three_entries_break_it():
+    table = ratio_table().set_index("triplet")
+    assert list(table.columns) == ["ratio", "bound", "admissible"]
+    assert table.admissible.dtype == bool
+    assert table.bound["CCA"] == pytest.approx(45 / (53 + 45), rel=1e-15)
+    assert table.bound["ABD"] == pytest.approx(166 / (53 + 166), rel=1e-15)
+    assert list(table.index[~table.admissible]) == ["CCA", "DBB", "DBC"]
+
+
+def test_interchange_hypothesis_would_repair_all_four_entries():
+    table = ratio_table().set_index("triplet")
+    for one, other in [("DBB", "BBD"), ("DBC", "CBD")]:
+        assert table.ratio[one] <= table.bound[other]
+        assert table.ratio[other] <= table.bound[one]
+    used = {
+        triplet
+        for sequence in paper_sequences()
+        for i in range(len(sequence) - 2)
+        for triplet in (sequence[i : i + 3], sequence[i : i + 3][::-1])
+    }
+    assert used.isdisjoint({"DBB", "BBD", "DBC", "CBD"})
+
+
+def test_masses_are_in_kilograms():
+    assert dict(ball_masses()) == {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}
+
+
+def test_ten_sequences_five_of_four_balls_three_of_five_two_of_six():
+    lengths = [len(sequence) for sequence in paper_sequences()]
+    assert [lengths.count(n) for n in (4, 5, 6)] == [5, 3, 2]
+    assert sorted(paper_sequences().values()) == [10] * 4 + [11] * 2 + [12] * 4
+
+
+def test_shared_tables_cannot_be_changed():
+    with pytest.raises(TypeError):
+        ball_masses()["A"] = 1.0
+
+
+def test_paper_chain_by_hand():
+    chain, model = paper_chain("ABCCA", speed=1.5, excess="saturate", meeting=0.25)
+    np.testing.assert_array_equal(chain.masses, [0.045, 0.053, 0.053, 0.053, 0.045])
+    np.testing.assert_array_equal(chain.velocities, [1.5, 0, 0, 0, 0])
+    np.testing.assert_array_equal(chain.restitution, [0.53, 0.28, 0.27, 0.31])
+    np.testing.assert_array_equal(model.forward, [0.111, 0.319, 0.462])  # ABC, BCC, CCA
+    np.testing.assert_array_equal(model.backward, [0.435, 0.414, 0.216])  # CBA, CCB, ACC
+    assert model.meeting == 0.25
+    assert model.excess == "saturate"
+
+
+@pytest.mark.parametrize("sequence", list(paper_sequences()))
+def test_reversing_the_balls_exchanges_the_directions(sequence):
+    chain, model = paper_chain(sequence)
+    mirrored, mirrored_model = paper_chain(sequence[::-1])
+    np.testing.assert_array_equal(mirrored.masses, chain.masses[::-1])
+    np.testing.assert_array_equal(mirrored.restitution, chain.restitution[::-1])
+    np.testing.assert_array_equal(mirrored_model.forward, model.backward[::-1])
+    np.testing.assert_array_equal(mirrored_model.backward, model.forward[::-1])
+
+
+def test_two_balls_need_no_ratio():
+    chain, model = paper_chain("DA")
+    np.testing.assert_array_equal(chain.restitution, [0.94])
+    assert len(model.forward) == 0
+
+
+@pytest.mark.parametrize(
+    ("sequence", "message"),
+    [
+        ("ABXA", r"sequence\[2\] = 'X'; must be one of A, B, C, D"),
+        ("abc", r"sequence\[0\] = 'a'; must be one of A, B, C, D"),
+        ("AB C", r"sequence\[2\] = ' '; must be one of A, B, C, D"),
+        ("A", r"sequence = 'A'; must name at least 2 balls"),
+        ("", r"sequence = ''; must name at least 2 balls"),
+    ],
+)
+def test_bad_sequences_are_refused(sequence, message):
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        paper_chain(sequence)
+
+
+def test_import_loads_neither_pandas_nor_matplotlib():
+    code = (
+        "import sys, cradle; cradle.paper_chain('ABACA');"
+        "print(sorted({'pandas', 'matplotlib'} & sys.modules.keys()))"
+    )
+    loaded = subprocess.check_output([sys.executable, "-c", code], text=True)
+    assert loaded.strip() == "[]"
+
+
+def test_data_readme_names_every_file_and_column(root: Path):
+    readme = (root / "data" / "README.md").read_text(encoding="utf-8")
+    files = sorted((root / "data").glob("*.csv"))
+    assert len(files) == 5
+    for path in files:
+        assert f"`{path.name}`" in readme
+        with path.open(encoding="utf-8") as file:
+            header = next(csv.reader(file))
+        # Single letters are ball types, explained together.
+        assert all(f"`{column}`" in readme for column in header if len(column) > 1)
