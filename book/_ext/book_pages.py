@@ -1,0 +1,112 @@
+r"""Sphinx extension: what Jupyter Book leaves to be put right in the pages.
+
+- MathJax is served with the book. The file comes from sphinx-mathjax-offline, whose own
+  extension would copy 18 MB of alternatives; one self-contained file of 2 MB is all a page needs.
+- sphinx-thebe, which Jupyter Book always loads, writes scripts that name a server even when live
+  code is off. They are dropped.
+- Sphinx wraps an equation of several lines in `split`, where MathJax refuses the `\tag` that
+  carries the paper's number. Such an equation is passed on as it is.
+- A page that is linked from elsewhere shows a title, a sentence and a picture.
+"""
+
+from html import escape
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.fileutil import copy_asset_file
+
+
+def copy_mathjax(app: Sphinx, exception: Exception | None) -> None:
+    """Put the file that `mathjax_path` names into the built book."""
+    if exception is not None or app.builder.format != "html":
+        return
+    target = Path(app.outdir, "_static", app.config.mathjax_path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with as_file(
+        files("sphinx-mathjax-offline") / "static" / app.config.mathjax_path
+    ) as source:
+        copy_asset_file(str(source), str(target))
+
+
+def drop_thebe(
+    app: Sphinx,
+    page: str,
+    template: str,
+    context: dict[str, Any],
+    doctree: nodes.document | None,
+) -> None:
+    """Remove sphinx-thebe's script files and style sheet from a page."""
+    for kind in ("script_files", "css_files"):
+        if kind in context:
+            context[kind] = [
+                asset for asset in context[kind] if not _is_thebe(asset)
+            ]
+
+
+def drop_thebe_settings(
+    app: Sphinx, doctree: nodes.document, page: str
+) -> None:
+    """Remove the settings that sphinx-thebe writes into the text of a page."""
+    for raw in [
+        node
+        for node in doctree.findall(nodes.raw)
+        if "x-thebe-config" in node.astext()
+    ]:
+        raw.parent.remove(raw)
+
+
+def keep_tags(app: Sphinx, doctree: nodes.document, page: str) -> None:
+    r"""Mark equations with a `\tag`, so that MyST writes them without Sphinx's `split`."""
+    for equation in doctree.findall(nodes.math_block):
+        if r"\tag" in equation.astext():
+            # MyST passes blocks of this class on as they are, if its amsmath extension is on.
+            equation["classes"].append("amsmath")
+
+
+def describe(
+    app: Sphinx,
+    page: str,
+    template: str,
+    context: dict[str, Any],
+    doctree: nodes.document | None,
+) -> None:
+    """Say in the page's head what a link to it may show (the Open Graph properties)."""
+    if doctree is None:
+        return
+    title, text = (
+        next((node.astext() for node in doctree.findall(kind)), "")
+        for kind in (nodes.title, nodes.paragraph)
+    )
+    properties = {
+        "og:type": "article",
+        "og:title": f"{title} - {app.config.html_title}",
+        "og:description": " ".join(text.split())[:200],
+        "og:image": f"{app.config.html_baseurl}_static/cradle.png",
+    }
+    context["metatags"] = context.get("metatags", "") + "".join(
+        f'\n<meta property="{name}" content="{escape(value, quote=True)}" />'
+        for name, value in properties.items()
+    )
+
+
+def _is_thebe(asset: Any) -> bool:
+    text = f"{asset.filename or ''} {getattr(asset, 'attributes', {}).get('body', '')}"
+    return "thebe" in text.lower()
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the callbacks."""
+    # Late, so that every other extension has added its part.
+    app.connect("doctree-resolved", drop_thebe_settings, priority=900)
+    app.connect("html-page-context", drop_thebe, priority=900)
+    app.connect("html-page-context", describe)
+    app.connect("doctree-resolved", keep_tags)
+    app.connect("build-finished", copy_mathjax)
+    return {
+        "version": "1",
+        "parallel_read_safe": True,
+        "parallel_write_safe": True,
+    }

@@ -1,0 +1,51 @@
+"""Draw the picture of README.md from the solver: `python book/draw_readme.py`."""
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from cradle import Chain, ImpulseCorrelation, collide, figures
+
+PICTURE = Path(__file__).parent / "_static" / "cradle.png"
+
+
+def draw() -> Figure:
+    """Draw three equal elastic balls at ratio .15 from the first contact to the last."""
+    chain = Chain(masses=[1, 1, 1], velocities=[1, 0, 0], restitution=1)
+    trace = collide(chain, ImpulseCorrelation(forward=0.15))
+    fig = Figure(figsize=(8, 4.2), layout="constrained")
+    ax = figures.velocities(trace, fig.subplots())
+    ax.get_legend().remove()
+    total = figures.progress(trace)
+    ax.set_xlim(0, 1.28 * total[-1])
+    for ball, velocity in enumerate(trace.velocities):
+        text = f"  ball {ball + 1}: {velocity:.2f} m/s".replace("-", "−")
+        style = {
+            "color": figures.PALETTE[ball],
+            "weight": "bold",
+            "va": "center",
+        }
+        ax.text(total[-1], velocity, text, **style)
+    for row, event in enumerate(trace.events, start=1):
+        marker, _, name = figures.EVENT_STYLES[event.kind]
+        ax.axvline(total[row], color="0.7", lw=0.8, ls=":")
+        pair = trace.path[row, event.contact : event.contact + 2]
+        ax.plot(
+            [total[row]] * 2,
+            pair,
+            marker,
+            mfc="white",
+            mec="black",
+            zorder=3,
+        )
+        ax.annotate(
+            f"{event.contact + 1}-{event.contact + 2}: {name}", (total[row], 1), (0, 4),
+            xycoords=ax.get_xaxis_transform(), textcoords="offset points",
+            fontsize=8, ha="center",
+        )  # fmt: skip
+    return fig
+
+
+if __name__ == "__main__":
+    # No version and no date inside: the same picture at every run.
+    draw().savefig(PICTURE, dpi=200, metadata={"Software": None})

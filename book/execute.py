@@ -1,0 +1,68 @@
+"""Run notebooks from top to bottom and store their outputs, without traces of when and where.
+
+Usage::
+
+    python book/execute.py                       # every notebook of the book
+    python book/execute.py book/intro.ipynb      # one of them
+"""
+
+import os
+import sys
+from pathlib import Path
+
+import nbformat
+from nbclient import NotebookClient
+
+BOOK = Path(__file__).parent
+
+
+def execute(path: Path) -> None:
+    """Run the notebook at `path` in its own folder, as the tests do, and write it back."""
+    notebook = nbformat.read(path, as_version=4)
+    # record_timing would store when each cell ran: a difference at every run.
+    client = NotebookClient(
+        notebook,
+        timeout=120,
+        kernel_name="python3",
+        record_timing=False,
+        coalesce_streams=True,  # one output, however the text arrives
+        resources={"metadata": {"path": str(path.parent)}},
+    )
+    client.execute()
+    strip(notebook)
+    nbformat.validate(notebook)
+    nbformat.write(notebook, path)
+
+
+def strip(notebook: nbformat.NotebookNode) -> None:
+    """Drop what changes from run to run or from machine to machine but says nothing."""
+    notebook.metadata = nbformat.from_dict(
+        {
+            "kernelspec": {
+                "display_name": "Python 3",
+                "language": "python",
+                "name": "python3",
+            },
+            "language_info": {"name": "python"},
+        }
+    )
+    for cell in notebook.cells:
+        for key in ("execution", "collapsed", "scrolled"):
+            cell.metadata.pop(key, None)
+
+
+def main(arguments: list[str]) -> None:
+    """Execute the notebooks named, or all."""
+    # A backend chosen outside would keep figures out of the notebooks.
+    os.environ.pop("MPLBACKEND", None)
+    # Matplotlib writes this instead of the date into an SVG file.
+    os.environ.setdefault("SOURCE_DATE_EPOCH", "0")
+    for path in [Path(name) for name in arguments] or sorted(
+        BOOK.glob("*.ipynb")
+    ):
+        print(path)
+        execute(path)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
