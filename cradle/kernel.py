@@ -359,6 +359,18 @@ def velocities(u, p, out, n, v, shift, m, p0, x):
                 momentum += m[b] * ((math.ldexp(v[b], -shift) - origin) - x[b])
             for b in range(i, j + 1):
                 out[b] = v[k] + math.ldexp(momentum / mass + x[b], shift)
+            # Balls that do not approach stay in order; the momentum's rounding must not tell
+            # otherwise of a ball beside the stretch.
+            for b in range(max(i, 1), j + 1):
+                if u[b - 1] > 0.0 or out[b] >= out[b - 1]:
+                    break
+                out[b] = out[b - 1]
+            if j < n - 1 and (j == n - 2 or p0[j + 1] + p[j + 1] <= 0.0):
+                out[j + 1] = v[j + 1]
+                for b in range(j, i - 1, -1):
+                    if u[b] > 0.0 or out[b] <= out[b + 1]:
+                        break
+                    out[b] = out[b + 1]
         i = j + 1
 
 
