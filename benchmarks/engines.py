@@ -1,0 +1,386 @@
+"""Today's physics engines on the scenes of this book; each is optional and skipped when absent.
+
+All have the same line of balls: radius .5 m, striker at 2 m/s, no gravity, no friction, no
+damping, no sleeping. Three placements: `touching` (gap zero), `apart` (gap one hundredth of a
+diameter), `pressed` (overlap one hundred-thousandth). Two settings: `default` (what the engine
+does if only restitution is given) and `refined` (small step, many iterations, and whatever adds
+or takes energy switched off).
+
+Restitution of a pair is the engine's product of one number a ball where there is such a rule; a
+chain always has such numbers. Box2D takes it from a listener. MuJoCo has no coefficient of
+restitution: its contact is a damped constraint, whose damping is found from two balls.
+"""
+
+import importlib.util
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from measure import Row, distance, outcome, versions
+from scenes import SCENES, Scene
+from solvers import model_error
+
+SPEED, RADIUS = 2.0, 0.5
+PLACEMENTS = {"apart": 1e-2, "touching": 0.0, "pressed": -1e-5}  # gap over diameter
+CHUNK = 10  # steps between looks at the state
+
+#: Two balls, which every engine must get right before its chains mean anything.
+CHECKS = {
+    name: Scene(name, (1.0, 1.0), (e,), (), (), "exact")
+    for name, e in (("two equal, e = 1", 1.0), ("two equal, e = .5", 0.5))
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """Balls on a line as an engine is given them."""
+
+    masses: tuple[float, ...]
+    restitution: tuple[float, ...]
+    placement: str
+
+    @property
+    def positions(self):
+        """Centres, m."""
+        pitch = 2.0 * RADIUS * (1.0 + PLACEMENTS[self.placement])
+        return [pitch * i for i in range(len(self.masses))]
+
+    @property
+    def velocities(self):
+        """m/s."""
+        return [SPEED] + [0.0] * (len(self.masses) - 1)
+
+    @property
+    def factors(self):
+        """One number a ball; the product over a contact is its restitution."""
+        factors = [1.0]
+        for e in self.restitution:
+            factors.append(e / factors[-1])
+        # All of even place times s and of odd place over s: the products stay, the largest meet.
+        s = math.sqrt(max(factors[1::2]) / max(factors[::2]))
+        return [x * s if i % 2 == 0 else x / s for i, x in enumerate(factors)]
+
+
+# Each engine: a function that makes the world and returns `step(count)` and `state()`.
+
+
+def chipmunk(line, *, step, iterations):
+    """Chipmunk through pymunk: sequential impulses with a restitution bias."""
+    import pymunk
+
+    space = pymunk.Space()
+    space.iterations = iterations
+    bodies = []
+    for mass, x, v, factor in zip(
+        line.masses, line.positions, line.velocities, line.factors, strict=True
+    ):
+        body = pymunk.Body(mass, math.inf)
+        body.position, body.velocity = (x, 0), (v, 0)
+        ball = pymunk.Circle(body, RADIUS)
+        ball.elasticity, ball.friction = factor, 0.0
+        space.add(body, ball)
+        bodies.append(body)
+
+    def advance(count):
+        for _ in range(count):
+            space.step(step)
+
+    return advance, lambda: ([b.position.x for b in bodies], [b.velocity.x for b in bodies])
+
+
+def box2d(line, *, step, iterations, faster=1.0):
+    """Box2D 2.3. `faster` scales all speeds and the step: its threshold of 1 m/s is fixed."""
+    from Box2D import b2CircleShape, b2ContactListener, b2FixtureDef, b2World
+
+    class Restitution(b2ContactListener):
+        def PreSolve(self, contact, _):
+            pair = contact.fixtureA.body.userData, contact.fixtureB.body.userData
+            contact.restitution = line.restitution[min(pair)]
+
+    world = b2World(gravity=(0, 0), doSleep=False)
+    # The world keeps no reference to its listener; without one it would be lost.
+    world.contactListener = listener = Restitution()
+    bodies = [
+        world.CreateDynamicBody(
+            position=(x, 0),
+            linearVelocity=(v * faster, 0),
+            fixedRotation=True,
+            allowSleep=False,  # the world's doSleep alone lets slow balls sleep, at rest
+            userData=i,
+            fixtures=b2FixtureDef(
+                shape=b2CircleShape(radius=RADIUS),
+                density=mass / (math.pi * RADIUS**2),
+                friction=0.0,
+                restitution=1.0,
+            ),
+        )
+        for i, (mass, x, v) in enumerate(
+            zip(line.masses, line.positions, line.velocities, strict=True)
+        )
+    ]
+
+    def advance(count, _kept=listener):
+        for _ in range(count):
+            world.Step(step / faster, iterations, 3)
+
+    def state():
+        return [b.position.x for b in bodies], [b.linearVelocity.x / faster for b in bodies]
+
+    return advance, state
+
+
+def bullet(line, *, step, iterations, **parameters):
+    """Bullet through pybullet."""
+    import pybullet
+
+    world = pybullet.connect(pybullet.DIRECT)
+    here = {"physicsClientId": world}
+    pybullet.setGravity(0, 0, 0, **here)
+    pybullet.setPhysicsEngineParameter(
+        fixedTimeStep=step, numSolverIterations=iterations, **parameters, **here
+    )
+    ball = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=RADIUS, **here)
+    bodies = []
+    for mass, x, v, factor in zip(
+        line.masses, line.positions, line.velocities, line.factors, strict=True
+    ):
+        body = pybullet.createMultiBody(mass, ball, basePosition=(x, 0, 0), **here)
+        pybullet.changeDynamics(
+            body, -1, restitution=factor, lateralFriction=0, rollingFriction=0,
+            spinningFriction=0, linearDamping=0, angularDamping=0, **here,
+        )  # fmt: skip
+        pybullet.resetBaseVelocity(body, (v, 0, 0), **here)
+        bodies.append(body)
+
+    def advance(count):
+        for _ in range(count):
+            pybullet.stepSimulation(**here)
+
+    def state():
+        x = [pybullet.getBasePositionAndOrientation(b, **here)[0][0] for b in bodies]
+        return x, [pybullet.getBaseVelocity(b, **here)[0][0] for b in bodies]
+
+    # Bullet knows worlds by number only, and has room for about a thousand.
+    advance.close = lambda: pybullet.disconnect(world)
+    return advance, state
+
+
+def rapier(line, *, step, iterations, **parameters):
+    """Rapier in three dimensions and single precision."""
+    import rapier3d
+
+    world = rapier3d.PhysicsWorld()
+    world.integration_parameters.dt = step
+    world.integration_parameters.num_solver_iterations = iterations
+    for name, value in parameters.items():
+        setattr(world.integration_parameters, name, value)
+    product = rapier3d.CoefficientCombineRule.MULTIPLY
+    bodies = []
+    for mass, x, v, factor in zip(
+        line.masses, line.positions, line.velocities, line.factors, strict=True
+    ):
+        body = rapier3d.RigidBody.dynamic().translation((x, 0, 0)).linvel((v, 0, 0))
+        ball = rapier3d.Collider.ball(RADIUS).mass(mass).friction(0.0).restitution(factor)
+        ball = ball.restitution_combine_rule(product)
+        bodies.append(world.add_body(body.can_sleep(False), [ball]))
+
+    def advance(count):
+        for _ in range(count):
+            world.step()
+
+    def state():
+        all_bodies = [world.rigid_bodies[b] for b in bodies]
+        return [b.translation.x for b in all_bodies], [b.linvel.x for b in all_bodies]
+
+    return advance, state
+
+
+def mujoco(line, *, step, steps_a_contact, damping=None):
+    """MuJoCo: contacts as constraints that follow a spring of given frequency and damping ratio."""
+    import mujoco as engine
+
+    stiffness = (math.pi / (steps_a_contact * step)) ** 2
+    if damping is None:
+        damping = [
+            0.0 if e == 1.0 else damping_for(e, step, steps_a_contact) for e in line.restitution
+        ]
+    balls = "".join(
+        f'<body pos="{x!r} 0 0"><joint type="slide" axis="1 0 0"/>'
+        f'<geom name="{i}" type="sphere" size="{RADIUS}" mass="{mass!r}" contype="0" '
+        'conaffinity="0"/></body>'
+        for i, (mass, x) in enumerate(zip(line.masses, line.positions, strict=True))
+    )
+    # Negative numbers are stiffness and damping themselves; a constant impedance leaves them so.
+    pairs = "".join(
+        f'<pair geom1="{c}" geom2="{c + 1}" condim="1" solimp=".95 .95 .001 .5 2" '
+        f'solref="{-stiffness!r} {-2.0 * ratio * math.sqrt(stiffness)!r}"/>'
+        for c, ratio in enumerate(damping)
+    )
+    model = engine.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{step!r}" gravity="0 0 0"/>'
+        f"<worldbody>{balls}</worldbody><contact>{pairs}</contact></mujoco>"
+    )
+    data = engine.MjData(model)
+    data.qvel[:] = line.velocities
+    start = np.array(line.positions)
+
+    def advance(count):
+        engine.mj_step(model, data, count)
+
+    return advance, lambda: (start + data.qpos, data.qvel)
+
+
+@cache
+def damping_for(restitution, step, steps_a_contact):
+    """Return the damping ratio that gives two balls this restitution."""
+    from scipy.optimize import brentq
+
+    line = Line((1.0, 1.0), (restitution,), "touching")
+
+    def excess(damping):
+        made = mujoco(line, step=step, steps_a_contact=steps_a_contact, damping=[damping])
+        _, v = run(*made, step, 3.0)
+        return (v[1] - v[0]) / SPEED - restitution
+
+    return brentq(excess, 0.0, 0.95, xtol=1e-6)
+
+
+@dataclass(frozen=True)
+class Engine:
+    """An engine, its two settings, and what is to be known of them."""
+
+    name: str
+    module: str
+    distribution: str
+    build: object
+    default: dict
+    refined: dict
+    note: str
+
+
+FINE = 1e-4
+ENGINES = (
+    Engine(
+        "Chipmunk", "pymunk", "pymunk", chipmunk,
+        {"step": 1 / 60, "iterations": 10},
+        {"step": FINE, "iterations": 1000},
+        "step 1/60 s as in its manual's example",
+    ),
+    Engine(
+        "Box2D", "Box2D", "box2d", box2d,
+        {"step": 1 / 60, "iterations": 8},
+        {"step": FINE, "iterations": 1000, "faster": 1000.0},
+        "closings below 1 m/s do not rebound; refined: all speeds times 1000",
+    ),
+    Engine(
+        "Bullet", "pybullet", "pybullet", bullet,
+        {"step": 1 / 240, "iterations": 50},
+        {
+            "step": FINE, "iterations": 1000, "restitutionVelocityThreshold": 0.0,
+            "contactSlop": 0.0, "contactERP": 0.0, "erp": 0.0,
+        },
+        "refined: no correction of overlaps, no slop, no threshold",
+    ),
+    Engine(
+        "Rapier", "rapier3d", "rapier3d", rapier,
+        {"step": 1 / 60, "iterations": 4},
+        {
+            "step": FINE, "iterations": 4, "num_internal_pgs_iterations": 200,
+            "normalized_prediction_distance": 1e-6, "contact_recycling": False,
+        },
+        "single precision; refined: no prediction of contacts, 200 inner iterations",
+    ),
+    Engine(
+        "MuJoCo", "mujoco", "mujoco", mujoco,
+        {"step": 2e-3, "steps_a_contact": 10},
+        {"step": 1e-5, "steps_a_contact": 100},
+        "no coefficient of restitution: stiffness and damping of the contact are chosen, the "
+        "damping from two balls",
+    ),
+)  # fmt: skip
+
+
+def absent():
+    """Return the engines that are not installed."""
+    return {
+        engine.name: f'{engine.distribution} is not installed; pip install -e ".[engines]"'
+        for engine in ENGINES
+        if importlib.util.find_spec(engine.module) is None
+    }
+
+
+def run(advance, state, step, longest):
+    """Step until all balls are apart and in order of velocity; return steps and velocities."""
+    taken, before = 0, None
+    while True:
+        advance(CHUNK)
+        taken += CHUNK
+        v = np.array(state()[1])
+        # Nothing more to come: in order of velocity, and the same as at the last look.
+        settled = before is not None and np.abs(v - before).max() < 1e-6 * SPEED
+        if settled and np.diff(v).min() > -1e-6 * SPEED:
+            break
+        if taken * step >= longest:
+            break
+        before = v
+    if close := getattr(advance, "close", None):
+        close()
+    return taken, v
+
+
+def solve(engine, scene, placement, setting):
+    """Return steps and velocities over the striker's speed, of one engine on one scene."""
+    options = getattr(engine, setting)
+    made = engine.build(Line(scene.masses, scene.restitution, placement), **options)
+    steps, v = run(*made, options["step"], longest(setting))
+    return steps, v / SPEED
+
+
+def longest(setting):
+    """Return the time after which what still touches is left so, s."""
+    return 3.0 if setting == "default" else 1.0
+
+
+def rows(clock, quick):
+    """Yield a row for each engine, setting, placement and scene."""
+    missing = absent()
+    for engine in ENGINES:
+        if engine.name in missing:
+            continue
+        for setting in ("default",) if quick else ("default", "refined"):
+            options = getattr(engine, setting)
+            scenes = [*CHECKS.values(), *SCENES.values()]
+            for scene in scenes:
+                for placement in PLACEMENTS:
+                    line = Line(scene.masses, scene.restitution, placement)
+                    steps, after = solve(engine, scene, placement, setting)
+                    if scene.name in CHECKS:
+                        e = scene.restitution[0]
+                        error = {
+                            "model_error": distance(after, [(1 - e) / 2, (1 + e) / 2]),
+                            "model_reference": "two balls, exact",
+                        }
+                    else:
+                        error = model_error(scene, after)
+                    time = {}
+                    if placement == "touching" and scene.name not in CHECKS:
+                        time = clock(
+                            lambda made, o=options, s=setting: run(*made, o["step"], longest(s)),
+                            prepare=lambda line=line, e=engine, o=options: e.build(line, **o),
+                        )
+                    yield Row(
+                        "engine",
+                        engine.name,
+                        f"{setting}, {placement}",
+                        scene.name,
+                        parameter=options["step"],
+                        **outcome(scene.masses, scene.velocities, after),
+                        **error,
+                        evaluations=steps,
+                        needs="e",
+                        gives="velocities, path in time",
+                        versions=versions(engine.distribution),
+                        note=engine.note,
+                        **time,
+                    )

@@ -1,0 +1,152 @@
+"""What one row of the table is, and how its time is taken."""
+
+import contextlib
+import math
+import os
+import platform
+import statistics
+import time
+from dataclasses import dataclass, fields
+from importlib import metadata
+
+import numpy as np
+
+from cradle import post_impact_velocities, runtime
+
+#: The unit of time of the whole table: one impact of three equal balls, solved in a batch.
+REFERENCE = "one impact of three equal elastic balls, ratio .167, in a batch of 2000"
+_BATCH = np.ones((2000, 3)), np.tile([1.0, 0.0, 0.0], (2000, 1))
+
+
+@dataclass
+class Row:
+    """One line of the table; an empty field does not apply.
+
+    The two errors are never mixed. `numerical_error` is the distance from the converged answer of
+    the same model; `model_error` that from another model or from an exact result that the model
+    does not use. Both are the largest over the balls, as a part of the striker's speed.
+    """
+
+    group: str
+    model: str
+    setting: str
+    chain: str
+    parameter: float | str = ""  #: the setting as a number, for the axis of a figure
+    velocities: str = ""  #: after the impact, over the striker's speed
+    numerical_error: float | str = ""
+    numerical_reference: str = ""
+    model_error: float | str = ""
+    model_reference: str = ""
+    momentum_error: float | str = ""  #: relative
+    energy_change: float | str = ""  #: of the kinetic energy, as a part of that before
+    microseconds: float | str = ""  #: median, an impact
+    time_ratio: float | str = ""  #: median of this time over that of `REFERENCE`, taken beside it
+    repeats: int | str = ""
+    evaluations: int | str = ""  #: events, steps or evaluations of the forces
+    needs: str = ""
+    gives: str = ""
+    versions: str = ""
+    note: str = ""
+
+    def as_text(self):
+        """Return the fields as they are stored: errors and times in four digits."""
+
+        def text(value):
+            if isinstance(value, (float, np.floating)):
+                return f"{value:.4g}"
+            return str(value)
+
+        return [text(getattr(self, field.name)) for field in fields(self)]
+
+
+COLUMNS = [field.name for field in fields(Row)]
+
+
+def distance(velocities, reference):
+    """Return the largest difference of two outcomes."""
+    return float(np.max(np.abs(np.asarray(velocities, float) - np.asarray(reference, float))))
+
+
+def outcome(masses, before, after):
+    """Return the fields that every outcome has: velocities, momentum, energy."""
+    m, before, after = (np.asarray(x, float) for x in (masses, before, after))
+    energy = float(m @ before**2)
+    return {
+        "velocities": " ".join(f"{v:.12g}" for v in after / np.abs(before).max()),
+        "momentum_error": abs(float(m @ (after - before))) / float(m @ np.abs(before)),
+        "energy_change": float(m @ after**2) / energy - 1.0,
+    }
+
+
+class Clock:
+    """Takes times beside those of the reference, so that a busy machine slows down both."""
+
+    def __init__(self, repeats):
+        self.repeats = repeats
+
+    def seconds(self, function, calls=1):
+        """Return the time of one call."""
+        begin = time.perf_counter()
+        for _ in range(calls):
+            function()
+        return (time.perf_counter() - begin) / calls
+
+    def __call__(self, function, impacts=1, prepare=None, kernel=None):
+        """Return the fields of a row that tell the time of `function`, which solves `impacts`.
+
+        `prepare` makes the argument of each call anew, outside the measured time. `kernel` names
+        the kernel that `function`, not the reference, runs on.
+        """
+
+        def reference():
+            post_impact_velocities(*_BATCH, 1.0, 0.167)
+
+        with running(kernel):
+            function(*([prepare()] if prepare else []))
+            once = self.seconds(function) if prepare is None else math.inf
+        # A millisecond at least: short calls are repeated.
+        calls = max(1, math.ceil(1e-3 / once))
+        reference()
+        times, ratios = [], []
+        for _ in range(self.repeats):
+            unit = self.seconds(reference, 2) / len(_BATCH[0])
+            with running(kernel):
+                if prepare:
+                    argument = prepare()
+                    taken = self.seconds(lambda made=argument: function(made)) / impacts
+                else:
+                    taken = self.seconds(function, calls) / impacts
+            times.append(taken)
+            ratios.append(taken / unit)
+        return {
+            "microseconds": 1e6 * statistics.median(times),
+            "time_ratio": statistics.median(ratios),
+            "repeats": self.repeats,
+        }
+
+
+@contextlib.contextmanager
+def running(kernel):
+    """Run with the kernel of that name ("plain"), or with the one in force if None."""
+    before = os.environ.get(runtime.VARIABLE)
+    if kernel is not None:
+        os.environ[runtime.VARIABLE] = kernel
+    try:
+        yield
+    finally:
+        if kernel is not None:
+            os.environ.pop(runtime.VARIABLE)
+            if before is not None:
+                os.environ[runtime.VARIABLE] = before
+
+
+def versions(*packages):
+    """Return name and version of the packages, and of Python."""
+    named = [f"{name} {metadata.version(name)}" for name in packages]
+    return "; ".join([*named, f"CPython {platform.python_version()}"])
+
+
+def ours(*more):
+    """Return the versions behind the package's own models."""
+    compiler = [] if runtime.compiled() is None else ["numba"]
+    return versions("cradle-companion", "numpy", *compiler, *more)
