@@ -140,6 +140,49 @@ def test_each_fault_is_seen(spoil, fault):
     assert any(fault in line for line in faults(notebook))
 
 
+# Decimals that the text may state: given by the paper, by an exercise, or chosen for an example.
+# All others are computed by a cell, and the text takes them from there ({glue:text}`...`).
+GIVEN = {
+    "intro": ".15 3.11 3.13 4.0",  # a caption's ratio, Python, Creative Commons
+    "problem": "",
+    "compliance": "",
+    "three_balls": "0.01 0.1 0.25 0.5 0.6 0.75",
+    "multiple_impacts": ".1 .2 .8",
+    "patterns": "0.003 0.01 0.1 0.15 0.3 0.3475 0.348 0.5 0.6 0.9 0.999",
+    "n_balls": ".1 0.2 .5 1.5 1.75",
+    "experiments": ".01 .171 0.17121 .17121 .40 .5 .62 1.5 1.59",
+    "errata": ".001 .01 .05 .1 .15 .171 0.17121 .2 .25 .3 .348 .390 .439 .5 .6 .7 .710 .75 .755"
+    " .8 .95 1.043 1.045 1.185 1.470",
+    "notation": "",
+    "ledger": "",
+}
+
+
+def decimals(text: str) -> set[str]:
+    """Return the decimals typed in a text: none in code, roles, links or displayed formulas."""
+    for nothing in (
+        r"(?s)```.*?```|\$\$.*?\$\$",
+        r"\{[\w:]+\}`[^`]*`|`[^`]*`|\]\([^)]*\)|\([\w-]+\)=|\\tag\{[^}]*\}",
+        r"[Ss]ections? \d\.\d( and \d\.\d)?",
+    ):
+        text = re.sub(nothing, "", text)
+    return set(re.findall(r"(?<![\w.])\d*\.\d+", text))
+
+
+@pytest.mark.parametrize("chapter", GIVEN)
+def test_no_computed_number_is_typed(chapter: str):
+    typed = set()
+    for cell in nbformat.read(BOOK / f"{chapter}.ipynb", as_version=4).cells:
+        caption = cell.metadata.get("mystnb", {}).get("figure", {}).get("caption", "")
+        typed |= decimals(cell.source if cell.cell_type == "markdown" else caption)
+    assert typed == set(GIVEN[chapter].split())
+
+
+def test_a_typed_number_is_seen():
+    assert decimals("It leaves with 0.347 m/s, $e = .5$.") == {"0.347", ".5"}
+    assert not decimals("It is {glue:text}`patterns-0.1`, `0.2`, section 2.5, $$ 0.3 $$")
+
+
 @pytest.mark.parametrize(("stored", "outcome"), [("42\n", 0), ("43\n", 1)])
 def test_one_changed_digit_fails(tmp_path: Path, root: Path, stored: str, outcome: int):
     """The project's own options compare stored outputs; a lax option would pass both."""

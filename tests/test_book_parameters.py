@@ -1,0 +1,121 @@
+"""Every chapter runs from top to bottom when a reader changes its ratios and other parameters.
+
+A cell tagged `parameters` holds nothing but plain numbers that a reader may change. The stored
+outputs are those of the stored numbers, and nbval compares them; here other numbers take their
+place, and no cell may fail.
+"""
+
+import ast
+import itertools
+from pathlib import Path
+
+import matplotlib
+import matplotlib.pyplot as plt
+import nbformat
+import pytest
+
+BOOK = Path(__file__).parents[1] / "book"
+
+# Chapter -> other admissible values: each line is one run of the whole chapter.
+CHANGES = {
+    "intro": [{"ratio": 0}, {"ratio": 0.31}, {"ratio": 0.5}],
+    "problem": [{"ratio": 0}, {"ratio": 0.4}, {"ratio": 0.5}],
+    "compliance": [{"stiffness_ratio": 0.2}, {"stiffness_ratio": 30}],
+    "three_balls": [
+        {"ratio": 0, "restitution": [0, 1]},
+        {"ratio": 0.4, "masses": [3, 1, 2], "velocities": [1, 0, 0]},
+        {"ratio": 0.9, "restitution": [0.5, 0.3]},  # above the bound
+    ],
+    "multiple_impacts": [
+        {"chosen_ratio": 0.1, "chosen_e": 0.2},  # the six events of Fig. 5
+        {"chosen_ratio": 0.35, "chosen_e": 0.9},  # others
+        {"chosen_ratio": 0},
+    ],
+    "patterns": [{"ALPHA": 0.3, "E": 0.8}, {"ALPHA": 0.5, "E": 0.3}],
+    "n_balls": [{"ratio": 0}, {"ratio": 0.05}, {"ratio": 0.33}, {"ratio": 0.5}],
+    "experiments": [
+        {"ratio": 0, "velocity_error": 0.05},
+        {"ratio": 1, "sequence": "BCACBA", "triplet": "CAC", "velocity_error": 0.001},
+    ],
+}
+RUNS = [(chapter, changes) for chapter, runs in CHANGES.items() for changes in runs]
+
+
+def code(chapter: str) -> list:
+    """Return the code cells of a chapter."""
+    cells = nbformat.read(BOOK / f"{chapter}.ipynb", as_version=4).cells
+    return [cell for cell in cells if cell.cell_type == "code"]
+
+
+def parameters(cells: list) -> dict[str, object]:
+    """Return the parameters of a chapter as stored, and check that they are plain numbers."""
+    found: dict[str, object] = {}
+    for cell in cells:
+        if "parameters" in cell.metadata.get("tags", []):
+            for line in ast.parse(cell.source).body:
+                assert isinstance(line, ast.Assign), ast.unparse(line)
+                (target,) = line.targets
+                assert target.id not in found
+                found[target.id] = ast.literal_eval(line.value)
+    return found
+
+
+def run(cells: list, changes: dict[str, object]) -> dict[str, object]:
+    """Execute cells from top to bottom with other parameters; return all names."""
+    names: dict[str, object] = {"__name__": "__main__"}
+    for number, cell in enumerate(cells, start=1):
+        lines = [line for line in cell.source.splitlines() if not line.startswith("%")]
+        exec(compile("\n".join(lines), f"code cell {number}", "exec"), names)
+        if "parameters" in cell.metadata.get("tags", []):
+            names.update({name: changes[name] for name in changes.keys() & names.keys()})
+    return names
+
+
+def draw_and_close():
+    """Take the place of plt.show, so that a figure that cannot be drawn is seen."""
+    for number in plt.get_fignums():
+        plt.figure(number).canvas.draw()
+    plt.close("all")
+
+
+@pytest.fixture
+def pictures_in_memory(monkeypatch: pytest.MonkeyPatch):
+    before = matplotlib.get_backend()
+    plt.switch_backend("agg")
+    monkeypatch.setattr(plt, "show", draw_and_close)
+    with matplotlib.rc_context():
+        yield
+    plt.close("all")
+    plt.switch_backend(before)
+
+
+def test_every_chapter_has_parameters():
+    numbered = "problem compliance three_balls multiple_impacts patterns n_balls experiments"
+    assert {"intro", *numbered.split()} <= set(CHANGES)
+
+
+@pytest.mark.parametrize("chapter", CHANGES)
+def test_every_parameter_is_changed(chapter: str):
+    stored = parameters(code(chapter))
+    assert stored
+    for name, value in stored.items():
+        assert any(run_.get(name, value) != value for run_ in CHANGES[chapter]), name
+    assert set(itertools.chain.from_iterable(CHANGES[chapter])) <= set(stored)
+
+
+@pytest.mark.usefixtures("pictures_in_memory")
+@pytest.mark.parametrize(("chapter", "changes"), RUNS, ids=str)
+def test_chapter_runs_with_other_numbers(chapter: str, changes: dict[str, object]):
+    cells = code(chapter)
+    run(cells, changes)
+
+
+@pytest.mark.usefixtures("pictures_in_memory")
+def test_a_cell_tied_to_the_stored_number_is_seen():
+    cells = [
+        nbformat.v4.new_code_cell("ratio = 0.15", metadata={"tags": ["parameters"]}),
+        nbformat.v4.new_code_cell("outcome = {0.15: 'here'}[ratio]"),
+    ]
+    assert run(cells, {})["outcome"] == "here"
+    with pytest.raises(KeyError):
+        run(cells, {"ratio": 0.2})
