@@ -20,12 +20,15 @@ from cradle.chain import Chain
 from cradle.models import Model, collide
 from cradle.models.compliant import SpringChain, TimedTrace
 from cradle.models.correlation import ImpulseCorrelation, post_impact_velocities
+from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
 from cradle.tables import paper_chain, paper_sequences, ratio_table, restitution_table
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 __all__ = [
     "Chain",
+    "EnergyDistribution",
+    "EnergyTrace",
     "Event",
     "FusedChain",
     "ImpactNotFinished",

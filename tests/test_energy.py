@@ -1,0 +1,255 @@
+"""Energy-based distribution: springs at e = 1, two balls, ledger, fixed steps, other programs."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cradle import Chain, EnergyDistribution, EnergyTrace, ImpactNotFinished, SpringChain, collide
+
+
+def at_rest(masses, e=1.0):
+    """Chain at rest, its first ball striking at speed 1."""
+    return Chain(masses, [1] + [0] * (len(masses) - 1), e)
+
+
+CONVERGED = [
+    ([1, 1, 1], 1.5, [-0.070952354, 0.076403039, 0.994549315]),
+    ([1] * 5, 1.5, [-0.071085017, -0.030273764, -0.014463629, 0.127044986, 0.988777424]),
+    ([1, 0.01, 1], 1.5, [-0.003175725, 0.396855171, 0.999207173]),
+    ([1, 1, 1], 1, [-0.130261695, 0.150229569, 0.980032126]),
+]
+
+
+@pytest.mark.parametrize(("masses", "exponent", "velocities"), CONVERGED)
+@pytest.mark.parametrize("gaps", [True, False])
+def test_elastic_impacts_are_those_of_springs(masses, exponent, velocities, gaps):
+    """No contact of these acts twice, so that both readings of a gap agree."""
+    trace = collide(at_rest(masses), EnergyDistribution(3.0, exponent, gaps=gaps, rtol=1e-11))
+    np.testing.assert_allclose(trace.velocities, velocities, rtol=0, atol=1e-9)
+
+
+def by_small_steps(chain, k, p, steps):
+    """Impact in the law's own variables P, E and v, up to the end of contact 0 of three balls.
+
+    Midpoint steps of the sum of both impulses.  The first one is the limit: E = u P at contact 0, so that
+    P = k u^p t^q / q with q = p + 1, and x'' = k u^p t^p / m from rest at contact 1.
+    """
+    m, e, k = chain.masses, chain.restitution, np.asarray(k, float)
+
+    def rates(energy, v):
+        growth = k ** (1 / (1 + p)) * np.maximum(energy, 0) ** (p / (1 + p))
+        growth = growth / growth.sum()
+        u = v[:-1] - v[1:]
+        power = np.where(u > 0, u, u / e**2) * growth
+        passed = np.array([0.0, *growth, 0.0])
+        return power, (passed[:-1] - passed[1:]) / m
+
+    v, h = chain.velocities.copy(), steps
+    t = (h * (p + 1) / (k[0] * v[0] ** p)) ** (1 / (p + 1))
+    x1 = k[0] * v[0] ** p * t ** (p + 2) / (m[1] * (p + 1) * (p + 2))
+    energy = np.array([v[0] * h, k[1] * x1 ** (p + 1) / (p + 1)])
+    v = v + np.array([-h / m[0], h / m[1], 0])
+    rows = []
+    while energy[0] > 0:
+        rows.append((v, energy))
+        a = rates(energy, v)
+        middle = energy + h / 2 * a[0]
+        if middle[0] <= 0:
+            break
+        b = rates(middle, v + h / 2 * a[1])
+        energy, v = energy + h * b[0], v + h * b[1]
+    return rows[-1][0]
+
+
+@pytest.mark.parametrize(("k", "p", "e"), [([1, 1], 1.5, 0.8), ([1, 3], 1, 0.6), ([2, 1], 2, 1)])
+def test_against_the_law_as_it_is_written(k, p, e):
+    chain = at_rest([1, 1.5, 0.7], [e, 0.9])
+    v = by_small_steps(chain, k, p, 2e-4)
+    trace = collide(chain, EnergyDistribution(k, p, rtol=1e-10))
+    row = trace.events.index(("end", 0)) + 1
+    np.testing.assert_allclose(v, trace.path[row], rtol=0, atol=2e-3)
+    closer = by_small_steps(chain, k, p, 4e-5)
+    np.testing.assert_allclose(closer, trace.path[row], rtol=0, atol=4e-4)
+
+
+@pytest.mark.parametrize("step", [None, 0.1, 0.01])
+@pytest.mark.parametrize("exponent", [1, 1.5, 2.5])
+@pytest.mark.parametrize("e", [0, 1e-3, 0.1, 0.5, 0.9, 1])
+def test_two_balls(e, exponent, step):
+    chain = Chain([2, 3], [1.7, 1], e)
+    trace = collide(chain, EnergyDistribution(50.0, exponent, step=step))
+    mu = 6 / 5
+    # The adaptive error of a speed is of the order of rtol = 1e-9.
+    assert trace.velocities[0] - trace.velocities[1] == pytest.approx(-0.7 * e, abs=1e-8)
+    assert trace.impulses[0] == pytest.approx((1 + e) * mu * 0.7, rel=1e-8)
+    assert trace.absorbed[0] == pytest.approx(mu * 0.49 / 2, rel=1e-8)
+    assert trace.events[0] == ("maximum_compression", 0)
+    assert len(trace.events) == 2
+
+
+@pytest.mark.parametrize("exponent", [1, 1.5])
+@pytest.mark.parametrize("e", [[1, 1], [0.7, 0.9], [0, 1], [1, 0]])
+def test_error_falls_with_the_step(e, exponent):
+    """At least in proportion to it."""
+    chain = at_rest([1, 1.3, 0.8], e)
+    exact = collide(chain, EnergyDistribution([1, 2], exponent, rtol=1e-12)).velocities
+    errors = [
+        abs(collide(chain, EnergyDistribution([1, 2], exponent, step)).velocities - exact).max()
+        for step in (0.1, 0.02, 0.004)
+    ]
+    assert errors[0] > 5 * errors[1] > 25 * errors[2]
+    assert errors[2] < 1e-3
+
+
+def test_ten_balls_of_the_authors_program():
+    """Siconos, examples MonodisperseChainOfBalls-LZBModel: its stored outcome, e = 1, p = 3/2.
+
+    Its steps are 1e-6 N s, 6e-5 of the unit here, of first order: 1e-4 is its own error.
+    """
+    siconos = [-0.07105929, -0.03018624, -0.01574960, -0.00880806, -0.00506234]
+    siconos += [-0.00293663, -0.00170186, 0.00262452, 0.14692339, 0.98595612]
+    trace = collide(at_rest([0.0326] * 10), EnergyDistribution(1.0, gaps=False, rtol=1e-11))
+    np.testing.assert_allclose(trace.velocities, siconos, rtol=0, atol=5e-4)
+    assert abs(trace.velocities - siconos)[:8].max() < 1e-4
+
+
+# --- laws that every outcome keeps ---------------------------------------------------------
+
+
+@st.composite
+def chains(draw):
+    """Chain, stiffness, exponent: two to four balls."""
+    n = draw(st.integers(2, 4))
+    part = st.floats(-1, 1)
+    masses = [10.0 ** draw(part) for _ in range(n)]
+    velocities = [
+        draw(st.sampled_from([0.0, 1.0, -1.0]) | st.floats(-1, 1).map(lambda v: round(v, 3)))
+        for _ in range(n)
+    ]
+    e = [draw(st.sampled_from([0.0, 1.0]) | st.floats(0.4, 1)) for _ in range(n - 1)]
+    stiffness = [10.0 ** draw(part) for _ in range(n - 1)]
+    return Chain(masses, velocities, e), stiffness, draw(st.sampled_from([1, 1.5, 2.5]))
+
+
+@settings(max_examples=40)
+@given(chains(), st.sampled_from([None, 0.05]), st.booleans())
+def test_laws(case, step, gaps):
+    chain, stiffness, exponent = case
+    m, v = chain.masses, chain.velocities
+    trace = collide(chain, EnergyDistribution(stiffness, exponent, step, gaps=gaps, rtol=1e-8))
+    scale = max(chain.closing_speeds.max(), 0)
+    after = trace.velocities
+    passed = np.concatenate([[0], trace.impulses, [0]])
+    np.testing.assert_allclose(
+        m * (after - v), passed[:-1] - passed[1:], rtol=0, atol=1e-12 * scale * m.sum() + 1e-15
+    )
+    available = 0.5 * m @ (v - chain.momentum / m.sum()) ** 2
+    lost = chain.kinetic_energy - 0.5 * m @ after**2
+    # With steps exact, but for what a collapse leaves out: speeds below 5e-4.
+    atol = 1e-6 if step is None else 1e-12 if not trace.collapsed else 1e-5
+    assert trace.energy_loss == pytest.approx(lost, abs=atol * available + 1e-15)
+    assert (np.diff(after) >= -1e-14).all()
+    assert isinstance(trace, EnergyTrace)
+    np.testing.assert_array_equal(trace.path[0], v)
+    np.testing.assert_array_equal(trace.path[-1], after)
+    np.testing.assert_array_equal(trace.path_impulses[-1], trace.impulses)
+    assert (np.diff(trace.path_impulses, axis=0) >= -1e-12 * scale).all()
+    ends = [
+        sum(event in (("end", c), ("collapse", c)) for event in trace.events)
+        for c in range(len(chain) - 1)
+    ]
+    assert ends == trace.collisions.tolist()
+    assert ((trace.impulses > 0) >= (trace.collisions > 0)).all()
+
+
+@settings(max_examples=25)
+@given(chains())
+def test_spring_chain_at_e_1(case):
+    """Gaps count as for the springs: equal whatever closes again."""
+    chain, stiffness, exponent = case
+    chain = Chain(chain.masses, chain.velocities, 1)
+    springs = collide(chain, SpringChain(stiffness, exponent, rtol=1e-10))
+    trace = collide(chain, EnergyDistribution(stiffness, exponent, rtol=1e-10))
+    np.testing.assert_allclose(trace.velocities, springs.velocities, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(trace.absorbed, springs.absorbed, rtol=1e-6, atol=1e-8)
+
+
+def test_gaps_matter_where_a_contact_closes_again():
+    """Ball 3 runs ahead: springs let it gain a gap, rigid balls touch whenever they approach."""
+    chain = Chain([1, 1, 1], [1, 0, 0.5], 1)
+    springs = collide(chain, SpringChain(1.0)).velocities
+    with_gap = collide(chain, EnergyDistribution(1.0)).velocities
+    rigid = collide(chain, EnergyDistribution(1.0, gaps=False)).velocities
+    np.testing.assert_allclose(with_gap, springs, rtol=0, atol=1e-8)
+    assert abs(rigid - springs).max() > 1e-3
+    steps = collide(chain, EnergyDistribution(1.0, step=1e-3, gaps=False)).velocities
+    np.testing.assert_allclose(steps, rigid, rtol=0, atol=1e-3)
+
+
+def test_recompression_counts_in_the_totals():
+    """A light ball between heavy ones: contacts are compressed again before they end."""
+    chain = at_rest([1, 0.01, 1], 0.9)
+    trace = collide(chain, EnergyDistribution(1.0))
+    maxima = [event.contact for event in trace.events if event.kind == "maximum_compression"]
+    assert len(maxima) > trace.collisions.sum()
+    lost = chain.kinetic_energy - 0.5 * chain.masses @ trace.velocities**2
+    assert trace.energy_loss == pytest.approx(lost, abs=1e-7)
+
+
+@pytest.mark.parametrize("gaps", [True, False])
+@pytest.mark.parametrize("step", [None, 0.01])
+def test_endless_plastic_impacts_end_in_one_body(step, gaps):
+    trace = collide(at_rest([1, 1, 1], 0), EnergyDistribution(1.0, 1.5, step, gaps=gaps))
+    assert trace.collapsed
+    np.testing.assert_allclose(trace.velocities, 1 / 3, rtol=0, atol=1e-14)
+
+
+def test_balls_that_do_not_approach():
+    trace = collide(Chain([1, 2, 3], [-1, 0, 0], 0.5), EnergyDistribution(1.0))
+    assert trace.velocities.tolist() == [-1, 0, 0]
+    assert not trace.events
+    assert trace.evaluations == 0
+
+
+@pytest.mark.parametrize("step", [None, 0.001])
+def test_unfinished_impact_shows_what_was_reached(step):
+    model = EnergyDistribution(1.0, step=step, max_evaluations=50)
+    with pytest.raises(ImpactNotFinished, match="max_evaluations = 50 reached") as stopped:
+        collide(at_rest([1, 1, 1]), model)
+    trace = stopped.value.trace
+    assert trace.evaluations == 50
+    assert trace.velocities.sum() == pytest.approx(1, abs=1e-14)
+    assert trace.step_impulses[-1, 0] >= 0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"stiffness": -1}, "stiffness = -1.0; must be above 0"),
+        ({"exponent": 0.5}, "exponent = 0.5; must be at least 1"),
+        ({"step": 0}, "step = 0.0; must lie in (0, 1]"),
+        ({"step": 1.5}, "step = 1.5; must lie in (0, 1]"),
+        ({"step": [0.1]}, "step = [0.1]; must be one number, or None"),
+        ({"gaps": 1}, "gaps = 1; must be True or False"),
+        ({"rtol": 0}, "rtol = 0.0; must lie in"),
+        ({"max_evaluations": 0}, "max_evaluations = 0; must be a whole number, at least 1"),
+    ],
+)
+def test_bad_options_name_value_and_rule(options, message):
+    with pytest.raises(ValueError, match="^" + re.escape(message)):
+        EnergyDistribution(**{"stiffness": 1.0} | options)
+
+
+def test_stiffness_of_the_wrong_length():
+    with pytest.raises(ValueError, match=r"^stiffness has 3 values; 3 balls need 2"):
+        collide(at_rest([1, 1, 1]), EnergyDistribution([1, 2, 3]))
+
+
+def test_repr_is_the_caption():
+    assert repr(EnergyDistribution([1, 2], 1, 0.01)) == (
+        "EnergyDistribution(stiffness=(1.0, 2.0), exponent=1.0, step=0.01, gaps=True, "
+        "rtol=1e-09, max_evaluations=1000000)"
+    )
