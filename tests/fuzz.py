@@ -85,18 +85,18 @@ def problem(data):
     f = source.numbers("unit", n - 2)
     b = source.numbers("unit", n - 2) if source.byte() % 2 else None
     at_bound = source.byte()
-    if at_bound % 4 == 0 and n > 2:
-        # Ratios at their bound, or an ulp beside it.
-        from cradle.closed_form import largest_ratios
-
-        try:
-            f, b = (part.tolist() for part in largest_ratios(m, f, b if b is not None else f))
-        except ValueError:
-            return m, v, e, f, b, options
+    if at_bound % 4 == 0:
+        # Ratios at their bound (Eq. 34), or an ulp beside it.
         side = [None, 0.0, 1.0][at_bound // 4 % 3]
+        f, b = ([quotient(x, x + y) for x, y in zip(far, m[1:-1])] for far in (m[2:], m[:-2]))
         if side is not None:
             f, b = ([math.nextafter(x, side) for x in part] for part in (f, b))
     return m, v, e, f, b, options
+
+
+def quotient(x, y):
+    """A ratio, or 1/2 where it is none."""
+    return x / y if 0.0 < y < math.inf and 0.0 < x < math.inf else 0.5
 
 
 def attempt(data, max_events=400):
