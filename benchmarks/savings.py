@@ -77,7 +77,7 @@ def _one_by_one_or_at_once(clock, count):
 
 
 def _two_balls(clock, count):
-    """Yield: two balls by the event loop, or by Newton's formula."""
+    """Yield: two balls by the event loop, or by Newton's rule."""
     m, v, e, f, b = random_chains(2, count)
 
     def formula():
@@ -88,7 +88,7 @@ def _two_balls(clock, count):
         "all: the event loop": (
             lambda: post_impact_velocities(m, v, e, f, b), count, "velocities"
         ),
-        "less: v' = v -+ (1 + e) mu u / m": (formula, count, "velocities, impulses"),
+        "less: Newton's rule": (formula, count, "velocities, impulses"),
     }  # fmt: skip
     yield from _pair(clock, "two balls", "2 balls, random", both)
 

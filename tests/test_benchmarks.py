@@ -1,0 +1,187 @@
+"""The benchmark suite: its quick form runs, its rows are sound, engines repeat what is stored."""
+
+import csv
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cradle.closed_form import three_balls
+
+ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "benchmarks"))
+import engines  # noqa: E402
+import measure  # noqa: E402
+import run  # noqa: E402
+import savings  # noqa: E402
+import scenes  # noqa: E402
+import solvers  # noqa: E402
+
+CLOCK = measure.Clock(repeats=1)
+
+
+@pytest.fixture(scope="module")
+def rows():
+    """All rows of the quick form but those of the engines, each timed once."""
+    return [*solvers.rows(CLOCK, True), *savings.rows(CLOCK, True)]
+
+
+def of(rows, group):
+    return [row for row in rows if row.group == group]
+
+
+def test_every_group_has_rows_with_times(rows):
+    groups = {row.group for row in rows}
+    assert groups == {
+        "event", "march", "closed form", "springs", "penalty", "stiffness", "energy", "outcome",
+        "saving",
+    }  # fmt: skip
+    assert all(row.microseconds > 0 and row.time_ratio > 0 for row in rows)
+    assert all(row.gives and row.needs and row.versions for row in rows)
+
+
+def test_errors_name_what_they_are_measured_against(rows):
+    for row in rows:
+        for kind in ("numerical", "model"):
+            error = getattr(row, f"{kind}_error")
+            assert (error == "") == (getattr(row, f"{kind}_reference") == ""), row.setting
+            assert error == "" or 0.0 <= error < 1.0
+
+
+def test_rigid_models_are_exact_and_keep_momentum(rows):
+    for row in [*of(rows, "event"), *of(rows, "closed form"), *of(rows, "saving")]:
+        assert row.numerical_error < (1e-6 if "float32" in row.setting else 1e-13), row.setting
+        assert row.momentum_error == "" or row.momentum_error < 1e-13
+
+
+@pytest.mark.parametrize(
+    ("group", "text", "order"),
+    [
+        ("march", "three equal", 0.8),
+        ("penalty", "velocity Verlet", 1.8),
+        ("penalty", "semi-implicit", 1.8),
+        ("energy", "step", 0.8),
+    ],
+)
+def test_fixed_steps_converge(rows, group, text, order):
+    found = [row for row in of(rows, group) if text in row.setting + row.chain]
+    for law in {row.model for row in found}:
+        series = [row for row in found if row.model == law]
+        steps, errors = np.log([[r.parameter, r.numerical_error] for r in series]).T
+        assert len(series) > 1
+        assert np.polyfit(steps, errors, 1)[0] > order, law
+
+
+def test_error_control_converges(rows):
+    for row in of(rows, "springs"):
+        assert row.numerical_error < 10 * row.parameter, row.setting
+
+
+def test_penalty_depends_on_step_times_frequency_alone():
+    """A stiffness and a step with one product give the velocities of another such pair."""
+    m, v = np.ones(3), np.array([1.0, 0.0, 0.0])
+    for phase in (0.1, 1.0):
+        outcomes = [
+            solvers.penalty(m, v, 0.5 * (phase / step) ** 2, 1.0, step, 0.5, 100_000)[0]
+            for step in (1e-3, 1.0, 7.0)
+        ]
+        np.testing.assert_allclose(outcomes[1:], [outcomes[0]] * 2, rtol=0, atol=1e-9)
+
+
+def test_penalty_gives_two_balls_their_exchange():
+    for kick in (1.0, 0.5):
+        after, _ = solvers.penalty(
+            np.ones(2), np.array([1.0, 0.0]), 1.0, 1.5, 1e-3, kick, 10_000_000
+        )
+        np.testing.assert_allclose(after, [0.0, 1.0], atol=1e-5)
+
+
+def test_truths_by_a_second_route():
+    """Eqs. 30-33 for three balls; converged springs for the elastic scenes, from elsewhere."""
+    scene = scenes.SCENES["three equal"]
+    exact = three_balls(scene.masses, scene.velocities, scene.restitution, 0.167)
+    np.testing.assert_allclose(scene.truth(), exact, rtol=0, atol=1e-15)
+    hertz = {
+        "three equal": [-0.070952354, 0.076403039, 0.994549315],
+        "five equal": [-0.071085017, -0.030273764, -0.014463629, 0.127044986, 0.988777424],
+        "light middle": [-0.003175725, 0.396855171, 0.999207173],
+    }
+    for name, expected in hertz.items():
+        np.testing.assert_allclose(scenes.SCENES[name].springs(), expected, rtol=0, atol=6e-10)
+    linear = scenes.SCENES["three equal"].springs(1)
+    np.testing.assert_allclose(linear, [-0.130261695, 0.150229569, 0.980032126], atol=6e-10)
+
+
+def test_factors_of_the_balls_multiply_to_restitution():
+    line = engines.Line((1,) * 5, (0.53, 0.28, 0.27, 0.31), "apart")
+    factors = np.array(line.factors)
+    np.testing.assert_allclose(factors[:-1] * factors[1:], line.restitution, rtol=1e-14)
+    assert factors.max() <= 1
+
+
+def test_quick_form_writes_its_table(tmp_path, monkeypatch, rows, capsys):
+    monkeypatch.setattr(run.solvers, "rows", lambda *_: iter(rows))
+    monkeypatch.setattr(run.savings, "rows", lambda *_: iter(()))
+    monkeypatch.setattr(engines, "ENGINES", ())
+    run.main(["--quick", "--output", str(tmp_path / "table.csv")])
+    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    assert list(table[0]) == measure.COLUMNS
+    assert len(table) == len(rows)
+    assert float(table[0]["time_ratio"]) > 0
+    assert f"{len(rows)} rows" in capsys.readouterr().out
+
+
+def test_absent_engines_are_named_and_skipped(monkeypatch):
+    find = importlib.util.find_spec
+    hidden = {engine.module for engine in engines.ENGINES}
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *a: None if name in hidden else find(name, *a)
+    )
+    assert list(engines.absent()) == [engine.name for engine in engines.ENGINES]
+    assert all("is not installed" in reason for reason in engines.absent().values())
+    assert list(engines.rows(CLOCK, True)) == []
+
+
+@pytest.fixture(params=engines.ENGINES, ids=lambda engine: engine.name)
+def engine(request):
+    """An engine, if it is installed."""
+    if request.param.name in engines.absent():
+        pytest.skip(engines.absent()[request.param.name])
+    return request.param
+
+
+def stored():
+    with (ROOT / "data" / "benchmarks.csv").open(encoding="utf-8") as file:
+        return [row for row in csv.DictReader(file) if row["group"] == "engine"]
+
+
+# A step in the engines' own code that warns about NumPy or Python is not this project's affair.
+@pytest.mark.filterwarnings("default")
+def test_engine_exchanges_the_velocities_of_two_balls(engine):
+    for scene in engines.CHECKS.values():
+        e = scene.restitution[0]
+        _, after = engines.solve(engine, scene, "touching", "refined")
+        np.testing.assert_allclose(after, [(1 - e) / 2, (1 + e) / 2], atol=1e-3)
+
+
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize("setting", ["default", "refined"])
+def test_engine_repeats_what_is_stored(engine, setting):
+    """Same version, same velocities; another version may differ, and is only asked for momentum."""
+    same_version = measure.versions(engine.distribution).split("; ")[0]
+    for name in ("three equal", "five equal", "light middle"):
+        scene = scenes.SCENES[name]
+        _, after = engines.solve(engine, scene, "touching", setting)
+        assert abs(np.dot(scene.masses, after) / scene.masses[0] - 1) < 1e-5
+        (row,) = [
+            row
+            for row in stored()
+            if (row["model"], row["setting"], row["chain"])
+            == (engine.name, f"{setting}, touching", name)
+        ]
+        if row["versions"].startswith(same_version):
+            expected = [float(v) for v in row["velocities"].split()]
+            np.testing.assert_allclose(after, expected, rtol=0, atol=1e-4)
