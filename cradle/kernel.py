@@ -15,6 +15,8 @@ all in the chain's own units, see `scales`):
 
 m[i]         mass                                   e[c]    restitution
 
+hi[i] lo[i]  velocity as a sum of two numbers: twice the digits, so that nothing is lost when a
+             light ball shuttles a thousand times as fast as the heavy balls on its sides
 u[c]         closing speed, > 0 in compression
 q[c]         work that the contact can still release, e^2 W+ - W-, since it became active
 w[c]         work absorbed since it became active, W+
@@ -23,7 +25,7 @@ a[c]         work absorbed, since the last snapshot a0[c]   work absorbed before
 rate[c]      impulse per unit of progress of the contact's run; the largest of a run is about 1
 slope[c]     closing speed per unit of progress, du/ds
 pull[i]      velocity of ball i per unit of progress, dv/ds
-ratio[i]     ratio in force at ball i
+ratio[i]     ratio in force at ball i                rest[i]      1 - ratio, to all its digits
 until[c]     progress to the contact's own next event
 before[c]    -u of an idle contact at the start of the round
 reach[k]     progress of run k to its own next event
@@ -31,7 +33,8 @@ u1[c] q1[c]  snapshot of u and q                    x[i] y[i] z[i]  scratch
 
 active[c]    1 while the contact is active
 turn[i]      direction at ball i: 1 forward, -1 backward, 0 none
-fixed[c]     1 while the contact is held at u = 0   held[c] 1 if it had an impulse then
+fixed[c]     above 0 while the contact is held at u = 0, 2 if its ratio is just the bound
+held[c]      1 if it had an impulse while held by a ratio above the bound
 hits[c]      how often it became active             tiny[c] how many exhausted collisions in a row
 code1[c] hits1[c]  snapshot of what is active and how it is driven, and of hits
 power[c]     binary exponent of the rate            first[k], last[k]  the contacts of run k
@@ -40,7 +43,7 @@ power[c]     binary exponent of the rate            first[k], last[k]  the conta
 import math
 
 # Rows of the work area.
-FLOATS = 20
+FLOATS = 23
 INTS = 9
 
 # Status codes.
@@ -50,16 +53,18 @@ MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE = 0, 1, 2, 3
 
 # R9: what is exhausted, relative to the largest initial closing speed; how many exhausted
 # collisions in a row are a collapse; how closely a cycle must repeat, relative to its own scale.
-EXHAUSTED = 1e-13
+EXHAUSTED = 1e-18
 REPEATS = 8
 SELF_SIMILAR = 1e-13
 # R8: meeting keys closer than this are equal; a run's events closer than this, relative to the
 # progress they need, are simultaneous.
 TIE = 1e-9
 SIMULTANEOUS = 1.0 + 64 * 2.0**-52
-# A rate below 2**CUT of its run's largest is zero: it could not change a digit.
-CUT = -200
-SMALLEST = 2.0**CUT
+# R7: a ratio above its bound by no more than this factor was meant to be the bound.
+ROUNDED = 1.0 + 4 * 2.0**-52
+# A rate below this part of its run's largest, times the lightest ball's part of the heaviest, is
+# zero: no ball could notice it.
+CUT = 2.0**-200
 # R6: one vanishing ratio, as a binary exponent far below any of a number.
 VANISHING = 1 << 40
 
@@ -93,7 +98,7 @@ def start(n, u, active, turn, hits):
 
 
 @jit
-def ratios_in_force(left, right, forward, backward, m, u, w, ratio, turn, fixed):
+def ratios_in_force(left, right, forward, backward, m, u, w, ratio, rest, turn, fixed):
     """R7: ratios in force in the run left..right; contacts above their bound are held.
 
     Each chain of drives is worked from its far end towards its driver, because the bound of a
@@ -105,27 +110,31 @@ def ratios_in_force(left, right, forward, backward, m, u, w, ratio, turn, fixed)
     for c in range(right, left, -1):
         if turn[c] == 1:
             f = forward[c - 1]
-            if u[c] == 0.0 and w[c] == 0.0 and not (c < right and turn[c + 1] == -1):
-                onward = ratio[c + 1] if c < right else 0.0
-                bound = m[c + 1] / (m[c + 1] + m[c] * (1.0 - onward))
-                if f > bound:
-                    f = bound
-                    fixed[c] = 1
             ratio[c] = f
+            rest[c] = 1.0 - f
+            if u[c] == 0.0 and w[c] == 0.0 and not (c < right and turn[c + 1] == -1):
+                kept = m[c] * (rest[c + 1] if c < right else 1.0)
+                bound = m[c + 1] / (m[c + 1] + kept)
+                if f >= bound:
+                    fixed[c] = 1 if f > bound * ROUNDED else 2
+                    ratio[c] = bound
+                    rest[c] = kept / (m[c + 1] + kept)
     for c in range(left, right):
         if turn[c + 1] == -1:
             f = backward[c]
-            if u[c] == 0.0 and w[c] == 0.0 and not (c > left and turn[c] == 1):
-                onward = ratio[c] if c > left else 0.0
-                bound = m[c] / (m[c] + m[c + 1] * (1.0 - onward))
-                if f > bound:
-                    f = bound
-                    fixed[c] = 1
             ratio[c + 1] = f
+            rest[c + 1] = 1.0 - f
+            if u[c] == 0.0 and w[c] == 0.0 and not (c > left and turn[c] == 1):
+                kept = m[c + 1] * (rest[c] if c > left else 1.0)
+                bound = m[c] / (m[c] + kept)
+                if f >= bound:
+                    fixed[c] = 1 if f > bound * ROUNDED else 2
+                    ratio[c + 1] = bound
+                    rest[c + 1] = kept / (m[c] + kept)
 
 
 @jit
-def several_sources(left, right, rate, ratio, turn, power):
+def several_sources(left, right, smallest, rate, ratio, turn, power):
     """R1, R6: rates of a run with more than one source, where products of ratios are divided.
 
     Each rate is x * 2**k, so that long products neither overflow nor vanish, and a ratio of zero
@@ -158,15 +167,18 @@ def several_sources(left, right, rate, ratio, turn, power):
         top = max(top, k)
     for c in range(left, right + 1):
         k = power[c] - top
-        rate[c] = math.ldexp(rate[c], k) if k > CUT else 0.0
+        rate[c] = math.ldexp(rate[c], k) if k > -VANISHING // 2 else 0.0
+        if rate[c] <= smallest:
+            rate[c] = 0.0
 
 
 @jit
 def rates(
-    left, right, forward, backward, m, u, w, rate, slope, pull, ratio, turn, fixed, power,
+    left, right, smallest, forward, backward, m, u, w, rate, slope, pull, ratio, rest, turn, fixed,
+    power,
 ):  # fmt: skip
     """R1, R6, R7: impulse rates and slopes of the run of contacts left..right."""
-    ratios_in_force(left, right, forward, backward, m, u, w, ratio, turn, fixed)
+    ratios_in_force(left, right, forward, backward, m, u, w, ratio, rest, turn, fixed)
     source = left
     while source < right and turn[source + 1] == -1:
         source += 1
@@ -177,24 +189,28 @@ def rates(
         rate[source] = 1.0
         for c in range(source + 1, right + 1):
             f = rate[c - 1] * ratio[c]
-            rate[c] = f if f > SMALLEST else 0.0
+            rate[c] = f if f > smallest else 0.0
         for c in range(source - 1, left - 1, -1):
             f = rate[c + 1] * ratio[c + 1]
-            rate[c] = f if f > SMALLEST else 0.0
+            rate[c] = f if f > smallest else 0.0
     else:
-        several_sources(left, right, rate, ratio, turn, power)
+        several_sources(left, right, smallest, rate, ratio, turn, power)
 
     # Eqs. 47-48: m dv = dP on the left - dP on the right.
     pull[left] = -rate[left] / m[left]
     for c in range(left, right):
-        pull[c + 1] = (rate[c] - rate[c + 1]) / m[c + 1]
+        # The driver's rate less the driven one's, where both are nearly equal too.
+        if turn[c + 1] == 1:
+            pull[c + 1] = rate[c] * rest[c + 1] / m[c + 1]
+        else:
+            pull[c + 1] = -rate[c + 1] * rest[c + 1] / m[c + 1]
     pull[right + 1] = rate[right] / m[right + 1]
     for c in range(left, right + 1):
         slope[c] = pull[c] - pull[c + 1]
         # A held contact stays at u = 0.  A driven one within its bound cannot open either;
         # rounding must not make it.
         driven = (c > left and turn[c] == 1) or (c < right and turn[c + 1] == -1)
-        if fixed[c] == 1 or (driven and slope[c] < 0.0 and u[c] == 0.0 and w[c] == 0.0):
+        if fixed[c] > 0 or (driven and slope[c] < 0.0 and u[c] == 0.0 and w[c] == 0.0):
             slope[c] = 0.0
 
 
@@ -261,18 +277,111 @@ def segment(left, right, n, e, u, q, rate, slope, pull, until, before, active):
 
 
 @jit
-def advance(left, right, s, whole, n, e, u, q, w, p, a, rate, slope, pull, until, fixed, held):
+def add(b, x, hi, lo):
+    """Add x to the velocity hi + lo of ball b; nothing is lost (two-sum)."""
+    total = hi[b] + x
+    part = total - hi[b]
+    x = ((hi[b] - (total - part)) + (x - part)) + lo[b]
+    hi[b] = total + x
+    lo[b] = x - (hi[b] - total)
+
+
+@jit
+def closing(c, hi, lo):
+    """Return the closing speed of contact c from the velocities of its balls."""
+    return (hi[c] - hi[c + 1]) + (lo[c] - lo[c + 1])
+
+
+@jit
+def open_at(c, speed, hi, lo, m):
+    """Make the velocities agree with a closing speed that is known better than they are.
+
+    The two balls share the difference, a rounding error, so that no momentum is made.
+    """
+    x = (speed - closing(c, hi, lo)) / (m[c] + m[c + 1])
+    add(c, x * m[c + 1], hi, lo)
+    add(c + 1, -x * m[c], hi, lo)
+
+
+@jit
+def move_together(left, right, x, hi, lo, m):
+    """Give balls left..right the velocities x and a common one that leaves their momentum alone."""
+    k = left
+    for b in range(left + 1, right + 1):
+        k = b if m[b] > m[k] else k
+    mass = 0.0
+    momentum = 0.0  # both it and x counted from the heaviest ball
+    for b in range(left, right + 1):
+        mass += m[b]
+        momentum += m[b] * ((hi[b] - hi[k]) + (lo[b] - lo[k]) - (x[b] - x[k]))
+    add(k, momentum / mass, hi, lo)
+    for b in range(left, right + 1):
+        if b != k:
+            hi[b] = hi[k]
+            lo[b] = lo[k]
+            if x[b] != x[k]:
+                add(b, x[b] - x[k], hi, lo)
+
+
+@jit
+def motion(left, right, hi, lo, m):
+    """Kinetic energy of balls left..right, relative to the heaviest of them."""
+    k = left
+    for b in range(left + 1, right + 1):
+        k = b if m[b] > m[k] else k
+    mass = 0.0
+    momentum = 0.0
+    energy = 0.0
+    for b in range(left, right + 1):
+        x = (hi[b] - hi[k]) + (lo[b] - lo[k])
+        mass += m[b]
+        momentum += m[b] * x
+        energy += 0.5 * m[b] * x * x
+    return energy - 0.5 * momentum * (momentum / mass)
+
+
+@jit
+def stick(c, low, high, rate, u, x, hi, lo, m):
+    """Give all balls that exact zeros join to contact c, within low..high, one velocity.
+
+    Returns the last contact of the stretch.
+    """
+    first = c
+    last = c
+    while first > low and u[first - 1] == 0.0 and rate[first - 1] > 0.0:
+        first -= 1
+    while last < high and u[last + 1] == 0.0 and rate[last + 1] > 0.0:
+        last += 1
+    for b in range(first, last + 2):
+        x[b] = 0.0
+    move_together(first, last + 1, x, hi, lo, m)
+    return last
+
+
+@jit
+def advance(
+    left, right, s, whole, n, e, m, hi, lo, u, q, w, p, a, rate, slope, pull, until, fixed, held,
+    x,
+):  # fmt: skip
     """Take the run left..right straight on by s; `whole` if that is its own next event.
 
     Velocities are linear and works quadratic in s.  What is zero at the event is stored as zero.
     """
     horizon = s * SIMULTANEOUS if whole else -1.0
+    for b in range(left, right + 2):
+        add(b, pull[b] * s, hi, lo)
     for c in range(left, right + 1):
         u0 = u[c]
-        u1 = u0 + slope[c] * s
         done = until[c] <= horizon
         if done:
             u1 = end_speed(u0, q[c], slope[c], rate[c], e[c])
+            if u1 < 0.0:
+                open_at(c, u1, hi, lo, m)
+        else:
+            u1 = closing(c, hi, lo)
+            if slope[c] == 0.0 or (u1 < u0) != (slope[c] < 0.0):
+                u1 = u0  # a change below rounding
+        u[c] = u1
         p[c] += rate[c] * s
         if fixed[c] == 1 and rate[c] * s > 0.0:
             held[c] = 1
@@ -290,17 +399,22 @@ def advance(left, right, s, whole, n, e, u, q, w, p, a, rate, slope, pull, until
             else:
                 give = -0.5 * rate[c] * s0 * u0
                 gain = 0.5 * rate[c] * (s - s0) * u1
-        u[c] = u1
         w[c] += gain
         a[c] += gain
         q[c] = 0.0 if done else max(q[c] + e[c] * e[c] * gain - give, 0.0)
+    # Exact zeros: balls that touch at rest to each other have one velocity.
+    c = left
+    while c <= right:
+        if u[c] == 0.0 and closing(c, hi, lo) != 0.0:
+            c = stick(c, left, right, rate, u, x, hi, lo, m)
+        c += 1
     # Idle neighbours only ever close, and wait at zero.
     c = left - 1
     if c >= 0:
-        u[c] = 0.0 if until[c] <= horizon else min(u[c] - pull[left] * s, 0.0)
+        u[c] = 0.0 if until[c] <= horizon else min(closing(c, hi, lo), 0.0)
     c = right + 1
     if c < n - 1:
-        u[c] = 0.0 if until[c] <= horizon else min(u[c] + pull[c] * s, 0.0)
+        u[c] = 0.0 if until[c] <= horizon else min(closing(c, hi, lo), 0.0)
 
 
 @jit
@@ -328,61 +442,46 @@ def deactivate(c, u, q, before, active, turn):
 
 
 @jit
-def velocities(u, p, out, n, v, shift, m, p0, x):
-    """Velocities from the closing speeds and the momentum of each stretch of balls that shares it.
+def velocities(hi, u, p, out, n, v, shift, m, p0):
+    """Velocities in the caller's units; a ball without impulse keeps its own to the last bit.
 
-    Differences of large impulses over a light mass would lose digits; sums of closing speeds,
-    counted from the heaviest ball of the stretch, do not.  A ball without impulse keeps its
-    velocity to the last bit.
+    Balls that do not approach are in order.  Where the last bit tells otherwise, the lighter of
+    the two gives way, and a ball without impulse never does.
     """
-    i = 0
-    while i < n:
-        j = i
-        k = i
-        while j < n - 1 and p0[j] + p[j] > 0.0:
-            j += 1
-            if m[j] > m[k]:
-                k = j
-        if j == i:
-            out[i] = v[i]
-        else:
-            x[k] = 0.0
-            for c in range(k - 1, i - 1, -1):
-                x[c] = x[c + 1] + u[c]
-            for c in range(k, j):
-                x[c + 1] = x[c] - u[c]
-            mass = 0.0
-            momentum = 0.0
-            origin = math.ldexp(v[k], -shift)
-            for b in range(i, j + 1):
-                mass += m[b]
-                momentum += m[b] * ((math.ldexp(v[b], -shift) - origin) - x[b])
-            for b in range(i, j + 1):
-                out[b] = v[k] + math.ldexp(momentum / mass + x[b], shift)
-            # Balls that do not approach stay in order; the momentum's rounding must not tell
-            # otherwise of a ball beside the stretch.
-            for b in range(max(i, 1), j + 1):
-                if u[b - 1] > 0.0 or out[b] >= out[b - 1]:
-                    break
-                out[b] = out[b - 1]
-            if j < n - 1 and (j == n - 2 or p0[j + 1] + p[j + 1] <= 0.0):
-                out[j + 1] = v[j + 1]
-                for b in range(j, i - 1, -1):
-                    if u[b] > 0.0 or out[b] <= out[b + 1]:
-                        break
-                    out[b] = out[b + 1]
-        i = j + 1
+    ordered = True
+    for i in range(n):
+        out[i] = v[i] if rests(i, n, p, p0) else math.ldexp(hi[i], shift)
+        if i > 0 and out[i] < out[i - 1] and u[i - 1] <= 0.0:
+            ordered = False
+    if ordered:
+        return
+    for i in range(1, n):
+        yields = m[i] <= m[i - 1] or rests(i - 1, n, p, p0)
+        if out[i] < out[i - 1] and u[i - 1] <= 0.0 and yields and not rests(i, n, p, p0):
+            out[i] = out[i - 1]
+    for i in range(n - 1, 0, -1):
+        if out[i] < out[i - 1] and u[i - 1] <= 0.0 and not rests(i - 1, n, p, p0):
+            out[i - 1] = out[i]
+    for i in range(1, n):
+        if out[i] < out[i - 1] and u[i - 1] <= 0.0:
+            out[i] = out[i - 1]
+
+
+@jit
+def rests(i, n, p, p0):
+    """Tell whether ball i has had no impulse."""
+    return (i == 0 or p0[i - 1] + p[i - 1] == 0.0) and (i == n - 1 or p0[i] + p[i] == 0.0)
 
 
 @jit
 def record(
-    count, kind, c, u, p, n, v, shift, mass_shift, m, p0, x, kinds, contacts, path_v, path_p,
+    count, kind, c, hi, u, p, n, v, shift, mass_shift, m, p0, kinds, contacts, path_v, path_p,
 ):  # fmt: skip
-    """Write an event and the state u, p after it, if there is room; return the number of events."""
+    """Write an event and the state after it, if there is room; return the number of events."""
     if count < len(kinds):
         kinds[count] = kind
         contacts[count] = c
-        velocities(u, p, path_v[count + 1], n, v, shift, m, p0, x)
+        velocities(hi, u, p, path_v[count + 1], n, v, shift, m, p0)
         for j in range(n - 1):
             path_p[count + 1][j] = math.ldexp(p0[j] + p[j], shift + mass_shift)
     return count + 1
@@ -390,8 +489,8 @@ def record(
 
 @jit
 def record_compressions(
-    count, left, right, s, whole, n, v, shift, mass_shift, m, u, p, p0, rate, slope, pull, until,
-    x, y, z, power, kinds, contacts, path_v, path_p,
+    count, left, right, s, whole, n, v, shift, mass_shift, m, hi, lo, u, p, p0, rate, slope, pull,
+    until, x, y, z, power, kinds, contacts, path_v, path_p,
 ):  # fmt: skip
     """Record every maximum compression of the run within the next s, in order of progress.
 
@@ -411,19 +510,18 @@ def record_compressions(
             return count
         power[k] = 0
         at = min(at, s)
+        for b in range(n):
+            y[b] = hi[b]
+            if left <= b <= right + 1:
+                y[b] += lo[b] + pull[b] * at
+        y[k] = y[k + 1] = y[k] if m[k] > m[k + 1] else y[k + 1]
         for c in range(n - 1):
-            y[c] = u[c]
+            x[c] = y[c] - y[c + 1]
             z[c] = p[c]
             if left <= c <= right:
-                y[c] += slope[c] * at
                 z[c] += rate[c] * at
-        y[k] = 0.0
-        if left > 0:
-            y[left - 1] -= pull[left] * at
-        if right < n - 2:
-            y[right + 1] += pull[right + 1] * at
         count = record(
-            count, MAXIMUM_COMPRESSION, k, y, z, n, v, shift, mass_shift, m, p0, x, kinds,
+            count, MAXIMUM_COMPRESSION, k, y, x, z, n, v, shift, mass_shift, m, p0, kinds,
             contacts, path_v, path_p,
         )  # fmt: skip
 
@@ -442,21 +540,44 @@ def exhausted(c, work, threshold, m, u):
 
 
 @jit
-def exhausted_stretch(c, threshold, n, e, m, u, q, tiny):
+def chatters(c, threshold, n, m, u, q, tiny):
+    """R9: tell whether contact c exists and has made nothing but exhausted collisions of late."""
+    return 0 <= c < n - 1 and tiny[c] > 0 and exhausted(c, q[c], threshold, m, u)
+
+
+@jit
+def exhausted_stretch(c, threshold, n, e, m, u, q, w, tiny):
     """R9: the stretch around c of exhausted contacts that only chatter, as (first, last).
 
-    Empty (last < first) if nothing in it can lose energy: elastic sequences are finite.
+    A contact at rest between two of them, which passes their impulses on, belongs to it.  Empty
+    (last < first) if nothing in it can lose energy: elastic sequences are finite.
     """
     left = c
     right = c
-    while left > 0 and tiny[left - 1] > 0 and exhausted(left - 1, q[left - 1], threshold, m, u):
-        left -= 1
-    while (
-        right < n - 2
-        and tiny[right + 1] > 0
-        and exhausted(right + 1, q[right + 1], threshold, m, u)
-    ):
-        right += 1
+    while True:
+        if chatters(left - 1, threshold, n, m, u, q, tiny):
+            left -= 1
+        elif (
+            left > 1
+            and u[left - 1] == 0.0
+            and w[left - 1] == 0.0
+            and chatters(left - 2, threshold, n, m, u, q, tiny)
+        ):
+            left -= 2
+        else:
+            break
+    while True:
+        if chatters(right + 1, threshold, n, m, u, q, tiny):
+            right += 1
+        elif (
+            right < n - 3
+            and u[right + 1] == 0.0
+            and w[right + 1] == 0.0
+            and chatters(right + 2, threshold, n, m, u, q, tiny)
+        ):
+            right += 2
+        else:
+            break
     for k in range(left, right + 1):
         if e[k] < 1.0:
             return left, right
@@ -464,27 +585,35 @@ def exhausted_stretch(c, threshold, n, e, m, u, q, tiny):
 
 
 @jit
-def merge(first, last, n, m, u, q, tiny, before, active, turn):
-    """R9: end the contacts first..last plastically: their balls take the common velocity."""
-    mass = m[first]
-    momentum = 0.0  # both counted from the velocity of ball `first`
-    speed = 0.0
-    for c in range(first, last + 1):
-        speed -= u[c]
-        mass += m[c + 1]
-        momentum += m[c + 1] * speed
-    common = momentum / mass
-    if first > 0:
-        u[first - 1] -= common
-    if last < n - 2:
-        u[last + 1] += common - speed
-    for c in range(max(first - 1, 0), min(last + 1, n - 2) + 1):
-        if first <= c <= last:
+def merge(first, last, n, m, hi, lo, u, q, p, x, y, tiny, before, active, turn):
+    """R9: end the contacts first..last plastically: their balls take the common velocity.
+
+    A neighbour that this makes them approach, at a speed below the threshold, joins.  Returns the
+    contacts that ended.
+    """
+    while True:
+        for b in range(first, last + 2):
+            x[b] = 0.0
+            y[b] = hi[b]
+        move_together(first, last + 1, x, hi, lo, m)
+        impulse = 0.0
+        for c in range(first, last + 1):
+            impulse += m[c] * (y[c] - hi[c])
+            p[c] += max(impulse, 0.0)
             u[c] = 0.0
             tiny[c] = 0
             deactivate(c, u, q, before, active, turn)
-        elif active[c] == 0:
-            u[c] = min(u[c], 0.0)
+        if first > 0:
+            u[first - 1] = closing(first - 1, hi, lo)
+            if active[first - 1] == 0 and u[first - 1] > 0.0:
+                first -= 1
+                continue
+        if last < n - 2:
+            u[last + 1] = closing(last + 1, hi, lo)
+            if active[last + 1] == 0 and u[last + 1] > 0.0:
+                last += 1
+                continue
+        return first, last
 
 
 @jit
@@ -540,7 +669,9 @@ def chatterers(c, n, e, p, active, turn, code1, hits1, hits):
 
 
 @jit
-def cycle(c, n, e, m, u, q, w, p, a, before, u1, q1, x, y, active, turn, tiny, code1, hits1, hits):
+def cycle(
+    c, n, e, m, hi, lo, u, q, w, p, a, before, u1, q1, x, y, active, turn, tiny, code1, hits1, hits,
+):  # fmt: skip
     """R9: if the neighbourhood of contact c repeats itself on a smaller scale, go to the limit.
 
     The state is compared with the snapshot of an earlier end of the same contact.  If every closing
@@ -617,14 +748,16 @@ def cycle(c, n, e, m, u, q, w, p, a, before, u1, q1, x, y, active, turn, tiny, c
         y[k] = p[k] * total * (u[k] + step * squares) + (work - u1[k] * p[k]) * squares
         if active[k] == 1 and u[k] < 0.0 and q[k] + y[k] <= 0.0:
             return c, c - 1
+    energy = motion(left, right + 1, hi, lo, m)
     for k in range(low, high + 1):
         if first <= k <= last:
             p[k] += x[k]
-            a[k] += a[k] * squares
+            energy += q[k]
             u[k] = 0.0
             tiny[k] = 0
             deactivate(k, u, q, before, active, turn)
             continue
+        energy -= y[k]
         if active[k] == 1 and u[k] > 0.0:
             w[k] += y[k]
             a[k] += y[k]
@@ -633,6 +766,23 @@ def cycle(c, n, e, m, u, q, w, p, a, before, u1, q1, x, y, active, turn, tiny, c
             q[k] += y[k]
         p[k] += p[k] * total
         u[k] += (u[k] - u1[k]) * total
+    # The neighbours' velocities follow from the common one.
+    x[first] = 0.0
+    for b in range(first - 1, left - 1, -1):
+        x[b] = x[b + 1] + u[b]
+    for b in range(first, right + 1):
+        x[b + 1] = x[b] - u[b]
+    move_together(left, right + 1, x, hi, lo, m)
+    # The ledger: what disappears is the part 1 - e^2 of what these contacts absorb, by the sum of
+    # the squares of L, which this makes exact.
+    energy -= motion(left, right + 1, hi, lo, m)
+    loss = 0.0
+    for k in range(first, last + 1):
+        loss += (1.0 - e[k] * e[k]) * a[k]
+    if loss > 0.0:
+        squares = max(energy / loss, 0.0)
+    for k in range(first, last + 1):
+        a[k] += a[k] * squares
     return first, last
 
 
@@ -652,8 +802,8 @@ def scales(n, v, m):
 
 @jit
 def end_contacts(
-    low, high, count, threshold, sloped, n, v, e, shift, mass_shift, m, u, q, w, p, p0, slope,
-    before, x, active, turn, tiny, kinds, contacts, path_v, path_p,
+    low, high, count, threshold, sloped, n, v, e, shift, mass_shift, m, hi, u, q, w, p, p0, slope,
+    before, active, turn, tiny, kinds, contacts, path_v, path_p,
 ):  # fmt: skip
     """R8.1: end every contact of low..high that needs no progress to end; left to right.
 
@@ -685,7 +835,7 @@ def end_contacts(
         ends += 1
         ended = c
         count = record(
-            count, END, c, u, p, n, v, shift, mass_shift, m, p0, x, kinds, contacts, path_v,
+            count, END, c, hi, u, p, n, v, shift, mass_shift, m, p0, kinds, contacts, path_v,
             path_p,
         )  # fmt: skip
     return ends, ended, worn, count
@@ -693,7 +843,7 @@ def end_contacts(
 
 @jit
 def close_contacts(
-    low, high, count, n, v, shift, mass_shift, m, u, q, w, p, p0, rate, before, x, active, turn,
+    low, high, count, n, v, shift, mass_shift, m, hi, u, q, w, p, p0, rate, before, active, turn,
     hits, kinds, contacts, path_v, path_p,
 ):  # fmt: skip
     """R5, R8.1: activate every idle contact of low..high at u = 0 that is about to rise.
@@ -722,7 +872,7 @@ def close_contacts(
         activate(c, from_left, from_right, u, q, w, active, turn, hits)
         rate[c] = 0.0  # it drives nobody in this round
         count = record(
-            count, CLOSE, c, u, p, n, v, shift, mass_shift, m, p0, x, kinds, contacts, path_v,
+            count, CLOSE, c, hi, u, p, n, v, shift, mass_shift, m, p0, kinds, contacts, path_v,
             path_p,
         )  # fmt: skip
     return count
@@ -781,12 +931,17 @@ def impact(
     a, a0, rate, slope, pull = floats[6], floats[7], floats[8], floats[9], floats[10]
     ratio, until, before, reach = floats[11], floats[12], floats[13], floats[14]
     u1, q1, x, y, z = floats[15], floats[16], floats[17], floats[18], floats[19]
+    hi, lo, rest = floats[20], floats[21], floats[22]
     active, turn, fixed, tiny, power = ints[0], ints[1], ints[2], ints[3], ints[4]
     first, last, code1, hits1 = ints[5], ints[6], ints[7], ints[8]
     recording = len(kinds) > 0
     threshold = 0.0
+    smallest = CUT
     for i in range(n):
         m[i] = math.ldexp(masses[i], -mass_shift)
+        smallest = min(smallest, CUT * m[i])
+        hi[i] = math.ldexp(v[i], -shift)
+        lo[i] = 0.0
         turn[i] = 0
         if i < n - 1:
             u[i] = math.ldexp(v[i], -shift) - math.ldexp(v[i + 1], -shift)
@@ -796,7 +951,7 @@ def impact(
             active[i] = tiny[i] = hits[i] = held[i] = 0
     start(n, u, active, turn, hits)
     if recording:
-        velocities(u, p, path_v[0], n, v, shift, m, p0, x)
+        velocities(hi, u, p, path_v[0], n, v, shift, m, p0)
         for c in range(n - 1):
             path_p[0][c] = 0.0
 
@@ -812,8 +967,8 @@ def impact(
     while True:
         # R8.1, events without progress: ends, those first that are known without the slopes.
         more, ended, worn, count = end_contacts(
-            low, high, count, threshold, False, n, v, e, shift, mass_shift, m, u, q, w, p, p0,
-            slope, before, x, active, turn, tiny, kinds, contacts, path_v, path_p,
+            low, high, count, threshold, False, n, v, e, shift, mass_shift, m, hi, u, q, w, p, p0,
+            slope, before, active, turn, tiny, kinds, contacts, path_v, path_p,
         )  # fmt: skip
         while low <= high and active[low] == 0:
             low += 1
@@ -828,15 +983,15 @@ def impact(
                     c += 1
                 last[runs] = c
                 rates(
-                    first[runs], c, forward, backward, m, u, w, rate, slope, pull, ratio, turn,
-                    fixed, power,
+                    first[runs], c, smallest, forward, backward, m, u, w, rate, slope, pull, ratio,
+                    rest, turn, fixed, power,
                 )  # fmt: skip
                 runs += 1
             c += 1
         if runs > 0:
             others, c, k, count = end_contacts(
-                low, high, count, threshold, True, n, v, e, shift, mass_shift, m, u, q, w, p, p0,
-                slope, before, x, active, turn, tiny, kinds, contacts, path_v, path_p,
+                low, high, count, threshold, True, n, v, e, shift, mass_shift, m, hi, u, q, w, p,
+                p0, slope, before, active, turn, tiny, kinds, contacts, path_v, path_p,
             )  # fmt: skip
             if others > 0:
                 more += others
@@ -848,20 +1003,22 @@ def impact(
             ends += more
             left, right = ended, ended - 1
             if worn >= 0:
-                left, right = exhausted_stretch(worn, threshold, n, e, m, u, q, tiny)
+                left, right = exhausted_stretch(worn, threshold, n, e, m, u, q, w, tiny)
                 if left <= right:
-                    merge(left, right, n, m, u, q, tiny, before, active, turn)
+                    left, right = merge(
+                        left, right, n, m, hi, lo, u, q, p, x, y, tiny, before, active, turn,
+                    )  # fmt: skip
             elif mark == ended:
                 left, right = cycle(
-                    mark, n, e, m, u, q, w, p, a, before, u1, q1, x, y, active, turn, tiny,
-                    code1, hits1, hits,
+                    mark, n, e, m, hi, lo, u, q, w, p, a, before, u1, q1, x, y, active, turn,
+                    tiny, code1, hits1, hits,
                 )  # fmt: skip
             if left <= right:
                 collapsed = 1
                 mark, marked_at, ends = -1, 16, 0
                 for c in range(left, right + 1):
                     count = record(
-                        count, COLLAPSE, c, u, p, n, v, shift, mass_shift, m, p0, x, kinds,
+                        count, COLLAPSE, c, hi, u, p, n, v, shift, mass_shift, m, p0, kinds,
                         contacts, path_v, path_p,
                     )  # fmt: skip
                 runs = -1
@@ -881,7 +1038,7 @@ def impact(
         high = min(high + 1, n - 2)
         so_far = count
         count = close_contacts(
-            low, high, count, n, v, shift, mass_shift, m, u, q, w, p, p0, rate, before, x, active,
+            low, high, count, n, v, shift, mass_shift, m, hi, u, q, w, p, p0, rate, before, active,
             turn, hits, kinds, contacts, path_v, path_p,
         )  # fmt: skip
         if count > so_far:
@@ -925,22 +1082,23 @@ def impact(
             s = reach[k] * part
             if recording:
                 count = record_compressions(
-                    count, first[k], last[k], s, part == 1.0, n, v, shift, mass_shift, m, u, p, p0,
-                    rate, slope, pull, until, x, y, z, power, kinds, contacts, path_v, path_p,
+                    count, first[k], last[k], s, part == 1.0, n, v, shift, mass_shift, m, hi, lo, u,
+                    p, p0, rate, slope, pull, until, x, y, z, power, kinds, contacts, path_v,
+                    path_p,
                 )  # fmt: skip
             advance(
-                first[k], last[k], s, part == 1.0, n, e, u, q, w, p, a, rate, slope, pull, until,
-                fixed, held,
+                first[k], last[k], s, part == 1.0, n, e, m, hi, lo, u, q, w, p, a, rate, slope,
+                pull, until, fixed, held, x,
             )  # fmt: skip
         if gap >= 0:
             # R8.5: driven from both sides.
             activate(gap, True, True, u, q, w, active, turn, hits)
             count = record(
-                count, CLOSE, gap, u, p, n, v, shift, mass_shift, m, p0, x, kinds, contacts,
+                count, CLOSE, gap, hi, u, p, n, v, shift, mass_shift, m, p0, kinds, contacts,
                 path_v, path_p,
             )  # fmt: skip
 
-    velocities(u, p, out_v, n, v, shift, m, p0, x)
+    velocities(hi, u, p, out_v, n, v, shift, m, p0)
     for c in range(n - 1):
         out_p[c] = math.ldexp(p0[c] + p[c], shift + mass_shift)
         out_a[c] = math.ldexp(a0[c] + a[c], 2 * shift + mass_shift)

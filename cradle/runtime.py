@@ -30,8 +30,11 @@ def compiled() -> ModuleType | None:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     # The same arithmetic as Python's: no reordering, no contraction; a division by zero gives
-    # infinity, and the kernel makes none.
-    vars(module)["jit"] = numba.njit(cache=True, nogil=True, error_model="numpy")
+    # infinity, and the kernel makes none.  It allocates nothing, so arrays need no reference counts
+    # (`_nrt`); without these and with its functions inlined the loop runs ten times faster.
+    vars(module)["jit"] = numba.njit(
+        cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False
+    )
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
