@@ -20,6 +20,7 @@ from cradle.chain import Chain
 from cradle.models import Model, collide
 from cradle.models.compliant import SpringChain, TimedTrace
 from cradle.models.correlation import ImpulseCorrelation, post_impact_velocities
+from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
 from cradle.tables import paper_chain, paper_sequences, ratio_table, restitution_table
@@ -27,6 +28,7 @@ from cradle.trace import Event, ImpactNotFinished, Trace
 
 __all__ = [
     "Chain",
+    "DissipationTrace",
     "EnergyDistribution",
     "EnergyTrace",
     "Event",
@@ -34,6 +36,7 @@ __all__ = [
     "ImpactNotFinished",
     "ImpulseCorrelation",
     "Model",
+    "QuadraticDissipation",
     "SequentialCollisions",
     "SpringChain",
     "TimedTrace",

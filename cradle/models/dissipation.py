@@ -1,0 +1,209 @@
+"""One convex problem for the whole impact: Moreau, Frémond and Cholet's quadratic dissipation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cradle.chain import Chain, Vector, checked
+from cradle.trace import Event, ImpactNotFinished, Trace
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DissipationTrace(Trace):
+    """The outcome of an impact that has no phases: all contacts end at one instant.
+
+    Here `absorbed` is the net work that each contact takes from the balls: its impulse times the
+    mean of its closing speeds before and after.  A contact can also give work that another one
+    takes; the sum is what is lost, whatever the restitution of the chain.
+
+    Examples
+    --------
+    >>> from cradle import Chain, collide
+    >>> collide(Chain([1, 1], [1, 0], 0.5), QuadraticDissipation()).absorbed.round(6)
+    array([0.1875])
+    """
+
+    @property
+    def energy_loss(self) -> float:
+        """Kinetic energy lost, in joules."""
+        return float(np.sum(self.absorbed))
+
+
+@dataclass(frozen=True, init=False)
+class QuadraticDissipation:
+    """Velocities after the impact from one convex problem (Moreau; Frémond; Cholet).
+
+    With D_c the mean of the closing speeds of contact c before and after, the velocities v make ::
+
+        1/2 sum_i m_i (v_i - v_i^-)^2 + sum_c k_c D_c^2
+
+    as small as possible while no two balls go on approaching.  So the percussion of a contact is
+    ``k_c D_c``, and a reaction beside it where the balls would still approach.  Energy cannot
+    grow: the loss is the sum of ``k_c D_c^2`` and of reactions times D_c, none of them negative.
+
+    Two balls of reduced mass mu have ``e = (kappa - 1) / (kappa + 1)`` with kappa = k / (2 mu), or
+    e = 0 where kappa is below 1.  The coefficients are such kappa, each with the mu of its pair.
+    e = 1 is a limit only.
+
+    Contacts that open before the impact take no part.  If their balls approach after it, another
+    such problem follows, with the velocities reached.  A percussion opposes D_c whatever its sign,
+    so it can hold back balls that part: two balls at rest that are struck by a third one stay
+    together, unless `distance` adds the same term for the pair of the outer balls.  Of the outcomes
+    of three equal balls that lose no energy, only the two of Han and Gilmore are limits of this.
+
+    Parameters
+    ----------
+    coefficients : float or sequence, length N - 1, optional
+        kappa of each contact, at least 0.  If left out, (1 + e) / (1 - e) with the restitution e of
+        the chain, which must be below 1; if given, the restitution of the chain has no say.
+    distance : float
+        kappa of the pair of balls 1 and 3; for three balls only.  It acts if neither contact opens.
+        The percussion of this pair passes through both contacts: `Trace.impulses` hold it.
+    max_problems : int
+        Number of problems after which the impact is given up.
+
+    Raises
+    ------
+    ValueError
+        If a value is outside its range, or infinite; on solving, if there are not as many as
+        contacts, if e = 1 gives a coefficient, or for `distance` with other than three balls.
+    ImpactNotFinished
+        On solving, if balls still approach after `max_problems`.
+
+    References
+    ----------
+    Frémond, Non-Smooth Thermomechanics, Springer (2002); Moreau, in: Unilateral Problems in
+    Structural Analysis (1988).
+
+    Examples
+    --------
+    >>> from cradle import Chain, collide
+    >>> collide(Chain([2, 1], [1, 0], 0.5), QuadraticDissipation()).velocities.round(6)
+    array([0.5, 1. ])
+    >>> three = Chain([1, 1, 1], [1, 0, 0], 1)
+    >>> for model in (QuadraticDissipation(1e9), QuadraticDissipation(0, distance=1e9)):
+    ...     print(collide(three, model).velocities.round(6) + 0.0)
+    [-0.333333  0.666667  0.666667]
+    [0. 0. 1.]
+    """
+
+    coefficients: float | tuple[float, ...] | None
+    distance: float
+    max_problems: int
+
+    def __init__(
+        self,
+        coefficients: float | Sequence[float] | None = None,
+        *,
+        distance: float = 0.0,
+        max_problems: int = 10_000,
+    ) -> None:
+        rule = "must be at least 0"
+        value: float | tuple[float, ...] | None = None
+        if coefficients is not None:
+            kappa = checked("coefficients", coefficients, rule, 0.0)
+            if kappa.ndim > 1:
+                raise ValueError(f"coefficients has shape {kappa.shape}; must be () or (N - 1,)")
+            value = tuple(kappa.tolist()) if kappa.ndim else float(kappa)
+        if np.ndim(distance):
+            raise ValueError(f"distance = {distance!r}; must be one number")
+        most = max_problems
+        if isinstance(most, bool) or not isinstance(most, (int, np.integer)) or most < 1:
+            raise ValueError(f"max_problems = {most!r}; must be a whole number, at least 1")
+        object.__setattr__(self, "max_problems", int(most))
+        object.__setattr__(self, "coefficients", value)
+        object.__setattr__(self, "distance", float(checked("distance", distance, rule, 0.0)))
+
+    def solve(self, chain: Chain) -> DissipationTrace:
+        """Solve the impact of `chain`; see `collide`."""
+        n, m, v = len(chain), chain.masses, chain.velocities
+        kappa = self._kappa(chain)
+        if self.distance and n != 3:
+            raise ValueError(f"distance = {self.distance!r}; needs three balls, the chain has {n}")
+        impulses, absorbed = np.zeros((2, n - 1))
+        path, path_impulses, events = [v], [impulses], []
+        rounding = 1e-14 * np.abs(v - v.mean()).max()
+
+        def closing(v: Vector) -> Vector:
+            u = v[:-1] - v[1:]
+            return np.where(np.abs(u) <= rounding, 0.0, u)
+
+        problems = 0
+        while (closing(v) > 0.0).any() and problems < self.max_problems:
+            problems += 1
+            u = closing(v)
+            stretch = np.cumsum(u < 0.0)
+            active = (u >= 0.0) & np.isin(stretch, stretch[u > 0.0])
+            after = _solution(m, v, active, np.append(kappa, self.distance))
+            passed = -np.cumsum(m * (after - v))[:-1]
+            impulses = impulses + passed
+            absorbed += passed * 0.5 * (u + closing(after))
+            v = after
+            contacts = np.flatnonzero(active).tolist()
+            events += [Event("end", c) for c in contacts]
+            path += [v] * len(contacts)
+            path_impulses += [impulses] * len(contacts)
+        trace = DissipationTrace(
+            chain=chain,
+            model=self,
+            velocities=v,
+            impulses=impulses,
+            absorbed=absorbed,
+            collisions=np.bincount([event.contact for event in events], minlength=n - 1),
+            path=np.array(path),
+            path_impulses=np.array(path_impulses),
+            events=tuple(events),
+        )
+        if (closing(v) > 0.0).any():
+            raise ImpactNotFinished(
+                f"the impact was not finished after max_problems = {self.max_problems}; "
+                f"closing speeds so far {(v[:-1] - v[1:]).tolist()}",
+                trace,
+            )
+        return trace
+
+    def _kappa(self, chain: Chain) -> Vector:
+        """Return the coefficient of each contact."""
+        contacts = len(chain) - 1
+        if self.coefficients is None:
+            e = chain.restitution
+            if (e == 1.0).any():
+                raise ValueError(
+                    f"restitution[{int(np.argmax(e))}] = 1.0; must be below 1 for "
+                    "QuadraticDissipation: e = 1 is the limit of an infinite coefficient"
+                )
+            return (1.0 + e) / (1.0 - e)
+        if np.ndim(self.coefficients) and np.size(self.coefficients) != contacts:
+            raise ValueError(
+                f"coefficients has {np.size(self.coefficients)} values; "
+                f"{contacts + 1} balls need {contacts}, or one"
+            )
+        return np.broadcast_to(np.asarray(self.coefficients, dtype=np.float64), (contacts,))
+
+
+def _solution(m: Vector, v: Vector, active: NDArray[np.bool_], kappa: Vector) -> Vector:
+    """Return the velocities after one problem; kappa of contacts, then of the outer balls."""
+    from scipy.linalg import solve_triangular
+    from scipy.optimize import nnls
+
+    # Rows that give the closing speeds: contacts, then the pair of the outer balls.
+    n = len(m)
+    contacts = np.eye(n)[:-1] - np.eye(n)[1:]
+    pairs = np.vstack([contacts, np.eye(n)[0] - np.eye(n)[-1]])
+    # Masses in units of the heaviest, and w = m^(1/2) (v+ - v-): then stationarity reads
+    # (1 + pairs' k pairs / 2) w = -pairs' (k pairs v- + r), with reactions r >= 0 of contacts.
+    root = np.sqrt(m / m.max())
+    k = np.append(active, active.all()) * kappa * 2.0 / (pairs**2 @ root**-2)
+    rows = np.sqrt(0.5 * k)[:, None] * pairs / root
+    matrix, inward = np.eye(n) + rows.T @ rows, (contacts[active] / root).T
+    alone = np.linalg.solve(matrix, -(pairs / root).T @ (k * (pairs @ v)))
+    response = np.linalg.solve(matrix, inward)
+    # u+ = free - G r <= 0, r >= 0, r u+ = 0: non-negative least squares with G = L L'.
+    free = contacts[active] @ v + inward.T @ alone
+    lower = np.linalg.cholesky(inward.T @ response)
+    reactions, _ = nnls(lower.T, solve_triangular(lower, free, lower=True))
+    return np.asarray(v + (alone - response @ reactions) / root)

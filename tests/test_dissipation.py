@@ -1,0 +1,256 @@
+"""Quadratic dissipation: two balls, the conditions of the minimum, and what it can reach."""
+
+import itertools
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cradle import (
+    Chain,
+    FusedChain,
+    ImpactNotFinished,
+    QuadraticDissipation,
+    SequentialCollisions,
+    collide,
+)
+
+
+def striking(masses=(1, 1, 1), e=1.0):
+    return Chain(masses, [1] + [0] * (len(masses) - 1), e)
+
+
+@pytest.mark.parametrize("e", [0, 0.1, 0.5, 0.9, 0.999])
+@pytest.mark.parametrize("masses", [[1, 1], [2, 3], [1e-3, 1e3]])
+def test_two_balls(masses, e):
+    """From the restitution of the chain, and from the coefficient that belongs to it."""
+    chain = Chain(masses, [1.7, 1], e)
+    kappa = (1 + e) / (1 - e)
+    for model in (QuadraticDissipation(), QuadraticDissipation(kappa)):
+        trace = collide(chain, model)
+        closing = trace.velocities[0] - trace.velocities[1]
+        assert closing == pytest.approx(-0.7 * e, abs=1e-12)
+        lost = chain.kinetic_energy - 0.5 * chain.masses @ trace.velocities**2
+        assert trace.energy_loss == pytest.approx(lost, rel=1e-10, abs=1e-12)
+        assert trace.events == (("end", 0),)
+
+
+@pytest.mark.parametrize("kappa", [0, 0.3, 1])
+def test_coefficient_below_one_is_plastic(kappa):
+    trace = collide(Chain([1, 3], [1, 0], 1), QuadraticDissipation(kappa))
+    np.testing.assert_allclose(trace.velocities, 0.25, rtol=0, atol=1e-15)
+
+
+@st.composite
+def cases(draw):
+    """Chain, coefficients, coefficient at a distance: two to five balls."""
+    n = draw(st.integers(2, 5))
+    masses = [10.0 ** draw(st.floats(-1.5, 1.5)) for _ in range(n)]
+    number = st.sampled_from([0.0, 1.0, -1.0]) | st.floats(-1, 1).map(lambda v: round(v, 3))
+    velocities = [draw(number) for _ in range(n)]
+    kappa = [draw(st.sampled_from([0.0, 1.0]) | st.floats(0, 50)) for _ in range(n - 1)]
+    return Chain(masses, velocities, 1), kappa, draw(st.floats(0, 50)) if n == 3 else 0.0
+
+
+def part(chain):
+    """Which contacts take part: those in a stretch of touching contacts with one that closes."""
+    u = chain.closing_speeds
+    taking = u > 0
+    for c in [*range(1, len(u)), *range(len(u) - 2, -1, -1)]:
+        taking[c] |= u[c] == 0 and taking[max(c - 1, 0) : c + 2].any()
+    return taking
+
+
+def problem(chain, kappa, distance):
+    """Rows of closing speeds, and k of each pair that takes part."""
+    m, n = chain.masses, len(chain)
+    pairs = [(c, c + 1, kappa[c]) for c in np.flatnonzero(part(chain))]
+    if n == 3 and part(chain).all():
+        pairs.append((0, 2, distance))
+    rows = np.zeros((len(pairs), n))
+    k = np.zeros(len(pairs))
+    for row, (i, j, coefficient) in enumerate(pairs):
+        rows[row, i], rows[row, j] = 1, -1
+        k[row] = 2 * coefficient * m[i] * m[j] / (m[i] + m[j])
+    return rows, k
+
+
+@given(cases())
+def test_laws(case):
+    chain, kappa, distance = case
+    trace = collide(chain, QuadraticDissipation(kappa, distance=distance))
+    m, before, after = chain.masses, chain.velocities, trace.velocities
+    if not (chain.closing_speeds > 0).any():
+        assert after.tolist() == before.tolist()
+        assert not trace.events
+    lost = chain.kinetic_energy - 0.5 * m @ after**2
+    assert lost > -1e-11 * m.sum()
+    assert trace.energy_loss == pytest.approx(lost, abs=1e-11 * m.sum())
+    assert (after[:-1] - after[1:]).max() < 1e-13
+    passed = np.concatenate([[0], trace.impulses, [0]])
+    np.testing.assert_allclose(
+        m * (after - before), passed[:-1] - passed[1:], rtol=0, atol=1e-12 * m.sum()
+    )
+    np.testing.assert_array_equal(trace.path[-1], after)
+    assert len(trace.path) == len(trace.path_impulses) == len(trace.events) + 1
+    assert np.bincount([c for _, c in trace.events], minlength=len(m) - 1).tolist() == (
+        trace.collisions.tolist()
+    )
+
+
+@given(cases())
+def test_conditions_of_the_minimum(case):
+    """Stationary, reactions push, no ball approaches, and reactions act on contact only."""
+    chain, kappa, distance = case
+    u = chain.closing_speeds
+    if not (u > 0).any():
+        return
+    m, before = chain.masses, chain.velocities
+    trace = collide(chain, QuadraticDissipation(kappa, distance=distance))
+    after = trace.path[1]
+    rows, k = problem(chain, kappa, distance)
+    gradient = m * (after - before) + rows.T @ (k * (rows @ (after + before)) / 2)
+    reactions = -np.cumsum(gradient)[:-1]  # - gradient = differences' r
+    scale = m.sum() + k.sum()
+    touching = part(chain)
+    after_u = (after[:-1] - after[1:])[touching]
+    assert abs(gradient.sum()) < 1e-12 * scale
+    assert abs(reactions[~touching]).max(initial=0) < 1e-12 * scale
+    assert reactions.min() > -1e-12 * scale
+    assert after_u.max() < 1e-12
+    assert abs(reactions[touching] * after_u).max() < 1e-12 * scale
+
+
+@given(cases())
+def test_against_every_active_set(case):
+    """The minimum, found by trying all sets of contacts that stay closed."""
+    chain, kappa, distance = case
+    if not (chain.closing_speeds > 0).any():
+        return
+    n, m, v = len(chain), chain.masses, chain.velocities
+    rows, k = problem(chain, kappa, distance)
+    half = rows.T @ (k[:, None] * rows) / 2
+    touching = np.flatnonzero(part(chain)).tolist()
+    best, least = None, np.inf
+    for size in range(len(touching) + 1):
+        for closed in itertools.combinations(touching, size):
+            # Balls that stay together move as one: x = groups @ y.
+            label = np.cumsum([0] + [c not in closed for c in range(n - 1)])
+            groups = np.eye(label[-1] + 1)[label]
+            matrix = groups.T @ (np.diag(m) + half) @ groups
+            x = groups @ np.linalg.solve(matrix, groups.T @ (np.diag(m) - half) @ v)
+            cost = m @ (x - v) ** 2 / 2 + k @ (rows @ (x + v) / 2) ** 2
+            if (x[:-1] - x[1:])[touching].max() < 1e-12 and cost < least:
+                best, least = x, cost
+    trace = collide(chain, QuadraticDissipation(kappa, distance=distance))
+    np.testing.assert_allclose(trace.path[1], best, rtol=0, atol=1e-9)
+
+
+def test_a_ball_that_ran_away_is_caught_up_with():
+    """Contact 0 opens, ball 2 comes back from ball 3: a second problem, of contact 0 alone."""
+    chain = Chain([1, 1, 5], [0, 1, 0], 0.9)
+    trace = collide(chain, QuadraticDissipation())
+    assert trace.events == (("end", 1), ("end", 0))
+    first = collide(Chain([1, 5], [1, 0], 0.9), QuadraticDissipation()).velocities
+    second = collide(Chain([1, 1], [0, first[0]], 0.9), QuadraticDissipation()).velocities
+    np.testing.assert_allclose(trace.velocities, [*second, first[1]], rtol=0, atol=1e-14)
+
+
+def test_unfinished_impact_shows_what_was_reached():
+    model = QuadraticDissipation(9.0, max_problems=2)
+    with pytest.raises(ImpactNotFinished, match="max_problems = 2;") as stopped:
+        collide(Chain([10, 0.1, 10], [0, 1, 0], 1), model)
+    assert stopped.value.trace.collisions.tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("n", [3, 4, 6])
+def test_without_distance_the_rest_moves_as_one(n):
+    """Balls that touch at rest are not parted by percussions of their own contacts."""
+    chain = striking([1, 0.5, 2, 1, 3, 0.2][:n], 0.6)
+    trace = collide(chain, QuadraticDissipation(4.0))
+    fused = collide(striking([1, 0.5, 2, 1, 3, 0.2][:n], trace_e(trace)), FusedChain())
+    np.testing.assert_allclose(trace.velocities, fused.velocities, rtol=0, atol=1e-13)
+
+
+def trace_e(trace):
+    """Restitution of the struck contact that an outcome shows."""
+    return trace.velocities[1] - trace.velocities[0]
+
+
+@pytest.mark.parametrize("masses", [(1, 1, 1), (1, 2, 3)])
+def test_limits(masses):
+    """k12 to infinity is the fused rest; for equal balls k13 to infinity is one after the other."""
+    after = [
+        collide(striking(masses), QuadraticDissipation(kappa)).velocities for kappa in (1e3, 1e6)
+    ]
+    fused = collide(striking(masses), FusedChain()).velocities
+    distances = [abs(v - fused).max() for v in after]
+    assert distances[1] < 1e-5
+    assert distances[0] == pytest.approx(1e3 * distances[1], rel=0.01)
+    one = collide(striking(), QuadraticDissipation(0, distance=1e6)).velocities
+    np.testing.assert_allclose(
+        one, collide(striking(), SequentialCollisions()).velocities, rtol=0, atol=1e-5
+    )
+
+
+@pytest.mark.parametrize(
+    "target",
+    [(0.1, 0.2, 0.7), (-0.1, 0.5, 0.6), (0.3, 0.3, 0.4), (0.0, 0.05, 0.95), (-0.2, 0.5, 0.7)],
+)
+def test_outcomes_that_can_be_reached(target):
+    """Equal balls, ball 1 striking: P13 = v3, P12 = v2 and the law give the coefficients."""
+    v1, v2, v3 = target
+    # mu = 1/2, so that kappa = k, and k D = P with the means D12 and D13.
+    k12, k13 = 2 * v2 / (1 + v1 - v2), 2 * v3 / (1 + v1 - v3)
+    assert min(k12, k13) >= 0
+    trace = collide(striking(), QuadraticDissipation([k12, 0], distance=k13))
+    np.testing.assert_allclose(trace.velocities, target, rtol=0, atol=1e-13)
+
+
+def test_outcomes_that_cannot_be_reached():
+    """Where v3 > 1 + v1, as for springs, the outer balls would have to attract each other."""
+    rng = np.random.default_rng(0)
+    for kappa in 10 ** rng.uniform(-3, 3, (300, 3)):
+        v = collide(striking(), QuadraticDissipation(kappa[:2], distance=kappa[2])).velocities
+        assert v[2] <= 1 + v[0] + 1e-13
+        assert v[1] >= -1e-13
+
+
+def test_balls_of_any_mass():
+    trace = collide(Chain([1e-12, 1, 1e12], [1, 0, 0], 0.5), QuadraticDissipation())
+    assert np.isfinite(trace.velocities).all()
+    assert (np.diff(trace.velocities) > -1e-14).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"coefficients": -1}, "coefficients = -1.0; must be at least 0"),
+        ({"coefficients": [1, np.inf]}, "coefficients[1] = inf; must be finite"),
+        ({"coefficients": [[1]]}, "coefficients has shape (1, 1); must be () or (N - 1,)"),
+        ({"distance": -1}, "distance = -1.0; must be at least 0"),
+        ({"distance": [1]}, "distance = [1]; must be one number"),
+        ({"max_problems": 0}, "max_problems = 0; must be a whole number, at least 1"),
+    ],
+)
+def test_bad_coefficients_name_value_and_rule(arguments, message):
+    with pytest.raises(ValueError, match="^" + re.escape(message)):
+        QuadraticDissipation(**arguments)
+
+
+def test_chains_that_it_cannot_treat():
+    message = "restitution[1] = 1.0; must be below 1 for QuadraticDissipation: e = 1 is the limit"
+    with pytest.raises(ValueError, match="^" + re.escape(message)):
+        collide(striking(e=[0.5, 1]), QuadraticDissipation())
+    with pytest.raises(ValueError, match=r"^coefficients has 3 values; 3 balls need 2, or one"):
+        collide(striking(), QuadraticDissipation([1, 2, 3]))
+    with pytest.raises(ValueError, match=r"^distance = 1.0; needs three balls, the chain has 2"):
+        collide(striking([1, 1]), QuadraticDissipation(1, distance=1))
+
+
+def test_repr_is_the_caption():
+    assert repr(QuadraticDissipation([1, 2], distance=3)) == (
+        "QuadraticDissipation(coefficients=(1.0, 2.0), distance=3.0, max_problems=10000)"
+    )
