@@ -2,7 +2,7 @@
 
 Usage::
 
-    python benchmarks/run.py             # about four minutes; writes data/benchmarks.csv
+    python benchmarks/run.py             # two to five minutes; writes data/benchmarks.csv
     python benchmarks/run.py --quick     # half a minute; prints only, unless --output is given
 
 Every time stands beside that of one reference impact, taken at the same moment: read the ratios.
