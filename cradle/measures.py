@@ -1,4 +1,4 @@
-"""What is read off an outcome: which balls bounce back."""
+"""What is read off outcomes: bouncing patterns, conditioning, effective ratios, conservation."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.chain import Chain, checked
+from cradle.chain import Chain, Vector, checked
+from cradle.closed_form import largest_ratios
 from cradle.models import Model, collide
+from cradle.models.correlation import post_impact_velocities
 from cradle.trace import Event, Trace
 
 #: Pattern by the number of balls that bounce back: none, the first, the first two.
 _PATTERNS = np.array([2, 1, 3])
+
+#: Ratios that are tried to bracket an effective ratio.
+_RATIOS = 257
 
 
 def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
@@ -179,3 +184,181 @@ def _events_at_balls(trace: Trace) -> list[list[Event]]:
             seen[event.contact].append(event)
             seen[event.contact + 1].append(event)
     return seen
+
+
+def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
+    """Return the constant ratio that gives the outcome of an impact of three balls.
+
+    The outcome may come from any model.  The ratio lies between 0 and its bound (Eq. 34); the
+    restitution is that of the chain.  It is the ratio at the middle ball in both directions, as in
+    `ImpulseCorrelation(ratio)`, held at its bound where one is smaller.  If several ratios give the
+    outcome, the smallest is returned.  Two outcomes that lose no energy differ by one number, so
+    that there one ratio often suffices; with losses there is in general none.
+
+    Parameters
+    ----------
+    trace : Trace
+        An impact of three balls.
+    tolerance : float
+        How far velocities may be from those of the ratio, as a part of the fastest closing speed.
+
+    Returns
+    -------
+    float
+        The ratio.
+
+    Raises
+    ------
+    ValueError
+        If there are not three balls, none approach, or no ratio gives the outcome: then the message
+        has the one that comes nearest.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, Eqs. 16 and 34.
+
+    Examples
+    --------
+    >>> from cradle import Chain, SpringChain, collide
+    >>> three = Chain([1, 1, 1], [1, 0, 0], 1)
+    >>> for exponent in (1, 1.5):
+    ...     print(round(effective_ratio(collide(three, SpringChain(1.0, exponent))), 6))
+    0.230498
+    0.132503
+    """
+    # SciPy is slow to import, and only this measure needs it.
+    from scipy.optimize import brentq, minimize_scalar
+
+    chain, target = trace.chain, trace.velocities
+    u = chain.closing_speeds
+    if len(chain) != 3:
+        raise ValueError(f"trace has {len(chain)} balls; an effective ratio is that of three")
+    if not (u > 0.0).any():
+        raise ValueError(
+            f"closing_speeds = {u.tolist()}; any ratio fits balls that do not approach"
+        )
+    # The leftmost approaching contact drives (forward), or the right one alone (backward).
+    bounds = largest_ratios(chain.masses, np.zeros(1), np.zeros(1))
+    bound = float(bounds[0 if u[0] > 0.0 else 1][0])
+
+    def distances(ratio: ArrayLike) -> Vector:
+        ratios = np.asarray(ratio, dtype=np.float64)[..., None]
+        after = post_impact_velocities(
+            chain.masses, chain.velocities, chain.restitution, ratios, excess="saturate"
+        )
+        return np.asarray((after - target) / u.max())
+
+    grid = np.linspace(0.0, bound, _RATIOS)
+    missed = distances(grid)
+    ball = int(np.argmax(np.ptp(missed, axis=0)))  # the one that tells most
+    side = np.sign(missed[:, ball])
+    found = [
+        brentq(lambda ratio: float(distances(ratio)[ball]), grid[k], grid[k + 1], xtol=1e-15)
+        for k in np.flatnonzero(side[:-1] * side[1:] < 0.0)
+    ]
+    # The outcome can be that of an end, and rounding hide the change of sign there.
+    candidates = np.array([*found, *grid[side == 0.0], 0.0, bound])
+    far = np.abs(distances(candidates)).max(axis=1)
+    if (far <= tolerance).any():
+        # The smallest that fits; but an end that fits beside a root gives way to the root.
+        beside = candidates <= candidates[far <= tolerance].min() + grid[1]
+        return float(candidates[np.argmin(np.where(beside, far, np.inf))])
+    near = int(np.argmin(np.abs(missed).max(axis=1)))
+    best = minimize_scalar(
+        lambda ratio: float(np.abs(distances(ratio)).max()),
+        bounds=(grid[max(near - 1, 0)], grid[min(near + 1, _RATIOS - 1)]),
+        method="bounded",
+    )
+    raise ValueError(
+        f"no ratio in [0, {bound:.6g}] gives the velocities {target.tolist()}; the nearest, "
+        f"{best.x:.6g}, misses by {best.fun:.3g} of the fastest closing speed"
+    )
+
+
+def conserving_outcomes(
+    masses: ArrayLike, velocities: ArrayLike, angles: ArrayLike | None = None
+) -> tuple[Vector, Vector]:
+    """Return all outcomes of three balls that keep momentum, energy and the order of the balls.
+
+    With y_i = m_i^(1/2) (v_i - V), V the velocity of the centre of mass, energy fixes the length
+    of y, and momentum a plane: a circle.  v1 <= v2 <= v3 leaves an arc of it, from v1 = v2, angle
+    0, to v2 = v3 at ``arccos((m1 m3 / ((m1 + m2) (m2 + m3)))^(1/2))``, 60 degrees for equal balls.
+
+    Parameters
+    ----------
+    masses, velocities : array_like, shape (3,)
+        kg, and m/s before the impact.
+    angles : array_like, shape (K,), optional
+        Angles on the arc, rad; 181 from end to end if left out.
+
+    Returns
+    -------
+    angles : ndarray, shape (K,)
+        rad.
+    velocities : ndarray, shape (K, 3)
+        m/s.
+
+    Raises
+    ------
+    ValueError
+        If there are not three balls, a value is wrong, or an angle is off the arc.
+
+    References
+    ----------
+    Walkiewicz and Newby, Am. J. Phys. 40 (1972) 133-137.
+
+    Examples
+    --------
+    >>> angles, outcomes = conserving_outcomes([1, 1, 1], [1, 0, 0])
+    >>> outcomes[[0, -1]].round(3) + 0.0
+    array([[ 0.   ,  0.   ,  1.   ],
+           [-0.333,  0.667,  0.667]])
+    """
+    chain, ends, centre = _arc(masses, velocities)
+    full = float(np.arccos(min(1.0, ends[0] @ ends[1])))
+    if angles is None:
+        angle = np.linspace(0.0, full, 181)
+    else:
+        angle = checked("angles", angles, f"must lie in [0, {full:.6g}]", 0.0, full)
+    weights = np.stack([np.sin(full - angle), np.sin(angle)], axis=-1) / np.sin(full)
+    root = np.sqrt(chain.masses)
+    radius = np.linalg.norm(root * (chain.velocities - centre))
+    return angle, np.asarray(centre + radius * (weights @ ends) / root)
+
+
+def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
+    """Return the angle, in rad, of an outcome on the arc of `conserving_outcomes`.
+
+    The angle is negative, or beyond the end of the arc, where the balls are not in order.
+
+    Parameters
+    ----------
+    masses, velocities : array_like, shape (3,)
+        kg, and m/s after the impact.
+
+    Returns
+    -------
+    float
+        The angle; 0 for balls that all have one velocity.
+
+    Examples
+    --------
+    >>> from math import degrees
+    >>> round(degrees(conserving_angle([1, 1, 1], [-1 / 3, 2 / 3, 2 / 3])), 6)
+    60.0
+    """
+    chain, ends, centre = _arc(masses, velocities)
+    y = np.sqrt(chain.masses) * (chain.velocities - centre)
+    across = ends[1] - (ends[0] @ ends[1]) * ends[0]
+    return float(np.arctan2(y @ across / np.linalg.norm(across), y @ ends[0]))
+
+
+def _arc(masses: ArrayLike, velocities: ArrayLike) -> tuple[Chain, Vector, float]:
+    """Return three balls, the unit vectors of the ends of the arc, and the centre's velocity."""
+    chain = Chain(masses, velocities, 1.0)
+    if len(chain) != 3:
+        raise ValueError(f"masses has shape ({len(chain)},); must be (3,)")
+    m1, m2, m3 = chain.masses
+    ends = np.sqrt(chain.masses) * [[-m3, -m3, m1 + m2], [-m2 - m3, m1, m1]]
+    centre = chain.momentum / chain.masses.sum()
+    return chain, ends / np.linalg.norm(ends, axis=1, keepdims=True), float(centre)

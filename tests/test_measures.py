@@ -1,9 +1,26 @@
-"""Measures of outcomes: bouncing patterns."""
+"""Measures of outcomes: bouncing patterns, effective ratios, the arc of conserving outcomes."""
+
+import re
 
 import numpy as np
 import pytest
 
-from cradle.measures import bouncing_pattern
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    FusedChain,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    post_impact_velocities,
+)
+from cradle.measures import (
+    bouncing_pattern,
+    conserving_angle,
+    conserving_outcomes,
+    effective_ratio,
+)
 
 
 def test_pattern_of_each_sign():
@@ -33,3 +50,122 @@ def test_pattern_keeps_leading_axes():
 def test_pattern_refuses(velocities, message):
     with pytest.raises(ValueError, match=message):
         bouncing_pattern(velocities)
+
+
+# --- effective ratio -----------------------------------------------------------------------
+
+
+def striking(masses=(1, 1, 1), e=1.0):
+    return Chain(masses, [1, 0, 0], e)
+
+
+@pytest.mark.parametrize(("exponent", "ratio"), [(1.5, 0.132503287), (1, 0.230498292)])
+def test_effective_ratio_of_springs(exponent, ratio):
+    trace = collide(striking(), SpringChain(1.0, exponent, rtol=1e-12))
+    assert effective_ratio(trace) == pytest.approx(ratio, abs=1e-9)
+    # Eqs. 24 and 31 for equal elastic balls: v1 = -ratio / (2 - ratio).
+    v1 = trace.velocities[0]
+    assert effective_ratio(trace) == pytest.approx(-2 * v1 / (1 - v1), abs=1e-10)
+
+
+@pytest.mark.parametrize("part", [0, 0.01, 0.3, 0.7, 1])
+@pytest.mark.parametrize("e", [1.0, 0.7])
+@pytest.mark.parametrize("masses", [(1, 1, 1), (1, 2, 0.5), (2, 1, 2.5)])
+def test_effective_ratio_of_a_ratio_is_that_ratio(masses, e, part):
+    bound = masses[2] / (masses[1] + masses[2])
+    for chain in (striking(masses, e), Chain(masses[::-1], [0, 0, -1], e)):  # and its mirror image
+        trace = collide(chain, ImpulseCorrelation(part * bound, excess="saturate"))
+        assert effective_ratio(trace) == pytest.approx(part * bound, abs=1e-9)
+
+
+def test_effective_ratio_of_the_textbook_answers():
+    assert effective_ratio(collide(striking(), SequentialCollisions())) == pytest.approx(0)
+    assert effective_ratio(collide(striking(), FusedChain())) == pytest.approx(0.5, abs=1e-9)
+
+
+def test_two_ratios_one_outcome():
+    """Masses 3, 1, 2 (an arc of 45 degrees): ratios 0 and 2/3 leave the same velocities."""
+    chain = striking((3, 1, 2))
+    one, other = (collide(chain, ImpulseCorrelation(ratio)) for ratio in (0, 2 / 3))
+    np.testing.assert_allclose(one.velocities, other.velocities, rtol=0, atol=1e-13)
+    assert effective_ratio(other) == 0
+
+
+def test_no_effective_ratio():
+    """Energy is lost elsewhere than under a ratio; the nearest one is told."""
+    trace = collide(striking(e=0.5), EnergyDistribution(1.0))
+    with pytest.raises(ValueError, match=r"^no ratio in \[0, 0\.5\] gives .* misses by") as error:
+        effective_ratio(trace)
+    words = re.search(r"nearest, ([\d.e-]+), misses by ([\d.e-]+) of", str(error.value))
+    ratio, miss = float(words[1]), float(words[2])
+    after = collide(trace.chain, ImpulseCorrelation(ratio)).velocities
+    assert abs(after - trace.velocities).max() == pytest.approx(miss, rel=0.01)
+    # No ratio of a fine grid comes nearer by much.
+    grid = post_impact_velocities([1, 1, 1], [1, 0, 0], 0.5, np.linspace(0, 0.5, 5001)[:, None])
+    assert abs(grid - trace.velocities).max(axis=1).min() > 0.95 * miss
+
+
+def test_effective_ratio_refuses():
+    four = collide(Chain([1] * 4, [1, 0, 0, 0], 1), SequentialCollisions())
+    with pytest.raises(ValueError, match="trace has 4 balls; an effective ratio is that of three"):
+        effective_ratio(four)
+    apart = collide(Chain([1] * 3, [0, 0, 1], 1), SequentialCollisions())
+    with pytest.raises(ValueError, match=r"closing_speeds = \[0.0, -1.0\]; any ratio fits"):
+        effective_ratio(apart)
+
+
+# --- outcomes that conserve momentum and energy --------------------------------------------
+
+
+def random_three(seed):
+    rng = np.random.default_rng(seed)
+    return 10 ** rng.uniform(-1, 1, 3), np.sort(rng.normal(size=3))[::-1]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_conserving_outcomes_conserve(seed):
+    m, v = random_three(seed)
+    angles, after = conserving_outcomes(m, v)
+    np.testing.assert_allclose(after @ m, m @ v, rtol=1e-12)
+    np.testing.assert_allclose(after**2 @ m, m @ v**2, rtol=1e-12)
+    assert (np.diff(after, axis=1) > -1e-14).all()
+    assert after[0, 0] == pytest.approx(after[0, 1], abs=1e-13)
+    assert after[-1, 1] == pytest.approx(after[-1, 2], abs=1e-13)
+    assert np.cos(angles[-1]) ** 2 == pytest.approx(
+        m[0] * m[2] / ((m[0] + m[1]) * (m[1] + m[2])), rel=1e-12
+    )
+    back = [conserving_angle(m, outcome) for outcome in after]
+    np.testing.assert_allclose(back, angles, rtol=0, atol=1e-12)
+    # Any ordered outcome that conserves both is on the arc: the ellipse of closing speeds.
+    same = conserving_outcomes(m, v, back[1:-1])[1]
+    np.testing.assert_allclose(same, after[1:-1], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        ImpulseCorrelation(0.2, excess="saturate"),
+        SequentialCollisions(),
+        FusedChain(),
+        SpringChain(1.0, 1, rtol=1e-12),
+        SpringChain([1, 3], 1.5, rtol=1e-12),
+        EnergyDistribution([1, 3], step=0.01),
+    ],
+    ids=lambda model: type(model).__name__,
+)
+@pytest.mark.parametrize("masses", [(1, 1, 1), (1, 0.1, 2), (3, 1, 0.5)])
+def test_every_conservative_model_is_a_point_of_the_curve(model, masses):
+    chain = striking(masses)
+    after = collide(chain, model).velocities
+    angle = conserving_angle(masses, after)
+    full = conserving_outcomes(masses, chain.velocities)[0][-1]
+    assert -1e-9 < angle < full + 1e-9
+    point = conserving_outcomes(masses, chain.velocities, np.clip(angle, 0, full))[1]
+    np.testing.assert_allclose(point, after, rtol=0, atol=1e-9)
+
+
+def test_conserving_outcomes_refuse():
+    with pytest.raises(ValueError, match=r"masses has shape \(2,\); must be \(3,\)"):
+        conserving_outcomes([1, 1], [1, 0])
+    with pytest.raises(ValueError, match=r"angles\[1\] = 1.5; must lie in \[0, 1.0472\]"):
+        conserving_outcomes([1, 1, 1], [1, 0, 0], [0.1, 1.5])
