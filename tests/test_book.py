@@ -9,6 +9,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+import nbformat
 import pytest
 
 # Attributes whose address a browser loads by itself. <a href> and <form action> wait for a click.
@@ -179,6 +180,28 @@ def test_every_link_of_the_ledger_leads_somewhere(html: Path, root: Path):
         page, _, label = link.partition("#")
         assert f'href="{link}"' in table, link
         assert f'id="{label}"' in (html / "book" / page).read_text(encoding="utf-8"), link
+
+
+def test_two_clicks_from_the_landing_page_to_any_item(html: Path, root: Path):
+    """Landing page, ledger, item: the verdict on the way, the code within two cells of the item."""
+    landing = (html / "book" / "intro.html").read_text(encoding="utf-8")
+    assert 'href="ledger.html"' in landing.partition("<article")[2].partition("</article>")[0]
+    table = (html / "book" / "ledger.html").read_text(encoding="utf-8")
+    with (root / "data" / "ledger.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        line = f'<td><a href="{row["cell"]}">{row["item"]}</a></td><td>{row["status"]}</td>'
+        assert line in table, row["item"]
+        page, _, label = row["cell"].partition("#")
+        notebook = root / "book" / page.replace(".html", ".ipynb")
+        cells = nbformat.read(notebook, as_version=4).cells
+        at = next(
+            number
+            for number, cell in enumerate(cells)
+            if f"({label})=" in cell.source
+            or cell.metadata.get("mystnb", {}).get("figure", {}).get("name") == label
+        )
+        assert "code" in [cell.cell_type for cell in cells[at : at + 3]], row["item"]
 
 
 def test_pages_say_what_a_link_to_them_may_show(html: Path):
