@@ -1,0 +1,116 @@
+"""data/implied_ratio.csv: the ratio that springs imply, computed again by other means."""
+
+import csv
+import importlib.util
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cradle import post_impact_velocities
+from cradle.closed_form import one_collision_each, three_balls
+
+ROOT = Path(__file__).parents[1]
+
+
+@cache
+def table():
+    with (ROOT / "data" / "implied_ratio.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def numbers(row, names):
+    return np.array([float(row[name]) for name in names.split()])
+
+
+def masses(row):
+    return np.cumprod([1.0, *numbers(row, "m2_over_m1 m3_over_m2")])
+
+
+def springs(m, k, p, steps=20000):
+    """Three balls on springs by Runge-Kutta, of fixed step."""
+    k = np.array(k)
+
+    def rate(y):
+        d = np.maximum(y[:2] - y[1:3], 0)
+        force = np.concatenate([[0], k * d**p, [0]])
+        return np.concatenate([y[3:], (force[:-1] - force[1:]) / m])
+
+    y = np.array([0.0, 0, 0, 1, 0, 0])
+    # A speed of 1 takes the time `deepest` to the largest compression of two balls.
+    mu = m[:-1] * m[1:] / (m[:-1] + m[1:])
+    deepest = ((p + 1) * mu / (2 * k)) ** (1 / (p + 1))
+    h = deepest.min() * 50 / steps
+    while True:
+        a = rate(y)
+        b = rate(y + h / 2 * a)
+        c = rate(y + h / 2 * b)
+        y = y + h / 6 * (a + 2 * b + 2 * c + rate(y + h * c))
+        if (np.diff(y[:3]) >= 0).all() and (np.diff(y[3:]) >= 0).all():
+            return y[3:]
+
+
+def test_map_is_whole():
+    rows = table()
+    keys = {tuple(numbers(r, "exponent m2_over_m1 m3_over_m2 k2_over_k1")) for r in rows}
+    assert len(keys) == len(rows) == 2 * 5 * 5 * 25
+    for row in rows:
+        assert bool(row["ratio"]) != bool(row["note"])
+        bound = float(row["m3_over_m2"]) / (1 + float(row["m3_over_m2"]))
+        assert float(row["bound"]) == pytest.approx(bound, abs=1e-9)
+        # Elastic springs: each of these outcomes can be had from an admissible ratio.
+        assert 0 <= float(row["ratio"]) <= bound * (1 + 1e-14)
+
+
+@pytest.mark.parametrize("number", [10, 312, 480, 937, 1240])
+def test_outcomes_of_springs_by_another_integration(number):
+    row = table()[number]
+    k = [1.0, float(row["k2_over_k1"])]
+    after = springs(masses(row), k, float(row["exponent"]))
+    np.testing.assert_allclose(numbers(row, "v1 v2 v3"), after, rtol=0, atol=2e-7)
+
+
+def test_ratios_give_the_outcomes():
+    """By the solver for all, by the closed form where it holds."""
+    rows = table()
+    m = np.array([masses(row) for row in rows])
+    ratios = np.array([[float(row["ratio"])] for row in rows])
+    after = np.array([numbers(row, "v1 v2 v3") for row in rows])
+    solved = post_impact_velocities(m, [1, 0, 0], 1, ratios, excess="saturate")
+    np.testing.assert_allclose(solved, after, rtol=0, atol=1e-6)
+    once = one_collision_each(m, [1, 0, 0], [1, 1], ratios[:, 0])
+    assert once.sum() > 400
+    closed = three_balls(m[once], [1, 0, 0], [1, 1], ratios[once, 0])
+    np.testing.assert_allclose(closed, after[once], rtol=0, atol=1e-6)
+
+
+def test_limits_of_equal_balls():
+    """Soft second spring: (pi^2/8 - 1) k2/k1 for linear ones, not Eq. 14; stiff: Eq. 15, 1/2."""
+    equal = [r for r in table() if r["m2_over_m1"] == r["m3_over_m2"] == "1"]
+    for exponent, same in (("1", 0.230498292), ("1.5", 0.132503287)):
+        rows = {
+            float(r["k2_over_k1"]): float(r["ratio"]) for r in equal if r["exponent"] == exponent
+        }
+        assert rows[1.0] == pytest.approx(same, abs=2e-9)
+        assert rows[1000.0] == pytest.approx(0.5, abs=1e-5)
+        if exponent == "1":
+            assert rows[0.001] / 0.001 == pytest.approx(np.pi**2 / 8 - 1, rel=1e-3)
+        assert rows[0.001] < 0.25 * 0.001
+
+
+@pytest.mark.parametrize("number", [312, 937])
+def test_script_makes_the_rows(number):
+    path = ROOT / "benchmarks" / "implied_ratio.py"
+    spec = importlib.util.spec_from_file_location("implied_ratio", path)
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    row = table()[number]
+    made = script.row(*numbers(row, "exponent m2_over_m1 m3_over_m2 k2_over_k1"))
+    assert list(row) == script.COLUMNS
+    np.testing.assert_allclose(
+        [float(x) for x in made[:-1]],
+        [float(row[name]) for name in script.COLUMNS[:-1]],
+        rtol=0,
+        atol=2e-8,
+    )
