@@ -101,21 +101,24 @@ class Clock:
         def reference():
             post_impact_velocities(*_BATCH, 1.0, 0.167)
 
+        def measured():
+            given = [prepare()] if prepare else []
+            return self.seconds(lambda: function(*given), calls)
+
+        calls = 1
         with running(kernel):
-            function(*([prepare()] if prepare else []))
-            once = self.seconds(function) if prepare is None else math.inf
-        # A millisecond at least: short calls are repeated.
-        calls = max(1, math.ceil(1e-3 / once))
+            measured()
+            once = measured()
+        if not prepare:
+            calls = max(1, math.ceil(1e-3 / once))  # a millisecond at least
         reference()
+        # As long as the row itself, within limits: what interrupts one interrupts the other.
+        units = min(20, max(2, math.ceil(once * calls / self.seconds(reference))))
         times, ratios = [], []
         for _ in range(self.repeats):
-            unit = self.seconds(reference, 2) / len(_BATCH[0])
+            unit = self.seconds(reference, units) / len(_BATCH[0])
             with running(kernel):
-                if prepare:
-                    argument = prepare()
-                    taken = self.seconds(lambda made=argument: function(made)) / impacts
-                else:
-                    taken = self.seconds(function, calls) / impacts
+                taken = measured() / impacts
             times.append(taken)
             ratios.append(taken / unit)
         return {
