@@ -64,7 +64,9 @@ SIMULTANEOUS = 1.0 + 64 * 2.0**-52
 ROUNDED = 1.0 + 4 * 2.0**-52
 # A rate below this part of its run's largest, times the lightest ball's part of the heaviest, is
 # zero: no ball could notice it.
-CUT = 2.0**-200
+CUT = 2.0**-120
+# How many contacts the window grows by at a time.
+AHEAD = 8
 # R6: one vanishing ratio, as a binary exponent far below any of a number.
 VANISHING = 1 << 40
 
@@ -112,8 +114,8 @@ def ratios_in_force(left, right, forward, backward, m, u, w, ratio, rest, turn, 
             f = forward[c - 1]
             ratio[c] = f
             rest[c] = 1.0 - f
-            if u[c] == 0.0 and w[c] == 0.0 and not (c < right and turn[c + 1] == -1):
-                kept = m[c] * (rest[c + 1] if c < right else 1.0)
+            if u[c] == 0.0 and w[c] == 0.0 and turn[c + 1] != -1:
+                kept = m[c] * (rest[c + 1] if turn[c + 1] == 1 else 1.0)
                 bound = m[c + 1] / (m[c + 1] + kept)
                 if f >= bound:
                     fixed[c] = 1 if f > bound * ROUNDED else 2
@@ -124,8 +126,8 @@ def ratios_in_force(left, right, forward, backward, m, u, w, ratio, rest, turn, 
             f = backward[c]
             ratio[c + 1] = f
             rest[c + 1] = 1.0 - f
-            if u[c] == 0.0 and w[c] == 0.0 and not (c > left and turn[c] == 1):
-                kept = m[c + 1] * (rest[c] if c > left else 1.0)
+            if u[c] == 0.0 and w[c] == 0.0 and turn[c] != 1:
+                kept = m[c + 1] * (rest[c] if turn[c] == -1 else 1.0)
                 bound = m[c] / (m[c] + kept)
                 if f >= bound:
                     fixed[c] = 1 if f > bound * ROUNDED else 2
@@ -199,8 +201,11 @@ def rates(
     # Eqs. 47-48: m dv = dP on the left - dP on the right.
     pull[left] = -rate[left] / m[left]
     for c in range(left, right):
-        # The driver's rate less the driven one's, where both are nearly equal too.
-        if turn[c + 1] == 1:
+        # The difference of the rates leaves the sum of the momenta alone; where they are nearly
+        # equal, what the driver keeps for the ball has more digits.
+        if rest[c + 1] > 0.5:
+            pull[c + 1] = (rate[c] - rate[c + 1]) / m[c + 1]
+        elif turn[c + 1] == 1:
             pull[c + 1] = rate[c] * rest[c + 1] / m[c + 1]
         else:
             pull[c + 1] = -rate[c + 1] * rest[c + 1] / m[c + 1]
@@ -249,6 +254,13 @@ def end_speed(u, q, slope, rate, e):
     if q <= 0.0 or rate == 0.0:
         return 0.0
     return -math.sqrt(max(u * u - 2.0 * slope * q / rate, 0.0))
+
+
+@jit
+def idles(c, inside, u, w, rate, slope):
+    """Tell whether no impulse arrives at contact c, untouched so far, nor at its neighbour."""
+    untouched = u[c] == 0.0 and w[c] == 0.0 and slope[c] == 0.0
+    return untouched and rate[c] == 0.0 and rate[inside] == 0.0
 
 
 @jit
@@ -963,7 +975,7 @@ def impact(
     mark, marked_at = -1, 16
     collapsed = 0
     status = FINISHED
-    low, high = 0, n - 2
+    low, high = 0, n - 2  # the window: no contact outside it is at work
     while True:
         # R8.1, events without progress: ends, those first that are known without the slopes.
         more, ended, worn, count = end_contacts(
@@ -986,8 +998,27 @@ def impact(
                     first[runs], c, smallest, forward, backward, m, u, w, rate, slope, pull, ratio,
                     rest, turn, fixed, power,
                 )  # fmt: skip
+                # Impulses that reach the edge of the window go on beyond it.
+                left = low
+                right = high
+                if c == high and rate[c] > 0.0:
+                    while high < min(right + AHEAD, n - 2) and active[high + 1] == 1:
+                        high += 1
+                if first[runs] == low and rate[low] > 0.0:
+                    while low > max(left - AHEAD, 0) and active[low - 1] == 1:
+                        low -= 1
+                if low < left or high > right:
+                    c = first[runs] if low == left else low
+                    continue
                 runs += 1
             c += 1
+        # Where none arrives, the window ends.
+        while runs > 0 and low < last[0] and idles(low, low + 1, u, w, rate, slope):
+            low += 1
+            first[0] = low
+        while runs > 0 and high > first[runs - 1] and idles(high, high - 1, u, w, rate, slope):
+            high -= 1
+            last[runs - 1] = high
         if runs > 0:
             others, c, k, count = end_contacts(
                 low, high, count, threshold, True, n, v, e, shift, mass_shift, m, hi, u, q, w, p,
