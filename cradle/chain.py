@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Vector = NDArray[np.float64]
+from cradle.kernel import LIGHTEST
 
-#: Lightest ball allowed, as a part of the heaviest: beyond it squares of small numbers vanish.
-LIGHTEST = 1e-150
+Vector = NDArray[np.float64]
 
 
 def checked(

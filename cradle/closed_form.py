@@ -157,7 +157,9 @@ def largest_ratios(
 
     def bound(m: Vector, ratio: Vector) -> Vector:
         onward = np.concatenate([ratio[..., 1:], np.zeros_like(ratio[..., :1])], axis=-1)
-        return np.asarray(m[..., 2:] / (m[..., 2:] + m[..., 1:-1] * (1.0 - onward)))
+        # Sums of masses could overflow.
+        with np.errstate(over="ignore"):
+            return np.asarray(1.0 / (1.0 + m[..., 1:-1] / m[..., 2:] * (1.0 - onward)))
 
     f, b = np.asarray(forward, dtype=np.float64), np.asarray(backward, dtype=np.float64)
     return bound(m, f), bound(m[..., ::-1], b[..., ::-1])[..., ::-1]

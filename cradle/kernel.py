@@ -11,33 +11,32 @@ R2  start                          R5  closing              R8  two runs that me
 R3  end of a contact               R6  ratio zero           R9  collapse
 
 Notation (n balls; ball i lies between contacts i - 1 and i, contact c between balls c and c + 1;
-all in the chain's own units, see `scales`):
+all in the chain's own units, see `scales`)::
 
-m[i]         mass                                   e[c]    restitution
+  m[i]         mass                                   e[c]    restitution
 
-hi[i] lo[i]  velocity as a sum of two numbers: twice the digits, so that nothing is lost when a
-             light ball shuttles a thousand times as fast as the heavy balls on its sides
-u[c]         closing speed, > 0 in compression
-q[c]         work that the contact can still release, e^2 W+ - W-, since it became active
-w[c]         work absorbed since it became active, W+
-p[c]         impulse, since the last snapshot       p0[c]   impulse before that
-a[c]         work absorbed, since the last snapshot a0[c]   work absorbed before that
-rate[c]      impulse per unit of progress of the contact's run; the largest of a run is about 1
-slope[c]     closing speed per unit of progress, du/ds
-pull[i]      velocity of ball i per unit of progress, dv/ds
-ratio[i]     ratio in force at ball i                rest[i]      1 - ratio, to all its digits
-until[c]     progress to the contact's own next event
-before[c]    -u of an idle contact at the start of the round
-reach[k]     progress of run k to its own next event
-u1[c] q1[c]  snapshot of u and q                    x[i] y[i] z[i]  scratch
+  hi[i] lo[i]  velocity as a sum of two numbers, with twice the digits (see `add`)
+  u[c]         closing speed, > 0 in compression
+  q[c]         work that the contact can still release, e^2 W+ - W-, since it became active
+  w[c]         work absorbed since it became active, W+
+  p[c]         impulse, since the last snapshot       p0[c]   impulse before that
+  a[c]         work absorbed, since the last snapshot a0[c]   work absorbed before that
+  rate[c]      impulse per unit of progress of the contact's run; the largest of a run is about 1
+  slope[c]     closing speed per unit of progress, du/ds
+  pull[i]      velocity of ball i per unit of progress, dv/ds
+  ratio[i]     ratio in force at ball i                rest[i]      1 - ratio, to all its digits
+  until[c]     progress to the contact's own next event
+  before[c]    -u of an idle contact at the start of the round
+  reach[k]     progress of run k to its own next event
+  u1[c] q1[c]  snapshot of u and q                    x[i] y[i] z[i]  scratch
 
-active[c]    1 while the contact is active
-turn[i]      direction at ball i: 1 forward, -1 backward, 0 none
-fixed[c]     above 0 while the contact is held at u = 0, 2 if its ratio is just the bound
-held[c]      1 if it had an impulse while held by a ratio above the bound
-hits[c]      how often it became active             tiny[c] how many exhausted collisions in a row
-code1[c] hits1[c]  snapshot of what is active and how it is driven, and of hits
-power[c]     binary exponent of the rate            first[k], last[k]  the contacts of run k
+  active[c]    1 while the contact is active
+  turn[i]      direction at ball i: 1 forward, -1 backward, 0 none
+  fixed[c]     above 0 while the contact is held at u = 0, 2 if its ratio is just the bound
+  held[c]      1 if it had an impulse while held by a ratio above the bound
+  hits[c]      how often it became active             tiny[c] how many exhausted collisions in a row
+  code1[c] hits1[c]  snapshot of what is active and how it is driven, and of hits
+  power[c]     binary exponent of the rate            first[k], last[k]  the contacts of run k
 """
 
 import math
@@ -47,7 +46,7 @@ FLOATS = 23
 INTS = 9
 
 # Status codes.
-FINISHED, UNFINISHED = 0, 1
+FINISHED, UNFINISHED, REFUSED = 0, 1, 2
 # Kinds of event.
 MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE = 0, 1, 2, 3
 
@@ -64,7 +63,15 @@ SIMULTANEOUS = 1.0 + 64 * 2.0**-52
 ROUNDED = 1.0 + 4 * 2.0**-52
 # A rate below this part of its run's largest, times the lightest ball's part of the heaviest, is
 # zero: no ball could notice it.
-CUT = 2.0**-200
+CUT = 2.0**-120
+# How many contacts the window grows by at a time.
+AHEAD = 8
+# Closed forms are used for numbers between these, where no square over- or underflows, and for
+# conditions that are met by this part of the largest term.
+TINY, HUGE = 1e-60, 1e60
+CLEAR = 1e-12
+# Lightest ball allowed, as a part of the heaviest: beyond it squares of small numbers vanish.
+LIGHTEST = 1e-150
 # R6: one vanishing ratio, as a binary exponent far below any of a number.
 VANISHING = 1 << 40
 
@@ -112,8 +119,8 @@ def ratios_in_force(left, right, forward, backward, m, u, w, ratio, rest, turn, 
             f = forward[c - 1]
             ratio[c] = f
             rest[c] = 1.0 - f
-            if u[c] == 0.0 and w[c] == 0.0 and not (c < right and turn[c + 1] == -1):
-                kept = m[c] * (rest[c + 1] if c < right else 1.0)
+            if u[c] == 0.0 and w[c] == 0.0 and turn[c + 1] != -1:
+                kept = m[c] * (rest[c + 1] if turn[c + 1] == 1 else 1.0)
                 bound = m[c + 1] / (m[c + 1] + kept)
                 if f >= bound:
                     fixed[c] = 1 if f > bound * ROUNDED else 2
@@ -124,8 +131,8 @@ def ratios_in_force(left, right, forward, backward, m, u, w, ratio, rest, turn, 
             f = backward[c]
             ratio[c + 1] = f
             rest[c + 1] = 1.0 - f
-            if u[c] == 0.0 and w[c] == 0.0 and not (c > left and turn[c] == 1):
-                kept = m[c + 1] * (rest[c] if c > left else 1.0)
+            if u[c] == 0.0 and w[c] == 0.0 and turn[c] != 1:
+                kept = m[c + 1] * (rest[c] if turn[c] == -1 else 1.0)
                 bound = m[c] / (m[c] + kept)
                 if f >= bound:
                     fixed[c] = 1 if f > bound * ROUNDED else 2
@@ -199,8 +206,11 @@ def rates(
     # Eqs. 47-48: m dv = dP on the left - dP on the right.
     pull[left] = -rate[left] / m[left]
     for c in range(left, right):
-        # The driver's rate less the driven one's, where both are nearly equal too.
-        if turn[c + 1] == 1:
+        # The difference of the rates leaves the sum of the momenta alone; where they are nearly
+        # equal, what the driver keeps for the ball has more digits.
+        if rest[c + 1] > 0.5:
+            pull[c + 1] = (rate[c] - rate[c + 1]) / m[c + 1]
+        elif turn[c + 1] == 1:
             pull[c + 1] = rate[c] * rest[c + 1] / m[c + 1]
         else:
             pull[c + 1] = -rate[c + 1] * rest[c + 1] / m[c + 1]
@@ -252,6 +262,13 @@ def end_speed(u, q, slope, rate, e):
 
 
 @jit
+def idles(c, inside, u, w, rate, slope):
+    """Tell whether no impulse arrives at contact c, untouched so far, nor at its neighbour."""
+    untouched = u[c] == 0.0 and w[c] == 0.0 and slope[c] == 0.0
+    return untouched and rate[c] == 0.0 and rate[inside] == 0.0
+
+
+@jit
 def segment(left, right, n, e, u, q, rate, slope, pull, until, before, active):
     """R8.2: progress of the run left..right to its own next rate-changing event."""
     s = math.inf
@@ -278,7 +295,11 @@ def segment(left, right, n, e, u, q, rate, slope, pull, until, before, active):
 
 @jit
 def add(b, x, hi, lo):
-    """Add x to the velocity hi + lo of ball b; nothing is lost (two-sum)."""
+    """Add x to the velocity hi + lo of ball b, by a sum that loses nothing.
+
+    A light ball may shuttle a thousand times as fast as the heavy balls beside it.  Closing speeds
+    alone would lose track of how these move, single velocities of how slowly some balls part.
+    """
     total = hi[b] + x
     part = total - hi[b]
     x = ((hi[b] - (total - part)) + (x - part)) + lo[b]
@@ -963,7 +984,7 @@ def impact(
     mark, marked_at = -1, 16
     collapsed = 0
     status = FINISHED
-    low, high = 0, n - 2
+    low, high = 0, n - 2  # the window: no contact outside it is at work
     while True:
         # R8.1, events without progress: ends, those first that are known without the slopes.
         more, ended, worn, count = end_contacts(
@@ -986,8 +1007,27 @@ def impact(
                     first[runs], c, smallest, forward, backward, m, u, w, rate, slope, pull, ratio,
                     rest, turn, fixed, power,
                 )  # fmt: skip
+                # Impulses that reach the edge of the window go on beyond it.
+                left = low
+                right = high
+                if c == high and rate[c] > 0.0:
+                    while high < min(right + AHEAD, n - 2) and active[high + 1] == 1:
+                        high += 1
+                if first[runs] == low and rate[low] > 0.0:
+                    while low > max(left - AHEAD, 0) and active[low - 1] == 1:
+                        low -= 1
+                if low < left or high > right:
+                    c = first[runs] if low == left else low
+                    continue
                 runs += 1
             c += 1
+        # Where none arrives, the window ends.
+        while runs > 0 and low < last[0] and idles(low, low + 1, u, w, rate, slope):
+            low += 1
+            first[0] = low
+        while runs > 0 and high > first[runs - 1] and idles(high, high - 1, u, w, rate, slope):
+            high -= 1
+            last[runs - 1] = high
         if runs > 0:
             others, c, k, count = end_contacts(
                 low, high, count, threshold, True, n, v, e, shift, mass_shift, m, hi, u, q, w, p,
@@ -1106,14 +1146,117 @@ def impact(
 
 
 @jit
+def short_cut(n, m, v, e, forward, out_v, out_p, out_a):
+    """Eqs. 24 and 30: two balls, or three whose first strikes the others, one collision each.
+
+    Returns False, with nothing decided, if that is not so or not clear beyond rounding, or if the
+    numbers are so far from 1 that the loop's own units are needed.
+    """
+    for i in range(n):
+        if not (TINY < m[i] < HUGE and (v[i] == 0.0 or TINY < abs(v[i]) < HUGE)):
+            return False
+    u0 = v[0] - v[1]
+    if not (u0 > 0.0 and e[0] > CLEAR):
+        return False
+    if n == 2:
+        impulse = (1.0 + e[0]) * u0 * reduced_mass(m[0], m[1])
+        out_p[0] = impulse
+        out_a[0] = 0.5 * u0 * (impulse / (1.0 + e[0]))
+        out_v[0] = v[0] - impulse / m[0]
+        out_v[1] = v[1] + impulse / m[1]
+        return out_v[0] < out_v[1]
+    a = forward[0]
+    u1 = v[1] - v[2]
+    if u1 < 0.0 or e[1] < CLEAR or a * (m[1] + m[2]) > (1.0 - CLEAR) * m[2]:
+        return False
+    # Contact 0 drives contact 1 until it ends (Eqs. 17-24); speeds per impulse.
+    one, two, three = 1.0 / m[0], 1.0 / m[1], 1.0 / m[2]
+    reach = u0 / (one + (1.0 - a) * two)
+    first = (1.0 + e[0]) * reach
+    gain = first * ((1.0 - a) * two - a * three)
+    u2 = u1 + gain
+    # Contact 1 goes on alone, with all the work it has absorbed to give back (Eqs. 25-30).
+    mu = 1.0 / (two + three)
+    work = 0.5 * (a * first * (u1 + u2) + mu * u2 * u2)
+    opens = e[1] * math.sqrt(2.0 * work * (two + three))
+    second = mu * (u2 + opens)
+    apart = e[0] * u0 - second * two  # Eq. 43: ball 1 does not fall back on ball 0
+    if not (apart > CLEAR * u0 and u2 > CLEAR * (u1 + gain) and opens > CLEAR * u0):
+        return False
+    out_p[0] = first
+    out_p[1] = a * first + second
+    out_a[0] = 0.5 * u0 * reach
+    out_a[1] = work
+    out_v[0] = v[0] - first * one
+    out_v[2] = v[2] + out_p[1] * three
+    # A light ball's velocity from its neighbour's, a heavy one's from its impulses.
+    if m[1] < m[0]:
+        out_v[1] = out_v[0] + apart
+    else:
+        out_v[1] = v[1] + ((1.0 - a) * first - second) * two
+    return out_v[0] < out_v[1] < out_v[2]
+
+
+@jit
+def admissible(n, m, v, e, forward, backward, bounded):
+    """Tell whether all inputs are within their limits, ratios within Eq. 53 too if `bounded`."""
+    heaviest = 0.0
+    for i in range(n):
+        heaviest = max(heaviest, m[i])
+    energy = 0.0
+    for i in range(n):
+        if not (0.0 < m[i] < math.inf and m[i] >= LIGHTEST * heaviest):
+            return False
+        energy += m[i] * v[i] * v[i]
+    for c in range(n - 1):
+        if not 0.0 <= e[c] <= 1.0:
+            return False
+    for i in range(n - 2):
+        if not (0.0 <= forward[i] <= 1.0 and 0.0 <= backward[i] <= 1.0):
+            return False
+    if not energy < math.inf:
+        return False
+    if bounded:
+        unit = 0.25 if heaviest > 1.0 else 1.0  # sums of masses must not overflow
+        onward = 0.0
+        back = 0.0
+        for i in range(n - 2):
+            j = n - 3 - i
+            here = unit * m[j + 1] * (1.0 - onward) + unit * m[j + 2]
+            if forward[j] * here > ROUNDED * (unit * m[j + 2]):
+                return False
+            here = unit * m[i + 1] * (1.0 - back) + unit * m[i]
+            if backward[i] * here > ROUNDED * (unit * m[i]):
+                return False
+            onward = forward[j]
+            back = backward[i]
+    return True
+
+
+@jit
 def batch(
-    rows, n, masses, v, e, forward, backward, meeting, max_events,
+    rows, n, bounded, masses, v, e, forward, backward, meeting, max_events,
     out_v, hits, status, collapsed, out_p, out_a, held, floats, ints, kinds, contacts,
     path_v, path_p,
 ):  # fmt: skip
-    """Solve `rows` impacts, outcome alone: inputs, `out_v` and `hits` have one row a chain."""
+    """Solve `rows` impacts, outcome alone: inputs, `out_v` and `hits` have one row a chain.
+
+    Stops at the first row whose status is not FINISHED, and returns how many were solved.
+    """
     for k in range(rows):
+        if not admissible(n, masses[k], v[k], e[k], forward[k], backward[k], bounded):
+            status[k] = REFUSED
+            return k
+        collapsed[k] = 0
+        if n <= 3 and short_cut(n, masses[k], v[k], e[k], forward[k], out_v[k], out_p, out_a):
+            status[k] = FINISHED
+            for c in range(n - 1):
+                hits[k][c] = 1
+            continue
         status[k], _, collapsed[k] = impact(
             n, masses[k], v[k], e[k], forward[k], backward[k], meeting, max_events, out_v[k],
             out_p, out_a, hits[k], held, floats, ints, kinds, contacts, path_v, path_p,
         )  # fmt: skip
+        if status[k] != FINISHED:
+            return k
+    return rows

@@ -7,6 +7,7 @@ import importlib.util
 import os
 import sys
 from types import ModuleType
+from typing import Any
 
 from cradle import kernel as plain
 
@@ -32,9 +33,9 @@ def compiled() -> ModuleType | None:
     # The same arithmetic as Python's: no reordering, no contraction; a division by zero gives
     # infinity, and the kernel makes none.  It allocates nothing, so arrays need no reference counts
     # (`_nrt`); without these and with its functions inlined the loop runs ten times faster.
-    vars(module)["jit"] = numba.njit(
-        cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False
-    )
+    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+    options.update(forceinline=True, _nrt=False)
+    vars(module)["jit"] = numba.njit(**options)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.chain import LIGHTEST, Chain, Vector, checked
+from cradle.chain import Chain, Vector, checked
+from cradle.kernel import LIGHTEST
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 _METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")

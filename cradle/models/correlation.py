@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -211,10 +215,12 @@ def post_impact_velocities(
     meeting: float = 0.5,
     excess: str = "raise",
     max_events: int = MAX_EVENTS,
+    progress: bool = False,
 ) -> Vector:
     """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
 
-    The same event loop as `collide` with `ImpulseCorrelation`, without the record.
+    The same event loop as `collide` with `ImpulseCorrelation`, without the record; two balls, and
+    three that collide once each, take the closed form instead.  All processors are used.
 
     Parameters
     ----------
@@ -226,6 +232,8 @@ def post_impact_velocities(
         Ratios; `backward` as `forward` if left out.
     meeting, excess, max_events
         As for `ImpulseCorrelation`.
+    progress : bool
+        Show a progress bar.
 
     Returns
     -------
@@ -260,6 +268,7 @@ def post_impact_velocities(
         meeting=meeting,
         excess=excess,
         max_events=max_events,
+        progress=progress,
     ).velocities
 
 
@@ -290,12 +299,13 @@ def outcomes(
     meeting: float = 0.5,
     excess: str = "raise",
     max_events: int = MAX_EVENTS,
+    progress: bool = False,
 ) -> Outcomes:
     """Solve many chains of N balls at once, and count their collisions too.
 
     Parameters
     ----------
-    masses, velocities, restitution, forward, backward, meeting, excess, max_events
+    masses, velocities, restitution, forward, backward, meeting, excess, max_events, progress
         As for `post_impact_velocities`.
 
     Returns
@@ -318,66 +328,131 @@ def outcomes(
     [False, True]
     """
     _check_options(meeting, excess, max_events)
-    m = checked_masses(masses)
-    n = m.shape[-1] if m.ndim else 0
+    given = {
+        "masses": masses,
+        "velocities": velocities,
+        "restitution": restitution,
+        "forward": forward,
+        "backward": forward if backward is None else backward,
+    }
+    arrays = [_numbers(name, values) for name, values in given.items()]
+    n = arrays[0].shape[-1] if arrays[0].ndim else 0
     if n < 2:
-        raise ValueError(f"masses has shape {m.shape}; must be (..., N) with N >= 2")
-    v = checked("velocities", velocities)
-    if v.shape[-1:] != (n,):
-        raise ValueError(f"velocities has shape {v.shape}; must be (..., {n}), as masses")
-    e = checked("restitution", restitution, "must lie in [0, 1]", 0.0, 1.0)
-    f = _checked_ratios("forward", forward)
-    b = f if backward is None else _checked_ratios("backward", backward)
-    sized = []
-    for name, array, size in (
-        ("restitution", e, n - 1),
-        ("forward", f, n - 2),
-        ("backward", b, n - 2),
-    ):
-        if array.ndim and array.shape[-1] != size:
+        raise ValueError(f"masses has shape {arrays[0].shape}; must be (..., N) with N >= 2")
+    if arrays[1].shape[-1:] != (n,):
+        raise ValueError(f"velocities has shape {arrays[1].shape}; must be (..., {n}), as masses")
+    for k, size in ((2, n - 1), (3, n - 2), (4, n - 2)):
+        if arrays[k].ndim == 0:
+            arrays[k] = np.full(size, arrays[k])
+        elif arrays[k].shape[-1] != size:
             raise ValueError(
-                f"{name} has shape {array.shape}; must be () or (..., {size}) for {n} balls"
+                f"{list(given)[k]} has shape {arrays[k].shape}; "
+                f"must be () or (..., {size}) for {n} balls"
             )
-        sized.append(array if array.ndim else np.broadcast_to(array, (size,)))
-    e, f, b = sized
     try:
-        lead = np.broadcast_shapes(*(array.shape[:-1] for array in (m, v, e, f, b)))
+        lead = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     except ValueError:
-        named = {"masses": m, "velocities": v, "restitution": e, "forward": f, "backward": b}
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in named.items())
+        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
         raise ValueError(f"leading axes do not broadcast: {shapes}") from None
-    refuse_overflow(v, m)
-    if excess == "raise":
-        _refuse_excess(m, f, b)
 
     kernel = runtime.chosen()
     count = math.prod(lead)
     out = np.empty((count, n))
-    hits = np.zeros((count, n - 1), dtype=np.int64)
+    hits = np.empty((count, n - 1), dtype=np.int64)
     status, collapsed = np.zeros((2, count), dtype=np.int64)
-    p, absorbed, _, *work = _work(kernel, n, 0)
-    for begin in range(0, count, _ROWS):
+
+    def solve(begin: int) -> int:
+        """Solve the chunk of chains that begins there; return how many come before a failure."""
         rows = slice(begin, min(begin + _ROWS, count))
-        part = [_rows(array, lead, rows) for array in (m, v, e, f, b)]
+        part = [_rows(array, lead, rows) for array in arrays]
         results = [out[rows], hits[rows], status[rows], collapsed[rows]]
-        options = [float(meeting), int(max_events)]
-        _call(kernel, "batch", [len(out[rows]), n, *part, *options, *results, p, absorbed, *work])
-        if status[rows].any():
-            k = int(np.argmax(status[rows] != kernel.FINISHED))
-            m, v, e, f, b = (array[k] for array in part)
+        inputs = [rows.stop - begin, n, excess == "raise", *part, float(meeting), int(max_events)]
+        return int(_call(kernel, "batch", [*inputs, *results, *_area(kernel, n)]))
+
+    starts = range(0, count, _ROWS)
+    # At the first failure in the order of the chains; none has been returned before.
+    for begin, done in zip(starts, _in_order(solve, starts, progress), strict=True):
+        failed = begin + done
+        if failed < min(begin + _ROWS, count):
+            if status[failed] == kernel.REFUSED:
+                _explain(given, excess)
             # Alone, with its record; it stops where it stopped here, and raises.
+            m, v, e, f, b = (_rows(array, lead, slice(failed, failed + 1))[0] for array in arrays)
             ImpulseCorrelation(
                 f, b, meeting=meeting, excess="saturate", max_events=max_events
             ).solve(Chain(m, v, e))
-    return Outcomes(
-        out.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.astype(bool).reshape(lead)
-    )
+    return Outcomes(out.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.reshape(lead) != 0)
+
+
+def _in_order(solve: Callable[[int], int], starts: range, progress: bool) -> Iterable[int]:
+    """Yield the results of `solve` in order, made by as many threads as there are processors."""
+    if progress:
+        from tqdm.auto import tqdm
+
+        with tqdm(total=len(starts), unit="chunk") as bar:
+            for result in _in_order(solve, starts, progress=False):
+                bar.update()
+                yield result
+    elif len(starts) < 2:
+        yield from map(solve, starts)
+    else:
+        with ThreadPoolExecutor(min(len(starts), os.cpu_count() or 1)) as pool:
+            try:
+                yield from pool.map(solve, starts)
+            finally:
+                pool.shutdown(cancel_futures=True)
+
+
+#: Each thread's work area, kept for its next call.
+_KEPT = threading.local()
+
+
+def _area(kernel: ModuleType, n: int) -> list[Any]:
+    """Return this thread's work area for outcomes of n balls."""
+    if getattr(_KEPT, "n", None) != n:
+        _KEPT.n = n
+        p, absorbed, _, *work = _work(kernel, n, 0)
+        _KEPT.area = [p, absorbed, *work]
+    return list(_KEPT.area)
+
+
+def _numbers(name: str, values: ArrayLike) -> Vector:
+    """Return `values` as floats; whether these are in range is checked by the kernel."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+        return values
+    try:
+        array = np.asarray(values)
+        return array.astype(np.float64) if array.dtype.kind in "biuf" else checked(name, values)
+    except ValueError:
+        return checked(name, values)
+
+
+def _explain(given: dict[str, ArrayLike], excess: str) -> None:
+    """Raise the error of the first value that the kernel refused."""
+    m = checked_masses(given["masses"])
+    v = checked("velocities", given["velocities"])
+    checked("restitution", given["restitution"], "must lie in [0, 1]", 0.0, 1.0)
+    f, b = (_checked_ratios(name, given[name]) for name in ("forward", "backward"))
+    refuse_overflow(v, m)
+    if excess == "raise":
+        ends = m.shape[-1] - 2
+        f, b = (np.broadcast_to(x, (ends,)) if x.ndim == 0 else x for x in (f, b))
+        _refuse_excess(m, f, b)
+    raise AssertionError("the kernel refused chains that the checks admit")
 
 
 def _rows(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
     """Return some rows of `array` broadcast to the leading shape, without making the others."""
-    full = np.broadcast_to(array, (lead or (1,)) + array.shape[-1:])
-    return full[np.unravel_index(np.arange(rows.start, rows.stop), lead or (1,))]
+    if array.ndim == 1:
+        copies = np.empty((rows.stop - rows.start, array.size))
+        copies[:] = array
+        return copies
+    if array.shape[:-1] == lead and array.flags.c_contiguous:
+        part = array.reshape(math.prod(lead), array.shape[-1])[rows]
+        # Compiled code is made for arrays that may be written to; it writes to no input.
+        return part if part.flags.writeable else part.copy()
+    full = np.broadcast_to(array, lead + array.shape[-1:])
+    return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
 
 
 def _checked_ratios(name: str, ratios: ArrayLike | None) -> Vector:
@@ -385,9 +460,11 @@ def _checked_ratios(name: str, ratios: ArrayLike | None) -> Vector:
 
 
 def _check_options(meeting: float, excess: str, max_events: int) -> None:
-    checked("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
-    if np.ndim(meeting):
-        raise ValueError(f"meeting = {meeting!r}; must be one number")
+    # The usual options first: they cost a call for one chain less than the checks in full.
+    if not (type(meeting) is float and 0.0 <= meeting <= 1.0):
+        checked("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
+        if np.ndim(meeting):
+            raise ValueError(f"meeting = {meeting!r}; must be one number")
     if excess not in ("raise", "saturate"):
         raise ValueError(f"excess = {excess!r}; must be 'raise' or 'saturate'")
     if isinstance(max_events, bool) or not isinstance(max_events, (int, np.integer)):
