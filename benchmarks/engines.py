@@ -13,8 +13,10 @@ restitution: its contact is a damped constraint, whose damping is found from two
 
 import importlib.util
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from measure import Row, distance, outcome, versions
@@ -62,7 +64,15 @@ class Line:
         return [x * s if i % 2 == 0 else x / s for i, x in enumerate(factors)]
 
 
-# Each engine: a function that makes the world and returns `step(count)` and `state()`.
+class World(NamedTuple):
+    """A line of balls in an engine."""
+
+    advance: Callable  #: makes so many steps
+    velocities: Callable  #: returns them, ball by ball, m/s
+    close: Callable = lambda: None  #: gives back what the engine holds
+
+
+# Each engine: a function that makes the world.
 
 
 def chipmunk(line, *, step, iterations):
@@ -86,7 +96,7 @@ def chipmunk(line, *, step, iterations):
         for _ in range(count):
             space.step(step)
 
-    return advance, lambda: ([b.position.x for b in bodies], [b.velocity.x for b in bodies])
+    return World(advance, lambda: [b.velocity.x for b in bodies])
 
 
 def box2d(line, *, step, iterations, faster=1.0):
@@ -124,10 +134,7 @@ def box2d(line, *, step, iterations, faster=1.0):
         for _ in range(count):
             world.Step(step / faster, iterations, 3)
 
-    def state():
-        return [b.position.x for b in bodies], [b.linearVelocity.x / faster for b in bodies]
-
-    return advance, state
+    return World(advance, lambda: [b.linearVelocity.x / faster for b in bodies])
 
 
 def bullet(line, *, step, iterations, **parameters):
@@ -157,13 +164,11 @@ def bullet(line, *, step, iterations, **parameters):
         for _ in range(count):
             pybullet.stepSimulation(**here)
 
-    def state():
-        x = [pybullet.getBasePositionAndOrientation(b, **here)[0][0] for b in bodies]
-        return x, [pybullet.getBaseVelocity(b, **here)[0][0] for b in bodies]
+    def velocities():
+        return [pybullet.getBaseVelocity(b, **here)[0][0] for b in bodies]
 
-    # Bullet knows worlds by number only, and has room for about a thousand.
-    advance.close = lambda: pybullet.disconnect(world)
-    return advance, state
+    # Bullet has room for about a thousand worlds.
+    return World(advance, velocities, lambda: pybullet.disconnect(world))
 
 
 def rapier(line, *, step, iterations, **parameters):
@@ -189,11 +194,7 @@ def rapier(line, *, step, iterations, **parameters):
         for _ in range(count):
             world.step()
 
-    def state():
-        all_bodies = [world.rigid_bodies[b] for b in bodies]
-        return [b.translation.x for b in all_bodies], [b.linvel.x for b in all_bodies]
-
-    return advance, state
+    return World(advance, lambda: [world.rigid_bodies[b].linvel.x for b in bodies])
 
 
 def mujoco(line, *, step, steps_a_contact, damping=None):
@@ -223,12 +224,7 @@ def mujoco(line, *, step, steps_a_contact, damping=None):
     )
     data = engine.MjData(model)
     data.qvel[:] = line.velocities
-    start = np.array(line.positions)
-
-    def advance(count):
-        engine.mj_step(model, data, count)
-
-    return advance, lambda: (start + data.qpos, data.qvel)
+    return World(lambda count: engine.mj_step(model, data, count), lambda: data.qvel)
 
 
 @cache
@@ -240,7 +236,7 @@ def damping_for(restitution, step, steps_a_contact):
 
     def excess(damping):
         made = mujoco(line, step=step, steps_a_contact=steps_a_contact, damping=[damping])
-        _, v = run(*made, step, 3.0)
+        _, v = run(made, step, 3.0)
         return (v[1] - v[0]) / SPEED - restitution
 
     return brentq(excess, 0.0, 0.95, xtol=1e-6)
@@ -310,13 +306,13 @@ def absent():
     }
 
 
-def run(advance, state, step, longest):
+def run(world, step, longest):
     """Step until all balls are apart and in order of velocity; return steps and velocities."""
     taken, before = 0, None
     while True:
-        advance(CHUNK)
+        world.advance(CHUNK)
         taken += CHUNK
-        v = np.array(state()[1])
+        v = np.array(world.velocities())
         # Nothing more to come: in order of velocity, and the same as at the last look.
         settled = before is not None and np.abs(v - before).max() < 1e-6 * SPEED
         if settled and np.diff(v).min() > -1e-6 * SPEED:
@@ -324,8 +320,7 @@ def run(advance, state, step, longest):
         if taken * step >= longest:
             break
         before = v
-    if close := getattr(advance, "close", None):
-        close()
+    world.close()
     return taken, v
 
 
@@ -333,7 +328,7 @@ def solve(engine, scene, placement, setting):
     """Return steps and velocities over the striker's speed, of one engine on one scene."""
     options = getattr(engine, setting)
     made = engine.build(Line(scene.masses, scene.restitution, placement), **options)
-    steps, v = run(*made, options["step"], longest(setting, placement))
+    steps, v = run(made, options["step"], longest(setting, placement))
     return steps, v / SPEED
 
 
@@ -368,7 +363,7 @@ def rows(clock, quick):
                     if placement == "touching" and scene.name not in CHECKS:
                         time = clock(
                             lambda made, o=options, s=setting: run(
-                                *made, o["step"], longest(s, "touching")
+                                made, o["step"], longest(s, "touching")
                             ),
                             prepare=lambda line=line, e=engine, o=options: e.build(line, **o),
                         )

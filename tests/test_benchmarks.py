@@ -158,8 +158,8 @@ def stored():
         return [row for row in csv.DictReader(file) if row["group"] == "engine"]
 
 
-# A step in the engines' own code that warns about NumPy or Python is not this project's affair.
-@pytest.mark.filterwarnings("default")
+# Box2D's bindings, made by SWIG, warn when they are imported.
+@pytest.mark.filterwarnings("ignore:builtin type:DeprecationWarning")
 def test_engine_exchanges_the_velocities_of_two_balls(engine):
     for scene in engines.CHECKS.values():
         e = scene.restitution[0]
@@ -167,7 +167,7 @@ def test_engine_exchanges_the_velocities_of_two_balls(engine):
         np.testing.assert_allclose(after, [(1 - e) / 2, (1 + e) / 2], atol=1e-3)
 
 
-@pytest.mark.filterwarnings("default")
+@pytest.mark.filterwarnings("ignore:builtin type:DeprecationWarning")
 @pytest.mark.parametrize("setting", ["default", "refined"])
 def test_engine_repeats_what_is_stored(engine, setting):
     """Same version, same velocities; another version may differ, and is only asked for momentum."""
