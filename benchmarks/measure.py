@@ -10,12 +10,13 @@ from dataclasses import dataclass, fields
 from importlib import metadata
 
 import numpy as np
+from scenes import random_chains
 
 from cradle import post_impact_velocities, runtime
 
-#: The unit of time of the whole table: one impact of three equal balls, solved in a batch.
-REFERENCE = "one impact of three equal elastic balls, ratio .167, in a batch of 2000"
-_BATCH = np.ones((2000, 3)), np.tile([1.0, 0.0, 0.0], (2000, 1))
+#: The unit of time of the whole table: one impact of three balls, solved in a batch.
+REFERENCE = "one impact of three balls, in a batch of 2000 random chains"
+_BATCH = random_chains(3, 2000)
 
 
 @dataclass
@@ -99,7 +100,7 @@ class Clock:
         """
 
         def reference():
-            post_impact_velocities(*_BATCH, 1.0, 0.167)
+            post_impact_velocities(*_BATCH)
 
         def measured():
             given = [prepare()] if prepare else []
