@@ -46,7 +46,7 @@ def _pair(clock, question, chain, both, note=""):
 
 
 def _path_or_outcome(clock, count):
-    """Yield: the path of each impact, or its outcome alone, for the same chains of six balls."""
+    """Yield: the path of each impact, or all outcomes alone, for the same chains of six balls."""
     chains = random_chains(6, count)
     made = [
         (Chain(m, v, e), ImpulseCorrelation(f, b)) for m, v, e, f, b in zip(*chains, strict=True)
@@ -56,10 +56,14 @@ def _path_or_outcome(clock, count):
         return [collide(*pair).velocities for pair in made]
 
     both = {
-        "all: path, events, impulses": (paths, count, PATH),
-        "less: outcome alone": (lambda: post_impact_velocities(*chains), count, "velocities"),
+        "all: the path of each, one call a chain": (paths, count, PATH),
+        "less: outcomes alone, one call": (
+            lambda: post_impact_velocities(*chains),
+            count,
+            "velocities",
+        ),
     }
-    yield from _pair(clock, "path or outcome", "6 balls, random", both)
+    yield from _pair(clock, "paths or outcomes", "6 balls, random", both)
 
 
 def _one_by_one_or_at_once(clock, count):
