@@ -185,3 +185,43 @@ def test_engine_repeats_what_is_stored(engine, setting):
         if row["versions"].startswith(same_version):
             expected = [float(v) for v in row["velocities"].split()]
             np.testing.assert_allclose(after, expected, rtol=0, atol=1e-4)
+
+
+def named(name):
+    """The engine of that name, if it is installed."""
+    if name in engines.absent():
+        pytest.skip(engines.absent()[name])
+    return next(engine for engine in engines.ENGINES if engine.name == name)
+
+
+def energy(engine, scene, placement, **options):
+    """Kinetic energy after an impact, over that before."""
+    line = engines.Line(scene.masses, scene.restitution, placement)
+    _, v = engines.run(engine.build(line, **options), options["step"], 3.0)
+    m = np.array(scene.masses)
+    return m @ (v / engines.SPEED) ** 2 / m[0]
+
+
+def test_bullet_gains_energy_by_its_correction_of_overlaps():
+    bullet = named("Bullet")
+    for scene in (engines.CHECKS["two equal, e = 1"], scenes.SCENES["light middle"]):
+        assert energy(bullet, scene, "apart", **bullet.default) > 1.05
+        without = bullet.default | {"contactERP": 0.0}
+        assert energy(bullet, scene, "apart", **without) < 1 + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("step", "iterations", "inner"), [(1e-2, 4, 1), (1e-3, 50, 1), (1e-3, 4, 100)]
+)
+def test_rapier_loses_a_sixth_whatever_the_step_and_iterations(step, iterations, inner):
+    options = {"step": step, "iterations": iterations, "num_internal_pgs_iterations": inner}
+    left = energy(named("Rapier"), scenes.SCENES["three equal"], "pressed", **options)
+    assert left == pytest.approx(5 / 6, abs=2e-3)
+
+
+@pytest.mark.filterwarnings("ignore:builtin type:DeprecationWarning")
+def test_box2d_cuts_off_slow_rebounds():
+    box2d, scene = named("Box2D"), engines.CHECKS["two equal, e = 1"]
+    for faster, left in ((1.0, 1.0), (0.4, 0.5)):  # 2 m/s, and 0.8 m/s: below the threshold
+        options = {"step": 1e-3, "iterations": 8, "faster": faster}
+        assert energy(box2d, scene, "touching", **options) == pytest.approx(left, abs=1e-5)

@@ -419,6 +419,14 @@ def glue_of(cell_id):
     return {o.metadata["scrapbook"]["name"]: o.data[kind] for o in found}
 
 
+def test_sequential_collisions_tell_who_moves_off_fastest():
+    for scene in ELASTIC:
+        for answer in (sequential(scene), np.array(HERTZ[scene])):
+            assert np.argmax(answer) == len(answer) - 1
+            assert answer[-1] - answer[-2] > 0.2
+        assert abs(np.diff(fused(scene)[1:])).max() < 1e-12
+
+
 def output(cell_id):
     cells = nbformat.read(ROOT / "book" / "trade.ipynb", as_version=4).cells
     (cell,) = [cell for cell in cells if cell.id == cell_id]
