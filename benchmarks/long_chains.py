@@ -1,0 +1,222 @@
+"""Long chains and large maps: work, speed, and what can be trusted, as a CSV.
+
+Usage::
+
+    python benchmarks/long_chains.py            # a few minutes; writes data/long_chains.csv
+    python benchmarks/long_chains.py --output chains.csv
+
+All balls are equal and touch, and the first one strikes the others at speed 1.  Times are
+processor times, and each is divided by the time of one impact of three equal balls on Hertz
+springs, integrated beside it, so that a busy machine slows down both.
+"""
+
+import argparse
+import csv
+import statistics
+import time
+from pathlib import Path
+
+import numpy as np
+
+from cradle import Chain, SpringChain, collide
+from cradle.models.correlation import outcomes
+
+OUTPUT = Path(__file__).parents[1] / "data" / "long_chains.csv"
+COLUMNS = [
+    "group", "restitution", "ratio", "exponent", "balls", "chains", "collisions", "collapsed",
+    "orders", "kept", "spread", "fast", "fast_least", "fast_most", "back", "first", "third_last",
+    "second_last", "last", "cpu_seconds", "time_ratio", "repeats",
+]  # fmt: skip
+
+#: A ball counts as flying off if it is faster than this part of the striker's speed.
+FAST = 0.01
+#: Copies of a chain whose masses and restitutions differ by up to this part, at random.
+COPIES, CHANGE = 16, 1e-15
+#: A velocity is kept if no copy's differs by more than this part of it.
+KEPT = 1e-6
+
+ELASTIC_RATIOS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.45, 0.5)
+ELASTIC_BALLS = (100, 300, 1000, 3000, 10_000, 30_000, 100_000)
+# Few enough balls that nothing collapses, but for the last ones at .9.
+LOSSES = {0.9: (10, 20, 30, 40, 50, 60, 100), 0.99: (10, 20, 30, 40, 60, 80, 120, 160, 240, 320)}
+LOSSES_RATIOS = (0.0, 0.1, 0.3, 0.45)
+SPRINGS = {
+    1.5: (3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 60, 80, 100),
+    1.0: (3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 60, 80, 100),
+}
+MAP_SIDE = 1000
+
+
+def still_chain(balls):
+    """Return masses and velocities: equal balls, the first at speed 1, the others at rest."""
+    velocities = np.zeros(balls)
+    velocities[0] = 1.0
+    return np.ones(balls), velocities
+
+
+def three_on_springs():
+    """Solve the unit of time."""
+    return collide(Chain(*still_chain(3), 1.0), SpringChain(1.0))
+
+
+def cost(function, repeats):
+    """Return the fields of a row that tell the processor time of `function`."""
+
+    def seconds(solve, calls=1):
+        begin = time.process_time()
+        for _ in range(calls):
+            solve()
+        return (time.process_time() - begin) / calls
+
+    function()
+    calls = max(1, round(0.02 / max(seconds(function), 1e-6)))
+    pairs = [(seconds(function, calls), seconds(three_on_springs, 3)) for _ in range(repeats)]
+    return {
+        "cpu_seconds": statistics.median(taken for taken, _ in pairs),
+        "time_ratio": statistics.median(taken / unit for taken, unit in pairs),
+        "repeats": repeats,
+    }
+
+
+def leaving(velocities):
+    """Return the fields of a row that tell which balls fly off."""
+    return {
+        "fast": int((velocities > FAST).sum()),
+        "back": int((velocities < -FAST).sum()),
+        "first": velocities[0],
+        "third_last": velocities[-3],
+        "second_last": velocities[-2],
+        "last": velocities[-1],
+    }
+
+
+def elastic(ratio, balls, repeats):
+    """Return a row: no losses, so every contact collides once, at any length."""
+    chain = still_chain(balls)
+    found = outcomes(*chain, 1.0, ratio)
+    return {
+        "group": "elastic",
+        "restitution": 1.0,
+        "ratio": ratio,
+        "balls": balls,
+        "collisions": int(found.collisions.sum()),
+        "collapsed": int(found.collapsed),
+        **leaving(found.velocities),
+        **cost(lambda: outcomes(*chain, 1.0, ratio), repeats),
+    }
+
+
+def copies(restitution, balls):
+    """Return masses, velocities and restitutions of a chain and of its copies."""
+    rng = np.random.default_rng(balls)
+    masses, velocities = still_chain(balls)
+    masses = np.tile(masses, (1 + COPIES, 1))
+    restitutions = np.full((1 + COPIES, balls - 1), restitution)
+    for values in (masses, restitutions):
+        values[1:] *= 1.0 + CHANGE * rng.uniform(-1.0, 1.0, values[1:].shape)
+    return masses, velocities, restitutions
+
+
+def kept_from_the_front(velocities):
+    """Return how many leading balls all copies agree on, and the leader's spread."""
+    off = np.abs(velocities - velocities[0]).max(axis=0)
+    agrees = (off <= KEPT * np.abs(velocities[0]))[::-1]
+    kept = len(agrees) if agrees.all() else int(np.argmin(agrees))
+    return kept, off[-1] / abs(velocities[0, -1])
+
+
+def losses(restitution, ratio, balls):
+    """Return a row: with losses, balls collide again and again, in an order that may be chance."""
+    found = outcomes(*copies(restitution, balls), ratio)
+    kept, spread = kept_from_the_front(found.velocities)
+    fast = (found.velocities > FAST).sum(axis=-1)
+    return {
+        "group": "losses",
+        "restitution": restitution,
+        "ratio": ratio,
+        "balls": balls,
+        "chains": 1 + COPIES,
+        "collisions": int(found.collisions[0].sum()),
+        "collapsed": int(found.collapsed.sum()),
+        "orders": len(np.unique(found.collisions, axis=0)),
+        "kept": kept,
+        "spread": spread,
+        "fast_least": int(fast.min()),
+        "fast_most": int(fast.max()),
+        **leaving(found.velocities[0]),
+    }
+
+
+def springs(exponent, balls):
+    """Return a row: the same chain on springs, without losses."""
+    found = collide(Chain(*still_chain(balls), 1.0), SpringChain(1.0, exponent, rtol=1e-10))
+    return {
+        "group": "springs",
+        "restitution": 1.0,
+        "exponent": exponent,
+        "balls": balls,
+        **leaving(found.velocities),
+    }
+
+
+def map_of_three(side):
+    """Return masses of three balls, m2 = 1, over the mass ratios m2/m1 and m2/m3 of Fig. 6."""
+    ratios = (np.arange(side) + 0.5) * 3.0 / side
+    return np.stack(np.broadcast_arrays(1.0 / ratios[:, None], 1.0, 1.0 / ratios), axis=-1)
+
+
+def large_map(side, repeats):
+    """Return a row: collisions of three balls over a square of mass ratios."""
+    masses = map_of_three(side)
+
+    def solve():
+        return outcomes(masses, [1.0, 0.0, 0.0], 0.5, 0.15)
+
+    found = solve()
+    return {
+        "group": "map",
+        "restitution": 0.5,
+        "ratio": 0.15,
+        "balls": 3,
+        "chains": side * side,
+        "collisions": int(found.collisions.sum()),
+        "collapsed": int(found.collapsed.sum()),
+        **cost(solve, repeats),
+    }
+
+
+def rows():
+    """Yield all rows."""
+    yield large_map(MAP_SIDE, 9)
+    for ratio in ELASTIC_RATIOS:
+        for balls in ELASTIC_BALLS:
+            yield elastic(ratio, balls, 9 if balls <= 10_000 else 5)
+    for restitution, lengths in LOSSES.items():
+        for ratio in LOSSES_RATIOS:
+            for balls in lengths:
+                yield losses(restitution, ratio, balls)
+    for exponent, lengths in SPRINGS.items():
+        for balls in lengths:
+            yield springs(exponent, balls)
+
+
+def text(value):
+    """Return a field as it is stored."""
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def main(arguments=None):
+    """Write the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", type=Path, default=OUTPUT)
+    output = parser.parse_args(arguments).output
+    with output.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
+        writer.writeheader()
+        for row in rows():
+            writer.writerow({name: text(value) for name, value in row.items()})
+            file.flush()
+
+
+if __name__ == "__main__":
+    main()
