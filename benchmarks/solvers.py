@@ -79,7 +79,7 @@ def event_rows(clock, quick):
         time = clock(batch, 2000)
         yield Row(setting=f"{usual}, batch", gives="velocities", **common, **time)
 
-    count = 500 if quick else 10_000
+    count = 500 if quick else 2000
     for balls in (3, 6):
         chains = random_chains(balls, count)
         some = 20 if quick else 60
