@@ -1,0 +1,296 @@
+"""Speed, without a stopwatch: how much work an impact is, how much memory a batch takes.
+
+Times differ between machines and moments; the work does not.  The plain kernel is run once more as
+a module of its own, whose functions count the contacts that they are given.
+"""
+
+import math
+import os
+import threading
+import tracemalloc
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cradle import ImpactNotFinished, kernel, paper_chain, post_impact_velocities, runtime
+from cradle.models import correlation
+from cradle.models.correlation import outcomes
+
+SOURCE = Path(kernel.__file__).read_text(encoding="utf-8")
+#: Functions of the loop that walk along contacts; their first two arguments are the ends.
+WALKS = ("rates", "advance", "segment", "end_contacts", "close_contacts")
+
+needs_numba = pytest.mark.skipif(runtime.compiled() is None, reason="numba is not installed")
+
+
+def solve(m, v, e, forward, backward=None, **constants):
+    """Solve one impact by the plain kernel with other constants; count what it does."""
+    names = {"__name__": "kernel"}
+    exec(compile(SOURCE, "kernel.py", "exec"), names)
+    assert set(constants) <= set(names)
+    names.update(constants)
+    calls, touched = dict.fromkeys(WALKS, 0), dict.fromkeys(WALKS, 0)
+
+    def counting(name, function):
+        def walk(left, right, *others):
+            calls[name] += 1
+            touched[name] += max(right - left + 1, 0)
+            return function(left, right, *others)
+
+        return walk
+
+    names.update({name: counting(name, names[name]) for name in WALKS})
+    n = len(m)
+    after, impulses, absorbed = [0.0] * n, [0.0] * (n - 1), [0.0] * (n - 1)
+    hits, held = [0] * (n - 1), [0] * (n - 1)
+    status, events, collapsed = names["impact"](
+        n, list(m), list(v),
+        *(np.broadcast_to(x, k).tolist() for x, k in ((e, n - 1), (forward, n - 2))),
+        np.broadcast_to(forward if backward is None else backward, n - 2).tolist(),
+        0.5, 10**6, after, impulses, absorbed, hits, held,
+        [[0.0] * n for _ in range(kernel.FLOATS)], [[0] * n for _ in range(kernel.INTS)],
+        [], [], [[0.0] * n], [[0.0] * (n - 1)],
+    )  # fmt: skip
+    assert status == kernel.FINISHED
+    return SimpleNamespace(
+        velocities=after,
+        collisions=hits,
+        collapsed=bool(collapsed),
+        events=events,
+        rounds=calls["close_contacts"],  # once a round
+        work=sum(touched.values()),
+        touched=touched,
+    )
+
+
+def struck(n):
+    """Equal balls, of which the first strikes the others."""
+    return [1.0] * n, [1.0] + [0.0] * (n - 1)
+
+
+def sequence(name):
+    chain, model = paper_chain(name, excess="saturate")
+    return chain.masses, chain.velocities, chain.restitution, model.forward, model.backward
+
+
+# Chain -> events, rounds and contacts touched (in all walks together) when last measured.  Events
+# are facts of the chain.  Rounds and work may only become less; a change that needs more of them
+# for a reason writes its own numbers here, and the reason into the commit.
+MEASURED = {
+    "three equal": ((*struck(3), 1.0, 0.167), (2, 2, 22)),
+    "five equal": ((*struck(5), 1.0, 0.167), (4, 4, 70)),
+    "light middle": (([1.0, 0.01, 1.0], [1.0, 0.0, 0.0], 1.0, 0.167), (38, 56, 490)),
+    "ABCCA": (sequence("ABCCA"), (6, 6, 110)),
+    "BCACBA": (sequence("BCACBA"), (27, 32, 697)),
+    "two strike two": (([1.0] * 4, [1.0, 0.5, 0.0, 0.0], 1.0, 0.1), (7, 8, 120)),
+    "from both sides": (([1.0] * 9, [1.0, *[0.0] * 7, -0.7], 0.8, 0.2), (62, 66, 2265)),
+    "twenty, losses": ((*struck(20), 0.9, 0.1), (285, 210, 15323)),
+    "a collapse": (([1.0] * 3, [1.0, 0.0, 0.0], 0.05, 0.1), (99, 145, 1265)),
+    "a hundred": ((*struck(100), 1.0, 0.3), (99, 99, 27643)),
+}
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_no_more_work_than_measured(name):
+    chain, (events, rounds, work) = MEASURED[name]
+    found = solve(*chain)
+    assert found.events == events
+    assert 0 < found.rounds <= rounds
+    assert 0 < found.work <= work
+    # It is the package's own loop that was counted.
+    m, v, e, forward, *backward = chain
+    after = outcomes(m, v, e, forward, *backward, excess="saturate")
+    assert after.collisions.tolist() == found.collisions
+    np.testing.assert_allclose(after.velocities, found.velocities, rtol=0, atol=1e-14)
+
+
+def window(ratio):
+    """How far ahead impulses reach: the smallest k with ratio^k <= CUT."""
+    return math.ceil(math.log(kernel.CUT) / math.log(ratio) - 1e-9)
+
+
+def work_a_collision(ratio, **constants):
+    """Contacts touched by each walk, per ball added to a long elastic chain."""
+    few, some, many = (solve(*struck(n), 1.0, ratio, **constants) for n in (200, 300, 400))
+    steps = {name: many.touched[name] - some.touched[name] for name in WALKS}
+    before = {name: some.touched[name] - few.touched[name] for name in WALKS}
+    return before, steps
+
+
+def grows_in_proportion(ratio, **constants):
+    before, steps = work_a_collision(ratio, **constants)
+    most = 100 * (window(ratio) + kernel.AHEAD)
+    passes = {"end_contacts": 2}  # before and after the slopes are known
+    return before == steps and all(steps[k] <= passes.get(k, 1) * most for k in WALKS)
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.3, 0.45, 0.5])
+def test_work_grows_in_proportion_to_a_long_chain(ratio):
+    assert grows_in_proportion(ratio)
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [{"CUT": 0.0}, {"idles": lambda *_: False}],
+    ids=["no rate is cut", "the window never ends"],
+)
+def test_quadratic_work_is_seen(spoilt):
+    assert not grows_in_proportion(0.45, **spoilt)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.45])
+@pytest.mark.parametrize("n", [50, 100, 200, 400])
+def test_elastic_chain_at_any_length(n, ratio):
+    """One collision a contact, a bounded number of contacts a collision, one and the same end."""
+    found = solve(*struck(n), 1.0, ratio)
+    assert found.collisions == [1] * (n - 1)
+    reach = 2 if ratio == 0.0 else window(ratio) + kernel.AHEAD
+    assert found.touched["advance"] <= (n - 1) * reach
+    short = solve(*struck(50), 1.0, ratio)
+    assert found.velocities[-5:] == short.velocities[-5:]
+    assert found.velocities[0] == short.velocities[0]
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.3, 0.45])
+def test_what_is_cut_is_below_rounding(ratio):
+    """The same bits for every cut, and for none; a coarse one is seen."""
+    stored = solve(*struck(150), 1.0, ratio).velocities
+    for cut in (2.0**-100, 2.0**-140, 2.0**-200, 0.0):
+        assert solve(*struck(150), 1.0, ratio, CUT=cut).velocities == stored, cut
+    assert solve(*struck(150), 1.0, ratio, CUT=2.0**-30).velocities != stored
+
+
+def test_what_is_cut_is_below_rounding_for_random_chains():
+    """Unequal balls and losses: all balls of the same bits as long as the order is no chance."""
+    rng = np.random.default_rng(7)
+    for n in (20, 40, 150):
+        m = 10.0 ** rng.uniform(-0.5, 0.5, n)
+        forward = rng.uniform(0.0, 0.2, n - 2)
+        backward = rng.uniform(0.0, 0.2, n - 2)
+        e = rng.uniform(0.9, 1.0, n - 1) if n == 20 else 1.0
+        chain = m.tolist(), struck(n)[1], e, forward, backward
+        stored, uncut = solve(*chain), solve(*chain, CUT=0.0)
+        assert stored.collisions == uncut.collisions
+        leading = slice(None) if n == 20 else slice(-5, None)
+        assert stored.velocities[leading] == uncut.velocities[leading]
+
+
+@pytest.mark.parametrize("balls", [40, 80, 160])
+def test_collisions_with_losses_grow_with_the_square(balls):
+    """At ratio zero every two balls meet once, so to speak; with a ratio it is nearly as many."""
+    pairs = balls * (balls - 1) // 2
+    chain = struck(balls)
+    assert outcomes(*chain, 0.99, 0.0).collisions.sum() == pairs
+    for ratio in (0.1, 0.3, 0.45):
+        assert 0.7 * pairs < outcomes(*chain, 0.99, ratio).collisions.sum() < 1.4 * pairs
+
+
+def batch_of_three(first, second):
+    """Masses over one axis, restitutions over another, all else once."""
+    rng = np.random.default_rng(0)
+    masses = rng.uniform(0.5, 2.0, (first, 1, 3))
+    return masses, np.array([1.0, 0.0, 0.0]), rng.uniform(0.2, 1.0, (second, 2)), 0.1
+
+
+@needs_numba
+@pytest.mark.parametrize("shape", [(500, 200), (1000, 400)], ids=str)
+def test_a_batch_needs_inputs_outputs_and_a_small_work_area(shape):
+    chains = batch_of_three(*shape)
+    outcomes(*batch_of_three(100, 100))  # compiled, and threads' areas made
+    tracemalloc.start()
+    try:
+        found = outcomes(*chains)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    count = math.prod(shape)
+    # Velocities 3, collisions 2, status 1, collapses 1 (and their truth), 8 bytes each.
+    results = 8 * 7 * count + count
+    assert found.velocities.nbytes + found.collisions.nbytes < peak
+    # A chunk's inputs (3 + 3 + 2 + 1 + 1 numbers a chain), with indices and as much again in spare.
+    chunk = 8 * 2 * 16 * correlation._ROWS
+    assert peak <= results + chunk * (os.cpu_count() or 1) + 2**20
+
+
+def mixed_batch(count, n=4):
+    rng = np.random.default_rng(11)
+    return (
+        rng.uniform(0.5, 2.0, (count, n)),
+        -np.sort(rng.uniform(-1.0, 1.0, (count, n))),
+        rng.uniform(0.3, 1.0, (count, n - 1)),
+        rng.uniform(0.0, 0.2, (count, n - 2)),
+        rng.uniform(0.0, 0.2, (count, n - 2)),
+    )
+
+
+def within(seconds, function):
+    """Run in a thread that may be left behind, so that a batch that hangs is a failure."""
+    result = []
+
+    def run():
+        try:
+            result.append(function())
+        except Exception as error:
+            result.append(error)
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    thread.join(seconds)
+    assert result, "it hangs"
+    return result[0]
+
+
+@needs_numba
+def test_threads_do_not_change_a_bit():
+    rows = correlation._ROWS
+    chains = mixed_batch(5 * rows + 77)
+    whole = outcomes(*chains)
+    for begin in range(0, len(whole.velocities), rows):
+        part = slice(begin, begin + rows)
+        alone = outcomes(*(x[part] for x in chains))
+        for one, other in zip(whole, alone, strict=True):
+            assert one[part].tobytes() == other.tobytes()
+    shown = outcomes(*chains, progress=True)
+    assert shown.velocities.tobytes() == whole.velocities.tobytes()
+
+
+@needs_numba
+@pytest.mark.parametrize("workers", [1, 2, 7])
+def test_any_number_of_threads(workers, monkeypatch):
+    chains = mixed_batch(4 * correlation._ROWS + 5)
+    expected = post_impact_velocities(*chains)
+    monkeypatch.setattr(os, "cpu_count", lambda: workers)
+    assert post_impact_velocities(*chains).tobytes() == expected.tobytes()
+
+
+@needs_numba
+def test_an_error_in_the_middle_names_its_element():
+    rows = correlation._ROWS
+    m, v, e, f, b = mixed_batch(6 * rows)
+    at, later = 2 * rows + 1234, 5 * rows + 1
+    for array, value, message in (
+        (m, -1.0, rf"masses[{at}, 0] = -1.0"),
+        (v, np.nan, rf"velocities[{at}, 0] = nan"),
+        (e, 1.5, rf"restitution[{at}, 0] = 1.5"),
+        (f, 2.0, rf"forward[{at}, 0] = 2.0"),
+        (b, -0.5, rf"backward[{at}, 0] = -0.5"),
+    ):
+        kept = array[[at, later], 0]
+        array[[at, later], 0] = value  # of two errors the first is named
+        error = within(60, lambda: post_impact_velocities(m, v, e, f, b))
+        assert isinstance(error, ValueError)
+        assert str(error).startswith(message + ";")
+        array[[at, later], 0] = kept
+    assert within(60, lambda: post_impact_velocities(m, v, e, f, b)).shape == v.shape
+
+
+@needs_numba
+def test_an_impact_that_does_not_finish_in_the_middle_is_handed_back():
+    rows = correlation._ROWS
+    m, v, e = np.ones((4 * rows, 3)), np.array([1.0, 0.0, 0.0]), 1.0
+    m[[rows + 17, 3 * rows], 1] = 1e-6, 2e-6
+    error = within(60, lambda: post_impact_velocities(m, v, e, 0.0, max_events=50))
+    assert isinstance(error, ImpactNotFinished)
+    assert error.trace.chain.masses.tolist() == m[rows + 17].tolist()
