@@ -109,7 +109,7 @@ def checked_masses(masses: ArrayLike) -> Vector:
 
 
 def refuse_overflow(velocities: Vector, masses: Vector) -> None:
-    """Raise if the kinetic energy of a chain is not a finite number.
+    """Raise if the kinetic energy or a momentum of a chain is no finite number.
 
     Parameters
     ----------
@@ -130,14 +130,18 @@ def refuse_overflow(velocities: Vector, masses: Vector) -> None:
     """
     v, m = np.broadcast_arrays(velocities, masses)
     with np.errstate(over="ignore"):
-        energies = (m * v * v).sum(axis=-1)
-    if not np.isfinite(energies).all():
-        lead = np.unravel_index(int(np.argmax(~np.isfinite(energies))), energies.shape)
-        at = (*lead, np.argmax(np.abs(v[lead])))
-        place = ", ".join(str(int(k)) for k in at)
-        raise ValueError(
-            f"velocities[{place}] = {float(v[at])!r}; kinetic energy overflows: choose larger units"
-        )
+        sums = {
+            "kinetic energy": (m * v * v).sum(axis=-1),
+            "momentum": 2.0 * (m * np.abs(v)).sum(axis=-1),  # an impulse is no larger
+        }
+    for what, values in sums.items():
+        if not np.isfinite(values).all():
+            lead = np.unravel_index(int(np.argmax(~np.isfinite(values))), values.shape)
+            at = (*lead, np.argmax(np.abs(v[lead])))
+            place = ", ".join(str(int(k)) for k in at)
+            raise ValueError(
+                f"velocities[{place}] = {float(v[at])!r}; {what} overflows: choose larger units"
+            )
 
 
 @dataclass(frozen=True, eq=False, init=False)

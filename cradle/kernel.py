@@ -55,11 +55,14 @@ MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE = 0, 1, 2, 3
 EXHAUSTED = 1e-18
 REPEATS = 8
 SELF_SIMILAR = 1e-13
+BEND = 1e-2
+# ... and how much of a chatterer's impulse a steady neighbour must leave, for its digits.
+SPLIT = 1e-3
 # R8: meeting keys closer than this are equal; a run's events closer than this, relative to the
 # progress they need, are simultaneous.
 TIE = 1e-9
 SIMULTANEOUS = 1.0 + 64 * 2.0**-52
-# R7: a ratio above its bound by no more than this factor was meant to be the bound.
+# R7: a ratio this close to its bound, on either side, was meant to be the bound.
 ROUNDED = 1.0 + 4 * 2.0**-52
 # A rate below this part of its run's largest, times the lightest ball's part of the heaviest, is
 # zero: no ball could notice it.
@@ -122,7 +125,7 @@ def ratios_in_force(left, right, forward, backward, m, u, w, ratio, rest, turn, 
             if u[c] == 0.0 and w[c] == 0.0 and turn[c + 1] != -1:
                 kept = m[c] * (rest[c + 1] if turn[c + 1] == 1 else 1.0)
                 bound = m[c + 1] / (m[c + 1] + kept)
-                if f >= bound:
+                if f * ROUNDED >= bound:
                     fixed[c] = 1 if f > bound * ROUNDED else 2
                     ratio[c] = bound
                     rest[c] = kept / (m[c + 1] + kept)
@@ -134,7 +137,7 @@ def ratios_in_force(left, right, forward, backward, m, u, w, ratio, rest, turn, 
             if u[c] == 0.0 and w[c] == 0.0 and turn[c] != 1:
                 kept = m[c + 1] * (rest[c] if turn[c] == -1 else 1.0)
                 bound = m[c] / (m[c] + kept)
-                if f >= bound:
+                if f * ROUNDED >= bound:
                     fixed[c] = 1 if f > bound * ROUNDED else 2
                     ratio[c + 1] = bound
                     rest[c + 1] = kept / (m[c] + kept)
@@ -691,7 +694,8 @@ def chatterers(c, n, e, p, active, turn, code1, hits1, hits):
 
 @jit
 def cycle(
-    c, n, e, m, hi, lo, u, q, w, p, a, before, u1, q1, x, y, active, turn, tiny, code1, hits1, hits,
+    c, bend, threshold, n, e, m, hi, lo, u, q, w, p, a, before, u1, q1, x, y, active, turn, tiny,
+    code1, hits1, hits,
 ):  # fmt: skip
     """R9: if the neighbourhood of contact c repeats itself on a smaller scale, go to the limit.
 
@@ -701,19 +705,26 @@ def cycle(
     T = L / (1 - L).  T comes from the limit itself: the impulses that bring all chattering balls to
     one velocity, over the impulses of the last cycle.  1 - L itself would lose all digits for a
     very light ball.  Neighbours that stay active throughout receive their share; if that would
-    take one of them to an event of its own, there is no jump.  Returns (first, last) of the
-    contacts that have collapsed; empty, with nothing changed, if there is no cycle.
+    take one of them to an event of its own, there is no jump.
+
+    Light balls need many cycles to settle on one factor.  Without steady neighbours it is enough
+    that what still changes will not matter: the bend, how far the state turns (relative to its own
+    size, as u / scale) by the time that it is exhausted, is below BEND at the present pace, and
+    the pace was no lower (`bend`) over the snapshot before.
+
+    Returns (first, last) of the contacts that have collapsed, empty, with nothing changed, if
+    there is no cycle; and the bend.
     """
     left, first, last, right = chatterers(c, n, e, p, active, turn, code1, hits1, hits)
     if last < first:
-        return c, c - 1
+        return c, c - 1, math.inf
 
     # The limit: one velocity.  A steady neighbour whose impulse is h times that of the outermost
     # chatterer makes the ball between them act as one of mass m / (1 - h), whatever its sign.
     share_left = p[first - 1] / p[first] if first > left else 0.0
     share_right = p[last + 1] / p[last] if last < right else 0.0
-    if share_left == 1.0 or share_right == 1.0:
-        return c, c - 1
+    if abs(1.0 - share_left) < SPLIT or abs(1.0 - share_right) < SPLIT:
+        return c, c - 1, math.inf
     scale = 0.0
     mass = 0.0
     momentum = 0.0
@@ -731,7 +742,7 @@ def cycle(
             mu = reduced_mass(m[k], m[k + 1])
             scale = max(scale, abs(u[k]), math.sqrt(2.0 * q[k] / mu))
     if mass == 0.0:
-        return c, c - 1
+        return c, c - 1, math.inf
     common = momentum / mass
     impulse = 0.0
     to_come = 0.0
@@ -742,17 +753,23 @@ def cycle(
         last_cycle += p[k]
         x[k] = impulse
     if to_come <= 0.0:
-        return c, c - 1
+        return c, c - 1, math.inf
     total = to_come / last_cycle
     factor = total / (1.0 + total)
+    worst = 0.0
     for k in range(first, last + 1):
         mu = reduced_mass(m[k], m[k + 1])
-        if abs(u[k] - factor * u1[k]) > SELF_SIMILAR * scale:
-            return c, c - 1
-        if abs(q[k] - factor * factor * q1[k]) > SELF_SIMILAR * mu * scale * scale:
-            return c, c - 1
+        worst = max(worst, abs(u[k] - factor * u1[k]) / scale)
+        worst = max(worst, abs(q[k] - factor * factor * q1[k]) / (mu * scale * scale))
         if abs(x[k] - total * p[k]) > 0.01 * total * p[k]:
-            return c, c - 1
+            return c, c - 1, math.inf
+    if worst > SELF_SIMILAR:
+        if left < first or last < right:
+            return c, c - 1, math.inf
+        # How often the scale still shrinks by L before nothing is left, log(1 / L) = log1p(1 / T).
+        spans = max(math.log(scale / threshold), 1.0) / math.log1p(1.0 / total)
+        if not worst * spans < min(BEND, bend):
+            return c, c - 1, worst * spans
     squares = total * total / (1.0 + 2.0 * total)  # sum of L^2, L^4, ...
 
     # Neighbours: y is the work of all cycles, with the closing speed linear in the impulse so far.
@@ -764,11 +781,11 @@ def cycle(
         step = u[k] - u1[k]
         speed = u[k] + step * total
         if u[k] * u1[k] < 0.0 or u[k] * speed < 0.0 or (u[k] == 0.0) != (speed == 0.0):
-            return c, c - 1
+            return c, c - 1, math.inf
         work = a[k] if u[k] > 0.0 else q[k] - q1[k]
         y[k] = p[k] * total * (u[k] + step * squares) + (work - u1[k] * p[k]) * squares
         if active[k] == 1 and u[k] < 0.0 and q[k] + y[k] <= 0.0:
-            return c, c - 1
+            return c, c - 1, math.inf
     energy = motion(left, right + 1, hi, lo, m)
     for k in range(low, high + 1):
         if first <= k <= last:
@@ -804,7 +821,7 @@ def cycle(
         squares = max(energy / loss, 0.0)
     for k in range(first, last + 1):
         a[k] += a[k] * squares
-    return first, last
+    return first, last, math.inf
 
 
 @jit
@@ -982,6 +999,7 @@ def impact(
     # that time.  Snapshots are taken at doubling distances, so that a cycle of any length is found.
     ends = 0
     mark, marked_at = -1, 16
+    bend = bent = math.inf  # of the snapshot before, and of this one so far
     collapsed = 0
     status = FINISHED
     low, high = 0, n - 2  # the window: no contact outside it is at work
@@ -1049,13 +1067,14 @@ def impact(
                         left, right, n, m, hi, lo, u, q, p, x, y, tiny, before, active, turn,
                     )  # fmt: skip
             elif mark == ended:
-                left, right = cycle(
-                    mark, n, e, m, hi, lo, u, q, w, p, a, before, u1, q1, x, y, active, turn,
-                    tiny, code1, hits1, hits,
+                left, right, bent = cycle(
+                    mark, bend if 2 * ends > 3 * marked_at else 0.0, threshold, n, e, m, hi, lo, u,
+                    q, w, p, a, before, u1, q1, x, y, active, turn, tiny, code1, hits1, hits,
                 )  # fmt: skip
             if left <= right:
                 collapsed = 1
                 mark, marked_at, ends = -1, 16, 0
+                bend = bent = math.inf
                 for c in range(left, right + 1):
                     count = record(
                         count, COLLAPSE, c, hi, u, p, n, v, shift, mass_shift, m, p0, kinds,
@@ -1063,6 +1082,8 @@ def impact(
                     )  # fmt: skip
                 runs = -1
             elif ends >= 2 * marked_at:
+                bend = bent if mark == ended else math.inf
+                bent = math.inf
                 mark, marked_at = ended, ends
                 snapshot(n, u, q, p, p0, a, a0, u1, q1, active, turn, code1, hits1, hits)
         if runs == 0:
@@ -1204,9 +1225,11 @@ def admissible(n, m, v, e, forward, backward, bounded):
     for i in range(n):
         heaviest = max(heaviest, m[i])
     energy = 0.0
+    momentum = 0.0
     for i in range(n):
         if not (0.0 < m[i] < math.inf and m[i] >= LIGHTEST * heaviest):
             return False
+        momentum += 2.0 * (m[i] * abs(v[i]))
         energy += m[i] * v[i] * v[i]
     for c in range(n - 1):
         if not 0.0 <= e[c] <= 1.0:
@@ -1214,7 +1237,7 @@ def admissible(n, m, v, e, forward, backward, bounded):
     for i in range(n - 2):
         if not (0.0 <= forward[i] <= 1.0 and 0.0 <= backward[i] <= 1.0):
             return False
-    if not energy < math.inf:
+    if not (energy < math.inf and momentum < math.inf):
         return False
     if bounded:
         unit = 0.25 if heaviest > 1.0 else 1.0  # sums of masses must not overflow
