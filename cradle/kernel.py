@@ -328,31 +328,33 @@ def open_at(c, speed, hi, lo, m):
 
 
 @jit
-def move_together(left, right, x, hi, lo, m):
-    """Give balls left..right the velocities x and a common one that leaves their momentum alone."""
-    k = left
-    for b in range(left + 1, right + 1):
+def heaviest_of(first, last, m):
+    """Return the heaviest of balls first..last."""
+    k = first
+    for b in range(first + 1, last + 1):
         k = b if m[b] > m[k] else k
+    return k
+
+
+@jit
+def share(first, last, hi, lo, m):
+    """Give balls first..last the velocity of their momentum."""
+    k = heaviest_of(first, last, m)
     mass = 0.0
-    momentum = 0.0  # both it and x counted from the heaviest ball
-    for b in range(left, right + 1):
+    momentum = 0.0
+    for b in range(first, last + 1):
         mass += m[b]
-        momentum += m[b] * ((hi[b] - hi[k]) + (lo[b] - lo[k]) - (x[b] - x[k]))
+        momentum += m[b] * ((hi[b] - hi[k]) + (lo[b] - lo[k]))
     add(k, momentum / mass, hi, lo)
-    for b in range(left, right + 1):
-        if b != k:
-            hi[b] = hi[k]
-            lo[b] = lo[k]
-            if x[b] != x[k]:
-                add(b, x[b] - x[k], hi, lo)
+    for b in range(first, last + 1):
+        hi[b] = hi[k]
+        lo[b] = lo[k]
 
 
 @jit
 def motion(left, right, hi, lo, m):
-    """Kinetic energy of balls left..right, relative to the heaviest of them."""
-    k = left
-    for b in range(left + 1, right + 1):
-        k = b if m[b] > m[k] else k
+    """Kinetic energy of balls left..right relative to their centre of mass."""
+    k = heaviest_of(left, right, m)
     mass = 0.0
     momentum = 0.0
     energy = 0.0
@@ -365,7 +367,7 @@ def motion(left, right, hi, lo, m):
 
 
 @jit
-def stick(c, low, high, rate, u, x, hi, lo, m):
+def stick(c, low, high, rate, u, hi, lo, m):
     """Give all balls that exact zeros join to contact c, within low..high, one velocity.
 
     Returns the last contact of the stretch.
@@ -376,16 +378,13 @@ def stick(c, low, high, rate, u, x, hi, lo, m):
         first -= 1
     while last < high and u[last + 1] == 0.0 and rate[last + 1] > 0.0:
         last += 1
-    for b in range(first, last + 2):
-        x[b] = 0.0
-    move_together(first, last + 1, x, hi, lo, m)
+    share(first, last + 1, hi, lo, m)
     return last
 
 
 @jit
 def advance(
     left, right, s, whole, n, e, m, hi, lo, u, q, w, p, a, rate, slope, pull, until, fixed, held,
-    x,
 ):  # fmt: skip
     """Take the run left..right straight on by s; `whole` if that is its own next event.
 
@@ -430,7 +429,7 @@ def advance(
     c = left
     while c <= right:
         if u[c] == 0.0 and closing(c, hi, lo) != 0.0:
-            c = stick(c, left, right, rate, u, x, hi, lo, m)
+            c = stick(c, left, right, rate, u, hi, lo, m)
         c += 1
     # Idle neighbours only ever close, and wait at zero.
     c = left - 1
@@ -609,7 +608,7 @@ def exhausted_stretch(c, threshold, n, e, m, u, q, w, tiny):
 
 
 @jit
-def merge(first, last, n, m, hi, lo, u, q, p, x, y, tiny, before, active, turn):
+def merge(first, last, n, m, hi, lo, u, q, p, x, tiny, before, active, turn):
     """R9: end the contacts first..last plastically: their balls take the common velocity.
 
     A neighbour that this makes them approach, at a speed below the threshold, joins.  Returns the
@@ -617,12 +616,11 @@ def merge(first, last, n, m, hi, lo, u, q, p, x, y, tiny, before, active, turn):
     """
     while True:
         for b in range(first, last + 2):
-            x[b] = 0.0
-            y[b] = hi[b]
-        move_together(first, last + 1, x, hi, lo, m)
+            x[b] = hi[b]
+        share(first, last + 1, hi, lo, m)
         impulse = 0.0
         for c in range(first, last + 1):
-            impulse += m[c] * (y[c] - hi[c])
+            impulse += m[c] * (x[c] - hi[c])
             p[c] += max(impulse, 0.0)
             u[c] = 0.0
             tiny[c] = 0
@@ -772,55 +770,72 @@ def cycle(
             return c, c - 1, worst * spans
     squares = total * total / (1.0 + 2.0 * total)  # sum of L^2, L^4, ...
 
+    # Where the velocities go (x, changes): those of the neighbours' balls by the impulses of all
+    # cycles, the chatterers' to a common one that leaves the momentum alone.
+    i = heaviest_of(first, last + 1, m)
+    mass = 0.0
+    momentum = 0.0
+    for b in range(left, right + 2):
+        if first <= b <= last + 1:
+            mass += m[b]
+            momentum += m[b] * ((hi[b] - hi[i]) + (lo[b] - lo[i]))
+        else:
+            push = p[b - 1] if b > left else 0.0
+            x[b] = (push - (p[b] if b <= right else 0.0)) * total / m[b]
+            momentum -= m[b] * x[b]
+    for b in range(first, last + 2):
+        x[b] = momentum / mass - ((hi[b] - hi[i]) + (lo[b] - lo[i]))
+
     # Neighbours: y is the work of all cycles, with the closing speed linear in the impulse so far.
     low = max(left - 1, 0)
     high = min(right + 1, n - 2)
     for k in range(low, high + 1):
         if first <= k <= last:
             continue
-        step = u[k] - u1[k]
-        speed = u[k] + step * total
+        change = (x[k] if k >= left else 0.0) - (x[k + 1] if k <= right else 0.0)
+        speed = u[k] + change
         if u[k] * u1[k] < 0.0 or u[k] * speed < 0.0 or (u[k] == 0.0) != (speed == 0.0):
             return c, c - 1, math.inf
         work = a[k] if u[k] > 0.0 else q[k] - q1[k]
-        y[k] = p[k] * total * (u[k] + step * squares) + (work - u1[k] * p[k]) * squares
+        y[k] = p[k] * (total * u[k] + change * squares) + (work - u1[k] * p[k]) * squares
         if active[k] == 1 and u[k] < 0.0 and q[k] + y[k] <= 0.0:
             return c, c - 1, math.inf
     energy = motion(left, right + 1, hi, lo, m)
+    for b in range(left, right + 2):
+        add(b, x[b], hi, lo)
+    for b in range(first, last + 2):
+        hi[b] = hi[i]
+        lo[b] = lo[i]
+    # The ledger: what disappears is the part 1 - e^2 of what the chatterers absorb.  That makes the
+    # sum of L^2, L^4, ... exact.
+    energy -= motion(left, right + 1, hi, lo, m)
+    loss = 0.0
     for k in range(low, high + 1):
         if first <= k <= last:
-            p[k] += x[k]
             energy += q[k]
+            loss += (1.0 - e[k] * e[k]) * a[k]
+        else:
+            energy -= y[k]
+    if loss > 0.0:
+        squares = max(energy / loss, 0.0)
+    impulse = p[first - 1] * total if first > left else 0.0
+    for k in range(low, high + 1):
+        if first <= k <= last:
+            impulse -= m[k] * x[k]
+            p[k] += max(impulse, 0.0)
+            a[k] += a[k] * squares
             u[k] = 0.0
             tiny[k] = 0
             deactivate(k, u, q, before, active, turn)
             continue
-        energy -= y[k]
+        u[k] = closing(k, hi, lo)
+        p[k] += p[k] * total
         if active[k] == 1 and u[k] > 0.0:
             w[k] += y[k]
             a[k] += y[k]
             q[k] += e[k] * e[k] * y[k]
         elif active[k] == 1:
             q[k] += y[k]
-        p[k] += p[k] * total
-        u[k] += (u[k] - u1[k]) * total
-    # The neighbours' velocities follow from the common one.
-    x[first] = 0.0
-    for b in range(first - 1, left - 1, -1):
-        x[b] = x[b + 1] + u[b]
-    for b in range(first, right + 1):
-        x[b + 1] = x[b] - u[b]
-    move_together(left, right + 1, x, hi, lo, m)
-    # The ledger: what disappears is the part 1 - e^2 of what these contacts absorb, by the sum of
-    # the squares of L, which this makes exact.
-    energy -= motion(left, right + 1, hi, lo, m)
-    loss = 0.0
-    for k in range(first, last + 1):
-        loss += (1.0 - e[k] * e[k]) * a[k]
-    if loss > 0.0:
-        squares = max(energy / loss, 0.0)
-    for k in range(first, last + 1):
-        a[k] += a[k] * squares
     return first, last, math.inf
 
 
@@ -1064,7 +1079,7 @@ def impact(
                 left, right = exhausted_stretch(worn, threshold, n, e, m, u, q, w, tiny)
                 if left <= right:
                     left, right = merge(
-                        left, right, n, m, hi, lo, u, q, p, x, y, tiny, before, active, turn,
+                        left, right, n, m, hi, lo, u, q, p, x, tiny, before, active, turn,
                     )  # fmt: skip
             elif mark == ended:
                 left, right, bent = cycle(
@@ -1149,7 +1164,7 @@ def impact(
                 )  # fmt: skip
             advance(
                 first[k], last[k], s, part == 1.0, n, e, m, hi, lo, u, q, w, p, a, rate, slope,
-                pull, until, fixed, held, x,
+                pull, until, fixed, held,
             )  # fmt: skip
         if gap >= 0:
             # R8.5: driven from both sides.
