@@ -11,9 +11,19 @@ from typing import NamedTuple
 
 import mpmath
 import numpy as np
+from chains import with_ends, within_bounds
+from march import march
 from reference import EventLimit, solve
 
-from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide
+from cradle import (
+    Chain,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    SpringChain,
+    collide,
+    post_impact_velocities,
+)
+from cradle.models.correlation import outcomes
 
 EPS = 2.0**-52
 TINIEST = 5e-324  # the smallest number above zero
@@ -111,9 +121,10 @@ def faults(trace, finished=True, momentum=8.0, energy=8.0):
     """What is wrong with a trace, by itself; empty if nothing is.
 
     `momentum` and `energy` are multiples of rounding that are granted per ball, and, for the
-    ledger, per square root of the number of events: so do rounding errors add up.
+    energy, per square root of the number of events: so do rounding errors add up.
     """
     n = len(trace.chain)
+    energy *= n * max(1.0, math.sqrt(len(trace.events)))
     arrays = (trace.velocities, trace.impulses, trace.absorbed, trace.path, trace.path_impulses)
     if not all(np.isfinite(array).all() for array in arrays):
         return ["not finite"]
@@ -121,10 +132,10 @@ def faults(trace, finished=True, momentum=8.0, energy=8.0):
     defect = invariants(trace)
     if defect["momentum"] > momentum * n:
         found.append(f"momentum off by {defect['momentum']:.3g} roundings")
-    if defect["gain"] > energy * n:
+    if defect["gain"] > energy:
         found.append(f"energy gained: {defect['gain']:.3g} roundings")
     if finished:
-        if defect["ledger"] > energy * n * max(1.0, math.sqrt(len(trace.events))):
+        if defect["ledger"] > energy:
             found.append(f"ledger open by {defect['ledger']:.3g} roundings")
         if defect["overlap"] > 0:
             found.append(f"balls overlap by {defect['overlap']:.3g}")
@@ -154,12 +165,24 @@ def unavoidable(problem, exact, max_events=20_000):
     An answer cannot be known better than that from rounded inputs: it is the conditioning, measured
     at the very distance that matters, so that square roots and jumps count at their true size.
     """
+    return change_by(problem, exact, FIELDS, 1, max_events)
+
+
+def slack_of_bound(problem, exact, max_events=20_000):
+    """The same for ratios and four ulps: so near to its bound a ratio counts as at its bound."""
+    return change_by(problem, exact, ("forward", "backward"), 4, max_events)
+
+
+def change_by(problem, exact, names, ulps, max_events):
+    """Change of each exact velocity, by so many ulps of each of these inputs, added up."""
     total = [mpmath.mpf(0)] * len(problem.masses)
-    for name in FIELDS:
+    for name in names:
         values = getattr(problem, name)
         for k, value in enumerate(values):
             worst = [mpmath.mpf(0)] * len(total)
-            for moved in neighbours(value, *ranges(name)):
+            for near in neighbours(value, *ranges(name)):
+                low, high = ranges(name)
+                moved = min(max(value + ulps * (near - value), low), high)
                 changed = problem._replace(**{name: [*values[:k], moved, *values[k + 1 :]]})
                 try:
                     other = changed.exact(max_events)
@@ -222,7 +245,7 @@ SHAPES = {
     "last": lambda r: (1.0, 1.0, r),
     "taper": lambda r: (1.0, math.sqrt(r), r),
 }
-POWERS = range(-12, 13, 2)
+POWERS = range(-12, 13, 3)
 RESTITUTION = (0.0, 1e-16, 0.3, 0.9, 1.0 - 2.0**-53, 1.0)
 RATIOS = {
     "0": lambda _: 0.0,
@@ -264,7 +287,8 @@ def truth(problem, trace, longest=400, conditioned=80):
             return None
         change = None
         if len(exact.events) <= conditioned:
-            change = unavoidable(problem, exact, longest)
+            parts = (part(problem, exact, longest) for part in (unavoidable, slack_of_bound))
+            change = [a + b for a, b in zip(*parts)]
         return exact.velocities, change
 
 
@@ -279,3 +303,273 @@ def compare(trace, known):
             return error, math.nan, math.nan
         own = max(a / (EPS * abs(b) + c + TINIEST) for a, b, c in zip(off, velocities, change))
         return error, float(max(change) / largest / EPS), float(own)
+
+
+# --- long chains -------------------------------------------------------------------------------
+
+SIZES = (2, 3, 5, 10, 20, 30, 50, 100, 200, 500, 1000)
+ROWS = {
+    # name: neighbouring mass ratio, restitution, correlation ratio
+    "equal, e = 1, ratio 0": (1.0, 1.0, 0.0),
+    "equal, e = 1, ratio .1": (1.0, 1.0, 0.1),
+    "equal, e = .9, ratio 0": (1.0, 0.9, 0.0),
+    "equal, e = .9, ratio .1": (1.0, 0.9, 0.1),
+    "taper .97, e = .9, ratio 0": (0.97, 0.9, 0.0),
+    "taper .97, e = 1, ratio .1": (0.97, 1.0, 0.1),
+}
+
+
+def row_case(name, n):
+    """The first of n balls strikes the others."""
+    step, e, ratio = ROWS[name]
+    masses = [step**i for i in range(n)]
+    return case(masses, [1.0] + [0.0] * (n - 1), e, ratio)
+
+
+def handed_on(masses, e):
+    """Velocities after one binary collision a pair, left to right, in the digits in force."""
+    v = [mpmath.mpf(1)] + [mpmath.mpf(0)] * (len(masses) - 1)
+    masses, e = [mpmath.mpf(m) for m in masses], mpmath.mpf(e)
+    for c, (a, b) in enumerate(zip(masses, masses[1:])):
+        v[c], v[c + 1] = v[c] * (a - e * b) / (a + b), v[c] * (1 + e) * a / (a + b)
+    return v
+
+
+# --- growth of a perturbation ------------------------------------------------------------------
+
+
+def perturbed(spread, n, e, size, chains=10, seed=2001):
+    """Chains of n balls, ratio .1, and copies in which every input is changed by the part `size`.
+
+    Masses are 1 but for the part `spread`.  Returns, one a chain, the largest change of a velocity
+    relative to the largest speed, and the number of balls at the far end that keep six digits.
+    """
+    rng = np.random.default_rng([seed, n, round(1000 * e)])
+    masses = rng.uniform(1 - spread, 1 + spread, (chains, n))
+    velocities = np.zeros((chains, n))
+    velocities[:, 0] = 1.0
+    parts = [masses, velocities, np.full((chains, n - 1), e), np.full((chains, n - 2), 0.1)]
+    changed = [part * (1 + size * rng.choice([-1, 1], part.shape)) for part in parts]
+    changed[2] = np.minimum(changed[2], 1.0)
+    one, other = (post_impact_velocities(*these) for these in (parts, changed))
+    off = np.abs(other - one)
+    off /= np.abs(one).max(axis=-1, keepdims=True)
+    leading = [int(np.argmin([*row[::-1], False])) for row in off <= 1e-6]
+    return off.max(axis=-1), np.array(leading)
+
+
+# --- a light ball between two heavy ones -------------------------------------------------------
+
+
+def alternating(masses, restitution):
+    """Number of impacts of three balls, v = (1, 0, 0), at ratio 0 and e near 1, and the outcome.
+
+    In mass-weighted coordinates the three balls are a point in a wedge of angle
+    theta = arctan sqrt(m2 (m1 + m2 + m3) / (m1 m3)), and every elastic impact is a mirror.
+    Unfolded, the path is a straight line, at right angles to the first wall: it meets
+    ceil(pi / theta) - 1 of them.  Closing speeds map linearly: n impacts are a power of a matrix.
+    With e an ulp below 1 another impact may follow.
+    """
+    a, b, c = (mpmath.mpf(m) for m in masses)
+    e, f = (mpmath.mpf(x) for x in restitution)
+    angle = mpmath.atan(mpmath.sqrt(b * (a + b + c) / (a * c)))
+    number = int(mpmath.ceil(mpmath.pi / angle)) - 1
+    left = mpmath.matrix([[-e, 0], [(1 + e) * a / (a + b), 1]])
+    right = mpmath.matrix([[1, (1 + f) * c / (b + c)], [0, -f]])
+    u = (right * left) ** (number // 2) * mpmath.matrix([1, 0])
+    if number % 2:
+        u = left * u
+    while u[number % 2] > mpmath.mpf(10) ** -40:
+        u, number = (right, left)[number % 2 == 0] * u, number + 1
+    middle = (a - a * u[0] + c * u[1]) / (a + b + c)
+    return number, [middle + u[0], middle, middle - u[1]]
+
+
+def elastic_impacts(light):
+    """Number, exact outcome and its unavoidable change, of (1, light, 1) at e = 1 and ratio 0."""
+    given = [1.0, light, 1.0, 1.0, 1.0]
+    number, after = alternating(given[:3], given[3:])
+    change = [mpmath.mpf(0)] * 3
+    for k, value in enumerate(given):
+        worst = [mpmath.mpf(0)] * 3
+        for x in neighbours(value, 0.0, 1.0 if k > 2 else math.inf):
+            changed = [*given[:k], x, *given[k + 1 :]]
+            other = alternating(changed[:3], changed[3:])
+            worst = [max(a, abs(b - c)) for a, b, c in zip(worst, other[1], after)]
+        change = [a + b for a, b in zip(change, worst)]
+    return number, after, change
+
+
+def infinite_below(e):
+    """Largest light mass of (1, light, 1) with an infinite sequence, ratio 0, both e alike.
+
+    The closing speeds of a cycle of two impacts map by a matrix of determinant e^2 and trace
+    (1 + e)^2 / (1 + light)^2 - 2 e.  Its eigenvalues are real, and no turn of the closing speeds
+    ends the sequence, from trace = 2 e on.
+    """
+    return (1 - math.sqrt(e)) ** 2 / (2 * math.sqrt(e)) if e > 0 else math.inf
+
+
+def edge(e, ratio, low=1e-7, high=2.0):
+    """The same at any ratio, by bisection on what the solver reports."""
+    for _ in range(60):
+        middle = math.sqrt(low * high)
+        found = outcomes([1.0, middle, 1.0], [1.0, 0.0, 0.0], e, ratio)
+        low, high = (middle, high) if found.collapsed else (low, middle)
+    return math.sqrt(low * high)
+
+
+# --- distance to another sequence of events ----------------------------------------------------
+
+
+def events_at_balls(trace):
+    """Ends, closings and collapses as each ball sees them."""
+    return [
+        [e for e in trace.events if e.kind != "maximum_compression" and i - 1 <= e.contact <= i]
+        for i in range(len(trace.chain))
+    ]
+
+
+def inputs(problem):
+    """Inputs of a case that are not zero, as (name, index, value)."""
+    return [
+        (name, k, value)
+        for name in FIELDS
+        for k, value in enumerate(getattr(problem, name))
+        if value
+    ]
+
+
+def moved(problem, name, k, change):
+    """The case with one input changed, or None if that leaves its range."""
+    values = list(getattr(problem, name))
+    values[k] += change
+    low, high = ranges(name)
+    return problem._replace(**{name: values}) if low <= values[k] <= high else None
+
+
+def nearest_edge(problem, name, k, side, scale, farthest=0.3, per_decade=20):
+    """How far an input can move to one side before the events change, and the jump there.
+
+    Relative distance and the largest change of a velocity across it, relative to the largest
+    speed; (inf, 0) if there is no edge up to `farthest` or to the end of the input's range.
+    """
+    base = events_at_balls(problem.collide()[0])
+
+    def at(distance):
+        changed = moved(problem, name, k, side * distance * scale)
+        if changed is None:
+            return None
+        trace = changed.collide()[0]
+        return trace.velocities, events_at_balls(trace) == base
+
+    near = 0.0
+    for far in np.geomspace(1e-12, farthest, 1 + round(per_decade * math.log10(farthest / 1e-12))):
+        found = at(far)
+        if found is None:
+            return math.inf, 0.0
+        if not found[1]:
+            break
+        near = far
+    else:
+        return math.inf, 0.0
+    while far - near > max(1e-10 * far, 1e-15):
+        middle = 0.5 * (near + far)
+        near, far = (middle, far) if at(middle)[1] else (near, middle)
+    before, after = at(near)[0], at(far)[0]
+    return far, float(np.abs(after - before).max() / np.abs(before).max())
+
+
+# --- every chain finishes ----------------------------------------------------------------------
+
+FAMILIES = (("within", 3), ("within", 6), ("saturate", 3), ("saturate", 6))
+
+
+def any_chain(family, decades, index):
+    """A chain of 2 to 8 balls, e and ratios often exactly 0 or 1 (or at their bounds)."""
+    rng = np.random.default_rng([FAMILIES.index((family, decades)), index])
+    n = int(rng.integers(2, 9))
+    masses = 10 ** rng.uniform(-decades / 2, decades / 2, n)
+    velocities = (
+        rng.normal(size=n),
+        np.sort(rng.uniform(-1, 1, n))[::-1],
+        np.eye(n)[0],
+    )[rng.integers(3)]
+    part = with_ends(rng)
+    e = part((n - 1,))
+    if family == "within":
+        forward, backward = within_bounds(masses, part)
+    else:
+        forward, backward = part((n - 2,)), part((n - 2,))
+    return case(masses, velocities, e, forward, backward)
+
+
+def work(problem, max_events):
+    """Collisions, whether collapsed, and the trace if it did not finish, of the fast run."""
+    try:
+        found = outcomes(*problem[:5], excess="saturate", max_events=max_events)
+    except ImpactNotFinished as stopped:
+        return int(stopped.trace.collisions.sum()), False, stopped.trace
+    return int(found.collisions.sum()), bool(found.collapsed), None
+
+
+def relative_energy(masses, velocities):
+    """Energy of the motion relative to the centre of mass."""
+    m, v = np.asarray(masses), np.asarray(velocities)
+    return float(0.5 * m @ (v - m @ v / m.sum()) ** 2)
+
+
+def period(sequence):
+    """Smallest period of a sequence that repeats at least three times, or 0."""
+    s = np.asarray(sequence)
+    return next((p for p in range(1, len(s) // 3) if np.array_equal(s[p:], s[:-p])), 0)
+
+
+def portrait(problem, trace):
+    """Why a chain takes so long: period of its events, energy left half way and at the end.
+
+    Energies relative to the start, of the motion relative to the centre of mass.
+    """
+    start = relative_energy(problem.masses, problem.velocities)
+    left = [
+        relative_energy(problem.masses, velocities) / start
+        for velocities in (trace.path[len(trace.path) // 2], trace.velocities)
+    ]
+    events = [e for e in trace.events if e.kind in ("end", "close")]
+    tail = [2 * e.contact + (e.kind == "end") for e in events[-2000:]]
+    return period(tail), *left
+
+
+# --- the same points by steps and by springs ---------------------------------------------------
+
+POINTS = {
+    "equal": ((1.0, 1.0, 1.0), 1.0, 0.15),
+    "middle 1e-2": ((1.0, 1e-2, 1.0), 1.0, 0.15),
+    "middle 1e-4": ((1.0, 1e-4, 1.0), 1.0, 0.15),
+    "lossy": ((1.0, 1.0, 1.0), 0.9, 0.15),
+    "near the bound": ((1.0, 1.0, 1.0), 0.9, 0.4999),
+    "infinite": ((1.0, 1e-2, 1.0), 0.5, 0.15),
+}
+
+
+def costs(point):
+    """Rows (method, effort, evaluations, error) of one point, errors relative to the striker."""
+    masses, e, ratio = POINTS[point]
+    chain = Chain(masses, [1, 0, 0], e)
+    trace = collide(chain, ImpulseCorrelation(ratio))
+    with mpmath.workdps(50):
+        exact = truth(case(masses, [1, 0, 0], e, ratio), trace, 5000, 0)[0]
+        exact = np.array([float(v) for v in exact])
+    yield "events", 0.0, len(trace.events), float(np.abs(trace.velocities - exact).max())
+    for steps in (10, 100, 1000, 10_000):
+        try:
+            end = march(masses, [1, 0, 0], e, ratio, steps=steps, max_steps=3_000_000)
+        except RuntimeError:
+            break
+        yield "march", float(steps), end.steps, float(np.abs(end.velocities - exact).max())
+    if e == 1:
+        best = collide(chain, SpringChain(1.0, rtol=1e-13))
+        for power in (4, 6, 8, 10, 12):
+            end = collide(chain, SpringChain(1.0, rtol=10.0**-power))
+            off = float(np.abs(end.velocities - best.velocities).max())
+            yield "springs", 10.0**-power, end.evaluations, off

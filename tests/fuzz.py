@@ -120,7 +120,9 @@ def attempt(data, max_events=400):
         batch = post_impact_velocities(m, v, e, f, b, max_events=max_events, **options)
         assert refused is None, f"refused by collide alone: {refused}"
         assert finished, "the batch finished, collide did not"
-        assert batch.tobytes() == trace.velocities.tobytes(), "the batch differs"
+        # Short cuts of the batch may round the last digit another way.
+        off = max(abs(batch - trace.velocities))
+        assert off <= 1e-13 * max(map(abs, v)), f"the batch differs by {off}"
     except ValueError:
         assert refused is not None, "refused by the batch alone"
         return None

@@ -1,0 +1,199 @@
+"""Maps of the chapter on extremes: errors, edges, long and infinite sequences.
+
+Usage::
+
+    python benchmarks/extremes.py                 # all parts, about half an hour
+    python benchmarks/extremes.py map edges       # some of them
+    python benchmarks/extremes.py map --keep exact.pickle    # keep exact outcomes for the next time
+
+Every part writes one small file `data/extremes_<part>.csv`.  The measuring functions are those of
+`tests/extremes.py`, and the tests compute a sample of the rows anew.
+"""
+
+import argparse
+import csv
+import itertools
+import math
+import pickle
+import sys
+from pathlib import Path
+
+import mpmath
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "tests"))
+
+import extremes as x  # noqa: E402
+
+from cradle import paper_chain  # noqa: E402
+from cradle.models.correlation import outcomes  # noqa: E402
+from cradle.tables import paper_sequences  # noqa: E402
+
+
+def write(part, header, rows):
+    with (ROOT / "data" / f"extremes_{part}.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        count = 0
+        for row in rows:
+            writer.writerow(f"{v:.4g}" if isinstance(v, float) else v for v in row)
+            count += 1
+    print(f"{part}: {count} rows", flush=True)
+
+
+def the_map(keep):
+    """Worst of the velocities of each (shape, mass ratio, restitution, ratio)."""
+    known = {}
+    if keep and keep.exists():
+        with keep.open("rb") as file:
+            known = pickle.load(file)
+    for labels in itertools.product(x.SHAPES, x.POWERS, x.RESTITUTION, x.RATIOS):
+        worst = np.zeros(3)
+        events, compared, faulty, unfinished = 0, 0, 0, 0
+        for velocities in x.VELOCITIES:
+            point = (*labels, velocities)
+            problem = x.map_case(*point)
+            trace, finished = problem.collide()
+            unfinished += not finished
+            faulty += bool(x.faults(trace, finished))
+            events = max(events, len(trace.events))
+            if not finished:
+                continue
+            if point not in known:
+                known[point] = x.truth(problem, trace)
+            if known[point] is not None:
+                compared += 1
+                worst = np.fmax(worst, x.compare(trace, known[point]))
+        yield (*labels, *map(float, worst), events, compared, faulty, unfinished)
+    if keep:
+        with keep.open("wb") as file:
+            pickle.dump(known, file)
+
+
+def lengths(_):
+    for name, n in itertools.product(x.ROWS, x.SIZES):
+        problem = x.row_case(name, n)
+        # The path of a thousand balls is large: not more of it than needed.
+        trace, finished = problem.collide(4_000_000 // n)
+        defects = x.invariants(trace)
+        error = math.nan
+        with mpmath.workdps(50):
+            exact = None
+            _, e, ratio = x.ROWS[name]
+            if ratio == 0 and trace.collisions.max() == 1:
+                exact = x.handed_on(problem.masses, e)
+            elif finished and len(trace.events) <= 400:
+                exact = problem.exact().velocities
+            if exact:
+                error = x.compare(trace, (exact, None))[0]
+        yield (name, n, len(trace.events), int(finished), defects["momentum"],
+               max(defects["gain"], 0.0), defects["ledger"], error)  # fmt: skip
+
+
+def growth(_):
+    sizes = (3, 5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 80)
+    for spread, e, size, n in itertools.product((0.0, 0.1), (0.9, 0.97, 1.0), (1e-12, 1e-9), sizes):
+        change, leading = x.perturbed(spread, n, e, size)
+        yield spread, e, size, n, float(np.median(change)), float(change.max()), int(leading.min())
+
+
+def edges(_):
+    for name in paper_sequences():
+        chain, model = paper_chain(name, excess="saturate")
+        own = chain.masses, chain.velocities, chain.restitution
+        problem = x.case(*own, model.forward, model.backward)
+        for part, k, scale in x.inputs(problem):
+            for side in (-1, 1):
+                distance, jump = x.nearest_edge(problem, part, k, side, scale)
+                yield name, part, k, side, distance, jump
+
+
+def elastic(_):
+    for power, ratio in itertools.product(np.arange(0, 10.25, 0.25), (0.0, 0.15)):
+        light = 10.0 ** -float(power)
+        problem = x.case([1, light, 1], [1, 0, 0], 1, ratio)
+        trace, finished = problem.collide(5_000_000)
+        assert finished
+        defects = x.invariants(trace)
+        theory = math.pi * math.sqrt((1 - ratio) / (2 * light))
+        error = condition = own = math.nan
+        if ratio == 0:
+            with mpmath.workdps(50):
+                theory, *known = x.elastic_impacts(light)
+                error, condition, own = x.compare(trace, known)
+        yield (float(power), ratio, int(trace.collisions.sum()), theory, error,
+               condition, own, max(defects["gain"], 0.0), int(trace.collapsed))  # fmt: skip
+
+
+def limits(_):
+    """Yield edges between finite and infinite sequences, and what both sides cost."""
+    restitution = (0.05, 0.1, 0.3, 0.5, 0.7, 0.9, 0.95, 0.99)
+    for e, ratio in itertools.product(
+        restitution, (0.0, 0.05, 0.15, 0.3)
+    ):  # all within 1/3, the bound at high
+        at = x.edge(e, ratio)
+        theory = x.infinite_below(e) if ratio == 0 else math.nan
+        found = [outcomes([1, at * f, 1], [1, 0, 0], e, ratio) for f in (0.5, 0.99, 1.01, 2)]
+        yield (e, ratio, at, theory, *(int(f.collisions.sum()) for f in found))
+
+
+CHAINS, LONG = 25_000, 50_000
+
+
+def finish(_):
+    """Count by family and number of balls: finished, collapsed, long; unfinished ones by name."""
+    unfinished = []
+    for family, decades in x.FAMILIES:
+        table = np.zeros((9, 6), dtype=int)
+        for index in range(CHAINS):
+            problem = x.any_chain(family, decades, index)
+            n = len(problem.masses)
+            collisions, collapsed, stopped = x.work(problem, LONG)
+            row = (1, collapsed, collisions > 100, collisions > 1000, collisions > 10_000)
+            table[n] += (*row, stopped is not None)
+            if stopped:
+                unfinished.append((family, decades, index, n, *x.portrait(problem, stopped)))
+        for n in range(2, 9):
+            yield (family, decades, n, *table[n].tolist())
+        print(family, decades, len(unfinished), flush=True)
+    header = ["family", "decades", "index", "balls", "period", "energy_half", "energy"]
+    write("unfinished", header, unfinished)
+
+
+def cost(_):
+    for point in x.POINTS:
+        for row in x.costs(point):
+            yield (point, *row)
+
+
+PARTS = {
+    "map": (
+        the_map,
+        "shape power restitution ratio error condition own events compared faulty unfinished",
+    ),
+    "lengths": (lengths, "row balls events finished momentum gain ledger error"),
+    "growth": (growth, "spread restitution size balls median largest leading"),
+    "edges": (edges, "sequence input index side distance jump"),
+    "elastic": (elastic, "power ratio impacts theory error condition own gain collapsed"),
+    "cost": (cost, "point method effort evaluations error"),
+    "finish": (
+        finish,
+        "family decades balls chains collapsed above_100 above_1000 above_10000 unfinished",
+    ),
+    "limits": (limits, "restitution ratio edge theory half below above double"),
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("parts", nargs="*", default=list(PARTS), choices=[*PARTS, []])
+    parser.add_argument("--keep", type=Path)
+    options = parser.parse_args()
+    for part in options.parts or PARTS:
+        rows, header = PARTS[part]
+        write(part, header.split(), rows(options.keep))
+
+
+if __name__ == "__main__":
+    main()
