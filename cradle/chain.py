@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,11 +53,13 @@ def checked(
     """
     try:
         array = np.asarray(values)
-        if array.dtype.kind not in "biuf":
+        if array.dtype.kind not in "biuf" or np.ma.is_masked(values):
             raise TypeError
         array = array.astype(np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} = {values!r}; must be real numbers, one shape") from None
+        raise ValueError(
+            f"{name} = {values!r}; must be real numbers, one shape, none masked"
+        ) from None
     wrong = ~np.isfinite(array) | (array < low) | (array > high)
     if open_low:
         wrong |= array <= low
@@ -196,6 +199,10 @@ class Chain:
         for name, value in (("masses", m), ("velocities", v), ("restitution", e)):
             value.flags.writeable = False
             object.__setattr__(self, name, value)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Make copies through the constructor: they are frozen too."""
+        return type(self), (self.masses, self.velocities, self.restitution)
 
     def __repr__(self) -> str:
         """Return the call that makes this chain."""

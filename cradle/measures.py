@@ -139,6 +139,7 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
     if np.ndim(step):
         raise ValueError(f"step = {step!r}; must be one number")
     checked("step", step, "must lie in [1e-12, 0.1]", 1e-12, 0.1)
+    base = collide(chain, model)
     own = {name: getattr(chain, name) for name in ("masses", "velocities", "restitution")}
     ratios: dict[str, Any] = {}
     if hasattr(model, "forward") and hasattr(model, "backward"):
@@ -154,7 +155,6 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
             replace(model_of, **changed) if changed else model,
         )
 
-    base = solve()
     sequence = _events_at_balls(base)
     total, largest, most, same = 0.0, -1.0, "", True
     for name, values in (own | ratios).items():
@@ -315,7 +315,8 @@ def conserving_outcomes(
            [-0.333,  0.667,  0.667]])
     """
     chain, ends, centre = _arc(masses, velocities)
-    full = float(np.arccos(min(1.0, ends[0] @ ends[1])))
+    m1, m2, m3 = chain.masses / chain.masses.sum()
+    full = float(np.arctan2(np.sqrt(m2), np.sqrt(m1) * np.sqrt(m3)))  # the arccos, to all digits
     if angles is None:
         angle = np.linspace(0.0, full, 181)
     else:
@@ -348,6 +349,8 @@ def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
     60.0
     """
     chain, ends, centre = _arc(masses, velocities)
+    if (chain.closing_speeds == 0.0).all():
+        return 0.0
     y = np.sqrt(chain.masses) * (chain.velocities - centre)
     across = ends[1] - (ends[0] @ ends[1]) * ends[0]
     return float(np.arctan2(y @ across / np.linalg.norm(across), y @ ends[0]))

@@ -112,5 +112,9 @@ class ImpactNotFinished(RuntimeError):
     """
 
     def __init__(self, message: str, trace: Trace) -> None:
-        super().__init__(message)
+        super().__init__(message, trace)  # both, so that it can be pickled
         self.trace = trace
+
+    def __str__(self) -> str:
+        """Return the message."""
+        return str(self.args[0])

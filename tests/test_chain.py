@@ -1,11 +1,13 @@
 """The chain: what is accepted, what is refused, and in which words."""
 
+import copy
+import pickle
 import re
 
 import numpy as np
 import pytest
 
-from cradle import Chain
+from cradle import Chain, post_impact_velocities
 
 GOOD = {"masses": [1, 2, 3], "velocities": [1, 0, -1], "restitution": [0.5, 1]}
 
@@ -112,3 +114,19 @@ def test_lightest_and_smallest_masses(mass):
     assert Chain([heavy, mass], [1, 0], 1).masses.tolist() == [heavy, mass]
     with pytest.raises(ValueError, match=r"^masses\[1\] = .*; must be at least 1e-150"):
         Chain([heavy * 2, mass], [1, 0], 1)
+
+
+def test_copies_are_frozen_too():
+    chain = Chain([1, 2], [1, 0], 0.5)
+    for other in (copy.copy(chain), copy.deepcopy(chain), pickle.loads(pickle.dumps(chain))):
+        assert repr(other) == repr(chain)
+        with pytest.raises(ValueError, match="read-only"):
+            other.masses[0] = -1.0
+
+
+def test_masked_numbers_are_refused():
+    masked = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
+    with pytest.raises(ValueError, match="none masked"):
+        Chain(masked, [1, 0, 0], 1)
+    with pytest.raises(ValueError, match="none masked"):
+        post_impact_velocities(masked, [1, 0, 0], 1, 0.1)

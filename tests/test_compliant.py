@@ -419,7 +419,7 @@ def test_extreme_scales():
 def test_repr_is_the_caption():
     assert repr(SpringChain([1, 2], 1, rtol=1e-6)) == (
         "SpringChain(stiffness=(1.0, 2.0), exponent=1.0, rtol=1e-06, method='DOP853', "
-        "max_time=inf, max_evaluations=1000000)"
+        "max_time=None, max_evaluations=1000000)"
     )
 
 

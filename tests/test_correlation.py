@@ -1,5 +1,6 @@
 """The paper's model behind its public names: input, record, batch, and how an impact gives up."""
 
+import pickle
 import re
 from functools import partial
 
@@ -469,3 +470,30 @@ def test_long_unfinished_records_are_cut():
     recorded = sum(event.kind == "close" for event in trace.events)
     assert trace.collisions.sum() > recorded + 1000
     assert trace.velocities @ chain.masses == pytest.approx(1, rel=1e-14)
+
+
+def test_empty_batches_are_checked():
+    with pytest.raises(ValueError, match=r"velocities\[0\] = nan; must be finite"):
+        post_impact_velocities(np.ones((0, 3)), [np.nan, 0, 0], 1, 0.1)
+    with pytest.raises(ValueError, match=r"forward = 2.0; must lie in \[0, 1\]"):
+        post_impact_velocities(np.ones((0, 3)), [1, 0, 0], 1, 2)
+
+
+def test_the_error_of_a_worker_reaches_its_caller():
+    """Across processes: an unfinished impact is pickled with its trace."""
+    with pytest.raises(ImpactNotFinished) as stopped:
+        collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.1, max_events=1))
+    other = pickle.loads(pickle.dumps(stopped.value))
+    assert str(other) == str(stopped.value)
+    assert other.trace.velocities.tobytes() == stopped.value.trace.velocities.tobytes()
+
+
+def test_max_events_has_a_largest_value():
+    for call in (
+        lambda: ImpulseCorrelation(0.1, max_events=2**63),
+        lambda: post_impact_velocities([1, 1, 1], [1, 0, 0], 1, 0.1, max_events=2**63),
+    ):
+        with pytest.raises(
+            ValueError, match=r"max_events = 9223372036854775808; must be at least 1"
+        ):
+            call()

@@ -17,6 +17,7 @@ from cradle import (
 )
 from cradle.measures import (
     bouncing_pattern,
+    condition_number,
     conserving_angle,
     conserving_outcomes,
     effective_ratio,
@@ -169,3 +170,17 @@ def test_conserving_outcomes_refuse():
         conserving_outcomes([1, 1], [1, 0])
     with pytest.raises(ValueError, match=r"angles\[1\] = 1.5; must lie in \[0, 1.0472\]"):
         conserving_outcomes([1, 1, 1], [1, 0, 0], [0.1, 1.5])
+
+
+def test_condition_number_names_what_does_not_fit():
+    with pytest.raises(ValueError, match="forward has 3 values"):
+        condition_number(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation([0.1] * 3))
+
+
+def test_arc_of_a_very_light_middle_ball():
+    """Its length keeps its digits where the arccos of a number near one has none."""
+    for light in (1e-6, 1e-14):
+        angles, outcomes = conserving_outcomes([1, light, 1], [1, 0, 0])
+        assert angles[-1] == pytest.approx(np.arctan(np.sqrt(light * (2 + light))), rel=1e-14)
+        assert outcomes[-1, 2] - outcomes[-1, 1] == pytest.approx(0, abs=1e-7)
+    assert conserving_angle([1, 2, 3], [0.1, 0.1, 0.1]) == 0

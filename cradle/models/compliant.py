@@ -102,8 +102,8 @@ class SpringChain:
         the speed, compression and impulse of the fastest closing.
     method : {"RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"}
         Integrator, as for `scipy.integrate.solve_ivp`.
-    max_time : float
-        Time after which the impact is given up, s.
+    max_time : float, optional
+        Time after which the impact is given up, s; none if left out.
     max_evaluations : int
         How often the forces may be evaluated before the impact is given up.
 
@@ -130,7 +130,7 @@ class SpringChain:
     exponent: float = 1.5
     rtol: float = field(default=1e-9, kw_only=True)
     method: str = field(default="DOP853", kw_only=True)
-    max_time: float = field(default=math.inf, kw_only=True)
+    max_time: float | None = field(default=None, kw_only=True)
     max_evaluations: int = field(default=1_000_000, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -151,7 +151,7 @@ class SpringChain:
             object.__setattr__(self, name, _one_number(name, getattr(self, name), rule, low, high))
         if self.method not in _METHODS:
             raise ValueError(f"method = {self.method!r}; must be one of {', '.join(_METHODS)}")
-        if self.max_time != math.inf:
+        if self.max_time is not None:
             limit = _one_number("max_time", self.max_time, "must be at least 0", 0.0, math.inf)
             object.__setattr__(self, "max_time", limit)
         most = self.max_evaluations
@@ -188,7 +188,8 @@ class SpringChain:
 
         scaled = (chain.masses / mass, u / speed, stiffness / stiffness[c])
         motion = _Motion(*scaled, self.exponent, self.rtol)
-        reason = motion.run(self.method, self.max_time / second, self.max_evaluations)
+        limit = math.inf if self.max_time is None else self.max_time / second
+        reason = motion.run(self.method, limit, self.max_evaluations)
         reached = motion.parts(motion.y)
         times, kinds, contacts, states = zip(*motion.record, strict=True)
         change, _, impulses = motion.parts(np.array(states).T)

@@ -357,6 +357,8 @@ def outcomes(
 
     kernel = runtime.chosen()
     count = math.prod(lead)
+    if count == 0:
+        _check(given, excess)
     out = np.empty((count, n))
     hits = np.empty((count, n - 1), dtype=np.int64)
     status, collapsed = np.zeros((2, count), dtype=np.int64)
@@ -375,7 +377,8 @@ def outcomes(
         failed = begin + done
         if failed < min(begin + _ROWS, count):
             if status[failed] == kernel.REFUSED:
-                _explain(given, excess)
+                _check(given, excess)
+                raise AssertionError("the kernel refused chains that the checks admit")
             # Alone, with its record; it stops where it stopped here, and raises.
             m, v, e, f, b = (_rows(array, lead, slice(failed, failed + 1))[0] for array in arrays)
             ImpulseCorrelation(
@@ -418,17 +421,19 @@ def _area(kernel: ModuleType, n: int) -> list[Any]:
 
 def _numbers(name: str, values: ArrayLike) -> Vector:
     """Return `values` as floats; whether these are in range is checked by the kernel."""
-    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+    if type(values) is np.ndarray and values.dtype == np.float64:
         return values
     try:
         array = np.asarray(values)
-        return array.astype(np.float64) if array.dtype.kind in "biuf" else checked(name, values)
     except ValueError:
         return checked(name, values)
+    if array.dtype.kind not in "biuf" or np.ma.is_masked(values):
+        return checked(name, values)
+    return array.astype(np.float64)
 
 
-def _explain(given: dict[str, ArrayLike], excess: str) -> None:
-    """Raise the error of the first value that the kernel refused."""
+def _check(given: dict[str, ArrayLike], excess: str) -> None:
+    """Raise if a value is outside its limits: what the kernel checks, and in words."""
     m = checked_masses(given["masses"])
     v = checked("velocities", given["velocities"])
     checked("restitution", given["restitution"], "must lie in [0, 1]", 0.0, 1.0)
@@ -438,7 +443,6 @@ def _explain(given: dict[str, ArrayLike], excess: str) -> None:
         ends = m.shape[-1] - 2
         f, b = (np.broadcast_to(x, (ends,)) if x.ndim == 0 else x for x in (f, b))
         _refuse_excess(m, f, b)
-    raise AssertionError("the kernel refused chains that the checks admit")
 
 
 def _rows(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
@@ -469,8 +473,8 @@ def _check_options(meeting: float, excess: str, max_events: int) -> None:
         raise ValueError(f"excess = {excess!r}; must be 'raise' or 'saturate'")
     if isinstance(max_events, bool) or not isinstance(max_events, (int, np.integer)):
         raise ValueError(f"max_events = {max_events!r}; must be a whole number")
-    if max_events < 1:
-        raise ValueError(f"max_events = {max_events!r}; must be at least 1")
+    if not 1 <= max_events < 2**63:
+        raise ValueError(f"max_events = {max_events!r}; must be at least 1 and below 2**63")
 
 
 def _refuse_excess(masses: Vector, forward: Vector, backward: Vector) -> None:
