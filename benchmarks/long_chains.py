@@ -183,7 +183,7 @@ def large_map(side, repeats):
         "ratio": 0.15,
         "balls": 3,
         "chains": side * side,
-        "collisions": int(found.collisions.sum()),
+        "collisions": int(found.collisions[~found.collapsed].sum()),
         "collapsed": int(found.collapsed.sum()),
         **cost(solve, repeats),
     }

@@ -1,0 +1,377 @@
+"""Chapter 10: what the text of book/beyond.ipynb says, from the stored table and by second routes.
+
+The table is measured (benchmarks/long_chains.py); its outcomes are computed again here by closed
+forms, by the independent solver in reference.py, and by another integrator.
+"""
+
+import csv
+import importlib.util
+from functools import cache
+from pathlib import Path
+
+import dask.array as da
+import mpmath
+import nbformat
+import numpy as np
+import pytest
+import xarray as xr
+from reference import solve
+
+from cradle import Chain, SpringChain, collide, kernel, post_impact_velocities
+from cradle.closed_form import back_impact_line, one_collision_each
+from cradle.models.correlation import outcomes
+
+ROOT = Path(__file__).parents[1]
+NOTEBOOK = nbformat.read(ROOT / "book" / "beyond.ipynb", as_version=4)
+# Converged Hertz springs, v = (1, 0, ...), from another program than this package.
+HERTZ = {
+    3: [-0.070952354, 0.076403039, 0.994549315],
+    5: [-0.071085017, -0.030273764, -0.014463629, 0.127044986, 0.988777424],
+}
+
+
+def benchmark():
+    path = ROOT / "benchmarks" / "long_chains.py"
+    spec = importlib.util.spec_from_file_location("long_chains", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+long_chains = benchmark()
+
+
+@cache
+def table():
+    with long_chains.OUTPUT.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        for name, value in row.items():
+            if name != "group":
+                row[name] = float(value) if value else None
+    return rows
+
+
+def find(group, **equal):
+    return [
+        row
+        for row in table()
+        if row["group"] == group and all(row[name] == value for name, value in equal.items())
+    ]
+
+
+def column(rows, *names):
+    found = np.array([[row[name] for name in names] for row in rows])
+    return found[:, 0] if len(names) == 1 else found
+
+
+def glued(name):
+    """A number as the text shows it."""
+    for cell in NOTEBOOK.cells:
+        for output in cell.get("outputs", ()):
+            if output.get("metadata", {}).get("scrapbook", {}).get("name") == f"beyond-{name}":
+                return output.data["application/papermill.record/text/plain"].strip("'")
+    raise KeyError(name)
+
+
+def struck(balls, strikers=1):
+    velocities = np.zeros(balls)
+    velocities[:strikers] = 1.0
+    return np.ones(balls), velocities
+
+
+def ends(ratio):
+    root = np.sqrt(1.0 - 2.0 * np.asarray(ratio))
+    return np.stack([-np.asarray(ratio), 1.0 - root, 1.0 + root], axis=-1) / (
+        2.0 - np.asarray(ratio)[..., None]
+    )
+
+
+# The table
+
+
+def test_every_row_of_the_benchmark_is_stored():
+    assert list(table()[0]) == long_chains.COLUMNS
+    b = long_chains
+    assert len(find("map")) == 1
+    assert len(find("elastic")) == len(b.ELASTIC_RATIOS) * len(b.ELASTIC_BALLS)
+    assert len(find("losses")) == len(b.LOSSES_RATIOS) * sum(map(len, b.LOSSES.values()))
+    assert len(find("springs")) == sum(map(len, b.SPRINGS.values()))
+
+
+def test_stored_map_is_the_map():
+    (row,) = find("map")
+    side = round(row["chains"] ** 0.5)
+    found = outcomes(long_chains.map_of_three(side), [1, 0, 0], row["restitution"], row["ratio"])
+    assert found.collisions[~found.collapsed].sum() == row["collisions"]
+    assert found.collapsed.sum() == row["collapsed"]
+    assert row["time_ratio"] < 1000  # a million chains, in the time of a thousand on springs
+
+
+def test_stored_elastic_rows_have_the_closed_form():
+    rows = find("elastic")
+    stored = column(rows, "first", "second_last", "last")
+    np.testing.assert_allclose(stored, ends(column(rows, "ratio")), rtol=0, atol=1e-10)
+    assert (column(rows, "collisions") == column(rows, "balls") - 1).all()
+    assert not column(rows, "collapsed").any()
+    for row in rows:
+        assert row["fast"] == (1 if row["ratio"] == 0 else 2)
+        assert row["back"] == (0 if row["ratio"] == 0 else 1)
+        assert abs(row["third_last"]) < 1e-15
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.3, 0.5])
+def test_longest_rows_again(ratio):
+    row = max(find("elastic", ratio=ratio), key=lambda row: row["balls"])
+    found = outcomes(*struck(int(row["balls"])), 1.0, ratio)
+    np.testing.assert_allclose(found.velocities[[0, -2, -1]], ends(ratio), rtol=0, atol=1e-13)
+    assert np.abs(found.velocities[1:-2]).max() < 1e-14
+    assert (found.collisions == 1).all()
+
+
+@pytest.mark.parametrize("ratio", ["0.05", "0.2", "0.35", "0.5"])
+@pytest.mark.parametrize("balls", [3, 4, 7])
+def test_closed_form_of_a_row_at_fifty_digits(balls, ratio):
+    with mpmath.workdps(50):
+        after = solve([1] * balls, [1] + [0] * (balls - 1), 1, ratio).velocities
+        a = mpmath.mpf(ratio)
+        root = mpmath.sqrt(1 - 2 * a)
+        expected = [-a, *[0] * (balls - 3), 1 - root, 1 + root]
+        off = [abs(v - x / (2 - a)) for v, x in zip(after, expected, strict=True)]
+        assert max(off) < mpmath.mpf(10) ** -48
+
+
+def test_stored_rows_with_losses_again():
+    """Where the order of events is no chance, all digits; else the front and the fast balls."""
+    b = long_chains
+    for row in find("losses", collapsed=0.0):
+        if row["balls"] > 80:
+            continue
+        found = outcomes(*struck(int(row["balls"])), row["restitution"], row["ratio"])
+        if row["orders"] == 1:
+            assert found.collisions.sum() == row["collisions"]
+            after = found.velocities[[0, -3, -2, -1]]
+            stored = [row[name] for name in ("first", "third_last", "second_last", "last")]
+            np.testing.assert_allclose(after, stored, rtol=1e-9, atol=1e-13)
+        np.testing.assert_allclose(found.velocities[-1], row["last"], rtol=1e-4)
+        fast = (found.velocities > b.FAST).sum()
+        assert row["fast_least"] <= fast <= row["fast_most"]
+
+
+@pytest.mark.parametrize(("balls", "restitution"), [(20, 0.99), (12, 0.9)])
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.45])
+def test_rows_with_losses_at_fifty_digits(balls, restitution, ratio):
+    with mpmath.workdps(50):
+        expected = solve([1] * balls, [1] + [0] * (balls - 1), restitution, ratio)
+    after = outcomes(*struck(balls), restitution, ratio)
+    assert list(expected.collisions) == after.collisions.tolist()
+    expected = np.array([float(v) for v in expected.velocities])
+    np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("exponent", [1.5, 1.0])
+def test_stored_springs_by_another_integrator(exponent):
+    for row in find("springs", exponent=exponent):
+        balls = int(row["balls"])
+        if balls > 15:
+            continue
+        model = SpringChain(1.0, exponent, rtol=1e-9, method="RK45")
+        after = collide(Chain(*struck(balls), 1.0), model).velocities
+        stored = [row[name] for name in ("first", "third_last", "second_last", "last")]
+        np.testing.assert_allclose(after[[0, -3, -2, -1]], stored, rtol=0, atol=2e-6)
+        if exponent == 1.5 and balls in HERTZ:
+            np.testing.assert_allclose(after, HERTZ[balls], rtol=0, atol=2e-6)
+
+
+def test_rows_of_linear_springs_by_their_modes():
+    """All contacts closed is a linear system: exact until the first contact opens."""
+    row = find("springs", exponent=1.0, balls=3.0)[0]
+    # Frequencies of three equal balls on two equal springs are 1 and sqrt 3.
+    times = np.linspace(0, 6, 600_001)
+    one, three = np.sin(times), np.sin(np.sqrt(3) * times) / np.sqrt(3)
+    # Compressions x1 - x2 and x2 - x3 for the start (1, 0, 0).
+    first, second = (one + three) / 2, (one - three) / 2
+    opens = np.argmax((first < 0) & (times > 0.1))
+    speeds = [
+        1 / 3 + np.cos(times[opens]) / 2 + np.cos(np.sqrt(3) * times[opens]) / 6,
+        1 / 3 - np.cos(np.sqrt(3) * times[opens]) / 3,
+        1 / 3 - np.cos(times[opens]) / 2 + np.cos(np.sqrt(3) * times[opens]) / 6,
+    ]
+    # Then the last two balls part alone: energy of their spring, which is not yet open.
+    relative = np.hypot(speeds[1] - speeds[2], np.sqrt(2) * second[opens])
+    middle = (speeds[1] + speeds[2]) / 2
+    expected = [speeds[0], middle - relative / 2, middle + relative / 2]
+    stored = [row["first"], row["second_last"], row["last"]]
+    np.testing.assert_allclose(stored, expected, rtol=0, atol=2e-5)
+
+
+# Figures
+
+
+def test_fig_beyond_map():
+    """Two collisions above Eq. 44, more below; white where the sequence is infinite."""
+    axis = (np.arange(250) + 0.5) * 3 / 250
+    m1, m3 = np.broadcast_arrays(1 / axis[:, None], 1 / axis)
+    masses = np.stack([m1, np.ones_like(m1), m3], axis=-1)
+    found = outcomes(masses, [1, 0, 0], 0.5, 0.15)
+    assert str(found.collapsed.size) == glued("map-live")
+    above = axis[:, None] > back_impact_line(axis, 0.5, 0.5, 0.15)[None, :]
+    np.testing.assert_array_equal((found.collisions == 1).all(axis=-1), above)
+    once = one_collision_each(masses, np.array([1.0, 0, 0]), np.full(2, 0.5), 0.15)
+    np.testing.assert_array_equal(once, above)
+    corner = np.argwhere(found.collapsed)
+    assert len(corner) > 0
+    assert corner.max() < 25
+
+
+def test_fig_beyond_front():
+    """Left: the closed form for any length; right: a leader that slows down with every ball."""
+    for ratio in (0.0, 0.15, 0.3, 0.45):
+        after = outcomes(*struck(1000), 1.0, ratio).velocities
+        np.testing.assert_allclose(after[[0, -2, -1]], ends(ratio), rtol=0, atol=1e-13)
+    leaders = np.array([outcomes(*struck(n), 0.99, 0.3).velocities[-1] for n in (10, 20, 40, 80)])
+    assert (np.diff(leaders) < 0).all()
+    # The same part from ball to ball, whatever the length.
+    parts = (leaders[1:] / leaders[:-1]) ** (1 / np.array([10, 20, 40]))
+    np.testing.assert_allclose(parts, parts[-1], rtol=1e-4)
+
+
+def test_fig_beyond_time():
+    """Time in proportion to the length, from a thousand balls on."""
+    for ratio in long_chains.ELASTIC_RATIOS:
+        rows = [row for row in find("elastic", ratio=ratio) if row["balls"] >= 1000]
+        for name in ("cpu_seconds", "time_ratio"):
+            slope = np.polyfit(np.log(column(rows, "balls")), np.log(column(rows, name)), 1)[0]
+            assert 0.9 < slope < 1.1
+    longest = find("elastic", balls=100_000.0)
+    assert column(longest, "cpu_seconds").max() < 1.0  # a long chain in a second
+    assert glued("time-most") == f"{column(longest, 'time_ratio').max():.0f}"
+    assert kernel.CUT == 2.0**-120  # as the text has it
+
+
+def test_fig_beyond_stability():
+    """The count of collisions, the point where the order becomes chance, and the front."""
+    for e in (0.99, 0.999):
+        for row in find("losses", restitution=e, ratio=0.0):
+            if row["balls"] <= 240:
+                assert row["collisions"] == row["balls"] * (row["balls"] - 1) / 2
+            assert row["kept"] == row["balls"]
+        for ratio in (0.1, 0.3, 0.45):
+            rows = find("losses", restitution=e, ratio=ratio)
+            count = column(rows, "collisions") / (column(rows, "balls") ** 2 / 2)
+            assert 0.5 < count.min() < 0.8
+            assert 1.2 < count[-1] < 2.0
+            assert rows[-1]["orders"] == rows[-1]["chains"]
+            assert rows[-1]["kept"] <= 2
+    finite = find("losses", collapsed=0.0)
+    assert column(finite, "spread").max() < 1e-4  # the leader to four digits
+    assert (column(finite, "fast_least") == column(finite, "fast_most")).all()
+    assert glued("fast-same") == "all"
+    # A change of masses that is not a rounding error: the leader stays, others do not.
+    masses, velocities = np.ones((9, 120)), struck(120)[1]
+    masses[1:] *= 1 + 1e-15 * np.random.default_rng(5).uniform(-1, 1, (8, 120))
+    after = outcomes(masses, velocities, 0.99, 0.3).velocities
+    off = np.abs(after / after[0] - 1).max(axis=0)
+    assert off[-1] < 1e-4
+    assert off[1:-2].max() > 1e-3
+
+
+def test_part_of_its_speed_that_a_pulse_keeps():
+    """At ratio zero, Newton's rule for two balls, from ball to ball."""
+    for e in (0.9, 0.99, 0.999):
+        for row in find("losses", restitution=e, ratio=0.0, collapsed=0.0):
+            expected = ((1 + e) / 2) ** (row["balls"] - 1)
+            np.testing.assert_allclose(row["last"], expected, rtol=1e-9)
+
+
+def test_fig_beyond_springs():
+    """Ratios by the leader and by the striker; tails and fronts."""
+    rows = find("springs", exponent=1.5)
+    last, first = column(rows, "last"), column(rows, "first")
+    tried = np.linspace(0, 0.5, 500_001)
+    leaders = ends(tried)[:, 2]  # falls with the ratio
+    by_leader = np.interp(-last, -leaders, tried)
+    by_striker = -2 * first / (1 - first)
+    assert f"{by_leader[-1]:.4f}" == glued("ratio-leader")
+    assert f"{by_leader[0]:.4f}" == glued("ratio-three")
+    assert f"{by_striker[-1]:.4f}" == glued("ratio-striker")
+    assert (np.diff(by_leader[:8]) > 0).all()
+    assert np.abs(by_striker - by_striker[-1]).max() < 3e-4
+    np.testing.assert_allclose(by_leader[0], by_striker[0], atol=1e-5)
+    # The front of the long row keeps more momentum than the striker's ratio allows.
+    assert last[-1] + column(rows, "second_last")[-1] > 1 - first[-1] + 0.05
+    linear = find("springs", exponent=1.0)
+    assert (np.diff(column(linear, "last")) < 0).all()
+    assert (np.diff(column(linear, "fast")) >= 0).all()
+    assert column(linear, "last")[-1] < 2 / 3  # slower than any constant ratio's leader
+
+
+def test_ratios_that_differ_from_ball_to_ball_give_the_springs():
+    """Exercise 3, with the velocities of another program."""
+    after = post_impact_velocities(*struck(5), 1.0, [0.13274, 0.15339, 0.20183], excess="saturate")
+    np.testing.assert_allclose(after, HERTZ[5], rtol=0, atol=2e-4)
+
+
+def test_two_strikers_have_no_closed_form():
+    """Exercise 1: four balls fly off at the stored ratio, and lengths differ."""
+    leaders = []
+    for balls in (20, 50, 200):
+        after = outcomes(*struck(balls, 2), 1.0, 0.3).velocities
+        assert (after > 0.01).sum() == 4
+        leaders.append(after[-1])
+    assert leaders[0] < leaders[1] - 0.02 < leaders[2] - 0.04
+
+
+# Sweeps in pieces
+
+
+def sweep(n=4):
+    rng = np.random.default_rng(2)
+    return (
+        rng.uniform(0.5, 2, (12, 1, n)),
+        -np.sort(rng.uniform(-1, 1, (12, 1, n))),
+        rng.uniform(0.2, 1, (9, n - 1)),
+        rng.uniform(0, 0.2, (12, 1, n - 2)),
+        rng.uniform(0, 0.2, (9, n - 2)),
+    )
+
+
+@pytest.mark.parametrize("scheduler", ["synchronous", "threads"])
+@pytest.mark.parametrize("size", [1, 5, 12])
+def test_dask_gives_the_same_bits(scheduler, size):
+    inputs = sweep()
+    pieces = [da.from_array(x, chunks=(*[size] * (x.ndim - 1), -1)) for x in inputs]
+    lazy = da.apply_gufunc(
+        post_impact_velocities,
+        "(n),(n),(m),(k),(k)->(n)",
+        *(x.rechunk({0: min(size, x.shape[0])}) for x in pieces),
+        output_dtypes=float,
+    )
+    direct = post_impact_velocities(*inputs)
+    assert lazy.shape == direct.shape == (12, 9, 4)
+    assert lazy.compute(scheduler=scheduler).tobytes() == direct.tobytes()
+
+
+@pytest.mark.parametrize("chunks", [None, {"case": 5, "loss": 4}])
+def test_xarray_gives_the_same_bits(chunks):
+    m, v, e, f, b = sweep()
+    data = xr.Dataset(
+        {
+            "m": (("case", "ball"), m[:, 0]),
+            "v": (("case", "ball"), v[:, 0]),
+            "e": (("loss", "contact"), e),
+            "f": (("case", "inner"), f[:, 0]),
+            "b": (("loss", "inner"), b),
+        }
+    )
+    if chunks:
+        data = data.chunk(chunks)
+    after = xr.apply_ufunc(
+        post_impact_velocities,
+        *(data[name] for name in "mvefb"),
+        input_core_dims=[["ball"], ["ball"], ["contact"], ["inner"], ["inner"]],
+        output_core_dims=[["ball"]],
+        dask="parallelized",
+        output_dtypes=[float],
+    ).transpose("case", "loss", "ball")
+    assert after.values.tobytes() == post_impact_velocities(m, v, e, f, b).tobytes()
