@@ -157,9 +157,8 @@ def largest_ratios(
 
     def bound(m: Vector, ratio: Vector) -> Vector:
         onward = np.concatenate([ratio[..., 1:], np.zeros_like(ratio[..., :1])], axis=-1)
-        # Sums of masses could overflow.
-        with np.errstate(over="ignore"):
-            return np.asarray(1.0 / (1.0 + m[..., 1:-1] / m[..., 2:] * (1.0 - onward)))
+        # A quotient of masses, as their sum could overflow.
+        return np.asarray(1.0 / (1.0 + m[..., 1:-1] / m[..., 2:] * (1.0 - onward)))
 
     f, b = np.asarray(forward, dtype=np.float64), np.asarray(backward, dtype=np.float64)
     return bound(m, f), bound(m[..., ::-1], b[..., ::-1])[..., ::-1]

@@ -1255,16 +1255,14 @@ def admissible(n, m, v, e, forward, backward, bounded):
     if not (energy < math.inf and momentum < math.inf):
         return False
     if bounded:
-        unit = 0.25 if heaviest > 1.0 else 1.0  # sums of masses must not overflow
+        # The operations of `closed_form.largest_ratios`, so that both draw the same line.
         onward = 0.0
         back = 0.0
         for i in range(n - 2):
             j = n - 3 - i
-            here = unit * m[j + 1] * (1.0 - onward) + unit * m[j + 2]
-            if forward[j] * here > ROUNDED * (unit * m[j + 2]):
+            if forward[j] > 1.0 / (1.0 + m[j + 1] / m[j + 2] * (1.0 - onward)) * ROUNDED:
                 return False
-            here = unit * m[i + 1] * (1.0 - back) + unit * m[i]
-            if backward[i] * here > ROUNDED * (unit * m[i]):
+            if backward[i] > 1.0 / (1.0 + m[i + 1] / m[i] * (1.0 - back)) * ROUNDED:
                 return False
             onward = forward[j]
             back = backward[i]

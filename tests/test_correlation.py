@@ -497,3 +497,39 @@ def test_max_events_has_a_largest_value():
             ValueError, match=r"max_events = 9223372036854775808; must be at least 1"
         ):
             call()
+
+
+def test_batch_and_single_draw_the_line_of_excess_alike():
+    """A few roundings around Eq. 53: refused by both, in the same words, or by neither."""
+    rng = np.random.default_rng(53)
+    refused = 0
+    for _ in range(300):
+        n = int(rng.integers(3, 6))
+        m = 10 ** rng.uniform(-2, 2, n)
+        ratios = [part * (1 + rng.integers(0, 12) * 2.0**-53) for part in largest(m)]
+        f, b = np.minimum(ratios, 1.0)
+        chain = Chain(m, np.eye(n)[0], 0.5)
+        try:
+            expected = repr(collide(chain, ImpulseCorrelation(f, b)).velocities)
+        except ValueError as error:
+            expected = str(error)
+            refused += 1
+        try:
+            found = repr(post_impact_velocities(m, np.eye(n)[0], 0.5, [f], b)[0])
+        except ValueError as error:
+            found = str(error).replace("[0, ", "[")
+        assert found.partition(" = ")[0] == expected.partition(" = ")[0]
+    assert 100 < refused < 250
+
+
+def largest(m):
+    """Ratios at their bounds, from the far end on, forward and backward."""
+    n = len(m)
+    forward, backward = np.zeros((2, n - 2))
+    for i in reversed(range(n - 2)):
+        onward = forward[i + 1] if i + 1 < n - 2 else 0.0
+        forward[i] = m[i + 2] / (m[i + 2] + m[i + 1] * (1 - onward))
+    for i in range(n - 2):
+        onward = backward[i - 1] if i else 0.0
+        backward[i] = m[i] / (m[i] + m[i + 1] * (1 - onward))
+    return forward, backward

@@ -34,8 +34,8 @@ def test_elastic_impacts_are_those_of_springs(masses, exponent, velocities, gaps
 def by_small_steps(chain, k, p, steps):
     """Impact in the law's own variables P, E and v, up to the end of contact 0 of three balls.
 
-    Midpoint steps of the sum of both impulses.  The first one is the limit: E = u P at contact 0, so
-    that P = k u^p t^q / q with q = p + 1, and x'' = k u^p t^p / m from rest at contact 1.
+    Midpoint steps of the sum of both impulses.  The first one is the limit: E = u P at contact 0,
+    so that P = k u^p t^q / q with q = p + 1, and x'' = k u^p t^p / m from rest at contact 1.
     """
     m, e, k = chain.masses, chain.restitution, np.asarray(k, float)
 

@@ -481,7 +481,7 @@ def _refuse_excess(masses: Vector, forward: Vector, backward: Vector) -> None:
     """Raise if a ratio is above Eq. 53 or its mirror image, by more than a rounding error."""
     bounds = largest_ratios(masses, forward, backward)
     for name, ratios, bound in (("forward", forward, bounds[0]), ("backward", backward, bounds[1])):
-        above = ratios > bound * (1.0 + 4.0 * np.finfo(np.float64).eps)
+        above = ratios > bound * plain.ROUNDED
         if above.any():
             at = np.unravel_index(int(np.argmax(above)), above.shape)
             ratio = float(np.broadcast_to(ratios, above.shape)[at])
