@@ -17,7 +17,7 @@ import pytest
 import xarray as xr
 from reference import solve
 
-from cradle import Chain, SpringChain, collide, kernel, post_impact_velocities
+from cradle import Chain, SpringChain, collide, kernel, post_impact_velocities, runtime
 from cradle.closed_form import back_impact_line, one_collision_each
 from cradle.models.correlation import outcomes
 
@@ -39,6 +39,7 @@ def benchmark():
 
 
 long_chains = benchmark()
+needs_numba = pytest.mark.skipif(runtime.compiled() is None, reason="too long without numba")
 
 
 @cache
@@ -99,6 +100,7 @@ def test_every_row_of_the_benchmark_is_stored():
     assert len(find("springs")) == sum(map(len, b.SPRINGS.values()))
 
 
+@needs_numba
 def test_stored_map_is_the_map():
     (row,) = find("map")
     side = round(row["chains"] ** 0.5)
@@ -120,6 +122,7 @@ def test_stored_elastic_rows_have_the_closed_form():
         assert abs(row["third_last"]) < 1e-15
 
 
+@needs_numba
 @pytest.mark.parametrize("ratio", [0.0, 0.1, 0.3, 0.5])
 def test_longest_rows_again(ratio):
     row = max(find("elastic", ratio=ratio), key=lambda row: row["balls"])
