@@ -1,0 +1,153 @@
+"""The chapter on extremes: the numbers in its text and figures, from the maps and anew."""
+
+import csv
+import math
+from pathlib import Path
+
+import extremes as x
+import nbformat
+import numpy as np
+import pytest
+
+from cradle import Chain, ImpulseCorrelation, SpringChain, collide, paper_chain
+from cradle.models.correlation import outcomes
+
+ROOT = Path(__file__).parents[1]
+
+
+def stored(part):
+    with (ROOT / "data" / f"extremes_{part}.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def glued():
+    """Numbers that the text of the chapter shows."""
+    found = {}
+    for cell in nbformat.read(ROOT / "book" / "extremes.ipynb", as_version=4).cells:
+        for output in cell.get("outputs", []):
+            name = output.get("metadata", {}).get("scrapbook", {}).get("name", "")
+            if name.startswith("application/papermill.record/extremes-"):
+                name = name.removeprefix("application/papermill.record/")
+            if name.startswith("extremes-"):
+                text = next(iter(output["data"].values()))
+                found[name.removeprefix("extremes-")] = text.strip("'")
+    assert len(found) > 30
+    return found
+
+
+def test_fig_extremes_map(glued):
+    rows = stored("map")
+    assert int(glued["points"]) == 4 * len(rows)
+    assert int(glued["faulty"]) == sum(int(row["faulty"]) for row in rows) == 0
+    compared = [row for row in rows if int(row["compared"])]
+    assert int(glued["compared"]) == sum(int(row["compared"]) for row in compared)
+    assert int(glued["excess"]) == math.ceil(max(float(row["own"]) for row in compared))
+    moving = [row for row in compared if float(row["condition"]) <= 1e12]
+    thirteen = [row for row in moving if float(row["error"]) * x.EPS <= 1e-13 - x.EPS / 2]
+    assert int(glued["thirteen"]) == round(100 * len(thirteen) / len(moving))
+
+
+def test_fig_extremes_edges(glued):
+    near = [row for row in stored("edges") if math.isfinite(float(row["distance"]))]
+    jumps = [row for row in near if float(row["jump"]) > 1e-8]
+    assert glued["jumping"] == " and ".join(sorted({row["sequence"] for row in jumps}))
+    assert {len(row["sequence"]) for row in jumps} == {6}
+    nearest = min(near, key=lambda row: float(row["distance"]))
+    assert glued["nearest-chain"] == nearest["sequence"]
+    assert float(nearest["jump"]) < 1e-8  # "harmless"
+    first = min(jumps, key=lambda row: float(row["distance"]))
+    assert glued["first-jump-input"] == f"{first['input']}[{first['index']}]"
+    assert float(glued["first-jump"]) == pytest.approx(100 * float(first["distance"]), abs=0.051)
+
+
+def test_fig_extremes_jump():
+    """The two branches on either side of the nearest jump, solved anew with fifty digits."""
+    rows = [row for row in stored("edges") if row["sequence"] == "BCACBA"]
+    edge = min(
+        (row for row in rows if float(row["jump"]) > 1e-8), key=lambda row: float(row["distance"])
+    )
+    chain, model = paper_chain("BCACBA", excess="saturate")
+    own = chain.masses, chain.velocities, chain.restitution
+    problem = x.case(*own, model.forward, model.backward)
+    name, k = edge["input"], int(edge["index"])
+    value = getattr(problem, name)[k] * float(edge["distance"]) * float(edge["side"])
+    sides = [x.moved(problem, name, k, value * (1 + s)).exact().velocities for s in (-1e-3, 1e-3)]
+    size = max(abs(a - b) for a, b in zip(*sides)) / max(map(abs, sides[0]))
+    assert float(size) == pytest.approx(float(edge["jump"]), rel=0.05)
+
+
+def test_fig_extremes_count(glued):
+    rows = [row for row in stored("elastic") if float(row["ratio"]) == 0]
+    most = max(rows, key=lambda row: int(row["impacts"]))
+    assert glued["most"] == most["impacts"]
+    # The wedge, without fifty digits: the angle is arctan sqrt(r (2 + r)).
+    for row in rows:
+        r = 10 ** -float(row["power"])
+        turns = math.pi / math.atan(math.sqrt(r * (2 + r)))
+        assert abs(int(row["impacts"]) - (turns - 0.5)) <= 0.5 + 1e-6
+    worst = max(float(row["own"]) / int(row["impacts"]) for row in rows)
+    assert float(glued["per-impact"]) == pytest.approx(worst, abs=0.0051)
+
+
+def test_fig_extremes_edge(glued):
+    """The border by the closed form, by the eigenvalues of the cycle, and by the solver."""
+    for row in stored("limits"):
+        if float(row["ratio"]) == 0:
+            e = float(row["restitution"])
+            assert float(row["theory"]) == pytest.approx(x.infinite_below(e), rel=1e-3)
+    for e, part in ((0.3, 0.99), (0.3, 1.01), (0.8, 0.99), (0.8, 1.01)):
+        a = 1 / (1 + x.infinite_below(e) * part)
+        cycle = np.array([[1, (1 + e) * a], [0, -e]]) @ np.array([[-e, 0], [(1 + e) * a, 1]])
+        assert np.linalg.det(cycle) == pytest.approx(e * e)
+        assert np.trace(cycle) == pytest.approx((1 + e) ** 2 * a * a - 2 * e)
+        assert np.isrealobj(np.linalg.eigvals(cycle)) == (part < 1)
+    found = [
+        outcomes([1, light, 1], [1, 0, 0], e, 0.15).collisions.sum()
+        for light in (1e-3, 1e-6, 1e-12)
+        for e in (0.0, 1e-16, 0.3, 0.7, 0.9)
+    ]
+    assert int(glued["bounded"]) == max(found)
+
+
+def test_fig_extremes_growth(glued):
+    rows = stored("growth")
+    uneven = [r for r in rows if float(r["spread"]) > 0]
+    assert int(glued["uneven"]) == round(
+        max(float(r["largest"]) / float(r["size"]) for r in uneven)
+    )
+    broken = [
+        r for r in rows
+        if float(r["spread"]) == 0 and float(r["restitution"]) < 1 and float(r["largest"]) > 1e-6
+    ]  # fmt: skip
+    assert int(glued["breaks"]) == min(int(r["balls"]) for r in broken)
+    # A jump does not care for the size of the perturbation.
+    for r in broken:
+        if float(r["median"]) > 1e-5:
+            assert r["size"] in ("1e-12", "1e-09")
+
+
+def test_fig_extremes_cost(glued):
+    rows = stored("cost")
+    for point, (masses, e, ratio) in x.POINTS.items():
+        events = next(r for r in rows if r["point"] == point and r["method"] == "events")
+        trace = collide(Chain(masses, [1, 0, 0], e), ImpulseCorrelation(ratio))
+        assert len(trace.events) == int(events["evaluations"])
+        assert float(events["error"]) < 1e-12
+        march = [float(r["error"]) for r in rows if (r["point"], r["method"]) == (point, "march")]
+        assert march[0] > march[-1] > 1e-6
+    spring = next(
+        r for r in rows if (r["point"], r["method"], r["effort"]) == ("equal", "springs", "1e-08")
+    )
+    again = collide(Chain([1, 1, 1], [1, 0, 0], 1), SpringChain(1.0, rtol=1e-8))
+    assert again.evaluations == pytest.approx(int(spring["evaluations"]), rel=0.1)
+    assert int(glued["event-steps"]) == 58
+
+
+def test_table_of_unfinished_chains(glued):
+    rows, never = stored("finish"), stored("unfinished")
+    assert int(glued["hundred"]) == sum(int(r["chains"]) for r in rows)
+    assert int(glued["unfinished"]) == len(never)
+    assert int(glued["periodic"]) == sum(int(r["period"]) > 0 for r in never)
+    assert int(glued["spent"]) == sum(float(r["energy"]) < 1e-12 for r in never)
+    assert int(glued["fewest"]) == min(int(r["balls"]) for r in never)
