@@ -98,7 +98,9 @@ def test_no_point_of_the_map_breaks_an_invariant():
     assert len(rows) == math.prod(map(len, (x.SHAPES, x.POWERS, x.RESTITUTION, x.RATIOS)))
     for row in rows:
         assert row["faulty"] == 0, row
-        assert row["own"] <= THIRTEEN, row
+        assert row["own"] <= 4, row
+        if row["condition"] == 0:  # too long to ask for the unavoidable: all digits all the same
+            assert row["error"] <= THIRTEEN, row
         # Unfinished or too long to compare: elastic, or all but, with a very light middle ball.
         light = row["shape"] == "middle" and row["power"] <= -3
         if row["unfinished"] or row["compared"] < len(x.VELOCITIES):
