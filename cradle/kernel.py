@@ -758,7 +758,7 @@ def cycle(
     for k in range(first, last + 1):
         mu = reduced_mass(m[k], m[k + 1])
         worst = max(worst, abs(u[k] - factor * u1[k]) / scale)
-        worst = max(worst, abs(q[k] - factor * factor * q1[k]) / (mu * scale * scale))
+        worst = max(worst, abs(q[k] - factor * factor * q1[k]) / mu / scale / scale)
         if abs(x[k] - total * p[k]) > 0.01 * total * p[k]:
             return c, c - 1, math.inf
     if worst > SELF_SIMILAR:
@@ -949,11 +949,18 @@ def meeting_gap(runs, meeting, u, pull, reach, first, last):
         fall = -pull[first[k + 1]] * reach[k + 1]
         if rise + fall <= wide:
             continue
+        # They overlap from low to high.  Each distance is exact at the ends, meeting = 0 and 1: a
+        # run that gets to its own next event must do it.
         low = max(0.0, wide - fall)
         high = min(rise, wide)
-        at = low + meeting * (high - low)
-        part_left = min(at / rise, 1.0) if rise > 0.0 else 0.0
-        part_right = min((wide - at) / fall, 1.0) if fall > 0.0 else 0.0
+        at = low + meeting * (high - low) if meeting < 1.0 else high
+        back = min(fall, wide) - meeting * (high - low) if meeting < 1.0 else wide - high
+        part_left = at / rise if rise > 0.0 else 0.0
+        part_right = back / fall if fall > 0.0 else 0.0
+        if part_left * SIMULTANEOUS >= 1.0:
+            part_left = 1.0
+        if part_right * SIMULTANEOUS >= 1.0:
+            part_right = 1.0
         large = max(part_left, part_right)
         small = min(part_left, part_right)
         if (

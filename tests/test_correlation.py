@@ -533,3 +533,23 @@ def largest(m):
         onward = backward[i - 1] if i else 0.0
         backward[i] = m[i] / (m[i] + m[i + 1] * (1 - onward))
     return forward, backward
+
+
+@pytest.mark.parametrize(
+    ("masses", "velocities", "forward", "backward", "expected"),
+    [
+        ([1] * 5, [0.5, 0.5, 0.5, -0.5, 0.25], [0.25, 0, 0], [0.2, 0.2, 0.1],
+         [-0.4882275, 0.2686158, 0.3585006, 0.5]),
+        ([1] * 6, [0, 0, -1, 0.25, 0, -0.5], [1, 0.5, 0.1, 0.12483687377646042],
+         [1e-300] + [0.20255585724249234] * 3, [None, None, -0.06691606]),
+    ],
+)  # fmt: skip
+def test_a_run_that_gets_to_its_event_at_a_meeting_does_it(
+    masses, velocities, forward, backward, expected
+):
+    """At meeting = 0 a run moves on to its own next event, exactly; 50 digits agree."""
+    model = ImpulseCorrelation(forward, backward, meeting=0, excess="saturate")
+    after = collide(Chain(masses, velocities, 1), model).velocities
+    for found, known in zip(after, expected):
+        if known is not None:
+            assert found == pytest.approx(known, abs=1e-7)

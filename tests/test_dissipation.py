@@ -224,13 +224,22 @@ def test_balls_of_any_mass():
     assert (np.diff(trace.velocities) > -1e-14).all()
 
 
+def test_a_ball_too_light_to_tell_its_neighbours_apart_is_refused():
+    with pytest.raises(
+        ValueError, match=r"^masses\[1\] = 1e-100; must be at least 1e-08 of one of"
+    ):
+        collide(Chain([1, 1e-100, 1], [1, 0, 0], 0.5), QuadraticDissipation())
+    after = collide(Chain([1, 1.01e-8, 1], [1, 0, 0], 0.5), QuadraticDissipation()).velocities
+    np.testing.assert_allclose(after, 0.5, rtol=1e-7)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"coefficients": -1}, "coefficients = -1.0; must be at least 0"),
+        ({"coefficients": -1}, "coefficients = -1.0; must lie in [0, 1e+09]"),
         ({"coefficients": [1, np.inf]}, "coefficients[1] = inf; must be finite"),
         ({"coefficients": [[1]]}, "coefficients has shape (1, 1); must be () or (N - 1,)"),
-        ({"distance": -1}, "distance = -1.0; must be at least 0"),
+        ({"distance": -1}, "distance = -1.0; must lie in [0, 1e+09]"),
         ({"distance": [1]}, "distance = [1]; must be one number"),
         ({"max_problems": 0}, "max_problems = 0; must be a whole number, at least 1"),
     ],
@@ -240,8 +249,19 @@ def test_bad_coefficients_name_value_and_rule(arguments, message):
         QuadraticDissipation(**arguments)
 
 
+@pytest.mark.parametrize("e", [0.5, 0.999, 1 - 1e-6, 1 - 3e-9])
+def test_digits_next_to_elastic(e):
+    """kappa = (1 + e) / (1 - e) up to 1e9: momentum, energy and Newton's rule to rounding."""
+    chain = Chain([1, 0.1, 3], [1, 0, 0], e)
+    after = collide(chain, QuadraticDissipation()).velocities
+    assert chain.masses @ after == pytest.approx(1, rel=1e-14)
+    assert chain.masses @ after**2 <= 1 + 1e-13
+    two = collide(Chain([1, 2], [1, 0], e), QuadraticDissipation()).velocities
+    assert two[1] - two[0] == pytest.approx(e, rel=1e-14)
+
+
 def test_chains_that_it_cannot_treat():
-    message = "restitution[1] = 1.0; must be below 1 for QuadraticDissipation: e = 1 is the limit"
+    message = "restitution[1] = 1.0; must be below 1 - 2e-09 for QuadraticDissipation: e = 1 is"
     with pytest.raises(ValueError, match="^" + re.escape(message)):
         collide(striking(e=[0.5, 1]), QuadraticDissipation())
     with pytest.raises(ValueError, match=r"^coefficients has 3 values; 3 balls need 2, or one"):

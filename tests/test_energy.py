@@ -253,3 +253,12 @@ def test_repr_is_the_caption():
         "EnergyDistribution(stiffness=(1.0, 2.0), exponent=1.0, step=0.01, gaps=True, "
         "rtol=1e-09, max_evaluations=1000000)"
     )
+
+
+def test_restitution_next_to_zero_is_refused():
+    """Its release would be a step too short for the integrator."""
+    message = "restitution[1] = 1e-12; must be 0 or at least 1e-06 for EnergyDistribution"
+    with pytest.raises(ValueError, match="^" + re.escape(message)):
+        collide(Chain([1, 1, 1], [1, 0, 0], [0.5, 1e-12]), EnergyDistribution(1.0))
+    after = collide(Chain([1, 1], [1, 0], 1e-6), EnergyDistribution(1.0)).velocities
+    assert after[1] - after[0] == pytest.approx(1e-6, abs=1e-8)

@@ -531,7 +531,7 @@ def test_anything_at_all(masses, velocities, number):
     assert x.faults(trace) == []
 
 
-@settings(max_examples=100)
+@settings(max_examples=300)
 @given(st.binary(max_size=160))
 def test_fuzzing_target(data):
     """What `fuzz.py` runs for an hour, on a few random strings of bytes."""

@@ -412,11 +412,11 @@ _KEPT = threading.local()
 
 def _area(kernel: ModuleType, n: int) -> list[Any]:
     """Return this thread's work area for outcomes of n balls."""
-    if getattr(_KEPT, "n", None) != n:
-        _KEPT.n = n
+    kept: tuple[int, list[Any]] = getattr(_KEPT, "area", (0, []))
+    if kept[0] != n:
         p, absorbed, _, *work = _work(kernel, n, 0)
-        _KEPT.area = [p, absorbed, *work]
-    return list(_KEPT.area)
+        kept = _KEPT.area = (n, [p, absorbed, *work])
+    return kept[1]
 
 
 def _numbers(name: str, values: ArrayLike) -> Vector:

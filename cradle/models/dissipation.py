@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 from cradle.chain import Chain, Vector, checked
 from cradle.trace import Event, ImpactNotFinished, Trace
 
+# Beyond these the equations of one problem keep too few digits.
+_LARGEST = 1e9
+_LIGHTEST = 1e-8
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DissipationTrace(Trace):
@@ -102,10 +106,10 @@ class QuadraticDissipation:
         distance: float = 0.0,
         max_problems: int = 10_000,
     ) -> None:
-        rule = "must be at least 0"
+        rule = f"must lie in [0, {_LARGEST:g}]"
         value: float | tuple[float, ...] | None = None
         if coefficients is not None:
-            kappa = checked("coefficients", coefficients, rule, 0.0)
+            kappa = checked("coefficients", coefficients, rule, 0.0, _LARGEST)
             if kappa.ndim > 1:
                 raise ValueError(f"coefficients has shape {kappa.shape}; must be () or (N - 1,)")
             value = tuple(kappa.tolist()) if kappa.ndim else float(kappa)
@@ -116,7 +120,9 @@ class QuadraticDissipation:
             raise ValueError(f"max_problems = {most!r}; must be a whole number, at least 1")
         object.__setattr__(self, "max_problems", int(most))
         object.__setattr__(self, "coefficients", value)
-        object.__setattr__(self, "distance", float(checked("distance", distance, rule, 0.0)))
+        object.__setattr__(
+            self, "distance", float(checked("distance", distance, rule, 0.0, _LARGEST))
+        )
 
     def solve(self, chain: Chain) -> DissipationTrace:
         """Solve the impact of `chain`; see `collide`."""
@@ -126,6 +132,13 @@ class QuadraticDissipation:
             raise ValueError(f"distance = {self.distance!r}; needs three balls, the chain has {n}")
         impulses, absorbed = np.zeros((2, n - 1))
         path, path_impulses, events = [v], [impulses], []
+        light = m[1:-1] < _LIGHTEST * np.minimum(m[:-2], m[2:])
+        if light.any():
+            i = 1 + int(np.argmax(light))
+            raise ValueError(
+                f"masses[{i}] = {float(m[i])!r}; must be at least {_LIGHTEST} of one of its "
+                "neighbours for QuadraticDissipation"
+            )
         rounding = 1e-14 * np.abs(v - v.mean()).max()
 
         def closing(v: Vector) -> Vector:
@@ -138,8 +151,8 @@ class QuadraticDissipation:
             u = closing(v)
             stretch = np.cumsum(u < 0.0)
             active = (u >= 0.0) & np.isin(stretch, stretch[u > 0.0])
-            after = _solution(m, v, active, np.append(kappa, self.distance))
-            passed = -np.cumsum(m * (after - v))[:-1]
+            passed = np.where(active, _impulses(m, u, active, np.append(kappa, self.distance)), 0.0)
+            after = v + np.diff(np.concatenate([[0.0], -passed, [0.0]])) / m
             impulses = impulses + passed
             absorbed += passed * 0.5 * (u + closing(after))
             v = after
@@ -171,9 +184,10 @@ class QuadraticDissipation:
         contacts = len(chain) - 1
         if self.coefficients is None:
             e = chain.restitution
-            if (e == 1.0).any():
+            if (1.0 - e < 2.0 / _LARGEST).any():
+                c = int(np.argmax(e))
                 raise ValueError(
-                    f"restitution[{int(np.argmax(e))}] = 1.0; must be below 1 for "
+                    f"restitution[{c}] = {float(e[c])!r}; must be below 1 - {2.0 / _LARGEST:g} for "
                     "QuadraticDissipation: e = 1 is the limit of an infinite coefficient"
                 )
             return (1.0 + e) / (1.0 - e)
@@ -185,25 +199,35 @@ class QuadraticDissipation:
         return np.broadcast_to(np.asarray(self.coefficients, dtype=np.float64), (contacts,))
 
 
-def _solution(m: Vector, v: Vector, active: NDArray[np.bool_], kappa: Vector) -> Vector:
-    """Return the velocities after one problem; kappa of contacts, then of the outer balls."""
+def _impulses(m: Vector, u: Vector, active: NDArray[np.bool_], kappa: Vector) -> Vector:
+    """Return the impulses of one problem, passing through each contact.
+
+    u holds closing speeds; kappa those of the contacts, then of the outer balls.
+    """
     from scipy.linalg import solve_triangular
     from scipy.optimize import nnls
 
-    # Rows that give the closing speeds: contacts, then the pair of the outer balls.
+    # Rows that give the closing speeds from the velocities: contacts, then the outer balls.  In
+    # units of m^(1/2) for w = m^(1/2) v and of mu^(1/2) for the speeds their products have a
+    # diagonal of ones, and an impulse q = k (u- + u+) / 2 has the stiffness k / mu = 2 kappa.
     n = len(m)
-    contacts = np.eye(n)[:-1] - np.eye(n)[1:]
-    pairs = np.vstack([contacts, np.eye(n)[0] - np.eye(n)[-1]])
-    # Masses in units of the heaviest, and w = m^(1/2) (v+ - v-): then stationarity reads
-    # (1 + pairs' k pairs / 2) w = -pairs' (k pairs v- + r), with reactions r >= 0 of contacts.
-    root = np.sqrt(m / m.max())
-    k = np.append(active, active.all()) * kappa * 2.0 / (pairs**2 @ root**-2)
-    rows = np.sqrt(0.5 * k)[:, None] * pairs / root
-    matrix, inward = np.eye(n) + rows.T @ rows, (contacts[active] / root).T
-    alone = np.linalg.solve(matrix, -(pairs / root).T @ (k * (pairs @ v)))
-    response = np.linalg.solve(matrix, inward)
-    # u+ = free - G r <= 0, r >= 0, r u+ = 0: non-negative least squares with G = L L'.
-    free = contacts[active] @ v + inward.T @ alone
-    lower = np.linalg.cholesky(inward.T @ response)
-    reactions, _ = nnls(lower.T, solve_triangular(lower, free, lower=True))
-    return np.asarray(v + (alone - response @ reactions) / root)
+    pairs = np.vstack([np.eye(n)[:-1] - np.eye(n)[1:], np.eye(n)[0] - np.eye(n)[-1]])
+    rows = pairs / np.sqrt(m)
+    size = np.linalg.norm(rows, axis=1)  # mu^(-1/2)
+    rows /= size[:, None]
+    before = np.append(u, u.sum()) / size
+    # Nothing absorbs at an open contact; a kappa far below rounding is none.
+    soft = 0.5 / np.maximum(np.append(active, active.all()) * kappa, 1e-30)
+    gram = rows @ rows.T
+    # (1 / 2 kappa + G / 2) q = u- - G r / 2, so that u+ = free - S r, with reactions r >= 0 of the
+    # contacts.  Written so that nothing cancels for a large kappa.
+    inverse = np.linalg.inv(np.diag(soft) + 0.5 * gram)
+    free = (soft[:, None] * inverse - 0.5 * gram @ inverse) @ before
+    response = gram @ inverse * soft
+    # u+ <= 0, r >= 0, r u+ = 0: non-negative least squares with S = L L'.
+    at = np.flatnonzero(active)
+    lower = np.linalg.cholesky(0.5 * (response + response.T)[np.ix_(at, at)])
+    reactions = np.zeros(n)
+    reactions[at], _ = nnls(lower.T, solve_triangular(lower, free[at], lower=True))
+    impulses = (inverse @ (before - 0.5 * gram @ reactions) + reactions) / size
+    return np.asarray(impulses[:-1] + impulses[-1])

@@ -16,6 +16,10 @@ from cradle.trace import Event, ImpactNotFinished, Trace
 _EPSILON = float(np.finfo(np.float64).eps)
 
 
+# Smallest restitution above 0.
+_SMALLEST = 1e-6
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class EnergyTrace(Trace):
     """The path of an impact whose ratios of impulses change all the time; N balls, S steps.
@@ -142,6 +146,13 @@ class EnergyDistribution:
         if np.ndim(self.stiffness) and np.size(self.stiffness) != n - 1:
             raise ValueError(
                 f"stiffness has {np.size(self.stiffness)} values; {n} balls need {n - 1}, or one"
+            )
+        small = (chain.restitution > 0.0) & (chain.restitution < _SMALLEST)
+        if small.any():
+            c = int(np.argmax(small))
+            raise ValueError(
+                f"restitution[{c}] = {float(chain.restitution[c])!r}; must be 0 or at least "
+                f"{_SMALLEST} for EnergyDistribution: such a release is too short to follow"
             )
         k = np.broadcast_to(np.asarray(self.stiffness, dtype=np.float64), (n - 1,))
         # Units of the chain's own: reduced mass, speed and stiffness of the fastest closing.
