@@ -13,7 +13,7 @@ from cradle.trace import Event, ImpactNotFinished, Trace
 
 # Beyond these the equations of one problem keep too few digits.
 _LARGEST = 1e9
-_LIGHTEST = 1e-8
+_LIGHTEST = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,7 +139,9 @@ class QuadraticDissipation:
                 f"masses[{i}] = {float(m[i])!r}; must be at least {_LIGHTEST} of one of its "
                 "neighbours for QuadraticDissipation"
             )
-        rounding = 1e-14 * np.abs(v - v.mean()).max()
+        # Closing speeds that are rounding errors: of the speeds, and of impulses over a light mass.
+        speed = np.abs(v - v.mean()).max()
+        rounding = 1e-14 * speed * (1.0 + 0.1 * m.max() / np.minimum(m[:-1], m[1:]))
 
         def closing(v: Vector) -> Vector:
             u = v[:-1] - v[1:]
