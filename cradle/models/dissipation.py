@@ -139,13 +139,14 @@ class QuadraticDissipation:
                 f"masses[{i}] = {float(m[i])!r}; must be at least {_LIGHTEST} of one of its "
                 "neighbours for QuadraticDissipation"
             )
-        # Closing speeds that are rounding errors: of the speeds, and of impulses over a light mass.
         speed = np.abs(v - v.mean()).max()
-        rounding = 1e-14 * speed * (1.0 + 0.1 * m.max() / np.minimum(m[:-1], m[1:]))
 
         def closing(v: Vector) -> Vector:
             u = v[:-1] - v[1:]
-            return np.where(np.abs(u) <= rounding, 0.0, u)
+            # A rounding error of the speeds, or of the impulses over a light mass, is none.
+            ends = np.concatenate([[0.0], impulses, [0.0]])
+            noise = 1e-14 * speed + 1e-15 * (ends[:-1] + ends[1:]) / m
+            return np.where(np.abs(u) <= np.maximum(noise[:-1], noise[1:]), 0.0, u)
 
         problems = 0
         while (closing(v) > 0.0).any() and problems < self.max_problems:
