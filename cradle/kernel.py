@@ -431,13 +431,26 @@ def advance(
         if u[c] == 0.0 and closing(c, hi, lo) != 0.0:
             c = stick(c, left, right, rate, u, hi, lo, m)
         c += 1
-    # Idle neighbours only ever close, and wait at zero.
+    # Idle neighbours only ever close, and wait at zero.  A light ball that arrives takes the
+    # velocity of the heavier one: what is left of its own is rounding.
     c = left - 1
     if c >= 0:
-        u[c] = 0.0 if until[c] <= horizon else min(closing(c, hi, lo), 0.0)
+        u[c] = min(closing(c, hi, lo), 0.0)
+        if until[c] <= horizon:
+            u[c] = 0.0
+            if m[left] < m[c] and u[left] != 0.0 and until[left] > horizon:
+                hi[left] = hi[c]
+                lo[left] = lo[c]
+                u[left] = closing(left, hi, lo)
     c = right + 1
     if c < n - 1:
-        u[c] = 0.0 if until[c] <= horizon else min(closing(c, hi, lo), 0.0)
+        u[c] = min(closing(c, hi, lo), 0.0)
+        if until[c] <= horizon:
+            u[c] = 0.0
+            if m[c] < m[c + 1] and u[right] != 0.0 and until[right] > horizon:
+                hi[c] = hi[c + 1]
+                lo[c] = lo[c + 1]
+                u[right] = closing(right, hi, lo)
 
 
 @jit
