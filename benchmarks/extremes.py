@@ -153,11 +153,13 @@ def finish(_):
             row = (1, collapsed, collisions > 100, collisions > 1000, collisions > 10_000)
             table[n] += (*row, stopped is not None)
             if stopped:
-                unfinished.append((family, decades, index, n, *x.portrait(problem, stopped)))
+                seen = (*x.portrait(problem, stopped), *x.to_the_default(problem))
+                unfinished.append((family, decades, index, n, *seen))
         for n in range(2, 9):
             yield (family, decades, n, *table[n].tolist())
         print(family, decades, len(unfinished), flush=True)
     header = ["family", "decades", "index", "balls", "period", "energy_half", "energy"]
+    header += ["collisions", "finished"]
     write("unfinished", header, unfinished)
 
 

@@ -23,7 +23,7 @@ from cradle import (
     collide,
     post_impact_velocities,
 )
-from cradle.models.correlation import outcomes
+from cradle.models.correlation import MAX_EVENTS, outcomes
 
 EPS = 2.0**-52
 TINIEST = 5e-324  # the smallest number above zero
@@ -511,6 +511,12 @@ def work(problem, max_events):
     except ImpactNotFinished as stopped:
         return int(stopped.trace.collisions.sum()), False, stopped.trace
     return int(found.collisions.sum()), bool(found.collapsed), None
+
+
+def to_the_default(problem):
+    """Collisions at the solver's default limit, and 1 if that was enough."""
+    collisions, _, stopped = work(problem, MAX_EVENTS)
+    return collisions, int(stopped is None)
 
 
 def relative_energy(masses, velocities):

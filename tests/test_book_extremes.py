@@ -151,3 +151,9 @@ def test_table_of_unfinished_chains(glued):
     assert int(glued["periodic"]) == sum(int(r["period"]) > 0 for r in never)
     assert int(glued["spent"]) == sum(float(r["energy"]) < 1e-12 for r in never)
     assert int(glued["fewest"]) == min(int(r["balls"]) for r in never)
+    left = [r["family"] for r in never if r["finished"] == "0"]
+    for family in ("within", "saturate"):
+        assert int(glued[f"rest-{family}"]) == left.count(family)
+    assert float(glued["rest-share"]) == pytest.approx(len(left) / 1000, abs=0.005)
+    done = [int(r["collisions"]) for r in never if r["finished"] == "1"]
+    assert int(glued["default-most"]) == max(done)

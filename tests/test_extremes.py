@@ -354,6 +354,13 @@ def test_random_chains_finish():
     for row in unfinished:
         assert row["energy"] <= 1 + 1e-9, row
         assert row["balls"] > 3, row
+        problem = x.any_chain(row["family"], int(row["decades"]), int(row["index"]))
+        m = problem.masses
+        assert any(b < min(a, c) for a, b, c in zip(m, m[1:], m[2:])), row
+        assert min(problem.restitution) < 1, row
+    for row in unfinished[::300]:
+        problem = x.any_chain(row["family"], int(row["decades"]), int(row["index"]))
+        assert x.to_the_default(problem) == (row["collisions"], row["finished"]), row
     named = {(r["family"], r["decades"], r["index"]) for r in unfinished}
     rng = np.random.default_rng(5)
     for family, decades in x.FAMILIES:
