@@ -26,7 +26,7 @@ all in the chain's own units, see `scales`)::
   pull[i]      velocity of ball i per unit of progress, dv/ds
   ratio[i]     ratio in force at ball i                rest[i]      1 - ratio, to all its digits
   until[c]     progress to the contact's own next event
-  before[c]    -u of an idle contact at the start of the round
+  before[c]    -u of an idle contact at the start of the round, or at its end
   reach[k]     progress of run k to its own next event
   u1[c] q1[c]  snapshot of u and q                    x[i] y[i] z[i]  scratch
 
@@ -36,7 +36,7 @@ all in the chain's own units, see `scales`)::
   held[c]      1 if it had an impulse while held by a ratio above the bound
   hits[c]      how often it became active             tiny[c] how many exhausted collisions in a row
   code1[c] hits1[c]  snapshot of what is active and how it is driven, and of hits
-  power[c]     binary exponent of the rate            first[k], last[k]  the contacts of run k
+  power[c]     binary exponent of the rate; a flag    first[k], last[k]  the contacts of run k
 """
 
 import math
@@ -777,8 +777,9 @@ def cycle(
     if worst > SELF_SIMILAR:
         if left < first or last < right:
             return c, c - 1, math.inf
-        # How often the scale still shrinks by L before nothing is left, log(1 / L) = log1p(1 / T).
-        spans = max(math.log(scale / threshold), 1.0) / math.log1p(1.0 / total)
+        # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
+        # 1 / (T + 1/2), and as good as that for a slow cycle.
+        spans = max(math.log(scale / threshold), 1.0) * (total + 0.5)
         if not worst * spans < min(BEND, bend):
             return c, c - 1, worst * spans
     squares = total * total / (1.0 + 2.0 * total)  # sum of L^2, L^4, ...

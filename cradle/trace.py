@@ -96,7 +96,7 @@ class Trace:
 
 
 class ImpactNotFinished(RuntimeError):
-    """An impact was still going on at `max_events`; `trace` holds what was reached.
+    """An impact was still going on after `max_events` steps; `trace` holds what was reached.
 
     The path of that trace covers at most the first 100 000 events; its velocities, impulses and
     works are those reached.

@@ -38,7 +38,7 @@ def collide(chain: Chain, model: Model) -> Trace:
     ValueError
         If the model cannot treat this chain; the message says why.
     ImpactNotFinished
-        If the impact takes more events than the model allows.
+        If the impact takes more steps than the model allows.
 
     Examples
     --------
@@ -48,6 +48,6 @@ def collide(chain: Chain, model: Model) -> Trace:
     """
     if not isinstance(chain, Chain):
         raise TypeError(f"chain is a {type(chain).__name__}; must be a Chain")
-    if not hasattr(model, "solve"):
+    if isinstance(model, type) or not hasattr(model, "solve"):
         raise TypeError(f"model is a {type(model).__name__}; must be an impact model")
     return model.solve(chain)

@@ -20,7 +20,7 @@ from cradle.chain import Chain, Vector, checked, checked_masses, refuse_overflow
 from cradle.closed_form import largest_ratios
 from cradle.trace import Event, ImpactNotFinished, Trace
 
-#: Events after which an impact is given up, unless told otherwise.
+#: Steps after which an impact is given up, unless told otherwise.
 MAX_EVENTS = 5_000_000
 
 # Chains of a batch that are solved at a time: the memory needed beyond inputs and outputs.
@@ -220,7 +220,8 @@ def post_impact_velocities(
     """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
 
     The same event loop as `collide` with `ImpulseCorrelation`, without the record; two balls, and
-    three that collide once each, take the closed form instead.  All processors are used.
+    three that collide once each, take the closed form instead.  Compiled, some
+    thousands of chains and more are shared out to all processors.
 
     Parameters
     ----------
@@ -245,7 +246,7 @@ def post_impact_velocities(
     ValueError
         If a value or a shape is wrong; the message names the first value and the rule.
     ImpactNotFinished
-        If an impact takes more than `max_events`; `trace` is that of the first such chain.
+        If an impact takes more than `max_events` steps; `trace` is that of the first such chain.
 
     References
     ----------
