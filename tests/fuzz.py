@@ -17,7 +17,6 @@ import sys
 import warnings
 from pathlib import Path
 
-os.environ["CRADLE_KERNEL"] = "plain"
 sys.path.insert(0, str(Path(__file__).parent))
 
 ENDS = {
@@ -136,6 +135,7 @@ def attempt(data, max_events=400):
 def main():
     import atheris
 
+    os.environ["CRADLE_KERNEL"] = "plain"  # here, not on import: the tests import this file
     warnings.simplefilter("error")
     with atheris.instrument_imports(include=["cradle"]):
         import cradle.models.correlation  # noqa: F401
