@@ -235,10 +235,11 @@ class _Process(_Motion):
 
     def extreme(self, c: int) -> Any:
         """Return SciPy's event of contact c turning from compression to release or back."""
-        event = self.zero_speed(c, 1.0 if self.loading[c] else -1.0)
-        # The rate has a kink there, unless e = 1: no step may cross it.
-        vars(event).update(terminal=bool(self.closed[c] and self.e[c] < 1.0))
-        return event
+        # The rate has a kink there, unless e = 1: no step may cross it.  Without a kink the
+        # integration goes on, and may meet several extremes, of both kinds.
+        if not (self.closed[c] and self.e[c] < 1.0):
+            return super().extreme(c)
+        return self.zero_speed(c, 1.0 if self.loading[c] else -1.0)
 
     def zero_speed(self, c: int, side: float) -> Any:
         """Return SciPy's event of the closing speed of contact c leaving its side of zero."""
