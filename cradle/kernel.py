@@ -1203,49 +1203,49 @@ def impact(
 
 
 @jit
-def short_cut(n, m, v, e, forward, out_v, out_p, out_a):
+def short_cut(n, m, v, e, forward, backward, bounded, out_v):
     """Eqs. 24 and 30: two balls, or three whose first strikes the others, one collision each.
 
-    Returns False, with nothing decided, if that is not so or not clear beyond rounding, or if the
-    numbers are so far from 1 that the loop's own units are needed.
+    Returns False, with nothing decided, if that is not so or not clear beyond rounding, if an input
+    is not well within the limits of `admissible`, or if the numbers are so far from 1 that the
+    loop's own units are needed.
     """
     for i in range(n):
         if not (TINY < m[i] < HUGE and (v[i] == 0.0 or TINY < abs(v[i]) < HUGE)):
             return False
     u0 = v[0] - v[1]
-    if not (u0 > 0.0 and e[0] > CLEAR):
+    if not (u0 > 0.0 and CLEAR < e[0] <= 1.0):
         return False
+    one, two = 1.0 / m[0], 1.0 / m[1]
     if n == 2:
         impulse = (1.0 + e[0]) * u0 * reduced_mass(m[0], m[1])
-        out_p[0] = impulse
-        out_a[0] = 0.5 * u0 * (impulse / (1.0 + e[0]))
-        out_v[0] = v[0] - impulse / m[0]
-        out_v[1] = v[1] + impulse / m[1]
+        out_v[0] = v[0] - impulse * one
+        out_v[1] = v[1] + impulse * two
         return out_v[0] < out_v[1]
     a = forward[0]
+    if not (CLEAR < e[1] <= 1.0 and a >= 0.0 and a * (m[1] + m[2]) <= (1.0 - CLEAR) * m[2]):
+        return False
+    # Nothing is driven backward, but a ratio that is none is refused.
+    b = backward[0]
+    if not (b >= 0.0 and b * (m[0] + m[1] if bounded else 1.0) <= (m[0] if bounded else 1.0)):
+        return False
     u1 = v[1] - v[2]
-    if u1 < 0.0 or e[1] < CLEAR or a * (m[1] + m[2]) > (1.0 - CLEAR) * m[2]:
+    if u1 < 0.0:
         return False
     # Contact 0 drives contact 1 until it ends (Eqs. 17-24); speeds per impulse.
-    one, two, three = 1.0 / m[0], 1.0 / m[1], 1.0 / m[2]
-    reach = u0 / (one + (1.0 - a) * two)
-    first = (1.0 + e[0]) * reach
+    three = 1.0 / m[2]
+    first = (1.0 + e[0]) * u0 / (one + (1.0 - a) * two)
     gain = first * ((1.0 - a) * two - a * three)
     u2 = u1 + gain
     # Contact 1 goes on alone, with all the work it has absorbed to give back (Eqs. 25-30).
-    mu = 1.0 / (two + three)
-    work = 0.5 * (a * first * (u1 + u2) + mu * u2 * u2)
-    opens = e[1] * math.sqrt(2.0 * work * (two + three))
-    second = mu * (u2 + opens)
+    both = two + three
+    opens = e[1] * math.sqrt(u2 * u2 + a * first * (u1 + u2) * both)
+    second = (u2 + opens) / both
     apart = e[0] * u0 - second * two  # Eq. 43: ball 1 does not fall back on ball 0
-    if not (apart > CLEAR * u0 and u2 > CLEAR * (u1 + gain) and opens > CLEAR * u0):
+    if not (apart > CLEAR * u0 and opens > CLEAR * u0):
         return False
-    out_p[0] = first
-    out_p[1] = a * first + second
-    out_a[0] = 0.5 * u0 * reach
-    out_a[1] = work
     out_v[0] = v[0] - first * one
-    out_v[2] = v[2] + out_p[1] * three
+    out_v[2] = v[2] + (a * first + second) * three
     # A light ball's velocity from its neighbour's, a heavy one's from its impulses.
     if m[1] < m[0]:
         out_v[1] = out_v[0] + apart
@@ -1292,28 +1292,31 @@ def admissible(n, m, v, e, forward, backward, bounded):
 
 @jit
 def batch(
-    rows, n, bounded, masses, v, e, forward, backward, meeting, max_events,
-    out_v, hits, status, collapsed, out_p, out_a, held, floats, ints, kinds, contacts,
-    path_v, path_p,
+    rows, n, bounded, masses, v, e, forward, backward, meeting, max_events, out_v, hits, collapsed,
+    p, a, held, floats, ints, kinds, contacts, path_v, path_p,
 ):  # fmt: skip
-    """Solve `rows` impacts, outcome alone: inputs, `out_v` and `hits` have one row a chain.
+    """Solve `rows` impacts, outcome alone; return how many, and the status of the next.
 
-    Stops at the first row whose status is not FINISHED, and returns how many were solved.
+    Inputs have a row for each chain, or one for all; `out_v`, `hits`, `collapsed` one for each.
+    It stops at the first row whose status is not FINISHED.
     """
+    # How far to go from row to row: not at all in an input that has one for all.
+    by_m, by_v, by_e = min(len(masses), 2) - 1, min(len(v), 2) - 1, min(len(e), 2) - 1
+    by_f, by_b = min(len(forward), 2) - 1, min(len(backward), 2) - 1
     for k in range(rows):
-        if not admissible(n, masses[k], v[k], e[k], forward[k], backward[k], bounded):
-            status[k] = REFUSED
-            return k
+        m_k, v_k, e_k = masses[k * by_m], v[k * by_v], e[k * by_e]
+        f_k, b_k = forward[k * by_f], backward[k * by_b]
         collapsed[k] = 0
-        if n <= 3 and short_cut(n, masses[k], v[k], e[k], forward[k], out_v[k], out_p, out_a):
-            status[k] = FINISHED
+        if n <= 3 and short_cut(n, m_k, v_k, e_k, f_k, b_k, bounded, out_v[k]):
             for c in range(n - 1):
                 hits[k][c] = 1
             continue
-        status[k], _, collapsed[k] = impact(
-            n, masses[k], v[k], e[k], forward[k], backward[k], meeting, max_events, out_v[k],
-            out_p, out_a, hits[k], held, floats, ints, kinds, contacts, path_v, path_p,
+        if not admissible(n, m_k, v_k, e_k, f_k, b_k, bounded):
+            return k, REFUSED
+        status, _, collapsed[k] = impact(
+            n, m_k, v_k, e_k, f_k, b_k, meeting, max_events, out_v[k], p, a, hits[k], held, floats,
+            ints, kinds, contacts, path_v, path_p,
         )  # fmt: skip
-        if status[k] != FINISHED:
-            return k
-    return rows
+        if status != FINISHED:
+            return k, status
+    return rows, FINISHED

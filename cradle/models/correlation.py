@@ -23,9 +23,6 @@ from cradle.trace import Event, ImpactNotFinished, Trace
 #: Steps after which an impact is given up, unless told otherwise.
 MAX_EVENTS = 5_000_000
 
-# Chains of a batch that are solved at a time: the memory needed beyond inputs and outputs.
-_ROWS = 4096
-
 # A record of this length fits nearly every impact; longer ones are run again with enough room.
 _ROOM = 64
 # The longest path kept of an impact that did not finish.
@@ -357,29 +354,30 @@ def outcomes(
         raise ValueError(f"leading axes do not broadcast: {shapes}") from None
 
     kernel = runtime.chosen()
-    count = math.prod(lead)
+    count, chunk = math.prod(lead), _chunk(n)
     if count == 0:
         _check(given, excess)
     out = np.empty((count, n))
     hits = np.empty((count, n - 1), dtype=np.int64)
-    status, collapsed = np.zeros((2, count), dtype=np.int64)
+    collapsed = np.empty(count, dtype=np.int64)
 
-    def solve(begin: int) -> int:
-        """Solve the chunk of chains that begins there; return how many come before a failure."""
-        rows = slice(begin, min(begin + _ROWS, count))
+    def solve(begin: int) -> tuple[int, int]:
+        """Solve the chunk of chains that begins there; return how many, and the next's status."""
+        rows = slice(begin, min(begin + chunk, count))
         part = [_rows(array, lead, rows) for array in arrays]
-        results = [out[rows], hits[rows], status[rows], collapsed[rows]]
+        results = [out[rows], hits[rows], collapsed[rows]]
         inputs = [rows.stop - begin, n, excess == "raise", *part, float(meeting), int(max_events)]
-        return int(_call(kernel, "batch", [*inputs, *results, *_area(kernel, n)]))
+        solved, status = _call(kernel, "batch", [*inputs, *results, *_area(kernel, n)])
+        return solved, status
 
-    starts = range(0, count, _ROWS)
+    starts = range(0, count, chunk)
     # At the first failure in the order of the chains; none has been returned before.
-    for begin, done in zip(starts, _in_order(solve, starts, progress), strict=True):
-        failed = begin + done
-        if failed < min(begin + _ROWS, count):
-            if status[failed] == kernel.REFUSED:
-                _check(given, excess)
-                raise AssertionError("the kernel refused chains that the checks admit")
+    for begin, (solved, status) in zip(starts, _in_order(solve, starts, progress), strict=True):
+        if status == kernel.REFUSED:
+            _check(given, excess)
+            raise AssertionError("the kernel refused chains that the checks admit")
+        if status != kernel.FINISHED:
+            failed = begin + solved
             # Alone, with its record; it stops where it stopped here, and raises.
             m, v, e, f, b = (_rows(array, lead, slice(failed, failed + 1))[0] for array in arrays)
             ImpulseCorrelation(
@@ -388,7 +386,9 @@ def outcomes(
     return Outcomes(out.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.reshape(lead) != 0)
 
 
-def _in_order(solve: Callable[[int], int], starts: range, progress: bool) -> Iterable[int]:
+def _in_order(
+    solve: Callable[[int], tuple[int, int]], starts: range, progress: bool
+) -> Iterable[tuple[int, int]]:
     """Yield the results of `solve` in order, made by as many threads as there are processors."""
     if progress:
         from tqdm.auto import tqdm
@@ -397,14 +397,22 @@ def _in_order(solve: Callable[[int], int], starts: range, progress: bool) -> Ite
             for result in _in_order(solve, starts, progress=False):
                 bar.update()
                 yield result
-    elif len(starts) < 2:
+    elif (workers := min(len(starts), os.cpu_count() or 1)) < 2:
         yield from map(solve, starts)
     else:
-        with ThreadPoolExecutor(min(len(starts), os.cpu_count() or 1)) as pool:
+        with ThreadPoolExecutor(workers) as pool:
             try:
                 yield from pool.map(solve, starts)
             finally:
                 pool.shutdown(cancel_futures=True)
+
+
+def _chunk(n: int) -> int:
+    """Return how many chains of n balls are solved at a time, more where they may be short cuts.
+
+    So much memory is needed beyond inputs and outputs.
+    """
+    return 16_384 if n <= 3 else 4096
 
 
 #: Each thread's work area, kept for its next call.
@@ -447,17 +455,18 @@ def _check(given: dict[str, ArrayLike], excess: str) -> None:
 
 
 def _rows(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
-    """Return some rows of `array` broadcast to the leading shape, without making the others."""
-    if array.ndim == 1:
-        copies = np.empty((rows.stop - rows.start, array.size))
-        copies[:] = array
-        return copies
-    if array.shape[:-1] == lead and array.flags.c_contiguous:
-        part = array.reshape(math.prod(lead), array.shape[-1])[rows]
-        # Compiled code is made for arrays that may be written to; it writes to no input.
-        return part if part.flags.writeable else part.copy()
-    full = np.broadcast_to(array, lead + array.shape[-1:])
-    return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
+    """Return some rows of `array` broadcast to the leading shape, or the one row that all share."""
+    size = array.shape[-1]
+    if array.size == size:
+        part = array.reshape(1, size)
+    elif array.shape[:-1] == lead and array.flags.c_contiguous:
+        part = array.reshape(math.prod(lead), size)[rows]
+    else:
+        # Without making the others.
+        full = np.broadcast_to(array, (*lead, size))
+        return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
+    # Compiled code is made for arrays that may be written to; it writes to no input.
+    return part if part.flags.writeable and part.flags.c_contiguous else part.copy()
 
 
 def _checked_ratios(name: str, ratios: ArrayLike | None) -> Vector:
