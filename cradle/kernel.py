@@ -438,7 +438,7 @@ def advance(
         u[c] = min(closing(c, hi, lo), 0.0)
         if until[c] <= horizon:
             u[c] = 0.0
-            if m[left] < m[c] and u[left] != 0.0 and until[left] > horizon:
+            if m[left] < m[c] and u[left] != 0.0:
                 hi[left] = hi[c]
                 lo[left] = lo[c]
                 u[left] = closing(left, hi, lo)
@@ -447,7 +447,7 @@ def advance(
         u[c] = min(closing(c, hi, lo), 0.0)
         if until[c] <= horizon:
             u[c] = 0.0
-            if m[c] < m[c + 1] and u[right] != 0.0 and until[right] > horizon:
+            if m[c] < m[c + 1] and u[right] != 0.0:
                 hi[c] = hi[c + 1]
                 lo[c] = lo[c + 1]
                 u[right] = closing(right, hi, lo)
@@ -894,7 +894,7 @@ def end_contacts(
         if not exhausted(c, w[c], threshold, m, u):
             for k in range(max(c - 1, 0), min(c + 1, n - 2) + 1):
                 tiny[k] = 0
-        elif w[c] > 0.0:
+        else:
             tiny[c] += 1
             if tiny[c] >= REPEATS:
                 worn = c
