@@ -5,9 +5,10 @@ Usage, with atheris from PyPI (not a dependency of the project)::
     python tests/fuzz.py -max_total_time=3600 corpus/
 
 Every input is a string of bytes that becomes a call: numbers from the ends of their ranges, their
-neighbours, and any pattern of 64 bits. The event loop runs as plain Python, so that the search sees
-which of its lines a chain reaches. Allowed are the documented errors alone; every outcome must keep
-`extremes.faults` empty. What was found became named cases in `test_extremes.py`.
+neighbours, and any pattern of 64 bits. Single impacts run as plain Python, so that the search sees
+which lines of the event loop a chain reaches; the batch runs compiled. Allowed are the documented
+errors alone; every outcome must keep `extremes.faults` empty. What was found became named cases in
+`test_extremes.py`.
 """
 
 import math
@@ -16,6 +17,7 @@ import struct
 import sys
 import warnings
 from pathlib import Path
+from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -98,16 +100,28 @@ def quotient(x, y):
     return x / y if 0.0 < y < math.inf and 0.0 < x < math.inf else 0.5
 
 
-def attempt(data, max_events=400):
-    """Run one call; raises what must not happen. Returns the trace, or None if refused."""
+def attempt(data, max_events=400, kernel=""):
+    """Run one call; raises what must not happen. Returns the trace, or None if refused.
+
+    `kernel` names the kernel of the single impact ("plain"); the batch takes the fastest.
+    """
     from extremes import faults
 
-    from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide, post_impact_velocities
+    from cradle import (
+        Chain,
+        ImpactNotFinished,
+        ImpulseCorrelation,
+        collide,
+        post_impact_velocities,
+        runtime,
+    )
 
     m, v, e, f, b, options = problem(data)
     refused = None
     try:
-        trace = collide(Chain(m, v, e), ImpulseCorrelation(f, b, max_events=max_events, **options))
+        with mock.patch.dict(os.environ, {runtime.VARIABLE: kernel} if kernel else {}):
+            model = ImpulseCorrelation(f, b, max_events=max_events, **options)
+            trace = collide(Chain(m, v, e), model)
         finished = True
     except ValueError as error:
         refused = str(error)
@@ -135,7 +149,6 @@ def attempt(data, max_events=400):
 def main():
     import atheris
 
-    os.environ["CRADLE_KERNEL"] = "plain"  # here, not on import: the tests import this file
     warnings.simplefilter("error")
     with atheris.instrument_imports(include=["cradle"]):
         import cradle.models.correlation  # noqa: F401
@@ -146,7 +159,7 @@ def main():
 
     def target(data):
         try:
-            attempt(data)
+            attempt(data, kernel="plain")
         except Exception as error:
             # Keep going: one file a kind of failure and number of balls, not one a run.
             key = (type(error).__name__, str(error)[:24], 2 + (data[0] % 7 if data else 0))
