@@ -383,6 +383,23 @@ def stick(c, low, high, rate, u, hi, lo, m):
 
 
 @jit
+def arrive(c, ball, other, own, ends, m, hi, lo, u):
+    """R5: a ball pushed by its `own` contact reaches the `other` ball of the idle contact c.
+
+    A light ball takes the velocity of the heavier one: what is left of its own is rounding.  If its
+    own contact `ends` at the same time with the two balls at rest to each other, they stay so,
+    unless the balls that met overlap by more than their own velocities' rounding: then the end is
+    still to come.
+    """
+    late = closing(c, hi, lo) > (SIMULTANEOUS - 1.0) * max(abs(hi[c]), abs(hi[c + 1]))
+    u[c] = 0.0
+    if m[ball] < m[other] and (u[own] != 0.0 or (ends and late)):
+        hi[ball] = hi[other]
+        lo[ball] = lo[other]
+        u[own] = closing(own, hi, lo)
+
+
+@jit
 def advance(
     left, right, s, whole, n, e, m, hi, lo, u, q, w, p, a, rate, slope, pull, until, fixed, held,
 ):  # fmt: skip
@@ -431,26 +448,17 @@ def advance(
         if u[c] == 0.0 and closing(c, hi, lo) != 0.0:
             c = stick(c, left, right, rate, u, hi, lo, m)
         c += 1
-    # Idle neighbours only ever close, and wait at zero.  A light ball that arrives takes the
-    # velocity of the heavier one: what is left of its own is rounding.
+    # Idle neighbours only ever close, and wait at zero.
     c = left - 1
     if c >= 0:
         u[c] = min(closing(c, hi, lo), 0.0)
         if until[c] <= horizon:
-            u[c] = 0.0
-            if m[left] < m[c] and u[left] != 0.0:
-                hi[left] = hi[c]
-                lo[left] = lo[c]
-                u[left] = closing(left, hi, lo)
+            arrive(c, left, c, left, until[left] <= horizon, m, hi, lo, u)
     c = right + 1
     if c < n - 1:
         u[c] = min(closing(c, hi, lo), 0.0)
         if until[c] <= horizon:
-            u[c] = 0.0
-            if m[c] < m[c + 1] and u[right] != 0.0:
-                hi[c] = hi[c + 1]
-                lo[c] = lo[c + 1]
-                u[right] = closing(right, hi, lo)
+            arrive(c, c, c + 1, right, until[right] <= horizon, m, hi, lo, u)
 
 
 @jit
