@@ -50,9 +50,11 @@ FINISHED, UNFINISHED, REFUSED = 0, 1, 2
 # Kinds of event.
 MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE = 0, 1, 2, 3
 
-# R9: what is exhausted, relative to the largest initial closing speed; how many exhausted
-# collisions in a row are a collapse; how closely a cycle must repeat, relative to its own scale.
+# R9: what is exhausted, relative to the largest initial closing speed; what its collapse may cost,
+# relative to the energy of the initial closing; how many exhausted collisions in a row are a
+# collapse; how closely a cycle must repeat, relative to its own scale.
 EXHAUSTED = 1e-18
+FAINT = 1e-20
 REPEATS = 8
 SELF_SIMILAR = 1e-13
 BEND = 1e-2
@@ -73,6 +75,8 @@ AHEAD = 8
 # conditions that are met by this part of the largest term.
 TINY, HUGE = 1e-60, 1e60
 CLEAR = 1e-12
+# The smallest number above zero.
+LEAST = 5e-324
 # Lightest ball allowed, as a part of the heaviest: beyond it squares of small numbers vanish.
 LIGHTEST = 1e-150
 # R6: one vanishing ratio, as a binary exponent far below any of a number.
@@ -440,6 +444,8 @@ def advance(
                 give = -0.5 * rate[c] * s0 * u0
                 gain = 0.5 * rate[c] * (s - s0) * u1
         w[c] += gain
+        if w[c] == 0.0 and rate[c] * s > 0.0 and max(u0, u1) > 0.0:
+            w[c] = LEAST  # a work that underflows is one nevertheless
         a[c] += gain
         q[c] = 0.0 if done else max(q[c] + e[c] * e[c] * gain - give, 0.0)
     # Exact zeros: balls that touch at rest to each other have one velocity.
@@ -590,11 +596,12 @@ def chatters(c, threshold, n, m, u, q, tiny):
 
 
 @jit
-def exhausted_stretch(c, threshold, n, e, m, u, q, w, tiny):
+def exhausted_stretch(c, threshold, faint, n, e, m, hi, lo, u, q, w, tiny):
     """R9: the stretch around c of exhausted contacts that only chatter, as (first, last).
 
     A contact at rest between two of them, which passes their impulses on, belongs to it.  Empty
-    (last < first) if nothing in it can lose energy: elastic sequences are finite.
+    (last < first) if nothing in it can lose energy: elastic sequences are finite; or if its balls
+    move with an energy above `faint`: heavy ones, slower than a light ball that struck them.
     """
     left = c
     right = c
@@ -622,9 +629,11 @@ def exhausted_stretch(c, threshold, n, e, m, u, q, w, tiny):
             right += 2
         else:
             break
+    loses = False
     for k in range(left, right + 1):
-        if e[k] < 1.0:
-            return left, right
+        loses = loses or e[k] < 1.0
+    if loses and motion(left, right + 1, hi, lo, m) <= faint:
+        return left, right
     return c, c - 1
 
 
@@ -902,7 +911,7 @@ def end_contacts(
         if not exhausted(c, w[c], threshold, m, u):
             for k in range(max(c - 1, 0), min(c + 1, n - 2) + 1):
                 tiny[k] = 0
-        else:
+        elif w[c] > 0.0:
             tiny[c] += 1
             if tiny[c] >= REPEATS:
                 worn = c
@@ -1017,7 +1026,6 @@ def impact(
     active, turn, fixed, tiny, power = ints[0], ints[1], ints[2], ints[3], ints[4]
     first, last, code1, hits1 = ints[5], ints[6], ints[7], ints[8]
     recording = len(kinds) > 0
-    threshold = 0.0
     smallest = CUT
     for i in range(n):
         m[i] = math.ldexp(masses[i], -mass_shift)
@@ -1025,12 +1033,15 @@ def impact(
         hi[i] = math.ldexp(v[i], -shift)
         lo[i] = 0.0
         turn[i] = 0
-        if i < n - 1:
-            u[i] = math.ldexp(v[i], -shift) - math.ldexp(v[i + 1], -shift)
-            threshold = max(threshold, EXHAUSTED * u[i])
-            q[i] = w[i] = p[i] = p0[i] = a[i] = a0[i] = 0.0
-            before[i] = abs(u[i])
-            active[i] = tiny[i] = hits[i] = held[i] = 0
+    threshold = faint = 0.0
+    for c in range(n - 1):
+        u[c] = hi[c] - hi[c + 1]
+        q[c] = w[c] = p[c] = p0[c] = a[c] = a0[c] = 0.0
+        before[c] = abs(u[c])
+        active[c] = tiny[c] = hits[c] = held[c] = 0
+        speed = max(u[c], 0.0)
+        threshold = max(threshold, EXHAUSTED * speed)
+        faint = max(faint, FAINT * reduced_mass(m[c], m[c + 1]) * speed * speed)
     start(n, u, active, turn, hits)
     if recording:
         velocities(hi, u, p, path_v[0], n, v, shift, m, p0)
@@ -1105,11 +1116,13 @@ def impact(
             ends += more
             left, right = ended, ended - 1
             if worn >= 0:
-                left, right = exhausted_stretch(worn, threshold, n, e, m, u, q, w, tiny)
-                if left <= right:
-                    left, right = merge(
-                        left, right, n, m, hi, lo, u, q, p, x, tiny, before, active, turn,
-                    )  # fmt: skip
+                left, right = exhausted_stretch(
+                    worn, threshold, faint, n, e, m, hi, lo, u, q, w, tiny,
+                )  # fmt: skip
+            if left <= right:
+                left, right = merge(
+                    left, right, n, m, hi, lo, u, q, p, x, tiny, before, active, turn,
+                )  # fmt: skip
             elif mark == ended:
                 left, right, bent = cycle(
                     mark, bend if 2 * ends > 3 * marked_at else 0.0, threshold, n, e, m, hi, lo, u,

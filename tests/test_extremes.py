@@ -590,6 +590,16 @@ FOUND = {
         [0.4, 1e-150, 0.25, 1e-150, 1e-150], [0, 2e11, 0, -9e30, 0.9], [0, 1e-16, 0, 0],
         [0.3, 0.5, 0],
     ),
+    "a light ball arrives just before its plastic contact ends": (
+        [0.25, 1, 1e-150, 1, 1e-150, 0.0075, 0.8, 1e-19],
+        [0, 0, 0.5, 0.8, 7.5e125, 1e-16, 1e-16, 0],
+        [0.9, 1e-16, 0.8, 0, 0, 0, 0],
+        [4e-150, 1, 1e-150, 1, 0.99, 1.2e-19],
+        [0.2, 1, 1e-150, 1, 1.33e-148, 0.009],
+    ),
+    "heavy balls, slower than the light one that struck them by twenty digits": (
+        [1, 1e-30, 1], [1, 1e20, 0], [1, 0], 0.5,
+    ),
 }  # fmt: skip
 
 
