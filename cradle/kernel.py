@@ -499,8 +499,9 @@ def velocities(hi, u, p, out, n, v, shift, m, p0):
     the two gives way, and a ball without impulse never does.
     """
     ordered = True
+    unit = math.ldexp(1.0, shift)
     for i in range(n):
-        out[i] = v[i] if rests(i, n, p, p0) else math.ldexp(hi[i], shift)
+        out[i] = v[i] if rests(i, n, p, p0) else hi[i] * unit
         if i > 0 and out[i] < out[i - 1] and u[i - 1] <= 0.0:
             ordered = False
     if ordered:
@@ -874,14 +875,16 @@ def cycle(
 def scales(n, v, m):
     """Return binary exponents of the largest velocity and the largest mass: the chain's own units.
 
-    Powers of two change no digit, and in these units nothing overflows.
+    Powers of two change no digit, and in these units nothing overflows.  The units themselves and
+    their inverses are numbers too.
     """
     largest = 0.0
     heaviest = 0.0
     for i in range(n):
         largest = max(largest, abs(v[i]))
         heaviest = max(heaviest, m[i])
-    return math.frexp(largest)[1], math.frexp(heaviest)[1]
+    shift, mass_shift = math.frexp(largest)[1], math.frexp(heaviest)[1]
+    return min(max(shift, -1000), 1023), min(max(mass_shift, -1000), 1023)
 
 
 @jit
@@ -1012,12 +1015,13 @@ def impact(
     """Solve one impact; return (status, number of events, 1 if any contacts collapsed).
 
     Inputs: n balls; `masses`, `v` (n); `e` (n - 1); `forward`, `backward` (n - 2); scalars.
-    Outputs: `out_v` (n); `out_p`, `out_a`, `hits`, `held` (n - 1).
+    Outputs: `out_v` (n); `out_p` and `out_a` (n - 1, or 0 for none); `hits`, `held` (n - 1).
     Work area: `floats` (FLOATS, n), `ints` (INTS, n).
     Record, kept while there is room: `kinds`, `contacts` (K), `path_v` (K + 1, n), `path_p`
     (K + 1, n - 1).  Pass length 0 for the outcome alone: the run is the same.
     """
     shift, mass_shift = scales(n, v, masses)
+    scale, mass_scale = math.ldexp(1.0, -shift), math.ldexp(1.0, -mass_shift)
     m, u, q, w, p, p0 = floats[0], floats[1], floats[2], floats[3], floats[4], floats[5]
     a, a0, rate, slope, pull = floats[6], floats[7], floats[8], floats[9], floats[10]
     ratio, until, before, reach = floats[11], floats[12], floats[13], floats[14]
@@ -1028,9 +1032,9 @@ def impact(
     recording = len(kinds) > 0
     smallest = CUT
     for i in range(n):
-        m[i] = math.ldexp(masses[i], -mass_shift)
+        m[i] = masses[i] * mass_scale
         smallest = min(smallest, CUT * m[i])
-        hi[i] = math.ldexp(v[i], -shift)
+        hi[i] = v[i] * scale
         lo[i] = 0.0
         turn[i] = 0
     threshold = faint = 0.0
@@ -1217,7 +1221,7 @@ def impact(
             )  # fmt: skip
 
     velocities(hi, u, p, out_v, n, v, shift, m, p0)
-    for c in range(n - 1):
+    for c in range(len(out_p)):
         out_p[c] = math.ldexp(p0[c] + p[c], shift + mass_shift)
         out_a[c] = math.ldexp(a0[c] + a[c], 2 * shift + mass_shift)
     return status, count, collapsed

@@ -423,8 +423,8 @@ def _area(kernel: ModuleType, n: int) -> list[Any]:
     """Return this thread's work area for outcomes of n balls."""
     kept: tuple[int, list[Any]] = getattr(_KEPT, "area", (0, []))
     if kept[0] != n:
-        p, absorbed, _, *work = _work(kernel, n, 0)
-        kept = _KEPT.area = (n, [p, absorbed, *work])
+        _, _, _, *work = _work(kernel, n, 0)
+        kept = _KEPT.area = (n, [np.zeros(0), np.zeros(0), *work])
     return kept[1]
 
 
