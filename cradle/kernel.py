@@ -387,17 +387,18 @@ def stick(c, low, high, rate, u, hi, lo, m):
 
 
 @jit
-def arrive(c, ball, other, own, ends, m, hi, lo, u):
-    """R5: a ball pushed by its `own` contact reaches the `other` ball of the idle contact c.
+def approach(c, due, ball, other, own, ends, m, hi, lo, u):
+    """R5: the idle contact c, whose `ball` is pushed by its `own` contact, only ever closes.
 
-    A light ball takes the velocity of the heavier one: what is left of its own is rounding.  If its
-    own contact `ends` at the same time with the two balls at rest to each other, they stay so,
-    unless the balls that met overlap by more than their own velocities' rounding: then the end is
-    still to come.
+    When it is `due`, it waits at zero, and a light ball takes the velocity of the heavier one: what
+    is left of its own is rounding.  If its own contact `ends` at the same time with the two balls
+    at rest to each other, they stay so, unless the balls that meet overlap by more than their own
+    velocities' rounding: then they met before, and the end is still to come.
     """
-    late = closing(c, hi, lo) > (SIMULTANEOUS - 1.0) * max(abs(hi[c]), abs(hi[c + 1]))
-    u[c] = 0.0
-    if m[ball] < m[other] and (u[own] != 0.0 or (ends and late)):
+    overlap = closing(c, hi, lo)
+    late = overlap > (SIMULTANEOUS - 1.0) * max(abs(hi[c]), abs(hi[c + 1]))
+    u[c] = 0.0 if due else min(overlap, 0.0)
+    if (due or late) and m[ball] < m[other] and (u[own] != 0.0 or (ends and late)):
         hi[ball] = hi[other]
         lo[ball] = lo[other]
         u[own] = closing(own, hi, lo)
@@ -454,17 +455,12 @@ def advance(
         if u[c] == 0.0 and closing(c, hi, lo) != 0.0:
             c = stick(c, left, right, rate, u, hi, lo, m)
         c += 1
-    # Idle neighbours only ever close, and wait at zero.
     c = left - 1
     if c >= 0:
-        u[c] = min(closing(c, hi, lo), 0.0)
-        if until[c] <= horizon:
-            arrive(c, left, c, left, until[left] <= horizon, m, hi, lo, u)
+        approach(c, until[c] <= horizon, left, c, left, until[left] <= horizon, m, hi, lo, u)
     c = right + 1
     if c < n - 1:
-        u[c] = min(closing(c, hi, lo), 0.0)
-        if until[c] <= horizon:
-            arrive(c, c, c + 1, right, until[right] <= horizon, m, hi, lo, u)
+        approach(c, until[c] <= horizon, c, c + 1, right, until[right] <= horizon, m, hi, lo, u)
 
 
 @jit

@@ -597,6 +597,9 @@ FOUND = {
         [4e-150, 1, 1e-150, 1, 0.99, 1.2e-19],
         [0.2, 1, 1e-150, 1, 1.33e-148, 0.009],
     ),
+    "the same across a gap between two collisions": (
+        [1, 1e-150, 0.0075, 0.8], [0.8, 7.5e125, 1e-16, 1e-16], [0, 0.74, 0.5], 0,
+    ),
     "heavy balls, slower than the light one that struck them by twenty digits": (
         [1, 1e-30, 1], [1, 1e20, 0], [1, 0], 0.5,
     ),
