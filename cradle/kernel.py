@@ -1033,7 +1033,8 @@ def impact(
         hi[i] = v[i] * scale
         lo[i] = 0.0
         turn[i] = 0
-    threshold = faint = 0.0
+    threshold = LEAST
+    faint = 0.0
     for c in range(n - 1):
         u[c] = hi[c] - hi[c + 1]
         q[c] = w[c] = p[c] = p0[c] = a[c] = a0[c] = 0.0

@@ -600,6 +600,9 @@ FOUND = {
     "the same across a gap between two collisions": (
         [1, 1e-150, 0.0075, 0.8], [0.8, 7.5e125, 1e-16, 1e-16], [0, 0.74, 0.5], 0,
     ),
+    "a closing speed so small that nothing smaller is a number": (
+        [1] * 8, [0, 5e-324, 0, 0, 0, 0, 0, 3e-18], 0, 0.5,
+    ),
     "heavy balls, slower than the light one that struck them by twenty digits": (
         [1, 1e-30, 1], [1, 1e20, 0], [1, 0], 0.5,
     ),
