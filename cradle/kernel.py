@@ -1210,7 +1210,9 @@ def impact(
                 pull, until, fixed, held,
             )  # fmt: skip
         if gap >= 0:
-            # R8.5: driven from both sides.
+            # R8.5: driven from both sides, at one velocity.
+            approach(gap, True, gap, gap + 1, gap - 1, False, m, hi, lo, u)
+            approach(gap, True, gap + 1, gap, gap + 1, False, m, hi, lo, u)
             activate(gap, True, True, u, q, w, active, turn, hits)
             count = record(
                 count, CLOSE, gap, hi, u, p, n, v, shift, mass_shift, m, p0, kinds, contacts,

@@ -335,6 +335,13 @@ def handed_on(masses, e):
     return v
 
 
+def equal_elastic(n, ratio):
+    """Velocities of n equal elastic balls struck by the first, one ratio; chapter 10 derives them."""
+    a = mpmath.mpf(ratio)
+    root = mpmath.sqrt(1 - 2 * a)
+    return [-a / (2 - a)] + [mpmath.mpf(0)] * (n - 3) + [(1 - root) / (2 - a), (1 + root) / (2 - a)]
+
+
 # --- growth of a perturbation ------------------------------------------------------------------
 
 

@@ -603,6 +603,11 @@ FOUND = {
     "a closing speed so small that nothing smaller is a number": (
         [1] * 8, [0, 5e-324, 0, 0, 0, 0, 0, 3e-18], 0, 0.5,
     ),
+    "a light ball meets a heavy one that another collision drives": (
+        [1e-29, 0.10588235294117647, 3.16e-16, 3e4],
+        [0.87, 0.0001333521432163324, 0.2784313725490196, 1e-16], 0, [3e-15, 1],
+        [9e-29, 0.999999999999997],
+    ),
     "heavy balls, slower than the light one that struck them by twenty digits": (
         [1, 1e-30, 1], [1, 1e20, 0], [1, 0], 0.5,
     ),
