@@ -11,10 +11,10 @@ from pathlib import Path
 
 import dask.array as da
 import mpmath
-import nbformat
 import numpy as np
 import pytest
 import xarray as xr
+from chapters import Chapter
 from reference import solve
 
 from cradle import Chain, SpringChain, collide, kernel, post_impact_velocities, runtime
@@ -22,7 +22,7 @@ from cradle.closed_form import back_impact_line, one_collision_each
 from cradle.models.correlation import outcomes
 
 ROOT = Path(__file__).parents[1]
-NOTEBOOK = nbformat.read(ROOT / "book" / "beyond.ipynb", as_version=4)
+CHAPTER = Chapter("beyond")
 # Converged Hertz springs, v = (1, 0, ...), from another program than this package.
 HERTZ = {
     3: [-0.070952354, 0.076403039, 0.994549315],
@@ -64,15 +64,6 @@ def find(group, **equal):
 def column(rows, *names):
     found = np.array([[row[name] for name in names] for row in rows])
     return found[:, 0] if len(names) == 1 else found
-
-
-def glued(name):
-    """A number as the text shows it."""
-    for cell in NOTEBOOK.cells:
-        for output in cell.get("outputs", ()):
-            if output.get("metadata", {}).get("scrapbook", {}).get("name") == f"beyond-{name}":
-                return output.data["application/papermill.record/text/plain"].strip("'")
-    raise KeyError(name)
 
 
 def struck(balls, strikers=1):
@@ -217,7 +208,7 @@ def test_fig_beyond_map():
     m1, m3 = np.broadcast_arrays(1 / axis[:, None], 1 / axis)
     masses = np.stack([m1, np.ones_like(m1), m3], axis=-1)
     found = outcomes(masses, [1, 0, 0], 0.5, 0.15)
-    assert str(found.collapsed.size) == glued("map-live")
+    assert str(found.collapsed.size) == CHAPTER.glued["map-live"]
     above = axis[:, None] > back_impact_line(axis, 0.5, 0.5, 0.15)[None, :]
     np.testing.assert_array_equal((found.collisions == 1).all(axis=-1), above)
     once = one_collision_each(masses, np.array([1.0, 0, 0]), np.full(2, 0.5), 0.15)
@@ -248,7 +239,7 @@ def test_fig_beyond_time():
             assert 0.9 < slope < 1.1
     longest = find("elastic", balls=100_000.0)
     assert column(longest, "cpu_seconds").max() < 1.0  # a long chain in a second
-    assert glued("time-most") == f"{column(longest, 'time_ratio').max():.0f}"
+    assert CHAPTER.glued["time-most"] == f"{column(longest, 'time_ratio').max():.0f}"
     assert kernel.CUT == 2.0**-120  # as the text has it
 
 
@@ -269,7 +260,7 @@ def test_fig_beyond_stability():
     finite = find("losses", collapsed=0.0)
     assert column(finite, "spread").max() < 1e-4  # the leader to four digits
     assert (column(finite, "fast_least") == column(finite, "fast_most")).all()
-    assert glued("fast-same") == "all"
+    assert CHAPTER.glued["fast-same"] == "all"
     # A change of masses that is not a rounding error: the leader stays, others do not.
     masses, velocities = np.ones((9, 120)), struck(120)[1]
     masses[1:] *= 1 + 1e-15 * np.random.default_rng(5).uniform(-1, 1, (8, 120))
@@ -295,9 +286,9 @@ def test_fig_beyond_springs():
     leaders = ends(tried)[:, 2]  # falls with the ratio
     by_leader = np.interp(-last, -leaders, tried)
     by_striker = -2 * first / (1 - first)
-    assert f"{by_leader[-1]:.4f}" == glued("ratio-leader")
-    assert f"{by_leader[0]:.4f}" == glued("ratio-three")
-    assert f"{by_striker[-1]:.4f}" == glued("ratio-striker")
+    assert f"{by_leader[-1]:.4f}" == CHAPTER.glued["ratio-leader"]
+    assert f"{by_leader[0]:.4f}" == CHAPTER.glued["ratio-three"]
+    assert f"{by_striker[-1]:.4f}" == CHAPTER.glued["ratio-striker"]
     assert (np.diff(by_leader[:8]) > 0).all()
     assert np.abs(by_striker - by_striker[-1]).max() < 3e-4
     np.testing.assert_allclose(by_leader[0], by_striker[0], atol=1e-5)

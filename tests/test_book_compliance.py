@@ -4,11 +4,10 @@ The second route is the equations of motion with contacts that cannot pull, inte
 """
 
 import math
-from pathlib import Path
 
-import nbformat
 import numpy as np
 import pytest
+from chapters import Chapter
 from reference import solve
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -17,28 +16,7 @@ from cradle import Chain, ImpulseCorrelation, collide, ratio_table
 
 GAMMAS = (0.05, 0.5, 1.0, 2.0, 7.0, 60.0)
 THREE = Chain([1, 1, 1], [1, 0, 0], 1)
-
-
-@pytest.fixture(scope="module")
-def cells(root: Path) -> dict:
-    """The cells of the chapter by id, as stored."""
-    notebook = nbformat.read(root / "book" / "compliance.ipynb", as_version=4)
-    return {cell.id: cell for cell in notebook.cells}
-
-
-def printed(cell) -> str:
-    return "".join(output.get("text", "") for output in cell.outputs)
-
-
-def glued(cells: dict, name: str) -> str:
-    """The value that the text of the chapter shows under this name."""
-    (value,) = [
-        output.data["application/papermill.record/text/plain"]
-        for cell in cells.values()
-        for output in cell.get("outputs", [])
-        if output.get("metadata", {}).get("scrapbook", {}).get("name") == name
-    ]
-    return value.strip("'")
+CHAPTER = Chapter("compliance")
 
 
 def springs(*stiffness, pull=False, until=None):
@@ -165,15 +143,15 @@ def test_eqs_12_and_13(gamma: float):
             assert delta == pytest.approx(printed_13(gamma, 1, t, alpha_2), rel=0, abs=1e-12)
 
 
-def test_eq_13_has_no_constant_ratio(cells: dict):
+def test_eq_13_has_no_constant_ratio():
     """The alpha_2 that stops one mode lets the other go on."""
     for gamma in GAMMAS:
         first, second = (gamma * lam / (2 * lam - 3 * gamma) for lam in eigenvalues(gamma))
         assert first - second == pytest.approx(2 * math.sqrt(1 - gamma + gamma**2), rel=1e-12)
-    assert "2*sqrt(gamma**2 - gamma + 1)" in printed(cells["sympy-delta"])
+    assert "2*sqrt(gamma**2 - gamma + 1)" in CHAPTER.printed("sympy-delta")
 
 
-def test_eq_14_is_not_the_limit(cells: dict):
+def test_eq_14_is_not_the_limit():
     """Printed form: gamma_2 = gamma instead of 3 gamma / 2; the ratio is never gamma."""
     gamma, alpha_2 = 1e-6, -0.3
     _, g2 = eigenvalues(gamma)
@@ -192,7 +170,7 @@ def test_eq_14_is_not_the_limit(cells: dict):
         tau_2, tau_3 = path.sol(first_loss(gamma)[0])[6:]
         assert tau_3 / tau_2 / gamma == pytest.approx(factor, rel=gamma)
         assert path.y[7, -1] / path.y[6, -1] == pytest.approx(1, abs=gamma)
-    assert glued(cells, "compliance-loss-factor") == f"{factor:.3f}"
+    assert CHAPTER.glued["loss-factor"] == f"{factor:.3f}"
 
 
 def test_eq_15_is_a_clean_limit():
@@ -223,8 +201,8 @@ def test_eq_16_is_what_the_model_does():
         np.testing.assert_allclose(steps[first, 1], ratio * steps[first, 0], rtol=1e-13)
 
 
-def test_fig_2_is_drawn_and_described(cells: dict):
-    cell = cells["draw-springs"]
+def test_fig_2_is_drawn_and_described():
+    cell = CHAPTER.cells["draw-springs"]
     assert any("image/svg+xml" in output.get("data", {}) for output in cell.outputs)
     assert cell.metadata["mystnb"]["figure"]["name"] == "fig-p2"
     alt = cell.metadata["mystnb"]["image"]["alt"]
@@ -246,8 +224,8 @@ def test_fig_own_compliance_ratio():
                 assert tau_3 / tau_2 / gamma == pytest.approx(limit, rel=0.01)
 
 
-def test_table_of_limits(cells: dict):
-    lines = printed(cells["table-limits"]).splitlines()
+def test_table_of_limits():
+    lines = CHAPTER.printed("table-limits").splitlines()
     assert lines[0].split() == ["gamma", "opens_first", "ratio_there", "error_Eq_14", "error_Eq_15"]
     assert len(lines) == 8
     for line in lines[1:]:
@@ -261,49 +239,48 @@ def test_table_of_limits(cells: dict):
         assert [error_14, error_15] == pytest.approx(worst, rel=1e-3)
 
 
-def test_converged_outcome_of_equal_springs(cells: dict):
+def test_converged_outcome_of_equal_springs():
     expected = (-0.130261695, 0.150229569, 0.980032126)
     velocities = outcome(1, 1)
     np.testing.assert_allclose(velocities, expected, rtol=0, atol=1e-8)
     for name, v in zip(("v1", "v2", "v3"), velocities):
-        assert float(glued(cells, f"compliance-{name}")) == pytest.approx(v, rel=0, abs=5.1e-7)
-    first, last = printed(cells["equal-springs"]).splitlines()
+        assert float(CHAPTER.glued[name]) == pytest.approx(v, rel=0, abs=5.1e-7)
+    first, last = CHAPTER.printed("equal-springs").splitlines()
     stored = [float(x) for x in last.split("[")[1].rstrip("]").split()]
     np.testing.assert_allclose(stored, expected, rtol=0, atol=1e-8)
     loss, contact = first_loss(1)
     assert first.startswith(f"t = {loss:.6f}: contact {contact} opens")
 
 
-def test_ratios_of_equal_springs(cells: dict):
+def test_ratios_of_equal_springs():
     loss, _ = first_loss(1)
     minus_2, minus_3 = printed_10_and_11(1, 1, loss)
     tau_2, tau_3 = springs(1, 1).y[6:, -1]
-    assert glued(cells, "compliance-loss") == f"{loss:.4f}"
-    assert glued(cells, "compliance-ratio-loss") == f"{minus_3 / minus_2:.4f}"
-    assert glued(cells, "compliance-ratio-end") == f"{tau_3 / tau_2:.4f}"
+    assert CHAPTER.glued["loss"] == f"{loss:.4f}"
+    assert CHAPTER.glued["ratio-loss"] == f"{minus_3 / minus_2:.4f}"
+    assert CHAPTER.glued["ratio-end"] == f"{tau_3 / tau_2:.4f}"
     table = ratio_table()
     (measured,) = table.loc[table["triplet"] == "AAA", "ratio"]
-    assert glued(cells, "compliance-AAA") == f"{measured:.3f}"
+    assert CHAPTER.glued["AAA"] == f"{measured:.3f}"
 
 
-def test_effective_ratio_of_equal_springs(cells: dict):
+def test_effective_ratio_of_equal_springs():
     velocities = outcome(1, 1)
     ratio = constant_ratio(velocities)
     assert ratio == pytest.approx(0.230498292, rel=0, abs=1e-8)
-    assert float(glued(cells, "compliance-effective")) == pytest.approx(ratio, rel=0, abs=5.1e-7)
+    assert float(CHAPTER.glued["effective"]) == pytest.approx(ratio, rel=0, abs=5.1e-7)
     # The model with that ratio: an independent solver gives the springs' outcome.
     again = [float(v) for v in solve([1, 1, 1], [1, 0, 0], 1, ratio).velocities]
     np.testing.assert_allclose(again, velocities, rtol=0, atol=1e-9)
 
 
-def test_fig_own_compliance_effective(cells: dict):
+def test_fig_own_compliance_effective():
     """The three ratios of the figure at some stiffnesses, and the law for a soft second spring."""
     for gamma in (0.1, 0.01):
         ratio = constant_ratio(outcome(1, gamma))
         assert ratio / gamma == pytest.approx(math.pi**2 / 8 - 1, rel=0.03 * gamma + 1e-7)
-        assert f"gamma = {gamma}: effective ratio / gamma = {ratio / gamma:.6f}" in printed(
-            cells["sympy-effective"]
-        )
+        stored = f"gamma = {gamma}: effective ratio / gamma = {ratio / gamma:.6f}"
+        assert stored in CHAPTER.printed("sympy-effective")
     # Towards 1/2 for a stiff second spring; all outcomes stay on the arc of chapter 1.
     for gamma, low in ((2, 0.394), (10, 0.497), (100, 0.4999)):
         velocities = outcome(1, gamma)
@@ -311,17 +288,17 @@ def test_fig_own_compliance_effective(cells: dict):
         assert [velocities.sum(), (velocities**2).sum()] == pytest.approx([1, 1], abs=1e-9)
 
 
-def test_exercises(cells: dict):
-    gamma = float(printed(cells["solution-1"]).split("=")[1])
+def test_exercises():
+    gamma = float(CHAPTER.printed("solution-1").split("=")[1])
     assert constant_ratio(outcome(1, gamma)) == pytest.approx(0.167, abs=2e-5)
 
     loss, _ = first_loss(1)
     q = printed_7_to_9(1, 1, loss)
-    assert printed(cells["solution-2"]).startswith(f"{(q[1] - q[2]) ** 2:.1%} ")
+    assert CHAPTER.printed("solution-2").startswith(f"{(q[1] - q[2]) ** 2:.1%} ")
 
     rows = [
         [float(x) for x in line.split("[")[1].split("]")[0].split()]
-        for line in printed(cells["solution-3"]).splitlines()
+        for line in CHAPTER.printed("solution-3").splitlines()
     ]
     ratio = constant_ratio(outcome(1, 1))
     np.testing.assert_allclose(rows[0], outcome(1, 1, 1), rtol=0, atol=6e-5)

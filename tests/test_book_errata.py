@@ -6,24 +6,17 @@ import re
 from pathlib import Path
 
 import mpmath
-import nbformat
 import numpy as np
 import pytest
 import reference
+from chapters import Chapter
 
 from cradle import Chain, ImpulseCorrelation, collide
 
 TESTS = Path(__file__).parent
-CELLS = nbformat.read(TESTS.parent / "book" / "errata.ipynb", as_version=4).cells
-TEXT = "\n".join(cell.source for cell in CELLS if cell.cell_type == "markdown")
-GLUED = {
-    output.metadata["scrapbook"]["name"].removeprefix("errata-"): output.data[
-        "application/papermill.record/text/plain"
-    ].strip("'")
-    for cell in CELLS
-    for output in cell.get("outputs", [])
-    if "scrapbook" in output.get("metadata", {})
-}
+CHAPTER = Chapter("errata")
+TEXT = "\n".join(cell.source for cell in CHAPTER.cells.values() if cell.cell_type == "markdown")
+GLUED = CHAPTER.glued
 
 
 def exact(*chain, **options):

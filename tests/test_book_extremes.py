@@ -5,9 +5,9 @@ import math
 from pathlib import Path
 
 import extremes as x
-import nbformat
 import numpy as np
 import pytest
+from chapters import Chapter
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide, paper_chain
 from cradle.models.correlation import outcomes
@@ -23,17 +23,7 @@ def stored(part):
 @pytest.fixture(scope="module")
 def glued():
     """Numbers that the text of the chapter shows."""
-    found = {}
-    for cell in nbformat.read(ROOT / "book" / "extremes.ipynb", as_version=4).cells:
-        for output in cell.get("outputs", []):
-            name = output.get("metadata", {}).get("scrapbook", {}).get("name", "")
-            if name.startswith("application/papermill.record/extremes-"):
-                name = name.removeprefix("application/papermill.record/")
-            if name.startswith("extremes-"):
-                text = next(iter(output["data"].values()))
-                found[name.removeprefix("extremes-")] = text.strip("'")
-    assert len(found) > 30
-    return found
+    return Chapter("extremes").glued
 
 
 def test_fig_extremes_map(glued):

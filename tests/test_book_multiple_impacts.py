@@ -2,19 +2,18 @@
 
 import re
 from itertools import pairwise
-from pathlib import Path
 
 import mpmath
-import nbformat
 import numpy as np
 import pytest
 import reference
+from chapters import Chapter
 
 from cradle import Chain, ImpulseCorrelation, collide
 
 SEQUENCE = [("end", 0), ("close", 0), ("end", 1), ("close", 1), ("end", 0), ("end", 1)]
 VELOCITIES = (1, "0.8", 0)
-NOTEBOOK = Path(__file__).parents[1] / "book" / "multiple_impacts.ipynb"
+CHAPTER = Chapter("multiple_impacts")
 # The chapter's example and others with the same sequence: masses, e2, e3, forward, backward.
 EXAMPLES = [
     ((1, 1, 1), "0.3", "0.3", "0.05", "0.05"),
@@ -22,13 +21,6 @@ EXAMPLES = [
     ((1, 1, 1), "0.25", "0.35", "0.08", "0.02"),
     ((2, "1.5", "1.7"), "0.25", "0.3", "0.05", "0.1"),
 ]
-
-
-def printed(cell_id):
-    """What a cell of the chapter prints, as stored."""
-    cells = nbformat.read(NOTEBOOK, as_version=4).cells
-    outputs = next(cell.outputs for cell in cells if cell["id"] == cell_id)
-    return "".join(output.text for output in outputs if output.output_type == "stream")
 
 
 def changes(events):
@@ -95,7 +87,7 @@ def test_eq_36_fourth_line_needs_its_factor():
         assert too_fast == pytest.approx(a * (end[3] - start[3]) / m2, rel=1e-9)
         assert too_fast > 1e-3
         if example is EXAMPLES[0]:
-            stored = re.search(r"momentum missing .*: ([\d.]+)", printed("functions"))
+            stored = re.search(r"momentum missing .*: ([\d.]+)", CHAPTER.printed("functions"))
             assert float(stored[1]) == pytest.approx(m2 * too_fast, abs=6e-6)
 
 
@@ -135,7 +127,9 @@ def test_fig_5_marked_values_as_printed_in_the_chapter():
     }
     for name, key in velocities.items():
         expected[f"v_{name}+"] = exact.path[rows[key]][int(name[0]) - 1]
-    stored = {line.split()[0]: line.split()[1:3] for line in printed("compare").splitlines()[1:]}
+    stored = {
+        line.split()[0]: line.split()[1:3] for line in CHAPTER.printed("compare").splitlines()[1:]
+    }
     assert stored.keys() == expected.keys()
     for name, (by_equations, by_solver) in stored.items():
         assert float(by_equations) == pytest.approx(float(expected[name]), abs=6e-7)
@@ -154,7 +148,9 @@ def sequence_occurs(e, ratio):
 
 
 def test_fig_5_region_of_the_sequence():
-    numbers = re.search(r"([\d.]+) < e < ([\d.]+), as printed from ([\d.]+)", printed("edges"))
+    numbers = re.search(
+        r"([\d.]+) < e < ([\d.]+), as printed from ([\d.]+)", CHAPTER.printed("edges")
+    )
     lower, upper, split = map(float, numbers.groups())
     step = 1e-4  # the last digit printed
     assert not sequence_occurs(lower - step, 0.05)[0]
@@ -170,7 +166,7 @@ def test_fig_5_region_share_of_the_map():
     values = ((np.arange(120) + 0.5) / 240)[2::6].tolist()
     found = np.array([[sequence_occurs(e, ratio) for ratio in values] for e in values])
     share, early = found.sum(axis=(0, 1)) / len(values) ** 2
-    stored = re.search(r"share of the map: ([\d.]+), as printed ([\d.]+)", printed("edges"))
+    stored = re.search(r"share of the map: ([\d.]+), as printed ([\d.]+)", CHAPTER.printed("edges"))
     assert float(stored[1]) == pytest.approx(share, abs=0.02)
     assert float(stored[2]) == pytest.approx(early, abs=0.02)
 

@@ -2,26 +2,18 @@
 
 import io
 import math
-from pathlib import Path
 
-import nbformat
 import numpy as np
 import pandas as pd
 import pytest
 import reference
+from chapters import Chapter
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequences
 from cradle.closed_form import largest_ratios
 
 FIG_8 = Chain([1] * 4, [1, 0.5, 0, 0], 1)
-NOTEBOOK = Path(__file__).parents[1] / "book" / "n_balls.ipynb"
-
-
-def printed(cell_id):
-    """What a cell of the chapter prints, as stored."""
-    cells = nbformat.read(NOTEBOOK, as_version=4).cells
-    outputs = next(cell.outputs for cell in cells if cell["id"] == cell_id)
-    return "".join(output.text for output in outputs if output.output_type == "stream")
+CHAPTER = Chapter("n_balls")
 
 
 def random_chain(seed, n):
@@ -112,7 +104,7 @@ def test_eq_53_at_the_bound_the_rest_is_one_body(n):
 
 
 def test_end_progress_is_as_exact_as_its_arguments():
-    rows = printed("root-cell").splitlines()[2:]
+    rows = CHAPTER.printed("root-cell").splitlines()[2:]
     errors = {float(row.split()[0]): [float(x) for x in row.split()[1:]] for row in rows}
     assert all(ours < 3e-16 for _, ours in errors.values())
     # The school formula loses as many digits as Q is small.
@@ -203,7 +195,7 @@ def test_fig_8_overlap_and_midpoint():
     high, low = (v[0] + v[1] + left) / 2, (v[2] + v[3] - right) / 2
     met = trace.path[trace.events.index(("close", 1)) + 1]
     assert met[1] == pytest.approx((low + high) / 2, rel=1e-13) == pytest.approx(met[2], rel=1e-15)
-    words = printed("fig8a-cell").replace(",", "").split()
+    words = CHAPTER.printed("fig8a-cell").replace(",", "").split()
     assert float(words[words.index("overlap") + 1]) == pytest.approx(low, abs=6e-5)
     assert float(words[words.index("midpoint") - 1]) == pytest.approx(high, abs=6e-5)
 
@@ -215,7 +207,9 @@ def contact_work(trace, c, row):
 
 
 def test_fig_8_three_readings():
-    table = pd.read_csv(io.StringIO(printed("readings-cell").split("spread")[0]), sep=r"\s+")
+    table = pd.read_csv(
+        io.StringIO(CHAPTER.printed("readings-cell").split("spread")[0]), sep=r"\s+"
+    )
     turns = {
         "both": ("forward", "backward"),
         "left": ("forward", "forward"),
@@ -249,7 +243,8 @@ def test_fig_8_meeting_moves_two_of_ten_sequences():
             np.testing.assert_allclose(ends[-1], exact.velocities, atol=1e-12)
         moved[name] = np.ptp(ends, axis=0).max()
     stored = {
-        row.split()[0]: float(row.split()[-1]) for row in printed("meeting-cell").splitlines()[2:]
+        row.split()[0]: float(row.split()[-1])
+        for row in CHAPTER.printed("meeting-cell").splitlines()[2:]
     }
     assert list(stored) == list(moved)
     assert {name for name, size in moved.items() if size > 0} == {"ABCCAB", "BCACBA"}

@@ -1,38 +1,16 @@
 """Chapter 1 of the book: momentum, restitution, and the two answers (Eqs. 1-6, Fig. 1)."""
 
 from fractions import Fraction
-from pathlib import Path
 
-import nbformat
 import numpy as np
 import pytest
+from chapters import Chapter
 from reference import solve
 
 from cradle import Chain, ImpulseCorrelation, collide
 
 EQUAL = Chain([1, 1, 1], [1, 0, 0], 1)
-
-
-@pytest.fixture(scope="module")
-def cells(root: Path) -> dict:
-    """The cells of the chapter by id, as stored."""
-    notebook = nbformat.read(root / "book" / "problem.ipynb", as_version=4)
-    return {cell.id: cell for cell in notebook.cells}
-
-
-def printed(cell) -> str:
-    return "".join(output.get("text", "") for output in cell.outputs)
-
-
-def glued(cells: dict, name: str) -> str:
-    """The value that the text of the chapter shows under this name."""
-    (value,) = [
-        output.data["application/papermill.record/text/plain"]
-        for cell in cells.values()
-        for output in cell.get("outputs", [])
-        if output.get("metadata", {}).get("scrapbook", {}).get("name") == name
-    ]
-    return value.strip("'")
+CHAPTER = Chapter("problem")
 
 
 def elastic(m1, v1, m2, v2):
@@ -74,19 +52,19 @@ def test_eq_4_kinematic_restitution():
         assert v[0] - v[1] == pytest.approx(-e * before, rel=0, abs=1e-13)
 
 
-def test_eqs_1_to_4_leave_one_unknown(cells: dict):
+def test_eqs_1_to_4_leave_one_unknown():
     """Unknown: three velocities and two impulses; rows: Eqs. 1-4 for some masses."""
     rows = np.array(
         [[2, 0, 0, 1, 0], [0, 3, 0, -1, 1], [0, 0, 5, 0, -1], [1, -1, 0, 0, 0]], dtype=float
     )
     assert [5 - np.linalg.matrix_rank(rows[:count]) for count in (3, 4)] == [2, 1]
-    assert printed(cells["sympy-count"]).splitlines() == [
+    assert CHAPTER.printed("sympy-count").splitlines() == [
         "Eqs. 1-3: 5 unknowns, rank 3, 2 missing",
         "Eqs. 1-4: 5 unknowns, rank 4, 1 missing",
     ]
 
 
-def test_eq_5_fused_rest(cells: dict):
+def test_eq_5_fused_rest():
     first, rest = elastic(Fraction(1), Fraction(1), Fraction(2), Fraction(0))
     expected = [float(x) for x in (first, rest, rest)]
     for velocities in (
@@ -94,10 +72,10 @@ def test_eq_5_fused_rest(cells: dict):
         collide(EQUAL, ImpulseCorrelation(0.5)).velocities,
     ):
         np.testing.assert_allclose([float(v) for v in velocities], expected, rtol=0, atol=1e-14)
-    assert f"({first}, {rest}, {rest})" in printed(cells["sympy-answers"])
+    assert f"({first}, {rest}, {rest})" in CHAPTER.printed("sympy-answers")
 
 
-def test_eq_6_sequential(cells: dict):
+def test_eq_6_sequential():
     v1, v2 = elastic(Fraction(1), Fraction(1), Fraction(1), Fraction(0))
     v2, v3 = elastic(Fraction(1), v2, Fraction(1), Fraction(0))
     expected = [float(x) for x in (v1, v2, v3)]
@@ -106,18 +84,18 @@ def test_eq_6_sequential(cells: dict):
         collide(EQUAL, ImpulseCorrelation(0)).velocities,
     ):
         np.testing.assert_allclose([float(v) for v in velocities], expected, rtol=0, atol=1e-14)
-    assert f"({v1}, {v2}, {v3})" in printed(cells["sympy-answers"])
+    assert f"({v1}, {v2}, {v3})" in CHAPTER.printed("sympy-answers")
 
 
-def test_the_ends_of_the_ratio_are_the_two_answers(cells: dict):
+def test_the_ends_of_the_ratio_are_the_two_answers():
     """The cell names the answer that it meets and asserts none: a reader may change the ratio."""
-    lines = printed(cells["cradle-answers-code"]).splitlines()
+    lines = CHAPTER.printed("cradle-answers-code").splitlines()
     ends = {line.split(":")[0]: line.rpartition("]")[2].strip() for line in lines}
     assert ends == {"ratio 0": "Eq. 6", "ratio 0.25": "in between", "ratio 0.5": "Eq. 5"}
 
 
-def test_fig_1_is_drawn_and_described(cells: dict):
-    cell = cells["draw-impulses"]
+def test_fig_1_is_drawn_and_described():
+    cell = CHAPTER.cells["draw-impulses"]
     assert any("image/svg+xml" in output.get("data", {}) for output in cell.outputs)
     assert cell.metadata["mystnb"]["figure"]["name"] == "fig-p1"
     alt = cell.metadata["mystnb"]["image"]["alt"]
@@ -150,7 +128,7 @@ def test_fig_own_problem_family():
     np.testing.assert_allclose([u2[0], u3[0], u2[-1], u3[-1]], [0, -1, -1, 0], rtol=0, atol=1e-14)
 
 
-def test_fig_own_problem_definitions(cells: dict):
+def test_fig_own_problem_definitions():
     """Energy left by three definitions of e = 1, in closed form (equal balls)."""
     for a in np.linspace(0, 0.499, 12):
         trace = collide(EQUAL, ImpulseCorrelation(a))
@@ -164,14 +142,14 @@ def test_fig_own_problem_definitions(cells: dict):
         assert energy(2 * compressed) == pytest.approx((4 + a**2) / (2 - a) ** 2, rel=1e-13)
         assert energy(left / 2) == pytest.approx((2 + a**2) / (2 - a) ** 2, rel=1e-13)
         assert energy(right) == pytest.approx(1, rel=1e-13)
-    assert glued(cells, "problem-poisson-most") == f"{(4 + 0.499**2) / (2 - 0.499) ** 2:.3f}"
-    assert glued(cells, "problem-newton-least") == f"{2 / 4:.3f}"
+    assert CHAPTER.glued["poisson-most"] == f"{(4 + 0.499**2) / (2 - 0.499) ** 2:.3f}"
+    assert CHAPTER.glued["newton-least"] == f"{2 / 4:.3f}"
 
 
-def test_exercise_2_heavy_middle(cells: dict):
+def test_exercise_2_heavy_middle():
     rows = {
         line.split()[0]: [float(x) for x in line.split()[1:]]
-        for line in cells["solution-2"].outputs[0].data["text/plain"].splitlines()[1:3]
+        for line in CHAPTER.cells["solution-2"].outputs[0].data["text/plain"].splitlines()[1:3]
     }
     for name, ratio in (("sequential", 0), ("between", 1 / 6)):
         v = [float(x) for x in solve([1, 2, 1], [1, 0, 0], 1, ratio).velocities]

@@ -8,14 +8,15 @@ import csv
 from functools import cache
 from pathlib import Path
 
-import nbformat
 import numpy as np
 import pytest
+from chapters import Chapter
 from reference import solve
 
 from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, paper_chain
 
 ROOT = Path(__file__).parents[1]
+CHAPTER = Chapter("trade")
 IMPULSE_ENGINES = ("Chipmunk", "Box2D", "Bullet", "Rapier")
 ENGINES = (*IMPULSE_ENGINES, "MuJoCo")
 ELASTIC = {"three equal": [1, 1, 1], "five equal": [1] * 5, "light middle": [1, 0.01, 1]}
@@ -342,9 +343,8 @@ def test_fig_trade_curve_angles():
     measured = [float(v) for v in solve([1, 1, 1], [1, 0, 0], [1, 1], 0.167).velocities]
     expected |= {"measured": angle("three equal", measured), "end": 60.0}
     assert 0 < expected["Hertz"] < expected["measured"] < expected["linear"] < 60
-    glued = glue_of("trade-curve")
     for name, value in expected.items():
-        assert glued[f"trade-angle-{name}"] == f"'{value:.0f}'"
+        assert CHAPTER.glued[f"angle-{name}"] == f"{value:.0f}"
     # Engines that keep the energy of three equal balls sit at an end of the arc.
     for row in find("engine", chain="three equal"):
         if abs(row["energy_change"]) < 1e-6 and row["model"] != "MuJoCo":
@@ -358,7 +358,6 @@ def test_fig_trade_map():
             {k: float(v or "nan") for k, v in r.items() if k != "note"}
             for r in csv.DictReader(file)
         ]
-    glued = {name: text.strip("'") for name, text in glue_of("trade-map").items()}
 
     def at(exponent, gamma, m2=1.0, m3=1.0):
         (row,) = [
@@ -378,14 +377,14 @@ def test_fig_trade_map():
         assert at(exponent, 0.001) / 0.001 < 0.3
         assert at(exponent, 1000.0) == pytest.approx(0.5, abs=1e-4)
         # The stiffness ratio that gives AAA does, by springs: solved here, not interpolated.
-        gamma = float(glued[f"trade-crossing-{name}"])
+        gamma = float(CHAPTER.glued[f"crossing-{name}"])
         trace = collide(Chain([1] * 3, [1, 0, 0], 1), SpringChain([1.0, gamma], exponent))
         rigid = [float(v) for v in solve([1, 1, 1], [1, 0, 0], [1, 1], 0.167).velocities]
         np.testing.assert_allclose(trace.velocities, rigid, rtol=0, atol=3e-3)
     ratios = [r["ratio"] for r in rows if r["exponent"] == 1.5 and r["k2_over_k1"] == 1]
     assert len(ratios) == 25
-    assert glued["trade-map-least"] == f"{min(ratios):.3f}"
-    assert glued["trade-map-most"] == f"{max(ratios):.3f}"
+    assert CHAPTER.glued["map-least"] == f"{min(ratios):.3f}"
+    assert CHAPTER.glued["map-most"] == f"{max(ratios):.3f}"
     assert max(ratios) > 30 * min(ratios)
 
 
@@ -410,27 +409,12 @@ def test_savings_are_savings():
     assert line["time_ratio"] < 10 * three["time_ratio"]  # 333 times as many balls
 
 
-def glue_of(cell_id):
-    """Names and texts that a cell gives to the text."""
-    cells = nbformat.read(ROOT / "book" / "trade.ipynb", as_version=4).cells
-    (cell,) = [cell for cell in cells if cell.id == cell_id]
-    kind = "application/papermill.record/text/plain"
-    found = [o for o in cell.outputs if kind in o.get("data", {})]
-    return {o.metadata["scrapbook"]["name"]: o.data[kind] for o in found}
-
-
 def test_sequential_collisions_tell_who_moves_off_fastest():
     for scene in ELASTIC:
         for answer in (sequential(scene), np.array(HERTZ[scene])):
             assert np.argmax(answer) == len(answer) - 1
             assert answer[-1] - answer[-2] > 0.2
         assert abs(np.diff(fused(scene)[1:])).max() < 1e-12
-
-
-def output(cell_id):
-    cells = nbformat.read(ROOT / "book" / "trade.ipynb", as_version=4).cells
-    (cell,) = [cell for cell in cells if cell.id == cell_id]
-    return next(o.data["text/html"] for o in cell.outputs if "text/html" in o.get("data", {}))
 
 
 def test_the_decision_follows_from_the_table():
@@ -458,7 +442,11 @@ def test_the_decision_follows_from_the_table():
         cheapest(["springs"], "forces", 1e-6, 0.01),
         cheapest(["energy"], "energies", 1e-3, 1),
     ]
-    text = output("trade-decision")
+    (text,) = (
+        output.data["text/html"]
+        for output in CHAPTER.cells["trade-decision"].outputs
+        if "text/html" in output.get("data", {})
+    )
     at = 0
     for row in chosen:
         place = text.find(f"<td>{row['setting'].removeprefix('less: ')}</td>", at)
