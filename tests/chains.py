@@ -1,6 +1,34 @@
-"""Random chains, shared by the tests."""
+"""Chains that several tests use: given ones with their outcomes, and random ones."""
 
 import numpy as np
+
+from cradle import Chain
+
+# Elastic chains, struck with speed 1, on equal springs: converged velocities from another program.
+ELASTIC = {"three equal": [1, 1, 1], "five equal": [1] * 5, "light middle": [1, 0.01, 1]}
+HERTZ = {
+    "three equal": [-0.070952354, 0.076403039, 0.994549315],
+    "five equal": [-0.071085017, -0.030273764, -0.014463629, 0.127044986, 0.988777424],
+    "light middle": [-0.003175725, 0.396855171, 0.999207173],
+}
+LINEAR = {"three equal": [-0.130261695, 0.150229569, 0.980032126]}
+# Masses, exponent, velocities.
+SPRINGS = [
+    (ELASTIC[name], exponent, velocities)
+    for exponent, table in ((1.5, HERTZ), (1, LINEAR))
+    for name, velocities in table.items()
+]
+
+# Which contacts end and close under the paper's Fig. 8.
+FIG_8 = [
+    *(("end", 0), ("close", 0), ("end", 1), ("close", 1)),
+    *(("end", 2), ("end", 0), ("end", 1)),
+]
+
+
+def striking(masses=(1, 1, 1), e=1.0, speed=1.0):
+    """The first ball strikes the others at rest."""
+    return Chain(masses, [speed] + [0] * (len(masses) - 1), e)
 
 
 def within_bounds(masses, part):
@@ -39,6 +67,11 @@ def random_chains(rng, count, n, decades=6, speed=None):
     velocities = rng.normal(size=(count, n)) if speed is None else speed(count, n)
     part = with_ends(rng)
     return masses, velocities, part((count, n - 1)), *within_bounds(masses, part)
+
+
+def changes(events):
+    """Events that change which contacts are active."""
+    return [tuple(event) for event in events if event[0] != "maximum_compression"]
 
 
 def local_orders(events, contacts):

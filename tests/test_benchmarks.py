@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from chains import HERTZ, LINEAR
 
 from cradle.closed_form import three_balls
 
@@ -103,15 +104,10 @@ def test_truths_by_a_second_route():
     scene = scenes.SCENES["three equal"]
     exact = three_balls(scene.masses, scene.velocities, scene.restitution, 0.167)
     np.testing.assert_allclose(scene.truth(), exact, rtol=0, atol=1e-15)
-    hertz = {
-        "three equal": [-0.070952354, 0.076403039, 0.994549315],
-        "five equal": [-0.071085017, -0.030273764, -0.014463629, 0.127044986, 0.988777424],
-        "light middle": [-0.003175725, 0.396855171, 0.999207173],
-    }
-    for name, expected in hertz.items():
+    for name, expected in HERTZ.items():
         np.testing.assert_allclose(scenes.SCENES[name].springs(), expected, rtol=0, atol=6e-10)
     linear = scenes.SCENES["three equal"].springs(1)
-    np.testing.assert_allclose(linear, [-0.130261695, 0.150229569, 0.980032126], atol=6e-10)
+    np.testing.assert_allclose(linear, LINEAR["three equal"], atol=6e-10)
 
 
 def test_factors_of_the_balls_multiply_to_restitution():

@@ -7,6 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 import reference
+from chains import changes
 from chapters import Chapter
 
 from cradle import Chain, ImpulseCorrelation, collide
@@ -21,10 +22,6 @@ EXAMPLES = [
     ((1, 1, 1), "0.25", "0.35", "0.08", "0.02"),
     ((2, "1.5", "1.7"), "0.25", "0.3", "0.05", "0.1"),
 ]
-
-
-def changes(events):
-    return [tuple(event) for event in events if event[0] != "maximum_compression"]
 
 
 def solved(masses, e2, e3, forward, backward):

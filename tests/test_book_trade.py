@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from chains import ELASTIC, HERTZ, LINEAR
 from chapters import Chapter
 from reference import solve
 
@@ -19,13 +20,6 @@ ROOT = Path(__file__).parents[1]
 CHAPTER = Chapter("trade")
 IMPULSE_ENGINES = ("Chipmunk", "Box2D", "Bullet", "Rapier")
 ENGINES = (*IMPULSE_ENGINES, "MuJoCo")
-ELASTIC = {"three equal": [1, 1, 1], "five equal": [1] * 5, "light middle": [1, 0.01, 1]}
-# Converged Hertz springs, v = (1, 0, ...); the first from another program than this package.
-HERTZ = {
-    "three equal": [-0.070952354, 0.076403039, 0.994549315],
-    "five equal": [-0.071085017, -0.030273764, -0.014463629, 0.127044986, 0.988777424],
-    "light middle": [-0.003175725, 0.396855171, 0.999207173],
-}
 NUMBERS = (
     "parameter", "numerical_error", "model_error", "momentum_error", "energy_change",
     "microseconds", "time_ratio", "repeats", "evaluations",
@@ -338,8 +332,7 @@ def test_fig_trade_curve_angles():
 
     assert angle("three equal", fused("three equal")) == pytest.approx(60, abs=1e-6)
     expected = {"Hertz": angle("three equal", HERTZ["three equal"])}
-    linear = [-0.130261695, 0.150229569, 0.980032126]
-    expected |= {"linear": angle("three equal", linear)}
+    expected |= {"linear": angle("three equal", LINEAR["three equal"])}
     measured = [float(v) for v in solve([1, 1, 1], [1, 0, 0], [1, 1], 0.167).velocities]
     expected |= {"measured": angle("three equal", measured), "end": 60.0}
     assert 0 < expected["Hertz"] < expected["measured"] < expected["linear"] < 60

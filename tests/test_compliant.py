@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from chains import HERTZ, SPRINGS, striking
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import gamma
@@ -18,26 +19,14 @@ from cradle.models.compliant import SpringChain, TimedTrace
 KINDS = ("maximum_compression", "end", "close")
 
 
-def at_rest(masses, speed=1.0):
-    """Elastic chain, its first ball striking the others at rest."""
-    return Chain(masses, [speed] + [0] * (len(masses) - 1), 1)
-
-
 # --- outcomes ------------------------------------------------------------------------------
 
-CONVERGED = [
-    ([1, 1, 1], 1.5, [-0.070952354, 0.076403039, 0.994549315]),
-    ([1] * 5, 1.5, [-0.071085017, -0.030273764, -0.014463629, 0.127044986, 0.988777424]),
-    ([1, 0.01, 1], 1.5, [-0.003175725, 0.396855171, 0.999207173]),
-    ([1, 1, 1], 1, [-0.130261695, 0.150229569, 0.980032126]),
-]
 
-
-@pytest.mark.parametrize(("masses", "exponent", "velocities"), CONVERGED)
+@pytest.mark.parametrize(("masses", "exponent", "velocities"), SPRINGS)
 @pytest.mark.parametrize("rtol", [1e-9, 1e-12])
 def test_converged_values(masses, exponent, velocities, rtol):
     """Rounded to nine decimals, so the last of them is all that may differ once converged."""
-    trace = collide(at_rest(masses), SpringChain(1.0, exponent, rtol=rtol))
+    trace = collide(striking(masses), SpringChain(1.0, exponent, rtol=rtol))
     atol = 1e-8 if rtol == 1e-9 else 6e-10
     np.testing.assert_allclose(trace.velocities, velocities, rtol=0, atol=atol)
 
@@ -46,7 +35,7 @@ def test_converged_values(masses, exponent, velocities, rtol):
 def test_three_linear_balls_follow_equations_7_to_11(ratio):
     """Equal balls, springs k and ratio k: two harmonics while both contacts are closed."""
     k = np.array([2.0, 2.0 * ratio])
-    trace = collide(at_rest([1, 1, 1]), SpringChain(k, 1, rtol=1e-11))
+    trace = collide(striking(), SpringChain(k, 1, rtol=1e-11))
     rows = [event.kind for event in trace.events].index("end") + 2
     assert rows > 2
     # Displacements q: q'' = -K q. The eigenvalues of K are those of Eqs. 7-9, and zero; the initial
@@ -101,7 +90,7 @@ def test_two_balls(exponent):
 
 @pytest.mark.parametrize("exponent", [1, 1.5])
 def test_error_falls_with_rtol(exponent):
-    chain = at_rest([1, 0.3, 1, 2])
+    chain = striking([1, 0.3, 1, 2])
     exact = collide(chain, SpringChain([1, 2, 3], exponent, rtol=1e-13)).velocities
 
     def error(rtol):
@@ -115,8 +104,8 @@ def test_error_falls_with_rtol(exponent):
 
 @pytest.mark.parametrize("method", ["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"])
 def test_every_method(method):
-    trace = collide(at_rest([1, 1, 1]), SpringChain(1.0, rtol=1e-6, method=method))
-    np.testing.assert_allclose(trace.velocities, CONVERGED[0][2], rtol=0, atol=1e-4)
+    trace = collide(striking(), SpringChain(1.0, rtol=1e-6, method=method))
+    np.testing.assert_allclose(trace.velocities, HERTZ["three equal"], rtol=0, atol=1e-4)
     assert trace.evaluations > 50
 
 
@@ -124,7 +113,7 @@ def test_stiff_second_spring_makes_one_body():
     """Eq. 5 is the limit of a second spring much stiffer than the first."""
     fused = np.array([-1, 2, 2]) / 3
     distances = [
-        abs(collide(at_rest([1, 1, 1]), SpringChain([1, g], 1)).velocities - fused).max()
+        abs(collide(striking(), SpringChain([1, g], 1)).velocities - fused).max()
         for g in (1e2, 1e4, 1e6)
     ]
     assert distances[0] > 5 * distances[1] > 25 * distances[2]
@@ -230,7 +219,7 @@ def test_mirror(case):
 
 
 def test_events_of_three_hertz_balls():
-    trace = collide(at_rest([1, 1, 1]), SpringChain(1.0))
+    trace = collide(striking(), SpringChain(1.0))
     assert trace.events == (
         ("maximum_compression", 0),
         ("maximum_compression", 1),
@@ -248,7 +237,7 @@ def test_events_of_three_hertz_balls():
 
 
 def test_forces_integrate_to_impulses():
-    trace = collide(at_rest([1, 2, 1, 3]), SpringChain([1, 2, 3], rtol=1e-11))
+    trace = collide(striking([1, 2, 1, 3]), SpringChain([1, 2, 3], rtol=1e-11))
     impulses = np.trapezoid(trace.step_forces, trace.step_times, axis=0)
     np.testing.assert_allclose(impulses, trace.impulses, rtol=0.01)
 
@@ -299,7 +288,7 @@ def test_contact_shorter_than_a_step(masses, velocities, stiffness, exponent, co
 def test_no_contact_opens_ahead_of_the_wave(exponent):
     """Compressions there are smaller than the errors of the integration."""
     n = 30
-    trace = collide(at_rest([1] * n), SpringChain(1.0, exponent))
+    trace = collide(striking([1] * n), SpringChain(1.0, exponent))
     assert trace.collisions.tolist() == [1] * (n - 1)
     first = [trace.events.index(("maximum_compression", c)) for c in range(n - 1)]
     assert first == sorted(first)
@@ -307,11 +296,11 @@ def test_no_contact_opens_ahead_of_the_wave(exponent):
 
 def test_absorbed_is_the_energy_at_the_extremes():
     """A light ball swings between heavy ones that stay in touch: many maxima, one collision."""
-    trace = collide(at_rest([1, 0.01, 1]), SpringChain(1.0, 1, rtol=1e-11))
+    trace = collide(striking([1, 0.01, 1]), SpringChain(1.0, 1, rtol=1e-11))
     assert trace.collisions.tolist() == [1, 1]
     # Between two maxima of a contact is a minimum; every one of them is a turn of the closing
     # speed, so the work absorbed is the integral of the power over the time of compression.
-    fine = collide(at_rest([1, 0.01, 1]), SpringChain(1.0, 1, rtol=1e-13, method="RK45"))
+    fine = collide(striking([1, 0.01, 1]), SpringChain(1.0, 1, rtol=1e-13, method="RK45"))
     d = fine.step_forces  # k = 1, p = 1: the force is the compression
     energy = d**2 / 2
     rises = np.clip(np.diff(energy, axis=0), 0, None).sum(axis=0)
@@ -345,7 +334,7 @@ def test_max_time_shows_what_was_reached():
     with pytest.raises(
         ImpactNotFinished, match=r"not finished after 1 s and 0 events: max_time"
     ) as e:
-        collide(at_rest([1, 1]), model)
+        collide(striking([1, 1]), model)
     # A linear contact of mu = 1/2: u = cos(omega t), omega = sqrt(2).
     v1, v2 = e.value.trace.velocities
     assert v1 - v2 == pytest.approx(math.cos(math.sqrt(2)), abs=1e-8)
@@ -356,7 +345,7 @@ def test_max_time_shows_what_was_reached():
 def test_max_evaluations_bounds_the_work(method):
     model = SpringChain(1.0, max_evaluations=100, method=method)
     with pytest.raises(ImpactNotFinished, match="max_evaluations = 100 reached") as stopped:
-        collide(at_rest([1, 1e-12, 1]), model)
+        collide(striking([1, 1e-12, 1]), model)
     assert stopped.value.trace.evaluations == 100
 
 
@@ -399,17 +388,17 @@ def test_a_spring_cannot_dissipate():
 
 def test_stiffness_of_the_wrong_length():
     with pytest.raises(ValueError, match=r"^stiffness has 3 values; 3 balls need 2"):
-        collide(at_rest([1, 1, 1]), SpringChain([1, 2, 3]))
+        collide(striking(), SpringChain([1, 2, 3]))
 
 
 def test_scales_beyond_floats_are_refused():
     with pytest.raises(ValueError, match=r"^stiffness = 1e-300; .*choose other units"):
-        collide(at_rest([1e300, 1e300], 1e-3), SpringChain(1e-300, 1))
+        collide(striking([1e300, 1e300], speed=1e-3), SpringChain(1e-300, 1))
 
 
 def test_extreme_scales():
     """Nothing overflows on the way: units are the chain's own."""
-    trace = collide(at_rest([1e-200, 1e-200], 1e120), SpringChain(1e-10, rtol=1e-12))
+    trace = collide(striking([1e-200, 1e-200], speed=1e120), SpringChain(1e-10, rtol=1e-12))
     np.testing.assert_allclose(trace.velocities, [0, 1e120], rtol=0, atol=1e110)
 
 
@@ -424,7 +413,7 @@ def test_repr_is_the_caption():
 
 
 def test_trace_is_a_frozen_trace_with_times():
-    trace = collide(at_rest([1, 1]), SpringChain(1.0))
+    trace = collide(striking([1, 1]), SpringChain(1.0))
     assert isinstance(trace, TimedTrace)
     assert isinstance(trace, Trace)
     assert repr(trace).startswith("Trace(velocities=[")

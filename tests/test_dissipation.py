@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from chains import striking
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,10 +17,6 @@ from cradle import (
     SequentialCollisions,
     collide,
 )
-
-
-def striking(masses=(1, 1, 1), e=1.0):
-    return Chain(masses, [1] + [0] * (len(masses) - 1), e)
 
 
 @pytest.mark.parametrize("e", [0, 0.1, 0.5, 0.9, 0.999])

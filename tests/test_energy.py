@@ -4,30 +4,18 @@ import re
 
 import numpy as np
 import pytest
+from chains import SPRINGS, striking
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cradle import Chain, EnergyDistribution, EnergyTrace, ImpactNotFinished, SpringChain, collide
 
 
-def at_rest(masses, e=1.0):
-    """Chain at rest, its first ball striking at speed 1."""
-    return Chain(masses, [1] + [0] * (len(masses) - 1), e)
-
-
-CONVERGED = [
-    ([1, 1, 1], 1.5, [-0.070952354, 0.076403039, 0.994549315]),
-    ([1] * 5, 1.5, [-0.071085017, -0.030273764, -0.014463629, 0.127044986, 0.988777424]),
-    ([1, 0.01, 1], 1.5, [-0.003175725, 0.396855171, 0.999207173]),
-    ([1, 1, 1], 1, [-0.130261695, 0.150229569, 0.980032126]),
-]
-
-
-@pytest.mark.parametrize(("masses", "exponent", "velocities"), CONVERGED)
+@pytest.mark.parametrize(("masses", "exponent", "velocities"), SPRINGS)
 @pytest.mark.parametrize("gaps", [True, False])
 def test_elastic_impacts_are_those_of_springs(masses, exponent, velocities, gaps):
     """No contact of these acts twice, so that both readings of a gap agree."""
-    trace = collide(at_rest(masses), EnergyDistribution(3.0, exponent, gaps=gaps, rtol=1e-11))
+    trace = collide(striking(masses), EnergyDistribution(3.0, exponent, gaps=gaps, rtol=1e-11))
     np.testing.assert_allclose(trace.velocities, velocities, rtol=0, atol=1e-9)
 
 
@@ -66,7 +54,7 @@ def by_small_steps(chain, k, p, steps):
 
 @pytest.mark.parametrize(("k", "p", "e"), [([1, 1], 1.5, 0.8), ([1, 3], 1, 0.6), ([2, 1], 2, 1)])
 def test_against_the_law_as_it_is_written(k, p, e):
-    chain = at_rest([1, 1.5, 0.7], [e, 0.9])
+    chain = striking([1, 1.5, 0.7], [e, 0.9])
     v = by_small_steps(chain, k, p, 2e-4)
     trace = collide(chain, EnergyDistribution(k, p, rtol=1e-10))
     row = trace.events.index(("end", 0)) + 1
@@ -94,7 +82,7 @@ def test_two_balls(e, exponent, step):
 @pytest.mark.parametrize("e", [[1, 1], [0.7, 0.9], [0, 1], [1, 0]])
 def test_error_falls_with_the_step(e, exponent):
     """At least in proportion to it."""
-    chain = at_rest([1, 1.3, 0.8], e)
+    chain = striking([1, 1.3, 0.8], e)
     exact = collide(chain, EnergyDistribution([1, 2], exponent, rtol=1e-12)).velocities
     errors = [
         abs(collide(chain, EnergyDistribution([1, 2], exponent, step)).velocities - exact).max()
@@ -111,7 +99,7 @@ def test_ten_balls_of_the_authors_program():
     """
     siconos = [-0.07105929, -0.03018624, -0.01574960, -0.00880806, -0.00506234]
     siconos += [-0.00293663, -0.00170186, 0.00262452, 0.14692339, 0.98595612]
-    trace = collide(at_rest([0.0326] * 10), EnergyDistribution(1.0, gaps=False, rtol=1e-11))
+    trace = collide(striking([0.0326] * 10), EnergyDistribution(1.0, gaps=False, rtol=1e-11))
     np.testing.assert_allclose(trace.velocities, siconos, rtol=0, atol=5e-4)
     assert abs(trace.velocities - siconos)[:8].max() < 1e-4
 
@@ -181,8 +169,8 @@ def test_works_are_those_of_springs_at_e_1():
     """Contacts that are compressed again before they end count each compression."""
     again = False
     for masses, exponent in (([1, 1, 1], 1.5), ([2, 1, 1], 1), ([1, 2, 1, 3], 2)):
-        springs = collide(at_rest(masses), SpringChain(1.0, exponent, rtol=1e-10))
-        trace = collide(at_rest(masses), EnergyDistribution(1.0, exponent, rtol=1e-10))
+        springs = collide(striking(masses), SpringChain(1.0, exponent, rtol=1e-10))
+        trace = collide(striking(masses), EnergyDistribution(1.0, exponent, rtol=1e-10))
         maxima = [event.kind for event in trace.events].count("maximum_compression")
         again = again or maxima > trace.collisions.sum()
         np.testing.assert_allclose(trace.absorbed, springs.absorbed, rtol=1e-6, atol=1e-8)
@@ -203,7 +191,7 @@ def test_gaps_matter_where_a_contact_closes_again():
 
 def test_recompression_counts_in_the_totals():
     """A light ball between heavy ones: contacts are compressed again before they end."""
-    chain = at_rest([1, 0.01, 1], 0.9)
+    chain = striking([1, 0.01, 1], 0.9)
     trace = collide(chain, EnergyDistribution(1.0))
     maxima = [event.contact for event in trace.events if event.kind == "maximum_compression"]
     assert len(maxima) > trace.collisions.sum()
@@ -214,7 +202,7 @@ def test_recompression_counts_in_the_totals():
 @pytest.mark.parametrize("gaps", [True, False])
 @pytest.mark.parametrize("step", [None, 0.01])
 def test_endless_plastic_impacts_end_in_one_body(step, gaps):
-    trace = collide(at_rest([1, 1, 1], 0), EnergyDistribution(1.0, 1.5, step, gaps=gaps))
+    trace = collide(striking([1, 1, 1], 0), EnergyDistribution(1.0, 1.5, step, gaps=gaps))
     assert trace.collapsed
     np.testing.assert_allclose(trace.velocities, 1 / 3, rtol=0, atol=1e-14)
 
@@ -230,7 +218,7 @@ def test_balls_that_do_not_approach():
 def test_unfinished_impact_shows_what_was_reached(step):
     model = EnergyDistribution(1.0, step=step, max_evaluations=50)
     with pytest.raises(ImpactNotFinished, match="max_evaluations = 50 reached") as stopped:
-        collide(at_rest([1, 1, 1]), model)
+        collide(striking(), model)
     trace = stopped.value.trace
     assert trace.evaluations == 50
     assert trace.velocities.sum() == pytest.approx(1, abs=1e-14)
@@ -257,7 +245,7 @@ def test_bad_options_name_value_and_rule(options, message):
 
 def test_stiffness_of_the_wrong_length():
     with pytest.raises(ValueError, match=r"^stiffness has 3 values; 3 balls need 2"):
-        collide(at_rest([1, 1, 1]), EnergyDistribution([1, 2, 3]))
+        collide(striking(), EnergyDistribution([1, 2, 3]))
 
 
 def test_repr_is_the_caption():

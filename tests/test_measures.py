@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from chains import striking
 
 from cradle import (
     Chain,
@@ -54,10 +55,6 @@ def test_pattern_refuses(velocities, message):
 
 
 # --- effective ratio -----------------------------------------------------------------------
-
-
-def striking(masses=(1, 1, 1), e=1.0):
-    return Chain(masses, [1, 0, 0], e)
 
 
 @pytest.mark.parametrize(("exponent", "ratio"), [(1.5, 0.132503287), (1, 0.230498292)])
