@@ -160,24 +160,14 @@ class SpringChain:
 
     def solve(self, chain: Chain) -> TimedTrace:
         """Solve the impact of `chain`; see `collide`."""
-        n, u = len(chain), chain.closing_speeds
-        if np.ndim(self.stiffness) and np.size(self.stiffness) != n - 1:
-            raise ValueError(
-                f"stiffness has {np.size(self.stiffness)} values; {n} balls need {n - 1}, or one"
-            )
+        k, unit, mass, speed = _own_units(chain, self.stiffness)
         if (chain.restitution < 1.0).any():
             c = int(np.argmax(chain.restitution < 1.0))
             raise ValueError(
                 f"restitution[{c}] = {float(chain.restitution[c])!r}; must be 1 for SpringChain: "
                 "a spring gives back all the energy that it stores"
             )
-        stiffness = np.broadcast_to(np.asarray(self.stiffness, dtype=np.float64), (n - 1,))
-
-        # Units of the chain's own: reduced mass, speed and stiffness of the fastest closing.
-        c = int(np.argmax(u))
-        mass = chain.masses[c] / (chain.masses[c] + chain.masses[c + 1]) * chain.masses[c + 1]
-        speed = abs(float(u[c])) or 1.0
-        logarithm = math.log(mass) + 2.0 * math.log(speed) - math.log(stiffness[c])
+        logarithm = math.log(mass) + 2.0 * math.log(speed) - math.log(unit)
         logarithm = logarithm / (self.exponent + 1.0) - math.log(speed)
         if not abs(logarithm) <= 600.0:
             raise ValueError(
@@ -186,7 +176,7 @@ class SpringChain:
             )
         second = math.exp(logarithm)
 
-        scaled = (chain.masses / mass, u / speed, stiffness / stiffness[c])
+        scaled = (chain.masses / mass, chain.closing_speeds / speed, k / unit)
         motion = _Motion(*scaled, self.exponent, self.rtol)
         limit = math.inf if self.max_time is None else self.max_time / second
         reason = motion.run(self.method, limit, self.max_evaluations)
@@ -221,6 +211,21 @@ class SpringChain:
                 trace,
             )
         return trace
+
+
+def _own_units(
+    chain: Chain, stiffness: float | Sequence[float]
+) -> tuple[Vector, float, float, float]:
+    """Return the stiffnesses; then stiffness, reduced mass and speed of the fastest closing."""
+    n, u = len(chain), chain.closing_speeds
+    if np.ndim(stiffness) and np.size(stiffness) != n - 1:
+        raise ValueError(
+            f"stiffness has {np.size(stiffness)} values; {n} balls need {n - 1}, or one"
+        )
+    c = int(np.argmax(u))
+    mass = chain.masses[c] / (chain.masses[c] + chain.masses[c + 1]) * chain.masses[c + 1]
+    k = np.broadcast_to(np.asarray(stiffness, dtype=np.float64), (n - 1,))
+    return k, float(k[c]), float(mass), abs(float(u[c])) or 1.0
 
 
 class _TooManyEvaluations(Exception):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cradle.chain import Chain, Vector, checked
-from cradle.models.compliant import SpringChain, _Motion, _TooManyEvaluations
+from cradle.models.compliant import SpringChain, _Motion, _own_units, _TooManyEvaluations
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 _EPSILON = float(np.finfo(np.float64).eps)
@@ -142,11 +142,7 @@ class EnergyDistribution:
 
     def solve(self, chain: Chain) -> EnergyTrace:
         """Solve the impact of `chain`; see `collide`."""
-        n, u = len(chain), chain.closing_speeds
-        if np.ndim(self.stiffness) and np.size(self.stiffness) != n - 1:
-            raise ValueError(
-                f"stiffness has {np.size(self.stiffness)} values; {n} balls need {n - 1}, or one"
-            )
+        k, unit, mass, speed = _own_units(chain, self.stiffness)
         small = (chain.restitution > 0.0) & (chain.restitution < _SMALLEST)
         if small.any():
             c = int(np.argmax(small))
@@ -154,12 +150,8 @@ class EnergyDistribution:
                 f"restitution[{c}] = {float(chain.restitution[c])!r}; must be 0 or at least "
                 f"{_SMALLEST} for EnergyDistribution: such a release is too short to follow"
             )
-        k = np.broadcast_to(np.asarray(self.stiffness, dtype=np.float64), (n - 1,))
-        # Units of the chain's own: reduced mass, speed and stiffness of the fastest closing.
-        c = int(np.argmax(u))
-        mass = chain.masses[c] / (chain.masses[c] + chain.masses[c + 1]) * chain.masses[c + 1]
-        speed = abs(float(u[c])) or 1.0
-        process = _Process(chain.masses / mass, u / speed, k / k[c], chain.restitution, self)
+        scaled = (chain.masses / mass, chain.closing_speeds / speed, k / unit)
+        process = _Process(*scaled, chain.restitution, self)
         reason = process.run("DOP853", math.inf, self.max_evaluations)
         if not reason:
             process.part()
