@@ -73,6 +73,44 @@ def checked(
     return array
 
 
+def one_number(
+    name: str,
+    value: ArrayLike,
+    rule: str = "must be finite",
+    low: float = -np.inf,
+    high: float = np.inf,
+    open_low: bool = False,
+) -> float:
+    """Return `value` as a float inside its limits.
+
+    Parameters
+    ----------
+    name, value, rule, low, high, open_low
+        As for `checked`.
+
+    Returns
+    -------
+    float
+        The value.
+
+    Raises
+    ------
+    ValueError
+        If it is more than one number, or as `checked`.
+
+    Examples
+    --------
+    >>> one_number("step", [0.1, 0.2])
+    Traceback (most recent call last):
+    ...
+    ValueError: step = [0.1, 0.2]; must be one number
+    """
+    number = checked(name, value, rule, low, high, open_low)
+    if number.ndim:
+        raise ValueError(f"{name} = {value!r}; must be one number")
+    return float(number)
+
+
 def checked_masses(masses: ArrayLike) -> Vector:
     """Return masses as floats: positive, and within `LIGHTEST` of the heaviest of their chain.
 

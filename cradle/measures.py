@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.chain import Chain, Vector, checked
+from cradle.chain import Chain, Vector, checked, one_number
 from cradle.closed_form import largest_ratios
 from cradle.models import Model, collide
 from cradle.models.correlation import post_impact_velocities
@@ -136,9 +136,7 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
     3.7 velocities[0] True
     2.4e+03 forward[0] True
     """
-    if np.ndim(step):
-        raise ValueError(f"step = {step!r}; must be one number")
-    checked("step", step, "must lie in [1e-12, 0.1]", 1e-12, 0.1)
+    step = one_number("step", step, "must lie in [1e-12, 0.1]", 1e-12, 0.1)
     base = collide(chain, model)
     own = {name: getattr(chain, name) for name in ("masses", "velocities", "restitution")}
     ratios: dict[str, Any] = {}
@@ -210,8 +208,8 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     Raises
     ------
     ValueError
-        If there are not three balls, none approach, or no ratio gives the outcome: then the message
-        has the one that comes nearest.
+        If `tolerance` is no number of at least 0, there are not three balls, none approach, or no
+        ratio gives the outcome: then the message has the one that comes nearest.
 
     References
     ----------
@@ -226,6 +224,7 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     0.230498
     0.132503
     """
+    tolerance = one_number("tolerance", tolerance, "must be at least 0", 0.0)
     # SciPy is slow to import, and only this measure needs it.
     from scipy.optimize import brentq, minimize_scalar
 

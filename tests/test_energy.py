@@ -232,7 +232,7 @@ def test_unfinished_impact_shows_what_was_reached(step):
         ({"exponent": 0.5}, "exponent = 0.5; must be at least 1"),
         ({"step": 0}, "step = 0.0; must lie in (0, 1]"),
         ({"step": 1.5}, "step = 1.5; must lie in (0, 1]"),
-        ({"step": [0.1]}, "step = [0.1]; must be one number, or None"),
+        ({"step": [0.1]}, "step = [0.1]; must be one number"),
         ({"gaps": 1}, "gaps = 1; must be True or False"),
         ({"rtol": 0}, "rtol = 0.0; must lie in"),
         ({"max_evaluations": 0}, "max_evaluations = 0; must be a whole number, at least 1"),

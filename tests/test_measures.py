@@ -112,6 +112,22 @@ def test_effective_ratio_refuses():
         effective_ratio(apart)
 
 
+@pytest.mark.parametrize(
+    ("tolerance", "message"),
+    [
+        (-1e-9, "tolerance = -1e-09; must be at least 0"),
+        (np.nan, "tolerance = nan; must be finite"),
+        ([1e-6], r"tolerance = \[1e-06\]; must be one number"),
+        ("1e-6", "tolerance = '1e-6'; must be real numbers"),
+        ([[1e-6], []], r"tolerance = \[\[1e-06\], \[\]\]; must be real numbers"),
+    ],
+)
+def test_effective_ratio_refuses_a_tolerance(tolerance, message):
+    trace = collide(striking(), ImpulseCorrelation(0.1))
+    with pytest.raises(ValueError, match=message):
+        effective_ratio(trace, tolerance=tolerance)
+
+
 # --- outcomes that conserve momentum and energy --------------------------------------------
 
 

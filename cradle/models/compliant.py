@@ -8,22 +8,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from cradle.chain import Chain, Vector, checked
+from cradle.chain import Chain, Vector, checked, one_number
 from cradle.kernel import LIGHTEST
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 _METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 # SciPy takes no smaller relative tolerance.
 _SMALLEST_RTOL = 100 * float(np.finfo(np.float64).eps)
-
-
-def _one_number(name: str, value: ArrayLike, rule: str, low: float, high: float) -> float:
-    """Return the value of an option as a float inside its limits."""
-    if np.ndim(value):
-        raise ValueError(f"{name} = {value!r}; must be one number")
-    return float(checked(name, value, rule, low, high))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -148,11 +140,11 @@ class SpringChain:
             "rtol": (f"must lie in [{_SMALLEST_RTOL:.3g}, 0.1]", _SMALLEST_RTOL, 0.1),
         }
         for name, (rule, low, high) in rules.items():
-            object.__setattr__(self, name, _one_number(name, getattr(self, name), rule, low, high))
+            object.__setattr__(self, name, one_number(name, getattr(self, name), rule, low, high))
         if self.method not in _METHODS:
             raise ValueError(f"method = {self.method!r}; must be one of {', '.join(_METHODS)}")
         if self.max_time is not None:
-            limit = _one_number("max_time", self.max_time, "must be at least 0", 0.0, math.inf)
+            limit = one_number("max_time", self.max_time, "must be at least 0", 0.0, math.inf)
             object.__setattr__(self, "max_time", limit)
         most = self.max_evaluations
         if isinstance(most, bool) or not isinstance(most, (int, np.integer)) or most < 1:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.chain import Chain, Vector, checked
+from cradle.chain import Chain, Vector, checked, one_number
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 # Beyond these the equations of one problem keep too few digits.
@@ -113,16 +113,12 @@ class QuadraticDissipation:
             if kappa.ndim > 1:
                 raise ValueError(f"coefficients has shape {kappa.shape}; must be () or (N - 1,)")
             value = tuple(kappa.tolist()) if kappa.ndim else float(kappa)
-        if np.ndim(distance):
-            raise ValueError(f"distance = {distance!r}; must be one number")
         most = max_problems
         if isinstance(most, bool) or not isinstance(most, (int, np.integer)) or most < 1:
             raise ValueError(f"max_problems = {most!r}; must be a whole number, at least 1")
         object.__setattr__(self, "max_problems", int(most))
         object.__setattr__(self, "coefficients", value)
-        object.__setattr__(
-            self, "distance", float(checked("distance", distance, rule, 0.0, _LARGEST))
-        )
+        object.__setattr__(self, "distance", one_number("distance", distance, rule, 0.0, _LARGEST))
 
     def solve(self, chain: Chain) -> DissipationTrace:
         """Solve the impact of `chain`; see `collide`."""

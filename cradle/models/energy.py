@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cradle.chain import Chain, Vector, checked
+from cradle.chain import Chain, Vector, one_number
 from cradle.models.compliant import SpringChain, _Motion, _own_units, _TooManyEvaluations
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -133,10 +133,8 @@ class EnergyDistribution:
         for name in ("stiffness", "exponent", "rtol"):
             object.__setattr__(self, name, getattr(springs, name))
         if self.step is not None:
-            if np.ndim(self.step):
-                raise ValueError(f"step = {self.step!r}; must be one number, or None")
-            step = checked("step", self.step, "must lie in (0, 1]", 0.0, 1.0, open_low=True)
-            object.__setattr__(self, "step", float(step))
+            step = one_number("step", self.step, "must lie in (0, 1]", 0.0, 1.0, open_low=True)
+            object.__setattr__(self, "step", step)
         if not isinstance(self.gaps, bool):
             raise ValueError(f"gaps = {self.gaps!r}; must be True or False")
 
