@@ -13,6 +13,46 @@ from cradle.kernel import LIGHTEST
 Vector = NDArray[np.float64]
 
 
+def numbers(name: str, values: ArrayLike | None) -> Vector:
+    """Return `values` as floats of any size; an array of floats comes back as it is.
+
+    Parameters
+    ----------
+    name : str
+        What the values are called in an error.
+    values : array_like
+        Numbers of any shape.
+
+    Returns
+    -------
+    ndarray of float64
+        The values, same shape.
+
+    Raises
+    ------
+    ValueError
+        If a value is no number.
+
+    Examples
+    --------
+    >>> numbers("ratio", [0.5, "x"])
+    Traceback (most recent call last):
+    ...
+    ValueError: ratio = [0.5, 'x']; must be real numbers, one shape, none masked
+    """
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        return values
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "biuf" or np.ma.is_masked(values):
+            raise TypeError
+        return array.astype(np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"{name} = {values!r}; must be real numbers, one shape, none masked"
+        ) from None
+
+
 def checked(
     name: str,
     values: ArrayLike | None,
@@ -51,15 +91,9 @@ def checked(
     ...
     ValueError: restitution[1] = 1.2; must lie in [0, 1]
     """
-    try:
-        array = np.asarray(values)
-        if array.dtype.kind not in "biuf" or np.ma.is_masked(values):
-            raise TypeError
-        array = array.astype(np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(
-            f"{name} = {values!r}; must be real numbers, one shape, none masked"
-        ) from None
+    array = numbers(name, values)
+    if array is values:
+        array = array.copy()
     wrong = ~np.isfinite(array) | (array < low) | (array > high)
     if open_low:
         wrong |= array <= low

@@ -9,12 +9,49 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.chain import Vector
+from cradle.chain import Vector, checked, numbers, one_number
+
+_Balls = tuple[Vector, ...]
 
 
-def _split(*arrays: ArrayLike) -> list[tuple[Vector, ...]]:
-    """Split each array along its last axis."""
-    return [tuple(np.moveaxis(np.asarray(a, dtype=np.float64), -1, 0)) for a in arrays]
+def _split(
+    masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, ratio: ArrayLike
+) -> tuple[_Balls, _Balls, _Balls, Vector]:
+    """Check shapes; return masses, velocities and restitution one by one, and the ratio."""
+    given = {
+        "masses": numbers("masses", masses),
+        "velocities": numbers("velocities", velocities),
+        "restitution": numbers("restitution", restitution),
+    }
+    for name, array in given.items():
+        size = 2 if name == "restitution" else 3
+        if array.shape[-1:] != (size,):
+            raise ValueError(f"{name} has shape {array.shape}; must be (..., {size})")
+    m, v, e = (tuple(array[..., k] for k in range(array.shape[-1])) for array in given.values())
+    alpha = numbers("ratio", ratio)
+    try:
+        np.broadcast_shapes(m[0].shape, v[0].shape, e[0].shape, alpha.shape)
+    except ValueError:
+        shapes = [f"{name} {array.shape}" for name, array in {**given, "ratio": alpha}.items()]
+        raise ValueError(f"leading axes do not broadcast: {', '.join(shapes)}") from None
+    return m, v, e, alpha
+
+
+def _impulses(m: _Balls, v: _Balls, e: _Balls, alpha: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return what contact 2-3 would gain from the whole impulse tau_2 at once, tau_2 and tau_3."""
+    (m1, m2, m3), (v1, v2, v3), (e2, e3) = m, v, e
+    gain = (1.0 + e2) * m1 * (v1 - v2) / ((1.0 - alpha) * m1 + m2)
+    tau_2 = m2 * gain  # Eq. 24
+    tau_3c = (gain + (v2 - v3)) * m2 * m3 / (m2 + m3)  # Eq. 28
+    with np.errstate(invalid="ignore"):
+        root = np.sqrt(1.0 - alpha * (m2 / m3 + 1.0) * (gain / (gain + (v2 - v3))) ** 2)
+    return gain, tau_2, tau_3c * (1.0 + e3 * root)  # Eq. 30
+
+
+def _after(m: _Balls, v: _Balls, tau_2: Vector, tau_3: Vector) -> _Balls:
+    """Return the velocities after the impact, ball by ball."""
+    (m1, m2, m3), (v1, v2, v3) = m, v
+    return v1 - tau_2 / m1, v2 + (tau_2 - tau_3) / m2, v3 + tau_3 / m3
 
 
 def three_balls(
@@ -25,17 +62,23 @@ def three_balls(
     Parameters
     ----------
     masses, velocities : array_like, shape (..., 3)
-        kg and m/s, with v1 > v2 >= v3.
+        kg, above 0, and m/s, with v1 > v2 >= v3.
     restitution : array_like, shape (..., 2)
-        e2 and e3.
+        e2 and e3, 0 to 1.
     ratio : array_like, shape (...)
-        Forward Impulse Correlation Ratio alpha.
+        Forward Impulse Correlation Ratio alpha, 0 to 1.
 
     Returns
     -------
     ndarray, shape (..., 3)
-        Velocities after the impact, m/s.  NaN where the radical of Eq. 30 is not real; see
-        `one_collision_each` for where the result applies.
+        Velocities after the impact, m/s.  NaN where the radical of Eq. 30 is not real or an input
+        is NaN; see `one_collision_each` for where the result applies.  The ranges above are not
+        checked, which would take longer than the formulas: outside them the result has no meaning.
+
+    Raises
+    ------
+    ValueError
+        If a value is no number, or a shape is wrong.
 
     References
     ----------
@@ -47,11 +90,9 @@ def three_balls(
     array([[ 0.   ,  0.   ,  1.   ],
            [-0.333,  0.667,  0.667]])
     """
-    (m1, m2, m3), (v1, v2, v3) = _split(masses, velocities)
-    tau_2, tau_3 = final_impulses(masses, velocities, restitution, ratio)
-    return np.stack(
-        np.broadcast_arrays(v1 - tau_2 / m1, v2 + (tau_2 - tau_3) / m2, v3 + tau_3 / m3), axis=-1
-    )
+    m, v, e, alpha = _split(masses, velocities, restitution, ratio)
+    _, tau_2, tau_3 = _impulses(m, v, e, alpha)
+    return np.stack(np.broadcast_arrays(*_after(m, v, tau_2, tau_3)), axis=-1)
 
 
 def final_impulses(
@@ -67,7 +108,12 @@ def final_impulses(
     Returns
     -------
     tau_2, tau_3 : ndarray, shape (...)
-        N s.
+        N s; tau_3 is NaN where the velocities of `three_balls` are.
+
+    Raises
+    ------
+    ValueError
+        As `three_balls`.
 
     References
     ----------
@@ -78,15 +124,8 @@ def final_impulses(
     >>> final_impulses([1, 1, 1], [1, 0, 0], [1, 1], 0.0)
     (np.float64(1.0), np.float64(1.0))
     """
-    (m1, m2, m3), (v1, v2, v3), (e2, e3) = _split(masses, velocities, restitution)
-    alpha = np.asarray(ratio, dtype=np.float64)
-    # Speed that contact 2-3 would gain from the whole impulse tau_2 at once.
-    gain = (1.0 + e2) * m1 * (v1 - v2) / ((1.0 - alpha) * m1 + m2)
-    tau_2 = m2 * gain  # Eq. 24
-    tau_3c = (gain + (v2 - v3)) * m2 * m3 / (m2 + m3)  # Eq. 28
-    with np.errstate(invalid="ignore"):
-        root = np.sqrt(1.0 - alpha * (m2 / m3 + 1.0) * (gain / (gain + (v2 - v3))) ** 2)
-    return tau_2, tau_3c * (1.0 + e3 * root)  # Eq. 30
+    _, tau_2, tau_3 = _impulses(*_split(masses, velocities, restitution, ratio))
+    return tau_2, tau_3
 
 
 def one_collision_each(
@@ -105,6 +144,12 @@ def one_collision_each(
     Returns
     -------
     ndarray of bool, shape (...)
+        False where the result of `three_balls` is NaN.
+
+    Raises
+    ------
+    ValueError
+        As `three_balls`.
 
     References
     ----------
@@ -115,12 +160,11 @@ def one_collision_each(
     >>> one_collision_each([1, 1, 1], [1, 0, 0], [1, 1], [0.1, 0.6])
     array([ True, False])
     """
-    (m1, m2, m3), (v1, v2, v3), (e2, _) = _split(masses, velocities, restitution)
-    alpha = np.asarray(ratio, dtype=np.float64)
-    gain = (1.0 + e2) * m1 * (v1 - v2) / ((1.0 - alpha) * m1 + m2)
-    after = three_balls(masses, velocities, restitution, ratio)
-    still_closes = alpha * (m2 + m3) * gain <= (gain + (v2 - v3)) * m3
-    return np.asarray(still_closes & (after[..., 0] <= after[..., 1]))
+    m, v, e, alpha = _split(masses, velocities, restitution, ratio)
+    gain, tau_2, tau_3 = _impulses(m, v, e, alpha)
+    v1, v2, _ = _after(m, v, tau_2, tau_3)
+    still_closes = alpha * (m[1] + m[2]) * gain <= (gain + (v[1] - v[2])) * m[2]
+    return np.asarray(still_closes & (v1 <= v2))
 
 
 def largest_ratios(
@@ -135,14 +179,19 @@ def largest_ratios(
     Parameters
     ----------
     masses : array_like, shape (..., N)
-        kg.
+        kg, above 0; N >= 2.
     forward, backward : array_like, shape (..., N - 2)
-        Ratios at the interior balls.
+        Ratios at the interior balls, 0 to 1.
 
     Returns
     -------
     forward, backward : ndarray, shape (..., N - 2)
         The largest admissible ratios.
+
+    Raises
+    ------
+    ValueError
+        If a value or a shape is wrong; the message names the value and the rule.
 
     References
     ----------
@@ -153,31 +202,50 @@ def largest_ratios(
     >>> [bound.tolist() for bound in largest_ratios([1, 1, 1, 1], [0.5, 0.5], [0.5, 0.5])]
     [[0.6666666666666666, 0.5], [0.5, 0.6666666666666666]]
     """
-    m = np.asarray(masses, dtype=np.float64)
+    m = numbers("masses", masses)
+    if not m.ndim or m.shape[-1] < 2:
+        raise ValueError(f"masses has shape {m.shape}; must be (..., N) with N >= 2")
+    # The quick test of good values first: every impact asks for its bounds.
+    if m.size and not (m.min() > 0.0 and m.max() < np.inf):
+        checked("masses", m, "must be above 0", 0.0, open_low=True)
+    f, b = numbers("forward", forward), numbers("backward", backward)
+    size = m.shape[-1] - 2
+    for name, ratio in (("forward", f), ("backward", b)):
+        if ratio.shape[-1:] != (size,):
+            raise ValueError(
+                f"{name} has shape {ratio.shape}; must be (..., {size}) for {size + 2} balls"
+            )
+        if ratio.size and not (ratio.min() >= 0.0 and ratio.max() <= 1.0):
+            checked(name, ratio, "must lie in [0, 1]", 0.0, 1.0)
 
     def bound(m: Vector, ratio: Vector) -> Vector:
-        onward = np.concatenate([ratio[..., 1:], np.zeros_like(ratio[..., :1])], axis=-1)
+        onward = np.zeros(ratio.shape)
+        onward[..., :-1] = ratio[..., 1:]
         # A quotient of masses, as their sum could overflow.
         return np.asarray(1.0 / (1.0 + m[..., 1:-1] / m[..., 2:] * (1.0 - onward)))
 
-    f, b = np.asarray(forward, dtype=np.float64), np.asarray(backward, dtype=np.float64)
     return bound(m, f), bound(m[..., ::-1], b[..., ::-1])[..., ::-1]
 
 
-def back_impact_line(r2: ArrayLike, e2: float, e3: float, ratio: float) -> Vector:
+def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLike) -> Vector:
     """Mass ratio r1 = m2/m1 at and below which ball 2 falls back on ball 1 (Eq. 44).
 
     Parameters
     ----------
     r2 : array_like
-        Mass ratio m2/m3.
-    e2, e3, ratio : float
-        Restitution of the two contacts and the forward ratio.
+        Mass ratio m2/m3, at least 0.
+    e2, e3, ratio : array_like
+        Restitution of the two contacts, e2 above 0, and the forward ratio; 0 to 1.
 
     Returns
     -------
     ndarray
-        r1, same shape; NaN where the ratio exceeds its bound (Eq. 34).
+        r1; NaN where the ratio exceeds its bound (Eq. 34).
+
+    Raises
+    ------
+    ValueError
+        If a value is wrong; the message names the value and the rule.
 
     References
     ----------
@@ -188,7 +256,10 @@ def back_impact_line(r2: ArrayLike, e2: float, e3: float, ratio: float) -> Vecto
     >>> float(back_impact_line(1.0, 0.5, 0.5, 0.15).round(4))
     0.8275
     """
-    r2 = np.asarray(r2, dtype=np.float64)
+    r2 = checked("r2", r2, "must be at least 0", 0.0)
+    e2 = checked("e2", e2, "must lie in (0, 1]", 0.0, 1.0, open_low=True)
+    e3 = checked("e3", e3, "must lie in [0, 1]", 0.0, 1.0)
+    ratio = checked("ratio", ratio, "must lie in [0, 1]", 0.0, 1.0)
     with np.errstate(invalid="ignore"):
         root = np.sqrt(1.0 - ratio * (1.0 + r2))
     return np.asarray((1.0 + e2) * (1.0 + e3 * root) / (e2 * (1.0 + r2)) - (1.0 + ratio / e2))
@@ -197,21 +268,66 @@ def back_impact_line(r2: ArrayLike, e2: float, e3: float, ratio: float) -> Vecto
 def first_ball_stops(e2: float, ratio: float) -> float:
     """Mass ratio r1 = m2/m1 at which ball 1 is left at rest (Eq. 45).
 
+    Parameters
+    ----------
+    e2 : float
+        Restitution of contact 1-2, above 0 and at most 1.
+    ratio : float
+        Forward ratio, 0 to 1.
+
+    Returns
+    -------
+    float
+        r1.
+
+    Raises
+    ------
+    ValueError
+        If a value is wrong; the message names the value and the rule.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu (2001), Eq. 45.
+
     Examples
     --------
     >>> first_ball_stops(0.5, 0.15)
     1.7
     """
-    return (1.0 - ratio) / e2
+    e2 = one_number("e2", e2, "must lie in (0, 1]", 0.0, 1.0, open_low=True)
+    return (1.0 - one_number("ratio", ratio, "must lie in [0, 1]", 0.0, 1.0)) / e2
 
 
 def middle_ball_stops(e3: float, ratio: float) -> float:
     """Mass ratio r2 = m2/m3 at which ball 2 is left at rest (Eq. 46).
+
+    Parameters
+    ----------
+    e3 : float
+        Restitution of contact 2-3, 0 to 1.
+    ratio : float
+        Forward ratio, 0 to 1.
+
+    Returns
+    -------
+    float
+        r2.
+
+    Raises
+    ------
+    ValueError
+        If a value is wrong; the message names the value and the rule.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu (2001), Eq. 46.
 
     Examples
     --------
     >>> round(middle_ball_stops(0.5, 0.15), 6)
     0.442608
     """
+    e3 = one_number("e3", e3, "must lie in [0, 1]", 0.0, 1.0)
+    ratio = one_number("ratio", ratio, "must lie in [0, 1]", 0.0, 1.0)
     half = 0.5 * ratio * e3
     return float(e3 * np.sqrt(1.0 - ratio + half * half) - half * e3)
