@@ -252,6 +252,6 @@ def test_one_address_of_the_project(root: Path):
     with (root / "pyproject.toml").open("rb") as file:
         address = tomllib.load(file)["project"]["urls"]["Repository"]
     host = "/".join(address.split("/")[:3])
-    for name in ("_config.yml", "CITATION.cff", "README.md"):
+    for name in ("_config.yml", "CITATION.cff", "README.md", "book/cite.md"):
         text = (root / name).read_text(encoding="utf-8")
         assert set(re.findall(rf"{re.escape(host)}/[\w.-]+/[\w.-]+", text)) == {address}, name
