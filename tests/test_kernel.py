@@ -131,6 +131,8 @@ MATH = {
     *("nan", "pi", "pow", "radians", "sin", "sqrt", "tan", "trunc"),
 }
 BUILT_IN = {"abs", "globals", "len", "max", "min", "range"}
+# Without `_`, which running examples of docstrings leave there.
+OTHER_BUILT_IN = set(dir(builtins)) - BUILT_IN - {"_"}
 
 
 def not_plain(source):
@@ -143,7 +145,7 @@ def not_plain(source):
             case ast.Attribute(value=value, attr=name):
                 return isinstance(value, ast.Name) and value.id == "math" and name in MATH
             case ast.Name(id=name):
-                return name in BUILT_IN or not hasattr(builtins, name)
+                return name not in OTHER_BUILT_IN
             case ast.Call(func=function):
                 return isinstance(function, ast.Name | ast.Attribute)
             case ast.Constant(value=value):
