@@ -40,6 +40,10 @@ MODEL = [
     ({"meeting": [0.5]}, "meeting = [0.5]; must be one number"),
     ({"excess": "ignore"}, "excess = 'ignore'; must be 'raise' or 'saturate'"),
     ({"excess": None}, "excess = None; must be 'raise' or 'saturate'"),
+    (
+        {"excess": np.array(["raise"])},
+        "excess = array(['raise'], dtype='<U5'); must be 'raise' or 'saturate'",
+    ),
     ({"max_events": 0}, "max_events = 0; must be at least 1"),
     ({"max_events": -1}, "max_events = -1; must be at least 1"),
     ({"max_events": 1e6}, "max_events = 1000000.0; must be a whole number"),

@@ -16,7 +16,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from cradle import kernel as plain
 from cradle import runtime
-from cradle.chain import Chain, Vector, checked, checked_masses, refuse_overflow
+from cradle.chain import (
+    Chain,
+    Vector,
+    checked,
+    checked_masses,
+    numbers,
+    one_number,
+    refuse_overflow,
+)
 from cradle.closed_form import largest_ratios
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -333,7 +341,8 @@ def outcomes(
         "forward": forward,
         "backward": forward if backward is None else backward,
     }
-    arrays = [_numbers(name, values) for name, values in given.items()]
+    # Whether these are in range is checked by the kernel.
+    arrays = [numbers(name, values) for name, values in given.items()]
     n = arrays[0].shape[-1] if arrays[0].ndim else 0
     if n < 2:
         raise ValueError(f"masses has shape {arrays[0].shape}; must be (..., N) with N >= 2")
@@ -428,19 +437,6 @@ def _area(kernel: ModuleType, n: int) -> list[Any]:
     return kept[1]
 
 
-def _numbers(name: str, values: ArrayLike) -> Vector:
-    """Return `values` as floats; whether these are in range is checked by the kernel."""
-    if type(values) is np.ndarray and values.dtype == np.float64:
-        return values
-    try:
-        array = np.asarray(values)
-    except ValueError:
-        return checked(name, values)
-    if array.dtype.kind not in "biuf" or np.ma.is_masked(values):
-        return checked(name, values)
-    return array.astype(np.float64)
-
-
 def _check(given: dict[str, ArrayLike], excess: str) -> None:
     """Raise if a value is outside its limits: what the kernel checks, and in words."""
     m = checked_masses(given["masses"])
@@ -476,10 +472,8 @@ def _checked_ratios(name: str, ratios: ArrayLike | None) -> Vector:
 def _check_options(meeting: float, excess: str, max_events: int) -> None:
     # The usual options first: they cost a call for one chain less than the checks in full.
     if not (type(meeting) is float and 0.0 <= meeting <= 1.0):
-        checked("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
-        if np.ndim(meeting):
-            raise ValueError(f"meeting = {meeting!r}; must be one number")
-    if excess not in ("raise", "saturate"):
+        one_number("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
+    if not isinstance(excess, str) or excess not in ("raise", "saturate"):
         raise ValueError(f"excess = {excess!r}; must be 'raise' or 'saturate'")
     if isinstance(max_events, bool) or not isinstance(max_events, (int, np.integer)):
         raise ValueError(f"max_events = {max_events!r}; must be a whole number")
