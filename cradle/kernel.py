@@ -19,6 +19,7 @@ all in the chain's own units, see `scales`)::
   u[c]         closing speed, > 0 in compression
   q[c]         work that the contact can still release, e^2 W+ - W-, since it became active
   w[c]         work absorbed since it became active, W+
+  top[c] tip[c]  closing speed at which its compression began, as a sum of two numbers
   p[c]         impulse, since the last snapshot       p0[c]   impulse before that
   a[c]         work absorbed, since the last snapshot a0[c]   work absorbed before that
   rate[c]      impulse per unit of progress of the contact's run; the largest of a run is about 1
@@ -42,7 +43,7 @@ all in the chain's own units, see `scales`)::
 import math
 
 # Rows of the work area.
-FLOATS = 23
+FLOATS = 25
 INTS = 9
 
 # Status codes.
@@ -64,6 +65,8 @@ SPLIT = 1e-3
 # progress they need, are simultaneous.
 TIE = 1e-9
 SIMULTANEOUS = 1.0 + 64 * 2.0**-52
+# R3: an end speed this close to -e times the speed at which its compression began is meant to be.
+SAME = 16 * 2.0**-52
 # R7: a ratio this close to its bound, on either side, was meant to be the bound.
 ROUNDED = 1.0 + 4 * 2.0**-52
 # A rate below this part of its run's largest, times the lightest ball's part of the heaviest, is
@@ -321,12 +324,21 @@ def closing(c, hi, lo):
 
 
 @jit
-def open_at(c, speed, hi, lo, m):
-    """Make the velocities agree with a closing speed that is known better than they are.
+def closing_parts(c, hi, lo):
+    """Return the closing speed of contact c to all digits, as a sum of two numbers."""
+    speed = hi[c] - hi[c + 1]
+    part = speed - hi[c]
+    return speed, (hi[c] - (speed - part)) - (hi[c + 1] + part) + (lo[c] - lo[c + 1])
+
+
+@jit
+def open_at(c, speed, rest, hi, lo, m):
+    """Make the velocities agree with a closing speed + rest that is known better than they are.
 
     The two balls share the difference, a rounding error, so that no momentum is made.
     """
-    x = (speed - closing(c, hi, lo)) / (m[c] + m[c + 1])
+    high, low = closing_parts(c, hi, lo)
+    x = ((speed - high) + (rest - low)) / (m[c] + m[c + 1])
     add(c, x * m[c + 1], hi, lo)
     add(c + 1, -x * m[c], hi, lo)
 
@@ -406,22 +418,34 @@ def approach(c, due, ball, other, own, ends, m, hi, lo, u):
 
 @jit
 def advance(
-    left, right, s, whole, n, e, m, hi, lo, u, q, w, p, a, rate, slope, pull, until, fixed, held,
+    left, right, s, whole, n, e, m, hi, lo, u, q, w, top, tip, p, a, rate, slope, pull, until,
+    fixed, held,
 ):  # fmt: skip
     """Take the run left..right straight on by s; `whole` if that is its own next event.
 
     Velocities are linear and works quadratic in s.  What is zero at the event is stored as zero.
     """
     horizon = s * SIMULTANEOUS if whole else -1.0
-    for b in range(left, right + 2):
-        add(b, pull[b] * s, hi, lo)
+    for c in range(left, right + 1):
+        if u[c] > 0.0 and q[c] == 0.0:
+            top[c], tip[c] = closing_parts(c, hi, lo)
+        add(c, pull[c] * s, hi, lo)
+    add(right + 1, pull[right + 1] * s, hi, lo)
     for c in range(left, right + 1):
         u0 = u[c]
         done = until[c] <= horizon
         if done:
             u1 = end_speed(u0, q[c], slope[c], rate[c], e[c])
+            rest = 0.0
+            # With one slope all the time it ends at this speed; light balls collide so often that
+            # a rounding error each time would matter.  From e = 1/2 on no difference is rounded.
+            speed = e[c] * top[c]
+            if e[c] >= 0.5 and abs(u1 + speed) < SAME * speed:
+                u1 = -speed
+                rest = (1.0 - e[c]) * top[c] - (top[c] - speed) - e[c] * tip[c]
             if u1 < 0.0:
-                open_at(c, u1, hi, lo, m)
+                open_at(c, u1, rest, hi, lo, m)
+            top[c] = 0.0
         else:
             u1 = closing(c, hi, lo)
             if slope[c] == 0.0 or (u1 < u0) != (slope[c] < 0.0):
@@ -1022,7 +1046,7 @@ def impact(
     a, a0, rate, slope, pull = floats[6], floats[7], floats[8], floats[9], floats[10]
     ratio, until, before, reach = floats[11], floats[12], floats[13], floats[14]
     u1, q1, x, y, z = floats[15], floats[16], floats[17], floats[18], floats[19]
-    hi, lo, rest = floats[20], floats[21], floats[22]
+    hi, lo, rest, top, tip = floats[20], floats[21], floats[22], floats[23], floats[24]
     active, turn, fixed, tiny, power = ints[0], ints[1], ints[2], ints[3], ints[4]
     first, last, code1, hits1 = ints[5], ints[6], ints[7], ints[8]
     recording = len(kinds) > 0
@@ -1037,7 +1061,7 @@ def impact(
     faint = 0.0
     for c in range(n - 1):
         u[c] = hi[c] - hi[c + 1]
-        q[c] = w[c] = p[c] = p0[c] = a[c] = a0[c] = 0.0
+        q[c] = w[c] = top[c] = p[c] = p0[c] = a[c] = a0[c] = 0.0
         before[c] = abs(u[c])
         active[c] = tiny[c] = hits[c] = held[c] = 0
         speed = max(u[c], 0.0)
@@ -1206,8 +1230,8 @@ def impact(
                     path_p,
                 )  # fmt: skip
             advance(
-                first[k], last[k], s, part == 1.0, n, e, m, hi, lo, u, q, w, p, a, rate, slope,
-                pull, until, fixed, held,
+                first[k], last[k], s, part == 1.0, n, e, m, hi, lo, u, q, w, top, tip, p, a, rate,
+                slope, pull, until, fixed, held,
             )  # fmt: skip
         if gap >= 0:
             # R8.5: driven from both sides, at one velocity.

@@ -392,9 +392,9 @@ def alternating(masses, restitution):
     return number, [middle + u[0], middle, middle - u[1]]
 
 
-def elastic_impacts(light):
-    """Number, exact outcome and its unavoidable change, of (1, light, 1) at e = 1 and ratio 0."""
-    given = [1.0, light, 1.0, 1.0, 1.0]
+def elastic_impacts(light, last=1.0, e=1.0):
+    """Number, exact outcome and its unavoidable change, of (1, light, last), e near 1, ratio 0."""
+    given = [1.0, light, last, e, e]
     number, after = alternating(given[:3], given[3:])
     change = [mpmath.mpf(0)] * 3
     for k, value in enumerate(given):
