@@ -194,7 +194,10 @@ def rates(
     left, right, smallest, forward, backward, m, u, w, rate, slope, pull, ratio, rest, turn, fixed,
     power,
 ):  # fmt: skip
-    """R1, R6, R7: impulse rates and slopes of the run of contacts left..right."""
+    """R1, R6, R7: impulse rates and slopes of the run of contacts left..right.
+
+    Returns whether a contact at u = 0 is about to open.
+    """
     ratios_in_force(left, right, forward, backward, m, u, w, ratio, rest, turn, fixed)
     source = left
     while source < right and turn[source + 1] == -1:
@@ -225,6 +228,7 @@ def rates(
         else:
             pull[c + 1] = -rate[c + 1] * rest[c + 1] / m[c + 1]
     pull[right + 1] = rate[right] / m[right + 1]
+    falls = False
     for c in range(left, right + 1):
         slope[c] = pull[c] - pull[c + 1]
         # A held contact stays at u = 0.  A driven one within its bound cannot open either;
@@ -232,6 +236,8 @@ def rates(
         driven = (c > left and turn[c] == 1) or (c < right and turn[c + 1] == -1)
         if fixed[c] > 0 or (driven and slope[c] < 0.0 and u[c] == 0.0 and w[c] == 0.0):
             slope[c] = 0.0
+        falls = falls or (u[c] == 0.0 and slope[c] < 0.0)
+    return falls
 
 
 @jit
@@ -1094,6 +1100,7 @@ def impact(
         while low <= high and active[high] == 0:
             high -= 1
         runs = 0
+        opening = False
         c = low
         while c <= high:
             if active[c] == 1:
@@ -1101,7 +1108,7 @@ def impact(
                 while c < high and active[c + 1] == 1:
                     c += 1
                 last[runs] = c
-                rates(
+                falls = rates(
                     first[runs], c, smallest, forward, backward, m, u, w, rate, slope, pull, ratio,
                     rest, turn, fixed, power,
                 )  # fmt: skip
@@ -1118,6 +1125,7 @@ def impact(
                     c = first[runs] if low == left else low
                     continue
                 runs += 1
+                opening = opening or falls
             c += 1
         # Where none arrives, the window ends.
         while runs > 0 and low < last[0] and idles(low, low + 1, u, w, rate, slope):
@@ -1126,7 +1134,7 @@ def impact(
         while runs > 0 and high > first[runs - 1] and idles(high, high - 1, u, w, rate, slope):
             high -= 1
             last[runs - 1] = high
-        if runs > 0:
+        if opening:
             others, c, k, count = end_contacts(
                 low, high, count, threshold, True, n, v, e, shift, mass_shift, m, hi, u, q, w, p,
                 p0, slope, before, active, turn, tiny, kinds, contacts, path_v, path_p,
