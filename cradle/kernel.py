@@ -612,8 +612,9 @@ def reduced_mass(m1, m2):
 @jit
 def exhausted(c, work, threshold, m, u):
     """R9: tell whether next to nothing is left of contact c, neither closing speed nor `work`."""
-    mu = reduced_mass(m[c], m[c + 1])
-    return abs(u[c]) < threshold and 2.0 * work < mu * threshold * threshold
+    if abs(u[c]) >= threshold:
+        return False
+    return 2.0 * work < reduced_mass(m[c], m[c + 1]) * threshold * threshold
 
 
 @jit
