@@ -338,15 +338,40 @@ def closing_parts(c, hi, lo):
 
 
 @jit
-def open_at(c, speed, rest, hi, lo, m):
+def refresh(c, u, q, hi, lo):
+    """Take the closing speed of a contact at work anew from velocities that a rounding changed."""
+    speed = closing(c, hi, lo)
+    if (u[c] > 0.0 and speed > 0.0) or (u[c] < 0.0 and speed < 0.0 and q[c] > 0.0):
+        u[c] = speed
+
+
+@jit
+def open_at(c, low, high, speed, rest, u, q, hi, lo, m):
     """Make the velocities agree with a closing speed + rest that is known better than they are.
 
-    The two balls share the difference, a rounding error, so that no momentum is made.
+    The two sides share the difference, a rounding error, so that no momentum is made.  To a side
+    belong the balls that exact zeros within contacts low..high join to it.
     """
-    high, low = closing_parts(c, hi, lo)
-    x = ((speed - high) + (rest - low)) / (m[c] + m[c + 1])
-    add(c, x * m[c + 1], hi, lo)
-    add(c + 1, -x * m[c], hi, lo)
+    first = c
+    last = c + 1
+    left = m[c]
+    right = m[c + 1]
+    while first > low and u[first - 1] == 0.0:
+        first -= 1
+        left += m[first]
+    while last <= high and u[last] == 0.0:
+        last += 1
+        right += m[last]
+    speed_now, rest_now = closing_parts(c, hi, lo)
+    x = ((speed - speed_now) + (rest - rest_now)) / (left + right)
+    for b in range(first, c + 1):
+        add(b, x * right, hi, lo)
+    for b in range(c + 1, last + 1):
+        add(b, -x * left, hi, lo)
+    if first > low:
+        refresh(first - 1, u, q, hi, lo)
+    if last <= high:
+        refresh(last, u, q, hi, lo)
 
 
 @jit
@@ -442,15 +467,15 @@ def advance(
         done = until[c] <= horizon
         if done:
             u1 = end_speed(u0, q[c], slope[c], rate[c], e[c])
-            rest = 0.0
+            tip[c] *= -e[c]
             # With one slope all the time it ends at this speed; light balls collide so often that
             # a rounding error each time would matter.  From e = 1/2 on no difference is rounded.
             speed = e[c] * top[c]
             if e[c] >= 0.5 and abs(u1 + speed) < SAME * speed:
                 u1 = -speed
-                rest = (1.0 - e[c]) * top[c] - (top[c] - speed) - e[c] * tip[c]
-            if u1 < 0.0:
-                open_at(c, u1, rest, hi, lo, m)
+                tip[c] += (1.0 - e[c]) * top[c] - (top[c] - speed)
+            else:
+                tip[c] = 0.0
             top[c] = 0.0
         else:
             u1 = closing(c, hi, lo)
@@ -485,6 +510,9 @@ def advance(
         if u[c] == 0.0 and closing(c, hi, lo) != 0.0:
             c = stick(c, left, right, rate, u, hi, lo, m)
         c += 1
+    for c in range(left, right + 1):
+        if u[c] < 0.0 and until[c] <= horizon:
+            open_at(c, left, right, u[c], tip[c], u, q, hi, lo, m)
     c = left - 1
     if c >= 0:
         approach(c, until[c] <= horizon, left, c, left, until[left] <= horizon, m, hi, lo, u)
@@ -522,26 +550,38 @@ def velocities(hi, u, p, out, n, v, shift, m, p0):
     """Velocities in the caller's units; a ball without impulse keeps its own to the last bit.
 
     Balls that do not approach are in order.  Where the last bit tells otherwise, the lighter of
-    the two gives way, and a ball without impulse never does.
+    the two gives way, with all that have its velocity; a ball without impulse never does.
     """
-    ordered = True
     unit = math.ldexp(1.0, shift)
     for i in range(n):
         out[i] = v[i] if rests(i, n, p, p0) else hi[i] * unit
-        if i > 0 and out[i] < out[i - 1] and u[i - 1] <= 0.0:
-            ordered = False
-    if ordered:
-        return
-    for i in range(1, n):
-        yields = m[i] <= m[i - 1] or rests(i - 1, n, p, p0)
-        if out[i] < out[i - 1] and u[i - 1] <= 0.0 and yields and not rests(i, n, p, p0):
-            out[i] = out[i - 1]
-    for i in range(n - 1, 0, -1):
-        if out[i] < out[i - 1] and u[i - 1] <= 0.0 and not rests(i - 1, n, p, p0):
-            out[i - 1] = out[i]
-    for i in range(1, n):
-        if out[i] < out[i - 1] and u[i - 1] <= 0.0:
-            out[i] = out[i - 1]
+    i = 1
+    while i < n:
+        if out[i] >= out[i - 1] or u[i - 1] > 0.0:
+            i += 1
+            continue
+        first = i - 1
+        while first > 0 and out[first - 1] == out[i - 1]:
+            first -= 1
+        last = i
+        while last < n - 1 and out[last + 1] == out[i]:
+            last += 1
+        if weight(first, i - 1, n, p, p0, m) >= weight(i, last, n, p, p0, m):
+            for k in range(i, last + 1):
+                out[k] = out[i - 1]
+        else:
+            for k in range(first, i):
+                out[k] = out[i]
+            i = max(first, 1)
+
+
+@jit
+def weight(first, last, n, p, p0, m):
+    """Return the largest mass of balls first..last, infinite if one of them has had no impulse."""
+    heaviest = 0.0
+    for i in range(first, last + 1):
+        heaviest = max(heaviest, math.inf if rests(i, n, p, p0) else m[i])
+    return heaviest
 
 
 @jit

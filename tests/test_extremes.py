@@ -632,6 +632,10 @@ FOUND = {
         [0.87, 0.0001333521432163324, 0.2784313725490196, 1e-16], 0, [3e-15, 1],
         [9e-29, 0.999999999999997],
     ),
+    "a ball falls behind two that have one velocity, the lightest in the middle": (
+        [254.8, 5.6e-24, 1e-12, 0.79], [1e-150, 1, 4.2, 1e-25], [0, 1e-21, 0.9999999999999999],
+        [0.9999999999943765, 0.9999999999987313], [1, 5.6e-12],
+    ),
     "heavy balls, slower than the light one that struck them by twenty digits": (
         [1, 1e-30, 1], [1, 1e20, 0], [1, 0], 0.5,
     ),
