@@ -30,21 +30,22 @@ all in the chain's own units, see `scales`)::
   before[c]    -u of an idle contact at the start of the round, or at its end
   reach[k]     progress of run k to its own next event
   u1[c] q1[c]  snapshot of u and q                    x[i] y[i] z[i]  scratch
+  u2[c] q2[c]  the same, of a collapse                p2[c] a2[c]  impulse, work since that
 
   active[c]    1 while the contact is active
   turn[i]      direction at ball i: 1 forward, -1 backward, 0 none
   fixed[c]     above 0 while the contact is held at u = 0, 2 if its ratio is just the bound
   held[c]      1 if it had an impulse while held by a ratio above the bound
   hits[c]      how often it became active             tiny[c] how many exhausted collisions in a row
-  code1[c] hits1[c]  snapshot of what is active and how it is driven, and of hits
+  code1[c] hits1[c]  snapshot of what is active and how it is driven, and of hits; code2, hits2
   power[c]     binary exponent of the rate; a flag    first[k], last[k]  the contacts of run k
 """
 
 import math
 
 # Rows of the work area.
-FLOATS = 25
-INTS = 9
+FLOATS = 29
+INTS = 11
 
 # Status codes.
 FINISHED, UNFINISHED, REFUSED = 0, 1, 2
@@ -59,8 +60,10 @@ FAINT = 1e-20
 REPEATS = 8
 SELF_SIMILAR = 1e-13
 BEND = 1e-2
-# ... and how much of a chatterer's impulse a steady neighbour must leave, for its digits.
-SPLIT = 1e-3
+# How closely impulses are known, relative to themselves; and what a jump beside a steady neighbour
+# may leave in doubt, as a multiple of what is exhausted.
+DIGITS = 4 * 2.0**-52
+DOUBT = 1e5
 # R8: meeting keys closer than this are equal; a run's events closer than this, relative to the
 # progress they need, are simultaneous.
 TIE = 1e-9
@@ -338,28 +341,21 @@ def closing_parts(c, hi, lo):
 
 
 @jit
-def refresh(c, u, q, hi, lo):
-    """Take the closing speed of a contact at work anew from velocities that a rounding changed."""
-    speed = closing(c, hi, lo)
-    if (u[c] > 0.0 and speed > 0.0) or (u[c] < 0.0 and speed < 0.0 and q[c] > 0.0):
-        u[c] = speed
-
-
-@jit
-def open_at(c, low, high, speed, rest, u, q, hi, lo, m):
+def open_at(c, low, high, speed, rest, rate, u, hi, lo, m):
     """Make the velocities agree with a closing speed + rest that is known better than they are.
 
     The two sides share the difference, a rounding error, so that no momentum is made.  To a side
-    belong the balls that exact zeros within contacts low..high join to it.
+    belong the balls that exact zeros within contacts low..high join to it.  Returns the contacts at
+    their far ends.
     """
     first = c
     last = c + 1
     left = m[c]
     right = m[c + 1]
-    while first > low and u[first - 1] == 0.0:
+    while first > low and u[first - 1] == 0.0 and rate[first - 1] > 0.0:
         first -= 1
         left += m[first]
-    while last <= high and u[last] == 0.0:
+    while last <= high and u[last] == 0.0 and rate[last] > 0.0:
         last += 1
         right += m[last]
     speed_now, rest_now = closing_parts(c, hi, lo)
@@ -368,10 +364,7 @@ def open_at(c, low, high, speed, rest, u, q, hi, lo, m):
         add(b, x * right, hi, lo)
     for b in range(c + 1, last + 1):
         add(b, -x * left, hi, lo)
-    if first > low:
-        refresh(first - 1, u, q, hi, lo)
-    if last <= high:
-        refresh(last, u, q, hi, lo)
+    return first - 1, last
 
 
 @jit
@@ -450,7 +443,7 @@ def approach(c, due, ball, other, own, ends, m, hi, lo, u):
 @jit
 def advance(
     left, right, s, whole, n, e, m, hi, lo, u, q, w, top, tip, p, a, rate, slope, pull, until,
-    fixed, held,
+    fixed, held, old,
 ):  # fmt: skip
     """Take the run left..right straight on by s; `whole` if that is its own next event.
 
@@ -463,25 +456,38 @@ def advance(
         add(c, pull[c] * s, hi, lo)
     add(right + 1, pull[right + 1] * s, hi, lo)
     for c in range(left, right + 1):
-        u0 = u[c]
-        done = until[c] <= horizon
-        if done:
-            u1 = end_speed(u0, q[c], slope[c], rate[c], e[c])
-            tip[c] *= -e[c]
+        old[c] = u[c]
+        if until[c] <= horizon:
+            u[c] = end_speed(u[c], q[c], slope[c], rate[c], e[c])
             # With one slope all the time it ends at this speed; light balls collide so often that
             # a rounding error each time would matter.  From e = 1/2 on no difference is rounded.
             speed = e[c] * top[c]
-            if e[c] >= 0.5 and abs(u1 + speed) < SAME * speed:
-                u1 = -speed
-                tip[c] += (1.0 - e[c]) * top[c] - (top[c] - speed)
+            if e[c] >= 0.5 and abs(u[c] + speed) < SAME * speed:
+                u[c] = -speed
+                tip[c] = (1.0 - e[c]) * top[c] - (top[c] - speed) - e[c] * tip[c]
             else:
                 tip[c] = 0.0
             top[c] = 0.0
         else:
-            u1 = closing(c, hi, lo)
-            if slope[c] == 0.0 or (u1 < u0) != (slope[c] < 0.0):
-                u1 = u0  # a change below rounding
-        u[c] = u1
+            speed = closing(c, hi, lo)
+            if slope[c] != 0.0 and (speed < u[c]) == (slope[c] < 0.0):
+                u[c] = speed  # else a change below rounding
+    # Exact zeros: balls that touch at rest to each other have one velocity.
+    c = left
+    while c <= right:
+        if u[c] == 0.0 and closing(c, hi, lo) != 0.0:
+            c = stick(c, left, right, rate, u, hi, lo, m)
+        c += 1
+    for c in range(left, right + 1):
+        if u[c] < 0.0 and until[c] <= horizon:
+            for k in open_at(c, left, right, u[c], tip[c], rate, u, hi, lo, m):
+                if left <= k <= right and until[k] > horizon:
+                    speed = closing(k, hi, lo)
+                    if speed * u[k] > 0.0:
+                        u[k] = speed
+    for c in range(left, right + 1):
+        u0 = old[c]
+        u1 = u[c]
         p[c] += rate[c] * s
         if fixed[c] == 1 and rate[c] * s > 0.0:
             held[c] = 1
@@ -503,16 +509,7 @@ def advance(
         if w[c] == 0.0 and rate[c] * s > 0.0 and max(u0, u1) > 0.0:
             w[c] = LEAST  # a work that underflows is one nevertheless
         a[c] += gain
-        q[c] = 0.0 if done else max(q[c] + e[c] * e[c] * gain - give, 0.0)
-    # Exact zeros: balls that touch at rest to each other have one velocity.
-    c = left
-    while c <= right:
-        if u[c] == 0.0 and closing(c, hi, lo) != 0.0:
-            c = stick(c, left, right, rate, u, hi, lo, m)
-        c += 1
-    for c in range(left, right + 1):
-        if u[c] < 0.0 and until[c] <= horizon:
-            open_at(c, left, right, u[c], tip[c], u, q, hi, lo, m)
+        q[c] = 0.0 if until[c] <= horizon else max(q[c] + e[c] * e[c] * gain - give, 0.0)
     c = left - 1
     if c >= 0:
         approach(c, until[c] <= horizon, left, c, left, until[left] <= horizon, m, hi, lo, u)
@@ -658,13 +655,17 @@ def exhausted(c, work, threshold, m, u):
 
 
 @jit
-def chatters(c, threshold, n, m, u, q, tiny):
-    """R9: tell whether contact c exists and has made nothing but exhausted collisions of late."""
-    return 0 <= c < n - 1 and tiny[c] > 0 and exhausted(c, q[c], threshold, m, u)
+def chatters(c, threshold, n, m, u, q, w, active, tiny):
+    """R9: tell whether contact c exists and is in an exhausted collision, or has just been."""
+    if not 0 <= c < n - 1:
+        return False
+    if active[c] == 1 and w[c] > 0.0 and exhausted(c, w[c], threshold, m, u):
+        return True
+    return tiny[c] > 0 and exhausted(c, q[c], threshold, m, u)
 
 
 @jit
-def exhausted_stretch(c, threshold, faint, n, e, m, hi, lo, u, q, w, tiny):
+def exhausted_stretch(c, threshold, faint, n, e, m, hi, lo, u, q, w, active, tiny):
     """R9: the stretch around c of exhausted contacts that only chatter, as (first, last).
 
     A contact at rest between two of them, which passes their impulses on, belongs to it.  Empty
@@ -674,25 +675,25 @@ def exhausted_stretch(c, threshold, faint, n, e, m, hi, lo, u, q, w, tiny):
     left = c
     right = c
     while True:
-        if chatters(left - 1, threshold, n, m, u, q, tiny):
+        if chatters(left - 1, threshold, n, m, u, q, w, active, tiny):
             left -= 1
         elif (
             left > 1
             and u[left - 1] == 0.0
             and w[left - 1] == 0.0
-            and chatters(left - 2, threshold, n, m, u, q, tiny)
+            and chatters(left - 2, threshold, n, m, u, q, w, active, tiny)
         ):
             left -= 2
         else:
             break
     while True:
-        if chatters(right + 1, threshold, n, m, u, q, tiny):
+        if chatters(right + 1, threshold, n, m, u, q, w, active, tiny):
             right += 1
         elif (
             right < n - 3
             and u[right + 1] == 0.0
             and w[right + 1] == 0.0
-            and chatters(right + 2, threshold, n, m, u, q, tiny)
+            and chatters(right + 2, threshold, n, m, u, q, w, active, tiny)
         ):
             right += 2
         else:
@@ -737,13 +738,21 @@ def merge(first, last, n, m, hi, lo, u, q, p, x, tiny, before, active, turn):
 
 
 @jit
-def snapshot(n, u, q, p, p0, a, a0, u1, q1, active, turn, code1, hits1, hits):
-    """R9: remember the state, and count impulses and works from here."""
+def settle(n, p, p0, p2, a, a0, a2):
+    """R9: add the impulses and works since the last snapshot to the sums, and begin anew."""
     for c in range(n - 1):
         p0[c] += p[c]
-        a0[c] += a[c]
+        p2[c] += p[c]
         p[c] = 0.0
+        a0[c] += a[c]
+        a2[c] += a[c]
         a[c] = 0.0
+
+
+@jit
+def snapshot(n, u, q, u1, q1, active, turn, code1, hits1, hits):
+    """R9: remember the state."""
+    for c in range(n - 1):
         u1[c] = u[c]
         q1[c] = q[c]
         hits1[c] = hits[c]
@@ -778,9 +787,12 @@ def chatterers(c, n, e, p, active, turn, code1, hits1, hits):
     for k in range(first, last + 1):
         if hits[k] == hits1[k]:
             return c, c, c - 1, c
-    # Nobody else may be at work next to them.
-    if (left > 0 and active[left - 1] == 1) or (right < n - 2 and active[right + 1] == 1):
-        return c, c, c - 1, c
+    # Whoever is active next to them has waited throughout, at a ratio of zero.
+    for k in range(max(left - 1, 0), min(right + 1, n - 2) + 1):
+        if (k < left or k > right) and (
+            hits[k] != hits1[k] or code1[k] != 9 * active[k] + 3 * turn[k] + turn[k + 1]
+        ):
+            return c, c, c - 1, c
     if (left > 1 and p[left - 2] > 0.0) or (right < n - 3 and p[right + 2] > 0.0):
         return c, c, c - 1, c
     if not loses:
@@ -790,23 +802,27 @@ def chatterers(c, n, e, p, active, turn, code1, hits1, hits):
 
 @jit
 def cycle(
-    c, bend, threshold, n, e, m, hi, lo, u, q, w, p, a, before, u1, q1, x, y, active, turn, tiny,
-    code1, hits1, hits,
+    c, bend, threshold, n, e, m, hi, lo, u, q, w, p, total_p, a, total_a, before, u1, q1, x, y,
+    active, turn, tiny, code1, hits1, hits,
 ):  # fmt: skip
     """R9: if the neighbourhood of contact c repeats itself on a smaller scale, go to the limit.
 
-    The state is compared with the snapshot of an earlier end of the same contact.  If every closing
-    speed of the chattering contacts has shrunk by one factor L, and every stored work by its
-    square, then so will the next cycle, and the sum of all cycles is a geometric series with
-    T = L / (1 - L).  T comes from the limit itself: the impulses that bring all chattering balls to
-    one velocity, over the impulses of the last cycle.  1 - L itself would lose all digits for a
-    very light ball.  Neighbours that stay active throughout receive their share; if that would
-    take one of them to an event of its own, there is no jump.
+    The state is compared with the snapshot of an earlier end, or collapse, of the same contact.
+    If every closing speed of the chattering contacts has shrunk by one factor L, and every stored
+    work by its square, then so will the next cycle, and the sum of all cycles is a geometric series
+    with T = L / (1 - L).  T comes from the limit itself: the impulses that bring all chattering
+    balls to one velocity, over the impulses of the last cycle.  1 - L itself would lose all digits
+    for a very light ball.  Neighbours that stay active throughout receive their share; if that
+    would take one of them to an event of its own, there is no jump.
 
-    Light balls need many cycles to settle on one factor.  Without steady neighbours it is enough
-    that what still changes will not matter: the bend, how far the state turns (relative to its own
-    size, as u / scale) by the time that it is exhausted, is below BEND at the present pace, and
-    the pace was no lower (`bend`) over the snapshot before.
+    Light balls need many cycles to settle on one factor.  It is enough that what still changes
+    will not matter: the bend, how far the state turns (relative to its own size, as u / scale) by
+    the time that it is exhausted, is below BEND at the present pace, and the pace was no lower
+    (`bend`) over the snapshot before.  Without steady neighbours the limit does not depend on it.
+    With them it does: then the part of the way that the bend leaves open, and what the digits of
+    the neighbours' shares do, must be below DOUBT.
+
+    p and a are impulses and works since the snapshot; those to come are added to total_p, total_a.
 
     Returns (first, last) of the contacts that have collapsed, empty, with nothing changed, if
     there is no cycle; and the bend.
@@ -817,10 +833,12 @@ def cycle(
 
     # The limit: one velocity.  A steady neighbour whose impulse is h times that of the outermost
     # chatterer makes the ball between them act as one of mass m / (1 - h), whatever its sign.
-    share_left = p[first - 1] / p[first] if first > left else 0.0
-    share_right = p[last + 1] / p[last] if last < right else 0.0
-    if abs(1.0 - share_left) < SPLIT or abs(1.0 - share_right) < SPLIT:
-        return c, c - 1, math.inf
+    kept_left = 1.0 - p[first - 1] / p[first] if first > left else 1.0
+    kept_right = 1.0 - p[last + 1] / p[last] if last < right else 1.0
+    if kept_left == 0.0:
+        kept_left = DIGITS
+    if kept_right == 0.0:
+        kept_right = DIGITS
     scale = 0.0
     mass = 0.0
     momentum = 0.0
@@ -828,9 +846,9 @@ def cycle(
     for k in range(first, last + 2):
         y[k] = m[k]
         if k == first:
-            y[k] /= 1.0 - share_left
+            y[k] /= kept_left
         if k == last + 1:
-            y[k] /= 1.0 - share_right
+            y[k] /= kept_right
         mass += y[k]
         momentum += y[k] * x[k]
         if k <= last:
@@ -859,20 +877,26 @@ def cycle(
         worst = max(worst, abs(q[k] - factor * factor * q1[k]) / mu / scale / scale)
         if abs(x[k] - total * p[k]) > 0.01 * total * p[k]:
             return c, c - 1, math.inf
+    bent = 0.0
     if worst > SELF_SIMILAR:
-        if left < first or last < right:
-            return c, c - 1, math.inf
         # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
         # 1 / (T + 1/2), and as good as that for a slow cycle.
         spans = max(math.log(scale / threshold), 1.0) * (total + 0.5)
-        if not worst * spans < min(BEND, bend):
-            return c, c - 1, worst * spans
+        bent = worst * spans
+        if not bent < min(BEND, bend):
+            return c, c - 1, bent
     squares = total * total / (1.0 + 2.0 * total)  # sum of L^2, L^4, ...
 
     # Where the velocities go (x, changes): those of the neighbours' balls by the impulses of all
     # cycles, the chatterers' to a common one that leaves the momentum alone.
+    doubt = 0.0
+    if first > left:
+        doubt += DIGITS * abs(x[first] / kept_left / mass)
+    if last < right:
+        doubt += DIGITS * abs(x[last] / kept_right / mass)
     i = heaviest_of(first, last + 1, m)
     mass = 0.0
+    farthest = 0.0
     momentum = 0.0
     for b in range(left, right + 2):
         if first <= b <= last + 1:
@@ -882,8 +906,12 @@ def cycle(
             push = p[b - 1] if b > left else 0.0
             x[b] = (push - (p[b] if b <= right else 0.0)) * total / m[b]
             momentum -= m[b] * x[b]
+            farthest = max(farthest, abs(x[b]))
     for b in range(first, last + 2):
         x[b] = momentum / mass - ((hi[b] - hi[i]) + (lo[b] - lo[i]))
+        farthest = max(farthest, abs(x[b]))
+    if (left < first or last < right) and doubt + bent * farthest > DOUBT * threshold:
+        return c, c - 1, bent
 
     # Neighbours: y is the work of all cycles, with the closing speed linear in the impulse so far.
     low = max(left - 1, 0)
@@ -893,6 +921,9 @@ def cycle(
             continue
         change = (x[k] if k >= left else 0.0) - (x[k + 1] if k <= right else 0.0)
         speed = u[k] + change
+        if active[k] == 1 and u[k] == 0.0 and u1[k] == 0.0 and abs(change) < TIE * farthest:
+            y[k] = 0.0  # held throughout; the change is rounding
+            continue
         if u[k] * u1[k] < 0.0 or u[k] * speed < 0.0 or (u[k] == 0.0) != (speed == 0.0):
             return c, c - 1, math.inf
         work = a[k] if u[k] > 0.0 else q[k] - q1[k]
@@ -921,17 +952,20 @@ def cycle(
     for k in range(low, high + 1):
         if first <= k <= last:
             impulse -= m[k] * x[k]
-            p[k] += max(impulse, 0.0)
-            a[k] += a[k] * squares
+            total_p[k] += max(impulse, 0.0)
+            total_a[k] += a[k] * squares
             u[k] = 0.0
             tiny[k] = 0
             deactivate(k, u, q, before, active, turn)
             continue
+        total_p[k] += p[k] * total
+        if active[k] == 1 and u[k] == 0.0:
+            open_at(k, k, k, 0.0, 0.0, p, u, hi, lo, m)
+            continue
         u[k] = closing(k, hi, lo)
-        p[k] += p[k] * total
         if active[k] == 1 and u[k] > 0.0:
             w[k] += y[k]
-            a[k] += y[k]
+            total_a[k] += y[k]
             q[k] += e[k] * e[k] * y[k]
         elif active[k] == 1:
             q[k] += y[k]
@@ -1094,8 +1128,10 @@ def impact(
     ratio, until, before, reach = floats[11], floats[12], floats[13], floats[14]
     u1, q1, x, y, z = floats[15], floats[16], floats[17], floats[18], floats[19]
     hi, lo, rest, top, tip = floats[20], floats[21], floats[22], floats[23], floats[24]
+    p2, a2, u2, q2 = floats[25], floats[26], floats[27], floats[28]
     active, turn, fixed, tiny, power = ints[0], ints[1], ints[2], ints[3], ints[4]
     first, last, code1, hits1 = ints[5], ints[6], ints[7], ints[8]
+    code2, hits2 = ints[9], ints[10]
     recording = len(kinds) > 0
     smallest = CUT
     for i in range(n):
@@ -1108,7 +1144,7 @@ def impact(
     faint = 0.0
     for c in range(n - 1):
         u[c] = hi[c] - hi[c + 1]
-        q[c] = w[c] = top[c] = p[c] = p0[c] = a[c] = a0[c] = 0.0
+        q[c] = w[c] = top[c] = p[c] = p0[c] = p2[c] = a[c] = a0[c] = a2[c] = 0.0
         before[c] = abs(u[c])
         active[c] = tiny[c] = hits[c] = held[c] = 0
         speed = max(u[c], 0.0)
@@ -1127,6 +1163,10 @@ def impact(
     ends = 0
     mark, marked_at = -1, 16
     bend = bent = math.inf  # of the snapshot before, and of this one so far
+    # The same for cycles that contain collapses: counted in collapses, with their own snapshot.
+    falls = 0
+    mark2, marked2 = -1, 4
+    bend2 = bent2 = math.inf
     collapsed = 0
     status = FINISHED
     low, high = 0, n - 2  # the window: no contact outside it is at work
@@ -1191,7 +1231,7 @@ def impact(
             left, right = ended, ended - 1
             if worn >= 0:
                 left, right = exhausted_stretch(
-                    worn, threshold, faint, n, e, m, hi, lo, u, q, w, tiny,
+                    worn, threshold, faint, n, e, m, hi, lo, u, q, w, active, tiny,
                 )  # fmt: skip
             if left <= right:
                 left, right = merge(
@@ -1200,12 +1240,33 @@ def impact(
             elif mark == ended:
                 left, right, bent = cycle(
                     mark, bend if 2 * ends > 3 * marked_at else 0.0, threshold, n, e, m, hi, lo, u,
-                    q, w, p, a, before, u1, q1, x, y, active, turn, tiny, code1, hits1, hits,
+                    q, w, p, p, a, a, before, u1, q1, x, y, active, turn, tiny, code1, hits1, hits,
                 )  # fmt: skip
             if left <= right:
                 collapsed = 1
                 mark, marked_at, ends = -1, 16, 0
                 bend = bent = math.inf
+                # Collapses may themselves be part of a cycle: the same again, one level up.
+                settle(n, p, p0, p2, a, a0, a2)
+                falls += 1
+                one, other = 0, -1
+                if mark2 == left:
+                    one, other, bent2 = cycle(
+                        mark2, bend2 if 2 * falls > 3 * marked2 else 0.0, threshold, n, e, m, hi,
+                        lo, u, q, w, p2, p0, a2, a0, before, u2, q2, x, y, active, turn, tiny,
+                        code2, hits2, hits,
+                    )  # fmt: skip
+                if one <= other:
+                    left, right = one, other
+                    mark2, marked2, falls = -1, 4, 0
+                    bend2 = bent2 = math.inf
+                elif falls >= 2 * marked2:
+                    bend2 = bent2 if mark2 == left else math.inf
+                    bent2 = math.inf
+                    mark2, marked2 = left, falls
+                    for c in range(n - 1):
+                        p2[c] = a2[c] = 0.0
+                    snapshot(n, u, q, u2, q2, active, turn, code2, hits2, hits)
                 for c in range(left, right + 1):
                     count = record(
                         count, COLLAPSE, c, hi, u, p, n, v, shift, mass_shift, m, p0, kinds,
@@ -1216,7 +1277,8 @@ def impact(
                 bend = bent if mark == ended else math.inf
                 bent = math.inf
                 mark, marked_at = ended, ends
-                snapshot(n, u, q, p, p0, a, a0, u1, q1, active, turn, code1, hits1, hits)
+                settle(n, p, p0, p2, a, a0, a2)
+                snapshot(n, u, q, u1, q1, active, turn, code1, hits1, hits)
         if runs == 0:
             break
         rounds += 1
@@ -1280,7 +1342,7 @@ def impact(
                 )  # fmt: skip
             advance(
                 first[k], last[k], s, part == 1.0, n, e, m, hi, lo, u, q, w, top, tip, p, a, rate,
-                slope, pull, until, fixed, held,
+                slope, pull, until, fixed, held, x,
             )  # fmt: skip
         if gap >= 0:
             # R8.5: driven from both sides, at one velocity.
