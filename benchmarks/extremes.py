@@ -144,7 +144,10 @@ CHAINS, LONG = 25_000, 50_000
 
 
 def finish(_):
-    """Count by family and number of balls: finished, collapsed, long; unfinished ones by name."""
+    """Count by family and number of balls: finished, collapsed, long; unfinished ones by name.
+
+    Those that the solver's default limit does not finish either are explained, one by one.
+    """
     unfinished = []
     for family, decades in x.FAMILIES:
         table = np.zeros((9, 6), dtype=int)
@@ -156,12 +159,15 @@ def finish(_):
             table[n] += (*row, stopped is not None)
             if stopped:
                 seen = (*x.portrait(problem, stopped), *x.to_the_default(problem))
-                unfinished.append((family, decades, index, n, *seen))
+                why = [""] * len(x.Explanation._fields)
+                if not seen[-1]:
+                    why = x.explain(problem, x.late(problem, x.MAX_EVENTS))
+                unfinished.append((family, decades, index, n, *seen, *why))
         for n in range(2, 9):
             yield (family, decades, n, *table[n].tolist())
         print(family, decades, len(unfinished), flush=True)
     header = ["family", "decades", "index", "balls", "period", "energy_half", "energy"]
-    header += ["collisions", "finished"]
+    header += ["collisions", "finished", *(f"late_{name}" for name in x.Explanation._fields)]
     write("unfinished", header, unfinished)
 
 

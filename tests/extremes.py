@@ -5,6 +5,9 @@
 the change of the exact outcome when every input changes by its last digit.
 """
 
+import functools
+import importlib.util
+import itertools
 import math
 from fractions import Fraction
 from typing import NamedTuple
@@ -21,6 +24,7 @@ from cradle import (
     ImpulseCorrelation,
     SpringChain,
     collide,
+    kernel,
     post_impact_velocities,
 )
 from cradle.models.correlation import MAX_EVENTS, outcomes
@@ -551,6 +555,114 @@ def portrait(problem, trace):
     events = [e for e in trace.events if e.kind in ("end", "close")]
     tail = [2 * e.contact + (e.kind == "end") for e in events[-2000:]]
     return period(tail), *left
+
+
+class Late(NamedTuple):
+    """The last events before a limit, closing speeds (own units) after each, and who is active."""
+
+    kinds: np.ndarray
+    contacts: np.ndarray
+    closing_speeds: np.ndarray
+    active: np.ndarray
+
+
+def keep_the_last(count, kind, c, _hi, u, _p, n, _v, _shift, _mass_shift, _m, _p0, *record):
+    """The kernel's `record`, round and round, with closing speeds to all their digits."""
+    kinds, contacts, _, speeds = record
+    k = count % len(kinds)
+    kinds[k] = kind
+    contacts[k] = c
+    for j in range(n - 1):
+        speeds[k][j] = u[j]
+    return count + 1
+
+
+def no_compressions(count, *_):
+    """The kernel's `record_compressions`, left out."""
+    return count
+
+
+@functools.cache
+def late_kernel():
+    """The kernel with a record of the last events in place of the first."""
+    import numba
+
+    spec = importlib.util.spec_from_file_location("late_kernel", kernel.__file__)
+    module = importlib.util.module_from_spec(spec)
+    vars(module)["jit"] = numba.njit(error_model="numpy")
+    spec.loader.exec_module(module)
+    module.record = module.jit(keep_the_last)
+    module.record_compressions = module.jit(no_compressions)
+    return module
+
+
+def late(problem, steps, room=20_000):
+    """The last events, no more than `room`, of a chain that is stopped after so many steps."""
+    n = len(problem.masses)
+    record = [np.zeros(room, int), np.zeros(room, int), np.zeros((1, n)), np.zeros((room, n - 1))]
+    floats, ints = np.zeros((kernel.FLOATS, n)), np.zeros((kernel.INTS, n), int)
+    outputs = [np.zeros(n), *np.zeros((2, n - 1)), *np.zeros((2, n - 1), int)]
+    parts = [np.array(part, float) for part in problem[:5]]
+    _, count, _ = late_kernel().impact(
+        n, *parts, problem.meeting, steps, *outputs, floats, ints, *record
+    )
+    order = np.arange(max(count - room, 0), count) % room
+    kinds, contacts, _, speeds = record
+    return Late(kinds[order], contacts[order], speeds[order], ints[0][: n - 1])
+
+
+class Explanation(NamedTuple):
+    """What an unfinished chain does at the end, from its last events.
+
+    pattern: "nested" if infinite sequences are among these events, "cycle" if they repeat in a
+    fixed order, else "irregular".  steady: contacts that are active throughout without an event.
+    returns: how often the rarest of the events that come back at all occurs.  Between the first and
+    the last return: `shrink`, by what power of e the closing speeds of all other contacts shrink,
+    and `turn`, how far they turn (relative to their largest), both per thousand events; `drift`,
+    the largest relative change of a steady contact's closing speed, likewise.  scale: the
+    largest closing speed of the others, relative to the largest initial one.  predicted: events
+    until, at this pace, that is exhausted or a steady contact comes to u = 0; inf if neither.
+    """
+
+    pattern: str
+    period: int
+    steady: int
+    returns: int
+    shrink: float
+    turn: float
+    drift: float
+    scale: float
+    predicted: float
+
+
+def explain(problem, seen):
+    """See `Explanation`."""
+    kinds, contacts, speeds, active = seen
+    tokens = 4 * contacts + kinds
+    names, counts = np.unique(tokens, return_counts=True)
+    again = counts >= 4
+    rarest = names[again][np.argmin(counts[again])]
+    (rows,) = np.nonzero(tokens == rarest)
+    first, last = speeds[rows[0]], speeds[rows[-1]]
+    thousands = (rows[-1] - rows[0]) / 1000
+    moving = np.isin(np.arange(len(active)), contacts)
+    steady = (active == 1) & ~moving
+    sizes = [np.abs(row[moving]).max() for row in (first, last)]
+    shrink = math.log(sizes[0] / sizes[1]) / thousands
+    turn = np.abs(last[moving] / sizes[1] - first[moving] / sizes[0]).max() / thousands
+    change = (last - first)[steady] / thousands
+    drift = max((abs(d / v) for d, v in zip(change, first[steady]) if v), default=0.0)
+    largest = max(a - b for a, b in itertools.pairwise(problem.velocities))
+    scale = sizes[1] * 2.0 ** math.frexp(max(map(abs, problem.velocities)))[1] / largest
+    ends = [v / -d for d, v in zip(change, last[steady]) if d * v < 0]
+    if shrink > 0:
+        ends.append(max(math.log(scale / kernel.EXHAUSTED), 0.0) / shrink)
+    repeats = period(tokens[-2000:])
+    pattern = "nested" if (kinds == kernel.COLLAPSE).any() else "cycle" if repeats else "irregular"
+    return Explanation(
+        pattern, repeats, int(steady.sum()), len(rows), shrink, float(turn), float(drift), scale,
+        1000.0 * min(ends, default=math.inf),
+    )  # fmt: skip
 
 
 # --- the same points by steps and by springs ---------------------------------------------------
