@@ -400,6 +400,28 @@ def test_random_chains_finish():
             assert x.faults(trace, finished) == [], (family, decades, index)
 
 
+def test_limits_of_slow_and_nested_cycles():
+    """Ten thousands of impacts at fifty digits, which know no cycles; at once in the package.
+
+    In the second chain balls at rest are driven on from the limit.  What a threshold leaves of
+    their motion grows again, and changes velocities by 0.3: the limit must be exact.
+    """
+    nested = x.case(
+        [15, 0.25, 0.071, 16, 12], [1, 0, 0, 0, 0], [0.75, 0.55, 0, 0.53],
+        [0.084, 0.8, 1], [0.8, 1, 0.86],
+    )  # fmt: skip
+    for problem, most in ((nested, 2000), (x.any_chain("saturate", 3, 8741), 5000)):
+        trace, finished = problem.collide()
+        assert finished
+        assert trace.collapsed
+        assert len(trace.events) < most
+        with mpmath.workdps(50):
+            exact = problem.exact(100_000)
+        assert len(exact.events) > 20_000
+        after = [float(v) for v in exact.velocities]
+        np.testing.assert_allclose(trace.velocities, after, rtol=0, atol=1e-14)
+
+
 def test_chains_that_do_not_finish_are_explained():
     """Those that the default limit does not finish: what they do there, one by one."""
     never = [row for row in stored("unfinished") if not row["finished"]]
