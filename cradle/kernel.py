@@ -72,6 +72,8 @@ SIMULTANEOUS = 1.0 + 64 * 2.0**-52
 SAME = 16 * 2.0**-52
 # R7: a ratio this close to its bound, on either side, was meant to be the bound.
 ROUNDED = 1.0 + 4 * 2.0**-52
+# A closing speed below this part of the velocities is their rounding.
+DUST = 2.0**-100
 # A rate below this part of its run's largest, times the lightest ball's part of the heaviest, is
 # zero: no ball could notice it.
 CUT = 2.0**-120
@@ -328,8 +330,9 @@ def add(b, x, hi, lo):
 
 @jit
 def closing(c, hi, lo):
-    """Return the closing speed of contact c from the velocities of its balls."""
-    return (hi[c] - hi[c + 1]) + (lo[c] - lo[c + 1])
+    """Return the closing speed of contact c from the velocities of its balls, zero if rounding."""
+    speed = (hi[c] - hi[c + 1]) + (lo[c] - lo[c + 1])
+    return speed if abs(speed) > DUST * abs(hi[c]) else 0.0
 
 
 @jit
