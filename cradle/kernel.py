@@ -233,7 +233,7 @@ def rates(
         else:
             pull[c + 1] = -rate[c + 1] * rest[c + 1] / m[c + 1]
     pull[right + 1] = rate[right] / m[right + 1]
-    falls = False
+    opens = False
     for c in range(left, right + 1):
         slope[c] = pull[c] - pull[c + 1]
         # A held contact stays at u = 0.  A driven one within its bound cannot open either;
@@ -241,8 +241,8 @@ def rates(
         driven = (c > left and turn[c] == 1) or (c < right and turn[c + 1] == -1)
         if fixed[c] > 0 or (driven and slope[c] < 0.0 and u[c] == 0.0 and w[c] == 0.0):
             slope[c] = 0.0
-        falls = falls or (u[c] == 0.0 and slope[c] < 0.0)
-    return falls
+        opens = opens or (u[c] == 0.0 and slope[c] < 0.0)
+    return opens
 
 
 @jit
@@ -1192,7 +1192,7 @@ def impact(
                 while c < high and active[c + 1] == 1:
                     c += 1
                 last[runs] = c
-                falls = rates(
+                opens = rates(
                     first[runs], c, smallest, forward, backward, m, u, w, rate, slope, pull, ratio,
                     rest, turn, fixed, power,
                 )  # fmt: skip
@@ -1209,7 +1209,7 @@ def impact(
                     c = first[runs] if low == left else low
                     continue
                 runs += 1
-                opening = opening or falls
+                opening = opening or opens
             c += 1
         # Where none arrives, the window ends.
         while runs > 0 and low < last[0] and idles(low, low + 1, u, w, rate, slope):
