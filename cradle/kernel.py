@@ -1357,6 +1357,14 @@ def impact(
                 path_v, path_p,
             )  # fmt: skip
 
+    for c in range(n - 1):
+        # R9: sequences that shrank so fast that the last digit was the limit.
+        if status == FINISHED and tiny[c] > 0 and u[c] == 0.0 and e[c] < 1.0:
+            collapsed = 1
+            count = record(
+                count, COLLAPSE, c, hi, u, p, n, v, shift, mass_shift, m, p0, kinds, contacts,
+                path_v, path_p,
+            )  # fmt: skip
     velocities(hi, u, p, out_v, n, v, shift, m, p0)
     for c in range(len(out_p)):
         out_p[c] = math.ldexp(p0[c] + p[c], shift + mass_shift)
