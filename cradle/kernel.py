@@ -438,9 +438,14 @@ def approach(c, due, ball, other, own, ends, m, hi, lo, u):
     late = overlap > (SIMULTANEOUS - 1.0) * max(abs(hi[c]), abs(hi[c + 1]))
     u[c] = 0.0 if due else min(overlap, 0.0)
     if (due or late) and m[ball] < m[other] and (u[own] != 0.0 or (ends and late)):
+        high, low = hi[ball], lo[ball]
         hi[ball] = hi[other]
         lo[ball] = lo[other]
-        u[own] = closing(own, hi, lo)
+        speed = closing(own, hi, lo)
+        if u[own] * speed < 0.0 or (u[own] != 0.0 and speed == 0.0):
+            hi[ball], lo[ball] = high, low  # rounding decides no event
+        else:
+            u[own] = speed
 
 
 @jit
