@@ -1,48 +1,179 @@
-"""Which form of `kernel.py` runs: compiled by numba where numba is installed, else as it stands."""
+"""How the event loop runs: as it stands, or compiled by numba, with the same bits.
+
+The rooms of `cradle.kernel` are joined to one source file, named after a hash of their text, and
+compiled as one unit, kept on disk: an edit anywhere makes a new unit.  Compiling takes seconds, so
+small work runs plain until compiled code is on disk or plain work has taken as long.
+"""
 
 from __future__ import annotations
 
+import ast
 import functools
+import hashlib
 import importlib.util
+import logging
 import os
 import sys
-from types import ModuleType
+import tempfile
+import time
+import warnings
+from importlib.resources import files
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from cradle import kernel as plain
 
-#: Set this environment variable to ``plain`` to run the kernel as it stands.
+#: Set this environment variable to ``plain`` to run the kernel as it stands, to ``compiled`` to
+#: compile at the first call.
 VARIABLE = "CRADLE_KERNEL"
+#: Seconds of plain work after which compiling pays: about as long as compiling takes.
+PAYS_AFTER = 10.0
+
+logger = logging.getLogger("cradle")
+_spent = 0.0  # seconds of plain work so far, in this process
 
 
 @functools.cache
-def compiled() -> ModuleType | None:
-    """Return the kernel's functions compiled, or None where numba is absent.
+def unit() -> str:
+    """Return the rooms of the kernel as one source file.
 
-    The file is run a second time with `jit` replaced by the compiler, so that importing cradle
-    costs no compiler.  Compiled code is kept on disk: only the first call on a machine compiles.
+    Returns
+    -------
+    str
+        Python source that imports nothing but `math` and `typing`.
+
+    Examples
+    --------
+    >>> "from cradle" in unit()
+    False
     """
+    parts = []
+    for room in plain.ROOMS:
+        text = (files(plain) / f"{room}.py").read_text(encoding="utf-8")
+        lines = text.splitlines(keepends=True)
+        for node in ast.parse(text).body:
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cradle."):
+                assert node.end_lineno is not None
+                for k in range(node.lineno - 1, node.end_lineno):
+                    lines[k] = ""
+        parts.append("".join(lines))
+    return "\n\n".join(parts)
+
+
+def _name() -> str:
+    return f"cradle_kernel_{hashlib.sha256(unit().encode()).hexdigest()[:16]}"
+
+
+def _folders() -> list[Path]:
+    """Return where the unit and its compiled code may be kept, best first."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if chosen:
+        return [Path(chosen)]
+    home = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
+    user = Path(home) if home else Path("~/.cache").expanduser()
+    return [Path(__file__).parent / "__pycache__", user / "cradle"]
+
+
+@functools.cache
+def _stored() -> Path | None:
+    """Write the unit where compiled code can be kept beside it; None if that is nowhere."""
+    for folder in _folders():
+        path = folder / f"{_name()}.py"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            # Compiled code goes there too, so try to write even if the unit is there already.
+            with tempfile.NamedTemporaryFile(
+                "w", encoding="utf-8", dir=folder, suffix=".tmp", delete=False
+            ) as file:
+                file.write(unit())
+            if path.exists():
+                Path(file.name).unlink()
+            else:
+                Path(file.name).replace(path)
+        except OSError:
+            continue
+        return path
+    return None
+
+
+@functools.cache
+def available() -> bool:
+    """Tell whether numba is installed and not switched off."""
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return False
+    return "numba" in sys.modules or importlib.util.find_spec("numba") is not None
+
+
+@functools.cache
+def compiled() -> Any | None:
+    """Return the kernel's door compiled (at its first call), or None where numba is absent."""
+    if not available():
+        return None
     try:
         import numba
     except ImportError:
         return None
-    spec = importlib.util.spec_from_file_location("cradle._compiled", plain.__file__)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
+    path = _stored()
+    if path is None:
+        warnings.warn(
+            "no writable folder for compiled code: it is compiled anew in each process; set "
+            f"NUMBA_CACHE_DIR, or {VARIABLE}=plain to run without",
+            stacklevel=2,
+        )
+    name = _name()
+    module = ModuleType(name)
+    module.__file__ = str(path or name)
     # The same arithmetic as Python's: no reordering, no contraction; a division by zero gives
     # infinity, and the kernel makes none.  It allocates nothing, so arrays need no reference counts
-    # (`_nrt`); without these and with its functions inlined the loop runs ten times faster.
-    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-    options.update(forceinline=True, _nrt=False)
-    vars(module)["jit"] = numba.njit(**options)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
+    # (`_nrt`), without which the loop runs several times faster.
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False}
+    inlined = numba.njit(forceinline=True, **options)
+    called = numba.njit(**options)
+    door = numba.njit(cache=path is not None, **options)
+    vars(module).update(jit=inlined, apart=called, door=door)
+    sys.modules[name] = module
+    exec(compile(unit(), module.__file__, "exec"), vars(module))
     return module
 
 
-def chosen() -> ModuleType:
-    """Return the kernel in force: compiled unless numba is absent or the user asks for plain."""
-    if os.environ.get(VARIABLE) == "plain":
+def on_disk() -> bool:
+    """Tell whether compiled code of this very kernel is on disk."""
+    path = _stored() if available() else None
+    if path is None:
+        return False
+    folder = path.parent if os.environ.get("NUMBA_CACHE_DIR") else path.parent / "__pycache__"
+    return any(folder.rglob(f"{_name()}.batch-*.nbi"))
+
+
+def ready() -> bool:
+    """Tell whether compiled code runs without a wait."""
+    module = compiled() if compiled.cache_info().currsize else None
+    return bool(module is not None and module.batch.signatures) or on_disk()
+
+
+def spend(seconds: float) -> None:
+    """Count seconds of plain work."""
+    global _spent
+    _spent += seconds
+
+
+def chosen(large: bool = False) -> Any:
+    """Return the kernel in force.
+
+    Parameters
+    ----------
+    large : bool
+        Whether the work is surely worth compiling for.
+    """
+    wish = os.environ.get(VARIABLE)
+    if wish == "plain" or not available():
         return plain
-    return compiled() or plain
+    if not (wish == "compiled" or large or _spent > PAYS_AFTER or ready()):
+        return plain
+    module = compiled()
+    if module is None:
+        return plain
+    if not ready():
+        logger.warning("compiling the event loop: some seconds, once on a machine")
+    return module

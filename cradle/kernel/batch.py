@@ -1,0 +1,183 @@
+"""Many impacts, outcome alone or with a record of one: checks of input, closed form, event loop."""
+
+import math
+from typing import Any, NamedTuple
+
+from cradle.kernel.loop import impact
+from cradle.kernel.record import in_units
+from cradle.kernel.state import FINISHED, LIMITS, REFUSED, door, jit
+
+
+class Inputs(NamedTuple):
+    """Chains: one a row, or one row for all."""
+
+    m: Any
+    v: Any
+    e: Any
+    forward: Any
+    backward: Any
+
+
+class Options(NamedTuple):
+    """How to solve them."""
+
+    meeting: float
+    max_events: int
+    bounded: bool  # refuse ratios above Eq. 53
+    whole: bool  # run the event loop even where the closed form would do
+
+
+class Outputs(NamedTuple):
+    """Outcomes, a row for each chain; impulses, works and held contacts of the last one alone."""
+
+    v: Any
+    hits: Any
+    collapsed: Any
+    p: Any
+    a: Any
+    held: Any
+
+
+@jit
+def short_cut(n, chain, bounded, out_v):
+    """Eqs. 24 and 30: two balls, or three whose first strikes the others, one collision each.
+
+    Returns False, with nothing decided, if that is not so or not clear beyond rounding, if an input
+    is not well within the limits of `admissible`, or if the numbers are so far from 1 that the
+    loop's own units are needed.
+    """
+    m, v, e = chain.m, chain.v, chain.e
+    for i in range(n):
+        if not (LIMITS.tiny < m[i] < LIMITS.huge):
+            return False
+        if not (v[i] == 0.0 or LIMITS.tiny < abs(v[i]) < LIMITS.huge):
+            return False
+    u0 = v[0] - v[1]
+    if not (u0 > 0.0 and LIMITS.clear < e[0] <= 1.0):
+        return False
+    one, two = 1.0 / m[0], 1.0 / m[1]
+    if n == 2:
+        impulse = (1.0 + e[0]) * u0 * (m[0] / (m[0] + m[1]) * m[1])
+        out_v[0] = v[0] - impulse * one
+        out_v[1] = v[1] + impulse * two
+        return out_v[0] < out_v[1]
+    a = chain.forward[0]
+    if not (LIMITS.clear < e[1] <= 1.0 and a >= 0.0):
+        return False
+    if not a * (m[1] + m[2]) <= (1.0 - LIMITS.clear) * m[2]:
+        return False
+    # Nothing is driven backward, but a ratio that is none is refused.
+    b = chain.backward[0]
+    if not (b >= 0.0 and b * (m[0] + m[1] if bounded else 1.0) <= (m[0] if bounded else 1.0)):
+        return False
+    u1 = v[1] - v[2]
+    if u1 < 0.0:
+        return False
+    # Contact 0 drives contact 1 until it ends (Eqs. 17-24); speeds per impulse.
+    three = 1.0 / m[2]
+    first = (1.0 + e[0]) * u0 / (one + (1.0 - a) * two)
+    gain = first * ((1.0 - a) * two - a * three)
+    u2 = u1 + gain
+    # Contact 1 goes on alone, with all the work it has absorbed to give back (Eqs. 25-30).
+    both = two + three
+    opens = e[1] * math.sqrt(u2 * u2 + a * first * (u1 + u2) * both)
+    second = (u2 + opens) / both
+    apart_by = e[0] * u0 - second * two  # Eq. 43: ball 1 does not fall back on ball 0
+    if not (apart_by > LIMITS.clear * u0 and opens > LIMITS.clear * u0):
+        return False
+    out_v[0] = v[0] - first * one
+    out_v[2] = v[2] + (a * first + second) * three
+    # A light ball's velocity from its neighbour's, a heavy one's from its impulses.
+    if m[1] < m[0]:
+        out_v[1] = out_v[0] + apart_by
+    else:
+        out_v[1] = v[1] + ((1.0 - a) * first - second) * two
+    return out_v[0] < out_v[1] < out_v[2]
+
+
+@jit
+def admissible(n, chain, bounded):
+    """Tell whether all inputs are within their limits, ratios within Eq. 53 too if `bounded`."""
+    m, v, e, forward, backward = chain.m, chain.v, chain.e, chain.forward, chain.backward
+    heaviest = 0.0
+    for i in range(n):
+        heaviest = max(heaviest, m[i])
+    energy = 0.0
+    momentum = 0.0
+    for i in range(n):
+        if not (0.0 < m[i] < math.inf and m[i] >= LIMITS.lightest * heaviest):
+            return False
+        momentum += 2.0 * (m[i] * abs(v[i]))
+        energy += m[i] * v[i] * v[i]
+    if not (energy < math.inf and momentum < math.inf):
+        return False
+    for c in range(n - 1):
+        if not 0.0 <= e[c] <= 1.0:
+            return False
+    for i in range(n - 2):
+        if not (0.0 <= forward[i] <= 1.0 and 0.0 <= backward[i] <= 1.0):
+            return False
+    if bounded:
+        # The operations of `closed_form.largest_ratios`, so that both draw the same line.
+        onward = 0.0
+        back = 0.0
+        for i in range(n - 2):
+            j = n - 3 - i
+            if forward[j] > 1.0 / (1.0 + m[j + 1] / m[j + 2] * (1.0 - onward)) * LIMITS.rounded:
+                return False
+            if backward[i] > 1.0 / (1.0 + m[i + 1] / m[i] * (1.0 - back)) * LIMITS.rounded:
+                return False
+            onward = forward[j]
+            back = backward[i]
+    return True
+
+
+@jit
+def hand_out(k, n, out, state):
+    """Write the outcome of chain k in the caller's units."""
+    contact, tally = state.contact, state.tally[0]
+    shift, mass_shift = tally.shift, tally.mass_shift
+    out_v, hits = out.v[k], out.hits[k]
+    for i in range(n):
+        out_v[i] = in_units(state.ball[i], state.ball[i].hi, shift)
+    out.collapsed[k] = tally.collapsed
+    for c in range(n - 1):
+        hits[c] = contact[c].hits
+    for c in range(len(out.p)):
+        out.p[c] = math.ldexp(contact[c].p, shift + mass_shift)
+        out.a[c] = math.ldexp(contact[c].a, 2 * shift + mass_shift)
+        out.held[c] = contact[c].held
+
+
+@door
+def batch(begin, resumed, n, inputs, options, out, state, effort):
+    """Solve the chains of `out` from number `begin` on; return the next one's number, and status.
+
+    It stops at the first chain whose status is not FINISHED: PAUSED, when `effort` (contacts
+    touched) is used up, to be `resumed` there.
+    """
+    rows = len(out.v)
+    # How far to go from row to row: not at all in an input that has one for all.
+    by_m, by_v = min(len(inputs.m), 2) - 1, min(len(inputs.v), 2) - 1
+    by_e = min(len(inputs.e), 2) - 1
+    by_f, by_b = min(len(inputs.forward), 2) - 1, min(len(inputs.backward), 2) - 1
+    state.tally[0].effort = effort
+    for k in range(begin, rows):
+        chain = Inputs(
+            inputs.m[k * by_m], inputs.v[k * by_v], inputs.e[k * by_e],
+            inputs.forward[k * by_f], inputs.backward[k * by_b],
+        )  # fmt: skip
+        if not resumed:
+            if n <= 3 and not options.whole and short_cut(n, chain, options.bounded, out.v[k]):
+                out.collapsed[k] = 0
+                for c in range(n - 1):
+                    out.hits[k][c] = 1
+                continue
+            if not admissible(n, chain, options.bounded):
+                return k, REFUSED
+        status = impact(n, chain, options.meeting, options.max_events, resumed, state)
+        resumed = False
+        hand_out(k, n, out, state)
+        if status != FINISHED:
+            return k, status
+    return rows, FINISHED

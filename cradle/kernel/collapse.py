@@ -1,0 +1,102 @@
+"""R9, the first sign of an infinite sequence of impacts: exhausted contacts that only chatter.
+
+What they have left is far below rounding, and they end plastically.
+"""
+
+from cradle.kernel.events import deactivate, exhausted, stir
+from cradle.kernel.motion import closing, join_velocities, relative_energy
+from cradle.kernel.state import apart, jit
+
+
+@jit
+def end_plastically(first, last, n, state):
+    """End those contacts of first..last that are active."""
+    contact, run = state.contact, state.run
+    for c in range(first, last + 1):
+        contact[c].tiny = 0
+        if contact[c].active == 1:
+            k = c
+            while k > 0 and contact[k - 1].active == 1:
+                k -= 1
+            deactivate(c, k, n, state)
+    for c in (first - 1, last + 1):
+        if 0 <= c < n - 1:
+            stir(c, n, run, contact)
+            if contact[c].active == 1:
+                k = c
+                while k > 0 and contact[k - 1].active == 1:
+                    k -= 1
+                run[k].stirred = 1
+
+
+@jit
+def chatters(c, n, state):
+    """Tell whether contact c exists and is in an exhausted collision, or has just been."""
+    if not 0 <= c < n - 1:
+        return False
+    ball, contact, threshold = state.ball, state.contact, state.tally[0].threshold
+    if (
+        contact[c].active == 1
+        and contact[c].w > 0.0
+        and exhausted(c, contact[c].w, threshold, ball, contact)
+    ):
+        return True
+    return contact[c].tiny > 0 and exhausted(c, contact[c].q, threshold, ball, contact)
+
+
+@jit
+def passes_on(c, n, state):
+    """Tell whether contact c exists and only passes on impulses, at rest."""
+    contact = state.contact
+    return 0 <= c < n - 1 and contact[c].u == 0.0 and contact[c].w == 0.0
+
+
+@apart
+def exhausted_stretch(c, n, state):
+    """Return the stretch (first, last) around c of contacts that only chatter.
+
+    A contact at rest between two of them, which passes their impulses on, belongs to it.  Empty if
+    nothing in it can lose energy: elastic sequences are finite; or if its balls move with more than
+    a faint energy: heavy ones, slower than a light ball that struck them.
+    """
+    first = c
+    last = c
+    while True:
+        if chatters(first - 1, n, state):
+            first -= 1
+        elif passes_on(first - 1, n, state) and chatters(first - 2, n, state):
+            first -= 2
+        elif chatters(last + 1, n, state):
+            last += 1
+        elif passes_on(last + 1, n, state) and chatters(last + 2, n, state):
+            last += 2
+        else:
+            break
+    loses = False
+    for k in range(first, last + 1):
+        loses = loses or state.contact[k].e < 1.0
+    if loses and relative_energy(first, last + 1, state.ball) <= state.tally[0].faint:
+        return first, last
+    return c, c - 1
+
+
+@apart
+def merge(first, last, n, state):
+    """End the contacts first..last plastically: their balls take the common velocity.
+
+    An idle neighbour that this makes them approach, at a speed below the threshold, joins.
+    """
+    ball, contact = state.ball, state.contact
+    while True:
+        join_velocities(first, last + 1, ball, contact)
+        for c in (first - 1, last + 1):
+            if 0 <= c < n - 1:
+                contact[c].u = closing(c, ball)
+        if first > 0 and contact[first - 1].active == 0 and contact[first - 1].u > 0.0:
+            first -= 1
+        elif last < n - 2 and contact[last + 1].active == 0 and contact[last + 1].u > 0.0:
+            last += 1
+        else:
+            break
+    end_plastically(first, last, n, state)
+    return first, last

@@ -1,0 +1,289 @@
+"""The event loop: rounds of events, each a closed-form root of the impulses (R8)."""
+
+import math
+
+from cradle.kernel.certificate import certify
+from cradle.kernel.cycles import forget, take_limits
+from cradle.kernel.events import close_contacts, end_contacts, grow, start
+from cradle.kernel.meeting import first_meeting, part_beyond
+from cradle.kernel.motion import (
+    add_impulse,
+    add_velocity,
+    add_work,
+    arrive,
+    closing,
+    closing_parts,
+    reduced_mass,
+    set_closing_speed,
+)
+from cradle.kernel.record import record, record_compressions
+from cradle.kernel.rules import rates, segment
+from cradle.kernel.state import (
+    COLLAPSE,
+    FINISHED,
+    LIMITS,
+    NO_EVENT,
+    PAUSED,
+    UNFINISHED,
+    UNSOUND,
+    apart,
+    jit,
+)
+
+
+@jit
+def works(k, s, ended, recent):
+    """Book the works of contact k over a progress s that took its closing speed from x to u."""
+    u0, u1, rate = k.x, k.u, k.rate
+    gain = 0.0  # absorbed
+    give = 0.0  # released
+    if u0 >= 0.0 and u1 >= 0.0:
+        gain = 0.5 * rate * s * (u0 + u1)
+    elif u0 <= 0.0 and u1 <= 0.0:
+        give = -0.5 * rate * s * (u0 + u1)
+    else:
+        s0 = -u0 / k.slope
+        if u0 > 0.0:
+            gain = 0.5 * rate * s0 * u0
+            give = -0.5 * rate * (s - s0) * u1
+        else:
+            give = -0.5 * rate * s0 * u0
+            gain = 0.5 * rate * (s - s0) * u1
+    k.w += gain
+    if k.w == 0.0 and rate * s > 0.0 and max(u0, u1) > 0.0:
+        k.w = 5e-324  # a work that underflows is one nevertheless (R7)
+    add_work(k, gain)
+    recent.a += gain
+    k.q = 0.0 if ended else max(k.q + k.e * k.e * gain - give, 0.0)
+
+
+@jit
+def end_exactly(low, high, horizon, ball, contact):
+    """R3: give the contacts that end at this instant the closing speed that they end with.
+
+    With one slope all the time it is -e times that at the start of compression; light balls collide
+    so often that a rounding error each time would matter.  From e = 1/2 on no difference of these
+    is rounded.
+    """
+    for c in range(low, high + 1):
+        if contact[c].until <= horizon and contact[c].final == 0.0:
+            set_closing_speed(c, 0.0, 0.0, low, high, ball, contact)
+    for c in range(low, high + 1):
+        if contact[c].until <= horizon and contact[c].final < 0.0:
+            e, top, tip = contact[c].e, contact[c].top, contact[c].tip
+            final = contact[c].final
+            rest = 0.0
+            speed = e * top
+            if e >= 0.5 and abs(final + speed) < LIMITS.same * speed:
+                final = -speed
+                rest = (1.0 - e) * top - (top - speed) - e * tip
+            contact[c].top = 0.0
+            set_closing_speed(c, final, rest, low, high, ball, contact)
+
+
+@jit
+def advance(first, part, n, state):
+    """Take a run straight on by a part of its segment.
+
+    Velocities are linear and works quadratic in the progress.  What is zero at the event becomes
+    zero to the last bit, by impulses of the run's own contacts.
+    """
+    ball, contact, run, recent = state.ball, state.contact, state.run, state.memory[0]
+    low, high = run[first].low, run[first].high
+    s = run[first].reach * part
+    horizon = s * LIMITS.simultaneous if part == 1.0 else -1.0
+    for c in range(low, high + 1):
+        if contact[c].u > 0.0 and contact[c].q == 0.0:
+            contact[c].top, contact[c].tip = closing_parts(c, ball)
+    for i in range(low, high + 2):
+        add_velocity(ball[i], ball[i].pull * s)
+    for c in range(low, high + 1):
+        contact[c].x = contact[c].u
+        if contact[c].slope != 0.0:
+            contact[c].u = closing(c, ball)
+        impulse = contact[c].rate * s
+        add_impulse(contact[c], impulse)
+        recent[c].p += impulse
+        if contact[c].fixed == 1 and impulse > 0.0:
+            contact[c].held = 1
+    if part == 1.0:
+        end_exactly(low, high, horizon, ball, contact)
+    for c in range(low, high + 1):
+        works(contact[c], s, contact[c].until <= horizon, recent[c])
+    for c in (low - 1, high + 1):
+        if 0 <= c < n - 1 and contact[c].active == 0:
+            due = contact[c].until <= horizon
+            if not (due and arrive(c, low, high, ball, contact)):
+                contact[c].u = closing(c, ball)
+    run[first].stirred = 1
+
+
+@jit
+def move(first, part, n, state):
+    """Take a run straight on by a part of its segment, with a record of it if wanted."""
+    if len(state.record.kinds) > 0:
+        record_compressions(first, state.run[first].reach * part, part == 1.0, n, state)
+    advance(first, part, n, state)
+
+
+@jit
+def touch(gap, n, state):
+    """Bring a gap between two runs to zero, by impulses of one of the runs."""
+    run, ball, contact = state.run, state.ball, state.contact
+    left, right = run[gap - 1].last, gap + 1
+    if run[left].high == gap - 1 and arrive(gap, run[left].low, gap - 1, ball, contact):
+        return
+    if run[right].low == right:
+        arrive(gap, right, run[right].high, ball, contact)
+
+
+@jit
+def meet(one, n, state):
+    """R8.4, R8.5: take run `one` and the next to where they meet, and close the gap between them.
+
+    If one of them reaches the gap at its far side on the way, this gap closes first, and only that
+    run moves.
+    """
+    ball, run = state.ball, state.run
+    other = run[one].onward
+    part_one, part_other = run[one].left, run[one].right
+    left, gap, right = one - 1, run[one].last + 1, run[other].last + 1
+    beyond_left = part_beyond(one, part_one, -ball[one].pull, left, n, state)
+    beyond_right = part_beyond(other, part_other, ball[right].pull, right, n, state)
+    if beyond_left < math.inf and beyond_left <= beyond_right:
+        gap = left
+        move(one, beyond_left, n, state)
+    elif beyond_right < math.inf:
+        gap = right
+        move(other, beyond_right, n, state)
+    else:
+        move(one, part_one, n, state)
+        move(other, part_other, n, state)
+    touch(gap, n, state)
+    grow(gap, n, state)
+
+
+@jit
+def complete(n, state):
+    """R8.6: take every run to its own next event."""
+    contact, run = state.contact, state.run
+    first = state.tally[0].first
+    while first < n:
+        move(first, 1.0, n, state)
+        # Both sides of a gap have moved: it is at zero if only rounding says otherwise.
+        gap = first - 1
+        if gap > 0 and contact[gap - 1].active == 1:
+            if contact[gap].u > (1.0 - LIMITS.simultaneous) * contact[gap].before:
+                touch(gap, n, state)
+        first = run[first].onward
+
+
+@jit
+def prepare(n, chain, meeting, state):
+    """Write the chain into the state, in its own units; R2."""
+    ball, contact, tally = state.ball, state.contact, state.tally[0]
+    largest = heaviest = 0.0
+    for i in range(n):
+        largest = max(largest, abs(chain.v[i]))
+        heaviest = max(heaviest, chain.m[i])
+    # The units themselves and their inverses are numbers too.
+    tally.shift = min(max(math.frexp(largest)[1], -1000), 1023)
+    tally.mass_shift = min(max(math.frexp(heaviest)[1], -1000), 1023)
+    unit, mass_unit = math.ldexp(1.0, -tally.shift), math.ldexp(1.0, -tally.mass_shift)
+    tally.events = tally.rounds = tally.collapsed = tally.defect = 0
+    tally.cut_off, tally.meeting = LIMITS.cut, meeting
+    tally.threshold, tally.faint = 5e-324, 0.0
+    for i in range(n):
+        ball[i].v = chain.v[i]
+        ball[i].m = chain.m[i] * mass_unit
+        tally.cut_off = min(tally.cut_off, LIMITS.cut * ball[i].m)
+        ball[i].hi = chain.v[i] * unit
+        ball[i].lo = 0.0
+        ball[i].turn = 0
+    for c in range(n - 1):
+        k = contact[c]
+        k.e = chain.e[c]
+        if c < n - 2:
+            k.forward, k.backward = chain.forward[c], chain.backward[c]
+        k.u = u = ball[c].hi - ball[c + 1].hi
+        k.q = k.w = k.top = k.tip = k.p = k.p_lo = k.a = k.a_lo = 0.0
+        k.before = abs(u)
+        k.active = k.tiny = k.hits = k.held = 0
+        for row in range(2):
+            state.memory[row][c].p = state.memory[row][c].a = 0.0
+        if u > 0.0:
+            tally.threshold = max(tally.threshold, LIMITS.exhausted * u)
+            tally.faint = max(tally.faint, LIMITS.faint * reduced_mass(c, ball) * u * u)
+    forget(0, state.level)
+    forget(1, state.level)
+    start(n, state)
+
+
+@jit
+def impact(n, chain, meeting, max_events, resumed, state):
+    """Solve one impact: run rounds until no contact is active; return the status.
+
+    With tally.effort used up it stops, PAUSED, to be `resumed` with the same arguments.
+    """
+    contact, run, tally = state.contact, state.run, state.tally[0]
+    if not resumed:
+        prepare(n, chain, meeting, state)
+    while True:
+        # R8.1: ends first, those that are known without the slopes before the others; then R9.
+        ends, ended, worn = end_contacts(False, n, state)
+        opening = False
+        first = tally.first
+        while first < n:
+            if run[first].stirred == 1:
+                opens = rates(first, run, state.ball, contact, tally)
+                opening = opening or opens
+                tally.effort -= 2 + run[first].high - run[first].low
+            first = run[first].onward
+        more = 0
+        if opening:
+            more, last, last_worn = end_contacts(True, n, state)
+            ends += more
+            ended = last if more > 0 else ended
+            worn = max(worn, last_worn)
+        collapsed = ends > 0 and take_limits(ends, ended, worn, n, state)
+        if tally.first >= n:
+            break
+        tally.rounds += 1
+        if tally.rounds > max_events:
+            return UNFINISHED
+        if tally.effort < 0:
+            return PAUSED
+        # R8.1: then closings; both need no progress, so the next round looks again.
+        if more > 0 or collapsed or close_contacts(n, state) > 0:
+            continue
+        # R8.2: segments of the runs that have changed; R8.3: do two of them meet?
+        first = tally.first
+        while first < n:
+            if run[first].stirred == 1:
+                segment(first, n, run, state.ball, contact)
+            first = run[first].onward
+        one = first_meeting(n, state)
+        first = tally.first
+        while first < n:
+            if not run[first].reach < math.inf:
+                tally.defect = NO_EVENT
+                return UNSOUND
+            run[first].stirred = 0
+            first = run[first].onward
+        if one >= 0:
+            meet(one, n, state)
+        else:
+            complete(n, state)
+    last_limits(n, state)
+    tally.defect = certify(n, state)
+    return UNSOUND if tally.defect > 0 else FINISHED
+
+
+@apart
+def last_limits(n, state):
+    """R9: sequences that shrank so fast that the last digit was the limit have collapsed too."""
+    contact = state.contact
+    for c in range(n - 1):
+        if contact[c].tiny > 0 and contact[c].u == 0.0 and contact[c].e < 1.0:
+            state.tally[0].collapsed = 1
+            record(COLLAPSE, c, n, state)

@@ -1,0 +1,199 @@
+"""Velocities: sums of two numbers, moved by impulses of contacts and by nothing else.
+
+A light ball may shuttle a thousand times as fast as the heavy balls beside it.  Closing speeds
+alone would lose track of how these move, single velocities of how slowly some balls part.
+"""
+
+from cradle.kernel.state import jit
+
+
+@jit
+def add_velocity(b, x):
+    """Add x to the velocity of ball b, by a sum that loses nothing (Knuth's two-sum)."""
+    total = b.hi + x
+    part = total - b.hi
+    x = ((b.hi - (total - part)) + (x - part)) + b.lo
+    b.hi = total + x
+    b.lo = x - (b.hi - total)
+
+
+@jit
+def add_impulse(k, x):
+    """Add x to the impulse of contact k in the same way."""
+    total = k.p + x
+    part = total - k.p
+    x = ((k.p - (total - part)) + (x - part)) + k.p_lo
+    k.p = total + x
+    k.p_lo = x - (k.p - total)
+
+
+@jit
+def add_work(k, x):
+    """Add x to the work that contact k has absorbed in the same way."""
+    total = k.a + x
+    part = total - k.a
+    x = ((k.a - (total - part)) + (x - part)) + k.a_lo
+    k.a = total + x
+    k.a_lo = x - (k.a - total)
+
+
+@jit
+def closing(c, ball):
+    """Return the closing speed of contact c from the velocities of its balls."""
+    return (ball[c].hi - ball[c + 1].hi) + (ball[c].lo - ball[c + 1].lo)
+
+
+@jit
+def closing_parts(c, ball):
+    """Return the closing speed of contact c to all digits, as a sum of two numbers."""
+    speed = ball[c].hi - ball[c + 1].hi
+    part = speed - ball[c].hi
+    rest = (ball[c].hi - (speed - part)) - (ball[c + 1].hi + part)
+    return speed, rest + (ball[c].lo - ball[c + 1].lo)
+
+
+@jit
+def reduced_mass(c, ball):
+    """Return the reduced mass of the two balls of contact c."""
+    return ball[c].m / (ball[c].m + ball[c + 1].m) * ball[c + 1].m
+
+
+@jit
+def heaviest_of(first, last, ball):
+    """Return the heaviest of balls first..last."""
+    k = first
+    for i in range(first + 1, last + 1):
+        k = i if ball[i].m > ball[k].m else k
+    return k
+
+
+@jit
+def one_velocity(first, last, k, ball):
+    """Write the velocity of ball k, to the last bit, for all balls first..last."""
+    for i in range(first, last + 1):
+        ball[i].hi = ball[k].hi
+        ball[i].lo = ball[k].lo
+
+
+@jit
+def bodies(c, low, high, ball, contact):
+    """Return what moves as one with each ball of contact c: first and last ball, and both masses.
+
+    Balls that zeros of contacts low..high join are one body.
+    """
+    first = c
+    left = ball[c].m
+    while first > low and contact[first - 1].u == 0.0:
+        first -= 1
+        left += ball[first].m
+    last = c + 1
+    right = ball[last].m
+    while last <= high and contact[last].u == 0.0:
+        last += 1
+        right += ball[last].m
+    return first, last, left, right
+
+
+@jit
+def push(c, impulse, low, high, ball, contact):
+    """Give contact c an impulse; contacts inside the two bodies pass on what their balls need."""
+    first, last, left, right = bodies(c, low, high, ball, contact)
+    add_impulse(contact[c], impulse)
+    part = 0.0
+    for i in range(first, c + 1):
+        add_velocity(ball[i], -impulse / left)
+        part += ball[i].m
+        if i < c:
+            add_impulse(contact[i], impulse * (part / left))
+    part = 0.0
+    for j in range(c + 1, last + 1):
+        i = last + c + 1 - j
+        add_velocity(ball[i], impulse / right)
+        part += ball[i].m
+        if i > c + 1:
+            add_impulse(contact[i - 1], impulse * (part / right))
+
+
+@jit
+def set_closing_speed(c, speed, rest, low, high, ball, contact):
+    """Bring the closing speed of contact c to speed + rest, known better than its balls', by a push.
+
+    At zero the balls of both bodies have one velocity to the last bit.
+    """
+    first, last, left, right = bodies(c, low, high, ball, contact)
+    speed_now, rest_now = closing_parts(c, ball)
+    x = (speed_now - speed) + (rest_now - rest)
+    push(c, x * (left / (left + right) * right), low, high, ball, contact)
+    if speed == 0.0:
+        one_velocity(first, last, heaviest_of(first, last, ball), ball)
+    contact[c].u = speed
+    for k in (first - 1, last):
+        if low <= k <= high:
+            contact[k].u = closing(k, ball)
+
+
+@jit
+def arrive(c, low, high, ball, contact):
+    """Bring the idle contact c beside the run low..high to zero, by the run's impulses alone.
+
+    The run's last impulse is corrected by its rounding.  Returns whether that can be done: not if
+    all balls of the run are one body.
+    """
+    k = low if c < low else high
+    while low <= k <= high and contact[k].u == 0.0:
+        k += 1 if c < low else -1
+    if not low <= k <= high:
+        return False
+    first, last, left, right = bodies(k, low, high, ball, contact)
+    if c < low:  # ball low gains what it is too slow by
+        push(k, -closing(c, ball) * left, low, high, ball, contact)
+        other = c
+        last = k
+    else:
+        push(k, -closing(c, ball) * right, low, high, ball, contact)
+        other = c + 1
+        first = k + 1
+    for i in range(first, last + 1):
+        ball[i].hi = ball[other].hi
+        ball[i].lo = ball[other].lo
+    contact[c].u = 0.0
+    for j in range(low, high + 1):
+        if contact[j].u != 0.0:
+            contact[j].u = closing(j, ball)
+    return True
+
+
+@jit
+def join_velocities(first, last, ball, contact):
+    """Bring balls first..last to one velocity by impulses of the contacts between them."""
+    k = heaviest_of(first, last, ball)
+    mass = 0.0
+    momentum = 0.0
+    for i in range(first, last + 1):
+        mass += ball[i].m
+        momentum += ball[i].m * ((ball[i].hi - ball[k].hi) + (ball[i].lo - ball[k].lo))
+    common = momentum / mass
+    impulse = 0.0
+    for i in range(first, last):
+        off = ((ball[i].hi - ball[k].hi) + (ball[i].lo - ball[k].lo)) - common
+        impulse += ball[i].m * off
+        if impulse > 0.0:
+            add_impulse(contact[i], impulse)
+        contact[i].u = 0.0
+    add_velocity(ball[k], common)
+    one_velocity(first, last, k, ball)
+
+
+@jit
+def relative_energy(first, last, ball):
+    """Kinetic energy of balls first..last relative to their centre of mass."""
+    k = heaviest_of(first, last, ball)
+    mass = 0.0
+    momentum = 0.0
+    energy = 0.0
+    for i in range(first, last + 1):
+        x = (ball[i].hi - ball[k].hi) + (ball[i].lo - ball[k].lo)
+        mass += ball[i].m
+        momentum += ball[i].m * x
+        energy += 0.5 * ball[i].m * x * x
+    return energy - 0.5 * momentum * (momentum / mass)

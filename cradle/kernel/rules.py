@@ -1,0 +1,249 @@
+"""The rules of one run: who starts (R2), drives whom (R1, R4 to R7), and ends when (R3)."""
+
+import math
+
+from cradle.kernel.state import LIMITS, jit
+
+# A run's contacts low..high have impulses, or balls that move; contacts beyond them wait, because
+# no impulse that a ball could notice reaches them (`reached`).
+
+
+@jit
+def source_of(first, last, ball):
+    """R1: the one contact of a run that drives all others, or -1 if there are several."""
+    source = first
+    while source < last and ball[source + 1].turn == -1:
+        source += 1
+    for c in range(source + 1, last + 1):
+        if ball[c].turn != 1:
+            return -1
+    return source
+
+
+@jit
+def admissible_ratio(driver, driven, far, onward, nominal, ball, contact):
+    """R7: the ratio in force at ball `driver` between its driver and the contact `driven`.
+
+    `far` is the other ball of the driven contact; `onward` the part of its impulse that this ball
+    keeps, 1 - ratio in force there, or 1.  Eq. 53: beyond its bound the contact would open at once;
+    it is held at u = 0 instead.
+    """
+    ball[driver].ratio = nominal
+    ball[driver].rest = 1.0 - nominal
+    if contact[driven].u == 0.0 and contact[driven].w == 0.0:
+        kept = ball[driver].m * onward
+        bound = ball[far].m / (ball[far].m + kept)
+        if nominal * LIMITS.rounded >= bound:
+            contact[driven].fixed = 1 if nominal > bound * LIMITS.rounded else 2
+            ball[driver].ratio = bound
+            ball[driver].rest = kept / (ball[far].m + kept)
+
+
+@jit
+def ratios_in_force(low, high, ball, contact):
+    """R7: the ratios in force in a run, each chain of drives from its far end to its driver.
+
+    A contact driven from both sides cannot open, so it is never held.
+    """
+    for c in range(low, high + 1):
+        contact[c].fixed = 0
+    for c in range(high, low, -1):
+        if ball[c].turn == 1:
+            f = contact[c - 1].forward
+            if ball[c + 1].turn == -1:
+                ball[c].ratio = f
+                ball[c].rest = 1.0 - f
+            else:
+                onward = ball[c + 1].rest if c < high and ball[c + 1].turn == 1 else 1.0
+                admissible_ratio(c, c, c + 1, onward, f, ball, contact)
+    for c in range(low, high):
+        if ball[c + 1].turn == -1:
+            f = contact[c].backward
+            if ball[c].turn == 1:
+                ball[c + 1].ratio = f
+                ball[c + 1].rest = 1.0 - f
+            else:
+                onward = ball[c].rest if c > low and ball[c].turn == -1 else 1.0
+                admissible_ratio(c + 1, c, c, onward, f, ball, contact)
+
+
+@jit
+def several_sources(low, high, smallest, ball, contact):
+    """R1, R6: rates of a run with more than one source, where products of ratios are divided.
+
+    Each rate is x * 2**k, so that long products neither overflow nor vanish, and a ratio of zero
+    is one more vanishing factor: of the contacts, those of the leading order move.
+    """
+    x, k = 0.5, 1
+    top = k
+    contact[low].rate = x
+    contact[low].power = k
+    for c in range(low + 1, high + 1):
+        f = ball[c].ratio
+        way = ball[c].turn
+        if f == 0.0:
+            k -= way * LIMITS.vanishing
+        else:
+            f, j = math.frexp(f)
+            k += way * j
+            x = x * f if way == 1 else x / f
+            if x < 0.5:
+                x *= 2.0
+                k -= 1
+            elif x >= 1.0:
+                x *= 0.5
+                k += 1
+        contact[c].rate = x
+        contact[c].power = k
+        top = max(top, k)
+    for c in range(low, high + 1):
+        k = contact[c].power - top
+        contact[c].rate = math.ldexp(contact[c].rate, k) if k > -LIMITS.vanishing // 2 else 0.0
+        if contact[c].rate <= smallest:
+            contact[c].rate = 0.0
+
+
+@jit
+def reached(first, run, smallest, ball, contact):
+    """R1: set low..high of a run, as far as impulses reach at the nominal ratios, or beyond.
+
+    From the one source outwards rates only become less.  With several sources all contacts count.
+    """
+    source, last = run[first].source, run[first].last
+    run[first].low = first
+    run[first].high = last
+    if source < 0:
+        return
+    x = 1.0
+    c = source
+    while c < last and x > smallest:
+        x *= contact[c].forward
+        c += 1
+    run[first].high = c
+    x = 1.0
+    c = source
+    while c > first and x > smallest:
+        x *= contact[c - 1].backward
+        c -= 1
+    run[first].low = c
+
+
+@jit
+def rates(first, run, ball, contact, tally):
+    """R1, R6, R7: impulse rates, pulls and slopes of a run.
+
+    Returns whether a contact at u = 0 with nothing to release is about to open.
+    """
+    smallest = tally.cut_off
+    reached(first, run, smallest, ball, contact)
+    low, high, source = run[first].low, run[first].high, run[first].source
+    ratios_in_force(low, high, ball, contact)
+    if source < 0:
+        several_sources(low, high, smallest, ball, contact)
+    else:
+        contact[source].rate = 1.0
+        for c in range(source + 1, high + 1):
+            x = contact[c - 1].rate * ball[c].ratio
+            contact[c].rate = x if x > smallest else 0.0
+        for c in range(source - 1, low - 1, -1):
+            x = contact[c + 1].rate * ball[c + 1].ratio
+            contact[c].rate = x if x > smallest else 0.0
+
+    # Eqs. 47-48: m dv = dP on the left - dP on the right.
+    ball[low].pull = -contact[low].rate / ball[low].m
+    ball[high + 1].pull = contact[high].rate / ball[high + 1].m
+    for i in range(low + 1, high + 1):
+        # The difference of the rates leaves the sum of the momenta alone; where they are nearly
+        # equal, what the driver keeps for the ball has more digits.
+        if ball[i].rest > 0.5:
+            ball[i].pull = (contact[i - 1].rate - contact[i].rate) / ball[i].m
+        elif ball[i].turn == 1:
+            ball[i].pull = contact[i - 1].rate * ball[i].rest / ball[i].m
+        else:
+            ball[i].pull = -contact[i].rate * ball[i].rest / ball[i].m
+    # The balls of a contact that is held move as one, to the last bit.
+    for c in range(low + 1, high + 1):
+        if contact[c].fixed > 0 and ball[c].turn == 1:
+            ball[c + 1].pull = ball[c].pull
+    for j in range(low, high):
+        c = low + high - 1 - j
+        if contact[c].fixed > 0 and ball[c + 1].turn == -1:
+            ball[c].pull = ball[c + 1].pull
+    opens = False
+    for c in range(low, high + 1):
+        contact[c].slope = ball[c].pull - ball[c + 1].pull
+        opens = opens or opens_at_zero(c, contact)
+    return opens
+
+
+@jit
+def opens_at_zero(c, contact):
+    """R3: tell whether contact c, at u = 0 with nothing to release, is about to open."""
+    return contact[c].u == 0.0 and contact[c].q <= 0.0 and contact[c].slope < 0.0
+
+
+@jit
+def has_ended(c, contact):
+    """R3: tell whether contact c has ended: it opens, or has e = 0 and no longer closes."""
+    if contact[c].q > 0.0:
+        return False
+    u = contact[c].u
+    return u < 0.0 or (u == 0.0 and contact[c].e == 0.0 and contact[c].w > 0.0)
+
+
+@jit
+def end_progress(u, q, slope, rate, e):
+    """R3: progress to the end of a contact, where all that it can release is released.
+
+    While u < 0, Q(s) = Q + rate (u s + slope s^2 / 2); the root is written without cancellation.
+    Returns the progress and the closing speed there.
+    """
+    s = 0.0
+    if u > 0.0:
+        if slope >= 0.0:
+            return math.inf, 0.0
+        s = -u / slope
+        q += 0.5 * e * e * rate * u * s
+        u = 0.0
+        if q <= 0.0:
+            return s, 0.0
+    if q <= 0.0 or rate == 0.0:
+        return math.inf, 0.0
+    square = u * u - 2.0 * slope * q / rate
+    if square < 0.0:
+        return math.inf, 0.0  # recompression comes first
+    root = math.sqrt(square)
+    speed = root - u
+    if speed <= 0.0:
+        return math.inf, 0.0
+    return s + 2.0 * q / (rate * speed), -root
+
+
+@jit
+def is_gap(c, n, contact):
+    """R8: tell whether the idle contact c has active contacts on both sides."""
+    return 0 < c < n - 2 and contact[c - 1].active == 1 and contact[c + 1].active == 1
+
+
+@jit
+def segment(first, n, run, ball, contact):
+    """R8.2: progress of a run to its own next rate-changing event."""
+    low, high = run[first].low, run[first].high
+    s = math.inf
+    for c in range(low, high + 1):
+        at, speed = end_progress(
+            contact[c].u, contact[c].q, contact[c].slope, contact[c].rate, contact[c].e
+        )
+        contact[c].until = at
+        contact[c].final = speed
+        s = min(s, at)
+    # Idle neighbours close; a gap, shared with another run, is no event of this run's own.
+    for c in (low - 1, high + 1):
+        if 0 <= c < n - 1 and contact[c].active == 0:
+            contact[c].before = -contact[c].u
+            contact[c].until = math.inf
+            toward = -ball[low].pull if c < low else ball[c].pull
+            if toward > 0.0 and not is_gap(c, n, contact):
+                contact[c].until = -contact[c].u / toward
+                s = min(s, contact[c].until)
+    run[first].reach = s

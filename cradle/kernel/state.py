@@ -1,0 +1,226 @@
+"""What the event loop knows: groups of arrays, each field explained; and the limits of rounding.
+
+The comments of the fields are the notation of this package.  There are n balls; ball i lies between
+contacts i - 1 and i, contact c between balls c and c + 1.  Masses and velocities are counted in the
+chain's own units, powers of two, in which the largest are near 1 (`scales`): that changes no digit.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+if "jit" not in globals():
+
+    def jit(function: Any) -> Any:
+        """Mark a function that is compiled into its callers; `cradle.runtime` replaces this."""
+        return function
+
+    def apart(function: Any) -> Any:
+        """Mark a function that is called seldom: compiled once, not into each caller."""
+        return function
+
+    def door(function: Any) -> Any:
+        """Mark the function that is called from outside, whose compiled code is kept on disk."""
+        return function
+
+
+# Status codes.
+FINISHED, UNFINISHED, REFUSED, PAUSED, UNSOUND = 0, 1, 2, 3, 4
+# Kinds of event.
+MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE = 0, 1, 2, 3
+# What an answer can break; 0 is none.
+NO_EVENT, MOMENTUM, ORDER, ENERGY, LEDGER = 1, 2, 3, 4, 5
+
+
+class Limits(NamedTuple):
+    """What rounding and infinity are measured by; each has a test that fails without it."""
+
+    #: R9: an exhausted contact's speed, relative to the largest initial closing speed.
+    exhausted: float
+    #: R9: kinetic energy that a collapse may cost, relative to that of the initial closing.
+    faint: float
+    #: R9: exhausted collisions in a row that are a collapse.
+    repeats: int
+    #: R9: how closely a cycle must repeat itself, relative to its own scale.
+    self_similar: float
+    #: R9: how far a cycle may turn before it is exhausted, relative to its own scale.
+    bend: float
+    #: R9: what a jump beside a steady neighbour may leave in doubt, in exhausted speeds.
+    doubt: float
+    #: Relative accuracy of an impulse.
+    digits: float
+    #: R8: parts of segments, and distances, closer than this are equal.
+    tie: float
+    #: A run's events closer than this, relative to the progress that they need, are simultaneous.
+    simultaneous: float
+    #: R3: an end speed this close to -e times the speed at the start of compression is meant so.
+    same: float
+    #: R7: a ratio this close to its bound is meant to be the bound.
+    rounded: float
+    #: R1: a rate below this part of its run's largest, times the lightest ball's part of the
+    #: heaviest, is zero: no ball could notice it.
+    cut: float
+    #: R6: one vanishing ratio, as a binary exponent far below that of any number.
+    vanishing: int
+    #: The closed form is used for numbers between these, where no square over- or underflows ...
+    tiny: float
+    huge: float
+    #: ... and for conditions that are met by this part of their largest term.
+    clear: float
+    #: Mass of the lightest ball allowed, as a part of the heaviest.
+    lightest: float
+    #: The certificate: what each sum may be off, in units of the rounding of its terms.
+    sound: float
+
+
+LIMITS = Limits(
+    exhausted=1e-18,
+    faint=1e-20,
+    repeats=8,
+    self_similar=1e-13,
+    bend=1e-2,
+    doubt=1e5,
+    digits=4 * 2.0**-52,
+    tie=1e-9,
+    simultaneous=1.0 + 64 * 2.0**-52,
+    same=16 * 2.0**-52,
+    rounded=1.0 + 4 * 2.0**-52,
+    cut=2.0**-120,
+    vanishing=1 << 40,
+    tiny=1e-60,
+    huge=1e60,
+    clear=1e-12,
+    lightest=1e-150,
+    sound=64 * 2.0**-52,
+)
+
+
+class Ball:
+    """One ball."""
+
+    v: float  # velocity before the impact, in the caller's units
+    m: float  # mass
+    hi: float  # velocity as a sum of two numbers, hi + lo, with twice the digits
+    lo: float
+    pull: float  # velocity per unit of progress of the ball's run, dv/ds
+    ratio: float  # ratio in force at the ball
+    rest: float  # 1 - ratio, to all its digits
+    turn: int  # direction: 1 forward, -1 backward, 0 none
+    x: float  # room for what a function works out in passing
+    y: float
+
+
+class Contact:
+    """One contact; it joins the ball of its own number and the next.
+
+    `u` is zero exactly if the two balls have the same velocity to the last bit of both its parts.
+    """
+
+    e: float  # restitution
+    forward: float  # ratios at its right ball
+    backward: float
+    u: float  # closing speed, > 0 in compression
+    q: float  # work that it can still release, e^2 W+ - W-, since it became active
+    w: float  # work absorbed since it became active, W+
+    top: float  # closing speed at which its compression began, as a sum of two numbers
+    tip: float
+    rate: float  # impulse per unit of progress; the largest of a run is about 1
+    slope: float  # closing speed per unit of progress, du/ds
+    until: float  # progress to its own next event, and
+    final: float  # its closing speed there, if it ends
+    before: float  # -u of an idle contact at the start of the round, or at its end
+    p: float  # impulse since the start, as a sum of two numbers
+    p_lo: float
+    a: float  # work absorbed since the start, as a sum of two numbers
+    a_lo: float
+    active: int  # 1 while it is active
+    fixed: int  # > 0 while it is held at u = 0; 2 if its ratio is just the bound
+    held: int  # 1 if it had an impulse while held by a ratio above the bound
+    hits: int  # how often it became active
+    tiny: int  # how many exhausted collisions in a row
+    power: int  # binary exponent of the rate; a flag
+    x: float  # room for what a function works out in passing
+    y: float
+    z: float
+
+
+class Run:
+    """One run, under the number of its first contact; linked from left to right."""
+
+    last: int  # last contact; under the number of a last contact, the first
+    source: int  # the contact that drives all others, -1 if there are several
+    low: int  # contacts low..high have impulses or moving balls; the others wait
+    high: int
+    onward: int  # first contact of the next run, or n
+    back: int  # first contact of the run before, or -1
+    stirred: int  # 1 if it has changed since its rates and its segment were worked out
+    reach: float  # progress to the run's own next event
+    left: float  # of the gap after the run: parts of the two segments at which it is reached,
+    right: float  # left run's and right run's; `left` is negative if it must not meet
+
+
+class Level:
+    """R9: one of two levels on which cycles are looked for, ends of contacts and collapses."""
+
+    mark: int  # contact at whose end, or collapse, the snapshot was taken; -1 for none
+    due: int  # how many ends, or collapses, had been counted then
+    count: int  # how many have been counted so far
+    bend: float  # how far the cycle before the snapshot turned; and since then
+    bent: float
+
+
+class Memory:
+    """R9: what is remembered of one contact on one level."""
+
+    u: float  # the snapshot: closing speed, work, collisions, and who drives whom
+    q: float
+    hits: int
+    code: int
+    p: float  # impulse and work absorbed since then; on the upper level without the lower one's
+    a: float
+
+
+class Tally:
+    """The impact as a whole."""
+
+    events: int  # how many events, and rounds, so far
+    rounds: int
+    collapsed: int  # 1 if contacts have collapsed
+    effort: int  # contacts that may still be touched before a pause
+    first: int  # first contact of the first run, or n
+    shift: int  # binary exponents of the largest velocity and the largest mass
+    mass_shift: int
+    defect: int  # what the answer breaks
+    cut_off: float  # rates below this are zero
+    threshold: float  # R9: speed and energy below which a contact is exhausted
+    faint: float
+    meeting: float  # R8: where two runs meet, as a part of the overlap
+
+
+class Cluster(NamedTuple):
+    """R9: contacts left..right, of which first..last chatter between steady neighbours."""
+
+    left: int
+    first: int
+    last: int
+    right: int
+
+
+class Record(NamedTuple):
+    """Where events are written, while there is room; lengths 0 for the outcome alone."""
+
+    kinds: Any
+    contacts: Any
+    velocities: Any
+    impulses: Any
+
+
+class State(NamedTuple):
+    """All of it: sequences of the things above, `level` of two, `memory` of two rows."""
+
+    ball: Any
+    contact: Any
+    run: Any
+    level: Any
+    memory: Any
+    tally: Any  # of one
+    record: Record
