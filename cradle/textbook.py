@@ -229,8 +229,7 @@ class Impact:
 
 def solve(
     masses: Any, velocities: Any, restitution: Any, forward: Any, backward: Any = None, *,
-    meeting: Any = 0.5, number: Any = float, max_events: int = 100_000,
-    impact: type[Impact] = Impact,
+    meeting: Any = 0.5, number: Any = float, max_events: int = 100_000, impact: Any = Impact,
 ) -> Impact:  # fmt: skip
     """Return an impact after R1 to R8; arguments as for `Chain` and `ImpulseCorrelation`.
 
@@ -243,7 +242,7 @@ def solve(
     sizes = (masses, n), (velocities, n), (restitution, n - 1), (forward, n - 2), (back, n - 2)
     lists = [x if isinstance(x, list | tuple) else [x] * size for x, size in sizes]
     m, v, e, f, b = ([number(x) for x in values] for values in lists)
-    state = impact(m, v, e, {FORWARD: [0, *f, 0], BACKWARD: [0, *b, 0]}, number(meeting))
+    state: Impact = impact(m, v, e, {FORWARD: [0, *f, 0], BACKWARD: [0, *b, 0]}, number(meeting))
     state.start()
     for _ in range(2 * max_events):  # an event takes a round to get there, and one of its own
         if not state.round():
