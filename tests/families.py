@@ -1,0 +1,166 @@
+"""Families of random chains that need more than continuous numbers: ties, zeros, light balls.
+
+Every number is made by choices, products, sums and divisions of whole numbers, operations that
+round alike everywhere; printed, it is short.  Draws come from `random.Random`, whose `random` and
+`getrandbits` are the same on every platform; nothing else of it is used.
+"""
+
+import random
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from cradle import Chain, ImpulseCorrelation, collide
+
+PAPER_MASSES = [0.045, 0.053, 0.053, 0.166]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A chain and the parameters of its impact, as plain numbers."""
+
+    masses: list
+    velocities: list
+    restitution: list
+    forward: list
+    backward: list
+    meeting: float = 0.5
+
+    def solve(self, solver, **options):
+        """By `textbook.solve`, `truth.solve` or anything that is called like them."""
+        parts = self.masses, self.velocities, self.restitution, self.forward, self.backward
+        return solver(*parts, meeting=self.meeting, **options)
+
+    def collide(self, **options):
+        """By the package."""
+        model = ImpulseCorrelation(
+            self.forward, self.backward, meeting=self.meeting, excess="saturate", **options
+        )
+        return collide(Chain(self.masses, self.velocities, self.restitution), model)
+
+    def mirrored(self):
+        return Problem(
+            self.masses[::-1],
+            [-v for v in self.velocities[::-1]],
+            self.restitution[::-1],
+            self.backward[::-1],
+            self.forward[::-1],
+            1 - self.meeting,
+        )
+
+    def boosted(self, speed):
+        """Seen from a frame that moves: the same closing speeds, exactly, or a ValueError."""
+        velocities = [v + speed for v in self.velocities]
+        if any(
+            Fraction(w) - Fraction(speed) != Fraction(v)
+            for v, w in zip(self.velocities, velocities)
+        ):
+            raise ValueError(f"{self.velocities} plus {speed} needs rounding")
+        return replace(self, velocities=velocities)
+
+    def in_units(self, mass, velocity):
+        """In other units; exact if these are powers of two."""
+        return replace(
+            self,
+            masses=[m * mass for m in self.masses],
+            velocities=[v * velocity for v in self.velocities],
+        )
+
+
+class Draw:
+    """Numbers and choices."""
+
+    def __init__(self, seed):
+        self.source = random.Random(seed)
+
+    def below(self, n):
+        """A whole number below n."""
+        return int(self.source.random() * n)
+
+    def choice(self, values):
+        return values[self.below(len(values))]
+
+    def decimal(self, low, high, places):
+        """A number of a few decimals, as it is printed."""
+        scale = 10**places
+        return (round(low * scale) + self.below(round((high - low) * scale) + 1)) / scale
+
+    def chance(self, percent):
+        return self.below(100) < percent
+
+
+def within_bounds(masses, parts):
+    """One way's ratios as parts of Eq. 53, for a chain driven to the right."""
+    ratios, onward = [], 0.0
+    for here, beyond, part in reversed(list(zip(masses[1:], masses[2:], parts))):
+        onward = part * (beyond / (beyond + here * (1 - onward)))
+        ratios.insert(0, onward)
+    return ratios
+
+
+def ties(draw, n):
+    """Equal or the paper's masses, few different numbers: everything coincides."""
+    kind = draw.below(3)
+    masses = [1.0] * n
+    if kind == 1:
+        masses = [draw.choice(PAPER_MASSES) for _ in range(n)]
+    elif kind == 2:
+        masses = [draw.choice([1.0, 1.0, 1.0, 3.0, 0.3]) for _ in range(n)]
+    first = [1.0] + [0.0] * (n - 1)
+    velocities = first if draw.chance(40) else [draw.choice([-0.5, 0, 0.5, 1]) for _ in range(n)]
+    coefficients = draw.choice([[1], [1], [0, 0.5, 0.9, 1], [0.5, 0.9, 1], [0.9]])
+    restitution = [float(draw.choice(coefficients)) for _ in range(n - 1)]
+    values = draw.choice([[0.0, 1.0], [0.0, 1e-20], [0.0, 0.1], [0.0, 1e-20, 0.1, 1.0]])
+    forward, backward = ([draw.choice(values) for _ in range(n - 2)] for _ in range(2))
+    return Problem(masses, velocities, restitution, forward, backward, draw.choice([0.0, 0.5, 1.0]))
+
+
+def bounded_ties(draw, n):
+    """The same, with no ratio above its bound."""
+    given = ties(draw, n)
+    parts = draw.choice([[0.0, 0.5], [0.0, 1.0], [0.0, 1e-20, 0.5]])
+    forward = within_bounds(given.masses, [draw.choice(parts) for _ in given.forward])
+    backward = within_bounds(given.masses[::-1], [draw.choice(parts) for _ in given.forward])
+    return replace(given, forward=forward, backward=backward[::-1])
+
+
+def mixed_zeros(draw, n):
+    """Generic balls in decreasing order of velocity; a tenth to a half of the ratios are zero."""
+    masses = [draw.decimal(0.3, 3, 2) for _ in range(n)]
+    velocities = sorted((draw.decimal(0, 1, 2) for _ in range(n)), reverse=True)
+    restitution = [draw.decimal(0.5, 1, 2) for _ in range(n - 1)]
+    zeros = 10 + draw.below(41)
+
+    def part():
+        return 0.0 if draw.chance(zeros) else draw.decimal(0.05, 0.95, 2)
+
+    ways = []
+    for m in (masses, masses[::-1]):
+        bounds = within_bounds(m, [part() for _ in range(n - 2)])
+        ways.append([int(x * 100) / 100 for x in bounds])  # printed, and still within its bound
+    return Problem(masses, velocities, restitution, ways[0], ways[1][::-1])
+
+
+def light_balls(draw, n):
+    """Balls a thousand to a million times lighter among the others; elastic or nearly so."""
+    masses = [draw.choice([1.0, 1.0, 1.7, 1e-3, 1e-6]) for _ in range(n)]
+    velocities = [1.0] + [0.0] * (n - 1)
+    restitution = [draw.choice([1.0, 1.0, 0.99, 0.9]) for _ in range(n - 1)]
+    forward, backward = ([draw.choice([0.0, 0.05, 0.1]) for _ in range(n - 2)] for _ in range(2))
+    return Problem(masses, velocities, restitution, forward, backward)
+
+
+#: name: generator, least and largest number of balls
+FAMILIES = {
+    "ties": (ties, 2, 20),
+    "ties within bounds": (bounded_ties, 3, 20),
+    "mixed zeros": (mixed_zeros, 7, 12),
+    "light balls": (light_balls, 3, 5),
+}
+
+
+def family(name, count, seed=2001):
+    """Yield problems of a family; the same for the same seed, everywhere."""
+    draw = Draw(seed)
+    generate, least, largest = FAMILIES[name]
+    for _ in range(count):
+        yield generate(draw, least + draw.below(largest - least + 1))

@@ -1,0 +1,146 @@
+"""The truth at any number of digits: `cradle.textbook` with rule R9 by a plain threshold.
+
+Contacts whose closing speed and store have both become negligible, and that alone keep making
+events, end plastically.  It knows no cycles: every impact of a sequence is made, down to a
+threshold that leaves thirty of fifty digits.
+"""
+
+from itertools import groupby
+
+import mpmath
+
+from cradle import textbook
+from cradle.textbook import EventLimit
+
+__all__ = ["EventLimit", "Impact", "solve"]
+
+
+class Impact(textbook.Impact):
+    """R1 to R9, with counts of what tests look for."""
+
+    #: Threshold of R9, relative to the largest initial closing speed; None for that of the type.
+    collapse_below = None
+
+    def __init__(self, *given):
+        super().__init__(*given)
+        self.reduced = [a * b / (a + b) for a, b in zip(self.m, self.m[1:])]
+        digits = 13 if isinstance(self.one, float) else int(0.6 * mpmath.mp.dps)
+        below = self.one / 10**digits if self.collapse_below is None else self.collapse_below
+        self.tiny = (below * max([*self.u, self.zero])) ** 2
+        # Largest squared speed of a contact since its last event; its events in a row with this
+        # below `tiny`; the contacts of the latest events, as long as all of these were calm.
+        self.peak = [u * u for u in self.u]
+        self.calm, self.streak = [0] * len(self.u), []
+        self.collapsed, self.meetings, self.recompressions = False, 0, 0
+
+    def speed_squared(self, c):
+        """Larger of closing speed and speed equivalent of the store, squared."""
+        store = self.e[c] * self.e[c] * self.gained[c] - self.given[c]
+        return max(self.u[c] * self.u[c], 2 * store / self.reduced[c])
+
+    def record(self, kind, c):
+        super().record(kind, c)
+        if kind in ("end", "close"):
+            self.calm[c] = self.calm[c] + 1 if self.peak[c] < self.tiny else 0
+            self.peak[c] = self.speed_squared(c)
+            self.streak = [*self.streak, c] if self.calm[c] > 4 else []
+
+    def close(self, c):
+        super().close(c)
+        self.meetings += self.direction[c] != 0 and self.direction[c + 1] != 0
+
+    def move(self, run, s):
+        before = list(self.gained)
+        super().move(run, s)
+        for c in run.slope:
+            self.peak[c] = max(self.peak[c], self.speed_squared(c))
+            self.recompressions += self.given[c] > 0 and self.gained[c] > before[c]
+
+    def progress(self, runs):
+        if len(self.streak) < 8 * len(self.m):
+            super().progress(runs)
+        else:
+            self.collapse()
+
+    def exhausted(self, c):
+        return self.calm[c] > 0 and max(self.peak[c], self.speed_squared(c)) < self.tiny
+
+    def collapse(self):
+        """R9: exhausted contacts that alone make events end plastically."""
+        spent = set(self.streak)
+        for step in (1, -1):  # exhausted contacts that adjoin them go with them
+            for c in range(len(self.u))[::step]:
+                if c - step in spent and self.exhausted(c):
+                    spent.add(c)
+        for _, group in groupby(enumerate(sorted(spent)), key=lambda item: item[1] - item[0]):
+            self.fuse([c for _, c in group])
+        self.u = [u if active else min(u, self.zero) for u, active in zip(self.u, self.active)]
+        self.streak, self.collapsed = [], True
+
+    def fuse(self, contacts):
+        """Plastic end of neighbouring contacts: their balls take the common velocity."""
+        balls, v = range(contacts[0], contacts[-1] + 2), self.velocities
+        common = sum(self.m[i] * v[i] for i in balls) / sum(self.m[i] for i in balls)
+        passed = self.zero
+        for i in balls:
+            change, v[i] = common - v[i], common
+            passed -= self.m[i] * change
+            if i > 0:
+                self.u[i - 1] -= change
+            if i < len(self.u):
+                self.u[i] += change
+            if i in contacts:
+                self.impulses[i] += passed
+        for c in contacts:
+            self.u[c] = self.near[c] = self.peak[c] = self.zero
+            self.active[c], self.calm[c] = False, 0
+            self.direction[c] = self.direction[c + 1] = 0
+            self.record("collapse", c)
+
+
+def check_ratios(masses, forward, backward, slack):
+    """Eq. 53, and its mirror image by the same lines."""
+    for name, way in (("forward", 1), ("backward", -1)):
+        m, ratios, onward = masses[::way], (forward if way == 1 else backward)[::way], 0
+        for i in reversed(range(len(ratios))):
+            bound = m[i + 2] / (m[i + 2] + m[i + 1] * (1 - onward))
+            onward = ratios[i]
+            if onward > bound * (1 + slack):
+                at = i if way == 1 else len(ratios) - 1 - i
+                raise ValueError(f"{name}[{at}] = {onward}; bound at ball {at + 1} is {bound}")
+
+
+def solve(
+    masses,
+    velocities,
+    restitution,
+    forward,
+    backward=None,
+    *,
+    excess="raise",
+    number=mpmath.mpf,
+    max_events=1_000_000,
+    collapse_below=None,
+    impact=Impact,
+    **options,
+):
+    """Post-impact state by rules R1 to R9, with the digits of `number`.
+
+    A string such as "0.1" is read as that decimal number.  `collapse_below` is the threshold of R9
+    relative to the largest initial closing speed.
+    """
+
+    class Chosen(impact):
+        def __init__(self, m, v, e, ratio, meeting):
+            ratios = [ratio[way][1:-1] for way in (textbook.FORWARD, textbook.BACKWARD)]
+            if not all(0 <= a <= 1 for part in ratios for a in part):
+                raise ValueError(f"ratios {ratios} must lie in [0, 1]")
+            self.collapse_below = collapse_below
+            super().__init__(m, v, e, ratio, meeting)
+            if excess == "raise":
+                check_ratios(m, *ratios, self.last_digits / 16)
+
+    return textbook.solve(
+        masses, velocities, restitution, forward, backward,
+        number=number, max_events=max_events, impact=Chosen, **options,
+    )  # fmt: skip
