@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.kernel import LIGHTEST
+from cradle.kernel.state import LIMITS
 
 Vector = NDArray[np.float64]
 
@@ -146,7 +146,7 @@ def one_number(
 
 
 def checked_masses(masses: ArrayLike) -> Vector:
-    """Return masses as floats: positive, and within `LIGHTEST` of the heaviest of their chain.
+    """Return masses as floats: positive, and within `LIMITS.lightest` of the heaviest of their chain.
 
     Parameters
     ----------
@@ -172,13 +172,13 @@ def checked_masses(masses: ArrayLike) -> Vector:
     """
     array = checked("masses", masses, "must be above 0", 0.0, open_low=True)
     if array.size and array.ndim:
-        small = array < LIGHTEST * array.max(axis=-1, keepdims=True)
+        small = array < LIMITS.lightest * array.max(axis=-1, keepdims=True)
         if small.any():
             at = np.unravel_index(int(np.argmax(small)), array.shape)
             place = ", ".join(str(int(k)) for k in at)
             raise ValueError(
                 f"masses[{place}] = {float(array[at])!r}; "
-                f"must be at least {LIGHTEST} of the heaviest ball of its chain"
+                f"must be at least {LIMITS.lightest} of the heaviest ball of its chain"
             )
     return array
 

@@ -118,3 +118,34 @@ class ImpactNotFinished(RuntimeError):
     def __str__(self) -> str:
         """Return the message."""
         return str(self.args[0])
+
+
+class ImpactNotCertified(RuntimeError):
+    """An outcome failed the check that every answer has to pass, so it is not returned.
+
+    This is a defect of the solver, not of the input: please report `chain` and `model`.
+
+    Attributes
+    ----------
+    chain : Chain
+        The chain.
+    model : object
+        The model.
+    defect : str
+        What the outcome would have broken.
+
+    Examples
+    --------
+    >>> raise ImpactNotCertified("a chain", "a model", "balls still approach")
+    Traceback (most recent call last):
+    ...
+    cradle.trace.ImpactNotCertified: balls still approach: a chain, a model
+    """
+
+    def __init__(self, chain: Any, model: Any, defect: str) -> None:
+        super().__init__(chain, model, defect)  # all, so that it can be pickled
+        self.chain, self.model, self.defect = chain, model, defect
+
+    def __str__(self) -> str:
+        """Return the defect and what shows it."""
+        return f"{self.defect}: {self.chain!r}, {self.model!r}"

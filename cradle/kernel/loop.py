@@ -17,7 +17,7 @@ from cradle.kernel.motion import (
     set_closing_speed,
 )
 from cradle.kernel.record import record, record_compressions
-from cradle.kernel.rules import rates, segment
+from cradle.kernel.rules import is_gap, rates, segment
 from cradle.kernel.state import (
     COLLAPSE,
     FINISHED,
@@ -42,7 +42,7 @@ def works(k, s, ended, recent):
     elif u0 <= 0.0 and u1 <= 0.0:
         give = -0.5 * rate * s * (u0 + u1)
     else:
-        s0 = -u0 / k.slope
+        s0 = s * (u0 / (u0 - u1))
         if u0 > 0.0:
             gain = 0.5 * rate * s0 * u0
             give = -0.5 * rate * (s - s0) * u1
@@ -127,14 +127,25 @@ def move(first, part, n, state):
 
 
 @jit
-def touch(gap, n, state):
-    """Bring a gap between two runs to zero, by impulses of one of the runs."""
+def touch(gap, moved, n, state):
+    """Bring a gap to zero by impulses of the run that has moved there, or else of the other."""
     run, ball, contact = state.run, state.ball, state.contact
     left, right = run[gap - 1].last, gap + 1
-    if run[left].high == gap - 1 and arrive(gap, run[left].low, gap - 1, ball, contact):
-        return
-    if run[right].low == right:
-        arrive(gap, right, run[right].high, ball, contact)
+    other = left if moved == right else right
+    for first in (moved, other):
+        at_edge = run[first].high == gap - 1 or run[first].low == gap + 1
+        if at_edge and arrive(gap, run[first].low, run[first].high, ball, contact):
+            return
+
+
+@jit
+def touch_beside(first, n, state):
+    """Bring the gaps beside a run that has moved to zero, if only rounding says otherwise."""
+    contact, last = state.contact, state.run[first].last
+    for gap in (first - 1, last + 1):
+        if 0 <= gap < n - 1 and contact[gap].active == 0 and is_gap(gap, n, contact):
+            if contact[gap].u > (1.0 - LIMITS.simultaneous) * contact[gap].before:
+                touch(gap, first, n, state)
 
 
 @jit
@@ -150,32 +161,36 @@ def meet(one, n, state):
     left, gap, right = one - 1, run[one].last + 1, run[other].last + 1
     beyond_left = part_beyond(one, part_one, -ball[one].pull, left, n, state)
     beyond_right = part_beyond(other, part_other, ball[right].pull, right, n, state)
+    moved = one
     if beyond_left < math.inf and beyond_left <= beyond_right:
         gap = left
         move(one, beyond_left, n, state)
     elif beyond_right < math.inf:
         gap = right
+        moved = other
         move(other, beyond_right, n, state)
     else:
         move(one, part_one, n, state)
         move(other, part_other, n, state)
-    touch(gap, n, state)
+        if part_other > part_one:
+            moved = other
+        touch_beside(one, n, state)
+        touch_beside(other, n, state)
+    touch(gap, moved, n, state)
     grow(gap, n, state)
 
 
 @jit
 def complete(n, state):
     """R8.6: take every run to its own next event."""
-    contact, run = state.contact, state.run
     first = state.tally[0].first
     while first < n:
         move(first, 1.0, n, state)
-        # Both sides of a gap have moved: it is at zero if only rounding says otherwise.
-        gap = first - 1
-        if gap > 0 and contact[gap - 1].active == 1:
-            if contact[gap].u > (1.0 - LIMITS.simultaneous) * contact[gap].before:
-                touch(gap, n, state)
-        first = run[first].onward
+        first = state.run[first].onward
+    first = state.tally[0].first
+    while first < n:
+        touch_beside(first, n, state)
+        first = state.run[first].onward
 
 
 @jit
@@ -223,7 +238,7 @@ def prepare(n, chain, meeting, state):
 def impact(n, chain, meeting, max_events, resumed, state):
     """Solve one impact: run rounds until no contact is active; return the status.
 
-    With tally.effort used up it stops, PAUSED, to be `resumed` with the same arguments.
+    With tally.effort or tally.room used up it stops, PAUSED, to be `resumed`.
     """
     contact, run, tally = state.contact, state.run, state.tally[0]
     if not resumed:
@@ -251,7 +266,7 @@ def impact(n, chain, meeting, max_events, resumed, state):
         tally.rounds += 1
         if tally.rounds > max_events:
             return UNFINISHED
-        if tally.effort < 0:
+        if tally.effort < 0 or tally.events > tally.room:
             return PAUSED
         # R8.1: then closings; both need no progress, so the next round looks again.
         if more > 0 or collapsed or close_contacts(n, state) > 0:

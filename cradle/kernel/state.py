@@ -185,7 +185,8 @@ class Tally:
     events: int  # how many events, and rounds, so far
     rounds: int
     collapsed: int  # 1 if contacts have collapsed
-    effort: int  # contacts that may still be touched before a pause
+    effort: int  # contacts that may still be touched, and events written, before a pause
+    room: int
     first: int  # first contact of the first run, or n
     shift: int  # binary exponents of the largest velocity and the largest mass
     mass_shift: int

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from types import ModuleType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle import kernel as plain
-from cradle import runtime
 from cradle.chain import (
     Chain,
     Vector,
@@ -26,15 +24,21 @@ from cradle.chain import (
     refuse_overflow,
 )
 from cradle.closed_form import largest_ratios
-from cradle.trace import Event, ImpactNotFinished, Trace
+from cradle.drive import DEFECTS, FINISHED, LARGE, REFUSED, UNFINISHED, UNSOUND, Job
+from cradle.kernel import Inputs, Options
+from cradle.kernel.state import LIMITS
+from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
 #: Steps after which an impact is given up, unless told otherwise.
 MAX_EVENTS = 5_000_000
 
-# A record of this length fits nearly every impact; longer ones are run again with enough room.
-_ROOM = 64
-# The longest path kept of an impact that did not finish.
-_UNFINISHED_ROOM = 100_000
+# Numbers that a path may hold unless it is asked for in full: 80 MB.
+_MOST_NUMBERS = 10_000_000
+_EVERY = 2**40
+
+def _most_events(n: int) -> int:
+    return max(_MOST_NUMBERS // n, 1000)
+
 
 _KINDS = ("maximum_compression", "end", "close", "collapse")
 
@@ -108,7 +112,7 @@ class ImpulseCorrelation:
         object.__setattr__(self, "excess", excess)
         object.__setattr__(self, "max_events", int(max_events))
 
-    def solve(self, chain: Chain) -> Trace:
+    def solve(self, chain: Chain, *, record: bool | None = None) -> Trace:
         """Solve the impact of `chain`; see `collide`."""
         n = len(chain)
         ratios: list[Vector] = []
@@ -125,89 +129,42 @@ class ImpulseCorrelation:
         if self.excess == "raise":
             _refuse_excess(chain.masses, *ratios)
 
-        kernel = runtime.chosen()
-        room = _ROOM
-        while True:
-            status, count, collapsed, arrays = _run(
-                kernel, chain, ratios, self.meeting, self.max_events, room
-            )
-            kept = count if status == kernel.FINISHED else min(count, _UNFINISHED_ROOM)
-            if kept <= room:
-                break
-            room = kept
-        v, p, absorbed, hits, held, _, _, kinds, contacts, path, path_impulses = arrays
-        trace = Trace(
-            chain=chain,
-            model=self,
-            velocities=v,
-            impulses=p,
-            absorbed=absorbed,
-            collisions=hits,
-            path=path[: kept + 1],
-            path_impulses=path_impulses[: kept + 1],
-            events=tuple(
-                Event(_KINDS[kind], contact)
-                for kind, contact in zip(
-                    kinds[:kept].tolist(), contacts[:kept].tolist(), strict=True
-                )
-            ),
-            collapsed=bool(collapsed),
-            saturated=tuple(np.flatnonzero(held).tolist()),
+        inputs = Inputs(
+            *(part[None].copy() for part in (chain.masses, chain.velocities, chain.restitution)),
+            *(part[None] for part in ratios),
         )
-        if status != kernel.FINISHED:
+        room = _most_events(n) if record is None else _EVERY if record else 0
+        job = Job(inputs, 1, Options(self.meeting, self.max_events, False, True), room).run()
+        trace = self._trace(chain, job)
+        if job.status == UNFINISHED:
+            v = trace.velocities
             raise ImpactNotFinished(
                 f"the impact was not finished after max_events = {self.max_events} steps, "
-                f"{count} events; closing speeds so far {(v[:-1] - v[1:]).tolist()}",
+                f"{job.tally.events} events; closing speeds so far {(v[:-1] - v[1:]).tolist()}",
                 trace,
             )
+        if job.status == UNSOUND:
+            raise ImpactNotCertified(chain, self, DEFECTS[int(job.tally.defect)])
         return trace
 
-
-def _work(kernel: ModuleType, n: int, room: int) -> list[Any]:
-    """Return outputs but the velocities, work area and record, as `kernel.impact` takes them."""
-    integer = np.int64
-    return [
-        np.zeros(n - 1),
-        np.zeros(n - 1),
-        np.zeros(n - 1, dtype=integer),
-        np.zeros(n - 1, dtype=integer),
-        np.zeros((kernel.FLOATS, n)),
-        np.zeros((kernel.INTS, n), dtype=integer),
-        np.zeros(room, dtype=integer),
-        np.zeros(room, dtype=integer),
-        np.zeros((room + 1, n)),
-        np.zeros((room + 1, n - 1)),
-    ]
-
-
-def _call(kernel: ModuleType, function: str, arrays: list[Any]) -> Any:
-    """Call a function of the kernel; it writes into the arrays among its arguments."""
-    if kernel is not plain:
-        return getattr(kernel, function)(*arrays)
-    # Python's own numbers: faster than NumPy's one at a time, and the same digits.
-    lists = [array.tolist() if isinstance(array, np.ndarray) else array for array in arrays]
-    result = getattr(kernel, function)(*lists)
-    for array, values in zip(arrays, lists, strict=True):
-        if isinstance(array, np.ndarray) and array.size:
-            array[...] = values
-    return result
-
-
-def _run(
-    kernel: ModuleType,
-    chain: Chain,
-    ratios: list[Vector],
-    meeting: float,
-    max_events: int,
-    room: int,
-) -> tuple[int, int, int, list[Any]]:
-    """Call the kernel once, with room for a record of that many events."""
-    n = len(chain)
-    # Copies: compiled code is made for arrays that may be written to.
-    inputs = [array.copy() for array in (chain.masses, chain.velocities, chain.restitution)]
-    arrays = [np.zeros(n), *_work(kernel, n, room)]
-    arguments = [n, *inputs, *ratios, meeting, max_events, *arrays]
-    return *_call(kernel, "impact", arguments), arrays
+    def _trace(self, chain: Chain, job: Job) -> Trace:
+        """Return what the event loop left."""
+        results, written = job.outputs, job.record
+        kept = min(int(job.tally.events), len(written.kinds))
+        kinds, contacts = written.kinds[:kept].tolist(), written.contacts[:kept].tolist()
+        return Trace(
+            chain=chain,
+            model=self,
+            velocities=results.v[0],
+            impulses=results.p,
+            absorbed=results.a,
+            collisions=results.hits[0],
+            path=written.velocities[: kept + 1],
+            path_impulses=written.impulses[: kept + 1],
+            events=tuple(Event(_KINDS[k], c) for k, c in zip(kinds, contacts, strict=True)),
+            collapsed=bool(results.collapsed[0]),
+            saturated=tuple(np.flatnonzero(results.held).tolist()),
+        )
 
 
 def post_impact_velocities(
@@ -362,57 +319,60 @@ def outcomes(
         shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
         raise ValueError(f"leading axes do not broadcast: {shapes}") from None
 
-    kernel = runtime.chosen()
     count, chunk = math.prod(lead), _chunk(n)
     if count == 0:
         _check(given, excess)
     out = np.empty((count, n))
     hits = np.empty((count, n - 1), dtype=np.int64)
     collapsed = np.empty(count, dtype=np.int64)
+    options = Options(float(meeting), int(max_events), excess == "raise", False)
+    large = count * n >= LARGE
 
-    def solve(begin: int) -> tuple[int, int]:
-        """Solve the chunk of chains that begins there; return how many, and the next's status."""
+    def solve(begin: int, stop: threading.Event) -> Job:
+        """Solve the chunk of chains that begins there."""
         rows = slice(begin, min(begin + chunk, count))
-        part = [_rows(array, lead, rows) for array in arrays]
-        results = [out[rows], hits[rows], collapsed[rows]]
-        inputs = [rows.stop - begin, n, excess == "raise", *part, float(meeting), int(max_events)]
-        solved, status = _call(kernel, "batch", [*inputs, *results, *_area(kernel, n)])
-        return solved, status
+        part = Inputs(*(_rows(array, lead, rows) for array in arrays))
+        job = Job(part, rows.stop - begin, options, large=large).run(stop)
+        out[rows], hits[rows], collapsed[rows] = job.outputs[:3]
+        return job
 
     starts = range(0, count, chunk)
     # At the first failure in the order of the chains; none has been returned before.
-    for begin, (solved, status) in zip(starts, _in_order(solve, starts, progress), strict=True):
-        if status == kernel.REFUSED:
+    for begin, job in zip(starts, _in_order(solve, starts, progress), strict=True):
+        if job.status == REFUSED:
             _check(given, excess)
             raise AssertionError("the kernel refused chains that the checks admit")
-        if status != kernel.FINISHED:
-            failed = begin + solved
+        if job.status != FINISHED:
+            failed = begin + job.next
             # Alone, with its record; it stops where it stopped here, and raises.
             m, v, e, f, b = (_rows(array, lead, slice(failed, failed + 1))[0] for array in arrays)
-            ImpulseCorrelation(
+            model = ImpulseCorrelation(
                 f, b, meeting=meeting, excess="saturate", max_events=max_events
-            ).solve(Chain(m, v, e))
+            )
+            model.solve(Chain(m, v, e))
     return Outcomes(out.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.reshape(lead) != 0)
 
 
 def _in_order(
-    solve: Callable[[int], tuple[int, int]], starts: range, progress: bool
-) -> Iterable[tuple[int, int]]:
+    solve: Callable[[int, threading.Event], Job], starts: range, progress: bool
+) -> Iterable[Job]:
     """Yield the results of `solve` in order, made by as many threads as there are processors."""
+    stop = threading.Event()
     if progress:
         from tqdm.auto import tqdm
 
         with tqdm(total=len(starts), unit="chunk") as bar:
-            for result in _in_order(solve, starts, progress=False):
+            for job in _in_order(solve, starts, progress=False):
                 bar.update()
-                yield result
+                yield job
     elif (workers := min(len(starts), os.cpu_count() or 1)) < 2:
-        yield from map(solve, starts)
+        yield from (solve(begin, stop) for begin in starts)
     else:
         with ThreadPoolExecutor(workers) as pool:
             try:
-                yield from pool.map(solve, starts)
+                yield from pool.map(solve, starts, itertools.repeat(stop))
             finally:
+                stop.set()
                 pool.shutdown(cancel_futures=True)
 
 
@@ -422,19 +382,6 @@ def _chunk(n: int) -> int:
     So much memory is needed beyond inputs and outputs.
     """
     return 16_384 if n <= 3 else 4096
-
-
-#: Each thread's work area, kept for its next call.
-_KEPT = threading.local()
-
-
-def _area(kernel: ModuleType, n: int) -> list[Any]:
-    """Return this thread's work area for outcomes of n balls."""
-    kept: tuple[int, list[Any]] = getattr(_KEPT, "area", (0, []))
-    if kept[0] != n:
-        _, _, _, *work = _work(kernel, n, 0)
-        kept = _KEPT.area = (n, [np.zeros(0), np.zeros(0), *work])
-    return kept[1]
 
 
 def _check(given: dict[str, ArrayLike], excess: str) -> None:
@@ -485,7 +432,7 @@ def _refuse_excess(masses: Vector, forward: Vector, backward: Vector) -> None:
     """Raise if a ratio is above Eq. 53 or its mirror image, by more than a rounding error."""
     bounds = largest_ratios(masses, forward, backward)
     for name, ratios, bound in (("forward", forward, bounds[0]), ("backward", backward, bounds[1])):
-        above = ratios > bound * plain.ROUNDED
+        above = ratios > bound * LIMITS.rounded
         if above.any():
             at = np.unravel_index(int(np.argmax(above)), above.shape)
             ratio = float(np.broadcast_to(ratios, above.shape)[at])
