@@ -112,8 +112,9 @@ def advance(first, part, n, state):
         works(contact[c], s, contact[c].until <= horizon, recent[c])
     for c in (low - 1, high + 1):
         if 0 <= c < n - 1 and contact[c].active == 0:
-            due = contact[c].until <= horizon
-            if not (due and arrive(c, low, high, ball, contact)):
+            if contact[c].until <= horizon:
+                arrive(c, low, high, ball, contact)
+            else:
                 contact[c].u = closing(c, ball)
     run[first].stirred = 1
 
@@ -127,15 +128,16 @@ def move(first, part, n, state):
 
 
 @jit
-def touch(gap, moved, n, state):
-    """Bring a gap to zero by impulses of the run that has moved there, or else of the other."""
-    run, ball, contact = state.run, state.ball, state.contact
+def touch(gap, n, state):
+    """Bring a gap to zero: the ball that moved last, or the lighter one, takes the other's velocity."""
+    run, ball = state.run, state.ball
     left, right = run[gap - 1].last, gap + 1
-    other = left if moved == right else right
-    for first in (moved, other):
-        at_edge = run[first].high == gap - 1 or run[first].low == gap + 1
-        if at_edge and arrive(gap, run[first].low, run[first].high, ball, contact):
-            return
+    left_moves = run[left].stirred == 1 and ball[gap].pull != 0.0
+    right_moves = run[right].stirred == 1 and ball[gap + 1].pull != 0.0
+    if left_moves and not (right_moves and ball[gap + 1].m < ball[gap].m):
+        arrive(gap, run[left].low, gap - 1, ball, state.contact)
+    elif right_moves:
+        arrive(gap, right, run[right].high, ball, state.contact)
 
 
 @jit
@@ -145,7 +147,7 @@ def touch_beside(first, n, state):
     for gap in (first - 1, last + 1):
         if 0 <= gap < n - 1 and contact[gap].active == 0 and is_gap(gap, n, contact):
             if contact[gap].u > (1.0 - LIMITS.simultaneous) * contact[gap].before:
-                touch(gap, first, n, state)
+                touch(gap, n, state)
 
 
 @jit
@@ -161,22 +163,18 @@ def meet(one, n, state):
     left, gap, right = one - 1, run[one].last + 1, run[other].last + 1
     beyond_left = part_beyond(one, part_one, -ball[one].pull, left, n, state)
     beyond_right = part_beyond(other, part_other, ball[right].pull, right, n, state)
-    moved = one
     if beyond_left < math.inf and beyond_left <= beyond_right:
         gap = left
         move(one, beyond_left, n, state)
     elif beyond_right < math.inf:
         gap = right
-        moved = other
         move(other, beyond_right, n, state)
     else:
         move(one, part_one, n, state)
         move(other, part_other, n, state)
-        if part_other > part_one:
-            moved = other
         touch_beside(one, n, state)
         touch_beside(other, n, state)
-    touch(gap, moved, n, state)
+    touch(gap, n, state)
     grow(gap, n, state)
 
 

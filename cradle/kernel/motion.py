@@ -134,33 +134,23 @@ def set_closing_speed(c, speed, rest, low, high, ball, contact):
 
 @jit
 def arrive(c, low, high, ball, contact):
-    """Bring the idle contact c beside the run low..high to zero, by the run's impulses alone.
+    """Let the contact c beside the run low..high be at zero: give the run's ball the other's velocity.
 
-    The run's last impulse is corrected by its rounding.  Returns whether that can be done: not if
-    all balls of the run are one body.
+    The two differ by the rounding of what the run's last impulse did to this ball, and to those
+    that zeros join to it; no more is changed.
     """
-    k = low if c < low else high
-    while low <= k <= high and contact[k].u == 0.0:
-        k += 1 if c < low else -1
-    if not low <= k <= high:
-        return False
-    first, last, left, right = bodies(k, low, high, ball, contact)
-    if c < low:  # ball low gains what it is too slow by
-        push(k, -closing(c, ball) * left, low, high, ball, contact)
-        other = c
-        last = k
-    else:
-        push(k, -closing(c, ball) * right, low, high, ball, contact)
-        other = c + 1
-        first = k + 1
-    for i in range(first, last + 1):
-        ball[i].hi = ball[other].hi
-        ball[i].lo = ball[other].lo
+    i = low if c < low else high + 1
+    other = c if c < low else c + 1
+    step = 1 if c < low else -1
+    while True:
+        ball[i].hi, ball[i].lo = ball[other].hi, ball[other].lo
+        k = i if c < low else i - 1  # the contact inwards
+        if not low <= k <= high or contact[k].u != 0.0:
+            break
+        i += step
+    if low <= k <= high:
+        contact[k].u = closing(k, ball)
     contact[c].u = 0.0
-    for j in range(low, high + 1):
-        if contact[j].u != 0.0:
-            contact[j].u = closing(j, ball)
-    return True
 
 
 @jit
