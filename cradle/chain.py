@@ -146,7 +146,7 @@ def one_number(
 
 
 def checked_masses(masses: ArrayLike) -> Vector:
-    """Return masses as floats: positive, and within `LIMITS.lightest` of the heaviest of their chain.
+    """Return masses as floats: positive, none too light beside the heaviest of its chain.
 
     Parameters
     ----------

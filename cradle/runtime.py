@@ -15,11 +15,10 @@ import logging
 import os
 import sys
 import tempfile
-import time
 import warnings
 from importlib.resources import files
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 from typing import Any
 
 from cradle import kernel as plain
@@ -36,7 +35,7 @@ _spent = 0.0  # seconds of plain work so far, in this process
 
 @functools.cache
 def unit() -> str:
-    """Return the rooms of the kernel as one source file.
+    """Return the rooms of the kernel as one source, without comments and docstrings.
 
     Returns
     -------
@@ -48,17 +47,20 @@ def unit() -> str:
     >>> "from cradle" in unit()
     False
     """
-    parts = []
+    body: list[ast.stmt] = []
     for room in plain.ROOMS:
-        text = (files(plain) / f"{room}.py").read_text(encoding="utf-8")
-        lines = text.splitlines(keepends=True)
-        for node in ast.parse(text).body:
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cradle."):
-                assert node.end_lineno is not None
-                for k in range(node.lineno - 1, node.end_lineno):
-                    lines[k] = ""
-        parts.append("".join(lines))
-    return "\n\n".join(parts)
+        tree = ast.parse((files(plain) / f"{room}.py").read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                first = node.body[0]
+                if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
+                    del node.body[0]
+        body += [
+            node
+            for node in tree.body
+            if not (isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cradle."))
+        ]
+    return ast.unparse(ast.Module(body, [])) + "\n"
 
 
 def _name() -> str:

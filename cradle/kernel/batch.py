@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from cradle.kernel.loop import impact
 from cradle.kernel.record import in_units
-from cradle.kernel.state import FINISHED, LIMITS, REFUSED, door, jit
+from cradle.kernel.state import FINISHED, LIMITS, REFUSED, apart, door, jit
 
 
 class Inputs(NamedTuple):
@@ -95,7 +95,7 @@ def short_cut(n, chain, bounded, out_v):
     return out_v[0] < out_v[1] < out_v[2]
 
 
-@jit
+@apart
 def admissible(n, chain, bounded):
     """Tell whether all inputs are within their limits, ratios within Eq. 53 too if `bounded`."""
     m, v, e, forward, backward = chain.m, chain.v, chain.e, chain.forward, chain.backward
@@ -132,7 +132,7 @@ def admissible(n, chain, bounded):
     return True
 
 
-@jit
+@apart
 def hand_out(k, n, out, state):
     """Write the outcome of chain k in the caller's units."""
     contact, tally = state.contact, state.tally[0]

@@ -8,7 +8,7 @@ from cradle.kernel.motion import closing, join_velocities, relative_energy
 from cradle.kernel.state import apart, jit
 
 
-@jit
+@apart
 def end_plastically(first, last, n, state):
     """End those contacts of first..last that are active."""
     contact, run = state.contact, state.run

@@ -18,6 +18,7 @@ from cradle.kernel.motion import (
     reduced_mass,
     relative_energy,
     set_closing_speed,
+    share_out,
 )
 from cradle.kernel.record import record
 from cradle.kernel.state import COLLAPSE, LIMITS, Cluster, apart, jit
@@ -264,13 +265,14 @@ def jump(cluster, total, level, n, state):
     one_velocity(first, last + 1, heaviest_of(first, last + 1, ball), ball)
     energy -= relative_energy(left, right + 1, ball)
     squares = exact_squares(cluster, total, energy, state, memory, low, high)
-    impulse = memory[first - 1].p * total if first > left else 0.0
+    before = memory[first - 1].p * total if first > left else 0.0
+    after = memory[last + 1].p * total if last < right else 0.0
+    share_out(first, last, before, after, ball, contact)
     for c in range(low, high + 1):
         k = contact[c]
         work = 0.0
         if first <= c <= last:
-            impulse -= ball[c].m * ball[c].x
-            share = max(impulse, 0.0)
+            share = max(k.x, 0.0)
             work = memory[c].a * squares
             k.u = 0.0
         else:

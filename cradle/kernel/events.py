@@ -2,7 +2,7 @@
 
 from cradle.kernel.record import record
 from cradle.kernel.rules import has_ended, is_gap, opens_at_zero, source_of
-from cradle.kernel.state import CLOSE, END, LIMITS, jit
+from cradle.kernel.state import CLOSE, END, LIMITS, apart, jit
 
 
 @jit
@@ -45,7 +45,7 @@ def make_run(first, last, source, low, high, run):
     run[first].stirred = 1
 
 
-@jit
+@apart
 def start(n, state):
     """R2: in each touching stretch the leftmost approaching contact is the source."""
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]

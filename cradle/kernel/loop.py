@@ -128,8 +128,8 @@ def move(first, part, n, state):
 
 
 @jit
-def touch(gap, n, state):
-    """Bring a gap to zero: the ball that moved last, or the lighter one, takes the other's velocity."""
+def touch(gap, state):
+    """Bring a gap to zero: the ball that has just moved takes the other's velocity; or the lighter."""
     run, ball = state.run, state.ball
     left, right = run[gap - 1].last, gap + 1
     left_moves = run[left].stirred == 1 and ball[gap].pull != 0.0
@@ -145,9 +145,10 @@ def touch_beside(first, n, state):
     """Bring the gaps beside a run that has moved to zero, if only rounding says otherwise."""
     contact, last = state.contact, state.run[first].last
     for gap in (first - 1, last + 1):
-        if 0 <= gap < n - 1 and contact[gap].active == 0 and is_gap(gap, n, contact):
-            if contact[gap].u > (1.0 - LIMITS.simultaneous) * contact[gap].before:
-                touch(gap, n, state)
+        if not (0 <= gap < n - 1 and contact[gap].active == 0 and is_gap(gap, n, contact)):
+            continue
+        if contact[gap].u > (1.0 - LIMITS.simultaneous) * contact[gap].before:
+            touch(gap, state)
 
 
 @jit
@@ -174,7 +175,7 @@ def meet(one, n, state):
         move(other, part_other, n, state)
         touch_beside(one, n, state)
         touch_beside(other, n, state)
-    touch(gap, n, state)
+    touch(gap, state)
     grow(gap, n, state)
 
 
@@ -191,7 +192,7 @@ def complete(n, state):
         first = state.run[first].onward
 
 
-@jit
+@apart
 def prepare(n, chain, meeting, state):
     """Write the chain into the state, in its own units; R2."""
     ball, contact, tally = state.ball, state.contact, state.tally[0]

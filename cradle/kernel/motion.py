@@ -4,7 +4,7 @@ A light ball may shuttle a thousand times as fast as the heavy balls beside it. 
 alone would lose track of how these move, single velocities of how slowly some balls part.
 """
 
-from cradle.kernel.state import jit
+from cradle.kernel.state import apart, jit
 
 
 @jit
@@ -116,7 +116,7 @@ def push(c, impulse, low, high, ball, contact):
 
 @jit
 def set_closing_speed(c, speed, rest, low, high, ball, contact):
-    """Bring the closing speed of contact c to speed + rest, known better than its balls', by a push.
+    """Bring the closing speed of contact c to speed + rest by a push: its balls are known less well.
 
     At zero the balls of both bodies have one velocity to the last bit.
     """
@@ -134,7 +134,7 @@ def set_closing_speed(c, speed, rest, low, high, ball, contact):
 
 @jit
 def arrive(c, low, high, ball, contact):
-    """Let the contact c beside the run low..high be at zero: give the run's ball the other's velocity.
+    """Let contact c beside the run low..high be at zero: the run's ball takes the other's velocity.
 
     The two differ by the rounding of what the run's last impulse did to this ball, and to those
     that zeros join to it; no more is changed.
@@ -153,24 +153,43 @@ def arrive(c, low, high, ball, contact):
     contact[c].u = 0.0
 
 
-@jit
+@apart
+def share_out(first, last, before, after, ball, contact):
+    """Leave in x of contacts first..last the impulses that change the velocities by the balls' x.
+
+    `before` and `after` are the impulses of the contacts beside them.  Each sum begins at its own
+    end and stops at the heaviest ball, so that the impulse of a light one keeps its digits.
+    """
+    k = heaviest_of(first, last + 1, ball)
+    impulse = before
+    for c in range(first, k):
+        impulse -= ball[c].m * ball[c].x
+        contact[c].x = impulse
+    impulse = after
+    for j in range(k, last + 1):
+        c = last + k - j
+        impulse += ball[c + 1].m * ball[c + 1].x
+        contact[c].x = impulse
+
+
+@apart
 def join_velocities(first, last, ball, contact):
     """Bring balls first..last to one velocity by impulses of the contacts between them."""
     k = heaviest_of(first, last, ball)
     mass = 0.0
     momentum = 0.0
     for i in range(first, last + 1):
-        mass += ball[i].m
-        momentum += ball[i].m * ((ball[i].hi - ball[k].hi) + (ball[i].lo - ball[k].lo))
-    common = momentum / mass
-    impulse = 0.0
-    for i in range(first, last):
-        off = ((ball[i].hi - ball[k].hi) + (ball[i].lo - ball[k].lo)) - common
-        impulse += ball[i].m * off
-        if impulse > 0.0:
-            add_impulse(contact[i], impulse)
-        contact[i].u = 0.0
-    add_velocity(ball[k], common)
+        b = ball[i]
+        b.x = -((b.hi - ball[k].hi) + (b.lo - ball[k].lo))
+        mass += b.m
+        momentum -= b.m * b.x
+    for i in range(first, last + 1):
+        ball[i].x += momentum / mass
+    share_out(first, last - 1, 0.0, 0.0, ball, contact)
+    for c in range(first, last):
+        add_impulse(contact[c], max(contact[c].x, 0.0))
+        contact[c].u = 0.0
+    add_velocity(ball[k], ball[k].x)
     one_velocity(first, last, k, ball)
 
 

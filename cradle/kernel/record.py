@@ -20,7 +20,7 @@ def in_units(b, speed, shift):
 
 @apart
 def write(k, kind, c, n, state):
-    """Write event number k, with the velocities x of the balls and the impulses x of the contacts."""
+    """Write event number k, with the velocities x of the balls and impulses x of the contacts."""
     record, tally = state.record, state.tally[0]
     record.kinds[k] = kind
     record.contacts[k] = c

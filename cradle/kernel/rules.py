@@ -2,7 +2,7 @@
 
 import math
 
-from cradle.kernel.state import LIMITS, jit
+from cradle.kernel.state import LIMITS, apart, jit
 
 # A run's contacts low..high have impulses, or balls that move; contacts beyond them wait, because
 # no impulse that a ball could notice reaches them (`reached`).
@@ -67,7 +67,7 @@ def ratios_in_force(low, high, ball, contact):
                 admissible_ratio(c + 1, c, c, onward, f, ball, contact)
 
 
-@jit
+@apart
 def several_sources(low, high, smallest, ball, contact):
     """R1, R6: rates of a run with more than one source, where products of ratios are divided.
 
@@ -104,7 +104,7 @@ def several_sources(low, high, smallest, ball, contact):
 
 
 @jit
-def reached(first, run, smallest, ball, contact):
+def reached(first, run, smallest, contact):
     """R1: set low..high of a run, as far as impulses reach at the nominal ratios, or beyond.
 
     From the one source outwards rates only become less.  With several sources all contacts count.
@@ -135,7 +135,7 @@ def rates(first, run, ball, contact, tally):
     Returns whether a contact at u = 0 with nothing to release is about to open.
     """
     smallest = tally.cut_off
-    reached(first, run, smallest, ball, contact)
+    reached(first, run, smallest, contact)
     low, high, source = run[first].low, run[first].high, run[first].source
     ratios_in_force(low, high, ball, contact)
     if source < 0:

@@ -5,7 +5,6 @@ contacts i - 1 and i, contact c between balls c and c + 1.  Masses and velocitie
 chain's own units, powers of two, in which the largest are near 1 (`scales`): that changes no digit.
 """
 
-import math
 from typing import Any, NamedTuple
 
 if "jit" not in globals():

@@ -36,6 +36,7 @@ MAX_EVENTS = 5_000_000
 _MOST_NUMBERS = 10_000_000
 _EVERY = 2**40
 
+
 def _most_events(n: int) -> int:
     return max(_MOST_NUMBERS // n, 1000)
 
