@@ -129,7 +129,7 @@ def move(first, part, n, state):
 
 @jit
 def touch(gap, state):
-    """Bring a gap to zero: the ball that has just moved takes the other's velocity; or the lighter."""
+    """Bring a gap to zero: the ball that has just moved takes the other's velocity."""
     run, ball = state.run, state.ball
     left, right = run[gap - 1].last, gap + 1
     left_moves = run[left].stirred == 1 and ball[gap].pull != 0.0

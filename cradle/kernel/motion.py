@@ -116,7 +116,7 @@ def push(c, impulse, low, high, ball, contact):
 
 @jit
 def set_closing_speed(c, speed, rest, low, high, ball, contact):
-    """Bring the closing speed of contact c to speed + rest by a push: its balls are known less well.
+    """Bring the closing speed of contact c to speed + rest by a push of its balls.
 
     At zero the balls of both bodies have one velocity to the last bit.
     """
