@@ -1,0 +1,191 @@
+"""What counts as a real number, and how an error names a value that does not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Vector = NDArray[np.float64]
+
+# The longest value that an error repeats, in characters.
+_SHOWN = 80
+
+# Python would turn these into floats, or NumPy with a warning, but they are no real numbers.
+_NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating, np.ma.core.MaskedConstant)
+
+
+def numbers(name: str, values: ArrayLike | None) -> Vector:
+    """Return `values` as floats of any size; an array of floats comes back as it is.
+
+    A number is whatever `float` takes: fractions and decimals too.  Not so text, truth values,
+    masked values, complex numbers, and numbers with an uncertainty.
+
+    Parameters
+    ----------
+    name : str
+        What the values are called in an error.
+    values : array_like
+        Numbers of any shape.
+
+    Returns
+    -------
+    ndarray of float64
+        The values, same shape.
+
+    Raises
+    ------
+    ValueError
+        If a value is no real number or beyond the range of floats, or the rows of a list differ in
+        length; it names the first such value.
+
+    Examples
+    --------
+    >>> from fractions import Fraction
+    >>> numbers("ratio", [0.5, Fraction(1, 8)]).tolist()
+    [0.5, 0.125]
+    >>> numbers("ratio", [0.5, "x"])
+    Traceback (most recent call last):
+    ...
+    ValueError: ratio[1] = 'x'; must be a real number
+    """
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        return values
+    given: Any = values
+    strange = any(issubclass(kind, _NO_NUMBERS) for kind in _types(values))
+    if not strange:
+        try:
+            array = np.asarray(values)
+        except (TypeError, ValueError):
+            strange = True
+    if strange or array.dtype.kind not in "iuf":
+        # One by one, each as it was given.
+        cells = list(_cells(values))
+        floats = [_as_float(name, at, cell) for at, cell in cells]
+        _refuse_ragged(name, values)
+        return np.array(floats, dtype=np.float64).reshape(np.shape(given))
+    with np.errstate(over="ignore"):  # of long doubles
+        result = array.astype(np.float64)
+    lost = np.isinf(result) & np.isfinite(array)
+    if lost.any():
+        at = tuple(int(k) for k in np.unravel_index(int(np.argmax(lost)), lost.shape))
+        raise _beyond_floats(name, at, array[at])
+    return result
+
+
+def _types(values: Any) -> set[type]:
+    """Return the types of the cells of nested lists, of arrays those of their elements."""
+    if isinstance(values, (list, tuple)):
+        kinds = set(map(type, values))
+        for value in values if any(map(_holds_cells, kinds)) else ():
+            kinds |= _types(value)
+        return {kind for kind in kinds if not _holds_cells(kind)}
+    if np.ma.is_masked(values):
+        return {np.ma.core.MaskedConstant}
+    return {values.dtype.type} if isinstance(values, np.ndarray) else {type(values)}
+
+
+def _holds_cells(kind: type) -> bool:
+    return issubclass(kind, (list, tuple, np.ndarray)) and kind is not np.ma.core.MaskedConstant
+
+
+def _cells(values: Any, at: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Any]]:
+    """Yield the index and the value of each cell of nested lists and arrays."""
+    if isinstance(values, (list, tuple)):
+        for k, value in enumerate(values):
+            yield from _cells(value, (*at, k))
+    elif values is np.ma.masked or not hasattr(values, "__array__") or np.ndim(values) == 0:
+        yield at, values
+    elif isinstance(values, np.ma.MaskedArray):
+        for index in np.ndindex(values.shape):
+            yield (*at, *index), values[index]  # `np.ma.masked` where it is masked
+    else:
+        for index, value in np.ndenumerate(np.asarray(values)):
+            yield (*at, *index), value
+
+
+def _as_float(name: str, at: tuple[int, ...], cell: Any) -> float:
+    """Return one cell as a float, or refuse it."""
+    try:
+        if isinstance(cell, _NO_NUMBERS) or not hasattr(type(cell), "__float__"):
+            raise TypeError
+        value = float(cell)
+    except OverflowError:
+        raise _beyond_floats(name, at, cell) from None
+    except (TypeError, ValueError):
+        rule = "must be a real number" if at else "must be real numbers, one shape, none masked"
+        known = type(cell).__module__ in ("builtins", "numpy", "numpy.ma", "numpy.ma.core")
+        what = "" if known else f" ({type(cell).__module__}.{type(cell).__qualname__})"
+        raise ValueError(f"{name}{place(at)} = {shown(cell)}{what}; {rule}") from None
+    if math.isinf(value) and cell != value:
+        raise _beyond_floats(name, at, cell)
+    return value
+
+
+def _beyond_floats(name: str, at: tuple[int, ...], value: Any) -> ValueError:
+    return ValueError(f"{name}{place(at)} = {shown(value)}; must be within the range of floats")
+
+
+def _refuse_ragged(name: str, values: Any, at: tuple[int, ...] = ()) -> None:
+    """Raise if rows beside each other differ in shape."""
+    if not isinstance(values, (list, tuple)):
+        return
+    for k, row in enumerate(values):
+        _refuse_ragged(name, row, (*at, k))
+        shape, first = np.shape(row), np.shape(values[0])
+        if shape != first:
+            raise ValueError(
+                f"{name}{place((*at, k))} has shape {shape}, {name}{place((*at, 0))} has {first}; "
+                "must have one shape"
+            )
+
+
+def place(at: tuple[Any, ...]) -> str:
+    """Return an index as an error names it.
+
+    Parameters
+    ----------
+    at : tuple of int
+        The index; empty for a single number.
+
+    Returns
+    -------
+    str
+        The index in brackets, or nothing.
+
+    Examples
+    --------
+    >>> "masses" + place((2, 0))
+    'masses[2, 0]'
+    """
+    return f"[{', '.join(str(int(k)) for k in at)}]" if at else ""
+
+
+def shown(value: object) -> str:
+    """Return a value as an error repeats it: on one line, and cut if it is long.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+
+    Returns
+    -------
+    str
+        Its repr, at most 80 characters of it.
+
+    Examples
+    --------
+    >>> shown("x" * 1000)[-10:]
+    'xxxxxxx...'
+    """
+    # NumPy's own scalars as plain numbers; of a long list no more than is shown.
+    if isinstance(value, (np.floating, np.complexfloating)):
+        return str(value)
+    if isinstance(value, (list, tuple)) and len(value) > _SHOWN:
+        value = [*value[:_SHOWN]]
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
