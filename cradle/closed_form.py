@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.chain import Vector, checked, numbers, one_number
+from cradle.checks import Vector, checked, numbers, one_number
 
 _Balls = tuple[Vector, ...]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from cradle.chain import Chain
+from cradle.checks import a, must_be
 from cradle.trace import Trace
 
 
@@ -46,8 +47,9 @@ def collide(chain: Chain, model: Model) -> Trace:
     >>> collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.0)).velocities.tolist()
     [0.0, 0.0, 1.0]
     """
-    if not isinstance(chain, Chain):
-        raise TypeError(f"chain is a {type(chain).__name__}; must be a Chain")
-    if isinstance(model, type) or not hasattr(model, "solve"):
-        raise TypeError(f"model is a {type(model).__name__}; must be an impact model")
+    must_be(Chain, "chain", chain)
+    if isinstance(model, type):
+        raise TypeError(f"model is the class {model.__name__}; must be made: {model.__name__}(...)")
+    if not hasattr(model, "solve"):
+        raise TypeError(f"model is {a(type(model).__name__)}; must be an impact model")
     return model.solve(chain)
