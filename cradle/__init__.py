@@ -6,14 +6,18 @@ One idea: every impact model is a rule from a chain of balls to a path of contac
 
 The rooms, in that order:
 
-- `cradle.chain`: the chain before the impact.
+- `cradle.chain`: the chain before the impact; `cradle.checks` and `cradle.reals`: what is asked of
+  input; `cradle.drawing`: pictures and tables for notebooks.
 - `cradle.trace`: what happened.
 - `cradle.kernel`: the event loop; `cradle.runtime` compiles it.
 - `cradle.models`: one file a model, and the verb `collide`.
-- `cradle.closed_form`: what the paper gives in closed form.
-- `cradle.tables`: the paper's tables and chains.
+- `cradle.closed_form`: what the paper gives in closed form; `cradle.conserving`: all outcomes of
+  three balls that conserve energy.
+- `cradle.tables`: the paper's tables and chains, read by `cradle.reading`.
 - `cradle.measures`: what is read off outcomes.
 - `cradle.figures`: matplotlib, imported only when asked for.
+
+The distribution is called cradle-companion; its version is `cradle.__version__`.
 """
 
 from cradle.chain import Chain
@@ -48,3 +52,12 @@ __all__ = [
     "ratio_table",
     "restitution_table",
 ]
+
+
+def __getattr__(name: str) -> str:
+    """Return the version of the installed distribution; looked up when it is asked for."""
+    if name != "__version__":
+        raise AttributeError(f"module 'cradle' has no attribute {name!r}")
+    from importlib.metadata import version
+
+    return version("cradle-companion")
