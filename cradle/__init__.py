@@ -14,7 +14,7 @@ The rooms, in that order:
 - `cradle.closed_form`: what the paper gives in closed form; `cradle.conserving`: all outcomes of
   three balls that conserve energy.
 - `cradle.tables`: the paper's tables and chains, read by `cradle.reading`.
-- `cradle.measures`: what is read off outcomes.
+- `cradle.measures`: what is read off outcomes; `cradle.blocks`: batches under dask.
 - `cradle.figures`: matplotlib, imported only when asked for.
 
 The distribution is called cradle-companion; its version is `cradle.__version__`.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.kernel import LIGHTEST
-from cradle.reals import Vector, numbers, place, shown
+from cradle.reals import Vector, numbers, refusal, shown
 
 __all__ = [
     "Vector",
@@ -18,7 +18,7 @@ __all__ = [
     "must_be",
     "numbers",
     "one_number",
-    "place",
+    "refusal",
     "refuse_overflow",
     "shown",
     "whole_number",
@@ -74,9 +74,7 @@ def checked(
     if wrong.any():
         at = np.unravel_index(int(np.argmax(wrong)), array.shape)
         bad = float(array[at])
-        raise ValueError(
-            f"{name}{place(at)} = {bad!r}; {rule if np.isfinite(bad) else 'must be finite'}"
-        )
+        raise refusal(name, at, f" = {bad!r}; {rule if np.isfinite(bad) else 'must be finite'}")
     return array
 
 
@@ -148,10 +146,8 @@ def checked_masses(masses: ArrayLike) -> Vector:
         small = array < LIGHTEST * array.max(axis=-1, keepdims=True)
         if small.any():
             at = np.unravel_index(int(np.argmax(small)), array.shape)
-            raise ValueError(
-                f"masses{place(at)} = {float(array[at])!r}; "
-                f"must be at least {LIGHTEST} of the heaviest ball of its chain"
-            )
+            rule = f"must be at least {LIGHTEST} of the heaviest ball of its chain"
+            raise refusal("masses", at, f" = {float(array[at])!r}; {rule}")
     return array
 
 
@@ -185,9 +181,8 @@ def refuse_overflow(velocities: Vector, masses: Vector) -> None:
         if not np.isfinite(values).all():
             lead = np.unravel_index(int(np.argmax(~np.isfinite(values))), values.shape)
             at = (*lead, np.argmax(np.abs(v[lead])))
-            raise ValueError(
-                f"velocities{place(at)} = {float(v[at])!r}; {what} overflows: choose larger units"
-            )
+            rest = f" = {float(v[at])!r}; {what} overflows: choose larger units"
+            raise refusal("velocities", at, rest)
 
 
 def whole_number(name: str, value: object) -> int:

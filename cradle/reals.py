@@ -119,14 +119,14 @@ def _as_float(name: str, at: tuple[int, ...], cell: Any) -> float:
         rule = "must be a real number" if at else "must be real numbers, one shape, none masked"
         known = type(cell).__module__ in ("builtins", "numpy", "numpy.ma", "numpy.ma.core")
         what = "" if known else f" ({type(cell).__module__}.{type(cell).__qualname__})"
-        raise ValueError(f"{name}{place(at)} = {shown(cell)}{what}; {rule}") from None
+        raise refusal(name, at, f" = {shown(cell)}{what}; {rule}") from None
     if math.isinf(value) and cell != value:
         raise _beyond_floats(name, at, cell)
     return value
 
 
 def _beyond_floats(name: str, at: tuple[int, ...], value: Any) -> ValueError:
-    return ValueError(f"{name}{place(at)} = {shown(value)}; must be within the range of floats")
+    return refusal(name, at, f" = {shown(value)}; must be within the range of floats")
 
 
 def _refuse_ragged(name: str, values: Any, at: tuple[int, ...] = ()) -> None:
@@ -141,6 +141,35 @@ def _refuse_ragged(name: str, values: Any, at: tuple[int, ...] = ()) -> None:
                 f"{name}{place((*at, k))} has shape {shape}, {name}{place((*at, 0))} has {first}; "
                 "must have one shape"
             )
+
+
+def refusal(name: str, at: tuple[Any, ...], rest: str) -> ValueError:
+    """Return the error that refuses a value; it knows its place, so that it can be moved.
+
+    Parameters
+    ----------
+    name : str
+        What the values are called.
+    at : tuple of int
+        Index of the value; empty for a single number.
+    rest : str
+        What follows: the value and the rule.
+
+    Returns
+    -------
+    ValueError
+        With `name`, `index` and `rest` as attributes.
+
+    Examples
+    --------
+    >>> error = refusal("masses", (2,), " = 0.0; must be above 0")
+    >>> print(error, error.index)
+    masses[2] = 0.0; must be above 0 (2,)
+    """
+    index = tuple(int(k) for k in at)
+    error = ValueError(f"{name}{place(index)}{rest}")
+    vars(error).update(name=name, index=index, rest=rest)
+    return error
 
 
 def place(at: tuple[Any, ...]) -> str:

@@ -103,7 +103,8 @@ class Trace:
             Columns ``step`` (0 to K), ``event`` and ``contact`` (what happened there; "before"
             and missing at step 0), ``ball``, ``velocity`` (m/s), and ``left`` and
             ``right``, the impulses so far of the ball's two contacts (N s; 0 beyond the ends), so
-            that each ball's mass times its change of velocity is ``left - right``.
+            that each ball's mass times its change of velocity is ``left - right``.  Models with
+            a time add ``time`` (s).
 
         Examples
         --------
@@ -128,6 +129,7 @@ class Trace:
         return pd.DataFrame(
             {
                 "step": np.repeat(np.arange(steps), balls),
+                **{name: values.repeat(balls) for name, values in self._clock().items()},
                 "event": np.repeat(kinds, balls),
                 "contact": contacts.repeat(balls).array,
                 "ball": np.tile(np.arange(balls), steps),
@@ -136,6 +138,10 @@ class Trace:
                 "right": impulses[:, 1:].ravel(),
             }
         )
+
+    def _clock(self) -> dict[str, Vector]:
+        """Return what tells the time of each row of the path; a rigid model has no time."""
+        return {}
 
     def plot(self, ax: Axes | None = None, *, contact: int | None = None) -> Axes:
         """Draw the velocities over the impact, or the velocity-impulse diagram of a contact.

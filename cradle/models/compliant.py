@@ -63,6 +63,10 @@ class TimedTrace(Trace):
     step_forces: Vector
     evaluations: int
 
+    def _clock(self) -> dict[str, Vector]:
+        """Return the times of the rows of the path."""
+        return {"time": self.times}
+
 
 @dataclass(frozen=True)
 class SpringChain:
