@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,8 +15,13 @@ Vector = NDArray[np.float64]
 # The longest value that an error repeats, in characters.
 _SHOWN = 80
 
+
+class _Masked:
+    """Stands for the type of masked values."""
+
+
 # Python would turn these into floats, or NumPy with a warning, but they are no real numbers.
-_NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating, np.ma.core.MaskedConstant)
+_NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating, _Masked)
 
 
 def numbers(name: str, values: ArrayLike | None) -> Vector:
@@ -83,13 +89,19 @@ def _types(values: Any) -> set[type]:
         for value in values if any(map(_holds_cells, kinds)) else ():
             kinds |= _types(value)
         return {kind for kind in kinds if not _holds_cells(kind)}
-    if np.ma.is_masked(values):
-        return {np.ma.core.MaskedConstant}
+    if _is_masked(values):
+        return {_Masked}
     return {values.dtype.type} if isinstance(values, np.ndarray) else {type(values)}
 
 
 def _holds_cells(kind: type) -> bool:
-    return issubclass(kind, (list, tuple, np.ndarray)) and kind is not np.ma.core.MaskedConstant
+    return issubclass(kind, (list, tuple, np.ndarray))
+
+
+def _is_masked(value: Any) -> bool:
+    """Tell whether anything is masked, without loading `numpy.ma` if nobody else has."""
+    ma = sys.modules.get("numpy.ma")
+    return ma is not None and bool(ma.is_masked(value))
 
 
 def _cells(values: Any, at: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Any]]:
@@ -97,9 +109,9 @@ def _cells(values: Any, at: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, .
     if isinstance(values, (list, tuple)):
         for k, value in enumerate(values):
             yield from _cells(value, (*at, k))
-    elif values is np.ma.masked or not hasattr(values, "__array__") or np.ndim(values) == 0:
+    elif not hasattr(values, "__array__") or np.ndim(values) == 0:
         yield at, values
-    elif isinstance(values, np.ma.MaskedArray):
+    elif _is_masked(values):
         for index in np.ndindex(values.shape):
             yield (*at, *index), values[index]  # `np.ma.masked` where it is masked
     else:
@@ -110,7 +122,8 @@ def _cells(values: Any, at: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, .
 def _as_float(name: str, at: tuple[int, ...], cell: Any) -> float:
     """Return one cell as a float, or refuse it."""
     try:
-        if isinstance(cell, _NO_NUMBERS) or not hasattr(type(cell), "__float__"):
+        number = hasattr(type(cell), "__float__") and not isinstance(cell, _NO_NUMBERS)
+        if not number or _is_masked(cell):
             raise TypeError
         value = float(cell)
     except OverflowError:

@@ -134,7 +134,8 @@ def test_effective_ratio_refuses_a_tolerance(tolerance, message):
 
 def random_three(seed):
     rng = np.random.default_rng(seed)
-    return 10 ** rng.uniform(-1, 1, 3), np.sort(rng.normal(size=3))[::-1]
+    masses = np.ldexp(1.0 + rng.random(3), rng.integers(-3, 3, 3))
+    return masses, np.sort(2.0 * rng.random(3) - 1.0)[::-1]
 
 
 @pytest.mark.parametrize("seed", range(10))
