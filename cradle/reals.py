@@ -20,6 +20,7 @@ class _Masked:
     """Stands for the type of masked values."""
 
 
+_USUAL = {float, int, np.float64}
 # Python would turn these into floats, or NumPy with a warning, but they are no real numbers.
 _NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating, _Masked)
 
@@ -60,8 +61,11 @@ def numbers(name: str, values: ArrayLike | None) -> Vector:
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
+    if type(values) is float:
+        return np.array(values)
     given: Any = values
-    strange = any(issubclass(kind, _NO_NUMBERS) for kind in _types(values))
+    kinds = _types(values)
+    strange = not kinds <= _USUAL and any(issubclass(kind, _NO_NUMBERS) for kind in kinds)
     if not strange:
         try:
             array = np.asarray(values)
@@ -73,7 +77,10 @@ def numbers(name: str, values: ArrayLike | None) -> Vector:
         floats = [_as_float(name, at, cell) for at, cell in cells]
         _refuse_ragged(name, values)
         return np.array(floats, dtype=np.float64).reshape(np.shape(given))
-    with np.errstate(over="ignore"):  # of long doubles
+    if array.itemsize <= 8:
+        return array.astype(np.float64)
+    # Long doubles go further than floats.
+    with np.errstate(over="ignore"):
         result = array.astype(np.float64)
     lost = np.isinf(result) & np.isfinite(array)
     if lost.any():
@@ -86,9 +93,10 @@ def _types(values: Any) -> set[type]:
     """Return the types of the cells of nested lists, of arrays those of their elements."""
     if isinstance(values, (list, tuple)):
         kinds = set(map(type, values))
-        for value in values if any(map(_holds_cells, kinds)) else ():
-            kinds |= _types(value)
-        return {kind for kind in kinds if not _holds_cells(kind)}
+        if kinds <= _USUAL:
+            return kinds
+        inner = [_types(value) for value in values if _holds_cells(type(value))]
+        return {kind for kind in kinds if not _holds_cells(kind)}.union(*inner)
     if _is_masked(values):
         return {_Masked}
     return {values.dtype.type} if isinstance(values, np.ndarray) else {type(values)}
