@@ -71,7 +71,7 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
     """
     v = checked("velocities", velocities)
     if v.shape[-1:] != (3,):
-        raise ValueError(f"velocities has shape {v.shape}; must be (..., 3)")
+        raise ValueError(f"velocities has shape {v.shape}; must be (..., 3): those of three balls")
     checked("velocities of ball 3", v[..., 2], "must be at least 0: ball 1 came from the left", 0.0)
     return np.asarray(_PATTERNS[np.count_nonzero(v < 0.0, axis=-1)])
 
