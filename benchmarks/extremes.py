@@ -26,8 +26,10 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import extremes as x  # noqa: E402
 
-from cradle import paper_chain  # noqa: E402
-from cradle.models.correlation import outcomes  # noqa: E402
+from cradle import (
+    outcomes,
+    paper_chain,
+)
 from cradle.tables import paper_sequences  # noqa: E402
 
 

@@ -18,8 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cradle import Chain, SpringChain, collide
-from cradle.models.correlation import outcomes
+from cradle import Chain, SpringChain, collide, outcomes
 
 OUTPUT = Path(__file__).parents[1] / "data" / "long_chains.csv"
 COLUMNS = [

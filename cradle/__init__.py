@@ -6,25 +6,30 @@ One idea: every impact model is a rule from a chain of balls to a path of contac
 
 The rooms, in that order:
 
-- `cradle.chain`: the chain before the impact.
+- `cradle.chain`: the chain before the impact; `cradle.checks` and `cradle.reals`: what is asked of
+  input; `cradle.drawing`: pictures and tables for notebooks.
 - `cradle.trace`: what happened.
 - `cradle.kernel`: the event loop; `cradle.runtime` compiles it.
 - `cradle.models`: one file a model, and the verb `collide`.
-- `cradle.closed_form`: what the paper gives in closed form.
-- `cradle.tables`: the paper's tables and chains.
-- `cradle.measures`: what is read off outcomes.
+- `cradle.closed_form`: what the paper gives in closed form; `cradle.conserving`: all outcomes of
+  three balls that conserve energy.
+- `cradle.tables`: the paper's tables and chains, read by `cradle.reading`.
+- `cradle.measures`: what is read off outcomes; `cradle.blocks`: batches under dask.
 - `cradle.figures`: matplotlib, imported only when asked for.
+
+The distribution is called cradle-companion; its version is `cradle.__version__`.
 """
 
 from cradle.chain import Chain
 from cradle.models import Model, collide
+from cradle.models.batch import Outcomes, outcomes, post_impact_velocities
 from cradle.models.compliant import SpringChain, TimedTrace
-from cradle.models.correlation import ImpulseCorrelation, post_impact_velocities
+from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
 from cradle.tables import paper_chain, paper_sequences, ratio_table, restitution_table
-from cradle.trace import Event, ImpactNotFinished, Trace
+from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
 __all__ = [
     "Chain",
@@ -33,18 +38,30 @@ __all__ = [
     "EnergyTrace",
     "Event",
     "FusedChain",
+    "ImpactNotCertified",
     "ImpactNotFinished",
     "ImpulseCorrelation",
     "Model",
+    "Outcomes",
     "QuadraticDissipation",
     "SequentialCollisions",
     "SpringChain",
     "TimedTrace",
     "Trace",
     "collide",
+    "outcomes",
     "paper_chain",
     "paper_sequences",
     "post_impact_velocities",
     "ratio_table",
     "restitution_table",
 ]
+
+
+def __getattr__(name: str) -> str:
+    """Return the version of the installed distribution; looked up when it is asked for."""
+    if name != "__version__":
+        raise AttributeError(f"module 'cradle' has no attribute {name!r}")
+    from importlib.metadata import version
+
+    return version("cradle-companion")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.chain import Vector, checked, numbers, one_number
+from cradle.checks import Vector, checked, numbers, one_number
 
 _Balls = tuple[Vector, ...]
 
@@ -26,7 +26,8 @@ def _split(
     for name, array in given.items():
         size = 2 if name == "restitution" else 3
         if array.shape[-1:] != (size,):
-            raise ValueError(f"{name} has shape {array.shape}; must be (..., {size})")
+            words = "one number for each of " + ("3 balls" if size == 3 else "their 2 contacts")
+            raise ValueError(f"{name} has shape {array.shape}; must be (..., {size}): {words}")
     m, v, e = (tuple(array[..., k] for k in range(array.shape[-1])) for array in given.values())
     alpha = numbers("ratio", ratio)
     try:
@@ -213,7 +214,8 @@ def largest_ratios(
     for name, ratio in (("forward", f), ("backward", b)):
         if ratio.shape[-1:] != (size,):
             raise ValueError(
-                f"{name} has shape {ratio.shape}; must be (..., {size}) for {size + 2} balls"
+                f"{name} has shape {ratio.shape}; must be (..., {size}) for {size + 2} balls: one "
+                "number for each ball between two others"
             )
         if ratio.size and not (ratio.min() >= 0.0 and ratio.max() <= 1.0):
             checked(name, ratio, "must lie in [0, 1]", 0.0, 1.0)

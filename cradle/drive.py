@@ -68,11 +68,12 @@ def _area(n: int, compiled: bool, record: rooms.Record) -> rooms.State:
     """Return a work area: NumPy records for compiled code, Python objects for plain."""
     sizes = {"Ball": n, "Contact": n, "Run": n, "Level": 2}
     if compiled:
-        parts = [np.zeros(size, _TYPES[name]) for name, size in sizes.items()]
-        return rooms.State(*parts, np.zeros((2, n), _TYPES["Memory"]), np.zeros(1, _TALLY), record)
-    things = [_blank(getattr(rooms, name), size) for name, size in sizes.items()]
-    memory = [_blank(rooms.Memory, n) for _ in range(2)]
-    return rooms.State(*things, memory, _blank(rooms.Tally, 1), record)
+        arrays: list[Any] = [np.zeros(size, _TYPES[name]) for name, size in sizes.items()]
+        arrays += [np.zeros((2, n), _TYPES["Memory"]), np.zeros(1, _TALLY), record]
+        return rooms.State(*arrays)
+    things: list[Any] = [_blank(getattr(rooms, name), size) for name, size in sizes.items()]
+    things += [[_blank(rooms.Memory, n) for _ in range(2)], _blank(rooms.Tally, 1), record]
+    return rooms.State(*things)
 
 
 _kept = threading.local()

@@ -19,7 +19,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
-from cradle.chain import Chain, Vector
+from cradle.chain import Chain
+from cradle.checks import Vector
 from cradle.trace import Trace
 
 __all__ = [

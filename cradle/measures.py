@@ -8,11 +8,22 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.chain import Chain, Vector, checked, one_number
+from cradle.chain import Chain
+from cradle.checks import Vector, checked, must_be, one_number
 from cradle.closed_form import largest_ratios
+from cradle.conserving import conserving_angle, conserving_outcomes
 from cradle.models import Model, collide
-from cradle.models.correlation import post_impact_velocities
+from cradle.models.batch import post_impact_velocities
 from cradle.trace import Event, Trace
+
+__all__ = [
+    "Condition",
+    "bouncing_pattern",
+    "condition_number",
+    "conserving_angle",
+    "conserving_outcomes",
+    "effective_ratio",
+]
 
 #: Pattern by the number of balls that bounce back: none, the first, the first two.
 _PATTERNS = np.array([2, 1, 3])
@@ -60,7 +71,7 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
     """
     v = checked("velocities", velocities)
     if v.shape[-1:] != (3,):
-        raise ValueError(f"velocities has shape {v.shape}; must be (..., 3)")
+        raise ValueError(f"velocities has shape {v.shape}; must be (..., 3): those of three balls")
     checked("velocities of ball 3", v[..., 2], "must be at least 0: ball 1 came from the left", 0.0)
     return np.asarray(_PATTERNS[np.count_nonzero(v < 0.0, axis=-1)])
 
@@ -115,6 +126,8 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
 
     Raises
     ------
+    TypeError
+        If `chain` is no `Chain` or `model` no impact model.
     ValueError
         If `step` is no number from 1e-12 to 0.1, or the model cannot treat the chain.
     ImpactNotFinished
@@ -207,6 +220,8 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
 
     Raises
     ------
+    TypeError
+        If `trace` is no `Trace`.
     ValueError
         If `tolerance` is no number of at least 0, there are not three balls, none approach, or no
         ratio gives the outcome: then the message has the one that comes nearest.
@@ -228,7 +243,7 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     # SciPy is slow to import, and only this measure needs it.
     from scipy.optimize import brentq, minimize_scalar
 
-    chain, target = trace.chain, trace.velocities
+    chain, target = must_be(Trace, "trace", trace).chain, trace.velocities
     u = chain.closing_speeds
     if len(chain) != 3:
         raise ValueError(f"trace has {len(chain)} balls; an effective ratio is that of three")
@@ -272,95 +287,3 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
         f"no ratio in [0, {bound:.6g}] gives the velocities {target.tolist()}; the nearest, "
         f"{best.x:.6g}, misses by {best.fun:.3g} of the fastest closing speed"
     )
-
-
-def conserving_outcomes(
-    masses: ArrayLike, velocities: ArrayLike, angles: ArrayLike | None = None
-) -> tuple[Vector, Vector]:
-    """Return all outcomes of three balls that keep momentum, energy and the order of the balls.
-
-    With y_i = m_i^(1/2) (v_i - V), V the velocity of the centre of mass, energy fixes the length
-    of y, and momentum a plane: a circle.  v1 <= v2 <= v3 leaves an arc of it, from v1 = v2, angle
-    0, to v2 = v3 at ``arccos((m1 m3 / ((m1 + m2) (m2 + m3)))^(1/2))``, 60 degrees for equal balls.
-
-    Parameters
-    ----------
-    masses, velocities : array_like, shape (3,)
-        kg, and m/s before the impact.
-    angles : array_like, shape (K,), optional
-        Angles on the arc, rad; 181 from end to end if left out.
-
-    Returns
-    -------
-    angles : ndarray, shape (K,)
-        rad.
-    velocities : ndarray, shape (K, 3)
-        m/s.
-
-    Raises
-    ------
-    ValueError
-        If there are not three balls, a value is wrong, or an angle is off the arc.
-
-    References
-    ----------
-    Walkiewicz and Newby, Am. J. Phys. 40 (1972) 133-137.
-
-    Examples
-    --------
-    >>> angles, outcomes = conserving_outcomes([1, 1, 1], [1, 0, 0])
-    >>> outcomes[[0, -1]].round(3) + 0.0
-    array([[ 0.   ,  0.   ,  1.   ],
-           [-0.333,  0.667,  0.667]])
-    """
-    chain, ends, centre = _arc(masses, velocities)
-    m1, m2, m3 = chain.masses / chain.masses.sum()
-    full = float(np.arctan2(np.sqrt(m2), np.sqrt(m1) * np.sqrt(m3)))  # the arccos, to all digits
-    if angles is None:
-        angle = np.linspace(0.0, full, 181)
-    else:
-        angle = checked("angles", angles, f"must lie in [0, {full:.6g}]", 0.0, full)
-    weights = np.stack([np.sin(full - angle), np.sin(angle)], axis=-1) / np.sin(full)
-    root = np.sqrt(chain.masses)
-    radius = np.linalg.norm(root * (chain.velocities - centre))
-    return angle, np.asarray(centre + radius * (weights @ ends) / root)
-
-
-def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
-    """Return the angle, in rad, of an outcome on the arc of `conserving_outcomes`.
-
-    The angle is negative, or beyond the end of the arc, where the balls are not in order.
-
-    Parameters
-    ----------
-    masses, velocities : array_like, shape (3,)
-        kg, and m/s after the impact.
-
-    Returns
-    -------
-    float
-        The angle; 0 for balls that all have one velocity.
-
-    Examples
-    --------
-    >>> from math import degrees
-    >>> round(degrees(conserving_angle([1, 1, 1], [-1 / 3, 2 / 3, 2 / 3])), 6)
-    60.0
-    """
-    chain, ends, centre = _arc(masses, velocities)
-    if (chain.closing_speeds == 0.0).all():
-        return 0.0
-    y = np.sqrt(chain.masses) * (chain.velocities - centre)
-    across = ends[1] - (ends[0] @ ends[1]) * ends[0]
-    return float(np.arctan2(y @ across / np.linalg.norm(across), y @ ends[0]))
-
-
-def _arc(masses: ArrayLike, velocities: ArrayLike) -> tuple[Chain, Vector, float]:
-    """Return three balls, the unit vectors of the ends of the arc, and the centre's velocity."""
-    chain = Chain(masses, velocities, 1.0)
-    if len(chain) != 3:
-        raise ValueError(f"masses has shape ({len(chain)},); must be (3,)")
-    m1, m2, m3 = chain.masses
-    ends = np.sqrt(chain.masses) * [[-m3, -m3, m1 + m2], [-m2 - m3, m1, m1]]
-    centre = chain.momentum / chain.masses.sum()
-    return chain, ends / np.linalg.norm(ends, axis=1, keepdims=True), float(centre)

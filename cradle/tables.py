@@ -5,17 +5,20 @@ Impulse Correlation Ratios to triplets. The numbers are read from the CSV files 
 whose README gives their origin, units and doubtful readings.
 """
 
-import csv
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 from cradle.chain import Chain
+from cradle.checks import a, one_number, shown
+from cradle.closed_form import largest_ratios
 from cradle.models.correlation import ImpulseCorrelation
+from cradle.reading import read_table
 
 if TYPE_CHECKING:
     # At run time pandas is imported by the two functions that return a DataFrame, and only there:
@@ -49,11 +52,6 @@ def data_folder() -> Traversable:
     return installed if installed.is_dir() else Path(__file__).parents[1] / "data"
 
 
-def _rows(name: str) -> list[dict[str, str]]:
-    with (data_folder() / name).open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
 @cache
 def ball_masses() -> Mapping[str, float]:
     """Return the mass of each ball type.
@@ -68,7 +66,16 @@ def ball_masses() -> Mapping[str, float]:
     >>> ball_masses()["D"]
     0.166
     """
-    return MappingProxyType({row["ball"]: float(row["mass_kg"]) for row in _rows("masses.csv")})
+    rows = read_table(data_folder() / "masses.csv", ["ball", "mass_kg"])
+    for ball, row in rows.items():
+        if len(ball) != 1 or not ball.isupper():
+            row.refuse("ball", "must be one capital letter")
+    return MappingProxyType(
+        {
+            ball: row.number("mass_kg", "must be above 0", 0.0, open_low=True)
+            for ball, row in rows.items()
+        }
+    )
 
 
 @cache
@@ -85,31 +92,39 @@ def paper_sequences() -> Mapping[str, int]:
     >>> list(paper_sequences())
     ['BABC', 'BABB', 'BABA', 'BBCB', 'CDAB', 'CDADB', 'ABCCA', 'ABACA', 'ABCCAB', 'BCACBA']
     """
-    return MappingProxyType({row["sequence"]: int(row["figure"]) for row in _rows("sequences.csv")})
+    rows = read_table(data_folder() / "sequences.csv", ["sequence", "figure"])
+    for sequence, row in rows.items():
+        if len(sequence) < 2 or not set(sequence) <= set(ball_masses()):
+            row.refuse("sequence", f"must be two or more of {', '.join(ball_masses())}")
+        if not row.cells["figure"].isdecimal():
+            row.refuse("figure", "must be the number of a figure")
+    return MappingProxyType({name: int(row.cells["figure"]) for name, row in rows.items()})
 
 
 @cache
 def _restitution() -> Mapping[str, float]:
     """Table 1 as a mapping from the pair "XY" to the coefficient of restitution."""
-    return MappingProxyType(
-        {
-            row["ball"] + other: float(row[other])
-            for row in _rows("restitution.csv")
-            for other in ball_masses()
-        }
-    )
+    balls = list(ball_masses())
+    rows = read_table(data_folder() / "restitution.csv", ["ball", *balls], balls)
+    table = {
+        ball + other: rows[ball].number(other, "must lie in [0, 1]", 0.0, 1.0)
+        for ball, other in product(balls, balls)
+    }
+    for ball, other in product(balls, balls):
+        if table[ball + other] != table[other + ball]:
+            place = f"{rows[other].place}, column {ball}"
+            rows[ball].refuse(other, f"must be equal to {place}: a pair has one coefficient")
+    return MappingProxyType(table)
 
 
 @cache
 def _ratios() -> Mapping[str, float]:
     """Table 2 as a mapping from the triplet "XYZ" to the Impulse Correlation Ratio."""
-    return MappingProxyType({row["triplet"]: float(row["ratio"]) for row in _rows("ratios.csv")})
-
-
-def _largest_ratio(triplet: str) -> float:
-    """Eq. 34 for the balls of a triplet: beyond it the second contact of three would pull."""
-    _, middle, right = (ball_masses()[ball] for ball in triplet)
-    return right / (middle + right)
+    triplets = ["".join(balls) for balls in product(ball_masses(), repeat=3)]
+    rows = read_table(data_folder() / "ratios.csv", ["triplet", "ratio"], triplets)
+    return MappingProxyType(
+        {name: row.number("ratio", "must lie in [0, 1]", 0.0, 1.0) for name, row in rows.items()}
+    )
 
 
 def restitution_table() -> "pd.DataFrame":
@@ -163,18 +178,16 @@ def ratio_table() -> "pd.DataFrame":
     """
     import pandas as pd
 
+    masses = [[ball_masses()[ball] for ball in triplet] for triplet in _ratios()]
+    bound, _ = largest_ratios(masses, [0.0], [0.0])
     table = pd.DataFrame(
-        {
-            "triplet": list(_ratios()),
-            "ratio": list(_ratios().values()),
-            "bound": [_largest_ratio(triplet) for triplet in _ratios()],
-        }
+        {"triplet": list(_ratios()), "ratio": list(_ratios().values()), "bound": bound[:, 0]}
     )
     return table.assign(admissible=table.ratio <= table.bound)
 
 
 def paper_chain(
-    sequence: str,
+    sequence: str | Iterable[str],
     speed: float = 1.0,
     *,
     excess: Literal["raise", "saturate"] = "raise",
@@ -184,7 +197,7 @@ def paper_chain(
 
     Parameters
     ----------
-    sequence : str
+    sequence : str or iterable of str
         Ball types, first ball first: at least two letters out of "A" to "D".
     speed : float, optional
         Velocity of the first ball in m/s.
@@ -204,6 +217,8 @@ def paper_chain(
 
     Raises
     ------
+    TypeError
+        If `sequence` is no text and no list of letters.
     ValueError
         If a letter names no ball type, if the sequence is shorter than two balls, or if `Chain` or
         `ImpulseCorrelation` refuses another argument.
@@ -221,17 +236,12 @@ def paper_chain(
     [0.001, 0.05]
     """
     masses = ball_masses()
-    for position, ball in enumerate(sequence):
-        if ball not in masses:
-            raise ValueError(f"sequence[{position}] = {ball!r}; must be one of {', '.join(masses)}")
-    if len(sequence) < 2:
-        raise ValueError(f"sequence = {sequence!r}; must name at least 2 balls")
-
-    pairs = [sequence[i : i + 2] for i in range(len(sequence) - 1)]
-    triplets = [sequence[i : i + 3] for i in range(len(sequence) - 2)]
+    balls = _letters(sequence)
+    pairs = [balls[i : i + 2] for i in range(len(balls) - 1)]
+    triplets = [balls[i : i + 3] for i in range(len(balls) - 2)]
     chain = Chain(
-        masses=[masses[ball] for ball in sequence],
-        velocities=[speed] + [0.0] * (len(sequence) - 1),
+        masses=[masses[ball] for ball in balls],
+        velocities=[one_number("speed", speed)] + [0.0] * (len(balls) - 1),
         restitution=[_restitution()[pair] for pair in pairs],
     )
     model = ImpulseCorrelation(
@@ -241,3 +251,20 @@ def paper_chain(
         excess=excess,
     )
     return chain, model
+
+
+def _letters(sequence: str | Iterable[str]) -> str:
+    """Return the ball types of a sequence as one word, or refuse it."""
+    if not isinstance(sequence, Iterable):
+        raise TypeError(f"sequence is {a(type(sequence).__name__)}; must be letters, as in 'ABC'")
+    types, letters = list(ball_masses()), list(sequence)
+    for position, ball in enumerate(letters):
+        if ball not in types:
+            capital = isinstance(ball, str) and ball.upper() in types
+            hint = f": a capital letter, {ball.upper()!r}" if capital else ""
+            raise ValueError(
+                f"sequence[{position}] = {shown(ball)}; must be one of {', '.join(types)}{hint}"
+            )
+    if len(letters) < 2:
+        raise ValueError(f"sequence = {shown(sequence)}; must name at least 2 balls")
+    return "".join(letters)

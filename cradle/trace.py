@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.chain import Chain, Vector
+from cradle.chain import Chain
+from cradle.checks import Vector, shown
+from cradle.drawing import as_html
+
+if TYPE_CHECKING:
+    # At run time pandas and matplotlib are imported by the methods that need them.
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 
 class Event(NamedTuple):
@@ -86,6 +93,105 @@ class Trace:
     def energy_loss(self) -> float:
         """Kinetic energy lost, in joules; each contact keeps back (1 - e^2) of what it absorbed."""
         return float(np.sum((1.0 - self.chain.restitution**2) * self.absorbed))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the path as a table, a row for each ball at each row of the path.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``step`` (0 to K), ``event`` and ``contact`` (what happened there; "before"
+            and missing at step 0), ``ball``, ``velocity`` (m/s), and ``left`` and
+            ``right``, the impulses so far of the ball's two contacts (N s; 0 beyond the ends), so
+            that each ball's mass times its change of velocity is ``left - right``.  Models with
+            a time add ``time`` (s).
+
+        Examples
+        --------
+        >>> from cradle import Chain, ImpulseCorrelation, collide
+        >>> trace = collide(Chain([1, 1], [1, 0], 1), ImpulseCorrelation(0.0))
+        >>> print(trace.to_frame().to_string(index=False))
+         step               event  contact  ball  velocity  left  right
+            0              before     <NA>     0       1.0   0.0    0.0
+            0              before     <NA>     1       0.0   0.0    0.0
+            1 maximum_compression        0     0       0.5   0.0    0.5
+            1 maximum_compression        0     1       0.5   0.5    0.0
+            2                 end        0     0       0.0   0.0    1.0
+            2                 end        0     1       1.0   1.0    0.0
+        """
+        import pandas as pd
+
+        steps, balls = self.path.shape
+        kinds = ["before", *(event.kind for event in self.events)]
+        contacts = pd.Series([None, *(event.contact for event in self.events)], dtype="Int64")
+        ends = np.zeros((steps, 1))
+        impulses = np.hstack([ends, self.path_impulses, ends])
+        return pd.DataFrame(
+            {
+                "step": np.repeat(np.arange(steps), balls),
+                **{name: values.repeat(balls) for name, values in self._clock().items()},
+                "event": np.repeat(kinds, balls),
+                "contact": contacts.repeat(balls).array,
+                "ball": np.tile(np.arange(balls), steps),
+                "velocity": self.path.ravel(),
+                "left": impulses[:, :-1].ravel(),
+                "right": impulses[:, 1:].ravel(),
+            }
+        )
+
+    def _clock(self) -> dict[str, Vector]:
+        """Return what tells the time of each row of the path; a rigid model has no time."""
+        return {}
+
+    def plot(self, ax: Axes | None = None, *, contact: int | None = None) -> Axes:
+        """Draw the velocities over the impact, or the velocity-impulse diagram of a contact.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; new axes if left out.
+        contact : int, optional
+            Contact c joins balls c and c + 1.  If left out, all balls are drawn.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes, as from `cradle.figures.velocities` and `cradle.figures.velocity_impulse`.
+
+        Raises
+        ------
+        ValueError
+            If there is no such contact.
+
+        Examples
+        --------
+        >>> from cradle import Chain, ImpulseCorrelation, collide
+        >>> from matplotlib.figure import Figure
+        >>> trace = collide(Chain([1, 1], [1, 0], 1), ImpulseCorrelation(0.0))
+        >>> len(trace.plot(Figure().subplots()).get_lines())
+        2
+        """
+        from cradle import figures
+
+        if contact is None:
+            return figures.velocities(self, ax)
+        if contact not in range(len(self.impulses)):
+            raise ValueError(
+                f"contact = {shown(contact)}; must be one of 0 to {len(self.impulses) - 1}"
+            )
+        return figures.velocity_impulse(self, contact, ax)
+
+    def _repr_html_(self) -> str:
+        """Return a picture and a table for a notebook."""
+        columns = {
+            "mass (kg)": self.chain.masses,
+            "before (m/s)": self.chain.velocities,
+            "after (m/s)": self.velocities + 0.0,  # no -0
+            "impulse with the next (N s)": self.impulses,
+            "collisions with the next": self.collisions,
+        }
+        states = {"before": self.chain.velocities, "after": self.velocities}
+        return as_html(self.chain.masses, states, columns)
 
     def __repr__(self) -> str:
         """Return a short account."""

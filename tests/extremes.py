@@ -25,9 +25,10 @@ from cradle import (
     SpringChain,
     collide,
     kernel,
+    outcomes,
     post_impact_velocities,
 )
-from cradle.models.correlation import MAX_EVENTS, outcomes
+from cradle.models.correlation import MAX_EVENTS
 
 EPS = 2.0**-52
 TINIEST = 5e-324  # the smallest number above zero

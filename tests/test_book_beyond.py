@@ -18,9 +18,8 @@ from chains import HERTZ
 from chapters import Chapter
 from reference import solve
 
-from cradle import Chain, SpringChain, collide, kernel, post_impact_velocities, runtime
+from cradle import Chain, SpringChain, collide, kernel, outcomes, post_impact_velocities, runtime
 from cradle.closed_form import back_impact_line, one_collision_each
-from cradle.models.correlation import outcomes
 
 ROOT = Path(__file__).parents[1]
 CHAPTER = Chapter("beyond")

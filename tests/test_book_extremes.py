@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from chapters import Chapter
 
-from cradle import Chain, ImpulseCorrelation, SpringChain, collide, paper_chain
-from cradle.models.correlation import outcomes
+from cradle import Chain, ImpulseCorrelation, SpringChain, collide, outcomes, paper_chain
 
 ROOT = Path(__file__).parents[1]
 

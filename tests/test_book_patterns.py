@@ -6,10 +6,9 @@ import pytest
 from reference import solve
 from scipy.optimize import brentq, minimize_scalar
 
-from cradle import Chain, ImpulseCorrelation, collide
+from cradle import Chain, ImpulseCorrelation, collide, outcomes
 from cradle.closed_form import back_impact_line, first_ball_stops, middle_ball_stops
 from cradle.measures import bouncing_pattern
-from cradle.models.correlation import outcomes
 
 ALPHA, E = 0.15, 0.5
 

@@ -86,10 +86,10 @@ BAD = [
     ({"restitution": [1]}, "restitution has shape (1,); 3 balls need () or (2,)"),
     ({"restitution": [[1, 1]]}, "restitution has shape (1, 2); 3 balls need () or (2,)"),
     ({"masses": "heavy"}, "masses = 'heavy'; must be real numbers, one shape"),
-    ({"masses": ["1", "2", "3"]}, "masses = ['1', '2', '3']; must be real numbers, one shape"),
-    ({"masses": [1, [2, 3], 4]}, "masses = [1, [2, 3], 4]; must be real numbers, one shape"),
-    ({"masses": [1, None, 1]}, "masses = [1, None, 1]; must be real numbers, one shape"),
-    ({"velocities": [1j, 0, 0]}, "velocities = [1j, 0, 0]; must be real numbers, one shape"),
+    ({"masses": ["1", "2", "3"]}, "masses[0] = '1'; must be a real number"),
+    ({"masses": [1, [2, 3], 4]}, "masses[1] has shape (2,), masses[0] has (); must have one shape"),
+    ({"masses": [1, None, 1]}, "masses[1] = None; must be a real number"),
+    ({"velocities": [1j, 0, 0]}, "velocities[0] = 1j; must be a real number"),
     ({"velocities": None}, "velocities = None"),
     ({"restitution": "1"}, "restitution = '1'; must be real numbers, one shape"),
     ({"restitution": None}, "restitution = None; must be real numbers, one shape"),
@@ -126,7 +126,49 @@ def test_copies_are_frozen_too():
 
 def test_masked_numbers_are_refused():
     masked = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
-    with pytest.raises(ValueError, match="none masked"):
-        Chain(masked, [1, 0, 0], 1)
-    with pytest.raises(ValueError, match="none masked"):
-        post_impact_velocities(masked, [1, 0, 0], 1, 0.1)
+    for given in (masked, [1.0, np.ma.masked, 3.0]):
+        with pytest.raises(ValueError, match=r"^masses\[1\] = masked; must be a real number$"):
+            Chain(given, [1, 0, 0], 1)
+        with pytest.raises(ValueError, match=r"^masses\[1\] = masked; must be a real number$"):
+            post_impact_velocities(given, [1, 0, 0], 1, 0.1)
+
+
+# --- words beside the exact message --------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"masses": [1.0]}, "one row of two or more numbers"),
+        ({"velocities": [1, 0]}, "one velocity for each of 3 balls"),
+        (
+            {"restitution": [1, 1, 1]},
+            "3 balls have 2 contacts, restitution needs one number or 2",
+        ),
+    ],
+)
+def test_lengths_are_told_without_shapes_too(values, words):
+    with pytest.raises(ValueError, match=f": {words}$"):
+        Chain(**(GOOD | values))
+    with pytest.raises(ValueError, match="2 balls have 1 contact, restitution needs one number or"):
+        Chain([1, 1], [1, 0], [1, 1])
+
+
+# --- equality, defaults --------------------------------------------------------------------
+
+
+def test_chains_with_equal_values_are_equal():
+    one, other = Chain(**GOOD), Chain(**{name: np.array(v, float) for name, v in GOOD.items()})
+    assert one == other
+    assert len({one, other}) == 1
+    for name, values in [("masses", [1, 2, 4]), ("velocities", [1, 0, -2]), ("restitution", 1)]:
+        assert one != Chain(**(GOOD | {name: values}))
+    assert one != Chain([1, 2], [1, 0], 0.5)
+    assert one != "Chain"
+    # The two zeros are one number, so these chains are equal, and found under one key.
+    zeros = {Chain([1, 1], [1, zero], 1) for zero in (0.0, -0.0)}
+    assert len(zeros) == 1
+
+
+def test_balls_are_elastic_unless_said_otherwise():
+    assert Chain([1, 2, 3], [1, 0, 0]).restitution.tolist() == [1.0, 1.0]

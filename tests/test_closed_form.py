@@ -205,7 +205,7 @@ ONES = np.ones(3)
         ((ONES, [1, 0, 0], 1, 0), "restitution has shape (); must be (..., 2)"),
         ((ONES, [1, 0, 0], ONES, 0), "restitution has shape (3,); must be (..., 2)"),
         ((ONES, [1, 0, 0], [1, 1], "a"), "ratio = 'a'; must be real numbers"),
-        ((ONES, [1, None, 0], [1, 1], 0), "velocities = [1, None, 0]; must be real numbers"),
+        ((ONES, [1, None, 0], [1, 1], 0), "velocities[1] = None; must be a real number"),
         (
             (np.ones((4, 3)), [1, 0, 0], [1, 1], [0, 0.1]),
             "leading axes do not broadcast: masses (4, 3), velocities (3,), restitution (2,), "

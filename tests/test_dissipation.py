@@ -223,7 +223,7 @@ def test_balls_of_any_mass():
 
 def test_a_ball_too_light_to_tell_its_neighbours_apart_is_refused():
     with pytest.raises(
-        ValueError, match=r"^masses\[1\] = 1e-100; must be at least 1e-06 of one of"
+        ValueError, match=r"^masses\[1\] = 1e-100; must be at least 1e-06 of the he"
     ):
         collide(Chain([1, 1e-100, 1], [1, 0, 0], 0.5), QuadraticDissipation())
     after = collide(Chain([1, 1e-6, 1], [1, 0, 0], 0.5), QuadraticDissipation()).velocities

@@ -20,12 +20,13 @@ from cradle import (
     ImpulseCorrelation,
     collide,
     kernel,
+    outcomes,
     paper_chain,
     post_impact_velocities,
     runtime,
 )
 from cradle.measures import condition_number
-from cradle.models.correlation import MAX_EVENTS, outcomes
+from cradle.models.correlation import MAX_EVENTS
 from cradle.tables import paper_sequences
 
 DATA = Path(__file__).parents[1] / "data"

@@ -1,6 +1,7 @@
 """Measures of outcomes: bouncing patterns, effective ratios, the arc of conserving outcomes."""
 
 import re
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -119,7 +120,7 @@ def test_effective_ratio_refuses():
         (np.nan, "tolerance = nan; must be finite"),
         ([1e-6], r"tolerance = \[1e-06\]; must be one number"),
         ("1e-6", "tolerance = '1e-6'; must be real numbers"),
-        ([[1e-6], []], r"tolerance = \[\[1e-06\], \[\]\]; must be real numbers"),
+        ([[1e-6], []], r"tolerance\[1\] has shape \(0,\), tolerance\[0\] has \(1,\)"),
     ],
 )
 def test_effective_ratio_refuses_a_tolerance(tolerance, message):
@@ -133,7 +134,8 @@ def test_effective_ratio_refuses_a_tolerance(tolerance, message):
 
 def random_three(seed):
     rng = np.random.default_rng(seed)
-    return 10 ** rng.uniform(-1, 1, 3), np.sort(rng.normal(size=3))[::-1]
+    masses = np.ldexp(1.0 + rng.random(3), rng.integers(-3, 3, 3))
+    return masses, np.sort(2.0 * rng.random(3) - 1.0)[::-1]
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -197,3 +199,35 @@ def test_arc_of_a_very_light_middle_ball():
         assert angles[-1] == pytest.approx(np.arctan(np.sqrt(light * (2 + light))), rel=1e-14)
         assert outcomes[-1, 2] - outcomes[-1, 1] == pytest.approx(0, abs=1e-7)
     assert conserving_angle([1, 2, 3], [0.1, 0.1, 0.1]) == 0
+
+
+@pytest.mark.parametrize("power", [-1073, -600, 900])
+def test_the_arc_has_no_unit_of_mass(power):
+    """To the bit, from the smallest floats on: once products of masses were lost."""
+    velocities = [1.0, 0.0, -0.25]
+    angles, outcomes = conserving_outcomes([1, 2, 1], velocities)
+    same = np.ldexp([1.0, 2.0, 1.0], power)
+    other_angles, other_outcomes = conserving_outcomes(same, velocities)
+    assert other_angles.tolist() == angles.tolist()
+    assert other_outcomes.tolist() == outcomes.tolist()
+    assert conserving_angle(same, outcomes[90]) == conserving_angle([1, 2, 1], outcomes[90])
+
+
+@pytest.mark.parametrize("where", [0, 1, 2])
+@pytest.mark.parametrize("other", [1e-12, 1e-150, 1e12, 1e150])
+def test_ends_of_the_arc_of_masses_far_apart(where, other):
+    """Against the two collisions whose outcomes the ends are, in rational numbers.
+
+    At one end balls 1 and 2 go on together and ball 3 leaves them elastically, at the other end
+    ball 1 leaves balls 2 and 3: each as two balls with the speeds that energy and momentum fix.
+    """
+    masses = [1.0, 1.0, 1.0]
+    masses[where] = other
+    m1, m2, m3 = map(Fraction, masses)
+    total = m1 + m2 + m3
+    left = [-2 * m3 / total, -2 * m3 / total, (m1 + m2 - m3) / total]  # ball 3 comes at -1
+    right = [(m1 - m2 - m3) / total, 2 * m1 / total, 2 * m1 / total]  # ball 1 comes at 1
+    ends = [([0.0, 0.0, -1.0], 0, left), ([1.0, 0.0, 0.0], -1, right)]
+    for velocities, end, exact in ends:
+        outcome = conserving_outcomes(masses, velocities)[1][end]
+        np.testing.assert_allclose(outcome, list(map(float, exact)), rtol=1e-12, atol=1e-15)

@@ -6,8 +6,7 @@ from chains import random_chains, within_bounds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide
-from cradle.models.correlation import outcomes
+from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide, outcomes
 
 unit = st.one_of(st.sampled_from([0.0, 1.0]), st.floats(0, 1))
 exponent = st.floats(-3, 3)

@@ -14,9 +14,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cradle import ImpactNotFinished, kernel, paper_chain, post_impact_velocities, runtime
+from cradle import ImpactNotFinished, kernel, outcomes, paper_chain, post_impact_velocities, runtime
 from cradle.models import correlation
-from cradle.models.correlation import outcomes
 
 SOURCE = Path(kernel.__file__).read_text(encoding="utf-8")
 #: Functions of the loop that walk along contacts; their first two arguments are the ends.

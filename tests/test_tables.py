@@ -2,13 +2,16 @@
 
 import csv
 import re
+import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cradle import tables
 from cradle.tables import (
     ball_masses,
     paper_chain,
@@ -117,7 +120,10 @@ def test_two_balls_need_no_ratio():
     ("sequence", "message"),
     [
         ("ABXA", r"sequence\[2\] = 'X'; must be one of A, B, C, D"),
-        ("abc", r"sequence\[0\] = 'a'; must be one of A, B, C, D"),
+        ("abc", r"sequence\[0\] = 'a'; must be one of A, B, C, D: a capital letter, 'A'"),
+        (["A", "e"], r"sequence\[1\] = 'e'; must be one of A, B, C, D"),
+        (["A", "BC"], r"sequence\[1\] = 'BC'; must be one of A, B, C, D"),
+        ([1, 2], r"sequence\[0\] = 1; must be one of A, B, C, D"),
         ("AB C", r"sequence\[2\] = ' '; must be one of A, B, C, D"),
         ("A", r"sequence = 'A'; must name at least 2 balls"),
         ("", r"sequence = ''; must name at least 2 balls"),
@@ -126,6 +132,141 @@ def test_two_balls_need_no_ratio():
 def test_bad_sequences_are_refused(sequence, message):
     with pytest.raises(ValueError, match=f"^{message}$"):
         paper_chain(sequence)
+
+
+def test_letters_may_come_in_a_list():
+    for letters in (["A", "B", "C"], ("A", "B", "C"), np.array(["A", "B", "C"]), iter("ABC")):
+        assert paper_chain(letters) == paper_chain("ABC")
+    with pytest.raises(TypeError, match=r"^sequence is an int; must be letters, as in 'ABC'$"):
+        paper_chain(3)
+    with pytest.raises(ValueError, match=r"^speed = \[1, 2\]; must be one number$"):
+        paper_chain("ABC", speed=[1, 2])
+
+
+def test_long_sequences_are_made_or_refused_at_once():
+    start = time.perf_counter()
+    chain, model = paper_chain("ABCA" * 75, excess="saturate")
+    assert (len(chain), len(model.forward)) == (300, 298)
+    with pytest.raises(ValueError, match=r"^sequence\[299\] = 'x'; must be one of A, B, C, D$"):
+        paper_chain("ABC" * 99 + "ABx")
+    assert time.perf_counter() - start < 1.0
+
+
+# --- files that are wrong ------------------------------------------------------------------
+
+
+@pytest.fixture
+def edited(tmp_path, root, monkeypatch):
+    """Return a function that edits a copy of one of the four tables, and has it read."""
+    cached = (tables.ball_masses, tables.paper_sequences, tables._restitution, tables._ratios)
+
+    def edit(name, old, new):
+        for file in ("masses.csv", "restitution.csv", "ratios.csv", "sequences.csv"):
+            shutil.copy(root / "data" / file, tmp_path)
+        data = (tmp_path / name).read_bytes()
+        if old is None:
+            (tmp_path / name).unlink()
+        else:
+            assert data.count(old) >= 1
+            (tmp_path / name).write_bytes(data.replace(old, new, 1))
+        for function in cached:
+            function.cache_clear()
+        monkeypatch.setattr(tables, "data_folder", lambda: tmp_path)
+
+    yield edit
+    for function in cached:
+        function.cache_clear()
+
+
+WRONG = [
+    ("masses.csv", b"B,0.053", b"B,-0.053", "masses.csv, row 3, column mass_kg = -0.053; must be"),
+    ("masses.csv", b"B,0.053", b"B,0", "masses.csv, row 3, column mass_kg = 0.0; must be above 0"),
+    ("masses.csv", b"B,0.053", b"B,nan", "masses.csv, row 3, column mass_kg = nan; must be finite"),
+    ("masses.csv", b"B,0.053", b"B,", "masses.csv, row 3, column mass_kg = ''; must be a number"),
+    ("masses.csv", b"B,0.053", b"B", "masses.csv, row 3 is ['B']; must have 2 cells: ball, m"),
+    ("masses.csv", b"B,0.053", b"B,0,053", "masses.csv, row 3 is ['B', '0', '053']; must have 2"),
+    ("masses.csv", b"0.053", b'"0,053"', "masses.csv, row 3, column mass_kg = '0,053'; must be a "),
+    (
+        "masses.csv",
+        b"B,0.053",
+        b"",
+        "masses.csv, row 3 is []; must have 2 cells: ball, m",
+    ),
+    (
+        "masses.csv",
+        b"B,0.053",
+        b"A,0.053",
+        "masses.csv, row 3, column ball = 'A'; must be there once",
+    ),
+    (
+        "masses.csv",
+        b"B,0.053",
+        b"b,0.053",
+        "masses.csv, row 3, column ball = 'b'; must be one capit",
+    ),
+    ("masses.csv", b"ball,mass_kg", b"ball;mass_kg", "masses.csv, row 1 is ['ball;mass_kg']; must"),
+    ("masses.csv", b"ball", b"\xef\xbb\xbfball", "masses.csv begins with a byte-order mark"),
+    ("masses.csv", b"ball", b"b\xe4ll", "masses.csv is no UTF-8 text: byte 1"),
+    ("masses.csv", None, None, "masses.csv is missing: there is no file"),
+    (
+        "restitution.csv",
+        b"0.31",
+        b"1.5",
+        "restitution.csv, row 2, column C = 1.5; must lie in [0, 1]",
+    ),
+    (
+        "restitution.csv",
+        b"0.31",
+        b"0.32",
+        "restitution.csv, row 2, column C = '0.32'; must be equal",
+    ),
+    (
+        "restitution.csv",
+        b"\nD,",
+        b"\nE,",
+        "restitution.csv, row 5, column ball = 'E'; must be one of A",
+    ),
+    ("restitution.csv", None, None, "restitution.csv is missing: there is no file"),
+    ("ratios.csv", b"AAB,0.232\n", b"", "ratios.csv has no row 'AAB' in column triplet"),
+    (
+        "ratios.csv",
+        b"AAB,0.232",
+        b"AAB,-0.232",
+        "ratios.csv, row 3, column ratio = -0.232; must lie",
+    ),
+    (
+        "ratios.csv",
+        b"AAB,0.232",
+        b"AAA,0.232",
+        "ratios.csv, row 3, column triplet = 'AAA'; must be ",
+    ),
+    (
+        "sequences.csv",
+        b"BABB",
+        b"BAXB",
+        "sequences.csv, row 3, column sequence = 'BAXB'; must be two",
+    ),
+    (
+        "sequences.csv",
+        b"BABB,10",
+        b"BABB,ten",
+        "sequences.csv, row 3, column figure = 'ten'; must be",
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "old", "new", "message"), WRONG, ids=[row[3] for row in WRONG])
+def test_a_wrong_table_is_named_with_row_and_column(edited, name, old, new, message):
+    edited(name, old, new)
+    kind = FileNotFoundError if old is None else ValueError
+    with pytest.raises(kind, match="^" + re.escape(message)):
+        paper_sequences() if name == "sequences.csv" else paper_chain("ABC")
+
+
+def test_a_table_changed_rightly_is_read(edited):
+    """The fixture itself reads the copy: else the refusals above would prove nothing."""
+    edited("masses.csv", b"A,0.045", b"A,0.5")
+    assert paper_chain("AB")[0].masses.tolist() == [0.5, 0.053]
 
 
 def test_import_loads_neither_pandas_nor_matplotlib():

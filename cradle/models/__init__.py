@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+import inspect
+from typing import Protocol, cast
 
 from cradle.chain import Chain
+from cradle.checks import a, must_be
 from cradle.trace import Trace
+
+
+class RecordingModel(Protocol):
+    """A model that can leave the path out."""
+
+    def solve(self, chain: Chain, *, record: bool | None = None) -> Trace:
+        """Return the outcome of the impact of `chain`, with or without its path."""
+        ...
 
 
 class Model(Protocol):
@@ -16,7 +26,7 @@ class Model(Protocol):
         ...
 
 
-def collide(chain: Chain, model: Model) -> Trace:
+def collide(chain: Chain, model: Model, *, record: bool | None = None) -> Trace:
     """Solve one impact.
 
     Parameters
@@ -25,6 +35,9 @@ def collide(chain: Chain, model: Model) -> Trace:
         The balls at the instant before.
     model : Model
         The impact law, such as `ImpulseCorrelation`.
+    record : bool, optional
+        Whether to keep the path; for models whose `solve` lets one choose, such as
+        `ImpulseCorrelation`.
 
     Returns
     -------
@@ -46,8 +59,13 @@ def collide(chain: Chain, model: Model) -> Trace:
     >>> collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.0)).velocities.tolist()
     [0.0, 0.0, 1.0]
     """
-    if not isinstance(chain, Chain):
-        raise TypeError(f"chain is a {type(chain).__name__}; must be a Chain")
-    if isinstance(model, type) or not hasattr(model, "solve"):
-        raise TypeError(f"model is a {type(model).__name__}; must be an impact model")
-    return model.solve(chain)
+    must_be(Chain, "chain", chain)
+    if isinstance(model, type):
+        raise TypeError(f"model is the class {model.__name__}; must be made: {model.__name__}(...)")
+    if not hasattr(model, "solve"):
+        raise TypeError(f"model is {a(type(model).__name__)}; must be an impact model")
+    if record is None:
+        return model.solve(chain)
+    if "record" not in inspect.signature(model.solve).parameters:
+        raise TypeError(f"{type(model).__name__} always keeps its path: record does not apply")
+    return cast("RecordingModel", model).solve(chain, record=record)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.chain import Chain, Vector, checked, one_number
+from cradle.chain import Chain
+from cradle.checks import Vector, checked, must_be, one_number, whole_number
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 # Beyond these the equations of one problem keep too few digits.
@@ -74,7 +75,8 @@ class QuadraticDissipation:
     ------
     ValueError
         If a value is outside its range, or infinite; on solving, if there are not as many as
-        contacts, if e = 1 gives a coefficient, or for `distance` with other than three balls.
+        contacts, if e = 1 gives a coefficient, for `distance` with other than three balls, or if
+        light balls between heavy ones leave the equations too few digits.
     ImpactNotFinished
         On solving, if balls still approach after `max_problems`.
 
@@ -113,27 +115,28 @@ class QuadraticDissipation:
             if kappa.ndim > 1:
                 raise ValueError(f"coefficients has shape {kappa.shape}; must be () or (N - 1,)")
             value = tuple(kappa.tolist()) if kappa.ndim else float(kappa)
-        most = max_problems
-        if isinstance(most, bool) or not isinstance(most, (int, np.integer)) or most < 1:
-            raise ValueError(f"max_problems = {most!r}; must be a whole number, at least 1")
-        object.__setattr__(self, "max_problems", int(most))
+        object.__setattr__(self, "max_problems", whole_number("max_problems", max_problems))
         object.__setattr__(self, "coefficients", value)
         object.__setattr__(self, "distance", one_number("distance", distance, rule, 0.0, _LARGEST))
 
     def solve(self, chain: Chain) -> DissipationTrace:
         """Solve the impact of `chain`; see `collide`."""
-        n, m, v = len(chain), chain.masses, chain.velocities
+        n, v = len(must_be(Chain, "chain", chain)), chain.velocities
+        # In units in which no product of masses is beyond the range of floats.
+        unit = np.ldexp(1.0, int(np.frexp(chain.masses.max())[1]) - 1)
+        m = chain.masses / unit
         kappa = self._kappa(chain)
         if self.distance and n != 3:
             raise ValueError(f"distance = {self.distance!r}; needs three balls, the chain has {n}")
         impulses, absorbed = np.zeros((2, n - 1))
         path, path_impulses, events = [v], [impulses], []
-        light = m[1:-1] < _LIGHTEST * np.minimum(m[:-2], m[2:])
+        left, right = np.maximum.accumulate(m), np.maximum.accumulate(m[::-1])[::-1]
+        light = m[1:-1] < _LIGHTEST * np.minimum(left[:-2], right[2:])
         if light.any():
             i = 1 + int(np.argmax(light))
             raise ValueError(
-                f"masses[{i}] = {float(m[i])!r}; must be at least {_LIGHTEST} of one of its "
-                "neighbours for QuadraticDissipation"
+                f"masses[{i}] = {float(chain.masses[i])!r}; must be at least {_LIGHTEST} of "
+                "the heaviest ball on its left, or on its right, for QuadraticDissipation"
             )
         speed = np.abs(v - v.mean()).max()
 
@@ -163,11 +166,11 @@ class QuadraticDissipation:
             chain=chain,
             model=self,
             velocities=v,
-            impulses=impulses,
-            absorbed=absorbed,
+            impulses=impulses * unit,
+            absorbed=absorbed * unit,
             collisions=np.bincount([event.contact for event in events], minlength=n - 1),
             path=np.array(path),
-            path_impulses=np.array(path_impulses),
+            path_impulses=np.array(path_impulses) * unit,
             events=tuple(events),
         )
         if (closing(v) > 0.0).any():

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from cradle.chain import Chain, Vector, one_number
-from cradle.models.compliant import SpringChain, _Motion, _own_units, _TooManyEvaluations
+from cradle.chain import Chain
+from cradle.checks import Vector, one_number
+from cradle.models.compliant import SpringChain
+from cradle.models.motion import Motion, TooManyEvaluations, own_units
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 _EPSILON = float(np.finfo(np.float64).eps)
@@ -83,7 +85,7 @@ class EnergyDistribution:
     Parameters
     ----------
     stiffness : float or sequence, length N - 1
-        k of each contact; only ratios count.
+        k of each contact; only ratios count, so they are all 1 if left out.
     exponent : float
         p, at least 1: 1 a linear spring, 3/2 the contact of two elastic spheres (Hertz).
     step : float, optional
@@ -119,7 +121,7 @@ class EnergyDistribution:
     array([-0.008615,  0.104143,  0.904473])
     """
 
-    stiffness: float | Sequence[float]
+    stiffness: float | Sequence[float] = 1.0
     exponent: float = 1.5
     step: float | None = None
     gaps: bool = field(default=True, kw_only=True)
@@ -140,7 +142,7 @@ class EnergyDistribution:
 
     def solve(self, chain: Chain) -> EnergyTrace:
         """Solve the impact of `chain`; see `collide`."""
-        k, unit, mass, speed = _own_units(chain, self.stiffness)
+        k, unit, mass, speed = own_units(chain, self.stiffness)
         small = (chain.restitution > 0.0) & (chain.restitution < _SMALLEST)
         if small.any():
             c = int(np.argmax(small))
@@ -181,7 +183,7 @@ class EnergyDistribution:
         return trace
 
 
-class _Process(_Motion):
+class _Process(Motion):
     """The motion of springs that give back only the part e^2 of what they absorb.
 
     The compressions of the state are the x of `EnergyDistribution`, below zero gaps.
@@ -247,7 +249,7 @@ class _Process(_Motion):
     def march(self, step: float) -> str:
         """Make one explicit step of the fastest growing impulse, to the next event at most."""
         if self.evaluations == self.most:
-            raise _TooManyEvaluations
+            raise TooManyEvaluations
         self.evaluations += 1
         closed, loading = self.closed, self.loading
         self.y = self.y.copy()

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cradle.chain import Chain, Vector
+from cradle.chain import Chain
+from cradle.checks import Vector, must_be
 from cradle.models.correlation import MAX_EVENTS, ImpulseCorrelation
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -70,7 +71,7 @@ class SequentialCollisions:
 
     def solve(self, chain: Chain) -> Trace:
         """Solve the impact of `chain`; see `collide`."""
-        seen, message = chain, ""
+        seen, message = must_be(Chain, "chain", chain), ""
         if self.order == "right":
             # The leftmost contact of the mirror image is the rightmost of the chain.
             seen = Chain(chain.masses[::-1], 0.0 - chain.velocities[::-1], chain.restitution[::-1])
@@ -132,7 +133,7 @@ class FusedChain:
 
     def solve(self, chain: Chain) -> Trace:
         """Solve the impact of `chain`; see `collide`."""
-        n, u, v = len(chain), chain.closing_speeds, chain.velocities
+        n, u, v = len(must_be(Chain, "chain", chain)), chain.closing_speeds, chain.velocities
         c = _struck(u)
         path = np.tile(v, (n + 1 if c >= 0 else 1, 1))
         path_impulses = np.zeros((len(path), n - 1))

@@ -1,0 +1,314 @@
+"""Many chains at once by the paper's model: the outcome alone, on all processors."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cradle.chain import Chain
+from cradle.checks import Vector, checked, checked_masses, numbers, refuse_overflow
+from cradle.drive import FINISHED, LARGE, REFUSED, Job
+from cradle.kernel import Inputs, Options
+from cradle.models.correlation import (
+    MAX_EVENTS,
+    ImpulseCorrelation,
+    check_options,
+    checked_ratios,
+    refuse_excess,
+)
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def post_impact_velocities(
+    masses: ArrayLike,
+    velocities: ArrayLike,
+    restitution: ArrayLike,
+    forward: ArrayLike,
+    backward: ArrayLike | None = None,
+    *,
+    meeting: float = 0.5,
+    excess: str = "raise",
+    max_events: int = MAX_EVENTS,
+    progress: bool = False,
+) -> Vector:
+    """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
+
+    The same event loop as `collide` with `ImpulseCorrelation`, without the record; two balls, and
+    three that collide once each, take the closed form instead.  Compiled, some
+    thousands of chains and more are shared out to all processors.
+
+    Parameters
+    ----------
+    masses, velocities : array_like, shape (..., N)
+        kg and m/s.
+    restitution : array_like, shape (..., N - 1) or ()
+        Energetic coefficients of restitution.
+    forward, backward : array_like, shape (..., N - 2) or ()
+        Ratios; `backward` as `forward` if left out.
+    meeting, excess, max_events
+        As for `ImpulseCorrelation`.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    ndarray, shape (..., N)
+        Velocities after the impact, m/s.
+
+    Raises
+    ------
+    ValueError
+        If a value or a shape is wrong; the message names the first value and the rule.
+    ImpactNotFinished
+        If an impact takes more than `max_events` steps; `trace` is that of the first such chain.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583.
+
+    Examples
+    --------
+    The two ends of Fig. 4 in one call:
+
+    >>> post_impact_velocities([1, 1, 1], [1, 0, 0], 1, [[0.0], [0.5]]).round(3)
+    array([[ 0.   ,  0.   ,  1.   ],
+           [-0.333,  0.667,  0.667]])
+    """
+    return outcomes(
+        masses,
+        velocities,
+        restitution,
+        forward,
+        backward,
+        meeting=meeting,
+        excess=excess,
+        max_events=max_events,
+        progress=progress,
+    ).velocities
+
+
+class Outcomes(NamedTuple):
+    """What a batch of impacts leaves.
+
+    Examples
+    --------
+    >>> outcomes([100, 1, 100], [1, 0, 0], 1, 0.15).collisions.tolist()
+    [10, 10]
+    """
+
+    #: Velocities after the impact, shape (..., N), m/s.
+    velocities: Vector
+    #: How often each contact became active, shape (..., N - 1); before the limit, if collapsed.
+    collisions: NDArray[np.int64]
+    #: Whether an infinite sequence of impacts was taken to its limit, shape (...).
+    collapsed: NDArray[np.bool_]
+
+    def to_xarray(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
+        """Return the outcomes with named axes.
+
+        Parameters
+        ----------
+        dims : tuple of str, optional
+            Names of the leading axes; ``chain_0``, ``chain_1`` ... if left out.
+
+        Returns
+        -------
+        xarray.Dataset
+            `velocities` (..., ball), `collisions` (..., contact), `collapsed` (...).
+
+        Raises
+        ------
+        ImportError
+            If xarray, of the extra ``book``, is not installed.
+        ValueError
+            If the number of names is not that of the leading axes.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError(
+                "to_xarray needs xarray: pip install 'cradle-companion[book]'"
+            ) from None
+        lead = self.collapsed.ndim
+        names = tuple(f"chain_{k}" for k in range(lead)) if dims is None else tuple(dims)
+        if len(names) != lead:
+            raise ValueError(f"dims = {names}; the outcomes have {lead} leading axes")
+        balls = self.velocities.shape[-1]
+        return xarray.Dataset(
+            {
+                "velocities": ((*names, "ball"), self.velocities),
+                "collisions": ((*names, "contact"), self.collisions),
+                "collapsed": (names, self.collapsed),
+            },
+            coords={"ball": range(balls), "contact": range(balls - 1)},
+        )
+
+
+def outcomes(
+    masses: ArrayLike,
+    velocities: ArrayLike,
+    restitution: ArrayLike,
+    forward: ArrayLike,
+    backward: ArrayLike | None = None,
+    *,
+    meeting: float = 0.5,
+    excess: str = "raise",
+    max_events: int = MAX_EVENTS,
+    progress: bool = False,
+) -> Outcomes:
+    """Solve many chains of N balls at once, and count their collisions too.
+
+    Parameters
+    ----------
+    masses, velocities, restitution, forward, backward, meeting, excess, max_events, progress
+        As for `post_impact_velocities`.
+
+    Returns
+    -------
+    Outcomes
+        Velocities, collisions and collapses.
+
+    Raises
+    ------
+    ValueError, ImpactNotFinished
+        As `post_impact_velocities`.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583; Fig. 6 is a map of such counts.
+
+    Examples
+    --------
+    >>> outcomes([1, 1, 1], [1, 0, 0], [[1, 1], [0, 0]], 0).collapsed.tolist()
+    [False, True]
+    """
+    check_options(meeting, excess, max_events)
+    given = {
+        "masses": masses,
+        "velocities": velocities,
+        "restitution": restitution,
+        "forward": forward,
+        "backward": forward if backward is None else backward,
+    }
+    # Whether these are in range is checked by the kernel.
+    arrays = [numbers(name, values) for name, values in given.items()]
+    n = arrays[0].shape[-1] if arrays[0].ndim else 0
+    if n < 2:
+        raise ValueError(f"masses has shape {arrays[0].shape}; must be (..., N) with N >= 2")
+    if arrays[1].shape[-1:] != (n,):
+        raise ValueError(f"velocities has shape {arrays[1].shape}; must be (..., {n}), as masses")
+    for k, size in ((2, n - 1), (3, n - 2), (4, n - 2)):
+        if arrays[k].ndim == 0:
+            arrays[k] = np.full(size, arrays[k])
+        elif arrays[k].shape[-1] != size:
+            raise ValueError(
+                f"{list(given)[k]} has shape {arrays[k].shape}; "
+                f"must be () or (..., {size}) for {n} balls"
+            )
+    try:
+        lead = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    except ValueError:
+        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
+        raise ValueError(f"leading axes do not broadcast: {shapes}") from None
+
+    count, chunk = math.prod(lead), _chunk(n)
+    if count == 0:
+        _check(given, excess)
+    out = np.empty((count, n))
+    hits = np.empty((count, n - 1), dtype=np.int64)
+    collapsed = np.empty(count, dtype=np.int64)
+    options = Options(float(meeting), int(max_events), excess == "raise", False)
+    large = count * n >= LARGE
+
+    def solve(begin: int, stop: threading.Event) -> Job:
+        """Solve the chunk of chains that begins there."""
+        rows = slice(begin, min(begin + chunk, count))
+        part = Inputs(*(_rows(array, lead, rows) for array in arrays))
+        job = Job(part, rows.stop - begin, options, large=large).run(stop)
+        out[rows], hits[rows], collapsed[rows] = job.outputs[:3]
+        return job
+
+    starts = range(0, count, chunk)
+    # At the first failure in the order of the chains; none has been returned before.
+    for begin, job in zip(starts, _in_order(solve, starts, progress), strict=True):
+        if job.status == REFUSED:
+            _check(given, excess)
+            raise AssertionError("the kernel refused chains that the checks admit")
+        if job.status != FINISHED:
+            failed = begin + job.next
+            # Alone, with its record; it stops where it stopped here, and raises.
+            m, v, e, f, b = (_rows(array, lead, slice(failed, failed + 1))[0] for array in arrays)
+            model = ImpulseCorrelation(
+                f, b, meeting=meeting, excess="saturate", max_events=max_events
+            )
+            model.solve(Chain(m, v, e))
+    return Outcomes(out.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.reshape(lead) != 0)
+
+
+def _in_order(
+    solve: Callable[[int, threading.Event], Job], starts: range, progress: bool
+) -> Iterable[Job]:
+    """Yield the results of `solve` in order, made by as many threads as there are processors."""
+    stop = threading.Event()
+    if progress:
+        from tqdm.auto import tqdm
+
+        with tqdm(total=len(starts), unit="chunk") as bar:
+            for job in _in_order(solve, starts, progress=False):
+                bar.update()
+                yield job
+    elif (workers := min(len(starts), os.cpu_count() or 1)) < 2:
+        yield from (solve(begin, stop) for begin in starts)
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            try:
+                yield from pool.map(solve, starts, itertools.repeat(stop))
+            finally:
+                stop.set()
+                pool.shutdown(cancel_futures=True)
+
+
+def _chunk(n: int) -> int:
+    """Return how many chains of n balls are solved at a time, more where they may be short cuts.
+
+    So much memory is needed beyond inputs and outputs.
+    """
+    return 16_384 if n <= 3 else 4096
+
+
+def _check(given: dict[str, ArrayLike], excess: str) -> None:
+    """Raise if a value is outside its limits: what the kernel checks, and in words."""
+    m = checked_masses(given["masses"])
+    v = checked("velocities", given["velocities"])
+    checked("restitution", given["restitution"], "must lie in [0, 1]", 0.0, 1.0)
+    f, b = (checked_ratios(name, given[name]) for name in ("forward", "backward"))
+    refuse_overflow(v, m)
+    if excess == "raise":
+        ends = m.shape[-1] - 2
+        f, b = (np.broadcast_to(x, (ends,)) if x.ndim == 0 else x for x in (f, b))
+        refuse_excess(m, f, b)
+
+
+def _rows(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
+    """Return some rows of `array` broadcast to the leading shape, or the one row that all share."""
+    size = array.shape[-1]
+    if array.size == size:
+        part = array.reshape(1, size)
+    elif array.shape[:-1] == lead and array.flags.c_contiguous:
+        part = array.reshape(math.prod(lead), size)[rows]
+    else:
+        # Without making the others.
+        full = np.broadcast_to(array, (*lead, size))
+        return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
+    # Compiled code is made for arrays that may be written to; it writes to no input.
+    return part if part.flags.writeable and part.flags.c_contiguous else part.copy()

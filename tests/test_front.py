@@ -1,0 +1,206 @@
+"""What a newcomer meets first: the desk toy, the version, pictures, tables and plots."""
+
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from importlib.metadata import version
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+import cradle
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    FusedChain,
+    ImpulseCorrelation,
+    QuadraticDissipation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    paper_chain,
+)
+from cradle.drawing import as_html
+
+# --- the desk toy --------------------------------------------------------------------------
+
+
+def elastic_spheres(balls: int, step: float) -> np.ndarray:
+    """Velocities after the strike by a second route: Hertz's force, fixed steps, plain Verlet."""
+    place, speed = np.zeros(balls), np.zeros(balls)
+    speed[0] = 1.0
+    force = np.zeros(balls + 1)  # from the left of each ball, then from its right
+    while True:
+        speed += 0.5 * step * (force[:-1] - force[1:])
+        place += step * speed
+        force[1:-1] = np.maximum(place[:-1] - place[1:], 0.0) ** 1.5
+        speed += 0.5 * step * (force[:-1] - force[1:])
+        if not force.any() and (np.diff(speed) >= 0.0).all():
+            return speed
+
+
+def test_the_toy_by_a_second_route(root: Path):
+    """The README's numbers: from its text, from the model, and from an integration of our own."""
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    sentence = readme.partition("**The last ball")[2].partition("**")[0]
+    assert re.findall(r"\d+(?= %| and|,)", sentence) == ["99", "13", "7", "3", "1"]
+    after = collide(Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain()).velocities
+    assert (np.abs(after[::-1]) * 100).round().tolist() == [99, 13, 1, 3, 7]
+    assert (after[:3] < 0).all()
+    np.testing.assert_allclose(elastic_spheres(5, 2e-3), after, rtol=0, atol=1e-6)
+
+
+def test_mass_size_stiffness_and_speed_of_the_toy_cancel():
+    after = collide(Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain()).velocities
+    steel = collide(Chain([0.045] * 5, [0.3, 0, 0, 0, 0]), SpringChain(1.3e10))
+    np.testing.assert_allclose(steel.velocities / 0.3, after, rtol=0, atol=1e-9)
+
+
+def test_what_the_readme_says_of_the_other_answers():
+    chain = Chain([1] * 5, [1, 0, 0, 0, 0])
+    assert collide(chain, SequentialCollisions()).velocities.tolist() == [0, 0, 0, 0, 1]
+    elastic = collide(chain, EnergyDistribution()).velocities
+    np.testing.assert_allclose(elastic, collide(chain, SpringChain()).velocities, atol=1e-7)
+    lossy = Chain([1] * 5, [1, 0, 0, 0, 0], 0.97)
+    assert collide(lossy, EnergyDistribution()).velocities[-1] < elastic[-1]
+    with pytest.raises(ValueError, match="must be 1 for SpringChain"):
+        collide(lossy, SpringChain())
+
+
+# --- version -------------------------------------------------------------------------------
+
+
+def test_version_has_one_source():
+    assert cradle.__version__ == version("cradle-companion")
+    with pytest.raises(AttributeError, match="module 'cradle' has no attribute 'version'"):
+        _ = cradle.version
+
+
+def test_version_costs_the_import_nothing():
+    code = "import sys, cradle; print('importlib.metadata' in sys.modules); cradle.__version__"
+    loaded = subprocess.check_output([sys.executable, "-c", code], text=True)
+    assert loaded.strip() == "False"
+
+
+# --- pictures in notebooks -----------------------------------------------------------------
+
+MODELS = [
+    ImpulseCorrelation(0.15),
+    SequentialCollisions(),
+    FusedChain(),
+    SpringChain(),
+    EnergyDistribution(),
+    QuadraticDissipation(3.0),
+]
+
+
+def parsed(html: str) -> ElementTree.Element:
+    """Return the HTML as a tree: it is well formed, so that it cannot spill into the page."""
+    return ElementTree.fromstring(html)
+
+
+def cells(tree: ElementTree.Element) -> list[list[str]]:
+    return [[cell.text or "" for cell in row] for row in tree.iter("tr")]
+
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def test_picture_and_table_of_a_chain():
+    tree = parsed(Chain([8, 1, 1], [1, 0, -2], [1, 0.5])._repr_html_())
+    assert cells(tree) == [
+        ["ball", "mass (kg)", "velocity (m/s)", "restitution with the next"],
+        ["0", "8", "1", "1"],
+        ["1", "1", "0", "0.5"],
+        ["2", "1", "-2", ""],
+    ]
+    radii = [float(circle.get("r")) for circle in tree.iter(f"{SVG}circle")]
+    assert radii[0] == pytest.approx(2 * radii[1])  # of one density
+    steps = [path.get("d").split(" h ")[1].split()[0] for path in tree.iter(f"{SVG}path")]
+    assert [float(step) for step in steps] == [15, -30]  # arrows: to the right, twice to the left
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
+def test_picture_and_table_of_a_trace(model):
+    trace = collide(Chain([1, 1, 1], [1, 0, 0]), model)
+    tree = parsed(trace._repr_html_())
+    head, *rows = cells(tree)
+    assert head[2:4] == ["before (m/s)", "after (m/s)"]
+    assert [row[3] for row in rows] == [f"{v + 0.0:.6g}" for v in trace.velocities]
+    assert [row[5] for row in rows] == [*map(str, trace.collisions.tolist()), ""]
+    assert len(list(tree.iter(f"{SVG}circle"))) == 6
+
+
+def test_pictures_take_the_colours_of_the_page():
+    svg = Chain([1, 1], [1, 0])._repr_html_()
+    colours = set(re.findall(r'(?:fill|stroke|color)="([^"]*)"', svg))
+    assert colours == {"currentColor", "none"}
+    assert "style>" not in svg
+
+
+def test_long_chains_are_cut():
+    tree = parsed(Chain([1] * 500, [1] + [0] * 499)._repr_html_())
+    names = [row[0] for row in cells(tree)[1:]]
+    assert names == [*map(str, range(8)), "…", *map(str, range(496, 500))]
+    assert len(list(tree.iter(f"{SVG}circle"))) == 12
+
+
+def test_pictures_of_extremes():
+    """Light balls are seen, nothing is infinite; text is escaped."""
+    light, tiny = Chain([1, 1e-150, 1], [0, 0, 0]), Chain([5e-324, 5e-324], [1e-300, -1e-300])
+    for chain, radii in ((light, [18, 2, 18]), (tiny, [18, 18])):
+        html = chain._repr_html_()
+        assert not re.search(r"nan|inf", html)
+        assert [float(c.get("r")) for c in parsed(html).iter(f"{SVG}circle")] == radii
+    escaped = as_html(np.ones(1), {"<b>": np.zeros(1)}, {"&": np.zeros(1)})
+    assert [text.text for text in parsed(escaped).iter(f"{SVG}text")] == ["<b>"]
+
+
+# --- tables and plots of a path ------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
+def test_frame_holds_the_path_and_momentum(model):
+    trace = collide(Chain([1, 2, 0.5], [1, 0, 0]), model)
+    frame = trace.to_frame()
+    steps, balls = trace.path.shape
+    timed = isinstance(model, SpringChain)
+    assert frame.shape == (steps * balls, 8 if timed else 7)
+    if timed:
+        assert frame["time"].tolist() == np.repeat(trace.times, balls).tolist()
+    wide = frame.pivot(index="step", columns="ball", values="velocity")
+    np.testing.assert_array_equal(wide.to_numpy(), trace.path)
+    # Each ball's momentum against the impulses of its own two contacts.
+    mass = trace.chain.masses[frame["ball"]]
+    change = mass * (frame["velocity"] - trace.chain.velocities[frame["ball"]])
+    np.testing.assert_allclose(change, frame["left"] - frame["right"], rtol=0, atol=1e-12)
+    events = frame[(frame["ball"] == 0) & (frame["step"] > 0)]
+    assert list(zip(events["event"], events["contact"])) == list(trace.events)
+    assert frame["contact"].isna().sum() == balls
+    assert frame["contact"].dtype == pd.Int64Dtype()
+
+
+def test_frame_of_no_impact():
+    frame = collide(Chain([1, 1], [0, 1]), ImpulseCorrelation(0)).to_frame()
+    assert frame["event"].tolist() == ["before", "before"]
+    assert frame["velocity"].tolist() == [0, 1]
+
+
+def test_plot_draws_what_figures_draw():
+    trace = collide(*paper_chain("ABACA"))
+    ax = Figure().subplots()
+    assert trace.plot(ax) is ax
+    for line, velocity in zip(ax.get_lines(), trace.path.T):
+        np.testing.assert_array_equal(line.get_ydata(), velocity)
+    lines = trace.plot(Figure().subplots(), contact=np.int64(2)).get_lines()
+    assert [line.get_label() for line in lines[:2]] == ["$v_3$", "$v_4$"]
+    np.testing.assert_array_equal(lines[0].get_xdata(), trace.path_impulses[:, 2])
+    with pytest.raises(ValueError, match=r"^contact = 4; must be one of 0 to 3$"):
+        trace.plot(contact=4)
+    fresh = trace.plot()
+    plt.close(fresh.figure)
