@@ -62,6 +62,10 @@ class Trace:
         True if an infinite sequence of impacts was taken to its limit.
     saturated : tuple of int
         Contacts that were held closed at the largest admissible ratio (Eqs. 34, 53) at some time.
+    margin : float
+        How close a different order of events came: the least distance of two events of one run
+        whose order mattered, relative to the progress to the later one.  Below about 1e-12 another
+        order, and so another outcome, lies within rounding.
 
     References
     ----------
@@ -88,6 +92,7 @@ class Trace:
     events: tuple[Event, ...]
     collapsed: bool = False
     saturated: tuple[int, ...] = ()
+    margin: float = 1.0
 
     @property
     def energy_loss(self) -> float:

@@ -5,7 +5,7 @@ What they have left is far below rounding, and they end plastically.
 
 from cradle.kernel.events import deactivate, exhausted, stir
 from cradle.kernel.motion import closing, join_velocities, relative_energy
-from cradle.kernel.state import apart, jit
+from cradle.kernel.state import LIMITS, apart, jit
 
 
 @apart
@@ -56,8 +56,9 @@ def exhausted_stretch(c, n, state):
     """Return the stretch (first, last) around c of contacts that only chatter.
 
     A contact at rest between two of them, which passes their impulses on, belongs to it.  Empty if
-    nothing in it can lose energy: elastic sequences are finite; or if its balls move with more than
-    a faint energy: heavy ones, slower than a light ball that struck them.
+    nothing in it can lose energy, unless it is slower than the last digit: elastic sequences are
+    finite, or hand all their energy on; or if its balls move with more than a faint energy: heavy
+    ones, slower than a light ball that struck them.
     """
     first = c
     last = c
@@ -73,9 +74,13 @@ def exhausted_stretch(c, n, state):
         else:
             break
     loses = False
+    fastest = 0.0
     for k in range(first, last + 1):
         loses = loses or state.contact[k].e < 1.0
-    if loses and relative_energy(first, last + 1, state.ball) <= state.tally[0].faint:
+        fastest = max(fastest, abs(state.contact[k].u))
+    if (loses or fastest < LIMITS.dust) and relative_energy(
+        first, last + 1, state.ball
+    ) <= state.tally[0].faint:
         return first, last
     return c, c - 1
 

@@ -206,7 +206,7 @@ def prepare(n, chain, meeting, state):
     unit, mass_unit = math.ldexp(1.0, -tally.shift), math.ldexp(1.0, -tally.mass_shift)
     tally.events = tally.rounds = tally.collapsed = tally.defect = 0
     tally.cut_off, tally.meeting = LIMITS.cut, meeting
-    tally.threshold, tally.faint = 5e-324, 0.0
+    tally.threshold, tally.faint, tally.margin = 5e-324, 0.0, 1.0
     for i in range(n):
         ball[i].v = chain.v[i]
         ball[i].m = chain.m[i] * mass_unit
@@ -274,7 +274,8 @@ def impact(n, chain, meeting, max_events, resumed, state):
         first = tally.first
         while first < n:
             if run[first].stirred == 1:
-                segment(first, n, run, state.ball, contact)
+                apart_by = segment(first, n, run, state.ball, contact)
+                tally.margin = min(tally.margin, apart_by)
             first = run[first].onward
         one = first_meeting(n, state)
         first = tally.first

@@ -227,15 +227,19 @@ def is_gap(c, n, contact):
 
 @jit
 def segment(first, n, run, ball, contact):
-    """R8.2: progress of a run to its own next rate-changing event."""
+    """R8.2: progress of a run to its own next rate-changing event.
+
+    Returns how much later the next one is that does not come at the same time, relative to itself.
+    """
     low, high = run[first].low, run[first].high
-    s = math.inf
+    s = second = math.inf
     for c in range(low, high + 1):
         at, speed = end_progress(
             contact[c].u, contact[c].q, contact[c].slope, contact[c].rate, contact[c].e
         )
         contact[c].until = at
         contact[c].final = speed
+        second = min(second, max(s, at))
         s = min(s, at)
     # Idle neighbours close; a gap, shared with another run, is no event of this run's own.
     for c in (low - 1, high + 1):
@@ -245,5 +249,7 @@ def segment(first, n, run, ball, contact):
             toward = -ball[low].pull if c < low else ball[c].pull
             if toward > 0.0 and not is_gap(c, n, contact):
                 contact[c].until = -contact[c].u / toward
+                second = min(second, max(s, contact[c].until))
                 s = min(s, contact[c].until)
     run[first].reach = s
+    return 1.0 - s / second if s * LIMITS.simultaneous < second < math.inf else 1.0

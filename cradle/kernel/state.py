@@ -35,6 +35,8 @@ class Limits(NamedTuple):
 
     #: R9: an exhausted contact's speed, relative to the largest initial closing speed.
     exhausted: float
+    #: R9: closing speed below the last digit of velocities kept as sums of two numbers.
+    dust: float
     #: R9: kinetic energy that a collapse may cost, relative to that of the initial closing.
     faint: float
     #: R9: exhausted collisions in a row that are a collapse.
@@ -73,6 +75,7 @@ class Limits(NamedTuple):
 
 LIMITS = Limits(
     exhausted=1e-18,
+    dust=2.0**-100,
     faint=1e-20,
     repeats=8,
     self_similar=1e-13,
@@ -194,6 +197,7 @@ class Tally:
     threshold: float  # R9: speed and energy below which a contact is exhausted
     faint: float
     meeting: float  # R8: where two runs meet, as a part of the overlap
+    margin: float  # least distance of two events whose order mattered, relative to their progress
 
 
 class Cluster(NamedTuple):

@@ -174,6 +174,7 @@ class ImpulseCorrelation:
             events=tuple(Event(_KINDS[k], c) for k, c in zip(kinds, contacts, strict=True)),
             collapsed=bool(results.collapsed[0]),
             saturated=tuple(np.flatnonzero(results.held).tolist()),
+            margin=float(job.tally.margin),
         )
 
 
