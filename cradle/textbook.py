@@ -1,13 +1,12 @@
 """The rules of an impact, to be read first: how a chain of touching balls parts.
 
 Rules R1 to R8 of the book's chapter on N balls, for numbers of any type.  R9 is left out: here an
-infinite sequence of impacts ends in an `EventLimit`; `cradle.kernel`, the fast form, knows it.
+infinite sequence of impacts goes on to the last digits of its numbers, or to an `EventLimit`.
 
 Contact c joins balls c and c + 1.  Its closing speed u = v[c] - v[c + 1] is above 0 in compression.
 Inside a run of active contacts there is no time, only progress s.  Between two events velocities
-are linear and works quadratic in s: every event is the root of a formula.  Nothing guards against
-rounding but this: a closing speed that is zero by construction, or but for its last digits, is
-stored as zero.
+are linear and works quadratic in s: every event is the root of a formula.  The only guard against
+rounding: a closing speed that is zero by construction, or but for its last digits, is made zero.
 """
 
 import math
@@ -15,8 +14,7 @@ from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
 Number = Any  # float, Fraction, mpf: whatever adds, multiplies, divides and compares
-FORWARD, BACKWARD = 1, -1
-TIE = 1e-9  # R8: closer meetings, or distances, are a tie, and the left one wins
+FORWARD, BACKWARD, TIE = 1, -1, 1e-9  # R8: closer meetings, or distances, tie: the left wins
 
 
 class EventLimit(RuntimeError):
@@ -43,7 +41,7 @@ class Impact:
     def __init__(self, m: list[Any], v: list[Any], e: list[Any], ratio: Any, meeting: Any) -> None:
         self.m, self.e, self.meeting, self.zero = m, e, meeting, 0 * meeting
         rounding = abs(3 * ((self.zero + 4) / 3 - 1) - 1)  # of the number 1; none in exact numbers
-        self.last_digits = 64 * rounding * max(abs(a - b) for a, b in pairwise(v))
+        self.last_digits = 8 * rounding * max(abs(a - b) for a, b in pairwise(v))
         self.ratio, self.direction = ratio, [0] * len(m)  # by ball: who drives there, and how much
         self.velocities, self.u = list(v), [a - b for a, b in pairwise(v)]
         self.near = [abs(u) for u in self.u]  # |u| before the last segments, or at its end since

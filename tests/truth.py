@@ -24,7 +24,7 @@ class Impact(textbook.Impact):
     def __init__(self, *given):
         super().__init__(*given)
         self.reduced = [a * b / (a + b) for a, b in zip(self.m, self.m[1:])]
-        digits = 13 if isinstance(self.zero, float) else int(0.6 * mpmath.mp.dps)
+        digits = 12 if isinstance(self.zero, float) else int(0.6 * mpmath.mp.dps)
         below = (self.zero + 1) / 10**digits if self.collapse_below is None else self.collapse_below
         self.tiny = (below * max([*self.u, self.zero])) ** 2
         # Largest squared speed of a contact since its last event; its events in a row with this
