@@ -13,7 +13,7 @@ import math
 from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
-Number = Any  # float, Fraction, mpf: whatever adds, multiplies, divides and compares
+Number = Any  # float, mpf, or another type that can be calculated with and has a `sqrt`
 FORWARD, BACKWARD, TIE = 1, -1, 1e-9  # R8: closer meetings, or distances, tie: the left wins
 
 
@@ -240,7 +240,7 @@ def solve(
     """
     n, back = len(masses), forward if backward is None else backward
     sizes = (masses, n), (velocities, n), (restitution, n - 1), (forward, n - 2), (back, n - 2)
-    lists = [x if isinstance(x, list | tuple) else [x] * size for x, size in sizes]
+    lists = [[x] * k if isinstance(x, str) or not hasattr(x, "__len__") else x for x, k in sizes]
     m, v, e, f, b = ([number(x) for x in values] for values in lists)
     state: Impact = impact(m, v, e, {FORWARD: [0, *f, 0], BACKWARD: [0, *b, 0]}, number(meeting))
     state.start()

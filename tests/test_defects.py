@@ -63,10 +63,25 @@ NAMED = {
 named = pytest.mark.parametrize("name", NAMED)
 
 
-def exact(problem, digits=50, **options):
+def exact(problem, digits=50, number=mpmath.mpf, **options):
     """The outcome at fifty digits."""
     with mpmath.workdps(digits):
-        return problem.solve(solve, excess="saturate", **options)
+        return problem.solve(solve, excess="saturate", number=number, **options)
+
+
+def as_printed(x):
+    """The number that 0.1 is meant to be, not the nearest double."""
+    return mpmath.mpf(repr(x))
+
+
+def truths(problem, **options):
+    """The outcome of the doubles, and of the decimals that they stand for.
+
+    They differ by more than rounding where the decimals tie and the doubles do not: then both are
+    right, since the order of the events lies within the rounding of the input.
+    """
+    yield exact(problem, **options)
+    yield exact(problem, number=as_printed, **options)
 
 
 def difference(one, other):
@@ -161,8 +176,12 @@ def test_masses_of_eighteen_decades_are_solved_or_refused():
     problem = Problem([1e-8, 1e-26, 1e-9, 1], [0, 1, 0, 0], [0, 1, 1], [0.3, 0.1], [0.3, 0.5])
     try:
         trace = problem.collide()
-    except ValueError as refused:
-        assert "masses" in str(refused)
+    except ValueError as error:
+        refusal = str(error)
+    else:
+        refusal = ""
+    if refusal:
+        assert refusal.startswith("masses[1] = 1e-26; ")
         return
     momentum = sum(Fraction(m) * Fraction(v) for m, v in zip(problem.masses, trace.velocities))
     assert float(momentum) == pytest.approx(1e-26, rel=1e-12)
@@ -217,10 +236,12 @@ def test_textbook_says_the_same(name):
             continue
         compared += 1
         if difference(trace.velocities, other.velocities) > 1e-12:
-            # What an error of rounding grows to in so many collisions is not an event's doing.
-            truth = exact(problem, max_events=4000)
-            assert difference(trace.velocities, truth.velocities) < 1e-8, problem
-            assert trace.collisions.tolist() == truth.collisions, problem
+            # An error of rounding may grow in so many collisions; their number stays.
+            assert any(
+                trace.collisions.tolist() == truth.collisions
+                and difference(trace.velocities, truth.velocities) < 1e-6
+                for truth in truths(problem, max_events=4000)
+            ), problem
     assert compared > 0.6 * COUNT
 
 
