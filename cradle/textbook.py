@@ -1,22 +1,20 @@
 """The rules of an impact, to be read first: how a chain of touching balls parts.
 
 Rules R1 to R8 of the book's chapter on N balls, for numbers of any type.  R9 is left out: here an
-infinite sequence of impacts ends in an `EventLimit`; `cradle.kernel`, the fast form, knows it.
+infinite sequence of impacts goes on to the last digits of its numbers, or to an `EventLimit`.
 
-Contact c joins balls c and c + 1.  Its closing speed u = v[c] - v[c + 1] is above 0 in compression,
-below 0 in restitution.  Inside a run of active contacts there is no time, only progress s.  Between
-two events velocities are linear and works quadratic in s: every event is the root of a formula.
-Nothing guards against rounding but this: a closing speed that is zero by construction is stored as
-zero, and events of one run that coincide but for the last digits coincide.
+Contact c joins balls c and c + 1.  Its closing speed u = v[c] - v[c + 1] is above 0 in compression.
+Inside a run of active contacts there is no time, only progress s.  Between two events velocities
+are linear and works quadratic in s: every event is the root of a formula.  The only guard against
+rounding: a closing speed that is zero by construction, or but for its last digits, is made zero.
 """
 
 import math
 from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
-Number = Any  # float, Fraction, mpf: whatever adds, multiplies, divides and compares
-FORWARD, BACKWARD = 1, -1
-TIE = 1e-9  # R8: closer meetings, or distances, are a tie, and the left one wins
+Number = Any  # float, mpf, or another type that can be calculated with and has a `sqrt`
+FORWARD, BACKWARD, TIE = 1, -1, 1e-9  # R8: closer meetings, or distances, tie: the left wins
 
 
 class EventLimit(RuntimeError):
@@ -34,15 +32,16 @@ class Run(NamedTuple):
     bound: dict[int, bool]  # contacts that R7 keeps closed: whether they are held
     ahead: list[tuple[Number, Number, str, int]]  # progress to an event, u there, kind, contact
     length: Number  # progress to the first of these
+    instant: Number  # progress in which closing speeds change by less than their last digits
 
 
 class Impact:
     """A chain on its way from the first touch to the last separation, with the record of it."""
 
     def __init__(self, m: list[Any], v: list[Any], e: list[Any], ratio: Any, meeting: Any) -> None:
-        self.m, self.e, self.meeting = m, e, meeting
-        self.zero, self.one = 0 * meeting, 0 * meeting + 1
-        self.last_digits = 64 * abs(3 * (4 * self.one / 3 - 1) - 1)  # 0 if numbers are exact
+        self.m, self.e, self.meeting, self.zero = m, e, meeting, 0 * meeting
+        rounding = abs(3 * ((self.zero + 4) / 3 - 1) - 1)  # of the number 1; none in exact numbers
+        self.last_digits = 8 * rounding * max(abs(a - b) for a, b in pairwise(v))
         self.ratio, self.direction = ratio, [0] * len(m)  # by ball: who drives there, and how much
         self.velocities, self.u = list(v), [a - b for a, b in pairwise(v)]
         self.near = [abs(u) for u in self.u]  # |u| before the last segments, or at its end since
@@ -72,19 +71,19 @@ class Impact:
         """R1, R6: one ratio at each inner ball fixes all impulse rates but for a common factor."""
         balls, near = range(first, last + 2), range(max(first - 1, 0), min(last + 2, len(self.u)))
         ratio, bound = self.ratios_in_force(balls[1:-1])
-        power, size = 0, self.one  # R6: all ratios of zero are one vanishing number, to this power
-        rates = {first: (power, size)}
+        rates = {
+            first: (0, self.zero + 1)
+        }  # R6: ratios of zero are one vanishing number, to a power
         for i in balls[1:-1]:
-            way, factor = self.direction[i], ratio[i] or 1
-            power -= 0 if ratio[i] else way
-            size = size * factor if way == FORWARD else size / factor
-            rates[i] = power, size
+            way, factor, (power, size) = self.direction[i], ratio[i] or 1, rates[i - 1]
+            rates[i] = power - way * (ratio[i] == 0), size * factor**way
         top = max(rates.values())  # in the limit what has another power has no rate
         rate = {c: x / top[1] if k == top[0] else self.zero for c, (k, x) in rates.items()}
         pull = {i: (rate.get(i - 1, 0) - rate.get(i, 0)) / self.m[i] for i in balls}  # Eqs. 47-48
         slope = {c: 0 if c in bound else pull.get(c, 0) - pull.get(c + 1, 0) for c in near}
         ahead = self.look_ahead(rate, slope)
-        return Run(first, last, rate, pull, slope, bound, ahead, min(s for s, *_ in ahead))
+        instant = self.last_digits / max(map(abs, slope.values()))
+        return Run(first, last, rate, pull, slope, bound, ahead, min(ahead)[0], instant)
 
     def ratios_in_force(self, inner: range) -> tuple[dict[int, Number], dict[int, bool]]:
         """R7: a driven contact at u = 0 that has absorbed nothing cannot open: Eqs. 34, 53."""
@@ -101,11 +100,11 @@ class Impact:
 
     def look_ahead(self, rate: dict[int, Number], slope: dict[int, Number]) -> list[Any]:
         """R8.2: what comes on the straight way of a run: ends, and closings beside it (R5)."""
-        ends = [(self.way_to_end(c, rate[c], slope[c]), "end", c) for c in rate]
-        gaps = [c for c in slope if self.active[c - 1] and self.active[c + 1]]  # their rule is R8.3
-        beside = [c for c in slope if c not in rate and c not in gaps and slope[c] > 0]
-        closings = [((-self.u[c] / slope[c], self.zero), "close", c) for c in beside]
-        return [(*way, kind, c) for way, kind, c in ends + closings if way]
+        found = [(self.way_to_end(c, rate[c], slope[c]), "end", c) for c in rate]
+        for c in slope:  # one between two runs is a gap: R8.3
+            if slope[c] > 0 and not self.active[c] and self.active[c - 1] != self.active[c + 1]:
+                found.append(((-self.u[c] / slope[c], self.zero), "close", c))
+        return [(*way, kind, c) for way, kind, c in found if way]
 
     def way_to_end(self, c: int, rate: Number, slope: Number) -> tuple[Number, ...]:
         """R3: progress until all is released and u < 0, and u there; none if it does not end."""
@@ -149,19 +148,20 @@ class Impact:
         # Seen from the left ball of the gap: it goes from velocity 0 to p, the right from q to r.
         p, q = left.pull[right.first - 1] * left.length, -self.u[right.first - 1]
         r = q + right.pull[right.first] * right.length
-        if p <= r:
+        if p - r <= self.last_digits:
             return []
         low, high = max(self.zero, r), min(p, q)
         at = high if self.meeting == 1 else low + self.meeting * (high - low)
         parts = [at / p if p else self.zero, (at - q) / (r - q) if r != q else self.zero]
-        return [self.one if part >= 1 - self.last_digits else part for part in parts]
+        used = zip(parts, (left, right), strict=True)
+        return [1 if (1 - x) * run.length <= run.instant else x for x, run in used]
 
     def first_meeting(self, runs: list[Run]) -> tuple[int, list[tuple[Run, Number]]]:
         """R8.4: the gap that is reached first, and who goes how far to it; -1 if none is met."""
         pairs = [(a, b) for a, b in pairwise(runs) if b.first == a.last + 2]
         met = [(pair, parts) for pair in pairs if (parts := self.parts_to_meeting(*pair))]
         if not met:
-            return -1, [(run, self.one) for run in runs]  # R8.6
+            return -1, [(run, 1) for run in runs]  # R8.6
         for key in (max, min):  # the larger part is the least, at a tie the smaller; then the left
             least = min(key(parts) for _, parts in met)
             met = [(pair, parts) for pair, parts in met if key(parts) <= least + TIE]
@@ -170,7 +170,7 @@ class Impact:
         gaps, passed = [b.first - 1 for _, b in pairs], []
         for run, part, c in (left, parts[0], left.first - 1), (right, parts[1], right.last + 1):
             change = run.slope.get(c, 0) * run.length
-            if c in gaps and self.u[c] + change * part > 0:
+            if c in gaps and self.u[c] + change * part > self.last_digits:
                 passed.append((-self.u[c] / change, c, [(run, -self.u[c] / change)]))
         return min(passed)[1:] if passed else (left.last + 1, [(left, parts[0]), (right, parts[1])])
 
@@ -178,14 +178,15 @@ class Impact:
         """Take a run through a part of its segment; what is zero there is stored as zero."""
         goal, here = run.length * part, self.zero
         stops = [(-self.u[c] / run.slope[c], c) for c in run.rate if self.u[c] * run.slope[c] < 0]
-        for s, c in sorted(stop for stop in stops if stop[0] <= goal * (1 + self.last_digits)):
+        for s, c in sorted(stop for stop in stops if stop[0] <= goal + run.instant):
             self.move(run, min(s, goal) - here)
             here, self.u[c] = min(s, goal), self.zero
             if run.slope[c] < 0:
                 self.record("maximum_compression", c)
         self.move(run, goal - here)
+        self.u = [u if abs(u) > self.last_digits else self.zero for u in self.u]
         for s, u, _, c in run.ahead if part == 1 else []:
-            if s <= goal * (1 + self.last_digits):
+            if s <= goal + run.instant:
                 self.u[c], self.given[c] = u, self.e[c] * self.e[c] * self.gained[c]
         self.held |= {c for c, held in run.bound.items() if held and goal * run.rate[c] > 0}
 
@@ -204,8 +205,7 @@ class Impact:
 
     def progress(self, runs: list[Run]) -> None:
         """R8: on to the first gap that must close; if there is none, every run to its own event."""
-        gap, moves = self.first_meeting(runs)
-        self.near = [abs(u) for u in self.u]
+        (gap, moves), self.near = self.first_meeting(runs), [abs(u) for u in self.u]
         for run, part in moves:
             self.advance(run, part)
         if gap >= 0:
@@ -240,7 +240,7 @@ def solve(
     """
     n, back = len(masses), forward if backward is None else backward
     sizes = (masses, n), (velocities, n), (restitution, n - 1), (forward, n - 2), (back, n - 2)
-    lists = [x if isinstance(x, list | tuple) else [x] * size for x, size in sizes]
+    lists = [[x] * k if isinstance(x, str) or not hasattr(x, "__len__") else x for x, k in sizes]
     m, v, e, f, b = ([number(x) for x in values] for values in lists)
     state: Impact = impact(m, v, e, {FORWARD: [0, *f, 0], BACKWARD: [0, *b, 0]}, number(meeting))
     state.start()

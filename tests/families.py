@@ -7,7 +7,6 @@ round alike everywhere; printed, it is short.  Draws come from `random.Random`, 
 
 import random
 from dataclasses import dataclass, replace
-from fractions import Fraction
 
 from cradle import Chain, ImpulseCorrelation, collide
 
@@ -48,14 +47,8 @@ class Problem:
         )
 
     def boosted(self, speed):
-        """Seen from a frame that moves: the same closing speeds, exactly, or a ValueError."""
-        velocities = [v + speed for v in self.velocities]
-        if any(
-            Fraction(w) - Fraction(speed) != Fraction(v)
-            for v, w in zip(self.velocities, velocities)
-        ):
-            raise ValueError(f"{self.velocities} plus {speed} needs rounding")
-        return replace(self, velocities=velocities)
+        """Seen from a moving frame; exact if velocities and speed are multiples of a power of 2."""
+        return replace(self, velocities=[v + speed for v in self.velocities])
 
     def in_units(self, mass, velocity):
         """In other units; exact if these are powers of two."""
@@ -109,7 +102,7 @@ def ties(draw, n):
     velocities = first if draw.chance(40) else [draw.choice([-0.5, 0, 0.5, 1]) for _ in range(n)]
     coefficients = draw.choice([[1], [1], [0, 0.5, 0.9, 1], [0.5, 0.9, 1], [0.9]])
     restitution = [float(draw.choice(coefficients)) for _ in range(n - 1)]
-    values = draw.choice([[0.0, 1.0], [0.0, 1e-20], [0.0, 0.1], [0.0, 1e-20, 0.1, 1.0]])
+    values = draw.choice([[0.0, 1.0], [0.0, 0.1], [0.0, 0.1, 1.0]])
     forward, backward = ([draw.choice(values) for _ in range(n - 2)] for _ in range(2))
     return Problem(masses, velocities, restitution, forward, backward, draw.choice([0.0, 0.5, 1.0]))
 
@@ -117,10 +110,22 @@ def ties(draw, n):
 def bounded_ties(draw, n):
     """The same, with no ratio above its bound."""
     given = ties(draw, n)
-    parts = draw.choice([[0.0, 0.5], [0.0, 1.0], [0.0, 1e-20, 0.5]])
-    forward = within_bounds(given.masses, [draw.choice(parts) for _ in given.forward])
-    backward = within_bounds(given.masses[::-1], [draw.choice(parts) for _ in given.forward])
+    m, count = given.masses, len(given.forward)
+    forward = within_bounds(m, [draw.choice([0.0, 0.5]) for _ in range(count)])
+    backward = within_bounds(m[::-1], [draw.choice([0.0, 0.5]) for _ in range(count)])
     return replace(given, forward=forward, backward=backward[::-1])
+
+
+def tiny_ratios(draw, n):
+    """Ratios of 1e-20 among those of ties.
+
+    What they do cannot be seen in doubles, but it decides whether a contact has been touched.
+    Products of several of them need hundreds of digits: no outcome is demanded, only invariants.
+    """
+    given = ties(draw, n)
+    values = draw.choice([[0.0, 1e-20], [0.0, 1e-20, 0.1], [0.0, 1e-20, 0.1, 1.0]])
+    forward, backward = ([draw.choice(values) for _ in range(n - 2)] for _ in range(2))
+    return replace(given, forward=forward, backward=backward)
 
 
 def mixed_zeros(draw, n):
@@ -153,6 +158,7 @@ def light_balls(draw, n):
 FAMILIES = {
     "ties": (ties, 2, 20),
     "ties within bounds": (bounded_ties, 3, 20),
+    "tiny ratios": (tiny_ratios, 3, 20),
     "mixed zeros": (mixed_zeros, 7, 12),
     "light balls": (light_balls, 3, 5),
 }

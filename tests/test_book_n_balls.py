@@ -155,21 +155,17 @@ class Reading(reference.Impact):
     turns: tuple[str, str]
 
     def close(self, c):
-        gap = self.is_gap(c)
         super().close(c)
-        if gap:
-            self.direction[c], self.direction[c + 1] = self.turns
+        if self.active[c - 1] and self.active[c + 1]:
+            ways = {"forward": 1, "backward": -1}
+            self.direction[c], self.direction[c + 1] = (ways[way] for way in self.turns)
 
 
 def outcome(turns, meeting=0.5):
     """Outcome of Fig. 8's chain when the gap closes with these directions at its two balls."""
-    ratio = {way: [None, 0.1, 0.1, None] for way in ("forward", "backward")}
-    impact = Reading([1.0] * 4, [1.0, 0.5, 0.0, 0.0], [1.0] * 3, ratio, meeting, float, 1e-13)
-    impact.turns = turns
-    impact.start()
-    while impact.round():
-        pass
-    return impact.outcome()
+    reading = type("Chosen", (Reading,), {"turns": turns})
+    chain = [1] * 4, [1, 0.5, 0, 0], 1, 0.1
+    return reference.solve(*chain, meeting=meeting, number=float, impact=reading)
 
 
 def test_fig_8_path():

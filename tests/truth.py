@@ -24,8 +24,8 @@ class Impact(textbook.Impact):
     def __init__(self, *given):
         super().__init__(*given)
         self.reduced = [a * b / (a + b) for a, b in zip(self.m, self.m[1:])]
-        digits = 13 if isinstance(self.one, float) else int(0.6 * mpmath.mp.dps)
-        below = self.one / 10**digits if self.collapse_below is None else self.collapse_below
+        digits = 12 if isinstance(self.zero, float) else int(0.6 * mpmath.mp.dps)
+        below = (self.zero + 1) / 10**digits if self.collapse_below is None else self.collapse_below
         self.tiny = (below * max([*self.u, self.zero])) ** 2
         # Largest squared speed of a contact since its last event; its events in a row with this
         # below `tiny`; the contacts of the latest events, as long as all of these were calm.
@@ -138,7 +138,7 @@ def solve(
             self.collapse_below = collapse_below
             super().__init__(m, v, e, ratio, meeting)
             if excess == "raise":
-                check_ratios(m, *ratios, self.last_digits / 16)
+                check_ratios(m, *ratios, 4 * abs(3 * ((self.zero + 4) / 3 - 1) - 1))
 
     return textbook.solve(
         masses, velocities, restitution, forward, backward,

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import local_orders
-from reference import solve
+from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide
 from cradle.models.correlation import MAX_EVENTS

@@ -1,0 +1,495 @@
+"""The textbook's rules by themselves, against the package, and against a march by small steps."""
+
+import ast
+import functools
+import math
+import random
+from fractions import Fraction
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from chains import FIG_8, changes, local_orders
+from march import march
+from truth import EventLimit, solve
+
+from cradle import Chain, ImpulseCorrelation, collide, paper_chain, textbook
+from cradle.closed_form import largest_ratios
+from cradle.tables import paper_sequences
+
+SOURCE = Path(textbook.__file__).read_text(encoding="utf-8")
+in_floats = functools.partial(solve, number=float)
+
+
+@pytest.fixture(autouse=True)
+def fifty_digits():
+    with mpmath.workdps(50):
+        yield
+
+
+# --- the text ----------------------------------------------------------------------------------
+
+
+def test_it_is_short():
+    """A newcomer reads it at one sitting: 250 lines, no function above 25, few parameters."""
+    assert len(SOURCE.splitlines()) <= 250
+    for node in ast.walk(ast.parse(SOURCE)):
+        if isinstance(node, ast.FunctionDef):
+            assert node.end_lineno - node.lineno < 25, node.name
+            assert len(node.args.args) <= 6 or node.name == "solve", node.name
+
+
+def test_it_needs_nothing_but_python():
+    imported = set()
+    for node in ast.walk(ast.parse(SOURCE)):
+        if isinstance(node, ast.Import):
+            imported |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            imported.add(node.module)
+    assert imported <= {"itertools", "math", "typing"}
+
+
+def test_every_rule_has_its_place():
+    docs = " ".join(
+        ast.get_docstring(node) or ""
+        for node in ast.walk(ast.parse(SOURCE))
+        if isinstance(node, ast.FunctionDef)
+    )
+    for rule in ["R1", "R2", "R3", "R4", "R5", "R6", "R7", *(f"R8.{k}" for k in range(1, 7))]:
+        assert rule in docs, rule
+
+
+# --- number types ------------------------------------------------------------------------------
+
+
+class Rational(Fraction):
+    """A fraction with a root, where that is a fraction too."""
+
+    def sqrt(self):
+        parts = [math.isqrt(part) for part in (self.numerator, self.denominator)]
+        assert Fraction(*parts) ** 2 == self, f"the root of {self} is no fraction"
+        return Rational(*parts)
+
+
+def _closed(name):
+    def calculate(self, *other):
+        return Rational(getattr(Fraction, name)(self, *other))
+
+    return calculate
+
+
+for _name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv", "pow", "neg"):
+    setattr(Rational, f"__{_name}__", _closed(f"__{_name}__"))
+Rational.__abs__ = _closed("__abs__")
+
+
+def test_figure_4_in_fractions():
+    """Han and Gilmore's two answers, as fractions: no rounding anywhere."""
+    rest = [1, 0, 0], 1
+    assert textbook.solve([1, 1, 1], *rest, 0, number=Rational).velocities == [0, 0, 1]
+    third = Fraction(1, 3)
+    together = textbook.solve([1, 1, 1], *rest, "1/2", number=Rational)
+    assert together.velocities == [-third, 2 * third, 2 * third]
+    assert all(isinstance(v, Fraction) for v in together.velocities)
+
+
+def test_momentum_and_energy_in_fractions():
+    """Ratio zero: one collision after the other, and between elastic balls no root but a square."""
+    m, v = [3, 1, 2, "1.5", 1], [1, "0.5", 0, 0, "-0.25"]
+    exact = textbook.solve(m, v, 1, 0, number=Rational)
+    masses, before = ([Fraction(x) for x in part] for part in (m, v))
+    after = exact.velocities
+    assert len(exact.events) > 8
+    assert sum(a * (b - c) for a, b, c in zip(masses, after, before)) == 0
+    assert sum(a * (b * b - c * c) for a, b, c in zip(masses, after, before)) == 0
+    assert after == sorted(after)
+    across = [0, *exact.impulses, 0]
+    for i, mass in enumerate(masses):
+        assert mass * (after[i] - before[i]) == across[i] - across[i + 1]
+    for number, error in ((float, 1e-15), (mpmath.mpf, 1e-48)):
+        rounded = textbook.solve(m, v, 1, 0, number=number)
+        assert rounded.events == exact.events
+        expected = [number(x.numerator) / x.denominator for x in after]
+        assert max(abs(x - y) for x, y in zip(rounded.velocities, expected)) < error
+
+
+def test_a_scalar_stands_for_all_and_a_string_for_a_decimal():
+    in_digits = functools.partial(textbook.solve, number=mpmath.mpf)
+    tenth, third = mpmath.mpf(1) / 10, mpmath.mpf(3) / 10
+    one = in_digits([1, 2, 1], ["0.3", 0, 0], "0.1", "0.1").velocities
+    assert one == in_digits([1, 2, 1], [third, 0, 0], [tenth] * 2, [tenth], [tenth]).velocities
+    assert one != in_digits([1, 2, 1], [0.3, 0, 0], 0.1, 0.1).velocities
+
+
+# --- the package -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 1.5, 2.0])
+def test_the_papers_ten_chains_in_every_event(speed):
+    """Events in order; velocities and impulses at each of them, held contacts, collisions."""
+    sequences = paper_sequences()
+    assert len(sequences) == 10
+    for sequence in sequences:
+        chain, model = paper_chain(sequence, speed=speed, excess="saturate")
+        trace = collide(chain, model)
+        parts = chain.masses, chain.velocities, chain.restitution, model.forward, model.backward
+        plain = textbook.solve(*parts)
+        assert [tuple(event) for event in trace.events] == plain.events, sequence
+        close = functools.partial(np.testing.assert_allclose, rtol=0)
+        close(trace.path, plain.path, atol=2e-15 * speed)
+        close(trace.path_impulses, plain.path_impulses, atol=2e-16 * speed)
+        close(trace.absorbed, plain.absorbed, atol=2e-16 * speed**2)
+        assert trace.collisions.tolist() == plain.collisions
+        assert trace.saturated == tuple(sorted(plain.held))
+
+
+def generic(seed, n, bounded=True, light=0.3):
+    """A chain without ties: nothing decided by rounding; ratios two parts in a hundred off bounds.
+
+    At a bound, the speed that an ulp of the ratio releases is of the order of its square root.
+    """
+    rng = random.Random(seed)
+    masses = [rng.uniform(light, 2) * rng.choice([1, 2]) for _ in range(n)]
+    if rng.random() < 0.7:
+        velocities = [rng.uniform(-1, 1) for _ in range(n)]
+    else:
+        velocities = [1.0] + [0.0] * (n - 1)
+    restitution = [rng.uniform(0.05, 0.95) for _ in range(n - 1)]
+    forward, backward = ([rng.uniform(0.02, 0.98) for _ in range(n - 2)] for _ in range(2))
+    if bounded:
+        for k in reversed(range(n - 2)):  # Eq. 53 needs the next ratio
+            forward[k] *= largest_ratios(masses, forward, backward)[0][k]
+        for k in range(n - 2):
+            backward[k] *= largest_ratios(masses, forward, backward)[1][k]
+    meeting = rng.choice([0.5, 0.5, 0.0, 1.0, rng.random()])
+    return (masses, velocities, restitution, forward, backward), meeting
+
+
+def packaged(chain, meeting=0.5, **options):
+    masses, velocities, restitution, forward, backward = chain
+    model = ImpulseCorrelation(forward, backward, meeting=meeting, excess="saturate", **options)
+    return collide(Chain(masses, velocities, restitution), model)
+
+
+@functools.cache
+def compared(n, bounded):
+    """Generic chains that end soon, with what the package and the textbook make of them."""
+    found = []
+    for seed in range(150):
+        chain, meeting = generic((n, seed).__hash__(), n, bounded)
+        try:
+            plain = textbook.solve(*chain, meeting=meeting, max_events=40)
+        except EventLimit:
+            continue
+        trace = packaged(chain, meeting)
+        if not trace.collapsed and len(plain.events) < 60:
+            found.append((chain, trace, plain))
+    assert len(found) > 60
+    return found
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
+@pytest.mark.parametrize("bounded", [True, False], ids=["within bounds", "saturated"])
+def test_generic_chains_in_every_event(n, bounded):
+    held = 0
+    for chain, trace, plain in compared(n, bounded):
+        assert local_orders(trace.events, n - 1) == local_orders(plain.events, n - 1), chain
+        np.testing.assert_allclose(trace.velocities, plain.velocities, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(trace.impulses, plain.impulses, rtol=0, atol=4e-13)
+        np.testing.assert_allclose(trace.absorbed, plain.absorbed, rtol=0, atol=4e-13)
+        assert trace.collisions.tolist() == plain.collisions
+        assert trace.saturated == tuple(sorted(plain.held))
+        held += bool(plain.held)
+    assert held > 10 or bounded or n == 2
+
+
+@pytest.mark.parametrize("n", [3, 5, 7])
+def test_generic_chains_at_fifty_digits(n):
+    """Rounding alone, a few ulp for each of some dozens of events."""
+    for chain, trace, plain in compared(n, True)[:12] if n < 7 else compared(6, True)[12:24]:
+        exact = textbook.solve(*chain, meeting=trace.model.meeting, number=mpmath.mpf)
+        assert exact.events == plain.events
+        for after in (trace.velocities, plain.velocities):
+            assert max(abs(v - float(w)) for v, w in zip(after, exact.velocities)) < 4e-14
+
+
+# --- invariants --------------------------------------------------------------------------------
+
+
+def check_invariants(chain, outcome, tolerance):
+    """Momentum, ledger, impulses, order, and no idle contact overlapping at any event."""
+    masses, velocities, restitution = ([mpmath.mpf(x) for x in part] for part in chain[:3])
+    after = outcome.velocities
+    across = [0, *outcome.impulses, 0]
+    for i, m in enumerate(masses):
+        assert abs(m * (after[i] - velocities[i]) - (across[i] - across[i + 1])) <= tolerance
+    loss = sum(m * (v - w) * (v + w) / 2 for m, v, w in zip(masses, velocities, after))
+    ledger = sum((1 - e * e) * w for e, w in zip(restitution, outcome.absorbed))
+    assert abs(loss - ledger) <= tolerance
+    assert loss >= -tolerance
+    assert all(a - b <= tolerance for a, b in zip(after, after[1:]))
+    for before, now in zip(outcome.path_impulses, outcome.path_impulses[1:]):
+        assert all(b >= a for a, b in zip(before, now))
+    started = list(outcome.collisions)
+    for kind, c in outcome.events:
+        started[c] -= kind == "close"
+    idle = {c for c, count in enumerate(started) if not count}
+    for (kind, c), v in zip(outcome.events, outcome.path[1:]):
+        if kind == "close":
+            idle.discard(c)
+        elif kind in ("end", "collapse"):
+            idle.add(c)
+        if kind != "maximum_compression":  # there one run may be ahead of the other
+            assert all(v[k] - v[k + 1] <= tolerance for k in idle)
+    assert len(idle) == len(masses) - 1
+
+
+@pytest.mark.parametrize("bounded", [True, False], ids=["within bounds", "saturated"])
+def test_invariants_at_fifty_digits(bounded):
+    seen = {"meetings": 0, "held": 0, "recompressions": 0}
+    for seed in range(60):
+        chain, meeting = generic(seed, 3 + seed % 5, bounded)
+        try:
+            exact = solve(*chain, meeting=meeting, excess="saturate", max_events=150)
+        except EventLimit:
+            continue
+        check_invariants(chain, exact, mpmath.mpf(10) ** (-28 if exact.collapsed else -45))
+        seen["meetings"] += exact.meetings > 0
+        seen["held"] += bool(exact.held)
+        seen["recompressions"] += exact.recompressions > 0
+    assert seen["meetings"] > 5
+    assert seen["held"] > 5 or bounded
+
+
+def test_mirrors_boosts_and_units():
+    """Generic chains, one striker: the mirror image needs a single approaching contact."""
+    met = 0
+    for seed in range(40):
+        (m, _, e, f, b), meeting = generic(seed, 3 + seed % 4)
+        v = [1.0] + [0.0] * (len(m) - 1)
+        try:
+            here = textbook.solve(m, v, e, f, b, meeting=meeting, number=mpmath.mpf, max_events=150)
+        except EventLimit:
+            continue
+        there = textbook.solve(
+            m[::-1], [-x for x in v[::-1]], e[::-1], b[::-1], f[::-1],
+            meeting=1 - mpmath.mpf(meeting), number=mpmath.mpf,
+        )  # fmt: skip
+        assert max(abs(x + y) for x, y in zip(here.velocities, there.velocities[::-1])) < 1e-42
+        other = textbook.solve(
+            [1000 * mpmath.mpf(x) for x in m], [3 * x + 0.25 for x in v], e, f, b,
+            meeting=meeting, number=mpmath.mpf,
+        )  # fmt: skip
+        expected = [3 * x + 0.25 for x in here.velocities]
+        assert max(abs(x - y) for x, y in zip(other.velocities, expected)) < 1e-42
+        kinds = [kind for kind, c in here.events]
+        met += "close" in kinds
+    assert met > 10
+
+
+# --- what is known otherwise -------------------------------------------------------------------
+
+
+def test_closed_form_of_three_balls():
+    """Eqs. 24, 30-33 for chains with one collision per contact, all but one ball at rest."""
+    rng = random.Random(24)
+    checked = 0
+    while checked < 40:
+        m1, m2, m3 = (mpmath.mpf(rng.uniform(0.2, 4)) for _ in range(3))
+        e2, e3 = (mpmath.mpf(rng.uniform(0.3, 1)) for _ in range(2))
+        a = rng.random() * m3 / (m2 + m3)
+        outcome = solve([m1, m2, m3], [1, 0, 0], [e2, e3], a, 0)
+        if outcome.collisions != [1, 1]:
+            continue
+        first = (1 + e2) * m1 * m2 / ((1 - a) * m1 + m2)
+        root = mpmath.sqrt(1 - a * (m2 / m3 + 1))
+        second = (1 + e3 * root) * (1 + e2) * m1 * m2 * m3 / (((1 - a) * m1 + m2) * (m2 + m3))
+        assert abs(outcome.impulses[0] - first) < 1e-45
+        assert abs(outcome.impulses[1] - second) < 1e-45
+        checked += 1
+
+
+@pytest.mark.parametrize("r2", ["0.3", "1", "2"])
+def test_equation_44_separates_one_collision_per_contact(r2):
+    a, e, r2 = mpmath.mpf("0.15"), mpmath.mpf("0.5"), mpmath.mpf(r2)
+    edge = (1 + e) * (1 + e * mpmath.sqrt(1 - a * (1 + r2))) / (e * (1 + r2)) - (1 + a / e)
+
+    def collisions(r1):
+        return solve([1, r1, r1 / r2], [1, 0, 0], e, a).collisions
+
+    step = mpmath.mpf(10) ** -20
+    assert collisions(edge + step) == [1, 1]
+    assert collisions(edge - step)[0] > 1
+
+
+def test_figures_5_7_and_8():
+    five = solve([1, 1, 1], [1, "0.8", 0], "0.2", "0.1")
+    assert changes(five.events) == [
+        *(("end", 0), ("close", 0), ("end", 1)),
+        *(("close", 1), ("end", 0), ("end", 1)),
+    ]
+    seven = solve([1, "0.01", 1], [1, 0, 0], 1, "0.15")
+    assert [mpmath.nstr(v, 3) for v in seven.velocities] == ["-0.00287", "0.347", "0.999"]
+    # The middle ball hangs on the last digits of the input: 6e-5 more ratio give the printed .348.
+    nudged = solve([1, "0.01", 1], [1, 0, 0], 1, "0.15006")
+    assert mpmath.nstr(nudged.velocities[1], 3) == "0.348"
+    eight = solve([1] * 4, [1, "0.5", 0, 0], 1, "0.1")
+    assert changes(eight.events) == FIG_8
+    assert eight.meetings == 1
+
+
+ABCCA = (
+    ["0.045", "0.053", "0.053", "0.053", "0.045"],
+    [1, 0, 0, 0, 0],
+    ["0.53", "0.28", "0.27", "0.31"],
+    ["0.111", "0.319", "0.462"],
+    ["0.435", "0.414", "0.262"],
+)
+
+
+def test_abcca_is_above_its_bound():
+    with pytest.raises(ValueError, match=r"forward\[2\] = 0\.462; bound at ball 3 is 0\.4591836"):
+        solve(*ABCCA)
+    mirrored = ABCCA[0][::-1], [0, 0, 0, 0, -1], ABCCA[2][::-1], ABCCA[4][::-1], ABCCA[3][::-1]
+    with pytest.raises(ValueError, match=r"backward\[0\] = 0\.462; bound at ball 1 is 0\.4591836"):
+        solve(*mirrored)
+    outcome = solve(*ABCCA, excess="saturate")
+    assert outcome.held == {3}
+    assert outcome.velocities[3] == pytest.approx(outcome.velocities[4], abs=1e-45)
+
+
+@pytest.mark.parametrize(
+    ("nudge", "first"), [(0, 1), (1e-11, 1), (-1e-11, 1), (1e-7, 1), (-1e-7, 2)]
+)
+def test_double_closing_within_the_tie(nudge, first):
+    """R8.6: of two contacts on one ball the nearer closes; within 1e-9 they tie, the left goes."""
+    velocities = [1, mpmath.mpf("-0.1"), 0, mpmath.mpf("0.1") + mpmath.mpf(nudge), -1]
+    outcome = textbook.solve([1] * 5, velocities, 1, "0.1", number=mpmath.mpf)
+    assert outcome.events[:2] == [("close", first), ("close", 3 - first)]
+
+
+def test_ties_do_not_depend_on_the_digits():
+    """What coincides in decimal numbers coincides in all: rounding decides no event."""
+    n = 13
+    velocities = [1, 0.5, -0.5, 1, 1, 0.5, 0, 0.5, 1, 0, 1, 0.5, 0]
+    given = ["0.053"] * n, velocities, "0.9", "0.1", ["0", "0.1"] * 5 + ["0"]
+    outcomes = [textbook.solve(*given, meeting=0)]
+    for digits in (20, 40, 60):
+        with mpmath.workdps(digits):
+            outcomes.append(textbook.solve(*given, meeting=0, number=mpmath.mpf))
+    for one in outcomes[:-1]:
+        assert one.events == outcomes[-1].events
+        error = max(abs(float(v - w)) for v, w in zip(one.velocities, outcomes[-1].velocities))
+        assert error < 1e-12
+
+
+# --- R9, and limits ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("masses", "e", "ratio"), [([1, 1, 1], 0, 0), ([1, "0.01", 1], "0.5", "0.15")]
+)
+def test_infinite_sequences_end_with_the_common_velocity(masses, e, ratio):
+    outcome = solve(masses, [1, 0, 0], e, ratio)
+    common = 1 / sum(mpmath.mpf(m) for m in masses)
+    assert outcome.collapsed
+    assert max(abs(v - common) for v in outcome.velocities) < 1e-29
+
+
+CHATTER = ([2, "0.1", "0.2", 5], [1, "0.5", 0, 0], [0, "0.5", 0], ["0.8", "0.1"], ["0.8", 1])
+
+
+def test_chatter_beside_a_finite_closing_speed():
+    outcome = solve(*CHATTER, excess="saturate")
+    first = next(i for i, (kind, _) in enumerate(outcome.events) if kind == "collapse")
+    before = outcome.path[first]
+    assert outcome.events[first : first + 2] == [("collapse", 0), ("collapse", 1)]
+    assert abs(before[0] - before[1]) < 1e-29
+    assert before[2] - before[3] > 0.1
+    common = mpmath.mpf("2.05") / mpmath.mpf("7.3")
+    assert max(abs(v - common) for v in outcome.velocities) < 1e-29
+
+
+def test_threshold_is_a_limit():
+    """Ten digits less in the threshold move the outcome by no more than the threshold."""
+    near = solve(*CHATTER, excess="saturate", collapse_below=mpmath.mpf(10) ** -20)
+    far = solve(*CHATTER, excess="saturate")
+    assert len(near.events) < len(far.events)
+    assert max(abs(a - b) for a, b in zip(near.velocities, far.velocities)) < 1e-19
+
+
+def test_elastic_light_middle_ball_is_finite():
+    """Of the order of sqrt(heavy / light) impacts, none of them a collapse."""
+    counts = []
+    for light in ("1e-2", "1e-4"):
+        outcome = solve([1, light, 1], [1, 0, 0], 1, 0)
+        assert not outcome.collapsed
+        counts.append(sum(outcome.collisions))
+    assert 8 < counts[1] / counts[0] < 12
+
+
+def test_nothing_happens_without_approach():
+    outcome = textbook.solve([1, 1, 1], [0, 0, 1], 1, 0.1)
+    assert outcome.velocities == [0, 0, 1]
+    assert outcome.events == []
+
+
+def test_event_limit_reports_what_was_reached():
+    with pytest.raises(EventLimit, match="max_events = 100") as caught:
+        textbook.solve([1, 1e-6, 1], [1, 0, 0], 1, 0, max_events=100)
+    state = caught.value.args[1]
+    assert len(state.events) > 90
+    assert sum(m * v for m, v in zip([1, 1e-6, 1], state.velocities)) == pytest.approx(1, rel=1e-12)
+
+
+@pytest.mark.parametrize("ratio", ["-0.1", "1.1"])
+def test_ratio_outside_its_range(ratio):
+    with pytest.raises(ValueError, match=r"\[0, 1\]"):
+        solve([1, 1, 1], [1, 0, 0], 1, ratio, excess="saturate")
+
+
+# --- the march ---------------------------------------------------------------------------------
+
+STEPS = (200, 800, 3200)
+ENOUGH = 16
+
+
+def marched(kind):
+    """Generic chains of a kind: so many balls, or with something that must happen in them."""
+    found, seed = [], 0
+    while len(found) < ENOUGH:
+        seed += 1
+        n = kind if isinstance(kind, int) else 3 + seed % 4
+        chain, meeting = generic(seed, n, bounded=kind != "held")
+        try:
+            plain = in_floats(*chain, meeting=meeting, excess="saturate", max_events=40)
+        except EventLimit:
+            continue
+        # The march has no rule R9, and needs a step far smaller than the last of many collisions.
+        if plain.collapsed or not 1 < len(plain.events) < 40:
+            continue
+        if (
+            isinstance(kind, int)
+            or (kind == "two runs meet" and plain.meetings)
+            or (kind == "held" and plain.held)
+            or (kind == "close many times" and max(plain.collisions) >= 4)
+        ):
+            found.append((chain, meeting, plain.velocities))
+    return found
+
+
+@pytest.mark.parametrize("kind", [2, 3, 4, 5, 6, "two runs meet", "held", "close many times"])
+def test_march_converges_to_the_textbook_at_first_order(kind):
+    """The mean over chains: the error of one chain depends on where its steps fall."""
+    chains = marched(kind)
+    errors = [
+        np.mean([
+            abs(march(*chain, meeting=meeting, steps=k).velocities - v).max()
+            for chain, meeting, v in chains
+        ])
+        for k in STEPS
+    ]  # fmt: skip
+    order = -np.polyfit(np.log(STEPS), np.log(errors), 1)[0]
+    assert 0.8 < order < 1.2
+    assert errors[-1] < 4e-4
