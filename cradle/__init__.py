@@ -10,6 +10,8 @@ The rooms, in that order:
 - `cradle.trace`: what happened.
 - `cradle.kernel`: the event loop; `cradle.runtime` compiles it.
 - `cradle.models`: one file a model, and the verb `collide`.
+- `cradle.swinging`: impacts and pendulums in turn; `cradle.pendulums`, `cradle.flight` and
+  `cradle.resting` say how balls hang, fly and rest against each other.
 - `cradle.closed_form`: what the paper gives in closed form.
 - `cradle.tables`: the paper's tables and chains.
 - `cradle.measures`: what is read off outcomes.
@@ -23,6 +25,8 @@ from cradle.models.correlation import ImpulseCorrelation, post_impact_velocities
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
+from cradle.pendulums import Pendulums
+from cradle.swinging import Impact, Swing, swing
 from cradle.tables import paper_chain, paper_sequences, ratio_table, restitution_table
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -33,12 +37,15 @@ __all__ = [
     "EnergyTrace",
     "Event",
     "FusedChain",
+    "Impact",
     "ImpactNotFinished",
     "ImpulseCorrelation",
     "Model",
+    "Pendulums",
     "QuadraticDissipation",
     "SequentialCollisions",
     "SpringChain",
+    "Swing",
     "TimedTrace",
     "Trace",
     "collide",
@@ -47,4 +54,5 @@ __all__ = [
     "post_impact_velocities",
     "ratio_table",
     "restitution_table",
+    "swing",
 ]
