@@ -125,9 +125,10 @@ def test_second_third_and_twentieth_stroke(ratio, e):
     v = [0.02 * 2 * math.pi, 0, 0, 0]
     for stroke in range(20):
         v = solve([1.0] * n, v, [e] * (n - 1), ratio).velocities
+        v = [float(a) for a in v]
         if stroke in (0, 1, 2, 19):
             np.testing.assert_allclose(run.impacts[stroke].after, v, rtol=0, atol=2e-15 * 4**3)
-        v = [-float(a) for a in v]
+        v = [-a for a in v]
 
 
 # Energy
@@ -256,9 +257,9 @@ def test_two_balls_at_a_time_are_the_limit_of_stiff_springs(m, x, pendulums):
     assert len(run.impacts) >= 3
     apart = [
         np.abs(springs(m, x, 2, times, k, pendulums) - run.positions).max() / 0.02
-        for k in (1e6, 1e8, 1e10)
+        for k in (1e7, 1e9, 1e11)
     ]
-    assert apart[2] < 0.003
+    assert apart[2] < 0.005
     for coarse, fine in zip(apart, apart[1:]):
         assert 0.5 < math.log(coarse / fine) / math.log(100**0.4) < 1.5
 
@@ -303,42 +304,40 @@ def test_pressed_balls_move_as_one_until_pulled_apart():
     assert not run.impacts
 
 
-def bounces(m, e, length, x, end, least):
-    """Two pendulums by SciPy's events; pressed for good once they bounce slower than `least`."""
+def bounces(m, e, length, x, least):
+    """Two pendulums by SciPy's events, bounce after bounce, until they are slower than `least`."""
     w2 = 9.81 / np.asarray(length)
-    y, t, count = np.array([*x, 0, 0], float), 0.0, 0
+    y, t, count, step = np.array([*x, 0, 0], float), 0.0, 0, 0.01
     touch = lambda _, y: y[1] - y[0]  # noqa: E731
     touch.terminal, touch.direction = True, -1
-    force = lambda _, y: -(w2[0] * y[0] - w2[1] * y[1])  # noqa: E731
-    force.terminal, force.direction = True, -1
-    joint = (m[0] * w2[0] + m[1] * w2[1]) / (m[0] + m[1])
-    together = False
-    while t < end:
-        square = np.array([joint, joint]) if together else w2
+    while True:
         found = solve_ivp(
-            lambda _, y, q=square: np.concatenate([y[2:], -q * y[:2]]), (t, end), y, "DOP853",
-            events=force if together else touch, rtol=1e-12, atol=1e-15,
+            lambda _, y: np.concatenate([y[2:], -w2 * y[:2]]), (t, t + 30 * step), y, "DOP853",
+            events=touch, rtol=1e-12, atol=1e-15, max_step=step,
         )  # fmt: skip
-        t, y = found.t[-1], found.y[:, -1].copy()
-        if found.status == 1 and together:
-            together = False
-        elif found.status == 1:
-            y[:2] = m @ y[:2] / m.sum()
-            u, common = y[2] - y[3], m @ y[2:] / m.sum()
-            count += 1
-            together = e * u < least and force(t, y) > 0
-            after = 0.0 if together else e * u
-            y[2:] = common + np.array([-m[1], m[0]]) / m.sum() * after
-    return y, count
+        assert found.status == 1
+        t, y, count = found.t[-1], found.y[:, -1].copy(), count + 1
+        u, common = y[2] - y[3], m @ y[2:] / m.sum()
+        if u < least:
+            return t, common, count
+        y[:2] = m @ y[:2] / m.sum()
+        y[2:] = common + np.array([-m[1], m[0]]) / m.sum() * e * u
+        # Short enough that SciPy sees the whole of the next bounce.
+        step = 0.2 * e * u / abs(w2[1] * y[1] - w2[0] * y[0])
 
 
 def test_infinite_bounces_of_pressed_balls_have_the_limit_of_an_independent_run():
-    m, e, length, x, end = np.array([1.0, 1.0]), 0.3, [0.1, 0.4], [-0.03, -0.02], 1.9
-    run = swing(Chain(m, [0, 0], e), ImpulseCorrelation(0), x, [end], pendulums=Pendulums(length))
-    y, count = bounces(m, e, length, x, end, 1e-7)
-    assert len(run.impacts) > count > 20
-    np.testing.assert_allclose(run.positions[-1], y[:2], rtol=0, atol=2e-8)
-    np.testing.assert_allclose(run.velocities[-1], y[2:], rtol=0, atol=2e-7)
+    m, e, length, x = np.array([1.0, 2.0]), 0.5, [0.1, 0.4], [-0.03, -0.0295]
+    limit, common, count = bounces(m, e, length, x, 1e-6)
+    run = swing(Chain(m, [0, 0], e), ImpulseCorrelation(0), x, [limit, limit + 0.01, 0.5],
+                pendulums=Pendulums(length))  # fmt: skip
+    early = [impact for impact in run.impacts if impact.time < limit + 0.01]
+    assert len(early) > count > 12
+    np.testing.assert_allclose(run.velocities[0], common, rtol=0, atol=2e-6)
+    # From the limit on they move as one; past the lowest point the left one stays behind.
+    assert run.positions[1, 0] == run.positions[1, 1]
+    assert early[-1].time == pytest.approx(limit, abs=1e-6)
+    assert run.positions[2, 1] > run.positions[2, 0] + 0.01
 
 
 def test_where_slow_begins_does_not_matter(monkeypatch):
@@ -497,11 +496,14 @@ def test_parts_of_a_chain_take_their_part_of_the_model():
 
 
 def test_mirror():
-    """Seen from behind, everything is the same."""
-    arguments = ImpulseCorrelation(0.12), np.linspace(0, 5, 26)
-    run = swing(Chain([1, 2, 1, 3], [0] * 4, 0.9), arguments[0], [-0.02, 0, 0, 0], arguments[1])
-    seen = swing(Chain([3, 1, 2, 1], [0] * 4, 0.9), arguments[0], [0, 0, 0, 0.02], arguments[1])
-    np.testing.assert_allclose(seen.positions[:, ::-1], -run.positions, rtol=0, atol=1e-12)
+    """Seen from behind, everything is the same, if no two contacts approach at one instant."""
+    times, pendulums = np.linspace(0, 5, 26), Pendulums(gaps=0.001)
+    runs = [
+        swing(Chain(m, [0] * 4, 0.9), ImpulseCorrelation(0.1), x, times, pendulums=pendulums)
+        for m, x in (([1, 2, 1, 3], [-0.02, 0, 0, 0]), ([3, 1, 2, 1], [0, 0, 0, 0.02]))
+    ]
+    assert len(runs[0].impacts) > 20
+    np.testing.assert_allclose(runs[1].positions[:, ::-1], -runs[0].positions, rtol=0, atol=1e-12)
 
 
 def test_frames():
