@@ -15,7 +15,7 @@ The rooms, in that order:
 - `cradle.closed_form`: what the paper gives in closed form.
 - `cradle.tables`: the paper's tables and chains.
 - `cradle.measures`: what is read off outcomes.
-- `cradle.figures`: matplotlib, imported only when asked for.
+- `cradle.figures` and `cradle.animation`: matplotlib, imported only when asked for.
 """
 
 from cradle.chain import Chain

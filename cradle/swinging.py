@@ -29,7 +29,7 @@ class Impact(NamedTuple):
 
     Examples
     --------
-    >>> Impact(0.5, (0,), np.array([1.0, 0.0]), np.array([0.0, 1.0]), 0.0, ()).contacts
+    >>> Impact(0.5, (0,), np.zeros(2), np.array([1.0, 0.0]), np.array([0.0, 1.0]), 0.0, ()).contacts
     (0,)
     """
 
@@ -37,6 +37,8 @@ class Impact(NamedTuple):
     time: float
     #: Contacts that took part: they touched, and their stretch had an approaching one.
     contacts: tuple[int, ...]
+    #: Where the balls were, shape (N,), m.
+    positions: Vector
     #: Velocities just before, shape (N,), m/s.
     before: Vector
     #: Velocities just after, shape (N,), m/s.
@@ -344,7 +346,15 @@ class _Run:
         if traces:
             loss = sum(trace.energy_loss for trace in traces)
             self.impacts.append(
-                Impact(self.t, tuple(contacts), before, self.v.copy(), loss, tuple(traces))
+                Impact(
+                    self.t,
+                    tuple(contacts),
+                    self.x.copy(),
+                    before,
+                    self.v.copy(),
+                    loss,
+                    tuple(traces),
+                )
             )
 
 

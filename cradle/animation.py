@@ -1,0 +1,380 @@
+"""Moving pictures of an impact and of a swing, as SVG with keyframes in CSS.
+
+A film of pixels would need some hundred frames.  Here the solver's own events are the keyframes:
+between two events of an impact every velocity is linear in the progress, and a browser
+interpolates linearly.  So the motion is exact, sharp at any size, and a few kilobytes long.  A
+style sheet, unlike SMIL, can also honour a reader who asks for less motion, and paper: both get
+the still.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+from numpy.typing import NDArray
+
+from cradle.chain import Vector
+from cradle.figures import PALETTE, progress, velocities, velocity_impulse
+from cradle.swinging import Swing
+from cradle.trace import Trace
+
+__all__ = ["Animation", "animate", "animate_swing"]
+
+_STILL = "{{ {0} {{ animation: none !important }} }}"
+# Seconds of the flight before the impact, of the impact, of the flight after it, and of a rest.
+_ACTS = (1.5, 5.0, 2.0, 1.5)
+
+
+@dataclass(frozen=True)
+class Animation:
+    """A moving picture; a notebook shows it, a browser plays it.
+
+    Attributes
+    ----------
+    svg : str
+        The picture as a file.
+
+    Examples
+    --------
+    >>> Animation("<svg/>")._repr_svg_()
+    '<svg/>'
+    """
+
+    svg: str
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+    def __repr__(self) -> str:
+        """Return a short account."""
+        return f"Animation({len(self.svg.encode()) / 1000:.0f} kB)"
+
+    def save(self, path: str | Path) -> None:
+        """Write the picture to an SVG file.
+
+        Examples
+        --------
+        >>> Animation("<svg/>").save("/dev/null")
+        """
+        Path(path).write_text(self.svg, encoding="utf-8")
+
+
+def _thin(times: Vector, values: Vector, tolerance: float) -> NDArray[np.int64]:
+    """Return the rows that straight lines need to stay within the tolerance (Douglas, Peucker)."""
+    keep = np.zeros(len(times), dtype=bool)
+    keep[[0, -1]] = True
+    spans = [(0, len(times) - 1)]
+    while spans:
+        a, b = spans.pop()
+        if b - a < 2:
+            continue
+        part = (times[a + 1 : b] - times[a]) / ((times[b] - times[a]) or 1.0)
+        line = values[a] + part[:, None] * (values[b] - values[a])
+        off = np.abs(values[a + 1 : b] - line).max(axis=1)
+        if off.max() > tolerance:
+            middle = a + 1 + int(np.argmax(off))
+            keep[middle] = True
+            spans += [(a, middle), (middle, b)]
+    return np.flatnonzero(keep)
+
+
+def _number(value: float) -> str:
+    return f"{value:.3f}".rstrip("0").rstrip(".")
+
+
+def _keyframes(
+    name: str, times: Vector, values: Vector, form: str, tolerance: float, still: int
+) -> str:
+    """Return the style of one moving part: where it rests, and how it moves.
+
+    `form` makes the CSS of a row of `values`; row `still` is the still's.
+    """
+
+    def css(row: int) -> str:
+        return form.format(*(_number(round(float(value), 3) + 0.0) for value in values[row]))
+
+    rows = _thin(times, values, tolerance).tolist()
+    frames = " ".join(f"{_number(100 * times[k] / times[-1])}%{{{css(k)}}}" for k in rows)
+    moves = f"animation:{name} {_number(times[-1])}s linear infinite"
+    return f"#{name}{{{css(still)};{moves}}}\n@keyframes {name}{{{frames}}}\n"
+
+
+def animate(trace: Trace, contact: int | None = None) -> Animation:
+    """Show an impact in slow motion: the balls, and their velocities being drawn.
+
+    The balls fly in.  Then the clock stands still, for an impact takes no time: the diagram grows
+    with the impulses, a star marks each contact that is pressed, and the bars on the balls are
+    their velocities at that point of the diagram.  At last the balls fly off.
+
+    Parameters
+    ----------
+    trace : Trace
+        The impact.
+    contact : int, optional
+        Draw this contact's velocity-impulse diagram.  If left out, the velocities of all balls
+        against the sum of all impulses.
+
+    Returns
+    -------
+    Animation
+        The still shows the whole diagram, and the velocities after the impact.
+
+    Examples
+    --------
+    >>> from cradle import Chain, ImpulseCorrelation, collide
+    >>> animate(collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15)))
+    Animation(45 kB)
+    """
+    with mpl.rc_context({"svg.hashsalt": "cradle", "svg.fonttype": "path", "font.size": 10}):
+        # At 72 dots an inch, points of the figure are units of the file.
+        figure = Figure(figsize=(6.4, 5.4), dpi=72, layout="constrained", facecolor="white")
+        row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.6])
+        _draw_balls(trace, row)
+        if contact is None:
+            velocities(trace, diagram)
+            along, shown = progress(trace), range(len(trace.chain))
+        else:
+            velocity_impulse(trace, contact, diagram)
+            along, shown = trace.path_impulses[:, contact], range(contact, contact + 2)
+        x, y = diagram.get_xlim(), diagram.get_ylim()
+        cover = Rectangle((x[0], y[0]), x[1] - x[0], y[1] - y[0], fc="white", alpha=0.9, zorder=4)
+        cover.set_gid("cover")
+        diagram.add_patch(cover)
+        for ball in shown:
+            (dot,) = diagram.plot(
+                along[-1], trace.velocities[ball], "o", ms=9, mfc="white",
+                mec=PALETTE[ball % len(PALETTE)], mew=2.5, zorder=6, clip_on=False,
+            )  # fmt: skip
+            dot.set_gid(f"dot{ball}")
+        diagram.set(xlim=x, ylim=y)
+        file = io.StringIO()
+        figure.savefig(
+            file, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type"))
+        )
+    style = _impact_style(trace, row, diagram, along, list(shown))
+    parts = "[id^=ball], [id^=bar], [id^=tip], [id^=star], [id^=dot], #cover"
+    return Animation(_with_style(file.getvalue(), style, parts))
+
+
+def _with_style(svg: str, style: str, parts: str) -> str:
+    """Put a style sheet into a picture; stillness for those who ask for it, and on paper."""
+    still = "".join(
+        f"@media {media} {_STILL.format(parts)}\n"
+        for media in ("print", "(prefers-reduced-motion: reduce)")
+    )
+    head = svg.index(">", svg.index("<svg")) + 1
+    return f"{svg[svg.index('<svg') : head]}\n<style>\n{style}{still}</style>{svg[head:]}"
+
+
+def _radii(masses: Vector) -> Vector:
+    return np.asarray(0.5 * np.cbrt(masses / masses.max()))
+
+
+def _bar_length(trace: Trace) -> float:
+    """Return the length of a bar for 1 m/s, in diameters of the largest ball."""
+    return 0.95 / (float(np.abs(trace.path).max()) or 1.0)
+
+
+def _draw_balls(trace: Trace, ax: Axes) -> None:
+    """Draw the balls as they touch, a star on each contact, and a bar of unit length on each."""
+    radii = _radii(trace.chain.masses)
+    centres = np.cumsum(2 * radii) - radii
+    for ball, (x, radius) in enumerate(zip(centres.tolist(), radii.tolist(), strict=True)):
+        colour = PALETTE[ball % len(PALETTE)]
+        parts: list[tuple[str, Any]] = [
+            ("ball", ax.add_patch(Circle((x, 0), radius, fc="0.95", ec=colour, lw=2))),
+            ("ballname", ax.text(x, -0.02, f"{ball + 1}", ha="center", va="center", size=12)),
+            ("bar", ax.add_patch(Rectangle((x, 0.68), 1, 0.1, fc=colour, ec="none"))),
+            ("tip", ax.add_patch(Circle((x, 0.73), 0.09, fc="white", ec=colour, lw=2))),
+        ]
+        for name, part in parts:
+            part.set_gid(f"{name}{ball}")
+    for contact, x in enumerate((centres + radii)[:-1].tolist()):
+        (star,) = ax.plot(x, 0, "*", ms=15, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
+        star.set_gid(f"star{contact}")
+    reach = 2.2
+    ax.set(xlim=(-reach, centres[-1] + radii[-1] + reach), ylim=(-0.6, 0.95), aspect="equal")
+    ax.set_axis_off()
+
+
+def _impact_style(
+    trace: Trace, row: Axes, diagram: Axes, along: Vector, shown: Sequence[int]
+) -> str:
+    """Return the keyframes: one at each event, and at the ends of the flights."""
+    height = row.get_figure().bbox.height  # type: ignore[union-attr]
+    before, slow, after, rest = _ACTS
+    events = len(trace.path)
+    done = progress(trace)
+    share = done / done[-1] if done[-1] else np.linspace(0, 1, events)
+    times = np.concatenate(
+        [[0.0], before + slow * share, [before + slow + after, sum(_ACTS[:3]) + rest]]
+    )
+    index = np.clip(np.arange(-1, events + 2), 0, events - 1)
+    still = events  # the end of the impact
+    # Where each ball is drawn, in units of the file: it moves in the flights alone.
+    unit = float(row.transData.transform((1, 0))[0] - row.transData.transform((0, 0))[0])
+    per_speed = 1.9 / (float(np.abs(trace.path[[0, -1]]).max()) or 1.0)
+    come = 0.0 if (trace.chain.closing_speeds < 0.0).any() else -per_speed
+    shift = np.zeros((len(times), len(trace.chain)))
+    shift[0] = come * unit * trace.path[0]
+    shift[-2:] = per_speed * unit * trace.velocities
+    shift[-1] = shift[-2]
+    radii = _radii(trace.chain.masses)
+    centres = row.transData.transform(
+        np.column_stack([np.cumsum(2 * radii) - radii, np.full(len(radii), 0.73)])
+    )
+    bar = _bar_length(trace)
+    style: list[str] = []
+    for ball, centre in enumerate(centres[:, 0].tolist()):
+        x, v = shift[:, ball], trace.path[index, ball] * bar
+        move = "transform:translateX({}px)"
+        for name, values in (
+            (f"ball{ball}", x), (f"ballname{ball}", x), (f"tip{ball}", x + unit * v)
+        ):  # fmt: skip
+            style.append(_keyframes(name, times, values[:, None], move, 0.03, still))
+        style.append(f"#bar{ball}{{transform-origin:{_number(centre)}px 0}}\n")
+        form = "transform:translateX({}px) scaleX({})"
+        style.append(_keyframes(f"bar{ball}", times, np.column_stack([x, v]), form, 0.001, still))
+    # The diagram: dots on the curves, and a cover that draws back to the right.
+    places = np.dstack(np.broadcast_arrays(along[:, None], trace.path))
+    drawn = diagram.transData.transform(places.reshape(-1, 2)).reshape(places.shape)
+    for ball in shown:
+        moved = (drawn[:, ball] - drawn[-1, ball]) * [1, -1]
+        style.append(
+            _keyframes(f"dot{ball}", times, moved[index], "transform:translate({}px,{}px)", 0.03,
+                       still)
+        )  # fmt: skip
+    box = diagram.bbox
+    hidden = (box.x1 - drawn[index, 0, 0]) / box.width
+    hidden[still + 1 :] = 0.0  # beyond the last point too
+    style.append(f"#cover{{transform-origin:{_number(box.x1)}px {_number(height)}px}}\n")
+    style.append(
+        _keyframes("cover", times, hidden[:, None], "transform:scaleX({})", 0.0005, still + 1)
+    )
+    style += _stars(trace, times)
+    return "".join(style)
+
+
+def _stars(trace: Trace, times: Vector) -> list[str]:
+    """Return the keyframes of the stars: seen while the impulse of their contact grows."""
+    style = []
+    for contact, grows in enumerate((np.diff(trace.path_impulses, axis=0) > 0.0).T.tolist()):
+        name, frames, last = f"star{contact}", ["0%{opacity:0}"], False
+        for time, now in zip(times[1:], [*grows, False], strict=False):
+            if now != last:
+                frames.append(f"{_number(100 * time / times[-1])}%{{opacity:{int(now)}}}")
+                last = now
+        # Steps: a star keeps its state until the next keyframe.
+        style.append(
+            f"#{name}{{opacity:0;animation:{name} {_number(times[-1])}s step-end infinite}}\n"
+            f"@keyframes {name}{{{' '.join(frames)}}}\n"
+        )
+    return style
+
+
+def animate_swing(
+    runs: Swing | Sequence[Swing], labels: Sequence[str] = (), *, speed: float = 1.0
+) -> Animation:
+    """Show one swing or several, one below the other, by the same clock.
+
+    Parameters
+    ----------
+    runs : Swing or sequence of Swing
+        Their times are the keyframes, with the impacts in between: twenty in a swing suffice.
+    labels : sequence of str
+        A line of text above each.
+    speed : float
+        1 plays in real time, less in slow motion.
+
+    Returns
+    -------
+    Animation
+        The still shows the balls at the first of the times.
+
+    Raises
+    ------
+    ValueError
+        If a run has no duration, or there are not as many labels as runs.
+
+    Examples
+    --------
+    >>> from cradle import Chain, ImpulseCorrelation, swing
+    >>> balls = Chain([1] * 5, [0] * 5, 1)
+    >>> run = swing(balls, ImpulseCorrelation(0), [-0.03, 0, 0, 0, 0], np.linspace(0, 4, 161))
+    >>> animate_swing(run)
+    Animation(8 kB)
+    """
+    several = [runs] if isinstance(runs, Swing) else list(runs)
+    if labels and len(labels) != len(several):
+        raise ValueError(f"labels has {len(labels)} lines; {len(several)} swings need as many")
+    duration = min(run.times[-1] - run.times[0] for run in several) if several else 0.0
+    if not duration > 0.0:
+        raise ValueError("runs has no swing, or one without a duration")
+    rows, style, top = [], [], 0.0
+    for k, run in enumerate(several):
+        label = labels[k] if labels else ""
+        drawn, motion, height = _draw_swing(run, f"s{k}b", duration, speed)
+        text = f'<text x="12" y="20" font-size="15">{escape(label)}</text>' if label else ""
+        rows.append(f'<g transform="translate(0 {_number(top)})">{text}{drawn}</g>')
+        style.append(motion)
+        top += height + (14 if label else 0)
+    svg = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 480 {_number(top)}" width="480" '
+        f'height="{_number(top)}" font-family="sans-serif"><rect width="480" '
+        f'height="{_number(top)}" fill="white"/>{"".join(rows)}</svg>'
+    )
+    return Animation(_with_style(svg, "".join(style), "[id]"))
+
+
+def _lengths(run: Swing) -> Vector:
+    return run.pendulums.row("length", len(run.chain))
+
+
+def _draw_swing(run: Swing, name: str, duration: float, speed: float) -> tuple[str, str, float]:
+    """Return a swing's picture, its keyframes and its height."""
+    lengths = _lengths(run)
+    scale = 105.0 / float(lengths.max())  # units of the file in a metre
+    # Ball sizes are free: the model needs none.  Here they leave room for the widest swing.
+    radii = 17.0 * np.cbrt(run.chain.masses / run.chain.masses.max())
+    gaps = run.pendulums.row("gaps", len(lengths) - 1) * scale
+    pivots = np.concatenate([[0.0], np.cumsum(radii[:-1] + radii[1:] + gaps)])
+    pivots += 240.0 - (pivots[0] - radii[0] + pivots[-1] + radii[-1]) / 2
+    beam = 34.0
+    low = beam + 105.0 + float(radii.max()) + 8.0
+    inside = (run.times > run.times[0]) & (run.times <= run.times[0] + duration)
+    hits = [hit for hit in run.impacts if 0.0 < hit.time - run.times[0] < duration]
+    # Between two of the times an impact is a kink: it needs a keyframe of its own.
+    times = np.array([0.0, *run.times[inside], *(hit.time for hit in hits)])
+    times[1:] -= run.times[0]
+    places = np.vstack([run.positions[:1], run.positions[inside], *(hit.positions for hit in hits)])
+    order = np.argsort(times, kind="stable")
+    times, places = times[order] / speed, places[order]
+    drawn, style = [], []
+    for ball, (x, length, radius) in enumerate(zip(pivots, lengths, radii, strict=True)):
+        y, part = beam + length * scale, f"{name}{ball}"
+        drawn.append(
+            f'<g id="{part}"><path d="M{_number(x)} {beam}V{_number(y - radius)}" stroke="#555"/>'
+            f'<circle cx="{_number(x)}" cy="{_number(y)}" r="{_number(radius - 1.25)}" '
+            f'fill="#f2f2f2" stroke-width="2.5" stroke="{PALETTE[ball % len(PALETTE)]}"/>'
+            f'<text x="{_number(x)}" y="{_number(y + 5)}" font-size="14" '
+            f'text-anchor="middle">{ball + 1}</text></g>'
+        )
+        # A positive angle of SVG turns what hangs to the left.
+        angle = -np.degrees(places[:, ball] / length)
+        style.append(f"#{part}{{transform-origin:{_number(x)}px {beam}px}}\n")
+        style.append(_keyframes(part, times, angle[:, None], "transform:rotate({}deg)", 0.1, 0))
+    ends = pivots[0] - 30, pivots[-1] + 30
+    drawn.append(
+        f'<path d="M{_number(ends[0])} {beam}H{_number(ends[1])}" stroke="#333" stroke-width="4"/>'
+    )
+    return "".join(drawn), "".join(style), low
