@@ -202,7 +202,7 @@ def _draw_balls(trace: Trace, ax: Axes) -> None:
     for contact, x in enumerate((centres + radii)[:-1].tolist()):
         (star,) = ax.plot(x, 0, "*", ms=15, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
         star.set_gid(f"star{contact}")
-    reach = 2.2
+    reach = 2.6
     ax.set(xlim=(-reach, centres[-1] + radii[-1] + reach), ylim=(-0.6, 0.95), aspect="equal")
     ax.set_axis_off()
 
