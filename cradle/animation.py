@@ -10,6 +10,7 @@ the still.
 from __future__ import annotations
 
 import io
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -30,14 +31,19 @@ from cradle.trace import Trace
 
 __all__ = ["Animation", "animate", "animate_swing"]
 
-_STILL = "{{ {0} {{ animation: none !important }} }}"
+# Stands before the name of every moving part, until the picture's own key takes its place.
+_KEY = "moving-part-"
+_STYLE_OF_ALL = '<style type="text/css">*{stroke-linejoin: round; stroke-linecap: butt}</style>'
 # Seconds of the flight before the impact, of the impact, of the flight after it, and of a rest.
 _ACTS = (1.5, 5.0, 2.0, 1.5)
 
 
 @dataclass(frozen=True)
 class Animation:
-    """A moving picture; a notebook shows it, a browser plays it.
+    """A moving picture; a notebook shows it with a box to tick for a pause.
+
+    In a page it is part of the page, not an image file: browsers tell image files neither that
+    they are printed nor that they should pause.
 
     Attributes
     ----------
@@ -46,14 +52,23 @@ class Animation:
 
     Examples
     --------
-    >>> Animation("<svg/>")._repr_svg_()
-    '<svg/>'
+    >>> Animation("<svg/>")
+    Animation(0 kB)
     """
 
     svg: str
 
-    def _repr_svg_(self) -> str:
-        return self.svg
+    def _repr_html_(self) -> str:
+        key = f"p{zlib.crc32(self.svg.encode()):08x}"
+        style = (
+            f"#{key}:checked ~ svg * {{ animation-play-state: paused !important }}\n"
+            f"@media print, (prefers-reduced-motion: reduce) {{ .{key} {{ display: none }} }}"
+        )
+        box = f'<input type="checkbox" id="{key}" class="{key}">'
+        return (
+            f'<div class="animation"><style>{style}</style>{box}'
+            f'<label for="{key}" class="{key}"> pause</label><br>{self.svg}</div>'
+        )
 
     def __repr__(self) -> str:
         """Return a short account."""
@@ -148,32 +163,39 @@ def animate(trace: Trace, contact: int | None = None) -> Animation:
             along, shown = trace.path_impulses[:, contact], range(contact, contact + 2)
         x, y = diagram.get_xlim(), diagram.get_ylim()
         cover = Rectangle((x[0], y[0]), x[1] - x[0], y[1] - y[0], fc="white", alpha=0.9, zorder=4)
-        cover.set_gid("cover")
+        cover.set_gid(f"{_KEY}cover")
         diagram.add_patch(cover)
         for ball in shown:
             (dot,) = diagram.plot(
                 along[-1], trace.velocities[ball], "o", ms=9, mfc="white",
                 mec=PALETTE[ball % len(PALETTE)], mew=2.5, zorder=6, clip_on=False,
             )  # fmt: skip
-            dot.set_gid(f"dot{ball}")
+            dot.set_gid(f"{_KEY}dot{ball}")
         diagram.set(xlim=x, ylim=y)
         file = io.StringIO()
         figure.savefig(
             file, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type"))
         )
     style = _impact_style(trace, row, diagram, along, list(shown))
-    parts = "[id^=ball], [id^=bar], [id^=tip], [id^=star], [id^=dot], #cover"
-    return Animation(_with_style(file.getvalue(), style, parts))
+    return Animation(_with_style(file.getvalue(), style))
 
 
-def _with_style(svg: str, style: str, parts: str) -> str:
-    """Put a style sheet into a picture; stillness for those who ask for it, and on paper."""
+def _with_style(svg: str, style: str) -> str:
+    """Put a style sheet into a picture; stillness for those who ask for it, and on paper.
+
+    In a page the names of all pictures share one space, so each gets a key of its own.
+    """
     still = "".join(
-        f"@media {media} {_STILL.format(parts)}\n"
+        f"@media {media} {{ [id^={_KEY}] {{ animation: none !important }} }}\n"
         for media in ("print", "(prefers-reduced-motion: reduce)")
     )
-    head = svg.index(">", svg.index("<svg")) + 1
-    return f"{svg[svg.index('<svg') : head]}\n<style>\n{style}{still}</style>{svg[head:]}"
+    start = svg.index("<svg")
+    head = svg.index(">", start)
+    # Matplotlib sets these two for `*`: in a page that would be every picture.
+    root = 'style="max-width:100%;height:auto;stroke-linejoin:round;stroke-linecap:butt"'
+    body = svg[head + 1 :].replace(_STYLE_OF_ALL, "")
+    moving = f"{svg[start:head]} {root}>\n<style>\n{style}{still}</style>{body}"
+    return moving.replace(_KEY, f"m{zlib.crc32(moving.encode()):08x}-")
 
 
 def _radii(masses: Vector) -> Vector:
@@ -198,10 +220,10 @@ def _draw_balls(trace: Trace, ax: Axes) -> None:
             ("tip", ax.add_patch(Circle((x, 0.73), 0.09, fc="white", ec=colour, lw=2))),
         ]
         for name, part in parts:
-            part.set_gid(f"{name}{ball}")
+            part.set_gid(f"{_KEY}{name}{ball}")
     for contact, x in enumerate((centres + radii)[:-1].tolist()):
         (star,) = ax.plot(x, 0, "*", ms=15, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
-        star.set_gid(f"star{contact}")
+        star.set_gid(f"{_KEY}star{contact}")
     reach = 2.6
     ax.set(xlim=(-reach, centres[-1] + radii[-1] + reach), ylim=(-0.6, 0.95), aspect="equal")
     ax.set_axis_off()
@@ -238,28 +260,29 @@ def _impact_style(
     for ball, centre in enumerate(centres[:, 0].tolist()):
         x, v = shift[:, ball], trace.path[index, ball] * bar
         move = "transform:translateX({}px)"
-        for name, values in (
-            (f"ball{ball}", x), (f"ballname{ball}", x), (f"tip{ball}", x + unit * v)
-        ):  # fmt: skip
-            style.append(_keyframes(name, times, values[:, None], move, 0.03, still))
-        style.append(f"#bar{ball}{{transform-origin:{_number(centre)}px 0}}\n")
+        for name, values in (("ball", x), ("ballname", x), ("tip", x + unit * v)):
+            part = f"{_KEY}{name}{ball}"
+            style.append(_keyframes(part, times, values[:, None], move, 0.03, still))
+        style.append(f"#{_KEY}bar{ball}{{transform-origin:{_number(centre)}px 0}}\n")
         form = "transform:translateX({}px) scaleX({})"
-        style.append(_keyframes(f"bar{ball}", times, np.column_stack([x, v]), form, 0.001, still))
+        style.append(
+            _keyframes(f"{_KEY}bar{ball}", times, np.column_stack([x, v]), form, 0.001, still)
+        )
     # The diagram: dots on the curves, and a cover that draws back to the right.
     places = np.dstack(np.broadcast_arrays(along[:, None], trace.path))
     drawn = diagram.transData.transform(places.reshape(-1, 2)).reshape(places.shape)
     for ball in shown:
         moved = (drawn[:, ball] - drawn[-1, ball]) * [1, -1]
-        style.append(
-            _keyframes(f"dot{ball}", times, moved[index], "transform:translate({}px,{}px)", 0.03,
-                       still)
-        )  # fmt: skip
+        part, move = f"{_KEY}dot{ball}", "transform:translate({}px,{}px)"
+        style.append(_keyframes(part, times, moved[index], move, 0.03, still))
     box = diagram.bbox
     hidden = (box.x1 - drawn[index, 0, 0]) / box.width
     hidden[still + 1 :] = 0.0  # beyond the last point too
-    style.append(f"#cover{{transform-origin:{_number(box.x1)}px {_number(height)}px}}\n")
+    style.append(f"#{_KEY}cover{{transform-origin:{_number(box.x1)}px {_number(height)}px}}\n")
     style.append(
-        _keyframes("cover", times, hidden[:, None], "transform:scaleX({})", 0.0005, still + 1)
+        _keyframes(
+            f"{_KEY}cover", times, hidden[:, None], "transform:scaleX({})", 0.0005, still + 1
+        )
     )
     style += _stars(trace, times)
     return "".join(style)
@@ -269,7 +292,7 @@ def _stars(trace: Trace, times: Vector) -> list[str]:
     """Return the keyframes of the stars: seen while the impulse of their contact grows."""
     style = []
     for contact, grows in enumerate((np.diff(trace.path_impulses, axis=0) > 0.0).T.tolist()):
-        name, frames, last = f"star{contact}", ["0%{opacity:0}"], False
+        name, frames, last = f"{_KEY}star{contact}", ["0%{opacity:0}"], False
         for time, now in zip(times[1:], [*grows, False], strict=False):
             if now != last:
                 frames.append(f"{_number(100 * time / times[-1])}%{{opacity:{int(now)}}}")
@@ -312,7 +335,7 @@ def animate_swing(
     >>> balls = Chain([1] * 5, [0] * 5, 1)
     >>> run = swing(balls, ImpulseCorrelation(0), [-0.03, 0, 0, 0, 0], np.linspace(0, 4, 161))
     >>> animate_swing(run)
-    Animation(8 kB)
+    Animation(9 kB)
     """
     several = [runs] if isinstance(runs, Swing) else list(runs)
     if labels and len(labels) != len(several):
@@ -323,7 +346,7 @@ def animate_swing(
     rows, style, top = [], [], 0.0
     for k, run in enumerate(several):
         label = labels[k] if labels else ""
-        drawn, motion, height = _draw_swing(run, f"s{k}b", duration, speed)
+        drawn, motion, height = _draw_swing(run, f"{_KEY}s{k}b", duration, speed)
         text = f'<text x="12" y="20" font-size="15">{escape(label)}</text>' if label else ""
         rows.append(f'<g transform="translate(0 {_number(top)})">{text}{drawn}</g>')
         style.append(motion)
@@ -333,7 +356,7 @@ def animate_swing(
         f'height="{_number(top)}" font-family="sans-serif"><rect width="480" '
         f'height="{_number(top)}" fill="white"/>{"".join(rows)}</svg>'
     )
-    return Animation(_with_style(svg, "".join(style), "[id]"))
+    return Animation(_with_style(svg, "".join(style)))
 
 
 def _lengths(run: Swing) -> Vector:

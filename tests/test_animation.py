@@ -17,7 +17,9 @@ RUN = swing(
 
 
 def keyframes(svg, name):
-    """Percentages and numbers of the keyframes of one part, and its length in seconds."""
+    """Times and numbers of the keyframes of one part."""
+    ((key, name),) = set(re.findall(rf"@keyframes (m[0-9a-f]{{8}}-)({name})\{{", svg))
+    name = key + name
     ((body,),) = [re.findall(rf"@keyframes {name}\{{((?:[^{{}}]*\{{[^}}]*\}})*)\}}", svg)]
     rows = re.findall(r"([\d.]+)%\{([^}]*)\}", body)
     number = r"-?\d+(?:\.\d+)?"
@@ -51,7 +53,7 @@ def test_dots_and_cover_are_in_step():
             slope, offset = np.polyfit(edge, x, 1)
             np.testing.assert_allclose(x, offset + slope * edge, atol=0.3)
             assert slope < 0
-        assert f'id="dot{max(shown) + 1}"' not in svg
+        assert f'-dot{max(shown) + 1}"' not in svg
 
 
 def test_nobody_moves_during_the_impact():
@@ -100,7 +102,9 @@ def test_still_for_print_and_reduced_motion():
     for svg in (animate(TRACE).svg, animate_swing(RUN, ["a < b"]).svg):
         ElementTree.fromstring(svg)  # well-formed
         for media in ("print", "(prefers-reduced-motion: reduce)"):
-            assert re.search(rf"@media {re.escape(media)} {{[^}}]*animation: none !important", svg)
+            assert re.search(
+                rf"@media {re.escape(media)} {{ \[id\^=m\w+-\] {{ animation: none", svg
+            )
         assert "<script" not in svg
         assert "http" not in re.sub(
             r'xmlns(:\w+)?="[^"]*"', "", re.sub(r"<!DOCTYPE[^>]*>", "", svg)
@@ -109,16 +113,38 @@ def test_still_for_print_and_reduced_motion():
 
 def test_the_still_of_an_impact_shows_its_end():
     svg = animate(TRACE).svg
-    assert re.search(r"#cover\{transform:scaleX\(0\);", svg)
+    assert re.search(r"-cover\{transform:scaleX\(0\);", svg)
     for ball in range(3):
         (length,) = re.findall(
-            rf"#bar{ball}\{{transform:translateX\(0px\) scaleX\(([-\d.]+)\)", svg
+            rf"-bar{ball}\{{transform:translateX\(0px\) scaleX\(([-\d.]+)\)", svg
         )
         assert float(length) == pytest.approx(0.95 * TRACE.velocities[ball], abs=1e-3)
 
 
 def test_same_picture_every_time():
     assert animate(TRACE).svg == animate(TRACE).svg
+
+
+def test_two_pictures_of_a_page_share_no_name():
+    names = [
+        set(re.findall(r"@keyframes ([\w-]+)", picture.svg))
+        for picture in (animate(TRACE), animate(TRACE, 1), animate_swing(RUN))
+    ]
+    assert all(names)
+    assert not names[0] & names[1]
+    assert not names[1] & names[2]
+    # And no style reaches beyond its picture.
+    for picture in (animate(TRACE), animate_swing(RUN)):
+        selectors = re.findall(r"(?:^|[};])\s*([#.*\[][^{};]*)\{", picture._repr_html_())
+        assert selectors
+        assert all(re.match(r"[#.][mp][0-9a-f]{8}|\[id\^=m[0-9a-f]{8}-", s) for s in selectors)
+
+
+def test_pause():
+    html = animate_swing(RUN)._repr_html_()
+    (key,) = re.findall(r'<input type="checkbox" id="(\w+)"', html)
+    assert f'<label for="{key}"' in html
+    assert re.search(rf"#{key}:checked ~ svg \* {{ animation-play-state: paused", html)
 
 
 def test_light_enough_for_a_page():
