@@ -11,11 +11,13 @@ The rooms, in that order:
 - `cradle.kernel`: the event loop; `cradle.runtime` compiles it.
 - `cradle.models`: one file a model, and the verb `collide`.
 - `cradle.swinging`: impacts and pendulums in turn; `cradle.pendulums`, `cradle.flight` and
-  `cradle.resting` say how balls hang, fly and rest against each other.
+  `cradle.resting` say how balls hang, fly and rest against each other, `cradle.swing_trace`
+  what happened.
 - `cradle.closed_form`: what the paper gives in closed form.
 - `cradle.tables`: the paper's tables and chains.
 - `cradle.measures`: what is read off outcomes.
-- `cradle.figures` and `cradle.animation`: matplotlib, imported only when asked for.
+- `cradle.figures` and `cradle.animation`: matplotlib, imported only when asked for;
+  `cradle.film`: keyframes.
 """
 
 from cradle.chain import Chain
@@ -26,7 +28,8 @@ from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
 from cradle.pendulums import Pendulums
-from cradle.swinging import Impact, Swing, swing
+from cradle.swing_trace import Impact, Swing
+from cradle.swinging import swing
 from cradle.tables import paper_chain, paper_sequences, ratio_table, restitution_table
 from cradle.trace import Event, ImpactNotFinished, Trace
 

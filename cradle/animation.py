@@ -1,20 +1,10 @@
-"""Moving pictures of an impact and of a swing, as SVG with keyframes in CSS.
-
-A film of pixels would need some hundred frames.  Here the solver's own events are the keyframes:
-between two events of an impact every velocity is linear in the progress, and a browser
-interpolates linearly.  So the motion is exact, sharp at any size, and a few kilobytes long.  A
-style sheet, unlike SMIL, can also honour a reader who asks for less motion, and paper: both get
-the still.
-"""
+"""Moving pictures of an impact, drawn by matplotlib, and of a swing; see `cradle.film`."""
 
 from __future__ import annotations
 
 import io
-import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from html import escape
-from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -22,109 +12,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
-from numpy.typing import NDArray
 
 from cradle.chain import Vector
 from cradle.figures import PALETTE, progress, velocities, velocity_impulse
-from cradle.swinging import Swing
+from cradle.film import KEY, Animation, keyframes, number, with_style
+from cradle.swing_trace import Swing
 from cradle.trace import Trace
 
 __all__ = ["Animation", "animate", "animate_swing"]
 
-# Stands before the name of every moving part, until the picture's own key takes its place.
-_KEY = "moving-part-"
-_STYLE_OF_ALL = '<style type="text/css">*{stroke-linejoin: round; stroke-linecap: butt}</style>'
 # Seconds of the flight before the impact, of the impact, of the flight after it, and of a rest.
 _ACTS = (1.5, 5.0, 2.0, 1.5)
 
 
-@dataclass(frozen=True)
-class Animation:
-    """A moving picture; a notebook shows it with a box to tick for a pause.
-
-    In a page it is part of the page, not an image file: browsers tell image files neither that
-    they are printed nor that they should pause.
-
-    Attributes
-    ----------
-    svg : str
-        The picture as a file.
-
-    Examples
-    --------
-    >>> Animation("<svg/>")
-    Animation(0 kB)
-    """
-
-    svg: str
-
-    def _repr_html_(self) -> str:
-        key = f"p{zlib.crc32(self.svg.encode()):08x}"
-        style = (
-            f"#{key}:checked ~ svg * {{ animation-play-state: paused !important }}\n"
-            f"@media print, (prefers-reduced-motion: reduce) {{ .{key} {{ display: none }} }}"
-        )
-        box = f'<input type="checkbox" id="{key}" class="{key}">'
-        return (
-            f'<div class="animation"><style>{style}</style>{box}'
-            f'<label for="{key}" class="{key}"> pause</label><br>{self.svg}</div>'
-        )
-
-    def __repr__(self) -> str:
-        """Return a short account."""
-        return f"Animation({len(self.svg.encode()) / 1000:.0f} kB)"
-
-    def save(self, path: str | Path) -> None:
-        """Write the picture to an SVG file.
-
-        Examples
-        --------
-        >>> Animation("<svg/>").save("/dev/null")
-        """
-        Path(path).write_text(self.svg, encoding="utf-8")
-
-
-def _thin(times: Vector, values: Vector, tolerance: float) -> NDArray[np.int64]:
-    """Return the rows that straight lines need to stay within the tolerance (Douglas, Peucker)."""
-    keep = np.zeros(len(times), dtype=bool)
-    keep[[0, -1]] = True
-    spans = [(0, len(times) - 1)]
-    while spans:
-        a, b = spans.pop()
-        if b - a < 2:
-            continue
-        part = (times[a + 1 : b] - times[a]) / ((times[b] - times[a]) or 1.0)
-        line = values[a] + part[:, None] * (values[b] - values[a])
-        off = np.abs(values[a + 1 : b] - line).max(axis=1)
-        if off.max() > tolerance:
-            middle = a + 1 + int(np.argmax(off))
-            keep[middle] = True
-            spans += [(a, middle), (middle, b)]
-    return np.flatnonzero(keep)
-
-
-def _number(value: float) -> str:
-    return f"{value:.3f}".rstrip("0").rstrip(".")
-
-
-def _keyframes(
-    name: str, times: Vector, values: Vector, form: str, tolerance: float, still: int
-) -> str:
-    """Return the style of one moving part: where it rests, and how it moves.
-
-    `form` makes the CSS of a row of `values`; row `still` is the still's.
-    """
-
-    def css(row: int) -> str:
-        return form.format(*(_number(round(float(value), 3) + 0.0) for value in values[row]))
-
-    rows = _thin(times, values, tolerance).tolist()
-    frames = " ".join(f"{_number(100 * times[k] / times[-1])}%{{{css(k)}}}" for k in rows)
-    moves = f"animation:{name} {_number(times[-1])}s linear infinite"
-    return f"#{name}{{{css(still)};{moves}}}\n@keyframes {name}{{{frames}}}\n"
-
-
-def animate(trace: Trace, contact: int | None = None) -> Animation:
+def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Animation:
     """Show an impact in slow motion: the balls, and their velocities being drawn.
 
     The balls fly in.  Then the clock stands still, for an impact takes no time: the diagram grows
@@ -138,6 +39,8 @@ def animate(trace: Trace, contact: int | None = None) -> Animation:
     contact : int, optional
         Draw this contact's velocity-impulse diagram.  If left out, the velocities of all balls
         against the sum of all impulses.
+    alt : str
+        What the picture shows, for those who do not see it.
 
     Returns
     -------
@@ -147,8 +50,8 @@ def animate(trace: Trace, contact: int | None = None) -> Animation:
     Examples
     --------
     >>> from cradle import Chain, ImpulseCorrelation, collide
-    >>> animate(collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15)))
-    Animation(45 kB)
+    >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
+    >>> animate(trace).save("impact.svg")  # doctest: +SKIP
     """
     with mpl.rc_context({"svg.hashsalt": "cradle", "svg.fonttype": "path", "font.size": 10}):
         # At 72 dots an inch, points of the figure are units of the file.
@@ -163,39 +66,21 @@ def animate(trace: Trace, contact: int | None = None) -> Animation:
             along, shown = trace.path_impulses[:, contact], range(contact, contact + 2)
         x, y = diagram.get_xlim(), diagram.get_ylim()
         cover = Rectangle((x[0], y[0]), x[1] - x[0], y[1] - y[0], fc="white", alpha=0.9, zorder=4)
-        cover.set_gid(f"{_KEY}cover")
+        cover.set_gid(f"{KEY}cover")
         diagram.add_patch(cover)
         for ball in shown:
             (dot,) = diagram.plot(
                 along[-1], trace.velocities[ball], "o", ms=9, mfc="white",
                 mec=PALETTE[ball % len(PALETTE)], mew=2.5, zorder=6, clip_on=False,
             )  # fmt: skip
-            dot.set_gid(f"{_KEY}dot{ball}")
+            dot.set_gid(f"{KEY}dot{ball}")
         diagram.set(xlim=x, ylim=y)
         file = io.StringIO()
         figure.savefig(
             file, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type"))
         )
     style = _impact_style(trace, row, diagram, along, list(shown))
-    return Animation(_with_style(file.getvalue(), style))
-
-
-def _with_style(svg: str, style: str) -> str:
-    """Put a style sheet into a picture; stillness for those who ask for it, and on paper.
-
-    In a page the names of all pictures share one space, so each gets a key of its own.
-    """
-    still = "".join(
-        f"@media {media} {{ [id^={_KEY}] {{ animation: none !important }} }}\n"
-        for media in ("print", "(prefers-reduced-motion: reduce)")
-    )
-    start = svg.index("<svg")
-    head = svg.index(">", start)
-    # Matplotlib sets these two for `*`: in a page that would be every picture.
-    root = 'style="max-width:100%;height:auto;stroke-linejoin:round;stroke-linecap:butt"'
-    body = svg[head + 1 :].replace(_STYLE_OF_ALL, "")
-    moving = f"{svg[start:head]} {root}>\n<style>\n{style}{still}</style>{body}"
-    return moving.replace(_KEY, f"m{zlib.crc32(moving.encode()):08x}-")
+    return Animation(with_style(file.getvalue(), style, alt))
 
 
 def _radii(masses: Vector) -> Vector:
@@ -220,10 +105,10 @@ def _draw_balls(trace: Trace, ax: Axes) -> None:
             ("tip", ax.add_patch(Circle((x, 0.73), 0.09, fc="white", ec=colour, lw=2))),
         ]
         for name, part in parts:
-            part.set_gid(f"{_KEY}{name}{ball}")
+            part.set_gid(f"{KEY}{name}{ball}")
     for contact, x in enumerate((centres + radii)[:-1].tolist()):
         (star,) = ax.plot(x, 0, "*", ms=15, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
-        star.set_gid(f"{_KEY}star{contact}")
+        star.set_gid(f"{KEY}star{contact}")
     reach = 2.6
     ax.set(xlim=(-reach, centres[-1] + radii[-1] + reach), ylim=(-0.6, 0.95), aspect="equal")
     ax.set_axis_off()
@@ -261,28 +146,26 @@ def _impact_style(
         x, v = shift[:, ball], trace.path[index, ball] * bar
         move = "transform:translateX({}px)"
         for name, values in (("ball", x), ("ballname", x), ("tip", x + unit * v)):
-            part = f"{_KEY}{name}{ball}"
-            style.append(_keyframes(part, times, values[:, None], move, 0.03, still))
-        style.append(f"#{_KEY}bar{ball}{{transform-origin:{_number(centre)}px 0}}\n")
+            part = f"{KEY}{name}{ball}"
+            style.append(keyframes(part, times, values[:, None], move, 0.03, still))
+        style.append(f"#{KEY}bar{ball}{{transform-origin:{number(centre)}px 0}}\n")
         form = "transform:translateX({}px) scaleX({})"
         style.append(
-            _keyframes(f"{_KEY}bar{ball}", times, np.column_stack([x, v]), form, 0.001, still)
+            keyframes(f"{KEY}bar{ball}", times, np.column_stack([x, v]), form, 0.001, still)
         )
     # The diagram: dots on the curves, and a cover that draws back to the right.
     places = np.dstack(np.broadcast_arrays(along[:, None], trace.path))
     drawn = diagram.transData.transform(places.reshape(-1, 2)).reshape(places.shape)
     for ball in shown:
         moved = (drawn[:, ball] - drawn[-1, ball]) * [1, -1]
-        part, move = f"{_KEY}dot{ball}", "transform:translate({}px,{}px)"
-        style.append(_keyframes(part, times, moved[index], move, 0.03, still))
+        part, move = f"{KEY}dot{ball}", "transform:translate({}px,{}px)"
+        style.append(keyframes(part, times, moved[index], move, 0.03, still))
     box = diagram.bbox
     hidden = (box.x1 - drawn[index, 0, 0]) / box.width
     hidden[still + 1 :] = 0.0  # beyond the last point too
-    style.append(f"#{_KEY}cover{{transform-origin:{_number(box.x1)}px {_number(height)}px}}\n")
+    style.append(f"#{KEY}cover{{transform-origin:{number(box.x1)}px {number(height)}px}}\n")
     style.append(
-        _keyframes(
-            f"{_KEY}cover", times, hidden[:, None], "transform:scaleX({})", 0.0005, still + 1
-        )
+        keyframes(f"{KEY}cover", times, hidden[:, None], "transform:scaleX({})", 0.0005, still + 1)
     )
     style += _stars(trace, times)
     return "".join(style)
@@ -292,21 +175,21 @@ def _stars(trace: Trace, times: Vector) -> list[str]:
     """Return the keyframes of the stars: seen while the impulse of their contact grows."""
     style = []
     for contact, grows in enumerate((np.diff(trace.path_impulses, axis=0) > 0.0).T.tolist()):
-        name, frames, last = f"{_KEY}star{contact}", ["0%{opacity:0}"], False
+        name, frames, last = f"{KEY}star{contact}", ["0%{opacity:0}"], False
         for time, now in zip(times[1:], [*grows, False], strict=False):
             if now != last:
-                frames.append(f"{_number(100 * time / times[-1])}%{{opacity:{int(now)}}}")
+                frames.append(f"{number(100 * time / times[-1])}%{{opacity:{int(now)}}}")
                 last = now
         # Steps: a star keeps its state until the next keyframe.
         style.append(
-            f"#{name}{{opacity:0;animation:{name} {_number(times[-1])}s step-end infinite}}\n"
+            f"#{name}{{opacity:0;animation:{name} {number(times[-1])}s step-end infinite}}\n"
             f"@keyframes {name}{{{' '.join(frames)}}}\n"
         )
     return style
 
 
 def animate_swing(
-    runs: Swing | Sequence[Swing], labels: Sequence[str] = (), *, speed: float = 1.0
+    runs: Swing | Sequence[Swing], labels: Sequence[str] = (), *, speed: float = 1.0, alt: str = ""
 ) -> Animation:
     """Show one swing or several, one below the other, by the same clock.
 
@@ -318,6 +201,8 @@ def animate_swing(
         A line of text above each.
     speed : float
         1 plays in real time, less in slow motion.
+    alt : str
+        What the picture shows, for those who do not see it.
 
     Returns
     -------
@@ -334,8 +219,8 @@ def animate_swing(
     >>> from cradle import Chain, ImpulseCorrelation, swing
     >>> balls = Chain([1] * 5, [0] * 5, 1)
     >>> run = swing(balls, ImpulseCorrelation(0), [-0.03, 0, 0, 0, 0], np.linspace(0, 4, 161))
-    >>> animate_swing(run)
-    Animation(9 kB)
+    >>> animate_swing(run).svg.count("@keyframes")
+    5
     """
     several = [runs] if isinstance(runs, Swing) else list(runs)
     if labels and len(labels) != len(several):
@@ -346,17 +231,17 @@ def animate_swing(
     rows, style, top = [], [], 0.0
     for k, run in enumerate(several):
         label = labels[k] if labels else ""
-        drawn, motion, height = _draw_swing(run, f"{_KEY}s{k}b", duration, speed)
+        drawn, motion, height = _draw_swing(run, f"{KEY}s{k}b", duration, speed)
         text = f'<text x="12" y="20" font-size="15">{escape(label)}</text>' if label else ""
-        rows.append(f'<g transform="translate(0 {_number(top)})">{text}{drawn}</g>')
+        rows.append(f'<g transform="translate(0 {number(top)})">{text}{drawn}</g>')
         style.append(motion)
         top += height + (14 if label else 0)
     svg = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 480 {_number(top)}" width="480" '
-        f'height="{_number(top)}" font-family="sans-serif"><rect width="480" '
-        f'height="{_number(top)}" fill="white"/>{"".join(rows)}</svg>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 480 {number(top)}" width="480" '
+        f'height="{number(top)}" font-family="sans-serif"><rect width="480" '
+        f'height="{number(top)}" fill="white"/>{"".join(rows)}</svg>'
     )
-    return Animation(_with_style(svg, "".join(style)))
+    return Animation(with_style(svg, "".join(style), alt))
 
 
 def _lengths(run: Swing) -> Vector:
@@ -386,18 +271,18 @@ def _draw_swing(run: Swing, name: str, duration: float, speed: float) -> tuple[s
     for ball, (x, length, radius) in enumerate(zip(pivots, lengths, radii, strict=True)):
         y, part = beam + length * scale, f"{name}{ball}"
         drawn.append(
-            f'<g id="{part}"><path d="M{_number(x)} {beam}V{_number(y - radius)}" stroke="#555"/>'
-            f'<circle cx="{_number(x)}" cy="{_number(y)}" r="{_number(radius - 1.25)}" '
+            f'<g id="{part}"><path d="M{number(x)} {beam}V{number(y - radius)}" stroke="#555"/>'
+            f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(radius - 1.25)}" '
             f'fill="#f2f2f2" stroke-width="2.5" stroke="{PALETTE[ball % len(PALETTE)]}"/>'
-            f'<text x="{_number(x)}" y="{_number(y + 5)}" font-size="14" '
+            f'<text x="{number(x)}" y="{number(y + 5)}" font-size="14" '
             f'text-anchor="middle">{ball + 1}</text></g>'
         )
         # A positive angle of SVG turns what hangs to the left.
         angle = -np.degrees(places[:, ball] / length)
-        style.append(f"#{part}{{transform-origin:{_number(x)}px {beam}px}}\n")
-        style.append(_keyframes(part, times, angle[:, None], "transform:rotate({}deg)", 0.1, 0))
+        style.append(f"#{part}{{transform-origin:{number(x)}px {beam}px}}\n")
+        style.append(keyframes(part, times, angle[:, None], "transform:rotate({}deg)", 0.1, 0))
     ends = pivots[0] - 30, pivots[-1] + 30
     drawn.append(
-        f'<path d="M{_number(ends[0])} {beam}H{_number(ends[1])}" stroke="#333" stroke-width="4"/>'
+        f'<path d="M{number(ends[0])} {beam}H{number(ends[1])}" stroke="#333" stroke-width="4"/>'
     )
     return "".join(drawn), "".join(style), low

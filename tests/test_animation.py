@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, collide, swing
-from cradle.animation import Animation, _thin, animate, animate_swing
+from cradle.animation import animate, animate_swing
+from cradle.film import Animation, thin
 
 TRACE = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
 RUN = swing(
@@ -140,6 +141,12 @@ def test_two_pictures_of_a_page_share_no_name():
         assert all(re.match(r"[#.][mp][0-9a-f]{8}|\[id\^=m[0-9a-f]{8}-", s) for s in selectors)
 
 
+def test_words_for_those_who_do_not_see_it():
+    svg = animate_swing(RUN, alt='"A" & b').svg
+    assert ElementTree.fromstring(svg).attrib["aria-label"] == '"A" & b'
+    assert "aria-label" not in animate_swing(RUN).svg
+
+
 def test_pause():
     html = animate_swing(RUN)._repr_html_()
     (key,) = re.findall(r'<input type="checkbox" id="(\w+)"', html)
@@ -167,7 +174,7 @@ def test_no_impact_and_no_duration():
 def test_thinning_stays_within_its_tolerance():
     times = np.linspace(0, 1, 201)
     values = np.column_stack([times * (1 - times), np.abs(times - 0.3)])
-    rows = _thin(times, values, 0.003)
+    rows = thin(times, values, 0.003)
     for k in range(2):
         line = np.interp(times, times[rows], values[rows, k])
         assert np.abs(line - values[:, k]).max() <= 0.003
