@@ -1,6 +1,7 @@
 """Numbers of the chapter on the toy, by other routes than the chapter's."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -165,3 +166,26 @@ def test_exercises():
     counted = 1 + int(np.argmax(5 * five.var(axis=1) / 0.8 < 0.01))
     assert CHAPTER.printed("exercise-drift") == f"two balls {k} strokes, five balls {counted}\n"
     assert CHAPTER.printed("exercise-middle") == "always moving: ball 3\n"
+
+
+def test_fig_toy_inside_and_film():
+    """The stored pictures move as the independent solver says."""
+    inside = CHAPTER.cells["inside"].outputs[0].data["text/html"]
+    bars = [
+        float(x)
+        for x in re.findall(r"-bar\d\{transform:translateX\(0px\) scaleX\(([-\d.]+)\);", inside)
+    ]
+    expected = strokes(2, [1, 0, 0, 0, 0])[1]
+    np.testing.assert_allclose(np.array(bars) / bars[0], expected / expected[0], atol=2e-3)
+    film = CHAPTER.cells["film"].outputs[0].data["text/html"]
+    for row, ratio in enumerate((0, RATIO, 0.5)):
+        v = strokes(1, [1, 0, 0, 0, 0], ratio=ratio)[0]
+        for ball in range(5):
+            ((frames),) = re.findall(rf"@keyframes m\w+-s{row}b{ball}\{{(.*)\}}\n", film)
+            found = np.array(
+                re.findall(r"([\d.]+)%\{transform:rotate\(([-\d.]+)deg", frames), float
+            )
+            # At half speed, six periods less one frame: the widest angle after the first stroke.
+            seconds = found[:, 0] / 100 * (6 - 1 / 40) * PERIOD * 2
+            angle = np.interp(PERIOD, seconds, found[:, 1])
+            assert angle == pytest.approx(-math.degrees(BACK / LENGTH * v[ball]), abs=0.3)
