@@ -189,7 +189,12 @@ def _stars(trace: Trace, times: Vector) -> list[str]:
 
 
 def animate_swing(
-    runs: Swing | Sequence[Swing], labels: Sequence[str] = (), *, speed: float = 1.0, alt: str = ""
+    runs: Swing | Sequence[Swing],
+    labels: Sequence[str] = (),
+    *,
+    speed: float = 1.0,
+    still: float = 0.0,
+    alt: str = "",
 ) -> Animation:
     """Show one swing or several, one below the other, by the same clock.
 
@@ -201,13 +206,16 @@ def animate_swing(
         A line of text above each.
     speed : float
         1 plays in real time, less in slow motion.
+    still : float
+        Which instant stands still in print and for readers who ask for less motion, s after the
+        first of the times.
     alt : str
         What the picture shows, for those who do not see it.
 
     Returns
     -------
     Animation
-        The still shows the balls at the first of the times.
+        The picture.
 
     Raises
     ------
@@ -231,7 +239,7 @@ def animate_swing(
     rows, style, top = [], [], 0.0
     for k, run in enumerate(several):
         label = labels[k] if labels else ""
-        drawn, motion, height = _draw_swing(run, f"{KEY}s{k}b", duration, speed)
+        drawn, motion, height = _draw_swing(run, f"{KEY}s{k}b", duration, speed, still)
         text = f'<text x="12" y="20" font-size="15">{escape(label)}</text>' if label else ""
         rows.append(f'<g transform="translate(0 {number(top)})">{text}{drawn}</g>')
         style.append(motion)
@@ -248,7 +256,9 @@ def _lengths(run: Swing) -> Vector:
     return run.pendulums.row("length", len(run.chain))
 
 
-def _draw_swing(run: Swing, name: str, duration: float, speed: float) -> tuple[str, str, float]:
+def _draw_swing(
+    run: Swing, name: str, duration: float, speed: float, still: float
+) -> tuple[str, str, float]:
     """Return a swing's picture, its keyframes and its height."""
     lengths = _lengths(run)
     scale = 105.0 / float(lengths.max())  # units of the file in a metre
@@ -266,8 +276,9 @@ def _draw_swing(run: Swing, name: str, duration: float, speed: float) -> tuple[s
     times[1:] -= run.times[0]
     places = np.vstack([run.positions[:1], run.positions[inside], *(hit.positions for hit in hits)])
     order = np.argsort(times, kind="stable")
-    times, places = times[order] / speed, places[order]
-    drawn, style = [], []
+    times, places = times[order], places[order]
+    row = int(np.argmin(np.abs(times - still)))
+    drawn, style, turn = [], [], "transform:rotate({}deg)"
     for ball, (x, length, radius) in enumerate(zip(pivots, lengths, radii, strict=True)):
         y, part = beam + length * scale, f"{name}{ball}"
         drawn.append(
@@ -280,7 +291,7 @@ def _draw_swing(run: Swing, name: str, duration: float, speed: float) -> tuple[s
         # A positive angle of SVG turns what hangs to the left.
         angle = -np.degrees(places[:, ball] / length)
         style.append(f"#{part}{{transform-origin:{number(x)}px {beam}px}}\n")
-        style.append(keyframes(part, times, angle[:, None], "transform:rotate({}deg)", 0.1, 0))
+        style.append(keyframes(part, times / speed, angle[:, None], turn, 0.1, row))
     ends = pivots[0] - 30, pivots[-1] + 30
     drawn.append(
         f'<path d="M{number(ends[0])} {beam}H{number(ends[1])}" stroke="#333" stroke-width="4"/>'

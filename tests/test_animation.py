@@ -94,6 +94,13 @@ def test_swing_angles_are_those_of_the_run():
     np.testing.assert_allclose(np.interp(hits, times, angle[:, 0]), expected, atol=0.15)
 
 
+def test_the_still_of_a_swing_is_the_instant_asked_for():
+    svg = animate_swing(RUN, still=RUN.times[20]).svg
+    for ball in range(3):
+        (angle,) = re.findall(rf"-s0b{ball}\{{transform:rotate\(([-\d.]+)deg\);", svg)
+        assert float(angle) == pytest.approx(-np.degrees(RUN.positions[20, ball] / 0.1), abs=1e-3)
+
+
 def test_speed():
     slow = keyframes(animate_swing(RUN, speed=0.25).svg, "s0b0")[0]
     assert slow[-1] == pytest.approx(12)
