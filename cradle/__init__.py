@@ -9,15 +9,20 @@ The rooms, in that order:
 - `cradle.chain`: the chain before the impact; `cradle.checks` and `cradle.reals`: what is asked of
   input; `cradle.drawing`: pictures and tables for notebooks.
 - `cradle.trace`: what happened.
-- `cradle.kernel`: the event loop; `cradle.runtime` compiles it.
+- `cradle.kernel`: the event loop; `cradle.runtime` compiles it, `cradle.drive` feeds it.
 - `cradle.models`: one file a model, and the verb `collide`.
+- `cradle.swinging`: impacts and pendulums in turn; `cradle.pendulums`, `cradle.flight` and
+  `cradle.resting` say how balls hang, fly and rest against each other, `cradle.swing_trace`
+  what happened.
 - `cradle.closed_form`: what the paper gives in closed form; `cradle.conserving`: all outcomes of
   three balls that conserve energy.
 - `cradle.tables`: the paper's tables and chains, read by `cradle.reading`.
 - `cradle.measures`: what is read off outcomes; `cradle.blocks`: batches under dask.
-- `cradle.figures`: matplotlib, imported only when asked for.
+- `cradle.figures` and `cradle.animation`: matplotlib, imported only when asked for;
+  `cradle.film`: keyframes.
 
-The distribution is called cradle-companion; its version is `cradle.__version__`.
+Read `cradle.textbook` first: the rules of an impact in 250 lines.  The distribution is called
+cradle-companion; its version is `cradle.__version__`.
 """
 
 from cradle.chain import Chain
@@ -28,6 +33,9 @@ from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
+from cradle.pendulums import Pendulums
+from cradle.swing_trace import Impact, Swing
+from cradle.swinging import swing
 from cradle.tables import paper_chain, paper_sequences, ratio_table, restitution_table
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
@@ -38,14 +46,17 @@ __all__ = [
     "EnergyTrace",
     "Event",
     "FusedChain",
+    "Impact",
     "ImpactNotCertified",
     "ImpactNotFinished",
     "ImpulseCorrelation",
     "Model",
     "Outcomes",
+    "Pendulums",
     "QuadraticDissipation",
     "SequentialCollisions",
     "SpringChain",
+    "Swing",
     "TimedTrace",
     "Trace",
     "collide",
@@ -55,6 +66,7 @@ __all__ = [
     "post_impact_velocities",
     "ratio_table",
     "restitution_table",
+    "swing",
 ]
 
 

@@ -1,0 +1,299 @@
+"""Moving pictures of an impact, drawn by matplotlib, and of a swing; see `cradle.film`."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+
+from cradle.chain import Vector
+from cradle.figures import PALETTE, progress, velocities, velocity_impulse
+from cradle.film import KEY, Animation, keyframes, number, with_style
+from cradle.swing_trace import Swing
+from cradle.trace import Trace
+
+__all__ = ["Animation", "animate", "animate_swing"]
+
+# Seconds of the flight before the impact, of the impact, of the flight after it, and of a rest.
+_ACTS = (1.5, 5.0, 2.0, 1.5)
+
+
+def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Animation:
+    """Show an impact in slow motion: the balls, and their velocities being drawn.
+
+    The balls fly in.  Then the clock stands still, for an impact takes no time: the diagram grows
+    with the impulses, a star marks each contact that is pressed, and the bars on the balls are
+    their velocities at that point of the diagram.  At last the balls fly off.
+
+    Parameters
+    ----------
+    trace : Trace
+        The impact.
+    contact : int, optional
+        Draw this contact's velocity-impulse diagram.  If left out, the velocities of all balls
+        against the sum of all impulses.
+    alt : str
+        What the picture shows, for those who do not see it.
+
+    Returns
+    -------
+    Animation
+        The still shows the whole diagram, and the velocities after the impact.
+
+    Examples
+    --------
+    >>> from cradle import Chain, ImpulseCorrelation, collide
+    >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
+    >>> animate(trace).save("impact.svg")  # doctest: +SKIP
+    """
+    with mpl.rc_context({"svg.hashsalt": "cradle", "svg.fonttype": "path", "font.size": 10}):
+        # At 72 dots an inch, points of the figure are units of the file.
+        figure = Figure(figsize=(6.4, 5.4), dpi=72, layout="constrained", facecolor="white")
+        row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.6])
+        _draw_balls(trace, row)
+        if contact is None:
+            velocities(trace, diagram)
+            along, shown = progress(trace), range(len(trace.chain))
+        else:
+            velocity_impulse(trace, contact, diagram)
+            along, shown = trace.path_impulses[:, contact], range(contact, contact + 2)
+        x, y = diagram.get_xlim(), diagram.get_ylim()
+        cover = Rectangle((x[0], y[0]), x[1] - x[0], y[1] - y[0], fc="white", alpha=0.9, zorder=4)
+        cover.set_gid(f"{KEY}cover")
+        diagram.add_patch(cover)
+        for ball in shown:
+            (dot,) = diagram.plot(
+                along[-1], trace.velocities[ball], "o", ms=9, mfc="white",
+                mec=PALETTE[ball % len(PALETTE)], mew=2.5, zorder=6, clip_on=False,
+            )  # fmt: skip
+            dot.set_gid(f"{KEY}dot{ball}")
+        diagram.set(xlim=x, ylim=y)
+        file = io.StringIO()
+        figure.savefig(
+            file, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type"))
+        )
+    style = _impact_style(trace, row, diagram, along, list(shown))
+    return Animation(with_style(file.getvalue(), style, alt))
+
+
+def _radii(masses: Vector) -> Vector:
+    return np.asarray(0.5 * np.cbrt(masses / masses.max()))
+
+
+def _bar_length(trace: Trace) -> float:
+    """Return the length of a bar for 1 m/s, in diameters of the largest ball."""
+    return 0.95 / (float(np.abs(trace.path).max()) or 1.0)
+
+
+def _draw_balls(trace: Trace, ax: Axes) -> None:
+    """Draw the balls as they touch, a star on each contact, and a bar of unit length on each."""
+    radii = _radii(trace.chain.masses)
+    centres = np.cumsum(2 * radii) - radii
+    for ball, (x, radius) in enumerate(zip(centres.tolist(), radii.tolist(), strict=True)):
+        colour = PALETTE[ball % len(PALETTE)]
+        parts: list[tuple[str, Any]] = [
+            ("ball", ax.add_patch(Circle((x, 0), radius, fc="0.95", ec=colour, lw=2))),
+            ("ballname", ax.text(x, -0.02, f"{ball + 1}", ha="center", va="center", size=12)),
+            ("bar", ax.add_patch(Rectangle((x, 0.68), 1, 0.1, fc=colour, ec="none"))),
+            ("tip", ax.add_patch(Circle((x, 0.73), 0.09, fc="white", ec=colour, lw=2))),
+        ]
+        for name, part in parts:
+            part.set_gid(f"{KEY}{name}{ball}")
+    for contact, x in enumerate((centres + radii)[:-1].tolist()):
+        (star,) = ax.plot(x, 0, "*", ms=15, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
+        star.set_gid(f"{KEY}star{contact}")
+    reach = 2.6
+    ax.set(xlim=(-reach, centres[-1] + radii[-1] + reach), ylim=(-0.6, 0.95), aspect="equal")
+    ax.set_axis_off()
+
+
+def _impact_style(
+    trace: Trace, row: Axes, diagram: Axes, along: Vector, shown: Sequence[int]
+) -> str:
+    """Return the keyframes: one at each event, and at the ends of the flights."""
+    height = row.get_figure().bbox.height  # type: ignore[union-attr]
+    before, slow, after, rest = _ACTS
+    events = len(trace.path)
+    done = progress(trace)
+    share = done / done[-1] if done[-1] else np.linspace(0, 1, events)
+    times = np.concatenate(
+        [[0.0], before + slow * share, [before + slow + after, sum(_ACTS[:3]) + rest]]
+    )
+    index = np.clip(np.arange(-1, events + 2), 0, events - 1)
+    still = events  # the end of the impact
+    # Where each ball is drawn, in units of the file: it moves in the flights alone.
+    unit = float(row.transData.transform((1, 0))[0] - row.transData.transform((0, 0))[0])
+    per_speed = 1.9 / (float(np.abs(trace.path[[0, -1]]).max()) or 1.0)
+    come = 0.0 if (trace.chain.closing_speeds < 0.0).any() else -per_speed
+    shift = np.zeros((len(times), len(trace.chain)))
+    shift[0] = come * unit * trace.path[0]
+    shift[-2:] = per_speed * unit * trace.velocities
+    shift[-1] = shift[-2]
+    radii = _radii(trace.chain.masses)
+    centres = row.transData.transform(
+        np.column_stack([np.cumsum(2 * radii) - radii, np.full(len(radii), 0.73)])
+    )
+    bar = _bar_length(trace)
+    style: list[str] = []
+    for ball, centre in enumerate(centres[:, 0].tolist()):
+        x, v = shift[:, ball], trace.path[index, ball] * bar
+        move = "transform:translateX({}px)"
+        for name, values in (("ball", x), ("ballname", x), ("tip", x + unit * v)):
+            part = f"{KEY}{name}{ball}"
+            style.append(keyframes(part, times, values[:, None], move, 0.03, still))
+        style.append(f"#{KEY}bar{ball}{{transform-origin:{number(centre)}px 0}}\n")
+        form = "transform:translateX({}px) scaleX({})"
+        style.append(
+            keyframes(f"{KEY}bar{ball}", times, np.column_stack([x, v]), form, 0.001, still)
+        )
+    # The diagram: dots on the curves, and a cover that draws back to the right.
+    places = np.dstack(np.broadcast_arrays(along[:, None], trace.path))
+    drawn = diagram.transData.transform(places.reshape(-1, 2)).reshape(places.shape)
+    for ball in shown:
+        moved = (drawn[:, ball] - drawn[-1, ball]) * [1, -1]
+        part, move = f"{KEY}dot{ball}", "transform:translate({}px,{}px)"
+        style.append(keyframes(part, times, moved[index], move, 0.03, still))
+    box = diagram.bbox
+    hidden = (box.x1 - drawn[index, 0, 0]) / box.width
+    hidden[still + 1 :] = 0.0  # beyond the last point too
+    style.append(f"#{KEY}cover{{transform-origin:{number(box.x1)}px {number(height)}px}}\n")
+    style.append(
+        keyframes(f"{KEY}cover", times, hidden[:, None], "transform:scaleX({})", 0.0005, still + 1)
+    )
+    style += _stars(trace, times)
+    return "".join(style)
+
+
+def _stars(trace: Trace, times: Vector) -> list[str]:
+    """Return the keyframes of the stars: seen while the impulse of their contact grows."""
+    style = []
+    for contact, grows in enumerate((np.diff(trace.path_impulses, axis=0) > 0.0).T.tolist()):
+        name, frames, last = f"{KEY}star{contact}", ["0%{opacity:0}"], False
+        for time, now in zip(times[1:], [*grows, False], strict=False):
+            if now != last:
+                frames.append(f"{number(100 * time / times[-1])}%{{opacity:{int(now)}}}")
+                last = now
+        # Steps: a star keeps its state until the next keyframe.
+        style.append(
+            f"#{name}{{opacity:0;animation:{name} {number(times[-1])}s step-end infinite}}\n"
+            f"@keyframes {name}{{{' '.join(frames)}}}\n"
+        )
+    return style
+
+
+def animate_swing(
+    runs: Swing | Sequence[Swing],
+    labels: Sequence[str] = (),
+    *,
+    speed: float = 1.0,
+    still: float = 0.0,
+    alt: str = "",
+) -> Animation:
+    """Show one swing or several, one below the other, by the same clock.
+
+    Parameters
+    ----------
+    runs : Swing or sequence of Swing
+        Their times are the keyframes, with the impacts in between: twenty in a swing suffice.
+    labels : sequence of str
+        A line of text above each.
+    speed : float
+        1 plays in real time, less in slow motion.
+    still : float
+        Which instant stands still in print and for readers who ask for less motion, s after the
+        first of the times.
+    alt : str
+        What the picture shows, for those who do not see it.
+
+    Returns
+    -------
+    Animation
+        The picture.
+
+    Raises
+    ------
+    ValueError
+        If a run has no duration, or there are not as many labels as runs.
+
+    Examples
+    --------
+    >>> from cradle import Chain, ImpulseCorrelation, swing
+    >>> balls = Chain([1] * 5, [0] * 5, 1)
+    >>> run = swing(balls, ImpulseCorrelation(0), [-0.03, 0, 0, 0, 0], np.linspace(0, 4, 161))
+    >>> animate_swing(run).svg.count("@keyframes")
+    5
+    """
+    several = [runs] if isinstance(runs, Swing) else list(runs)
+    if labels and len(labels) != len(several):
+        raise ValueError(f"labels has {len(labels)} lines; {len(several)} swings need as many")
+    duration = min(run.times[-1] - run.times[0] for run in several) if several else 0.0
+    if not duration > 0.0:
+        raise ValueError("runs has no swing, or one without a duration")
+    rows, style, top = [], [], 0.0
+    for k, run in enumerate(several):
+        label = labels[k] if labels else ""
+        drawn, motion, height = _draw_swing(run, f"{KEY}s{k}b", duration, speed, still)
+        text = f'<text x="12" y="20" font-size="15">{escape(label)}</text>' if label else ""
+        rows.append(f'<g transform="translate(0 {number(top)})">{text}{drawn}</g>')
+        style.append(motion)
+        top += height + (14 if label else 0)
+    svg = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 480 {number(top)}" width="480" '
+        f'height="{number(top)}" font-family="sans-serif"><rect width="480" '
+        f'height="{number(top)}" fill="white"/>{"".join(rows)}</svg>'
+    )
+    return Animation(with_style(svg, "".join(style), alt))
+
+
+def _lengths(run: Swing) -> Vector:
+    return run.pendulums.row("length", len(run.chain))
+
+
+def _draw_swing(
+    run: Swing, name: str, duration: float, speed: float, still: float
+) -> tuple[str, str, float]:
+    """Return a swing's picture, its keyframes and its height."""
+    lengths = _lengths(run)
+    scale = 105.0 / float(lengths.max())  # units of the file in a metre
+    # Ball sizes are free: the model needs none.  Here they leave room for the widest swing.
+    radii = 17.0 * np.cbrt(run.chain.masses / run.chain.masses.max())
+    gaps = run.pendulums.row("gaps", len(lengths) - 1) * scale
+    pivots = np.concatenate([[0.0], np.cumsum(radii[:-1] + radii[1:] + gaps)])
+    pivots += 240.0 - (pivots[0] - radii[0] + pivots[-1] + radii[-1]) / 2
+    beam = 34.0
+    low = beam + 105.0 + float(radii.max()) + 8.0
+    inside = (run.times > run.times[0]) & (run.times <= run.times[0] + duration)
+    hits = [hit for hit in run.impacts if 0.0 < hit.time - run.times[0] < duration]
+    # Between two of the times an impact is a kink: it needs a keyframe of its own.
+    times = np.array([0.0, *run.times[inside], *(hit.time for hit in hits)])
+    times[1:] -= run.times[0]
+    places = np.vstack([run.positions[:1], run.positions[inside], *(hit.positions for hit in hits)])
+    order = np.argsort(times, kind="stable")
+    times, places = times[order], places[order]
+    row = int(np.argmin(np.abs(times - still)))
+    drawn, style, turn = [], [], "transform:rotate({}deg)"
+    for ball, (x, length, radius) in enumerate(zip(pivots, lengths, radii, strict=True)):
+        y, part = beam + length * scale, f"{name}{ball}"
+        drawn.append(
+            f'<g id="{part}"><path d="M{number(x)} {beam}V{number(y - radius)}" stroke="#555"/>'
+            f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(radius - 1.25)}" '
+            f'fill="#f2f2f2" stroke-width="2.5" stroke="{PALETTE[ball % len(PALETTE)]}"/>'
+            f'<text x="{number(x)}" y="{number(y + 5)}" font-size="14" '
+            f'text-anchor="middle">{ball + 1}</text></g>'
+        )
+        # A positive angle of SVG turns what hangs to the left.
+        angle = -np.degrees(places[:, ball] / length)
+        style.append(f"#{part}{{transform-origin:{number(x)}px {beam}px}}\n")
+        style.append(keyframes(part, times / speed, angle[:, None], turn, 0.1, row))
+    ends = pivots[0] - 30, pivots[-1] + 30
+    drawn.append(
+        f'<path d="M{number(ends[0])} {beam}H{number(ends[1])}" stroke="#333" stroke-width="4"/>'
+    )
+    return "".join(drawn), "".join(style), low

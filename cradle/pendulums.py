@@ -1,0 +1,136 @@
+"""How the balls hang: strings, gravity, gaps, damping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cradle.chain import Vector, checked, one_number
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Pendulums:
+    """How the balls hang: strings, gravity, gaps, and the damping of the air.
+
+    Parameters
+    ----------
+    length : float or sequence, length N
+        Distance from each pivot to the centre of its ball, m; above 0.
+    gravity : float
+        m/s^2; above 0.
+    gaps : float or sequence, length N - 1
+        Distance between the surfaces of neighbours at rest, m; 0 if they just touch.
+    damping : float or sequence, length N
+        Rate at which the amplitude of a ball that swings alone decays, 1/s; below its natural
+        frequency sqrt(g/l), or it would not swing.
+    angle : {"small", "full"}
+        Small-angle pendulums, or pendulums of any angle.  The latter need equal lengths, no gaps
+        and one damping: then contacts stay horizontal, at any angle.
+
+    Raises
+    ------
+    ValueError
+        If a value is outside its range; the message names the value and the rule.
+
+    Examples
+    --------
+    >>> Pendulums(length=0.1).natural_frequency(5).round(3).tolist()
+    [9.905, 9.905, 9.905, 9.905, 9.905]
+    """
+
+    length: float | tuple[float, ...]
+    gravity: float
+    gaps: float | tuple[float, ...]
+    damping: float | tuple[float, ...]
+    angle: str
+
+    def __init__(
+        self,
+        length: ArrayLike = 0.1,
+        *,
+        gravity: float = 9.81,
+        gaps: ArrayLike = 0.0,
+        damping: ArrayLike = 0.0,
+        angle: str = "small",
+    ) -> None:
+        g = one_number("gravity", gravity, "must be above 0", 0.0, open_low=True)
+        values = {
+            "length": checked("length", length, "must be above 0", 0.0, open_low=True),
+            "gaps": checked("gaps", gaps, "must be at least 0", 0.0),
+            "damping": checked("damping", damping, "must be at least 0", 0.0),
+        }
+        for name, value in values.items():
+            if value.ndim > 1:
+                raise ValueError(f"{name} has shape {value.shape}; must be one number or a row")
+            kept = tuple(value.tolist()) if value.ndim else float(value)
+            object.__setattr__(self, name, kept)
+        if angle not in ("small", "full"):
+            raise ValueError(f"angle = {angle!r}; must be 'small' or 'full'")
+        if angle == "full":
+            for name, value in values.items():
+                if (value != value.flat[0]).any() or (name == "gaps" and value.any()):
+                    rule = "must be 0" if name == "gaps" else "must be equal"
+                    raise ValueError(f"{name} = {getattr(self, name)!r}; {rule} with angle='full'")
+        object.__setattr__(self, "gravity", g)
+        object.__setattr__(self, "angle", angle)
+
+    def row(self, name: str, size: int) -> Vector:
+        """Return `length`, `gaps` or `damping` for each of `size` balls or contacts.
+
+        Examples
+        --------
+        >>> Pendulums(gaps=0.001).row("gaps", 2).tolist()
+        [0.001, 0.001]
+        """
+        value = np.asarray(getattr(self, name), dtype=np.float64)
+        if value.shape not in ((), (size,)):
+            raise ValueError(f"{name} has {value.size} values; must be {size}, or one number")
+        return np.broadcast_to(value, (size,)).copy()
+
+    def natural_frequency(self, size: int) -> Vector:
+        """Return sqrt(g/l) of each of `size` balls, rad/s.
+
+        Examples
+        --------
+        >>> Pendulums(length=9.81).natural_frequency(2).tolist()
+        [1.0, 1.0]
+        """
+        frequency: Vector = np.sqrt(self.gravity / self.row("length", size))
+        slow = self.row("damping", size) >= frequency
+        if slow.any():
+            at = int(np.argmax(slow))
+            raise ValueError(
+                f"damping[{at}] = {float(self.row('damping', size)[at])!r}; must be below the "
+                f"natural frequency sqrt(g/l) = {float(frequency[at])!r}"
+            )
+        return frequency
+
+    def accelerations(self, positions: Vector, velocities: Vector) -> Vector:
+        """Return the acceleration of each ball if it swung alone, m/s^2.
+
+        Examples
+        --------
+        >>> Pendulums(length=9.81).accelerations(np.array([1.0, 0.0]), np.zeros(2)).round(3)
+        array([-1.,  0.])
+        """
+        n = len(positions)
+        length = self.row("length", n)
+        angle = positions / length
+        sine = angle if self.angle == "small" else np.sin(angle)
+        return np.asarray(0.0 - self.gravity * sine - 2.0 * self.row("damping", n) * velocities)
+
+    def potential_energy(self, masses: Vector, positions: Vector) -> Vector:
+        """Return the potential energy above the lowest points, J; the last axis is summed.
+
+        Examples
+        --------
+        >>> float(Pendulums(length=9.81).potential_energy(np.ones(2), np.array([1.0, 0.0])))
+        0.5
+        """
+        length = self.row("length", positions.shape[-1])
+        half = 0.5 * positions / length
+        sine = half if self.angle == "small" else np.sin(half)
+        # 1 - cos a = 2 sin^2(a/2), without cancellation.
+        return np.asarray((2.0 * masses * self.gravity * length * sine**2).sum(axis=-1))

@@ -1,0 +1,150 @@
+"""What happened in a swing: positions and velocities in time, and every impact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cradle.chain import Chain, Vector
+from cradle.pendulums import Pendulums
+from cradle.trace import Trace
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Impact(NamedTuple):
+    """One impact of a swing.
+
+    Examples
+    --------
+    >>> Impact(0.5, (0,), np.zeros(2), np.array([1.0, 0.0]), np.array([0.0, 1.0]), 0.0, ()).contacts
+    (0,)
+    """
+
+    #: s since the release.
+    time: float
+    #: Contacts that took part: they touched, and their stretch had an approaching one.
+    contacts: tuple[int, ...]
+    #: Where the balls were, shape (N,), m.
+    positions: Vector
+    #: Velocities just before, shape (N,), m/s.
+    before: Vector
+    #: Velocities just after, shape (N,), m/s.
+    after: Vector
+    #: What the contacts kept back, J.
+    energy_loss: float
+    #: The path of each chain that collided, from left to right.
+    traces: tuple[Trace, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Swing:
+    """A swing of N balls at T times, and its impacts.
+
+    Attributes
+    ----------
+    chain : Chain
+        The balls, with their velocities at the release.
+    model : object
+        The impact model.
+    pendulums : Pendulums
+        How they hang.
+    times : ndarray, shape (T,)
+        s since the release; those asked for, up to the end of the run.
+    positions, velocities : ndarray, shape (T, N)
+        Of each ball along its arc, from its lowest point, m and m/s; at the instant of an impact,
+        those after it.
+    impacts : tuple of Impact
+        In the order in which they happened.
+    ended : {"times", "impacts", "energy"}
+        Why the run ended: at the last of the times, after `max_impacts`, or below `min_energy`.
+    end : float
+        When it ended, s.
+    together : tuple of int
+        Contacts whose balls moved together at the end.
+
+    Examples
+    --------
+    >>> from cradle import ImpulseCorrelation, swing
+    >>> balls = Chain([1] * 5, [0] * 5, 1)
+    >>> swing(balls, ImpulseCorrelation(0), [-0.02, 0, 0, 0, 0], np.linspace(0, 2, 21))
+    Swing(21 times to 2 s, 6 impacts, ended by times)
+    """
+
+    chain: Chain
+    model: Any
+    pendulums: Pendulums
+    times: Vector
+    positions: Vector
+    velocities: Vector
+    impacts: tuple[Impact, ...]
+    ended: str
+    end: float
+    together: tuple[int, ...]
+
+    @property
+    def energy(self) -> Vector:
+        """Kinetic and potential energy of all balls at each time, shape (T,), J."""
+        kinetic = 0.5 * (self.chain.masses * self.velocities**2).sum(axis=1)
+        return np.asarray(
+            kinetic + self.pendulums.potential_energy(self.chain.masses, self.positions)
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a row for each time and ball: time, ball, position, velocity.
+
+        Examples
+        --------
+        >>> from cradle import ImpulseCorrelation, swing
+        >>> balls = Chain([1, 1], [0, 0], 1)
+        >>> swing(balls, ImpulseCorrelation(0), [-0.02, 0], [0]).to_frame()
+           time  ball  position  velocity
+        0   0.0     0     -0.02       0.0
+        1   0.0     1      0.00       0.0
+        """
+        import pandas as pd
+
+        count, n = self.positions.shape
+        return pd.DataFrame(
+            {
+                "time": np.repeat(self.times, n),
+                "ball": np.tile(np.arange(n), count),
+                "position": self.positions.ravel(),
+                "velocity": self.velocities.ravel(),
+            }
+        )
+
+    def impacts_to_frame(self) -> pd.DataFrame:
+        """Return a row for each impact and ball: impact, time, ball, before, after.
+
+        Examples
+        --------
+        >>> from cradle import ImpulseCorrelation, swing
+        >>> balls = Chain([1, 1], [-1, 0], 1)
+        >>> swing(balls, ImpulseCorrelation(0), [0, 0], [0, 0.5]).impacts_to_frame().round(3)
+           impact   time  ball  before  after
+        0       0  0.317     0     1.0    0.0
+        1       0  0.317     1     0.0    1.0
+        """
+        import pandas as pd
+
+        n, count = len(self.chain), len(self.impacts)
+        return pd.DataFrame(
+            {
+                "impact": np.repeat(np.arange(count), n),
+                "time": np.repeat([impact.time for impact in self.impacts], n),
+                "ball": np.tile(np.arange(n), count),
+                "before": np.array([impact.before for impact in self.impacts]).ravel(),
+                "after": np.array([impact.after for impact in self.impacts]).ravel(),
+            }
+        )
+
+    def __repr__(self) -> str:
+        """Return a short account."""
+        return (
+            f"Swing({len(self.times)} times to {self.end:g} s, {len(self.impacts)} impacts, "
+            f"ended by {self.ended})"
+        )

@@ -1,0 +1,240 @@
+"""The swinging cradle: impacts by any model of the package, pendulums between them.
+
+The rules of touching and resting balls: `cradle.resting`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cradle.chain import Chain, Vector, checked, one_number
+from cradle.flight import TIE, Flight, FullFlight, SmallAngleFlight, State
+from cradle.models import Model, collide
+from cradle.pendulums import Pendulums
+from cradle.resting import RESTING, common_velocities, pressed, stretches
+from cradle.swing_trace import Impact, Swing
+from cradle.trace import Trace
+
+__all__ = ["swing"]
+
+
+def swing(
+    chain: Chain,
+    model: Model,
+    positions: ArrayLike,
+    times: ArrayLike,
+    *,
+    pendulums: Pendulums | None = None,
+    max_impacts: int = 100_000,
+    min_energy: float = 0.0,
+) -> Swing:
+    """Let a cradle swing.
+
+    Parameters
+    ----------
+    chain : Chain
+        Masses, restitution, and the velocities at the release (usually zeros).
+    model : Model
+        The impact law, such as `ImpulseCorrelation`.  Where a part of the chain collides alone,
+        the model's values for that part are used, with ``excess="saturate"`` if it has that field.
+    positions : array_like, shape (N,)
+        Where the balls are released, along their arcs from their lowest points, m; positive to
+        the right.  No ball may overlap its neighbour.
+    times : array_like, shape (T,)
+        When to report positions and velocities, s since the release; rising, from 0 on.  The run
+        ends at the last one, at the latest.
+    pendulums : Pendulums, optional
+        How the balls hang; small angles, 0.1 m, no gaps, no damping if left out.
+    max_impacts : int
+        End the run after this number of impacts.
+    min_energy : float
+        End the run when the energy after an impact is below this part of that at the release.
+
+    Returns
+    -------
+    Swing
+        The times up to the end of the run, positions, velocities and impacts.
+
+    Raises
+    ------
+    TypeError
+        As `collide`.
+    ValueError
+        If a value is wrong, balls overlap, or the model cannot treat an impact.
+    ImpactNotFinished
+        If an impact takes more steps than the model allows.
+
+    Examples
+    --------
+    Two balls are pulled back, and two fly off:
+
+    >>> from cradle import ImpulseCorrelation
+    >>> balls = Chain([1] * 5, [0] * 5, 1)
+    >>> run = swing(balls, ImpulseCorrelation(0), [-0.02, -0.02, 0, 0, 0], [0, 0.3])
+    >>> abs(run.positions[-1] * 1000).round(1).tolist()
+    [0.0, 0.0, 0.0, 19.7, 19.7]
+    """
+    hanging = Pendulums() if pendulums is None else pendulums
+    collide(Chain(chain.masses, np.zeros(len(chain)), chain.restitution), model)  # do they fit?
+    at = checked("times", times)
+    if at.ndim != 1 or not at.size or at[0] < 0.0 or (np.diff(at) < 0.0).any():
+        raise ValueError(f"times = {times!r}; must be a row of rising numbers, none below 0")
+    if isinstance(max_impacts, bool) or max_impacts != int(max_impacts) or max_impacts < 1:
+        raise ValueError(f"max_impacts = {max_impacts!r}; must be a whole number, at least 1")
+    least = one_number("min_energy", min_energy, "must lie in [0, 1]", 0.0, 1.0)
+    run = _Run(chain, model, hanging, checked("positions", positions))
+    ended = run.to_the_end(at, int(max_impacts), least)
+    found = at[: sum(len(x) for x, _ in run.series)]
+    return Swing(
+        chain=chain,
+        model=model,
+        pendulums=hanging,
+        times=found,
+        positions=np.concatenate([x for x, _ in run.series]),
+        velocities=np.concatenate([v for _, v in run.series]),
+        impacts=tuple(run.impacts),
+        ended=ended,
+        end=run.t,
+        together=tuple(np.flatnonzero(run.together).tolist()),
+    )
+
+
+class _Run:
+    """The event loop: settle what touches, fly to the next event."""
+
+    def __init__(self, chain: Chain, model: Model, pendulums: Pendulums, x: Vector) -> None:
+        n = len(chain)
+        if x.shape != (n,):
+            raise ValueError(f"positions has shape {x.shape}; {n} balls need ({n},)")
+        self.chain, self.model, self.pendulums = chain, model, pendulums
+        self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
+        self.gaps = pendulums.row("gaps", n - 1)
+        self.frequency = pendulums.natural_frequency(n)
+        self.released = self.present_energy()
+        self.speed = float(np.sqrt(2.0 * self.released / chain.masses.sum()))
+        self.impacts: list[Impact] = []
+        self.series: list[tuple[Vector, Vector]] = []
+        distance = self.gaps + np.diff(x)
+        size = max(float(np.abs(x).max()), self.speed / float(self.frequency.min()))
+        if (distance < -TIE * size).any():
+            c = int(np.argmin(distance))
+            raise ValueError(
+                f"positions = {x.tolist()}; balls {c} and {c + 1} overlap by {-distance[c]:g} m"
+            )
+        self.together = np.zeros(n - 1, dtype=bool)
+        self.parting = np.zeros(n - 1, dtype=bool)
+        self.settle(np.abs(distance) <= TIE * size, np.zeros(n - 1, dtype=bool))
+
+    def present_energy(self) -> float:
+        kinetic = 0.5 * float(self.chain.masses @ self.v**2)
+        return kinetic + float(self.pendulums.potential_energy(self.chain.masses, self.x))
+
+    def to_the_end(self, times: Vector, most: int, least: float) -> str:
+        """Fly from event to event; return why the run ended."""
+        done, end = 0, float(times[-1])
+        while True:
+            if len(self.impacts) >= most:
+                ended = "impacts"
+                break
+            if self.released and self.present_energy() < least * self.released:
+                ended = "energy"
+                break
+            flight = self.flight()
+            meeting = flight.next_meeting(end - self.t)
+            later = self.t + meeting.time
+            here = int(np.searchsorted(times, later, side="left"))
+            self.series.append(flight.at(times[done:here] - self.t))
+            done = here
+            if later > end:
+                self.t = end
+                return "times"
+            x, v = flight.at(np.array([meeting.time]))
+            self.t, self.x, self.v = later, x[0], v[0]
+            closing, releasing = np.zeros((2, len(self.gaps)), dtype=bool)
+            closing[meeting.closing] = True
+            releasing[meeting.releasing] = True
+            self.settle(closing | self.together, releasing)
+        # The instant at which the run ends is reported if it was asked for.
+        count = int(np.searchsorted(times[done:], self.t, side="right"))
+        self.series.append((np.tile(self.x, (count, 1)), np.tile(self.v, (count, 1))))
+        return ended
+
+    def flight(self) -> Flight:
+        state = State(self.chain.masses, self.x, self.v, self.together, self.parting)
+        kind = SmallAngleFlight if self.pendulums.angle == "small" else FullFlight
+        return kind(self.pendulums, state)
+
+    def settle(self, touching: NDArray[np.bool_], releasing: NDArray[np.bool_]) -> None:
+        """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
+        masses = self.chain.masses
+        for first, last in stretches(touching):
+            self.align(first, last)
+        self.collide(touching)
+        least = RESTING * self.speed
+        self.v, resting = common_velocities(masses, self.v, touching & ~releasing, least)
+        alone = self.pendulums.accelerations(self.x, self.v)
+        self.together = pressed(
+            masses, alone, resting, 1e-12 * self.speed * float(self.frequency.max())
+        )
+        self.parting = touching & ~self.together
+
+    def align(self, first: int, last: int) -> None:
+        """Move balls that touch, but for rounding, to where they touch; keep their centre."""
+        offset = np.concatenate([[0.0], np.cumsum(self.gaps[first : last - 1])])
+        m, x = self.chain.masses[first:last], self.x[first:last] + offset
+        if (x != x[0]).any():
+            x = np.full_like(x, m @ x / m.sum())
+        self.x[first:last] = x - offset
+
+    def collide(self, touching: NDArray[np.bool_]) -> None:
+        """Solve the impacts of this instant and record them as one."""
+        before, contacts, traces = self.v.copy(), list[int](), list[Trace]()
+        for first, last in stretches(touching):
+            v = before[first:last]
+            if (v[:-1] - v[1:] <= RESTING * self.speed).all():
+                continue
+            part = Chain(self.chain.masses[first:last], v, self.chain.restitution[first : last - 1])
+            try:
+                trace = collide(part, _part(self.model, len(before), first, last))
+            except ValueError as refused:
+                refused.add_note(f"at the impact at t = {self.t} s, balls {first} to {last - 1}")
+                raise
+            self.v[first:last] = trace.velocities
+            contacts += range(first, last - 1)
+            traces.append(trace)
+        if traces:
+            loss = sum(trace.energy_loss for trace in traces)
+            self.impacts.append(
+                Impact(
+                    self.t,
+                    tuple(contacts),
+                    self.x.copy(),
+                    before,
+                    self.v.copy(),
+                    loss,
+                    tuple(traces),
+                )
+            )
+
+
+def _part(model: Any, n: int, first: int, last: int) -> Model:
+    """Return the model of a part of the chain: its rows, cut to that part.
+
+    A part may end where a ratio's bound counts on the next ball (Eq. 53), so ratios above the
+    part's own bounds are held there (rule of the largest admissible ratio), not refused.
+    """
+    if last - first == n:
+        return model  # type: ignore[no-any-return]
+    changes: dict[str, Any] = {}
+    for field in fields(model) if hasattr(model, "__dataclass_fields__") else ():
+        value = getattr(model, field.name)
+        if field.name == "excess":
+            changes["excess"] = "saturate"
+        elif isinstance(value, tuple | list) and len(value) in (n - 1, n - 2):
+            missing = n - len(value)  # 1: one for each contact; 2: one for each inner ball
+            changes[field.name] = tuple(value[first : last - missing])
+    return replace(model, **changes) if changes else model  # type: ignore[no-any-return]

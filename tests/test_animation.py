@@ -1,0 +1,193 @@
+"""Moving pictures: every keyframe is the solver's, and stillness is kept where it is asked for."""
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from cradle import Chain, ImpulseCorrelation, Pendulums, collide, swing
+from cradle.animation import animate, animate_swing
+from cradle.film import Animation, thin
+
+TRACE = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
+RUN = swing(
+    Chain([1, 2, 1], [0] * 3, 0.9), ImpulseCorrelation(0.1), [-0.03, 0, 0], np.linspace(0, 3, 91),
+    pendulums=Pendulums(gaps=0.001),
+)  # fmt: skip
+
+
+def keyframes(svg, name):
+    """Times and numbers of the keyframes of one part."""
+    ((key, name),) = set(re.findall(rf"@keyframes (m[0-9a-f]{{8}}-)({name})\{{", svg))
+    name = key + name
+    ((body,),) = [re.findall(rf"@keyframes {name}\{{((?:[^{{}}]*\{{[^}}]*\}})*)\}}", svg)]
+    rows = re.findall(r"([\d.]+)%\{([^}]*)\}", body)
+    number = r"-?\d+(?:\.\d+)?"
+    (seconds,) = re.findall(rf"animation:{name} ({number})s", svg)
+    times = np.array([float(at) for at, _ in rows]) / 100 * float(seconds)
+    return times, np.array([[float(x) for x in re.findall(number, css)] for _, css in rows])
+
+
+def test_bars_are_the_velocities_at_every_event():
+    svg = animate(TRACE).svg
+    share = TRACE.path_impulses.sum(axis=1)
+    share /= share[-1]
+    for ball in range(3):
+        times, values = keyframes(svg, f"bar{ball}")
+        at = np.interp(1.5 + 5 * share, times, values[:, 1])
+        np.testing.assert_allclose(at, 0.95 * TRACE.path[:, ball], atol=2e-3)
+
+
+def test_dots_and_cover_are_in_step():
+    """Dot and cover are drawn from the same instant: the cover's edge is at every dot."""
+    for contact in (None, 0, 1):
+        svg = animate(TRACE, contact).svg
+        moment = np.linspace(1.5, 6.5, 51)
+        times, hidden = keyframes(svg, "cover")
+        edge = np.interp(moment, times, hidden[:, 0])
+        shown = range(3) if contact is None else (contact, contact + 1)
+        for ball in shown:
+            times, moved = keyframes(svg, f"dot{ball}")
+            x = np.interp(moment, times, moved[:, 0])
+            # Both are linear images of the impulse, so of each other.
+            slope, offset = np.polyfit(edge, x, 1)
+            np.testing.assert_allclose(x, offset + slope * edge, atol=0.3)
+            assert slope < 0
+        assert f'-dot{max(shown) + 1}"' not in svg
+
+
+def test_nobody_moves_during_the_impact():
+    """An impact takes no time: the balls are where they touch."""
+    svg = animate(TRACE).svg
+    for ball in range(3):
+        times, x = keyframes(svg, f"ball{ball}")
+        moment = np.linspace(1.5, 6.5, 21)
+        np.testing.assert_allclose(np.interp(moment, times, x[:, 0]), 0, atol=0.05)
+    came, went = (keyframes(svg, f"ball{ball}")[1][row, 0] for ball, row in ((0, 0), (2, -1)))
+    assert went / -came == pytest.approx(TRACE.velocities[2], rel=1e-3)
+
+
+def test_stars_show_the_contacts_that_press():
+    svg = animate(TRACE).svg
+    share = TRACE.path_impulses.sum(axis=1)
+    ends = {event.contact: 1.5 + 5 * share[k] / share[-1]
+            for k, event in enumerate(TRACE.events, 1) if event.kind == "end"}  # fmt: skip
+    for contact in range(2):
+        times, lit = keyframes(svg, f"star{contact}")
+        assert lit[:, 0].tolist() == [0, 1, 0]
+        assert times[1] == pytest.approx(1.5, abs=1e-3)
+        assert times[2] == pytest.approx(ends[contact], abs=1e-3)
+
+
+def test_swing_angles_are_those_of_the_run():
+    svg = animate_swing(RUN).svg
+    for ball in range(3):
+        times, angle = keyframes(svg, f"s0b{ball}")
+        expected = -np.degrees(RUN.positions[:, ball] / 0.1)
+        np.testing.assert_allclose(np.interp(RUN.times, times, angle[:, 0]), expected, atol=0.15)
+    # Impacts lie between the times; there too the angle is the run's.
+    hits = np.array([hit.time for hit in RUN.impacts if hit.time < 3])
+    expected = [-np.degrees(hit.positions[1] / 0.1) for hit in RUN.impacts if hit.time < 3]
+    times, angle = keyframes(svg, "s0b1")
+    assert len(hits) > 5
+    np.testing.assert_allclose(np.interp(hits, times, angle[:, 0]), expected, atol=0.15)
+
+
+def test_the_still_of_a_swing_is_the_instant_asked_for():
+    svg = animate_swing(RUN, still=RUN.times[20]).svg
+    for ball in range(3):
+        (angle,) = re.findall(rf"-s0b{ball}\{{transform:rotate\(([-\d.]+)deg\);", svg)
+        assert float(angle) == pytest.approx(-np.degrees(RUN.positions[20, ball] / 0.1), abs=1e-3)
+
+
+def test_speed():
+    slow = keyframes(animate_swing(RUN, speed=0.25).svg, "s0b0")[0]
+    assert slow[-1] == pytest.approx(12)
+
+
+def test_still_for_print_and_reduced_motion():
+    for svg in (animate(TRACE).svg, animate_swing(RUN, ["a < b"]).svg):
+        ElementTree.fromstring(svg)  # well-formed
+        for media in ("print", "(prefers-reduced-motion: reduce)"):
+            assert re.search(
+                rf"@media {re.escape(media)} {{ \[id\^=m\w+-\] {{ animation: none", svg
+            )
+        assert "<script" not in svg
+        assert "http" not in re.sub(
+            r'xmlns(:\w+)?="[^"]*"', "", re.sub(r"<!DOCTYPE[^>]*>", "", svg)
+        )
+
+
+def test_the_still_of_an_impact_shows_its_end():
+    svg = animate(TRACE).svg
+    assert re.search(r"-cover\{transform:scaleX\(0\);", svg)
+    for ball in range(3):
+        (length,) = re.findall(
+            rf"-bar{ball}\{{transform:translateX\(0px\) scaleX\(([-\d.]+)\)", svg
+        )
+        assert float(length) == pytest.approx(0.95 * TRACE.velocities[ball], abs=1e-3)
+
+
+def test_same_picture_every_time():
+    assert animate(TRACE).svg == animate(TRACE).svg
+
+
+def test_two_pictures_of_a_page_share_no_name():
+    names = [
+        set(re.findall(r"@keyframes ([\w-]+)", picture.svg))
+        for picture in (animate(TRACE), animate(TRACE, 1), animate_swing(RUN))
+    ]
+    assert all(names)
+    assert not names[0] & names[1]
+    assert not names[1] & names[2]
+    # And no style reaches beyond its picture.
+    for picture in (animate(TRACE), animate_swing(RUN)):
+        selectors = re.findall(r"(?:^|[};])\s*([#.*\[][^{};]*)\{", picture._repr_html_())
+        assert selectors
+        assert all(re.match(r"[#.][mp][0-9a-f]{8}|\[id\^=m[0-9a-f]{8}-", s) for s in selectors)
+
+
+def test_words_for_those_who_do_not_see_it():
+    svg = animate_swing(RUN, alt='"A" & b').svg
+    assert ElementTree.fromstring(svg).attrib["aria-label"] == '"A" & b'
+    assert "aria-label" not in animate_swing(RUN).svg
+
+
+def test_pause():
+    html = animate_swing(RUN)._repr_html_()
+    (key,) = re.findall(r'<input type="checkbox" id="(\w+)"', html)
+    assert f'<label for="{key}"' in html
+    assert re.search(rf"#{key}:checked ~ svg \* {{ animation-play-state: paused", html)
+
+
+def test_light_enough_for_a_page():
+    assert len(animate(TRACE).svg) < 60_000
+    times = np.arange(0, 12, 1 / 40)
+    run = swing(Chain([1] * 5, [0] * 5, 1), ImpulseCorrelation(0.15), [-0.05, 0, 0, 0, 0], times)
+    assert len(animate_swing(run).svg) < 80_000
+
+
+def test_no_impact_and_no_duration():
+    still = collide(Chain([1, 1], [0, 1], 1), ImpulseCorrelation(0))
+    assert "NaN" not in animate(still).svg
+    assert "nan" not in re.sub(r"<path[^>]*>", "", animate(still).svg)
+    with pytest.raises(ValueError, match="duration"):
+        animate_swing([])
+    with pytest.raises(ValueError, match="labels has 2 lines; 1 swings"):
+        animate_swing(RUN, ["a", "b"])
+
+
+def test_thinning_stays_within_its_tolerance():
+    times = np.linspace(0, 1, 201)
+    values = np.column_stack([times * (1 - times), np.abs(times - 0.3)])
+    rows = thin(times, values, 0.003)
+    for k in range(2):
+        line = np.interp(times, times[rows], values[rows, k])
+        assert np.abs(line - values[:, k]).max() <= 0.003
+    assert len(rows) < 15
+
+
+def test_save(tmp_path):
+    Animation("<svg/>").save(tmp_path / "a.svg")
+    assert (tmp_path / "a.svg").read_text() == "<svg/>"

@@ -1,0 +1,191 @@
+"""Numbers of the chapter on the toy, by other routes than the chapter's."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from chapters import Chapter
+from reference import solve
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+CHAPTER = Chapter("toy")
+LENGTH, BACK, G, RATIO = 0.12, 0.04, 9.81, 0.15
+PERIOD = 2 * math.pi * math.sqrt(LENGTH / G)
+
+
+def glued(name):
+    return float(CHAPTER.glued[name].replace("−", "-"))
+
+
+def strokes(count, v, e=1.0, ratio=RATIO):
+    """Velocities after each stroke by the independent solver and the map of reversal."""
+    found, v = [], [float(x) for x in v]
+    for _ in range(count):
+        v = [float(x) for x in solve([1.0] * len(v), v, [e] * (len(v) - 1), ratio).velocities]
+        found.append(v)
+        v = [-x for x in v]
+    return np.array(found)
+
+
+def rows(cell):
+    """Numbers after the colon of each printed line."""
+    return [
+        [float(x) for x in line.split(":")[1].split()]
+        for line in CHAPTER.printed(cell).splitlines()
+    ]
+
+
+def test_minute():
+    assert glued("period") == pytest.approx(PERIOD, abs=5e-4)
+    assert glued("impacts") == math.floor((60 - PERIOD / 4) / (PERIOD / 2)) + 1
+    assert glued("strike") == pytest.approx(BACK * math.sqrt(G / LENGTH), abs=5e-3)
+    energy = f"{0.5 * G / LENGTH * BACK**2:.12f}"
+    assert CHAPTER.printed("minute").count(energy) == 2
+
+
+def test_several():
+    *story, two = rows("several")
+    for k, row in enumerate(story, start=1):
+        assert row == [0] * (5 - k) + [1] * k
+    expected = strokes(1, [1, 1, 0, 0, 0])[0]
+    np.testing.assert_allclose(two, expected, rtol=0, atol=5.1e-4)
+    for name, ball in (("third", 2), ("fourth", 3), ("fifth", 4)):
+        assert glued(f"two-{name}") == pytest.approx(expected[ball], abs=5.1e-3)
+
+
+def test_strokes():
+    expected = strokes(20, [1, 0, 0, 0, 0])
+    for row, stroke in zip(rows("strokes"), (1, 2, 3, 20)):
+        np.testing.assert_allclose(row, expected[stroke - 1], rtol=0, atol=5.1e-4)
+    inner = 100 * (expected[:, 1:4] ** 2).sum(axis=1)
+    assert glued("inner-first") == pytest.approx(inner[0], abs=0.051)
+    assert glued("inner-twenty") == pytest.approx(inner[19], abs=0.051)
+    assert glued("second-first") == pytest.approx(-expected[1, 0], abs=5.1e-3)
+    assert glued("second-next") == pytest.approx(-expected[1, 1], abs=5.1e-3)
+
+
+def test_fig_toy_models():
+    late = strokes(172, [1, 0, 0, 0, 0])
+    assert glued("late-first") == pytest.approx(-late[171, 0], abs=5.1e-3)
+    assert glued("late-second") == pytest.approx(-late[171, 1], abs=5.1e-3)
+    inner = 100 * (late[:, 1:4] ** 2).sum(axis=1)
+    assert glued("inner-most") == pytest.approx(inner.max(), abs=0.51)
+    # One body of four: momentum and energy of two balls of masses 1 and 4.
+    assert glued("solid-first") == pytest.approx((1 - 4) / 5)
+    assert glued("solid-rest") == pytest.approx(2 / 5)
+    assert glued("lossy-last") == 1 / 5  # momentum
+
+
+def test_mirror():
+    """The map from either side, by the independent solver."""
+    one, other = strokes(20, [1, 0, 0, 0, 0]), -strokes(20, [0, 0, 0, 0, -1])[:, ::-1]
+    apart = np.abs(one - other).max(axis=1)
+    for (row,), stroke in zip(rows("mirror"), (1, 2, 3, 20)):
+        assert row == pytest.approx(apart[stroke - 1], abs=5.1e-5)
+    assert glued("mirror-second") == pytest.approx(apart[1], abs=5.1e-4)
+
+
+@pytest.mark.parametrize(("name", "e"), [("ninety", 0.9), ("ninetynine", 0.99)])
+def test_fig_toy_drift(name, e):
+    after = strokes(41, [1, 0, 0, 0, 0], e)
+    pace = (after[40].var() / after[20].var()) ** (1 / 40)
+    assert glued(f"pace-{name}") == pytest.approx(pace, abs=5.1e-4)
+    assert pace < e  # faster than two balls
+    assert glued("left") == 20
+
+
+def test_fig_toy_resting():
+    """Bounce after bounce by root finding, then one oscillator of the joint frequency."""
+    w = np.sqrt(G / np.array([0.10, 0.14]))
+    x, v, t, e = np.array([-0.04, -0.0392]), np.zeros(2), 0.0, 0.5
+
+    def at(tau):
+        position = x * np.cos(w * tau) + v / w * np.sin(w * tau)
+        return position, v * np.cos(w * tau) - x * w * np.sin(w * tau)
+
+    def gap(tau):
+        return float(np.diff(at(tau)[0])[0])
+
+    for _ in range(14):  # later bounces are too low for this way of counting
+        step = 1e-3 if t == 0 else 0.1 * (v[1] - v[0])
+        low = step
+        while gap(low + step) > 0:
+            low += step
+        tau = brentq(gap, low, low + step, xtol=1e-16, rtol=1e-15)
+        (left, right), (v1, v2) = at(tau)
+        flight = tau
+        t += tau
+        x = np.full(2, (left + right) / 2)
+        v = (v1 + v2) / 2 + np.array([-1, 1]) * e * (v1 - v2) / 2
+    end = t + flight * e / (1 - e)  # the flights shrink by e
+    assert glued("crowd-end") == pytest.approx(end, abs=6e-5)
+    joint = math.sqrt(np.mean(w**2))
+    common = v.mean()
+    falls = math.atan(-x[0] * joint / common) / joint
+    assert glued("opens") == pytest.approx(t + falls, abs=1.5e-3)
+
+
+def test_second_stroke_of_springs_by_another_integrator():
+    def rate(_, y):
+        force = 1e9 * np.maximum(y[:2] - y[1:3], 0) ** 1.5
+        return [*y[3:], -y[0] - force[0], -y[1] + force[0] - force[1], -y[2] + force[1]]
+
+    found = solve_ivp(
+        rate, (0, 2 * np.pi), [-1, 0, 0, 0, 0, 0], "RK45", rtol=1e-9, atol=1e-12, max_step=0.02
+    )  # fmt: skip
+    lines = [line.split("|")[1].split() for line in CHAPTER.printed("springs").splitlines()]
+    stiff, touching = (np.array([float(x) for x in line]) for line in lines[-2:])
+    np.testing.assert_allclose(found.y[:3, -1], stiff, rtol=0, atol=2e-3)
+    assert glued("second-off") == pytest.approx(np.abs(stiff - touching).max(), abs=6e-3)
+
+
+def test_contact_of_steel_balls_in_closed_form():
+    mass, speed = 0.045, BACK * math.sqrt(G / LENGTH)
+    modulus = 210e9 / (2 * (1 - 0.3**2))
+    radius = (3 * mass / (4 * np.pi * 7800)) ** (1 / 3)
+    k = 4 / 3 * modulus * np.sqrt(radius / 2)
+    deepest = (5 * (mass / 2) * speed**2 / (4 * k)) ** 0.4
+    duration = 2.94327 * deepest / speed
+    assert glued("contact-time") == pytest.approx(1e6 * duration, abs=0.51)
+    assert glued("contact-way") == pytest.approx(1e6 * duration * speed, abs=0.51)
+
+
+def test_spread_of_the_second_stroke_at_any_angle():
+    """The slowest and the fastest ball come back half a period of their own amplitude later."""
+    v = strokes(1, [1, 0, 0, 0, 0])[0]
+    widest = BACK / LENGTH * np.abs(v).max()
+    late = PERIOD / 2 * widest**2 / 16
+    assert glued("spread") == pytest.approx(1e3 * late, rel=0.1)
+
+
+def test_exercises():
+    k = math.ceil(math.log(100) / (2 * math.log(1 / 0.95)))
+    five = strokes(25, [1, 0, 0, 0, 0], 0.95)
+    counted = 1 + int(np.argmax(5 * five.var(axis=1) / 0.8 < 0.01))
+    assert CHAPTER.printed("exercise-drift") == f"two balls {k} strokes, five balls {counted}\n"
+    assert CHAPTER.printed("exercise-middle") == "always moving: ball 3\n"
+
+
+def test_fig_toy_inside_and_film():
+    """The stored pictures move as the independent solver says."""
+    inside = CHAPTER.cells["inside"].outputs[0].data["text/html"]
+    bars = [
+        float(x)
+        for x in re.findall(r"-bar\d\{transform:translateX\(0px\) scaleX\(([-\d.]+)\);", inside)
+    ]
+    expected = strokes(2, [1, 0, 0, 0, 0])[1]
+    np.testing.assert_allclose(np.array(bars) / bars[0], expected / expected[0], atol=2e-3)
+    film = CHAPTER.cells["film"].outputs[0].data["text/html"]
+    for row, ratio in enumerate((0, RATIO, 0.5)):
+        v = strokes(1, [1, 0, 0, 0, 0], ratio=ratio)[0]
+        for ball in range(5):
+            ((frames),) = re.findall(rf"@keyframes m\w+-s{row}b{ball}\{{(.*)\}}\n", film)
+            found = np.array(
+                re.findall(r"([\d.]+)%\{transform:rotate\(([-\d.]+)deg", frames), float
+            )
+            # At half speed, six periods less one frame: the widest angle after the first stroke.
+            seconds = found[:, 0] / 100 * (6 - 1 / 40) * PERIOD * 2
+            angle = np.interp(PERIOD, seconds, found[:, 1])
+            assert angle == pytest.approx(-math.degrees(BACK / LENGTH * v[ball]), abs=0.3)

@@ -1,0 +1,530 @@
+"""The swinging cradle against formulas, the independent solver, and springs under gravity."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from reference import solve
+from scipy.integrate import solve_ivp
+from scipy.special import ellipj, ellipk
+
+from cradle import (
+    Chain,
+    FusedChain,
+    ImpulseCorrelation,
+    Pendulums,
+    SequentialCollisions,
+    SpringChain,
+    swing,
+)
+from cradle.flight import first_fall
+
+ONE_HERTZ = Pendulums(length=9.81 / (4 * math.pi**2))  # sqrt(g/l) = 2 pi / s: a period of 1 s
+
+
+def balls(n, e=1.0):
+    return Chain([1] * n, [0] * n, e)
+
+
+def pulled(n, k=1, by=0.02):
+    return [-by] * k + [0] * (n - k)
+
+
+def lost(run):
+    return sum(impact.energy_loss for impact in run.impacts)
+
+
+def energy(m, x, v, length, gravity=9.81):
+    """Small-angle energy, written out again."""
+    return 0.5 * (m * v**2).sum() + 0.5 * (m * gravity / length * x**2).sum()
+
+
+# Periods
+
+
+def test_period_small_angle():
+    """One ball out, one ball out: each swing of 2 pi sqrt(l/g) has two impacts."""
+    length = 0.3
+    period = 2 * math.pi * math.sqrt(length / 9.81)
+    run = swing(balls(5), SequentialCollisions(), pulled(5), [20 * period],
+                pendulums=Pendulums(length))  # fmt: skip
+    times = [impact.time for impact in run.impacts]
+    np.testing.assert_allclose(times, period * (0.25 + 0.5 * np.arange(40)), rtol=1e-14)
+    # After whole periods the first ball is back where it was let go.
+    np.testing.assert_allclose(run.positions[-1], pulled(5), rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("amplitude", [0.1, 1.0, 2.5])
+def test_period_any_angle(amplitude):
+    """Two equal balls exchange their motion: in turn each swings half a full pendulum's period."""
+    length = 0.2
+    k = math.sin(amplitude / 2)
+    quarter = math.sqrt(length / 9.81) * ellipk(k * k)
+    pendulums = Pendulums(length, angle="full")
+    times = np.linspace(0, 0.99 * quarter, 7)
+    run = swing(balls(2), SequentialCollisions(), [-amplitude * length, 0],
+                [*times, 8 * quarter], pendulums=pendulums)  # fmt: skip
+    np.testing.assert_allclose(
+        [impact.time for impact in run.impacts], quarter * np.arange(1, 8, 2), rtol=1e-10
+    )
+    sine = ellipj(quarter / math.sqrt(length / 9.81) - math.sqrt(9.81 / length) * times, k * k)[0]
+    np.testing.assert_allclose(
+        run.positions[:-1, 0], -2 * length * np.arcsin(k * sine), rtol=0, atol=1e-11
+    )
+
+
+def test_small_amplitudes_of_any_angle_are_small_angle():
+    arguments = balls(3), ImpulseCorrelation(0.15), [-1e-5, 0, 0], np.linspace(0, 0.45, 9)
+    full = swing(*arguments, pendulums=Pendulums(angle="full"))
+    small = swing(*arguments)
+    np.testing.assert_allclose(full.positions, small.positions, rtol=0, atol=1e-12)
+
+
+def test_any_angle_loses_the_common_clock():
+    """Larger swings take longer: after the first stroke the balls no longer meet all at once."""
+    arguments = balls(5), ImpulseCorrelation(0.15), pulled(5, by=0.05), [3.0]
+    full = swing(*arguments, pendulums=Pendulums(angle="full"))
+    small = swing(*arguments)
+    assert {len(impact.contacts) for impact in small.impacts} == {4}
+    assert [len(impact.contacts) for impact in full.impacts[:1]] == [4]
+    assert max(len(impact.contacts) for impact in full.impacts[2:]) == 1
+
+
+# The toy
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+def test_as_many_fly_off_as_are_pulled_back(k):
+    times = np.arange(0, 61) * 0.5
+    run = swing(balls(5), ImpulseCorrelation(0), pulled(5, k), times, pendulums=ONE_HERTZ)
+    assert len(run.impacts) == 60
+    for stroke, impact in enumerate(run.impacts):
+        moving = np.abs(impact.after) > 1e-12
+        expected = [False] * (5 - k) + [True] * k
+        assert moving.tolist() == (expected if stroke % 2 == 0 else expected[::-1])
+    out = np.abs(run.positions[1::2]).max()
+    assert out == pytest.approx(0.02, rel=1e-13)
+    np.testing.assert_allclose(run.positions[1], -np.array(pulled(5, k))[::-1], atol=1e-15)
+
+
+def test_fused_three_balls_by_hand():
+    """(1, 0, 0) -> (-1/3, 2/3, 2/3) -> reversed, (-1, 0, 0) -> ...: back after two strokes."""
+    run = swing(balls(3), FusedChain(), pulled(3), [2.0], pendulums=ONE_HERTZ)
+    speed = 0.02 * 2 * math.pi
+    for stroke, impact in enumerate(run.impacts):
+        expected = ([-1 / 3, 2 / 3, 2 / 3], [-1, 0, 0])[stroke % 2]
+        np.testing.assert_allclose(impact.after / speed, expected, atol=1e-14)
+
+
+@pytest.mark.parametrize(("ratio", "e"), [(0.15, 1.0), (0.15, 0.9), (0.4, 1.0), (0.05, 0.7)])
+def test_second_third_and_twentieth_stroke(ratio, e):
+    """All meet again at the lowest point, velocities reversed: strokes are a map, solved anew."""
+    n = 4
+    run = swing(balls(n, e), ImpulseCorrelation(ratio), pulled(n), [10.2], pendulums=ONE_HERTZ)
+    v = [0.02 * 2 * math.pi, 0, 0, 0]
+    for stroke in range(20):
+        v = solve([1.0] * n, v, [e] * (n - 1), ratio).velocities
+        v = [float(a) for a in v]
+        if stroke in (0, 1, 2, 19):
+            np.testing.assert_allclose(run.impacts[stroke].after, v, rtol=0, atol=2e-15 * 4**3)
+        v = [-a for a in v]
+
+
+# Energy
+
+PENDULUMS = {
+    "plain": Pendulums(),
+    "gaps": Pendulums(gaps=[0.001, 0, 0.0005]),
+    "lengths": Pendulums(length=[0.1, 0.11, 0.1, 0.13]),
+    "any angle": Pendulums(angle="full"),
+}
+
+
+@pytest.mark.parametrize("how", PENDULUMS)
+@pytest.mark.parametrize("e", [1.0, 0.8])
+def test_energy_ledger(how, e):
+    """What is missing at any time is what the contacts kept back; nothing for e = 1."""
+    pendulums = PENDULUMS[how]
+    chain = Chain([1, 2, 0.5, 1], [0.1, 0, 0, -0.2], e)
+    times = np.linspace(0, 4, 101)
+    run = swing(chain, ImpulseCorrelation(0.1), [-0.03, -0.01, 0, 0.01], times, pendulums=pendulums)
+    assert len(run.impacts) > 10
+    start = run.energy[0]
+    if how != "any angle":
+        m, length = chain.masses, pendulums.row("length", 4)
+        assert start == pytest.approx(energy(m, run.positions[0], chain.velocities, length))
+    losses = np.array([[impact.time, impact.energy_loss] for impact in run.impacts])
+    booked = np.array([losses[losses[:, 0] <= t, 1].sum() for t in times])
+    tolerance = 1e-10 if how == "any angle" else 1e-13
+    np.testing.assert_allclose(run.energy + booked, start, rtol=tolerance)
+    for impact in run.impacts:
+        kinetic = 0.5 * chain.masses @ (impact.before**2 - impact.after**2)
+        assert kinetic == pytest.approx(impact.energy_loss, abs=1e-14 * start)
+    assert (lost(run) == 0) == (e == 1)
+    # Nobody passes: neighbours overlap by no more than rounding.
+    distance = pendulums.row("gaps", 3) + np.diff(run.positions, axis=1)
+    assert distance.min() > -1e-12
+
+
+def test_damping_between_impacts():
+    """Equal damping shrinks every velocity by one factor from stroke to stroke."""
+    rate = 0.3
+    w = 2 * math.pi
+    half = math.pi / math.sqrt(w * w - rate * rate)
+    pendulums = Pendulums(9.81 / w**2, damping=rate)
+    run = swing(balls(4), ImpulseCorrelation(0.15), pulled(4), [6.0], pendulums=pendulums)
+    first, *later = run.impacts
+    v = first.after
+    for k, impact in enumerate(later, start=1):
+        assert impact.time == pytest.approx(first.time + k * half, rel=1e-13)
+        np.testing.assert_allclose(impact.before, -math.exp(-rate * half) * v, atol=1e-14)
+        v = impact.after
+
+
+# Towards swinging together
+
+
+def test_drift_of_two_balls():
+    """The relative velocity of two balls falls to e at each stroke, their common one stays."""
+    e = 0.9
+    chain = Chain([2, 1], [0, 0], e)
+    run = swing(chain, ImpulseCorrelation(0), [-0.02, 0], [30.2], pendulums=ONE_HERTZ)
+    speed = 0.02 * 2 * math.pi
+    for k, impact in enumerate(run.impacts, start=1):
+        relative = impact.after[1] - impact.after[0]
+        assert relative == pytest.approx(speed * e**k, rel=1e-11)
+        mean = chain.masses @ impact.after / 3
+        assert mean == pytest.approx((-1) ** (k - 1) * speed * 2 / 3, rel=1e-13)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.15])
+def test_drift_of_five_balls(ratio):
+    """All energy but that of the common swing dies out, at the pace of the independent solver."""
+    e, n = 0.9, 5
+    run = swing(balls(n, e), ImpulseCorrelation(ratio), pulled(n), [60.0], pendulums=ONE_HERTZ)
+    v = np.array([0.02 * 2 * math.pi, 0, 0, 0, 0])
+    expected, found = [], []
+    for impact in run.impacts[:30]:
+        v = np.array([float(a) for a in solve([1.0] * n, list(v), [e] * 4, ratio).velocities])
+        expected.append(np.var(v))
+        found.append(np.var(impact.after))
+        v = -v
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    assert found[29] < 1e-2 * found[0]
+    # In the end the balls swing together, for ever: no more impacts, energy of the mean velocity.
+    assert run.together == (0, 1, 2, 3)
+    assert run.impacts[-1].time < 59
+    assert run.energy[-1] == pytest.approx(0.5 * n * (0.02 * 2 * math.pi / n) ** 2, rel=1e-12)
+    assert np.ptp(run.positions[-1]) < 1e-13
+
+
+# Independent integrations
+
+
+def springs(m, x, end, times, k, pendulums, exponent=1.5):
+    """Pendulums and contact springs, all integrated in time together."""
+    m, n = np.asarray(m, float), len(m)
+    square, gaps = 9.81 / pendulums.row("length", n), pendulums.row("gaps", n - 1)
+
+    def rate(_, y):
+        x, v = y[:n], y[n:]
+        force = k * np.maximum(x[:-1] - x[1:] - gaps, 0) ** exponent
+        a = -square * x
+        a[:-1] -= force / m[:-1]
+        a[1:] += force / m[1:]
+        return np.concatenate([v, a])
+
+    found = solve_ivp(
+        rate, (0, end), [*x, *np.zeros(n)], "DOP853", t_eval=times, rtol=1e-10, atol=1e-14,
+        max_step=0.01,
+    )  # fmt: skip
+    return found.y[:n].T
+
+
+@pytest.mark.parametrize(
+    ("m", "x", "pendulums"),
+    [
+        ([1, 3], [-0.02, 0], ONE_HERTZ),
+        ([1, 2, 1], [-0.02, 0, 0.01], Pendulums(ONE_HERTZ.length, gaps=[0.003, 0.004])),
+        ([1, 2], [-0.02, 0], Pendulums([0.2, 0.3])),
+    ],
+)
+def test_two_balls_at_a_time_are_the_limit_of_stiff_springs(m, x, pendulums):
+    """With a contact time that goes to zero like k^(-2/5), so does the difference."""
+    times = np.linspace(0, 2, 21)
+    run = swing(Chain(m, np.zeros(len(m)), 1), ImpulseCorrelation(0), x, times, pendulums=pendulums)
+    assert len(run.impacts) >= 3
+    apart = [
+        np.abs(springs(m, x, 2, times, k, pendulums) - run.positions).max() / 0.02
+        for k in (1e7, 1e9, 1e11)
+    ]
+    assert apart[2] < 0.005
+    for coarse, fine in zip(apart, apart[1:]):
+        assert 0.5 < math.log(coarse / fine) / math.log(100**0.4) < 1.5
+
+
+def test_first_stroke_of_three_touching_balls_is_that_of_springs():
+    half = np.array([0.5])
+    run = swing(balls(3), SpringChain(1.0), pulled(3), half, pendulums=ONE_HERTZ)
+    stiff = springs([1] * 3, pulled(3), 0.5, half, 1e10, ONE_HERTZ)
+    np.testing.assert_allclose(stiff[0], run.positions[0], rtol=0, atol=0.003 * 0.02)
+
+
+def test_second_stroke_of_springs_remembers_the_first():
+    """Springs of any stiffness let go at slightly different places, and meet again out of step.
+
+    So the touching second stroke is not their limit: the chapter says so.
+    """
+    full = np.array([1.0])
+    run = swing(balls(3), SpringChain(1.0), pulled(3), full, pendulums=ONE_HERTZ)
+    stiff = [springs([1] * 3, pulled(3), 1, full, k, ONE_HERTZ)[0] / 0.02 for k in (1e8, 1e10)]
+    np.testing.assert_allclose(stiff[0], stiff[1], rtol=0, atol=2e-3)
+    np.testing.assert_allclose(stiff[1], [-0.9735, -0.1745, 0.148], rtol=0, atol=1e-3)
+    assert np.abs(stiff[1] - run.positions[0] / 0.02).max() > 0.05
+
+
+# Resting contacts
+
+
+def test_pressed_balls_move_as_one_until_pulled_apart():
+    """The left pendulum is shorter: it pushes while it falls, and stays behind when it rises."""
+    length, a = np.array([0.2, 0.3]), 0.02
+    m = np.array([1.0, 2.0])
+    w2 = 9.81 / length
+    joint = math.sqrt(m @ w2 / m.sum())
+    part = math.pi / (2 * joint)
+    times = np.array([0.5 * part, part + 0.1])
+    run = swing(Chain(m, [0, 0], 0.5), ImpulseCorrelation(0), [-a, -a], times,
+                pendulums=Pendulums(length))  # fmt: skip
+    np.testing.assert_allclose(run.positions[0], -a * math.cos(math.pi / 4), rtol=1e-14)
+    # At the lowest point the force is zero: from there on each swings alone.
+    w = np.sqrt(w2)
+    np.testing.assert_allclose(run.positions[1], a * joint / w * np.sin(w * 0.1), rtol=1e-12)
+    assert not run.impacts
+
+
+def bounces(m, e, length, x, least):
+    """Two pendulums by SciPy's events, bounce after bounce, until they are slower than `least`."""
+    w2 = 9.81 / np.asarray(length)
+    y, t, count, step = np.array([*x, 0, 0], float), 0.0, 0, 0.01
+    touch = lambda _, y: y[1] - y[0]  # noqa: E731
+    touch.terminal, touch.direction = True, -1
+    while True:
+        found = solve_ivp(
+            lambda _, y: np.concatenate([y[2:], -w2 * y[:2]]), (t, t + 30 * step), y, "DOP853",
+            events=touch, rtol=1e-12, atol=1e-15, max_step=step,
+        )  # fmt: skip
+        assert found.status == 1
+        t, y, count = found.t[-1], found.y[:, -1].copy(), count + 1
+        u, common = y[2] - y[3], m @ y[2:] / m.sum()
+        if u < least:
+            return t, common, count
+        y[:2] = m @ y[:2] / m.sum()
+        y[2:] = common + np.array([-m[1], m[0]]) / m.sum() * e * u
+        # Short enough that SciPy sees the whole of the next bounce.
+        step = 0.2 * e * u / abs(w2[1] * y[1] - w2[0] * y[0])
+
+
+def test_infinite_bounces_of_pressed_balls_have_the_limit_of_an_independent_run():
+    m, e, length, x = np.array([1.0, 2.0]), 0.5, [0.1, 0.4], [-0.03, -0.0295]
+    limit, common, count = bounces(m, e, length, x, 1e-6)
+    run = swing(Chain(m, [0, 0], e), ImpulseCorrelation(0), x, [limit, limit + 0.01, 0.5],
+                pendulums=Pendulums(length))  # fmt: skip
+    early = [impact for impact in run.impacts if impact.time < limit + 0.01]
+    assert len(early) > count > 12
+    np.testing.assert_allclose(run.velocities[0], common, rtol=0, atol=2e-6)
+    # From the limit on they move as one; past the lowest point the left one stays behind.
+    assert run.positions[1, 0] == run.positions[1, 1]
+    assert early[-1].time == pytest.approx(limit, abs=1e-6)
+    assert run.positions[2, 1] > run.positions[2, 0] + 0.01
+
+
+def test_where_slow_begins_does_not_matter(monkeypatch):
+    arguments = Chain([1, 2, 1], [0] * 3, 0.6), ImpulseCorrelation(0.1), [-0.03, 0, 0.01]
+    found, counts = [], []
+    for least in (1e-10, 1e-8, 1e-6):
+        monkeypatch.setattr("cradle.swinging.RESTING", least)
+        run = swing(*arguments, [5.0], pendulums=Pendulums([0.1, 0.12, 0.11]))
+        found.append(run.positions[-1] / 0.03)
+        counts.append(len(run.impacts))
+    assert counts[0] > counts[1] > counts[2] > 20
+    assert np.abs(found[1] - found[0]).max() < 1e-6
+    assert np.abs(found[2] - found[0]).max() < 1e-4
+
+
+def test_struck_balls_that_touch_collide_as_one_chain():
+    """Balls that hang still and touch take part although nothing moves them."""
+    run = swing(balls(4), ImpulseCorrelation(0.15), pulled(4), [0.3], pendulums=ONE_HERTZ)
+    (impact,) = run.impacts
+    assert impact.contacts == (0, 1, 2)
+    (trace,) = impact.traces
+    assert len(trace.chain) == 4
+    apart = swing(balls(4), ImpulseCorrelation(0.15), pulled(4), [0.3],
+                  pendulums=Pendulums(ONE_HERTZ.length, gaps=[0, 1e-4, 0]))  # fmt: skip
+    assert [impact.contacts for impact in apart.impacts[:2]] == [(0,), (1, 2)]
+
+
+def test_balls_at_rest_stay_at_rest():
+    run = swing(balls(3, 0.5), ImpulseCorrelation(0), [0, 0, 0], [0, 1e6])
+    assert not run.positions.any()
+    assert not run.impacts
+    assert run.together == (0, 1)
+
+
+# Roots
+
+
+def test_first_fall_is_the_first():
+    """Against values on a fine grid: positive up to the root, zero there."""
+    rng = np.random.default_rng(13)
+    found = 0
+    for _ in range(300):
+        rates = [complex(-0.05 * a, 0.5 + b) for a, b in rng.random((2, 2))]
+        terms = [(complex(a, b), rate) for (a, b), rate in zip(rng.random((2, 2)) - 0.5, rates)]
+        level = max(rng.random() - sum(c.real for c, _ in terms), 0.0)
+
+        def value(t, level=level, terms=terms):
+            return level + sum((c * np.exp(rate * t)).real for c, rate in terms)
+
+        if value(0.0) < 0:
+            continue
+        root = first_fall(level, terms, False, 50.0)
+        grid = np.linspace(0, min(root, 50.0), 20001)
+        assert value(grid[:-1]).min() > 0 or value(0.0) == 0
+        if root < 50:
+            assert abs(value(root)) < 1e-14
+            found += 1
+    assert found > 100
+
+
+def test_first_fall_after_a_tiny_step_up():
+    """A contact that opens at 1e-9 under a pull of 1 closes after 2e-9, to many digits."""
+    a, b = complex(0, 1.0), complex(0, 2.0)
+    # Pull to zero: f'' = -1 with f = 0, f' = 1e-9 at the start.
+    c1, c2 = complex(-1 / 3, -1e-9), complex(1 / 3, 0)
+    assert first_fall(0.0, [(c1, a), (c2, b)], True, 1.0) == pytest.approx(2e-9, rel=1e-6)
+
+
+def test_grazing_is_no_endless_loop():
+    """The gap just closes, at no speed."""
+    pendulums = Pendulums(9.81, gaps=0.02)
+    run = swing(balls(2), ImpulseCorrelation(0), [-0.02, 0], [20.0], pendulums=pendulums)
+    assert len(run.impacts) <= 4
+    assert run.energy[-1] == pytest.approx(run.energy[0], rel=1e-12)
+
+
+# Ends and errors
+
+
+def test_ends():
+    arguments = balls(2, 0.9), ImpulseCorrelation(0), [-0.02, 0.02], np.linspace(0, 5, 51)
+    by_time = swing(*arguments, pendulums=ONE_HERTZ)
+    assert (by_time.ended, by_time.end, len(by_time.times)) == ("times", 5.0, 51)
+    by_count = swing(*arguments, pendulums=ONE_HERTZ, max_impacts=3)
+    assert (by_count.ended, len(by_count.impacts)) == ("impacts", 3)
+    assert by_count.end == by_count.impacts[-1].time == pytest.approx(1.25)
+    assert by_count.times[-1] <= by_count.end < by_count.times[-1] + 0.1
+    by_energy = swing(*arguments, pendulums=ONE_HERTZ, min_energy=0.5)
+    # All energy is relative: .81, .656, .531, .43 of it are left.
+    assert (by_energy.ended, len(by_energy.impacts)) == ("energy", 4)
+    for run in (by_time, by_count, by_energy):
+        assert run.positions.shape == run.velocities.shape == (len(run.times), 2)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"positions": [0.01, 0, 0]}, r"balls 0 and 1 overlap by 0.01 m"),
+        ({"positions": [0, 0]}, r"positions has shape \(2,\); 3 balls need \(3,\)"),
+        ({"times": [1, 0]}, "rising"),
+        ({"times": []}, "rising"),
+        ({"max_impacts": 0}, "max_impacts = 0"),
+        ({"min_energy": 2}, "min_energy = 2.0; must lie in"),
+        ({"model": ImpulseCorrelation([0.1] * 4)}, "forward has 4 values; 3 balls need 1"),
+    ],
+)
+def test_errors(change, message):
+    arguments = {
+        "chain": balls(3), "model": ImpulseCorrelation(0.1), "positions": pulled(3), "times": [1]
+    }  # fmt: skip
+    with pytest.raises(ValueError, match=message):
+        swing(**arguments | change)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"length": 0}, "length = 0.0; must be above 0"),
+        ({"gaps": [0, -1]}, r"gaps\[1\] = -1.0; must be at least 0"),
+        ({"damping": -1}, "damping = -1.0"),
+        ({"gravity": 0}, "gravity = 0.0"),
+        ({"angle": "large"}, "angle = 'large'"),
+        ({"angle": "full", "gaps": 1e-3}, "must be 0 with angle='full'"),
+        ({"angle": "full", "length": [1, 2]}, "must be equal with angle='full'"),
+    ],
+)
+def test_pendulums_refuse(options, message):
+    with pytest.raises(ValueError, match=message):
+        Pendulums(**options)
+
+
+def test_overdamped_pendulums_do_not_swing():
+    with pytest.raises(ValueError, match="natural frequency"):
+        swing(balls(2), ImpulseCorrelation(0), pulled(2), [1], pendulums=Pendulums(1, damping=4))
+
+
+def test_a_model_that_refuses_says_when():
+    """Two contacts approach at once: fused bodies are undefined there."""
+    with pytest.raises(ValueError, match="FusedChain") as refused:
+        swing(balls(3), FusedChain(), [-0.02, 0, 0.02], [1], pendulums=ONE_HERTZ)
+    assert "t = 0.25" in refused.value.__notes__[0]
+
+
+def test_parts_of_a_chain_take_their_part_of_the_model():
+    """Balls 2 to 4 hang apart from the rest: their ratios are theirs alone."""
+    ratios = [0.1, 0.2, 0.3, 0.4]
+    pendulums = Pendulums(ONE_HERTZ.length, gaps=[1.0, 1.0, 0, 0, 1.0][:5])
+    chain = Chain([1, 1, 1, 2, 1.5, 1], [0] * 6, [1, 1, 0.9, 0.8, 1])
+    run = swing(chain, ImpulseCorrelation(ratios), [0, 0, -0.02, 0, 0, 0], [0.3],
+                pendulums=pendulums)  # fmt: skip
+    (impact,) = run.impacts
+    expected = solve([1.0, 2.0, 1.5], [impact.before[2], 0, 0], [0.9, 0.8], ratios[2])
+    np.testing.assert_allclose(
+        impact.after[2:5], [float(v) for v in expected.velocities], atol=1e-15
+    )
+
+
+def test_mirror():
+    """Seen from behind, everything is the same, if no two contacts approach at one instant."""
+    times, pendulums = np.linspace(0, 5, 26), Pendulums(gaps=0.001)
+    runs = [
+        swing(Chain(m, [0] * 4, 0.9), ImpulseCorrelation(0.1), x, times, pendulums=pendulums)
+        for m, x in (([1, 2, 1, 3], [-0.02, 0, 0, 0]), ([3, 1, 2, 1], [0, 0, 0, 0.02]))
+    ]
+    assert len(runs[0].impacts) > 20
+    np.testing.assert_allclose(runs[1].positions[:, ::-1], -runs[0].positions, rtol=0, atol=1e-12)
+
+
+def test_frames():
+    run = swing(balls(3), ImpulseCorrelation(0), pulled(3), [0, 0.3, 0.6], pendulums=ONE_HERTZ)
+    frame = run.to_frame()
+    assert list(frame.columns) == ["time", "ball", "position", "velocity"]
+    wide = frame.pivot(index="time", columns="ball", values="position")
+    np.testing.assert_array_equal(wide.to_numpy(), run.positions)
+    impacts = run.impacts_to_frame()
+    assert len(impacts) == 3 * len(run.impacts)
+    none = swing(balls(3), ImpulseCorrelation(0), [0, 0, 0], [1]).impacts_to_frame()
+    assert list(none.columns) == ["impact", "time", "ball", "before", "after"]
+    assert none.empty
+
+
+def test_ratio_zero_exact_in_fractions():
+    """Equal balls, e = 1, ratio 0: velocities are exchanged; the map needs no rounding."""
+    run = swing(balls(4), ImpulseCorrelation(0), [-0.02, -0.01, 0, 0], [3.3], pendulums=ONE_HERTZ)
+    v = [Fraction(2), Fraction(1), Fraction(0), Fraction(0)]
+    speed = 0.01 * 2 * math.pi
+    for impact in run.impacts[:6]:
+        v = sorted(v)  # equal elastic balls pass their velocities on: as if they ran through
+        np.testing.assert_allclose(impact.after / speed, [float(a) for a in v], atol=1e-12)
+        v = [-a for a in v]
