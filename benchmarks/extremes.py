@@ -25,6 +25,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import extremes as x  # noqa: E402
+from chains import power_of_ten  # noqa: E402
 
 from cradle import paper_chain  # noqa: E402
 from cradle.models.correlation import outcomes  # noqa: E402
@@ -112,8 +113,8 @@ def edges(_):
 
 
 def elastic(_):
-    for power, ratio in itertools.product(np.arange(0, 10.25, 0.25), (0.0, 0.15)):
-        light = 10.0 ** -float(power)
+    for quarters, ratio in itertools.product(range(41), (0.0, 0.15)):
+        light = power_of_ten(-quarters)
         problem = x.case([1, light, 1], [1, 0, 0], 1, ratio)
         trace, finished = problem.collide(5_000_000)
         assert finished
@@ -124,7 +125,7 @@ def elastic(_):
             with mpmath.workdps(50):
                 theory, *known = x.elastic_impacts(light)
                 error, condition, own = x.compare(trace, known)
-        yield (float(power), ratio, int(trace.collisions.sum()), theory, error,
+        yield (quarters / 4, ratio, int(trace.collisions.sum()), theory, error,
                condition, own, max(defects["gain"], 0.0), int(trace.collapsed))  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import mpmath
 import numpy as np
-from chains import with_ends, within_bounds
+from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
 from march import march
 from reference import EventLimit, solve
 
@@ -270,7 +270,7 @@ VELOCITIES = {
 
 def map_case(shape, power, e, ratio, velocities):
     """A point of the map: three balls."""
-    m1, m2, m3 = SHAPES[shape](10.0**power)
+    m1, m2, m3 = SHAPES[shape](power_of_ten(4 * power))
     forward, backward = (RATIOS[ratio](m / (m + m2)) for m in (m3, m1))
     return case((m1, m2, m3), VELOCITIES[velocities], e, [forward], [backward])
 
@@ -356,7 +356,7 @@ def perturbed(spread, n, e, size, chains=10, seed=2001):
     relative to the largest speed, and the number of balls at the far end that keep six digits.
     """
     rng = np.random.default_rng([seed, n, round(1000 * e)])
-    masses = rng.uniform(1 - spread, 1 + spread, (chains, n))
+    masses = uniform(rng, 1 - spread, 1 + spread, (chains, n))
     velocities = np.zeros((chains, n))
     velocities[:, 0] = 1.0
     parts = [masses, velocities, np.full((chains, n - 1), e), np.full((chains, n - 2), 0.1)]
@@ -459,7 +459,7 @@ def moved(problem, name, k, change):
     return problem._replace(**{name: values}) if low <= values[k] <= high else None
 
 
-def nearest_edge(problem, name, k, side, scale, farthest=0.3, per_decade=20):
+def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
     """How far an input can move to one side before the events change, and the jump there.
 
     Relative distance and the largest change of a velocity across it, relative to the largest
@@ -474,14 +474,14 @@ def nearest_edge(problem, name, k, side, scale, farthest=0.3, per_decade=20):
         trace = changed.collide()[0]
         return trace.velocities, events_at_balls(trace) == base
 
-    near = 0.0
-    for far in np.geomspace(1e-12, farthest, 1 + round(per_decade * math.log10(farthest / 1e-12))):
+    near, far = 0.0, 1e-12
+    while far <= farthest:
         found = at(far)
         if found is None:
             return math.inf, 0.0
         if not found[1]:
             break
-        near = far
+        near, far = far, far * step
     else:
         return math.inf, 0.0
     while far - near > max(1e-10 * far, 1e-15):
@@ -500,10 +500,10 @@ def any_chain(family, decades, index):
     """A chain of 2 to 8 balls, e and ratios often exactly 0 or 1 (or at their bounds)."""
     rng = np.random.default_rng([FAMILIES.index((family, decades)), index])
     n = int(rng.integers(2, 9))
-    masses = 10 ** rng.uniform(-decades / 2, decades / 2, n)
+    masses = magnitudes(rng, decades, n)
     velocities = (
-        rng.normal(size=n),
-        np.sort(rng.uniform(-1, 1, n))[::-1],
+        uniform(rng, -1, 1, n),
+        np.sort(uniform(rng, -1, 1, n))[::-1],
         np.eye(n)[0],
     )[rng.integers(3)]
     part = with_ends(rng)

@@ -10,6 +10,7 @@ import extremes as x
 import mpmath
 import numpy as np
 import pytest
+from chains import power_of_ten, uniform
 from fuzz import attempt
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -167,7 +168,7 @@ def test_speeds_of_any_size(size):
 def test_subnormal_energies_and_speeds():
     """Energies below the smallest number, then speeds there: to half of the smallest number."""
     for power in (-165, -200, -300, -310, -320):
-        problem = x.case([1, 1.5, 0.7], [10.0**power, 0, 0], 0.8, 0.2)
+        problem = x.case([1, 1.5, 0.7], [power_of_ten(4 * power), 0, 0], 0.8, 0.2)
         trace, finished = problem.collide()
         assert x.faults(trace, finished) == []
         exact = [float(v) for v in problem.exact().velocities]
@@ -251,7 +252,7 @@ def test_number_of_elastic_impacts():
         elif row["power"] >= 4:
             assert row["impacts"] == pytest.approx(row["theory"], rel=0.02), row
     for row in sample([r for r in rows if r["power"] <= 6], 6):
-        found = outcomes([1, 10 ** -row["power"], 1], [1, 0, 0], 1, row["ratio"])
+        found = outcomes([1, power_of_ten(-round(4 * row["power"])), 1], [1, 0, 0], 1, row["ratio"])
         assert found.collisions.sum() == row["impacts"]
 
 
@@ -528,8 +529,8 @@ def test_condition_number_sees_a_jump():
 def test_condition_number_agrees_with_fifty_digits():
     rng = np.random.default_rng(7)
     for _ in range(6):
-        m, v, e = rng.uniform(0.5, 2, 4), np.array([1.0, 0, 0, 0]), rng.uniform(0.3, 0.95, 3)
-        problem = x.case(m, v, e, rng.uniform(0.05, 0.25, 2), rng.uniform(0.05, 0.25, 2))
+        m, v, e = uniform(rng, 0.5, 2, 4), np.array([1.0, 0, 0, 0]), uniform(rng, 0.3, 0.95, 3)
+        problem = x.case(m, v, e, uniform(rng, 0.05, 0.25, 2), uniform(rng, 0.05, 0.25, 2))
         found = condition_number(
             Chain(m, v, e), ImpulseCorrelation(problem.forward, problem.backward)
         )

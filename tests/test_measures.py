@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from chains import striking
+from chains import magnitudes, striking, uniform
 
 from cradle import (
     Chain,
@@ -133,7 +133,7 @@ def test_effective_ratio_refuses_a_tolerance(tolerance, message):
 
 def random_three(seed):
     rng = np.random.default_rng(seed)
-    return 10 ** rng.uniform(-1, 1, 3), np.sort(rng.normal(size=3))[::-1]
+    return magnitudes(rng, 2, 3), np.sort(uniform(rng, -1, 1, 3))[::-1]
 
 
 @pytest.mark.parametrize("seed", range(10))
