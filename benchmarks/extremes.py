@@ -14,8 +14,11 @@ import argparse
 import csv
 import itertools
 import math
+import multiprocessing
 import pickle
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import mpmath
@@ -141,32 +144,41 @@ def limits(_):
         yield (e, ratio, at, theory, *(int(f.collisions.sum()) for f in found))
 
 
-CHAINS, LONG = 25_000, 50_000
+LONG = 50_000
+
+
+def long_or_not(family, decades, index):
+    """Return balls, the columns of `finish`, and a row of `unfinished` if there is one.
+
+    Chains that the solver's default limit does not finish either are explained, one by one.
+    """
+    problem = x.any_chain(family, decades, index)
+    n = len(problem.masses)
+    collisions, collapsed, stopped = x.work(problem, LONG)
+    row = (1, collapsed, collisions > 100, collisions > 1000, collisions > 10_000)
+    unfinished = None
+    if stopped:
+        seen = (*x.portrait(problem, stopped), *x.to_the_default(problem))
+        why = [""] * len(x.Explanation._fields)
+        if not seen[-1]:
+            why = x.explain(problem, x.late(problem, x.MAX_EVENTS))
+        unfinished = (family, decades, index, n, *seen, *why)
+    return n, (*row, stopped is not None), unfinished
 
 
 def finish(_):
-    """Count by family and number of balls: finished, collapsed, long; unfinished ones by name.
-
-    Those that the solver's default limit does not finish either are explained, one by one.
-    """
+    """Count by family and number of balls: finished, collapsed, long; unfinished ones by name."""
     unfinished = []
-    for family, decades in x.FAMILIES:
-        table = np.zeros((9, 6), dtype=int)
-        for index in range(CHAINS):
-            problem = x.any_chain(family, decades, index)
-            n = len(problem.masses)
-            collisions, collapsed, stopped = x.work(problem, LONG)
-            row = (1, collapsed, collisions > 100, collisions > 1000, collisions > 10_000)
-            table[n] += (*row, stopped is not None)
-            if stopped:
-                seen = (*x.portrait(problem, stopped), *x.to_the_default(problem))
-                why = [""] * len(x.Explanation._fields)
-                if not seen[-1]:
-                    why = x.explain(problem, x.late(problem, x.MAX_EVENTS))
-                unfinished.append((family, decades, index, n, *seen, *why))
-        for n in range(2, 9):
-            yield (family, decades, n, *table[n].tolist())
-        print(family, decades, len(unfinished), flush=True)
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        for family, decades in x.FAMILIES:
+            table = np.zeros((9, 6), dtype=int)
+            chains = partial(long_or_not, family, decades)
+            for n, row, name in pool.map(chains, range(x.CHAINS), chunksize=100):
+                table[n] += row
+                unfinished += [name] if name else []
+            for n in range(2, 9):
+                yield (family, decades, n, *table[n].tolist())
+            print(family, decades, len(unfinished), flush=True)
     header = ["family", "decades", "index", "balls", "period", "energy_half", "energy"]
     header += ["collisions", "finished", *(f"late_{name}" for name in x.Explanation._fields)]
     write("unfinished", header, unfinished)

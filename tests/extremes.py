@@ -349,11 +349,10 @@ def equal_elastic(n, ratio):
 # --- growth of a perturbation ------------------------------------------------------------------
 
 
-def perturbed(spread, n, e, size, chains=10, seed=2001):
+def rows_of_balls(spread, n, e, size, chains=10, seed=2001):
     """Chains of n balls, ratio .1, and copies in which every input is changed by the part `size`.
 
-    Masses are 1 but for the part `spread`.  Returns, one a chain, the largest change of a velocity
-    relative to the largest speed, and the number of balls at the far end that keep six digits.
+    Masses are 1 but for the part `spread`.
     """
     rng = np.random.default_rng([seed, n, round(1000 * e)])
     masses = uniform(rng, 1 - spread, 1 + spread, (chains, n))
@@ -362,7 +361,15 @@ def perturbed(spread, n, e, size, chains=10, seed=2001):
     parts = [masses, velocities, np.full((chains, n - 1), e), np.full((chains, n - 2), 0.1)]
     changed = [part * (1 + size * rng.choice([-1, 1], part.shape)) for part in parts]
     changed[2] = np.minimum(changed[2], 1.0)
-    one, other = (post_impact_velocities(*these) for these in (parts, changed))
+    return parts, changed
+
+
+def perturbed(spread, n, e, size):
+    """Largest change of a velocity relative to the largest speed, one a chain of `rows_of_balls`.
+
+    And the number of balls at the far end that keep six digits.
+    """
+    one, other = (post_impact_velocities(*these) for these in rows_of_balls(spread, n, e, size))
     off = np.abs(other - one)
     off /= np.abs(one).max(axis=-1, keepdims=True)
     leading = [int(np.argmin([*row[::-1], False])) for row in off <= 1e-6]
@@ -494,6 +501,8 @@ def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
 # --- every chain finishes ----------------------------------------------------------------------
 
 FAMILIES = (("within", 3), ("within", 6), ("saturate", 3), ("saturate", 6))
+#: How many chains of each family the map counts.
+CHAINS = 25_000
 
 
 def any_chain(family, decades, index):
@@ -583,16 +592,22 @@ def no_compressions(count, *_):
 
 
 @functools.cache
-def late_kernel():
+def late_kernel(compiled):
     """The kernel with a record of the last events in place of the first."""
-    import numba
-
     spec = importlib.util.spec_from_file_location("late_kernel", kernel.__file__)
     module = importlib.util.module_from_spec(spec)
-    vars(module)["jit"] = numba.njit(error_model="numpy")
+    if compiled:
+        import numba
+
+        jit = vars(module)["jit"] = numba.njit(error_model="numpy")
+    else:
+
+        def jit(function):
+            return function
+
     spec.loader.exec_module(module)
-    module.record = module.jit(keep_the_last)
-    module.record_compressions = module.jit(no_compressions)
+    module.record = jit(keep_the_last)
+    module.record_compressions = jit(no_compressions)
     return module
 
 
@@ -603,7 +618,8 @@ def late(problem, steps, room=20_000):
     floats, ints = np.zeros((kernel.FLOATS, n)), np.zeros((kernel.INTS, n), int)
     outputs = [np.zeros(n), *np.zeros((2, n - 1)), *np.zeros((2, n - 1), int)]
     parts = [np.array(part, float) for part in problem[:5]]
-    _, count, _ = late_kernel().impact(
+    # Few steps are sooner made than compiled.
+    _, count, _ = late_kernel(steps > 100_000).impact(
         n, *parts, problem.meeting, steps, *outputs, floats, ints, *record
     )
     order = np.arange(max(count - room, 0), count) % room
