@@ -614,17 +614,22 @@ def late_kernel(compiled):
 def late(problem, steps, room=20_000):
     """The last events, no more than `room`, of a chain that is stopped after so many steps."""
     n = len(problem.masses)
-    record = [np.zeros(room, int), np.zeros(room, int), np.zeros((1, n)), np.zeros((room, n - 1))]
-    floats, ints = np.zeros((kernel.FLOATS, n)), np.zeros((kernel.INTS, n), int)
-    outputs = [np.zeros(n), *np.zeros((2, n - 1)), *np.zeros((2, n - 1), int)]
-    parts = [np.array(part, float) for part in problem[:5]]
-    # Few steps are sooner made than compiled.
-    _, count, _ = late_kernel(steps > 100_000).impact(
+    compiled = steps > 100_000  # fewer are sooner made than compiled
+
+    def area(*shape, kind=float):
+        numbers = np.zeros(shape, kind)
+        return numbers if compiled else numbers.tolist()
+
+    record = [area(room, kind=int), area(room, kind=int), area(1, n), area(room, n - 1)]
+    outputs = [area(n), area(n - 1), area(n - 1), area(n - 1, kind=int), area(n - 1, kind=int)]
+    floats, ints = area(kernel.FLOATS, n), area(kernel.INTS, n, kind=int)
+    parts = [np.array(part, float) if compiled else part for part in problem[:5]]
+    _, count, _ = late_kernel(compiled).impact(
         n, *parts, problem.meeting, steps, *outputs, floats, ints, *record
     )
     order = np.arange(max(count - room, 0), count) % room
-    kinds, contacts, _, speeds = record
-    return Late(kinds[order], contacts[order], speeds[order], ints[0][: n - 1])
+    kinds, contacts, speeds = (np.array(record[k])[order] for k in (0, 1, 3))
+    return Late(kinds, contacts, speeds, np.array(ints[0][: n - 1]))
 
 
 class Explanation(NamedTuple):
