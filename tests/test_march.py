@@ -243,14 +243,14 @@ def test_mirrored_chain(meeting, strikers):
     stretch has one, and no two distances are equal (a tie goes to the left: no mirror image).
     """
     rng = np.random.default_rng(5)
-    for n in [4, 5, 6] * 10:
+    for n in [4, 5, 6] * 5:
         m, _, e, a, b = random_chain(rng, n)
         v = np.array([1, *np.zeros(n - 1)])
         if strikers == 2:
             v = np.array([1, *np.sort(uniform(rng, -0.1, 0.1, n - 2)), -0.7])
-        here = march(m, v, e, a, b, meeting=meeting, steps=1000)
+        here = march(m, v, e, a, b, meeting=meeting, steps=2000)
         reversed_chain = m[::-1], -v[::-1], e[::-1], b[::-1], a[::-1]
-        there = march(*reversed_chain, meeting=1 - meeting, steps=1000)
+        there = march(*reversed_chain, meeting=1 - meeting, steps=2000)
         # The march itself is symmetric; the rounding of a fraction to whole steps may not be.
         assert abs(here.velocities + there.velocities[::-1]).max() < 1e-3
 
