@@ -49,7 +49,7 @@ def test_one_striker_collides_pair_after_pair(n):
     for _ in range(50):
         velocities = np.zeros(n)
         velocities[0] = uniform(rng, 0.1, 10)
-        # Losses so small that no sequence is infinite, even of a ball between two 64 times as heavy.
+        # Losses so small that no sequence is infinite, even between balls 64 times as heavy.
         chain = Chain(magnitudes(rng, 2, n), velocities, uniform(rng, 0.8, 1, n - 1))
         trace = collide(chain, SequentialCollisions())
         v, impulses = by_rounds(chain, 0)
