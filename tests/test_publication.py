@@ -150,6 +150,12 @@ def test_oldest_versions_are_those_declared(project):
     assert tested == declared
 
 
+def test_binder_has_a_python_that_the_package_takes(project):
+    version = re.fullmatch(r"python-(3\.\d+)\n", text(".binder/runtime.txt"))[1]
+    assert f"Programming Language :: Python :: {version}" in project["classifiers"]
+    assert text(".binder/requirements.txt") == "-e .[book]\n"
+
+
 @pytest.fixture(scope="module")
 def sdist(tmp_path_factory):
     """Build a source distribution from a copy of the repository's files: no network."""
