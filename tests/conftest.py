@@ -29,7 +29,8 @@ MINUTES = 9
 
 def pytest_report_header(config: pytest.Config) -> str | None:
     """Say how long it will take."""
-    if config.args_source is not pytest.Config.ArgsSource.TESTPATHS:
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    if not whole or config.option.markexpr != "not exhaustive":
         return None
     workers = config.getoption("numprocesses", None) or 1
     return (

@@ -26,7 +26,7 @@ from cradle import (
     runtime,
 )
 from cradle.measures import condition_number
-from cradle.models.correlation import outcomes
+from cradle.models.correlation import MAX_EVENTS, outcomes
 from cradle.tables import paper_sequences
 
 DATA = Path(__file__).parents[1] / "data"
@@ -466,6 +466,17 @@ def test_chains_that_do_not_finish_are_explained():
         early = x.explain(problem, x.late(problem, 10_000))
         assert early.returns >= 4, row
         assert max(abs(early.shrink), early.turn, early.drift) > 0, row
+
+
+@pytest.mark.exhaustive
+def test_chains_go_on_to_the_default_limit():
+    """Five million events: still something comes back, without an error that shows."""
+    for row in sample([row for row in stored("unfinished") if not row["finished"]], 3, seed=4):
+        problem = x.any_chain(row["family"], int(row["decades"]), int(row["index"]))
+        assert x.to_the_default(problem)[1] == 0, row
+        found = x.explain(problem, x.late(problem, MAX_EVENTS))
+        assert found.returns >= 4, row
+        assert max(abs(found.shrink), found.turn, found.drift) > 0, row
 
 
 def test_last_events():
