@@ -14,8 +14,11 @@ import argparse
 import csv
 import itertools
 import math
+import multiprocessing
 import pickle
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import mpmath
@@ -25,6 +28,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import extremes as x  # noqa: E402
+from chains import power_of_ten  # noqa: E402
 
 from cradle import (
     outcomes,
@@ -114,8 +118,8 @@ def edges(_):
 
 
 def elastic(_):
-    for power, ratio in itertools.product(np.arange(0, 10.25, 0.25), (0.0, 0.15)):
-        light = 10.0 ** -float(power)
+    for quarters, ratio in itertools.product(range(41), (0.0, 0.15)):
+        light = power_of_ten(-quarters)
         problem = x.case([1, light, 1], [1, 0, 0], 1, ratio)
         trace, finished = problem.collide(5_000_000)
         assert finished
@@ -126,7 +130,7 @@ def elastic(_):
             with mpmath.workdps(50):
                 theory, *known = x.elastic_impacts(light)
                 error, condition, own = x.compare(trace, known)
-        yield (float(power), ratio, int(trace.collisions.sum()), theory, error,
+        yield (quarters / 4, ratio, int(trace.collisions.sum()), theory, error,
                condition, own, max(defects["gain"], 0.0), int(trace.collapsed))  # fmt: skip
 
 
@@ -142,32 +146,41 @@ def limits(_):
         yield (e, ratio, at, theory, *(int(f.collisions.sum()) for f in found))
 
 
-CHAINS, LONG = 25_000, 50_000
+LONG = 50_000
+
+
+def long_or_not(family, decades, index):
+    """Return balls, the columns of `finish`, and a row of `unfinished` if there is one.
+
+    Chains that the solver's default limit does not finish either are explained, one by one.
+    """
+    problem = x.any_chain(family, decades, index)
+    n = len(problem.masses)
+    collisions, collapsed, stopped = x.work(problem, LONG)
+    row = (1, collapsed, collisions > 100, collisions > 1000, collisions > 10_000)
+    unfinished = None
+    if stopped:
+        seen = (*x.portrait(problem, stopped), *x.to_the_default(problem))
+        why = [""] * len(x.Explanation._fields)
+        if not seen[-1]:
+            why = x.explain(problem, x.late(problem, x.MAX_EVENTS))
+        unfinished = (family, decades, index, n, *seen, *why)
+    return n, (*row, stopped is not None), unfinished
 
 
 def finish(_):
-    """Count by family and number of balls: finished, collapsed, long; unfinished ones by name.
-
-    Those that the solver's default limit does not finish either are explained, one by one.
-    """
+    """Count by family and number of balls: finished, collapsed, long; unfinished ones by name."""
     unfinished = []
-    for family, decades in x.FAMILIES:
-        table = np.zeros((9, 6), dtype=int)
-        for index in range(CHAINS):
-            problem = x.any_chain(family, decades, index)
-            n = len(problem.masses)
-            collisions, collapsed, stopped = x.work(problem, LONG)
-            row = (1, collapsed, collisions > 100, collisions > 1000, collisions > 10_000)
-            table[n] += (*row, stopped is not None)
-            if stopped:
-                seen = (*x.portrait(problem, stopped), *x.to_the_default(problem))
-                why = [""] * len(x.Explanation._fields)
-                if not seen[-1]:
-                    why = x.explain(problem, x.late(problem, x.MAX_EVENTS))
-                unfinished.append((family, decades, index, n, *seen, *why))
-        for n in range(2, 9):
-            yield (family, decades, n, *table[n].tolist())
-        print(family, decades, len(unfinished), flush=True)
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        for family, decades in x.FAMILIES:
+            table = np.zeros((9, 6), dtype=int)
+            chains = partial(long_or_not, family, decades)
+            for n, row, name in pool.map(chains, range(x.CHAINS), chunksize=100):
+                table[n] += row
+                unfinished += [name] if name else []
+            for n in range(2, 9):
+                yield (family, decades, n, *table[n].tolist())
+            print(family, decades, len(unfinished), flush=True)
     header = ["family", "decades", "index", "balls", "period", "energy_half", "energy"]
     header += ["collisions", "finished", *(f"late_{name}" for name in x.Explanation._fields)]
     write("unfinished", header, unfinished)

@@ -23,6 +23,7 @@ from cradle.measures import effective_ratio
 
 EXPONENTS = (1.0, 1.5)  # linear, Hertz
 MASS_RATIOS = (0.1, 0.3, 1.0, 3.0, 10.0)
+# Six digits, because the last one of a power depends on the C library.
 STIFFNESS_RATIOS = tuple(float(f"{10.0 ** (k / 4):.6g}") for k in range(-12, 13))
 CASE = ["exponent", "m2_over_m1", "m3_over_m2", "k2_over_k1"]
 COLUMNS = [*CASE, "v1", "v2", "v3", "bound", "ratio", "note"]

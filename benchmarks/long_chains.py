@@ -116,7 +116,7 @@ def copies(restitution, balls):
     masses = np.tile(masses, (1 + COPIES, 1))
     restitutions = np.full((1 + COPIES, balls - 1), restitution)
     for values in (masses, restitutions):
-        values[1:] *= 1.0 + CHANGE * rng.uniform(-1.0, 1.0, values[1:].shape)
+        values[1:] *= 1.0 + CHANGE * (2.0 * rng.random(values[1:].shape) - 1.0)
     return masses, velocities, restitutions
 
 

@@ -12,6 +12,7 @@ from cradle import Chain, ImpulseCorrelation, SpringChain, collide, paper_chain
 
 # The independent solvers of the tests: a march by small steps, an event loop in any number type.
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
+from chains import magnitudes, uniform
 from march import march
 from reference import solve
 
@@ -89,12 +90,12 @@ SCENES = {
 def random_chains(balls, count):
     """Return random chains of that many balls, ratios within the bounds."""
     rng = np.random.default_rng(balls)
-    masses = 10.0 ** rng.uniform(-0.5, 0.5, (count, balls))
+    masses = magnitudes(rng, 1, (count, balls))
     velocities = np.zeros((count, balls))
     velocities[:, 0] = 1.0
-    restitution = rng.uniform(0.3, 1.0, (count, balls - 1))
+    restitution = uniform(rng, 0.3, 1.0, (count, balls - 1))
     # Eq. 34 with any onward ratio: the bound of Eq. 53 is never below it, forward or backward.
-    part = rng.uniform(0.0, 1.0, (count, balls - 2))
+    part = uniform(rng, 0.0, 1.0, (count, balls - 2))
     forward = part * masses[:, 2:] / (masses[:, 2:] + masses[:, 1:-1])
     backward = part * masses[:, :-2] / (masses[:, :-2] + masses[:, 1:-1])
     return masses, velocities, restitution, forward, backward

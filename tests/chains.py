@@ -1,5 +1,7 @@
 """Chains that several tests use: given ones with their outcomes, and random ones."""
 
+import math
+
 import numpy as np
 
 from cradle import Chain
@@ -29,6 +31,29 @@ FIG_8 = [
 def striking(masses=(1, 1, 1), e=1.0, speed=1.0):
     """The first ball strikes the others at rest."""
     return Chain(masses, [speed] + [0] * (len(masses) - 1), e)
+
+
+# Random numbers are made of operations that round alike everywhere: products, sums, powers of two.
+# `10 ** x` rounds as the processor's vector unit or the C library does, and `Generator.uniform` and
+# `normal` hold a product and a sum that some compilers join into one rounding.
+
+
+def uniform(rng, low, high, size=None):
+    """Numbers between two ends."""
+    return low + (high - low) * rng.random(size)
+
+
+def magnitudes(rng, decades, size=None):
+    """Numbers around 1 over about so many decades: as many in every factor of two."""
+    most = max(round(decades / 2 * math.log2(10)), 1)
+    return np.ldexp(1 + rng.random(size), rng.integers(-most, most, size, dtype=np.int32))
+
+
+def power_of_ten(quarters):
+    """10 ** (quarters / 4)."""
+    whole, rest = divmod(quarters, 4)
+    root = math.sqrt(math.sqrt(10))
+    return float(f"1e{whole}") * (1, root, math.sqrt(10), root * math.sqrt(10))[rest]
 
 
 def within_bounds(masses, part):
@@ -63,8 +88,8 @@ def with_ends(rng, share=0.15):
 
 def random_chains(rng, count, n, decades=6, speed=None):
     """Masses, velocities, restitution, forward, backward of `count` chains of `n` balls."""
-    masses = 10 ** rng.uniform(-decades / 2, decades / 2, (count, n))
-    velocities = rng.normal(size=(count, n)) if speed is None else speed(count, n)
+    masses = magnitudes(rng, decades, (count, n))
+    velocities = uniform(rng, -1, 1, (count, n)) if speed is None else speed(count, n)
     part = with_ends(rng)
     return masses, velocities, part((count, n - 1)), *within_bounds(masses, part)
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import mpmath
 import numpy as np
-from chains import with_ends, within_bounds
+from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
 from march import march
 from reference import EventLimit, solve
 
@@ -271,7 +271,7 @@ VELOCITIES = {
 
 def map_case(shape, power, e, ratio, velocities):
     """A point of the map: three balls."""
-    m1, m2, m3 = SHAPES[shape](10.0**power)
+    m1, m2, m3 = SHAPES[shape](power_of_ten(4 * power))
     forward, backward = (RATIOS[ratio](m / (m + m2)) for m in (m3, m1))
     return case((m1, m2, m3), VELOCITIES[velocities], e, [forward], [backward])
 
@@ -350,20 +350,27 @@ def equal_elastic(n, ratio):
 # --- growth of a perturbation ------------------------------------------------------------------
 
 
-def perturbed(spread, n, e, size, chains=10, seed=2001):
+def rows_of_balls(spread, n, e, size, chains=10, seed=2001):
     """Chains of n balls, ratio .1, and copies in which every input is changed by the part `size`.
 
-    Masses are 1 but for the part `spread`.  Returns, one a chain, the largest change of a velocity
-    relative to the largest speed, and the number of balls at the far end that keep six digits.
+    Masses are 1 but for the part `spread`.
     """
     rng = np.random.default_rng([seed, n, round(1000 * e)])
-    masses = rng.uniform(1 - spread, 1 + spread, (chains, n))
+    masses = uniform(rng, 1 - spread, 1 + spread, (chains, n))
     velocities = np.zeros((chains, n))
     velocities[:, 0] = 1.0
     parts = [masses, velocities, np.full((chains, n - 1), e), np.full((chains, n - 2), 0.1)]
     changed = [part * (1 + size * rng.choice([-1, 1], part.shape)) for part in parts]
     changed[2] = np.minimum(changed[2], 1.0)
-    one, other = (post_impact_velocities(*these) for these in (parts, changed))
+    return parts, changed
+
+
+def perturbed(spread, n, e, size):
+    """Largest change of a velocity relative to the largest speed, one a chain of `rows_of_balls`.
+
+    And the number of balls at the far end that keep six digits.
+    """
+    one, other = (post_impact_velocities(*these) for these in rows_of_balls(spread, n, e, size))
     off = np.abs(other - one)
     off /= np.abs(one).max(axis=-1, keepdims=True)
     leading = [int(np.argmin([*row[::-1], False])) for row in off <= 1e-6]
@@ -460,7 +467,7 @@ def moved(problem, name, k, change):
     return problem._replace(**{name: values}) if low <= values[k] <= high else None
 
 
-def nearest_edge(problem, name, k, side, scale, farthest=0.3, per_decade=20):
+def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
     """How far an input can move to one side before the events change, and the jump there.
 
     Relative distance and the largest change of a velocity across it, relative to the largest
@@ -475,14 +482,14 @@ def nearest_edge(problem, name, k, side, scale, farthest=0.3, per_decade=20):
         trace = changed.collide()[0]
         return trace.velocities, events_at_balls(trace) == base
 
-    near = 0.0
-    for far in np.geomspace(1e-12, farthest, 1 + round(per_decade * math.log10(farthest / 1e-12))):
+    near, far = 0.0, 1e-12
+    while far <= farthest:
         found = at(far)
         if found is None:
             return math.inf, 0.0
         if not found[1]:
             break
-        near = far
+        near, far = far, far * step
     else:
         return math.inf, 0.0
     while far - near > max(1e-10 * far, 1e-15):
@@ -495,16 +502,18 @@ def nearest_edge(problem, name, k, side, scale, farthest=0.3, per_decade=20):
 # --- every chain finishes ----------------------------------------------------------------------
 
 FAMILIES = (("within", 3), ("within", 6), ("saturate", 3), ("saturate", 6))
+#: How many chains of each family the map counts.
+CHAINS = 25_000
 
 
 def any_chain(family, decades, index):
     """A chain of 2 to 8 balls, e and ratios often exactly 0 or 1 (or at their bounds)."""
     rng = np.random.default_rng([FAMILIES.index((family, decades)), index])
     n = int(rng.integers(2, 9))
-    masses = 10 ** rng.uniform(-decades / 2, decades / 2, n)
+    masses = magnitudes(rng, decades, n)
     velocities = (
-        rng.normal(size=n),
-        np.sort(rng.uniform(-1, 1, n))[::-1],
+        uniform(rng, -1, 1, n),
+        np.sort(uniform(rng, -1, 1, n))[::-1],
         np.eye(n)[0],
     )[rng.integers(3)]
     part = with_ends(rng)
@@ -584,32 +593,44 @@ def no_compressions(count, *_):
 
 
 @functools.cache
-def late_kernel():
+def late_kernel(compiled):
     """The kernel with a record of the last events in place of the first."""
-    import numba
-
     spec = importlib.util.spec_from_file_location("late_kernel", kernel.__file__)
     module = importlib.util.module_from_spec(spec)
-    vars(module)["jit"] = numba.njit(error_model="numpy")
+    if compiled:
+        import numba
+
+        jit = vars(module)["jit"] = numba.njit(error_model="numpy")
+    else:
+
+        def jit(function):
+            return function
+
     spec.loader.exec_module(module)
-    module.record = module.jit(keep_the_last)
-    module.record_compressions = module.jit(no_compressions)
+    module.record = jit(keep_the_last)
+    module.record_compressions = jit(no_compressions)
     return module
 
 
 def late(problem, steps, room=20_000):
     """The last events, no more than `room`, of a chain that is stopped after so many steps."""
     n = len(problem.masses)
-    record = [np.zeros(room, int), np.zeros(room, int), np.zeros((1, n)), np.zeros((room, n - 1))]
-    floats, ints = np.zeros((kernel.FLOATS, n)), np.zeros((kernel.INTS, n), int)
-    outputs = [np.zeros(n), *np.zeros((2, n - 1)), *np.zeros((2, n - 1), int)]
-    parts = [np.array(part, float) for part in problem[:5]]
-    _, count, _ = late_kernel().impact(
+    compiled = steps > 100_000  # fewer are sooner made than compiled
+
+    def area(*shape, kind=float):
+        numbers = np.zeros(shape, kind)
+        return numbers if compiled else numbers.tolist()
+
+    record = [area(room, kind=int), area(room, kind=int), area(1, n), area(room, n - 1)]
+    outputs = [area(n), area(n - 1), area(n - 1), area(n - 1, kind=int), area(n - 1, kind=int)]
+    floats, ints = area(kernel.FLOATS, n), area(kernel.INTS, n, kind=int)
+    parts = [np.array(part, float) if compiled else part for part in problem[:5]]
+    _, count, _ = late_kernel(compiled).impact(
         n, *parts, problem.meeting, steps, *outputs, floats, ints, *record
     )
     order = np.arange(max(count - room, 0), count) % room
-    kinds, contacts, _, speeds = record
-    return Late(kinds[order], contacts[order], speeds[order], ints[0][: n - 1])
+    kinds, contacts, speeds = (np.array(record[k])[order] for k in (0, 1, 3))
+    return Late(kinds, contacts, speeds, np.array(ints[0][: n - 1]))
 
 
 class Explanation(NamedTuple):

@@ -39,7 +39,7 @@ class Bytes:
         return self.data[self.at - 1] if self.at <= len(self.data) else 0
 
     def number(self, kind):
-        """A number: of the list of ends, near one, a simple fraction, a power of ten, or any."""
+        """A number: of the list of ends, near one, a simple fraction, one of any size, or any."""
         how = self.byte()
         ends = ENDS[kind]
         if how < 96:
@@ -54,8 +54,10 @@ class Bytes:
             return value if kind != "mass" else value or 1.0
         if how < 224:
             if kind == "unit":
-                return 10.0 ** -(self.byte() / 8)
-            return 10.0 ** ((self.byte() - 128) / (4 if how % 2 else 32))
+                part, power = self.byte() % 2, self.byte() // 2
+                return math.ldexp(0.5 + part / 4, -power)
+            power = self.byte() - 128
+            return math.ldexp(0.8, power) if how % 2 else math.ldexp(1 + power % 8 / 8, power // 8)
         any_value = struct.unpack("<d", bytes(self.byte() for _ in range(8)))[0]
         if how < 240 and math.isfinite(any_value):
             if kind == "unit":

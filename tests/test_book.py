@@ -2,8 +2,6 @@
 
 import csv
 import re
-import subprocess
-import sys
 import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
@@ -96,23 +94,6 @@ def requests(text: str) -> list[str]:
 def pages(html: Path) -> list[Path]:
     """List the pages; _static/ holds fragments of the theme that are not."""
     return [path for path in html.glob("**/*.html") if "_static" not in path.parts]
-
-
-@pytest.fixture(scope="module")
-def html(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
-    """Build the book, warnings as errors."""
-    folder = tmp_path_factory.mktemp("book")
-    command = "from jupyter_book.cli.main import main; main()"
-    build = subprocess.run(
-        [sys.executable, "-c", command, "build", root, "--path-output", folder, "-W", "-n",
-         "--keep-going"],
-        cwd=root,
-        capture_output=True,
-        text=True,
-        check=False,
-    )  # fmt: skip
-    assert build.returncode == 0, build.stdout + build.stderr
-    return folder / "_build" / "html"
 
 
 def test_every_chapter_is_built(html: Path, root: Path):

@@ -14,7 +14,7 @@ import mpmath
 import numpy as np
 import pytest
 import xarray as xr
-from chains import HERTZ
+from chains import HERTZ, uniform
 from chapters import Chapter
 from reference import solve
 
@@ -259,7 +259,7 @@ def test_fig_beyond_stability():
     assert CHAPTER.glued["fast-same"] == "all"
     # A change of masses that is not a rounding error: the leader stays, others do not.
     masses, velocities = np.ones((9, 120)), struck(120)[1]
-    masses[1:] *= 1 + 1e-15 * np.random.default_rng(5).uniform(-1, 1, (8, 120))
+    masses[1:] *= 1 + 1e-15 * uniform(np.random.default_rng(5), -1, 1, (8, 120))
     after = outcomes(masses, velocities, 0.99, 0.3).velocities
     off = np.abs(after / after[0] - 1).max(axis=0)
     assert off[-1] < 1e-4
@@ -318,11 +318,11 @@ def test_two_strikers_have_no_closed_form():
 def sweep(n=4):
     rng = np.random.default_rng(2)
     return (
-        rng.uniform(0.5, 2, (12, 1, n)),
-        -np.sort(rng.uniform(-1, 1, (12, 1, n))),
-        rng.uniform(0.2, 1, (9, n - 1)),
-        rng.uniform(0, 0.2, (12, 1, n - 2)),
-        rng.uniform(0, 0.2, (9, n - 2)),
+        uniform(rng, 0.5, 2, (12, 1, n)),
+        -np.sort(uniform(rng, -1, 1, (12, 1, n))),
+        uniform(rng, 0.2, 1, (9, n - 1)),
+        uniform(rng, 0, 0.2, (12, 1, n - 2)),
+        uniform(rng, 0, 0.2, (9, n - 2)),
     )
 
 

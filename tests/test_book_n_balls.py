@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import reference
+from chains import magnitudes, uniform
 from chapters import Chapter
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequences
@@ -19,11 +20,11 @@ CHAPTER = Chapter("n_balls")
 def random_chain(seed, n):
     """Masses and admissible ratios of a chain at random, worked out by Eq. 53 from the far end."""
     rng = np.random.default_rng(seed)
-    masses = 10.0 ** rng.uniform(-1, 1, n)
+    masses = magnitudes(rng, 2, n)
     ratios, onward = np.zeros(n - 2), 0.0
     for i in range(n - 2, 0, -1):
         bound = masses[i + 1] / (masses[i + 1] + masses[i] * (1 - onward))
-        onward = ratios[i - 1] = rng.uniform(0.05, 0.99) * bound
+        onward = ratios[i - 1] = uniform(rng, 0.05, 0.99) * bound
     return masses, ratios
 
 

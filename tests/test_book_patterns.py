@@ -3,6 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
+from chains import magnitudes, uniform
 from reference import solve
 from scipy.optimize import brentq, minimize_scalar
 
@@ -36,9 +37,9 @@ def reference(r1, r2, e=E, alpha=ALPHA):
 def random_cases(seed, size):
     """Ratios of masses, restitution of both contacts, ratio within both bounds."""
     rng = np.random.default_rng(seed)
-    r1, r2 = np.exp(rng.uniform(np.log(0.02), np.log(5), (2, size)))
-    e = rng.uniform(0.3, 1, size)
-    return r1, r2, e, rng.uniform(0, 1, size) / (1 + np.maximum(r1, r2))
+    r1, r2 = 0.3 * magnitudes(rng, 2.4, (2, size))
+    e = uniform(rng, 0.3, 1, size)
+    return r1, r2, e, uniform(rng, 0, 1, size) / (1 + np.maximum(r1, r2))
 
 
 # --- the map of one turn, as derived in the chapter: no events, no impulses ------------------
@@ -200,7 +201,7 @@ def test_fig_6_counts_at_ratio_zero():
     """n = ceil(pi / phi) - 1, from the eigenvalues of one cycle."""
     rng = np.random.default_rng(60)
     for e in (0.3, 0.5, 0.8, 1.0):
-        r1, r2 = np.exp(rng.uniform(np.log(0.01), np.log(5), (2, 2000)))
+        r1, r2 = 0.2 * magnitudes(rng, 2.7, (2, 2000))
         cosine = (1 + e) / (2 * np.sqrt(e * (1 + r1) * (1 + r2)))
         finite = cosine < np.cos(np.pi / 50)
         expected = np.ceil(np.pi / np.arccos(cosine[finite])) - 1

@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from chains import uniform
 from chapters import Chapter
 from reference import solve
 
@@ -21,9 +22,9 @@ def elastic(m1, v1, m2, v2):
 
 def random_chain(rng):
     chain = Chain(
-        rng.uniform(0.5, 2, 3), np.sort(rng.uniform(-1, 1, 3))[::-1], rng.uniform(0.2, 1, 2)
+        uniform(rng, 0.5, 2, 3), np.sort(uniform(rng, -1, 1, 3))[::-1], uniform(rng, 0.2, 1, 2)
     )
-    return chain, ImpulseCorrelation(rng.uniform(0, 0.2))
+    return chain, ImpulseCorrelation(uniform(rng, 0, 0.2))
 
 
 @pytest.mark.parametrize("equation", [1, 2, 3])
@@ -45,8 +46,8 @@ def test_eqs_1_to_3_momentum_of_each_ball(equation: int):
 def test_eq_4_kinematic_restitution():
     """For two balls kinematic and energetic restitution agree."""
     rng = np.random.default_rng(4)
-    for e in rng.uniform(0, 1, 50):
-        chain = Chain(rng.uniform(0.1, 10, 2), [rng.uniform(0, 1), rng.uniform(-1, 0)], e)
+    for e in uniform(rng, 0, 1, 50):
+        chain = Chain(uniform(rng, 0.1, 10, 2), [uniform(rng, 0, 1), uniform(rng, -1, 0)], e)
         v = collide(chain, ImpulseCorrelation(0)).velocities
         before = chain.velocities[0] - chain.velocities[1]
         assert v[0] - v[1] == pytest.approx(-e * before, rel=0, abs=1e-13)
@@ -106,7 +107,7 @@ def test_fig_own_problem_family():
     """The ellipse holds the conserving outcomes; the model walks the possible arc."""
     rng = np.random.default_rng(6)
     for _ in range(100):
-        m, v = rng.uniform(0.1, 10, 3), rng.normal(size=3)
+        m, v = uniform(rng, 0.1, 10, 3), uniform(rng, -1, 1, 3)
         u2, u3 = v[0] - v[1], v[1] - v[2]
         relative = m[0] * m[1] * u2**2 + m[1] * m[2] * u3**2 + m[0] * m[2] * (u2 + u3) ** 2
         centre = m @ v / m.sum()

@@ -7,6 +7,7 @@ The second routes are the independent solver in reference.py, the path of the pa
 import mpmath
 import numpy as np
 import pytest
+from chains import magnitudes, uniform
 from reference import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
@@ -32,10 +33,10 @@ def random_chains(count, seed, e3=None):
     """Three balls with v1 > v2 > v3 and any ratio."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        e = rng.uniform(0.1, 1, 2)
+        e = uniform(rng, 0.1, 1, 2)
         if e3 is not None:
             e[1] = e3
-        yield rng.uniform(0.3, 4, 3), np.array([1, rng.uniform(0, 0.8), 0]), e, rng.uniform(0, 1)
+        yield uniform(rng, 0.3, 4, 3), np.array([1, uniform(rng, 0, 0.8), 0]), e, uniform(rng, 0, 1)
 
 
 def single(count, seed):
@@ -344,7 +345,7 @@ def test_v2_rises_with_the_ratio_while_each_contact_collides_once():
     rng = np.random.default_rng(4)
     checked = 0
     for _ in range(300):
-        m, e = 10 ** rng.uniform(-1.5, 1.5, 3), rng.uniform(0.02, 1, 2)
+        m, e = magnitudes(rng, 3, 3), uniform(rng, 0.02, 1, 2)
         ratio = np.linspace(0, 0.999 * m[2] / (m[1] + m[2]), 40)
         one = one_collision_each(m, [1, 0, 0], e, ratio)
         v2 = three_balls(m, [1, 0, 0], e, ratio)[:, 1]

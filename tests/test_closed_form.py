@@ -5,6 +5,7 @@ import re
 import mpmath
 import numpy as np
 import pytest
+from chains import magnitudes, uniform
 from reference import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
@@ -22,8 +23,8 @@ from cradle.closed_form import (
 def random_three_balls(seed, count=4000):
     """Half with v2 = v3, half with v2 > v3; e = 0 and 1 among them; ratios up to Eq. 34."""
     rng = np.random.default_rng(seed)
-    masses = 10 ** rng.uniform(-1, 1, (count, 3))
-    velocities = np.sort(rng.normal(size=(count, 3)))[:, ::-1].copy()
+    masses = magnitudes(rng, 2, (count, 3))
+    velocities = np.sort(uniform(rng, -1, 1, (count, 3)))[:, ::-1].copy()
     velocities[: count // 2, 1] = velocities[: count // 2, 2]
     e = rng.random((count, 2))
     e = np.where(rng.random(e.shape) < 0.1, np.round(e), e)
@@ -150,7 +151,7 @@ def test_largest_ratios_give_zero_closing_acceleration():
     """Eqs. 34 and 53 by what they mean, from Eqs. 47-48 and not from their own formula."""
     rng = np.random.default_rng(53)
     for n in range(3, 9):
-        m, ratios = 10 ** rng.uniform(-1, 1, n), rng.random(n - 2)
+        m, ratios = magnitudes(rng, 2, n), rng.random(n - 2)
         forward, backward = largest_ratios(m, ratios, ratios)
         for i in range(1, n - 1):
             onward = ratios[i] if i < n - 2 else 0.0

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from chains import random_chains, with_ends
+from chains import magnitudes, random_chains, uniform, with_ends
 
 import cradle
 from cradle import (
@@ -117,7 +117,7 @@ def test_ratios_beyond_their_bound(forward, backward, message):
 def test_ratio_at_its_bound_is_admitted():
     """To rounding: the bound as anybody computes it must not be refused."""
     rng = np.random.default_rng(34)
-    for m in 10 ** rng.uniform(-3, 3, (200, 3)):
+    for m in magnitudes(rng, 6, (200, 3)):
         ahead, behind = m[2] / (m[1] + m[2]), 1 / (1 + m[1] / m[0])
         collide(Chain(m, [1, 0, 0], 1), ImpulseCorrelation(ahead, behind))
 
@@ -345,8 +345,8 @@ def test_batch_is_a_loop_of_single_impacts():
     """Every argument with its own leading axes: one broadcast against the others, bit by bit."""
     rng = np.random.default_rng(5)
     n = 4
-    m = 10 ** rng.uniform(-1, 1, (3, 1, 1, n))
-    v = rng.normal(size=(2, 1, n))
+    m = magnitudes(rng, 2, (3, 1, 1, n))
+    v = uniform(rng, -1, 1, (2, 1, n))
     e = with_ends(rng)((2, 1, 1, n - 1))[0]
     f, b = 0.2 * rng.random((4, n - 2)), 0.2 * rng.random((3, 1, 2, 1, n - 2))[:, 0]
     f, b = np.minimum(f, 0.05), np.minimum(b, 0.05)
@@ -364,13 +364,13 @@ def test_batch_is_a_loop_of_single_impacts():
 def test_each_argument_may_carry_the_leading_axes(name):
     rng = np.random.default_rng(6)
     base = {
-        "masses": rng.uniform(1, 2, 3),
+        "masses": uniform(rng, 1, 2, 3),
         "velocities": np.array([1.0, 0.2, 0.0]),
         "restitution": rng.random(2),
         "forward": np.array([0.1]),
         "backward": np.array([0.2]),
     }
-    many = base[name] * rng.uniform(0.5, 1, (2, 3, 1))
+    many = base[name] * uniform(rng, 0.5, 1, (2, 3, 1))
     batch = post_impact_velocities(**(base | {name: many}))
     assert batch.shape == (2, 3, 3)
     for at in np.ndindex(2, 3):
@@ -512,7 +512,7 @@ def test_batch_and_single_draw_the_line_of_excess_alike():
     refused = 0
     for _ in range(300):
         n = int(rng.integers(3, 6))
-        m = 10 ** rng.uniform(-2, 2, n)
+        m = magnitudes(rng, 4, n)
         ratios = [part * (1 + rng.integers(0, 12) * 2.0**-53) for part in largest(m)]
         f, b = np.minimum(ratios, 1.0)
         chain = Chain(m, np.eye(n)[0], 0.5)

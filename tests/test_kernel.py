@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chains import random_chains, with_ends
+from chains import random_chains, uniform, with_ends
 
 from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide, kernel, runtime
 from cradle import post_impact_velocities as batch
@@ -183,7 +183,7 @@ def test_work_area_need_not_be_cleared():
     n = 5
     area = [np.full(n, 7.5), *(np.full(n - 1, 7.5) for _ in range(2))]
     counts = [np.full(n - 1, 3) for _ in range(2)]
-    floats = rng.normal(size=(kernel.FLOATS, n))
+    floats = uniform(rng, -1, 1, (kernel.FLOATS, n))
     ints = rng.integers(-1, 2, (kernel.INTS, n))
     for chain, options in mixed_chains(9, 70):
         m, v, e, f, b = chain

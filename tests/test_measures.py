@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from chains import striking
+from chains import magnitudes, striking, uniform
 
 from cradle import (
     Chain,
@@ -134,8 +134,7 @@ def test_effective_ratio_refuses_a_tolerance(tolerance, message):
 
 def random_three(seed):
     rng = np.random.default_rng(seed)
-    masses = np.ldexp(1.0 + rng.random(3), rng.integers(-3, 3, 3))
-    return masses, np.sort(2.0 * rng.random(3) - 1.0)[::-1]
+    return magnitudes(rng, 2, 3), np.sort(uniform(rng, -1, 1, 3))[::-1]
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -193,7 +193,7 @@ def test_one_changed_digit_fails(tmp_path: Path, root: Path, stored: str, outcom
     notebook.cells[1].outputs[0].text = stored
     nbformat.write(notebook, tmp_path / "sample.ipynb")
     run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-p", "no:cacheprovider",
+        [sys.executable, "-m", "pytest", "-n0", "-p", "no:cacheprovider",
          "--config-file", root / "pyproject.toml", tmp_path / "sample.ipynb"],
         cwd=root,
         capture_output=True,

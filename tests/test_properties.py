@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from chains import random_chains, within_bounds
+from chains import magnitudes, random_chains, uniform, within_bounds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -122,10 +122,10 @@ def generic_chains(seed, count, striker=False):
     rng = np.random.default_rng(seed)
     for _ in range(count):
         n = int(rng.integers(2, 9))
-        m = 10 ** rng.uniform(-3, 3, n)
-        v = np.eye(n)[0] if striker else rng.uniform(-1, 1, n)
-        e = rng.uniform(0.02, 0.98, n - 1)
-        f, b = within_bounds(m, lambda shape: rng.uniform(0.02, 0.98, shape))
+        m = magnitudes(rng, 6, n)
+        v = np.eye(n)[0] if striker else uniform(rng, -1, 1, n)
+        e = uniform(rng, 0.02, 0.98, n - 1)
+        f, b = within_bounds(m, lambda shape: uniform(rng, 0.02, 0.98, shape))
         meeting = rng.choice([0.5, rng.random()])
         trace = outcome(Chain(m, v, e), f, b, meeting, limit=100)
         if trace is None or trace.collapsed:
@@ -133,7 +133,7 @@ def generic_chains(seed, count, striker=False):
         # The condition of the chain.
         moved = 0.0
         for _ in range(4):
-            nudge = [part * (1 + 1e-13 * rng.uniform(-1, 1, np.shape(part))) for part in (m, v, e)]
+            nudge = [part * (1 + 1e-13 * uniform(rng, -1, 1, np.shape(part))) for part in (m, v, e)]
             near = outcome(Chain(*nudge), f, b, meeting)
             same = near is not None and near.events == trace.events
             moved = max(moved, np.abs(near.velocities - trace.velocities).max() if same else np.inf)

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from chains import magnitudes, uniform
 
 from cradle import ImpactNotFinished, kernel, outcomes, paper_chain, post_impact_velocities, runtime
 from cradle.models import correlation
@@ -165,10 +166,10 @@ def test_what_is_cut_is_below_rounding_for_random_chains():
     """Unequal balls and losses: all balls of the same bits as long as the order is no chance."""
     rng = np.random.default_rng(7)
     for n in (20, 40, 150):
-        m = 10.0 ** rng.uniform(-0.5, 0.5, n)
-        forward = rng.uniform(0.0, 0.2, n - 2)
-        backward = rng.uniform(0.0, 0.2, n - 2)
-        e = rng.uniform(0.9, 1.0, n - 1) if n == 20 else 1.0
+        m = magnitudes(rng, 1, n)
+        forward = uniform(rng, 0.0, 0.2, n - 2)
+        backward = uniform(rng, 0.0, 0.2, n - 2)
+        e = uniform(rng, 0.9, 1.0, n - 1) if n == 20 else 1.0
         chain = m.tolist(), struck(n)[1], e, forward, backward
         stored, uncut = solve(*chain), solve(*chain, CUT=0.0)
         assert stored.collisions == uncut.collisions
@@ -189,8 +190,8 @@ def test_collisions_with_losses_grow_with_the_square(balls):
 def batch_of_three(first, second):
     """Masses over one axis, restitutions over another, all else once."""
     rng = np.random.default_rng(0)
-    masses = rng.uniform(0.5, 2.0, (first, 1, 3))
-    return masses, np.array([1.0, 0.0, 0.0]), rng.uniform(0.2, 1.0, (second, 2)), 0.1
+    masses = uniform(rng, 0.5, 2.0, (first, 1, 3))
+    return masses, np.array([1.0, 0.0, 0.0]), uniform(rng, 0.2, 1.0, (second, 2)), 0.1
 
 
 @needs_numba
@@ -216,11 +217,11 @@ def test_a_batch_needs_inputs_outputs_and_a_small_work_area(shape):
 def mixed_batch(count, n=4):
     rng = np.random.default_rng(11)
     return (
-        rng.uniform(0.5, 2.0, (count, n)),
-        -np.sort(rng.uniform(-1.0, 1.0, (count, n))),
-        rng.uniform(0.3, 1.0, (count, n - 1)),
-        rng.uniform(0.0, 0.2, (count, n - 2)),
-        rng.uniform(0.0, 0.2, (count, n - 2)),
+        uniform(rng, 0.5, 2.0, (count, n)),
+        -np.sort(uniform(rng, -1.0, 1.0, (count, n))),
+        uniform(rng, 0.3, 1.0, (count, n - 1)),
+        uniform(rng, 0.0, 0.2, (count, n - 2)),
+        uniform(rng, 0.0, 0.2, (count, n - 2)),
     )
 
 

@@ -7,6 +7,7 @@ import sysconfig
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 
@@ -64,7 +65,8 @@ def test_works_from_elsewhere(wheel: Path, tmp_path: Path):
     )  # fmt: skip
     # A .pth file adds a folder behind the clean environment's own and, unlike the start of Python,
     # does not run the .pth files in it: an editable install of this repository stays out of reach.
-    (target / "dependencies.pth").write_text(sysconfig.get_path("purelib"), encoding="utf-8")
+    folders = {sysconfig.get_path("purelib"), str(Path(np.__file__).parents[1])}
+    (target / "dependencies.pth").write_text("\n".join(folders), encoding="utf-8")
 
     code = """
 import cradle, cradle.tables
