@@ -1,0 +1,330 @@
+"""Positions exported by the video tool Tracker, and the velocities around an impact.
+
+Three layouts of Tracker's text export are read; the facts come from files that people published
+and from the program's source (github.com/OpenSourcePhysics/tracker, `ExportDataDialog.java`):
+
+- one track, older versions: a line with its name, spaces as underscores (``mass_A``), a line with
+  the columns (``t  x  y``), then the numbers;
+- one track, version 6: the same, but the name comes after a delimiter, and lines end with one;
+- several tracks, version 6: a line ``#multi:``, a line with the names above their columns, a line
+  with ``t`` once and the columns of each track.
+
+Tabs, commas and semicolons delimit; a cell is empty where a ball was not marked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cradle.chain import Vector, checked, one_number
+
+_GRAVITY = 9.81
+
+
+class Track(NamedTuple):
+    """Marks of one ball: times in s and positions along the row in m, both of shape (T,)."""
+
+    times: Vector
+    positions: Vector
+
+
+#: Marks of every ball, by the names of the tracks, in the order of the file.
+Tracks = dict[str, Track]
+
+
+class Velocities(NamedTuple):
+    """Velocities of all balls around an impact, from their tracks.
+
+    Attributes
+    ----------
+    time : float
+        When the impact happened, s.
+    before, after, sigma, sigma_before : ndarray, shape (N,)
+        m/s; ball by ball, with standard errors.
+    scatter : float
+        Standard deviation of the marks about the motion fitted, m.
+    """
+
+    time: float
+    before: Vector
+    after: Vector
+    sigma: Vector
+    sigma_before: Vector
+    scatter: float
+
+
+def read_tracker(
+    path: str | Path, *, column: str = "x", time_scale: float = 1.0, unit: float = 1.0
+) -> Tracks:
+    """Read a text file exported by Tracker.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    column : str
+        Which column holds the position along the row.
+    time_scale : float
+        True time over the time of the video: 30 / 240 for a video that shows 240 frames a second
+        slowed down to 30.
+    unit : float
+        Length of Tracker's unit in m: 0.01 if the calibration stick was given in cm.
+
+    Returns
+    -------
+    Tracks
+        By name; frames where a ball was not marked are left out.
+
+    Raises
+    ------
+    ValueError
+        If the file has another layout, or a cell is no number; the message names line and column.
+
+    Examples
+    --------
+    >>> from cradle.tables import data_folder
+    >>> tracks = read_tracker(data_folder() / "video_synthetic.txt")
+    >>> {name: track.times.size for name, track in tracks.items()}
+    {'A': 49, 'B': 49, 'C': 49}
+    """
+    one_number("time_scale", time_scale, "must be above 0", 0.0, open_low=True)
+    one_number("unit", unit, "must be above 0", 0.0, open_low=True)
+    file = Path(path) if isinstance(path, str) else path
+    lines = file.read_text(encoding="utf-8-sig").splitlines()
+    first = 1 if lines and lines[0].strip().rstrip(",;").strip() == "#multi:" else 0
+    if len(lines) < first + 3:
+        raise ValueError(f"{file.name}: too short for an export of Tracker")
+    header = lines[first + 1]
+    delimiter = next((mark for mark in "\t;," if mark in header), None)
+    columns = [name.strip() for name in header.split(delimiter)] if delimiter else []
+    if delimiter is None or columns[0] != "t" or column not in columns:
+        raise ValueError(
+            f"{file.name}, line {first + 2}: {header!r}; an export of Tracker has its columns "
+            f"there, t first, and {column} among them"
+        )
+    names = [name.strip() for name in lines[first].split(delimiter)]
+    owners = _owners(names, columns, several=first == 1)
+    tracks: Tracks = {}
+    for place, title in enumerate(columns):
+        if title == column:
+            marks = _marks(file.name, lines, first + 2, (delimiter, place, column))
+            times, positions = np.array(marks).reshape(-1, 2).T
+            tracks[owners[place]] = Track(times * time_scale, positions * unit)
+    return tracks
+
+
+def _owners(names: list[str], columns: list[str], several: bool) -> list[str]:
+    """Return the track that each column belongs to."""
+    if not several:
+        return [next((name for name in names if name), "track").replace("_", " ")] * len(columns)
+    # Of several tracks, the name stands above the first of its columns.
+    filled = names + [""] * (len(columns) - len(names))
+    owners = [""]
+    for name in filled[1 : len(columns)]:
+        owners.append(name or owners[-1])
+    return owners
+
+
+def _marks(
+    name: str, lines: list[str], begin: int, where: tuple[str, int, str]
+) -> list[tuple[float, float]]:
+    delimiter, place, column = where
+    marks = []
+    for number, line in enumerate(lines[begin:], begin + 1):
+        cells = [cell.strip() for cell in line.split(delimiter)]
+        if place >= len(cells) or not cells[place]:
+            continue
+        pair = []
+        for title, cell in (("t", cells[0]), (column, cells[place])):
+            # Tracker can be told to write decimal commas, with another delimiter then.
+            text = cell if delimiter == "," else cell.replace(",", ".")
+            try:
+                pair.append(float(text))
+            except ValueError:
+                raise ValueError(
+                    f"{name}, line {number}, column {title}: {cell!r}; must be a number"
+                ) from None
+        marks.append((pair[0], pair[1]))
+    return marks
+
+
+def speeds_from_heights(
+    heights: ArrayLike, sigma: float, gravity: float = _GRAVITY
+) -> tuple[Vector, Vector]:
+    """Turn drop or rise heights of hanging balls into velocities, as the paper did.
+
+    Parameters
+    ----------
+    heights : array_like
+        Heights above the lowest point, m; negative for a ball that swings to the left.
+    sigma : float
+        Standard error of a height, m.
+    gravity : float
+        m/s^2.
+
+    Returns
+    -------
+    velocities, sigma : ndarray
+        m/s, shapes of `heights`; the error is that towards larger speeds, and so finite at rest.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite, or the error or gravity not above 0.
+
+    Examples
+    --------
+    >>> [values.round(3).tolist() for values in speeds_from_heights([0.051, 0.0], 0.001)]
+    [[1.0, 0.0], [0.01, 0.14]]
+    """
+    h = checked("heights", heights)
+    error = one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
+    g = one_number("gravity", gravity, "must be above 0", 0.0, open_low=True)
+    speed = np.sqrt(2 * g * np.abs(h))
+    return np.sign(h) * speed, np.sqrt(2 * g * (np.abs(h) + error)) - speed
+
+
+def velocities_from_tracks(
+    tracks: Mapping[str, Track],
+    *,
+    length: float | None = None,
+    window: float = 0.05,
+    striker: int = 0,
+) -> Velocities:
+    """Find the impact in the tracks, and the velocities just before and just after it.
+
+    Every ball moves smoothly up to the impact and after it, through one place at one moment that
+    all balls share.  The balls but the striker rest before.
+
+    Parameters
+    ----------
+    tracks : mapping of str to Track
+        One track a ball, left to right.
+    length : float, optional
+        Length of the pendulums, m; left out, the balls roll on a level track.
+    window : float
+        How much time before and after the impact is used, s.
+    striker : int
+        Index of the ball that moves before.
+
+    Returns
+    -------
+    Velocities
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two balls, or too few marks on either side.
+
+    Notes
+    -----
+    A pendulum that leaves its lowest point with velocity v is at v t (1 - (g/l + v^2/l^2) t^2 / 6)
+    a short time t later.
+
+    Examples
+    --------
+    >>> from cradle.tables import data_folder
+    >>> tracks = read_tracker(data_folder() / "video_synthetic.txt")
+    >>> velocities_from_tracks(tracks, length=0.3).sigma.round(3).tolist()
+    [0.006, 0.006, 0.006]
+    """
+    balls = list(tracks.values())
+    if len(balls) < 2 or not 0 <= striker < len(balls):
+        raise ValueError(f"{len(balls)} tracks, striker = {striker}; needs two balls and a striker")
+    window = one_number("window", window, "must be above 0", 0.0, open_low=True)
+    if length is not None:
+        length = one_number("length", length, "must be above 0", 0.0, open_low=True)
+    time = _coarse_time(balls, striker, window)
+    near = [np.abs(ball.times - time) <= window for ball in balls]
+    used = [Track(b.times[k], b.positions[k]) for b, k in zip(balls, near, strict=True)]
+    for name, track in zip(tracks, used, strict=True):
+        sides = [int((track.times < time).sum()), int((track.times >= time).sum())]
+        if min(sides) < 4:
+            raise ValueError(
+                f"track {name!r} has {sides[0]} marks before and {sides[1]} after the impact at "
+                f"{time:.4g} s within window = {window:g} s; needs 4 on each side"
+            )
+    return _joint_fit(used, time, length, striker)
+
+
+def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
+    """Return the moment at which a bend in all tracks explains most."""
+    moments = np.unique(np.concatenate([ball.times for ball in balls]))
+    best, most = None, -np.inf
+    for moment in 0.5 * (moments[:-1] + moments[1:]):
+        gain = 0.0
+        for k, ball in enumerate(balls):
+            some = np.abs(ball.times - moment) <= window
+            t, x = ball.times[some] - moment, ball.positions[some]
+            if min((t < 0).sum(), (t >= 0).sum()) < 4:
+                break
+            earlier, later = np.minimum(t, 0.0), np.maximum(t, 0.0)
+            bent = [later, later**2] + ([earlier, earlier**2] if k == striker else [])
+            gain += _rest([t, t**2], x) - _rest(bent, x)
+        else:
+            if gain > most:
+                best, most = float(moment), gain
+    if best is None:
+        raise ValueError(f"no moment has 4 marks of every ball within {window:g} s on either side")
+    return best
+
+
+def _rest(columns: list[Vector], x: Vector) -> float:
+    """Return the sum of squares that columns and a constant leave of x."""
+    matrix = np.stack([np.ones(x.size), *columns], axis=-1)
+    left = x - matrix @ np.linalg.lstsq(matrix, x, rcond=None)[0]
+    return float(left @ left)
+
+
+def _motion(t: Vector, velocity: float, length: float | None) -> Vector:
+    """Return the way from the place of the impact."""
+    if length is None:
+        return velocity * t
+    return np.asarray(velocity * t * (1 - (_GRAVITY / length + (velocity / length) ** 2) * t**2 / 6))
+
+
+def _joint_fit(balls: list[Track], time: float, length: float | None, striker: int) -> Velocities:
+    """Fit the moment, and each ball's place and velocities, to all marks at once."""
+    from scipy.optimize import least_squares
+
+    count = len(balls)
+
+    def residuals(p: Vector) -> Vector:
+        parts = []
+        for k, ball in enumerate(balls):
+            t = ball.times - p[0]
+            way = _motion(np.maximum(t, 0.0), p[2 + count + k], length)
+            if k == striker:
+                way = way + _motion(np.minimum(t, 0.0), p[1], length)
+            parts.append(ball.positions - p[2 + k] - way)
+        return np.concatenate(parts)
+
+    start = np.zeros(2 + 2 * count)
+    start[0] = time
+    for k, ball in enumerate(balls):
+        earlier, later = ball.times < time, ball.times >= time
+        start[2 + count + k], start[2 + k] = np.polyfit(
+            ball.times[later] - time, ball.positions[later], 1
+        )
+        if k == striker:
+            start[1] = np.polyfit(ball.times[earlier] - time, ball.positions[earlier], 1)[0]
+    found = least_squares(residuals, start, x_scale="jac")
+    freedom = found.fun.size - start.size
+    variance = float(found.fun @ found.fun) / freedom
+    errors = np.sqrt(variance * np.diag(np.linalg.inv(found.jac.T @ found.jac)))
+    before, sigma_before = np.zeros(count), np.zeros(count)
+    before[striker], sigma_before[striker] = found.x[1], errors[1]
+    places = found.x[2 : 2 + count]
+    if (np.diff(places) <= 0).any():
+        raise ValueError(
+            f"the balls meet at {places.round(4).tolist()} m; the tracks must be in the order of "
+            "the balls, left to right"
+        )
+    return Velocities(float(found.x[0]), before, found.x[2 + count :], errors[2 + count :],
+                      sigma_before, float(np.sqrt(variance)))  # fmt: skip
