@@ -199,8 +199,9 @@ def velocities_from_tracks(
 ) -> Velocities:
     """Find the impact in the tracks, and the velocities just before and just after it.
 
-    Every ball moves smoothly up to the impact and after it, through one place at one moment that
-    all balls share.  The balls but the striker rest before.
+    All tracks bend at one moment, which is found first.  Then the velocity of each ball is fitted
+    on either side of it by itself, so that the errors are independent.  The balls but the striker
+    rest before.
 
     Parameters
     ----------
@@ -224,8 +225,8 @@ def velocities_from_tracks(
 
     Notes
     -----
-    A pendulum that leaves its lowest point with velocity v is at v t (1 - (g/l + v^2/l^2) t^2 / 6)
-    a short time t later.
+    A pendulum that passes its lowest point with velocity v is then, with w = g/l, u = (v/l)^2, at
+    v t (1 - (w + u) t^2/6 + (w^2 + 11 w u + u^2) t^4/120) up to terms in t^7.
 
     Examples
     --------
@@ -250,7 +251,7 @@ def velocities_from_tracks(
                 f"track {name!r} has {sides[0]} marks before and {sides[1]} after the impact at "
                 f"{time:.4g} s within window = {window:g} s; needs 4 on each side"
             )
-    return _joint_fit(used, time, length, striker)
+    return _velocities(used, time, length, striker)
 
 
 def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
@@ -286,11 +287,13 @@ def _motion(t: Vector, velocity: float, length: float | None) -> Vector:
     """Return the way from the place of the impact."""
     if length is None:
         return velocity * t
-    return np.asarray(velocity * t * (1 - (_GRAVITY / length + (velocity / length) ** 2) * t**2 / 6))
+    w, u = _GRAVITY / length, (velocity / length) ** 2
+    bend = -(w + u) * t**2 / 6 + (w * w + 11 * w * u + u * u) * t**4 / 120
+    return np.asarray(velocity * t * (1 + bend))
 
 
-def _joint_fit(balls: list[Track], time: float, length: float | None, striker: int) -> Velocities:
-    """Fit the moment, and each ball's place and velocities, to all marks at once."""
+def _moment(balls: list[Track], time: float, length: float | None, striker: int) -> Vector:
+    """Return the moment of the impact and the balls' places then: all tracks meet there."""
     from scipy.optimize import least_squares
 
     count = len(balls)
@@ -314,17 +317,48 @@ def _joint_fit(balls: list[Track], time: float, length: float | None, striker: i
         )
         if k == striker:
             start[1] = np.polyfit(ball.times[earlier] - time, ball.positions[earlier], 1)[0]
-    found = least_squares(residuals, start, x_scale="jac")
-    freedom = found.fun.size - start.size
-    variance = float(found.fun @ found.fun) / freedom
-    errors = np.sqrt(variance * np.diag(np.linalg.inv(found.jac.T @ found.jac)))
-    before, sigma_before = np.zeros(count), np.zeros(count)
-    before[striker], sigma_before[striker] = found.x[1], errors[1]
-    places = found.x[2 : 2 + count]
+    return np.asarray(least_squares(residuals, start, x_scale="jac").x[: 2 + count])
+
+
+def _slope(t: Vector, x: Vector, length: float | None) -> tuple[float, float, float]:
+    """Return velocity at time 0, its variance over that of a mark, and the squares left over.
+
+    The place is free: the velocities of different balls and sides have independent errors.
+    """
+    velocity = float(np.polyfit(t, x, 1)[0])
+    for _ in range(4):  # the way depends a little on the velocity itself
+        way = t if length is None else _motion(t, velocity, length) / velocity
+        matrix = np.stack([np.ones(t.size), way], axis=-1)
+        solution = np.linalg.lstsq(matrix, x, rcond=None)[0]
+        velocity = float(solution[1]) or np.finfo(float).tiny
+    left = x - matrix @ solution
+    return velocity, float(np.linalg.inv(matrix.T @ matrix)[1, 1]), float(left @ left)
+
+
+def _velocities(balls: list[Track], time: float, length: float | None, striker: int) -> Velocities:
+    """Fit the velocity of every ball on its own, on either side of the impact."""
+    found = _moment(balls, time, length, striker)
+    moment, places = float(found[0]), found[2:]
     if (np.diff(places) <= 0).any():
         raise ValueError(
             f"the balls meet at {places.round(4).tolist()} m; the tracks must be in the order of "
             "the balls, left to right"
         )
-    return Velocities(float(found.x[0]), before, found.x[2 + count :], errors[2 + count :],
-                      sigma_before, float(np.sqrt(variance)))  # fmt: skip
+    count = len(balls)
+    before, after = np.zeros(count), np.zeros(count)
+    variances = np.zeros((2, count))
+    squares, freedom = 0.0, 0
+    for k, ball in enumerate(balls):
+        t, x = ball.times - moment, ball.positions
+        # The moment is known to a part of a frame: a mark nearer than half a frame may be of
+        # either side, and is left out.
+        near = 0.5 * float(np.median(np.diff(t)))
+        later, earlier = t > near, t < -near
+        after[k], variances[1, k], left = _slope(t[later], x[later], length)
+        squares, freedom = squares + left, freedom + int(later.sum()) - 2
+        if k == striker:
+            before[k], variances[0, k], left = _slope(t[earlier], x[earlier], length)
+            squares, freedom = squares + left, freedom + int(earlier.sum()) - 2
+    scatter = float(np.sqrt(squares / freedom))
+    sigma_before, sigma = scatter * np.sqrt(variances)
+    return Velocities(moment, before, after, sigma, sigma_before, scatter)
