@@ -196,6 +196,7 @@ def velocities_from_tracks(
     length: float | None = None,
     window: float = 0.05,
     striker: int = 0,
+    scatter: float | None = None,
 ) -> Velocities:
     """Find the impact in the tracks, and the velocities just before and just after it.
 
@@ -213,6 +214,8 @@ def velocities_from_tracks(
         How much time before and after the impact is used, s.
     striker : int
         Index of the ball that moves before.
+    scatter : float, optional
+        Standard deviation of a mark, m, known from many shots; left out, that of these tracks.
 
     Returns
     -------
@@ -242,16 +245,31 @@ def velocities_from_tracks(
     if length is not None:
         length = one_number("length", length, "must be above 0", 0.0, open_low=True)
     time = _coarse_time(balls, striker, window)
-    near = [np.abs(ball.times - time) <= window for ball in balls]
-    used = [Track(b.times[k], b.positions[k]) for b, k in zip(balls, near, strict=True)]
-    for name, track in zip(tracks, used, strict=True):
-        sides = [int((track.times < time).sum()), int((track.times >= time).sum())]
-        if min(sides) < 4:
+    for _ in range(2):  # the window moves with the moment that is found in it
+        used = _window(tracks, time, window)
+        time = float(_moment(used, time, length, striker)[0])
+    used = _window(tracks, time, window)
+    found = _velocities(used, time, length, striker)
+    if scatter is None:
+        return found
+    ratio = one_number("scatter", scatter, "must be above 0", 0.0, open_low=True) / found.scatter
+    return found._replace(sigma=ratio * found.sigma, sigma_before=ratio * found.sigma_before)
+
+
+def _window(tracks: Mapping[str, Track], time: float, window: float) -> list[Track]:
+    """Return the marks near the impact; there must be some on either side."""
+    used = []
+    for name, track in tracks.items():
+        near = np.abs(track.times - time) <= window
+        times = track.times[near]
+        sides = [int((times < time).sum()), int((times >= time).sum())]
+        if min(sides) < 5:
             raise ValueError(
                 f"track {name!r} has {sides[0]} marks before and {sides[1]} after the impact at "
-                f"{time:.4g} s within window = {window:g} s; needs 4 on each side"
+                f"{time:.4g} s within window = {window:g} s; needs 5 on each side"
             )
-    return _velocities(used, time, length, striker)
+        used.append(Track(times, track.positions[near]))
+    return used
 
 
 def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
