@@ -44,7 +44,9 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
     ['likelihood of restitution AB', 'data of set AB']
     """
     if name is None:
-        name = next((n for n, e in fit.estimates.items() if e.identified), next(iter(fit.estimates)))
+        name = next(
+            (n for n, e in fit.estimates.items() if e.identified), next(iter(fit.estimates))
+        )
     estimate = fit[name]
     if axes is None:
         _, axes = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")

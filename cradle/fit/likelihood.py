@@ -40,9 +40,7 @@ class Responses:
     movers: Vector
 
 
-def responses(
-    shots: ShotSet, points: Points, uncertain: Sequence[tuple[Key, float]]
-) -> Responses:
+def responses(shots: ShotSet, points: Points, uncertain: Sequence[tuple[Key, float]]) -> Responses:
     """Solve one set of shots at all points, with the slopes that the profile needs.
 
     Parameters

@@ -152,6 +152,4 @@ def outcomes_of_draws(
     array([[0., 1.]])
     """
     before = [speed] + [0.0] * (len(masses) - 1)
-    return post_impact_velocities(
-        masses, before, restitution, forward, backward, excess="saturate"
-    )
+    return post_impact_velocities(masses, before, restitution, forward, backward, excess="saturate")

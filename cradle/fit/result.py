@@ -369,4 +369,3 @@ def predicted_points(fit: Fit, types: Sequence[str]) -> Points | None:
         ratios[key] = np.array([0.0 if value is None else value])
     restitution = {tuple(sorted(parameter_key(n))): v for n, (v, _) in fit.given.items()}
     return Points(restitution, ratios)
-

@@ -103,7 +103,7 @@ class Shots:
     --------
     >>> from cradle.tables import data_folder
     >>> read_shots(data_folder() / "shots_template.csv")
-    Shots(AB: 2 shots of 2 balls, ABB: 1 shot of 3 balls)
+    Shots(AB: 2 shots of 2 balls, ABA: 1 shot of 3 balls)
     """
 
     sets: tuple[ShotSet, ...]
@@ -263,9 +263,7 @@ def _number(where: str, line: dict[str, Any], name: str) -> float:
     return value
 
 
-def _row(
-    where: str, line: dict[str, Any], scale: tuple[float, float], sigma: float | None
-) -> _Row:
+def _row(where: str, line: dict[str, Any], scale: tuple[float, float], sigma: float | None) -> _Row:
     """Return one row in kg and m/s."""
     ball, mass = _number(where, line, "ball"), _number(where, line, "mass") * scale[0]
     before, after = (_number(where, line, name) * scale[1] for name in ("before", "after"))
