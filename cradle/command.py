@@ -26,22 +26,12 @@ if TYPE_CHECKING:
 _UNITS = {"kg": 1.0, "g": 1e-3}
 
 
-class _Numbers(click.ParamType):
-    """Numbers with commas between them."""
-
-    name = "numbers"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> list[float]:
-        """Return the numbers."""
-        if isinstance(value, list):
-            return value
-        try:
-            return [float(part) for part in str(value).split(",")]
-        except ValueError:
-            self.fail(f"{value!r} is not a list of numbers with commas between", param, ctx)
-
-
-_NUMBERS = _Numbers()
+def _numbers(_: click.Context, __: click.Parameter, value: str | None) -> list[float] | None:
+    """Read numbers with commas between them."""
+    try:
+        return None if value is None else [float(part) for part in value.split(",")]
+    except ValueError:
+        raise click.BadParameter(f"{value!r}; write numbers with commas between") from None
 
 
 def _chain_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -49,12 +39,16 @@ def _chain_options(command: Callable[..., None]) -> Callable[..., None]:
     options = [
         click.argument("sequence", required=False),
         click.option("--speed", default=1.0, help="Velocity of the first ball, m/s [1]."),
-        click.option("--masses", type=_NUMBERS, help="Masses, left to right: 45,53,53."),
+        click.option("--masses", callback=_numbers, help="Masses, left to right: 45,53,53."),
         click.option("--unit", type=click.Choice(list(_UNITS)), default="kg", help="Of masses."),
-        click.option("--velocities", type=_NUMBERS, help="Instead of --speed: 1,0,0."),
-        click.option("--restitution", type=_NUMBERS, help="One number, or one per contact [1]."),
-        click.option("--ratio", type=_NUMBERS, help="One number, or one per inner ball [0]."),
-        click.option("--backward", type=_NUMBERS, help="Ratios from right to left [as --ratio]."),
+        click.option("--velocities", callback=_numbers, help="Instead of --speed: 1,0,0."),
+        click.option(
+            "--restitution", callback=_numbers, help="One number, or one per contact [1]."
+        ),
+        click.option("--ratio", callback=_numbers, help="One number, or one per inner ball [0]."),
+        click.option(
+            "--backward", callback=_numbers, help="Ratios from right to left [as --ratio]."
+        ),
         click.option("--saturate", is_flag=True, help="Admit ratios above their bound."),
     ]
     for option in reversed(options):
@@ -113,7 +107,7 @@ def main() -> None:
 @_chain_options
 @_format_options
 def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
-    """Velocities after an impact.
+    r"""Velocities after an impact.
 
     SEQUENCE names the paper's balls, first ball first, such as ABACA; or give --masses.
 
@@ -166,7 +160,7 @@ def fit(
     file: Path, given: Sequence[str], known: Sequence[str], predict: str | None, speed: float,
     plot: str | None, as_json: bool, as_csv: bool, **options: Any,
 ) -> None:  # fmt: skip
-    """Fit coefficients of restitution and ratios to measured velocities.
+    r"""Fit coefficients of restitution and ratios to measured velocities.
 
     FILE is a table of shots; `cradle template` prints one to fill in.
 
@@ -185,7 +179,9 @@ def fit(
     if any(len(one.types) == 2 for one in shots.sets):
         fits.append(restitution(shots))
         values.update(fits[0].values())
-    values.update({name: (pair + [0.0])[:2] for name, pair in map(_named, given)})  # type: ignore[misc]
+    values.update(
+        {name: (pair[0], pair[1] if len(pair) > 1 else 0.0) for name, pair in map(_named, given)}
+    )
     if any(len(one.types) > 2 for one in shots.sets):
         fixed = {name: pair[0] for name, pair in map(_named, known)}
         fits.append(ratio(shots, values, known=fixed))
@@ -236,7 +232,7 @@ def _plot_fits(fits: Sequence[Any], path: str) -> None:
 
 @main.command()
 def template() -> None:
-    """Print a table of shots to fill in.
+    r"""Print a table of shots to fill in.
 
     \b
     Examples:
@@ -253,7 +249,7 @@ def template() -> None:
 @click.option("--output", "-o", required=True, type=click.Path(dir_okay=False),
               help="File to draw to: .png, .svg or .pdf.")  # fmt: skip
 def plot(output: str, **options: Any) -> None:
-    """Draw the velocities of all balls through an impact.
+    r"""Draw the velocities of all balls through an impact.
 
     \b
     Examples:
@@ -267,14 +263,18 @@ def plot(output: str, **options: Any) -> None:
 
     os.environ.setdefault("CRADLE_KERNEL", "plain")
     chain, model = _chain(**options)
-    axes = figures.velocities(collide(chain, model))
-    axes.figure.savefig(output)
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(7, 4.3), layout="constrained")
+    figures.velocities(collide(chain, model), axes)
+    figure.savefig(output)
+    plt.close(figure)
     click.echo(f"drawn to {output}")
 
 
 @main.command(name="warm-up")
 def warm_up() -> None:
-    """Compile the solver now, so that later runs start at once.
+    r"""Compile the solver now, so that later runs start at once.
 
     \b
     Examples:

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cradle.figures import PALETTE, ball_style
+from cradle.fit.answers import Estimate
 from cradle.fit.parameters import pair_keys, triplet_keys
-from cradle.fit.result import Estimate, Fit, predicted_points
+from cradle.fit.result import Fit, predicted_points
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.chain import Vector, checked
+from cradle.fit.answers import Estimate, Group
 from cradle.fit.likelihood import chi_squares
 from cradle.fit.parameters import (
     Key,
@@ -17,7 +18,7 @@ from cradle.fit.parameters import (
     parameter_key,
     triplet_keys,
 )
-from cradle.fit.result import Estimate, Fit, Group
+from cradle.fit.result import Fit
 from cradle.fit.search import RISE, Mode, refine, scan
 from cradle.fit.shots import Shots, ShotSet
 
@@ -126,7 +127,7 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
 
     def chi(e: Vector) -> Vector:
         square = e[:, None] ** 2
-        return ((low - square * high) ** 2 / (1 + square**2)).sum(axis=1) / error**2
+        return np.asarray(((low - square * high) ** 2 / (1 + square**2)).sum(axis=1) / error**2)
 
     key = parameter_key(name)
     found = scan(chi, np.linspace(0.0, 1.0, _GRID))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def pair_keys(types: Sequence[str]) -> list[Key]:
     >>> pair_keys("BAB")
     [('A', 'B'), ('A', 'B')]
     """
-    return [tuple(sorted(pair)) for pair in zip(types[:-1], types[1:], strict=True)]
+    return [tuple(sorted(pair)) for pair in pairwise(types)]
 
 
 def triplet_keys(types: Sequence[str]) -> tuple[list[Key], list[Key]]:

@@ -220,11 +220,10 @@ def _lows(points: Vector, values: Vector, step: Vector) -> Vector:
     """Return the points that no neighbour undercuts, among those near the lowest."""
     some = np.argsort(values, kind="stable")[:1500]
     some = some[values[some] - values[some[0]] <= 4 * RISE]
-    near: NDArray[np.bool_] = (np.abs(points[some, None] - points[None, some]) < 1.5 * step).all(
-        axis=-1
-    )
+    distance = np.abs(points[some, None] - points[None, some])
+    near: NDArray[np.bool_] = np.all(distance < 1.5 * step, axis=-1)
     lower = values[some][None, :] < values[some][:, None]
-    return points[some[~(near & lower).any(axis=1)]]
+    return np.asarray(points[some[~np.any(near & lower, axis=1)]])
 
 
 def _descended(

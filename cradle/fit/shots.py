@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -334,9 +335,9 @@ def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
 def _check_physics(name: str, shot: str, rows: Sequence[_Row]) -> None:
     """Raise if no balls approach, balls pass through each other, or energy is gained."""
     what = f"set {name}, shot {shot}"
-    if all(a.before <= b.before for a, b in zip(rows[:-1], rows[1:], strict=True)):
+    if all(a.before <= b.before for a, b in pairwise(rows)):
         raise ValueError(f"{rows[0].where}, column before: {what}: no balls approach")
-    for left, right in zip(rows[:-1], rows[1:], strict=True):
+    for left, right in pairwise(rows):
         error = np.hypot(left.sigma, right.sigma)
         if left.after - right.after > _BEYOND * error:
             raise ValueError(
