@@ -42,13 +42,9 @@ def _chain_options(command: Callable[..., None]) -> Callable[..., None]:
         click.option("--masses", callback=_numbers, help="Masses, left to right: 45,53,53."),
         click.option("--unit", type=click.Choice(list(_UNITS)), default="kg", help="Of masses."),
         click.option("--velocities", callback=_numbers, help="Instead of --speed: 1,0,0."),
-        click.option(
-            "--restitution", callback=_numbers, help="One number, or one per contact [1]."
-        ),
-        click.option("--ratio", callback=_numbers, help="One number, or one per inner ball [0]."),
-        click.option(
-            "--backward", callback=_numbers, help="Ratios from right to left [as --ratio]."
-        ),
+        click.option("--restitution", callback=_numbers, help="One, or one per contact [1]."),
+        click.option("--ratio", callback=_numbers, help="One, or one per inner ball [0]."),
+        click.option("--backward", callback=_numbers, help="Ratios from the right [as --ratio]."),
         click.option("--saturate", is_flag=True, help="Admit ratios above their bound."),
     ]
     for option in reversed(options):
@@ -97,7 +93,7 @@ def _one_or_all(values: list[float] | None, default: float) -> float | list[floa
     return values[0] if len(values) == 1 else values
 
 
-@click.group(epilog="Examples: cradle solve ABACA --speed 1; cradle fit shots.csv --predict ABACA")
+@click.group()
 @click.version_option(package_name="cradle-companion", prog_name="cradle")
 def main() -> None:
     """Impacts in chains of balls: Newton's cradle by the Impulse Correlation Ratio."""
@@ -107,7 +103,7 @@ def main() -> None:
 @_chain_options
 @_format_options
 def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
-    r"""Velocities after an impact.
+    """Velocities after an impact.
 
     SEQUENCE names the paper's balls, first ball first, such as ABACA; or give --masses.
 
@@ -160,7 +156,7 @@ def fit(
     file: Path, given: Sequence[str], known: Sequence[str], predict: str | None, speed: float,
     plot: str | None, as_json: bool, as_csv: bool, **options: Any,
 ) -> None:  # fmt: skip
-    r"""Fit coefficients of restitution and ratios to measured velocities.
+    """Fit coefficients of restitution and ratios to measured velocities.
 
     FILE is a table of shots; `cradle template` prints one to fill in.
 
@@ -232,7 +228,7 @@ def _plot_fits(fits: Sequence[Any], path: str) -> None:
 
 @main.command()
 def template() -> None:
-    r"""Print a table of shots to fill in.
+    """Print a table of shots to fill in.
 
     \b
     Examples:
@@ -249,7 +245,7 @@ def template() -> None:
 @click.option("--output", "-o", required=True, type=click.Path(dir_okay=False),
               help="File to draw to: .png, .svg or .pdf.")  # fmt: skip
 def plot(output: str, **options: Any) -> None:
-    r"""Draw the velocities of all balls through an impact.
+    """Draw the velocities of all balls through an impact.
 
     \b
     Examples:
@@ -274,7 +270,7 @@ def plot(output: str, **options: Any) -> None:
 
 @main.command(name="warm-up")
 def warm_up() -> None:
-    r"""Compile the solver now, so that later runs start at once.
+    """Compile the solver now, so that later runs start at once.
 
     \b
     Examples:
