@@ -6,9 +6,7 @@ that is wrong or an impact that did not finish, 2 for a command that was not und
 
 from __future__ import annotations
 
-import csv
-import io
-import json
+import importlib.util
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -16,6 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from cradle.console import plot_fits, show, text
 
 if TYPE_CHECKING:
     from cradle.chain import Chain
@@ -136,7 +136,7 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
         f"energy lost: {100 * extra['energy_lost']:.2f} %; collisions of the contacts: "
         f"{', '.join(map(str, extra['collisions']))}"
     )
-    _print(rows, extra, note, as_json, as_csv)
+    show(rows, extra, note, as_json, as_csv)
 
 
 @main.command()
@@ -194,36 +194,19 @@ def fit(
     if predict is not None:
         predicted = fits[-1].predict(predict, speed)
         extra["prediction"] = predicted.rows()
-        notes += ["", f"{predict} at {speed:g} m/s:", _text(predicted.rows())]
+        notes += ["", f"{predict} at {speed:g} m/s:", text(predicted.rows())]
     if plot is not None:
-        _plot_fits(fits, plot)
-    _print(rows, extra, "\n".join(notes), as_json, as_csv)
+        plot_fits(fits, plot)
+    show(rows, extra, "\n".join(notes), as_json, as_csv)
 
 
-def _named(text: str) -> tuple[str, list[float]]:
+def _named(given: str) -> tuple[str, list[float]]:
     """Read NAME=NUMBER or NAME=NUMBER:ERROR."""
-    name, _, numbers = text.partition("=")
+    name, _, numbers = given.partition("=")
     try:
         return name, [float(part) for part in numbers.split(":")]
     except ValueError:
-        raise click.UsageError(f"{text!r}: write NAME=NUMBER or NAME=NUMBER:ERROR") from None
-
-
-def _plot_fits(fits: Sequence[Any], path: str) -> None:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    drawn = [(one, name) for one in fits for name, e in one.estimates.items() if e.identified]
-    if not drawn:
-        raise ValueError("nothing was identified; there is nothing to draw")
-    figure, axes = plt.subplots(len(drawn), 2, figsize=(9, 3.9 * len(drawn)), squeeze=False,
-                                layout="constrained")  # fmt: skip
-    for (one, name), row in zip(drawn, axes, strict=True):
-        one.plot(name, row)
-    figure.savefig(path)
-    plt.close(figure)
+        raise click.UsageError(f"{given!r}: write NAME=NUMBER or NAME=NUMBER:ERROR") from None
 
 
 @main.command()
@@ -236,8 +219,7 @@ def template() -> None:
     """
     from cradle.tables import data_folder
 
-    text = (data_folder() / "shots_template.csv").read_text(encoding="utf-8")
-    click.echo(text, nl=False)
+    click.echo((data_folder() / "shots_template.csv").read_text(encoding="utf-8"), nl=False)
 
 
 @main.command()
@@ -268,6 +250,54 @@ def plot(output: str, **options: Any) -> None:
     click.echo(f"drawn to {output}")
 
 
+@click.command()
+@_chain_options
+@click.option("--pull", default=0.05, help="How far the first ball is pulled aside, m [0.05].")
+@click.option("--length", default=0.3, help="Of the pendulums, m [0.3].")
+@click.option("--seconds", default=2.0, help="How long it swings [2].")
+@click.option("--steps", default=20, help="How many rows to print [20].")
+@_format_options
+def swing(
+    pull: float, length: float, seconds: float, steps: int, as_json: bool, as_csv: bool,
+    **options: Any,
+) -> None:  # fmt: skip
+    """Positions of a swinging cradle, impact after impact.
+
+    The first ball is pulled aside and let go; --speed and --velocities do not matter.
+
+    \b
+    Examples:
+      cradle swing ABACA --pull 0.05 --seconds 1
+      cradle swing --masses 1,1,1,1,1 --csv
+    """
+    from cradle.chain import Chain
+
+    os.environ.setdefault("CRADLE_KERNEL", "plain")
+    rooms = [importlib.import_module(f"cradle.{name}") for name in ("swinging", "pendulums")]
+    chain, model = _chain(**options)
+    still = [0.0] * len(chain)
+    if not (seconds > 0 and steps >= 1):
+        raise ValueError(f"seconds = {seconds:g}, steps = {steps}; must be above 0")
+    run = rooms[0].swing(
+        Chain(chain.masses, still, chain.restitution), model, [-pull, *still[1:]],
+        [seconds * k / steps for k in range(steps + 1)],
+        pendulums=rooms[1].Pendulums(length=length),
+    )  # fmt: skip
+    rows = [
+        {"time": float(time), **{f"ball {k + 1}": float(x) + 0.0 for k, x in enumerate(places)}}
+        for time, places in zip(run.times, run.positions, strict=True)
+    ]
+    impacts = [
+        {"time": float(one.time), "before": one.before.tolist(), "after": one.after.tolist()}
+        for one in run.impacts
+    ]
+    show(rows, {"impacts": impacts}, f"impacts: {len(impacts)}; positions in m", as_json, as_csv)
+
+
+if importlib.util.find_spec("cradle.swinging") is not None:
+    main.add_command(swing)
+
+
 @main.command(name="warm-up")
 def warm_up() -> None:
     """Compile the solver now, so that later runs start at once.
@@ -285,42 +315,6 @@ def warm_up() -> None:
         collide(Chain([1, 1, 1], [1, 0, 0], 0.9), ImpulseCorrelation(0.1))
         post_impact_velocities([1, 1, 1, 1], [1, 0, 0, 0], 0.9, 0.1)
     click.echo("ready")
-
-
-def _print(
-    rows: Sequence[dict[str, Any]], extra: dict[str, Any], note: str, as_json: bool, as_csv: bool
-) -> None:
-    """Print a table, as text with a note, as CSV, or as JSON with all there is."""
-    if as_json and as_csv:
-        raise click.UsageError("give one of --json and --csv")
-    if as_json:
-        click.echo(json.dumps({"rows": list(rows), **extra}, indent=2))
-    elif as_csv:
-        text = io.StringIO()
-        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-        click.echo(text.getvalue(), nl=False)
-    else:
-        click.echo(f"{_text(rows)}\n{note}")
-
-
-def _text(rows: Sequence[dict[str, Any]]) -> str:
-    """Return rows as a table of text."""
-
-    def cell(value: Any) -> str:
-        if value is None:
-            return "-"
-        if isinstance(value, bool):
-            return "yes" if value else "no"
-        return f"{value:.4f}" if isinstance(value, float) else str(value)
-
-    table = [list(rows[0]), *([cell(value) for value in row.values()] for row in rows)]
-    widths = [max(len(line[k]) for line in table) for k in range(len(table[0]))]
-    return "\n".join(
-        "  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)).rstrip()
-        for line in table
-    )
 
 
 def run(arguments: Sequence[str] | None = None) -> None:
@@ -341,6 +335,6 @@ def run(arguments: Sequence[str] | None = None) -> None:
     try:
         main(arguments, prog_name="cradle")
     except (ValueError, OSError, ImpactNotFinished) as error:
-        text = str(error).replace("excess='saturate'", "--saturate")
-        click.echo(f"cradle: {text}", err=True)
+        message = str(error).replace("excess='saturate'", "--saturate")
+        click.echo(f"cradle: {message}", err=True)
         sys.exit(1)

@@ -18,7 +18,7 @@ from cradle import collide, paper_chain
 from cradle.command import main, run
 
 ROOT = Path(__file__).parents[1]
-COMMANDS = ["solve", "fit", "template", "plot", "warm-up"]
+COMMANDS = list(main.commands)
 
 
 def call(line, expected=0):
@@ -33,8 +33,6 @@ def examples():
         lines = re.findall(r"^\s+cradle (.+)$", call(f"{name} --help"), flags=re.M)
         assert lines, name
         found += lines
-        part.strip() for part in re.findall(r"cradle (solve [^;]+|fit [^;]+?)(?:;|$)", epilog)
-    ]
     return found
 
 
@@ -57,7 +55,7 @@ def folder(tmp_path, monkeypatch):
 
 def test_every_example_of_the_help_works(folder):
     lines = examples()
-    assert len(lines) == 12
+    assert len(lines) >= 12
     for line in lines:
         # The file of the example in grams is the one in grams.
         line = line.replace("shots.csv", "grams.csv") if "--mass-unit g" in line else line

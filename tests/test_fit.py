@@ -265,7 +265,8 @@ def test_confidence_set_by_another_route():
 def test_errors_of_restitution_widen_the_interval():
     shots = read_shots(columns("ABA", [1.0] * 5, outcome("ABA"), 0.003))
     sharp, blurred = (ratio(shots, pairs_of("ABA", error))["ABA"] for error in (0.0, 0.02))
-    assert blurred.standard_error > 1.5 * sharp.standard_error
+    # Not by much: the triplets themselves tell e.
+    assert blurred.standard_error > 1.05 * sharp.standard_error
 
 
 def test_what_the_data_do_not_tell():
