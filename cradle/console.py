@@ -48,6 +48,7 @@ def text(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def plot_fits(fits: Sequence[Any], path: str) -> None:
+    """Draw every identified estimate to a file."""
     import matplotlib
 
     matplotlib.use("Agg")
