@@ -31,7 +31,7 @@ STUDY = ["triplet", "noise", "ratio", "bound", "datasets", "covered", "width", "
          "not_identified", "several_intervals", "wrong_least_squares", "wrong_bounded",
          "wrong_five_starts"]  # fmt: skip
 PRECISION = ["triplet", "ratio", "bound", "backward_acts", "sensitivity", "third_digit", "second",
-             "second_excess", "trap_low", "trap_high", "detectable"]  # fmt: skip
+             "second_excess", "trap_low", "trap_high", "trap_misfit", "detectable"]  # fmt: skip
 
 
 def truth(triplet):
@@ -145,8 +145,12 @@ def precision(triplet):
     others = [k for k in _minima(excess) if abs(ratios[k] - true) > 0.01]
     second = min(others, key=lambda k: excess[k], default=None)
     # True ratios for which the printed value is a minimum, but not the lowest.
-    traps = [r for j, r in enumerate(ratios) if abs(r - true) > 0.02
-             and any(abs(ratios[k] - true) < 0.003 for k in _minima(seen[:, j]))]  # fmt: skip
+    traps, misfits = [], []
+    for j, other in enumerate(ratios):
+        for k in _minima(seen[:, j]):
+            if abs(other - true) > 0.02 and abs(ratios[k] - true) < 0.003:
+                traps.append(other)
+                misfits.append(np.sqrt(seen[k, j]))
     acts = any(
         (np.abs(outcomes(chain, ratios, b) - outcomes(chain, ratios, 0.0)) > 1e-9).any()
         for b in (0.1, 0.25, 0.5)
@@ -156,7 +160,8 @@ def precision(triplet):
             f"{0.0005 / 1.96 * sensitivity * np.sqrt(SHOTS):.3g}",
             "" if second is None else f"{ratios[second]:.4f}",
             "" if second is None else f"{excess[second]:.4g}",
-            f"{min(traps):.4f}" if traps else "", f"{max(traps):.4f}" if traps else "",
+            *(f"{x:.4f}" if traps else ""
+              for x in (min(traps, default=0), max(traps, default=0), min(misfits, default=0))),
             f"{(1.960 + 0.842) * np.sqrt(2) * error:.4f}"]  # fmt: skip
 
 

@@ -92,7 +92,9 @@ def draw_likelihood(estimate: Estimate, ax: Axes) -> Axes:
     ax.set(xlim=(0, estimate.bound), ylim=(0, _TOP), xlabel=f"{estimate.kind} {estimate.name}",
            ylabel="chi-square above its lowest",
            title=f"likelihood of {estimate.kind} {estimate.name}")  # fmt: skip
-    ax.legend(loc="upper center", frameon=True, fontsize="small")
+    ax.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.08), ncols=3, frameon=False, fontsize="small"
+    )
     return ax
 
 
