@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from cradle import collide, paper_chain
+from cradle import collide, paper_chain, runtime
 from cradle.command import main, run
 
 ROOT = Path(__file__).parents[1]
@@ -22,7 +22,9 @@ COMMANDS = list(main.commands)
 
 
 def call(line, expected=0):
-    result = CliRunner().invoke(main, shlex.split(line), catch_exceptions=False)
+    # What a command chooses for its own process must not reach the next one.
+    free = {runtime.VARIABLE: None}
+    result = CliRunner(env=free).invoke(main, shlex.split(line), catch_exceptions=False)
     assert result.exit_code == expected, result.output
     return result.output
 
@@ -50,6 +52,7 @@ def folder(tmp_path, monkeypatch):
         writer.writerow(rows[0])
         writer.writerows([*r[:4], 1000 * float(r[4]), *r[5:]] for r in rows[1:])
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(runtime.VARIABLE, "plain")
     return tmp_path
 
 

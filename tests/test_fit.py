@@ -405,6 +405,22 @@ def test_speeds_from_heights():
     np.testing.assert_allclose(sigma, [np.sqrt(1.02) - 1] * 2 + [np.sqrt(0.02)])
 
 
+def test_predictions_cover():
+    """A chain of five from pairs and triplets, 12 times: the truth is nearly always inside."""
+    truth, inside = outcome("ABABA"), []
+    random = np.random.default_rng(11)
+    for _ in range(12):
+        tables = [
+            columns(name, [0.5, 1.0, 1.5, 2.0], outcome(name), 0.01,
+                    0.01 * random.standard_normal((4, len(name))))
+            for name in ("AB", "ABA", "BAB")
+        ]  # fmt: skip
+        shots = read_shots({key: [x for table in tables for x in table[key]] for key in tables[0]})
+        predicted = ratio(shots, restitution(shots)).predict("ABABA")
+        inside += ((predicted.lower <= truth) & (truth <= predicted.upper)).tolist()
+    assert binom.ppf(1e-3, 60, 0.9) <= sum(inside)
+
+
 # --- stored data -------------------------------------------------------------------------------
 
 
