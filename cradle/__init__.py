@@ -13,7 +13,9 @@ The rooms, in that order:
 - `cradle.closed_form`: what the paper gives in closed form.
 - `cradle.tables`: the paper's tables and chains.
 - `cradle.measures`: what is read off outcomes.
+- `cradle.fit`: ratios and restitution from measured velocities.
 - `cradle.figures`: matplotlib, imported only when asked for.
+- `cradle.command`: the command line, `python -m cradle`.
 """
 
 from cradle.chain import Chain

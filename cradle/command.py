@@ -1,4 +1,4 @@
-"""The command line: `cradle solve`, `cradle fit`, `cradle plot`; also `python -m cradle`.
+"""The command line: `cradle solve`, `film`, `fit`, `plot` ...; also `python -m cradle`.
 
 Answers go to standard output, errors to standard error.  Exit codes: 0 for an answer, 1 for input
 that is wrong or an impact that did not finish, 2 for a command that was not understood.
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cradle.console import plot_fits, show, text
+from cradle.filming import film
 
 if TYPE_CHECKING:
     from cradle.chain import Chain
@@ -294,6 +295,7 @@ def swing(
     show(rows, {"impacts": impacts}, f"impacts: {len(impacts)}; positions in m", as_json, as_csv)
 
 
+main.add_command(film)
 if importlib.util.find_spec("cradle.swinging") is not None:
     main.add_command(swing)
 

@@ -11,11 +11,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from cradle import collide, paper_chain, runtime
 from cradle.command import main, run
+from cradle.fit import read_shots
 
 ROOT = Path(__file__).parents[1]
 COMMANDS = list(main.commands)
@@ -45,6 +47,7 @@ def folder(tmp_path, monkeypatch):
     kept = [line for line in lines[2:]
             if int(line.split(",")[1]) in (1, 5, 9) and not line.startswith("ABACA")]  # fmt: skip
     (tmp_path / "shots.csv").write_text("\n".join([*lines[:2], *kept]) + "\n", encoding="utf-8")
+    shutil.copy(ROOT / "data" / "video_synthetic.txt", tmp_path / "film.txt")
     shutil.copy(tmp_path / "shots.csv", tmp_path / "grams.csv")
     rows = list(csv.reader(io.StringIO((tmp_path / "shots.csv").read_text().split("\n", 1)[1])))
     with (tmp_path / "grams.csv").open("w", newline="") as file:
@@ -58,7 +61,7 @@ def folder(tmp_path, monkeypatch):
 
 def test_every_example_of_the_help_works(folder):
     lines = examples()
-    assert len(lines) >= 12
+    assert len(lines) >= 14
     for line in lines:
         # The file of the example in grams is the one in grams.
         line = line.replace("shots.csv", "grams.csv") if "--mass-unit g" in line else line
@@ -98,6 +101,21 @@ def test_fit_finds_what_the_example_was_made_with():
     assert len(answer["chi_square"]) == 2
 
 
+def test_film_gives_the_rows_of_the_table(folder):
+    """The film of the example, with the scatter of its own marks."""
+    line = "film film.txt --set BAC --masses 53,45,53 --unit g --length 0.3 --header"
+    (folder / "one.csv").write_text(call(line), encoding="utf-8")
+    one = read_shots(folder / "one.csv")["BAC"]
+    stored = read_shots(folder / "shots.csv")["BAC"]
+    np.testing.assert_allclose(one.after[0], stored.after[0], atol=1e-4)
+    np.testing.assert_allclose(one.before[0], stored.before[0], atol=1e-4)
+    np.testing.assert_allclose(one.sigma[0], stored.sigma[0], rtol=0.3)
+    slow = line.replace("--length 0.3", "--slower 0.5 --window 0.1")
+    (folder / "two.csv").write_text(call(slow), encoding="utf-8")
+    two = read_shots(folder / "two.csv")["BAC"]
+    np.testing.assert_allclose(2 * two.after[0], one.after[0], atol=0.05)
+
+
 @pytest.mark.parametrize(
     ("line", "code", "message"),
     [
@@ -112,6 +130,7 @@ def test_fit_finds_what_the_example_was_made_with():
         ("fit nothing.csv", 2, "does not exist"),
         ("fit shots.csv --mass-unit g --restitution AB", 2, "write NAME=NUMBER"),
         ("fit grams.csv", 1, "column mass: 45 kg is unlikely"),
+        ("film film.txt --set BA --masses 1,1,1", 1, "has 3 tracks, --set 2 types"),
         ("frobnicate", 2, "No such command"),
     ],
 )

@@ -147,6 +147,18 @@ def chi_squares(
     Returns
     -------
     ndarray, shape (P,)
+
+    Examples
+    --------
+    Three ratios and 36 velocities; the middle one is the ratio they were made with:
+
+    >>> from cradle.fit import read_shots
+    >>> from cradle.tables import data_folder
+    >>> shots = read_shots(data_folder() / "shots_synthetic.csv")
+    >>> ratios = {("A", "B", "A"): np.array([0.05, 0.127, 0.2])}
+    >>> points = Points({("A", "B"): 0.53}, ratios)
+    >>> chi_squares([shots["ABA"]], points, [(("A", "B"), 0.003)]).round().tolist()
+    [249.0, 32.0, 328.0]
     """
     size = max((values.size for values in points.ratios.values()), default=1)
     parts = []

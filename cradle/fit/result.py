@@ -152,6 +152,19 @@ class Fit:
         ValueError
             If the mass of a type, the coefficient of restitution of a pair or the ratio of a
             triplet (or of its reverse) is neither fitted nor given.
+
+        Notes
+        -----
+        Ratios that were fitted together are drawn together.  Ratios and coefficients of
+        restitution are drawn independently, though the ones were fitted with the others.
+
+        Examples
+        --------
+        >>> from cradle.fit import ratio, read_shots, restitution
+        >>> from cradle.tables import data_folder
+        >>> shots = read_shots(data_folder() / "shots_template.csv")
+        >>> ratio(shots, restitution(shots)).predict("ABA")
+        Prediction(ABA: 0.130 [0.112, 0.148], 0.244 [0.231, 0.257], 0.583 [0.571, 0.595] m/s)
         """
         row = tuple(types)
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
