@@ -30,7 +30,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import extremes as x  # noqa: E402
 from chains import power_of_ten  # noqa: E402
 
-from cradle import (
+from cradle import (  # noqa: E402
     outcomes,
     paper_chain,
 )

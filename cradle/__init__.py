@@ -18,8 +18,10 @@ The rooms, in that order:
   three balls that conserve energy.
 - `cradle.tables`: the paper's tables and chains, read by `cradle.reading`.
 - `cradle.measures`: what is read off outcomes; `cradle.blocks`: batches under dask.
+- `cradle.fit`: ratios and restitution from measured velocities.
 - `cradle.figures` and `cradle.animation`: matplotlib, imported only when asked for;
   `cradle.film`: keyframes.
+- `cradle.command`: the command line, `python -m cradle`.
 
 Read `cradle.textbook` first: the rules of an impact in 250 lines.  The distribution is called
 cradle-companion; its version is `cradle.__version__`.

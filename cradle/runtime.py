@@ -1,8 +1,8 @@
 """How the event loop runs: as it stands, or compiled by numba, with the same bits.
 
 The rooms of `cradle.kernel` are joined to one source file, named after a hash of their text, and
-compiled as one unit, kept on disk: an edit anywhere makes a new unit.  Compiling takes seconds, so
-small work runs plain until compiled code is on disk or plain work has taken as long.
+compiled as one unit, kept on disk: an edit anywhere makes a new unit.  Compiling and loading take
+seconds, so small work runs plain until plain work has taken as long.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ from cradle import kernel as plain
 #: Set this environment variable to ``plain`` to run the kernel as it stands, to ``compiled`` to
 #: compile at the first call.
 VARIABLE = "CRADLE_KERNEL"
-#: Seconds of plain work after which compiling pays: about as long as compiling takes.
-PAYS_AFTER = 10.0
+#: Seconds of plain work after which compiling pays, and loading what is compiled already: about as
+#: long as these take.
+PAYS_AFTER, LOADS_AFTER = 10.0, 0.5
 
 logger = logging.getLogger("cradle")
 _spent = 0.0  # seconds of plain work so far, in this process
@@ -148,10 +149,15 @@ def on_disk() -> bool:
     return any(folder.rglob(f"{_name()}.batch-*.nbi"))
 
 
-def ready() -> bool:
-    """Tell whether compiled code runs without a wait."""
+def loaded() -> bool:
+    """Tell whether compiled code has run in this process."""
     module = compiled() if compiled.cache_info().currsize else None
-    return bool(module is not None and module.batch.signatures) or on_disk()
+    return module is not None and bool(module.batch.signatures)
+
+
+def ready() -> bool:
+    """Tell whether compiled code runs without a long wait."""
+    return loaded() or on_disk()
 
 
 def spend(seconds: float) -> None:
@@ -171,7 +177,8 @@ def chosen(large: bool = False) -> Any:
     wish = os.environ.get(VARIABLE)
     if wish == "plain" or not available():
         return plain
-    if not (wish == "compiled" or large or _spent > PAYS_AFTER or ready()):
+    worth = wish == "compiled" or large or loaded() or _spent > PAYS_AFTER
+    if not (worth or (_spent > LOADS_AFTER and on_disk())):
         return plain
     module = compiled()
     if module is None:

@@ -1,0 +1,119 @@
+"""A synthetic experiment with hanging balls, as a phone would film it: files for the example.
+
+Usage::
+
+    python benchmarks/fit_example.py            # writes data/video_synthetic.txt and
+                                                # data/shots_synthetic.csv, seconds
+
+Nothing here was measured.  Balls of the paper's types swing on pendulums; before and after the
+impact they follow the pendulum's own equation of motion, step by step, and the impact is solved
+with the values of Tables 1 and 2.  A phone takes 240 frames a second; each mark is off by a random
+amount.  The velocities of the table are found from the marks as a reader would find them.
+"""
+
+import argparse
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from cradle import collide, paper_chain
+from cradle.fit import Tracks, velocities_from_tracks
+from cradle.fit.tracker import Track
+
+DATA = Path(__file__).parents[1] / "data"
+LENGTH, GRAVITY = 0.3, 9.81
+FRAMES_PER_SECOND, FRAMES = 240.0, 24  # frames on either side of the impact
+SCATTER = 0.0004  # of a mark, m
+DIAMETER = 0.035
+SPEEDS = (0.6, 1.0, 1.4)
+#: Sets of the experiment and how many shots of each there are at every speed.
+SETS = {"AB": 4, "AC": 4, "ABA": 4, "BAC": 4, "CAB": 4, "ACA": 4, "ABACA": 2}
+HEADER = ("set", "shot", "ball", "type", "mass", "before", "after", "sigma", "sigma_before")
+
+
+def swing(velocity, times):
+    """Return positions of a pendulum that passes its lowest point at time 0, by Runge-Kutta."""
+
+    def rate(y):
+        return np.array([y[1], -GRAVITY / LENGTH * np.sin(y[0])])
+
+    positions = np.empty(times.size)
+    for k, time in enumerate(times):
+        steps = 16
+        h, y = time / steps, np.array([0.0, velocity / LENGTH])
+        for _ in range(steps):
+            a = rate(y)
+            b = rate(y + h / 2 * a)
+            c = rate(y + h / 2 * b)
+            y = y + h / 6 * (a + 2 * b + 2 * c + rate(y + h * c))
+        positions[k] = LENGTH * np.sin(y[0])
+    return positions
+
+
+def film(name, speed, random):
+    """Return the tracks of one shot; the impact falls anywhere between two frames."""
+    chain, model = paper_chain(name, speed)
+    after = collide(chain, model).velocities
+    times = (np.arange(2 * FRAMES + 1) - FRAMES + random.random() - 0.5) / FRAMES_PER_SECOND
+    tracks: Tracks = {}
+    for k, letter in enumerate(name):
+        way = np.where(times < 0, swing(chain.velocities[k], times), swing(after[k], times))
+        marks = k * DIAMETER + way + SCATTER * random.standard_normal(times.size)
+        label = f"{letter}{k + 1}" if name.count(letter) > 1 else letter
+        tracks[label] = Track(times - times[0], marks)
+    return tracks, chain.masses
+
+
+def export(tracks):
+    """Return the text that Tracker would export for several tracks."""
+    names = list(tracks)
+    lines = ["#multi:", "\t" + "".join(f"{name}\t\t" for name in names),
+             "t\t" + "x\ty\t" * len(names)]  # fmt: skip
+    times = tracks[names[0]].times
+    for k, time in enumerate(times):
+        cells = "".join(f"{tracks[name].positions[k]:.5f}\t0.00000\t" for name in names)
+        lines.append(f"{time:.6f}\t{cells}")
+    return "\n".join(lines) + "\n"
+
+
+def experiment():
+    """Return the rows of the table, and the text of one film."""
+    films = []
+    for name, count in SETS.items():
+        random = np.random.default_rng([2001, *map(ord, name)])
+        shots = [speed for speed in SPEEDS for _ in range(count)]
+        for shot, speed in enumerate(shots, 1):
+            true_speed = speed * (1 + 0.03 * (random.random() - 0.5))  # a hand lets go
+            tracks, masses = film(name, true_speed, random)
+            films.append((name, shot, tracks, masses))
+    # The marks of all films have one scatter: pooled, it is known well.
+    alone = [velocities_from_tracks(tracks, length=LENGTH) for _, _, tracks, _ in films]
+    scatter = float(np.sqrt(np.mean([found.scatter**2 for found in alone])))
+    rows = []
+    for name, shot, tracks, masses in films:
+        found = velocities_from_tracks(tracks, length=LENGTH, scatter=scatter)
+        for k, letter in enumerate(name):
+            numbers = (found.before[k], found.after[k], found.sigma[k], found.sigma_before[k])
+            rows.append([name, shot, k + 1, letter, f"{masses[k]:.3f}",
+                         *(f"{x + 0.0:.4f}" if x else "0" for x in numbers)])  # fmt: skip
+    text = next(export(tracks) for name, _, tracks, _ in films if name == "BAC")
+    return rows, text
+
+
+def main(arguments=None):
+    """Write the files."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--folder", type=Path, default=DATA)
+    folder = parser.parse_args(arguments).folder
+    rows, text = experiment()
+    (folder / "video_synthetic.txt").write_text(text, encoding="utf-8")
+    with (folder / "shots_synthetic.csv").open("w", newline="", encoding="utf-8") as file:
+        file.write("# SYNTHETIC: made by benchmarks/fit_example.py, not measured\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(HEADER)
+        writer.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()

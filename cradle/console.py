@@ -1,0 +1,65 @@
+"""What the command line shows: tables as text, CSV or JSON, and figures in files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+
+def show(
+    rows: Sequence[dict[str, Any]], extra: dict[str, Any], note: str, as_json: bool, as_csv: bool
+) -> None:
+    """Print a table, as text with a note, as CSV, or as JSON with all there is."""
+    if as_json and as_csv:
+        raise click.UsageError("give one of --json and --csv")
+    if as_json:
+        click.echo(json.dumps({"rows": list(rows), **extra}, indent=2))
+    elif as_csv:
+        table = io.StringIO()
+        writer = csv.DictWriter(table, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        click.echo(table.getvalue(), nl=False)
+    else:
+        click.echo(f"{text(rows)}\n{note}")
+
+
+def text(rows: Sequence[dict[str, Any]]) -> str:
+    """Return rows as a table of text."""
+
+    def cell(value: Any) -> str:
+        if value is None:
+            return "-"
+        if isinstance(value, bool):
+            return "yes" if value else "no"
+        return f"{value:.4f}" if isinstance(value, float) else str(value)
+
+    table = [list(rows[0]), *([cell(value) for value in row.values()] for row in rows)]
+    widths = [max(len(line[k]) for line in table) for k in range(len(table[0]))]
+    return "\n".join(
+        "  ".join(word.rjust(width) for word, width in zip(line, widths, strict=True)).rstrip()
+        for line in table
+    )
+
+
+def plot_fits(fits: Sequence[Any], path: str) -> None:
+    """Draw every identified estimate to a file."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    drawn = [(one, name) for one in fits for name, e in one.estimates.items() if e.identified]
+    if not drawn:
+        raise ValueError("nothing was identified; there is nothing to draw")
+    figure, axes = plt.subplots(len(drawn), 2, figsize=(9, 3.9 * len(drawn)), squeeze=False,
+                                layout="constrained")  # fmt: skip
+    for (one, name), row in zip(drawn, axes, strict=True):
+        one.plot(name, row)
+    figure.savefig(path)
+    plt.close(figure)

@@ -1,0 +1,55 @@
+"""`cradle film`: from an export of the video tool Tracker to rows of the table of shots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+_UNITS = {"kg": 1.0, "g": 1e-3}
+
+
+@click.command()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--set", "name", required=True, help="Types of the balls, left to right: BAC.")
+@click.option("--shot", default="1", help="Name of the shot [1].")
+@click.option("--masses", required=True, help="Masses, left to right: 53,45,53.")
+@click.option("--unit", type=click.Choice(list(_UNITS)), default="kg", help="Of masses.")
+@click.option("--length", type=float, help="Of the pendulums, m; left out: a level track.")
+@click.option("--window", default=0.05, help="Time used before and after, s [0.05].")
+@click.option("--slower", default=1.0, help="8 if 240 pictures a second play at 30 [1].")
+@click.option("--header", is_flag=True, help="Print the names of the columns too.")
+def film(
+    file: Path, name: str, shot: str, masses: str, unit: str, length: float | None,
+    window: float, slower: float, header: bool,
+) -> None:  # fmt: skip
+    """Velocities from the marks in a film.
+
+    FILE is exported by the video tool Tracker, one track a ball, left to right; the first ball
+    strikes the others at rest.  Prints the rows of one shot for the table that `cradle fit` reads.
+
+    \b
+    Examples:
+      cradle film film.txt --set BAC --masses 53,45,53 --unit g --length 0.3 --header
+      cradle film film.txt --set BAC --masses 0.053,0.045,0.053 --shot 2 --slower 2
+    """
+    from cradle.fit import read_tracker, velocities_from_tracks
+    from cradle.fit.parameters import parameter_key
+
+    tracks = read_tracker(file, time_scale=1.0 / slower)
+    types = parameter_key(name)
+    try:
+        weights = [_UNITS[unit] * float(mass) for mass in masses.split(",")]
+    except ValueError:
+        raise click.UsageError(f"--masses {masses!r}; write numbers with commas between") from None
+    if not len(types) == len(weights) == len(tracks):
+        raise ValueError(
+            f"{file.name} has {len(tracks)} tracks, --set {len(types)} types and --masses "
+            f"{len(weights)} masses; must be as many"
+        )
+    found = velocities_from_tracks(tracks, length=length, window=window)
+    if header:
+        click.echo("set,shot,ball,type,mass,before,after,sigma,sigma_before")
+    for k, (kind, mass) in enumerate(zip(types, weights, strict=True)):
+        numbers = (mass, found.before[k], found.after[k], found.sigma[k], found.sigma_before[k])
+        click.echo(",".join([name, shot, str(k + 1), kind, *(f"{x:.6g}" for x in numbers)]))

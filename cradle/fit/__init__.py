@@ -1,0 +1,40 @@
+"""Measure your own cradle: coefficients of restitution and ratios from measured velocities.
+
+    read_shots -> restitution (pairs) -> ratio (triplets and longer chains) -> predict
+
+- `cradle.fit.shots`: tables of measured velocities, read and checked.
+- `cradle.fit.tracker`: positions exported by the video tool Tracker.
+- `cradle.fit.motion`: velocities from positions or heights.
+- `cradle.fit.parameters`: what is fitted, and its names.
+- `cradle.fit.likelihood`: how well parameters explain shots.
+- `cradle.fit.search`: exhaustive search, confidence sets.
+- `cradle.fit.estimate`: the fits.
+- `cradle.fit.answers`, `cradle.fit.result`: what they return.
+- `cradle.fit.drawing`: their figures; loads matplotlib when asked for.
+"""
+
+from cradle.fit.answers import Estimate, Prediction
+from cradle.fit.estimate import ratio, restitution, restitution_from_heights
+from cradle.fit.motion import Velocities, speeds_from_heights, velocities_from_tracks
+from cradle.fit.result import Fit
+from cradle.fit.search import Mode
+from cradle.fit.shots import Shots, ShotSet, read_shots
+from cradle.fit.tracker import Tracks, read_tracker
+
+__all__ = [
+    "Estimate",
+    "Fit",
+    "Mode",
+    "Prediction",
+    "ShotSet",
+    "Shots",
+    "Tracks",
+    "Velocities",
+    "ratio",
+    "read_shots",
+    "read_tracker",
+    "restitution",
+    "restitution_from_heights",
+    "speeds_from_heights",
+    "velocities_from_tracks",
+]

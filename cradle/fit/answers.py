@@ -1,0 +1,159 @@
+"""An estimate with its confidence set, and what estimates predict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cradle.chain import Vector
+from cradle.fit.parameters import Key, label
+from cradle.fit.search import RISE, Mode, Scan
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# A confidence set that covers more than this part of the range says nothing.
+_ALL = 0.999
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """One coefficient of restitution or one ratio.
+
+    Attributes
+    ----------
+    kind : {"restitution", "ratio"}
+    key : tuple of str
+        Types of the balls.
+    value : float or None
+        Where chi-square is lowest; None if the data tell nothing.
+    intervals : tuple of (float, float)
+        The 95 % confidence set, by profile likelihood; several intervals if several ranges of
+        values explain the data.
+    modes : tuple of Mode
+        All minima of chi-square that were found, lowest first.
+    identified : bool
+        False if the confidence set covers the whole range.
+    at_bound : {"", "lower", "upper"}
+        Whether the lowest chi-square is at an end of the range.
+    bound : float
+        Upper end of the range; the lower one is 0.
+    grid, excess : ndarray, shape (P,)
+        Values tried, and chi-square there above its lowest value.
+    """
+
+    kind: str
+    key: Key
+    value: float | None
+    intervals: tuple[tuple[float, float], ...]
+    modes: tuple[Mode, ...]
+    identified: bool
+    at_bound: str
+    bound: float
+    grid: Vector
+    excess: Vector
+
+    @classmethod
+    def of(cls, kind: str, key: Key, found: Scan, bound: float) -> Estimate:
+        """Make an estimate from a scan of one parameter."""
+        return cls.at(kind, key, found.modes, found.intervals, bound, found.grid, found.excess)
+
+    @classmethod
+    def at(
+        cls, kind: str, key: Key, modes: tuple[Mode, ...],
+        intervals: tuple[tuple[float, float], ...], bound: float, grid: Vector, excess: Vector,
+    ) -> Estimate:  # fmt: skip
+        """Make an estimate from its minima and its confidence set."""
+        identified = sum(high - low for low, high in intervals) < _ALL * bound
+        value = modes[0].value
+        ends = {"lower": value <= 1e-6 * bound, "upper": value >= (1.0 - 1e-6) * bound}
+        at_bound = next((end for end, reached in ends.items() if reached and identified), "")
+        return cls(kind, key, value if identified else None, intervals, modes, identified,
+                   at_bound, bound, grid, excess)  # fmt: skip
+
+    @classmethod
+    def unidentified(cls, kind: str, key: Key, bound: float) -> Estimate:
+        """Make the estimate of a parameter that acts in no shot."""
+        grid = np.array([0.0, bound])
+        return cls(kind, key, None, ((0.0, bound),), (), False, "", bound, grid, np.zeros(2))
+
+    @property
+    def name(self) -> str:
+        """Name of the parameter, such as "ABC"."""
+        return label(self.key)
+
+    @property
+    def standard_error(self) -> float:
+        """Total length of the confidence set over 3.92, as if it were that of a bell curve."""
+        return sum(high - low for low, high in self.intervals) / (2.0 * float(np.sqrt(RISE)))
+
+    def __str__(self) -> str:
+        """Return the estimate with its confidence set."""
+        if self.value is None:
+            return f"{self.kind} {self.name}: not identified"
+        digits = _digits(self.standard_error)
+        sets = " or ".join(f"[{low:.{digits}f}, {high:.{digits}f}]" for low, high in self.intervals)
+        end = f" at its {self.at_bound} bound" if self.at_bound else ""
+        return f"{self.kind} {self.name} = {self.value:.{digits}f} {sets}{end}"
+
+
+def _digits(error: float) -> int:
+    """Return how many decimals show two digits of an error."""
+    return min(8, max(2, 1 - int(np.floor(np.log10(max(error, 1e-8))))))
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Ratios fitted together: points tried, chi-square there, and the size of their cells."""
+
+    keys: tuple[Key, ...]
+    points: Vector
+    excess: Vector
+    weights: Vector
+
+    def draw(self, uniform: Vector) -> Vector:
+        """Return points in proportion to their likelihood, one for each number in [0, 1)."""
+        density = np.exp(-0.5 * self.excess) * self.weights
+        total = np.cumsum(density)
+        return np.asarray(self.points[np.searchsorted(total, uniform * total[-1], side="right")])
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Velocities predicted for a chain, with what the errors of the parameters leave open.
+
+    Attributes
+    ----------
+    types : tuple of str, length N
+    median, lower, upper : ndarray, shape (N,)
+        Middle and ends of the central 95 % of the predictions, m/s.
+    """
+
+    types: tuple[str, ...]
+    median: Vector
+    lower: Vector
+    upper: Vector
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return one row per ball."""
+        return [
+            {"ball": k + 1, "type": kind, "velocity": float(self.median[k]),
+             "lower": float(self.lower[k]), "upper": float(self.upper[k])}
+            for k, kind in enumerate(self.types)
+        ]  # fmt: skip
+
+    def table(self) -> pd.DataFrame:
+        """Return the rows as a table."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows()).set_index("ball")
+
+    def __repr__(self) -> str:
+        """Return the predictions in one line."""
+        parts = [
+            f"{m:.3f} [{a:.3f}, {b:.3f}]"
+            for m, a, b in zip(self.median, self.lower, self.upper, strict=True)
+        ]
+        return f"Prediction({label(self.types)}: {', '.join(parts)} m/s)"

@@ -1,0 +1,131 @@
+"""Figures of fits: the likelihood of a parameter, the data with their predictions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+from cradle.figures import PALETTE, ball_style
+from cradle.fit.answers import Estimate
+from cradle.fit.parameters import pair_keys, triplet_keys
+from cradle.fit.result import Fit, predicted_points
+from cradle.fit.search import RISE
+from cradle.fit.shots import ShotSet
+
+# Beyond this a value of chi-square is of no interest.
+_TOP = 25.0
+
+
+def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequence[Axes]:
+    """Draw one estimate of a fit: its likelihood, and its data with their predictions.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fit.
+    name : str, optional
+        Which estimate; the first identified one if left out.
+    axes : sequence of two Axes, optional
+        Where to draw; new axes if left out.
+
+    Returns
+    -------
+    sequence of Axes
+
+    Examples
+    --------
+    >>> from cradle.fit import read_shots, restitution
+    >>> from cradle.tables import data_folder
+    >>> fit = restitution(read_shots(data_folder() / "shots_template.csv"))
+    >>> from matplotlib.figure import Figure
+    >>> [axes.get_title() for axes in draw_fit(fit, "AB", Figure().subplots(1, 2))]
+    ['likelihood of restitution AB', 'data of set AB']
+    """
+    if name is None:
+        name = next(
+            (n for n, e in fit.estimates.items() if e.identified), next(iter(fit.estimates))
+        )
+    estimate = fit[name]
+    if axes is None:
+        _, axes = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
+    draw_likelihood(estimate, axes[0])
+    for one in fit.shots.sets:
+        keys = {*pair_keys(one.types)} if len(one.types) == 2 else {*triplet_keys(one.types)[0]}
+        if estimate.key in keys:
+            _draw_data(fit, estimate, one, axes[1])
+            break
+    else:
+        axes[1].set_axis_off()
+    return axes
+
+
+def draw_likelihood(estimate: Estimate, ax: Axes) -> Axes:
+    """Draw chi-square above its lowest value, with the confidence set and all minima.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        What was fitted.
+    ax : Axes
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+    """
+    x, y = estimate.grid, estimate.excess
+    if estimate.excess.size > 2 and (np.diff(x) <= 0).any():  # of several parameters: a cloud
+        ax.plot(x, y, ".", ms=2, color=PALETTE[0])
+    else:
+        ax.plot(x, y, color=PALETTE[0], lw=2)
+    if estimate.identified:
+        for k, (low, high) in enumerate(estimate.intervals):
+            ax.axvspan(low, high, color=PALETTE[4], alpha=0.3,
+                       label=None if k else "95 % confidence set")  # fmt: skip
+    ax.axhline(RISE, color="0.4", lw=1, ls=(0, (6, 2)), label="limit of the set, 3.84")
+    modes = [mode for mode in estimate.modes if mode.excess < _TOP]
+    ax.plot([m.value for m in modes], [m.excess for m in modes], "v", color=PALETTE[1], ms=8,
+            clip_on=False, zorder=5, ls="none", label="minima")  # fmt: skip
+    ax.set(xlim=(0, estimate.bound), ylim=(0, _TOP), xlabel=f"{estimate.kind} {estimate.name}",
+           ylabel="chi-square above its lowest",
+           title=f"likelihood of {estimate.kind} {estimate.name}")  # fmt: skip
+    ax.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.08), ncols=3, frameon=False, fontsize="small"
+    )
+    return ax
+
+
+def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> Axes:
+    """Draw measured velocities over the striker's against the striker's, and what is predicted."""
+    speed = shots.before.max(axis=1)
+    predicted = _predicted(fit, estimate, shots)
+    for k, kind in enumerate(shots.types):
+        style = ball_style(k)
+        ax.errorbar(speed, shots.after[:, k] / speed, shots.sigma[:, k] / speed, fmt="o", ms=4,
+                    color=style["color"], label=f"ball {k + 1} ({kind})", capsize=2)  # fmt: skip
+        if predicted is not None:
+            ax.axhline(predicted[k], lw=1.5, **style)
+    ax.set(xlabel="speed of the striker (m/s)", ylabel="velocity after / striker's speed",
+           title=f"data of set {shots.name}")  # fmt: skip
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.08), ncols=len(shots.types),
+              frameon=False, fontsize="small")  # fmt: skip
+    return ax
+
+
+def _predicted(fit: Fit, estimate: Estimate, shots: ShotSet) -> np.ndarray | None:
+    """Return the velocities that the best parameters give at unit speed of the first ball."""
+    unit = np.zeros((1, len(shots.types)))
+    unit[0, 0] = 1.0
+    if not (shots.before[:, 1:] == 0).all():
+        return None
+    if estimate.kind == "restitution":
+        if estimate.value is None:
+            return None
+        m1, m2 = shots.masses
+        total = m1 + m2
+        return np.array([(m1 - estimate.value * m2) / total, m1 * (1 + estimate.value) / total])
+    points = predicted_points(fit, shots.types)
+    return None if points is None else points.outcomes(shots.types, shots.masses, unit)[0]

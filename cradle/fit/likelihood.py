@@ -1,0 +1,182 @@
+"""How well parameters explain shots: chi-square over many parameter points at once.
+
+The velocities before an impact are measured too, and the coefficients of restitution are known
+with errors only.  Both enter as nuisances: chi-square is profiled over them.  The outcomes are
+linear in the velocity of a single striker, so that the profile over it is exact; in the
+coefficients of restitution they are taken as linear over one standard error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cradle.chain import Vector
+from cradle.fit.parameters import Key, Points, pair_keys
+from cradle.fit.shots import ShotSet
+
+# Parameter points evaluated at a time, to bound the memory.
+_CHUNK = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """Outcomes of one set at P points, per unit of what they are linear in.
+
+    Attributes
+    ----------
+    outcome : ndarray, shape (K or 1, P, N)
+        Velocities after the impact; for a single striker those of unit speed.
+    slopes : ndarray, shape (K or 1, P, N, E)
+        Their change with each uncertain coefficient of restitution.
+    movers : ndarray, shape (K or 1, P, N, M)
+        Their change with each measured velocity before the impact.
+    """
+
+    outcome: Vector
+    slopes: Vector
+    movers: Vector
+
+
+def responses(shots: ShotSet, points: Points, uncertain: Sequence[tuple[Key, float]]) -> Responses:
+    """Solve one set of shots at all points, with the slopes that the profile needs.
+
+    Parameters
+    ----------
+    shots : ShotSet
+        One arrangement.
+    points : Points
+        P parameter points.
+    uncertain : sequence of (key, float)
+        Coefficients of restitution with an error, and their standard errors.
+
+    Returns
+    -------
+    Responses
+    """
+    moving = np.flatnonzero((shots.before != 0).any(axis=0))
+    single = moving.size == 1 and (shots.before[:, moving[0]] > 0).all()
+    if single:
+        before = np.zeros((1, 1, shots.masses.size))
+        before[..., moving] = 1.0
+    else:
+        before = shots.before[:, None, :]
+    outcome = points.outcomes(shots.types, shots.masses, before)
+    slopes = np.zeros((*outcome.shape, len(uncertain)))
+    for k, (key, sigma) in enumerate(uncertain):
+        if key not in pair_keys(shots.types):
+            continue
+        e = points.restitution[key]
+        up, down = min(1.0, e + sigma) - e, max(0.0, e - sigma) - e
+        ends = [
+            points.shifted(key, step).outcomes(shots.types, shots.masses, before)
+            for step in (up, down)
+        ]
+        slopes[..., k] = (ends[0] - ends[1]) / (up - down)
+    if single:
+        # Homogeneous of degree one: the slope with the striker's velocity is the outcome itself.
+        return Responses(outcome, slopes, outcome[..., None])
+    movers = []
+    for ball in np.flatnonzero((shots.sigma_before > 0).any(axis=0)):
+        step = np.zeros(shots.masses.size)
+        step[ball] = shots.sigma_before[:, ball].max()
+        ends = [
+            points.outcomes(shots.types, shots.masses, before + sign * step) for sign in (1, -1)
+        ]
+        movers.append((ends[0] - ends[1]) / (2 * step[ball]))
+    columns = np.stack(movers, axis=-1) if movers else np.zeros((*outcome.shape, 0))
+    return Responses(outcome, slopes, columns)
+
+
+def normal_equations(shots: ShotSet, solved: Responses) -> tuple[Vector, Vector, Vector]:
+    """Chi-square at the nominal restitution, its slope and curvature, profiled over `before`.
+
+    Parameters
+    ----------
+    shots : ShotSet
+        K shots.
+    solved : Responses
+        The same set at P points.
+
+    Returns
+    -------
+    chi_square : ndarray, shape (P,)
+    slope : ndarray, shape (P, E)
+    curvature : ndarray, shape (P, E, E)
+        Chi-square of restitution changed by d is chi_square - 2 slope d + d curvature d.
+    """
+    outcome, slopes, movers = solved.outcome, solved.slopes, solved.movers
+    moving = np.flatnonzero((shots.sigma_before > 0).any(axis=0))
+    if outcome.shape[0] == 1 and len(shots.shots) >= 1 and movers.shape[-1] == 1:
+        speed = shots.before.max(axis=1)[:, None, None]
+        outcome, slopes = outcome * speed, slopes * speed[..., None]
+        moving = np.array([int(np.argmax(shots.before.max(axis=0)))])
+    residual = shots.after[:, None, :] - outcome
+    weight = (1.0 / shots.sigma**2)[:, None, :]
+    columns = np.concatenate([residual[..., None], slopes], axis=-1)
+    weighted = columns * weight[..., None]
+    products = np.einsum("kpni,kpnj->pij", columns, weighted)
+    if movers.shape[-1]:
+        spread = shots.sigma_before[:, moving]
+        scaled = np.broadcast_to(
+            movers * spread[:, None, None, :], (*residual.shape, spread.shape[1])
+        )
+        inner = np.einsum("kpnm,kpn,kpnl->kpml", scaled, np.broadcast_to(weight, residual.shape),
+                          scaled) + np.eye(spread.shape[1])  # fmt: skip
+        cross = np.einsum("kpnm,kpni->kpmi", scaled, weighted)
+        products = products - np.einsum("kpmi,kpmj->pij", cross, np.linalg.solve(inner, cross))
+    return products[:, 0, 0], products[:, 0, 1:], products[:, 1:, 1:]
+
+
+def chi_squares(
+    sets: Sequence[ShotSet], points: Points, uncertain: Sequence[tuple[Key, float]]
+) -> Vector:
+    """Chi-square of all shots at each point, profiled over restitution and velocities before.
+
+    Parameters
+    ----------
+    sets : sequence of ShotSet
+        Measured shots.
+    points : Points
+        P parameter points.
+    uncertain : sequence of (key, float)
+        Coefficients of restitution with an error, and their standard errors.
+
+    Returns
+    -------
+    ndarray, shape (P,)
+
+    Examples
+    --------
+    Three ratios and 36 velocities; the middle one is the ratio they were made with:
+
+    >>> from cradle.fit import read_shots
+    >>> from cradle.tables import data_folder
+    >>> shots = read_shots(data_folder() / "shots_synthetic.csv")
+    >>> ratios = {("A", "B", "A"): np.array([0.05, 0.127, 0.2])}
+    >>> points = Points({("A", "B"): 0.53}, ratios)
+    >>> chi_squares([shots["ABA"]], points, [(("A", "B"), 0.003)]).round().tolist()
+    [249.0, 32.0, 328.0]
+    """
+    size = max((values.size for values in points.ratios.values()), default=1)
+    parts = []
+    for begin in range(0, size, _CHUNK):
+        part = slice(begin, begin + _CHUNK)
+        some = Points(points.restitution, {k: v[part] for k, v in points.ratios.items()})
+        parts.append(_profiled([normal_equations(s, responses(s, some, uncertain)) for s in sets],
+                               uncertain))  # fmt: skip
+    return np.concatenate(parts)
+
+
+def _profiled(
+    equations: Sequence[tuple[Vector, Vector, Vector]], uncertain: Sequence[tuple[Key, float]]
+) -> Vector:
+    """Add the sets up and profile over the coefficients of restitution that they share."""
+    chi_square, slope, curvature = (sum(parts) for parts in zip(*equations, strict=True))
+    if uncertain:
+        curvature = curvature + np.diag([1.0 / sigma**2 for _, sigma in uncertain])
+        step = np.linalg.solve(curvature, slope[..., None])[..., 0]
+        chi_square = chi_square - (slope * step).sum(axis=-1)
+    return np.asarray(chi_square)

@@ -1,0 +1,242 @@
+"""What a fit found: estimates with their confidence sets, a table, a plot, predictions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cradle.chain import Vector, one_number
+from cradle.fit.answers import Estimate, Group, Prediction
+from cradle.fit.parameters import (
+    Key,
+    Points,
+    label,
+    outcomes_of_draws,
+    pair_keys,
+    parameter_key,
+    triplet_keys,
+)
+from cradle.fit.search import LEVEL
+from cradle.fit.shots import Shots
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+# Draws from the fitted parameters for a prediction.
+_DRAWS = 4000
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """All estimates of a fit.
+
+    Attributes
+    ----------
+    shots : Shots
+        The data.
+    estimates : mapping of str to Estimate
+    given : mapping of str to (float, float)
+        Coefficients of restitution that the fit was given, with their errors.
+    groups : tuple of Group
+        Ratios that were fitted together.
+    chi_square : float
+        Its lowest value, all estimates together.
+    degrees_of_freedom : int
+        Measured velocities after impacts, less the parameters fitted.
+    known : mapping of str to float
+        Ratios that were not fitted.
+    """
+
+    shots: Shots
+    estimates: Mapping[str, Estimate]
+    given: Mapping[str, tuple[float, float]]
+    groups: tuple[Group, ...]
+    chi_square: float
+    degrees_of_freedom: int
+    known: Mapping[str, float] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Estimate:
+        """Return one estimate."""
+        if name not in self.estimates:
+            raise KeyError(f"no estimate {name!r}; there are {', '.join(self.estimates)}")
+        return self.estimates[name]
+
+    @property
+    def probability(self) -> float:
+        """Chance of a chi-square at least as large if model and errors were right."""
+        from scipy.special import chdtrc
+
+        return float(chdtrc(max(self.degrees_of_freedom, 1), self.chi_square))
+
+    def values(self) -> dict[str, tuple[float, float]]:
+        """Return each identified value with its standard error."""
+        return {
+            name: (one.value, one.standard_error)
+            for name, one in self.estimates.items()
+            if one.value is not None
+        }
+
+    def __repr__(self) -> str:
+        """Return the estimates in one line, and how well they fit."""
+        shown = [str(one) for one in self.estimates.values()]
+        poor = "" if self.probability > 1e-3 else ", a poor fit"
+        return (
+            f"Fit({', '.join(shown)}; "
+            f"chi-square {self.chi_square:.1f} of {self.degrees_of_freedom}{poor})"
+        )
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return one row per estimate."""
+        return [
+            {
+                "name": name,
+                "kind": one.kind,
+                "value": one.value,
+                "lower": one.intervals[0][0] if one.identified else None,
+                "upper": one.intervals[-1][1] if one.identified else None,
+                "intervals": len(one.intervals) if one.identified else 0,
+                "minima": len(one.modes),
+                "identified": one.identified,
+                "at_bound": one.at_bound,
+                "bound": one.bound,
+            }
+            for name, one in self.estimates.items()
+        ]
+
+    def table(self) -> pd.DataFrame:
+        """Return the rows as a table; where nothing was identified the numbers are missing."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows()).set_index("name")
+
+    def plot(self, name: str | None = None, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
+        """Draw the likelihood of one estimate, and its data with their predictions.
+
+        Parameters
+        ----------
+        name : str, optional
+            Which estimate; the first identified one if left out.
+        axes : sequence of two Axes, optional
+            Where to draw; new axes if left out.
+
+        Returns
+        -------
+        sequence of Axes
+        """
+        from cradle.fit.drawing import draw_fit
+
+        return draw_fit(self, name, axes)
+
+    def predict(self, types: str | Sequence[str], speed: float = 1.0) -> Prediction:
+        """Predict a longer chain, the first ball striking the others at rest.
+
+        Parameters
+        ----------
+        types : str or sequence of str, length N
+            Types of the balls, left to right.
+        speed : float
+            Of the first ball, m/s.
+
+        Returns
+        -------
+        Prediction
+            Spread by the errors of the ratios and of the coefficients of restitution; a ratio that
+            the data left open takes all values up to its bound.
+
+        Raises
+        ------
+        ValueError
+            If the mass of a type, the coefficient of restitution of a pair or the ratio of a
+            triplet (or of its reverse) is neither fitted nor given.
+
+        Notes
+        -----
+        Ratios that were fitted together are drawn together.  Ratios and coefficients of
+        restitution are drawn independently, though the ones were fitted with the others.
+
+        Examples
+        --------
+        >>> from cradle.fit import ratio, read_shots, restitution
+        >>> from cradle.tables import data_folder
+        >>> shots = read_shots(data_folder() / "shots_template.csv")
+        >>> ratio(shots, restitution(shots)).predict("ABA")
+        Prediction(ABA: 0.130 [0.112, 0.148], 0.244 [0.231, 0.257], 0.583 [0.571, 0.595] m/s)
+        """
+        row = tuple(types)
+        one_number("speed", speed, "must be above 0", 0.0, open_low=True)
+        masses = self.shots.masses
+        e, ratios = self._draws(row, masses)
+        velocities = outcomes_of_draws([masses[kind] for kind in row], speed, e, *ratios)
+        lower, median, upper = np.quantile(
+            velocities, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0
+        )
+        return Prediction(row, median, lower, upper)
+
+    def _draws(
+        self, types: tuple[str, ...], masses: Mapping[str, float]
+    ) -> tuple[Vector, tuple[Vector, Vector]]:
+        """Draw coefficients of restitution and ratios of a chain from what was fitted."""
+        for kind in types:
+            if kind not in masses:
+                raise ValueError(
+                    f"no mass is known of type {kind!r}; there are {', '.join(masses)}"
+                )
+        random = np.random.default_rng(0)
+        restitution: dict[Key, Vector] = {}
+        for key in dict.fromkeys(pair_keys(types)):
+            value, error = self._restitution(key)
+            restitution[key] = np.clip(value + error * random.standard_normal(_DRAWS), 0.0, 1.0)
+        drawn: dict[Key, Vector] = {
+            key: points
+            for group in self.groups
+            for key, points in zip(group.keys, group.draw(random.random(_DRAWS)).T, strict=True)
+        }
+        forward, backward = triplet_keys(types)
+        for key in (*forward, *backward):
+            if key in drawn:
+                continue
+            name = label(key)
+            if name in self.known:
+                drawn[key] = np.full(_DRAWS, self.known[name])
+            elif name in self.estimates:
+                drawn[key] = self.estimates[name].bound * random.random(_DRAWS)
+            else:
+                raise ValueError(
+                    f"the ratio of {name} is not known; fitted: {', '.join(self.estimates)}"
+                )
+        e = np.stack([restitution[key] for key in pair_keys(types)], axis=-1)
+        empty = np.zeros((_DRAWS, 0))
+        ratios = tuple(
+            np.stack([drawn[key] for key in keys], axis=-1) if keys else empty
+            for keys in (forward, backward)
+        )
+        return e, (ratios[0], ratios[1])
+
+    def _restitution(self, key: Key) -> tuple[float, float]:
+        name = label(key)
+        known = {**self.given, **{n: v for n, v in self.values().items() if len(key) == 2}}
+        if name not in known:
+            raise ValueError(f"the coefficient of restitution of {name} is not known")
+        return known[name]
+
+
+def predicted_points(fit: Fit, types: Sequence[str]) -> Points | None:
+    """Return the best parameters for a set, or None if one of them is not identified."""
+    forward, backward = triplet_keys(types)
+    ratios: dict[Key, Vector] = {}
+    for key in (*forward, *backward):
+        name = label(key)
+        if name in fit.known:
+            ratios[key] = np.array([fit.known[name]])
+            continue
+        value = fit.estimates[name].value
+        # A ratio without effect may have any value.
+        if value is None and any(key in group.keys for group in fit.groups):
+            return None
+        ratios[key] = np.array([0.0 if value is None else value])
+    restitution = {tuple(sorted(parameter_key(n))): v for n, (v, _) in fit.given.items()}
+    return Points(restitution, ratios)

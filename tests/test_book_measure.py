@@ -1,0 +1,156 @@
+"""Chapter "Measure your own cradle": what its text says, by second routes, and with other files."""
+
+import csv
+import math
+from functools import cache
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from chapters import Chapter
+from reference import solve
+from scipy.optimize import brentq
+from test_book_parameters import code, pictures_in_memory, run
+from test_notebooks import decimals
+
+from cradle import ratio_table
+from cradle.closed_form import one_collision_each, three_balls
+
+ROOT = Path(__file__).parents[1]
+CHAPTER = Chapter("measure")
+GLUED = CHAPTER.glued
+
+__all__ = ["pictures_in_memory"]
+
+# Given by the paper, chosen for an example, or constants of statistics; all others are computed.
+GIVEN = (".050 .1 .15 .215 .22 .390 .462 .5 .6 .710 .73 .730 .731 .744 .755 .782"
+         " 0.3 0.4 0.5 1.96 2.54 3.84")  # fmt: skip
+
+
+@cache
+def stored(name):
+    with (ROOT / "data" / name).open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_no_computed_number_is_typed():
+    typed = set()
+    for cell in CHAPTER.cells.values():
+        caption = cell.metadata.get("mystnb", {}).get("figure", {}).get("caption", "")
+        typed |= decimals(cell.source if cell.cell_type == "markdown" else caption)
+    assert typed == set(GIVEN.split())
+
+
+def test_every_page_that_shows_data_calls_them_synthetic():
+    for name in ("fig-check", "fig-tracks", "fig-fit", "fig-minima"):
+        caption = CHAPTER.cells[name].metadata.mystnb.figure.caption
+        assert "synthetic" in caption.lower(), name
+
+
+def test_error_of_a_line_by_least_squares():
+    times = np.arange(12) / 240
+    matrix = np.stack([np.ones(12), times], axis=1)
+    error = 0.0004 * math.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1])
+    assert f"{1000 * error:.0f}" == GLUED["error"]
+
+
+def test_numbers_of_the_study():
+    rows = stored("fit_study.csv")
+    for noise in ("0.003", "0.01", "0.03"):
+        some = [row for row in rows if row["noise"] == noise]
+        trials = sum(int(row["datasets"]) for row in some)
+        covered = sum(int(row["covered"]) for row in some) / trials
+        assert GLUED[f"covered-{noise}"] == f"{100 * covered:.1f}"
+        widths = sorted(float(row["width"]) for row in some)
+        assert float(GLUED[f"width-{noise}"]) == pytest.approx(widths[32], abs=2e-3)
+    some = [row for row in rows if row["noise"] == "0.01"]
+    for name in ("wrong_least_squares", "wrong_bounded", "wrong_five_starts"):
+        wrong = sum(int(row[name]) for row in some)
+        assert GLUED[name] == f"{100 * wrong / (64 * 25):.1f}"
+
+
+def test_third_digit_by_the_closed_form():
+    """Where balls collide once each: sensitivities from the formulas, slope by slope."""
+    study = {row["triplet"]: row for row in stored("fit_precision.csv")}
+    mass = {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}
+    e = {"AB": 0.53, "BC": 0.28, "AC": 0.31, "AA": 0.97, "BB": 0.36}
+    checked = 0
+    for name in ("ABA", "ABC", "CBA", "ACA", "AAB", "BBA"):
+        m = [mass[letter] for letter in name]
+        losses = [e["".join(sorted(name[:2]))], e["".join(sorted(name[1:]))]]
+        true, step = float(study[name]["ratio"]), 1e-6
+        if not one_collision_each(m, [1, 0, 0], losses, true):
+            continue
+        checked += 1
+        low, here, high = three_balls(
+            m, [1, 0, 0], [losses] * 3, np.array([true - step, true, true + step])
+        )
+        slope = (high - low) / (2 * step)
+        seen = slope @ slope - (slope @ here) ** 2 / (1 + here @ here)
+        assert float(study[name]["sensitivity"]) == pytest.approx(math.sqrt(seen), rel=0.01)
+        needed = 0.0005 / 1.96 * math.sqrt(20 * seen)
+        assert float(study[name]["third_digit"]) == pytest.approx(needed, rel=0.01)
+    assert checked >= 4
+
+
+def test_counts_of_the_table():
+    rows = stored("fit_precision.csv")
+    needed = np.array([float(row["third_digit"]) for row in rows])
+    assert GLUED["loose"] == str((needed < 0.001).sum())
+    assert GLUED["third-median"] == f"{100 * np.median(needed):.2f}"
+    assert GLUED["traps"] == str(sum(bool(row["trap_low"]) for row in rows)) == "8"
+    assert GLUED["here"] == "8"
+    middle = ratio_table().set_index("triplet").ratio
+    others = [middle[t] for t in middle.index if t[1] == "A" and "D" in t[::2] and t != "DAD"]
+    assert (len(others), min(others), max(others)) == (6, 0.050, 0.215)
+
+
+def test_masses_within_half_a_gram():
+    assert float(GLUED["half-gram-CCA"]) == pytest.approx(45.5 / 98, abs=1e-4)
+    assert float(GLUED["half-gram-CCA"]) > 0.462 > 45 / 98
+    assert float(GLUED["half-gram-DBB"]) < 0.710
+
+
+def test_wrong_coefficient_makes_another_ratio_the_best():
+    """DAD with e .03 too low, by the independent solver."""
+
+    def velocities(e, value):
+        found = solve([0.166, 0.045, 0.166], [1, 0, 0], e, value, number=float)
+        return np.array([float(v) for v in found.velocities])
+
+    last = float(GLUED["e-0.03"])
+    assert last == pytest.approx(0.782, abs=0.002)
+    assert float(GLUED["e0.0"]) == pytest.approx(0.22, abs=0.002)
+    data = velocities(0.94, 0.22)
+    miss = {r: np.linalg.norm(velocities(0.91, r) - data) for r in (0.22, 0.484, last)}
+    assert miss[last] < miss[0.484] < miss[0.22]
+    assert miss[last] < 0.025
+
+
+def test_power_by_theory():
+    delta = next(float(r["detectable"]) for r in stored("fit_precision.csv")
+                 if r["triplet"] == "AAA")  # fmt: skip
+    sensitivity = next(float(r["sensitivity"]) for r in stored("fit_precision.csv")
+                       if r["triplet"] == "AAA")  # fmt: skip
+    error = 0.01 / (sensitivity * math.sqrt(10)) * math.sqrt(2)
+    normal = lambda x: 0.5 * (1 + math.erf(x / math.sqrt(2)))  # noqa: E731
+    limit = brentq(lambda x: normal(x) - 0.975, 0, 5) * error
+    power = 1 - normal((limit - delta) / error)
+    assert power == pytest.approx(0.8, abs=0.01)
+    assert float(GLUED["power"]) == pytest.approx(100 * power, abs=5)
+    assert float(GLUED["false"]) == pytest.approx(5, abs=2.5)
+
+
+@pytest.mark.usefixtures("pictures_in_memory")
+def test_chapter_runs_with_a_reader_s_own_file(tmp_path, monkeypatch):
+    """Two sets only, no chain of four: no cell may fail; and with another phone."""
+    lines = (ROOT / "data" / "shots_synthetic.csv").read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines[1:] if line.split(",")[0] in ("set", "AB", "ABA")]
+    (tmp_path / "my_shots.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    names = run(code("measure"), {"frame_rate": 120, "mark_error": 0.001, "length": 0.31})
+    assert names["mine"].is_file()
+    assert [one.name for one in names["shots"].sets] == ["AB", "ABA"]
+    assert names["check"].name == "ABA"
+    assert not plt.get_fignums()

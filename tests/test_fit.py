@@ -1,0 +1,498 @@
+"""Fits to measured shots: data read and refused, searches, confidence sets, predictions."""
+
+import csv
+import importlib.util
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.optimize import brentq, minimize
+from scipy.stats import binom
+
+from cradle import Chain, ImpulseCorrelation, collide, paper_chain, ratio_table
+from cradle.closed_form import three_balls
+from cradle.fit import (
+    Shots,
+    ratio,
+    read_shots,
+    read_tracker,
+    restitution,
+    restitution_from_heights,
+    speeds_from_heights,
+    velocities_from_tracks,
+)
+from cradle.fit.search import RISE, refine, scan
+from cradle.fit.tracker import Track
+
+ROOT = Path(__file__).parents[1]
+MASS = {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}
+
+
+@cache
+def script(name):
+    path = ROOT / "benchmarks" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@cache
+def stored(name):
+    with (ROOT / "data" / name).open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def columns(name, speeds, after, sigma, errors=None):
+    """Shots of the paper's balls as columns; `after` at unit speed of the striker."""
+    table = {key: [] for key in ("set", "shot", "ball", "type", "mass", "before", "after", "sigma")}
+    for shot, speed in enumerate(speeds):
+        for ball, letter in enumerate(name):
+            error = 0.0 if errors is None else errors[shot][ball]
+            row = (name, shot, ball + 1, letter, MASS[letter], speed if ball == 0 else 0.0,
+                   speed * after[ball] + error, sigma)  # fmt: skip
+            for key, value in zip(table, row):
+                table[key].append(value)
+    return table
+
+
+def outcome(name):
+    chain, model = paper_chain(name, excess="saturate")
+    return collide(chain, model).velocities
+
+
+def pairs_of(name, error):
+    chain, _ = paper_chain(name, excess="saturate")
+    keys = ["".join(sorted(name[i : i + 2])) for i in range(len(name) - 1)]
+    return {key: (float(e), error) for key, e in zip(keys, chain.restitution)}
+
+
+# --- reading -----------------------------------------------------------------------------------
+
+
+def good():
+    return columns("AB", [1.0, 1.5], outcome("AB"), 0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t.pop("sigma"), r"column 'sigma' is missing \(standard error"),
+        (lambda t: t.update(mass=[45, 53] * 2), r"row 1, column mass: 45 kg is unlikely; .*grams"),
+        (lambda t: t.update(after=[17.0, 70, 26, 105]), "row 2, column after: 70 m/s is unlikely"),
+        (lambda t: t["after"].__setitem__(0, 0.9), "row 2, column after: set AB, shot 0: ball 1"),
+        (lambda t: t["after"].__setitem__(1, 1.2), "gains .* % of its energy"),
+        (lambda t: t["after"].__setitem__(3, "x"), "row 4, column after: 'x'; must be a number"),
+        (lambda t: t["after"].__setitem__(3, np.nan), "row 4, column after: nan; must be a number"),
+        (lambda t: t["ball"].__setitem__(1, 3), r"row 1, column ball: set AB, shot 0 has balls"),
+        (lambda t: t["ball"].__setitem__(1, 1.5), "row 2, column ball: 1.5; must be 1, 2"),
+        (lambda t: t["mass"].__setitem__(2, 0.05), "row 3, column mass: 0.05; ball 1 of set AB"),
+        (lambda t: t["type"].__setitem__(3, "C"), "row 4, column type: 'C'; ball 2 of set AB"),
+        (lambda t: t["before"].__setitem__(0, -1.0), "row 1, column before: .*no balls approach"),
+        (lambda t: t["sigma"].__setitem__(2, 0.0), "row 3, column sigma: 0.0; must be above 0"),
+        (lambda t: t["mass"].__setitem__(0, -0.045), "row 1, column mass: -0.045; must be above 0"),
+        (lambda t: t["set"].append("AB"), "columns have different lengths"),
+        (lambda t: t.update({k: [] for k in t}), "the table has no rows"),
+    ],
+)
+def test_wrong_tables_are_refused_by_row_and_column(change, message):
+    table = good()
+    read_shots(table)
+    change(table)
+    with pytest.raises(ValueError, match=message):
+        read_shots(table)
+
+
+def test_one_table_three_ways(tmp_path):
+    """Columns, a DataFrame, and a file in grams and cm/s with comments and a byte-order mark."""
+    table = good()
+    frame = pd.DataFrame(table)
+    path = tmp_path / "shots.csv"
+    scaled = frame.assign(mass=1e3 * frame.mass, before=100 * frame.before,
+                          after=100 * frame.after, sigma=100 * frame.sigma)  # fmt: skip
+    text = "# a comment\n" + scaled.to_csv(index=False) + "\n# the end\n"
+    path.write_text(text, encoding="utf-8-sig")
+    three = [read_shots(table), read_shots(frame),
+             read_shots(path, mass_unit="g", velocity_unit="cm/s")]  # fmt: skip
+    for shots in three:
+        np.testing.assert_allclose(shots["AB"].after, three[0]["AB"].after, rtol=1e-14)
+        np.testing.assert_allclose(shots["AB"].masses, [0.045, 0.053], rtol=1e-14)
+        np.testing.assert_allclose(shots["AB"].sigma_before, [[0.01, 0]] * 2, rtol=1e-14)
+    with pytest.raises(ValueError, match=r"line 3, column mass: 53 kg|line 3, column mass: 45 kg"):
+        read_shots(path)
+    path.write_text(text.replace("AB,0,2,B", "AB,0,2,B,7"), encoding="utf-8")
+    with pytest.raises(ValueError, match="line 4: 9 values; the header has 8 columns"):
+        read_shots(path)
+
+
+def test_momentum_shows_a_wrong_mass():
+    shots = read_shots(good())
+    assert shots.momentum_check()[0] < 1e-20
+    wrong = good()
+    wrong["mass"] = [0.050 if m == 0.045 else m for m in wrong["mass"]]
+    residuals = read_shots(wrong)["AB"].momentum_residuals
+    after = outcome("AB")
+    gain = 0.050 * after[0] + 0.053 * after[1] - 0.050
+    assert residuals[0] == pytest.approx(gain / (0.01 * np.sqrt(2 * 0.05**2 + 0.053**2)))
+
+
+# --- search ------------------------------------------------------------------------------------
+
+
+def test_scan_reports_every_minimum_and_a_union_of_intervals():
+    def chi(x):
+        return 1e4 * np.minimum((x - 0.3) ** 2, (x - 0.7) ** 2 + 1e-4)
+
+    found = scan(chi, np.linspace(0, 1, 501))
+    np.testing.assert_allclose([m.value for m in found.modes], [0.3, 0.7], atol=1e-7)
+    np.testing.assert_allclose([m.excess for m in found.modes], [0, 1], atol=1e-7)
+    half, other = np.sqrt(RISE * 1e-4), np.sqrt((RISE - 1) * 1e-4)
+    expected = [(0.3 - half, 0.3 + half), (0.7 - other, 0.7 + other)]
+    np.testing.assert_allclose(found.intervals, expected, atol=1e-7)
+    level = scan(lambda x: 0 * x, np.linspace(0, 1, 501))
+    assert level.intervals == ((0.0, 1.0),)
+
+
+def test_scan_finds_minima_narrower_than_a_cell():
+    grid = np.linspace(0, 1, 501)
+    found = scan(lambda x: 1e10 * (x - 0.30071) ** 2, grid)
+    assert found.modes[0].value == pytest.approx(0.30071, abs=1e-8)
+    low, high = found.intervals[0]
+    assert high - low == pytest.approx(2 * np.sqrt(RISE * 1e-10), rel=1e-3)
+
+
+def test_refine_against_an_ellipse():
+    matrix = 1e5 * np.array([[2.0, 1.5], [1.5, 2.0]])
+    centre = np.array([0.21, 0.33])
+    found = refine(
+        lambda x: np.einsum("pi,ij,pj->p", x - centre, matrix, x - centre), np.array([0.5, 0.6])
+    )
+    np.testing.assert_allclose(found.best, centre, atol=1e-5)
+    half = np.sqrt(RISE * np.diag(np.linalg.inv(matrix)))
+    for axis in (0, 1):
+        ((low, high),) = found.intervals(axis)
+        assert low == pytest.approx(centre[axis] - half[axis], abs=0.12 * half[axis])
+        assert high == pytest.approx(centre[axis] + half[axis], abs=0.12 * half[axis])
+
+
+# --- restitution -------------------------------------------------------------------------------
+
+
+def test_restitution_of_exact_data_and_its_error():
+    """The interval is that of linear error propagation, worked out by hand."""
+    sigma, speeds = 0.004, [0.5, 1.0, 1.5, 2.0]
+    found = restitution(read_shots(columns("AB", speeds, outcome("AB"), sigma)))
+    one = found["AB"]
+    assert one.value == pytest.approx(0.53, abs=1e-7)
+    assert found.chi_square < 1e-8
+    assert found.degrees_of_freedom == 7
+    # d after / d e = (-m2, m1) v / (m1 + m2); the striker's speed v is profiled over.
+    m1, m2, v = 0.045, 0.053, outcome("AB")
+    slope = np.array([-m2, m1]) / (m1 + m2)
+    seen = slope @ slope - (slope @ v) ** 2 / (1 + v @ v)
+    error = sigma / np.sqrt(seen * np.square(speeds).sum())
+    ((low, high),) = one.intervals
+    assert (high - low) / (2 * np.sqrt(RISE)) == pytest.approx(error, rel=1e-3)
+
+
+def test_restitution_of_two_moving_balls():
+    table = columns("AB", [1.0], outcome("AB"), 0.01)
+    chain = Chain([0.045, 0.053], [1.0, -0.5], 0.53)
+    table["before"] = [1.0, -0.5]
+    table["after"] = collide(chain, ImpulseCorrelation(0)).velocities.tolist()
+    assert restitution(read_shots(table))["AB"].value == pytest.approx(0.53, abs=1e-7)
+
+
+def test_restitution_from_heights():
+    found = restitution_from_heights("AA", [1.0, 0.5], [0.81, 0.405], 0.002)
+    assert found["AA"].value == pytest.approx(0.9, abs=1e-6)
+    with pytest.raises(ValueError, match=r"rise\[0\] = -1.0; must be above 0"):
+        restitution_from_heights("AA", [1.0], [-1.0], 0.1)
+
+
+# --- ratio -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["AAA", "ABC", "BAC", "BCD", "DAA", "DDD", "CAA", "BDC"])
+def test_exact_data_give_the_ratio_back(name):
+    true = paper_chain(name)[1].forward[0]
+    known = {} if name == name[::-1] else {name[::-1]: paper_chain(name[::-1])[1].forward[0]}
+    shots = read_shots(columns(name, [0.5, 1.0, 2.0], outcome(name), 0.003))
+    found = ratio(shots, pairs_of(name, 0.0), known=known)
+    assert found[name].value == pytest.approx(true, abs=2e-6)
+    assert found.chi_square < 1e-3
+    assert any(low <= true <= high for low, high in found[name].intervals)
+
+
+def test_confidence_set_by_another_route():
+    """Profile by Nelder and Mead over e2, e3 and all speeds, impacts by the paper's formulas."""
+    name, sigma = "ABA", 0.01
+    random = np.random.default_rng(3)
+    speeds, errors = [0.8, 1.3], sigma * random.standard_normal((2, 3))
+    shots = read_shots(columns(name, speeds, outcome(name), sigma, errors))
+    e, error = {"AB": (0.53, 0.008)}, 0.008
+    masses, data = shots["ABA"].masses, shots["ABA"].after
+
+    def chi(a):
+        def squares(p):
+            v = np.array([[p[0], 0, 0], [p[1], 0, 0]])
+            model = three_balls(masses, v, np.array([[p[2], p[2]]]), np.array([a, a]))
+            return (
+                (((data - model) / sigma) ** 2).sum()
+                + (((p[:2] - speeds) / sigma) ** 2).sum()
+                + ((p[2] - 0.53) / error) ** 2
+            )
+
+        start = [*speeds, 0.53]
+        return minimize(squares, start, method="Nelder-Mead",
+                        options={"xatol": 1e-8, "fatol": 1e-10, "maxiter": 4000}).fun  # fmt: skip
+
+    one = ratio(shots, e)[name]
+    lowest = chi(one.value)
+    assert chi(one.value - 0.003) > lowest < chi(one.value + 0.003)
+    ((low, high),) = one.intervals
+    width = high - low
+    ends = [brentq(lambda a: chi(a) - lowest - RISE, *bracket, xtol=1e-6)
+            for bracket in ((max(low - 0.5 * width, 0.0), one.value),
+                            (one.value, high + 0.5 * width))]  # fmt: skip
+    np.testing.assert_allclose([low, high], ends, atol=0.01 * width)
+
+
+def test_errors_of_restitution_widen_the_interval():
+    shots = read_shots(columns("ABA", [1.0] * 5, outcome("ABA"), 0.003))
+    sharp, blurred = (ratio(shots, pairs_of("ABA", error))["ABA"] for error in (0.0, 0.02))
+    # Not by much: the triplets themselves tell e.
+    assert blurred.standard_error > 1.05 * sharp.standard_error
+
+
+def test_what_the_data_do_not_tell():
+    """Ball 1 of BDA never comes back to be struck again: the backward ratio acts in no shot."""
+    found = ratio(
+        read_shots(columns("BDA", [1.0, 1.5], outcome("BDA"), 0.003)), pairs_of("BDA", 0.0)
+    )
+    assert found["BDA"].identified
+    silent = found["ADB"]
+    assert not silent.identified
+    assert silent.value is None
+    assert "not identified" in str(silent)
+    rough = ratio(read_shots(columns("BDA", [1.0], outcome("BDA"), 0.4)), pairs_of("BDA", 0.0))[
+        "BDA"
+    ]
+    assert not rough.identified
+    assert rough.value is None
+    assert rough.intervals == ((0.0, rough.bound),)
+
+
+def test_two_ratios_explain_one_outcome():
+    """DAA: outcomes at .215 and near .398 are a hundredth apart."""
+    row = next(r for r in stored("fit_precision.csv") if r["triplet"] == "DAA")
+    shots = read_shots(columns("DAA", [1.0] * 5, outcome("DAA"), 0.02))
+    one = ratio(shots, pairs_of("DAA", 0.0), known={"AAD": 0.131})["DAA"]
+    assert len(one.intervals) == 2
+    assert len([m for m in one.modes if m.excess < RISE]) == 2
+    assert one.modes[1].value == pytest.approx(float(row["second"]), abs=0.005)
+
+
+@pytest.mark.parametrize("name", ["DBB", "CCA"])
+def test_data_of_the_bound_end_there(name):
+    """The three entries of Table 2 above their bound act like the bound: chi-square is level."""
+    shots = read_shots(columns(name, [1.0, 1.5], outcome(name), 0.003))
+    known = {name[::-1]: paper_chain(name[::-1], excess="saturate")[1].forward[0]}
+    one = ratio(shots, pairs_of(name, 0.0), known=known)[name]
+    assert one.at_bound == "upper"
+    assert one.value == pytest.approx(one.bound)
+    assert "at its upper bound" in str(one)
+
+
+def test_joint_fit_of_four_balls():
+    shots = read_shots(columns("BABC", [1.0, 1.5, 2.0], outcome("BABC"), 0.002))
+    truth = paper_chain("BABC")[1]
+    found = ratio(shots, pairs_of("BABC", 0.0),
+                  known={"BAB": truth.forward[0], "CBA": truth.backward[1]})  # fmt: skip
+    one = found["ABC"]
+    assert one.identified
+    assert any(low <= truth.forward[1] <= high for low, high in one.intervals)
+
+
+def test_missing_knowledge_is_named():
+    shots = read_shots(columns("ABA", [1.0], outcome("ABA"), 0.01))
+    with pytest.raises(ValueError, match="restitution has no 'AB', which set ABA needs"):
+        ratio(shots, {"AC": 0.3})
+    with pytest.raises(ValueError, match="must lie in"):
+        ratio(shots, {"AB": 1.3})
+    with pytest.raises(ValueError, match="no set has two balls"):
+        restitution(shots)
+    with pytest.raises(ValueError, match="no set has three balls"):
+        ratio(read_shots(good()), {"AB": 0.5})
+
+
+# --- tracks ------------------------------------------------------------------------------------
+
+OLD = "mass_A\nt\tx\ty\n0.00\t0.10\t0.5\n0.01\t0.12\t0.5\n"
+NEW = (
+    "\tmass A\t\t\t\nt\tx\ty\tv\t\n0.00\t1.0E-1\t0.5\t\t\n0.01\t1.2E-1\t0.5\t2.0\t\n0.02\t\t\t\t\n"
+)
+MULTI = "#multi:\n,A,,B,,\nt,x,y,x,y,\n0.00,0.10,0.5,0.20,0.5,\n0.01,0.12,0.5,,,\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "names"), [(OLD, ["mass A"]), (NEW, ["mass A"]), (MULTI, ["A", "B"])]
+)
+def test_layouts_of_tracker(tmp_path, text, names):
+    path = tmp_path / "export.txt"
+    path.write_text(text, encoding="utf-8")
+    tracks = read_tracker(path, time_scale=0.125, unit=0.01)
+    assert list(tracks) == names
+    first = tracks[names[0]]
+    np.testing.assert_allclose(first.times, [0, 0.00125], rtol=1e-14)
+    np.testing.assert_allclose(first.positions, [0.001, 0.0012], rtol=1e-14)
+    if len(names) > 1:
+        assert tracks["B"].positions.tolist() == [0.002]
+
+
+def test_other_files_are_not_taken_for_exports(tmp_path):
+    path = tmp_path / "export.txt"
+    path.write_text("a,b\n1,2\n3,4\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"export.txt, line 2: '1,2'; an export of Tracker"):
+        read_tracker(path)
+    path.write_text(OLD.replace("0.12", "here"), encoding="utf-8")
+    with pytest.raises(ValueError, match="line 4, column x: 'here'; must be a number"):
+        read_tracker(path)
+
+
+@pytest.mark.parametrize("length", [None, 0.3])
+def test_velocities_from_exact_tracks(length):
+    """Positions on a rail, or of pendulums by Runge-Kutta; the impact between two frames."""
+    example = script("fit_example")
+    after, times = outcome("ABC"), (np.arange(49) - 24.3) / 240
+    tracks = {}
+    for k in range(3):
+        before = 1.2 if k == 0 else 0.0
+        speeds = np.where(times < 0, before, 1.2 * after[k])
+        if length is None:
+            way = speeds * times
+        else:
+            way = np.where(times < 0, example.swing(before, times),
+                           example.swing(1.2 * after[k], times))  # fmt: skip
+        tracks["ABC"[k]] = Track(times + 3.0, 0.035 * k + way)
+    found = velocities_from_tracks(tracks, length=length)
+    assert found.time == pytest.approx(3.0, abs=2e-5)
+    np.testing.assert_allclose(found.before, [1.2, 0, 0], atol=1e-4)
+    np.testing.assert_allclose(found.after, 1.2 * after, atol=1e-4)
+    with pytest.raises(ValueError, match="tracks must be in the order"):
+        velocities_from_tracks({"C": tracks["C"], "A": tracks["A"]}, length=length, striker=1)
+
+
+def test_errors_of_velocities_are_those_of_the_marks():
+    """The squares of errors over their standard errors average to 1, within four of its errors."""
+    example, random = script("fit_example"), np.random.default_rng(8)
+    squares = []
+    for _ in range(40):
+        tracks, _ = example.film("AB", 1.0, random)
+        found = velocities_from_tracks(tracks, length=example.LENGTH, scatter=example.SCATTER)
+        squares += [((found.before[0] - 1) / found.sigma_before[0]) ** 2,
+                    *((found.after - outcome("AB")) / found.sigma) ** 2]  # fmt: skip
+    assert np.mean(squares) == pytest.approx(1, abs=4 * np.sqrt(2 / len(squares)))
+
+
+def test_speeds_from_heights():
+    speed, sigma = speeds_from_heights([0.05, -0.05, 0.0], 0.001, 10.0)
+    np.testing.assert_allclose(speed, [1, -1, 0])
+    np.testing.assert_allclose(sigma, [np.sqrt(1.02) - 1] * 2 + [np.sqrt(0.02)])
+
+
+def test_predictions_cover():
+    """A chain of five from pairs and triplets, 12 times: the truth is nearly always inside."""
+    truth, inside = outcome("ABABA"), []
+    random = np.random.default_rng(11)
+    for _ in range(12):
+        tables = [
+            columns(name, [0.5, 1.0, 1.5, 2.0], outcome(name), 0.01,
+                    0.01 * random.standard_normal((4, len(name))))
+            for name in ("AB", "ABA", "BAB")
+        ]  # fmt: skip
+        shots = read_shots({key: [x for table in tables for x in table[key]] for key in tables[0]})
+        predicted = ratio(shots, restitution(shots)).predict("ABABA")
+        inside += ((predicted.lower <= truth) & (truth <= predicted.upper)).tolist()
+    assert binom.ppf(1e-3, 60, 0.9) <= sum(inside)
+
+
+# --- stored data -------------------------------------------------------------------------------
+
+
+def test_synthetic_example_is_what_the_script_makes(monkeypatch):
+    example = script("fit_example")
+    monkeypatch.setattr(example, "SETS", {"BAC": 1})
+    monkeypatch.setattr(example, "SPEEDS", example.SPEEDS[:1])
+    rows, text = example.experiment()
+    assert text == (ROOT / "data" / "video_synthetic.txt").read_text(encoding="utf-8")
+    lines = (ROOT / "data" / "shots_synthetic.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0].startswith("# SYNTHETIC")
+    kept = [line.split(",") for line in lines if line.startswith("BAC,1,")]
+    for made, line in zip(rows, kept, strict=True):
+        assert list(map(str, made[:5])) == line[:5]
+        np.testing.assert_allclose([float(x) for x in made[5:7]],
+                                   [float(x) for x in line[5:7]], atol=2e-4)  # fmt: skip
+
+
+def test_example_ends_in_the_values_it_was_made_with():
+    shots = read_shots(ROOT / "data" / "shots_synthetic.csv")
+    squares, count = shots.momentum_check()
+    assert abs(squares - count) < 4 * np.sqrt(2 * count)
+    e = restitution(shots)
+    assert e["AB"].value == pytest.approx(0.53, abs=3 * e["AB"].standard_error)
+    some = Shots(tuple(s for s in shots.sets if s.name in ("ABA", "ACA")))
+    found = ratio(some, e)
+    for name, true in (("ABA", 0.127), ("ACA", 0.262)):
+        assert found[name].value == pytest.approx(true, abs=3 * found[name].standard_error)
+    assert found.probability > 1e-3
+    predicted = found.predict("ABA", 1.0)
+    assert (predicted.lower <= predicted.median).all()
+    np.testing.assert_allclose(predicted.median, outcome("ABA"), atol=0.01)
+    assert found.predict("AB", 2.0).median == pytest.approx(2 * outcome("AB"), abs=0.02)
+    with pytest.raises(ValueError, match="the ratio of BAB is not known"):
+        found.predict("ABABA")
+    with pytest.raises(ValueError, match="no mass is known of type 'D'"):
+        found.predict("ABD")
+    table = found.table()
+    assert table.loc["ABA", "value"] == found["ABA"].value
+    axes = found.plot("ABA")
+    assert axes[0].get_xlabel() == "ratio ABA"
+    assert len(axes[1].containers) == 3
+
+
+def test_study_covers_as_often_as_it_says():
+    """95 of 100, over all triplets, at each noise: within what chance allows."""
+    rows = stored("fit_study.csv")
+    assert len(rows) == 3 * 64
+    assert {row["triplet"] for row in rows} == set(ratio_table().triplet)
+    for noise in ("0.003", "0.01", "0.03"):
+        some = [row for row in rows if row["noise"] == noise]
+        trials = sum(int(row["datasets"]) for row in some)
+        covered = sum(int(row["covered"]) for row in some)
+        assert binom.ppf(1e-4, trials, 0.95) <= covered <= binom.ppf(1 - 1e-4, trials, 0.99)
+
+
+@pytest.mark.parametrize(("triplet", "noise"), [("ABA", 0.03), ("CCA", 0.003)])
+def test_study_is_what_the_script_makes(triplet, noise):
+    made = script("fit_study").study(triplet, noise)
+    row = next(
+        r for r in stored("fit_study.csv")
+        if r["triplet"] == triplet and float(r["noise"]) == noise
+    )  # fmt: skip
+    assert int(row["covered"]) == made[5]
+    np.testing.assert_allclose(float(row["width"]), float(made[6]), rtol=0.02)
+
+
+@pytest.mark.parametrize("triplet", ["AAA", "BBD", "CBD", "DAA"])
+def test_precision_is_what_the_script_makes(triplet):
+    study = script("fit_study")
+    row = next(r for r in stored("fit_precision.csv") if r["triplet"] == triplet)
+    for name, value in zip(study.PRECISION[1:], study.precision(triplet)[1:], strict=True):
+        assert bool(row[name]) == bool(value) or value == 0
+        if row[name] and float(row[name]) > 1e-4:
+            assert float(value) == pytest.approx(float(row[name]), rel=2e-3, abs=2e-4), name
