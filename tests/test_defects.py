@@ -189,7 +189,7 @@ def test_masses_of_eighteen_decades_are_solved_or_refused():
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_coefficients_whose_square_is_no_double(mirrored):
-    """A contact that ends at -1e-300 m/s has opened; at e = 0 it touches on, and may close first."""
+    """A contact that ends at -1e-300 m/s has opened; with e = 0 it still touches, and may close."""
     problem = Problem(
         [0.5, 2.0, 2.86, 0.5, 0.5],
         at_rest(5),
