@@ -169,7 +169,7 @@ def test_impulses_after_a_collapse_beside_a_light_ball():
         np.testing.assert_allclose(trace.velocities, float(common), rtol=1e-13)
         for c, impulse in enumerate(trace.impulses):
             passed = sum(a * (b - common) for a, b in zip(m[: c + 1], v[: c + 1]))
-            assert impulse == pytest.approx(float(passed), rel=1e-9), c
+            assert impulse == pytest.approx(float(passed), rel=1e-9, abs=0), c
 
 
 def test_masses_of_eighteen_decades_are_solved_or_refused():
@@ -184,20 +184,24 @@ def test_masses_of_eighteen_decades_are_solved_or_refused():
         assert refusal.startswith("masses[1] = 1e-26; ")
         return
     momentum = sum(Fraction(m) * Fraction(v) for m, v in zip(problem.masses, trace.velocities))
-    assert float(momentum) == pytest.approx(1e-26, rel=1e-12)
+    assert float(momentum) == pytest.approx(1e-26, rel=1e-12, abs=0)
 
 
-@pytest.mark.parametrize("e", [1e-300, 1e-170, 5e-324])
-def test_coefficients_whose_square_vanishes_have_mirrors(e):
-    """One striker: e = 1e-300 is 0 for all that can be seen, from either side."""
-    for masses in ([1.0, 2.0, 0.5, 1.3], [2.0, 0.7, 1.9, 1.0], [1.0, 1.0, 1.0, 1.0]):
-        for ratio in (0.0, 0.2):
-            one = Problem(masses, at_rest(4), [e] * 3, [ratio] * 2, [ratio] * 2)
-            here, there = one.collide(), one.mirrored().collide()
-            assert difference(here.velocities, -there.velocities[::-1]) < 1e-13
-            plastic = replace(one, restitution=[0.0] * 3).collide()
-            assert difference(here.velocities, plastic.velocities) < 1e-13
-            assert here.collapsed == there.collapsed == plastic.collapsed
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_coefficients_whose_square_is_no_double(mirrored):
+    """A contact that ends at -1e-300 m/s has opened; with e = 0 it still touches, and may close."""
+    problem = Problem(
+        [0.5, 2.0, 2.86, 0.5, 0.5],
+        at_rest(5),
+        [1e-300, 1e-300, 0.5, 1.0],
+        [0.2, 0.2, 0.2],
+        [0.0, 0.1, 0.3],
+    )
+    problem = problem.mirrored() if mirrored else problem
+    assert difference(problem.collide().velocities, exact(problem).velocities) < 1e-13
+    if mirrored:
+        here = problem.mirrored().collide().velocities
+        assert difference(problem.collide().velocities, -here[::-1]) < 1e-13
 
 
 # --- families ----------------------------------------------------------------------------------
