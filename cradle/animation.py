@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from cradle.chain import Vector
+from cradle.checks import Vector
 from cradle.figures import PALETTE, progress, velocities, velocity_impulse
 from cradle.film import KEY, Animation, keyframes, number, with_style
 from cradle.swing_trace import Swing

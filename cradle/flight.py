@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.chain import Vector
+from cradle.checks import Vector
 from cradle.pendulums import Pendulums
 
 #: Events nearer than this part of a swing (over 2 pi) are one; so are lengths, of the amplitude.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.chain import Vector, checked, one_number
+from cradle.checks import Vector, checked, one_number
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.chain import Vector
+from cradle.checks import Vector
 
 #: Speeds below this part of the swing's speed are none: they carry 1e-20 of its energy.
 RESTING = 1e-10

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cradle.chain import Chain, Vector
+from cradle.chain import Chain
+from cradle.checks import Vector
 from cradle.pendulums import Pendulums
 from cradle.trace import Trace
 

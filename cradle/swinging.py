@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.chain import Chain, Vector, checked, one_number
+from cradle.chain import Chain
+from cradle.checks import Vector, checked, one_number
 from cradle.flight import TIE, Flight, FullFlight, SmallAngleFlight, State
 from cradle.models import Model, collide
 from cradle.pendulums import Pendulums

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cradle.chain import Vector
+from cradle.checks import Vector
 from cradle.fit.parameters import Key, label
 from cradle.fit.search import RISE, Mode, Scan
 

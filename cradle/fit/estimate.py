@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.chain import Vector, checked
+from cradle.checks import Vector, checked
 from cradle.fit.answers import Estimate, Group
 from cradle.fit.likelihood import chi_squares
 from cradle.fit.parameters import (

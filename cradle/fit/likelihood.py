@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cradle.chain import Vector
+from cradle.checks import Vector
 from cradle.fit.parameters import Key, Points, pair_keys
 from cradle.fit.shots import ShotSet
 

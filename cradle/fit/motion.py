@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.chain import Vector, checked, one_number
+from cradle.checks import Vector, checked, one_number
 from cradle.fit.tracker import Track
 
 _GRAVITY = 9.81

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from cradle.chain import Vector
-from cradle.models.correlation import post_impact_velocities
+from cradle.checks import Vector
+from cradle.models.batch import post_impact_velocities
 
 #: A parameter: the types of two balls (restitution, in alphabetical order) or of three (ratio).
 Key = tuple[str, ...]

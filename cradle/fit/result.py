@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cradle.chain import Vector, one_number
+from cradle.checks import Vector, one_number
 from cradle.fit.answers import Estimate, Group, Prediction
 from cradle.fit.parameters import (
     Key,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cradle.chain import Vector
+from cradle.checks import Vector
 
 #: Columns that every table of shots has, and what they hold.
 COLUMNS = {

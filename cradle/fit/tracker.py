@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cradle.chain import Vector, one_number
+from cradle.checks import Vector, one_number
 
 
 class Track(NamedTuple):
