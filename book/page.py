@@ -1,0 +1,42 @@
+"""What the notebooks of the book share and a reader need not see: numbers as people write them."""
+
+from myst_nb import glue
+
+_SMALL = "no one two three four five six seven eight nine ten eleven twelve".split()
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def tell(chapter: str, **values: object) -> None:
+    """Hand values to the text: `name` becomes the label `chapter-name`, with - for _."""
+    for name, value in values.items():
+        glue(f"{chapter}-{name.replace('_', '-')}", str(value), display=False)
+
+
+def people(value: float, digits: int = 2) -> str:
+    """Write a number as in a sentence: 2.2 million, 37 000, 10⁻⁷, 0.031.
+
+    `digits` significant digits are kept. An integer below one million is written out in full.
+    """
+    if isinstance(value, int) or float(value).is_integer():
+        if abs(value) < 1_000_000:
+            return f"{int(value):,}".replace(",", "\N{NO-BREAK SPACE}").replace("-", "−")
+    for size, word in ((1e9, "billion"), (1e6, "million")):
+        if abs(value) >= size:
+            return f"{float(f'{value / size:.{digits}g}'):g} {word}".replace("-", "−")
+    if value and (abs(value) < 1e-3 or abs(value) >= 1e5):
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        power = "10" + str(int(exponent)).translate(_SUPERSCRIPT)
+        mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+        return (power if mantissa == "1" else f"{mantissa} × {power}").replace("-", "−")
+    return f"{value:.{digits}g}".replace("-", "−")
+
+
+def count(number: int, thing: str, things: str = "") -> str:
+    """Write how many there are: no chains, one chain, twelve chains, 35 chains."""
+    word = _SMALL[number] if 0 <= number < len(_SMALL) else people(int(number))
+    return f"{word} {thing if number == 1 else things or thing + 's'}"
+
+
+def below(value: float, limit: float = 1e-12) -> str:
+    """Write a difference that is rounding as "< 10⁻¹²", any other one as it is."""
+    return f"< {people(limit, 1)}" if abs(value) < limit else people(value, 1)
