@@ -1,5 +1,9 @@
 """What the notebooks of the book share and a reader need not see: numbers as people write them."""
 
+import inspect
+import textwrap
+
+from IPython.display import Markdown
 from myst_nb import glue
 
 _SMALL = "no one two three four five six seven eight nine ten eleven twelve".split()
@@ -40,3 +44,9 @@ def count(number: int, thing: str, things: str = "") -> str:
 def below(value: float, limit: float = 1e-12) -> str:
     """Write a difference that is rounding as "< 10⁻¹²", any other one as it is."""
     return f"< {people(limit, 1)}" if abs(value) < limit else people(value, 1)
+
+
+def listing(*functions: object) -> Markdown:
+    """Show the source of functions as it stands in the package, so that text and code agree."""
+    sources = [textwrap.dedent(inspect.getsource(function)).strip() for function in functions]
+    return Markdown("```python\n" + "\n\n\n".join(sources) + "\n```")
