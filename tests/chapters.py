@@ -16,6 +16,8 @@ import nbformat
 import numpy as np
 from matplotlib.figure import Figure
 
+from cradle import textbook
+
 BOOK = Path(__file__).parents[1] / "book"
 GLUED = "application/papermill.record/text/plain"
 A_RATIO = re.compile("ratio|alpha|gamma|tried|nominal|asked|backward|forward", re.IGNORECASE)
@@ -124,3 +126,19 @@ def lines(ax) -> dict[str, np.ndarray]:
         for line in ax.get_lines()
         if not line.get_label().startswith("_")
     }
+
+
+def panel(chapter: str, figure: str, number: int = 0) -> dict[str, np.ndarray]:
+    """The named lines of one panel of a chapter's figure."""
+    return lines(drawn(chapter)[figure].axes[number])
+
+
+def solved(chain, ratio, **options):
+    """Path of velocities and of impulses by the textbook solver: not the one that draws."""
+    done = textbook.solve(*chain, ratio, **options)
+    return np.array(done.path), np.array(done.path_impulses)
+
+
+def after(chain, ratio, **options):
+    """Velocities after the impact, by the textbook solver."""
+    return solved(chain, ratio, **options)[0][-1]
