@@ -50,7 +50,7 @@ def test_decimals_of_descriptions_are_in_the_figure(chapter):
 
 
 def test_every_figure_is_checked_here():
-    """A figure that neither this file nor its sister names has no check; drawings without data need none."""
+    """What neither this file nor its sister names has no check; bare drawings need none."""
     text = "".join(
         path.read_text(encoding="utf-8") for path in Path(__file__).parent.glob("test_book_fig*.py")
     )
