@@ -1,11 +1,26 @@
-"""Chapters of the book as they are stored."""
+"""Chapters of the book: as they are stored, run with other numbers, and what they draw."""
 
+import ast
+import contextlib
+import decimal
+import functools
+import io
+import re
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import matplotlib as mpl
+import matplotlib.pyplot as plt
 import nbformat
+import numpy as np
+from matplotlib.figure import Figure
+
+from cradle import textbook
 
 BOOK = Path(__file__).parents[1] / "book"
 GLUED = "application/papermill.record/text/plain"
+A_RATIO = re.compile("ratio|alpha|gamma|tried|nominal|asked|backward|forward", re.IGNORECASE)
 
 
 class Chapter:
@@ -27,3 +42,103 @@ class Chapter:
         """What a cell prints."""
         outputs = self.cells[cell_id].outputs
         return "".join(output.text for output in outputs if output.output_type == "stream")
+
+
+def code(chapter: str) -> list:
+    """Return the code cells of a chapter."""
+    cells = nbformat.read(BOOK / f"{chapter}.ipynb", as_version=4).cells
+    return [cell for cell in cells if cell.cell_type == "code"]
+
+
+def written_ratios(tree: ast.AST) -> Iterator[ast.Constant]:
+    """Find the ratios above 0 that code writes as numbers: in models, assignments and loops."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(func=ast.Name(id="ImpulseCorrelation")):
+                keywords = [k.value for k in node.keywords if A_RATIO.search(k.arg or "")]
+                places, named = [*node.args, *keywords], True
+            case ast.For() | ast.comprehension():
+                places, named = [node.iter], A_RATIO.search(ast.unparse(node.target))
+            case ast.Assign():
+                places, named = [node.value], A_RATIO.search(ast.unparse(node.targets[0]))
+            case _:
+                continue
+        for place in places if named else []:
+            for number in ast.walk(place):
+                if isinstance(number, ast.Constant) and isinstance(number.value, float):
+                    yield number
+
+
+def run(
+    cells: list, changes: dict[str, object], factor: float = 1.0, names: dict | None = None
+) -> dict[str, object]:
+    """Execute cells from top to bottom with other numbers; return all names."""
+    names = {} if names is None else names
+    names["__name__"] = "__main__"
+    for number, cell in enumerate(cells, start=1):
+        names["__cell__"] = cell
+        lines = [line for line in cell.source.splitlines() if not line.startswith("%")]
+        tree = ast.parse("\n".join(lines))
+        for written in set(written_ratios(tree)):
+            written.value *= factor
+        exec(compile(tree, f"code cell {number}", "exec"), names)
+        if "parameters" in cell.metadata.get("tags", []):
+            names.update({name: changes[name] for name in changes.keys() & names.keys()})
+    return names
+
+
+@contextlib.contextmanager
+def in_memory(show):
+    """Draw without a screen and let `show` take the place of plt.show; undo everything after."""
+    backend, shown, path = mpl.get_backend(), plt.show, list(sys.path)
+    plt.switch_backend("agg")
+    plt.show = show
+    sys.path.insert(0, str(BOOK))  # page.py, as for a notebook
+    try:
+        with mpl.rc_context(), decimal.localcontext():
+            yield
+    finally:
+        plt.close("all")
+        plt.show, sys.path[:] = shown, path
+        plt.switch_backend(backend)
+
+
+@functools.cache
+def drawn(chapter: str) -> dict[str, Figure]:
+    """Run a chapter as it is stored and return its figures by their names."""
+    figures, names = {}, {}
+
+    def keep():
+        settings = names["__cell__"].metadata["mystnb"]
+        figures[settings["figure"]["name"]] = plt.gcf()
+        plt.figure(plt.gcf().number).canvas.draw()
+        plt.close(plt.gcf())
+
+    with in_memory(keep), contextlib.redirect_stdout(io.StringIO()):
+        run(code(chapter), {}, names=names)
+    return figures
+
+
+def lines(ax) -> dict[str, np.ndarray]:
+    """The lines of a panel that have a name, by that name: points, shape (n, 2)."""
+    return {
+        line.get_label(): line.get_xydata()
+        for line in ax.get_lines()
+        if not line.get_label().startswith("_")
+    }
+
+
+def panel(chapter: str, figure: str, number: int = 0) -> dict[str, np.ndarray]:
+    """The named lines of one panel of a chapter's figure."""
+    return lines(drawn(chapter)[figure].axes[number])
+
+
+def solved(chain, ratio, **options):
+    """Path of velocities and of impulses by the textbook solver: not the one that draws."""
+    done = textbook.solve(*chain, ratio, **options)
+    return np.array(done.path), np.array(done.path_impulses)
+
+
+def after(chain, ratio, **options):
+    """Velocities after the impact, by the textbook solver."""
+    return solved(chain, ratio, **options)[0][-1]

@@ -106,7 +106,7 @@ def test_eq_53_at_the_bound_the_rest_is_one_body(n):
 
 
 def test_end_progress_is_as_exact_as_its_arguments():
-    rows = CHAPTER.printed("root-cell").splitlines()[2:]
+    rows = CHAPTER.printed("root-errors").splitlines()[2:]
     errors = {float(row.split()[0]): [float(x) for x in row.split()[1:]] for row in rows}
     assert all(ours < 3e-16 for _, ours in errors.values())
     # The school formula loses as many digits as Q is small.
@@ -194,7 +194,7 @@ def test_fig_8_overlap_and_midpoint():
     high, low = (v[0] + v[1] + left) / 2, (v[2] + v[3] - right) / 2
     met = trace.path[trace.events.index(("close", 1)) + 1]
     assert met[1] == pytest.approx((low + high) / 2, rel=1e-13) == pytest.approx(met[2], rel=1e-15)
-    words = CHAPTER.printed("fig8a-cell").replace(",", "").split()
+    words = CHAPTER.printed("fig8-overlap").replace(",", "").split()
     assert float(words[words.index("overlap") + 1]) == pytest.approx(low, abs=6e-5)
     assert float(words[words.index("midpoint") - 1]) == pytest.approx(high, abs=6e-5)
 
@@ -207,7 +207,7 @@ def contact_work(trace, c, row):
 
 def test_fig_8_three_readings():
     table = pd.read_csv(
-        io.StringIO(CHAPTER.printed("readings-cell").split("spread")[0]), sep=r"\s+"
+        io.StringIO(CHAPTER.printed("readings-table").split("spread")[0]), sep=r"\s+"
     )
     turns = {
         "both": ("forward", "backward"),

@@ -7,18 +7,12 @@ as numbers become smaller too.
 """
 
 import ast
-import decimal
 import itertools
-import re
-from collections.abc import Iterator
-from pathlib import Path
 
-import matplotlib
 import matplotlib.pyplot as plt
 import nbformat
 import pytest
-
-BOOK = Path(__file__).parents[1] / "book"
+from chapters import code, in_memory, run
 
 # Chapter -> other admissible values: each line is one run of the whole chapter.
 CHANGES = {
@@ -50,13 +44,6 @@ RUNS = [
     for chapter, runs in CHANGES.items()
     for k, changes in enumerate(runs)
 ]
-A_RATIO = re.compile("ratio|alpha|gamma|tried|nominal|asked|backward|forward", re.IGNORECASE)
-
-
-def code(chapter: str) -> list:
-    """Return the code cells of a chapter."""
-    cells = nbformat.read(BOOK / f"{chapter}.ipynb", as_version=4).cells
-    return [cell for cell in cells if cell.cell_type == "code"]
 
 
 def parameters(cells: list) -> dict[str, object]:
@@ -72,39 +59,6 @@ def parameters(cells: list) -> dict[str, object]:
     return found
 
 
-def written_ratios(tree: ast.AST) -> Iterator[ast.Constant]:
-    """Find the ratios above 0 that code writes as numbers: in models, assignments and loops."""
-    for node in ast.walk(tree):
-        match node:
-            case ast.Call(func=ast.Name(id="ImpulseCorrelation")):
-                keywords = [k.value for k in node.keywords if A_RATIO.search(k.arg or "")]
-                places, named = [*node.args, *keywords], True
-            case ast.For() | ast.comprehension():
-                places, named = [node.iter], A_RATIO.search(ast.unparse(node.target))
-            case ast.Assign():
-                places, named = [node.value], A_RATIO.search(ast.unparse(node.targets[0]))
-            case _:
-                continue
-        for place in places if named else []:
-            for number in ast.walk(place):
-                if isinstance(number, ast.Constant) and isinstance(number.value, float):
-                    yield number
-
-
-def run(cells: list, changes: dict[str, object], factor: float = 1.0) -> dict[str, object]:
-    """Execute cells from top to bottom with other numbers; return all names."""
-    names: dict[str, object] = {"__name__": "__main__"}
-    for number, cell in enumerate(cells, start=1):
-        lines = [line for line in cell.source.splitlines() if not line.startswith("%")]
-        tree = ast.parse("\n".join(lines))
-        for written in set(written_ratios(tree)):
-            written.value *= factor
-        exec(compile(tree, f"code cell {number}", "exec"), names)
-        if "parameters" in cell.metadata.get("tags", []):
-            names.update({name: changes[name] for name in changes.keys() & names.keys()})
-    return names
-
-
 def draw_and_close():
     """Take the place of plt.show, so that a figure that cannot be drawn is seen."""
     for number in plt.get_fignums():
@@ -113,14 +67,9 @@ def draw_and_close():
 
 
 @pytest.fixture
-def pictures_in_memory(monkeypatch: pytest.MonkeyPatch):
-    before = matplotlib.get_backend()
-    plt.switch_backend("agg")
-    monkeypatch.setattr(plt, "show", draw_and_close)
-    with matplotlib.rc_context(), decimal.localcontext():
+def pictures_in_memory():
+    with in_memory(draw_and_close):
         yield
-    plt.close("all")
-    plt.switch_backend(before)
 
 
 def test_every_chapter_has_parameters():

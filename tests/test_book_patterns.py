@@ -4,6 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
+from chapters import Chapter
 from reference import solve
 from scipy.optimize import brentq, minimize_scalar
 
@@ -12,6 +13,7 @@ from cradle.closed_form import back_impact_line, first_ball_stops, middle_ball_s
 from cradle.measures import bouncing_pattern
 
 ALPHA, E = 0.15, 0.5
+GLUED = Chapter("patterns").glued
 
 
 def masses(r1, r2):
@@ -137,6 +139,18 @@ def test_eqs_45_46_balls_at_rest(e, alpha):
     assert count(high, r2, e, alpha) == count(r1, 1.2 * r2, e, alpha) == 2
     # They hold only there: among multiple collisions they are no border.
     assert abs(velocity(1, r1, 0.5 * r2, e, alpha)) > 1e-3
+
+
+def test_eq_44_ends_of_the_curve():
+    """On the axes of the map, as the chapter states them."""
+    radical = (1 - ALPHA) ** 0.5
+    on_r1 = (1 + E) * (1 + E * radical) / E - (1 + ALPHA / E)
+
+    def height(r2):
+        return (1 + E) * (1 + E * (1 - ALPHA * (1 + r2)) ** 0.5) / (E * (1 + r2)) - 1 - ALPHA / E
+
+    ends = [f"{x:.3f}" for x in (on_r1, brentq(height, 1, 4))]
+    assert ends == [GLUED["end-1"], GLUED["end-2"]] == ["3.083", "2.146"]
 
 
 def test_curves_of_fig_6_meet_in_one_point():

@@ -8,11 +8,13 @@ import mpmath
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
+from chapters import Chapter
 from reference import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 from cradle.closed_form import final_impulses, one_collision_each, three_balls
 
+CHAPTER = Chapter("three_balls")
 # The chapter's example.
 EXAMPLE = ([1.0, 1.5, 1.0], [1.0, 0.2, 0.0], [0.8, 0.7], 0.25)
 CLOSE = {"rtol": 1e-12, "atol": 1e-13}
@@ -363,3 +365,23 @@ def test_equal_front_velocities_drive_the_first_contact_backward():
     assert trace.impulses[0] > 0.9
     other = solve(m, v, e, ratio)
     np.testing.assert_allclose(trace.velocities, [float(x) for x in other.velocities], atol=1e-13)
+
+
+def test_one_outcome_belongs_to_many_parameters():
+    """Eqs. 24 and 30 solved for e2 and e3, at fifty digits; and a ratio that comes twice."""
+    with mpmath.workdps(50):
+        target = solve([1, 1, 1], [1, 0, 0], ["0.9", "0.8"], "0.15").velocities
+        for ratio, printed in (("0.1", (0.951351, 0.748331)), ("0.2", (0.848649, 0.864099))):
+            a = mpmath.mpf(ratio)
+            tau_2, tau_3 = 1 - target[0], target[2]
+            e = tau_2 * (2 - a) - 1, (2 * tau_3 / tau_2 - 1) / mpmath.sqrt(1 - 2 * a)
+            assert [float(x) for x in e] == pytest.approx(printed, abs=5.1e-7)
+            again = solve([1, 1, 1], [1, 0, 0], list(e), a).velocities
+            assert max(abs(x - y) for x, y in zip(again, target)) < mpmath.mpf(10) ** -45
+    twice = [
+        solve(["0.045", "0.045", "0.053"], [1, 0, 0], 1, ratio)
+        for ratio in ("0.018", CHAPTER.glued["three-balls-other-ratio"])
+    ]
+    assert [sum(x.collisions) for x in twice] == [3, 2]
+    outcomes = [[float(v) for v in x.velocities] for x in twice]
+    np.testing.assert_allclose(*outcomes, rtol=0, atol=1e-7)  # seven digits of the ratio

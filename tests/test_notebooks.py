@@ -143,13 +143,13 @@ def test_each_fault_is_seen(spoil, fault):
 # Decimals that the text may state: given by the paper, by an exercise, or chosen for an example.
 # All others are computed by a cell, and the text takes them from there ({glue:text}`...`).
 GIVEN = {
-    "intro": ".15 3.11 3.13 4.0",  # a caption's ratio, Python, Creative Commons
+    "intro": "0.15 1.1344902 10.1115 3.11 3.13 4.0",  # a ratio, doi, Python, licence
     "problem": "",
     "compliance": "",
-    "three_balls": "0.01 0.1 0.25 0.5 0.6 0.75",
-    "multiple_impacts": ".1 .2 .8",
+    "three_balls": "0.01 0.09 0.1 0.11 3.9 0.25 0.5 0.6 0.75",
+    "multiple_impacts": "0.1 0.2 0.8",
     "patterns": "0.003 0.01 0.1 0.15 0.3 0.3475 0.348 0.5 0.6 0.9 0.999",
-    "n_balls": ".1 0.2 .5 1.5 1.75",
+    "n_balls": "0.1 0.2 1.5 1.75",
     "experiments": ".01 .171 0.17121 .17121 .40 .5 .62 1.5 1.59",
     "trade": "0.001 0.01 0.1",
     "beyond": "0.01 0.9 0.99 0.999",

@@ -1,0 +1,110 @@
+"""What the notebooks of the book share and a reader need not see: numbers as people write them."""
+
+import inspect
+import textwrap
+
+from IPython.display import Markdown
+from myst_nb import glue
+
+_SMALL = [
+    "no",
+    "one",
+    "two",
+    "three",
+    "four",
+    "five",
+    "six",
+    "seven",
+    "eight",
+    "nine",
+    "ten",
+]
+_SMALL += ["eleven", "twelve"]
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def tell(chapter: str, **values: object) -> None:
+    """Hand values to the text: `name` becomes the label `chapter-name`, with - for _."""
+    for name, value in values.items():
+        glue(
+            f"{chapter}-{name.replace('_', '-')}", str(value), display=False
+        )
+
+
+def people(value: float, digits: int = 2) -> str:
+    """Write a number as in a sentence: 2.2 million, 37 000, 10⁻⁷, 0.031.
+
+    `digits` significant digits are kept. An integer below one million is written out in full.
+    """
+    if float(value).is_integer() and abs(value) < 1_000_000:
+        return f"{int(value):,}".replace(",", "\N{NO-BREAK SPACE}").replace(
+            "-", "−"
+        )
+    for size, word in ((1e9, "billion"), (1e6, "million")):
+        if abs(value) >= size:
+            return (
+                f"{float(f'{value / size:.{digits}g}'):g} {word}".replace(
+                    "-", "−"
+                )
+            )
+    if value and (abs(value) < 1e-3 or abs(value) >= 1e5):
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        power = "10" + str(int(exponent)).translate(_SUPERSCRIPT)
+        mantissa = (
+            mantissa.rstrip("0").rstrip(".")
+            if "." in mantissa
+            else mantissa
+        )
+        return (
+            power if mantissa == "1" else f"{mantissa} × {power}"
+        ).replace("-", "−")
+    return f"{value:.{digits}g}".replace("-", "−")
+
+
+def count(number: int, thing: str, things: str = "") -> str:
+    """Write how many there are: no chains, one chain, twelve chains, 35 chains."""
+    word = (
+        _SMALL[number] if 0 <= number < len(_SMALL) else people(int(number))
+    )
+    return f"{word} {thing if number == 1 else things or thing + 's'}"
+
+
+def below(value: float, limit: float = 1e-12) -> str:
+    """Write a difference that is rounding as "< 10⁻¹²", any other one as it is."""
+    return (
+        f"< {people(limit, 1)}" if abs(value) < limit else people(value, 1)
+    )
+
+
+def listing(*functions: object, width: int = 80) -> Markdown:
+    """Show the source of functions as it stands in the package, so that text and code agree.
+
+    Where a line is wider than the page, its comment goes on a line of its own.
+    """
+    lines: list[str] = []
+    for function in functions:
+        if lines:
+            lines += ["", ""]
+        for line in (
+            textwrap.dedent(inspect.getsource(function))
+            .rstrip()
+            .splitlines()
+        ):
+            lines += _narrow(line, width)
+    return Markdown("```python\n" + "\n".join(lines) + "\n```")
+
+
+def _narrow(line: str, width: int) -> list[str]:
+    """Break a comment or a docstring of one line, and nothing else."""
+    indent = " " * (len(line) - len(line.lstrip()))
+    code, mark, comment = line.partition("# ")
+    if len(line) <= width:
+        return [line]
+    if mark:
+        above = textwrap.wrap(comment, width - len(indent) - 2)
+        return [f"{indent}# {part}" for part in above] + (
+            [code.rstrip()] if code.strip() else []
+        )
+    if '"""' in line:
+        return textwrap.wrap(line, width, subsequent_indent=indent)
+    return [line]

@@ -1,0 +1,250 @@
+"""Every curve of the landing page and chapters 1 to 3, against a second route.
+
+The chapters draw from the package's solver; here the textbook solver, formulas that the paper
+prints, or short computations of their own say where each line must lie.
+"""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chapters import Chapter, after, code, drawn, panel, solved
+from matplotlib.text import Text
+from test_book_compliance import first_loss, outcome, printed_10_and_11
+
+CHAPTERS = [
+    "intro",
+    "problem",
+    "compliance",
+    "three_balls",
+    "multiple_impacts",
+    "patterns",
+    "n_balls",
+    "notation",
+]
+EQUAL = [1, 1, 1], [1, 0, 0], 1
+THREE = [1.0, 1.5, 1.0], [1.0, 0.2, 0.0], [0.8, 0.7]  # the example of chapter 3, ratio 0.25
+FIVE = [1, 1, 1], [1, 0.8, 0], 0.3  # that of chapter 4, ratio 0.05
+LIGHT = [100, 1, 100], [1, 0, 0], 1  # Fig. 7, ratio 0.15
+CLOSE = {"rtol": 0, "atol": 1e-12}
+
+
+def texts(figure):
+    """All words of a figure: titles, labels, legends, notes."""
+    return " ".join(text.get_text() for text in figure.findobj(Text))
+
+
+@pytest.mark.parametrize("chapter", CHAPTERS)
+def test_decimals_of_descriptions_are_in_the_figure(chapter):
+    for cell in code(chapter):
+        settings = cell.metadata.get("mystnb", {})
+        figure = drawn(chapter).get(settings.get("figure", {}).get("name"))
+        if figure is None:  # the landing page's moving picture has a test of its own
+            continue
+        limits = [x for ax in figure.axes for x in (*ax.get_xlim(), *ax.get_ylim())]
+        said = [float(x) for x in re.findall(r"\d+\.\d+", texts(figure))] + limits
+        for number in re.findall(r"\d+\.\d+", settings["image"]["alt"]):
+            assert float(number) in said, (cell.id, number)
+
+
+def test_every_figure_is_checked_here():
+    """What neither this file nor its sister names has no check; bare drawings need none."""
+    text = "".join(
+        path.read_text(encoding="utf-8") for path in Path(__file__).parent.glob("test_book_fig*.py")
+    )
+    drawings = {"fig-p1", "fig-p2", "fig-own-notation-chain", "fig-own-notation-ratio"}
+    for chapter in CHAPTERS:
+        for name in drawn(chapter).keys() - drawings:
+            assert f'"{name}"' in text, name
+
+
+@pytest.mark.parametrize(
+    ("chapter", "figure", "chain", "ratio"),
+    [
+        ("intro", "fig-inside", EQUAL, 0.15),
+        ("three_balls", "fig-own-three-opening", THREE, 0.25),
+        ("multiple_impacts", "fig-own-multiple-opening", FIVE, 0.05),
+        ("n_balls", "fig-own-n-balls-opening", ([1] * 4, [1, 0.5, 0, 0], 1), 0.1),
+    ],
+)
+def test_opening_figures(chapter, figure, chain, ratio):
+    path, impulses = solved(chain, ratio)
+    shown = panel(chapter, figure)
+    assert list(shown) == [f"$v_{i + 1}$" for i in range(path.shape[1])]
+    for ball, line in enumerate(shown.values()):
+        expected = np.column_stack([impulses.sum(axis=1), path[:, ball]])
+        np.testing.assert_allclose(line, expected, **CLOSE)
+
+
+@pytest.mark.parametrize(
+    ("chapter", "figure", "number", "contact", "chain", "ratio"),
+    [
+        ("three_balls", "fig-p3", 0, 0, THREE, 0.25),
+        ("three_balls", "fig-p3", 1, 1, THREE, 0.25),
+        ("multiple_impacts", "fig-p5", 0, 0, FIVE, 0.05),
+        ("multiple_impacts", "fig-p5", 1, 1, FIVE, 0.05),
+        ("patterns", "fig-p7", 0, 0, LIGHT, 0.15),
+        ("patterns", "fig-p7", 1, 1, LIGHT, 0.15),
+    ],
+)
+def test_velocity_impulse_diagrams(chapter, figure, number, contact, chain, ratio):
+    path, impulses = solved(chain, ratio)
+    shown = panel(chapter, figure, number)
+    for ball in (contact, contact + 1):
+        expected = np.column_stack([impulses[:, contact], path[:, ball]])
+        np.testing.assert_allclose(shown[f"$v_{ball + 1}$"], expected, rtol=0, atol=1e-10)
+
+
+def test_fig_flight():
+    """Start, end and words of the moving picture; its description, too."""
+    cell = Chapter("intro").cells["flight"]
+    (picture,) = [o.data["image/svg+xml"] for o in cell.outputs if "image/svg+xml" in o.data]
+    moves = re.findall(r"#?b(\d)(\d) \{ 0% \{ transform: translateX\((.*?)px.*?100% \{ transform: "
+                       r"translateX\((.*?)px", picture, re.DOTALL)  # fmt: skip
+    alt = cell.metadata.mystnb.image.alt
+    outcomes = [after(EQUAL, ratio) for ratio in (0, 0.15, 0.5)]
+    assert len(moves) == 9
+    for row, ball, start, end in moves:
+        row, ball = int(row), int(ball)
+        speed = outcomes[row][ball]
+        assert float(start) == pytest.approx(-110 * EQUAL[1][ball], abs=0.006)
+        assert float(end) == pytest.approx(220 * speed, abs=0.006)
+    stated = [float(x) for x in re.findall(r"\d\.\d\d(?!\d)", alt.replace("Ratio 0.15", ""))]
+    expected = [*abs(outcomes[1]), abs(outcomes[2][0]), outcomes[2][1]]
+    assert stated == [float(f"{x:.2f}") for x in expected]
+
+
+def test_fig_five_balls():
+    shown = panel("intro", "fig-five-balls")
+    for k in (0, 30, 60, 137, 200):
+        ratio = shown["ball 1"][k, 0]
+        v = after(([1] * 5, [1, 0, 0, 0, 0], 1), ratio)
+        assert [shown[f"ball {i + 1}"][k, 1] for i in range(5)] == pytest.approx(v, abs=1e-7)
+
+
+def test_fig_problem_family():
+    shown = panel("problem", "fig-own-problem-family")
+    u2, u3 = shown["momentum and energy conserved"].T
+    np.testing.assert_allclose(u2**2 + u2 * u3 + u3**2, 1, rtol=1e-13)
+    arc = shown["and no ball passes through another"]
+    np.testing.assert_allclose((arc**2).sum(axis=1) + arc.prod(axis=1), 1, rtol=1e-13)
+    assert arc.max() < 1e-12
+    np.testing.assert_allclose(arc[[0, -1]], [[-1, 0], [0, -1]], atol=1e-12)
+    (dots,) = [line for name, line in shown.items() if name.startswith("this model")]
+    expected = [-np.diff(after(EQUAL, ratio)) for ratio in np.linspace(0, 0.5, 6)]
+    np.testing.assert_allclose(dots, expected, rtol=0, atol=1e-7)
+    for name, point in (
+        ("before the impact", (1, 0)),
+        ("Eq. 5: fused rest", (-1, 0)),
+        ("Eq. 6: sequential", (0, -1)),
+    ):
+        np.testing.assert_array_equal(shown[name], [point])
+
+
+def test_fig_problem_definitions():
+    shown = panel("problem", "fig-own-problem-definitions")
+    a = shown["Stronge: work"][:, 0]
+    for name, energy in (
+        ("Poisson: impulses", (4 + a**2) / (2 - a) ** 2),
+        ("Stronge: work", np.ones_like(a)),
+        ("Newton: speeds", (2 + a**2) / (2 - a) ** 2),
+    ):
+        np.testing.assert_allclose(shown[name], np.column_stack([a, energy]), rtol=1e-12)
+
+
+def test_fig_compliance_ratio():
+    for number in (0, 1):
+        shown = panel("compliance", "fig-own-compliance-ratio", number)
+        for name, line in shown.items():
+            if name.startswith(r"$\gamma$ = "):
+                gamma = float(name.rpartition("=")[2])
+                loss, _ = first_loss(gamma)
+                for part, value in line[::40]:
+                    minus_2, minus_3 = printed_10_and_11(gamma, 1, part * loss)
+                    expected = minus_3 / minus_2 / gamma**number
+                    # The printed forms subtract nearly equal numbers at the start.
+                    assert value == pytest.approx(expected, rel=1e-8, abs=1e-10), name
+    part, limit = shown[r"limit $\gamma \to 0$"].T
+    theta = np.pi * part
+    np.testing.assert_allclose(limit, theta**2 / (4 * (1 - np.cos(theta))) - 0.5, rtol=1e-9)
+    assert (shown["Eq. 14"][:, 1] == 1).all()
+
+
+def test_fig_compliance_effective():
+    shown = panel("compliance", "fig-own-compliance-effective")
+    (at_end, at_loss, effective, law, eq_14, eq_15, dot) = shown.values()
+    gammas = effective[:, 0]
+    np.testing.assert_allclose(eq_14, np.column_stack([gammas, gammas]))
+    np.testing.assert_allclose(law[:, 1], (math.pi**2 / 8 - 1) * gammas, rtol=1e-12)
+    assert (eq_15[:, 1] == 0.5).all()
+    for k in (20, 80, 100, 130):
+        minus_2, minus_3 = printed_10_and_11(gammas[k], 1, first_loss(gammas[k])[0])
+        assert at_loss[k, 1] == pytest.approx(minus_3 / minus_2, rel=1e-8)
+        v = outcome(1, gammas[k])
+        assert at_end[k, 1] == pytest.approx(v[2] / (1 - v[0]), abs=1e-6)
+        assert effective[k, 1] == pytest.approx(-2 * v[0] / (1 - v[0]), abs=1e-6)
+    v = outcome(1, 1)
+    assert dot[0] == pytest.approx([1, -2 * v[0] / (1 - v[0])], abs=1e-6)
+
+
+def test_fig_three_triangle_and_extended():
+    m, v, e = map(np.array, THREE)
+    g = (1 + e[0]) * m[0] * (v[0] - v[1]) / (0.75 * m[0] + m[1])
+    ends = m[1] * g
+    u = v[0] - v[1]
+    line = panel("three_balls", "fig-own-three-triangle")["closing speed $u_2$"]
+    expected = [(0, u), (ends / (1 + e[0]), 0), (ends, -e[0] * u)]
+    np.testing.assert_allclose(line, expected, **CLOSE)
+    shown = panel("three_balls", "fig-own-three-extended")
+    path, impulses = solved(THREE, 0.25)
+    bend = [0.25 * ends, v[1] + 0.75 * g - v[2] - 0.25 * ends / m[2]]
+    np.testing.assert_allclose(
+        shown["closing speed $u_3$"],
+        np.column_stack([impulses[:, 1], path[:, 1] - path[:, 2]]), **CLOSE
+    )  # fmt: skip
+    extended = [(0, g + v[1] - v[2]), bend]
+    np.testing.assert_allclose(shown["second piece, extended"], extended, **CLOSE)
+
+
+def test_fig_4():
+    shown = panel("three_balls", "fig-p4")
+    a = shown["$v_1^+$"][:, 0]
+    s = np.sqrt(1 - 2 * a)
+    for name, value in (
+        ("$v_1^+$", s**2 - 1), ("$v_2^+$", 2 * (1 - s)), ("$v_3^+$", 2 * (1 + s)),
+    ):  # fmt: skip
+        expected = np.column_stack([a, value / (3 + s**2)])
+        np.testing.assert_allclose(shown[name], expected, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(shown["Eq. (6)"], [(0, 0), (0, 0), (0, 1)])
+    np.testing.assert_allclose(shown["Eq. (5)"], [(0.5, -1 / 3), (0.5, 2 / 3), (0.5, 2 / 3)])
+
+
+def test_fig_three_ranges():
+    shown = panel("three_balls", "fig-own-three-ranges")
+    x = shown["$1+X$"][:, 0]
+    for name, bound in (
+        ("Eq. 34", 1 + 0 * x), ("$1+X$", 1 + x), ("$1+(1+e_3)X$", 1 + 1.5 * x),
+        ("$(1+X)^2$: radical real below", (1 + x) ** 2),
+    ):  # fmt: skip
+        np.testing.assert_allclose(shown[name], np.column_stack([x, bound]), rtol=1e-14)
+    x, y = shown["solver: contact 2-3 still closes"].T
+    assert (y <= 1 + x).all()
+    x, y = shown["solver: contact 2-3 already opens"].T
+    assert ((1 + x < y) & (y <= 1 + 1.5 * x)).all()
+    x, y = shown["solver: contact 2-3 ends first"].T
+    assert (y > 1 + 1.5 * x).all()
+
+
+def test_fig_three_ratio():
+    for number, (masses, e) in enumerate((([1, 1, 1], 0.5), ([2, 1, 1], 1))):
+        shown = panel("three_balls", "fig-own-three-ratio", number)
+        for k in (0, 137, 900, 1500, 1900):
+            v = after((masses, [1, 0, 0], e), shown["$v_1^+$"][k, 0])
+            values = [shown[f"$v_{i}^+$"][k, 1] for i in (1, 2, 3)]
+            assert values == pytest.approx(v, abs=1e-10)
+        (low,), (high,) = shown["least $v_2^+$"], shown["largest $v_3^+$"]
+        v2, v3 = shown["$v_2^+$"], shown["$v_3^+$"]
+        assert low.tolist() == v2[v2[:, 1].argmin()].tolist()
+        assert high.tolist() == v3[v3[:, 1].argmax()].tolist()

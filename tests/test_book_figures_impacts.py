@@ -1,0 +1,196 @@
+"""Every curve of chapters 4 to 6 and of the notation, against a second route."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from chapters import after, drawn, lines, panel
+from test_book_n_balls import FIG_8, contact_work
+from test_book_patterns import by_turns, edge, turn
+
+from cradle import ImpulseCorrelation, collide, paper_chain, textbook
+from cradle.measures import bouncing_pattern
+
+CLOSE = {"rtol": 0, "atol": 1e-12}
+PAPER = [("end", 0), ("close", 0), ("end", 1), ("close", 1), ("end", 0), ("end", 1)]
+
+
+def test_fig_sequence_map():
+    (mesh,) = drawn("multiple_impacts")["fig-own-sequence"].axes[0].collections
+    regions = mesh.get_array().reshape(120, 120)
+    for row in range(7, 120, 14):  # e; below, the textbook solver would have no limit to go to
+        for column in range(3, 120, 9):
+            e, ratio = (row + 0.5) / 240, (column + 0.5) / 240
+            if regions[row, column] == 4:
+                continue
+            done = textbook.solve([1, 1, 1], [1, 0.8, 0], e, ratio)
+            events = [x for x in done.events if x[0] != "maximum_compression"]
+            found = events == PAPER
+            assert (regions[row, column] in (1, 2)) == found
+            assert (regions[row, column] == 0) == (not found and done.collisions[0] <= 2
+                                                   and events.count(("close", 1)) == 0)  # fmt: skip
+
+
+def in_ratios(r1, r2):
+    return [1 / r1, 1.0, 1 / r2], [1, 0, 0]
+
+
+def test_fig_patterns_three():
+    for number, (r1, r2) in enumerate(((2.5, 1.5), (1.0, 1.5), (2.5, 0.2))):
+        v = after((*in_ratios(r1, r2), 0.5), 0.15)
+        for ball, line in enumerate(panel("patterns", "fig-patterns-three", number).values()):
+            places = 0.6 * ball + np.array([-1.0 * (ball == 0), 0, 2 * v[ball]])
+            np.testing.assert_allclose(line, np.column_stack([places, [-1, 0, 2]]), **CLOSE)
+
+
+def eq_44(r2, e=0.5, a=0.15):
+    return (1 + e) * (1 + e * np.sqrt(1 - a * (1 + r2))) / (e * (1 + r2)) - (1 + a / e)
+
+
+def test_fig_6_drawn():
+    ax = drawn("patterns")["fig-p6"].axes[0]
+    shown = lines(ax)
+    r2, r1 = shown["Eq. (44): back impact"].T
+    np.testing.assert_allclose(r1, eq_44(r2), rtol=1e-13)
+    rest_2 = 0.5 * math.sqrt(0.85 + 0.0375**2) - 0.01875  # Eq. 46
+    np.testing.assert_allclose(shown["Eq. (45): $v_1^+ = 0$"], [(rest_2, 1.7), (3, 1.7)])
+    np.testing.assert_allclose(shown["Eq. (46): $v_2^+ = 0$"], [(rest_2, 1.7), (rest_2, 3)])
+    np.testing.assert_allclose(shown["all three meet"], [(rest_2, 1.7)])
+    # The thin borders, from the fourth collision on: the map of turns counts one more below.
+    thin = [x.get_xydata() for x in ax.get_lines() if x.get_color() == "0.35"]
+    assert len(thin) == 7
+    for number, line in enumerate(thin, start=4):
+        for r2, r1 in line[~np.isnan(line[:, 1])][20::60]:
+            assert by_turns(r1 * (1 - 1e-7), r2, 0.5, 0.15)[0] == number
+            assert by_turns(r1 * (1 + 1e-7), r2, 0.5, 0.15)[0] == number - 1
+    (mesh,) = [x for x in ax.collections if hasattr(x, "get_coordinates")]
+    field = np.ma.getdata(mesh.get_array()).reshape(400, 400)
+    grid = np.linspace(0, 3, 401)[1:] - 3 / 800
+    for row in range(20, 400, 54):
+        for column in range(20, 400, 54):
+            v = by_turns(grid[row], grid[column], 0.5, 0.15)[1]
+            assert field[row, column] == bouncing_pattern(np.array(v))
+
+
+def test_fig_patterns_turns():
+    for name, line in panel("patterns", "fig-patterns-turns").items():
+        r = float(re.search(r"r = ([\d.]+)", name)[1])
+        if "border" in name:
+            r = edge_on_diagonal()
+        for zeta, drawn_value in line[::50]:
+            x, _, y, a = turn(zeta, r, 0.5, 0.15)
+            assert drawn_value == pytest.approx(a * y / (y - x), rel=1e-9)
+
+
+def edge_on_diagonal():
+    low, high = 0.03, 0.08
+    while high - low > 1e-14:
+        middle = (low + high) / 2
+        low, high = (middle, high) if edge(middle, 0.5, 0.15) > middle else (low, middle)
+    return low
+
+
+def test_fig_patterns_corner():
+    left, right = drawn("patterns")["fig-patterns-corner"].axes[:2]
+    log = np.geomspace(0.005, 3, 241)
+    log = np.sqrt(log[1:] * log[:-1])
+    (mesh,) = [x for x in left.collections if hasattr(x, "get_coordinates")]
+    number = np.ma.filled(mesh.get_array(), np.nan).reshape(240, 240)
+    for row in range(5, 240, 33):
+        for column in range(5, 240, 33):
+            turns = by_turns(log[row], log[column], 0.5, 0.15)[0]
+            shown = number[row, column]
+            assert turns > 100 if np.isnan(shown) else shown == turns
+    solid = [x.get_xydata() for x in left.get_lines() if x.get_linestyle() == "-"]
+    dots = [x.get_xydata()[0] for x in right.get_lines() if x.get_marker() == "o"]
+    (border,) = solid
+    for r2, r1 in border[:20:6]:
+        assert r1 == pytest.approx(edge(r2, 0.5, 0.15), rel=1e-6)
+    assert len(dots) == 3
+    for r2, r1 in dots:
+        np.testing.assert_allclose(by_turns(r1, r2, 0.5, 0.15)[1][:2], 0, atol=1e-9)
+
+
+def test_fig_patterns_parameters():
+    cases = [(0.0, 0.15), (0.1, 0.15), (1.0, 0.15), (0.5, 0.0), (0.4, 0.5), (1.0, 0.5)]
+    coarse = np.linspace(0, 3, 151)[1:] - 0.01
+    for ax, (e, a) in zip(drawn("patterns")["fig-patterns-parameters"].axes, cases):
+        some = coarse[coarse <= (1 / a - 1 if a else np.inf)]
+        mesh = ax.collections[0]
+        field = np.ma.getdata(mesh.get_array()).reshape(some.size, some.size)
+        if e == 0:
+            assert (field == 2).all()
+            continue
+        for row in range(9, some.size, 28):
+            for column in range(4, some.size, 28):
+                number, v = by_turns(some[row], some[column], e, a)
+                if number < 60 and min(abs(v[0]), abs(v[1])) > 1e-9:
+                    assert field[row, column] == bouncing_pattern(np.array(v))
+        (curve,) = [x.get_xydata() for x in ax.get_lines()]
+        r2, r1 = curve[~np.isnan(curve[:, 1])].T
+        np.testing.assert_allclose(r1, eq_44(r2, e, a), rtol=1e-12)
+
+
+def test_fig_patterns_micro():
+    top, low = (panel("patterns", "fig-patterns-micro", k) for k in (0, 1))
+    r = low["$v_1^+$"][:, 0]
+    np.testing.assert_allclose(top["estimate"][:, 1], np.pi * np.sqrt(1 / (2 * r)), rtol=1e-12)
+    for k in range(100, 4000, 350):
+        for a in (0, 0.15, 0.5):
+            assert top[f"$a$ = {a:g}"][k, 1] == by_turns(r[k], r[k], 1, a)[0]
+        v = by_turns(r[k], r[k], 1, 0.15)[1]
+        assert [low[f"$v_{i}^+$"][k, 1] for i in (1, 2, 3)] == pytest.approx(v, abs=1e-10)
+    assert low["Fig. 7"][0] == pytest.approx([0.01, by_turns(0.01, 0.01, 1, 0.15)[1][1]], abs=1e-9)
+
+
+def test_fig_8_drawn():
+    """Part (b) is the package's path; part (a) leaves it where the two runs would meet."""
+    trace = collide(FIG_8, ImpulseCorrelation(0.1))
+    rows = [0, *(k for k, x in enumerate(trace.events, 1) if x.kind != "maximum_compression")]
+    path, impulses = trace.path[rows], trace.path_impulses[rows]
+    met = [tuple(trace.events[k - 1]) for k in rows[1:]].index(("close", 1)) + 1
+    # Each pair, left alone, ends with the relative motion that its contact has paid for.
+    start = rows[met - 1]
+    v = trace.path[start]
+    back = impulses[met - 1, 0] - impulses[met - 2, 0]
+    left = math.hypot(v[0] - v[1], math.sqrt(2 * back * (v[0] - v[1])))
+    right = math.hypot(v[2] - v[3], math.sqrt(4 * contact_work(trace, 2, start)))
+    ends = [v[0] + v[1] - left, v[0] + v[1] + left, v[2] + v[3] - right, v[2] + v[3] + right]
+    for contact in range(3):
+        both, apart = (panel("n_balls", "fig-p8", 3 * row + contact) for row in (1, 0))
+        for ball in (contact, contact + 1):
+            name = f"$v_{ball + 1}$"
+            expected = np.column_stack([impulses[:, contact], path[:, ball]])
+            np.testing.assert_allclose(both[name], expected, **CLOSE)
+            np.testing.assert_allclose(apart[name][:met], expected[:met], **CLOSE)
+            np.testing.assert_allclose(apart[name][met:, 1], ends[ball] / 2, **CLOSE)
+
+
+def test_fig_meeting():
+    left, right = (panel("n_balls", "fig-own-meeting", k) for k in (0, 1))
+    chain = [1] * 4, [1, 0.5, 0, 0], 1
+    middle = after(chain, 0.1)
+    for k in (0, 13, 40):
+        moved = after(chain, 0.1, meeting=left["$v_1$"][k, 0]) - middle
+        assert [left[f"$v_{i}$"][k, 1] for i in (1, 2, 3, 4)] == pytest.approx(moved, abs=1e-12)
+    assert list(right) == ["ABCCAB", "BCACBA"]
+    for name, line in right.items():
+        balls, model = paper_chain(name, excess="saturate")
+        chain = list(balls.masses), list(balls.velocities), list(balls.restitution)
+        forward, backward = list(model.forward), list(model.backward)
+        ends = [
+            after(chain, forward, backward=backward, meeting=x)
+            for x in (0.5, *line[[0, 13, 40], 0])
+        ]
+        moved = [abs(end - ends[0]).max() for end in ends[1:]]
+        assert line[[0, 13, 40], 1] == pytest.approx(moved, abs=1e-12)
+
+
+def test_fig_notation_contact():
+    (line,) = [
+        x.get_xydata()
+        for x in drawn("notation")["fig-own-notation-contact"].axes[0].get_lines()
+        if len(x.get_xdata()) == 3
+    ]
+    np.testing.assert_allclose(line, [(0, 1), (0.5, 0), (0.85, -0.7)], **CLOSE)

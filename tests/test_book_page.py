@@ -1,0 +1,51 @@
+"""Numbers as the pages of the book write them, and listings that say what the file says."""
+
+import sys
+
+import pytest
+from chapters import BOOK
+
+from cradle.textbook import Impact
+
+sys.path.insert(0, str(BOOK))
+from page import below, count, listing, people
+
+sys.path.remove(str(BOOK))
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (2_234_567, "2.2 million"),
+        (36_877, "36\N{NO-BREAK SPACE}877"),
+        (1e-7, "10⁻⁷"),
+        (3.2e-8, "3.2 × 10⁻⁸"),
+        (0.0314, "0.031"),
+        (-5, "−5"),
+        (100.0, "100"),
+        (0, "0"),
+    ],
+)
+def test_numbers_for_people(value, text):
+    assert people(value) == text
+
+
+def test_counts():
+    assert [count(n, "chain") for n in (0, 1, 12, 35)] == [
+        "no chains", "one chain", "twelve chains", "35 chains"
+    ]  # fmt: skip
+    assert count(2, "ball", "pairs of balls") == "two pairs of balls"
+
+
+def test_below():
+    assert below(1e-15) == "< 10⁻¹²"
+    assert below(2e-4) == "2 × 10⁻⁴"
+
+
+def test_a_listing_keeps_every_line_of_code():
+    text = listing(Impact.ratios_in_force, Impact.end).data
+    assert max(map(len, text.splitlines())) < 100
+    code = [line.partition("#")[0].strip() for line in text.splitlines()]
+    for line in ("def end(self, c: int) -> None:", "return ratio, bound"):
+        assert line in code
+    assert '"""R4' in text
