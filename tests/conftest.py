@@ -1,6 +1,8 @@
 """Settings that all tests share."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -18,3 +20,20 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 def root() -> Path:
     """The top of the repository."""
     return Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def html(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+    """Build the book, warnings as errors."""
+    folder = tmp_path_factory.mktemp("book")
+    command = "from jupyter_book.cli.main import main; main()"
+    build = subprocess.run(
+        [sys.executable, "-c", command, "build", root, "--path-output", folder, "-W", "-n",
+         "--keep-going"],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )  # fmt: skip
+    assert build.returncode == 0, build.stdout + build.stderr
+    return folder / "_build" / "html"
