@@ -172,7 +172,10 @@ def test_two_clicks_from_the_landing_page_to_any_item(html: Path, root: Path):
     with (root / "data" / "ledger.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     for row in rows:
-        line = f'<td><a href="{row["cell"]}">{row["item"]}</a></td><td>{row["status"]}</td>'
+        line = (
+            f'<td data-name="item"><a href="{row["cell"]}">{row["item"]}</a></td>'
+            f'<td data-name="verdict">{row["status"]}</td>'
+        )
         assert line in table, row["item"]
         page, _, label = row["cell"].partition("#")
         notebook = root / "book" / page.replace(".html", ".ipynb")

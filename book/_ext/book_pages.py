@@ -21,7 +21,6 @@ from sphinx.application import Sphinx
 from sphinx.config import Config
 from sphinx.util.fileutil import copy_asset_file
 
-
 #: Options of the theme that lead to the project's address.
 ADDRESSED = (
     "launch_buttons",
