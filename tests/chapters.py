@@ -1,5 +1,6 @@
 """Chapters of the book as they are stored."""
 
+from ast import literal_eval
 from pathlib import Path
 
 import nbformat
@@ -21,9 +22,40 @@ class Chapter:
                 if GLUED in output.get("data", ()):
                     key = output.metadata.scrapbook.name.removeprefix(f"{name}-")
                     assert key not in self.glued, f"{name}-{key} is glued twice"
-                    self.glued[key] = output.data[GLUED].strip("'")
+                    text = output.data[GLUED]
+                    self.glued[key] = literal_eval(text) if text[0] in "'\"" else text
 
     def printed(self, cell_id):
         """What a cell prints."""
         outputs = self.cells[cell_id].outputs
         return "".join(output.text for output in outputs if output.output_type == "stream")
+
+
+WORDS = [
+    "no",
+    "one",
+    "two",
+    "three",
+    "four",
+    "five",
+    "six",
+    "seven",
+    "eight",
+    "nine",
+    "ten",
+    "eleven",
+    "twelve",
+]
+RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+
+def number(text):
+    """Read a number as a sentence has it: one, 222 144, 2.2 million, 0.004, 3·10⁻⁷."""
+    if text in WORDS:
+        return WORDS.index(text)
+    plain = text.replace("\u202f", "").removesuffix(" million")
+    factor, _, power = (
+        plain.rpartition("10") if set(plain) & set("⁻⁰¹²³⁴⁵⁶⁷⁸⁹") else (plain, "", "0")
+    )
+    scale = 1e6 if text.endswith(" million") else 10.0 ** int(power.translate(RAISED))
+    return float(factor.removesuffix("·") or 1) * scale

@@ -54,7 +54,7 @@ MISFITS = """() => {
     for (const image of shown) {
       const drawn = parseFloat(box.style.getPropertyValue("--drawn"));
       const share = image.getBoundingClientRect().width / drawn;
-      if (share < 0.7) say("small figure", image, share, 0.7);
+      if (share < 0.6) say("small figure", image, share, 0.6);
     }
   }
   // Columns of tables: none is squeezed to one word a line.
