@@ -7,7 +7,7 @@ from pathlib import Path
 import extremes as x
 import numpy as np
 import pytest
-from chapters import Chapter, number
+from chapters import Chapter, number, points
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide, paper_chain
 from cradle.models.correlation import outcomes
@@ -188,3 +188,106 @@ def test_cells_show_what_they_claim():
     for line, light in zip(lines, (1e-1, 1e-3, 1e-5), strict=True):
         walls = math.ceil(math.pi / math.atan(math.sqrt(light * (2 + light)))) - 1
         assert line.endswith(f"wedge {walls}, solver {walls}")
+
+
+@pytest.fixture(scope="module")
+def figures():
+    return Chapter("extremes").figures
+
+
+def test_fig_extremes_growth_as_drawn(figures):
+    rows = stored("growth")
+    for ax, spread in zip(figures["fig-extremes-growth"].axes, (0.0, 0.1), strict=True):
+        here = [r for r in rows if float(r["spread"]) == spread]
+        keys = sorted({(float(r["restitution"]), float(r["size"])) for r in here})
+        for line, key in zip(points(ax), keys, strict=True):
+            some = [r for r in here if (float(r["restitution"]), float(r["size"])) == key]
+            expected = [(float(r["balls"]), max(float(r["largest"]), 1e-15)) for r in some]
+            np.testing.assert_allclose(line, expected, rtol=1e-12)
+
+
+def test_fig_extremes_map_as_drawn(figures):
+    """Each cell of the right column is the worst excess of its rows; left: the digits."""
+    axes = figures["fig-extremes-map"].axes[:8]
+    rows = stored("map")
+    kinds = list(dict.fromkeys(row["ratio"] for row in rows))
+    powers = sorted({float(row["power"]) for row in rows})
+    for line, shape in enumerate(("middle", "striker", "last", "taper")):
+        digits, excess = (
+            np.ma.filled(ax.collections[0].get_array().astype(float), np.nan).reshape(
+                len(kinds), len(powers)
+            )
+            for ax in axes[2 * line : 2 * line + 2]
+        )
+        for i, kind in enumerate(kinds):
+            for j, power in enumerate(powers):
+                cell = [
+                    r for r in rows
+                    if (r["shape"], r["ratio"], float(r["power"])) == (shape, kind, power)
+                    and int(r["compared"])
+                ]  # fmt: skip
+                own = [float(r["own"]) for r in cell if float(r["condition"]) > 0]
+                if own:
+                    assert excess[i, j] == pytest.approx(max(*own, 0.1, 0.1))
+                else:
+                    assert math.isnan(excess[i, j])
+                errors = [float(r["error"]) for r in cell if float(r["condition"]) <= 1e12]
+                if errors:
+                    right = -math.log10(max(errors) * x.EPS + x.EPS / 2)
+                    assert digits[i, j] == pytest.approx(min(max(right, 0), 16))
+                else:
+                    assert math.isnan(digits[i, j])
+
+
+def test_fig_extremes_edges_as_drawn(figures):
+    (ax,) = figures["fig-extremes-edges"].axes
+    near = [row for row in stored("edges") if math.isfinite(float(row["distance"]))]
+    names = [label.get_text() for label in ax.get_yticklabels()]
+    harmless, jumps = (line for line in points(ax) if len(line) > 2)
+    for drawn, some in (
+        (harmless, [r for r in near if float(r["jump"]) <= 1e-8]),
+        (jumps, [r for r in near if float(r["jump"]) > 1e-8]),
+    ):
+        expected = sorted((float(r["distance"]), names.index(r["sequence"])) for r in some)
+        np.testing.assert_allclose(sorted(map(tuple, drawn)), expected, rtol=1e-12)
+
+
+def test_fig_extremes_jump_as_drawn(figures):
+    """Points of both branches by the reference solver; the step between them is the stored jump."""
+    (ax,) = figures["fig-extremes-jump"].axes
+    name = ax.get_title()
+    rows = [r for r in stored("edges") if r["sequence"] == name and float(r["jump"]) > 1e-8]
+    edge = min(rows, key=lambda row: float(row["distance"]))
+    first, second = (line for line in points(ax) if len(line) > 2)
+    chain, model = paper_chain(name, excess="saturate")
+    own = chain.masses, chain.velocities, chain.restitution
+    problem = x.case(*own, model.forward, model.backward)
+    which, k = edge["input"], int(edge["index"])
+    ball = int(ax.get_ylabel().split()[3].rstrip(",")) - 1
+    for line in (first[0], first[50], first[-1], second[0], second[40], second[-1]):
+        value = getattr(problem, which)[k] * line[0] / 100
+        solved = x.moved(problem, which, k, value).exact().velocities
+        assert line[1] == pytest.approx(float(solved[ball]), abs=1e-9)
+    step = abs(second[0, 1] - first[-1, 1])
+    largest = max(collide(chain, model).velocities)
+    assert step / largest == pytest.approx(float(edge["jump"]), rel=0.1)
+
+
+def test_fig_extremes_count_and_edge_as_drawn(figures):
+    (ax,) = figures["fig-extremes-count"].axes
+    rows = [r for r in stored("elastic") if float(r["ratio"]) == 0]
+    wedge, counted, _ = points(ax)
+    for row, at, one in zip(rows, wedge, counted, strict=True):
+        light = 10 ** -float(row["power"])
+        walls = math.ceil(math.pi / math.atan(math.sqrt(light * (2 + light)))) - 1
+        assert at == pytest.approx((light, walls), abs=1.001)
+        assert one == pytest.approx((light, int(row["impacts"])))
+    (ax,) = figures["fig-extremes-edge"].axes
+    theory, *found = points(ax)
+    for e, border in theory[::30]:
+        assert border == pytest.approx(x.infinite_below(e), rel=1e-9)
+    ratios = sorted({float(r["ratio"]) for r in stored("limits")})
+    for line, ratio in zip(found, ratios, strict=True):
+        some = [r for r in stored("limits") if float(r["ratio"]) == ratio]
+        expected = [(float(r["restitution"]), float(r["edge"])) for r in some]
+        np.testing.assert_allclose(line, expected, rtol=1e-12)
