@@ -205,3 +205,11 @@ def test_one_changed_digit_fails(tmp_path: Path, root: Path, stored: str, outcom
     )  # fmt: skip
     assert run.returncode == outcome, run.stdout
     assert ("1 passed" if outcome == 0 else "1 failed") in run.stdout
+
+
+@pytest.mark.parametrize("chapter", ["experiments", "trade", "extremes", "beyond"])
+def test_no_number_is_typed_into_a_description(chapter: str):
+    """What nobody computes, nobody corrects: a description says higher, lower, near, far."""
+    for cell in nbformat.read(BOOK / f"{chapter}.ipynb", as_version=4).cells:
+        alt = cell.metadata.get("mystnb", {}).get("image", {}).get("alt", "")
+        assert not decimals(alt), cell.id
