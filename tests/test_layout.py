@@ -132,7 +132,8 @@ def test_a_misfit_is_seen(browser, body: str, kind: str):
     """The list above is not empty because it cannot find anything."""
     tab = browser.new_page(viewport={"width": 390, "height": 900})
     tab.set_content(
-        f"<!DOCTYPE html><h1>page</h1><main class='bd-content' style='line-height: 20px'>{body}</main>"
+        "<!DOCTYPE html><h1>page</h1>"
+        f"<main class='bd-content' style='line-height: 20px'>{body}</main>"
     )
     assert kind in [misfit[0] for misfit in tab.evaluate(MISFITS)]
     tab.close()
@@ -157,6 +158,8 @@ def test_colours_of_dark_mode_can_be_seen():
     assert contrast(book_figures.dark("black"), ground) > LETTERS
     for colour in PALETTE:
         assert contrast(book_figures.dark(colour), ground) > LINES, colour
+    # Letters on a coloured ground stay as they are.
+    assert all(book_figures.dark(kept) == kept for kept in ("#010101", "#fefefe"))
     # Greys and tints change sides and keep their order.
     greys = ["#000000", "#666666", "#b0b0b0", "#e8eef4", "#ffffff"]
     light = [luminance(book_figures.dark(grey)) for grey in greys]

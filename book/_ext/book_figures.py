@@ -19,6 +19,8 @@ from sphinx.application import Sphinx
 
 #: Ground and text of the theme's dark mode.
 GROUND, TEXT = 0x12 / 255, 0xE0 / 255
+#: Black and white that stay: letters and lines on a coloured ground.
+KEPT = {"#010101", "#fefefe"}
 #: From this difference of its channels on, a colour is one that tells lines apart.
 COLOURFUL = 0.3
 
@@ -40,6 +42,8 @@ def dark(colour: str) -> str:
     digits = NAMED.get(colour, colour)[1:]
     if len(digits) == 3:
         digits = "".join(2 * digit for digit in digits)
+    if f"#{digits}" in KEPT:
+        return f"#{digits}"
     channels = [int(digits[k : k + 2], 16) / 255 for k in (0, 2, 4)]
     if max(channels) - min(channels) >= COLOURFUL:
         return f"#{digits}"
