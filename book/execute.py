@@ -8,17 +8,21 @@ Usage::
 
 import os
 import sys
+import tomllib
 from pathlib import Path
 
 import nbformat
+import yaml
 from nbclient import NotebookClient
 
 BOOK = Path(__file__).parent
+COLAB = "install-in-colab"
 
 
 def execute(path: Path) -> None:
     """Run the notebook at `path` in its own folder, as the tests do, and write it back."""
     notebook = nbformat.read(path, as_version=4)
+    put_colab_cell(notebook, colab_source())
     # record_timing would store when each cell ran: a difference at every run.
     client = NotebookClient(
         notebook,
@@ -32,6 +36,33 @@ def execute(path: Path) -> None:
     strip(notebook)
     nbformat.validate(notebook)
     nbformat.write(notebook, path)
+
+
+def colab_source() -> str | None:
+    """Return the cell that installs the package in Colab, once the project has an address."""
+    with (BOOK.parent / "_config.yml").open(encoding="utf-8") as file:
+        if not yaml.safe_load(file)["sphinx"]["config"]["book_published"]:
+            return None
+    with (BOOK.parent / "pyproject.toml").open("rb") as file:
+        address = tomllib.load(file)["project"]["urls"]["Repository"]
+    return (
+        'if "google.colab" in str(get_ipython()):\n'
+        f'    %pip install -q "cradle-companion[book] @ git+{address}"'
+    )
+
+
+def put_colab_cell(
+    notebook: nbformat.NotebookNode, source: str | None
+) -> None:
+    """Begin the notebook's code with this cell, which the built book does not show."""
+    notebook.cells = [cell for cell in notebook.cells if cell.id != COLAB]
+    if source is not None:
+        notebook.cells.insert(
+            1,
+            nbformat.v4.new_code_cell(
+                source, id=COLAB, metadata={"tags": ["remove-cell"]}
+            ),
+        )
 
 
 def strip(notebook: nbformat.NotebookNode) -> None:

@@ -15,6 +15,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+DEFAULT = ROOT / "_build" / "html" / "cradle-companion.pdf"
 NAMES = (
     "chromium",
     "chromium-browser",
@@ -56,12 +57,20 @@ def main(target: Path) -> None:
              f"--print-to-pdf={target.resolve()}", page.as_uri()],
             check=True,
         )  # fmt: skip
+    show_link(target)
     print(f"{target}: {target.stat().st_size / 1e6:.1f} MB")
 
 
+def show_link(target: Path) -> None:
+    """Show the link to the file in the book that it was put into, if there is one."""
+    page = target.parent / "book" / "cite.html"
+    if page.is_file() and target.name == DEFAULT.name:
+        text = page.read_text(encoding="utf-8")
+        page.write_text(
+            text.replace('<p id="pdf" hidden', '<p id="pdf"'),
+            encoding="utf-8",
+        )
+
+
 if __name__ == "__main__":
-    main(
-        Path(sys.argv[1])
-        if len(sys.argv) > 1
-        else ROOT / "_build/html/cradle-companion.pdf"
-    )
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT)

@@ -27,6 +27,7 @@ class Chapter:
     """The cells of a chapter by id, and the values that its text takes from them."""
 
     def __init__(self, name):
+        self.name = name
         notebook = nbformat.read(BOOK / f"{name}.ipynb", as_version=4)
         self.cells = {cell.id: cell for cell in notebook.cells}
         #: By name, without that of the chapter before it.
@@ -36,7 +37,13 @@ class Chapter:
                 if GLUED in output.get("data", ()):
                     key = output.metadata.scrapbook.name.removeprefix(f"{name}-")
                     assert key not in self.glued, f"{name}-{key} is glued twice"
-                    self.glued[key] = output.data[GLUED].strip("'")
+                    text = output.data[GLUED]
+                    self.glued[key] = ast.literal_eval(text) if text[0] in "'\"" else text
+
+    @property
+    def figures(self):
+        """Run the cells, and return what they draw: figures by name."""
+        return drawn(self.name)
 
     def printed(self, cell_id):
         """What a cell prints."""
@@ -109,8 +116,8 @@ def drawn(chapter: str) -> dict[str, Figure]:
     figures, names = {}, {}
 
     def keep():
-        settings = names["__cell__"].metadata["mystnb"]
-        figures[settings["figure"]["name"]] = plt.gcf()
+        settings = names["__cell__"].metadata.get("mystnb", {})
+        figures[settings.get("figure", {}).get("name")] = plt.gcf()
         plt.figure(plt.gcf().number).canvas.draw()
         plt.close(plt.gcf())
 
@@ -142,3 +149,39 @@ def solved(chain, ratio, **options):
 def after(chain, ratio, **options):
     """Velocities after the impact, by the textbook solver."""
     return solved(chain, ratio, **options)[0][-1]
+
+
+WORDS = [
+    "no",
+    "one",
+    "two",
+    "three",
+    "four",
+    "five",
+    "six",
+    "seven",
+    "eight",
+    "nine",
+    "ten",
+    "eleven",
+    "twelve",
+]
+RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+
+def number(text):
+    """Read a number as a sentence has it: one, 222 144, 2.2 million, 0.004, 3·10⁻⁷."""
+    if text in WORDS:
+        return WORDS.index(text)
+    plain = text.replace("\u202f", "").removesuffix(" million")
+    factor, _, power = (
+        plain.rpartition("10") if set(plain) & set("⁻⁰¹²³⁴⁵⁶⁷⁸⁹") else (plain, "", "0")
+    )
+    scale = 1e6 if text.endswith(" million") else 10.0 ** int(power.translate(RAISED))
+    return float(factor.removesuffix("·") or 1) * scale
+
+
+def points(ax, size=None):
+    """Points of the lines of some axes, in rows of x and y; of lines of so many points alone."""
+    lines = [np.column_stack(line.get_data()) for line in ax.get_lines()]
+    return [np.asarray(xy, float) for xy in lines if size is None or len(xy) == size]

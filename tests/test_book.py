@@ -9,6 +9,7 @@ from urllib.parse import unquote, urlsplit
 
 import nbformat
 import pytest
+import yaml
 
 # Attributes whose address a browser loads by itself. <a href> and <form action> wait for a click.
 LOADS = {
@@ -171,7 +172,10 @@ def test_two_clicks_from_the_landing_page_to_any_item(html: Path, root: Path):
     with (root / "data" / "ledger.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     for row in rows:
-        line = f'<td><a href="{row["cell"]}">{row["item"]}</a></td><td>{row["status"]}</td>'
+        line = (
+            f'<td data-name="item"><a href="{row["cell"]}">{row["item"]}</a></td>'
+            f'<td data-name="verdict">{row["status"]}</td>'
+        )
         assert line in table, row["item"]
         page, _, label = row["cell"].partition("#")
         notebook = root / "book" / page.replace(".html", ".ipynb")
@@ -227,6 +231,55 @@ def test_a_request_is_seen(text: str):
 def test_a_request_of_a_script_is_seen(text: str):
     assert SCRIPT_LOADS.search(text)
     assert not SCRIPT_LOADS.search("// see https://example.org, fetch(address)")
+
+
+def published(root: Path) -> bool:
+    with (root / "_config.yml").open(encoding="utf-8") as file:
+        return yaml.safe_load(file)["sphinx"]["config"]["book_published"]
+
+
+def test_no_button_leads_to_the_placeholder(html: Path, root: Path):
+    """Launch, repository and issue buttons are there if, and only if, the book is published."""
+    for path in (html / "book").glob("*.html"):
+        header = path.read_text(encoding="utf-8").partition("bd-header-article")[2]
+        header = header.partition("<article")[0]
+        assert header, path
+        buttons = [
+            address in header for address in ("colab.research", "mybinder.org", "github.com")
+        ]
+        if not published(root):
+            assert not any(buttons), path
+        elif path.with_suffix(".ipynb").name in {p.name for p in (root / "book").glob("*.ipynb")}:
+            assert all(buttons), path
+
+
+def test_notebooks_install_the_package_in_colab_once_published(root: Path, monkeypatch):
+    monkeypatch.syspath_prepend(root / "book")
+    import execute
+
+    for path in (root / "book").glob("*.ipynb"):
+        cells = nbformat.read(path, as_version=4).cells
+        assert (execute.COLAB in [cell.id for cell in cells]) == published(root), path
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_markdown_cell("# title")])
+    execute.put_colab_cell(notebook, "%pip install x")
+    execute.put_colab_cell(notebook, "%pip install y")
+    assert [cell.source for cell in notebook.cells] == ["# title", "%pip install y"]
+    execute.put_colab_cell(notebook, None)
+    assert len(notebook.cells) == 1
+
+
+def test_the_pdf_is_linked_once_it_is_there(html: Path, root: Path, tmp_path: Path, monkeypatch):
+    monkeypatch.syspath_prepend(root / "book")
+    import make_pdf
+
+    page = tmp_path / "book" / "cite.html"
+    page.parent.mkdir()
+    page.write_bytes((html / "book" / "cite.html").read_bytes())
+    hidden = re.compile(r'<p id="pdf" hidden[^>]*>[^<]*<a href="../cradle-companion.pdf">')
+    assert hidden.search(page.read_text(encoding="utf-8"))
+    make_pdf.show_link(tmp_path / "cradle-companion.pdf")
+    assert not hidden.search(page.read_text(encoding="utf-8"))
+    assert 'href="../cradle-companion.pdf"' in page.read_text(encoding="utf-8")
 
 
 def test_one_address_of_the_project(root: Path):

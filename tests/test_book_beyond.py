@@ -15,11 +15,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from chains import HERTZ, uniform
-from chapters import Chapter
+from chapters import Chapter, number, points
 from reference import solve
 
-from cradle import Chain, SpringChain, collide, kernel, outcomes, post_impact_velocities, runtime
+from cradle import Chain, SpringChain, collide, outcomes, post_impact_velocities, runtime
 from cradle.closed_form import back_impact_line, one_collision_each
+from cradle.kernel.state import LIMITS
 
 ROOT = Path(__file__).parents[1]
 CHAPTER = Chapter("beyond")
@@ -204,7 +205,7 @@ def test_fig_beyond_map():
     m1, m3 = np.broadcast_arrays(1 / axis[:, None], 1 / axis)
     masses = np.stack([m1, np.ones_like(m1), m3], axis=-1)
     found = outcomes(masses, [1, 0, 0], 0.5, 0.15)
-    assert str(found.collapsed.size) == CHAPTER.glued["map-live"]
+    assert found.collapsed.size == number(CHAPTER.glued["map-live"])
     above = axis[:, None] > back_impact_line(axis, 0.5, 0.5, 0.15)[None, :]
     np.testing.assert_array_equal((found.collisions == 1).all(axis=-1), above)
     once = one_collision_each(masses, np.array([1.0, 0, 0]), np.full(2, 0.5), 0.15)
@@ -215,7 +216,15 @@ def test_fig_beyond_map():
 
 
 def test_fig_beyond_front():
-    """Left: the closed form for any length; right: a leader that slows down with every ball."""
+    """Above: the closed form for any length; below: a leader that slows down with every ball."""
+    upper, lower = CHAPTER.figures["fig-beyond-front"].axes
+    for line, ratio in zip(points(upper), (0.0, 0.15, 0.3, 0.45), strict=True):
+        expected = np.zeros(12)
+        expected[:2] = ends(ratio)[[2, 1]]
+        np.testing.assert_allclose(line[:, 1], expected, rtol=0, atol=1e-12)
+    for line, n in zip(points(lower), (10, 20, 40, 80), strict=True):
+        shown = outcomes(*struck(n), 0.99, 0.3).velocities[:0:-1][:12]
+        np.testing.assert_array_equal(line[:, 1], shown)
     for ratio in (0.0, 0.15, 0.3, 0.45):
         after = outcomes(*struck(1000), 1.0, ratio).velocities
         np.testing.assert_allclose(after[[0, -2, -1]], ends(ratio), rtol=0, atol=1e-13)
@@ -228,6 +237,10 @@ def test_fig_beyond_front():
 
 def test_fig_beyond_time():
     """Time in proportion to the length, from a thousand balls on."""
+    (ax,) = CHAPTER.figures["fig-beyond-time"].axes
+    for line, ratio in zip(points(ax), (0.0, 0.1, 0.3, 0.5)):
+        rows = find("elastic", ratio=ratio)
+        np.testing.assert_array_equal(line, column(rows, "balls", "cpu_seconds"))
     for ratio in long_chains.ELASTIC_RATIOS:
         rows = [row for row in find("elastic", ratio=ratio) if row["balls"] >= 1000]
         for name in ("cpu_seconds", "time_ratio"):
@@ -235,12 +248,20 @@ def test_fig_beyond_time():
             assert 0.9 < slope < 1.1
     longest = find("elastic", balls=100_000.0)
     assert column(longest, "cpu_seconds").max() < 1.0  # a long chain in a second
-    assert CHAPTER.glued["time-most"] == f"{column(longest, 'time_ratio').max():.0f}"
-    assert kernel.CUT == 2.0**-120  # as the text has it
+    slowest = column(longest, "cpu_seconds").max()
+    assert CHAPTER.glued["seconds-most"] == f"{float(f'{slowest:.1e}'):g} s"
+    assert LIMITS.cut == 2.0**-120  # as the text has it
 
 
 def test_fig_beyond_stability():
     """The count of collisions, the point where the order becomes chance, and the front."""
+    upper, lower = CHAPTER.figures["fig-beyond-stability"].axes
+    for k, ratio in enumerate((0.0, 0.1, 0.3, 0.45)):
+        rows = find("losses", restitution=0.99, ratio=ratio, collapsed=0.0)
+        balls = column(rows, "balls")
+        pairs = balls * (balls - 1) / 2
+        np.testing.assert_allclose(points(upper)[k][:, 1], column(rows, "collisions") / pairs)
+        np.testing.assert_array_equal(points(lower)[k], column(rows, "balls", "kept"))
     for e in (0.99, 0.999):
         for row in find("losses", restitution=e, ratio=0.0):
             if row["balls"] <= 240:
@@ -276,6 +297,16 @@ def test_part_of_its_speed_that_a_pulse_keeps():
 
 def test_fig_beyond_springs():
     """Ratios by the leader and by the striker; tails and fronts."""
+    front, tail = CHAPTER.figures["fig-beyond-springs"].axes
+    best = float(CHAPTER.glued["ratio-leader"])
+    expected = [
+        collide(Chain(*struck(40), 1), SpringChain(1.0)).velocities,
+        collide(Chain(*struck(40), 1), SpringChain(1.0, 1.0)).velocities,
+        np.concatenate([ends(best)[:1], np.zeros(37), ends(best)[1:]]),
+    ]
+    for k, (v, off) in enumerate(zip(expected, (0, 0, 2e-4), strict=True)):
+        np.testing.assert_allclose(points(front)[k][:, 1], v[:-11:-1], rtol=0, atol=off)
+        np.testing.assert_allclose(points(tail)[k][:, 1], v[:10], rtol=0, atol=off)
     rows = find("springs", exponent=1.5)
     last, first = column(rows, "last"), column(rows, "first")
     tried = np.linspace(0, 0.5, 500_001)

@@ -9,7 +9,7 @@ from functools import cache
 import mpmath
 import numpy as np
 import pytest
-from chapters import Chapter
+from chapters import Chapter, points
 from reference import solve
 
 from cradle import (
@@ -252,3 +252,74 @@ def test_landing_five_equal_balls():
     glued = Chapter("intro").glued
     for name, ball in (("first", 0), ("fourth", 3), ("last", 4)):
         assert glued[name] == f"{abs(float(five[ball])):.3f}"
+
+
+FIGURES = Chapter("experiments")
+
+
+@pytest.mark.parametrize(
+    ("name", "chains"),
+    [
+        ("fig-p10", ["BABC", "BABB", "BABA", "BBCB"]),
+        ("fig-p11", ["CDAB", "CDADB"]),
+        ("fig-p12", ["ABCCA", "ABACA", "ABCCAB", "BCACBA"]),
+    ],
+)
+def test_figs_10_to_12_as_drawn(name, chains):
+    """Each mark at the velocity of its ball in the second solver, each panel with its letters."""
+    axes = FIGURES.figures[name].axes
+    for ax, sequence in zip(axes, chains, strict=True):
+        balls = np.arange(1, len(sequence) + 1)
+        velocities = [float(v) for v in predicted(sequence).velocities]
+        expected = np.column_stack([balls, velocities])
+        drawn = points(ax, len(sequence))
+        assert drawn
+        for line in drawn:
+            np.testing.assert_allclose(line, expected, rtol=0, atol=1e-12)
+        letters = [label.get_text().split()[-1] for label in ax.get_xticklabels()]
+        assert "".join(letters) == sequence == ax.get_title()
+
+
+def test_fig_experiments_structure_as_drawn():
+    table, pairs, masses = ratio_table(), restitution_table(), ball_masses()
+    upper, lower = FIGURES.figures["fig-experiments-structure"].axes
+    first, second = [], []
+    for triplet, ratio in zip(table.triplet, table.ratio):
+        bound = masses[triplet[2]] / (masses[triplet[1]] + masses[triplet[2]])
+        first.append((bound, ratio))
+        second.append((pairs.loc[triplet[0], triplet[1]], ratio / bound))
+    for ax, expected in ((upper, first), (lower, second)):
+        drawn = sorted(tuple(xy) for line in points(ax, 16) for xy in line)
+        np.testing.assert_allclose(drawn, sorted(expected), rtol=1e-12)
+
+
+def test_fig_experiments_swap_as_drawn():
+    table = ratio_table().set_index("triplet").ratio
+    (ax,) = FIGURES.figures["fig-experiments-swap"].axes
+    drawn = {tuple(np.round(line[0], 9)) for line in points(ax, 1)}
+    printed = {(table[x + "C" + z], table[x + "B" + z]) for x in "ABCD" for z in "ABCD"}
+    put_back = {(table[t[0] + "C" + t[2]], table[t[::-1]]) for t in ("DBB", "BBD", "DBC", "CBD")}
+    assert drawn == printed | put_back
+
+
+def test_fig_experiments_identify_as_drawn():
+    """Bars of four triplets: their ends agree within the error, and a step beyond they do not."""
+    table = ratio_table().set_index("triplet")
+    axes = FIGURES.figures["fig-experiments-identify"].axes
+    for triplet in ("AAA", "BBD", "DAA", "CDC"):
+        ax = axes["ABCD".index(triplet[1])]
+        row = [x + triplet[1] + z for x in "ABCD" for z in "ABCD"].index(triplet)
+        bars = [
+            (segment[:, 0].min(), segment[:, 0].max())
+            for bar in ax.collections
+            for segment in bar.get_segments()
+            if segment[0, 1] == row
+        ]
+        assert bars[0] == pytest.approx((0, table.bound[triplet]))
+        step = table.bound[triplet] / 2000
+        for low, high in bars[1:]:
+            for inside, outside in ((low, low - 1.01 * step), (high, high + 1.01 * step)):
+                assert distance(triplet, inside) <= 0.01 + 1e-9
+                if 0 <= outside <= table.bound[triplet]:
+                    assert distance(triplet, outside) > 0.01
+        assert len(bars) == 3 if triplet == "DAA" else len(bars) == 2

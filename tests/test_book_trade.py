@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chains import ELASTIC, HERTZ, LINEAR
-from chapters import Chapter
+from chapters import Chapter, points
 from reference import solve
 
 from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, paper_chain
@@ -273,6 +273,92 @@ def test_engines_energy_from_nowhere():
     assert max(r["energy_change"] for r in rows if r["model"] == "Rapier") < 1e-5
 
 
+def marks(ax):
+    """Points drawn one at a time."""
+    return np.array([line[0] for line in points(ax, 1)])
+
+
+def test_fig_trade_engines_drawn():
+    """The striker's velocity of every row of the table, in the line of its engine."""
+    axes = CHAPTER.figures["fig-trade-engines"].axes
+    for ax, scene in zip(axes, (*ELASTIC, "ABCCA"), strict=True):
+        expected = sorted(
+            (row["velocities"][0], ENGINES.index(row["model"]) + 0.22 * at)
+            for row in find("engine", chain=scene)
+            for at, placement in zip((-1, 0, 1), ("apart", "touching", "pressed"))
+            if row["setting"].endswith(placement)
+        )
+        np.testing.assert_allclose(sorted(map(tuple, marks(ax))), expected, rtol=0, atol=1e-12)
+        filled = [line for line in ax.get_lines() if line.get_markerfacecolor() != "none"]
+        refined = find("engine", "refined", chain=scene)
+        assert sum(len(line.get_xdata()) == 1 for line in filled) == len(refined)
+        verticals = {line[0, 0] for line in points(ax, 2)}
+        for answer in (sequential(scene), fused(scene)):
+            assert min(abs(x - answer[0]) for x in verticals) < 1e-12
+        if scene in ELASTIC:
+            assert min(abs(x - HERTZ[scene][0]) for x in verticals) < 1e-8
+
+
+def test_fig_trade_cost_drawn():
+    (ax,) = CHAPTER.figures["fig-trade-cost"].axes
+    chosen = [
+        find("march", chain="three equal"),
+        find("penalty", "Verlet", model="penalty, Hertz"),
+        find("springs", "DOP853", chain="three equal", model="SpringChain, Hertz"),
+        find("energy", "step", chain="three equal"),
+        find("energy", "rtol", chain="three equal"),
+    ]
+    drawn = [line for line in points(ax) if len(line) > 1]
+    for line, found in zip(drawn, chosen, strict=True):
+        expected = sorted((row["time_ratio"], row["numerical_error"]) for row in found)
+        # The unit of time: within the scatter of its own measurements.
+        unit = line[:, 0].min() / expected[0][0]
+        assert 1e6 * unit == pytest.approx(
+            np.median([r["microseconds"] / r["time_ratio"] for r in table() if r["time_ratio"]])
+        )
+        line = sorted(map(tuple, line / [unit, 1]))
+        np.testing.assert_allclose(line, expected, rtol=1e-12)
+    stars = sorted(x for x, _ in marks(ax))
+    settings = ("compiled, batch", "compiled, one call with", "plain, one call with")
+    ratios = [find("event", text, chain="three equal")[0]["time_ratio"] for text in settings]
+    np.testing.assert_allclose(np.array(stars) / stars[0], np.array(ratios) / ratios[0])
+
+
+def test_fig_trade_stiffness_drawn():
+    for ax, column in zip(
+        CHAPTER.figures["fig-trade-stiffness"].axes, ("numerical_error", "energy_change")
+    ):
+        drawn = [sorted(map(tuple, line)) for line in points(ax)]
+        for scheme in ("semi-implicit Euler", "velocity Verlet"):
+            for group, model, factor in (
+                ("penalty", "penalty, linear", np.pi),
+                ("stiffness", None, 1),
+            ):
+                found = find(group, scheme, **({"model": model} if model else {}))
+                expected = sorted((factor * r["parameter"], abs(r[column])) for r in found)
+                assert any(
+                    len(line) == len(expected) and np.allclose(line, expected, rtol=1e-12, atol=0)
+                    for line in drawn
+                )
+
+
+def test_fig_trade_curve_drawn():
+    """Every mark: angle by the law of cosines, energy from the table's velocities."""
+    for ax, scene in zip(CHAPTER.figures["fig-trade-curve"].axes, ("three equal", "light middle")):
+        m = np.array(ELASTIC[scene], float)
+        answers = [row["velocities"] for row in find("engine", chain=scene)]
+        answers += [sequential(scene), fused(scene), HERTZ[scene], LINEAR.get(scene)]
+        drawn = marks(ax)
+        assert len(drawn) == len(answers) + 1  # and the measured ratio
+        for v in (np.array(a) for a in answers if a is not None):
+            left = m @ v**2 / m[0]
+            y = np.sqrt(m) * (v - m @ v / m.sum())
+            meeting = np.sqrt(m) * np.array([-m[2], -m[2], m[0] + m[1]])
+            cosine = y @ meeting / np.linalg.norm(y) / np.linalg.norm(meeting)
+            at = np.degrees(np.arccos(min(cosine, 1.0)))
+            assert (abs(abs(drawn[:, 0]) - at) + abs(drawn[:, 1] - left)).min() < 1e-3
+
+
 def test_fig_trade_models():
     def distance(scene, model):
         m = ELASTIC[scene]
@@ -281,6 +367,18 @@ def test_fig_trade_models():
         ).max()
 
     measured, fitted = ImpulseCorrelation(0.167), ImpulseCorrelation(0.132503287)
+    (ax,) = CHAPTER.figures["fig-trade-models"].axes
+    for line, scene in zip(points(ax), ELASTIC, strict=True):
+        expected = [
+            0.0,
+            distance(scene, fitted),
+            distance(scene, measured),
+            distance(scene, SpringChain(1.0, 1)),
+            np.abs(sequential(scene) - HERTZ[scene]).max(),
+            np.abs(fused(scene) - HERTZ[scene]).max(),  # the limit of the convex problem
+            np.abs(fused(scene) - HERTZ[scene]).max(),
+        ]
+        np.testing.assert_allclose(line[:, 0], expected, rtol=0, atol=1e-6)
     for scene in ELASTIC:
         assert distance(scene, EnergyDistribution(1.0)) < 1e-8
         assert 0.5 < np.abs(fused(scene) - HERTZ[scene]).max() < 0.7
@@ -374,7 +472,24 @@ def test_fig_trade_map():
         trace = collide(Chain([1] * 3, [1, 0, 0], 1), SpringChain([1.0, gamma], exponent))
         rigid = [float(v) for v in solve([1, 1, 1], [1, 0, 0], [1, 1], 0.167).velocities]
         np.testing.assert_allclose(trace.velocities, rigid, rtol=0, atol=3e-3)
+    upper, lower = CHAPTER.figures["fig-trade-map"].axes[:2]
+    curves = [line for line in points(upper) if len(line) > 5]
+    for exponent in (1.0, 1.5):
+        expected = sorted(
+            (r["k2_over_k1"], r["ratio"])
+            for r in rows
+            if r["exponent"] == exponent and r["m2_over_m1"] == r["m3_over_m2"] == 1
+        )
+        assert any(
+            len(line) == len(expected) and np.allclose(line, expected, rtol=1e-12)
+            for line in curves
+        )
+    shown = [text.get_text() for text in lower.texts]
+    image = np.asarray(lower.images[0].get_array())
+    assert shown == [f"{value:.3f}" for value in image.ravel()]
+    assert image[2, 2] == pytest.approx(at(1.5, 1.0), abs=1e-12)
     ratios = [r["ratio"] for r in rows if r["exponent"] == 1.5 and r["k2_over_k1"] == 1]
+    assert sorted(image.ravel()) == sorted(ratios)
     assert len(ratios) == 25
     assert CHAPTER.glued["map-least"] == f"{min(ratios):.3f}"
     assert CHAPTER.glued["map-most"] == f"{max(ratios):.3f}"

@@ -57,6 +57,87 @@ def covers(name: str, item: str) -> bool:
     return numbers[0] <= number <= numbers[-1] if "to" in words else number in numbers
 
 
+def loosest(path: Path, name: str) -> str:
+    """Return the loosest tolerance that a test allows, itself or in a function of its file.
+
+    A tolerance that is no number is given as it is written, one without any as "exact".
+    """
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    local = {node.name: node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    named = {
+        node.targets[0].id: node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+    }
+    numbers, words, seen = [0.0], [], {name}
+    waiting = [local[name]]
+    while waiting:
+        for node in ast.walk(waiting.pop()):
+            allowed = []
+            if isinstance(node, ast.Call):
+                called = getattr(node.func, "id", getattr(node.func, "attr", ""))
+                if called in local and called not in seen:
+                    seen.add(called)
+                    waiting.append(local[called])
+                given = {word.arg: word.value for word in node.keywords}
+                if isinstance(shared := named.get(getattr(given.get(None), "id", "")), ast.Dict):
+                    given |= {key.value: value for key, value in zip(shared.keys, shared.values)}
+                names = {"atol", "rtol", "abs", "rel"} & set(given)
+                allowed = [given[word] for word in names]
+                if called == "assert_allclose" and "rtol" not in names:
+                    numbers.append(1e-7)  # NumPy's own
+            elif isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.Lt | ast.LtE):
+                # Numbers from .1 on are bounds of a quantity, not of an error.
+                limit = node.comparators[-1]
+                small = isinstance(limit, ast.Constant) and isinstance(limit.value, float)
+                allowed = [limit] if small and limit.value < 0.1 else []
+            for value in allowed:
+                if isinstance(value, ast.Constant):
+                    numbers.append(float(value.value))
+                else:
+                    words.append(ast.unparse(value))
+    parts = [f"{max(numbers):g}"] if max(numbers) else []
+    return ", ".join([*parts, *sorted(set(words))]) or "exact"
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row["item"])
+def test_tolerance_is_that_of_the_test(row):
+    """`python tests/test_ledger.py` writes the column anew."""
+    file, _, name = row["test"].partition("::")
+    assert row["tolerance"] == loosest(ROOT / file, name)
+
+
+def test_a_loose_tolerance_is_seen(tmp_path: Path):
+    test = tmp_path / "test_x.py"
+    test.write_text(
+        "CLOSE = {'rtol': 1e-12, 'atol': 1e-13}\n"
+        "def helper(): assert abs(x) < 1e-9\n"
+        "def test_one(): assert a == approx(b, rel=1e-15)\n"
+        "def test_two():\n  assert_allclose(a, b, **CLOSE)\n  helper()\n"
+        "def test_three(): assert_allclose(a, b, atol=1e-14)\n"
+        "def test_four(): assert a == b\n"
+        "def test_five(): assert a == approx(b, abs=3 / gamma)\n",
+        encoding="utf-8",
+    )
+    found = [loosest(test, f"test_{n}") for n in ("one", "two", "three", "four", "five")]
+    assert found == ["1e-15", "1e-09", "1e-07", "exact", "3 / gamma"]
+
+
+def test_numbers_of_differences_are_computed():
+    """No digit of the column is typed but those that number an equation or a place."""
+    shown = "".join(
+        output.get("data", {}).get("text/html", "")
+        for cell in nbformat.read(ROOT / "book" / "ledger.ipynb", as_version=4).cells
+        for output in cell.get("outputs", ())
+    )
+    for row in ROWS:
+        words = re.sub(r"\{[^}]*\}|\(1 - alpha\)", "", row["difference"])
+        assert not re.search(r"\d", words), row["item"]
+        assert "{" not in row["difference"] or row["difference"] not in shown, row["item"]
+    assert "0.734 gamma" in shown
+    assert "0.0006 m/s" in shown
+
+
 def test_a_name_covers_its_items_alone():
     assert covers("test_eqs_35_to_38_slope", "Eq. 36")
     assert covers("test_eqs_45_46_balls_at_rest", "Eq. 46")
@@ -87,7 +168,7 @@ def test_row(row):
     assert covers(name, row["item"])
     assert name in functions(ROOT / file)
     if row["status"] in {"derived, misprint", "reproduced, differs"}:
-        assert row["difference"] != "0"
+        assert row["difference"] != "none"
 
 
 def test_fig_9_and_all_schematics_are_drawn_and_described():
@@ -104,3 +185,18 @@ def test_fig_9_and_all_schematics_are_drawn_and_described():
         assert any(kind.startswith("image/") for kind in kinds), label
         assert len(settings[at]["image"]["alt"]) > 60, label
         assert row["item"] in settings[at]["figure"]["caption"], label
+
+
+def write_tolerances():
+    """Write the column `tolerance` from the tests as they stand."""
+    for row in ROWS:
+        file, _, name = row["test"].partition("::")
+        row["tolerance"] = loosest(ROOT / file, name)
+    with (ROOT / "data" / "ledger.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, ROWS[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(ROWS)
+
+
+if __name__ == "__main__":
+    write_tolerances()

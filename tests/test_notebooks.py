@@ -153,8 +153,11 @@ GIVEN = {
     "experiments": ".01 .171 0.17121 .17121 .40 .5 .62 1.5 1.59",
     "trade": "0.001 0.01 0.1",
     "beyond": "0.01 0.9 0.99 0.999",
-    "errata": ".001 .01 .05 .1 .15 .171 0.17121 .2 .25 .3 .348 .390 .439 .5 .6 .7 .710 .75 .755"
-    " .8 .95 1.043 1.045 1.185 1.470",
+    "errata": ".0001 .001 .01 .018 .05 .1 .10 .1354936 .15 .171 0.17121 .2 .20 .25 .3 .348 .390"
+    " .439 .5 .6 .7 .710 .748331 .75 .755 .8 .848649 .864099 .9 .95 .951351 1.043 1.045 1.185"
+    " 1.470",
+    "extremes": "0.1 0.3 0.8 36.9",
+    "extremes_inventory": "",
     "notation": "",
     "ledger": "",
 }
@@ -202,3 +205,11 @@ def test_one_changed_digit_fails(tmp_path: Path, root: Path, stored: str, outcom
     )  # fmt: skip
     assert run.returncode == outcome, run.stdout
     assert ("1 passed" if outcome == 0 else "1 failed") in run.stdout
+
+
+@pytest.mark.parametrize("chapter", ["experiments", "trade", "extremes", "beyond"])
+def test_no_number_is_typed_into_a_description(chapter: str):
+    """What nobody computes, nobody corrects: a description says higher, lower, near, far."""
+    for cell in nbformat.read(BOOK / f"{chapter}.ipynb", as_version=4).cells:
+        alt = cell.metadata.get("mystnb", {}).get("image", {}).get("alt", "")
+        assert not decimals(alt), cell.id

@@ -7,6 +7,8 @@ r"""Sphinx extension: what Jupyter Book leaves to be put right in the pages.
 - Sphinx wraps an equation of several lines in `split`, where MathJax refuses the `\tag` that
   carries the paper's number. Such an equation is passed on as it is.
 - A page that is linked from elsewhere shows a title, a sentence and a picture.
+- Until the project has a public address, buttons that lead there are left out. `book_published` in
+  `_config.yml` is the one switch.
 """
 
 from html import escape
@@ -16,7 +18,24 @@ from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.config import Config
 from sphinx.util.fileutil import copy_asset_file
+
+#: Options of the theme that lead to the project's address.
+ADDRESSED = (
+    "launch_buttons",
+    "use_edit_page_button",
+    "use_issues_button",
+    "use_repository_button",
+    "use_source_button",
+)
+
+
+def hide_what_needs_an_address(app: Sphinx, config: Config) -> None:
+    """Leave out the buttons that would lead nowhere before the book is published."""
+    if not config.book_published:
+        for option in ADDRESSED:
+            config.html_theme_options.pop(option, None)
 
 
 def copy_mathjax(app: Sphinx, exception: Exception | None) -> None:
@@ -99,6 +118,9 @@ def _is_thebe(asset: Any) -> bool:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the callbacks."""
+    app.add_config_value("book_published", False, "env", types=(bool,))
+    # Before the theme reads its options.
+    app.connect("config-inited", hide_what_needs_an_address, priority=100)
     # Late, so that every other extension has added its part.
     app.connect("doctree-resolved", drop_thebe_settings, priority=900)
     app.connect("html-page-context", drop_thebe, priority=900)

@@ -1,0 +1,35 @@
+// An equation that is wider than its column is set smaller, down to 55 % of the text; what is
+// still wider scrolls in its own box, from its beginning.
+(() => {
+  const SMALLEST = 0.55;
+
+  function fit(equation) {
+    const box = equation.parentElement;
+    equation.style.fontSize = "";
+    const full = parseFloat(getComputedStyle(equation).fontSize);
+    // Twice, as a font size is rounded and the number of the equation does not shrink with it.
+    for (let pass = 0, share = 1; pass < 3; pass += 1) {
+      const wide = Math.max(equation.scrollWidth / equation.clientWidth, box.scrollWidth / box.clientWidth);
+      if (!(wide > 1.002)) break;
+      share = Math.max(SMALLEST, (share / wide) * 0.99);
+      equation.style.fontSize = `${share * full}px`;
+    }
+    equation.scrollLeft = 0;
+    box.scrollLeft = 0;
+  }
+
+  function fitAll() {
+    document.querySelectorAll('mjx-container[display="true"]').forEach(fit);
+  }
+
+  window.addEventListener("load", () => {
+    const typeset = window.MathJax && window.MathJax.startup && window.MathJax.startup.promise;
+    if (!typeset) return;
+    typeset.then(() => {
+      fitAll();
+      // Folded solutions have no width until they are opened; nor does the page keep its own.
+      document.addEventListener("toggle", fitAll, true);
+      window.addEventListener("resize", fitAll);
+    });
+  });
+})();

@@ -1,0 +1,183 @@
+"""The pages in a browser: nothing cut, nothing wider than its window, in both widths and modes."""
+
+import os
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "book" / "_ext"))
+import book_figures
+
+WIDTHS = (390, 1400)
+MODES = ("light", "dark")
+#: Contrast that letters need, and lines and marks (WCAG 2.1: 1.4.6 and 1.4.11).
+LETTERS, LINES = 7.0, 3.0
+
+# What a page shows that does not fit: [kind, beginning of its text, has, needs].
+MISFITS = """() => {
+  const found = [];
+  const say = (kind, node, has, needs) =>
+    found.push([kind, (node.textContent || node.alt || "").trim().slice(0, 70), has, needs]);
+  if (document.scrollingElement.scrollWidth > innerWidth)
+    say("page", document.querySelector("h1"), innerWidth, document.scrollingElement.scrollWidth);
+  const wide = (node) => node.checkVisibility() && node.scrollWidth > node.clientWidth + 1;
+  // Code and messages: every line is seen as a whole, without scrolling.
+  for (const node of document.querySelectorAll(".bd-content pre"))
+    if (wide(node)) say("code", node, node.clientWidth, node.scrollWidth);
+  // Equations on a line of their own: whole, or in a box that scrolls and starts at its left end.
+  for (const node of document.querySelectorAll('.bd-content mjx-container[display="true"]')) {
+    for (const box of [node, node.parentElement]) {
+      if (!wide(box)) continue;
+      const scrolls = ["auto", "scroll"].includes(getComputedStyle(box).overflowX);
+      const left = node.querySelector("svg").getBoundingClientRect().left;
+      if (innerWidth > 600 || !scrolls || left < box.getBoundingClientRect().left - 1)
+        say("equation", node, box.clientWidth, box.scrollWidth);
+    }
+    const number = node.parentElement.querySelector(".eqno");
+    if (number && node.checkVisibility()) {
+      const end = node.getBoundingClientRect().right, start = number.getBoundingClientRect().left;
+      if (start < end - 1) say("number on equation", node, start, end);
+    }
+  }
+  // Formulas in a line of text: their box does not cut them.
+  for (const node of document.querySelectorAll('.bd-content mjx-container:not([display])'))
+    if (wide(node) && getComputedStyle(node).overflowX !== "visible")
+      say("formula", node, node.clientWidth, node.scrollWidth);
+  // Figures: one of the two is shown, and its letters are hardly shrunk.
+  for (const box of document.querySelectorAll(".figure-box")) {
+    const shown = [...box.children].filter((image) => image.checkVisibility());
+    const closed = !box.checkVisibility();
+    if (!closed && shown.length !== 1) say("figures shown", box, 1, shown.length);
+    for (const image of shown) {
+      const drawn = parseFloat(box.style.getPropertyValue("--drawn"));
+      const share = image.getBoundingClientRect().width / drawn;
+      if (share < 0.6) say("small figure", image, share, 0.6);
+    }
+  }
+  // Columns of tables: none is squeezed to a word or two a line.
+  for (const node of document.querySelectorAll(".bd-content td")) {
+    if (!node.checkVisibility()) continue;
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    const line = parseFloat(getComputedStyle(node).lineHeight);
+    const lines = range.getBoundingClientRect().height / line;
+    const letters = node.textContent.trim().length;
+    if (lines > 6.5 && letters / lines < 8) say("squeezed column", node, letters / lines, 8);
+  }
+  return found;
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    command = next(
+        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+    )
+    if command is None:
+        if os.environ.get("CRADLE_REQUIRE_BROWSER"):
+            pytest.fail("CRADLE_REQUIRE_BROWSER is set and there is no Chromium")
+        pytest.skip("no Chromium on this machine")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=command, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+def misfits(tab, width: int) -> list:
+    """List what does not fit into a window of this width."""
+    tab.set_viewport_size({"width": width, "height": 900})
+    tab.wait_for_timeout(100)  # fit_equations.js follows the window
+    return [[width, *misfit] for misfit in tab.evaluate(MISFITS)]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_nothing_is_cut(html: Path, browser, mode: str):
+    context = browser.new_context(viewport={"width": WIDTHS[0], "height": 900}, color_scheme=mode)
+    tab = context.new_page()
+    said: list[str] = []
+    tab.on("console", lambda entry: said.append(entry.text) if entry.type == "error" else None)
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    pages = sorted((html / "book").glob("*.html"))
+    assert len(pages) > 15
+    found = {}
+    for page in pages:
+        said.clear()
+        tab.goto(page.as_uri())
+        tab.evaluate("() => window.MathJax?.startup?.promise")  # equations are set
+        faults = [misfit for width in WIDTHS for misfit in misfits(tab, width)] + said
+        if faults:
+            found[page.stem] = faults
+    context.close()
+    assert not found, "\n".join(f"{page}: {fault}" for page in found for fault in found[page])
+
+
+@pytest.mark.parametrize(
+    ("body", "kind"),
+    [
+        ("<p style='width: 500px'>wide</p>", "page"),
+        (
+            "<div style='overflow: hidden'><pre style='overflow: auto'>"
+            + 90 * "x"
+            + "</pre></div>",
+            "code",
+        ),
+        ("<table><td style='width: 2em'>" + 40 * "word " + "</td></table>", "squeezed column"),
+    ],
+)
+def test_a_misfit_is_seen(browser, body: str, kind: str):
+    """The list above is not empty because it cannot find anything."""
+    tab = browser.new_page(viewport={"width": 390, "height": 900})
+    tab.set_content(
+        "<!DOCTYPE html><h1>page</h1>"
+        f"<main class='bd-content' style='line-height: 20px'>{body}</main>"
+    )
+    assert kind in [misfit[0] for misfit in tab.evaluate(MISFITS)]
+    tab.close()
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance as WCAG defines it."""
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+    return sum(k * p for k, p in zip((0.2126, 0.7152, 0.0722), linear))
+
+
+def contrast(one: str, other: str) -> float:
+    high, low = sorted((luminance(one), luminance(other)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_colours_of_dark_mode_can_be_seen():
+    from cradle.figures import PALETTE
+
+    ground = book_figures.dark("white")
+    assert contrast(book_figures.dark("black"), ground) > LETTERS
+    for colour in PALETTE:
+        assert contrast(book_figures.dark(colour), ground) > LINES, colour
+    # Letters on a coloured ground stay as they are.
+    assert all(book_figures.dark(kept) == kept for kept in ("#010101", "#fefefe"))
+    # Greys and tints change sides and keep their order.
+    greys = ["#000000", "#666666", "#b0b0b0", "#e8eef4", "#ffffff"]
+    light = [luminance(book_figures.dark(grey)) for grey in greys]
+    assert light == sorted(light, reverse=True)
+
+
+def test_every_figure_has_both_colourings(html: Path):
+    drawings = [
+        path for path in (html / "_images").glob("*.svg") if not path.stem.endswith("-dark")
+    ]
+    assert len(drawings) > 40
+    for path in drawings:
+        drawing = path.with_name(f"{path.stem}-dark.svg").read_text(encoding="utf-8")
+        colours = {match.lower() for match in book_figures.COLOUR.findall(drawing)}
+        assert not colours & {"#ffffff", "#fff", "#000000", "#000", "white", "black"}, path
+        # Colours alone differ.
+        blank = re.compile(r'fill="#e0e0e0" |' + book_figures.COLOUR.pattern)
+        assert blank.sub("", drawing) == blank.sub("", path.read_text(encoding="utf-8")), path
+    shown = "".join(page.read_text(encoding="utf-8") for page in (html / "book").glob("*.html"))
+    for path in drawings:
+        assert shown.count(f"{path.name}") == shown.count(f"{path.stem}-dark.svg") > 0, path
