@@ -44,6 +44,48 @@ NAMED = {
         [1e-20, 0, 1e-20, 1e-20, 1e-20],
         [1e-20, 0, 1e-20, 1e-20, 1e-20],
     ),
+    "an end and a closing beside it at once": Problem(
+        [1, 1, 1, 0.3, 1, 1, 0.3, 0.3, 1, 1, 1, 1, 1, 3, 3, 3, 3],
+        at_rest(17),
+        [1.0] * 16,
+        [0, 0.1, 0, 1, 0, 0, 0, 0.1, 0.1, 0.1, 1, 1, 0, 0.1, 0],
+        [0, 0, 0, 0.1, 1, 0.1, 0, 0, 0.1, 0.1, 0, 0, 0.1, 0.1, 0],
+        meeting=1.0,
+    ),
+    "equal balls, an end and a closing beside it at once": Problem(
+        [1.0] * 14,
+        [0.5, 0, 0, 0, 1, 0, 1, 1, 1, 0, 0, 1, 1, -0.5],
+        [1.0] * 13,
+        [
+            0.25,
+            0.0,
+            0.29285714285714287,
+            0.2926829268292683,
+            0.29166666666666663,
+            0.2857142857142857,
+            0.25,
+            0.0,
+            0.0,
+            0.25,
+            0.0,
+            0.25,
+        ],
+        [
+            0.25,
+            0.0,
+            0.25,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.25,
+            0.2857142857142857,
+            0.29166666666666663,
+        ],
+        meeting=0.0,
+    ),
     "seven generic balls": Problem(
         [0.23189, 0.747263, 0.722879, 0.744025, 0.917728, 0.767347, 3.62118],
         [0.973746, 0.923249, 0.759269, 0.498736, 0.41812, 0.404743, 0.046269],
@@ -61,6 +103,16 @@ NAMED = {
 }
 
 named = pytest.mark.parametrize("name", NAMED)
+
+#: Twenty balls, partly plastic, with ties; some of them end in a collapse.
+TWENTY = Problem(
+    [1.0] * 20,
+    [-0.5, 0, 0, 1, -0.5, 0, -0.5, 1, 0, 0.5, 0.5, 1, 0, 0, 0.5, 0.5, 1, 0, 1, 0.5],
+    [0.5, 0.9, 0, 0, 0.5, 0, 0, 0.9, 0.9, 0.9, 0, 0.9, 1, 0.9, 0, 0.9, 0.5, 0.5, 0],
+    [0.1, 1, 0, 0, 0.1, 0, 0, 0.1, 0.1, 1, 0.1, 0.1, 0.1, 1, 0.1, 0, 1, 1],
+    [0, 0, 0, 0.1, 0, 0, 0.1, 0, 0, 0.1, 0, 0, 0, 0, 0, 0.1, 0.1, 0],
+    meeting=0.0,
+)
 
 
 def exact(problem, digits=50, number=mpmath.mpf, **options):
@@ -116,9 +168,9 @@ def test_named_chain_at_fifty_digits(name):
     problem = NAMED[name]
     truth, trace = exact(problem), problem.collide()
     assert not truth.collapsed
-    assert difference(trace.velocities, truth.velocities) < 1e-13
-    assert difference(trace.impulses, truth.impulses) < 1e-13
-    assert difference(trace.absorbed, truth.absorbed) < 1e-13
+    assert difference(trace.velocities, truth.velocities) < 1e-12
+    assert difference(trace.impulses, truth.impulses) < 1e-12
+    assert difference(trace.absorbed, truth.absorbed) < 1e-12
     assert trace.collisions.tolist() == truth.collisions
 
 
@@ -128,7 +180,7 @@ def test_named_chain_has_one_answer(name):
     problem = NAMED[name]
     truth = exact(problem)
     assert difference(truth.velocities, exact(problem, 90).velocities) < 1e-40
-    assert difference(truth.velocities, problem.solve(textbook.solve).velocities) < 1e-13
+    assert difference(truth.velocities, problem.solve(textbook.solve).velocities) < 1e-12
 
 
 @named
@@ -156,6 +208,13 @@ def test_neighbours_of_the_seven_generic_balls():
             velocities[k] *= 1 + sign * 2.0**-46
             nudged = replace(problem, velocities=velocities).collide().velocities
             assert difference(nudged, truth) < 1e-11
+
+
+def test_twenty_balls_of_which_some_collapse():
+    trace, truth = TWENTY.collide(), exact(TWENTY)
+    assert trace.collapsed == truth.collapsed
+    assert difference(trace.velocities, truth.velocities) < 1e-12
+    check(TWENTY, trace)
 
 
 def test_impulses_after_a_collapse_beside_a_light_ball():
@@ -240,11 +299,14 @@ def test_textbook_says_the_same(name):
             continue
         compared += 1
         if difference(trace.velocities, other.velocities) > 1e-12:
-            # An error of rounding may grow in so many collisions; their number stays.
+            # The rounding of the input may grow in so many collisions; their number stays.
+            both = list(truths(problem, max_events=4000))
+            grown = difference(both[0].velocities, both[1].velocities)
+            grown = grown if both[0].collisions == both[1].collisions else 0.0
             assert any(
                 trace.collisions.tolist() == truth.collisions
-                and difference(trace.velocities, truth.velocities) < 1e-6
-                for truth in truths(problem, max_events=4000)
+                and difference(trace.velocities, truth.velocities) < 1e-8 + 100 * grown
+                for truth in both
             ), problem
     assert compared > 0.6 * COUNT
 

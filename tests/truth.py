@@ -57,7 +57,7 @@ class Impact(textbook.Impact):
             self.recompressions += self.given[c] > 0 and self.gained[c] > before[c]
 
     def progress(self, runs):
-        if len(self.streak) < 8 * len(self.m):
+        if len(self.streak) < 8 * max(len(set(self.streak)), 1):
             super().progress(runs)
         else:
             self.collapse()
