@@ -274,7 +274,7 @@ def jump(cluster, total, level, n, state):
         if first <= c <= last:
             share = max(k.x, 0.0)
             work = memory[c].a * squares
-            k.u = 0.0
+            k.u = k.blur = 0.0
         else:
             share = memory[c].p * total
             if not (k.active == 1 and k.u == 0.0):  # else held throughout, see below

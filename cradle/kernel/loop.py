@@ -58,7 +58,7 @@ def works(k, s, ended, recent):
 
 
 @jit
-def end_exactly(low, high, horizon, ball, contact):
+def end_exactly(low, high, ball, contact):
     """R3: give the contacts that end at this instant the closing speed that they end with.
 
     With one slope all the time it is -e times that at the start of compression; light balls collide
@@ -66,10 +66,10 @@ def end_exactly(low, high, horizon, ball, contact):
     is rounded.
     """
     for c in range(low, high + 1):
-        if contact[c].until <= horizon and contact[c].final == 0.0:
+        if contact[c].due == 1 and contact[c].final == 0.0:
             set_closing_speed(c, 0.0, 0.0, low, high, ball, contact)
     for c in range(low, high + 1):
-        if contact[c].until <= horizon and contact[c].final < 0.0:
+        if contact[c].due == 1 and contact[c].final < 0.0:
             e, top, tip = contact[c].e, contact[c].top, contact[c].tip
             final = contact[c].final
             rest = 0.0
@@ -91,7 +91,7 @@ def advance(first, part, n, state):
     ball, contact, run, recent = state.ball, state.contact, state.run, state.memory[0]
     low, high = run[first].low, run[first].high
     s = run[first].reach * part
-    horizon = s * LIMITS.simultaneous if part == 1.0 else -1.0
+    whole = part == 1.0
     for c in range(low, high + 1):
         if contact[c].u > 0.0 and contact[c].q == 0.0:
             contact[c].top, contact[c].tip = closing_parts(c, ball)
@@ -101,21 +101,23 @@ def advance(first, part, n, state):
         contact[c].x = contact[c].u
         if contact[c].slope != 0.0:
             contact[c].u = closing(c, ball)
+            contact[c].blur += 2.0**-53 * abs(contact[c].slope) * s
         impulse = contact[c].rate * s
         add_impulse(contact[c], impulse)
         recent[c].p += impulse
         if contact[c].fixed == 1 and impulse > 0.0:
             contact[c].held = 1
-    if part == 1.0:
-        end_exactly(low, high, horizon, ball, contact)
+    if whole:
+        end_exactly(low, high, ball, contact)
     for c in range(low, high + 1):
-        works(contact[c], s, contact[c].until <= horizon, recent[c])
+        works(contact[c], s, whole and contact[c].due == 1, recent[c])
     for c in (low - 1, high + 1):
         if 0 <= c < n - 1 and contact[c].active == 0:
-            if contact[c].until <= horizon:
+            if whole and contact[c].due == 1:
                 arrive(c, low, high, ball, contact)
             else:
                 contact[c].u = closing(c, ball)
+                contact[c].blur += 2.0**-53 * abs(ball[low if c < low else c].pull) * s
     run[first].stirred = 1
 
 
@@ -147,7 +149,7 @@ def touch_beside(first, n, state):
     for gap in (first - 1, last + 1):
         if not (0 <= gap < n - 1 and contact[gap].active == 0 and is_gap(gap, n, contact)):
             continue
-        if contact[gap].u > (1.0 - LIMITS.simultaneous) * contact[gap].before:
+        if contact[gap].u >= -LIMITS.roundings * contact[gap].blur:
             touch(gap, state)
 
 
@@ -220,7 +222,7 @@ def prepare(n, chain, meeting, state):
         if c < n - 2:
             k.forward, k.backward = chain.forward[c], chain.backward[c]
         k.u = u = ball[c].hi - ball[c + 1].hi
-        k.q = k.w = k.top = k.tip = k.p = k.p_lo = k.a = k.a_lo = 0.0
+        k.q = k.w = k.top = k.tip = k.blur = k.p = k.p_lo = k.a = k.a_lo = 0.0
         k.before = abs(u)
         k.active = k.tiny = k.hits = k.held = 0
         for row in range(2):

@@ -17,7 +17,8 @@ def gap_parts(first, after, run, ball, contact, meeting):
     wide = -contact[gap].u
     rise = ball[gap].pull * run[first].reach if run[first].high == gap - 1 else 0.0
     fall = -ball[gap + 1].pull * run[after].reach if run[after].low == after else 0.0
-    if rise + fall <= wide:
+    blur = LIMITS.roundings * (contact[gap].blur + 2.0**-53 * (rise + fall))
+    if rise + fall <= wide + blur:
         return -1.0, 0.0
     # They overlap from low to high.  Each distance is exact at the ends, meeting = 0 and 1: a run
     # that gets to its own next event must do it.
@@ -75,6 +76,6 @@ def part_beyond(first, part, outward, c, n, state):
         return math.inf
     way = outward * state.run[first].reach
     wide = -state.contact[c].u
-    if way * part > wide:
+    if way * part > wide + LIMITS.roundings * (state.contact[c].blur + 2.0**-53 * way):
         return wide / way
     return math.inf

@@ -127,6 +127,7 @@ def set_closing_speed(c, speed, rest, low, high, ball, contact):
     if speed == 0.0:
         one_velocity(first, last, heaviest_of(first, last, ball), ball)
     contact[c].u = speed
+    contact[c].blur = 2.0**-53 * abs(speed)
     for k in (first - 1, last):
         if low <= k <= high:
             contact[k].u = closing(k, ball)
@@ -150,7 +151,7 @@ def arrive(c, low, high, ball, contact):
         i += step
     if low <= k <= high:
         contact[k].u = closing(k, ball)
-    contact[c].u = 0.0
+    contact[c].u = contact[c].blur = 0.0
 
 
 @apart
@@ -188,7 +189,7 @@ def join_velocities(first, last, ball, contact):
     share_out(first, last - 1, 0.0, 0.0, ball, contact)
     for c in range(first, last):
         add_impulse(contact[c], max(contact[c].x, 0.0))
-        contact[c].u = 0.0
+        contact[c].u = contact[c].blur = 0.0
     add_velocity(ball[k], ball[k].x)
     one_velocity(first, last, k, ball)
 

@@ -3,7 +3,6 @@
 import math
 
 from cradle.kernel.state import (
-    LIMITS,
     MAXIMUM_COMPRESSION,
     apart,
     jit,
@@ -55,7 +54,7 @@ def record_compressions(first, s, whole, n, state):
     low, high = run[first].low, run[first].high
     for c in range(low, high + 1):
         k = contact[c]
-        ends = whole and k.until <= s * LIMITS.simultaneous
+        ends = whole and k.due == 1
         k.power = 1 if k.u > 0.0 and (ends or k.u + k.slope * s <= 0.0) else 0
     while True:
         found = -1

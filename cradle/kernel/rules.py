@@ -226,6 +226,12 @@ def is_gap(c, n, contact):
 
 
 @jit
+def rounding_after(k, s):
+    """Return how much of the closing speed of contact k may be rounding after a progress s."""
+    return LIMITS.roundings * (k.blur + 2.0**-53 * abs(k.slope) * s)
+
+
+@jit
 def segment(first, n, run, ball, contact):
     """R8.2: progress of a run to its own next rate-changing event.
 
@@ -234,22 +240,22 @@ def segment(first, n, run, ball, contact):
     low, high = run[first].low, run[first].high
     s = second = math.inf
     for c in range(low, high + 1):
-        at, speed = end_progress(
-            contact[c].u, contact[c].q, contact[c].slope, contact[c].rate, contact[c].e
-        )
-        contact[c].until = at
-        contact[c].final = speed
-        second = min(second, max(s, at))
-        s = min(s, at)
+        k = contact[c]
+        k.until, k.final = end_progress(k.u, k.q, k.slope, k.rate, k.e)
+        s = min(s, k.until)
     # Idle neighbours close; a gap, shared with another run, is no event of this run's own.
     for c in (low - 1, high + 1):
         if 0 <= c < n - 1 and contact[c].active == 0:
             contact[c].before = -contact[c].u
             contact[c].until = math.inf
-            toward = -ball[low].pull if c < low else ball[c].pull
-            if toward > 0.0 and not is_gap(c, n, contact):
-                contact[c].until = -contact[c].u / toward
-                second = min(second, max(s, contact[c].until))
+            contact[c].slope = -ball[low].pull if c < low else ball[c].pull
+            if contact[c].slope > 0.0 and not is_gap(c, n, contact):
+                contact[c].until = -contact[c].u / contact[c].slope
                 s = min(s, contact[c].until)
     run[first].reach = s
-    return 1.0 - s / second if s * LIMITS.simultaneous < second < math.inf else 1.0
+    for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
+        k = contact[c]
+        k.due = 1 if (k.until - s) * abs(k.slope) <= rounding_after(k, s) else 0
+        if k.due == 0 and k.until < second:
+            second = k.until
+    return 1.0 - s / second if second < math.inf else 1.0

@@ -51,8 +51,10 @@ class Limits(NamedTuple):
     digits: float
     #: R8: parts of segments, and distances, closer than this are equal.
     tie: float
-    #: A run's events closer than this, relative to the progress that they need, are simultaneous.
+    #: R8: parts of segments closer to 1 than this are whole.
     simultaneous: float
+    #: R8: closing speeds closer than this many of their roundings are equal.
+    roundings: float
     #: R3: an end speed this close to -e times the speed at the start of compression is meant so.
     same: float
     #: R7: a ratio this close to its bound is meant to be the bound.
@@ -84,6 +86,7 @@ LIMITS = Limits(
     digits=4 * 2.0**-52,
     tie=1e-9,
     simultaneous=1.0 + 64 * 2.0**-52,
+    roundings=16.0,
     same=16 * 2.0**-52,
     rounded=1.0 + 4 * 2.0**-52,
     cut=2.0**-120,
@@ -91,7 +94,7 @@ LIMITS = Limits(
     tiny=1e-60,
     huge=1e60,
     clear=1e-12,
-    lightest=1e-150,
+    lightest=1e-15,
     sound=64 * 2.0**-52,
 )
 
@@ -129,6 +132,8 @@ class Contact:
     slope: float  # closing speed per unit of progress, du/ds
     until: float  # progress to its own next event, and
     final: float  # its closing speed there, if it ends
+    due: int  # 1 if that comes at the end of the run's segment, but for rounding
+    blur: float  # how much of u may be rounding: it grows with every change of u
     before: float  # -u of an idle contact at the start of the round, or at its end
     p: float  # impulse since the start, as a sum of two numbers
     p_lo: float
