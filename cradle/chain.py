@@ -12,6 +12,7 @@ from cradle.checks import (
     Vector,
     checked,
     checked_masses,
+    checked_restitution,
     refuse_overflow,
 )
 from cradle.drawing import as_html
@@ -71,7 +72,7 @@ class Chain:
                 f"one velocity for each of {m.size} balls"
             )
         refuse_overflow(v, m)
-        e = checked("restitution", restitution, "must lie in [0, 1]", 0.0, 1.0)
+        e = checked_restitution(restitution)
         if e.shape not in ((), (m.size - 1,)):
             contacts = "1 contact" if m.size == 2 else f"{m.size - 1} contacts"
             raise ValueError(

@@ -151,6 +151,40 @@ def checked_masses(masses: ArrayLike) -> Vector:
     return array
 
 
+def checked_restitution(restitution: ArrayLike) -> Vector:
+    """Return coefficients of restitution as floats: in [0, 1], and if above 0 not too small.
+
+    Parameters
+    ----------
+    restitution : array_like
+        Coefficients of any shape.
+
+    Returns
+    -------
+    ndarray
+        The coefficients, same shape.
+
+    Raises
+    ------
+    ValueError
+        Naming the first bad coefficient and the rule.
+
+    Examples
+    --------
+    >>> checked_restitution([0.5, 1e-300])
+    Traceback (most recent call last):
+    ...
+    ValueError: restitution[1] = 1e-300; must be 0 or at least 1e-30
+    """
+    array = checked("restitution", restitution, "must lie in [0, 1]", 0.0, 1.0)
+    small = (array > 0.0) & (array < LIMITS.least_restitution)
+    if small.any():
+        at = np.unravel_index(int(np.argmax(small)), array.shape)
+        rule = f"must be 0 or at least {LIMITS.least_restitution}"
+        raise refusal("restitution", at, f" = {float(array[at])!r}; {rule}")
+    return array
+
+
 def refuse_overflow(velocities: Vector, masses: Vector) -> None:
     """Raise if the kinetic energy or a momentum of a chain is no finite number.
 

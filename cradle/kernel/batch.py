@@ -112,7 +112,7 @@ def admissible(n, chain, bounded):
     if not (energy < math.inf and momentum < math.inf):
         return False
     for c in range(n - 1):
-        if not 0.0 <= e[c] <= 1.0:
+        if not (0.0 <= e[c] <= 1.0 and (e[c] == 0.0 or e[c] >= LIMITS.least_restitution)):
             return False
     for i in range(n - 2):
         if not (0.0 <= forward[i] <= 1.0 and 0.0 <= backward[i] <= 1.0):

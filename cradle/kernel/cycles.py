@@ -21,7 +21,7 @@ from cradle.kernel.motion import (
     share_out,
 )
 from cradle.kernel.record import record
-from cradle.kernel.state import COLLAPSE, LIMITS, Cluster, apart, jit
+from cradle.kernel.state import COLLAPSE, END, LIMITS, Cluster, apart, jit
 
 
 @jit
@@ -390,7 +390,11 @@ def take_limits(ends, ended, worn, n, state):
     if one <= other:
         forget(1, level)
         first, last = one, other
+    loses = False
     for c in range(first, last + 1):
-        record(COLLAPSE, c, n, state)
-    state.tally[0].collapsed = 1
+        loses = loses or state.contact[c].e < 1.0
+    for c in range(first, last + 1):
+        record(COLLAPSE if loses else END, c, n, state)
+    if loses:
+        state.tally[0].collapsed = 1
     return True

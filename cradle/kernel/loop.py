@@ -245,6 +245,8 @@ def impact(n, chain, meeting, max_events, resumed, state):
     if not resumed:
         prepare(n, chain, meeting, state)
     while True:
+        if tally.effort < 0 or tally.events > tally.room:
+            return PAUSED
         # R8.1: ends first, those that are known without the slopes before the others; then R9.
         ends, ended, worn = end_contacts(False, n, state)
         opening = False
@@ -267,8 +269,6 @@ def impact(n, chain, meeting, max_events, resumed, state):
         tally.rounds += 1
         if tally.rounds > max_events:
             return UNFINISHED
-        if tally.effort < 0 or tally.events > tally.room:
-            return PAUSED
         # R8.1: then closings; both need no progress, so the next round looks again.
         if more > 0 or collapsed or close_contacts(n, state) > 0:
             continue

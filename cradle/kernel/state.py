@@ -69,8 +69,11 @@ class Limits(NamedTuple):
     huge: float
     #: ... and for conditions that are met by this part of their largest term.
     clear: float
-    #: Mass of the lightest ball allowed, as a part of the heaviest.
+    #: Mass of the lightest ball allowed, as a part of the heaviest: beyond it a double cannot tell
+    #: how heavy balls part that a light one has struck.
     lightest: float
+    #: Least coefficient of restitution allowed, but zero: a slower end is below the last digit.
+    least_restitution: float
     #: The certificate: what each sum may be off, in units of the rounding of its terms.
     sound: float
 
@@ -95,6 +98,7 @@ LIMITS = Limits(
     huge=1e60,
     clear=1e-12,
     lightest=1e-15,
+    least_restitution=1e-30,
     sound=64 * 2.0**-52,
 )
 

@@ -14,7 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.checks import Vector, checked, checked_masses, numbers, refuse_overflow
+from cradle.checks import (
+    Vector,
+    checked,
+    checked_masses,
+    checked_restitution,
+    numbers,
+    refuse_overflow,
+)
 from cradle.drive import FINISHED, LARGE, REFUSED, Job
 from cradle.kernel import Inputs, Options
 from cradle.models.correlation import (
@@ -290,7 +297,7 @@ def _check(given: dict[str, ArrayLike], excess: str) -> None:
     """Raise if a value is outside its limits: what the kernel checks, and in words."""
     m = checked_masses(given["masses"])
     v = checked("velocities", given["velocities"])
-    checked("restitution", given["restitution"], "must lie in [0, 1]", 0.0, 1.0)
+    checked_restitution(given["restitution"])
     f, b = (checked_ratios(name, given[name]) for name in ("forward", "backward"))
     refuse_overflow(v, m)
     if excess == "raise":
