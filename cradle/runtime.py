@@ -93,6 +93,9 @@ def _stored() -> Path | None:
             if path.exists():
                 Path(file.name).unlink()
             else:
+                # numba keeps compiled code as long as the time of its source does not change:
+                # the name says enough, so the time is one for all, also where a cache is copied.
+                os.utime(file.name, (0, 0))
                 Path(file.name).replace(path)
         except OSError:
             continue

@@ -27,7 +27,7 @@ def certify(n, state):
             return MOMENTUM
         before = after
         ball[i].x, ball[i].y = ball[i].hi, ball[i].lo
-        fastest = max(fastest, abs(ball[i].hi - ball[0].hi))
+        fastest = max(fastest, abs(ball[i].hi - ball[0].hi), abs(ball[i].v - ball[0].v) * unit)
     for c in range(n - 1):
         if not closing(c, ball) <= LIMITS.sound * fastest:
             return ORDER
