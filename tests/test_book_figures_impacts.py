@@ -1,4 +1,4 @@
-"""Every curve of chapters 4 to 6 and of the notation, against a second route."""
+"""Every curve of the chapters on multiple impacts, patterns and N balls, and of the notation, against a second route."""
 
 import math
 import re
