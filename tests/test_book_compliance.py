@@ -1,4 +1,4 @@
-"""Chapter "A compliant chain and the ratio": three balls and two springs, and the ratio (Eqs. 7-16, Fig. 2).
+"""The chapter on compliance: three balls and two springs, and the ratio (Eqs. 7-16, Fig. 2).
 
 The second route is the equations of motion with contacts that cannot pull, integrated by SciPy.
 """

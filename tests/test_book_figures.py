@@ -25,8 +25,8 @@ CHAPTERS = [
     "notation",
 ]
 EQUAL = [1, 1, 1], [1, 0, 0], 1
-THREE = [1.0, 1.5, 1.0], [1.0, 0.2, 0.0], [0.8, 0.7]  # the example of "Three balls solved", ratio 0.25
-FIVE = [1, 1, 1], [1, 0.8, 0], 0.3  # that of "Multiple impacts", ratio 0.05
+THREE = [1.0, 1.5, 1.0], [1.0, 0.2, 0.0], [0.8, 0.7]  # of three_balls, ratio 0.25
+FIVE = [1, 1, 1], [1, 0.8, 0], 0.3  # of multiple_impacts, ratio 0.05
 LIGHT = [100, 1, 100], [1, 0, 0], 1  # Fig. 7, ratio 0.15
 CLOSE = {"rtol": 0, "atol": 1e-12}
 

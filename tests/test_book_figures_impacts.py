@@ -1,4 +1,4 @@
-"""Every curve of the chapters on multiple impacts, patterns and N balls, and of the notation, against a second route."""
+"""Every curve of multiple_impacts, patterns, n_balls and notation, against a second route."""
 
 import math
 import re
