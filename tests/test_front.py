@@ -58,7 +58,7 @@ def test_the_toy_by_a_second_route(root: Path):
 
 def test_the_landing_page_says_the_same_of_the_toy():
     told = Chapter("intro").glued
-    assert [told[f"desk_{ball}"] for ball in ("last", "fourth", "back")] == ["99", "13", "7"]
+    assert [told[f"desk-{ball}"] for ball in ("last", "fourth", "back")] == ["99", "13", "7"]
 
 
 def test_mass_size_stiffness_and_speed_of_the_toy_cancel():
