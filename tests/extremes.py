@@ -341,7 +341,7 @@ def handed_on(masses, e):
 
 
 def equal_elastic(n, ratio):
-    """Velocities of n equal elastic balls, the first striking, one ratio: see chapter 10."""
+    """Velocities of n equal elastic balls, the first striking, one ratio: book/beyond.ipynb."""
     a = mpmath.mpf(ratio)
     root = mpmath.sqrt(1 - 2 * a)
     return [-a / (2 - a)] + [mpmath.mpf(0)] * (n - 3) + [(1 - root) / (2 - a), (1 + root) / (2 - a)]

@@ -1,4 +1,4 @@
-"""Chapter 10: what the text of book/beyond.ipynb says, from the stored table and by second routes.
+"""What the text of book/beyond.ipynb says, from the stored table and by second routes.
 
 The table is measured (benchmarks/long_chains.py); its outcomes are computed again here by closed
 forms, by the independent solver in reference.py, and by another integrator.

@@ -1,4 +1,4 @@
-"""Chapter 2 of the book: three balls and two springs, and the ratio (Eqs. 7-16, Fig. 2).
+"""The chapter on compliance: three balls and two springs, and the ratio (Eqs. 7-16, Fig. 2).
 
 The second route is the equations of motion with contacts that cannot pull, integrated by SciPy.
 """
@@ -282,7 +282,7 @@ def test_fig_own_compliance_effective():
         assert ratio / gamma == pytest.approx(math.pi**2 / 8 - 1, rel=0.03 * gamma + 1e-7)
         stored = f"gamma = {gamma}: effective ratio / gamma = {ratio / gamma:.6f}"
         assert stored in CHAPTER.printed("sympy-effective")
-    # Towards 1/2 for a stiff second spring; all outcomes stay on the arc of chapter 1.
+    # Towards 1/2 for a stiff second spring; all outcomes stay on the arc of the first chapter.
     for gamma, low in ((2, 0.394), (10, 0.497), (100, 0.4999)):
         velocities = outcome(1, gamma)
         assert low < constant_ratio(velocities) <= 0.5

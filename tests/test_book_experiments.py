@@ -1,4 +1,4 @@
-"""Chapter 7: what the tables and the figures of book/experiments.ipynb show, by a second route.
+"""What the tables and the figures of book/experiments.ipynb show, by a second route.
 
 Velocities come from the independent solver in reference.py; the ranges of ratios from Eqs. 30-33
 where they hold, and from a bisection elsewhere.

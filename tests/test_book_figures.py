@@ -1,4 +1,4 @@
-"""Every curve of the landing page and chapters 1 to 3, against a second route.
+"""Every curve of the landing page and the first three chapters, against a second route.
 
 The chapters draw from the package's solver; here the textbook solver, formulas that the paper
 prints, or short computations of their own say where each line must lie.
@@ -25,8 +25,8 @@ CHAPTERS = [
     "notation",
 ]
 EQUAL = [1, 1, 1], [1, 0, 0], 1
-THREE = [1.0, 1.5, 1.0], [1.0, 0.2, 0.0], [0.8, 0.7]  # the example of chapter 3, ratio 0.25
-FIVE = [1, 1, 1], [1, 0.8, 0], 0.3  # that of chapter 4, ratio 0.05
+THREE = [1.0, 1.5, 1.0], [1.0, 0.2, 0.0], [0.8, 0.7]  # of three_balls, ratio 0.25
+FIVE = [1, 1, 1], [1, 0.8, 0], 0.3  # of multiple_impacts, ratio 0.05
 LIGHT = [100, 1, 100], [1, 0, 0], 1  # Fig. 7, ratio 0.15
 CLOSE = {"rtol": 0, "atol": 1e-12}
 

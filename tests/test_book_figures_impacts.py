@@ -1,4 +1,4 @@
-"""Every curve of chapters 4 to 6 and of the notation, against a second route."""
+"""Every curve of multiple_impacts, patterns, n_balls and notation, against a second route."""
 
 import math
 import re

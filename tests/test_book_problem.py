@@ -1,4 +1,4 @@
-"""Chapter 1 of the book: momentum, restitution, and the two answers (Eqs. 1-6, Fig. 1)."""
+"""Chapter "The problem": momentum, restitution, and the two answers (Eqs. 1-6, Fig. 1)."""
 
 from fractions import Fraction
 

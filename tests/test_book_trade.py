@@ -1,4 +1,4 @@
-"""Chapter 8: what the text of book/trade.ipynb says, from the stored table and by second routes.
+"""What the text of book/trade.ipynb says, from the stored table and by second routes.
 
 The table is measured (benchmarks/run.py); its velocities are compared with answers from the
 independent solver in reference.py, with closed formulas, and with converged springs from elsewhere.

@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from chapters import Chapter
 from matplotlib.figure import Figure
 
 import cradle
@@ -53,6 +54,11 @@ def test_the_toy_by_a_second_route(root: Path):
     assert (np.abs(after[::-1]) * 100).round().tolist() == [99, 13, 1, 3, 7]
     assert (after[:3] < 0).all()
     np.testing.assert_allclose(elastic_spheres(5, 2e-3), after, rtol=0, atol=1e-6)
+
+
+def test_the_landing_page_says_the_same_of_the_toy():
+    told = Chapter("intro").glued
+    assert [told[f"desk-{ball}"] for ball in ("last", "fourth", "back")] == ["99", "13", "7"]
 
 
 def test_mass_size_stiffness_and_speed_of_the_toy_cancel():

@@ -153,6 +153,7 @@ class ImpulseCorrelation:
     def _trace(self, chain: Chain, job: Job) -> Trace:
         """Return what the event loop left."""
         results, written = job.outputs, job.record
+        written.velocities[0] = chain.velocities
         count = int(job.tally.events)
         kept = min(count, len(written.kinds))
         if 0 < kept < count and job.status != UNFINISHED:
