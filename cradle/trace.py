@@ -259,4 +259,4 @@ class ImpactNotCertified(RuntimeError):
 
     def __str__(self) -> str:
         """Return the defect and what shows it."""
-        return f"{self.defect}: {self.chain!r}, {self.model!r}"
+        return f"{self.defect}: {shown(self.chain)}, {shown(self.model)}"

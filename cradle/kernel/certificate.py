@@ -12,7 +12,8 @@ def certify(n, state):
 
     Every increment of an impulse is rounded once in the impulse and once in each ball, so a ball's
     momentum is known to a few roundings of the impulses that it has had, however many.  Works are
-    products of impulses and closing speeds, so energies are known to a few roundings of all works.
+    products of impulses and closing speeds, so energies are known to a few roundings of all works,
+    and of their sums over the balls.
     """
     ball, contact, unit = state.ball, state.contact, math.ldexp(1.0, -state.tally[0].shift)
     before = 0.0
@@ -39,7 +40,7 @@ def certify(n, state):
     at_first = relative_energy(0, n - 1, ball)
     for i in range(n):
         ball[i].hi, ball[i].lo = ball[i].x, ball[i].y
-    slack = LIMITS.sound * (at_first + absorbed)
+    slack = (LIMITS.sound + n * LIMITS.digits) * (at_first + absorbed)
     if not now <= at_first + slack:
         return ENERGY
     if not abs(at_first - now - lost) <= slack:
