@@ -232,6 +232,22 @@ def rounding_after(k, s):
 
 
 @jit
+def comes_at(s, k):
+    """Tell whether the next event of contact k comes at progress s, as far as rounding can tell.
+
+    It closes, or ends at u = 0, when u gets there; it ends otherwise when Q = 0, and then Q changes
+    by rate * u.
+    """
+    if not k.until < math.inf:
+        return False
+    late = k.until - s
+    blur = rounding_after(k, s)
+    if k.active == 1 and k.final < 0.0:
+        return late * -k.final <= blur * s + LIMITS.roundings * 2.0**-53 * k.w / k.rate
+    return late * abs(k.slope) <= blur
+
+
+@jit
 def segment(first, n, run, ball, contact):
     """R8.2: progress of a run to its own next rate-changing event.
 
@@ -255,7 +271,7 @@ def segment(first, n, run, ball, contact):
     run[first].reach = s
     for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
         k = contact[c]
-        k.due = 1 if (k.until - s) * abs(k.slope) <= rounding_after(k, s) else 0
+        k.due = 1 if comes_at(s, k) else 0
         if k.due == 0 and k.until < second:
             second = k.until
     return 1.0 - s / second if second < math.inf else 1.0
