@@ -27,6 +27,22 @@ def rooms(**exchanged: Any) -> dict[str, Any]:
     return names
 
 
+def no_record() -> Record:
+    """No room for events."""
+    return Record([], [], [], [])
+
+
+def as_objects(state: Any, n: int) -> Any:
+    """The work area of compiled code as that of the plain loop."""
+    copy = drive._area(n, False, no_record())
+    pairs = [*zip(state[:4], copy[:4], strict=True), *zip(state.memory, copy.memory, strict=True)]
+    for records, things in [*pairs, (state.tally, copy.tally)]:
+        for record, thing in zip(records, things, strict=True):
+            for name in record.dtype.names:
+                setattr(thing, name, record[name].item())
+    return copy
+
+
 def solve(
     m, v, e, forward, backward=None, *, meeting=0.5, max_events=10**6, room=0, kernel=None,
     **exchanged,

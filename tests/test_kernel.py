@@ -138,8 +138,9 @@ LIGHT = [1, 0.01, 1], [1, 0, 0], 0.9
 LIGHT_MODEL = ImpulseCorrelation(0.15)
 
 
+@pytest.mark.usefixtures("fresh_runtime")
 @pytest.mark.parametrize("cause", ["no numba", "switched off"])
-def test_without_numba_everything_works(cause, monkeypatch, fresh_runtime):
+def test_without_numba_everything_works(cause, monkeypatch):
     """Where no wheel of numba exists the import fails; the kernel then runs as it stands."""
     monkeypatch.setenv(runtime.VARIABLE, "plain")
     expected = collide(Chain(*LIGHT), LIGHT_MODEL)
@@ -158,8 +159,9 @@ def test_without_numba_everything_works(cause, monkeypatch, fresh_runtime):
     assert after[0].tobytes() == expected.velocities.tobytes()
 
 
+@pytest.mark.usefixtures("fresh_runtime")
 @needs_numba
-def test_small_work_runs_plain_and_more_work_compiled(monkeypatch, fresh_runtime):
+def test_small_work_runs_plain_and_more_work_compiled(monkeypatch):
     """Nothing is loaded before plain work has taken as long as loading, nor compiled before."""
     ready = []
     monkeypatch.setattr(runtime, "loaded", lambda: False)
@@ -189,8 +191,9 @@ def test_plain_work_is_counted(plain, monkeypatch):
     assert 0.0 < runtime._spent <= time.perf_counter() - begun
 
 
+@pytest.mark.usefixtures("fresh_runtime")
 @needs_numba
-def test_a_compilation_says_so_once(monkeypatch, caplog, fresh_runtime):
+def test_a_compilation_says_so_once(monkeypatch, caplog):
     monkeypatch.setenv(runtime.VARIABLE, "compiled")
     monkeypatch.setattr(runtime, "compiled", lambda: "compiled")
     monkeypatch.setattr(runtime, "on_disk", lambda: False)
@@ -208,7 +211,8 @@ def test_a_compilation_says_so_once(monkeypatch, caplog, fresh_runtime):
 
 
 @needs_numba
-def test_warm_up_compiles(plain):
+@pytest.mark.usefixtures("plain")
+def test_warm_up_compiles():
     drive.warm_up()
     assert runtime.loaded()
     assert runtime.ready()
@@ -226,7 +230,8 @@ def test_compiled_code_is_found_on_disk():
     assert found.stdout.split() == ["False", "True"]
 
 
-def test_an_edit_anywhere_makes_a_new_unit(monkeypatch, fresh_runtime):
+@pytest.mark.usefixtures("fresh_runtime")
+def test_an_edit_anywhere_makes_a_new_unit(monkeypatch):
     name = runtime._name()
     monkeypatch.setattr(runtime, "unit", lambda: rooms_source() + "\nLAST = 1\n")
     assert runtime._name() != name
@@ -235,8 +240,9 @@ def test_an_edit_anywhere_makes_a_new_unit(monkeypatch, fresh_runtime):
 rooms_source = runtime.unit
 
 
+@pytest.mark.usefixtures("fresh_runtime")
 @needs_numba
-def test_without_a_folder_for_compiled_code_it_says_so_once(monkeypatch, tmp_path, fresh_runtime):
+def test_without_a_folder_for_compiled_code_it_says_so_once(monkeypatch, tmp_path):
     """Nothing can be written below a regular file, whoever one is."""
     file = tmp_path / "file"
     file.write_text("no folder")
@@ -363,7 +369,7 @@ def test_the_path_is_kept_if_asked_for_or_up_to_a_bound(plain, on, monkeypatch):
 
 
 SLOW = {
-    "one": "cradle.collide(cradle.Chain(m, v, 1), cradle.ImpulseCorrelation(0.0, max_events=2**60))",
+    "one": "cradle.ImpulseCorrelation(0.0, max_events=2**60).solve(cradle.Chain(m, v, 1))",
     "batch": "cradle.outcomes([m] * 40_000, v, 1, 0.0, max_events=2**60)",
 }
 
