@@ -380,31 +380,31 @@ SLOW = {
 @pytest.mark.parametrize("work", SLOW)
 @pytest.mark.parametrize("wish", ["plain", pytest.param("compiled", marks=needs_numba)])
 def test_ctrl_c_works_at_once(work, wish):
-    """An impact of a million million collisions."""
+    """Impacts of many millions of collisions each."""
     code = f"""if True:
         import cradle
         from cradle.drive import warm_up
         warm_up()
-        m, v = [1, 1e-24, 1], [1, 0, 0]
+        m, v = [1, *[1e-14, 1] * 4], [1, *[0] * 8]
         print("begins", flush=True)
         {SLOW[work]}
     """
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-c", code],
         env={**os.environ, runtime.VARIABLE: wish},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-    )
-    try:
-        assert process.stdout.readline() == "begins\n"
-        time.sleep(1)
-        assert process.poll() is None
-        process.send_signal(signal.SIGINT)
-        begun = time.perf_counter()
-        _, error = process.communicate(timeout=60)
-    finally:
-        process.kill()
+    ) as process:
+        try:
+            assert process.stdout.readline() == "begins\n"
+            time.sleep(1)
+            assert process.poll() is None
+            process.send_signal(signal.SIGINT)
+            begun = time.perf_counter()
+            _, error = process.communicate(timeout=60)
+        finally:
+            process.kill()
     assert "KeyboardInterrupt" in error
     assert time.perf_counter() - begun < 2
 
