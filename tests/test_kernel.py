@@ -406,7 +406,8 @@ def test_ctrl_c_works_at_once(work, wish):
         finally:
             process.kill()
     assert "KeyboardInterrupt" in error
-    assert time.perf_counter() - begun < 2
+    # A second or less on an idle machine; without pauses it would be minutes.
+    assert time.perf_counter() - begun < 5
 
 
 # --- the rooms stay plain -----------------------------------------------------------------------

@@ -88,7 +88,8 @@ def efforts(ratio, **limits):
 
 def grows_in_proportion(ratio, **limits):
     before, behind = efforts(ratio, **limits)
-    return before == behind <= window(ratio) + 2
+    # Both ends of the window, and one more as masses are counted in half of their largest.
+    return before == behind <= window(ratio) + 3
 
 
 @pytest.mark.parametrize("ratio", [0.1, 0.3, 0.45, 0.5])
@@ -106,7 +107,7 @@ def test_elastic_chain_at_any_length(n, ratio):
     """One collision a contact, a bounded number of contacts a collision, one and the same end."""
     found = solve(*struck(n), 1.0, ratio)
     assert found.collisions == [1] * (n - 1)
-    reach = 3 if ratio == 0.0 else window(ratio) + 2
+    reach = 3 if ratio == 0.0 else window(ratio) + 3
     assert found.effort <= (n - 1) * reach
     short = solve(*struck(50), 1.0, ratio)
     assert found.velocities[-5:] == short.velocities[-5:]
