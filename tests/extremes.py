@@ -5,8 +5,7 @@
 the change of the exact outcome when every input changes by its last digit.
 """
 
-import functools
-import importlib.util
+import collections
 import itertools
 import math
 from fractions import Fraction
@@ -14,6 +13,7 @@ from typing import NamedTuple
 
 import mpmath
 import numpy as np
+import plain
 from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
 from march import march
 from reference import EventLimit, solve
@@ -24,10 +24,12 @@ from cradle import (
     ImpulseCorrelation,
     SpringChain,
     collide,
+    drive,
     kernel,
     outcomes,
     post_impact_velocities,
 )
+from cradle.kernel.state import COLLAPSE, LIMITS
 from cradle.models.correlation import MAX_EVENTS
 
 EPS = 2.0**-52
@@ -576,61 +578,37 @@ class Late(NamedTuple):
     active: np.ndarray
 
 
-def keep_the_last(count, kind, c, _hi, u, _p, n, _v, _shift, _mass_shift, _m, _p0, *record):
-    """The kernel's `record`, round and round, with closing speeds to all their digits."""
-    kinds, contacts, _, speeds = record
-    k = count % len(kinds)
-    kinds[k] = kind
-    contacts[k] = c
-    for j in range(n - 1):
-        speeds[k][j] = u[j]
-    return count + 1
-
-
-def no_compressions(count, *_):
-    """The kernel's `record_compressions`, left out."""
-    return count
-
-
-@functools.cache
-def late_kernel(compiled):
-    """The kernel with a record of the last events in place of the first."""
-    spec = importlib.util.spec_from_file_location("late_kernel", kernel.__file__)
-    module = importlib.util.module_from_spec(spec)
-    if compiled:
-        import numba
-
-        jit = vars(module)["jit"] = numba.njit(error_model="numpy")
-    else:
-
-        def jit(function):
-            return function
-
-    spec.loader.exec_module(module)
-    module.record = jit(keep_the_last)
-    module.record_compressions = jit(no_compressions)
-    return module
-
-
 def late(problem, steps, room=20_000):
-    """The last events, no more than `room`, of a chain that is stopped after so many steps."""
+    """The last events, no more than `room`, of a chain that is stopped after so many steps.
+
+    Up to near the limit by the event loop as it is; then on, plain, with another record.
+    """
     n = len(problem.masses)
-    compiled = steps > 100_000  # fewer are sooner made than compiled
+    limit = max(steps - 2 * room, 0)
+    inputs = kernel.Inputs(*(np.array([part], float) for part in problem[:5]))
+    options = kernel.Options(problem.meeting, max(limit, 1), False, True)
+    job = drive.Job(inputs, 1, options, large=limit > 100_000).run()
+    assert job.status == drive.UNFINISHED
+    last = collections.deque(maxlen=room)
 
-    def area(*shape, kind=float):
-        numbers = np.zeros(shape, kind)
-        return numbers if compiled else numbers.tolist()
+    def keep(kind, c, n, state):
+        """The kernel's `record`: closing speeds to all their digits."""
+        state.tally[0].events += 1
+        last.append((kind, c, [names["closing"](j, state.ball) for j in range(n - 1)]))
 
-    record = [area(room, kind=int), area(room, kind=int), area(1, n), area(room, n - 1)]
-    outputs = [area(n), area(n - 1), area(n - 1), area(n - 1, kind=int), area(n - 1, kind=int)]
-    floats, ints = area(kernel.FLOATS, n), area(kernel.INTS, n, kind=int)
-    parts = [np.array(part, float) if compiled else part for part in problem[:5]]
-    _, count, _ = late_kernel(compiled).impact(
-        n, *parts, problem.meeting, steps, *outputs, floats, ints, *record
-    )
-    order = np.arange(max(count - room, 0), count) % room
-    kinds, contacts, speeds = (np.array(record[k])[order] for k in (0, 1, 3))
-    return Late(kinds, contacts, speeds, np.array(ints[0][: n - 1]))
+    names = plain.rooms(record=lambda _: keep)
+    state = job.state
+    if job.compiled:
+        state = plain.as_objects(state, n)
+    state.tally[0].effort = state.tally[0].room = 2**62
+    state.tally[0].rounds -= 1  # the one at which it stopped was not made
+    state = state._replace(record=plain.no_record())
+    chain = names["Inputs"](*(list(map(float, part)) for part in problem[:5]))
+    status = names["impact"](n, chain, problem.meeting, steps, True, state)
+    assert status == drive.UNFINISHED
+    kinds, contacts, speeds = (np.array(part) for part in zip(*last, strict=True))
+    active = np.array([state.contact[c].active for c in range(n - 1)])
+    return Late(kinds, contacts, speeds, active)
 
 
 class Explanation(NamedTuple):
@@ -678,9 +656,9 @@ def explain(problem, seen):
     scale = sizes[1] * 2.0 ** math.frexp(max(map(abs, problem.velocities)))[1] / largest
     ends = [v / -d for d, v in zip(change, last[steady]) if d * v < 0]
     if shrink > 0:
-        ends.append(max(math.log(scale / kernel.EXHAUSTED), 0.0) / shrink)
+        ends.append(max(math.log(scale / LIMITS.exhausted), 0.0) / shrink)
     repeats = period(tokens[-2000:])
-    pattern = "nested" if (kinds == kernel.COLLAPSE).any() else "cycle" if repeats else "irregular"
+    pattern = "nested" if (kinds == COLLAPSE).any() else "cycle" if repeats else "irregular"
     return Explanation(
         pattern, repeats, int(steady.sum()), len(rows), shrink, float(turn), float(drift), scale,
         1000.0 * min(ends, default=math.inf),

@@ -26,6 +26,7 @@ from cradle import (
     post_impact_velocities,
     runtime,
 )
+from cradle.kernel.state import LIMITS
 from cradle.measures import condition_number
 from cradle.models.correlation import MAX_EVENTS
 from cradle.tables import paper_sequences
@@ -514,7 +515,7 @@ def test_explanation_of_a_light_ball():
     assert (found.pattern, found.period, found.steady) == ("cycle", 4, 0)
     assert found.shrink == pytest.approx(-1000 / 4 * math.log(slow), rel=1e-6)
     assert found.turn < 1e-3
-    left = math.log(found.scale / kernel.EXHAUSTED) / found.shrink
+    left = math.log(found.scale / LIMITS.exhausted) / found.shrink
     assert found.predicted == pytest.approx(1000 * left)
 
 

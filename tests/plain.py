@@ -1,0 +1,88 @@
+"""The kernel as it stands, with a limit or a function exchanged: what each is there for."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from cradle import drive, runtime
+from cradle.kernel.state import LIMITS, Record
+
+CODE = compile(runtime.unit(), "kernel.py", "exec")
+
+
+def rooms(**exchanged: Any) -> dict[str, Any]:
+    """All names of the kernel; fields of `LIMITS` and functions exchanged as told.
+
+    A function is exchanged by one that takes the names of the kernel and gives the other function.
+    """
+    names: dict[str, Any] = {"__name__": "kernel"}
+    exec(CODE, names)
+    limits = {name: value for name, value in exchanged.items() if name in LIMITS._fields}
+    names["LIMITS"] = names["LIMITS"]._replace(**limits)
+    for name in exchanged.keys() - limits.keys():
+        assert isinstance(names[name], Callable), name
+        names[name] = exchanged[name](dict(names))
+    return names
+
+
+def no_record() -> Record:
+    """No room for events."""
+    return Record([], [], [], [])
+
+
+def as_objects(state: Any, n: int) -> Any:
+    """The work area of compiled code as that of the plain loop."""
+    copy = drive._area(n, False, no_record())
+    pairs = [*zip(state[:4], copy[:4], strict=True), *zip(state.memory, copy.memory, strict=True)]
+    for records, things in [*pairs, (state.tally, copy.tally)]:
+        for record, thing in zip(records, things, strict=True):
+            for name in record.dtype.names:
+                setattr(thing, name, record[name].item())
+    return copy
+
+
+def solve(
+    m, v, e, forward, backward=None, *, meeting=0.5, max_events=10**6, room=0, kernel=None,
+    **exchanged,
+):  # fmt: skip
+    """Solve one impact by the plain event loop; return all that it leaves."""
+    names = kernel or rooms(**exchanged)
+    n = len(m)
+    chain = names["Inputs"](
+        *([float(x) for x in part] for part in (m, v)),
+        np.broadcast_to(np.asarray(e, float), n - 1).tolist(),
+        *(
+            np.broadcast_to(np.asarray(part, float), n - 2).tolist()
+            for part in (forward, forward if backward is None else backward)
+        ),
+    )
+    inputs = names["Inputs"](*([part] for part in chain))
+    record = Record(
+        [0] * room, [0] * room, *([[0.0] * k for _ in range(room + 1)] for k in (n, n - 1))
+    )
+    state = drive._area(n, False, record)
+    state.tally[0].room = 2**62
+    out = names["Outputs"](
+        [[0.0] * n], [[0] * (n - 1)], [0], *([kind()] * (n - 1) for kind in (float, float, int))
+    )
+    options = names["Options"](meeting, max_events, False, True)
+    plenty = 2**62
+    _, status = names["batch"](0, False, n, inputs, options, out, state, plenty)
+    tally = state.tally[0]
+    return SimpleNamespace(
+        status=status,
+        velocities=out.v[0],
+        collisions=out.hits[0],
+        collapsed=bool(out.collapsed[0]),
+        impulses=out.p,
+        absorbed=out.a,
+        held=out.held,
+        events=tally.events,
+        rounds=tally.rounds,
+        effort=plenty - tally.effort,
+        defect=tally.defect,
+        margin=tally.margin,
+        state=state,
+    )

@@ -1,0 +1,134 @@
+"""Every safeguard earns its place: a small chain that goes wrong without it.
+
+The plain event loop runs with one limit or one function exchanged.  As it is, it gives a certified
+answer, for short impacts that of fifty digits; with the exchange it does not: it goes wrong, does
+not finish, or its answer is not certified.
+"""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+import truth
+from plain import solve
+
+from cradle.kernel.state import FINISHED, UNFINISHED, UNSOUND
+
+WRONG = "wrong"
+
+
+def simple_zero(_):
+    """In place of `arrive`: the closing speed alone is set to zero, the balls stay as they are."""
+
+    def arrive(c, _low, _high, _ball, contact):
+        contact[c].u = 0.0
+
+    return arrive
+
+
+def from_one_end(_):
+    """In place of `share_out`: one sum from left to right."""
+
+    def share_out(first, last, before, _after, ball, contact):
+        impulse = before
+        for c in range(first, last + 1):
+            impulse -= ball[c].m * ball[c].x
+            contact[c].x = impulse
+
+    return share_out
+
+
+def one_number(_):
+    """In place of `add_velocity`: a velocity is one number."""
+
+    def add_velocity(b, x):
+        b.hi += x
+        b.lo = 0.0
+
+    return add_velocity
+
+
+LIGHT_BETWEEN = ([1e-6, 1e-9, 1e-6, 1], [1, 0, 0, 0], [0.3, 0.1, 0.99], [0.3, 0.1], [0.5, 1], 1.0)
+
+#: What is exchanged; the chain with its ratios and `meeting`; what becomes of it.
+NEEDED = {
+    "velocities as sums of two numbers": (
+        {"add_velocity": one_number},
+        ([1000, 1], [1, 0], 0.3, [], [], 0.5),
+        UNSOUND,
+    ),
+    "a cycle that still turns": (
+        {"bend": 0.0},
+        ([1, 1e-6, 1], [1, 0, 0], [0.9, 1], 0.05, 0, 0.5),
+        UNFINISHED,
+    ),
+    "a cycle that turns too far": (
+        {"bend": math.inf},
+        ([1.7, 1e-3, 1, 1], [1, 0, 0, 0], [0.9, 0.99, 0.9], [0.05, 0.1], [0.1, 0.05], 0.5),
+        WRONG,
+    ),
+    "a cycle beside neighbours whose shares have few digits": (
+        {"doubt": 0.0},
+        LIGHT_BETWEEN,
+        UNFINISHED,
+    ),
+    "impulses summed from both ends": (
+        {"share_out": from_one_end},
+        ([1, 1e-6, 1000, 1e-9], [1, 0, 0, 0], [0.5, 0, 0.1], [0.3, 0.5], [0.3, 0.1], 1.0),
+        UNSOUND,
+    ),
+    "what arrives takes the other's velocity": (
+        {"arrive": simple_zero},
+        (
+            [0.77, 2.75, 0.56, 2.45, 2.67, 0.69, 2.55],
+            [0.8, 0.59, 0.44, 0.34, 0.28, 0.15, 0.04],
+            [0.83, 0.56, 0.6, 0.88, 0.55, 0.98],
+            [0, 0, 0, 0, 0], [0.18, 0, 0, 0, 0], 0.5,
+        ),
+        WRONG,
+    ),
+    "gaps reached at once": (
+        {"tie": 0.0},
+        (
+            [1.94, 2.65, 1.39, 2.14, 1.98, 1.73, 1.82, 1.75, 1.36],
+            [0.9, 0.63, 0.55, 0.55, 0.51, 0.43, 0.21, 0.17, 0.05],
+            [0.62, 0.63, 0.77, 0.74, 0.7, 0.55, 0.69, 0.83],
+            [0.37, 0.4, 0, 0, 0.1, 0.08, 0.1], [0.32, 0.21, 0.06, 0.2, 0, 0.41, 0.52], 0.5,
+        ),
+        WRONG,
+    ),
+}  # fmt: skip
+
+
+def run(chain, **exchanged):
+    *chain, meeting = chain
+    return solve(*chain, meeting=meeting, max_events=3000, **exchanged)
+
+
+@pytest.mark.parametrize("name", NEEDED)
+def test_without_it_a_chain_goes_wrong(name):
+    exchange, chain, becomes = NEEDED[name]
+    real, other = run(chain), run(chain, **exchange)
+    assert real.status == FINISHED
+    if becomes == WRONG:
+        assert other.status == FINISHED
+        assert np.abs(np.subtract(real.velocities, other.velocities)).max() > 1e-6
+    else:
+        assert other.status == becomes
+
+
+# The others take fifty digits minutes.
+SHORT = [name for name, (_, chain, _) in NEEDED.items() if min(chain[0]) > 0.1]
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_with_it_the_answer_is_that_of_fifty_digits(name):
+    *chain, meeting = NEEDED[name][1]
+    with mpmath.workdps(50):
+        exact = truth.solve(
+            *[list(map(float, x)) if np.ndim(x) else float(x) for x in chain],
+            meeting=meeting, excess="saturate", max_events=2000,
+        )  # fmt: skip
+        off = max(abs(a - b) for a, b in zip(run(NEEDED[name][1]).velocities, exact.velocities))
+    assert off < 1e-13
