@@ -31,8 +31,9 @@ CHANGES = {
     ],
     "patterns": [{"ALPHA": 0.3, "E": 0.8}, {"ALPHA": 0.5, "E": 0.3}],
     "n_balls": [{"ratio": 0}, {"ratio": 0.05}, {"ratio": 0.33}, {"ratio": 0.5}],
+    "toy": [{"ratio": 0.05, "pulled_back": 0.02}, {"ratio": 0.3}],
     "trade": [{"ratio": 0, "step": 1 / 240}, {"ratio": 0.4, "step": 1e-4}],
-    "extremes": [{"ratio": 0, "sequence": "ABCCAB"}, {"ratio": 0.3, "sequence": "BABA"}],
+    "extremes": [{"ratio": 0}, {"ratio": 0.3}],
     "beyond": [{"ratio": 0, "restitution": 0.9}, {"ratio": 0.5, "restitution": 1}],
     "experiments": [
         {"ratio": 0, "velocity_error": 0.05},
