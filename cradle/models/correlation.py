@@ -22,6 +22,8 @@ MAX_EVENTS = 5_000_000
 # Numbers that a path may hold unless it is asked for in full: 80 MB.
 _MOST_NUMBERS = 10_000_000
 _EVERY = 2**40
+# The longest path kept of an impact that did not finish.
+_UNFINISHED_EVENTS = 100_000
 
 
 def _most_events(n: int) -> int:
@@ -156,6 +158,8 @@ class ImpulseCorrelation:
         written.velocities[0] = chain.velocities
         count = int(job.tally.events)
         kept = min(count, len(written.kinds))
+        if job.status == UNFINISHED:
+            kept = min(kept, _UNFINISHED_EVENTS)
         if 0 < kept < count and job.status != UNFINISHED:
             warnings.warn(
                 f"the path holds the first {kept} of {count} events; record=True keeps all, "
