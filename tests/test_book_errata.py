@@ -185,7 +185,7 @@ def test_closings_that_are_due_together():
     assert abs(outcomes[1] + outcomes[1][::-1]).max() > 0.01
 
 
-def test_simultaneous_within_64_roundings():
+def test_simultaneous_within_rounding():
     """The chain of the entry: its tie, undone in one direction and in the other."""
     rest = [1, 0, 0, 0, 0, 0], [1, "0.5", "0.25", 1, "0.75"], ["0.1", 0, 0, "0.1"]
     rest = *rest, ["0.1", "0.25", "0.25", 0]
