@@ -4,7 +4,7 @@ A light ball may shuttle a thousand times as fast as the heavy balls beside it. 
 alone would lose track of how these move, single velocities of how slowly some balls part.
 """
 
-from cradle.kernel.state import apart, jit
+from cradle.kernel.state import LIMITS, apart, jit
 
 
 @jit
@@ -137,20 +137,28 @@ def set_closing_speed(c, speed, rest, low, high, ball, contact):
 def arrive(c, low, high, ball, contact):
     """Let contact c beside the run low..high be at zero: the run's ball takes the other's velocity.
 
-    The two differ by the rounding of what the run's last impulse did to this ball, and to those
-    that zeros join to it; no more is changed.
+    The two differ by rounding, most often by that of what the run's last impulse did to this ball,
+    and to those that zeros join to it.  Where it is more, the impulse of the contact inwards is
+    corrected first.
     """
-    i = low if c < low else high + 1
-    other = c if c < low else c + 1
     step = 1 if c < low else -1
-    while True:
-        ball[i].hi, ball[i].lo = ball[other].hi, ball[other].lo
-        k = i if c < low else i - 1  # the contact inwards
-        if not low <= k <= high or contact[k].u != 0.0:
-            break
-        i += step
+    k = low if c < low else high
+    while low <= k <= high and contact[k].u == 0.0:
+        k += step
     if low <= k <= high:
-        contact[k].u = closing(k, ball)
+        _, _, left, right = bodies(k, low, high, ball, contact)
+        impulse = -closing(c, ball) * (left if c < low else right)
+        if abs(impulse) > LIMITS.digits * contact[k].p:
+            push(k, impulse, low, high, ball, contact)
+    other = c if c < low else c + 1
+    for j in range(low, high + 2):
+        i = j if c < low else low + high + 1 - j
+        ball[i].hi, ball[i].lo = ball[other].hi, ball[other].lo
+        if i == (k if c < low else k + 1):
+            break
+    for j in range(low, high + 1):
+        if contact[j].u != 0.0:
+            contact[j].u = closing(j, ball)
     contact[c].u = contact[c].blur = 0.0
 
 
