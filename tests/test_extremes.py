@@ -660,7 +660,11 @@ def test_any_finite_numbers(data):
     m, v = draw(positive, n), draw(st.one_of(finite, st.sampled_from([0.0, 1.0, -1.0])), n)
     e, f, b = draw(unit, n - 1), draw(unit, n - 2), draw(unit, n - 2)
     problem = x.Case(m, v, e, f, b, data.draw(unit))
-    if max(m) * 1e-150 > min(m) or any(mass * speed * speed > 1e300 for mass, speed in zip(m, v)):
+    if (
+        max(m) * LIMITS.lightest > min(m)
+        or any(0 < c < LIMITS.least_restitution for c in e)
+        or any(mass * speed * speed > 1e300 for mass, speed in zip(m, v))
+    ):
         try:
             problem.collide(2000)
         except ValueError as error:
@@ -767,6 +771,13 @@ def test_found_by_fuzzing(name, plain, monkeypatch):
     if plain:
         monkeypatch.setenv(runtime.VARIABLE, "plain")
     problem = x.case(*FOUND[name])
+    least = min(problem.masses) / max(problem.masses)
+    if least < LIMITS.lightest or any(
+        0 < e < LIMITS.least_restitution for e in problem.restitution
+    ):
+        with pytest.raises(ValueError, match="must be (0 or )?at least 1e-(15|30)"):
+            problem.collide(20_000)
+        return
     trace, finished = problem.collide(20_000)
     assert finished
     assert x.faults(trace) == []
