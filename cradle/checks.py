@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike
 from cradle.kernel.state import LIMITS
 from cradle.reals import Vector, numbers, refusal, shown
 
+#: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
+LIGHTEST = 1e-150
+
 __all__ = [
     "Vector",
     "a",
@@ -143,10 +146,10 @@ def checked_masses(masses: ArrayLike) -> Vector:
     """
     array = checked("masses", masses, "must be above 0", 0.0, open_low=True)
     if array.size and array.ndim:
-        small = array < LIMITS.lightest * array.max(axis=-1, keepdims=True)
+        small = array < LIGHTEST * array.max(axis=-1, keepdims=True)
         if small.any():
             at = np.unravel_index(int(np.argmax(small)), array.shape)
-            rule = f"must be at least {LIMITS.lightest} of the heaviest ball of its chain"
+            rule = f"must be at least {LIGHTEST} of the heaviest ball of its chain"
             raise refusal("masses", at, f" = {float(array[at])!r}; {rule}")
     return array
 

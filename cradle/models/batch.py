@@ -30,6 +30,7 @@ from cradle.models.correlation import (
     check_options,
     checked_ratios,
     refuse_excess,
+    refuse_light,
 )
 
 if TYPE_CHECKING:
@@ -300,6 +301,8 @@ def _check(given: dict[str, ArrayLike], excess: str) -> None:
     checked_restitution(given["restitution"])
     f, b = (checked_ratios(name, given[name]) for name in ("forward", "backward"))
     refuse_overflow(v, m)
+    if m.size:
+        refuse_light(m)
     if excess == "raise":
         ends = m.shape[-1] - 2
         f, b = (np.broadcast_to(x, (ends,)) if x.ndim == 0 else x for x in (f, b))

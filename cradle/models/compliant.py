@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.checks import Vector, checked, one_number, whole_number
-from cradle.kernel.state import LIMITS
+from cradle.checks import LIGHTEST, Vector, checked, one_number, whole_number
 from cradle.models.motion import Motion, own_units
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -135,10 +134,10 @@ class SpringChain:
         k = checked("stiffness", self.stiffness, "must be above 0", 0.0, open_low=True)
         if k.ndim > 1:
             raise ValueError(f"stiffness has shape {k.shape}; must be () or (N - 1,)")
-        if k.size and k.min() < LIMITS.lightest * k.max():
+        if k.size and k.min() < LIGHTEST * k.max():
             raise ValueError(
                 f"stiffness[{int(k.argmin())}] = {float(k.min())!r}; "
-                f"must be at least {LIMITS.lightest} of the stiffest contact"
+                f"must be at least {LIGHTEST} of the stiffest contact"
             )
         object.__setattr__(self, "stiffness", tuple(k.tolist()) if k.ndim else float(k))
         rules = {

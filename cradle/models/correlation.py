@@ -119,6 +119,7 @@ class ImpulseCorrelation:
             The path and the outcome.
         """
         must_be(Chain, "chain", chain)
+        refuse_light(chain.masses)
         n = len(chain)
         ratios: list[Vector] = []
         for name in ("forward", "backward"):
@@ -199,6 +200,19 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
         raise ValueError(f"max_events = {max_events!r}; must be a whole number")
     if not 1 <= max_events < 2**63:
         raise ValueError(f"max_events = {max_events!r}; must be at least 1 and below 2**63")
+
+
+def refuse_light(masses: Vector) -> None:
+    """Raise if a ball is too light: how it parts the heavy ones is below rounding."""
+    small = masses < LIMITS.lightest * masses.max(axis=-1, keepdims=True)
+    if small.any():
+        at = np.unravel_index(int(np.argmax(small)), masses.shape)
+        raise refusal(
+            "masses",
+            at,
+            f" = {float(masses[at])!r}; for this model it must be at least {LIMITS.lightest} of "
+            "the heaviest ball of its chain",
+        )
 
 
 def refuse_excess(masses: Vector, forward: Vector, backward: Vector) -> None:
