@@ -505,7 +505,7 @@ def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
 
 FAMILIES = (("within", 3), ("within", 6), ("saturate", 3), ("saturate", 6))
 #: How many chains of each family the map counts.
-CHAINS = 2_500
+CHAINS = 25_000
 
 
 def any_chain(family, decades, index):
