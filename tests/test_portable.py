@@ -174,7 +174,7 @@ UNEVEN = re.compile(
     r"|(?:\b10(?:\.0)? ?\*\* ?|np\.(?:exp|power|sin|cos|log\w*)\()\(?(?:rng\.|uniform\(rng)"
 )
 #: Not read: the sentences of this file, and draws by Python's `random`, which are plain arithmetic.
-NOT_READ = ("test_portable.py", "test_reference.py", "test_agreement.py", "test_collapse.py")
+NOT_READ = ("test_portable.py",)
 
 
 def test_no_draw_rounds_unevenly():

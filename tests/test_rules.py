@@ -111,7 +111,7 @@ def test_ratio_zero_is_a_sequence_of_pairs():
     """Johnson's model: every pair by itself, the driver first."""
     rng = np.random.default_rng(6)
     for _ in range(20):
-        m, e = np.sort(rng.uniform(0.5, 2, 5))[::-1].copy(), rng.random(4)
+        m, e = np.sort(0.5 + 1.5 * rng.random(5))[::-1].copy(), rng.random(4)
         v = [1.0, 0.0, 0.0, 0.0, 0.0]
         for c in range(4):
             common = (m[c] * v[c] + m[c + 1] * v[c + 1]) / (m[c] + m[c + 1])

@@ -150,13 +150,15 @@ def generic(seed, n, bounded=True, light=0.3):
     At a bound, the speed that an ulp of the ratio releases is of the order of its square root.
     """
     rng = random.Random(seed)
-    masses = [rng.uniform(light, 2) * rng.choice([1, 2]) for _ in range(n)]
+    masses = [(light + (2 - light) * rng.random()) * rng.choice([1, 2]) for _ in range(n)]
     if rng.random() < 0.7:
-        velocities = [rng.uniform(-1, 1) for _ in range(n)]
+        velocities = [2 * rng.random() - 1 for _ in range(n)]
     else:
         velocities = [1.0] + [0.0] * (n - 1)
-    restitution = [rng.uniform(0.05, 0.95) for _ in range(n - 1)]
-    forward, backward = ([rng.uniform(0.02, 0.98) for _ in range(n - 2)] for _ in range(2))
+    restitution = [(0.05 + (0.95 - 0.05) * rng.random()) for _ in range(n - 1)]
+    forward, backward = (
+        [(0.02 + (0.98 - 0.02) * rng.random()) for _ in range(n - 2)] for _ in range(2)
+    )
     if bounded:
         for k in reversed(range(n - 2)):  # Eq. 53 needs the next ratio
             forward[k] *= largest_ratios(masses, forward, backward)[0][k]
@@ -296,8 +298,8 @@ def test_closed_form_of_three_balls():
     rng = random.Random(24)
     checked = 0
     while checked < 40:
-        m1, m2, m3 = (mpmath.mpf(rng.uniform(0.2, 4)) for _ in range(3))
-        e2, e3 = (mpmath.mpf(rng.uniform(0.3, 1)) for _ in range(2))
+        m1, m2, m3 = (mpmath.mpf(0.2 + (4 - 0.2) * rng.random()) for _ in range(3))
+        e2, e3 = (mpmath.mpf(0.3 + (1 - 0.3) * rng.random()) for _ in range(2))
         a = rng.random() * m3 / (m2 + m3)
         outcome = solve([m1, m2, m3], [1, 0, 0], [e2, e3], a, 0)
         if outcome.collisions != [1, 1]:
