@@ -49,8 +49,8 @@ DIGESTS = {
     "scenes": "13088f12c81b4e35",
     "long_chains": "eef8777637e3f854",
     "implied_ratio": "617f9eed01d94458",
-    "batch": "e3936e4b696a57a3",
-    "one by one": "39de3d70121211ba",
+    "batch": "3862697f15a1aa19",
+    "one by one": "65df8f79684a2536",
 }
 
 
