@@ -290,7 +290,8 @@ def test_invariants(name):
 def test_textbook_says_the_same(name):
     """Where it does not, fifty digits decide: doubles without a safeguard err now and then.
 
-    Of chains full of ties, which amplify the last digit, so does the package: in two of some three hundred when last counted.
+    Of chains full of ties, which amplify the last digit, so does the package: in two of some three
+    hundred when last counted.
     """
     compared = wrong = 0
     for problem, trace in finished(name, COUNT, seed=2):
