@@ -97,7 +97,7 @@ LIMITS = Limits(
     tiny=1e-60,
     huge=1e60,
     clear=1e-12,
-    lightest=1e-15,
+    lightest=1e-25,
     least_restitution=1e-30,
     sound=64 * 2.0**-52,
 )
