@@ -250,7 +250,7 @@ class ImpactNotCertified(RuntimeError):
     >>> raise ImpactNotCertified("a chain", "a model", "balls still approach")
     Traceback (most recent call last):
     ...
-    cradle.trace.ImpactNotCertified: balls still approach: a chain, a model
+    cradle.trace.ImpactNotCertified: balls still approach: 'a chain', 'a model'
     """
 
     def __init__(self, chain: Any, model: Any, defect: str) -> None:
