@@ -17,6 +17,7 @@ The rooms, in that order:
 - `cradle.closed_form`: what the paper gives in closed form; `cradle.conserving`: all outcomes of
   three balls that conserve energy.
 - `cradle.tables`: the paper's tables and chains, read by `cradle.reading`.
+- `cradle.advice`: which model a scene needs; `cradle.measured`: by which measurements.
 - `cradle.measures`: what is read off outcomes; `cradle.blocks`: batches under dask.
 - `cradle.fit`: ratios and restitution from measured velocities.
 - `cradle.figures` and `cradle.animation`: matplotlib, imported only when asked for;
@@ -27,6 +28,7 @@ Read `cradle.textbook` first: the rules of an impact in 250 lines.  The distribu
 cradle-companion; its version is `cradle.__version__`.
 """
 
+from cradle.advice import Recommendation, recommend
 from cradle.chain import Chain
 from cradle.models import Model, collide
 from cradle.models.batch import Outcomes, outcomes, post_impact_velocities
@@ -56,6 +58,7 @@ __all__ = [
     "Outcomes",
     "Pendulums",
     "QuadraticDissipation",
+    "Recommendation",
     "SequentialCollisions",
     "SpringChain",
     "Swing",
@@ -67,6 +70,7 @@ __all__ = [
     "paper_sequences",
     "post_impact_velocities",
     "ratio_table",
+    "recommend",
     "restitution_table",
     "swing",
 ]

@@ -1,0 +1,356 @@
+"""Which model a scene needs: from what is known and what is wanted, by what was measured.
+
+No number is an estimate.  It was measured on this very chain, or is the worst of those measured on
+chains around it, or there is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cradle.chain import Chain
+from cradle.checks import must_be, one_number, shown, whole_number
+from cradle.measured import Evidence, Row, evidence, lasting, measured_chain, rows, unit
+from cradle.models import Model
+from cradle.models.compliant import SpringChain
+from cradle.models.correlation import ImpulseCorrelation
+from cradle.models.energy import EnergyDistribution
+from cradle.models.sequential import SequentialCollisions
+
+WANTED = ("velocities", "impulses", "path", "forces", "times", "fastest ball")
+
+# A chain among the measured ones can be worse than each of them, by a few times.  It has the
+# accuracy if they are all better by this factor.
+_MARGIN = 10.0
+_BATCH = "post_impact_velocities(masses, velocities, restitution, forward, backward)"
+
+# By the group of the table.
+_REASONS = {
+    "event": "The ratios are known, so the impact is solved event by event: without a step, all "
+    "digits have one price.",
+    "springs": "Elastic balls of known stiffness are springs; only these have forces and times.",
+    "energy": "There are losses and no ratios: the energy law is what springs become with losses. "
+    "How near it comes to real balls was not measured.",
+    "outcome": "Restitution alone does not determine the impact; of the models that need no more, "
+    "this one is nearest to Hertz springs. On the chains measured it has the right fastest ball; "
+    "on others it can be wrong.",
+    "two balls": "Two balls have no ratio: restitution alone determines them.",
+}
+
+
+@dataclass(frozen=True, repr=False)
+class Recommendation:
+    """A model for a scene, and what to expect of it.
+
+    Attributes
+    ----------
+    model : Model
+        Ready for `collide`.
+    setting : str
+        The row of the measured table: integrator and tolerance, one call or a batch.
+    call : str
+        What to call.
+    numerical_error : float or None
+        Distance from the exact answer of the same model: of any ball's velocity, at most, as a
+        part of the closing speed.  None: not measured.
+    model_error : float or None
+        The same from equal Hertz springs, the theory of elastic spheres; no setting makes it
+        smaller.  None: not measured, or, with losses, not to be measured: there is no such theory.
+    seconds : float or None
+        Time of one impact on the machine that measured, to a factor of two.  None: not measured.
+    measured_on : tuple of str
+        The measured chains that these numbers come from: this very chain, or those around it, of
+        which the worst counts.  Empty: none.
+    reason : str
+        Why this model.
+
+    Examples
+    --------
+    >>> from cradle import Chain
+    >>> recommend(Chain([1] * 20, [1] + [0] * 19), stiffness=1.0).seconds is None
+    True
+    """
+
+    model: Model
+    setting: str
+    call: str
+    numerical_error: float | None
+    model_error: float | None
+    seconds: float | None
+    measured_on: tuple[str, ...]
+    reason: str
+
+    def _lines(self) -> dict[str, str]:
+        """Return what is shown, by its title."""
+
+        def number(value: float | None) -> str:
+            return "not measured" if value is None else f"{value:.1e}" if value else "0"
+
+        return {
+            "setting": self.setting,
+            "call": self.call,
+            "numerical error": number(self.numerical_error),
+            "model error": number(self.model_error),
+            "time": "not measured" if self.seconds is None else lasting(self.seconds),
+            "measured on": "; ".join(self.measured_on) or "nothing like this",
+            "reason": self.reason,
+        }
+
+    def __repr__(self) -> str:
+        """Return the model and a line for each thing to know."""
+        lines = [f"  {title + ':':<17}{text}" for title, text in self._lines().items()]
+        return "\n".join([f"Recommendation: {self.model!r}", *lines])
+
+    def _repr_html_(self) -> str:
+        """Return a table for a notebook."""
+        lines = {"model": repr(self.model), **self._lines()}.items()
+        rows = [f"<tr><th>{escape(a)}</th><td>{escape(b)}</td></tr>" for a, b in lines]
+        return f"<table>{''.join(rows)}</table>"
+
+
+def recommend(
+    chain: Chain,
+    wanted: str | Collection[str] = "velocities",
+    *,
+    accuracy: float = 1e-6,
+    model_error: float | None = None,
+    impacts: int = 1,
+    ratios: ImpulseCorrelation | ArrayLike | None = None,
+    stiffness: float | Sequence[float] | None = None,
+) -> Recommendation:
+    """Recommend the cheapest model that gives what is wanted from what is known.
+
+    Parameters
+    ----------
+    chain : Chain
+        The balls, with their restitution.
+    wanted : str or collection of str
+        One or several of "velocities", "impulses", "path", "forces", "times" (how long the
+        contacts last) and "fastest ball" (which one it is).
+    accuracy : float
+        Largest numerical error of a velocity, as a part of the closing speed; 1e-15 to 1.
+    model_error : float, optional
+        Largest distance from Hertz springs, elastic spheres, in the same unit; any if left out.
+    impacts : int
+        How many impacts of such chains are to be solved; several go into one call where a model
+        has one, measured with 2000.
+    ratios : ImpulseCorrelation, float or sequence of length N - 2, optional
+        Impulse Correlation Ratios, if they are known, as a model or as its `forward`.
+    stiffness : float or sequence of length N - 1, optional
+        k of the contacts of spheres (Hertz) if the material is known, N/m^(3/2); 1 for equal ones
+        if neither forces nor times are wanted.
+
+    Returns
+    -------
+    Recommendation
+        The model, its setting, its expected errors and cost, the reason.
+
+    Raises
+    ------
+    ValueError
+        If a value is wrong, a model refuses the chain, or no model fits; the message says what is
+        missing.
+
+    Notes
+    -----
+    The errors are those of velocities; errors of forces and times have not been measured.  The
+    chains measured are rows that touch, struck by a ball at one end: three and five equal elastic
+    balls, three with a light one in the middle, the paper's ABCCA, and, solved event by event,
+    random ones; all springs were equal.  A chain lies among them if its number of balls, its spread
+    of masses and its restitution lie between theirs.  Then the worst of them counts, and must be
+    ten times better than `accuracy`.
+
+    Examples
+    --------
+    >>> from cradle import Chain, collide
+    >>> chain = Chain([1, 1, 1], [1, 0, 0])
+    >>> advice = recommend(chain, ("forces", "times"), accuracy=1e-3, stiffness=1e10)
+    >>> advice.numerical_error <= 1e-3, advice.model_error, advice.measured_on
+    (True, 0.0, ('three equal',))
+    >>> collide(chain, advice.model).velocities.round(2).tolist()
+    [-0.07, 0.08, 0.99]
+    >>> recommend(Chain([1, 1, 1], [1, 0, 0], 0.9), "forces", stiffness=1e10)
+    Traceback (most recent call last):
+    ...
+    ValueError: wanted = 'forces', restitution[0] = 0.9; must be 1: forces and times come from \
+springs, which lose nothing; with losses, ask for impulses
+    """
+    must_be(Chain, "chain", chain)
+    one_number("accuracy", accuracy, "must lie in [1e-15, 1]", 1e-15, 1.0)
+    if model_error is not None:
+        one_number("model_error", model_error, "must lie in [0, 1]", 0.0, 1.0)
+    whole_number("impacts", impacts)
+    if ratios is not None and not isinstance(ratios, ImpulseCorrelation):
+        ratios = ImpulseCorrelation(ratios)
+    if stiffness is not None:
+        stiffness = SpringChain(stiffness).stiffness
+    wishes = _wishes(wanted)
+    wish = _Wish(chain, wishes, accuracy, model_error, impacts, ratios, stiffness)
+    _refuse(wish)
+    found, failures = [], []
+    for group, name in _models(wish):
+        try:
+            found.append(_best(group, name, wish))
+        except _Unfit as why:
+            failures.append(str(why))
+    if not found:
+        raise ValueError("; ".join(failures))
+    return min(found, key=lambda one: one[0])[1]
+
+
+class _Wish(NamedTuple):
+    """What is wanted of which chain, and what is known of it."""
+
+    chain: Chain
+    wanted: tuple[str, ...]
+    accuracy: float
+    model_error: float | None
+    impacts: int
+    ratios: ImpulseCorrelation | None
+    stiffness: float | Sequence[float] | None
+
+    @property
+    def elastic(self) -> bool:
+        """Whether springs apply."""
+        return bool((self.chain.restitution == 1.0).all())
+
+    @property
+    def modest(self) -> bool:
+        """Whether a model that needs restitution alone may do."""
+        return set(self.wanted) == {"fastest ball"} or self.model_error is not None
+
+    @property
+    def bare(self) -> bool:
+        """Whether nothing but restitution is known, and it is not enough."""
+        return self.ratios is None and self.stiffness is None and len(self.chain) > 2
+
+    @property
+    def uniform(self) -> bool:
+        """Whether the contacts are equal springs, as all that were measured."""
+        return self.stiffness is None or np.ptp(self.stiffness) == 0.0
+
+    def model(self, row: Row) -> Model:
+        """Return the model of a row, with what is known."""
+        stiffness = 1.0 if self.stiffness is None else self.stiffness
+        match row.group:
+            case "event":
+                return self.ratios or ImpulseCorrelation(0.0)
+            case "springs":
+                method = row.setting.split(",")[0]
+                return SpringChain(stiffness, rtol=row.parameter, method=method)
+            case "energy":
+                return EnergyDistribution(stiffness, rtol=row.parameter)
+        return SequentialCollisions()
+
+
+class _Unfit(Exception):
+    """Why a model does not fulfil a wish."""
+
+
+def _wishes(wanted: str | Collection[str]) -> tuple[str, ...]:
+    several = isinstance(wanted, Collection) and not isinstance(wanted, str)
+    wishes = tuple(wanted) if several else (str(wanted),)
+    if not wishes or not set(wishes) <= set(WANTED):
+        rule = f"must be one or several of {', '.join(WANTED)}"
+        raise ValueError(f"wanted = {shown(wanted)}; {rule}")
+    return wishes
+
+
+def _refuse(wish: _Wish) -> None:
+    """Raise if no model can fulfil a wish from what is known, whatever was measured."""
+    chain = wish.chain
+    if not (chain.closing_speeds > 0.0).any():
+        raise ValueError(f"velocities = {chain.velocities.tolist()}; no balls approach: no impact")
+    lossy = int(np.argmin(chain.restitution))
+    loss = f"restitution[{lossy}] = {float(chain.restitution[lossy])!r}"
+    timed = [name for name in wish.wanted if name in ("forces", "times")]
+    if timed and not wish.elastic:
+        raise ValueError(
+            f"wanted = {timed[0]!r}, {loss}; must be 1: forces and times come from springs, which "
+            "lose nothing; with losses, ask for impulses"
+        )
+    if timed and wish.stiffness is None:
+        raise ValueError(
+            f"wanted = {timed[0]!r}; needs stiffness: rigid models have impulses alone"
+        )
+    if wish.model_error is not None and not wish.elastic:
+        raise ValueError(
+            f"model_error = {wish.model_error!r}, {loss}; must be left out unless all are 1: there "
+            "is no theory of balls with losses to measure against"
+        )
+    if wish.bare and not wish.modest:
+        sequential = [row for row in rows("outcome") if row.model == "SequentialCollisions"]
+        errors = [row.model_error for row in sequential if row.model_error is not None]
+        raise ValueError(
+            f"wanted = {wish.wanted[0]!r}; needs ratios or stiffness: restitution alone does not "
+            f"determine the impact of {len(chain)} balls.  SequentialCollisions, which needs no "
+            f"more, was off by {min(errors):.2g} to {max(errors):.2g} of the closing speed on the "
+            "elastic chains measured; it may tell the 'fastest ball'"
+        )
+
+
+def _models(wish: _Wish) -> list[tuple[str, str]]:
+    """Return groups of the table and names of the models that what is known allows."""
+    found = []
+    if wish.ratios is not None or len(wish.chain) == 2:
+        found.append(("event", "ImpulseCorrelation"))
+    if wish.stiffness is not None:
+        springs = ("springs", "SpringChain"), ("energy", "EnergyDistribution")
+        found.append(springs[not wish.elastic])
+    if wish.modest and (wish.bare or (wish.uniform and measured_chain(wish.chain))):
+        found.append(("outcome", "SequentialCollisions"))
+    return found
+
+
+def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recommendation]:
+    """Return a model in its cheapest setting that fulfils a wish, after what orders models."""
+    gives = {"velocities" if one == "fastest ball" else one for one in wish.wanted}
+    found = tuple(
+        row for row in rows(group) if row.model.startswith(name) and gives <= row.gives
+        and (wish.impacts > 1 or "batch" not in row.setting)
+    )  # fmt: skip
+    if not found:
+        raise _Unfit(f"{name} does not give {', '.join(sorted(gives))}")
+    # What a model refuses it refuses now: the same balls at rest cost it no work.
+    chain, model = wish.chain, wish.model(found[0])
+    model.solve(Chain(chain.masses, 0.0 * chain.velocities, chain.restitution))
+    like = chain if wish.uniform else None
+    best = _cheapest(evidence(found, like, wish.ratios if group == "event" else None), name, wish)
+    row = best.rows[0]
+    apart = row.model_error if best.exact else None
+    if group == "springs" or (len(chain) == 2 and wish.elastic):
+        apart = 0.0
+    if wish.model_error is not None and (apart is None or apart > wish.model_error):
+        known = "was not measured here" if apart is None else f"is {apart:.2g}"
+        raise _Unfit(f"model_error = {wish.model_error!r}; that of {name} {known}")
+    known_error = best.measured and row.numerical_error is not None
+    return (not best.measured, best.cost), Recommendation(
+        model=wish.model(row),
+        setting=row.setting,
+        call=_BATCH if "batch" in row.setting else "collide(chain, model)",
+        numerical_error=best.error if known_error else None,
+        model_error=apart,
+        seconds=best.cost * unit() if best.measured else None,
+        measured_on=best.chains if best.measured else (),
+        reason=_REASONS["two balls" if group == "event" and len(chain) == 2 else group],
+    )
+
+
+def _cheapest(settings: list[Evidence], name: str, wish: _Wish) -> Evidence:
+    """Return the cheapest setting that has the accuracy."""
+    margin = 1.0 if settings[0].exact else _MARGIN
+    fit = [one for one in settings if margin * one.error <= wish.accuracy]
+    if fit:
+        return min(fit, key=lambda one: one.cost)
+    least = min(settings, key=lambda one: one.error)
+    stricter = "" if least.exact else f"; on other chains it must be {_MARGIN:g} times better"
+    raise _Unfit(
+        f"accuracy = {wish.accuracy!r}; the least numerical error of {name} measured is "
+        f"{least.error:.2g} ({'; '.join(least.chains)}){stricter}"
+    )

@@ -1,0 +1,308 @@
+"""What was measured of the models: errors and times, on which chains; read from the data.
+
+The table is `benchmarks.csv`, the one that chapter 8 of the book shows.
+"""
+
+from __future__ import annotations
+
+import csv
+from functools import cache
+from statistics import median
+from typing import NamedTuple
+
+import numpy as np
+
+from cradle import runtime
+from cradle.chain import Chain
+from cradle.models.correlation import ImpulseCorrelation
+from cradle.tables import data_folder, paper_chain
+
+__all__ = ["Evidence", "Row", "evidence", "lasting", "measured_chain", "rows", "unit"]
+
+
+class Row(NamedTuple):
+    """One model in one setting on one chain.
+
+    Examples
+    --------
+    >>> {row.chain for row in rows("energy")} == {"three equal", "ABCCA"}
+    True
+    """
+
+    group: str
+    model: str
+    setting: str
+    chain: str
+    #: The setting as a number.
+    parameter: float
+    #: Largest distance of a velocity from the exact answer of the same model, over the closing
+    #: speed; None where the table has none.
+    numerical_error: float | None
+    #: The same from Hertz springs.
+    model_error: float | None
+    #: Time of an impact in the table's unit.
+    time_ratio: float
+    #: What the model gives: "velocities", "impulses", "path", "forces", "times".
+    gives: frozenset[str]
+
+
+class Evidence(NamedTuple):
+    """What was measured of one setting, for one chain.
+
+    Examples
+    --------
+    >>> [evidence(rows("energy"), Chain([1] * n, np.eye(n)[0]))[0].measured for n in (3, 30)]
+    [True, False]
+    """
+
+    rows: tuple[Row, ...]
+    #: Measured on this very chain, which is then the only row.
+    exact: bool
+    #: Measured on it or on chains around it.
+    measured: bool
+
+    @property
+    def error(self) -> float:
+        """Largest numerical error of the rows."""
+        return max(row.numerical_error or 0.0 for row in self.rows)
+
+    @property
+    def cost(self) -> float:
+        """Longest time of the rows, in the table's unit."""
+        return max(row.time_ratio for row in self.rows)
+
+    @property
+    def chains(self) -> tuple[str, ...]:
+        """Names of the chains of the rows."""
+        return tuple(row.chain for row in self.rows)
+
+
+@cache
+def _lines() -> tuple[dict[str, str], ...]:
+    with (data_folder() / "benchmarks.csv").open(encoding="utf-8") as file:
+        return tuple(csv.DictReader(file))
+
+
+@cache
+def unit() -> float:
+    """Return the unit of times on the machine that measured.
+
+    Returns
+    -------
+    float
+        Seconds: one impact of three balls, solved in a batch.
+
+    Examples
+    --------
+    >>> 0 < unit() < 1e-3
+    True
+    """
+    timed = [line for line in _lines() if line["time_ratio"]]
+    return 1e-6 * median(float(line["microseconds"]) / float(line["time_ratio"]) for line in timed)
+
+
+def lasting(seconds: float) -> str:
+    """Return a time in two digits.
+
+    Parameters
+    ----------
+    seconds : float
+        The time, s.
+
+    Returns
+    -------
+    str
+        With its unit.
+
+    Examples
+    --------
+    >>> lasting(2.13e-5), lasting(0.0843)
+    ('21 µs', '84 ms')
+    """
+    for name, size in (("µs", 1e-6), ("ms", 1e-3), ("s", 1.0)):
+        if seconds < 999.5 * size or name == "s":
+            break
+    return f"{np.format_float_positional(float(f'{seconds / size:.1e}'), trim='-')} {name}"
+
+
+@cache
+def rows(group: str) -> tuple[Row, ...]:
+    """Return the rows of a group, in settings that this installation and its calls have.
+
+    Parameters
+    ----------
+    group : {"event", "springs", "energy", "outcome"}
+        Group of the table.
+
+    Returns
+    -------
+    tuple of Row
+        Without fixed steps, linear springs and single precision.
+
+    Examples
+    --------
+    >>> sorted({row.model for row in rows("outcome")})[:2]
+    ['FusedChain', 'ImpulseCorrelation']
+    """
+    kernel = "compiled" if runtime.available() else "plain"
+    batch = f"{kernel}, batch"
+    found = []
+    for line in _lines():
+        if line["model"] == "two balls" and line["setting"].startswith("all: "):
+            # A batch of two balls, solved as any other.
+            line = line | {"group": "event", "model": "ImpulseCorrelation", "setting": batch}
+        if (
+            line["group"] != group
+            or (group == "event" and line["setting"] not in (f"{kernel}, {_PATH}", batch))
+            or line["setting"].startswith("step")
+            or line["model"].endswith("linear")
+        ):
+            continue
+        apart = line["model_error"] if line["model_reference"].startswith("Hertz") else ""
+        found.append(
+            Row(
+                line["group"],
+                line["model"],
+                line["setting"],
+                line["chain"],
+                float(line["parameter"] or 0.0),
+                float(line["numerical_error"]) if line["numerical_error"] else None,
+                float(apart) if apart else None,
+                float(line["time_ratio"]),
+                frozenset(line["gives"].split(", ")),
+            )
+        )
+    return tuple(found)
+
+
+_PATH = "one call with its path"
+
+
+def evidence(
+    rows: tuple[Row, ...], chain: Chain | None, ratios: ImpulseCorrelation | None = None
+) -> list[Evidence]:
+    """Return what was measured on a chain; else on chains around it; else on most chains.
+
+    Parameters
+    ----------
+    rows : tuple of Row
+        Of one model.
+    chain : Chain or None
+        The chain; None for one that is like none of those measured.
+    ratios : ImpulseCorrelation, optional
+        The model, if it is this one: a chain is the same if its ratios are.
+
+    Returns
+    -------
+    list of Evidence
+        One for each setting.
+
+    Examples
+    --------
+    >>> found = evidence(rows("springs"), Chain([1, 1, 1, 1], [1, 0, 0, 0]))
+    >>> found[0].exact, found[0].measured, found[0].chains
+    (False, True, ('three equal', 'five equal', 'light middle'))
+    """
+    settings: dict[str, dict[str, Row]] = {}
+    for row in rows:
+        settings.setdefault(row.setting, {})[row.chain] = row
+    name = measured_chain(chain, ratios) if chain else ""
+    exact = [(same[name],) for same in settings.values() if name in same]
+    around = [tuple(same.values()) for same in settings.values() if chain and _enclose(same, chain)]
+    most = max(map(len, settings.values()))
+    others = [tuple(same.values()) for same in settings.values() if len(same) == most]
+    measured = bool(exact or around)
+    return [Evidence(one, bool(exact), measured) for one in exact or around or others]
+
+
+@cache
+def _chains() -> dict[str, tuple[Chain, ImpulseCorrelation]]:
+    """Return the measured chains that are not random, with their ratios."""
+    _, same = paper_chain("AAA")
+    elastic = {"three equal": [1.0] * 3, "five equal": [1.0] * 5, "light middle": [1.0, 0.01, 1.0]}
+    chains = {
+        name: (Chain(m, np.eye(len(m))[0]), ImpulseCorrelation(np.ravel(same.forward)[0]))
+        for name, m in elastic.items()
+    }
+    return chains | {"ABCCA": paper_chain("ABCCA", excess="saturate")}
+
+
+def measured_chain(chain: Chain, ratios: ImpulseCorrelation | None = None) -> str:
+    """Return the name of the measured chain that this is.
+
+    Parameters
+    ----------
+    chain : Chain
+        The chain; its units, its direction and a common velocity do not matter.
+    ratios : ImpulseCorrelation, optional
+        Ratios that must be the measured ones too.
+
+    Returns
+    -------
+    str
+        Empty if it is none of them.
+
+    Examples
+    --------
+    >>> measured_chain(Chain([7, 7, 7], [0.5, 0.5, -3]))
+    'three equal'
+    """
+    one = _struck(chain)
+    for name, (other, model) in _chains().items():
+        if one is None or len(one) != len(other):
+            continue
+        alike = np.allclose(one.masses, other.masses / other.masses[0], rtol=1e-12, atol=0.0)
+        alike = alike and bool((one.restitution == other.restitution).all())
+        n = len(one)
+        if alike and (ratios is None or _values(ratios, n) == _values(model, n)):
+            return name
+    return ""
+
+
+def _values(model: ImpulseCorrelation, balls: int) -> list[list[float]]:
+    """Return the forward and backward ratios of all interior balls."""
+    backward = model.forward if model.backward is None else model.backward
+    return [np.broadcast_to(part, (balls - 2,)).tolist() for part in (model.forward, backward)]
+
+
+def _struck(chain: Chain) -> Chain | None:
+    """Return a chain that is struck at one end, striker first and of mass 1; None for others."""
+    m, e, u = chain.masses, chain.restitution, chain.closing_speeds
+    if u[-1] > 0.0 and not u[:-1].any():
+        m, e, u = m[::-1], e[::-1], u[::-1]
+    if not u[0] > 0.0 or u[1:].any():
+        return None
+    return Chain(m / m[0], np.eye(len(m))[0], e)
+
+
+class _Reach(NamedTuple):
+    balls: int
+    #: Heaviest over lightest mass.
+    spread: float
+    #: Lowest and highest restitution.
+    low: float
+    high: float
+
+
+# Drawn by `random_chains` in benchmarks/scenes.py.
+_DRAWN = {f"{n} balls, random": _Reach(n, 16.0, 0.3, 1.0) for n in (2, 3, 6)}
+
+
+def _reach(chain: Chain) -> _Reach:
+    m, e = chain.masses, chain.restitution
+    return _Reach(len(chain), float(m.max() / m.min()), float(e.min()), float(e.max()))
+
+
+def _enclose(rows: dict[str, Row], chain: Chain) -> bool:
+    """Tell whether a chain lies between those of these rows in number, masses and restitution."""
+    one = _struck(chain)
+    if one is None or any(row.numerical_error is None for row in rows.values()):
+        return False
+    known = [_DRAWN.get(name) or _reach(_chains()[name][0]) for name in rows]
+    here = _reach(one)
+    return (
+        min(part.balls for part in known) <= here.balls <= max(part.balls for part in known)
+        and here.spread <= max(part.spread for part in known)
+        and min(part.low for part in known) <= here.low
+        and here.high <= max(part.high for part in known)
+    )
