@@ -38,8 +38,8 @@ _REASONS = {
     "energy": "There are losses and no ratios: the energy law is what springs become with losses. "
     "How near it comes to real balls was not measured.",
     "outcome": "Restitution alone does not determine the impact; of the models that need no more, "
-    "this one is nearest to Hertz springs. On the chains measured it has the right fastest ball; "
-    "on others it can be wrong.",
+    "this one is nearest to Hertz springs. On the elastic chains measured it has the right fastest "
+    "ball; on others it can be wrong.",
     "two balls": "Two balls have no ratio: restitution alone determines them.",
 }
 
@@ -303,7 +303,8 @@ def _models(wish: _Wish) -> list[tuple[str, str]]:
     if wish.stiffness is not None:
         springs = ("springs", "SpringChain"), ("energy", "EnergyDistribution")
         found.append(springs[not wish.elastic])
-    if wish.modest and (wish.bare or (wish.uniform and measured_chain(wish.chain))):
+    judged = wish.elastic and wish.uniform and measured_chain(wish.chain)
+    if wish.modest and (wish.bare or judged):
         found.append(("outcome", "SequentialCollisions"))
     return found
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 from functools import cache
-from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -98,7 +97,8 @@ def unit() -> float:
     True
     """
     timed = [line for line in _lines() if line["time_ratio"]]
-    return 1e-6 * median(float(line["microseconds"]) / float(line["time_ratio"]) for line in timed)
+    times = [float(line["microseconds"]) / float(line["time_ratio"]) for line in timed]
+    return 1e-6 * float(np.median(times))
 
 
 def lasting(seconds: float) -> str:

@@ -1,0 +1,398 @@
+"""Recommendations: kept by the recommended model on chains of its own, or refused in words.
+
+No number of the measured table stands here, because it is measured anew from time to time.
+"""
+
+import csv
+import re
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from chains import ELASTIC, HERTZ, magnitudes, uniform, within_bounds
+from reference import solve
+
+import cradle.advice
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    paper_chain,
+    post_impact_velocities,
+    recommend,
+)
+from cradle.measured import evidence, lasting, measured_chain, rows
+
+ROOT = Path(__file__).parents[1]
+#: Numbers of the table may come from another version of SciPy, and errors near rounding vary.
+SLACK, ROUNDING = 2.0, 2.0**-50
+LOSSY = Chain([1, 1, 1], [1, 0, 0], 0.9)
+
+
+def striking(masses, e=1.0):
+    return Chain(masses, np.eye(len(masses))[0], e)
+
+
+THREE, FIVE, LIGHT = (striking(ELASTIC[name]) for name in ELASTIC)
+ABCCA, TABLES = paper_chain("ABCCA", excess="saturate")
+
+
+def table(**equal):
+    """Rows of the table by a reader of our own."""
+    with (ROOT / "data" / "benchmarks.csv").open(encoding="utf-8") as file:
+        return [row for row in csv.DictReader(file)
+                if all(row[name] == value for name, value in equal.items())]  # fmt: skip
+
+
+def off(chain, advice, answer):
+    """Error of the recommended model, over the closing speed."""
+    u = np.abs(chain.closing_speeds).max()
+    return np.abs(collide(chain, advice.model).velocities - answer).max() / u
+
+
+def elastic_spheres(masses, step):
+    """Velocities after the strike by a second route: Hertz's force, fixed steps, plain Verlet."""
+    m = np.asarray(masses, float)
+    place, speed = np.zeros(len(m)), np.eye(len(m))[0]
+    force = np.zeros(len(m) + 1)  # from the left of each ball, then from its right
+    while True:
+        speed = speed + 0.5 * step * (force[:-1] - force[1:]) / m
+        place = place + step * speed
+        force[1:-1] = np.maximum(place[:-1] - place[1:], 0.0) ** 1.5
+        speed = speed + 0.5 * step * (force[:-1] - force[1:]) / m
+        if not force.any() and (np.diff(speed) >= 0.0).all():
+            return speed
+
+
+def between(number, balls, spread, seed=7):
+    """Masses of chains among the measured ones."""
+    rng = np.random.default_rng(seed)
+    for k in range(number):
+        m = 1.0 + (spread - 1.0) * rng.random(balls[k % len(balls)])
+        yield m, rng
+
+
+# --- what was promised is kept ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("name", list(ELASTIC))
+def test_springs_on_the_measured_chains(name, accuracy):
+    """Against velocities from another program; its last digit is the ninth."""
+    chain = striking(ELASTIC[name])
+    advice = recommend(chain, "forces", accuracy=accuracy, stiffness=1.0)
+    assert isinstance(advice.model, SpringChain)
+    assert advice.measured_on == (name,)
+    assert advice.model_error == 0.0
+    assert advice.numerical_error <= accuracy
+    assert off(chain, advice, HERTZ[name]) <= SLACK * advice.numerical_error + 1e-9
+
+
+def test_springs_among_the_measured_chains():
+    """Against Verlet steps of our own, and finer than they can be against another integrator."""
+    for k, (m, _) in enumerate(between(4, (3, 4, 5), 3.0)):
+        answer = elastic_spheres(m, 4e-3)
+        finer = elastic_spheres(m, 2e-3)
+        own = np.abs(answer - finer).max()  # of order two or nearly so: above the error of `finer`
+        assert own < 2e-5
+        for accuracy in (1e-2, 1e-4):
+            advice = recommend(striking(m), accuracy=accuracy, stiffness=7.0)
+            assert advice.measured_on == ("three equal", "five equal", "light middle"), k
+            assert off(striking(m), advice, finer) <= accuracy + own
+            assert advice.numerical_error * 10 <= accuracy
+    for m, _ in between(6, (3, 4, 5), 60.0, seed=8):
+        other = collide(striking(m), SpringChain(1.0, rtol=1e-12, method="RK45")).velocities
+        for accuracy in (1e-3, 1e-5, 1e-7):
+            advice = recommend(striking(m), accuracy=accuracy, stiffness=1.0)
+            assert off(striking(m), advice, other) <= accuracy
+
+
+def test_forces_and_times_are_no_worse_than_said():
+    """Their errors were not measured; the notes say so.  Of three balls they can be looked at."""
+    best = collide(THREE, SpringChain(1.0, rtol=1e-13))
+    for accuracy in (1e-3, 1e-6):
+        model = recommend(THREE, ("forces", "times"), accuracy=accuracy, stiffness=1.0).model
+        trace = collide(THREE, model)
+        peaks, others = (one.forces.max(axis=0) for one in (trace, best))
+        np.testing.assert_allclose(peaks, others, rtol=20 * accuracy)
+        np.testing.assert_allclose(trace.durations, best.durations, rtol=20 * accuracy)
+
+
+def test_events_against_fifty_digits():
+    """On all measured chains, and on random ones among them, each with ratios of its own."""
+    given = [(one, ImpulseCorrelation(0.167)) for one in (THREE, FIVE, LIGHT)] + [(ABCCA, TABLES)]
+    for m, rng in between(8, (3, 4, 5), 90.0):
+        e = uniform(rng, 0.3, 1.0, len(m) - 1)
+        given.append((striking(m, e), ImpulseCorrelation(*within_bounds(m, rng.random))))
+    for chain, ratios in given:
+        advice = recommend(chain, "path", ratios=ratios, accuracy=1e-12)
+        assert advice.model == ratios
+        assert advice.call == "collide(chain, model)"
+        n = len(chain)
+        ways = [ratios.forward, ratios.forward if ratios.backward is None else ratios.backward]
+        forward, backward = (np.broadcast_to(part, n - 2).tolist() for part in ways)
+        with mpmath.workdps(50):
+            parts = (part.tolist() for part in (chain.masses, chain.velocities, chain.restitution))
+            done = solve(*parts, forward, backward, excess="saturate")
+            answer = np.array([float(v) for v in done.velocities])
+        assert advice.numerical_error * (1 if len(advice.measured_on) == 1 else 10) <= 1e-12
+        assert off(chain, advice, answer) <= 10 * advice.numerical_error + ROUNDING
+
+
+def test_losses_and_no_ratios():
+    """Against the other scheme of the same law, and at more digits against a finer tolerance."""
+    advice = recommend(LOSSY, "impulses", accuracy=1e-3, stiffness=1.0)
+    assert isinstance(advice.model, EnergyDistribution)
+    steps = [collide(LOSSY, EnergyDistribution(step=h)).velocities for h in (0.02, 0.01)]
+    answer, own = 2 * steps[1] - steps[0], np.abs(steps[1] - steps[0]).max()
+    assert own < 1e-3
+    assert off(LOSSY, advice, answer) <= 1e-3 + own
+    for m, rng in between(4, (3, 4, 5), 1.15):
+        chain = striking(m, uniform(rng, 0.3, 1.0, len(m) - 1))
+        finer = collide(chain, EnergyDistribution(rtol=1e-12)).velocities
+        for accuracy in (1e-2, 1e-5):
+            advice = recommend(chain, accuracy=accuracy, stiffness=1.0)
+            assert off(chain, advice, finer) <= accuracy
+            assert advice.model_error is None
+
+
+@pytest.mark.parametrize("name", list(ELASTIC))
+def test_model_errors(name):
+    """Of what restitution alone allows, and of the measured ratio: from the other program."""
+    chain = striking(ELASTIC[name])
+    for known, kind in (({}, SequentialCollisions), ({"ratios": 0.167}, ImpulseCorrelation)):
+        advice = recommend(chain, model_error=0.5, **known)
+        assert isinstance(advice.model, kind)
+        assert advice.model_error == pytest.approx(off(chain, advice, HERTZ[name]), abs=1e-4)
+        with pytest.raises(ValueError, match=r"^model_error = .*; that of "):
+            recommend(chain, model_error=advice.model_error / 100, **known)
+        # Springs are what it is measured from.
+        springs = recommend(chain, model_error=advice.model_error / 100, stiffness=1, **known)
+        assert springs.model_error == 0.0
+
+
+def test_sequential_is_the_nearest_that_needs_restitution_alone():
+    worst = {}
+    for row in table(group="outcome", needs="e"):
+        if row["model_reference"].startswith("Hertz"):
+            error = float(row["model_error"])
+            worst[row["model"]] = max(error, worst.get(row["model"], 0.0))
+    assert min(worst, key=worst.get) == "SequentialCollisions"
+    assert len(worst) > 1
+
+
+def test_the_fastest_ball():
+    """Right on the measured elastic chains, wrong on another one, as the reason warns."""
+    for chain, answer in zip((THREE, FIVE, LIGHT), HERTZ.values(), strict=True):
+        for known in ({}, {"stiffness": 1.0}):
+            advice = recommend(chain, "fastest ball", **known)
+            assert advice.model == SequentialCollisions()
+            assert len(advice.measured_on) == 1
+            after = np.abs(collide(chain, advice.model).velocities)
+            assert after.argmax() == np.abs(answer).argmax()
+    assert isinstance(recommend(ABCCA, "fastest ball", stiffness=1).model, EnergyDistribution)
+    m = [1.0, 0.08, 2.16, 0.93, 0.84]
+    advice = recommend(striking(m), "fastest ball")
+    assert advice.measured_on == ()
+    assert "on others it can be wrong" in advice.reason
+    wrong = np.abs(collide(striking(m), advice.model).velocities).argmax()
+    assert wrong != np.abs(elastic_spheres(m, 4e-3)).argmax()
+    # Whoever knows the stiffness is given springs there.
+    assert isinstance(recommend(striking(m), "fastest ball", stiffness=1).model, SpringChain)
+
+
+def test_two_balls_need_no_ratio():
+    rng = np.random.default_rng(5)
+    for impacts in (1, 100):
+        m, e = magnitudes(rng, 1, 2), uniform(rng, 0.3, 1.0)
+        chain = Chain(m, [1.0, -0.5], e)
+        advice = recommend(chain, impacts=impacts)
+        impulse = (1 + e) * 1.5 / (1 / m[0] + 1 / m[1])
+        newton = np.array([1.0, -0.5]) + np.array([-impulse, impulse]) / m
+        assert off(chain, advice, newton) < 1e-14
+        assert "restitution alone determines" in advice.reason
+        assert (advice.numerical_error is None) == (impacts == 1)  # as the table has it
+    assert recommend(Chain([1, 2], [1, 0])).model_error == 0.0
+
+
+def test_many_impacts_go_into_one_call():
+    one, many = (recommend(THREE, ratios=0.1, impacts=k) for k in (1, 1000))
+    assert many.seconds < one.seconds
+    assert "batch" in many.setting
+    f = many.model.forward
+    after = post_impact_velocities([[1, 1, 1]] * 3, [1, 0, 0], 1, f)
+    np.testing.assert_allclose(after, [collide(THREE, one.model).velocities] * 3, atol=1e-15)
+    assert many.call.partition("(")[0] == "post_impact_velocities"
+    # A batch keeps no path.
+    assert recommend(THREE, "path", ratios=0.1, impacts=1000) == recommend(
+        THREE, "path", ratios=0.1
+    )
+
+
+# --- what is measured, and what is not ----------------------------------------------------------
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-5, 1e-10])
+@pytest.mark.parametrize("name", list(ELASTIC))
+def test_the_cheapest_setting_of_the_table(name, accuracy):
+    advice = recommend(striking(ELASTIC[name]), accuracy=accuracy, stiffness=1.0)
+    fit = [row for row in table(group="springs", model="SpringChain, Hertz", chain=name)
+           if float(row["numerical_error"]) <= accuracy]  # fmt: skip
+    row = min(fit, key=lambda row: float(row["time_ratio"]))
+    assert advice.setting == row["setting"]
+    assert advice.numerical_error == float(row["numerical_error"])
+    assert advice.seconds == pytest.approx(1e-6 * float(row["microseconds"]), rel=0.5)
+    assert f"{advice.model.method}, rtol {advice.model.rtol:.0e}" == advice.setting
+
+
+@pytest.mark.parametrize(
+    ("chain", "known"),
+    [
+        (striking([1] * 20), {"stiffness": 1.0}),
+        (striking([1, 1e-4, 1]), {"stiffness": 1.0}),
+        (Chain([1, 1, 1], [1, 0, -1]), {"stiffness": 1.0}),
+        (Chain([1, 1, 1], [1, 0, 0.5]), {"stiffness": 1.0}),
+        (THREE, {"stiffness": [1.0, 2.0]}),
+        (striking([1, 1.5, 1], 0.9), {"stiffness": 1.0}),
+        (striking([1] * 4, 0.2), {"stiffness": 1.0}),
+        (striking([1] * 3, 0.1), {"ratios": 0.1}),
+        (striking([1] * 30, 0.9), {"ratios": 0.1}),
+    ],
+    ids=str,
+)
+def test_outside_nothing_is_claimed(chain, known):
+    advice = recommend(chain, **known)
+    assert advice.numerical_error is advice.seconds is None
+    assert advice.measured_on == ()
+    assert advice.model_error == (0.0 if isinstance(advice.model, SpringChain) else None)
+    lines = re.findall(r"^  .*: +not measured$", repr(advice), flags=re.M)
+    assert len(lines) == (2 if advice.model_error == 0.0 else 3)
+    collide(chain, advice.model)  # ready for it
+
+
+def test_units_direction_and_frame_do_not_matter():
+    for known in ({"stiffness": 1.0}, {"ratios": 0.167}):
+        here = recommend(FIVE, accuracy=1e-4, **known)
+        for chain in (
+            Chain([0.3] * 5, [0.2, 0, 0, 0, 0]),
+            Chain([1] * 5, [0, 0, 0, 0, -1]),
+            Chain([1] * 5, [3, 2, 2, 2, 2]),
+        ):
+            assert recommend(chain, accuracy=1e-4, **known) == here
+
+
+def test_chains_have_the_names_of_the_benchmarks():
+    sys.path.append(str(ROOT / "benchmarks"))
+    scenes = pytest.importorskip("scenes")
+    for name, scene in scenes.SCENES.items():
+        assert measured_chain(scene.chain) == name
+        assert measured_chain(scene.chain, scene.model) == name
+        assert measured_chain(scene.chain, ImpulseCorrelation(0.01)) == ""
+    for balls in (2, 3, 6):
+        m, v, e, *_ = scenes.random_chains(balls, 300)
+        reach = cradle.measured._DRAWN[f"{balls} balls, random"]
+        spread = (m.max(axis=1) / m.min(axis=1)).max()
+        assert (v == np.eye(balls)[0]).all()
+        assert 0.5 * reach.spread < spread <= reach.spread
+        assert reach.low <= e.min() <= e.max() <= reach.high
+    known = {row.chain for group in ("event", "springs", "energy") for row in rows(group)}
+    assert known == {*scenes.SCENES, *(f"{n} balls, random" for n in (2, 3, 6))}
+
+
+def test_the_worst_of_the_chains_around_counts():
+    for one in evidence(rows("springs"), striking([1, 2, 1, 1])):
+        assert one.error == max(row.numerical_error for row in one.rows)
+        assert one.cost == max(row.time_ratio for row in one.rows)
+        assert len(one.rows) > 1
+
+
+def test_the_other_kernel_has_rows_of_its_own(monkeypatch):
+    """Without numba the times are those of the plain loop, in one call; batches have none."""
+    monkeypatch.setattr("cradle.runtime.available", lambda: False)
+    rows.cache_clear()
+    try:
+        plain = recommend(THREE, ratios=0.167, impacts=100)
+        assert plain.setting == "plain, one call with its path"
+    finally:
+        rows.cache_clear()
+
+
+# --- refusals -----------------------------------------------------------------------------------
+
+REFUSED = [
+    (THREE, {}, "wanted = 'velocities'; needs ratios or stiffness: restitution alone does not det"),
+    (LOSSY, {}, "wanted = 'velocities'; needs ratios or stiffness: restitution alone does not det"),
+    (THREE, {"wanted": "forces"}, "wanted = 'forces'; needs stiffness"),
+    (THREE, {"wanted": ("path", "times"), "ratios": 0.1}, "wanted = 'times'; needs stiffness"),
+    (LOSSY, {"wanted": "forces", "stiffness": 1}, "wanted = 'forces', restitution[0] = 0.9; must"),
+    (LOSSY, {"model_error": 0.1}, "model_error = 0.1, restitution[0] = 0.9; must be left out"),
+    (THREE, {"accuracy": 2e-15, "stiffness": 1}, "accuracy = 2e-15; the least numerical error of"),
+    (THREE, {"accuracy": 1e-17, "ratios": 0.1}, "accuracy = 1e-17; must lie in [1e-15, 1]"),
+    (LOSSY, {"accuracy": 1e-15, "stiffness": 1}, "accuracy = 1e-15; the least numerical error of"),
+    (THREE, {"model_error": 1e-6}, "model_error = 1e-06; that of SequentialCollisions is 0."),
+    (striking([1, 2, 1]), {"model_error": 0.5}, "model_error = 0.5; that of SequentialCollisions "),
+    (THREE, {"model_error": 0.5, "ratios": 0.2, "wanted": "forces"}, "wanted = 'forces'; needs st"),
+    (THREE, {"model_error": -1}, "model_error = -1.0; must lie in [0, 1]"),
+    (THREE, {"wanted": "speed"}, "wanted = 'speed'; must be one or several of velocities, imp"),
+    (THREE, {"wanted": []}, "wanted = []; must be one or several of"),
+    (THREE, {"wanted": 3}, "wanted = 3; must be one or several of"),
+    (THREE, {"wanted": [3]}, "wanted = [3]; must be one or several of"),
+    (THREE, {"impacts": 0, "ratios": 0.1}, "impacts = 0; must be a whole number, at least 1"),
+    (THREE, {"ratios": 0.6}, "forward[0] = 0.6; at ball 1, counted from 0, it must not exceed 0.5"),
+    (THREE, {"ratios": [0.1, 0.1]}, "forward has 2 values; 3 balls need 1, or one number"),
+    (THREE, {"stiffness": [1, 2, 3]}, "stiffness has 3 values; 3 balls need 2"),
+    (THREE, {"stiffness": 0}, "stiffness = 0.0; must be above 0"),
+    (Chain([1, 1, 1], [0, 0, 1]), {}, "velocities = [0.0, 0.0, 1.0]; no balls approach"),
+    (striking([1, 1, 1], 1e-9), {"stiffness": 1}, "restitution[0] = 1e-09; must be 0 or at least"),
+]
+
+
+@pytest.mark.parametrize(("chain", "asked", "words"), REFUSED, ids=lambda part: str(part)[:40])
+def test_refusals(chain, asked, words):
+    with pytest.raises(ValueError, match="^" + re.escape(words)):
+        recommend(chain, **asked)
+
+
+def test_what_is_no_chain():
+    with pytest.raises(TypeError, match=r"^chain is a list; must be a Chain$"):
+        recommend([1, 1, 1], ratios=0.1)
+
+
+def test_what_the_refusal_says_of_sequential_collisions_is_measured():
+    with pytest.raises(ValueError, match="needs ratios or stiffness") as refused:
+        recommend(THREE)
+    said = re.search(r"off by (\S+) to (\S+) of", str(refused.value))
+    errors = [
+        np.abs(collide(striking(m), SequentialCollisions()).velocities - HERTZ[name]).max()
+        for name, m in ELASTIC.items()
+    ]
+    assert [float(x) for x in said.groups()] == pytest.approx([min(errors), max(errors)], rel=0.05)
+
+
+# --- shown ---------------------------------------------------------------------------------------
+
+
+def test_what_is_shown():
+    advice = recommend(THREE, "forces", accuracy=1e-3, stiffness=1e10)
+    text = repr(advice)
+    assert text.startswith("Recommendation: SpringChain(stiffness=10000000000.0")
+    assert f"{advice.numerical_error:.1e}" in text
+    assert lasting(advice.seconds) in text
+    assert advice.reason in text
+    tree = ElementTree.fromstring(advice._repr_html_())  # well formed
+    cells = {row[0].text: row[1].text for row in tree.iter("tr")}
+    assert cells["model"] == repr(advice.model)
+    assert cells["measured on"] == "three equal"
+    assert cells["time"] == lasting(advice.seconds)
+
+
+def test_times_in_words():
+    assert [lasting(t) for t in (2.5e-7, 9.996e-4, 0.0123, 12.3)] == [
+        "0.25 µs", "1 ms", "12 ms", "12 s",
+    ]  # fmt: skip
