@@ -163,8 +163,8 @@ def recommend(
     chains measured are rows that touch, struck by a ball at one end: three and five equal elastic
     balls, three with a light one in the middle, the paper's ABCCA, and, solved event by event,
     random ones; all springs were equal.  A chain lies among them if its number of balls, its spread
-    of masses and its restitution lie between theirs.  Then the worst of them counts, and must be
-    ten times better than `accuracy`.
+    of masses and its restitution lie between theirs.  Then the worst that was measured counts, and
+    must be ten times better than `accuracy`.
 
     Examples
     --------

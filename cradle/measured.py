@@ -208,7 +208,8 @@ def evidence(
         settings.setdefault(row.setting, {})[row.chain] = row
     name = measured_chain(chain, ratios) if chain else ""
     exact = [(same[name],) for same in settings.values() if name in same]
-    around = [tuple(same.values()) for same in settings.values() if chain and _enclose(same, chain)]
+    around = [_around(tuple(same.values()), chain) for same in settings.values()]
+    around = [found for found in around if found]
     most = max(map(len, settings.values()))
     others = [tuple(same.values()) for same in settings.values() if len(same) == most]
     measured = bool(exact or around)
@@ -275,34 +276,26 @@ def _struck(chain: Chain) -> Chain | None:
     return Chain(m / m[0], np.eye(len(m))[0], e)
 
 
-class _Reach(NamedTuple):
-    balls: int
-    #: Heaviest over lightest mass.
-    spread: float
-    #: Lowest and highest restitution.
-    low: float
-    high: float
+# What places a chain, least and most: balls, spread of masses, restitution.  These are the random
+# ones, as `random_chains` in benchmarks/scenes.py draws them.
+_DRAWN = {f"{n} balls, random": [[n, 1.0, 0.3], [n, 16.0, 1.0]] for n in (2, 3, 6)}
 
 
-# Drawn by `random_chains` in benchmarks/scenes.py.
-_DRAWN = {f"{n} balls, random": _Reach(n, 16.0, 0.3, 1.0) for n in (2, 3, 6)}
-
-
-def _reach(chain: Chain) -> _Reach:
+def _place(chain: Chain) -> list[list[float]]:
     m, e = chain.masses, chain.restitution
-    return _Reach(len(chain), float(m.max() / m.min()), float(e.min()), float(e.max()))
+    spread = float(m.max() / m.min())
+    return [[len(m), spread, float(e.min())], [len(m), spread, float(e.max())]]
 
 
-def _enclose(rows: dict[str, Row], chain: Chain) -> bool:
-    """Tell whether a chain lies between those of these rows in number, masses and restitution."""
-    one = _struck(chain)
-    if one is None or any(row.numerical_error is None for row in rows.values()):
-        return False
-    known = [_DRAWN.get(name) or _reach(_chains()[name][0]) for name in rows]
-    here = _reach(one)
-    return (
-        min(part.balls for part in known) <= here.balls <= max(part.balls for part in known)
-        and here.spread <= max(part.spread for part in known)
-        and min(part.low for part in known) <= here.low
-        and here.high <= max(part.high for part in known)
-    )
+def _around(rows: tuple[Row, ...], chain: Chain | None) -> tuple[Row, ...]:
+    """Return the rows of chains around a chain: of each that reaches it alone, or else of all."""
+    if chain is None or _struck(chain) is None or any(row.numerical_error is None for row in rows):
+        return ()
+    least, most = np.array(_place(chain))
+    known = [_DRAWN.get(row.chain) or _place(_chains()[row.chain][0]) for row in rows]
+    low, high = np.array(known).transpose(1, 0, 2)
+    low, high = low * (1.0 - 1e-12), high * (1.0 + 1e-12)  # a spread is a quotient, and is rounded
+    alone = ((low <= least) & (most <= high)).all(axis=1)
+    if alone.any():
+        return tuple(row for row, reached in zip(rows, alone, strict=True) if reached)
+    return rows if (low.min(axis=0) <= least).all() and (most <= high.max(axis=0)).all() else ()

@@ -296,11 +296,13 @@ def test_chains_have_the_names_of_the_benchmarks():
         assert measured_chain(scene.chain, ImpulseCorrelation(0.01)) == ""
     for balls in (2, 3, 6):
         m, v, e, *_ = scenes.random_chains(balls, 300)
-        reach = cradle.measured._DRAWN[f"{balls} balls, random"]
-        spread = (m.max(axis=1) / m.min(axis=1)).max()
+        low, high = cradle.measured._DRAWN[f"{balls} balls, random"]
         assert (v == np.eye(balls)[0]).all()
-        assert 0.5 * reach.spread < spread <= reach.spread
-        assert reach.low <= e.min() <= e.max() <= reach.high
+        for one in zip(m, v, e, strict=True):
+            least, most = cradle.measured._place(Chain(*one))
+            assert (np.array(low) <= least).all()
+            assert (most <= np.array(high)).all()
+        assert (m.max(axis=1) / m.min(axis=1)).max() > 0.5 * high[1]
     known = {row.chain for group in ("event", "springs", "energy") for row in rows(group)}
     assert known == {*scenes.SCENES, *(f"{n} balls, random" for n in (2, 3, 6))}
 
@@ -310,6 +312,11 @@ def test_the_worst_of_the_chains_around_counts():
         assert one.error == max(row.numerical_error for row in one.rows)
         assert one.cost == max(row.time_ratio for row in one.rows)
         assert len(one.rows) > 1
+    (batch,) = evidence(
+        tuple(row for row in rows("event") if "batch" in row.setting), striking([1, 2, 1], 0.9)
+    )
+    # One that reaches the chain alone tells more than all together.
+    assert batch.chains == ("3 balls, random",)
 
 
 def test_the_other_kernel_has_rows_of_its_own(monkeypatch):
