@@ -193,14 +193,15 @@ springs, which lose nothing; with losses, ask for impulses
     wishes = _wishes(wanted)
     wish = _Wish(chain, wishes, accuracy, model_error, impacts, ratios, stiffness)
     _refuse(wish)
-    found, failures = [], []
+    found = []
+    failures: dict[str, list[str]] = {}
     for group, name in _models(wish):
         try:
             found.append(_best(group, name, wish))
         except _Unfit as why:
-            failures.append(str(why))
+            failures.setdefault(why.args[0], []).append(why.args[1])
     if not found:
-        raise ValueError("; ".join(failures))
+        raise ValueError("; ".join(f"{one}; {', '.join(all_)}" for one, all_ in failures.items()))
     return min(found, key=lambda one: one[0])[1]
 
 
@@ -245,12 +246,14 @@ class _Wish(NamedTuple):
                 method = row.setting.split(",")[0]
                 return SpringChain(stiffness, rtol=row.parameter, method=method)
             case "energy":
+                if row.setting.startswith("step"):
+                    return EnergyDistribution(stiffness, step=row.parameter)
                 return EnergyDistribution(stiffness, rtol=row.parameter)
         return SequentialCollisions()
 
 
 class _Unfit(Exception):
-    """Why a model does not fulfil a wish."""
+    """A wish, and why a model does not fulfil it."""
 
 
 def _wishes(wanted: str | Collection[str]) -> tuple[str, ...]:
@@ -317,7 +320,7 @@ def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recom
         and (wish.impacts > 1 or "batch" not in row.setting)
     )  # fmt: skip
     if not found:
-        raise _Unfit(f"{name} does not give {', '.join(sorted(gives))}")
+        raise _Unfit(f"wanted = {wish.wanted!r}", f"{name} has no {' and '.join(sorted(gives))}")
     # What a model refuses it refuses now: the same balls at rest cost it no work.
     chain, model = wish.chain, wish.model(found[0])
     model.solve(Chain(chain.masses, 0.0 * chain.velocities, chain.restitution))
@@ -329,7 +332,7 @@ def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recom
         apart = 0.0
     if wish.model_error is not None and (apart is None or apart > wish.model_error):
         known = "was not measured here" if apart is None else f"is {apart:.2g}"
-        raise _Unfit(f"model_error = {wish.model_error!r}; that of {name} {known}")
+        raise _Unfit(f"model_error = {wish.model_error!r}", f"that of {name} {known}")
     known_error = best.measured and row.numerical_error is not None
     return (not best.measured, best.cost), Recommendation(
         model=wish.model(row),
@@ -352,6 +355,7 @@ def _cheapest(settings: list[Evidence], name: str, wish: _Wish) -> Evidence:
     least = min(settings, key=lambda one: one.error)
     stricter = "" if least.exact else f"; on other chains it must be {_MARGIN:g} times better"
     raise _Unfit(
-        f"accuracy = {wish.accuracy!r}; the least numerical error of {name} measured is "
-        f"{least.error:.2g} ({'; '.join(least.chains)}){stricter}"
+        f"accuracy = {wish.accuracy!r}",
+        f"the least numerical error of {name} measured is {least.error:.2g} "
+        f"({', '.join(least.chains)}){stricter}",
     )

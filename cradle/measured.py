@@ -137,7 +137,7 @@ def rows(group: str) -> tuple[Row, ...]:
     Returns
     -------
     tuple of Row
-        Without fixed steps, linear springs and single precision.
+        Without linear springs and single precision.
 
     Examples
     --------
@@ -154,7 +154,6 @@ def rows(group: str) -> tuple[Row, ...]:
         if (
             line["group"] != group
             or (group == "event" and line["setting"] not in (f"{kernel}, {_PATH}", batch))
-            or line["setting"].startswith("step")
             or line["model"].endswith("linear")
         ):
             continue
