@@ -17,7 +17,7 @@ The rooms, in that order:
 - `cradle.closed_form`: what the paper gives in closed form; `cradle.conserving`: all outcomes of
   three balls that conserve energy.
 - `cradle.tables`: the paper's tables and chains, read by `cradle.reading`.
-- `cradle.advice`: which model a scene needs; `cradle.measured`: by which measurements.
+- `cradle.advice`: which model a scene needs, by what was measured.
 - `cradle.measures`: what is read off outcomes; `cradle.blocks`: batches under dask.
 - `cradle.fit`: ratios and restitution from measured velocities.
 - `cradle.figures` and `cradle.animation`: matplotlib, imported only when asked for;

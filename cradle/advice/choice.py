@@ -1,22 +1,17 @@
-"""Which model a scene needs: from what is known and what is wanted, by what was measured.
-
-No number is an estimate.  It was measured on this very chain, or is the worst of those measured on
-chains around it, or there is none.
-"""
+"""Choose the model: refuse what is impossible, then take the cheapest that does what is wanted."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from html import escape
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cradle.advice.measured import Evidence, Row, evidence, measured_chain, rows, unit
+from cradle.advice.recommendation import Recommendation
 from cradle.chain import Chain
 from cradle.checks import must_be, one_number, shown, whole_number
-from cradle.measured import Evidence, Row, evidence, lasting, measured_chain, rows, unit
 from cradle.models import Model
 from cradle.models.compliant import SpringChain
 from cradle.models.correlation import ImpulseCorrelation
@@ -42,76 +37,6 @@ _REASONS = {
     "ball; on others it can be wrong.",
     "two balls": "Two balls have no ratio: restitution alone determines them.",
 }
-
-
-@dataclass(frozen=True, repr=False)
-class Recommendation:
-    """A model for a scene, and what to expect of it.
-
-    Attributes
-    ----------
-    model : Model
-        Ready for `collide`.
-    setting : str
-        The row of the measured table: integrator and tolerance, one call or a batch.
-    call : str
-        What to call.
-    numerical_error : float or None
-        Distance from the exact answer of the same model: of any ball's velocity, at most, as a
-        part of the closing speed.  None: not measured.
-    model_error : float or None
-        The same from equal Hertz springs, the theory of elastic spheres; no setting makes it
-        smaller.  None: not measured, or, with losses, not to be measured: there is no such theory.
-    seconds : float or None
-        Time of one impact on the machine that measured, to a factor of two.  None: not measured.
-    measured_on : tuple of str
-        The measured chains that these numbers come from: this very chain, or those around it, of
-        which the worst counts.  Empty: none.
-    reason : str
-        Why this model.
-
-    Examples
-    --------
-    >>> from cradle import Chain
-    >>> recommend(Chain([1] * 20, [1] + [0] * 19), stiffness=1.0).seconds is None
-    True
-    """
-
-    model: Model
-    setting: str
-    call: str
-    numerical_error: float | None
-    model_error: float | None
-    seconds: float | None
-    measured_on: tuple[str, ...]
-    reason: str
-
-    def _lines(self) -> dict[str, str]:
-        """Return what is shown, by its title."""
-
-        def number(value: float | None) -> str:
-            return "not measured" if value is None else f"{value:.1e}" if value else "0"
-
-        return {
-            "setting": self.setting,
-            "call": self.call,
-            "numerical error": number(self.numerical_error),
-            "model error": number(self.model_error),
-            "time": "not measured" if self.seconds is None else lasting(self.seconds),
-            "measured on": "; ".join(self.measured_on) or "nothing like this",
-            "reason": self.reason,
-        }
-
-    def __repr__(self) -> str:
-        """Return the model and a line for each thing to know."""
-        lines = [f"  {title + ':':<17}{text}" for title, text in self._lines().items()]
-        return "\n".join([f"Recommendation: {self.model!r}", *lines])
-
-    def _repr_html_(self) -> str:
-        """Return a table for a notebook."""
-        lines = {"model": repr(self.model), **self._lines()}.items()
-        rows = [f"<tr><th>{escape(a)}</th><td>{escape(b)}</td></tr>" for a, b in lines]
-        return f"<table>{''.join(rows)}</table>"
 
 
 def recommend(

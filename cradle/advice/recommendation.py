@@ -1,0 +1,88 @@
+"""What a recommendation says, and how it is shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from html import escape
+from typing import Any
+
+from cradle.advice.measured import lasting
+from cradle.models import Model
+
+
+@dataclass(frozen=True, repr=False)
+class Recommendation:
+    """A model for a scene, and what to expect of it.
+
+    Attributes
+    ----------
+    model : Model
+        Ready for `collide`.
+    setting : str
+        The row of the measured table: integrator and tolerance, one call or a batch.
+    call : str
+        What to call.
+    numerical_error : float or None
+        Distance from the exact answer of the same model: of any ball's velocity, at most, as a
+        part of the closing speed.  None: not measured.
+    model_error : float or None
+        The same from equal Hertz springs, the theory of elastic spheres; no setting makes it
+        smaller.  None: not measured, or, with losses, not to be measured: there is no such theory.
+    seconds : float or None
+        Time of one impact on the machine that measured, to a factor of two.  None: not measured.
+    measured_on : tuple of str
+        The measured chains that these numbers come from: this very chain, or those around it, of
+        which the worst counts.  Empty: none.
+    reason : str
+        Why this model.
+
+    Examples
+    --------
+    >>> from cradle import Chain, recommend
+    >>> recommend(Chain([1] * 20, [1] + [0] * 19), stiffness=1.0).seconds is None
+    True
+    """
+
+    model: Model
+    setting: str
+    call: str
+    numerical_error: float | None
+    model_error: float | None
+    seconds: float | None
+    measured_on: tuple[str, ...]
+    reason: str
+
+    def _lines(self) -> dict[str, str]:
+        """Return what is shown, by its title."""
+
+        def number(value: float | None) -> str:
+            return "not measured" if value is None else f"{value:.1e}" if value else "0"
+
+        return {
+            "setting": self.setting,
+            "call": self.call,
+            "numerical error": number(self.numerical_error),
+            "model error": number(self.model_error),
+            "time": "not measured" if self.seconds is None else lasting(self.seconds),
+            "measured on": "; ".join(self.measured_on) or "nothing like this",
+            "reason": self.reason,
+        }
+
+    def __repr__(self) -> str:
+        """Return the model and a line for each thing to know."""
+        lines = [f"  {title + ':':<17}{text}" for title, text in self._lines().items()]
+        return "\n".join([f"Recommendation: {_made(self.model)}", *lines])
+
+    def _repr_html_(self) -> str:
+        """Return a table for a notebook."""
+        lines = {"model": _made(self.model), **self._lines()}.items()
+        style = ' style="overflow-wrap: anywhere"'  # on a phone, too, nothing is cut
+        rows = [f"<tr><th>{escape(a)}</th><td{style}>{escape(b)}</td></tr>" for a, b in lines]
+        return f"<table>{''.join(rows)}</table>"
+
+
+def _made(model: Any) -> str:
+    """Return the call that makes a model, without what is as usual."""
+    values = {one.name: (getattr(model, one.name), one.default) for one in fields(model)}
+    given = [f"{name}={value!r}" for name, (value, usual) in values.items() if value != usual]
+    return f"{type(model).__name__}({', '.join(given)})"
