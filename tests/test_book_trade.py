@@ -564,12 +564,12 @@ def test_the_decision_follows_from_the_table():
         else:
             assert number(error) == pytest.approx(expected["numerical_error"], rel=0.5)
         if expected["model_reference"].startswith("Hertz"):
-            assert float(apart) == pytest.approx(expected["model_error"], abs=0.0051)
+            assert float(apart) == pytest.approx(expected["model_error"], rel=0.06)
         elif expected["group"] == "springs":
-            assert float(apart) == 0.0
+            assert apart == "0"
         else:
             assert apart == "not measured"
-    assert last[4:] == ["not measured", "not measured", "0.00"]
+    assert last[4:] == ["not measured", "not measured", "0"]
     assert chosen[2]["time_ratio"] < 2
     assert chosen[4]["time_ratio"] > 50 * chosen[2]["time_ratio"]
 

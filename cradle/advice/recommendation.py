@@ -78,7 +78,7 @@ class Recommendation:
         lines = {"model": _made(self.model), **self._lines()}.items()
         style = ' style="overflow-wrap: anywhere"'  # on a phone, too, nothing is cut
         rows = [f"<tr><th>{escape(a)}</th><td{style}>{escape(b)}</td></tr>" for a, b in lines]
-        return f"<table>{''.join(rows)}</table>"
+        return f'<table class="dataframe">{"".join(rows)}</table>'  # pages style it as a table
 
 
 def _made(model: Any) -> str:
