@@ -27,7 +27,8 @@ class Recommendation:
         part of the closing speed.  None: not measured.
     model_error : float or None
         The same from Hertz springs, the theory of elastic spheres (equal ones, unless `stiffness`
-        says otherwise); no setting makes it smaller.  None: not measured, or, with losses, not to be measured: there is no such theory.
+        says otherwise); no setting makes it smaller.  None: not measured, or, with losses, not to
+        be measured: there is no such theory.
     seconds : float or None
         Time of one impact on the machine that measured, to a factor of two.  None: not measured.
     measured_on : tuple of str
