@@ -18,7 +18,13 @@ from matplotlib.figure import Figure
 
 from cradle import textbook
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "book"))
+from page import WORDS
+
+sys.path.pop(0)
+
 BOOK = Path(__file__).parents[1] / "book"
+
 GLUED = "application/papermill.record/text/plain"
 A_RATIO = re.compile("ratio|alpha|gamma|tried|nominal|asked|backward|forward", re.IGNORECASE)
 
@@ -151,21 +157,6 @@ def after(chain, ratio, **options):
     return solved(chain, ratio, **options)[0][-1]
 
 
-WORDS = [
-    "no",
-    "one",
-    "two",
-    "three",
-    "four",
-    "five",
-    "six",
-    "seven",
-    "eight",
-    "nine",
-    "ten",
-    "eleven",
-    "twelve",
-]
 RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 

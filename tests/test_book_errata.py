@@ -1,4 +1,4 @@
-"""Appendix C: its numbers by a second route, and the tests that it names."""
+"""The errata: their numbers by a second route, and the tests that they name."""
 
 import ast
 import math
