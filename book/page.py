@@ -4,7 +4,8 @@ import inspect
 import textwrap
 
 import numpy as np
-from IPython.display import Markdown
+import pandas as pd
+from IPython.display import Markdown, display
 from myst_nb import glue
 
 #: Whole numbers as words.
@@ -68,6 +69,29 @@ def below(value: float, limit: float = 1e-12) -> str:
     return (
         f"< {people(limit, 1)}" if abs(value) < limit else people(value, 1)
     )
+
+
+class _Table:
+    """A table as a page shows it, and as plain text."""
+
+    def __init__(self, frame: pd.DataFrame, **options: object) -> None:
+        self.frame, self.options = frame, options
+
+    def __repr__(self) -> str:
+        return self.frame.to_string(**self.options)
+
+    def _repr_html_(self) -> str:
+        return self.frame.to_html(border=0, **self.options)
+
+
+def show(
+    frame: pd.DataFrame, *, index: bool = False, **options: object
+) -> None:
+    """Show a table whose columns stay in line on a narrow screen, too.
+
+    `options` are those that `to_string` and `to_html` share.
+    """
+    display(_Table(frame, index=index, **options))
 
 
 def listing(*functions: object, width: int = 80) -> Markdown:

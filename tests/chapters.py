@@ -52,9 +52,14 @@ class Chapter:
         return drawn(self.name)
 
     def printed(self, cell_id):
-        """What a cell prints."""
-        outputs = self.cells[cell_id].outputs
-        return "".join(output.text for output in outputs if output.output_type == "stream")
+        """What a cell prints, and its tables as text."""
+        texts = []
+        for output in self.cells[cell_id].outputs:
+            if output.output_type == "stream":
+                texts.append(output.text)
+            elif "text/html" in output.get("data", ()):
+                texts.append(output.data["text/plain"] + "\n")
+        return "".join(texts)
 
 
 def code(chapter: str) -> list:
