@@ -3,23 +3,16 @@
 import inspect
 import textwrap
 
-from IPython.display import Markdown
+import numpy as np
+import pandas as pd
+from IPython.display import Markdown, display
 from myst_nb import glue
 
-_SMALL = [
-    "no",
-    "one",
-    "two",
-    "three",
-    "four",
-    "five",
-    "six",
-    "seven",
-    "eight",
-    "nine",
-    "ten",
-]
-_SMALL += ["eleven", "twelve"]
+#: Whole numbers as words.
+WORDS = [
+    "no", "one", "two", "three", "four", "five", "six", "seven", "eight",
+    "nine", "ten", "eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen",
+]  # fmt: skip
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -37,36 +30,38 @@ def people(value: float, digits: int = 2) -> str:
     `digits` significant digits are kept. An integer below one million is written out in full.
     """
     if float(value).is_integer() and abs(value) < 1_000_000:
-        return f"{int(value):,}".replace(",", "\N{NO-BREAK SPACE}").replace(
+        text = (
+            f"{int(value):,}" if abs(value) >= 10_000 else f"{int(value)}"
+        )
+        return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace(
             "-", "−"
         )
     for size, word in ((1e9, "billion"), (1e6, "million")):
         if abs(value) >= size:
-            return (
-                f"{float(f'{value / size:.{digits}g}'):g} {word}".replace(
-                    "-", "−"
-                )
-            )
-    if value and (abs(value) < 1e-3 or abs(value) >= 1e5):
-        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        power = "10" + str(int(exponent)).translate(_SUPERSCRIPT)
-        mantissa = (
-            mantissa.rstrip("0").rstrip(".")
-            if "." in mantissa
-            else mantissa
-        )
-        return (
-            power if mantissa == "1" else f"{mantissa} × {power}"
-        ).replace("-", "−")
-    return f"{value:.{digits}g}".replace("-", "−")
+            return f"{_rounded(value / size, digits)} {word}"
+    if 1e-3 <= abs(value) < 1e5:
+        return _rounded(value, digits)
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    power = "10" + str(int(exponent)).translate(_SUPERSCRIPT)
+    mantissa = f"{float(mantissa):g}".replace("-", "−")
+    return power if mantissa == "1" else f"{mantissa}·{power}"
+
+
+def said(value: float, digits: int = 2) -> str:
+    """Write a number as in a sentence, and a small whole number as a word."""
+    if isinstance(value, (int, np.integer)) and 0 <= value <= 12:
+        return WORDS[value]
+    return people(value, digits)
 
 
 def count(number: int, thing: str, things: str = "") -> str:
     """Write how many there are: no chains, one chain, twelve chains, 35 chains."""
-    word = (
-        _SMALL[number] if 0 <= number < len(_SMALL) else people(int(number))
-    )
-    return f"{word} {thing if number == 1 else things or thing + 's'}"
+    return f"{said(int(number))} {thing if number == 1 else things or thing + 's'}"
+
+
+def _rounded(value: float, digits: int) -> str:
+    """Write a number in significant digits, without a power of ten."""
+    return f"{float(f'{value:.{digits}g}'):g}".replace("-", "−")
 
 
 def below(value: float, limit: float = 1e-12) -> str:
@@ -74,6 +69,29 @@ def below(value: float, limit: float = 1e-12) -> str:
     return (
         f"< {people(limit, 1)}" if abs(value) < limit else people(value, 1)
     )
+
+
+class _Table:
+    """A table as a page shows it, and as plain text."""
+
+    def __init__(self, frame: pd.DataFrame, **options: object) -> None:
+        self.frame, self.options = frame, options
+
+    def __repr__(self) -> str:
+        return self.frame.to_string(**self.options)
+
+    def _repr_html_(self) -> str:
+        return self.frame.to_html(border=0, **self.options)
+
+
+def show(
+    frame: pd.DataFrame, *, index: bool = False, **options: object
+) -> None:
+    """Show a table whose columns stay in line on a narrow screen, too.
+
+    `options` are those that `to_string` and `to_html` share.
+    """
+    display(_Table(frame, index=index, **options))
 
 
 def listing(*functions: object, width: int = 80) -> Markdown:

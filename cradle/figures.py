@@ -105,7 +105,7 @@ def progress(trace: Trace) -> Vector:
 
 
 def _axes(ax: Axes | None) -> Axes:
-    return plt.subplots(figsize=(7, 4.3), layout="constrained")[1] if ax is None else ax
+    return plt.subplots(figsize=(5.6, 3.9), layout="constrained")[1] if ax is None else ax
 
 
 def velocities(trace: Trace, ax: Axes | None = None) -> Axes:

@@ -18,7 +18,13 @@ from matplotlib.figure import Figure
 
 from cradle import textbook
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "book"))
+from page import WORDS
+
+sys.path.pop(0)
+
 BOOK = Path(__file__).parents[1] / "book"
+
 GLUED = "application/papermill.record/text/plain"
 A_RATIO = re.compile("ratio|alpha|gamma|tried|nominal|asked|backward|forward", re.IGNORECASE)
 
@@ -46,9 +52,14 @@ class Chapter:
         return drawn(self.name)
 
     def printed(self, cell_id):
-        """What a cell prints."""
-        outputs = self.cells[cell_id].outputs
-        return "".join(output.text for output in outputs if output.output_type == "stream")
+        """What a cell prints, and its tables as text."""
+        texts = []
+        for output in self.cells[cell_id].outputs:
+            if output.output_type == "stream":
+                texts.append(output.text)
+            elif "text/html" in output.get("data", ()):
+                texts.append(output.data["text/plain"] + "\n")
+        return "".join(texts)
 
 
 def code(chapter: str) -> list:
@@ -151,21 +162,6 @@ def after(chain, ratio, **options):
     return solved(chain, ratio, **options)[0][-1]
 
 
-WORDS = [
-    "no",
-    "one",
-    "two",
-    "three",
-    "four",
-    "five",
-    "six",
-    "seven",
-    "eight",
-    "nine",
-    "ten",
-    "eleven",
-    "twelve",
-]
 RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 

@@ -154,6 +154,14 @@ def test_equations_keep_their_tags(html: Path):
             assert r"\tag" not in equation, f"{path.name}: {equation}"
 
 
+def test_figures_of_the_appendices_carry_a_letter(html: Path):
+    numbers = {}
+    for name in ("notation", "problem"):
+        text = (html / "book" / f"{name}.html").read_text(encoding="utf-8")
+        numbers[name] = re.findall(r'caption-number">Fig\. ([\w.]+) ', text)
+    assert numbers == {"notation": ["A.1", "A.2", "A.3"], "problem": ["1.1", "1.2", "1.3"]}
+
+
 def test_every_link_of_the_ledger_leads_somewhere(html: Path, root: Path):
     with (root / "data" / "ledger.csv").open(encoding="utf-8", newline="") as file:
         links = [row["cell"] for row in csv.DictReader(file)]

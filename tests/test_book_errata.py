@@ -1,4 +1,4 @@
-"""Appendix C: its numbers by a second route, and the tests that it names."""
+"""The errata: their numbers by a second route, and the tests that they name."""
 
 import ast
 import math
@@ -65,9 +65,9 @@ def test_entries_are_numbered_and_complete():
 def test_different_parameters_with_one_outcome():
     """Entry 42: the closed form of three balls, and the reference solver."""
     for (e2, e3, a), text in (
-        (("0.9", "0.8", "0.15"), "(.9, .8, .15)"),
-        (("0.951351", "0.748331", "0.10"), "(.951351, .748331, .10)"),
-        (("0.848649", "0.864099", "0.20"), "(.848649, .864099, .20)"),
+        (("0.9", "0.8", "0.15"), "(0.9, 0.8, 0.15)"),
+        (("0.951351", "0.748331", "0.10"), "(0.951351, 0.748331, 0.10)"),
+        (("0.848649", "0.864099", "0.20"), "(0.848649, 0.864099, 0.20)"),
     ):
         assert text in TEXT
         gain = (1 + float(e2)) / (2 - float(a))

@@ -158,7 +158,7 @@ def test_fig_8_drawn():
     right = math.hypot(v[2] - v[3], math.sqrt(4 * contact_work(trace, 2, start)))
     ends = [v[0] + v[1] - left, v[0] + v[1] + left, v[2] + v[3] - right, v[2] + v[3] + right]
     for contact in range(3):
-        both, apart = (panel("n_balls", "fig-p8", 3 * row + contact) for row in (1, 0))
+        both, apart = (panel("n_balls", "fig-p8", 2 * contact + row) for row in (1, 0))
         for ball in (contact, contact + 1):
             name = f"$v_{ball + 1}$"
             expected = np.column_stack([impulses[:, contact], path[:, ball]])

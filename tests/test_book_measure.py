@@ -24,8 +24,8 @@ GLUED = CHAPTER.glued
 __all__ = ["pictures_in_memory"]
 
 # Given by the paper, chosen for an example, or constants of statistics; all others are computed.
-GIVEN = (".050 .1 .15 .215 .22 .390 .462 .5 .6 .710 .73 .730 .731 .744 .755 .782"
-         " 0.3 0.4 0.5 1.96 2.54 3.84")  # fmt: skip
+GIVEN = ("0.050 0.1 0.15 0.215 0.22 0.390 0.462 0.5 0.6 0.710 0.73 0.730 0.731 0.744 0.755 0.782"
+         " 0.3 0.4 1.96 2.54 3.84")  # fmt: skip
 
 
 @cache

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import reference
 from chains import magnitudes, uniform
-from chapters import Chapter
+from chapters import Chapter, number
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequences
 from cradle.closed_form import largest_ratios
@@ -107,7 +107,7 @@ def test_eq_53_at_the_bound_the_rest_is_one_body(n):
 
 def test_end_progress_is_as_exact_as_its_arguments():
     rows = CHAPTER.printed("root-errors").splitlines()[2:]
-    errors = {float(row.split()[0]): [float(x) for x in row.split()[1:]] for row in rows}
+    errors = {number(row.split()[0]): [number(x) for x in row.split()[1:]] for row in rows}
     assert all(ours < 3e-16 for _, ours in errors.values())
     # The school formula loses as many digits as Q is small.
     assert all(school > 1e-19 / q for q, (school, _) in errors.items() if q < 1e-3)
@@ -242,7 +242,7 @@ def test_fig_8_meeting_moves_two_of_ten_sequences():
             np.testing.assert_allclose(ends[-1], exact.velocities, atol=1e-12)
         moved[name] = np.ptp(ends, axis=0).max()
     stored = {
-        row.split()[0]: float(row.split()[-1])
+        row.split()[0]: number(row.split()[-1])
         for row in CHAPTER.printed("meeting-cell").splitlines()[2:]
     }
     assert list(stored) == list(moved)

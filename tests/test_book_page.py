@@ -8,7 +8,7 @@ from chapters import BOOK
 from cradle.textbook import Impact
 
 sys.path.insert(0, str(BOOK))
-from page import below, count, listing, people
+from page import below, count, listing, people, said
 
 sys.path.remove(str(BOOK))
 
@@ -17,11 +17,14 @@ sys.path.remove(str(BOOK))
     ("value", "text"),
     [
         (2_234_567, "2.2 million"),
-        (36_877, "36\N{NO-BREAK SPACE}877"),
+        (36_877, "36\N{NARROW NO-BREAK SPACE}877"),
+        (5_235, "5235"),
         (1e-7, "10⁻⁷"),
-        (3.2e-8, "3.2 × 10⁻⁸"),
+        (3.2e-8, "3.2·10⁻⁸"),
         (0.0314, "0.031"),
         (-5, "−5"),
+        (-3.2e-8, "−3.2·10⁻⁸"),
+        (1234.5, "1200"),
         (100.0, "100"),
         (0, "0"),
     ],
@@ -37,9 +40,13 @@ def test_counts():
     assert count(2, "ball", "pairs of balls") == "two pairs of balls"
 
 
+def test_small_whole_numbers_are_words():
+    assert [said(n) for n in (0, 12, 13, 2.0, 0.5)] == ["no", "twelve", "13", "2", "0.5"]
+
+
 def test_below():
     assert below(1e-15) == "< 10⁻¹²"
-    assert below(2e-4) == "2 × 10⁻⁴"
+    assert below(2e-4) == "2·10⁻⁴"
 
 
 def test_a_listing_keeps_every_line_of_code():

@@ -34,6 +34,7 @@ def rows(cell):
     return [
         [float(x) for x in line.split(":")[1].split()]
         for line in CHAPTER.printed(cell).splitlines()
+        if ":" in line
     ]
 
 

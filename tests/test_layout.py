@@ -46,6 +46,13 @@ MISFITS = """() => {
   for (const node of document.querySelectorAll('.bd-content mjx-container:not([display])'))
     if (wide(node) && getComputedStyle(node).overflowX !== "visible")
       say("formula", node, node.clientWidth, node.scrollWidth);
+  // Formulas in a table: they stay in their column.
+  for (const node of document.querySelectorAll(".bd-content td mjx-container > svg")) {
+    if (!node.checkVisibility()) continue;
+    const end = node.getBoundingClientRect().right, column = node.closest("td");
+    const edge = column.getBoundingClientRect().right;
+    if (end > edge + 1) say("formula over its column", column, edge, end);
+  }
   // Figures: one of the two is shown, and its letters are hardly shrunk.
   for (const box of document.querySelectorAll(".figure-box")) {
     const shown = [...box.children].filter((image) => image.checkVisibility());
@@ -126,6 +133,11 @@ def test_nothing_is_cut(html: Path, browser, mode: str):
             "code",
         ),
         ("<table><td style='width: 2em'>" + 40 * "word " + "</td></table>", "squeezed column"),
+        (
+            "<table style='table-layout: fixed; width: 4em'><td><mjx-container display='true'>"
+            "<svg style='width: 20em'></svg></mjx-container></td></table>",
+            "formula over its column",
+        ),
     ],
 )
 def test_a_misfit_is_seen(browser, body: str, kind: str):

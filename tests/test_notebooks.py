@@ -150,13 +150,13 @@ GIVEN = {
     "multiple_impacts": "0.1 0.2 0.8",
     "patterns": "0.003 0.01 0.1 0.15 0.3 0.3475 0.348 0.5 0.6 0.9 0.999",
     "n_balls": "0.1 0.2 1.5 1.75",
-    "experiments": ".01 .171 0.17121 .17121 .40 .5 .62 1.5 1.59",
+    "experiments": "0.01 0.171 0.17121 0.40 0.5 0.62 1.5 1.59",
     "toy": "0.5 0.9 0.95 0.99",
     "trade": "0.001 0.01 0.1",
     "beyond": "0.01 0.9 0.99 0.999",
-    "errata": ".0001 .001 .01 .018 .05 .1 .10 .1354936 .15 .171 0.17121 .2 .20 .25 .3 .348 .390"
-    " .439 .5 .6 .7 .710 .748331 .75 .755 .8 .848649 .864099 .9 .95 .951351 1.043 1.045 1.185"
-    " 1.470",
+    "errata": "0.0001 0.001 0.01 0.018 0.05 0.1 0.10 0.1354936 0.15 0.171 0.17121 0.2 0.20 0.25"
+    " 0.3 0.348 0.390 0.439 0.5 0.6 0.7 0.710 0.748331 0.75 0.755 0.8 0.848649 0.864099 0.9 0.95"
+    " 0.951351 1.043 1.045 1.185 1.470",
     "extremes": "0.1 0.3 0.8 36.9",
     "extremes_inventory": "",
     "notation": "",
@@ -208,7 +208,8 @@ def test_one_changed_digit_fails(tmp_path: Path, root: Path, stored: str, outcom
     assert ("1 passed" if outcome == 0 else "1 failed") in run.stdout
 
 
-@pytest.mark.parametrize("chapter", ["experiments", "trade", "extremes", "beyond"])
+# The numbers that describe the moving picture of the landing page have a test of their own.
+@pytest.mark.parametrize("chapter", sorted({p.stem for p in BOOK.glob("*.ipynb")} - {"intro"}))
 def test_no_number_is_typed_into_a_description(chapter: str):
     """What nobody computes, nobody corrects: a description says higher, lower, near, far."""
     for cell in nbformat.read(BOOK / f"{chapter}.ipynb", as_version=4).cells:

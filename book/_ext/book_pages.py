@@ -6,6 +6,7 @@ r"""Sphinx extension: what Jupyter Book leaves to be put right in the pages.
   code is off. They are dropped.
 - Sphinx wraps an equation of several lines in `split`, where MathJax refuses the `\tag` that
   carries the paper's number. Such an equation is passed on as it is.
+- Figures of the appendices carry a letter: Fig. A.1.
 - A page that is linked from elsewhere shows a title, a sentence and a picture.
 - Until the project has a public address, buttons that lead there are left out. `book_published` in
   `_config.yml` is the one switch.
@@ -19,6 +20,7 @@ from typing import Any
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.config import Config
+from sphinx.environment import BuildEnvironment
 from sphinx.util.fileutil import copy_asset_file
 
 #: Options of the theme that lead to the project's address.
@@ -85,6 +87,23 @@ def keep_tags(app: Sphinx, doctree: nodes.document, page: str) -> None:
             equation["classes"].append("amsmath")
 
 
+def letter_figures(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    """Give the figures of the appendices the numbers A.1, A.2, ..., through all pages."""
+    appendices = [
+        page
+        for page in env.toc_fignumbers
+        if page != app.config.root_doc and not env.toc_secnumbers.get(page)
+    ]
+    names = [
+        (page, name)
+        for page in appendices
+        for name in env.toc_fignumbers[page].get("figure", ())
+    ]
+    for number, (page, name) in enumerate(names, start=1):
+        env.toc_fignumbers[page]["figure"][name] = ("A", number)
+    return appendices
+
+
 def describe(
     app: Sphinx,
     page: str,
@@ -126,6 +145,8 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("html-page-context", drop_thebe, priority=900)
     app.connect("html-page-context", describe)
     app.connect("doctree-resolved", keep_tags)
+    # After Sphinx has numbered all figures.
+    app.connect("env-get-updated", letter_figures, priority=900)
     app.connect("build-finished", copy_mathjax)
     return {
         "version": "1",

@@ -50,7 +50,7 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
         )
     estimate = fit[name]
     if axes is None:
-        _, axes = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
+        _, axes = plt.subplots(2, 1, figsize=(5.6, 7), layout="constrained")
     draw_likelihood(estimate, axes[0])
     for one in fit.shots.sets:
         keys = {*pair_keys(one.types)} if len(one.types) == 2 else {*triplet_keys(one.types)[0]}

@@ -1,0 +1,182 @@
+"""Every curve of the chapters on the toy and on measuring, and the map of a million chains.
+
+The second routes: the independent solver of the tests, the stored data files, formulas.
+"""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chapters import Chapter, drawn, lines, panel
+from reference import solve
+
+from cradle.tables import paper_chain
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+def velocities(chain, forward, backward=None):
+    """Velocities after an impact by the independent solver."""
+    masses, before, restitution = (list(map(float, values)) for values in chain)
+    done = solve(masses, before, restitution, forward, backward, excess="saturate", number=float)
+    return np.array([float(v) for v in done.velocities])
+
+
+def strokes(count, e, ratio=0.15):
+    """Velocities after each stroke of five equal balls, the first released."""
+    found, v = [], np.array([1.0, 0, 0, 0, 0])
+    for _ in range(count):
+        found.append(velocities(([1] * 5, v, [e] * 4), ratio))
+        v = -found[-1]
+    return np.array(found)
+
+
+def shots(name):
+    """Striker's speeds of a stored set, and velocities afterwards over them, by shot."""
+    with (DATA / "shots_synthetic.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(line for line in file if line[0] != "#"))
+    rows = [row for row in rows if row["set"] == name]
+    after = np.array([float(row["after"]) for row in rows]).reshape(-1, len(name))
+    striker = np.array([float(row["before"]) for row in rows]).reshape(-1, len(name))[:, :1]
+    return striker[:, 0], after / striker
+
+
+def dots(ax, count):
+    """What error bars mark: points of the lines that have a marker and so many points."""
+    return [
+        line.get_xydata() for line in ax.get_lines()
+        if line.get_marker() == "o" and len(line.get_xydata()) == count
+    ]  # fmt: skip
+
+
+def test_fig_toy_models():
+    axes = drawn("toy")["fig-toy-models"].axes[:5]
+    shown = [ax.images[0].get_array() for ax in axes]
+    assert {image.shape[0] for image in shown} == {5}
+    sequential, ratio, springs, solid, lossy = shown
+    for image, e, a in ((sequential, 1, 0), (ratio, 1, 0.15), (lossy, 0.97, 0.15)):
+        expected = np.abs(strokes(20, e, a)).T
+        np.testing.assert_allclose(image[:, :20], expected, rtol=0, atol=1e-9)
+    # One stroke of five Hertz springs, integrated elsewhere, and a body of four by momentum.
+    hertz = [0.071085017, 0.030273764, 0.014463629, 0.127044986, 0.988777424]
+    np.testing.assert_allclose(springs[:, 0], hertz, atol=1e-7)
+    np.testing.assert_allclose(solid[:, :2].T, [[0.6] + [0.4] * 4, [1, 0, 0, 0, 0]], atol=1e-9)
+
+
+def test_fig_toy_drift():
+    shown = panel("toy", "fig-toy-drift")
+    assert len(shown) == 6
+    for e in (0.9, 0.95, 0.99):
+        five, two = shown[f"five, e = {e:g}"], shown[f"two, e = {e:g}"]
+        after = strokes(20, e)
+        relative = 5 * after.var(axis=1) / 0.8
+        np.testing.assert_allclose(five[:20, 1], relative, rtol=1e-6)
+        np.testing.assert_allclose(two[:, 1], e ** (2 * two[:, 0]), rtol=1e-7)
+        assert five[:3, 0].tolist() == two[:3, 0].tolist() == [1, 2, 3]
+
+
+def test_fig_toy_resting():
+    """Up to the first impact both balls are free."""
+    ax = drawn("toy")["fig-toy-resting"].axes[0]
+    distance, hits = (line.get_xydata() for line in ax.get_lines()[:2])
+    assert (distance[:, 1] > -1e-9).all()
+    first = hits[0, 0]
+    before = distance[distance[:, 0] < first]
+    short, long = (np.sqrt(9.81 / length) for length in (0.10, 0.14))
+    free = 40 * np.cos(short * before[:, 0]) - 39.2 * np.cos(long * before[:, 0])
+    np.testing.assert_allclose(before[:, 1], free, rtol=0, atol=1e-9)
+    assert 40 * math.cos(short * first) == pytest.approx(39.2 * math.cos(long * first), abs=1e-9)
+    assert (hits[:, 1] == 0).all()
+
+
+def test_fig_measure_check():
+    ax = drawn("measure")["fig-measure-check"].axes[0]
+    striker, after = shots("ABACA")
+    found = np.array([xy[:, 1] for xy in dots(ax, len(striker))])
+    np.testing.assert_allclose(found, after.T, rtol=1e-12)
+    # The bars are the intervals that the chapter prints.
+    printed = [line.split() for line in Chapter("measure").printed("check").splitlines()[2:7]]
+    for bar, (_, _, _, low, high) in zip(ax.patches, printed, strict=True):
+        ends = bar.get_y(), bar.get_y() + bar.get_height()
+        np.testing.assert_allclose(ends, [float(low), float(high)], rtol=0, atol=6e-4)
+
+
+def test_fig_measure_tracks():
+    ax = drawn("measure")["fig-measure-tracks"].axes[0]
+    rows = [
+        [float(x) for x in line.split()]
+        for line in (DATA / "video_synthetic.txt").read_text(encoding="utf-8").splitlines()[3:]
+    ]
+    times, *columns = np.array(rows).T
+    for name, x in zip("BAC", columns[::2], strict=True):
+        line = lines(ax)[f"ball {name}"]
+        np.testing.assert_allclose(line[:, 1], 1000 * x, rtol=1e-12)
+        np.testing.assert_allclose(np.diff(line[:, 0]), 1000 * np.diff(times), rtol=1e-9)
+    # The struck balls begin to move at time zero.
+    moved = lines(ax)["ball C"]
+    rest, later = moved[moved[:, 0] < 0, 1], moved[moved[:, 0] > 20, 1]
+    assert rest.max() < later.min()
+
+
+@pytest.mark.parametrize(
+    ("figure", "printed"),
+    [
+        ("fig-measure-fit", [0.1139, 0.1325]),
+        ("fig-measure-minima", [0.2024, 0.2272, 0.3919, 0.4028]),
+    ],
+)
+def test_likelihoods_cross_their_limit_at_the_printed_ends(figure, printed):
+    ax = drawn("measure")[figure].axes[0]
+    x, y = ax.get_lines()[0].get_xydata().T
+    assert y.min() == pytest.approx(0, abs=1e-3)
+    above = y > 3.84
+    k = np.flatnonzero(above[1:] != above[:-1])
+    ends = x[k] + (3.84 - y[k]) / (y[k + 1] - y[k]) * (x[k + 1] - x[k])
+    np.testing.assert_allclose(ends, printed, rtol=0, atol=2e-4)
+
+
+def test_fig_measure_fit_shots():
+    ax = drawn("measure")["fig-measure-fit"].axes[1]
+    striker, after = shots("ABA")
+    found = dots(ax, len(striker))
+    assert len(found) == 3
+    for ball, xy in enumerate(found):
+        np.testing.assert_allclose(xy, np.column_stack([striker, after[:, ball]]), rtol=1e-12)
+
+
+def test_fig_measure_fold():
+    upper, lower = drawn("measure")["fig-measure-fold"].axes
+    chain, model = paper_chain("CBD")
+    back = float(model.backward[0])
+    balls = chain.masses, chain.velocities, chain.restitution
+    for k in (0, 300, 600, 780):
+        shown = [lines(upper)[f"ball {i}"][k] for i in (1, 2, 3)]
+        expected = velocities(balls, float(shown[0][0]), back)
+        np.testing.assert_allclose([v for _, v in shown], expected, rtol=0, atol=1e-10)
+    chain, _ = paper_chain("DAD")
+    balls = chain.masses, chain.velocities, chain.restitution
+    for true in (0.15, 0.22):
+        line = lines(lower)[f"data of true ratio {true}"]
+        at = np.argmin(abs(line[:, 0] - true))
+        assert line[at, 1] == 0
+        data = velocities(balls, float(line[at, 0]))
+        for k in (0, 250, 500, 790):
+            miss = np.linalg.norm(velocities(balls, float(line[k, 0])) - data)
+            assert line[k, 1] == pytest.approx(miss, abs=1e-10)
+
+
+def test_fig_beyond_map():
+    ax = drawn("beyond")["fig-beyond-map"].axes[0]
+    count = ax.collections[0].get_array().reshape(250, 250)
+    axis = (np.arange(250) + 0.5) * 3 / 250
+    for row, column in ((200, 200), (60, 60), (20, 100), (100, 5), (12, 40), (9, 9)):
+        r1, r2 = axis[row], axis[column]
+        done = solve(
+            [1 / r1, 1.0, 1 / r2], [1.0, 0.0, 0.0], [0.5, 0.5], 0.15, 0.15, number=float
+        )  # fmt: skip
+        assert count[row, column] == sum(kind == "end" for kind, _ in done.events), (row, column)
+    x, r1 = ax.get_lines()[0].get_xydata().T
+    line = 1.5 * (1 + 0.5 * np.sqrt(1 - 0.15 * (1 + x))) / (0.5 * (1 + x)) - 1.3  # Eq. 44
+    np.testing.assert_allclose(r1, line, rtol=1e-12)
