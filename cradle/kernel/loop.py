@@ -214,7 +214,7 @@ def prepare(n, chain, meeting, state):
         ball[i].m = chain.m[i] * mass_unit
         tally.cut_off = min(tally.cut_off, LIMITS.cut * ball[i].m)
         ball[i].hi = chain.v[i] * unit
-        ball[i].lo = 0.0
+        ball[i].lo = ball[i].pull = 0.0
         ball[i].turn = 0
     for c in range(n - 1):
         k = contact[c]
@@ -222,7 +222,8 @@ def prepare(n, chain, meeting, state):
         if c < n - 2:
             k.forward, k.backward = chain.forward[c], chain.backward[c]
         k.u = u = ball[c].hi - ball[c + 1].hi
-        k.q = k.w = k.top = k.tip = k.blur = k.p = k.p_lo = k.a = k.a_lo = 0.0
+        k.q = k.w = k.top = k.tip = k.rate = k.slope = k.blur = 0.0
+        k.p = k.p_lo = k.a = k.a_lo = 0.0
         k.before = abs(u)
         k.active = k.tiny = k.hits = k.held = 0
         for row in range(2):

@@ -104,12 +104,25 @@ def several_sources(low, high, smallest, ball, contact):
 
 
 @jit
-def reached(first, run, smallest, contact):
+def wait(low, high, ball, contact, outer):
+    """Let contacts low..high of a run wait: they have no impulse, and their `outer` balls no pull.
+
+    `outer` is 0 for the left ball of each contact and 1 for the right one.
+    """
+    for c in range(low, high + 1):
+        contact[c].rate = contact[c].slope = 0.0
+        ball[c + outer].pull = 0.0
+
+
+@jit
+def reached(first, run, smallest, ball, contact):
     """R1: set low..high of a run, as far as impulses reach at the nominal ratios, or beyond.
 
     From the one source outwards rates only become less.  With several sources all contacts count.
+    Those that were reached before, and no longer are, wait.
     """
     source, last = run[first].source, run[first].last
+    low, high = run[first].low, run[first].high
     run[first].low = first
     run[first].high = last
     if source < 0:
@@ -120,12 +133,14 @@ def reached(first, run, smallest, contact):
         x *= contact[c].forward
         c += 1
     run[first].high = c
+    wait(c + 1, high, ball, contact, 1)
     x = 1.0
     c = source
     while c > first and x > smallest:
         x *= contact[c - 1].backward
         c -= 1
     run[first].low = c
+    wait(low, c - 1, ball, contact, 0)
 
 
 @jit
@@ -135,7 +150,7 @@ def rates(first, run, ball, contact, tally):
     Returns whether a contact at u = 0 with nothing to release is about to open.
     """
     smallest = tally.cut_off
-    reached(first, run, smallest, contact)
+    reached(first, run, smallest, ball, contact)
     low, high, source = run[first].low, run[first].high, run[first].source
     ratios_in_force(low, high, ball, contact)
     if source < 0:
@@ -271,7 +286,8 @@ def segment(first, n, run, ball, contact):
     run[first].reach = s
     for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
         k = contact[c]
-        k.due = 1 if comes_at(s, k) else 0
-        if k.due == 0 and k.until < second:
-            second = k.until
+        if low <= c <= high or k.active == 0:
+            k.due = 1 if comes_at(s, k) else 0
+            if k.due == 0 and k.until < second:
+                second = k.until
     return 1.0 - s / second if second < math.inf else 1.0
