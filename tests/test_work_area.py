@@ -7,7 +7,6 @@ import pytest
 from families import FAMILIES, Draw, Problem, family
 
 from cradle import drive
-from cradle.kernel import state as rooms
 
 #: Contacts that wait from the beginning: no impulse has reached them yet.
 WAITING = Problem(
