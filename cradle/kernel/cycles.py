@@ -14,10 +14,10 @@ from cradle.kernel.motion import (
     add_work,
     closing,
     heaviest_of,
+    join_velocities,
     one_velocity,
     reduced_mass,
     relative_energy,
-    set_closing_speed,
     share_out,
 )
 from cradle.kernel.record import record
@@ -252,6 +252,25 @@ def exact_squares(cluster, total, energy, state, memory, low, high):
     return total * total / (1.0 + 2.0 * total)
 
 
+@jit
+def hold_together(cluster, low, high, ball, contact):
+    """Bring balls of neighbours that are held at u = 0 to one velocity again, after a jump."""
+    c = low
+    while c <= high:
+        end = c
+        while end <= high and (
+            cluster.first <= end <= cluster.last
+            or (contact[end].active == 1 and contact[end].u == 0.0)
+        ):
+            end += 1
+        if c < end and (c < cluster.first or end - 1 > cluster.last):
+            join_velocities(c, end, ball, contact)
+            for k in (c - 1, end):
+                if low <= k <= high:
+                    contact[k].u = closing(k, ball)
+        c = end + 1
+
+
 @apart
 def jump(cluster, total, level, n, state):
     """Go to the limit: velocities by the balls' x, steady neighbours' works by the contacts' y."""
@@ -272,7 +291,7 @@ def jump(cluster, total, level, n, state):
         k = contact[c]
         work = 0.0
         if first <= c <= last:
-            share = max(k.x, 0.0)
+            share = k.x
             work = memory[c].a * squares
             k.u = k.blur = 0.0
         else:
@@ -290,9 +309,7 @@ def jump(cluster, total, level, n, state):
         if level == 0:
             memory[c].p += share
             memory[c].a += work
-    for c in range(low, high + 1):
-        if contact[c].active == 1 and contact[c].u == 0.0 and not first <= c <= last:
-            set_closing_speed(c, 0.0, 0.0, low, high, ball, contact)
+    hold_together(cluster, low, high, ball, contact)
     end_plastically(first, last, n, state)
 
 

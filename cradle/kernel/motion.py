@@ -196,7 +196,7 @@ def join_velocities(first, last, ball, contact):
         ball[i].x += momentum / mass
     share_out(first, last - 1, 0.0, 0.0, ball, contact)
     for c in range(first, last):
-        add_impulse(contact[c], max(contact[c].x, 0.0))
+        add_impulse(contact[c], contact[c].x)
         contact[c].u = contact[c].blur = 0.0
     add_velocity(ball[k], ball[k].x)
     one_velocity(first, last, k, ball)
