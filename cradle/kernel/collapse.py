@@ -89,18 +89,24 @@ def exhausted_stretch(c, n, state):
 def merge(first, last, n, state):
     """End the contacts first..last plastically: their balls take the common velocity.
 
-    An idle neighbour that this makes them approach, at a speed below the threshold, joins.
+    Balls that zeros beside them join to theirs go with them, and an idle neighbour that this makes
+    approach, at a speed below the threshold, joins.
     """
     ball, contact = state.ball, state.contact
     while True:
-        join_velocities(first, last + 1, ball, contact)
-        for c in (first - 1, last + 1):
+        low, high = first, last
+        while low > 0 and contact[low - 1].u == 0.0:
+            low -= 1
+        while high < n - 2 and contact[high + 1].u == 0.0:
+            high += 1
+        join_velocities(low, high + 1, ball, contact)
+        for c in (low - 1, high + 1):
             if 0 <= c < n - 1:
                 contact[c].u = closing(c, ball)
-        if first > 0 and contact[first - 1].active == 0 and contact[first - 1].u > 0.0:
-            first -= 1
-        elif last < n - 2 and contact[last + 1].active == 0 and contact[last + 1].u > 0.0:
-            last += 1
+        if low > 0 and contact[low - 1].active == 0 and contact[low - 1].u > 0.0:
+            first = low - 1
+        elif high < n - 2 and contact[high + 1].active == 0 and contact[high + 1].u > 0.0:
+            last = high + 1
         else:
             break
     end_plastically(first, last, n, state)
