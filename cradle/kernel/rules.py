@@ -266,7 +266,8 @@ def comes_at(s, k):
 def segment(first, n, run, ball, contact):
     """R8.2: progress of a run to its own next rate-changing event.
 
-    Returns how much later the next one is that does not come at the same time, relative to itself.
+    Returns how much later the next one is that does not come at the very same time, relative to
+    itself.
     """
     low, high = run[first].low, run[first].high
     s = second = math.inf
@@ -288,6 +289,6 @@ def segment(first, n, run, ball, contact):
         k = contact[c]
         if low <= c <= high or k.active == 0:
             k.due = 1 if comes_at(s, k) else 0
-            if k.due == 0 and k.until < second:
+            if k.until > s and k.until < second:
                 second = k.until
     return 1.0 - s / second if second < math.inf else 1.0

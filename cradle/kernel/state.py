@@ -206,7 +206,7 @@ class Tally:
     threshold: float  # R9: speed and energy below which a contact is exhausted
     faint: float
     meeting: float  # R8: where two runs meet, as a part of the overlap
-    margin: float  # least distance of two events whose order mattered, relative to their progress
+    margin: float  # least distance of two events of a run, relative to their progress
 
 
 class Cluster(NamedTuple):
