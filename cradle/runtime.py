@@ -21,6 +21,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+
 from cradle import kernel as plain
 
 #: Set this environment variable to ``plain`` to run the kernel as it stands, to ``compiled`` to
@@ -134,12 +136,25 @@ def compiled() -> Any | None:
     # infinity, and the kernel makes none.  It allocates nothing, so arrays need no reference counts
     # (`_nrt`), without which the loop runs several times faster.
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False}
-    inlined = numba.njit(forceinline=True, **options)
-    called = numba.njit(**options)
-    door = numba.njit(cache=path is not None, **options)
-    vars(module).update(jit=inlined, apart=called, door=door)
+    # Only the door is called from Python.  A function that says nothing about `forceinline` would
+    # take it over from its caller.
+    inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **options}
+    marks = {
+        "jit": numba.njit(forceinline=True, **inner),
+        "once": numba.njit(inline="always", forceinline=False, **inner),
+        "apart": numba.njit(forceinline=False, **inner),
+        "door": numba.njit(
+            cache=path is not None, forceinline=False, no_cfunc_wrapper=True, **options
+        ),
+    }
+    vars(module).update(marks)
     sys.modules[name] = module
     exec(compile(unit(), module.__file__, "exec"), vars(module))
+    # numba compiles a function anew for each whole number that is written down in a call; not so
+    # for these.
+    for constant, value in vars(module).items():
+        if type(value) is int:
+            vars(module)[constant] = np.int64(value)
     return module
 
 
