@@ -79,8 +79,8 @@ def _area(n: int, compiled: bool, record: rooms.Record) -> rooms.State:
 _kept = threading.local()
 
 
-def _area_without_record(n: int, compiled: bool) -> rooms.State:
-    """Return this thread's work area for outcomes of n balls, kept for its next call."""
+def _kept_area(n: int, compiled: bool) -> rooms.State:
+    """Return this thread's work area for n balls, without a record, kept for its next call."""
     kept = getattr(_kept, "areas", None)
     if kept is None:
         kept = _kept.areas = {}
@@ -142,7 +142,6 @@ class Job:
             np.zeros(one),
             np.zeros(one, dtype=integer),
         )
-        self.record = _record(0, n)
         self.compiled: bool | None = None
 
     def run(self, stop: threading.Event | None = None) -> Job:
@@ -177,12 +176,6 @@ class Job:
             self._write_back()
         return self
 
-    @property
-    def tally(self) -> Any:
-        """The counts of the impact at hand, by name."""
-        tally = self.state.tally
-        return tally.view(np.recarray)[0] if isinstance(tally, np.ndarray) else tally[0]
-
     def _begin(self, compiled: bool) -> None:
         """Lay out work area and outputs for one runtime; what is solved so far stays."""
         if self.compiled is False:
@@ -193,12 +186,14 @@ class Job:
             # Python's own numbers: faster than NumPy's one at a time, and the same digits.
             self.given = plain.Inputs(*(part.tolist() for part in self.inputs))
             self.results = plain.Outputs(*(part.tolist() for part in self.outputs))
+        self.state = _kept_area(self.n, compiled)
+        tally = self.state.tally
+        # The counts of the impact at hand, by name.
+        self.tally = tally.view(np.recarray)[0] if compiled else tally[0]
         if self.limit is None:
-            self.state = _area_without_record(self.n, compiled)
             self.tally.room = _ENDLESS
         else:
             self.record = _record(0, self.n)
-            self.state = _area(self.n, compiled, self.record)
             self._grow()
 
     def _grow(self) -> None:

@@ -170,7 +170,7 @@ def on_disk() -> bool:
 def loaded() -> bool:
     """Tell whether compiled code has run in this process."""
     module = compiled() if compiled.cache_info().currsize else None
-    return module is not None and bool(module.batch.signatures)
+    return module is not None and bool(module.batch.overloads)
 
 
 def ready() -> bool:

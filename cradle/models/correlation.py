@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from cradle.chain import Chain
 from cradle.checks import Vector, checked, must_be, one_number, refusal
 from cradle.closed_form import largest_ratios
-from cradle.drive import DEFECTS, UNFINISHED, UNSOUND, Job
+from cradle.drive import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job
 from cradle.kernel import Inputs, Options
 from cradle.kernel.state import LIMITS
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
@@ -119,7 +119,6 @@ class ImpulseCorrelation:
             The path and the outcome.
         """
         must_be(Chain, "chain", chain)
-        refuse_light(chain.masses)
         n = len(chain)
         ratios: list[Vector] = []
         for name in ("forward", "backward"):
@@ -127,20 +126,23 @@ class ImpulseCorrelation:
             if given is None:
                 ratios.append(ratios[0])
                 continue
-            if np.ndim(given) and len(given) != n - 2:
+            if isinstance(given, tuple) and len(given) != n - 2:
                 raise ValueError(
                     f"{name} has {len(given)} values; {n} balls need {n - 2}, or one number"
                 )
-            ratios.append(np.broadcast_to(np.asarray(given), (n - 2,)).astype(np.float64))
-        if self.excess == "raise":
-            refuse_excess(chain.masses, *ratios)
+            ratios.append(np.full(n - 2, given))
 
         inputs = Inputs(
             *(part[None].copy() for part in (chain.masses, chain.velocities, chain.restitution)),
             *(part[None] for part in ratios),
         )
         room = _most_events(n) if record is None else _EVERY if record else 0
-        job = Job(inputs, 1, Options(self.meeting, self.max_events, False, True), room).run()
+        options = Options(self.meeting, self.max_events, self.excess == "raise", True)
+        job = Job(inputs, 1, options, room).run()
+        if job.status == REFUSED:
+            refuse_light(chain.masses)
+            refuse_excess(chain.masses, *ratios)
+            raise AssertionError("the kernel refused a chain that the checks admit")
         trace = self._trace(chain, job)
         if job.status == UNFINISHED:
             v = trace.velocities
