@@ -70,39 +70,40 @@ def _name() -> str:
     return f"cradle_kernel_{hashlib.sha256(unit().encode()).hexdigest()[:16]}"
 
 
-def _folders() -> list[Path]:
-    """Return where the unit and its compiled code may be kept, best first."""
+def _folder() -> Path:
+    """Return where the unit and its compiled code are kept: never in the package itself.
+
+    There a wheel or a source distribution built later would take them along.
+    """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
-        return [Path(chosen)]
+        return Path(chosen)
     home = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
-    user = Path(home) if home else Path("~/.cache").expanduser()
-    return [Path(__file__).parent / "__pycache__", user / "cradle"]
+    usual = "~/Library/Caches" if sys.platform == "darwin" else "~/.cache"
+    return (Path(home) if home else Path(usual).expanduser()) / "cradle-companion"
 
 
 @functools.cache
 def _stored() -> Path | None:
-    """Write the unit where compiled code can be kept beside it; None if that is nowhere."""
-    for folder in _folders():
-        path = folder / f"{_name()}.py"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            # Compiled code goes there too, so try to write even if the unit is there already.
-            with tempfile.NamedTemporaryFile(
-                "w", encoding="utf-8", dir=folder, suffix=".tmp", delete=False
-            ) as file:
-                file.write(unit())
-            if path.exists():
-                Path(file.name).unlink()
-            else:
-                # numba keeps compiled code as long as the time of its source does not change:
-                # the name says enough, so the time is one for all, also where a cache is copied.
-                os.utime(file.name, (0, 0))
-                Path(file.name).replace(path)
-        except OSError:
-            continue
-        return path
-    return None
+    """Write the unit where compiled code can be kept beside it; None if that cannot be written."""
+    try:
+        path = _folder() / f"{_name()}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Compiled code goes there too, so try to write even if the unit is there already.
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", dir=path.parent, suffix=".tmp", delete=False
+        ) as file:
+            file.write(unit())
+        if path.exists():
+            Path(file.name).unlink()
+        else:
+            # numba keeps compiled code as long as the time of its source does not change: the name
+            # says enough, so the time is one for all, also where a cache is copied.
+            os.utime(file.name, (0, 0))
+            Path(file.name).replace(path)
+    except (OSError, RuntimeError):  # the latter where nobody knows a home
+        return None
+    return path
 
 
 @functools.cache

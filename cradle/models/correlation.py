@@ -102,7 +102,7 @@ class ImpulseCorrelation:
         object.__setattr__(self, "excess", excess)
         object.__setattr__(self, "max_events", int(max_events))
 
-    def solve(self, chain: Chain, *, record: bool | None = None) -> Trace:
+    def solve(self, chain: Chain, *, record: bool | None = None, progress: bool = False) -> Trace:
         """Solve the impact of `chain`; see `collide`.
 
         Parameters
@@ -112,6 +112,8 @@ class ImpulseCorrelation:
         record : bool, optional
             Whether to keep the path.  Left out, it is kept unless it has more than ten million
             numbers; the trace's `path` and `events` then end early, with a warning.
+        progress : bool
+            Show how many events there have been so far.
 
         Returns
         -------
@@ -138,7 +140,14 @@ class ImpulseCorrelation:
         )
         room = _most_events(n) if record is None else _EVERY if record else 0
         options = Options(self.meeting, self.max_events, self.excess == "raise", True)
-        job = Job(inputs, 1, options, room).run()
+        job = Job(inputs, 1, options, room)
+        if progress:
+            from tqdm.auto import tqdm
+
+            with tqdm(unit=" events") as bar:
+                job.run(pause=lambda: bar.update(job.tally("events") - bar.n))
+        else:
+            job.run()
         if job.status == REFUSED:
             refuse_light(chain.masses)
             refuse_excess(chain.masses, *ratios)
@@ -148,18 +157,18 @@ class ImpulseCorrelation:
             v = trace.velocities
             raise ImpactNotFinished(
                 f"the impact was not finished after max_events = {self.max_events} steps, "
-                f"{job.tally.events} events; closing speeds so far {(v[:-1] - v[1:]).tolist()}",
+                f"{job.tally('events')} events; closing speeds so far {(v[:-1] - v[1:]).tolist()}",
                 trace,
             )
         if job.status == UNSOUND:
-            raise ImpactNotCertified(chain, self, DEFECTS[int(job.tally.defect)])
+            raise ImpactNotCertified(chain, self, DEFECTS[job.tally("defect")])
         return trace
 
     def _trace(self, chain: Chain, job: Job) -> Trace:
         """Return what the event loop left."""
         results, written = job.outputs, job.record
         written.velocities[0] = chain.velocities
-        count = int(job.tally.events)
+        count = job.tally("events")
         kept = min(count, len(written.kinds))
         if job.status == UNFINISHED:
             kept = min(kept, _UNFINISHED_EVENTS)
@@ -182,7 +191,7 @@ class ImpulseCorrelation:
             events=tuple(Event(_KINDS[k], c) for k, c in zip(kinds, contacts, strict=True)),
             collapsed=bool(results.collapsed[0]),
             saturated=tuple(np.flatnonzero(results.held).tolist()),
-            margin=float(job.tally.margin),
+            margin=job.tally("margin"),
         )
 
 
