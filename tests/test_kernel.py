@@ -282,8 +282,11 @@ def test_without_a_folder_answers_are_the_same(tmp_path):
     assert found.stdout.split() == ["False", expected, "True"]
 
 
+HOME = "USERPROFILE" if sys.platform == "win32" else "HOME"
+
+
 @pytest.mark.usefixtures("fresh_runtime")
-@pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "LOCALAPPDATA", "HOME"])
+@pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "LOCALAPPDATA", HOME])
 def test_compiled_code_stays_out_of_the_package(monkeypatch, tmp_path, variable):
     """A wheel or a source distribution built afterwards would take it along."""
     for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
@@ -303,7 +306,7 @@ def test_a_user_without_a_home_has_no_folder(monkeypatch):
     for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
         monkeypatch.delenv(name, raising=False)
 
-    def unknown(path):
+    def unknown(_):
         raise RuntimeError("Could not determine home directory.")
 
     monkeypatch.setattr(Path, "expanduser", unknown)
