@@ -139,15 +139,15 @@ def compiled() -> Any | None:
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False}
     # Only the door is called from Python.  A function that says nothing about `forceinline` would
     # take it over from its caller.
-    inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **options}
-    marks = {
-        "jit": numba.njit(forceinline=True, **inner),
-        "once": numba.njit(inline="always", forceinline=False, **inner),
-        "apart": numba.njit(forceinline=False, **inner),
-        "door": numba.njit(
-            cache=path is not None, forceinline=False, no_cfunc_wrapper=True, **options
-        ),
+    options |= {"forceinline": False, "no_cfunc_wrapper": True}
+    inner = {**options, "no_cpython_wrapper": True}
+    meanings: dict[str, dict[str, Any]] = {
+        "jit": {**inner, "forceinline": True},
+        "once": {**inner, "inline": "always"},
+        "apart": inner,
+        "door": {**options, "cache": path is not None},
     }
+    marks = {mark: numba.njit(**chosen) for mark, chosen in meanings.items()}
     vars(module).update(marks)
     sys.modules[name] = module
     exec(compile(unit(), module.__file__, "exec"), vars(module))
