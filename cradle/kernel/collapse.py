@@ -18,7 +18,7 @@ def end_plastically(first, last, n, state):
             k = c
             while k > 0 and contact[k - 1].active == 1:
                 k -= 1
-            deactivate(c, k, n, state)
+            deactivate(c, k, n, state.ball, contact, run, state.tally[0])
     for c in (first - 1, last + 1):
         if 0 <= c < n - 1:
             stir(c, n, run, contact)

@@ -21,7 +21,7 @@ from cradle.kernel.motion import (
     share_out,
 )
 from cradle.kernel.record import record
-from cradle.kernel.state import COLLAPSE, END, LIMITS, Cluster, apart, jit
+from cradle.kernel.state import COLLAPSE, END, LIMITS, LOWER, UPPER, Cluster, apart, jit, once
 
 
 @jit
@@ -40,7 +40,7 @@ def code(c, state):
     return 9 * state.contact[c].active + 3 * ball[c].turn + ball[c + 1].turn
 
 
-@jit
+@once
 def snapshot(level, n, state):
     """Remember the state."""
     contact, memory = state.contact, state.memory[level]
@@ -232,7 +232,7 @@ def neighbours_stay(cluster, total, farthest, level, n, state):
     return True
 
 
-@jit
+@once
 def exact_squares(cluster, total, energy, state, memory, low, high):
     """Return the sum of L^2, L^4, ...: what disappears is (1 - e^2) of what is absorbed.
 
@@ -252,7 +252,7 @@ def exact_squares(cluster, total, energy, state, memory, low, high):
     return total * total / (1.0 + 2.0 * total)
 
 
-@jit
+@once
 def hold_together(cluster, low, high, ball, contact):
     """Bring balls of neighbours that are held at u = 0 to one velocity again, after a jump."""
     c = low
@@ -313,7 +313,7 @@ def jump(cluster, total, level, n, state):
     end_plastically(first, last, n, state)
 
 
-@apart
+@once
 def cycle(level, c, bend, n, state):
     """If the neighbourhood of contact c repeats itself on a smaller scale, go to the limit.
 
@@ -397,15 +397,15 @@ def take_limits(ends, ended, worn, n, state):
         if first <= last:
             first, last = merge(first, last, n, state)
     if last < first:
-        first, last = look(0, ended, n, state)
+        first, last = look(LOWER, ended, n, state)
     if last < first:
         return False
-    forget(0, level)
+    forget(LOWER, level)
     settle(n, state.memory)
     level[1].count += 1
-    one, other = look(1, first, n, state)
+    one, other = look(UPPER, first, n, state)
     if one <= other:
-        forget(1, level)
+        forget(UPPER, level)
         first, last = one, other
     loses = False
     for c in range(first, last + 1):

@@ -94,7 +94,7 @@ def bodies(c, low, high, ball, contact):
     return first, last, left, right
 
 
-@jit
+@apart
 def push(c, impulse, low, high, ball, contact):
     """Give contact c an impulse; contacts inside the two bodies pass on what their balls need."""
     first, last, left, right = bodies(c, low, high, ball, contact)
@@ -114,7 +114,7 @@ def push(c, impulse, low, high, ball, contact):
             add_impulse(contact[i - 1], impulse * (part / right))
 
 
-@jit
+@apart
 def set_closing_speed(c, speed, rest, low, high, ball, contact):
     """Bring the closing speed of contact c to speed + rest by a push of its balls.
 
@@ -133,7 +133,7 @@ def set_closing_speed(c, speed, rest, low, high, ball, contact):
             contact[k].u = closing(k, ball)
 
 
-@jit
+@apart
 def arrive(c, low, high, ball, contact):
     """Let contact c beside the run low..high be at zero: the run's ball takes the other's velocity.
 
@@ -202,7 +202,7 @@ def join_velocities(first, last, ball, contact):
     one_velocity(first, last, k, ball)
 
 
-@jit
+@apart
 def relative_energy(first, last, ball):
     """Kinetic energy of balls first..last relative to their centre of mass."""
     k = heaviest_of(first, last, ball)

@@ -2,7 +2,7 @@
 
 import math
 
-from cradle.kernel.state import LIMITS, apart, jit
+from cradle.kernel.state import LIMITS, apart, jit, once
 
 # A run's contacts low..high have impulses, or balls that move; contacts beyond them wait, because
 # no impulse that a ball could notice reaches them (`reached`).
@@ -39,7 +39,7 @@ def admissible_ratio(driver, driven, far, onward, nominal, ball, contact):
             ball[driver].rest = kept / (ball[far].m + kept)
 
 
-@jit
+@once
 def ratios_in_force(low, high, ball, contact):
     """R7: the ratios in force in a run, each chain of drives from its far end to its driver.
 
@@ -114,7 +114,7 @@ def wait(low, high, ball, contact, outer):
         ball[c + outer].pull = 0.0
 
 
-@jit
+@once
 def reached(first, run, smallest, ball, contact):
     """R1: set low..high of a run, as far as impulses reach at the nominal ratios, or beyond.
 
@@ -197,7 +197,7 @@ def opens_at_zero(c, contact):
     return contact[c].u == 0.0 and contact[c].q <= 0.0 and contact[c].slope < 0.0
 
 
-@jit
+@once
 def has_ended(c, contact):
     """R3: tell whether contact c has ended: it opens, or has e = 0 and no longer closes."""
     if contact[c].q > 0.0:
@@ -206,7 +206,7 @@ def has_ended(c, contact):
     return u < 0.0 or (u == 0.0 and contact[c].e == 0.0 and contact[c].w > 0.0)
 
 
-@jit
+@once
 def end_progress(u, q, slope, rate, e):
     """R3: progress to the end of a contact, where all that it can release is released.
 
@@ -240,13 +240,13 @@ def is_gap(c, n, contact):
     return 0 < c < n - 2 and contact[c - 1].active == 1 and contact[c + 1].active == 1
 
 
-@jit
+@once
 def rounding_after(k, s):
     """Return how much of the closing speed of contact k may be rounding after a progress s."""
     return LIMITS.roundings * (k.blur + 2.0**-53 * abs(k.slope) * s)
 
 
-@jit
+@once
 def comes_at(s, k):
     """Tell whether the next event of contact k comes at progress s, as far as rounding can tell.
 
