@@ -44,33 +44,21 @@ def chatters(c, n, state):
     return contact[c].tiny > 0 and exhausted(c, contact[c].q, threshold, ball, contact)
 
 
-@jit
-def passes_on(c, n, state):
-    """Tell whether contact c exists and only passes on impulses, at rest."""
-    contact = state.contact
-    return 0 <= c < n - 1 and contact[c].u == 0.0 and contact[c].w == 0.0
-
-
 @apart
 def exhausted_stretch(c, n, state):
     """Return the stretch (first, last) around c of contacts that only chatter.
 
-    A contact at rest between two of them, which passes their impulses on, belongs to it.  Empty if
-    nothing in it can lose energy, unless it is slower than the last digit: elastic sequences are
-    finite, or hand all their energy on; or if its balls move with more than a faint energy: heavy
-    ones, slower than a light ball that struck them.
+    Empty if nothing in it can lose energy, unless it is slower than the last digit: elastic
+    sequences are finite, or hand all their energy on; or if its balls move with more than a faint
+    energy: heavy ones, slower than a light ball that struck them.
     """
     first = c
     last = c
     while True:
         if chatters(first - 1, n, state):
             first -= 1
-        elif passes_on(first - 1, n, state) and chatters(first - 2, n, state):
-            first -= 2
         elif chatters(last + 1, n, state):
             last += 1
-        elif passes_on(last + 1, n, state) and chatters(last + 2, n, state):
-            last += 2
         else:
             break
     loses = False

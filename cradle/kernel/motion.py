@@ -8,33 +8,31 @@ from cradle.kernel.state import LIMITS, apart, jit
 
 
 @jit
+def add(high, low, x):
+    """Add x to a sum of two numbers, losing nothing (Knuth's two-sum); return the new two."""
+    total = high + x
+    part = total - high
+    x = ((high - (total - part)) + (x - part)) + low
+    high = total + x
+    return high, x - (high - total)
+
+
+@jit
 def add_velocity(b, x):
-    """Add x to the velocity of ball b, by a sum that loses nothing (Knuth's two-sum)."""
-    total = b.hi + x
-    part = total - b.hi
-    x = ((b.hi - (total - part)) + (x - part)) + b.lo
-    b.hi = total + x
-    b.lo = x - (b.hi - total)
+    """Add x to the velocity of ball b."""
+    b.hi, b.lo = add(b.hi, b.lo, x)
 
 
 @jit
 def add_impulse(k, x):
-    """Add x to the impulse of contact k in the same way."""
-    total = k.p + x
-    part = total - k.p
-    x = ((k.p - (total - part)) + (x - part)) + k.p_lo
-    k.p = total + x
-    k.p_lo = x - (k.p - total)
+    """Add x to the impulse of contact k."""
+    k.p, k.p_lo = add(k.p, k.p_lo, x)
 
 
 @jit
 def add_work(k, x):
-    """Add x to the work that contact k has absorbed in the same way."""
-    total = k.a + x
-    part = total - k.a
-    x = ((k.a - (total - part)) + (x - part)) + k.a_lo
-    k.a = total + x
-    k.a_lo = x - (k.a - total)
+    """Add x to the work that contact k has absorbed."""
+    k.a, k.a_lo = add(k.a, k.a_lo, x)
 
 
 @jit
