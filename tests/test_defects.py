@@ -238,6 +238,21 @@ def test_impulses_after_a_collapse_beside_a_light_ball():
             assert impulse == pytest.approx(float(passed), rel=1e-9, abs=0), c
 
 
+#: Two contacts hand on all their energy in ever smaller collisions; the balls beside them rest.
+ENDLESS = Problem(
+    [1.0] * 19,
+    [1, -0.5, 1, 1, 0, 0, 0.5, 0.5, 0.5, 1, 0, 1, 1, 0.5, 0, 0.5, 0.5, -0.5, 0.5],
+    [1.0] * 18,
+    [1, 0.1, 0.1, 0.1, 0.1, 0.1, 1, 0.1, 0, 1, 0.1, 1, 1, 0, 1, 0.1, 1],
+    [1, 0.1, 1, 0.1, 0, 0, 0.1, 1, 0, 0, 0, 0.1, 0.1, 0.1, 0.1, 1, 0],
+)
+
+
+def test_an_elastic_sequence_without_end():
+    """Balls that rest on those of a collapse stay with them, to the last bit."""
+    assert difference(ENDLESS.collide().velocities, exact(ENDLESS).velocities) < 1e-12
+
+
 #: Chains of many collapses, which made or lost momentum: in neighbours of a cycle that are held at
 #: u = 0 together, and in joined balls some of which were already parting.
 MANY_COLLAPSES = {

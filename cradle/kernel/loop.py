@@ -17,7 +17,7 @@ from cradle.kernel.motion import (
     set_closing_speed,
 )
 from cradle.kernel.record import record, record_compressions
-from cradle.kernel.rules import rates, segment
+from cradle.kernel.rules import is_gap, rates, segment
 from cradle.kernel.state import (
     COLLAPSE,
     FINISHED,
@@ -145,6 +145,17 @@ def touch(gap, state):
         arrive(gap, right, run[right].high, ball, state.contact)
 
 
+@jit
+def touch_beside(first, n, state):
+    """Bring the gaps beside a run that has moved to zero, if only rounding says otherwise."""
+    contact, last = state.contact, state.run[first].last
+    for gap in (first - 1, last + 1):
+        if not (0 <= gap < n - 1 and contact[gap].active == 0 and is_gap(gap, n, contact)):
+            continue
+        if contact[gap].u >= -LIMITS.roundings * contact[gap].blur:
+            touch(gap, state)
+
+
 @once
 def meet(one, n, state):
     """R8.4, R8.5: take run `one` and the next to where they meet, and close the gap between them.
@@ -158,6 +169,7 @@ def meet(one, n, state):
     left, gap, right = one - 1, run[one].last + 1, run[other].last + 1
     beyond_left = part_beyond(one, part_one, -ball[one].pull, left, n, state)
     beyond_right = part_beyond(other, part_other, ball[right].pull, right, n, state)
+    between = gap
     if beyond_left < math.inf and beyond_left <= beyond_right:
         gap, part_one, part_other = left, beyond_left, -1.0
     elif beyond_right < math.inf:
@@ -166,6 +178,9 @@ def meet(one, n, state):
         move(one, part_one, n, state)
     if part_other >= 0.0:
         move(other, part_other, n, state)
+    if gap == between:
+        touch_beside(one, n, state)
+        touch_beside(other, n, state)
     touch(gap, state)
     grow(gap, n, state)
 
@@ -176,6 +191,10 @@ def complete(n, state):
     first = state.tally[0].first
     while first < n:
         move(first, 1.0, n, state)
+        first = state.run[first].onward
+    first = state.tally[0].first
+    while first < n:
+        touch_beside(first, n, state)
         first = state.run[first].onward
 
 
