@@ -164,7 +164,7 @@ NEEDED = {
             [0.63, 0.56, 0.61, 0.66, 0.72, 0.94],
             [0.38, 0.24, 0, 0.1, 0], [0.28, 0, 0.43, 0.37, 0.27], 0.5,
         ),
-        WRONG,
+        UNSOUND,
     ),
     "gaps beside a run that has moved": (
         {"touch_beside": lambda _: lambda *_: None},
