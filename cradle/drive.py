@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import threading
 import time
+from collections.abc import Callable
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -35,6 +36,7 @@ _EFFORT = {False: 5_000, True: 2_000_000}
 LARGE = 50_000
 # No limit.
 _ENDLESS = 2**62
+_NOTHING = rooms.Record([], [], [], [])
 #: Events that one round may write: each contact may end, close, collapse and pass its maximum.
 _ROUND = 5
 
@@ -79,14 +81,14 @@ def _area(n: int, compiled: bool, record: rooms.Record) -> rooms.State:
 _kept = threading.local()
 
 
-def _area_without_record(n: int, compiled: bool) -> rooms.State:
-    """Return this thread's work area for outcomes of n balls, kept for its next call."""
+def _kept_area(n: int, compiled: bool) -> rooms.State:
+    """Return this thread's work area for n balls, without a record, kept for its next call."""
     kept = getattr(_kept, "areas", None)
     if kept is None:
         kept = _kept.areas = {}
     found = kept.get(compiled)
     if found is None or len(found.ball) != n:
-        empty = _record(0, n) if compiled else rooms.Record([], [], [], [])
+        empty = _record(0, n) if compiled else _NOTHING
         found = kept[compiled] = _area(n, compiled, empty)
     return found
 
@@ -142,11 +144,15 @@ class Job:
             np.zeros(one),
             np.zeros(one, dtype=integer),
         )
-        self.record = _record(0, n)
         self.compiled: bool | None = None
 
-    def run(self, stop: threading.Event | None = None) -> Job:
-        """Solve the chains, up to the first whose status is not FINISHED."""
+    def run(
+        self, stop: threading.Event | None = None, pause: Callable[[], object] | None = None
+    ) -> Job:
+        """Solve the chains, up to the first whose status is not FINISHED.
+
+        It ends when `stop` is set, and calls `pause` whenever the event loop pauses.
+        """
         resumed = False
         while self.next < self.rows:
             if stop is not None and stop.is_set():
@@ -169,19 +175,15 @@ class Job:
             if not self.compiled:
                 runtime.spend(time.perf_counter() - begun)
             resumed = self.status == PAUSED
-            if resumed and self.tally.events > self.tally.room:
+            if pause is not None:
+                pause()
+            if resumed and self.tally("events") > self.tally("room"):
                 self._grow()
             elif not resumed and self.status != FINISHED:
                 break
         if not self.compiled:
             self._write_back()
         return self
-
-    @property
-    def tally(self) -> Any:
-        """The counts of the impact at hand, by name."""
-        tally = self.state.tally
-        return tally.view(np.recarray)[0] if isinstance(tally, np.ndarray) else tally[0]
 
     def _begin(self, compiled: bool) -> None:
         """Lay out work area and outputs for one runtime; what is solved so far stays."""
@@ -193,13 +195,24 @@ class Job:
             # Python's own numbers: faster than NumPy's one at a time, and the same digits.
             self.given = plain.Inputs(*(part.tolist() for part in self.inputs))
             self.results = plain.Outputs(*(part.tolist() for part in self.outputs))
+        self.state = _kept_area(self.n, compiled)
         if self.limit is None:
-            self.state = _area_without_record(self.n, compiled)
-            self.tally.room = _ENDLESS
+            self._set_room(_ENDLESS)
         else:
-            self.record = _record(0, self.n)
-            self.state = _area(self.n, compiled, self.record)
+            self.record = _NOTHING
             self._grow()
+
+    def tally(self, name: str) -> Any:
+        """Return a count of the impact at hand."""
+        tally = self.state.tally
+        return tally[name][0].item() if self.compiled else getattr(tally[0], name)
+
+    def _set_room(self, room: int) -> None:
+        """Let the event loop write so many events."""
+        if self.compiled:
+            self.state.tally["room"] = room
+        else:
+            self.state.tally[0].room = room
 
     def _grow(self) -> None:
         """Make room for more events, twice as many as before, up to the limit."""
@@ -208,7 +221,7 @@ class Job:
         room = min(max(2 * len(old.kinds), 64 + spare), self.limit)
         self.record = _record(room, self.n)
         if len(old.kinds):
-            done = min(int(self.tally.events), len(old.kinds))
+            done = min(self.tally("events"), len(old.kinds))
             written = self.state.record
             for new, part, more in zip(self.record, written, (0, 0, 1, 1), strict=True):
                 new[: done + more] = part[: done + more]
@@ -216,7 +229,7 @@ class Job:
         if not self.compiled:
             record = rooms.Record(*(part.tolist() for part in self.record))
         self.state = self.state._replace(record=record)
-        self.tally.room = _ENDLESS if room == self.limit else room - spare
+        self._set_room(_ENDLESS if room == self.limit else room - spare)
 
     def _write_back(self) -> None:
         """Copy what the plain loop wrote into the arrays."""

@@ -21,6 +21,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+
 from cradle import kernel as plain
 
 #: Set this environment variable to ``plain`` to run the kernel as it stands, to ``compiled`` to
@@ -68,39 +70,40 @@ def _name() -> str:
     return f"cradle_kernel_{hashlib.sha256(unit().encode()).hexdigest()[:16]}"
 
 
-def _folders() -> list[Path]:
-    """Return where the unit and its compiled code may be kept, best first."""
+def _folder() -> Path:
+    """Return where the unit and its compiled code are kept: never in the package itself.
+
+    There a wheel or a source distribution built later would take them along.
+    """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
-        return [Path(chosen)]
+        return Path(chosen)
     home = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
-    user = Path(home) if home else Path("~/.cache").expanduser()
-    return [Path(__file__).parent / "__pycache__", user / "cradle"]
+    usual = "~/Library/Caches" if sys.platform == "darwin" else "~/.cache"
+    return (Path(home) if home else Path(usual).expanduser()) / "cradle-companion"
 
 
 @functools.cache
 def _stored() -> Path | None:
-    """Write the unit where compiled code can be kept beside it; None if that is nowhere."""
-    for folder in _folders():
-        path = folder / f"{_name()}.py"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            # Compiled code goes there too, so try to write even if the unit is there already.
-            with tempfile.NamedTemporaryFile(
-                "w", encoding="utf-8", dir=folder, suffix=".tmp", delete=False
-            ) as file:
-                file.write(unit())
-            if path.exists():
-                Path(file.name).unlink()
-            else:
-                # numba keeps compiled code as long as the time of its source does not change:
-                # the name says enough, so the time is one for all, also where a cache is copied.
-                os.utime(file.name, (0, 0))
-                Path(file.name).replace(path)
-        except OSError:
-            continue
-        return path
-    return None
+    """Write the unit where compiled code can be kept beside it; None if that cannot be written."""
+    try:
+        path = _folder() / f"{_name()}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Compiled code goes there too, so try to write even if the unit is there already.
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", dir=path.parent, suffix=".tmp", delete=False
+        ) as file:
+            file.write(unit())
+        if path.exists():
+            Path(file.name).unlink()
+        else:
+            # numba keeps compiled code as long as the time of its source does not change: the name
+            # says enough, so the time is one for all, also where a cache is copied.
+            os.utime(file.name, (0, 0))
+            Path(file.name).replace(path)
+    except (OSError, RuntimeError):  # the latter where nobody knows a home
+        return None
+    return path
 
 
 @functools.cache
@@ -134,12 +137,25 @@ def compiled() -> Any | None:
     # infinity, and the kernel makes none.  It allocates nothing, so arrays need no reference counts
     # (`_nrt`), without which the loop runs several times faster.
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False}
-    inlined = numba.njit(forceinline=True, **options)
-    called = numba.njit(**options)
-    door = numba.njit(cache=path is not None, **options)
-    vars(module).update(jit=inlined, apart=called, door=door)
+    # Only the door is called from Python.  A function that says nothing about `forceinline` would
+    # take it over from its caller.
+    options |= {"forceinline": False, "no_cfunc_wrapper": True}
+    inner = {**options, "no_cpython_wrapper": True}
+    meanings: dict[str, dict[str, Any]] = {
+        "jit": {**inner, "forceinline": True},
+        "once": {**inner, "inline": "always"},
+        "apart": inner,
+        "door": {**options, "cache": path is not None},
+    }
+    marks = {mark: numba.njit(**chosen) for mark, chosen in meanings.items()}
+    vars(module).update(marks)
     sys.modules[name] = module
     exec(compile(unit(), module.__file__, "exec"), vars(module))
+    # numba compiles a function anew for each whole number that is written down in a call; not so
+    # for these.
+    for constant, value in vars(module).items():
+        if type(value) is int:
+            vars(module)[constant] = np.int64(value)
     return module
 
 
@@ -155,7 +171,7 @@ def on_disk() -> bool:
 def loaded() -> bool:
     """Tell whether compiled code has run in this process."""
     module = compiled() if compiled.cache_info().currsize else None
-    return module is not None and bool(module.batch.signatures)
+    return module is not None and bool(module.batch.overloads)
 
 
 def ready() -> bool:

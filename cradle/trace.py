@@ -63,9 +63,9 @@ class Trace:
     saturated : tuple of int
         Contacts that were held closed at the largest admissible ratio (Eqs. 34, 53) at some time.
     margin : float
-        How close a different order of events came: the least distance of two events of one run
-        whose order mattered, relative to the progress to the later one.  Below about 1e-12 another
-        order, and so another outcome, lies within rounding.
+        How close a different order of events came: the least distance of two events of one run,
+        relative to the progress to the later one; events that coincide to the last bit are meant
+        to.  Below about 1e-12 another order, and perhaps another outcome, lies within rounding.
 
     References
     ----------

@@ -45,7 +45,7 @@ def as_objects(state: Any, n: int) -> Any:
 
 def solve(
     m, v, e, forward, backward=None, *, meeting=0.5, max_events=10**6, room=0, kernel=None,
-    **exchanged,
+    area=drive._area, **exchanged,
 ):  # fmt: skip
     """Solve one impact by the plain event loop; return all that it leaves."""
     names = kernel or rooms(**exchanged)
@@ -62,7 +62,7 @@ def solve(
     record = Record(
         [0] * room, [0] * room, *([[0.0] * k for _ in range(room + 1)] for k in (n, n - 1))
     )
-    state = drive._area(n, False, record)
+    state = area(n, False, record)
     state.tally[0].room = 2**62
     out = names["Outputs"](
         [[0.0] * n], [[0] * (n - 1)], [0], *([kind()] * (n - 1) for kind in (float, float, int))

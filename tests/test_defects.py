@@ -238,6 +238,59 @@ def test_impulses_after_a_collapse_beside_a_light_ball():
             assert impulse == pytest.approx(float(passed), rel=1e-9, abs=0), c
 
 
+#: Two contacts hand on all their energy in ever smaller collisions; the balls beside them rest.
+ENDLESS = Problem(
+    [1.0] * 19,
+    [1, -0.5, 1, 1, 0, 0, 0.5, 0.5, 0.5, 1, 0, 1, 1, 0.5, 0, 0.5, 0.5, -0.5, 0.5],
+    [1.0] * 18,
+    [1, 0.1, 0.1, 0.1, 0.1, 0.1, 1, 0.1, 0, 1, 0.1, 1, 1, 0, 1, 0.1, 1],
+    [1, 0.1, 1, 0.1, 0, 0, 0.1, 1, 0, 0, 0, 0.1, 0.1, 0.1, 0.1, 1, 0],
+)
+
+
+def test_an_elastic_sequence_without_end():
+    """Balls that rest on those of a collapse stay with them, to the last bit."""
+    assert difference(ENDLESS.collide().velocities, exact(ENDLESS).velocities) < 1e-12
+
+
+#: Chains of many collapses, which made or lost momentum: in neighbours of a cycle that are held at
+#: u = 0 together, and in joined balls some of which were already parting.
+MANY_COLLAPSES = {
+    "held neighbours": Problem(
+        [103.26201559217535, 0.0029458428086861876, 42.037175144265106, 368.4592301173039,
+         3.6033248776606968, 65.02699676001548],
+        [0.9276574737082792, 0.8165336320559369, 0.40052381164752004, 0.014953379291987146,
+         -0.4139783545152895, -0.6060795393367171],
+        [0.7679012279991019, 0.6890388067102825, 0.1473848239015375, 0.007660307222551066,
+         0.6598850616412061],
+        [0.6051257401104178, 0.49275940669505214, 0.8906014267771414, 0.06722149860770721],
+        [1.0, 0.8961740848105425, 1.0, 0.4339624923694204],
+    ),
+    "balls that part": Problem(
+        [0.007781671608169458, 963.1011207037445, 0.4059311376235678, 2.8556391008572826,
+         242.11331676336408, 89.2453415124181, 15.635726963231573, 3.9955644102813648],
+        at_rest(8),
+        [1.0, 0.0, 0.8907483257472151, 0.9957891338023604, 0.0, 0.7641101782622505,
+         0.6709302130469132],
+        [0.0, 0.3629097129890003, 0.0, 0.5470942843543211, 0.07847463601332183,
+         0.07316712531149228],
+        [1.0, 0.8928336729461167, 1.0, 0.0, 0.5327386222284957, 0.5046286714972666],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MANY_COLLAPSES)
+def test_momentum_through_many_collapses(name):
+    trace = MANY_COLLAPSES[name].collide()
+    assert trace.collapsed
+    exact = [Fraction(m) * Fraction(x - v) for m, x, v in zip(
+        trace.chain.masses.tolist(), trace.velocities.tolist(), trace.chain.velocities.tolist()
+    )]  # fmt: skip
+    passed = [0, *map(Fraction, trace.impulses.tolist()), 0]
+    for change, before, after in zip(exact, passed, passed[1:]):
+        assert abs(change - (before - after)) <= 16 * Fraction(2) ** -52 * (before + after)
+
+
 def test_masses_of_eighteen_decades_are_solved_or_refused():
     problem = Problem([1e-8, 1e-26, 1e-9, 1], [0, 1, 0, 0], [0, 1, 1], [0.3, 0.1], [0.3, 0.5])
     try:

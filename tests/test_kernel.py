@@ -264,12 +264,12 @@ def test_without_a_folder_answers_are_the_same(tmp_path):
     code = """if True:
         import cradle
         from cradle import runtime
-        runtime._folders = lambda: FOLDERS
+        runtime._folder = lambda: FOLDER
         print(runtime.on_disk())
         chain = cradle.Chain([1, 0.01, 1], [1, 0, 0], 0.9)
         print(cradle.collide(chain, cradle.ImpulseCorrelation(0.15)).velocities.tobytes().hex())
         print(runtime.chosen() is cradle.kernel)
-    """.replace("FOLDERS", f"[__import__('pathlib').Path({str(file)!r}) / 'below']")
+    """.replace("FOLDER", f"__import__('pathlib').Path({str(file)!r}) / 'below'")
     environment = {k: v for k, v in os.environ.items() if k != runtime.VARIABLE}
     found = subprocess.run(
         [sys.executable, "-W", "error", "-c", code],
@@ -280,6 +280,70 @@ def test_without_a_folder_answers_are_the_same(tmp_path):
     )
     expected = collide(Chain(*LIGHT), LIGHT_MODEL).velocities.tobytes().hex()
     assert found.stdout.split() == ["False", expected, "True"]
+
+
+HOME = "USERPROFILE" if sys.platform == "win32" else "HOME"
+
+
+@pytest.mark.usefixtures("fresh_runtime")
+@pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "LOCALAPPDATA", HOME])
+def test_compiled_code_stays_out_of_the_package(monkeypatch, tmp_path, variable):
+    """A wheel or a source distribution built afterwards would take it along."""
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv(variable, str(tmp_path))
+    package = Path(runtime.__file__).parent
+    before = set(package.rglob("*"))
+    stored = runtime._stored()
+    assert stored.parent.name == "cradle-companion"
+    assert stored.is_relative_to(tmp_path)
+    assert stored.read_text(encoding="utf-8") == runtime.unit()
+    assert set(package.rglob("*")) == before
+
+
+@pytest.mark.usefixtures("fresh_runtime")
+def test_a_user_without_a_home_has_no_folder(monkeypatch):
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+
+    def unknown(_):
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "expanduser", unknown)
+    assert runtime._stored() is None
+
+
+@needs_numba
+def test_no_function_is_inlined_that_is_meant_to_stand_apart():
+    """numba hands `forceinline` on to what a function calls, unless this says otherwise.
+
+    Then all of the event loop would be one function, which takes minutes to compile.
+    """
+    module = runtime.compiled()
+    inlined = {"jit": True, "once": False, "apart": False, "door": False}
+    for node in ast.parse(runtime.unit()).body:
+        if isinstance(node, ast.FunctionDef) and hasattr(getattr(module, node.name), "py_func"):
+            (mark,) = (ast.unparse(part) for part in node.decorator_list)
+            options = getattr(module, node.name).targetoptions
+            assert options["forceinline"] is inlined[mark], node.name
+            assert options.get("inline", "never") == ("always" if mark == "once" else "never")
+            assert mark == "door" or options["no_cpython_wrapper"], node.name
+
+
+def test_what_is_a_part_of_its_caller_is_called_from_one_place():
+    """A copy for each call would cost more than a function of its own."""
+    functions = [
+        node for node in ast.parse(runtime.unit()).body if isinstance(node, ast.FunctionDef)
+    ]
+    calls = [
+        node.func.id
+        for function in functions
+        for node in ast.walk(function)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    ]
+    once = [f.name for f in functions if [ast.unparse(d) for d in f.decorator_list] == ["once"]]
+    assert "impact" in once
+    assert {name: calls.count(name) for name in once} == dict.fromkeys(once, 1)
 
 
 # --- pauses -------------------------------------------------------------------------------------
@@ -370,6 +434,17 @@ def test_the_path_is_kept_if_asked_for_or_up_to_a_bound(plain, on, monkeypatch):
         assert trace.impulses.tobytes() == whole.impulses.tobytes()
 
 
+@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
+def test_progress_of_one_long_impact_is_shown(plain, capsys, on, monkeypatch):
+    plain(on)
+    monkeypatch.setattr(drive, "_EFFORT", {False: 1000, True: 1000})
+    chain, model = Chain(*LONG[:3]), ImpulseCorrelation(*LONG[3:])
+    expected = collide(chain, model)
+    assert not capsys.readouterr().err
+    same(collide(chain, model, progress=True), expected)
+    assert f"{len(expected.events)} events" in capsys.readouterr().err
+
+
 SLOW = {
     "one": "cradle.ImpulseCorrelation(0.0, max_events=2**60).solve(cradle.Chain(m, v, 1))",
     "batch": "cradle.outcomes([m] * 40_000, v, 1, 0.0, max_events=2**60)",
@@ -382,6 +457,8 @@ SLOW = {
 def test_ctrl_c_works_at_once(work, wish):
     """Impacts of many millions of collisions each."""
     code = f"""if True:
+        import signal
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs begin without
         import cradle
         from cradle.drive import warm_up
         warm_up()

@@ -7,7 +7,8 @@
     events       start, hand-over, closing                                  R2, R4, R5
     meeting      two runs that meet                                         R8.3, R8.4
     collapse     infinite sequences: exhausted contacts                     R9
-    cycles       infinite sequences: cycles, taken to their limit           R9
+    jump         infinite sequences: the limit of a cycle                   R9
+    cycles       infinite sequences: cycles, recognised                     R9
     certificate  momentum, order, energy, ledger of every answer
     loop         the rounds                                                 R8
     batch        many chains; the door
@@ -20,7 +21,7 @@ from cradle.kernel.batch import Inputs, Options, Outputs, batch
 
 #: The rooms in an order in which each uses only those before it.
 ROOMS = (
-    "state", "motion", "rules", "record", "events", "meeting", "collapse", "cycles",
+    "state", "motion", "rules", "record", "events", "meeting", "collapse", "jump", "cycles",
     "certificate", "loop",
     "batch",
 )  # fmt: skip

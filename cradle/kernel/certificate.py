@@ -3,10 +3,10 @@
 import math
 
 from cradle.kernel.motion import closing
-from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, apart
+from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, apart, once
 
 
-@apart
+@once
 def energies(n, state):
     """Return the change of kinetic energy, and the energies before and after of what has changed.
 

@@ -18,7 +18,7 @@ def end_plastically(first, last, n, state):
             k = c
             while k > 0 and contact[k - 1].active == 1:
                 k -= 1
-            deactivate(c, k, n, state)
+            deactivate(c, k, n, state.ball, contact, run, state.tally[0])
     for c in (first - 1, last + 1):
         if 0 <= c < n - 1:
             stir(c, n, run, contact)
@@ -44,33 +44,21 @@ def chatters(c, n, state):
     return contact[c].tiny > 0 and exhausted(c, contact[c].q, threshold, ball, contact)
 
 
-@jit
-def passes_on(c, n, state):
-    """Tell whether contact c exists and only passes on impulses, at rest."""
-    contact = state.contact
-    return 0 <= c < n - 1 and contact[c].u == 0.0 and contact[c].w == 0.0
-
-
 @apart
 def exhausted_stretch(c, n, state):
     """Return the stretch (first, last) around c of contacts that only chatter.
 
-    A contact at rest between two of them, which passes their impulses on, belongs to it.  Empty if
-    nothing in it can lose energy, unless it is slower than the last digit: elastic sequences are
-    finite, or hand all their energy on; or if its balls move with more than a faint energy: heavy
-    ones, slower than a light ball that struck them.
+    Empty if nothing in it can lose energy, unless it is slower than the last digit: elastic
+    sequences are finite, or hand all their energy on; or if its balls move with more than a faint
+    energy: heavy ones, slower than a light ball that struck them.
     """
     first = c
     last = c
     while True:
         if chatters(first - 1, n, state):
             first -= 1
-        elif passes_on(first - 1, n, state) and chatters(first - 2, n, state):
-            first -= 2
         elif chatters(last + 1, n, state):
             last += 1
-        elif passes_on(last + 1, n, state) and chatters(last + 2, n, state):
-            last += 2
         else:
             break
     loses = False
@@ -89,18 +77,24 @@ def exhausted_stretch(c, n, state):
 def merge(first, last, n, state):
     """End the contacts first..last plastically: their balls take the common velocity.
 
-    An idle neighbour that this makes them approach, at a speed below the threshold, joins.
+    Balls that zeros beside them join to theirs go with them, and an idle neighbour that this makes
+    approach, at a speed below the threshold, joins.
     """
     ball, contact = state.ball, state.contact
     while True:
-        join_velocities(first, last + 1, ball, contact)
-        for c in (first - 1, last + 1):
+        low, high = first, last
+        while low > 0 and contact[low - 1].u == 0.0:
+            low -= 1
+        while high < n - 2 and contact[high + 1].u == 0.0:
+            high += 1
+        join_velocities(low, high + 1, ball, contact)
+        for c in (low - 1, high + 1):
             if 0 <= c < n - 1:
                 contact[c].u = closing(c, ball)
-        if first > 0 and contact[first - 1].active == 0 and contact[first - 1].u > 0.0:
-            first -= 1
-        elif last < n - 2 and contact[last + 1].active == 0 and contact[last + 1].u > 0.0:
-            last += 1
+        if low > 0 and contact[low - 1].active == 0 and contact[low - 1].u > 0.0:
+            first = low - 1
+        elif high < n - 2 and contact[high + 1].active == 0 and contact[high + 1].u > 0.0:
+            last = high + 1
         else:
             break
     end_plastically(first, last, n, state)

@@ -2,7 +2,7 @@
 
 from cradle.kernel.record import record
 from cradle.kernel.rules import has_ended, is_gap, opens_at_zero, source_of
-from cradle.kernel.state import CLOSE, END, LIMITS, apart, jit
+from cradle.kernel.state import CLOSE, END, LIMITS, apart, jit, once
 
 
 @jit
@@ -45,7 +45,7 @@ def make_run(first, last, source, low, high, run):
     run[first].stirred = 1
 
 
-@apart
+@once
 def start(n, state):
     """R2: in each touching stretch the leftmost approaching contact is the source."""
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
@@ -74,7 +74,7 @@ def start(n, state):
             before = first
 
 
-@jit
+@once
 def activate(c, from_left, from_right, ball, contact):
     """R4, R5: contact c becomes active, driven from the side or sides already active."""
     contact[c].q = 0.0
@@ -89,7 +89,7 @@ def activate(c, from_left, from_right, ball, contact):
         ball[c + 1].turn = -1
 
 
-@jit
+@apart
 def grow(c, n, state):
     """R5: take the contact c that has just closed into the run, or the two runs, beside it."""
     contact, run, tally = state.contact, state.run, state.tally[0]
@@ -114,10 +114,9 @@ def grow(c, n, state):
     record(CLOSE, c, n, state)
 
 
-@jit
-def deactivate(c, first, n, state):
+@apart
+def deactivate(c, first, n, ball, contact, run, tally):
     """R4: contact c of a run ends and its relations go; contacts that it drove become sources."""
-    ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
     contact[c].q = 0.0
     contact[c].active = 0
     contact[c].before = -contact[c].u
@@ -155,7 +154,7 @@ def exhausted(c, work, threshold, ball, contact):
     return 2.0 * work < mu * threshold * threshold
 
 
-@jit
+@once
 def count_exhausted(c, n, ball, contact, threshold):
     """R9: count a collision as exhausted if all of it was; a genuine one clears its neighbours.
 
@@ -192,7 +191,7 @@ def end_contacts(sloped, n, state):
                 if count_exhausted(c, n, state.ball, contact, tally.threshold):
                     worn = c
                 last = run[first].last
-                deactivate(c, first, n, state)
+                deactivate(c, first, n, state.ball, contact, run, tally)
                 if c < last:
                     first = c + 1
                 ends += 1

@@ -22,16 +22,19 @@ from cradle.kernel.state import (
     COLLAPSE,
     FINISHED,
     LIMITS,
+    LOWER,
     NO_EVENT,
     PAUSED,
     UNFINISHED,
     UNSOUND,
+    UPPER,
     apart,
     jit,
+    once,
 )
 
 
-@jit
+@once
 def works(k, s, ended, recent):
     """Book the works of contact k over a progress s that took its closing speed from x to u."""
     u0, u1, rate = k.x, k.u, k.rate
@@ -57,7 +60,7 @@ def works(k, s, ended, recent):
     k.q = 0.0 if ended else max(k.q + k.e * k.e * gain - give, 0.0)
 
 
-@jit
+@once
 def end_exactly(low, high, ball, contact):
     """R3: give the contacts that end at this instant the closing speed that they end with.
 
@@ -81,7 +84,7 @@ def end_exactly(low, high, ball, contact):
             set_closing_speed(c, final, rest, low, high, ball, contact)
 
 
-@jit
+@once
 def advance(first, part, n, state):
     """Take a run straight on by a part of its segment.
 
@@ -153,7 +156,7 @@ def touch_beside(first, n, state):
             touch(gap, state)
 
 
-@jit
+@once
 def meet(one, n, state):
     """R8.4, R8.5: take run `one` and the next to where they meet, and close the gap between them.
 
@@ -166,22 +169,23 @@ def meet(one, n, state):
     left, gap, right = one - 1, run[one].last + 1, run[other].last + 1
     beyond_left = part_beyond(one, part_one, -ball[one].pull, left, n, state)
     beyond_right = part_beyond(other, part_other, ball[right].pull, right, n, state)
+    between = gap
     if beyond_left < math.inf and beyond_left <= beyond_right:
-        gap = left
-        move(one, beyond_left, n, state)
+        gap, part_one, part_other = left, beyond_left, -1.0
     elif beyond_right < math.inf:
-        gap = right
-        move(other, beyond_right, n, state)
-    else:
+        gap, part_one, part_other = right, -1.0, beyond_right
+    if part_one >= 0.0:
         move(one, part_one, n, state)
+    if part_other >= 0.0:
         move(other, part_other, n, state)
+    if gap == between:
         touch_beside(one, n, state)
         touch_beside(other, n, state)
     touch(gap, state)
     grow(gap, n, state)
 
 
-@jit
+@once
 def complete(n, state):
     """R8.6: take every run to its own next event."""
     first = state.tally[0].first
@@ -214,7 +218,7 @@ def prepare(n, chain, meeting, state):
         ball[i].m = chain.m[i] * mass_unit
         tally.cut_off = min(tally.cut_off, LIMITS.cut * ball[i].m)
         ball[i].hi = chain.v[i] * unit
-        ball[i].lo = 0.0
+        ball[i].lo = ball[i].pull = 0.0
         ball[i].turn = 0
     for c in range(n - 1):
         k = contact[c]
@@ -222,7 +226,8 @@ def prepare(n, chain, meeting, state):
         if c < n - 2:
             k.forward, k.backward = chain.forward[c], chain.backward[c]
         k.u = u = ball[c].hi - ball[c + 1].hi
-        k.q = k.w = k.top = k.tip = k.blur = k.p = k.p_lo = k.a = k.a_lo = 0.0
+        k.q = k.w = k.top = k.tip = k.rate = k.slope = k.blur = 0.0
+        k.p = k.p_lo = k.a = k.a_lo = 0.0
         k.before = abs(u)
         k.active = k.tiny = k.hits = k.held = 0
         for row in range(2):
@@ -230,12 +235,12 @@ def prepare(n, chain, meeting, state):
         if u > 0.0:
             tally.threshold = max(tally.threshold, LIMITS.exhausted * u)
             tally.faint = max(tally.faint, LIMITS.faint * reduced_mass(c, ball) * u * u)
-    forget(0, state.level)
-    forget(1, state.level)
+    forget(LOWER, state.level)
+    forget(UPPER, state.level)
     start(n, state)
 
 
-@jit
+@once
 def impact(n, chain, meeting, max_events, resumed, state):
     """Solve one impact: run rounds until no contact is active; return the status.
 

@@ -3,10 +3,10 @@
 import math
 
 from cradle.kernel.rules import is_gap
-from cradle.kernel.state import LIMITS, jit
+from cradle.kernel.state import LIMITS, jit, once
 
 
-@jit
+@once
 def gap_parts(first, after, run, ball, contact, meeting):
     """R8.3: parts of their two segments at which runs `first` and `after` meet.
 

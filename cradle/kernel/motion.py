@@ -8,33 +8,31 @@ from cradle.kernel.state import LIMITS, apart, jit
 
 
 @jit
+def add(high, low, x):
+    """Add x to a sum of two numbers, losing nothing (Knuth's two-sum); return the new two."""
+    total = high + x
+    part = total - high
+    x = ((high - (total - part)) + (x - part)) + low
+    high = total + x
+    return high, x - (high - total)
+
+
+@jit
 def add_velocity(b, x):
-    """Add x to the velocity of ball b, by a sum that loses nothing (Knuth's two-sum)."""
-    total = b.hi + x
-    part = total - b.hi
-    x = ((b.hi - (total - part)) + (x - part)) + b.lo
-    b.hi = total + x
-    b.lo = x - (b.hi - total)
+    """Add x to the velocity of ball b."""
+    b.hi, b.lo = add(b.hi, b.lo, x)
 
 
 @jit
 def add_impulse(k, x):
-    """Add x to the impulse of contact k in the same way."""
-    total = k.p + x
-    part = total - k.p
-    x = ((k.p - (total - part)) + (x - part)) + k.p_lo
-    k.p = total + x
-    k.p_lo = x - (k.p - total)
+    """Add x to the impulse of contact k."""
+    k.p, k.p_lo = add(k.p, k.p_lo, x)
 
 
 @jit
 def add_work(k, x):
-    """Add x to the work that contact k has absorbed in the same way."""
-    total = k.a + x
-    part = total - k.a
-    x = ((k.a - (total - part)) + (x - part)) + k.a_lo
-    k.a = total + x
-    k.a_lo = x - (k.a - total)
+    """Add x to the work that contact k has absorbed."""
+    k.a, k.a_lo = add(k.a, k.a_lo, x)
 
 
 @jit
@@ -94,7 +92,7 @@ def bodies(c, low, high, ball, contact):
     return first, last, left, right
 
 
-@jit
+@apart
 def push(c, impulse, low, high, ball, contact):
     """Give contact c an impulse; contacts inside the two bodies pass on what their balls need."""
     first, last, left, right = bodies(c, low, high, ball, contact)
@@ -114,7 +112,7 @@ def push(c, impulse, low, high, ball, contact):
             add_impulse(contact[i - 1], impulse * (part / right))
 
 
-@jit
+@apart
 def set_closing_speed(c, speed, rest, low, high, ball, contact):
     """Bring the closing speed of contact c to speed + rest by a push of its balls.
 
@@ -133,7 +131,7 @@ def set_closing_speed(c, speed, rest, low, high, ball, contact):
             contact[k].u = closing(k, ball)
 
 
-@jit
+@apart
 def arrive(c, low, high, ball, contact):
     """Let contact c beside the run low..high be at zero: the run's ball takes the other's velocity.
 
@@ -196,13 +194,13 @@ def join_velocities(first, last, ball, contact):
         ball[i].x += momentum / mass
     share_out(first, last - 1, 0.0, 0.0, ball, contact)
     for c in range(first, last):
-        add_impulse(contact[c], max(contact[c].x, 0.0))
+        add_impulse(contact[c], contact[c].x)
         contact[c].u = contact[c].blur = 0.0
     add_velocity(ball[k], ball[k].x)
     one_velocity(first, last, k, ball)
 
 
-@jit
+@apart
 def relative_energy(first, last, ball):
     """Kinetic energy of balls first..last relative to their centre of mass."""
     k = heaviest_of(first, last, ball)

@@ -2,11 +2,7 @@
 
 import math
 
-from cradle.kernel.state import (
-    MAXIMUM_COMPRESSION,
-    apart,
-    jit,
-)
+from cradle.kernel.state import MAXIMUM_COMPRESSION, apart, jit
 
 
 @jit
@@ -31,17 +27,23 @@ def write(k, kind, c, n, state):
         path[j] = math.ldexp(state.contact[j].x, tally.shift + tally.mass_shift)
 
 
+@apart
+def write_present(kind, c, n, state):
+    """Write an event and the state after it."""
+    ball, contact = state.ball, state.contact
+    for i in range(n):
+        ball[i].x = ball[i].hi
+    for j in range(n - 1):
+        contact[j].x = contact[j].p
+    write(state.tally[0].events, kind, c, n, state)
+
+
 @jit
 def record(kind, c, n, state):
     """Count an event; write it and the state after it, if there is room."""
-    tally, contact = state.tally[0], state.contact
-    if tally.events < len(state.record.kinds):
-        for i in range(n):
-            state.ball[i].x = state.ball[i].hi
-        for j in range(n - 1):
-            contact[j].x = contact[j].p
-        write(tally.events, kind, c, n, state)
-    tally.events += 1
+    if state.tally[0].events < len(state.record.kinds):
+        write_present(kind, c, n, state)
+    state.tally[0].events += 1
 
 
 @apart

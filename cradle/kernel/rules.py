@@ -2,7 +2,7 @@
 
 import math
 
-from cradle.kernel.state import LIMITS, apart, jit
+from cradle.kernel.state import LIMITS, apart, jit, once
 
 # A run's contacts low..high have impulses, or balls that move; contacts beyond them wait, because
 # no impulse that a ball could notice reaches them (`reached`).
@@ -39,7 +39,7 @@ def admissible_ratio(driver, driven, far, onward, nominal, ball, contact):
             ball[driver].rest = kept / (ball[far].m + kept)
 
 
-@jit
+@once
 def ratios_in_force(low, high, ball, contact):
     """R7: the ratios in force in a run, each chain of drives from its far end to its driver.
 
@@ -104,12 +104,25 @@ def several_sources(low, high, smallest, ball, contact):
 
 
 @jit
-def reached(first, run, smallest, contact):
+def wait(low, high, ball, contact, outer):
+    """Let contacts low..high of a run wait: they have no impulse, and their `outer` balls no pull.
+
+    `outer` is 0 for the left ball of each contact and 1 for the right one.
+    """
+    for c in range(low, high + 1):
+        contact[c].rate = contact[c].slope = 0.0
+        ball[c + outer].pull = 0.0
+
+
+@once
+def reached(first, run, smallest, ball, contact):
     """R1: set low..high of a run, as far as impulses reach at the nominal ratios, or beyond.
 
     From the one source outwards rates only become less.  With several sources all contacts count.
+    Those that were reached before, and no longer are, wait.
     """
     source, last = run[first].source, run[first].last
+    low, high = run[first].low, run[first].high
     run[first].low = first
     run[first].high = last
     if source < 0:
@@ -120,12 +133,14 @@ def reached(first, run, smallest, contact):
         x *= contact[c].forward
         c += 1
     run[first].high = c
+    wait(c + 1, high, ball, contact, 1)
     x = 1.0
     c = source
     while c > first and x > smallest:
         x *= contact[c - 1].backward
         c -= 1
     run[first].low = c
+    wait(low, c - 1, ball, contact, 0)
 
 
 @jit
@@ -135,7 +150,7 @@ def rates(first, run, ball, contact, tally):
     Returns whether a contact at u = 0 with nothing to release is about to open.
     """
     smallest = tally.cut_off
-    reached(first, run, smallest, contact)
+    reached(first, run, smallest, ball, contact)
     low, high, source = run[first].low, run[first].high, run[first].source
     ratios_in_force(low, high, ball, contact)
     if source < 0:
@@ -182,7 +197,7 @@ def opens_at_zero(c, contact):
     return contact[c].u == 0.0 and contact[c].q <= 0.0 and contact[c].slope < 0.0
 
 
-@jit
+@once
 def has_ended(c, contact):
     """R3: tell whether contact c has ended: it opens, or has e = 0 and no longer closes."""
     if contact[c].q > 0.0:
@@ -191,7 +206,7 @@ def has_ended(c, contact):
     return u < 0.0 or (u == 0.0 and contact[c].e == 0.0 and contact[c].w > 0.0)
 
 
-@jit
+@once
 def end_progress(u, q, slope, rate, e):
     """R3: progress to the end of a contact, where all that it can release is released.
 
@@ -225,13 +240,13 @@ def is_gap(c, n, contact):
     return 0 < c < n - 2 and contact[c - 1].active == 1 and contact[c + 1].active == 1
 
 
-@jit
+@once
 def rounding_after(k, s):
     """Return how much of the closing speed of contact k may be rounding after a progress s."""
     return LIMITS.roundings * (k.blur + 2.0**-53 * abs(k.slope) * s)
 
 
-@jit
+@once
 def comes_at(s, k):
     """Tell whether the next event of contact k comes at progress s, as far as rounding can tell.
 
@@ -251,7 +266,8 @@ def comes_at(s, k):
 def segment(first, n, run, ball, contact):
     """R8.2: progress of a run to its own next rate-changing event.
 
-    Returns how much later the next one is that does not come at the same time, relative to itself.
+    Returns how much later the next one is that does not come at the very same time, relative to
+    itself.
     """
     low, high = run[first].low, run[first].high
     s = second = math.inf
@@ -271,7 +287,8 @@ def segment(first, n, run, ball, contact):
     run[first].reach = s
     for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
         k = contact[c]
-        k.due = 1 if comes_at(s, k) else 0
-        if k.due == 0 and k.until < second:
-            second = k.until
+        if low <= c <= high or k.active == 0:
+            k.due = 1 if comes_at(s, k) else 0
+            if k.until > s and k.until < second:
+                second = k.until
     return 1.0 - s / second if second < math.inf else 1.0

@@ -17,6 +17,10 @@ if "jit" not in globals():
         """Mark a function that is called seldom: compiled once, not into each caller."""
         return function
 
+    def once(function: Any) -> Any:
+        """Mark a function that is called from one place: a part of its caller."""
+        return function
+
     def door(function: Any) -> Any:
         """Mark the function that is called from outside, whose compiled code is kept on disk."""
         return function
@@ -26,6 +30,8 @@ if "jit" not in globals():
 FINISHED, UNFINISHED, REFUSED, PAUSED, UNSOUND = 0, 1, 2, 3, 4
 # Kinds of event.
 MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE = 0, 1, 2, 3
+# R9: the two levels on which cycles are looked for.
+LOWER, UPPER = 0, 1
 # What an answer can break; 0 is none.
 NO_EVENT, MOMENTUM, ORDER, ENERGY, LEDGER = 1, 2, 3, 4, 5
 
@@ -206,7 +212,7 @@ class Tally:
     threshold: float  # R9: speed and energy below which a contact is exhausted
     faint: float
     meeting: float  # R8: where two runs meet, as a part of the overlap
-    margin: float  # least distance of two events whose order mattered, relative to their progress
+    margin: float  # least distance of two events of a run, relative to their progress
 
 
 class Cluster(NamedTuple):

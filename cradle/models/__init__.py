@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 from typing import Protocol, cast
 
@@ -10,10 +11,10 @@ from cradle.checks import a, must_be
 from cradle.trace import Trace
 
 
-class RecordingModel(Protocol):
-    """A model that can leave the path out."""
+class LongModel(Protocol):
+    """A model whose impacts may be long: it can leave the path out, and show its progress."""
 
-    def solve(self, chain: Chain, *, record: bool | None = None) -> Trace:
+    def solve(self, chain: Chain, *, record: bool | None = None, progress: bool = False) -> Trace:
         """Return the outcome of the impact of `chain`, with or without its path."""
         ...
 
@@ -26,7 +27,15 @@ class Model(Protocol):
         ...
 
 
-def collide(chain: Chain, model: Model, *, record: bool | None = None) -> Trace:
+@functools.cache
+def _takes(model: type[Model], option: str) -> bool:
+    """Tell whether a kind of model has an option."""
+    return option in inspect.signature(model.solve).parameters
+
+
+def collide(
+    chain: Chain, model: Model, *, record: bool | None = None, progress: bool = False
+) -> Trace:
     """Solve one impact.
 
     Parameters
@@ -38,6 +47,9 @@ def collide(chain: Chain, model: Model, *, record: bool | None = None) -> Trace:
     record : bool, optional
         Whether to keep the path; for models whose `solve` lets one choose, such as
         `ImpulseCorrelation`.
+    progress : bool
+        Show how many events there have been so far; for models that count them, such as
+        `ImpulseCorrelation`, the others ignore it.
 
     Returns
     -------
@@ -64,8 +76,9 @@ def collide(chain: Chain, model: Model, *, record: bool | None = None) -> Trace:
         raise TypeError(f"model is the class {model.__name__}; must be made: {model.__name__}(...)")
     if not hasattr(model, "solve"):
         raise TypeError(f"model is {a(type(model).__name__)}; must be an impact model")
-    if record is None:
+    kind = type(model)
+    if record is not None and not _takes(kind, "record"):
+        raise TypeError(f"{kind.__name__} always keeps its path: record does not apply")
+    if record is None and not (progress and _takes(kind, "progress")):
         return model.solve(chain)
-    if "record" not in inspect.signature(model.solve).parameters:
-        raise TypeError(f"{type(model).__name__} always keeps its path: record does not apply")
-    return cast("RecordingModel", model).solve(chain, record=record)
+    return cast("LongModel", model).solve(chain, record=record, progress=progress)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from cradle.chain import Chain
 from cradle.checks import Vector, checked, must_be, one_number, refusal
 from cradle.closed_form import largest_ratios
-from cradle.drive import DEFECTS, UNFINISHED, UNSOUND, Job
+from cradle.drive import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job
 from cradle.kernel import Inputs, Options
 from cradle.kernel.state import LIMITS
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
@@ -102,7 +102,7 @@ class ImpulseCorrelation:
         object.__setattr__(self, "excess", excess)
         object.__setattr__(self, "max_events", int(max_events))
 
-    def solve(self, chain: Chain, *, record: bool | None = None) -> Trace:
+    def solve(self, chain: Chain, *, record: bool | None = None, progress: bool = False) -> Trace:
         """Solve the impact of `chain`; see `collide`.
 
         Parameters
@@ -112,6 +112,8 @@ class ImpulseCorrelation:
         record : bool, optional
             Whether to keep the path.  Left out, it is kept unless it has more than ten million
             numbers; the trace's `path` and `events` then end early, with a warning.
+        progress : bool
+            Show how many events there have been so far.
 
         Returns
         -------
@@ -119,7 +121,6 @@ class ImpulseCorrelation:
             The path and the outcome.
         """
         must_be(Chain, "chain", chain)
-        refuse_light(chain.masses)
         n = len(chain)
         ratios: list[Vector] = []
         for name in ("forward", "backward"):
@@ -127,37 +128,47 @@ class ImpulseCorrelation:
             if given is None:
                 ratios.append(ratios[0])
                 continue
-            if np.ndim(given) and len(given) != n - 2:
+            if isinstance(given, tuple) and len(given) != n - 2:
                 raise ValueError(
                     f"{name} has {len(given)} values; {n} balls need {n - 2}, or one number"
                 )
-            ratios.append(np.broadcast_to(np.asarray(given), (n - 2,)).astype(np.float64))
-        if self.excess == "raise":
-            refuse_excess(chain.masses, *ratios)
+            ratios.append(np.full(n - 2, given))
 
         inputs = Inputs(
             *(part[None].copy() for part in (chain.masses, chain.velocities, chain.restitution)),
             *(part[None] for part in ratios),
         )
         room = _most_events(n) if record is None else _EVERY if record else 0
-        job = Job(inputs, 1, Options(self.meeting, self.max_events, False, True), room).run()
+        options = Options(self.meeting, self.max_events, self.excess == "raise", True)
+        job = Job(inputs, 1, options, room)
+        if progress:
+            from tqdm.auto import tqdm
+
+            with tqdm(unit=" events") as bar:
+                job.run(pause=lambda: bar.update(job.tally("events") - bar.n))
+        else:
+            job.run()
+        if job.status == REFUSED:
+            refuse_light(chain.masses)
+            refuse_excess(chain.masses, *ratios)
+            raise AssertionError("the kernel refused a chain that the checks admit")
         trace = self._trace(chain, job)
         if job.status == UNFINISHED:
             v = trace.velocities
             raise ImpactNotFinished(
                 f"the impact was not finished after max_events = {self.max_events} steps, "
-                f"{job.tally.events} events; closing speeds so far {(v[:-1] - v[1:]).tolist()}",
+                f"{job.tally('events')} events; closing speeds so far {(v[:-1] - v[1:]).tolist()}",
                 trace,
             )
         if job.status == UNSOUND:
-            raise ImpactNotCertified(chain, self, DEFECTS[int(job.tally.defect)])
+            raise ImpactNotCertified(chain, self, DEFECTS[job.tally("defect")])
         return trace
 
     def _trace(self, chain: Chain, job: Job) -> Trace:
         """Return what the event loop left."""
         results, written = job.outputs, job.record
         written.velocities[0] = chain.velocities
-        count = int(job.tally.events)
+        count = job.tally("events")
         kept = min(count, len(written.kinds))
         if job.status == UNFINISHED:
             kept = min(kept, _UNFINISHED_EVENTS)
@@ -180,7 +191,7 @@ class ImpulseCorrelation:
             events=tuple(Event(_KINDS[k], c) for k, c in zip(kinds, contacts, strict=True)),
             collapsed=bool(results.collapsed[0]),
             saturated=tuple(np.flatnonzero(results.held).tolist()),
-            margin=float(job.tally.margin),
+            margin=job.tally("margin"),
         )
 
 

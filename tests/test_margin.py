@@ -1,0 +1,55 @@
+"""`Trace.margin` tells where another order of events is within rounding."""
+
+import numpy as np
+import pytest
+from extremes import events_at_balls
+
+from cradle import Chain, ImpulseCorrelation, collide, paper_chain
+
+#: An input of one of the paper's chains, by how much it is changed, and how far the velocities jump
+#: there: edges of `data/extremes_edges.csv`.
+EDGES = {
+    "restitution of ABCCAB": ("ABCCAB", "restitution", 2, -0.1045, 0.0046),
+    "a mass of ABCCAB": ("ABCCAB", "masses", 3, -0.04106, 0.0025),
+    "a ratio of BCACBA": ("BCACBA", "backward", 2, 0.06774, 0.0012),
+}
+
+
+def changed(name, part, k, change):
+    """The chain with one input changed by that part of it."""
+    chain, model = paper_chain(name, excess="saturate")
+    given = {
+        "masses": chain.masses,
+        "restitution": chain.restitution,
+        "forward": np.array(model.forward),
+        "backward": np.array(model.forward if model.backward is None else model.backward),
+    }
+    given[part] = given[part].copy()
+    given[part][k] *= 1 + change
+    return collide(
+        Chain(given["masses"], chain.velocities, given["restitution"]),
+        ImpulseCorrelation(given["forward"], given["backward"], excess="saturate"),
+    )
+
+
+@pytest.mark.parametrize("name", EDGES)
+def test_it_vanishes_where_the_outcome_jumps(name):
+    *which, at, jump = EDGES[name]
+    near, far = 0.98 * at, 1.02 * at
+    before, after = (events_at_balls(changed(*which, x)) for x in (near, far))
+    assert before != after
+    for _ in range(40):
+        middle = 0.5 * (near + far)
+        same = events_at_balls(changed(*which, middle)) == before
+        near, far = (middle, far) if same else (near, middle)
+    sides = [changed(*which, x) for x in (near, far)]
+    moved = np.abs(sides[1].velocities - sides[0].velocities).max()
+    assert moved / np.abs(sides[0].velocities).max() == pytest.approx(jump, rel=0.05)
+    assert max(side.margin for side in sides) < 1e-11
+    # It is the distance to the edge, as far as that goes.
+    assert 1e-5 < changed(*which, near + 1e-3 * at).margin < 1e-2
+
+
+def test_it_is_large_far_from_any_other_order():
+    assert collide(Chain([1, 1, 1], [1, 0, 0]), ImpulseCorrelation(0.5)).margin == 1.0
+    assert collide(*paper_chain("AAA")).margin > 0.01
