@@ -14,7 +14,7 @@ from cradle import Chain, ImpulseCorrelation, SpringChain, collide, paper_chain
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from chains import magnitudes, uniform
 from march import march
-from reference import solve
+from truth import solve
 
 __all__ = ["SCENES", "Scene", "march", "random_chains", "random_truth", "solve"]
 

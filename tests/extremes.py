@@ -16,7 +16,7 @@ import numpy as np
 import plain
 from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
 from march import march
-from reference import EventLimit, solve
+from truth import EventLimit, solve
 
 from cradle import (
     Chain,

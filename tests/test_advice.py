@@ -13,7 +13,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import ELASTIC, HERTZ, magnitudes, uniform, within_bounds
-from reference import solve
+from truth import solve
 
 import cradle.advice.measured
 from cradle import (

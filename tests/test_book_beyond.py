@@ -1,7 +1,7 @@
 """What the text of book/beyond.ipynb says, from the stored table and by second routes.
 
 The table is measured (benchmarks/long_chains.py); its outcomes are computed again here by closed
-forms, by the independent solver in reference.py, and by another integrator.
+forms, by the independent solver in truth.py, and by another integrator.
 """
 
 import csv
@@ -16,7 +16,7 @@ import pytest
 import xarray as xr
 from chains import HERTZ, uniform
 from chapters import Chapter, number, points
-from reference import solve
+from truth import solve
 
 from cradle import Chain, SpringChain, collide, outcomes, post_impact_velocities, runtime
 from cradle.closed_form import back_impact_line, one_collision_each

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from chains import LINEAR
 from chapters import Chapter
-from reference import solve
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, ratio_table
 

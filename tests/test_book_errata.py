@@ -8,7 +8,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-import reference
+import truth
 from chapters import Chapter, number
 
 from cradle import (
@@ -30,7 +30,7 @@ GLUED = CHAPTER.glued
 def exact(*chain, **options):
     """Outcome of the reference solver in fifty digits; strings are read as decimals."""
     with mpmath.workdps(50):
-        outcome = reference.solve(*chain, excess="saturate", **options)
+        outcome = truth.solve(*chain, excess="saturate", **options)
         return np.array([float(v) for v in outcome.velocities])
 
 
@@ -88,7 +88,7 @@ def test_counts_of_entries_38_to_41():
         chain, model = paper_chain(triplet, excess="saturate")
         m, e = chain.masses.tolist(), chain.restitution.tolist()
         ratios = list(model.forward), list(model.backward)
-        outcome = reference.solve(m, [1, 0, 0], e, *ratios, excess="saturate")
+        outcome = truth.solve(m, [1, 0, 0], e, *ratios, excess="saturate")
         several += max(outcome.collisions) > 1
     assert number(GLUED["several"]) == several == 8
 
@@ -157,7 +157,7 @@ def test_r8_ties_go_to_the_left():
     assert float(GLUED["tie-generic"]) == pytest.approx(abs(here - there).max(), abs=5.1e-4)
 
 
-class OneByOne(reference.Impact):
+class OneByOne(truth.Impact):
     """The reference rules, but of several closings due without progress the left one alone."""
 
     closed = 0
@@ -177,8 +177,8 @@ def test_closings_that_are_due_together():
     together = collide(Chain([1] * 6, velocities, 1), ImpulseCorrelation(0.1))
     np.testing.assert_allclose(together.velocities, -together.velocities[::-1], atol=1e-14)
     outcomes = [
-        np.array(reference.solve([1] * 6, velocities, 1, 0.1, number=float, impact=kind).velocities)
-        for kind in (reference.Impact, OneByOne)
+        np.array(truth.solve([1] * 6, velocities, 1, 0.1, number=float, impact=kind).velocities)
+        for kind in (truth.Impact, OneByOne)
     ]
     np.testing.assert_allclose(outcomes[0], together.velocities, atol=1e-14)
     assert 0.01 < abs(outcomes[1] - outcomes[0]).max() < 0.02

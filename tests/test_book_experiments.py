@@ -1,6 +1,6 @@
 """What the tables and the figures of book/experiments.ipynb show, by a second route.
 
-Velocities come from the independent solver in reference.py; the ranges of ratios from Eqs. 30-33
+Velocities come from the independent solver in truth.py; the ranges of ratios from Eqs. 30-33
 where they hold, and from a bisection elsewhere.
 """
 
@@ -10,7 +10,7 @@ import mpmath
 import numpy as np
 import pytest
 from chapters import Chapter, points
-from reference import solve
+from truth import solve
 
 from cradle import (
     ImpulseCorrelation,

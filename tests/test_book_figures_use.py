@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chapters import Chapter, drawn, lines, panel
-from reference import solve
+from truth import solve
 
 from cradle.tables import paper_chain
 

@@ -9,10 +9,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from chapters import Chapter
-from reference import solve
 from scipy.optimize import brentq
 from test_book_parameters import code, pictures_in_memory, run
 from test_notebooks import decimals
+from truth import solve
 
 from cradle import ratio_table
 from cradle.closed_form import one_collision_each, three_balls

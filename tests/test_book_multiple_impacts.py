@@ -6,7 +6,7 @@ from itertools import pairwise
 import mpmath
 import numpy as np
 import pytest
-import reference
+import truth
 from chains import changes
 from chapters import Chapter
 
@@ -27,7 +27,7 @@ EXAMPLES = [
 def solved(masses, e2, e3, forward, backward):
     """The reference solver's outcome at fifty digits, and the package's trace."""
     with mpmath.workdps(50):
-        exact = reference.solve(masses, VELOCITIES, [e2, e3], [forward], [backward])
+        exact = truth.solve(masses, VELOCITIES, [e2, e3], [forward], [backward])
     chain = Chain([float(m) for m in masses], [1, 0.8, 0], [float(e2), float(e3)])
     return exact, collide(chain, ImpulseCorrelation([float(forward)], [float(backward)]))
 
@@ -134,7 +134,7 @@ def test_fig_5_marked_values_as_printed_in_the_chapter():
 
 
 def sequence_occurs(e, ratio):
-    outcome = reference.solve((1, 1, 1), VELOCITIES, e, ratio, number=float)
+    outcome = truth.solve((1, 1, 1), VELOCITIES, e, ratio, number=float)
     kinds = outcome.events
     here = changes(kinds) == SEQUENCE
     early = (

@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pandas as pd
 import pytest
-import reference
+import truth
 from chains import magnitudes, uniform
 from chapters import Chapter, number
 
@@ -32,9 +32,7 @@ def random_chain(seed, n):
 @pytest.mark.parametrize("n", range(2, 8))
 def test_eqs_47_48_momentum_of_every_ball(n):
     masses, ratios = random_chain(n, n)
-    path = reference.solve(
-        masses, np.arange(n)[::-1], 0.7, list(ratios), [0] * (n - 2), number=float
-    )
+    path = truth.solve(masses, np.arange(n)[::-1], 0.7, list(ratios), [0] * (n - 2), number=float)
     trace = collide(Chain(masses, np.arange(n)[::-1], 0.7), ImpulseCorrelation(ratios, 0))
     for velocities, impulses in (
         (path.path, path.path_impulses),
@@ -120,7 +118,7 @@ def test_r7_held_contact_and_a_bound_that_moves():
         np.testing.assert_allclose(trace.velocities, [-1 / 3, 2 / 3, 2 / 3], rtol=1e-14)
         assert trace.saturated == (1,)
     chain, model = paper_chain("ABCCAB")
-    exact = reference.solve(
+    exact = truth.solve(
         chain.masses, chain.velocities, list(chain.restitution), model.forward, model.backward
     )
     assert exact.held == {3} == set(collide(chain, model).saturated)
@@ -128,7 +126,7 @@ def test_r7_held_contact_and_a_bound_that_moves():
 
 def test_r6_zero_ratio_is_the_limit():
     chain = Chain([2, 1, 3], [1, 0, 0], 0.8)
-    exact = np.array(reference.solve([2, 1, 3], [1, 0, 0], "0.8", 0).velocities, float)
+    exact = np.array(truth.solve([2, 1, 3], [1, 0, 0], "0.8", 0).velocities, float)
     np.testing.assert_allclose(collide(chain, ImpulseCorrelation(0)).velocities, exact, rtol=1e-13)
     away = [
         abs(collide(chain, ImpulseCorrelation(ratio)).velocities - exact).max()
@@ -143,7 +141,7 @@ def test_r6_zero_ratio_is_the_limit():
 def test_r9_collapse_to_the_common_velocity(masses, e, ratio):
     trace = collide(Chain(masses, [1, 0, 0], e), ImpulseCorrelation(ratio))
     with mpmath.workdps(50):
-        exact = reference.solve(masses, [1, 0, 0], e, ratio)
+        exact = truth.solve(masses, [1, 0, 0], e, ratio)
     assert trace.collapsed
     assert exact.collapsed
     np.testing.assert_allclose(trace.velocities, [1 / sum(masses)] * 3, rtol=1e-14)
@@ -152,7 +150,7 @@ def test_r9_collapse_to_the_common_velocity(masses, e, ratio):
     assert trace.energy_loss == pytest.approx(plastic, rel=1e-12)
 
 
-class Reading(reference.Impact):
+class Reading(truth.Impact):
     """The reference rules with another direction of drive where two runs meet."""
 
     turns: tuple[str, str]
@@ -168,11 +166,11 @@ def outcome(turns, meeting=0.5):
     """Outcome of Fig. 8's chain when the gap closes with these directions at its two balls."""
     reading = type("Chosen", (Reading,), {"turns": turns})
     chain = [1] * 4, [1, 0.5, 0, 0], 1, 0.1
-    return reference.solve(*chain, meeting=meeting, number=float, impact=reading)
+    return truth.solve(*chain, meeting=meeting, number=float, impact=reading)
 
 
 def test_fig_8_path():
-    exact = reference.solve([1] * 4, [1, "0.5", 0, 0], 1, "0.1")
+    exact = truth.solve([1] * 4, [1, "0.5", 0, 0], 1, "0.1")
     trace = collide(FIG_8, ImpulseCorrelation(0.1))
     assert exact.meetings == 1
     assert [tuple(event) for event in trace.events] == exact.events
@@ -235,7 +233,7 @@ def test_fig_8_meeting_moves_two_of_ten_sequences():
                 model.forward, model.backward, meeting=meeting, excess="saturate"
             )
             ends.append(collide(chain, variant).velocities)
-            exact = reference.solve(
+            exact = truth.solve(
                 chain.masses, chain.velocities, list(chain.restitution), model.forward,
                 model.backward, meeting=meeting, excess="saturate", number=float,
             )  # fmt: skip

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from chains import magnitudes, uniform
 from chapters import Chapter
-from reference import solve
 from scipy.optimize import brentq, minimize_scalar
+from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, outcomes
 from cradle.closed_form import back_impact_line, first_ball_stops, middle_ball_stops

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from chains import uniform
 from chapters import Chapter
-from reference import solve
+from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide
 

@@ -1,6 +1,6 @@
 """Chapter "Three balls solved": Eqs. 17-34, Figs. 3 and 4, by a second route each.
 
-The second routes are the independent solver in reference.py, the path of the package's solver
+The second routes are the independent solver in truth.py, the path of the package's solver
 (whose loop knows no formula of this chapter), and integrals worked out at fifty digits.
 """
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from chains import magnitudes, uniform
 from chapters import Chapter
-from reference import solve
+from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 from cradle.closed_form import final_impulses, one_collision_each, three_balls

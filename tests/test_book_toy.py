@@ -6,9 +6,9 @@ import re
 import numpy as np
 import pytest
 from chapters import Chapter
-from reference import solve
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from truth import solve
 
 CHAPTER = Chapter("toy")
 LENGTH, BACK, G, RATIO = 0.12, 0.04, 9.81, 0.15

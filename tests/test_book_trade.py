@@ -1,7 +1,7 @@
 """What the text of book/trade.ipynb says, from the stored table and by second routes.
 
 The table is measured (benchmarks/run.py); its velocities are compared with answers from the
-independent solver in reference.py, with closed formulas, and with converged springs from elsewhere.
+independent solver in truth.py, with closed formulas, and with converged springs from elsewhere.
 """
 
 import csv
@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from chains import ELASTIC, HERTZ, LINEAR
 from chapters import Chapter, number, points
-from reference import solve
+from truth import solve
 
 from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, paper_chain
 

@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
-from reference import solve
+from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 from cradle.closed_form import (

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import FIG_8, changes
-from reference import solve
+from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain
 from cradle.tables import paper_sequences

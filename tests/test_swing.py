@@ -5,9 +5,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from reference import solve
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
+from truth import solve
 
 from cradle import (
     Chain,
