@@ -44,9 +44,10 @@ def cradle(pulled=1, angle=math.radians(30), *, mend=True, gap=0.0, **parameters
         beam = world.add_body(rapier3d.RigidBody.fixed().translation(pivot))
         shape = rapier3d.Collider.ball(RADIUS).mass(MASS).friction(0.0).restitution(1.0)
         if mend:  # a member of group 1, which meets all groups but its own
-            groups = rapier3d.InteractionGroups(rapier3d.Group(1), rapier3d.Group(0xFFFFFFFE))
-            shape = shape.collision_groups(groups)
-        body = rapier3d.RigidBody.dynamic().translation(place).can_sleep(False).lock_rotations()
+            group = rapier3d.Group.GROUP_1
+            shape = shape.collision_groups(rapier3d.InteractionGroups(group, ~group))
+        body = rapier3d.RigidBody.dynamic().translation(place).can_sleep(False)
+        body = body.locked_axes(rapier3d.LockedAxes.ROTATION_LOCKED)
         ball = world.add_body(body, [shape])
         joint = rapier3d.RopeJoint.builder(LENGTH).local_anchor1((0, 0, 0)).local_anchor2((0, 0, 0))
         world.impulse_joints.insert(beam, ball, joint.build(), True)
