@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numba
 import numpy as np
+from measure import versions
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
 from cradle.drive import warm_up
@@ -34,11 +35,18 @@ BALLS, RADIUS, LENGTH, GRAVITY = 5, 0.1, 1.0, 9.81
 ANGLE = math.radians(30)
 RATIO = 0.1325  # three equal balls on Hertz springs (data/implied_ratio.csv)
 FRAMES = 60  # samples a second
-MINUTE, FILM = 60, 11.5  # s
+MINUTE, FILM = 60, 11  # s
+FILMED = ("default", "ratio", "steel")
 GAP = 1e-2  # over a diameter
 FREQUENCY = math.sqrt(GRAVITY / LENGTH)
 #: Contact of two balls at the first stroke, s: steel, if the cradle were ten times smaller.
 STEEL = 6.9e-4 / FREQUENCY
+SPRINGS = {
+    "steel": {},
+    "half the step": {"steps_a_contact": 200},
+    "ten times softer": {"contact": 10**0.4 * STEEL},
+}
+MODELS = {"ratio": ImpulseCorrelation(RATIO), "springs": SpringChain(1.0)}
 
 
 @dataclass(frozen=True)
@@ -56,6 +64,7 @@ class Engine:
 
     name: str
     module: str
+    distribution: str
     program: str
     default: Setting
     refined: Setting
@@ -63,17 +72,17 @@ class Engine:
 
 ENGINES = (
     Engine(
-        "Chipmunk", "pymunk", "pymunk_cradle",
+        "Chipmunk", "pymunk", "pymunk", "pymunk_cradle",
         Setting(1 / 60, {"iterations": 10}),
         Setting(1e-3, {"iterations": 100}),
     ),
     Engine(
-        "Box2D", "Box2D", "box2d_cradle",
+        "Box2D", "Box2D", "box2d", "box2d_cradle",
         Setting(1 / 60, {"iterations": (8, 3)}),
         Setting(1e-3, {"iterations": (100, 30)}),
     ),
     Engine(
-        "Bullet", "pybullet", "bullet_cradle",
+        "Bullet", "pybullet", "pybullet", "bullet_cradle",
         Setting(1 / 240, {}),
         Setting(
             1e-3,
@@ -84,7 +93,7 @@ ENGINES = (
         ),
     ),
     Engine(
-        "Rapier", "rapier3d", "rapier_cradle",
+        "Rapier", "rapier3d", "rapier3d", "rapier_cradle",
         Setting(1 / 60, {}),
         Setting(
             1e-3,
@@ -95,7 +104,7 @@ ENGINES = (
         ),
     ),
     Engine(
-        "MuJoCo", "mujoco", "mujoco_cradle",
+        "MuJoCo", "mujoco", "mujoco", "mujoco_cradle",
         Setting(2e-3, {"contact": 0.02}),
         Setting(1e-4, {"contact": 0.002}, mended_step=1e-3),
     ),
@@ -104,14 +113,22 @@ ENGINES = (
 
 def absent():
     """Return the engines that are not installed."""
-    return [e.name for e in ENGINES if importlib.util.find_spec(e.module) is None]
+    return {
+        engine.name: f'{engine.distribution} is not installed; pip install -e ".[engines]"'
+        for engine in ENGINES
+        if importlib.util.find_spec(engine.module) is None
+    }
 
 
 # One run: times, angles and rates of the balls, shape (T, N).
 
 
 def in_engine(engine, setting, pulled, *, mend, gap=0.0, duration=MINUTE):
-    """Run a scene in an engine and look at it sixty times a second."""
+    """Run a scene in an engine and look at it sixty times a second.
+
+    Pulled back all together, with the mend, the balls swing as one and never collide: what they
+    lose then is lost between the impacts.
+    """
     advance, bodies, step = scene(engine, setting, pulled, mend=mend, gap=gap)
     pivots = 2 * RADIUS * (1 + gap) * np.arange(BALLS)
     frames, taken = [], 0
@@ -143,9 +160,8 @@ def close(bodies):
     getattr(bodies, "close", lambda: None)()
 
 
-def by_swing(pulled, duration=MINUTE, model=None):
+def by_swing(pulled, duration=MINUTE, model=MODELS["ratio"]):
     """Run the scene by the package's own events."""
-    model = ImpulseCorrelation(RATIO) if model is None else model
     hanging = Pendulums(length=LENGTH, gravity=GRAVITY, angle="full")
     release = [-ANGLE * LENGTH] * pulled + [0.0] * (BALLS - pulled)
     times = np.arange(int(duration * FRAMES) + 1) / FRAMES
@@ -154,7 +170,7 @@ def by_swing(pulled, duration=MINUTE, model=None):
     return run.times, run.positions / LENGTH, run.velocities / LENGTH
 
 
-def on_springs(pulled, duration=MINUTE, contact=STEEL, steps_a_contact=100):
+def on_springs(pulled, duration=MINUTE, *, contact=STEEL, steps_a_contact=100):
     """Run the scene on Hertz springs, with that contact of two balls at the first stroke."""
     speed = 2.0 * math.sqrt(GRAVITY * LENGTH) * math.sin(ANGLE / 2)
     # Two balls of mass 1 at speed v: contact 2.9432 d/v, depth d, k d^(5/2) = 5/8 v^2.
@@ -221,78 +237,86 @@ def strokes(angles, rates):
     passed = np.flatnonzero(np.sign(mean[1:]) != np.sign(mean[:-1])) + 1
     each = energies(angles, rates)
     ends = np.append(passed[1:], len(mean))
-    turning = [
-        a + int(np.argmax(np.abs(mean[a:b]))) for a, b in zip(passed, ends, strict=True)
-    ]
+    turning = [a + int(np.argmax(np.abs(mean[a:b]))) for a, b in zip(passed, ends, strict=True)]
     # The last one may lie beyond the end of the run.
     return each[[t for t in turning if t < len(mean) - 1]]
 
 
 def runs(missing):
-    """Yield name, setting, gap, how many balls were pulled back, and a run."""
+    """Yield who moves the balls and how, gap, how many balls were pulled back, and the run."""
     for pulled in (1, 2):
-        yield "Hertz springs", "steel", 0.0, pulled, on_springs(pulled)
-        yield "Hertz springs", "half the step", 0.0, pulled, on_springs(
-            pulled, steps_a_contact=200
-        )
-        yield "Hertz springs", "ten times softer", 0.0, pulled, on_springs(
-            pulled, contact=10**0.4 * STEEL
-        )
-        yield "swing", "ratio", 0.0, pulled, by_swing(pulled)
-        yield "swing", "springs", 0.0, pulled, by_swing(pulled, model=SpringChain(1.0))
-        for engine in ENGINES:
-            if engine.name in missing:
-                continue
-            for setting in ("default", "refined"):
+        for setting, options in SPRINGS.items():
+            yield "Hertz springs", "alone", setting, 0.0, pulled, on_springs(pulled, **options)
+        for setting, model in MODELS.items():
+            yield "swing", "alone", setting, 0.0, pulled, by_swing(pulled, model=model)
+    for engine in ENGINES:
+        for setting in ("default", "refined") if engine.name not in missing else ():
+            for pulled in (1, 2):
                 for gap in (0.0, GAP):
                     run = in_engine(engine, setting, pulled, mend=False, gap=gap)
-                    yield engine.name, setting, gap, pulled, run
+                    yield engine.name, "as it is", setting, gap, pulled, run
                 run = in_engine(engine, setting, pulled, mend=True)
-                yield f"{engine.name}, mended", setting, 0.0, pulled, run
+                yield engine.name, "mended", setting, 0.0, pulled, run
+            run = in_engine(engine, setting, BALLS, mend=True)
+            yield engine.name, "no impacts", setting, 0.0, BALLS, run
 
 
 def costs(missing, repeats=5, seconds=5.0):
-    """Yield what a step costs and a simulated second, mended and as it is, at rest and swinging."""
-    for engine in ENGINES:
-        if engine.name in missing:
-            continue
-        for setting in ("default", "refined"):
-            for pulled in (0, 1, 2):
-                kept = {"reference": [], "own": [], "mended": []}
-                for _ in range(repeats):
-                    begin = time.process_time()
-                    by_swing(1, seconds)
-                    kept["reference"].append((time.process_time() - begin) / seconds)
-                    for name in ("own", "mended"):
-                        kept[name].append(
-                            _cost(engine, setting, pulled, name == "mended", seconds)
-                        )
-                own = [second for second, _ in kept["own"]]
-                for name in ("own", "mended"):
-                    second = [s for s, _ in kept[name]]
-                    yield {
-                        "engine": engine.name,
-                        "setting": setting,
-                        "pulled": pulled,
-                        "mended": int(name == "mended"),
-                        "step": kept[name][0][1],
-                        "step_microseconds": 1e6 * statistics.median(second) * kept[name][0][1],
-                        "over_own": _ratio(second, own),
-                        "over_swing": _ratio(second, kept["reference"]),
-                        "repeats": repeats,
-                    }
+    """Yield what a simulated second costs: on springs, as an engine is, mended; at rest, swinging.
+
+    Each time is taken beside that of `swing` and, if mended, of the engine as it is.
+    """
+    on_springs(1, 1 / FRAMES)  # compiles
+    choices = [
+        (engine, setting, pulled)
+        for engine in ENGINES
+        for setting in ("default", "refined")
+        for pulled in (0, 1, 2)
+        if engine.name not in missing
+    ]
+    for choice in [None, *choices]:
+        kinds = {"alone": None} if choice is None else {"as it is": False, "mended": True}
+        reference, taken = [], {how: [] for how in kinds}
+        for _ in range(repeats):
+            reference.append(_timed(lambda: by_swing(1, seconds)) / seconds)
+            for how, mend in kinds.items():
+                if choice is None:
+                    taken[how].append(_timed(lambda: on_springs(1, seconds)) / seconds)
+                else:
+                    taken[how].append(_cost(*choice, mend, seconds))
+        for how, times in taken.items():
+            first = next(iter(taken.values()))
+            yield {
+                "run": "Hertz springs" if choice is None else choice[0].name,
+                "how": how,
+                "setting": "steel" if choice is None else choice[1],
+                "pulled": 1 if choice is None else choice[2],
+                "seconds": statistics.median(times),
+                "over_swing": _ratio(times, reference),
+                "over_as_it_is": _ratio(times, first),
+                "repeats": repeats,
+                "version": versions("numba" if choice is None else choice[0].distribution),
+            }
+
+
+def _timed(function):
+    begin = time.process_time()
+    function()
+    return time.process_time() - begin
 
 
 def _cost(engine, setting, pulled, mend, seconds):
-    """Return the processor time of a simulated second, and the step."""
+    """Return the processor time of a simulated second."""
     advance, bodies, step = scene(engine, setting, pulled, mend=mend)
     count = round(seconds / step)
-    begin = time.process_time()
-    for _ in range(count):
-        advance(step)
-    taken = time.process_time() - begin
+
+    def all_steps():
+        for _ in range(count):
+            advance(step)
+
+    taken = _timed(all_steps)
     close(bodies)
-    return taken / (count * step), step
+    return taken / (count * step)
 
 
 def _ratio(these, those):
@@ -313,32 +337,30 @@ def main(arguments=None):
     parser.add_argument("--output", type=Path, default=ROOT / "data", help="a folder")
     folder = parser.parse_args(arguments).output
     missing = absent()
-    for name in missing:
-        print(f"skipped {name}: not installed")
+    for name, reason in missing.items():
+        print(f"skipped {name}: {reason}")
     warm_up()
     begin = time.perf_counter()
     table, film = [], []
-    names = [f"ball{i}" for i in range(1, BALLS + 1)]
-    for name, setting, gap, pulled, (times, angles, rates) in runs(missing):
+    balls = [f"ball{i}" for i in range(1, BALLS + 1)]
+    for name, how, setting, gap, pulled, (times, angles, rates) in runs(missing):
         found = strokes(angles, rates)
-        row = (name, setting, f"{gap:g}", pulled)
-        table += [
-            (*row, k, *(f"{e:.4f}" for e in each)) for k, each in enumerate(found, start=1)
-        ]
-        if pulled == 1 and not gap and setting in ("default", "ratio", "steel"):
-            shown = times <= FILM
+        row = (name, how, setting, f"{gap:g}", pulled)
+        table += [(*row, k, *(f"{e:.4f}" for e in each)) for k, each in enumerate(found, start=1)]
+        if pulled == 1 and not gap and setting in FILMED:
             film += [
-                (name, f"{t:.4f}", *(f"{math.degrees(a):.1f}" for a in each))
-                for t, each in list(zip(times[shown], angles[shown], strict=True))[::2]
+                (name, how, f"{t:.4f}", *(f"{math.degrees(a):.1f}" for a in each))
+                for t, each in list(zip(times, angles, strict=True))[: FILM * FRAMES + 1 : 2]
             ]
-        print(f"{name:20} {setting:16} {gap:5} {pulled}  {len(found)} strokes, energy "
-              f"{found[-1].sum():.4f}, shares {found[-1].round(3)}", flush=True)  # fmt: skip
-    columns = ("run", "setting", "gap", "pulled", "stroke", *names)
+        print(
+            *row, f"{len(found)} strokes", found[-1].sum().round(4), found[-1].round(3), flush=True
+        )
+    columns = ("run", "how", "setting", "gap", "pulled", "stroke", *balls)
     write(folder / "scene_strokes.csv", columns, table)
-    write(folder / "scene_film.csv", ("run", "time", *names), film)
+    write(folder / "scene_film.csv", ("run", "how", "time", *balls), film)
     measured = []
     for row in costs(missing):
-        print(row, flush=True)
+        print(*row.values(), flush=True)
         measured.append([f"{x:.4g}" if isinstance(x, float) else x for x in row.values()])
         columns = tuple(row)
     write(folder / "scene_costs.csv", columns, measured)

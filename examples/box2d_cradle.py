@@ -8,6 +8,7 @@ from cradle import Chain, ImpulseCorrelation
 from cradle.row import Row
 
 BALLS, RADIUS, LENGTH, MASS = 5, 0.1, 1.0, 1.0  # m, kg
+ANGLE = math.radians(30)
 
 
 class Bodies:
@@ -27,7 +28,7 @@ class Bodies:
         self.world.Step(step, *self.iterations)
 
 
-def cradle(pulled=1, angle=math.radians(30), *, mend=True, gap=0.0, iterations=(8, 3)):
+def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=(8, 3)):
     """Hang five balls, pull some of them back; return the engine's world and the balls."""
     world = b2World(gravity=(0, -9.81), doSleep=False)
     beam = world.CreateStaticBody()

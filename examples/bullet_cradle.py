@@ -8,6 +8,7 @@ from cradle import Chain, ImpulseCorrelation
 from cradle.row import Row
 
 BALLS, RADIUS, LENGTH, MASS = 5, 0.1, 1.0, 1.0  # m, kg
+ANGLE = math.radians(30)
 
 
 class Bodies:
@@ -38,7 +39,7 @@ class Bodies:
         pybullet.disconnect(self.client)
 
 
-def cradle(pulled=1, angle=math.radians(30), *, mend=True, gap=0.0, **parameters):
+def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, **parameters):
     """Hang five balls, pull some of them back; return the engine's world and the balls."""
     client = pybullet.connect(pybullet.DIRECT)
     here = {"physicsClientId": client}

@@ -8,6 +8,7 @@ from cradle import Chain, ImpulseCorrelation
 from cradle.row import Row
 
 BALLS, RADIUS, LENGTH, MASS = 5, 0.1, 1.0, 1.0  # m, kg
+ANGLE = math.radians(30)
 
 
 class Bodies:
@@ -32,7 +33,7 @@ class Bodies:
         mujoco.mj_step(self.model, self.data)
 
 
-def cradle(pulled=1, angle=math.radians(30), *, mend=True, gap=0.0, contact=0.02):
+def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, contact=0.02):
     """Hang five balls, pull some of them back; return the engine's world and the balls.
 
     The contacts of the engine itself are springs without damping, with a contact of so many

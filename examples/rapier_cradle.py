@@ -8,6 +8,7 @@ from cradle import Chain, ImpulseCorrelation
 from cradle.row import Row
 
 BALLS, RADIUS, LENGTH, MASS = 5, 0.1, 1.0, 1.0  # m, kg
+ANGLE = math.radians(30)
 
 
 class Bodies:
@@ -30,7 +31,7 @@ class Bodies:
         self.world.step()
 
 
-def cradle(pulled=1, angle=math.radians(30), *, mend=True, gap=0.0, **parameters):
+def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, **parameters):
     """Hang five balls, pull some of them back; return the engine's world and the balls."""
     world = rapier3d.PhysicsWorld()
     world.gravity = (0.0, -9.81, 0.0)
