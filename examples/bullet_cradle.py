@@ -45,13 +45,17 @@ def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, **parameters):
     here = {"physicsClientId": client}
     pybullet.setGravity(0, 0, -9.81, **here)
     pybullet.setPhysicsEngineParameter(**parameters, **here)
-    shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=RADIUS, **here)
+    # Both the shape and the mass of a ball sit at the end of its arm.
+    end = (0, 0, -LENGTH)
+    shape = pybullet.createCollisionShape(
+        pybullet.GEOM_SPHERE, radius=RADIUS, collisionFramePosition=end, **here
+    )
     balls, pivots = [], [2 * RADIUS * (1 + gap) * i for i in range(BALLS)]
     for i, x in enumerate(pivots):
         ball = pybullet.createMultiBody(
             0, basePosition=(x, 0, 0), linkMasses=[MASS], linkCollisionShapeIndices=[shape],
             linkVisualShapeIndices=[-1], linkPositions=[(0, 0, 0)],
-            linkOrientations=[(0, 0, 0, 1)], linkInertialFramePositions=[(0, 0, -LENGTH)],
+            linkOrientations=[(0, 0, 0, 1)], linkInertialFramePositions=[end],
             linkInertialFrameOrientations=[(0, 0, 0, 1)], linkParentIndices=[0],
             linkJointTypes=[pybullet.JOINT_REVOLUTE], linkJointAxis=[(0, -1, 0)], **here,
         )  # fmt: skip
