@@ -1,4 +1,4 @@
-"""Newton's cradle in Box2D 2.3: `pip install box2d cradle-companion`."""
+"""Newton's cradle in Box2D 2.3: `pip install box2d` and this package."""
 
 import math
 
@@ -18,7 +18,8 @@ class Bodies:
         self.world, self.balls, self.iterations = world, balls, iterations
 
     def motion(self):
-        return [b.position.tuple for b in self.balls], [b.linearVelocity.tuple for b in self.balls]
+        places = [b.position.tuple for b in self.balls]
+        return places, [b.linearVelocity.tuple for b in self.balls]
 
     def push(self, ball, impulse):
         body = self.balls[ball]
@@ -29,7 +30,7 @@ class Bodies:
 
 
 def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=(8, 3)):
-    """Hang five balls, pull some of them back; return the engine's world and the balls."""
+    """Hang five balls and pull some of them back."""
     world = b2World(gravity=(0, -9.81), doSleep=False)
     beam = world.CreateStaticBody()
     balls = []
@@ -37,7 +38,10 @@ def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=(8, 3)):
         pivot = (2 * RADIUS * (1 + gap) * i, 0)
         turn = -angle if i < pulled else 0.0
         ball = world.CreateDynamicBody(
-            position=(pivot[0] + LENGTH * math.sin(turn), -LENGTH * math.cos(turn)),
+            position=(
+                pivot[0] + LENGTH * math.sin(turn),
+                -LENGTH * math.cos(turn),
+            ),
             fixedRotation=True,
             allowSleep=False,
             fixtures=b2FixtureDef(
@@ -45,12 +49,16 @@ def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=(8, 3)):
                 density=MASS / (math.pi * RADIUS**2),
                 friction=0.0,
                 restitution=1.0,
-                # Balls of one negative group do not collide with each other.
+                # One negative group: no contacts with each other.
                 filter=b2Filter(groupIndex=-1 if mend else 0),
             ),
         )
         world.CreateDistanceJoint(
-            bodyA=beam, bodyB=ball, anchorA=pivot, anchorB=ball.position, collideConnected=False
+            bodyA=beam,
+            bodyB=ball,
+            anchorA=pivot,
+            anchorB=ball.position,
+            collideConnected=False,
         )
         balls.append(ball)
     return Bodies(world, balls, iterations)
@@ -66,7 +74,7 @@ def mended(bodies):
 if __name__ == "__main__":
     row = mended(cradle())
     for step in range(5001):
-        if step % 500 == 0:
-            places, _ = row.bodies.motion()
-            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, (x, _) in enumerate(places)))
+        if step % 500 == 0:  # how far each ball is out
+            at = [x for x, _ in row.bodies.motion()[0]]
+            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, x in enumerate(at)))
         row.step(1 / 1000)

@@ -1,4 +1,4 @@
-"""Newton's cradle in Bullet (pybullet): `pip install pybullet cradle-companion`."""
+"""Newton's cradle in Bullet: `pip install pybullet` and this package."""
 
 import math
 
@@ -12,22 +12,39 @@ ANGLE = math.radians(30)
 
 
 class Bodies:
-    """What the row asks of the engine; here in angles, for each ball is an arm with one joint."""
+    """What the row asks of the engine; each ball is an arm with a joint."""
 
     def __init__(self, client, balls, pivots):
         self.client, self.balls, self.pivots = client, balls, pivots
 
     def motion(self):
-        states = [pybullet.getJointState(b, 0, physicsClientId=self.client) for b in self.balls]
-        arms = [(LENGTH * math.sin(s[0]), -LENGTH * math.cos(s[0])) for s in states]
-        places = [(p + x, y) for p, (x, y) in zip(self.pivots, arms, strict=True)]
-        return places, [(-s[1] * y, s[1] * x) for s, (x, y) in zip(states, arms, strict=True)]
+        states = [
+            pybullet.getJointState(b, 0, physicsClientId=self.client)
+            for b in self.balls
+        ]
+        arms = [
+            (LENGTH * math.sin(s[0]), -LENGTH * math.cos(s[0]))
+            for s in states
+        ]
+        places = [
+            (p + x, y) for p, (x, y) in zip(self.pivots, arms, strict=True)
+        ]
+        return places, [
+            (-s[1] * y, s[1] * x)
+            for s, (x, y) in zip(states, arms, strict=True)
+        ]
 
     def push(self, ball, impulse):
-        angle, rate, *_ = pybullet.getJointState(self.balls[ball], 0, physicsClientId=self.client)
+        angle, rate, *_ = pybullet.getJointState(
+            self.balls[ball], 0, physicsClientId=self.client
+        )
         along = impulse[0] * math.cos(angle) + impulse[1] * math.sin(angle)
         pybullet.resetJointState(
-            self.balls[ball], 0, angle, rate + along / (MASS * LENGTH), physicsClientId=self.client
+            self.balls[ball],
+            0,
+            angle,
+            rate + along / (MASS * LENGTH),
+            physicsClientId=self.client,
         )
 
     def advance(self, step):
@@ -40,7 +57,7 @@ class Bodies:
 
 
 def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, **parameters):
-    """Hang five balls, pull some of them back; return the engine's world and the balls."""
+    """Hang five balls and pull some of them back."""
     client = pybullet.connect(pybullet.DIRECT)
     here = {"physicsClientId": client}
     pybullet.setGravity(0, 0, -9.81, **here)
@@ -48,26 +65,38 @@ def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, **parameters):
     # Both the shape and the mass of a ball sit at the end of its arm.
     end = (0, 0, -LENGTH)
     shape = pybullet.createCollisionShape(
-        pybullet.GEOM_SPHERE, radius=RADIUS, collisionFramePosition=end, **here
+        pybullet.GEOM_SPHERE,
+        radius=RADIUS,
+        collisionFramePosition=end,
+        **here,
     )
     balls, pivots = [], [2 * RADIUS * (1 + gap) * i for i in range(BALLS)]
     for i, x in enumerate(pivots):
         ball = pybullet.createMultiBody(
-            0, basePosition=(x, 0, 0), linkMasses=[MASS], linkCollisionShapeIndices=[shape],
-            linkVisualShapeIndices=[-1], linkPositions=[(0, 0, 0)],
-            linkOrientations=[(0, 0, 0, 1)], linkInertialFramePositions=[end],
-            linkInertialFrameOrientations=[(0, 0, 0, 1)], linkParentIndices=[0],
-            linkJointTypes=[pybullet.JOINT_REVOLUTE], linkJointAxis=[(0, -1, 0)], **here,
+            0, basePosition=(x, 0, 0), linkMasses=[MASS],
+            linkCollisionShapeIndices=[shape], linkVisualShapeIndices=[-1],
+            linkPositions=[(0, 0, 0)], linkOrientations=[(0, 0, 0, 1)],
+            linkInertialFramePositions=[end],
+            linkInertialFrameOrientations=[(0, 0, 0, 1)],
+            linkParentIndices=[0], linkJointTypes=[pybullet.JOINT_REVOLUTE],
+            linkJointAxis=[(0, -1, 0)], **here,
         )  # fmt: skip
-        # A point mass as on two strings: an inertia of its own would turn with the arm.
+        # As on two strings: the ball itself does not turn.
         pybullet.changeDynamics(
-            ball, 0, restitution=1, lateralFriction=0, linearDamping=0, angularDamping=0,
-            jointDamping=0, localInertiaDiagonal=(1e-9, 1e-9, 1e-9), **here,
+            ball, 0, restitution=1, lateralFriction=0, linearDamping=0,
+            angularDamping=0, jointDamping=0,
+            localInertiaDiagonal=(1e-9, 1e-9, 1e-9), **here,
         )  # fmt: skip
-        pybullet.changeDynamics(ball, -1, linearDamping=0, angularDamping=0, **here)
-        # Bullet brakes every joint unless its motor is told to have no force.
-        pybullet.setJointMotorControl2(ball, 0, pybullet.VELOCITY_CONTROL, force=0, **here)
-        pybullet.resetJointState(ball, 0, -angle if i < pulled else 0.0, **here)
+        pybullet.changeDynamics(
+            ball, -1, linearDamping=0, angularDamping=0, **here
+        )
+        # Bullet brakes a joint unless its motor has no force.
+        pybullet.setJointMotorControl2(
+            ball, 0, pybullet.VELOCITY_CONTROL, force=0, **here
+        )
+        pybullet.resetJointState(
+            ball, 0, -angle if i < pulled else 0.0, **here
+        )
         for other in balls if mend else []:
             pybullet.setCollisionFilterPair(ball, other, 0, 0, 0, **here)
         balls.append(ball)
@@ -84,7 +113,7 @@ def mended(bodies):
 if __name__ == "__main__":
     row = mended(cradle())
     for step in range(5001):
-        if step % 500 == 0:
-            places, _ = row.bodies.motion()
-            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, (x, _) in enumerate(places)))
+        if step % 500 == 0:  # how far each ball is out
+            at = [x for x, _ in row.bodies.motion()[0]]
+            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, x in enumerate(at)))
         row.step(1 / 1000)

@@ -1,4 +1,4 @@
-"""Newton's cradle in MuJoCo: `pip install mujoco cradle-companion`."""
+"""Newton's cradle in MuJoCo: `pip install mujoco` and this package."""
 
 import math
 
@@ -12,16 +12,22 @@ ANGLE = math.radians(30)
 
 
 class Bodies:
-    """What the row asks of the engine; here in angles, which MuJoCo keeps."""
+    """What the row asks of the engine, which keeps angles."""
 
     def __init__(self, model, data, pivots):
         self.model, self.data, self.pivots = model, data, pivots
 
     def motion(self):
         angles, rates = self.data.qpos.tolist(), self.data.qvel.tolist()
-        arms = [(LENGTH * math.sin(a), -LENGTH * math.cos(a)) for a in angles]
-        places = [(p + x, y) for p, (x, y) in zip(self.pivots, arms, strict=True)]
-        return places, [(-w * y, w * x) for w, (x, y) in zip(rates, arms, strict=True)]
+        arms = [
+            (LENGTH * math.sin(a), -LENGTH * math.cos(a)) for a in angles
+        ]
+        places = [
+            (p + x, y) for p, (x, y) in zip(self.pivots, arms, strict=True)
+        ]
+        return places, [
+            (-w * y, w * x) for w, (x, y) in zip(rates, arms, strict=True)
+        ]
 
     def push(self, ball, impulse):
         angle = self.data.qpos[ball]
@@ -34,29 +40,31 @@ class Bodies:
 
 
 def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, contact=0.02):
-    """Hang five balls, pull some of them back; return the engine's world and the balls.
+    """Hang five balls and pull some of them back.
 
-    The contacts of the engine itself are springs without damping, with a contact of so many
-    seconds: MuJoCo knows no coefficient of restitution.
+    MuJoCo knows no coefficient of restitution: its own contacts are springs
+    without damping here, and last so many seconds.
     """
     pivots = [2 * RADIUS * (1 + gap) * i for i in range(BALLS)]
     stiffness = (math.pi / contact) ** 2
     balls = "".join(
         f'<body pos="{x} 0 0"><joint type="hinge" axis="0 -1 0"/>'
-        # A point mass as on two strings: an inertia of its own would turn with the arm.
-        f'<inertial pos="0 0 {-LENGTH}" mass="{MASS}" diaginertia="1e-9 1e-9 1e-9"/>'
-        f'<geom name="{i}" type="sphere" size="{RADIUS}" pos="0 0 {-LENGTH}" contype="0" '
-        'conaffinity="0"/></body>'
+        # As on two strings: the ball itself does not turn.
+        f'<inertial pos="0 0 {-LENGTH}" mass="{MASS}" '
+        'diaginertia="1e-9 1e-9 1e-9"/>'
+        f'<geom name="{i}" type="sphere" size="{RADIUS}" '
+        f'pos="0 0 {-LENGTH}" contype="0" conaffinity="0"/></body>'
         for i, x in enumerate(pivots)
     )
     pairs = "".join(
-        f'<pair geom1="{i}" geom2="{i + 1}" condim="1" solimp=".95 .95 .001 .5 2" '
-        f'solref="{-stiffness} 0"/>'
+        f'<pair geom1="{i}" geom2="{i + 1}" condim="1" '
+        f'solimp=".95 .95 .001 .5 2" solref="{-stiffness} 0"/>'
         for i in range(BALLS - 1)
     )
     model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><compiler boundinertia="1e-12"/><option gravity="0 0 -9.81"/><worldbody>{balls}'
-        f"</worldbody>{'' if mend else f'<contact>{pairs}</contact>'}</mujoco>"
+        '<mujoco><option gravity="0 0 -9.81"/>'
+        f"<worldbody>{balls}</worldbody>"
+        f"<contact>{'' if mend else pairs}</contact></mujoco>"
     )
     data = mujoco.MjData(model)
     data.qpos[:pulled] = -angle
@@ -73,7 +81,7 @@ def mended(bodies):
 if __name__ == "__main__":
     row = mended(cradle())
     for step in range(5001):
-        if step % 500 == 0:
-            places, _ = row.bodies.motion()
-            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, (x, _) in enumerate(places)))
+        if step % 500 == 0:  # how far each ball is out
+            at = [x for x, _ in row.bodies.motion()[0]]
+            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, x in enumerate(at)))
         row.step(1 / 1000)

@@ -1,4 +1,4 @@
-"""Newton's cradle in Chipmunk (pymunk): `pip install pymunk cradle-companion`."""
+"""Newton's cradle in pymunk: `pip install pymunk` and this package."""
 
 import math
 
@@ -18,7 +18,8 @@ class Bodies:
         self.space, self.balls = space, balls
 
     def motion(self):
-        return [b.position for b in self.balls], [b.velocity for b in self.balls]
+        balls = self.balls
+        return [b.position for b in balls], [b.velocity for b in balls]
 
     def push(self, ball, impulse):
         body = self.balls[ball]
@@ -29,7 +30,7 @@ class Bodies:
 
 
 def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=10):
-    """Hang five balls, pull some of them back; return the engine's world and the balls."""
+    """Hang five balls and pull some of them back."""
     space = pymunk.Space()
     space.gravity, space.iterations = (0, -9.81), iterations
     balls = []
@@ -37,12 +38,14 @@ def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=10):
         pivot = (2 * RADIUS * (1 + gap) * i, 0)
         turn = -angle if i < pulled else 0.0
         ball = pymunk.Body(MASS, math.inf)
-        ball.position = pivot[0] + LENGTH * math.sin(turn), -LENGTH * math.cos(turn)
+        x = pivot[0] + LENGTH * math.sin(turn)
+        ball.position = x, -LENGTH * math.cos(turn)
         shape = pymunk.Circle(ball, RADIUS)
         shape.elasticity, shape.friction = 1.0, 0.0
-        if mend:  # balls of one group do not collide with each other, only with everything else
+        if mend:  # one group: no contacts with each other
             shape.filter = pymunk.ShapeFilter(group=1)
-        space.add(ball, shape, pymunk.PinJoint(space.static_body, ball, pivot, (0, 0)))
+        string = pymunk.PinJoint(space.static_body, ball, pivot, (0, 0))
+        space.add(ball, shape, string)
         balls.append(ball)
     return Bodies(space, balls)
 
@@ -57,7 +60,7 @@ def mended(bodies):
 if __name__ == "__main__":
     row = mended(cradle())
     for step in range(5001):
-        if step % 500 == 0:
-            places, _ = row.bodies.motion()
-            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, (x, _) in enumerate(places)))
+        if step % 500 == 0:  # how far each ball is out
+            at = [x for x, _ in row.bodies.motion()[0]]
+            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, x in enumerate(at)))
         row.step(1 / 1000)

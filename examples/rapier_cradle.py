@@ -1,4 +1,4 @@
-"""Newton's cradle in Rapier (rapier3d): `pip install rapier3d cradle-companion`."""
+"""Newton's cradle in Rapier: `pip install rapier3d` and this package."""
 
 import math
 
@@ -12,7 +12,7 @@ ANGLE = math.radians(30)
 
 
 class Bodies:
-    """What the row asks of the engine; the cradle swings in the plane of x and y."""
+    """What the row asks of the engine, in the plane of x and y."""
 
     def __init__(self, world, balls):
         self.world, self.balls = world, balls
@@ -24,7 +24,9 @@ class Bodies:
         return [(p.x, p.y) for p in places], [(v.x, v.y) for v in speeds]
 
     def push(self, ball, impulse):
-        self.world.rigid_bodies[self.balls[ball]].apply_impulse((*impulse, 0.0), True)
+        self.world.rigid_bodies[self.balls[ball]].apply_impulse(
+            (*impulse, 0.0), True
+        )
 
     def advance(self, step):
         self.world.integration_parameters.dt = step
@@ -32,7 +34,7 @@ class Bodies:
 
 
 def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, **parameters):
-    """Hang five balls, pull some of them back; return the engine's world and the balls."""
+    """Hang five balls and pull some of them back."""
     world = rapier3d.PhysicsWorld()
     world.gravity = (0.0, -9.81, 0.0)
     for name, value in parameters.items():
@@ -41,16 +43,33 @@ def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, **parameters):
     for i in range(BALLS):
         pivot = (2 * RADIUS * (1 + gap) * i, 0.0, 0.0)
         turn = -angle if i < pulled else 0.0
-        place = (pivot[0] + LENGTH * math.sin(turn), -LENGTH * math.cos(turn), 0.0)
+        place = (
+            pivot[0] + LENGTH * math.sin(turn),
+            -LENGTH * math.cos(turn),
+            0.0,
+        )
         beam = world.add_body(rapier3d.RigidBody.fixed().translation(pivot))
-        shape = rapier3d.Collider.ball(RADIUS).mass(MASS).friction(0.0).restitution(1.0)
+        shape = (
+            rapier3d.Collider.ball(RADIUS)
+            .mass(MASS)
+            .friction(0.0)
+            .restitution(1.0)
+        )
         if mend:  # a member of group 1, which meets all groups but its own
             group = rapier3d.Group.GROUP_1
-            shape = shape.collision_groups(rapier3d.InteractionGroups(group, ~group))
-        body = rapier3d.RigidBody.dynamic().translation(place).can_sleep(False)
+            shape = shape.collision_groups(
+                rapier3d.InteractionGroups(group, ~group)
+            )
+        body = (
+            rapier3d.RigidBody.dynamic().translation(place).can_sleep(False)
+        )
         body = body.locked_axes(rapier3d.LockedAxes.ROTATION_LOCKED)
         ball = world.add_body(body, [shape])
-        joint = rapier3d.RopeJoint.builder(LENGTH).local_anchor1((0, 0, 0)).local_anchor2((0, 0, 0))
+        joint = (
+            rapier3d.RopeJoint.builder(LENGTH)
+            .local_anchor1((0, 0, 0))
+            .local_anchor2((0, 0, 0))
+        )
         world.impulse_joints.insert(beam, ball, joint.build(), True)
         balls.append(ball)
     return Bodies(world, balls)
@@ -66,7 +85,7 @@ def mended(bodies):
 if __name__ == "__main__":
     row = mended(cradle())
     for step in range(5001):
-        if step % 500 == 0:
-            places, _ = row.bodies.motion()
-            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, (x, _) in enumerate(places)))
+        if step % 500 == 0:  # how far each ball is out
+            at = [x for x, _ in row.bodies.motion()[0]]
+            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, x in enumerate(at)))
         row.step(1 / 1000)
