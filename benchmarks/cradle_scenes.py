@@ -36,6 +36,7 @@ ANGLE = math.radians(30)
 RATIO = 0.1325  # three equal balls on Hertz springs (data/implied_ratio.csv)
 FRAMES = 60  # samples a second
 MINUTE, FILM = 60, 11  # s
+WILD = 10.0  # times the energy at the release
 FILMED = ("default", "ratio", "steel")
 GAP = 1e-2  # over a diameter
 FREQUENCY = math.sqrt(GRAVITY / LENGTH)
@@ -239,7 +240,10 @@ def strokes(angles, rates):
     ends = np.append(passed[1:], len(mean))
     turning = [a + int(np.argmax(np.abs(mean[a:b]))) for a, b in zip(passed, ends, strict=True)]
     # The last one may lie beyond the end of the run.
-    return each[[t for t in turning if t < len(mean) - 1]]
+    found = each[[t for t in turning if t < len(mean) - 1]]
+    # Balls that go over the top have no strokes any more.
+    wild = np.flatnonzero(found.sum(axis=1) > WILD)
+    return found[: wild[0] + 1] if wild.size else found
 
 
 def runs(missing):

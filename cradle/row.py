@@ -72,13 +72,20 @@ class Row:
         Where the strings end, m.  A ball on a string takes up the part of an impulse along the
         tangent of its arc; its string takes the rest.  Without pivots the balls are free.
     touching : float, optional
-        Balls whose gap is at most this touch, m; a thousandth of the smallest radius if left out.
-    resting : float
-        Balls that touch and close no faster than this do not rebound: they go on together, m/s.
+        Balls whose gap is at most this touch, m; a thousandth of the smallest radius r if left
+        out.  Steel balls of a toy are pressed into each other by about that.
+    resting : float, optional
+        Balls that touch and close no faster than this do not rebound: they go on together, m/s;
+        sqrt(a r) / 100 with the acceleration a if left out.
     acceleration : float
-        The largest acceleration between neighbours that is to be expected, m/s^2.  From it follows
-        for how long nobody need look at the balls; but they are looked at every hundredth of a
-        second, if the steps are shorter, in case something else strikes them.
+        The largest acceleration between neighbours that is to be expected, usually that of
+        gravity, m/s^2.  From it follows for how long nobody need look at the balls; but they are
+        looked at every hundredth of a second, if the steps are shorter, in case something else
+        strikes them.
+
+    Notes
+    -----
+    Any units will do, such as pixels, if all lengths have the same one, and the acceleration too.
 
     Raises
     ------
@@ -117,7 +124,7 @@ class Row:
         pivots: ArrayLike | None = None,
         *,
         touching: float | None = None,
-        resting: float = 0.01,
+        resting: float | None = None,
         acceleration: float = 9.81,
     ) -> None:
         n = len(chain)
@@ -131,18 +138,20 @@ class Row:
         self.pivots = None if pivots is None else checked("pivots", pivots)
         if self.pivots is not None and self.pivots.shape != (n, 2):
             raise ValueError(f"pivots has shape {self.pivots.shape}; {n} balls need ({n}, 2)")
-        near = 1e-3 * min(self.radii) if touching is None else touching
-        self.touching = one_number("touching", near, "must be above 0", 0.0, open_low=True)
-        self.resting = one_number("resting", resting, "must be above 0", 0.0, open_low=True)
         self.acceleration = one_number(
             "acceleration", acceleration, "must be above 0", 0.0, open_low=True
         )
-        self.spacing, self.frequency = self._hanging()
+        near = 1e-3 * min(self.radii) if touching is None else touching
+        self.touching = one_number("touching", near, "must be above 0", 0.0, open_low=True)
+        slow = 0.01 * math.sqrt(self.acceleration * min(self.radii)) if resting is None else resting
+        self.resting = one_number("resting", slow, "must be above 0", 0.0, open_low=True)
+        x = np.array(bodies.motion()[0], dtype=np.float64)
+        self._refuse_a_pack(x)
+        self.spacing, self.frequency = self._hanging(x)
         #: How many impacts were solved so far, and how often touching balls were brought to rest.
         self.impacts, self.settled = 0, 0
         #: For how long nothing can happen, s.
         self.quiet = 0.0
-        self._refuse_a_pack(np.array(bodies.motion()[0], dtype=np.float64))
 
     def step(self, duration: float) -> None:
         """Move the scene on by one step; the engine steps at least once, and to every contact.
@@ -150,7 +159,7 @@ class Row:
         Raises
         ------
         ValueError
-            If the duration is not above 0, or balls of a cluster do not lie in a row.
+            If the duration is not above 0, or balls that touch do not lie in a row.
         RuntimeError
             If balls have passed through each other, or the impacts of the step do not end.
         """
@@ -180,11 +189,10 @@ class Row:
         """Look at the balls at the next step: call it after moving or kicking one of them."""
         self.quiet = 0.0
 
-    def _hanging(self) -> tuple[list[float], float]:
+    def _hanging(self, x: Vector) -> tuple[list[float], float]:
         """Return the distances of the pivots, and the frequency if all strings are equal, or 0."""
         if self.pivots is None:
             return [], 0.0
-        x = np.array(self.bodies.motion()[0], dtype=np.float64)
         lengths = np.hypot(*(x - self.pivots).T)
         equal = np.ptp(lengths) <= 1e-3 * lengths.min()
         frequency = math.sqrt(self.acceleration / lengths.min()) if equal else 0.0
@@ -197,6 +205,8 @@ class Row:
         the second, neighbours may also be accelerated towards each other.
         """
         x, v = self.bodies.motion()
+        if not self.frequency:  # nothing else keeps the balls in order
+            self._refuse_a_pack(np.array(x, dtype=np.float64))
         arrival, quiet = math.inf, _LONGEST
         strike = rest = False
         for c, reach in enumerate(self.reach):
@@ -220,7 +230,7 @@ class Row:
             if self.frequency:
                 off = abs(distance - self.spacing[c]) + abs(closing) / self.frequency
                 speeding = min(speeding, 2.0 * self.frequency**2 * off)
-            # room = closing t + speeding t^2 / 2, without cancellation and divisions by zero.
+            # The first t > 0 with room = closing t + speeding t^2 / 2; none if they only part.
             room = max(gap, 0.0) + self.touching
             root = math.sqrt(closing * closing + 2.0 * speeding * room)
             if closing + root > 0.0:

@@ -70,6 +70,11 @@ def hung(bodies, e=1.0, model=MODEL, **options):
     return Row(bodies, Chain(bodies.masses, [0] * n, e), model, RADIUS, bodies.pivots, **options)
 
 
+def steps(row, count, duration):
+    for _ in range(count):
+        row.step(duration)
+
+
 def gaps(bodies, reach=2 * RADIUS):
     x = np.array(bodies.motion()[0])
     return np.hypot(*np.diff(x, axis=0).T) - reach
@@ -161,6 +166,7 @@ def test_balls_at_rest_cost_no_impact():
     for _ in range(2000):
         row.step(1e-3)
     assert row.impacts == row.settled == 0
+    np.testing.assert_array_equal(bodies.angles, 0)
     assert len(looks) <= 220  # every hundredth of a second
 
 
@@ -241,6 +247,29 @@ def test_a_bend_is_refused_when_it_is_struck():
     row = Row(bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS)
     with pytest.raises(ValueError, match=r"balls 0 to 2 touch, but not in a straight row"):
         row.step(0.2)
+
+
+def test_a_row_that_folds_is_refused():
+    bodies = Free([[0, 0], [0.3, 0], [0.6, 0]], [[0.3, 1], [0, 0], [-0.3, 1]], [1] * 3)
+    row = Row(bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS)
+    with pytest.raises(ValueError, match=r"balls 0 and 2 touch and are no neighbours"):
+        steps(row, 100, 0.01)
+
+
+def test_units_are_free():
+    """The same scene in pixels: what touches and what rests is told by radius and gravity."""
+    found = []
+    for unit in (1.0, 256.0):
+        bodies = Free(np.array([[-0.3, 0], [0, 0], [0.2, 0]]) * unit, np.zeros((3, 2)), [1] * 3)
+        bodies.v[0, 0] = unit
+        row = Row(
+            bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS * unit, acceleration=GRAVITY * unit
+        )
+        for _ in range(30):
+            row.step(0.01)
+        found.append((bodies.v / unit, row.touching / unit, row.resting / unit, row.impacts))
+    for one, other in zip(*found):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_a_ball_struck_along_its_string_is_refused():
