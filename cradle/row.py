@@ -79,9 +79,9 @@ class Row:
         sqrt(a r) / 100 with the acceleration a if left out.
     acceleration : float
         The largest acceleration between neighbours that is to be expected, usually that of
-        gravity, m/s^2.  From it follows for how long nobody need look at the balls; but they are
-        looked at every hundredth of a second, if the steps are shorter, in case something else
-        strikes them.
+        gravity, m/s^2.  From it follows for how long nobody need look at balls that do not hang
+        on equal strings.  All are looked at every hundredth of a second, if the steps are shorter,
+        in case something else strikes them.
 
     Notes
     -----
@@ -147,7 +147,12 @@ class Row:
         self.resting = one_number("resting", slow, "must be above 0", 0.0, open_low=True)
         x = np.array(bodies.motion()[0], dtype=np.float64)
         self._refuse_a_pack(x)
-        self.spacing, self.frequency = self._hanging(x)
+        # Balls on equal strings that nearly touch are accelerated alike, others not.
+        self.hang_alike = False
+        if self.pivots is not None:
+            lengths = np.hypot(*(x - self.pivots).T)
+            self.hang_alike = bool(np.ptp(lengths) <= 1e-3 * lengths.min())
+        self.speeding = 0.0 if self.hang_alike else self.acceleration
         #: How many impacts were solved so far, and how often touching balls were brought to rest.
         self.impacts, self.settled = 0, 0
         #: For how long nothing can happen, s.
@@ -189,15 +194,6 @@ class Row:
         """Look at the balls at the next step: call it after moving or kicking one of them."""
         self.quiet = 0.0
 
-    def _hanging(self, x: Vector) -> tuple[list[float], float]:
-        """Return the distances of the pivots, and the frequency if all strings are equal, or 0."""
-        if self.pivots is None:
-            return [], 0.0
-        lengths = np.hypot(*(x - self.pivots).T)
-        equal = np.ptp(lengths) <= 1e-3 * lengths.min()
-        frequency = math.sqrt(self.acceleration / lengths.min()) if equal else 0.0
-        return np.hypot(*np.diff(self.pivots, axis=0).T).tolist(), frequency
-
     def _look(self) -> tuple[float, float]:
         """Solve what touches now.  Return when the next contact arrives, and how long is quiet.
 
@@ -205,7 +201,7 @@ class Row:
         the second, neighbours may also be accelerated towards each other.
         """
         x, v = self.bodies.motion()
-        if not self.frequency:  # nothing else keeps the balls in order
+        if not self.hang_alike:  # nothing else keeps the balls in order
             self._refuse_a_pack(np.array(x, dtype=np.float64))
         arrival, quiet = math.inf, _LONGEST
         strike = rest = False
@@ -225,14 +221,9 @@ class Row:
                 rest |= gap <= 0.0 and closing > 1e-3 * self.resting
             elif closing > self.resting:
                 arrival = min(arrival, gap / closing)
-            # Equal pendulums as far apart as their pivots are accelerated alike.
-            speeding = self.acceleration
-            if self.frequency:
-                off = abs(distance - self.spacing[c]) + abs(closing) / self.frequency
-                speeding = min(speeding, 2.0 * self.frequency**2 * off)
-            # The first t > 0 with room = closing t + speeding t^2 / 2; none if they only part.
+            # The first t > 0 with room = closing t + speeding t^2 / 2; none if they part for good.
             room = max(gap, 0.0) + self.touching
-            root = math.sqrt(closing * closing + 2.0 * speeding * room)
+            root = math.sqrt(closing * closing + 2.0 * self.speeding * room)
             if closing + root > 0.0:
                 quiet = min(quiet, 2.0 * room / (closing + root))
         if strike or rest:
