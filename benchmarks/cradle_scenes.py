@@ -70,6 +70,11 @@ class Engine:
     default: Setting
     refined: Setting
 
+    @property
+    def fine(self):
+        """A step of a millisecond and nothing else: to compare costs."""
+        return Setting(1e-3, self.default.options)
+
 
 ENGINES = (
     Engine(
@@ -274,8 +279,8 @@ def costs(missing, repeats=5, seconds=5.0):
     choices = [
         (engine, setting, pulled)
         for engine in ENGINES
-        for setting in ("default", "refined")
-        for pulled in (0, 1, 2)
+        for setting in ("default", "fine", "refined")
+        for pulled in (0, 1)
         if engine.name not in missing
     ]
     for choice in [None, *choices]:
@@ -335,16 +340,8 @@ def write(path, columns, rows):
         writer.writerows(rows)
 
 
-def main(arguments=None):
-    """Run all and write three tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=ROOT / "data", help="a folder")
-    folder = parser.parse_args(arguments).output
-    missing = absent()
-    for name, reason in missing.items():
-        print(f"skipped {name}: {reason}")
-    warm_up()
-    begin = time.perf_counter()
+def strokes_and_film(folder, missing):
+    """Run all scenes and write two tables."""
     table, film = [], []
     balls = [f"ball{i}" for i in range(1, BALLS + 1)]
     for name, how, setting, gap, pulled, (times, angles, rates) in runs(missing):
@@ -362,12 +359,27 @@ def main(arguments=None):
     columns = ("run", "how", "setting", "gap", "pulled", "stroke", *balls)
     write(folder / "scene_strokes.csv", columns, table)
     write(folder / "scene_film.csv", ("run", "how", "time", *balls), film)
+
+
+def main(arguments=None):
+    """Run all and write three tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", type=Path, default=ROOT / "data", help="a folder")
+    parser.add_argument("--costs", action="store_true", help="measure the costs alone")
+    options = parser.parse_args(arguments)
+    missing = absent()
+    for name, reason in missing.items():
+        print(f"skipped {name}: {reason}")
+    warm_up()
+    begin = time.perf_counter()
+    if not options.costs:
+        strokes_and_film(options.output, missing)
     measured = []
     for row in costs(missing):
         print(*row.values(), flush=True)
         measured.append([f"{x:.4g}" if isinstance(x, float) else x for x in row.values()])
         columns = tuple(row)
-    write(folder / "scene_costs.csv", columns, measured)
+    write(options.output / "scene_costs.csv", columns, measured)
     print(f"{time.perf_counter() - begin:.0f} s", file=sys.stderr)
 
 

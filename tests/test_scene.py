@@ -78,7 +78,7 @@ def test_the_judge_repeats_what_is_stored_and_keeps_the_energy():
 def test_two_routes_to_elastic_spheres(pulled: int):
     """Contacts in time, and contacts in no time by the package: the same balls move."""
     judge = run(*HERTZ, pulled)
-    np.testing.assert_allclose(run("swing", "alone", "springs", pulled), judge, atol=0.012)
+    np.testing.assert_allclose(run("swing", "alone", "springs", pulled), judge, atol=0.02)
     np.testing.assert_allclose(
         run("Hertz springs", "alone", "half the step", pulled), judge, atol=2e-3
     )
@@ -103,7 +103,7 @@ def test_the_tables_are_complete():
     for name in ENGINES:
         for setting in ("default", "refined"):
             for pulled in (1, 2):
-                assert len(run(name, "mended", setting, pulled)) == 58
+                assert len(run(name, "mended", setting, pulled)) in (58, 59)
                 for gap in ("0", "0.01"):
                     found = run(name, "as it is", setting, pulled, gap)
                     assert len(found) in (58, 59) or found[-1].sum() > scenes.WILD
@@ -150,13 +150,13 @@ def test_the_film_shows_what_the_table_says():
 
 
 def test_a_row_at_rest_costs_at_most_as_much_again():
-    """Measured with steps of a millisecond: within twice the engine's own cost."""
+    """Measured with steps of a millisecond, nothing refined: within twice the engine's own cost."""
     rows = [row for row in stored("costs") if row["how"] == "mended"]
     rest = {row["run"]: float(row["over_as_it_is"]) for row in rows
-            if row["setting"] == "refined" and row["pulled"] == "0"}  # fmt: skip
+            if row["setting"] == "fine" and row["pulled"] == "0"}  # fmt: skip
     assert set(rest) == set(ENGINES)
     assert max(rest.values()) < 2
-    assert len(rows) == 5 * 2 * 3
+    assert len(rows) == 5 * 3 * 2
 
 
 # What the chapters say.
@@ -171,16 +171,16 @@ def test_with_the_row_all_engines_do_what_spheres_do(pulled: int):
     assert float(told) == pytest.approx(worst, abs=0.006)
     for name in ENGINES:
         own = run(name, "as it is", "refined", pulled)
-        assert misplaced(own, pulled).max() > 5 * worst, name
+        assert misplaced(own, pulled).max() > 3 * worst, name
 
 
 def test_what_a_mended_cradle_loses_its_pendulums_lose_alone():
-    for setting, most in (("default", 0.04), ("refined", 0.015)):
+    for setting, most in (("default", 0.03), ("refined", 0.02)):
         for name in ENGINES:
             alone = run(name, "no impacts", setting, 5)[-1].sum()
             for pulled in (1, 2):
                 kept = run(name, "mended", setting, pulled)[-1].sum()
-                assert alone - most < kept < alone + 0.02, (name, setting, pulled)
+                assert alone - most < kept < alone + 0.01, (name, setting, pulled)
 
 
 def test_what_the_engines_do_alone():
@@ -194,6 +194,13 @@ def test_what_the_engines_do_alone():
     assert int(glued["wild"]) == len(run("Bullet", "as it is", "default"))
     # One fifth: all balls swing together, with the momentum of one.
     assert run("Box2D", "as it is", "refined")[-1] == pytest.approx(0.2 * 0.2, abs=2e-3)
+
+
+def test_gaps_give_the_school_book_first_and_not_for_ever():
+    for name in ("Chipmunk", "Box2D", "Bullet"):
+        found = run(name, "as it is", "refined", 1, "0.01")
+        assert found[0, 4] > 0.97, name
+        assert (found[:, [0, 4]].sum(axis=1) / found.sum(axis=1)).min() < 0.95, name
 
 
 @pytest.mark.parametrize("name", ["pymunk", "box2d", "bullet", "rapier", "mujoco"])
