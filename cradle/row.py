@@ -83,15 +83,14 @@ class Row:
         on equal strings.  All are looked at every hundredth of a second, if the steps are shorter,
         in case something else strikes them.
 
-    Notes
-    -----
-    Any units will do, such as pixels, if all lengths have the same one, and the acceleration too.
-
     Raises
     ------
     ValueError
-        If a value is wrong, or the balls are no row: out of order, or balls that are no neighbours
-        touch.
+        If a value is wrong, or the balls are no row: balls that are no neighbours touch.
+
+    Notes
+    -----
+    Any units will do, such as pixels, if all lengths have the same one, and the acceleration too.
 
     Examples
     --------
