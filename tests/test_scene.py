@@ -3,6 +3,7 @@
 import csv
 import math
 import sys
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -160,6 +161,28 @@ def test_a_row_at_rest_costs_at_most_as_much_again():
 
 
 # What the chapters say.
+
+
+def test_the_ratio_is_that_of_elastic_spheres():
+    with (ROOT / "data" / "implied_ratio.csv").open(encoding="utf-8") as file:
+        (row,) = [row for row in csv.DictReader(file) if list(row.values())[:4] == ["1.5", *"111"]]
+    assert scenes.RATIO == pytest.approx(float(row["ratio"]), abs=5e-5)
+    assert Chapter("recipe").glued["ratio"] == f"{scenes.RATIO:.2f}"
+    for path in (ROOT / "examples").glob("*.py"):
+        assert f"ImpulseCorrelation({scenes.RATIO})" in path.read_text(encoding="utf-8")
+
+
+def test_bullet_gains_by_its_correction_of_overlaps():
+    bullet = scenes.ENGINES[2]
+    if bullet.name in scenes.absent():
+        pytest.skip(scenes.absent()[bullet.name])
+    gain = []
+    for options in ({}, {"contactERP": 0.0}):
+        changed = replace(bullet, default=scenes.Setting(1 / 240, options))
+        _, angles, rates = scenes.in_engine(changed, "default", 1, mend=False, duration=5.6)
+        gain.append(scenes.strokes(angles, rates)[-1].sum())
+    assert gain[0] > 2
+    assert gain[1] == pytest.approx(1, abs=0.02)
 
 
 @pytest.mark.parametrize("pulled", [1, 2])
