@@ -166,7 +166,7 @@ def test_a_row_at_rest_costs_at_most_as_much_again():
 def test_the_ratio_is_that_of_elastic_spheres():
     with (ROOT / "data" / "implied_ratio.csv").open(encoding="utf-8") as file:
         (row,) = [row for row in csv.DictReader(file) if list(row.values())[:4] == ["1.5", *"111"]]
-    assert scenes.RATIO == pytest.approx(float(row["ratio"]), abs=5e-5)
+    assert pytest.approx(float(row["ratio"]), abs=5e-5) == scenes.RATIO
     assert Chapter("recipe").glued["ratio"] == f"{scenes.RATIO:.2f}"
     for path in (ROOT / "examples").glob("*.py"):
         assert f"ImpulseCorrelation({scenes.RATIO})" in path.read_text(encoding="utf-8")
