@@ -241,9 +241,10 @@ def animate_swing(
     if not duration > 0.0:
         raise ValueError("runs has no swing, or one without a duration")
     beside = whole_number("columns", columns)
-    # Side by side they stand closer: the room beside the balls is cut to what the swings need.
+    # Side by side they stand closer: the room beside the balls is cut to what the swings need, and
+    # letters are larger, for a page shows the whole smaller.
     cell = 480.0 if beside == 1 else max(300.0, *(2 * _half_width(run) for run in several))
-    edge = 240.0 - cell / 2
+    edge, letters = 240.0 - cell / 2, 15 if beside == 1 else 20
     rows, style, top = [], [], 0.0
     for first in range(0, len(several), beside):
         heights = []
@@ -251,7 +252,7 @@ def animate_swing(
             label = labels[k] if labels else ""
             drawn, motion, height = _draw_swing(run, f"{KEY}s{k}b", duration, speed, still)
             text = (
-                f'<text x="{number(edge + 12)}" y="20" font-size="15">{escape(label)}</text>'
+                f'<text x="{number(edge + 12)}" y="20" font-size="{letters}">{escape(label)}</text>'
                 if label
                 else ""
             )
