@@ -125,6 +125,7 @@ def test_ten_strokes(program, pulled):
 
 def test_springs_in_the_row_are_elastic_spheres(program, monkeypatch):
     """Two balls pulled back, where one ratio is not quite Hertz, and springs are."""
+    pytest.importorskip("numba", reason="the judge of the scene is compiled by numba")
     monkeypatch.syspath_prepend(EXAMPLES.parent / "benchmarks")
     scenes = importlib.import_module("cradle_scenes")
     bodies = program.cradle(pulled=2)

@@ -16,6 +16,7 @@ from cradle import Chain, SpringChain, collide
 
 ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "benchmarks"))
+pytest.importorskip("numba", reason="the judge of the scene is compiled by numba")
 import cradle_scenes as scenes  # noqa: E402
 from measure import versions  # noqa: E402
 
