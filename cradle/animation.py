@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from cradle.checks import Vector
+from cradle.checks import Vector, whole_number
 from cradle.figures import PALETTE, progress, velocities, velocity_impulse
 from cradle.film import KEY, Animation, keyframes, number, with_style
 from cradle.swing_trace import Swing
@@ -194,9 +194,10 @@ def animate_swing(
     *,
     speed: float = 1.0,
     still: float = 0.0,
+    columns: int = 1,
     alt: str = "",
 ) -> Animation:
-    """Show one swing or several, one below the other, by the same clock.
+    """Show one swing or several, one below the other or in columns, by the same clock.
 
     Parameters
     ----------
@@ -209,6 +210,8 @@ def animate_swing(
     still : float
         Which instant stands still in print and for readers who ask for less motion, s after the
         first of the times.
+    columns : int
+        How many stand side by side, from left to right and from top to bottom.
     alt : str
         What the picture shows, for those who do not see it.
 
@@ -220,7 +223,8 @@ def animate_swing(
     Raises
     ------
     ValueError
-        If a run has no duration, or there are not as many labels as runs.
+        If a run has no duration, there are not as many labels as runs, or `columns` is no whole
+        number above 0.
 
     Examples
     --------
@@ -236,20 +240,43 @@ def animate_swing(
     duration = min(run.times[-1] - run.times[0] for run in several) if several else 0.0
     if not duration > 0.0:
         raise ValueError("runs has no swing, or one without a duration")
+    beside = whole_number("columns", columns)
+    # Side by side they stand closer: the room beside the balls is cut to what the swings need, and
+    # letters are larger, for a page shows the whole smaller.
+    cell = 480.0 if beside == 1 else max(300.0, *(2 * _half_width(run) for run in several))
+    edge, letters = 240.0 - cell / 2, 15 if beside == 1 else 20
     rows, style, top = [], [], 0.0
-    for k, run in enumerate(several):
-        label = labels[k] if labels else ""
-        drawn, motion, height = _draw_swing(run, f"{KEY}s{k}b", duration, speed, still)
-        text = f'<text x="12" y="20" font-size="15">{escape(label)}</text>' if label else ""
-        rows.append(f'<g transform="translate(0 {number(top)})">{text}{drawn}</g>')
-        style.append(motion)
-        top += height + (14 if label else 0)
+    for first in range(0, len(several), beside):
+        heights = []
+        for k, run in enumerate(several[first : first + beside], start=first):
+            label = labels[k] if labels else ""
+            drawn, motion, height = _draw_swing(run, f"{KEY}s{k}b", duration, speed, still)
+            text = (
+                f'<text x="{number(edge + 12)}" y="20" font-size="{letters}">{escape(label)}</text>'
+                if label
+                else ""
+            )
+            place = f"{number((k - first) * cell - edge)} {number(top)}"
+            rows.append(f'<g transform="translate({place})">{text}{drawn}</g>')
+            style.append(motion)
+            heights.append(height + (14 if label else 0))
+        top += max(heights)
+    size = f'width="{number(cell * beside)}" height="{number(top)}"'
     svg = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 480 {number(top)}" width="480" '
-        f'height="{number(top)}" font-family="sans-serif"><rect width="480" '
-        f'height="{number(top)}" fill="white"/>{"".join(rows)}</svg>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {number(cell * beside)} '
+        f'{number(top)}" {size} font-family="sans-serif"><rect {size} fill="white"/>'
+        f"{''.join(rows)}</svg>"
     )
     return Animation(with_style(svg, "".join(style), alt))
+
+
+def _half_width(run: Swing) -> float:
+    """Return how far a swing reaches from the middle of its picture, with a margin."""
+    length = _lengths(run)
+    row = 17.0 * float(np.cbrt(run.chain.masses / run.chain.masses.max()).sum())
+    gaps = float(run.pendulums.row("gaps", len(length) - 1).sum())
+    out = float(np.abs(np.sin(run.positions / length) * length).max())
+    return row + (gaps / 2 + out) * 105.0 / float(length.max()) + 10.0
 
 
 def _lengths(run: Swing) -> Vector:

@@ -198,9 +198,11 @@ class _Run:
             v = before[first:last]
             if (v[:-1] - v[1:] <= RESTING * self.speed).all():
                 continue
-            part = Chain(self.chain.masses[first:last], v, self.chain.restitution[first : last - 1])
+            balls = Chain(
+                self.chain.masses[first:last], v, self.chain.restitution[first : last - 1]
+            )
             try:
-                trace = collide(part, _part(self.model, len(before), first, last))
+                trace = collide(balls, part(self.model, len(before), first, last))
             except ValueError as refused:
                 refused.add_note(f"at the impact at t = {self.t} s, balls {first} to {last - 1}")
                 raise
@@ -222,11 +224,17 @@ class _Run:
             )
 
 
-def _part(model: Any, n: int, first: int, last: int) -> Model:
+def part(model: Any, n: int, first: int, last: int) -> Model:
     """Return the model of a part of the chain: its rows, cut to that part.
 
     A part may end where a ratio's bound counts on the next ball (Eq. 53), so ratios above the
     part's own bounds are held there (rule of the largest admissible ratio), not refused.
+
+    Examples
+    --------
+    >>> from cradle import ImpulseCorrelation
+    >>> part(ImpulseCorrelation([0.1, 0.2, 0.3]), 5, 1, 4).forward
+    (0.2,)
     """
     if last - first == n:
         return model  # type: ignore[no-any-return]

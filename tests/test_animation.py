@@ -191,3 +191,28 @@ def test_thinning_stays_within_its_tolerance():
 def test_save(tmp_path):
     Animation("<svg/>").save(tmp_path / "a.svg")
     assert (tmp_path / "a.svg").read_text() == "<svg/>"
+
+
+def test_swings_side_by_side_are_the_same_swings():
+    """Columns change where a swing stands, not how it moves; cells are wide enough for it."""
+    below, beside = (animate_swing([RUN] * 3, ["a", "b", "c"], columns=k).svg for k in (1, 2))
+    for swing_ in range(3):
+        for ball in range(3):
+            one, other = (keyframes(svg, f"s{swing_}b{ball}") for svg in (below, beside))
+            np.testing.assert_array_equal(one[0], other[0])
+            np.testing.assert_array_equal(one[1], other[1])
+    (width, height) = map(float, re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', beside).groups())
+    places = re.findall(r'<g transform="translate\(([-\d.]+) ([\d.]+)\)">', beside)
+    left, top = np.array(places, float).T
+    assert top.tolist() == [0, 0, height / 2]
+    cell = left[1] - left[0]
+    assert width == 2 * cell
+    # The middle of every picture, at 240, is the middle of its cell.
+    np.testing.assert_allclose(left + 240, [cell / 2, 1.5 * cell, cell / 2], atol=1e-3)
+    assert cell == 300  # the swings are small
+
+
+@pytest.mark.parametrize("columns", [0, -1, 1.5])
+def test_columns_are_a_whole_number(columns):
+    with pytest.raises(ValueError, match=r"columns = .*; must be a whole number, at least 1"):
+        animate_swing(RUN, columns=columns)

@@ -1,0 +1,387 @@
+"""A minute of Newton's cradle: in engines as they are, with the mend, by `swing`, on Hertz springs.
+
+Usage::
+
+    python benchmarks/cradle_scenes.py     # some minutes; writes data/scene_*.csv
+
+Five balls of radius .1 m hang on strings of 1 m, so that they touch or with gaps of a hundredth of
+a diameter; one or two are pulled back by 30 degrees.  The scenes are those of `examples/`.  Hertz
+springs are integrated here, independently of the package, and judge the others.  Every cost stands
+beside that of `swing` or of the engine alone, measured in turn: read the ratios.
+"""
+
+import argparse
+import csv
+import importlib
+import importlib.util
+import math
+import statistics
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numba
+import numpy as np
+from measure import versions
+
+from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
+from cradle.drive import warm_up
+
+ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "examples"))
+
+BALLS, RADIUS, LENGTH, GRAVITY = 5, 0.1, 1.0, 9.81
+ANGLE = math.radians(30)
+RATIO = 0.1325  # three equal balls on Hertz springs (data/implied_ratio.csv)
+FRAMES = 60  # samples a second
+MINUTE, FILM = 60, 11  # s
+WILD = 10.0  # times the energy at the release
+FILMED = ("default", "ratio", "steel")
+GAP = 1e-2  # over a diameter
+FREQUENCY = math.sqrt(GRAVITY / LENGTH)
+#: Contact of two balls at the first stroke, s: steel, if the cradle were ten times smaller.
+STEEL = 6.9e-4 / FREQUENCY
+SPRINGS = {
+    "steel": {},
+    "half the step": {"steps_a_contact": 200},
+    "ten times softer": {"contact": 10**0.4 * STEEL},
+}
+MODELS = {"ratio": ImpulseCorrelation(RATIO), "springs": SpringChain(1.0)}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A step and what else an engine is told; with the mend it may be another step."""
+
+    step: float
+    options: dict
+    mended_step: float | None = None
+
+
+@dataclass(frozen=True)
+class Engine:
+    """An engine, its program in `examples/`, and its settings."""
+
+    name: str
+    module: str
+    distribution: str
+    program: str
+    default: Setting
+    refined: Setting
+
+    @property
+    def fine(self):
+        """A step of a millisecond and nothing else: to compare costs."""
+        return Setting(1e-3, self.default.options)
+
+
+ENGINES = (
+    Engine(
+        "Chipmunk", "pymunk", "pymunk", "pymunk_cradle",
+        Setting(1 / 60, {"iterations": 10}),
+        Setting(1e-3, {"iterations": 100}),
+    ),
+    Engine(
+        "Box2D", "Box2D", "box2d", "box2d_cradle",
+        Setting(1 / 60, {"iterations": (8, 3)}),
+        Setting(1e-3, {"iterations": (100, 30)}),
+    ),
+    Engine(
+        "Bullet", "pybullet", "pybullet", "bullet_cradle",
+        Setting(1 / 240, {}),
+        Setting(
+            1e-3,
+            {
+                "numSolverIterations": 200, "restitutionVelocityThreshold": 0.0,
+                "contactSlop": 0.0, "contactERP": 0.0, "erp": 0.0,
+            },
+        ),
+    ),
+    Engine(
+        "Rapier", "rapier3d", "rapier3d", "rapier_cradle",
+        Setting(1 / 60, {}),
+        Setting(
+            1e-3,
+            {
+                "num_internal_pgs_iterations": 50, "normalized_prediction_distance": 1e-6,
+                "contact_recycling": False,
+            },
+        ),
+    ),
+    Engine(
+        "MuJoCo", "mujoco", "mujoco", "mujoco_cradle",
+        Setting(2e-3, {"contact": 0.02}),
+        Setting(1e-4, {"contact": 0.002}, mended_step=1e-3),
+    ),
+)  # fmt: skip
+
+
+def absent():
+    """Return the engines that are not installed."""
+    return {
+        engine.name: f'{engine.distribution} is not installed; pip install -e ".[engines]"'
+        for engine in ENGINES
+        if importlib.util.find_spec(engine.module) is None
+    }
+
+
+# One run: times, angles and rates of the balls, shape (T, N).
+
+
+def in_engine(engine, setting, pulled, *, mend, gap=0.0, duration=MINUTE):
+    """Run a scene in an engine and look at it sixty times a second.
+
+    Pulled back all together, with the mend, the balls swing as one and never collide: what they
+    lose then is lost between the impacts.
+    """
+    advance, bodies, step = scene(engine, setting, pulled, mend=mend, gap=gap)
+    pivots = 2 * RADIUS * (1 + gap) * np.arange(BALLS)
+    frames, taken = [], 0
+    for k in range(int(duration * FRAMES) + 1):
+        while taken < round(k / FRAMES / step):
+            advance(step)
+            taken += 1
+        x, v = (np.array(part, float) for part in bodies.motion())
+        x[:, 0] -= pivots
+        angle = np.arctan2(x[:, 0], -x[:, 1])
+        rate = (v[:, 0] * np.cos(angle) + v[:, 1] * np.sin(angle)) / LENGTH
+        frames.append((taken * step, angle, rate))
+    close(bodies)
+    return tuple(np.array(part) for part in zip(*frames, strict=True))
+
+
+def scene(engine, setting, pulled, *, mend, gap=0.0):
+    """Return a function that makes one step, the bodies, and the step."""
+    program = importlib.import_module(engine.program)
+    chosen = getattr(engine, setting)
+    bodies = program.cradle(pulled, ANGLE, mend=mend, gap=gap, **chosen.options)
+    advance = program.mended(bodies).step if mend else bodies.advance
+    step = chosen.mended_step if mend and chosen.mended_step else chosen.step
+    return advance, bodies, step
+
+
+def close(bodies):
+    """Give back what an engine holds."""
+    getattr(bodies, "close", lambda: None)()
+
+
+def by_swing(pulled, duration=MINUTE, model=MODELS["ratio"]):
+    """Run the scene by the package's own events."""
+    hanging = Pendulums(length=LENGTH, gravity=GRAVITY, angle="full")
+    release = [-ANGLE * LENGTH] * pulled + [0.0] * (BALLS - pulled)
+    times = np.arange(int(duration * FRAMES) + 1) / FRAMES
+    chain = Chain([1] * BALLS, [0] * BALLS, 1)
+    run = swing(chain, model, release, times, pendulums=hanging)
+    return run.times, run.positions / LENGTH, run.velocities / LENGTH
+
+
+def on_springs(pulled, duration=MINUTE, *, contact=STEEL, steps_a_contact=100):
+    """Run the scene on Hertz springs, with that contact of two balls at the first stroke."""
+    speed = 2.0 * math.sqrt(GRAVITY * LENGTH) * math.sin(ANGLE / 2)
+    # Two balls of mass 1 at speed v: contact 2.9432 d/v, depth d, k d^(5/2) = 5/8 v^2.
+    depth = contact * speed / 2.9432
+    stiffness = 0.625 * speed**2 / depth**2.5
+    angle = np.zeros(BALLS)
+    angle[:pulled] = -ANGLE
+    inner = math.ceil(steps_a_contact / contact / FRAMES)
+    return _march(angle, int(duration * FRAMES), inner, stiffness)
+
+
+@numba.njit(cache=False)
+def _march(angle, frames, inner, stiffness):
+    """Velocity Verlet for pendulums whose balls repel each other by k d^(3/2), in the plane."""
+    n = len(angle)
+    step = 1.0 / FRAMES / inner
+    rate, pull = np.zeros(n), np.zeros(n)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    times = np.arange(frames + 1) / FRAMES
+    angles, rates = np.zeros((frames + 1, n)), np.zeros((frames + 1, n))
+    angles[0] = angle
+    for i in range(n):
+        pull[i] = -GRAVITY / LENGTH * sine[i]
+    for frame in range(1, frames + 1):
+        for _ in range(inner):
+            for i in range(n):
+                rate[i] += 0.5 * step * pull[i]
+                angle[i] += step * rate[i]
+                sine[i], cosine[i] = math.sin(angle[i]), math.cos(angle[i])
+                pull[i] = -GRAVITY / LENGTH * sine[i]
+            for c in range(n - 1):
+                dx = 2.0 * RADIUS + LENGTH * (sine[c + 1] - sine[c])
+                if dx < 2.0 * RADIUS:
+                    dy = LENGTH * (cosine[c] - cosine[c + 1])
+                    distance = math.sqrt(dx * dx + dy * dy)
+                    depth = 2.0 * RADIUS - distance
+                    if depth > 0.0:
+                        force = stiffness * depth * math.sqrt(depth) / distance / LENGTH
+                        pull[c] -= force * (dx * cosine[c] + dy * sine[c])
+                        pull[c + 1] += force * (dx * cosine[c + 1] + dy * sine[c + 1])
+            for i in range(n):
+                rate[i] += 0.5 * step * pull[i]
+        angles[frame], rates[frame] = angle, rate
+    return times, angles, rates
+
+
+# What is read off a run.
+
+
+def energies(angles, rates):
+    """Return each ball's kinetic and potential energy, shape (T, N), as part of all at release."""
+    each = 0.5 * (LENGTH * rates) ** 2 + 2.0 * GRAVITY * LENGTH * np.sin(angles / 2) ** 2
+    return each / each[0].sum()
+
+
+def strokes(angles, rates):
+    """Return each ball's energy after every stroke, shape (S, N).
+
+    The mean of the angles swings as one pendulum, whatever the impacts: they push neighbours
+    apart and leave the mean alone.  A stroke is its passage through zero, and the energies are
+    those at the turning point that follows.
+    """
+    mean = angles.mean(axis=1)
+    passed = np.flatnonzero(np.sign(mean[1:]) != np.sign(mean[:-1])) + 1
+    each = energies(angles, rates)
+    ends = np.append(passed[1:], len(mean))
+    turning = [a + int(np.argmax(np.abs(mean[a:b]))) for a, b in zip(passed, ends, strict=True)]
+    # The last one may lie beyond the end of the run.
+    found = each[[t for t in turning if t < len(mean) - 1]]
+    # Balls that go over the top have no strokes any more.
+    wild = np.flatnonzero(found.sum(axis=1) > WILD)
+    return found[: wild[0] + 1] if wild.size else found
+
+
+def runs(missing):
+    """Yield who moves the balls and how, gap, how many balls were pulled back, and the run."""
+    for pulled in (1, 2):
+        for setting, options in SPRINGS.items():
+            yield "Hertz springs", "alone", setting, 0.0, pulled, on_springs(pulled, **options)
+        for setting, model in MODELS.items():
+            yield "swing", "alone", setting, 0.0, pulled, by_swing(pulled, model=model)
+    for engine in ENGINES:
+        for setting in ("default", "refined") if engine.name not in missing else ():
+            for pulled in (1, 2):
+                for gap in (0.0, GAP):
+                    run = in_engine(engine, setting, pulled, mend=False, gap=gap)
+                    yield engine.name, "as it is", setting, gap, pulled, run
+                run = in_engine(engine, setting, pulled, mend=True)
+                yield engine.name, "mended", setting, 0.0, pulled, run
+            run = in_engine(engine, setting, BALLS, mend=True)
+            yield engine.name, "no impacts", setting, 0.0, BALLS, run
+
+
+def costs(missing, repeats=5, seconds=5.0):
+    """Yield what a simulated second costs: on springs, as an engine is, mended; at rest, swinging.
+
+    Each time is taken beside that of `swing` and, if mended, of the engine as it is.
+    """
+    on_springs(1, 1 / FRAMES)  # compiles
+    choices = [
+        (engine, setting, pulled)
+        for engine in ENGINES
+        for setting in ("default", "fine", "refined")
+        for pulled in (0, 1)
+        if engine.name not in missing
+    ]
+    for choice in [None, *choices]:
+        kinds = {"alone": None} if choice is None else {"as it is": False, "mended": True}
+        reference, taken = [], {how: [] for how in kinds}
+        for _ in range(repeats):
+            reference.append(_timed(lambda: by_swing(1, seconds)) / seconds)
+            for how, mend in kinds.items():
+                if choice is None:
+                    taken[how].append(_timed(lambda: on_springs(1, seconds)) / seconds)
+                else:
+                    taken[how].append(_cost(*choice, mend, seconds))
+        for how, times in taken.items():
+            first = next(iter(taken.values()))
+            yield {
+                "run": "Hertz springs" if choice is None else choice[0].name,
+                "how": how,
+                "setting": "steel" if choice is None else choice[1],
+                "pulled": 1 if choice is None else choice[2],
+                "seconds": statistics.median(times),
+                "over_swing": _ratio(times, reference),
+                "over_as_it_is": _ratio(times, first),
+                "repeats": repeats,
+                "version": versions("numba" if choice is None else choice[0].distribution),
+            }
+
+
+def _timed(function):
+    begin = time.process_time()
+    function()
+    return time.process_time() - begin
+
+
+def _cost(engine, setting, pulled, mend, seconds):
+    """Return the processor time of a simulated second."""
+    advance, bodies, step = scene(engine, setting, pulled, mend=mend)
+    count = round(seconds / step)
+
+    def all_steps():
+        for _ in range(count):
+            advance(step)
+
+    taken = _timed(all_steps)
+    close(bodies)
+    return taken / (count * step)
+
+
+def _ratio(these, those):
+    return statistics.median(a / b for a, b in zip(these, those, strict=True))
+
+
+def write(path, columns, rows):
+    """Write rows as CSV."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
+def strokes_and_film(folder, missing):
+    """Run all scenes and write two tables."""
+    table, film = [], []
+    balls = [f"ball{i}" for i in range(1, BALLS + 1)]
+    for name, how, setting, gap, pulled, (times, angles, rates) in runs(missing):
+        found = strokes(angles, rates)
+        row = (name, how, setting, f"{gap:g}", pulled)
+        table += [(*row, k, *(f"{e:.4f}" for e in each)) for k, each in enumerate(found, start=1)]
+        if pulled == 1 and not gap and setting in FILMED:
+            film += [
+                (name, how, f"{t:.4f}", *(f"{math.degrees(a):.1f}" for a in each))
+                for t, each in list(zip(times, angles, strict=True))[: FILM * FRAMES + 1 : 2]
+            ]
+        print(
+            *row, f"{len(found)} strokes", found[-1].sum().round(4), found[-1].round(3), flush=True
+        )
+    columns = ("run", "how", "setting", "gap", "pulled", "stroke", *balls)
+    write(folder / "scene_strokes.csv", columns, table)
+    write(folder / "scene_film.csv", ("run", "how", "time", *balls), film)
+
+
+def main(arguments=None):
+    """Run all and write three tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", type=Path, default=ROOT / "data", help="a folder")
+    parser.add_argument("--costs", action="store_true", help="measure the costs alone")
+    options = parser.parse_args(arguments)
+    missing = absent()
+    for name, reason in missing.items():
+        print(f"skipped {name}: {reason}")
+    warm_up()
+    begin = time.perf_counter()
+    if not options.costs:
+        strokes_and_film(options.output, missing)
+    measured = []
+    for row in costs(missing):
+        print(*row.values(), flush=True)
+        measured.append([f"{x:.4g}" if isinstance(x, float) else x for x in row.values()])
+        columns = tuple(row)
+    write(options.output / "scene_costs.csv", columns, measured)
+    print(f"{time.perf_counter() - begin:.0f} s", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,322 @@
+"""A row in an engine: against `swing`, its rests, what it refuses. The engines here are exact."""
+
+import math
+
+import numpy as np
+import pytest
+
+from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, swing
+from cradle.row import Row
+
+RADIUS, LENGTH, GRAVITY = 0.1, 1.0, 9.81
+MODEL = ImpulseCorrelation(0.1325)
+
+
+class Free:
+    """Balls in a plane on which no force acts."""
+
+    def __init__(self, x, v, masses):
+        self.x, self.v = np.array(x, float), np.array(v, float)
+        self.masses = np.array(masses, float)
+
+    def motion(self):
+        return self.x.tolist(), self.v.tolist()
+
+    def push(self, ball, impulse):
+        self.v[ball] += np.array(impulse) / self.masses[ball]
+
+    def advance(self, step):
+        self.x += step * self.v
+
+
+class Hanging(Free):
+    """Pendulums by velocity Verlet in steps of at most a millisecond, in angles."""
+
+    def __init__(self, angles, masses=None, spacing=2 * RADIUS):
+        n = len(angles)
+        self.angles, self.rates = np.array(angles, float), np.zeros(n)
+        self.masses = np.ones(n) if masses is None else np.array(masses, float)
+        self.pivots = np.column_stack([spacing * np.arange(n), np.zeros(n)])
+
+    def tangents(self):
+        return np.column_stack([np.cos(self.angles), np.sin(self.angles)])
+
+    def motion(self):
+        arms = LENGTH * np.column_stack([np.sin(self.angles), -np.cos(self.angles)])
+        v = LENGTH * self.rates[:, None] * self.tangents()
+        return (self.pivots + arms).tolist(), v.tolist()
+
+    def push(self, ball, impulse):
+        tangent = self.tangents()[ball]
+        # The impulse has no part along the string.
+        assert abs(impulse[0] * tangent[1] - impulse[1] * tangent[0]) < 1e-12
+        self.rates[ball] += np.array(impulse) @ tangent / (self.masses[ball] * LENGTH)
+
+    def advance(self, step):
+        count = math.ceil(step / 1e-3)
+        h = step / count
+        for _ in range(count):
+            self.rates -= 0.5 * h * GRAVITY / LENGTH * np.sin(self.angles)
+            self.angles += h * self.rates
+            self.rates -= 0.5 * h * GRAVITY / LENGTH * np.sin(self.angles)
+
+    def energy(self):
+        height = 2 * LENGTH * np.sin(self.angles / 2) ** 2
+        return self.masses * (0.5 * (LENGTH * self.rates) ** 2 + GRAVITY * height)
+
+
+def hung(bodies, e=1.0, model=MODEL, **options):
+    n = len(bodies.angles)
+    return Row(bodies, Chain(bodies.masses, [0] * n, e), model, RADIUS, bodies.pivots, **options)
+
+
+def steps(row, count, duration):
+    for _ in range(count):
+        row.step(duration)
+
+
+def gaps(bodies, reach=2 * RADIUS):
+    x = np.array(bodies.motion()[0])
+    return np.hypot(*np.diff(x, axis=0).T) - reach
+
+
+@pytest.mark.parametrize("pulled", [1, 2])
+def test_a_row_swings_as_swing_does(pulled: int):
+    """Two routes: steps of a fixed length and looks here, events in continuous time there."""
+    angles = [-0.5] * pulled + [0.0] * (5 - pulled)
+    bodies = Hanging(angles)
+    row, step = hung(bodies), 1 / 500
+    hanging = Pendulums(length=LENGTH, gravity=GRAVITY, angle="full")
+    times = np.arange(0, 10, 0.1)
+    run = swing(Chain([1] * 5, [0] * 5), MODEL, angles, times, pendulums=hanging)
+    total, found, least = bodies.energy().sum(), [], 0.0
+    for _ in times:
+        found.append(bodies.angles.copy())
+        for _ in range(50):
+            row.step(step)
+            least = min(least, gaps(bodies).min())
+    # Balls that a look may take for touching (a gap below 1e-4 m) shift small impacts.
+    assert np.abs(np.array(found) - run.positions).max() < 0.01
+    assert bodies.energy().sum() == pytest.approx(total, rel=1e-5)
+    assert least > -2 * row.touching
+    assert row.impacts < 200
+
+
+def test_one_impact_of_free_balls_is_that_of_collide():
+    masses, e = [1.0, 3.0, 2.0, 1.0], [1.0, 0.5, 0.25]
+    angle = 0.3  # the row lies askew in the plane
+    axis = np.array([math.cos(angle), math.sin(angle)])
+    places = np.array([-0.3, 0.0, 0.2, 0.4])[:, None] * axis
+    across = np.array([-axis[1], axis[0]])
+    v = np.array([2.0, 0.0, 0.0, 0.0])[:, None] * axis
+    v[2] += 0.0 * across
+    bodies = Free(places, v, masses)
+    model = ImpulseCorrelation(0.2)
+    row = Row(bodies, Chain(masses, [0] * 4, e), model, RADIUS)
+    for _ in range(4):
+        row.step(0.02)
+    chain = Chain(masses, [2.0, 0, 0, 0], e)
+    np.testing.assert_allclose(bodies.v @ axis, collide(chain, model).velocities, atol=1e-12)
+    np.testing.assert_allclose(bodies.v @ across, 0, atol=1e-12)
+    assert row.impacts == 1
+
+
+def test_what_is_across_the_row_is_kept():
+    """Without friction a ball keeps its velocity across the line of centres."""
+    bodies = Free([[-0.2, 0.0], [0.0, 0.0]], [[1.0, 0.25], [0.0, -0.5]], [1, 1])
+    Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS).step(1e-6)
+    np.testing.assert_allclose(bodies.v, [[0.0, 0.25], [1.0, -0.5]], atol=1e-15)
+
+
+def test_an_impact_up_the_arc_keeps_the_energy():
+    """Off the lowest point the strings take a part of the impulse, and no work."""
+    bodies = Hanging([-0.4, 0.3, 0.3], masses=[1.0, 2.0, 0.5])
+    bodies.angles[:] = 0.3
+    bodies.rates[:] = [1.0, 0.0, 0.0]
+    before = bodies.energy()
+    row = hung(bodies)
+    row._solve(*(np.array(part) for part in bodies.motion()))
+    assert bodies.energy().sum() == pytest.approx(before.sum(), rel=1e-14)
+    # All arcs are parallel: as on a straight line.
+    chain = Chain(bodies.masses, [1.0, 0.0, 0.0])
+    np.testing.assert_allclose(bodies.rates, collide(chain, MODEL).velocities, atol=1e-13)
+
+
+def test_any_model_and_rows_of_parameters():
+    """A part of the row gets its part of the model's numbers."""
+    model = ImpulseCorrelation([0.1, 0.2, 0.3])
+    # Ball 0 is far away: balls 1 to 4 collide.
+    bodies = Free([[-9, 0], [0, 0], [0.2, 0], [0.4, 0], [0.6, 0]], np.zeros((5, 2)), [1] * 5)
+    bodies.v[1, 0] = 1.0
+    Row(bodies, Chain([1] * 5, [0] * 5), model, RADIUS).step(1e-6)
+    expected = collide(Chain([1] * 4, [1, 0, 0, 0]), ImpulseCorrelation([0.2, 0.3])).velocities
+    np.testing.assert_allclose(bodies.v[1:, 0], expected, atol=1e-14)
+    bodies.v[:] = 0
+    bodies.v[1, 0] = 1.0
+    Row(bodies, Chain([1] * 5, [0] * 5), SpringChain(1.0), RADIUS).step(1e-6)
+    hertz = collide(Chain([1] * 4, [1, 0, 0, 0]), SpringChain(1.0)).velocities
+    np.testing.assert_allclose(bodies.v[1:, 0], hertz, atol=1e-14)
+
+
+def test_balls_at_rest_cost_no_impact():
+    bodies = Hanging([0.0] * 5)
+    looks = count(bodies)
+    row = hung(bodies)
+    looks.clear()
+    for _ in range(2000):
+        row.step(1e-3)
+    assert row.impacts == row.settled == 0
+    np.testing.assert_array_equal(bodies.angles, 0)
+    assert len(looks) <= 220  # every hundredth of a second
+
+
+def count(bodies):
+    """Note when somebody looks at the balls."""
+    looks, motion = [], bodies.motion
+    bodies.motion = lambda: looks.append(1) or motion()
+    return looks
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("step", [1 / 60, 1e-3])
+def test_balls_that_press_each_other_rest(e: float, step: float):
+    """Pivots nearer than two radii: every ball leans on its neighbour for ever."""
+    spacing = 1.9 * RADIUS
+    wide = np.arcsin((2 * RADIUS - spacing) * np.arange(-2, 3) / LENGTH)
+    bodies = Hanging(wide, spacing=spacing)
+    row = hung(bodies, e)
+    least = 0.0
+    for _ in range(round(10 / step)):
+        row.step(step)
+        least = min(least, gaps(bodies).min())
+    assert row.impacts < 20
+    assert row.settled > 0
+    assert least > -10 * row.touching
+    assert np.abs(bodies.angles - wide).max() < 0.01
+
+
+def test_lossy_balls_come_to_rest_together():
+    bodies = Hanging([-0.5, 0, 0, 0, 0])
+    row = hung(bodies, 0.5)
+    for _ in range(30_000):
+        row.step(1e-3)
+    assert row.impacts < 500
+    # At last all swing as one pendulum: with the momentum, a fifth of the velocity.
+    assert np.ptp(bodies.rates) < 0.02
+    assert bodies.energy().sum() < 0.25 * GRAVITY * 2 * math.sin(0.25) ** 2
+
+
+def test_a_kick_is_seen_within_a_hundredth_of_a_second_or_when_woken():
+    for wake, most in ((False, 10), (True, 1)):
+        bodies = Hanging([0.0] * 3)
+        row = hung(bodies)
+        row.step(1e-3)
+        bodies.rates[0] = 2.0
+        if wake:
+            row.wake()
+        taken = 0
+        while not row.impacts:
+            row.step(1e-3)
+            taken += 1
+        assert taken <= most
+        assert bodies.rates[0] < 0
+
+
+def test_free_balls_that_are_accelerated_are_seen_in_time():
+    """A ball that falls onto the next one, from rest: looked at before it can be there."""
+    bodies = Free([[0, 0.0203], [0, 0]], [[0, 0], [0, 0]], [1, 1])
+    fall = bodies.advance
+
+    def advance(step):
+        bodies.v[0, 1] -= GRAVITY * step
+        fall(step)
+
+    bodies.advance = advance
+    row = Row(bodies, Chain([1, 1], [0, 0]), MODEL, 0.01, touching=1e-5)
+    steps(row, 9, 1e-3)
+    assert row.impacts == 1  # after sqrt(2 gap / g), 7.8 ms
+
+
+TRIANGLE = [[0, 0], [0.2, 0], [0.1, 0.17320508]]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"x": TRIANGLE}, "balls 0 and 2 touch and are no neighbours; a row alone"),
+        ({"x": [[0, 0], [0.2, 0]]}, r"positions of shape \(2, 2\); must be \(3, 2\)"),
+        ({"radii": [0.1, 0.1]}, r"radii has shape \(2,\); 3 balls need \(\) or \(3,\)"),
+        ({"radii": [0.1, -0.1, 0.1]}, r"radii\[1\] = -0.1; must be above 0"),
+        ({"pivots": [[0, 0]]}, r"pivots has shape \(1, 2\); 3 balls need \(3, 2\)"),
+        ({"touching": 0.0}, "touching = 0.0; must be above 0"),
+        ({"resting": -1.0}, "resting = -1.0; must be above 0"),
+        ({"acceleration": math.nan}, "acceleration"),
+        ({"model": ImpulseCorrelation([0.1, 0.2])}, "forward"),
+    ],
+)
+def test_what_is_no_row_is_refused(change: dict, message: str):
+    given = {"x": [[0, 0], [0.2, 0], [0.4, 0]], "radii": RADIUS, "model": MODEL} | change
+    bodies = Free(given.pop("x"), np.zeros((3, 2)), [1] * 3)
+    with pytest.raises(ValueError, match=message):
+        Row(bodies, Chain([1] * 3, [0] * 3), given.pop("model"), given.pop("radii"), **given)
+
+
+def test_a_bend_is_refused_when_it_is_struck():
+    bodies = Free([[-0.3, 0], [0, 0], [0.2 * 0.8, 0.2 * 0.6]], [[1, 0], [0, 0], [0, 0]], [1] * 3)
+    row = Row(bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS)
+    with pytest.raises(ValueError, match=r"balls 0 to 2 touch, but not in a straight row"):
+        row.step(0.2)
+
+
+def test_a_row_that_folds_is_refused():
+    bodies = Free([[0, 0], [0.3, 0], [0.6, 0]], [[0.3, 1], [0, 0], [-0.3, 1]], [1] * 3)
+    row = Row(bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS)
+    with pytest.raises(ValueError, match=r"balls 0 and 2 touch and are no neighbours"):
+        steps(row, 100, 0.01)
+
+
+def test_units_are_free():
+    """The same scene in pixels: what touches and what rests is told by radius and gravity."""
+    found = []
+    for unit in (1.0, 256.0):
+        bodies = Free(np.array([[-0.3, 0], [0, 0], [0.2, 0]]) * unit, np.zeros((3, 2)), [1] * 3)
+        bodies.v[0, 0] = unit
+        row = Row(
+            bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS * unit, acceleration=GRAVITY * unit
+        )
+        for _ in range(30):
+            row.step(0.01)
+        found.append((bodies.v / unit, row.touching / unit, row.resting / unit, row.impacts))
+    for one, other in zip(*found):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_ball_struck_along_its_string_is_refused():
+    bodies = Free([[-0.2, 0], [0, 0]], [[1, 0], [0, 0]], [1, 1])
+    row = Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS, [[-0.2, 1], [1, 0]])
+    with pytest.raises(ValueError, match=r"ball 1 is struck along its string"):
+        row.step(0.01)
+
+
+def test_balls_that_passed_each_other_are_an_error():
+    bodies = Free([[0, 0], [0.5, 0]], [[0, 0], [0, 0]], [1, 1])
+    row = Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS)
+    bodies.x[0, 0] = 0.45
+    with pytest.raises(RuntimeError, match=r"balls 0 and 1 overlap by 0.15 m"):
+        row.step(1e-3)
+
+
+def test_an_engine_that_ignores_impulses_is_no_endless_loop(monkeypatch):
+    monkeypatch.setattr("cradle.row._MOST_IMPACTS", 5)
+    bodies = Free([[0, 0], [0.2, 0]], [[1, 0], [0, 0]], [1, 1])
+    bodies.push = lambda *_: None
+    row = Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS)
+    with pytest.raises(RuntimeError, match=r"more than 5 impacts in a step of 0\.01 s"):
+        row.step(0.01)
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, math.nan])
+def test_a_step_takes_time(duration: float):
+    row = hung(Hanging([0.0, 0.0]))
+    with pytest.raises(ValueError, match=r"duration = .*; must be above 0"):
+        row.step(duration)

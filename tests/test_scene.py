@@ -1,0 +1,271 @@
+"""A minute of a cradle: the judge, the stored tables, and what two chapters say of them."""
+
+import csv
+import importlib.util
+import math
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chapters import Chapter
+
+from cradle import Chain, SpringChain, collide
+
+ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "benchmarks"))
+pytest.importorskip("numba", reason="the judge of the scene is compiled by numba")
+import cradle_scenes as scenes  # noqa: E402
+from measure import versions  # noqa: E402
+
+# Box2D's bindings, made by SWIG, warn when they are imported.
+pytestmark = pytest.mark.filterwarnings("ignore:builtin type:DeprecationWarning")
+ENGINES = [engine.name for engine in scenes.ENGINES]
+HERTZ = ("Hertz springs", "alone", "steel")
+AT = (1, 5, 20, 50)
+
+
+@cache
+def stored(name):
+    with (ROOT / "data" / f"scene_{name}.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+@cache
+def run(name, how, setting, pulled=1, gap="0"):
+    """Energies of the balls after each stroke, shape (S, 5)."""
+    key = (name, how, setting, str(pulled), gap)
+    names = ("run", "how", "setting", "pulled", "gap")
+    rows = [row for row in stored("strokes") if tuple(row[k] for k in names) == key]
+    assert [int(row["stroke"]) for row in rows] == list(range(1, len(rows) + 1)), key
+    return np.array([[float(row[f"ball{k}"]) for k in range(1, 6)] for row in rows])
+
+
+def misplaced(found, pulled):
+    """Part of the energy on another ball than with Hertz springs, at the strokes of the table."""
+    shares = [e[np.array(AT) - 1] for e in (found, run(*HERTZ, pulled))]
+    one, other = (e / e.sum(axis=1, keepdims=True) for e in shares)
+    return 0.5 * np.abs(one - other).sum(axis=1)
+
+
+# The judge.
+
+
+def test_the_judge_is_as_stiff_as_it_says():
+    """A contact of two balls at the first stroke lasts as long as that of steel balls."""
+    speed = 2 * math.sqrt(9.81) * math.sin(scenes.ANGLE / 2)
+    depth = scenes.STEEL * speed / 2.9432
+    springs = SpringChain(0.625 * speed**2 / depth**2.5)
+    impact = collide(Chain([1, 1], [speed, 0]), springs)
+    assert impact.durations[0] == pytest.approx(scenes.STEEL, rel=1e-3)
+    # Of a steel cradle ten times smaller: Hertz's contact of two spheres of 33 g, E = 210 GPa.
+    mass, radius, modulus = 0.033 / 2, 0.01 / 2, 210e9 / (2 * (1 - 0.3**2))
+    slow = speed / math.sqrt(10)
+    lasts = 2.87 * (mass**2 / (radius * modulus**2 * slow)) ** 0.2
+    assert lasts * math.sqrt(10) == pytest.approx(scenes.STEEL, rel=0.05)
+
+
+def test_the_judge_repeats_what_is_stored_and_keeps_the_energy():
+    times, angles, rates = scenes.on_springs(2, 4.5)
+    found = scenes.strokes(angles, rates)
+    assert len(found) == 4
+    np.testing.assert_allclose(found, run(*HERTZ, 2)[:4], atol=1e-4)
+    total = scenes.energies(angles, rates).sum(axis=1)
+    assert np.abs(total - 1).max() < 1e-4
+    assert times[-1] == 4.5
+
+
+@pytest.mark.parametrize("pulled", [1, 2])
+def test_two_routes_to_elastic_spheres(pulled: int):
+    """Contacts in time, and contacts in no time by the package: the same balls move."""
+    judge = run(*HERTZ, pulled)
+    np.testing.assert_allclose(run("swing", "alone", "springs", pulled), judge, atol=0.02)
+    np.testing.assert_allclose(
+        run("Hertz springs", "alone", "half the step", pulled), judge, atol=2e-3
+    )
+    np.testing.assert_allclose(judge.sum(axis=1), 1, atol=5e-4)
+
+
+def test_a_stroke_is_told_by_the_mean():
+    """Free pendulums: as many strokes as half periods, and the energies of the release."""
+    times = np.arange(0, 20, 1 / 60)
+    one = 0.01 * np.cos(scenes.FREQUENCY * times)
+    angles = np.column_stack([one, 0 * one, 0 * one, 0 * one, 2 * one])
+    rates = np.gradient(angles, times, axis=0)
+    found = scenes.strokes(angles, rates)
+    assert len(found) == int(20 * scenes.FREQUENCY / math.pi - 0.5)
+    np.testing.assert_allclose(found, [[0.2, 0, 0, 0, 0.8]] * len(found), atol=2e-3)
+
+
+# The tables.
+
+
+def test_the_tables_are_complete():
+    for name in ENGINES:
+        for setting in ("default", "refined"):
+            for pulled in (1, 2):
+                assert len(run(name, "mended", setting, pulled)) in (58, 59)
+                for gap in ("0", "0.01"):
+                    found = run(name, "as it is", setting, pulled, gap)
+                    assert len(found) in (58, 59) or found[-1].sum() > scenes.WILD
+            assert len(run(name, "no impacts", setting, 5)) in (58, 59)
+    assert len(run("swing", "alone", "ratio")) == len(run(*HERTZ)) == 58
+    numbers = np.array([[float(row[f"ball{k}"]) for k in range(1, 6)] for row in stored("strokes")])
+    assert np.isfinite(numbers).all()
+    assert numbers.min() >= 0
+
+
+@pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
+@pytest.mark.parametrize(("how", "mend"), [("as it is", False), ("mended", True)])
+def test_an_engine_repeats_what_is_stored(engine, how, mend):
+    """Same version, same strokes; another one is asked only for what the row promises."""
+    if engine.name in scenes.absent():
+        pytest.skip(scenes.absent()[engine.name])
+    _, angles, rates = scenes.in_engine(engine, "default", 1, mend=mend, duration=5.6)
+    found, expected = scenes.strokes(angles, rates), run(engine.name, how, "default")
+    assert len(found) == 5
+    (version,) = {row["version"] for row in stored("costs") if row["run"] == engine.name}
+    if version.startswith(versions(engine.distribution).split("; ")[0]):
+        np.testing.assert_allclose(found, expected[:5], atol=1e-3)
+    if mend:
+        share = found / found.sum(axis=1, keepdims=True)
+        np.testing.assert_allclose(share, run("swing", "alone", "ratio")[:5], atol=0.03)
+
+
+def test_swing_repeats_what_is_stored():
+    _, angles, rates = scenes.by_swing(1, 5.6)
+    found = scenes.strokes(angles, rates)
+    np.testing.assert_allclose(found, run("swing", "alone", "ratio")[:5], atol=1e-4)
+
+
+def test_the_film_shows_what_the_table_says():
+    for name, how in (("Chipmunk", "as it is"), ("Rapier", "mended"), ("Hertz springs", "alone")):
+        rows = [row for row in stored("film") if (row["run"], row["how"]) == (name, how)]
+        angles = np.radians([[float(row[f"ball{k}"]) for k in range(1, 6)] for row in rows])
+        times = np.array([float(row["time"]) for row in rows])
+        assert times[-1] >= 11
+        np.testing.assert_allclose(np.diff(times), 1 / 30, atol=0.02)
+        setting = "steel" if how == "alone" else "default"
+        found = scenes.strokes(angles, np.gradient(angles, times, axis=0))
+        np.testing.assert_allclose(found[:9], run(name, how, setting)[:9], atol=0.03)
+
+
+def test_a_row_at_rest_costs_at_most_as_much_again():
+    """Measured with steps of a millisecond, nothing refined: within twice the engine's own cost."""
+    rows = [row for row in stored("costs") if row["how"] == "mended"]
+    rest = {row["run"]: float(row["over_as_it_is"]) for row in rows
+            if row["setting"] == "fine" and row["pulled"] == "0"}  # fmt: skip
+    assert set(rest) == set(ENGINES)
+    assert max(rest.values()) < 2
+    assert len(rows) == 5 * 3 * 2
+
+
+def test_absent_engines_are_named_and_skipped(monkeypatch):
+    find = importlib.util.find_spec
+    hidden = {engine.module for engine in scenes.ENGINES}
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *a: None if name in hidden else find(name, *a)
+    )
+    missing = scenes.absent()
+    assert list(missing) == ENGINES
+    assert all("is not installed" in reason for reason in missing.values())
+    rows = list(scenes.costs(missing, repeats=1, seconds=0.1))
+    assert [row["run"] for row in rows] == ["Hertz springs"]
+    assert rows[0]["over_swing"] > 0
+
+
+# What the chapters say.
+
+
+def test_the_ratio_is_that_of_elastic_spheres():
+    with (ROOT / "data" / "implied_ratio.csv").open(encoding="utf-8") as file:
+        (row,) = [row for row in csv.DictReader(file) if list(row.values())[:4] == ["1.5", *"111"]]
+    assert pytest.approx(float(row["ratio"]), abs=5e-5) == scenes.RATIO
+    assert Chapter("recipe").glued["ratio"] == f"{scenes.RATIO:.2f}"
+    for path in (ROOT / "examples").glob("*.py"):
+        assert f"ImpulseCorrelation({scenes.RATIO})" in path.read_text(encoding="utf-8")
+
+
+def test_bullet_gains_by_its_correction_of_overlaps():
+    bullet = scenes.ENGINES[2]
+    if bullet.name in scenes.absent():
+        pytest.skip(scenes.absent()[bullet.name])
+    gain = []
+    for options in ({}, {"contactERP": 0.0}):
+        changed = replace(bullet, default=scenes.Setting(1 / 240, options))
+        _, angles, rates = scenes.in_engine(changed, "default", 1, mend=False, duration=5.6)
+        gain.append(scenes.strokes(angles, rates)[-1].sum())
+    assert gain[0] > 2
+    assert gain[1] == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("pulled", [1, 2])
+def test_with_the_row_all_engines_do_what_spheres_do(pulled: int):
+    worst = max(misplaced(run(name, "mended", "refined", pulled), pulled).max() for name in ENGINES)
+    ideal = misplaced(run("swing", "alone", "ratio", pulled), pulled).max()
+    assert worst < ideal + 0.02
+    told = Chapter("scene").glued[{1: "mended-one", 2: "mended-two"}[pulled]]
+    assert float(told) == pytest.approx(worst, abs=0.006)
+    for name in ENGINES:
+        own = run(name, "as it is", "refined", pulled)
+        assert misplaced(own, pulled).max() > 3 * worst, name
+
+
+def test_what_a_mended_cradle_loses_its_pendulums_lose_alone():
+    for setting, most in (("default", 0.03), ("refined", 0.02)):
+        for name in ENGINES:
+            alone = run(name, "no impacts", setting, 5)[-1].sum()
+            for pulled in (1, 2):
+                kept = run(name, "mended", setting, pulled)[-1].sum()
+                assert alone - most < kept < alone + 0.01, (name, setting, pulled)
+
+
+def test_what_the_engines_do_alone():
+    end = {name: run(name, "as it is", "default")[-1].sum() for name in ENGINES}
+    assert end["Bullet"] > scenes.WILD
+    assert end["MuJoCo"] > 1.5
+    assert end["Box2D"] < 0.2 + 0.01
+    assert end["Rapier"] < 0.2 + 0.01
+    glued = Chapter("scene").glued
+    assert float(glued["box"]) == pytest.approx(end["Box2D"], abs=0.006)
+    assert int(glued["wild"]) == len(run("Bullet", "as it is", "default"))
+    # One fifth: all balls swing together, with the momentum of one.
+    assert run("Box2D", "as it is", "refined")[-1] == pytest.approx(0.2 * 0.2, abs=2e-3)
+
+
+def test_gaps_give_the_school_book_first_and_not_for_ever():
+    for name in ("Chipmunk", "Box2D", "Bullet"):
+        found = run(name, "as it is", "refined", 1, "0.01")
+        assert found[0, 4] > 0.97, name
+        assert (found[:, [0, 4]].sum(axis=1) / found.sum(axis=1)).min() < 0.95, name
+
+
+@pytest.mark.parametrize("name", ["pymunk", "box2d", "bullet", "rapier", "mujoco"])
+def test_the_recipe_shows_the_tested_programs(name: str):
+    (output,) = Chapter("recipe").cells[f"recipe-{name}"].outputs
+    text = (ROOT / "examples" / f"{name}_cradle.py").read_text(encoding="utf-8")
+    assert output.data["text/markdown"] == f"```python\n{text}```"
+
+
+def test_the_figures_draw_the_tables():
+    figures = Chapter("scene").figures
+    axes = figures["fig-scene-energy"].axes
+    for axis, name in zip(axes, ENGINES):
+        assert axis.get_title() == name
+        drawn = {line.get_label(): line.get_ydata() for line in axis.get_lines()}
+        for label, key in {
+            "as it is, default": ("as it is", "default"),
+            "refined, gaps": ("as it is", "refined", 1, "0.01"),
+            "with the row, refined": ("mended", "refined"),
+            "pendulums alone, default": ("no impacts", "default", 5),
+        }.items():
+            np.testing.assert_allclose(drawn[label], run(name, *key).sum(axis=1))
+    strips = figures["fig-scene-who"].axes
+    assert strips[0].get_title(loc="left") == "elastic spheres (Hertz)"
+    image = strips[0].get_images()[0].get_array()
+    np.testing.assert_allclose(image**2, run(*HERTZ).T, atol=1e-12)
+    assert strips[3].get_title(loc="left") == "Chipmunk with the row"
+    image = strips[3].get_images()[0].get_array()
+    np.testing.assert_allclose(image**2, run("Chipmunk", "mended", "default").T, atol=1e-12)
