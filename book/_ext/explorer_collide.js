@@ -1,0 +1,212 @@
+// One impact: what is asked of input, the event loop's work area, the outcome.
+
+const KINDS = ["maximum_compression", "end", "close", "collapse"];
+const DEFECTS = {
+  [NO_EVENT]: "no event follows, though contacts are active",
+  [MOMENTUM]: "a ball's momentum is not that of its impulses",
+  [ORDER]: "balls still approach",
+  [ENERGY]: "kinetic energy has grown",
+  [LEDGER]: "the energy lost is not what the contacts keep back",
+};
+// Steps after which an impact is given up, unless told otherwise: some tenths of a second.
+const MAX_EVENTS = 100000;
+const POSITIVE = Number.MIN_VALUE;
+const ENDLESS = 2 ** 53;
+
+// Largest admissible ratio at each inner ball, forward (Eq. 53) and backward (its mirror image). The
+// bound needs the ratio at the next ball; at 0, the last one's, it is Eq. 34.
+function largestRatios(masses, forward = 0, backward = 0) {
+  const m = checkedMasses(masses);
+  const inner = m.length - 2;
+  const [f, b] = [checkedRatios("forward", forward, inner), checkedRatios("backward", backward, inner)];
+  const bounds = { forward: [], backward: [] };
+  for (let i = 0; i < inner; i += 1) {
+    const [onward, back] = [i + 1 < inner ? f[i + 1] : 0, i > 0 ? b[i - 1] : 0];
+    bounds.forward.push(1 / (1 + (m[i + 1] / m[i + 2]) * (1 - onward)));
+    bounds.backward.push(1 / (1 + (m[i + 1] / m[i]) * (1 - back)));
+  }
+  return bounds;
+}
+
+// The largest ratio that all inner balls may have both ways. Where the next ball has it too, Eq. 53
+// says r (1 + q (1 - r)) <= 1 with q = m_i / m_next, so q r <= 1.
+function largestCommonRatio(masses) {
+  const m = checkedMasses(masses);
+  let largest = 1;
+  for (const way of [m, [...m].reverse()]) {
+    for (let i = 1; i + 1 < m.length; i += 1) {
+      const q = way[i] / way[i + 1];
+      largest = Math.min(largest, i + 2 < m.length ? 1 / q : 1 / (1 + q));
+    }
+  }
+  return largest;
+}
+
+function checkedMasses(masses) {
+  const m = row("masses", masses, undefined, "must be above 0", POSITIVE);
+  if (m.length < 2 || !(Array.isArray(masses) || ArrayBuffer.isView(masses))) {
+    throw new Error("masses must be a row of two or more numbers");
+  }
+  return m;
+}
+
+function checkedRatios(name, ratios, inner) {
+  const values = row(name, ratios, inner, "must lie in [0, 1]", 0, 1);
+  if (values.length !== inner) {
+    throw new Error(`${name} has ${values.length} values; ${inner + 2} balls need ${inner}, or one number`);
+  }
+  return values;
+}
+
+// Return a chain and its model as the event loop wants them, or throw.
+function checkedImpact(given) {
+  const m = checkedMasses(given.masses);
+  const n = m.length;
+  const heaviest = Math.max(...m);
+  const light = m.findIndex((mass) => mass < LIMITS.lightest * heaviest);
+  if (light >= 0) {
+    throw new Error(
+      `masses[${light}] = ${shown(m[light])}; for this model it must be at least ` +
+        `${shown(LIMITS.lightest)} of the heaviest ball of its chain`,
+    );
+  }
+  const v = row("velocities", given.velocities);
+  if (v.length !== n) throw new Error(`velocities has ${v.length} values; ${n} masses need ${n}`);
+  refuseOverflow(m, v);
+  const e = row("restitution", given.restitution ?? 1, n - 1, "must lie in [0, 1]", 0, 1);
+  const least = LIMITS.least_restitution;
+  const small = e.findIndex((value) => value > 0 && value < least);
+  if (small >= 0) {
+    const here = typeof given.restitution === "number" ? "" : `[${small}]`;
+    throw new Error(`restitution${here} = ${shown(e[small])}; must be 0 or at least ${shown(least)}`);
+  }
+  if (e.length !== n - 1) {
+    throw new Error(`restitution has ${e.length} values; ${n} balls need ${n - 1}, or one number`);
+  }
+  const forward = checkedRatios("forward", given.forward, n - 2);
+  const backward = checkedRatios("backward", given.backward ?? given.forward, n - 2);
+  const meeting = one("meeting", given.meeting ?? 0.5, "must lie in [0, 1]", 0, 1);
+  if (!(given.saturate ?? true)) refuseExcess(m, forward, backward);
+  return { m, v, e, forward, backward, meeting };
+}
+
+function refuseOverflow(m, v) {
+  const sum = (term) => m.reduce((total, mass, i) => total + term(mass, v[i]), 0);
+  const energy = sum((mass, speed) => mass * speed * speed);
+  const momentum = 2 * sum((mass, speed) => mass * Math.abs(speed));
+  if (Number.isFinite(energy) && Number.isFinite(momentum)) return;
+  const sizes = v.map(Math.abs);
+  const at = sizes.indexOf(Math.max(...sizes));
+  const what = Number.isFinite(energy) ? "momentum" : "kinetic energy";
+  throw new Error(`velocities[${at}] = ${shown(v[at])}; ${what} overflows: choose larger units`);
+}
+
+function refuseExcess(m, forward, backward) {
+  const bounds = largestRatios(m, forward, backward);
+  for (const [name, ratios, mirrored] of [["forward", forward, ""], ["backward", backward, ", mirrored"]]) {
+    const at = ratios.findIndex((ratio, i) => ratio > bounds[name][i] * LIMITS.rounded);
+    if (at < 0) continue;
+    const bound = shown(Number(bounds[name][at].toPrecision(6))).replace(/\.0$/, "");
+    throw new Error(
+      `${name}[${at}] = ${shown(ratios[at])}; at ball ${at + 1}, counted from 0, it must not exceed ` +
+        `${bound} (Eq. 53${mirrored}): a larger ratio would make a contact pull; ` +
+        "excess='saturate' holds the contact closed instead",
+    );
+  }
+}
+
+const zeros = (size) => Array(size).fill(0);
+const made = (size, make) => Array.from({ length: size }, make);
+const NO_RECORD = Record([], [], [], []);
+const areas = new Map();
+
+// The work area for n balls, kept for the next impact. Of the last one nothing is read but `until`,
+// by `segment`, of a contact that waits: so that is as in a new area.
+function area(n) {
+  if (!areas.has(n)) {
+    const memory = made(2, () => made(n, Memory));
+    const things = [made(n, Ball), made(n, Contact), made(n, Run), made(2, Level), memory, [Tally()]];
+    areas.set(n, State(...things, NO_RECORD));
+  }
+  for (const contact of areas.get(n).contact) contact.until = 0;
+  return areas.get(n);
+}
+
+// Make room in a record for more events than one round can write: each contact may end, close,
+// collapse and pass its maximum.
+function makeRoom(state, n) {
+  const { kinds, contacts, velocities, impulses } = state.record;
+  const [spare, room] = [5 * n, max(2 * kinds.length, 64 + 5 * n)];
+  while (kinds.length < room) {
+    kinds.push(0);
+    contacts.push(0);
+  }
+  while (velocities.length <= room) {
+    velocities.push(zeros(n));
+    impulses.push(zeros(n - 1));
+  }
+  state.tally[0].room = room - spare;
+}
+
+// Solve an impact that has been checked.
+function solved(chain, maxEvents, recorded) {
+  const n = chain.m.length;
+  const state = area(n);
+  const tally = state.tally[0];
+  state.record = recorded ? Record([], [], [], []) : NO_RECORD;
+  tally.room = ENDLESS;
+  if (recorded) makeRoom(state, n);
+  const { m, v, e, forward, backward, meeting } = chain;
+  const out = Outputs([zeros(n)], [zeros(n - 1)], [0], zeros(n - 1), zeros(n - 1), zeros(n - 1));
+  const inputs = Inputs([m], [v], [e], [forward], [backward]);
+  // The closed form would do for two or three balls, but differs in the last digit: one way for all.
+  const options = Options(meeting, maxEvents, false, true);
+  let status = FINISHED;
+  for (let resumed = false; ; resumed = true) {
+    status = batch(0, resumed, n, inputs, options, out, state, ENDLESS)[1];
+    if (status !== PAUSED) break;
+    makeRoom(state, n);
+  }
+  state.record.velocities[0] = [...v];
+  return { status, state, out };
+}
+
+// Return the outcome of an impact, with `events`, `path` and `pathImpulses` if `record` is true.
+function collide(given) {
+  const recorded = given.record ?? true;
+  const limit = given.maxEvents ?? MAX_EVENTS;
+  if (!(Number.isInteger(limit) && limit >= 1)) {
+    throw new Error(`max_events = ${limit}; must be a whole number, at least 1`);
+  }
+  const { status, state, out } = solved(checkedImpact(given), limit, recorded);
+  const tally = state.tally[0];
+  if (status === UNSOUND || status === REFUSED) {
+    // No number of such an outcome is worth anything.
+    const defect = status === UNSOUND ? DEFECTS[tally.defect] : "the event loop refused the input";
+    return { status: "unsound", defect };
+  }
+  const result = {
+    status: status === FINISHED ? "finished" : "unfinished",
+    velocities: out.v[0],
+    impulses: out.p,
+    absorbed: out.a,
+    collisions: out.hits[0],
+    collapsed: out.collapsed[0] === 1,
+    saturated: out.held.flatMap((held, c) => (held ? [c] : [])),
+    margin: tally.margin,
+    eventCount: tally.events,
+  };
+  if (recorded) {
+    const { kinds, contacts, velocities, impulses } = state.record;
+    result.events = contacts.slice(0, tally.events).map((contact, k) => ({ kind: KINDS[kinds[k]], contact }));
+    result.path = velocities.slice(0, tally.events + 1);
+    result.pathImpulses = impulses.slice(0, tally.events + 1);
+    state.record = NO_RECORD;
+  }
+  return result;
+}
+
+// The same without a record: for sweeps and maps.
+function outcome(given) {
+  return collide({ ...given, record: false });
+}

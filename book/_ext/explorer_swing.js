@@ -1,0 +1,1 @@
+globalThis.cradle = { collide, outcome, largestRatios, largestCommonRatio, shown };
