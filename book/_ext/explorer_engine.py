@@ -23,7 +23,7 @@ from sphinx.application import Sphinx
 from cradle import runtime
 
 #: Hand-written parts, beside this file: before the event loop, and after it.
-PARTS = ("explorer_numbers.js",), ("explorer_collide.js", "explorer_swing.js")
+PARTS = ("explorer_numbers.js",), ("explorer_collide.js", "explorer_flight.js", "explorer_swing.js")
 #: The script in the built book.
 SCRIPT = "_static/cradle_engine.js"
 
