@@ -2,8 +2,8 @@
 
 `cradle.runtime.unit` joins the rooms of the kernel to one plain source: functions of numbers,
 loops, sequences and records. This module writes that source out as JavaScript, statement by
-statement, between hand-written parts (`PARTS`). Both languages count in the same doubles, so the
-script's answers are those of Python, to the last bit (tests/test_explorer_engine.py).
+statement, between hand-written parts (`engine_*.js`). Both languages count in the same doubles, so
+the script's answers are those of Python, to the last bit (tests/test_explorer_engine.py).
 
 It knows what the kernel is made of and refuses anything else. What looks alike in the two languages
 and means something else is not passed on as it stands:
@@ -15,6 +15,8 @@ and means something else is not passed on as it stands:
 """
 
 import ast
+import re
+from collections import Counter
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -23,9 +25,12 @@ from sphinx.application import Sphinx
 from cradle import runtime
 
 #: Hand-written parts, beside this file: before the event loop, and after it.
-PARTS = ("explorer_numbers.js",), ("explorer_collide.js", "explorer_flight.js", "explorer_swing.js")
+PARTS = (
+    ("engine_numbers.js",),
+    ("engine_collide.js", "engine_flight.js", "engine_swing.js"),
+)
 #: The script in the built book.
-SCRIPT = "_static/cradle_engine.js"
+SCRIPT = "_static/explorer_engine.js"
 
 OPERATORS: dict[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/",
@@ -38,12 +43,6 @@ PURE = {
     "abs": "Math.abs", "max": "max", "min": "min", "sqrt": "Math.sqrt", "log": "Math.log",
     "frexp": "frexp", "ldexp": "ldexp",
 }  # fmt: skip
-#: Words that JavaScript keeps to itself and Python does not.
-RESERVED = set(
-    "arguments await case catch const debugger default delete do enum eval export extends function "
-    "implements instanceof interface let new null package private protected public static super "
-    "switch this throw typeof var void true false".split()
-)
 
 
 def refuse(node: ast.AST, why: str) -> NoReturn:
@@ -58,12 +57,17 @@ def indented(lines: list[str]) -> list[str]:
 
 def constant(node: ast.expr) -> str | None:
     """Return what an expression of constants is worth, as JavaScript writes it; None for others."""
-    if any(isinstance(part, ast.Name | ast.Attribute | ast.Tuple) for part in ast.walk(node)):
+    if any(
+        isinstance(part, ast.Name | ast.Attribute | ast.Tuple)
+        for part in ast.walk(node)
+    ):
         return None
     value = eval(ast.unparse(node), {})
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, float) or (isinstance(value, int) and abs(value) <= 2**53):
+    if isinstance(value, float) or (
+        isinstance(value, int) and abs(value) <= 2**53
+    ):
         return repr(value).removesuffix(".0")
     refuse(node, "a constant that is no double")
 
@@ -80,7 +84,9 @@ def expression(node: ast.expr) -> str:
             return "Infinity"
         case ast.Attribute(owner, name):
             return f"{expression(owner)}.{name}"
-        case ast.Subscript(owner, index) if not isinstance(index, ast.Slice | ast.UnaryOp):
+        case ast.Subscript(owner, index) if not isinstance(
+            index, ast.Slice | ast.UnaryOp
+        ):
             return f"{expression(owner)}[{expression(index)}]"
         case ast.Tuple(parts):
             return f"[{', '.join(map(expression, parts))}]"
@@ -101,17 +107,23 @@ def expression(node: ast.expr) -> str:
     refuse(node, f"{type(node).__name__} is not translated")
 
 
-def comparison(node: ast.Compare, sides: list[ast.expr], operators: list[ast.cmpop]) -> str:
+def comparison(
+    node: ast.Compare, sides: list[ast.expr], operators: list[ast.cmpop]
+) -> str:
     """Return a comparison, a chain of them as pairs."""
     for side in sides[1:-1]:
         for part in ast.walk(side):
             if isinstance(part, ast.Call) and called(part.func) not in PURE:
                 refuse(node, "a call in the middle would be made twice")
     pairs = []
-    for left, op, right in zip(sides[:-1], operators, sides[1:], strict=True):
+    for left, op, right in zip(
+        sides[:-1], operators, sides[1:], strict=True
+    ):
         if type(op) not in OPERATORS:
             refuse(node, "not a comparison of numbers")
-        pairs.append(f"{expression(left)} {OPERATORS[type(op)]} {expression(right)}")
+        pairs.append(
+            f"{expression(left)} {OPERATORS[type(op)]} {expression(right)}"
+        )
     return f"({' && '.join(pairs)})"
 
 
@@ -156,10 +168,18 @@ def loop(node: ast.For) -> list[str]:
     target, body = expression(node.target), indented(block(node.body))
     match node.iter:
         case ast.Tuple():
-            return [f"for ({target} of {expression(node.iter)}) {{", *body, "}"]
+            return [
+                f"for ({target} of {expression(node.iter)}) {{",
+                *body,
+                "}",
+            ]
         case ast.Call(ast.Name("range"), limits, []):
             given = [expression(limit) for limit in limits]
-            start, stop, step = {1: ["0", *given, "1"], 2: [*given, "1"], 3: given}[len(given)]
+            start, stop, step = {
+                1: ["0", *given, "1"],
+                2: [*given, "1"],
+                3: given,
+            }[len(given)]
             if step not in ("1", "-1"):
                 refuse(node.iter, "a step other than 1 and -1")
             more, move = ("<", "++") if step == "1" else (">", "--")
@@ -174,12 +194,23 @@ def statement(node: ast.stmt) -> list[str]:
         case ast.Assign(targets, value):
             return assignment(targets, value)
         case ast.AugAssign(target, op, value) if type(op) in OPERATORS:
-            return [f"{expression(target)} {OPERATORS[type(op)]}= {expression(value)};"]
+            return [
+                f"{expression(target)} {OPERATORS[type(op)]}= {expression(value)};"
+            ]
         case ast.If(test, body, other):
             rest = ["} else {", *indented(block(other))] if other else []
-            return [f"if ({expression(test)}) {{", *indented(block(body)), *rest, "}"]
+            return [
+                f"if ({expression(test)}) {{",
+                *indented(block(body)),
+                *rest,
+                "}",
+            ]
         case ast.While(test, body, []):
-            return [f"while ({expression(test)}) {{", *indented(block(body)), "}"]
+            return [
+                f"while ({expression(test)}) {{",
+                *indented(block(body)),
+                "}",
+            ]
         case ast.For(orelse=[]):
             return loop(node)
         case ast.Return(value):
@@ -206,11 +237,13 @@ def function(node: ast.FunctionDef) -> list[str]:
         for part in ast.walk(node)
         if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)
     }
-    for name in {*given, *stored} & RESERVED:
-        refuse(node, f"{name} is a word of JavaScript")
     names = sorted({"$parts", *stored} - set(given))
     head = f"function {node.name}({', '.join(given)}) {{"
-    return [head, *indented([f"let {', '.join(names)};", *block(node.body)]), "}"]
+    return [
+        head,
+        *indented([f"let {', '.join(names)};", *block(node.body)]),
+        "}",
+    ]
 
 
 def record(node: ast.ClassDef) -> list[str]:
@@ -218,15 +251,19 @@ def record(node: ast.ClassDef) -> list[str]:
     names = [field.target.id for field in node.body]
     if node.bases:
         inside = ", ".join(names)
-        return [f"function {node.name}({inside}) {{", f" return {{{inside}}};", "}"]
+        return [
+            f"function {node.name}({inside}) {{",
+            f" return {{{inside}}};",
+            "}",
+        ]
     inside = ", ".join(f"{name}: 0" for name in names)
     return [f"function {node.name}() {{", f" return {{{inside}}};", "}"]
 
 
 def translate(source: str) -> str:
-    """Return a kernel's source as JavaScript.
+    r"""Return a kernel's source as JavaScript.
 
-    >>> print(translate("def twice(x):\\n    return 2.0 * x"))
+    >>> print(translate("def twice(x):\n    return 2.0 * x"))
     function twice(x) {
      let $parts;
      return (2 * x);
@@ -242,10 +279,15 @@ def translate(source: str) -> str:
             case ast.ClassDef():
                 lines += record(node)
             case ast.Assign([ast.Name(name)], ast.Call(_, [], parts)):
-                inside = ", ".join(f"{part.arg}: {expression(part.value)}" for part in parts)
+                inside = ", ".join(
+                    f"{part.arg}: {expression(part.value)}"
+                    for part in parts
+                )
                 lines.append(f"const {name} = {{{inside}}};")
             case ast.Assign([target], value):
-                lines.append(f"const {expression(target)} = {expression(value)};")
+                lines.append(
+                    f"const {expression(target)} = {expression(value)};"
+                )
             case _:
                 refuse(node, f"{type(node).__name__} is not translated")
     return "\n".join(lines)
@@ -254,12 +296,24 @@ def translate(source: str) -> str:
 def engine() -> str:
     """Return the whole script: one function that is called at once and leaves the name `cradle`."""
     before, after = (
-        [(Path(__file__).parent / name).read_text(encoding="utf-8") for name in names]
+        [
+            (Path(__file__).parent / name).read_text(encoding="utf-8")
+            for name in names
+        ]
         for names in PARTS
     )
-    loop = "// The event loop of the package cradle, translated.\n" + translate(runtime.unit())
-    parts = ["(function () {", '"use strict";', *before, loop, *after, "})();"]
-    return "\n".join(parts) + "\n"
+    loop = (
+        "// The event loop of the package cradle, translated.\n"
+        + translate(runtime.unit())
+    )
+    inside = "\n".join([*before, loop, *after])
+    # In one room a second function of a name would replace the first without a word.
+    names = Counter(re.findall(r"^function (\w+)", inside, re.MULTILINE))
+    if names.most_common(1)[0][1] > 1:
+        raise ValueError(
+            f"function {names.most_common(1)[0][0]} is there twice"
+        )
+    return f'(function () {{\n"use strict";\n{inside}}})();\n'
 
 
 def write_engine(app: Sphinx, exception: Exception | None) -> None:

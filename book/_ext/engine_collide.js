@@ -44,10 +44,10 @@ function largestCommonRatio(masses) {
 
 function checkedMasses(masses) {
   const m = row("masses", masses, undefined, "must be above 0", POSITIVE);
-  if (m.length < 2 || !(Array.isArray(masses) || ArrayBuffer.isView(masses))) {
-    throw new Error("masses must be a row of two or more numbers");
-  }
-  return m;
+  if (m.length > 1) return m;
+  throw new Error(
+    `masses has shape ${shape(masses)}; a chain needs (N,) with N >= 2: one row of two or more numbers`,
+  );
 }
 
 function checkedRatios(name, ratios, inner) {
@@ -71,7 +71,12 @@ function checkedImpact(given) {
     );
   }
   const v = row("velocities", given.velocities);
-  if (v.length !== n) throw new Error(`velocities has ${v.length} values; ${n} masses need ${n}`);
+  if (v.length !== n || typeof given.velocities === "number") {
+    throw new Error(
+      `velocities has shape ${shape(given.velocities)}; ${n} masses need (${n},): ` +
+        `one velocity for each of ${n} balls`,
+    );
+  }
   refuseOverflow(m, v);
   const e = row("restitution", given.restitution ?? 1, n - 1, "must lie in [0, 1]", 0, 1);
   const least = LIMITS.least_restitution;
@@ -81,7 +86,10 @@ function checkedImpact(given) {
     throw new Error(`restitution${here} = ${shown(e[small])}; must be 0 or at least ${shown(least)}`);
   }
   if (e.length !== n - 1) {
-    throw new Error(`restitution has ${e.length} values; ${n} balls need ${n - 1}, or one number`);
+    throw new Error(
+      `restitution has shape ${shape(given.restitution)}; ${n} balls need () or (${n - 1},): ${n} balls ` +
+        `have ${n === 2 ? "1 contact" : `${n - 1} contacts`}, restitution needs one number or ${n - 1}`,
+    );
   }
   const forward = checkedRatios("forward", given.forward, n - 2);
   const backward = checkedRatios("backward", given.backward ?? given.forward, n - 2);

@@ -72,6 +72,11 @@ function row(name, given, size, rule = "must be finite", low = -Infinity, high =
   return values;
 }
 
+// Return the shape of what should be a row, as Python prints it.
+function shape(given) {
+  return typeof given === "number" ? "()" : `(${given.length},)`;
+}
+
 // Return one number within limits.
 function one(name, given, rule, low, high) {
   if (typeof given !== "number") throw new Error(`${name} = ${given}; must be one number`);

@@ -208,6 +208,11 @@ function swing(given) {
       const { impacts } = proceed(time + within, (found) => found.length > 0);
       return impacts.length ? impacts[0] : null;
     },
+    // When the next event comes, s: before it nothing but swinging happens. Null if not `within`.
+    nextEvent(within = (4 * Math.PI) / hanging.slowest) {
+      const event = status === "swinging" ? look(time + within) : null;
+      return event === null ? null : since + event.time;
+    },
     // Put a ball somewhere by hand, at rest like all others; it pushes those in its way.
     drag(ball, position, places = now().positions) {
       const at = [...places];

@@ -1,0 +1,440 @@
+"""The script of the live explorer against the package, to the last bit: V8 inside pytest."""
+
+import json
+import math
+import random
+import struct
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from families import FAMILIES, Draw, Problem, family, within_bounds
+
+from cradle import (
+    Chain,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    Pendulums,
+    collide,
+    runtime,
+    swing,
+)
+from cradle.closed_form import largest_ratios
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "book" / "_ext"))
+import explorer_engine
+
+# JSON has no -0, and 1.0 is 1 there.
+TO_JSON = 'value => JSON.stringify(value, (_, x) => Object.is(x, -0) ? "-0" : x)'
+CAUGHT = "(ask => given => { try { return ask(given); } catch (error) { return error.message; } })"
+
+
+class Script:
+    """A page's view of the engine."""
+
+    def __init__(self, source):
+        # The import of the context is late: without a wheel for a platform its tests are skipped.
+        engine = pytest.importorskip("py_mini_racer", reason="mini-racer is not installed")
+        self.context = engine.MiniRacer()
+        self.context.eval(source)
+
+    def __call__(self, function, *given):
+        """What a JavaScript function of some values returns."""
+        arguments = ", ".join(json.dumps(value) for value in given)
+        answer = self.context.eval(f"({TO_JSON})(({function})({arguments}))", timeout_sec=300)
+        return json.loads(answer)
+
+    def each(self, function, rows):
+        """What it returns for each row, or the sentence that it throws."""
+        return self(f"rows => rows.map({CAUGHT}({function}))", rows)
+
+
+@pytest.fixture(scope="module")
+def source():
+    return explorer_engine.engine()
+
+
+@pytest.fixture(scope="module")
+def script(source):
+    script = Script(source)
+    yield script
+    # Left open, its thread may keep the process alive.
+    script.context.close()
+
+
+def bits(values):
+    """Numbers as they are stored; -0.0 is not 0.0."""
+    return np.asarray(values, float).tobytes()
+
+
+def asked(problem, **options):
+    names = "masses", "velocities", "restitution", "forward", "backward", "meeting"
+    return {name: getattr(problem, name) for name in names} | options
+
+
+def check(answer, trace, status="finished"):
+    """Every field of an outcome."""
+    assert answer["status"] == status
+    for name, other in [
+        ("velocities", "velocities"),
+        ("impulses", "impulses"),
+        ("absorbed", "absorbed"),
+        ("collisions", "collisions"),
+        ("path", "path"),
+        ("pathImpulses", "path_impulses"),
+        ("margin", "margin"),
+    ]:
+        assert bits(answer[name]) == bits(getattr(trace, other)), name
+    assert answer["collapsed"] is trace.collapsed
+    assert tuple(answer["saturated"]) == trace.saturated
+    events = [(event["kind"], event["contact"]) for event in answer["events"]]
+    assert events == [tuple(event) for event in trace.events]
+    assert answer["eventCount"] == len(events)
+
+
+# Impacts
+
+
+def generic(draw, n):
+    """Any masses over six decades, velocities, coefficients with 0 and 1; ratios up to 1."""
+
+    def part():
+        return draw.choice([0.0, 1.0, draw.decimal(0, 1, 3), draw.decimal(0, 1, 3)])
+
+    masses = [draw.decimal(1, 9.99, 2) * draw.choice([0.001, 1.0, 1.0, 1000.0]) for _ in range(n)]
+    velocities = [draw.decimal(-1, 1, 3) for _ in range(n)]
+    if draw.chance(50):
+        velocities.sort(reverse=True)
+    forward, backward = ([part() for _ in range(n - 2)] for _ in range(2))
+    if draw.chance(50):
+        forward = within_bounds(masses, forward)
+        backward = within_bounds(masses[::-1], backward)[::-1]
+    restitution = [part() for _ in range(n - 1)]
+    return Problem(masses, velocities, restitution, forward, backward, draw.choice([0.0, 0.5, 1.0]))
+
+
+def problems(name, count, largest=12):
+    if name == "generic":
+        draw = Draw(53)
+        return [generic(draw, 2 + draw.below(6)) for _ in range(count)]
+    return [problem for problem in family(name, count) if len(problem.masses) <= largest]
+
+
+COUNTS = {
+    "generic": 1500,
+    "ties": 700,
+    "ties within bounds": 500,
+    "tiny ratios": 300,
+    "mixed zeros": 150,
+    "light balls": 200,
+}
+
+
+def test_every_family_is_asked():
+    assert {"generic", *FAMILIES} == set(COUNTS)
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_impacts_to_the_last_bit(script, name):
+    chains = problems(name, COUNTS[name])
+    assert len(chains) >= COUNTS[name] / 2
+    kinds = set()
+    answers = script.each("cradle.collide", [asked(chain) for chain in chains])
+    for chain, answer in zip(chains, answers):
+        trace = chain.collide()
+        check(answer, trace)
+        kinds |= {kind for kind, _ in trace.events}
+        kinds |= {"held"} if trace.saturated else set()
+    assert {"maximum_compression", "end", "close"} <= kinds
+    if name in ("generic", "ties"):
+        assert {"collapse", "held"} <= kinds
+
+
+def test_the_outcome_alone_is_the_same(script):
+    chains = problems("generic", 200)
+    rows = [asked(chain) for chain in chains]
+    for alone, answer in zip(
+        script.each("cradle.outcome", rows), script.each("cradle.collide", rows)
+    ):
+        for name in ("events", "path", "pathImpulses"):
+            del answer[name]
+        assert alone == answer
+
+
+def test_units_far_from_one(script):
+    """Powers of two up to the limits of doubles: frexp, ldexp, numbers below 2 ** -1022."""
+    chains = [
+        problem.in_units(math.ldexp(1, mass), math.ldexp(1, speed))
+        for problem in problems("generic", 40)
+        for mass, speed in [(-900, 0), (900, 0), (0, -900), (0, 400), (-500, -500), (10, -1040)]
+    ]
+    for chain, answer in zip(
+        chains, script.each("cradle.collide", [asked(chain) for chain in chains])
+    ):
+        check(answer, chain.collide())
+
+
+@pytest.mark.parametrize("limit", [1, 2, 5, 20])
+def test_unfinished_impacts(script, limit):
+    """The state reached, as Python's error holds it."""
+    chains = problems("ties", 100) + problems("generic", 100)
+    answers = script.each("cradle.collide", [asked(chain, maxEvents=limit) for chain in chains])
+    unfinished = 0
+    for chain, answer in zip(chains, answers):
+        try:
+            check(answer, chain.collide(max_events=limit))
+        except ImpactNotFinished as stopped:
+            check(answer, stopped.trace, "unfinished")
+            unfinished += 1
+    assert unfinished > 20
+
+
+def test_an_outcome_that_is_not_certified_has_no_numbers(source):
+    """If no rounding at all were allowed, the certificate would refuse this chain."""
+    assert source.count(" sound: ") == 1
+    script = Script(source.replace(" sound: ", " sound: -"))
+    answer = script("cradle.collide", {"masses": [1, 1, 1], "velocities": [1, 0, 0], "forward": 0})
+    script.context.close()
+    assert answer == {
+        "status": "unsound",
+        "defect": "a ball's momentum is not that of its impulses",
+    }
+
+
+GOOD = {
+    "masses": [1, 2, 1], "velocities": [1, 0, 0], "restitution": [1, 1], "forward": [0.1],
+    "backward": [0.1], "meeting": 0.5,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("masses", [1, 0, 1]),
+        ("masses", [1, -2.5, 1]),
+        ("masses", [1]),
+        ("masses", [1e-26, 1, 1]),
+        ("velocities", [1, 0]),
+        ("velocities", [1e200, 0, 0]),
+        ("velocities", [1e155, 0, 0]),
+        ("restitution", [1, 1.2]),
+        ("restitution", -1e-5),
+        ("restitution", 1e-40),
+        ("restitution", [0.5, 1e-40]),
+        ("restitution", [1, 1, 1]),
+        ("forward", [1.0000001]),
+        ("forward", 2),
+        ("forward", [0.1, 0.1]),
+        ("backward", [-1e-7]),
+        ("meeting", 1.5),
+        ("maxEvents", 0),
+    ],
+)
+def test_refusals_in_the_words_of_the_package(script, name, value):
+    given = GOOD | {name: value}
+    options = {"max_events": given["maxEvents"]} if "maxEvents" in given else {}
+    with pytest.raises(ValueError) as refused:
+        collide(
+            Chain(given["masses"], given["velocities"], given["restitution"]),
+            ImpulseCorrelation(
+                given["forward"], given["backward"], meeting=given["meeting"], **options
+            ),
+        )
+    assert script.each("cradle.collide", [given]) == [str(refused.value)]
+
+
+def test_what_is_no_number(script):
+    cases = {
+        "{...given, masses: [1, NaN, 1]}": "masses[1] = nan; must be finite",
+        "{...given, velocities: [1, -Infinity, 1]}": "velocities[1] = -inf; must be finite",
+        '{...given, masses: [1, "2", 1]}': "masses[1] = 2; must be a real number",
+        "{...given, forward: undefined}": "forward = undefined; must be a real number",
+        "{...given, meeting: [1]}": "meeting = 1; must be one number",
+    }
+    for given, sentence in cases.items():
+        assert script.each(f"given => cradle.collide({given})", [GOOD]) == [sentence]
+
+
+def test_ratios_above_their_bound(script):
+    """Refused in the same words, or held."""
+    seen = 0
+    chains = problems("ties", 200) + problems("generic", 200)
+    answers = script.each(
+        "cradle.outcome", [asked(chain, saturate=False) for chain in chains]
+    )
+    for chain, answer in zip(chains, answers):
+        model = ImpulseCorrelation(chain.forward, chain.backward, meeting=chain.meeting)
+        try:
+            trace = collide(Chain(chain.masses, chain.velocities, chain.restitution), model)
+        except ValueError as refused:
+            assert answer == str(refused)
+            seen += 1
+        else:
+            assert bits(answer["velocities"]) == bits(trace.velocities)
+    assert 50 < seen < 350
+
+
+def test_largest_ratios(script):
+    for chain in problems("generic", 100):
+        bounds = script("(m, f, b) => cradle.largestRatios(m, f, b)",
+                        chain.masses, chain.forward, chain.backward)  # fmt: skip
+        expected = largest_ratios(chain.masses, chain.forward, chain.backward)
+        assert bits(bounds["forward"]) == bits(expected[0])
+        assert bits(bounds["backward"]) == bits(expected[1])
+
+
+def test_largest_common_ratio(script):
+    """It is accepted by Eq. 53, and a little more is not."""
+    for chain in problems("generic", 200):
+        m = chain.masses
+        largest = script("cradle.largestCommonRatio", m)
+        if len(m) == 2:
+            assert largest == 1
+            continue
+        balls = Chain(m, [0] * len(m), 1)
+        collide(balls, ImpulseCorrelation(largest * (1 - 1e-9)))
+        with pytest.raises(ValueError, match="must not exceed|must lie in"):
+            collide(balls, ImpulseCorrelation(largest * (1 + 1e-9)))
+
+
+# Numbers
+
+
+def some_doubles(count, seed=1):
+    """Any bits: all sizes, numbers below 2 ** -1022, zeros."""
+    draw = random.Random(seed)
+    numbers = [struct.unpack("<d", draw.getrandbits(64).to_bytes(8, "little"))[0]
+               for _ in range(count)]  # fmt: skip
+    numbers += [math.ldexp(draw.getrandbits(53), -1074 - draw.getrandbits(6)) for _ in range(count)]
+    return [x for x in numbers if math.isfinite(x)] + [0.0, -0.0, 1.0, 5e-324, 2.0**1023]
+
+
+def test_frexp_and_ldexp(source):
+    # They are inside the script's one function: look at them from there.
+    script = Script(source.replace("globalThis.cradle = {", "globalThis.cradle = { frexp, ldexp,"))
+    numbers = some_doubles(2000)
+    parts = script.each("cradle.frexp", numbers)
+    assert bits(parts) == bits([math.frexp(x) for x in numbers])
+    draw = random.Random(2)
+    # Python raises where the result is too large.
+    pairs = [(x, draw.randrange(-2200, 2200)) for x in numbers]
+    pairs += [(x, draw.randrange(-1080, -1000)) for x in numbers]
+    pairs = [(x, k) for x, k in pairs if math.frexp(x)[1] + k <= 1023]
+    powers = script.each("([x, k]) => cradle.ldexp(x, k)", pairs)
+    script.context.close()
+    assert bits(powers) == bits([math.ldexp(x, k) for x, k in pairs])
+
+
+def test_numbers_as_python_prints_them(script):
+    numbers = [*some_doubles(2000), 0.1, 1e16, 1e15, 123456789.0, 1e-4, 9.999e-5, 1e22, -2.5]
+    assert script.each("cradle.shown", numbers) == [repr(float(x)) for x in numbers]
+
+
+# Translation
+
+ALIKE = {
+    "a loop keeps its own count": """
+def f(n):
+    total = 0
+    for i in range(n):
+        total = 10 * total + i
+        i += 5
+        n -= 1
+    return total, i, n
+""",
+    "the counter stays at its last value": """
+def f(n):
+    for i in range(n):
+        for j in range(n - 1, -1, -1):
+            if j == 1:
+                break
+    return i, j
+""",
+    "a shift beyond 32 bits, divisions, powers": """
+def f(n):
+    return (1 << 40) - n, -n // 2, n / 2, 2.0 ** -53 * n, -(1 << 40) // 3
+""",
+    "the first of equals": """
+def f(n):
+    return max(0.0, -0.0 * n), max(-0.0 * n, 0.0), min(0.0, -0.0 * n), max(1, n, 2), min(1, n, 2)
+""",
+    "chains of comparisons": """
+def f(n):
+    return [0 < n < 9 == (n > 3), 0 < n != n, not 1 <= n < 3 <= n][0 if n > 1 else 1]
+""".replace("[0 < n", "(0 < n").replace("][0 if n > 1 else 1]", ")"),
+    "a tuple is made before its parts are stored": """
+def f(n):
+    a, b = n, n + 1
+    a, b = b, a
+    _, c = a, b
+    return a, b, c
+""",
+    "truth values are numbers": """
+def f(n):
+    known = n > 1
+    x = y = 7 if known and n != 0 or n == 2 else 8
+    for k in (n - 1, n + 1):
+        if k == known:
+            continue
+        x += k
+    return x, y, known == 1
+""",
+}
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_what_looks_alike_means_the_same(name):
+    code = ALIKE[name].replace("math.", "")
+    names = {}
+    exec(code, names)
+    helpers = (Path(explorer_engine.__file__).parent / "engine_numbers.js").read_text("utf-8")
+    script = Script(f'"use strict";\n{helpers}\n{explorer_engine.translate(code)}')
+    for n in (1, 2, 3, 5, 8):
+        assert bits(script("f", n)) == bits(names["f"](n)), n
+    script.context.close()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "x[-1] = 2",
+        "y = x[n:]",
+        "y = x % n",
+        "y = n ** 2",
+        "y = 0 < f(x, n) < 2",
+        "y = 1 << 60",
+        "y = [n]",
+        "y = x is None",
+        "y = n in x",
+        "y = f(x, n=n)",
+        "y = x.pop()",
+        "y = 'word'",
+        "for y in x: pass",
+        "for y in range(0, n, 2): pass",
+        "while n: break\n    else: n = 1",
+        "del x",
+        "n @= x",
+        "y = lambda: 0",
+        "import os",
+        "raise ValueError",
+    ],
+)
+def test_anything_else_is_refused(line):
+    with pytest.raises(ValueError, match=r".+: "):
+        explorer_engine.translate(f"def f(x, n):\n    {line}\n    return 0")
+
+
+def test_one_name_for_one_function(monkeypatch):
+    monkeypatch.setattr(runtime, "unit", lambda: "def frexp(x):\n    return x")
+    with pytest.raises(ValueError, match="function frexp is there twice"):
+        explorer_engine.engine()
+
+
+def test_only_one_name_is_left_and_nothing_is_asked_for(source, script):
+    assert script("() => Object.keys(globalThis)") == ["cradle"]
+    for word in ("import", "export", "fetch", "Worker", "XMLHttpRequest", "http"):
+        assert f"{word}(" not in source
+        assert f"\n{word} " not in source
+    # From a file a page reads what it is told to be; plain ASCII is the same in every encoding.
+    assert source.isascii()
