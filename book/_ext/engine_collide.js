@@ -9,7 +9,7 @@ const DEFECTS = {
   [LEDGER]: "the energy lost is not what the contacts keep back",
 };
 // Steps after which an impact is given up, unless told otherwise: some tenths of a second.
-const MAX_EVENTS = 100000;
+const MAX_EVENTS = 20000;
 const POSITIVE = Number.MIN_VALUE;
 const ENDLESS = 2 ** 53;
 
@@ -123,28 +123,31 @@ function refuseExcess(m, forward, backward) {
   }
 }
 
-const zeros = (size) => Array(size).fill(0);
-const made = (size, make) => Array.from({ length: size }, make);
-const NO_RECORD = Record([], [], [], []);
-const areas = new Map();
-
-// The work area for n balls, kept for the next impact. Of the last one nothing is read but `until`,
-// by `segment`, of a contact that waits: so that is as in a new area.
-function area(n) {
-  if (!areas.has(n)) {
-    const memory = made(2, () => made(n, Memory));
-    const things = [made(n, Ball), made(n, Contact), made(n, Run), made(2, Level), memory, [Tally()]];
-    areas.set(n, State(...things, NO_RECORD));
-  }
-  for (const contact of areas.get(n).contact) contact.until = 0;
-  return areas.get(n);
+// Return a row of things; a plain loop, as this is much of the time of a short impact.
+function made(size, make) {
+  const things = [];
+  for (let k = 0; k < size; k += 1) things.push(make());
+  return things;
 }
+
+const zero = () => 0;
+const zeros = (size) => made(size, zero);
+
+// A work area for n balls, all zeros.
+function area(n, record) {
+  const memory = [made(n, Memory), made(n, Memory)];
+  return State(made(n, Ball), made(n, Contact), made(n, Run), made(2, Level), memory, [Tally()], record);
+}
+
+// Rows that the last record of n balls did not need, kept for the next one.
+const records = new Map();
 
 // Make room in a record for more events than one round can write: each contact may end, close,
 // collapse and pass its maximum.
-function makeRoom(state, n) {
+function makeRoom(state, n, least) {
   const { kinds, contacts, velocities, impulses } = state.record;
-  const [spare, room] = [5 * n, max(2 * kinds.length, 64 + 5 * n)];
+  const spare = 5 * n;
+  const room = max(kinds.length, spare + least);
   while (kinds.length < room) {
     kinds.push(0);
     contacts.push(0);
@@ -159,11 +162,10 @@ function makeRoom(state, n) {
 // Solve an impact that has been checked.
 function solved(chain, maxEvents, recorded) {
   const n = chain.m.length;
-  const state = area(n);
-  const tally = state.tally[0];
-  state.record = recorded ? Record([], [], [], []) : NO_RECORD;
-  tally.room = ENDLESS;
-  if (recorded) makeRoom(state, n);
+  if (recorded && !records.has(n)) records.set(n, Record([], [], [], []));
+  const state = area(n, recorded ? records.get(n) : Record([], [], [], []));
+  state.tally[0].room = ENDLESS;
+  if (recorded) makeRoom(state, n, 64);
   const { m, v, e, forward, backward, meeting } = chain;
   const out = Outputs([zeros(n)], [zeros(n - 1)], [0], zeros(n - 1), zeros(n - 1), zeros(n - 1));
   const inputs = Inputs([m], [v], [e], [forward], [backward]);
@@ -173,9 +175,9 @@ function solved(chain, maxEvents, recorded) {
   for (let resumed = false; ; resumed = true) {
     status = batch(0, resumed, n, inputs, options, out, state, ENDLESS)[1];
     if (status !== PAUSED) break;
-    makeRoom(state, n);
+    makeRoom(state, n, 2 * state.record.kinds.length);
   }
-  state.record.velocities[0] = [...v];
+  if (recorded) state.record.velocities[0] = [...v];
   return { status, state, out };
 }
 
@@ -183,9 +185,8 @@ function solved(chain, maxEvents, recorded) {
 function collide(given) {
   const recorded = given.record ?? true;
   const limit = given.maxEvents ?? MAX_EVENTS;
-  if (!(Number.isInteger(limit) && limit >= 1)) {
-    throw new Error(`max_events = ${limit}; must be a whole number, at least 1`);
-  }
+  if (!Number.isInteger(limit)) throw new Error(`max_events = ${limit}; must be a whole number`);
+  if (limit < 1) throw new Error(`max_events = ${limit}; must be at least 1 and below 2**63`);
   const { status, state, out } = solved(checkedImpact(given), limit, recorded);
   const tally = state.tally[0];
   if (status === UNSOUND || status === REFUSED) {
@@ -202,14 +203,12 @@ function collide(given) {
     collapsed: out.collapsed[0] === 1,
     saturated: out.held.flatMap((held, c) => (held ? [c] : [])),
     margin: tally.margin,
-    eventCount: tally.events,
   };
   if (recorded) {
     const { kinds, contacts, velocities, impulses } = state.record;
     result.events = contacts.slice(0, tally.events).map((contact, k) => ({ kind: KINDS[kinds[k]], contact }));
-    result.path = velocities.slice(0, tally.events + 1);
-    result.pathImpulses = impulses.slice(0, tally.events + 1);
-    state.record = NO_RECORD;
+    result.path = velocities.splice(0, tally.events + 1);
+    result.pathImpulses = impulses.splice(0, tally.events + 1);
   }
   return result;
 }
