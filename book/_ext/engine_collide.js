@@ -177,7 +177,7 @@ function solved(chain, maxEvents, recorded) {
     if (status !== PAUSED) break;
     makeRoom(state, n, 2 * state.record.kinds.length);
   }
-  if (recorded) state.record.velocities[0] = [...v];
+  if (recorded) [state.record.velocities[0], state.record.impulses[0]] = [[...v], zeros(n - 1)];
   return { status, state, out };
 }
 
