@@ -258,17 +258,3 @@ def test_largest_ratios(script):
         expected = largest_ratios(chain.masses, chain.forward, chain.backward)
         assert bits(bounds["forward"]) == bits(expected[0])
         assert bits(bounds["backward"]) == bits(expected[1])
-
-
-def test_largest_common_ratio(script):
-    """It is accepted by Eq. 53, and a little more is not."""
-    for chain in problems("generic", 200):
-        m = chain.masses
-        largest = script("cradle.largestCommonRatio", m)
-        if len(m) == 2:
-            assert largest == 1
-            continue
-        balls = Chain(m, [0] * len(m), 1)
-        collide(balls, ImpulseCorrelation(largest * (1 - 1e-9)))
-        with pytest.raises(ValueError, match=r"must not exceed|must lie in"):
-            collide(balls, ImpulseCorrelation(largest * (1 + 1e-9)))

@@ -4,8 +4,10 @@ import math
 import random
 import struct
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+import yaml
 from script import Script, bits
 
 from cradle import runtime
@@ -146,6 +148,20 @@ def test_what_looks_alike_means_the_same(name):
 def test_anything_else_is_refused(line):
     with pytest.raises(ValueError, match=r".+: "):
         explorer_engine.translate(f"def f(x, n):\n    {line}\n    return 0")
+
+
+def test_the_build_writes_it(tmp_path, root, source):
+    def build(kind, exception=None):
+        app = SimpleNamespace(builder=SimpleNamespace(format=kind), outdir=tmp_path)
+        explorer_engine.write_engine(app, exception)
+
+    build("latex")
+    build("html", RuntimeError())
+    assert not list(tmp_path.iterdir())
+    build("html")
+    assert (tmp_path / "_static" / "explorer_engine.js").read_text("utf-8") == source
+    config = yaml.safe_load((root / "_config.yml").read_text("utf-8"))
+    assert config["sphinx"]["local_extensions"]["explorer_engine"] == "book/_ext"
 
 
 def test_one_name_for_one_function(monkeypatch):

@@ -28,20 +28,6 @@ function largestRatios(masses, forward = 0, backward = 0) {
   return bounds;
 }
 
-// The largest ratio that all inner balls may have both ways. Where the next ball has it too, Eq. 53
-// says r (1 + q (1 - r)) <= 1 with q = m_i / m_next, so q r <= 1.
-function largestCommonRatio(masses) {
-  const m = checkedMasses(masses);
-  let largest = 1;
-  for (const way of [m, [...m].reverse()]) {
-    for (let i = 1; i + 1 < m.length; i += 1) {
-      const q = way[i] / way[i + 1];
-      largest = Math.min(largest, i + 2 < m.length ? 1 / q : 1 / (1 + q));
-    }
-  }
-  return largest;
-}
-
 function checkedMasses(masses) {
   const m = row("masses", masses, undefined, "must be above 0", POSITIVE);
   if (m.length > 1) return m;
@@ -217,3 +203,5 @@ function collide(given) {
 function outcome(given) {
   return collide({ ...given, record: false });
 }
+
+globalThis.cradle = { collide, outcome, largestRatios, shown };

@@ -241,4 +241,4 @@ function swing(given) {
   };
 }
 
-globalThis.cradle = { collide, outcome, largestRatios, largestCommonRatio, swing, shown };
+globalThis.cradle.swing = swing;
