@@ -1,5 +1,6 @@
 """The live explorer's script in V8, as a wheel brings it: no browser is needed."""
 
+import atexit
 import json
 import sys
 from pathlib import Path
@@ -21,6 +22,8 @@ class Script:
         # The import of the context is late: without a wheel for a platform its tests are skipped.
         engine = pytest.importorskip("py_mini_racer", reason="mini-racer is not installed")
         self.context = engine.MiniRacer()
+        # Left open, its thread may keep the process alive.
+        atexit.register(self.context.close)
         self.context.eval(source)
 
     def __call__(self, function, *given):

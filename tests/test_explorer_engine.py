@@ -27,7 +27,6 @@ def source():
 def script(source):
     script = Script(source)
     yield script
-    # Left open, its thread may keep the process alive.
     script.context.close()
 
 

@@ -11,7 +11,13 @@ from pathlib import Path
 
 DATA = Path(__file__).parents[1] / "data"
 CHECKSUMS = DATA / "checksums.csv"
-MEASURED = ("benchmarks.csv", "extremes_*.csv", "implied_ratio.csv", "long_chains.csv")
+MEASURED = (
+    "benchmarks.csv",
+    "explorer_speed.csv",
+    "extremes_*.csv",
+    "implied_ratio.csv",
+    "long_chains.csv",
+)
 
 
 def checksums(folder: Path) -> dict[str, str]:

@@ -125,8 +125,9 @@ function area(n, record) {
   return State(made(n, Ball), made(n, Contact), made(n, Run), made(2, Level), memory, [Tally()], record);
 }
 
-// Rows that the last record of n balls did not need, kept for the next one.
+// Rows that the last record of n balls did not need, kept for the next one if they are not many.
 const records = new Map();
+const KEPT_ROWS = 1000;
 
 // Make room in a record for more events than one round can write: each contact may end, close,
 // collapse and pass its maximum.
@@ -195,6 +196,7 @@ function collide(given) {
     result.events = contacts.slice(0, tally.events).map((contact, k) => ({ kind: KINDS[kinds[k]], contact }));
     result.path = velocities.splice(0, tally.events + 1);
     result.pathImpulses = impulses.splice(0, tally.events + 1);
+    if (kinds.length > KEPT_ROWS) records.delete(out.v[0].length);
   }
   return result;
 }
