@@ -31,10 +31,12 @@ COLUMNS = ("runtime", "record", "microseconds", "time_ratio", "repeats", "versio
 BALLS, RESTITUTION = 5, 0.9
 RATIOS = [k / 1000 for k in range(1001)]
 REPEATS = 3
+WARM_UP = 10
+PATH, OUTCOME, BATCH = "path", "outcome", "batch"
 
 TASK = json.dumps({"balls": BALLS, "restitution": RESTITUTION, "ratios": RATIOS})
 
-# Seconds of processor time for all ratios, in V8; the first time warms up.
+# Seconds of processor time for all ratios, in V8; the first few times it still compiles.
 IN_SCRIPT = """({ balls, restitution, ratios }, record, seconds) => {
   const ask = record ? cradle.collide : cradle.outcome;
   const masses = Array(balls).fill(1);
@@ -43,22 +45,27 @@ IN_SCRIPT = """({ balls, restitution, ratios }, record, seconds) => {
     for (const forward of ratios) ask({ masses, velocities, restitution, forward });
   };
   if (!seconds) return sweep();
-  sweep();
+  for (let k = 0; k < %d; k += 1) sweep();
   const begun = seconds();
   sweep();
   return seconds() - begun;
-}"""
+}""".replace("%d", str(WARM_UP))
 
 
-def in_package(record):
+def in_package(how):
     """Return the seconds that the package needs, compiled or plain as `CRADLE_KERNEL` says."""
-    from cradle import Chain, ImpulseCorrelation, collide
+    from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
+
+    ratios = [[ratio] * (BALLS - 2) for ratio in RATIOS]
+    masses, velocities = [1] * BALLS, [1] + [0] * (BALLS - 1)
 
     def sweep():
+        if how == BATCH:
+            post_impact_velocities(masses, velocities, RESTITUTION, ratios, excess="saturate")
+            return
         for ratio in RATIOS:
             model = ImpulseCorrelation(ratio, excess="saturate")
-            chain = Chain([1] * BALLS, [1] + [0] * (BALLS - 1), RESTITUTION)
-            collide(chain, model, record=record)
+            collide(Chain(masses, velocities, RESTITUTION), model, record=how == PATH)
 
     sweep()
     begun = time.process_time()
@@ -74,7 +81,8 @@ def in_mini_racer(record):
     context = MiniRacer()
     context.eval(engine())
     code = f"({IN_SCRIPT})({TASK}, {json.dumps(record)})"
-    context.eval(code)
+    for _ in range(WARM_UP):
+        context.eval(code)
     begun = time.process_time()
     context.eval(code)
     spent = time.process_time() - begun
@@ -94,10 +102,10 @@ def in_node(record):
         return float(subprocess.check_output(["node", path], text=True))
 
 
-def in_process(kernel, record):
+def in_process(kernel, how):
     """Return the seconds of the package in a process of its own."""
     answer = subprocess.check_output(
-        [sys.executable, __file__, "--package", str(int(record))],
+        [sys.executable, __file__, "--package", how],
         env={**os.environ, "CRADLE_KERNEL": kernel},
         text=True,
     )
@@ -109,23 +117,24 @@ def tasks():
     python = f"{platform.python_implementation()} {platform.python_version()}"
     numba = f"{python}, numba {metadata.version('numba')}"
     racer = f"mini-racer {metadata.version('mini-racer')}"
-    for record in (True, False):
-        yield "Python, compiled", record, numba, lambda r=record: in_process("compiled", r)
-        yield "Python, plain", record, python, lambda r=record: in_process("plain", r)
+    for record, how in ((True, PATH), (False, OUTCOME)):
+        yield "Python, compiled", record, numba, lambda h=how: in_process("compiled", h)
+        yield "Python, plain", record, python, lambda h=how: in_process("plain", h)
         yield "V8 in pytest", record, racer, lambda r=record: in_mini_racer(r)
         if shutil.which("node"):
             version = subprocess.check_output(["node", "--version"], text=True).strip()
             yield "V8 in Node.js", record, f"Node.js {version}", lambda r=record: in_node(r)
+    yield "Python, compiled, in a batch", False, numba, lambda: in_process("compiled", BATCH)
 
 
 def main():
     """Measure and write."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=OUTPUT)
-    parser.add_argument("--package", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--package", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.package is not None:
-        print(in_package(bool(options.package)))
+        print(in_package(options.package))
         return
     every = list(tasks())
     spent = [[] for _ in every]
