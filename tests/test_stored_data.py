@@ -13,6 +13,7 @@ DATA = Path(__file__).parents[1] / "data"
 CHECKSUMS = DATA / "checksums.csv"
 MEASURED = (
     "benchmarks.csv",
+    "explorer_speed.csv",
     "extremes_*.csv",
     "implied_ratio.csv",
     "long_chains.csv",
