@@ -1,0 +1,88 @@
+// What the pictures show, in words: for all readers, and for screen readers above all.
+(function (explorer) {
+  "use strict";
+
+  // Two digits after the point, with a true minus sign and without a negative zero.
+  function fixed(value, digits = 2) {
+    const text = value.toFixed(digits);
+    return (+text === 0 ? text.replace("-", "") : text).replace("-", "\u2212");
+  }
+
+  function list(words) {
+    if (words.length < 2) return words.join("");
+    return `${words.slice(0, -1).join(", ")} and ${words[words.length - 1]}`;
+  }
+
+  function motion(v, several) {
+    const verb = (one, many) => (several ? many : one);
+    if (v === 0) return verb("rests", "rest");
+    if (+v.toFixed(2) === 0) return verb("almost rests", "almost rest");
+    const way = v < 0 ? "left" : "right";
+    return `${verb("moves", "move")} ${way} at ${fixed(Math.abs(v))} m/s`;
+  }
+
+  // "ball 1 moves left at 0.07 m/s, balls 2 to 4 rest and ball 5 moves right at 0.98 m/s"
+  function motions(velocities) {
+    const groups = [];
+    velocities.forEach((v, ball) => {
+      const last = groups[groups.length - 1];
+      if (last && motion(last.v, false) === motion(v, false)) last.end = ball;
+      else groups.push({ v, start: ball, end: ball });
+    });
+    return list(
+      groups.map(({ v, start, end }) => {
+        if (start === end) return `ball ${start + 1} ${motion(v, false)}`;
+        const joined = end === start + 1 ? "and" : "to";
+        return `balls ${start + 1} ${joined} ${end + 1} ${motion(v, true)}`;
+      })
+    );
+  }
+
+  const kinetic = (masses, velocities) =>
+    masses.map((m, ball) => 0.5 * m * velocities[ball] ** 2);
+  const sum = (row) => row.reduce((total, value) => total + value, 0);
+
+  // `number` counts from 0.
+  function hitName(number) {
+    return number === 0 ? "the first hit" : `hit ${number + 1}`;
+  }
+
+  function noAnswer(status) {
+    if (status === "unfinished")
+      return (
+        `This hit takes more than ${explorer.EVENTS} events, more than a page should compute ` +
+        "between two pictures. The Python below has no such limit."
+      );
+    return "The solver's answer did not pass its own checks, so none is shown.";
+  }
+
+  // One hit in full: `hit` and `answer` (its record or outcome) as explorer_swing.js makes them.
+  function outcome(setting, hit, number, answer) {
+    const { masses } = setting;
+    if (hit.status !== "finished") return noAnswer(hit.status);
+    if (!hit.happened) {
+      if (hit.before.every((v) => v === 0)) return "No ball is pulled back. Drag one to a side.";
+      return "The balls swing together: none strikes another.";
+    }
+    const before = sum(kinetic(masses, hit.before));
+    const lost = 1 - sum(kinetic(masses, hit.after)) / before;
+    const kept = Math.abs(lost) < 1e-9;
+    const said = [
+      `Before ${hitName(number)} ${motions(hit.before)}.`,
+      `After it ${motions(hit.after)}.`,
+      kept ? "All energy is kept." : `${fixed(100 * lost, lost < 0.1 ? 1 : 0)} % of the energy is lost.`,
+    ];
+    if (answer) {
+      const total = sum(answer.collisions);
+      said.push(`${total} collision${total === 1 ? "" : "s"} in all.`);
+      if (answer.saturated.length) {
+        const balls = answer.saturated.map((inner) => inner + 1);
+        said.push(`A ratio above its largest value is held there (contact ${list(balls)}).`);
+      }
+      if (answer.collapsed) said.push("A sequence of endless collisions came to its limit.");
+    }
+    return said.join(" ");
+  }
+
+  Object.assign(explorer, { fixed, hitName, kinetic, list, motions, noAnswer, outcomeInWords: outcome, sum });
+})(globalThis.cradleExplorer);
