@@ -64,10 +64,10 @@ def story() -> list[dict[str, Any]]:
          "Two come, two go. Still the ratio 0. Pull back three, and one of them never stops."),
         ("small", "A small ratio", equal(5, 0.15), "inside",
          "Now each inner ball passes some of a push on while it is still being pushed. That share is "
-         "the ratio. The last ball still takes most of the motion, but no ball hangs still any more."),
+         "the ratio. The last ball still takes most of the motion, but the first one comes back a little."),
         ("half", "The ratio one half", equal(5, 0.5), "sweep",
-         "Half of each push goes on at once. The first ball bounces back, and the others leave "
-         "together or nearly so. Energy and momentum are the same as before."),
+         "Half of each push goes on at once. The last two balls leave together, and the first one "
+         "bounces back. Energy and momentum are the same as at the ratio 0."),
         ("three", "Three balls, two answers", equal(3, 0.5), "sweep",
          "Energy and momentum do not say what three balls do. Move the ratio from one half to 0: "
          "both textbook answers are here, and everything between them."),

@@ -50,12 +50,12 @@
       };
       const node = (name) => this.panels[name]?.node ?? "";
       const stage = make("div", { class: "cradle" });
-      const left = make("div", { class: "left" }, stage, node("run"), node("words"), node("settings"));
+      const left = make("div", { class: "left" }, stage, node("run"), node("words"));
       const right = make("div", { class: "right" }, node("outcome"), node("pictures"));
       const more = this.page
         ? ""
         : make("p", { class: "more" }, make("a", { href: "explorer.html" }, "Open in the full explorer"));
-      this.host.replaceChildren(node("scenes"), make("div", { class: "desk" }, left, right), node("share"), more);
+      this.host.replaceChildren(node("scenes"), make("div", { class: "desk" }, left, node("settings"), right), node("share"), more);
       this.host.classList.add("live");
       this.host.setAttribute("role", "group");
       this.host.setAttribute("aria-label", "live cradle");
@@ -248,14 +248,22 @@
 
     // --- full screen and keys -------------------------------------------------------------------------
 
+    get full() {
+      return document.fullscreenElement === this.host;
+    }
+
+    // Full screen, and wide: the style sheet puts all side by side then.
+    get wall() {
+      return this.full && matchMedia("(min-aspect-ratio: 4/3)").matches;
+    }
+
     fullScreen() {
       if (document.fullscreenElement) document.exitFullscreen();
       else if (this.host.requestFullscreen) this.host.requestFullscreen();
     }
 
     key(event) {
-      const full = document.fullscreenElement === this.host;
-      if (!full && !this.host.contains(event.target)) return;
+      if (!this.full && !this.host.contains(event.target)) return;
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       if (event.target.closest?.("input, select, textarea, summary, .ball, .point")) return;
       const act = {
@@ -264,7 +272,7 @@
         " ": () => this.play(), ".": () => this.step(),
       }[event.key];
       const pages = event.key.startsWith("Page");
-      if (!act || (pages && !full) || !this.panels.scenes) return;
+      if (!act || (pages && !this.full) || !this.panels.scenes) return;
       if (event.key === " " && event.target.closest?.("button")) return;
       event.preventDefault();
       act();
@@ -291,16 +299,30 @@
       if (running) this.advance(seconds);
       if (this.stale) this.draw();
       this.move();
-      const working = this.visible && this.panels.pictures?.resume((host) => this.box(host));
+      const working = this.visible && this.panels.pictures?.resume(this.view, (host) => this.box(host));
       if (running || working || this.stale) this.wake();
       else this.last = undefined;
     }
 
     box(host) {
       const em = parseFloat(getComputedStyle(host).fontSize);
-      const full = document.fullscreenElement === this.host;
-      const height = full ? 0.42 * innerHeight : Math.min(20 * em, 0.62 * host.clientWidth + 4 * em);
-      return { width: host.clientWidth, height, em };
+      const width = host.clientWidth;
+      // On the wall a plot takes what is left of the height; below it, its slider and caption.
+      const wall = Math.max(this.below(host) - 5 * em, 11 * em);
+      return { width, height: this.wall ? wall : Math.min(20 * em, 0.62 * width + 4 * em), em };
+    }
+
+      // The cradle's box; on the wall, what the rest of its column leaves.
+    stageBox(host) {
+      const { width, em } = this.box(host);
+      const wall = Math.max(this.below(host) - this.panels.run.node.offsetHeight - 3 * em, 12 * em);
+      return { width, em, height: this.wall ? wall : Math.min(24 * em, 0.72 * width) };
+    }
+
+    // On the wall: the height from the top of an element down to the settings.
+    below(host) {
+      const top = host.getBoundingClientRect().top - this.host.getBoundingClientRect().top;
+      return innerHeight - top - this.panels.settings.node.offsetHeight;
     }
 
     state() {
@@ -319,10 +341,8 @@
       const box = (host) => this.box(host);
       const state = this.state();
       const host = this.stage.svg.parentElement;
-      const full = document.fullscreenElement === this.host;
-      const room = box(host);
-      this.stage.lay(this.setting, { ...room, height: full ? 0.5 * innerHeight : Math.min(24 * room.em, 0.72 * room.width) });
       for (const panel of Object.values(this.panels)) panel?.show(state, box);
+      this.stage.lay(this.setting, this.stageBox(host));
       const link = this.host.querySelector(".more a");
       if (link) link.href = `explorer.html#${explorer.toFragment(this.setting, this.view.picture)}`;
       this.writeAddress();

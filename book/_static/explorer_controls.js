@@ -28,7 +28,7 @@
     });
     const box = make("input", {
       type: "number", min: low, max: high, step: "any", "aria-label": `${words}, as a number`,
-      onchange: () => (box.value !== "" && box.checkValidity() ? give(+box.value) : box.reportValidity()),
+      onchange: () => (box.value !== "" && box.checkValidity() ? give(+(+box.value).toFixed(6)) : box.reportValidity()),
     });
     const label = make("label", { for: name }, words);
     const node = make("div", { class: "slider" }, label, range, box, make("span", { class: "unit" }, unit));
@@ -41,7 +41,7 @@
       if (document.activeElement !== range || !one) range.value = place(values[0]);
       else if (value(+range.value) !== values[0]) range.value = place(values[0]);
       if (document.activeElement !== box) box.value = one ? values[0] : "";
-      box.placeholder = one ? "" : "several";
+      box.placeholder = one ? "" : "mixed";
       const text = one ? `${values[0]} ${unit}`.trim() : `several values, ${values.join(", ")}`;
       range.setAttribute("aria-valuetext", text);
       node.classList.toggle("several", !one);
@@ -57,9 +57,9 @@
     let inputs = [];
     function offer(list) {
       inputs.forEach(({ label }) => label.remove());
-      inputs = list.map(({ value, text, title }) => {
+      inputs = list.map(({ value, text, title, colour }) => {
         const input = make("input", { type: "radio", name, value, onchange: () => choose(value) });
-        const label = make("label", title ? { title } : {}, input, make("span", {}, text));
+        const label = make("label", title ? { title } : {}, input, make("span", colour ? { class: "coloured", style: `--ball: ${colour}` } : {}, text));
         node.append(label);
         return { input, label, value };
       });

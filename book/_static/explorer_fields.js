@@ -39,14 +39,14 @@
     return ratios.length && ratios.every((ratio) => ratio === ratios[0]) ? ratios[0] : null;
   }
 
-  // A line has a gap where the solver has no answer.
-  function stretches(known) {
+  // The stretches of a row whose entries pass a test.
+  function stretches(row, passes) {
     const parts = [[]];
-    known.forEach((answer) => {
-      if (answer.status === "finished") parts[parts.length - 1].push(answer);
+    row.forEach((entry) => {
+      if (passes(entry)) parts[parts.length - 1].push(entry);
       else parts.push([]);
     });
-    return parts;
+    return parts.filter((part) => part.length > 0);
   }
 
   class Sweep {
@@ -80,7 +80,7 @@
       this.plot = plot;
       const balls = explorer.all(setting.masses);
       const drawn = balls.map((ball) =>
-        stretches(known)
+        stretches(known, ({ status }) => status === "finished") // a gap where there is no answer
           .map((part) => polyline(part.map(({ ratio, velocities }) => [plot.x(ratio), plot.y(velocities[ball])]), stroke(ball)))
           .join("")
       );
@@ -94,16 +94,13 @@
       const first = found.findIndex((answer) => answer.saturated.length > 0);
       if (first < 0) return "";
       const { x, top, bottom } = this.plot;
-      let bands = "";
-      found.forEach(({ saturated, ratio }) => {
-        if (!saturated.length) return;
-        const half = 0.5 / STEPS;
-        const from = x(Math.max(0, ratio - half));
-        bands += `<rect class="held" x="${from}" y="${top}" width="${px(x(Math.min(1, ratio + half)) - from + 0.3)}" height="${px(bottom - top)}"/>`;
+      const bands = stretches(found, ({ saturated }) => saturated.length > 0).map((part) => {
+        const [from, to] = [x(part[0].ratio), x(part[part.length - 1].ratio)];
+        return `<rect class="held" x="${from}" y="${top}" width="${px(to - from)}" height="${px(bottom - top)}"/>`;
       });
       const room = this.plot.right - x(found[first].ratio) > 9 * em;
       const label = room ? text(this.plot.right - 0.4 * em, top + em, "held at the largest ratio", 'text-anchor="end" class="small"') : "";
-      return bands + label;
+      return bands.join("") + label;
     }
 
     present(setting, after, em) {
@@ -123,7 +120,7 @@
 
   // --- the map --------------------------------------------------------------------------------
 
-  const CELLS = 150;
+  const CELLS = 180;
   const LARGEST = 3; // of both axes, as in the paper's Fig. 6
 
   const ratios = ({ masses }) => ({ right: masses[1] / masses[2], left: masses[1] / masses[0] });

@@ -17,6 +17,7 @@
     ];
     const list = select({ words: "Scene", options, choose: act.scene, hidden: true });
     const place = make("span", { class: "place" });
+    const full = button("Full screen", act.fullScreen, { class: "full" });
     const text = make("p", { class: "scene-text" });
     const walk = make(
       "div",
@@ -25,9 +26,10 @@
       list.node,
       button("→", () => act.walk(1), { "aria-label": "next scene" }),
       place,
-      button("Full screen", act.fullScreen, { class: "full" })
+      full
     );
     function show({ scene }) {
+      full.textContent = document.fullscreenElement ? "Leave full screen" : "Full screen";
       const at = scenes.findIndex(({ key }) => key === scene);
       list.show(scene);
       place.textContent = at < 0 ? "" : `${at + 1} of ${scenes.length}`;
@@ -84,10 +86,10 @@
   function settingsPanel(act, parts) {
     const [fewest, most] = LIMITS.balls;
     const count = choice({
-      words: "balls", choose: (value) => act.count(+value),
+      words: "number of balls", choose: (value) => act.count(+value),
       options: Array.from({ length: most - fewest + 1 }, (_, k) => ({ value: String(fewest + k), text: String(fewest + k) })),
     });
-    const scope = choice({ words: "change", options: [], choose: act.scope });
+    const scope = choice({ words: "set for", options: [], choose: act.scope });
     const letters = [NONE, ...Object.keys(explorer.data.masses)];
     const material = choice({
       words: "material", choose: act.letter,
@@ -106,7 +108,7 @@
       const { balls, contacts, inner } = concerned(setting, chosen);
       const size = setting.masses.length;
       if (offered !== size) {
-        const each = all(setting.masses).map((ball) => ({ value: String(ball), text: `ball ${ball + 1}` }));
+        const each = all(setting.masses).map((ball) => ({ value: String(ball), text: `${ball + 1}`, title: `ball ${ball + 1}`, colour: explorer.colour(ball) }));
         scope.offer([{ value: "all", text: "all" }, ...each]);
         offered = size;
       }
@@ -137,7 +139,7 @@
     const title = make("h3", {});
     const bars = make("div", { class: "plot" });
     const energy = make("div", { class: "plot" });
-    const caption = make("p", { class: "caption" }, "kinetic energy; hatched: stored in the contacts or lost");
+    const caption = make("p", { class: "caption" }, "The kinetic energy before the hit is 100 %. Grey: lost, or stored in the contacts.");
     const node = make("div", { class: "outcome" }, title, bars, make("h3", {}, "Energy"), energy, caption);
     function show({ setting, hit, number, now, part }, box) {
       const name = explorer.hitName(number);

@@ -112,6 +112,7 @@
     const plot = make("div", { class: "plot" });
     const host = make("div", { class: "map" }, canvas, plot);
     const patterns = PATTERNS.map((words, k) => make("span", { class: `pattern pattern-${k}` }, words));
+    const legend = make("p", { class: "patterns" }, ...patterns);
     const note = make("p", { class: "caption" });
     const three = button("Take three balls", () => act.count(3));
     let map = null;
@@ -142,6 +143,7 @@
     function paint() {
       const style = getComputedStyle(host);
       map.paint(canvas, [0, 1, 2, 3, "odd"].map((k) => style.getPropertyValue(`--pattern-${k}`)));
+      patterns.forEach((pattern, k) => (pattern.hidden = !map.points.values.some((cell) => cell.pattern === k)));
       painted = document.documentElement.dataset.theme + map.key + map.points.finished;
     }
     function show(state, box) {
@@ -150,7 +152,7 @@
       const fits = setting.masses.length === 3;
       host.hidden = !fits;
       three.hidden = fits;
-      patterns.forEach((pattern) => (pattern.hidden = !fits));
+      legend.hidden = !fits;
       if (!fits) {
         map = null;
         note.textContent = "This map is for three balls.";
@@ -159,6 +161,7 @@
       if (!map || map.key !== RegionMap.key(setting)) map = new RegionMap(setting);
       const focused = plot.contains(document.activeElement);
       const space = box(plot);
+      space.width = Math.min(space.width, 1.25 * space.height);
       plot.innerHTML = map.svg(space, setting);
       if (focused) plot.querySelector(".point").focus({ preventScroll: true });
       const { left, right, top, bottom } = map.plot;
@@ -174,7 +177,6 @@
       paint();
       return !map.points.finished;
     }
-    const legend = make("p", { class: "patterns" }, ...patterns);
     return { node: make("div", {}, host, legend, note, three), show, move: () => {}, resume };
   }
 

@@ -46,7 +46,7 @@
   function axes(box, xs, ys, labels) {
     const { width, height, em } = box;
     const left = 3.4 * em;
-    const right = width - 1.5 * em;
+    const right = width - 1.7 * em;
     const top = 0.7 * em;
     const bottom = height - 3.1 * em;
     const x = (value) => px(left + ((value - xs[0]) / (xs[1] - xs[0])) * (right - left));
@@ -80,7 +80,7 @@
       places[k].y = Math.min(places[k].y, lowest);
     }
     return places
-      .map(({ ball, y }) => text(plot.right + 0.35 * em, y + 0.35 * em, ball + 1, `fill="${colour(ball)}" class="name"`))
+      .map(({ ball, y }) => text(plot.right + 0.6 * em, y + 0.35 * em, ball + 1, `fill="${colour(ball)}" class="name"`))
       .join("");
   }
 
@@ -119,7 +119,7 @@
       parts.push(`<circle cx="${px(0.6 * em)}" cy="${px(top + 0.6 * em)}" r="${px(0.4 * em)}" fill="${colour(ball)}"/>`);
       parts.push(text(1.3 * em, top + em, `${ball + 1}${letter}`));
       parts.push(bar(before[ball], 'class="before"'), bar(now[ball], `fill="${colour(ball)}"`));
-      const leftwards = now[ball] < 0;
+      const leftwards = +now[ball].toFixed(2) < 0;
       const at = x(now[ball]) + (leftwards ? -0.35 : 0.35) * em;
       const end = leftwards ? 'text-anchor="end" class="number"' : 'class="number"';
       parts.push(text(at, top + em, fixed(now[ball]), end));
@@ -146,7 +146,7 @@
       return part;
     };
     const percent = (share) => `${fixed(100 * share, 0)} %`;
-    const parts = shares.map((share, ball) => piece(share, `fill="${colour(ball)}" class="share"`, percent(share)));
+    const parts = shares.map((share, ball) => piece(share, `fill="${colour(ball)}" class="part"`, percent(share)));
     parts.push(piece(gone, 'class="gone"', percent(gone)));
     const words = shares.map((share, ball) => `ball ${ball + 1} ${percent(share)}`).join(", ");
     return picture({ width, height }, `Kinetic energy: ${words}; not in motion: ${percent(gone)}`, parts.join(""));

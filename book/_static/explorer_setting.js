@@ -134,6 +134,16 @@
     return parts.join("&");
   }
 
+  // What the solver itself does not take, such as a restitution of 1e-40.
+  function refused(setting) {
+    try {
+      explorer.outcome(setting);
+      return "";
+    } catch (error) {
+      return error.message;
+    }
+  }
+
   // Read a fragment: {setting, picture}, or {error} in words. A key may be left out.
   function fromFragment(text) {
     const given = new Map(text.split("&").map((part) => part.split("=", 2)));
@@ -157,7 +167,7 @@
       backward: row("backward", forward),
       letters: given.get("letters") ?? NONE.repeat(speeds.length),
     };
-    const error = refusal(setting);
+    const error = refusal(setting) || refused(setting);
     return error ? { error } : { setting, picture: given.get("picture") };
   }
 

@@ -40,7 +40,7 @@
       const heaviest = Math.max(...masses);
       const relative = masses.map((m) => Math.cbrt(m / heaviest));
       const whole = relative.reduce((total, r) => total + 2 * r, 0);
-      const unit = Math.min(2.6 * em, (0.4 * width) / whole);
+      const unit = Math.min(2.2 * em, (0.46 * width) / whole);
       this.radii = relative.map((r) => Math.max(r * unit, 3));
       const row = this.radii.reduce((total, r) => total + 2 * r, 0);
       const reach = Math.sin(ROOM * LENGTH);

@@ -72,12 +72,13 @@
 
     next() {
       const last = this.hits[this.hits.length - 1];
-      const before = last ? last.after.map((v) => 0 - v) : this.setting.speeds;
       if (last && last.status !== "finished") return last;
+      const before = last ? last.after.map((v) => 0 - v) : this.setting.speeds;
       const happened = before.some((v, k) => k > 0 && before[k - 1] - v > this.least);
       const answer = happened ? outcome(this.setting, before) : { status: "finished", velocities: before };
-      const after = settled(this.setting.masses, answer.velocities, this.least);
-      return { before, after, status: answer.status, happened };
+      const { status } = answer;
+      const after = status === "finished" ? settled(this.setting.masses, answer.velocities, this.least) : null;
+      return { before, after, status, happened };
     }
 
     // The same hit with its history: what the solver went through.

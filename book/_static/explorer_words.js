@@ -76,8 +76,8 @@
       const total = sum(answer.collisions);
       said.push(`${total} collision${total === 1 ? "" : "s"} in all.`);
       if (answer.saturated.length) {
-        const balls = answer.saturated.map((inner) => inner + 1);
-        said.push(`A ratio above its largest value is held there (contact ${list(balls)}).`);
+        const pairs = answer.saturated.map((c) => `${c + 1} and ${c + 2}`);
+        said.push(`A ratio is above its largest value: the contact of balls ${list(pairs)} is held.`);
       }
       if (answer.collapsed) said.push("A sequence of endless collisions came to its limit.");
     }
