@@ -315,7 +315,8 @@
       // The cradle's box; on the wall, what the rest of its column leaves.
     stageBox(host) {
       const { width, em } = this.box(host);
-      const wall = Math.max(this.below(host) - this.panels.run.node.offsetHeight - 3 * em, 12 * em);
+      const others = this.panels.run.node.offsetHeight + this.panels.words.node.offsetHeight;
+      const wall = Math.max(this.below(host) - others - 2 * em, 12 * em);
       return { width, em, height: this.wall ? wall : Math.min(24 * em, 0.72 * width) };
     }
 

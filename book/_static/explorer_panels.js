@@ -43,7 +43,7 @@
   function runPanel(act) {
     const play = button("", act.play, { class: "main" });
     const step = button("Next hit", act.step);
-    const back = button("Pull back again", act.back);
+    const back = button("Pull back", act.back);
     const slow = button("Slow motion", act.slow);
     function show({ clock }) {
       const words = clock.playing ? "Pause" : clock.time > 0 ? "Go on" : "Let go";
@@ -139,11 +139,11 @@
     const title = make("h3", {});
     const bars = make("div", { class: "plot" });
     const energy = make("div", { class: "plot" });
-    const caption = make("p", { class: "caption" }, "The kinetic energy before the hit is 100 %. Grey: lost, or stored in the contacts.");
+    const caption = make("p", { class: "note" }, "The kinetic energy before the hit is 100 %. Grey: lost, or stored in the contacts.");
     const node = make("div", { class: "outcome" }, title, bars, make("h3", {}, "Energy"), energy, caption);
     function show({ setting, hit, number, now, part }, box) {
       const name = explorer.hitName(number);
-      title.textContent = `Velocities ${part < 1 ? "during" : "after"} ${name} (m/s)`;
+      title.textContent = `${part < 1 ? "During" : "After"} ${name} (m/s)`;
       bars.innerHTML = now ? explorer.bars(box(bars), setting, hit.before, now) : "";
       energy.innerHTML = now ? explorer.energy(box(energy), setting, hit.before, now) : "";
     }

@@ -17,7 +17,7 @@
       oninput: () => act.part(+part.value),
     });
     const scrub = make("label", { class: "scrub" }, make("span", {}, "start"), part, make("span", {}, "end"));
-    const note = make("p", { class: "caption" });
+    const note = make("p", { class: "note" });
     let offered = 0;
     let drawn = null;
     function offer(count) {
@@ -54,7 +54,7 @@
 
   function sweepPicture(act) {
     const plot = make("div", { class: "plot drags-x" });
-    const note = make("p", { class: "caption" });
+    const note = make("p", { class: "note" });
     let sweep = null;
     let shown = null;
     const ratioAt = (event) => {
@@ -113,7 +113,7 @@
     const host = make("div", { class: "map" }, canvas, plot);
     const patterns = PATTERNS.map((words, k) => make("span", { class: `pattern pattern-${k}` }, words));
     const legend = make("p", { class: "patterns" }, ...patterns);
-    const note = make("p", { class: "caption" });
+    const note = make("p", { class: "note" });
     const three = button("Take three balls", () => act.count(3));
     let map = null;
     let painted = "";

@@ -45,10 +45,11 @@
   // Axes with a grid. `box`: {width, height, em}.
   function axes(box, xs, ys, labels) {
     const { width, height, em } = box;
-    const left = 3.4 * em;
-    const right = width - 1.7 * em;
     const top = 0.7 * em;
     const bottom = height - 3.1 * em;
+    const levels = ticks(ys[0], ys[1], (bottom - top) / (2.6 * em));
+    const left = (1.9 + 0.5 * Math.max(...levels.map(({ label }) => label.length))) * em;
+    const right = width - 1.7 * em;
     const x = (value) => px(left + ((value - xs[0]) / (xs[1] - xs[0])) * (right - left));
     const y = (value) => px(bottom - ((value - ys[0]) / (ys[1] - ys[0])) * (bottom - top));
     const parts = [];
@@ -56,7 +57,7 @@
       parts.push(`<path class="grid" d="M${x(value)} ${top}V${bottom}"/>`);
       parts.push(text(x(value), bottom + 1.15 * em, label, 'text-anchor="middle"'));
     }
-    for (const { value, label } of ticks(ys[0], ys[1], (bottom - top) / (2.6 * em))) {
+    for (const { value, label } of levels) {
       parts.push(`<path class="${+label === 0 ? "zero" : "grid"}" d="M${left} ${y(value)}H${right}"/>`);
       parts.push(text(left - 0.4 * em, y(value) + 0.35 * em, label, 'text-anchor="end"'));
     }

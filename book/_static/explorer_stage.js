@@ -4,7 +4,7 @@
   const { FREQUENCY, LENGTH, colour, fixed, px } = explorer;
   const SVG = "http://www.w3.org/2000/svg";
   // Angles up to which a swing is drawn in its true size, and beyond which it is cut off.
-  const ROOM = 2 / FREQUENCY / LENGTH;
+  const ROOM = 1.5 / FREQUENCY / LENGTH;
   const MOST = 1.25;
   // A pull is a whole number of these, m/s.
   const STEP = 0.05;
@@ -70,7 +70,7 @@
       });
       this.stars.forEach((star, c) => {
         const at = this.pivots[c] + this.radii[c];
-        star.setAttribute("transform", `translate(${px(at)} ${px(this.top + this.length)}) scale(${px(0.75 * em)})`);
+        star.setAttribute("transform", `translate(${px(at)} ${px(this.top + this.length)}) scale(${px(0.6 * em)})`);
       });
     }
 

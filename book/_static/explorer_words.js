@@ -13,27 +13,30 @@
     return `${words.slice(0, -1).join(", ")} and ${words[words.length - 1]}`;
   }
 
-  function motion(v, several) {
-    const verb = (one, many) => (several ? many : one);
-    if (v === 0) return verb("rests", "rest");
-    if (+v.toFixed(2) === 0) return verb("almost rests", "almost rest");
-    const way = v < 0 ? "left" : "right";
-    return `${verb("moves", "move")} ${way} at ${fixed(Math.abs(v))} m/s`;
+  function way(v) {
+    if (v === 0) return ["rests", "rest"];
+    if (+v.toFixed(2) === 0) return ["almost rests", "almost rest"];
+    return v < 0 ? ["moves left", "move left"] : ["moves right", "move right"];
   }
 
-  // "ball 1 moves left at 0.07 m/s, balls 2 to 4 rest and ball 5 moves right at 0.98 m/s"
+  // "ball 1 moves left at 0.08 m/s, balls 2 and 3 almost rest and balls 4 and 5 move right at 0.09
+  // and 0.99 m/s". Balls keep their order, so those that go one way are neighbours.
   function motions(velocities) {
     const groups = [];
     velocities.forEach((v, ball) => {
+      const verb = way(v);
       const last = groups[groups.length - 1];
-      if (last && motion(last.v, false) === motion(v, false)) last.end = ball;
-      else groups.push({ v, start: ball, end: ball });
+      if (last && last.verb[0] === verb[0]) last.balls.push(ball);
+      else groups.push({ verb, balls: [ball] });
     });
     return list(
-      groups.map(({ v, start, end }) => {
-        if (start === end) return `ball ${start + 1} ${motion(v, false)}`;
-        const joined = end === start + 1 ? "and" : "to";
-        return `balls ${start + 1} ${joined} ${end + 1} ${motion(v, true)}`;
+      groups.map(({ verb, balls }) => {
+        const [first, last] = [balls[0] + 1, balls[balls.length - 1] + 1];
+        const names = ["", `ball ${first}`, `balls ${first} and ${last}`][balls.length] ?? `balls ${first} to ${last}`;
+        const speeds = balls.map((ball) => fixed(Math.abs(velocities[ball])));
+        const each = speeds.every((speed) => speed === speeds[0]) ? speeds.slice(0, 1) : speeds;
+        const how = /move/.test(verb[0]) ? ` at ${list(each)} m/s` : "";
+        return `${names} ${verb[balls.length > 1 ? 1 : 0]}${how}`;
       })
     );
   }
