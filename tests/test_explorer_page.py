@@ -288,7 +288,7 @@ def test_number_material_and_sweep(visit):
     assert setting["letters"] == "DDD"
     assert setting["masses"] == [0.166] * 3
     assert same_outcome(setting)
-    tab.click("text=All ratios")
+    tab.click("label:has-text('All ratios')")
     tab.wait_for_function("document.querySelectorAll('.pictures polyline').length >= 3")
     x, y = middle(tab, ".drags-x svg")
     tab.mouse.move(x, y)

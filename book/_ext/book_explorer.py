@@ -56,6 +56,8 @@ def story() -> list[dict[str, Any]]:
     """Return the scenes that walk through the book's story."""
     light = equal(3, 0.15)
     light["masses"] = [1.0, 0.01, 1.0]
+    meeting = equal(4, 0.1)
+    meeting["speeds"] = [1.0, 0.5, 0.0, 0.0]
     told = [
         ("one", "Pull back one ball", equal(5, 0.0), "inside",
          "One comes, one goes. This is the toy of the textbooks: the balls collide one pair after "
@@ -77,6 +79,9 @@ def story() -> list[dict[str, Any]]:
         ("light", "A light ball in the middle", light, "inside",
          "A ball of a hundredth of the mass rattles between its heavy neighbours: one hit, many "
          "collisions. Make it lighter still."),
+        ("meeting", "Two impacts that meet", meeting, "inside",
+         "The first ball comes in at full speed, the second at half of it: Fig. 8 of the paper. Two "
+         "stretches of the row are in contact at once, until the gap between them closes too."),
         ("map", "Who bounces back?", equal(3, 0.15, e=0.5), "map",
          "Which balls come back depends on two ratios of masses. Drag the point over the map, which "
          "is Fig. 6 of the paper."),

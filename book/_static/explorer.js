@@ -304,11 +304,11 @@
       else this.last = undefined;
     }
 
-    box(host) {
+    box(host, under = 5) {
       const em = parseFloat(getComputedStyle(host).fontSize);
       const width = host.clientWidth;
-      // On the wall a plot takes what is left of the height; below it, its slider and caption.
-      const wall = Math.max(this.below(host) - 5 * em, 11 * em);
+      // On the wall a plot takes what is left of the height; below it, its slider and notes.
+      const wall = Math.max(this.below(host) - under * em, 11 * em);
       return { width, height: this.wall ? wall : Math.min(20 * em, 0.62 * width + 4 * em), em };
     }
 
@@ -317,7 +317,7 @@
       const { width, em } = this.box(host);
       const others = this.panels.run.node.offsetHeight + this.panels.words.node.offsetHeight;
       const wall = Math.max(this.below(host) - others - 2 * em, 12 * em);
-      return { width, em, height: this.wall ? wall : Math.min(24 * em, 0.72 * width) };
+      return { width, em, height: this.wall ? wall : Math.min((this.page ? 24 : 15) * em, 0.72 * width) };
     }
 
     // On the wall: the height from the top of an element down to the settings.
@@ -339,7 +339,7 @@
     // Bring everything up to date with the state.
     draw() {
       this.stale = false;
-      const box = (host) => this.box(host);
+      const box = (host, under) => this.box(host, under);
       const state = this.state();
       const host = this.stage.svg.parentElement;
       for (const panel of Object.values(this.panels)) panel?.show(state, box);

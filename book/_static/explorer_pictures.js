@@ -38,8 +38,7 @@
       drawn = record && explorer.diagram(box(plot), record, chosen);
       plot.innerHTML = drawn ? drawn.svg : "";
       if (record) note.textContent = legend(record, chosen);
-      else if (hit.status !== "finished") note.textContent = "There is no answer to draw.";
-      else note.textContent = hit.happened ? `More than ${explorer.DRAWN_EVENTS} events: too many to draw.` : "There is no hit to draw.";
+      else note.textContent = hit.happened ? "There is no answer to draw." : "There is no hit to draw.";
     }
     function move({ record, contact: chosen, part: now }, box) {
       if (!drawn || !record) return;
@@ -160,7 +159,7 @@
       }
       if (!map || map.key !== RegionMap.key(setting)) map = new RegionMap(setting);
       const focused = plot.contains(document.activeElement);
-      const space = box(plot);
+      const space = box(plot, 7);
       space.width = Math.min(space.width, 1.25 * space.height);
       plot.innerHTML = map.svg(space, setting);
       if (focused) plot.querySelector(".point").focus({ preventScroll: true });

@@ -152,7 +152,9 @@
     );
     if (unknown !== undefined) return { error: `${unknown} is no part of a setting` };
     const numbers = (name) => given.get(name).split(",").map((word) => (word === "" ? NaN : +word));
-    const speeds = given.has("speeds") ? numbers("speeds") : [1, 0, 0, 0, 0];
+    const listed = (given.get("masses") ?? "").split(",").length;
+    const others = Array((listed > 1 ? listed : 5) - 1).fill(0);
+    const speeds = given.has("speeds") ? numbers("speeds") : [1, ...others];
     const row = (name, first) => {
       const values = given.has(name) ? numbers(name) : first;
       const length = Math.max(speeds.length - LENGTHS[name], 0);

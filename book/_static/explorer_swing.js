@@ -11,8 +11,7 @@
   // As in cradle/resting.py: slower motion against each other counts as none.
   const RESTING = 1e-10;
   // Beyond this number of events a hit would hold up the picture.
-  const EVENTS = 20000;
-  const DRAWN_EVENTS = 4000;
+  const EVENTS = 4000;
 
   const question = (setting, velocities) => ({
     masses: setting.masses,
@@ -85,9 +84,8 @@
     record(number) {
       const { before, happened, status } = this.hit(number);
       if (!happened || status !== "finished") return null;
-      const asked = { ...question(this.setting, before), maxEvents: DRAWN_EVENTS, record: true };
-      const answer = globalThis.cradle.collide(asked);
-      return answer.status === "finished" ? answer : null;
+      const asked = { ...question(this.setting, before), record: true };
+      return globalThis.cradle.collide(asked);
     }
 
     // The number of the last hit up to a time; -1 before the first one.
@@ -107,5 +105,5 @@
     }
   }
 
-  Object.assign(explorer, { DRAWN_EVENTS, EVENTS, FREQUENCY, LENGTH, Swing, outcome });
+  Object.assign(explorer, { EVENTS, FREQUENCY, LENGTH, Swing, outcome });
 })(globalThis.cradleExplorer);
