@@ -14,7 +14,7 @@ from cradle.measures import bouncing_pattern
 from cradle.tables import paper_sequences
 
 EXPLORER = "cradleExplorer.live[0]"
-SETTING = f"{EXPLORER}.setting"
+SETTING = f"{EXPLORER}.state.setting"
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def still(visit, fragment="", **options):
 def drawn(tab):
     """Wait until the page has drawn its state, and return the setting and the outcome shown."""
     tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
-    return tab.evaluate(f"({{...{SETTING}, after: {EXPLORER}.swing.hit(0).after}})")
+    return tab.evaluate(f"({{...{SETTING}, after: {EXPLORER}.state.swing.hit(0).after}})")
 
 
 def press(tab, name: str):
@@ -219,7 +219,7 @@ def test_a_ball_is_dragged_and_let_go(visit):
     tab = visit()
     press(tab, "Pause")
     press(tab, "Pull back")
-    tab.evaluate(f"{EXPLORER}.set(cradleExplorer.atRest({SETTING})), {EXPLORER}.changed()")
+    tab.evaluate(f"{EXPLORER}.state.set(cradleExplorer.atRest({SETTING})), {EXPLORER}.changed()")
     drawn(tab)
     x, y = middle(tab, ".ball[data-ball='4'] .disc")
     tab.mouse.move(x, y)
@@ -235,7 +235,7 @@ def test_a_ball_is_dragged_and_let_go(visit):
     tab.mouse.up()
     assert same_outcome(drawn(tab))
     assert tab.inner_text("button.main") == "Pause"
-    tab.wait_for_function(f"{EXPLORER}.clock.time > 0.8")
+    tab.wait_for_function(f"{EXPLORER}.state.clock.time > 0.8")
     first, second = (middle(tab, f".ball[data-ball='{ball}'] .disc")[0] for ball in (0, 1))
     assert second - first > 60  # the hit has sent ball 1 to the left; at rest they touch
 

@@ -9,6 +9,7 @@ from test_explorer_page import (
     EXPLORER,
     SETTING,
     browser,  # noqa: F401
+    chain_of,
     drawn,
     middle,
     page,  # noqa: F401
@@ -20,7 +21,7 @@ from test_explorer_page import (
 )
 from test_layout import MISFITS, contrast
 
-from cradle import post_impact_velocities
+from cradle import collide, post_impact_velocities
 from cradle.measures import bouncing_pattern
 
 
@@ -30,7 +31,7 @@ from cradle.measures import bouncing_pattern
 def test_address_keeps_the_setting(visit):  # noqa: F811
     tab = still(visit)
     for setting in settings(6):
-        tab.evaluate(f"(setting) => ({EXPLORER}.set(setting), {EXPLORER}.changed())", setting)
+        tab.evaluate(f"(setting) => ({EXPLORER}.state.set(setting), {EXPLORER}.changed())", setting)
         before = drawn(tab)
         tab.wait_for_function("location.hash.includes('speeds')")
         tab.wait_for_timeout(300)
@@ -142,11 +143,11 @@ def test_full_screen_for_a_lecture(visit):  # noqa: F811
     tab = still(visit, width=1366, height=768)
     press(tab, "Full screen")
     tab.wait_for_function("document.fullscreenElement")
-    for count in range(1, 18):
+    for count in range(1, 19):
         tab.keyboard.press("PageDown")
         drawn(tab)
         tab.wait_for_timeout(60)
-        assert tab.inner_text(".place") == f"{count + 1} of 18"
+        assert tab.inner_text(".place") == f"{count + 1} of 19"
         scrolls = tab.evaluate("[document.fullscreenElement.scrollHeight, innerHeight]")
         assert scrolls[0] <= scrolls[1] + 1, tab.locator(".walk select").input_value()
     letters = tab.evaluate(
@@ -219,16 +220,16 @@ def test_motion_is_asked_for(visit):  # noqa: F811
     quiet, lively = still(visit), visit()
     for tab in (quiet, lively):
         tab.wait_for_timeout(1500)
-    assert quiet.evaluate(f"{EXPLORER}.clock.time") == 0
+    assert quiet.evaluate(f"{EXPLORER}.state.clock.time") == 0
     assert quiet.get_by_role("button", name="Let go").is_visible()
-    assert lively.evaluate(f"{EXPLORER}.clock.time") > 0
+    assert lively.evaluate(f"{EXPLORER}.state.clock.time") > 0
     assert lively.get_by_role("button", name="Pause").is_visible()
     # Out of sight it stands still.
     lively.evaluate("document.querySelector('footer').scrollIntoView()")
     lively.wait_for_timeout(300)
-    before = lively.evaluate(f"{EXPLORER}.clock.time")
+    before = lively.evaluate(f"{EXPLORER}.state.clock.time")
     lively.wait_for_timeout(400)
-    assert lively.evaluate(f"{EXPLORER}.clock.time") == before
+    assert lively.evaluate(f"{EXPLORER}.state.clock.time") == before
 
 
 def test_time_of_a_frame(visit):  # noqa: F811
@@ -258,7 +259,7 @@ def test_what_takes_too_long_is_said(visit):  # noqa: F811
     fragment = f"#speeds=2,0,0,0,0,0,0&masses={masses}&restitution=0.99&forward=0.02"
     tab = still(visit, fragment)
     drawn(tab)
-    status = tab.evaluate(f"{EXPLORER}.swing.hit(0).status")
+    status = tab.evaluate(f"{EXPLORER}.state.swing.hit(0).status")
     assert status == "unfinished"
     assert "more than 4000 events" in tab.inner_text(".words")
     assert tab.locator(".outcome rect").count() == 0  # no stale bars
@@ -327,6 +328,78 @@ def test_sweep_is_the_solvers(visit):  # noqa: F811
         setting["masses"], setting["speeds"], 1.0, np.tile(ratios[:, None], 3), excess="saturate"
     )
     np.testing.assert_allclose(values, python, rtol=0, atol=1e-12)
+
+
+# --- what the texts promise -------------------------------------------------------------------
+
+
+def test_scenes_do_what_their_texts_say(visit):  # noqa: F811
+    """In Python, from the settings that the page has."""
+    tab = still(visit)
+    scenes = tab.evaluate("cradleExplorer.data.scenes")
+    solved = {}
+    for scene in scenes:
+        trace = collide(*chain_of(scene["setting"]))
+        solved[scene["key"]] = trace.velocities, trace
+    velocities = {key: found[0] for key, found in solved.items()}
+    np.testing.assert_array_equal(velocities["one"], [0, 0, 0, 0, 1])
+    np.testing.assert_array_equal(velocities["two"], [0, 0, 0, 1, 1])
+    assert velocities["small"][0] < -0.05
+    assert 0.9 < velocities["small"][4] < 1
+    assert velocities["half"][0] < -0.2
+    assert velocities["half"][3] == pytest.approx(velocities["half"][4], abs=1e-6)
+    np.testing.assert_allclose(velocities["three"], [-1 / 3, 2 / 3, 2 / 3], atol=1e-6)
+    assert solved["light"][1].collisions.sum() > 10
+    kinds = [tuple(event) for event in solved["meeting"][1].events]
+    assert ("close", 1) in kinds  # the gap
+    # "One of them never stops": three of five pulled back, at the ratio 0.
+    middle_ball = tab.evaluate(
+        """() => {
+          const { withRatio, pulled, data, Swing } = cradleExplorer;
+          const swing = new Swing(pulled(data.scenes[0].setting, 2, 1));
+          return [0, 1, 2, 3].map((k) => Math.abs(swing.hit(k).after[2]));
+        }"""
+    )
+    assert middle_ball == [1, 1, 1, 1]
+    # "They end up swinging together."
+    together = tab.evaluate(
+        """() => {
+          const { data, Swing } = cradleExplorer;
+          const swing = new Swing(data.scenes.find((scene) => scene.key === "losses").setting);
+          return swing.hit(400);
+        }"""
+    )
+    assert not together["happened"]
+    np.testing.assert_allclose(np.abs(together["after"]), 0.2)
+
+
+@pytest.mark.parametrize(
+    ("chapter", "parts"),
+    [
+        ("problem", {"ratio"}),
+        ("three_balls", {"mass", "restitution", "ratio"}),
+        ("patterns", {"restitution", "ratio"}),
+        ("n_balls", {"ratio"}),
+    ],
+)
+def test_small_ones_in_chapters(visit, page, chapter: str, parts: set[str]):  # noqa: F811
+    """They wait to be let go, show what the chapter is about, and leave the address alone."""
+    address = page.replace("explorer.html", f"{chapter}.html")
+    tab = visit(address=address, width=390)
+    assert tab.evaluate("document.querySelectorAll('.cradle-explorer.live').length") == 1
+    host = tab.locator(".cradle-explorer")
+    labels = host.locator(".slider:visible label").all_text_contents()
+    assert set(labels) == parts
+    assert tab.evaluate(f"{EXPLORER}.state.clock.playing") is False
+    before = drawn(tab)
+    tab.get_by_label("ratio", exact=True).press("ArrowLeft")
+    after = drawn(tab)
+    assert after["forward"] != before["forward"]
+    assert same_outcome(after)
+    tab.wait_for_timeout(300)
+    assert tab.evaluate("location.hash") == ""
+    link = host.locator(".more a").get_attribute("href")
+    assert drawn(still(visit, "#" + link.partition("#")[2])) == after
 
 
 def test_without_scripts_there_is_a_picture(visit):  # noqa: F811

@@ -28,8 +28,11 @@ SCRIPTS = (
     "explorer_controls.js",
     "explorer_panels.js",
     "explorer_pictures.js",
+    "explorer_state.js",
     "explorer.js",
 )
+
+STYLES = ("explorer.css", "explorer_pictures.css")
 
 PLACE = re.compile(
     r'<div class="cradle-explorer"[^>]*data-scene="(?P<scene>[^"]*)"[^>]*>'
@@ -199,7 +202,8 @@ def add_scripts(
         )
 
     context["body"] = PLACE.sub(with_picture, body)
-    app.add_css_file("explorer.css")
+    for style in STYLES:
+        app.add_css_file(style)
     for script in SCRIPTS:
         app.add_js_file(script, loading_method="defer")
 

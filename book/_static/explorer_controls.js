@@ -24,14 +24,33 @@
     const place = (value) => (logarithmic ? Math.log10(value) : value);
     const value = (at) => (logarithmic ? +(10 ** at).toPrecision(2) : at);
     const range = make("input", {
-      type: "range", id: name, min: place(low), max: place(high), step, oninput: () => give(value(+range.value)),
+      type: "range",
+      id: name,
+      min: place(low),
+      max: place(high),
+      step,
+      oninput: () => give(value(+range.value)),
     });
     const box = make("input", {
-      type: "number", min: low, max: high, step: "any", "aria-label": `${words}, as a number`,
-      onchange: () => (box.value !== "" && box.checkValidity() ? give(+(+box.value).toFixed(6)) : box.reportValidity()),
+      type: "number",
+      min: low,
+      max: high,
+      step: "any",
+      "aria-label": `${words}, as a number`,
+      onchange: () =>
+        box.value !== "" && box.checkValidity()
+          ? give(+(+box.value).toFixed(6))
+          : box.reportValidity(),
     });
     const label = make("label", { for: name }, words);
-    const node = make("div", { class: "slider" }, label, range, box, make("span", { class: "unit" }, unit));
+    const node = make(
+      "div",
+      { class: "slider" },
+      label,
+      range,
+      box,
+      make("span", { class: "unit" }, unit),
+    );
     function give(number) {
       input(Math.min(Math.max(number, low), high));
     }
@@ -59,7 +78,12 @@
       inputs.forEach(({ label }) => label.remove());
       inputs = list.map(({ value, text, title, colour }) => {
         const input = make("input", { type: "radio", name, value, onchange: () => choose(value) });
-        const label = make("label", title ? { title } : {}, input, make("span", colour ? { class: "coloured", style: `--ball: ${colour}` } : {}, text));
+        const label = make(
+          "label",
+          title ? { title } : {},
+          input,
+          make("span", colour ? { class: "coloured", style: `--ball: ${colour}` } : {}, text),
+        );
         node.append(label);
         return { input, label, value };
       });
@@ -81,7 +105,7 @@
         ...groups.flatMap(({ group, entries }) => {
           const nodes = entries.map(({ value, text }) => make("option", { value }, text));
           return group ? [make("optgroup", { label: group }, ...nodes)] : nodes;
-        })
+        }),
       );
     }
     offer(options);

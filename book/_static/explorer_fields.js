@@ -2,7 +2,7 @@
 // coarse to fine, a few milliseconds in each frame, and begin anew when their question changes.
 (function (explorer) {
   "use strict";
-  const { axes, names, picture, polyline, px, span, stroke, sub, text } = explorer;
+  const { axes, names, picture, polyline, px, span, stroke, sub } = explorer;
 
   // `compute(k)` for k below `count`, every 16th first, then those between.
   class Gradual {
@@ -56,7 +56,7 @@
       this.setting = setting;
       this.inner = inner;
       this.points = new Gradual(STEPS + 1, (k) =>
-        explorer.outcome(explorer.withRatio(setting, inner, k / STEPS))
+        explorer.outcome(explorer.withRatio(setting, inner, k / STEPS)),
       );
     }
 
@@ -70,37 +70,46 @@
     // `after`: velocities of the present setting.
     svg(box, setting, after) {
       const { em } = box;
-      const known = this.points.values.map((answer, k) => ({ ...answer, ratio: k / STEPS })).filter(Boolean);
+      const known = this.points.values
+        .map((answer, k) => ({ ...answer, ratio: k / STEPS }))
+        .filter(Boolean);
       const found = known.filter((answer) => answer.status === "finished");
       const all = found.flatMap(({ velocities }) => [...velocities]);
       const plot = axes(box, [0, 1], span([...all, ...(after || [])]), [
-        this.inner.length > 1 ? "ratio, the same at all inner balls" : `ratio at ball ${this.inner[0] + 2}`,
+        this.inner.length > 1
+          ? "ratio, the same at all inner balls"
+          : `ratio at ball ${this.inner[0] + 2}`,
         "velocity after the hit (m/s)",
       ]);
       this.plot = plot;
       const balls = explorer.all(setting.masses);
       const drawn = balls.map((ball) =>
         stretches(known, ({ status }) => status === "finished") // a gap where there is no answer
-          .map((part) => polyline(part.map(({ ratio, velocities }) => [plot.x(ratio), plot.y(velocities[ball])]), stroke(ball)))
-          .join("")
+          .map((part) =>
+            polyline(
+              part.map(({ ratio, velocities }) => [plot.x(ratio), plot.y(velocities[ball])]),
+              stroke(ball),
+            ),
+          )
+          .join(""),
       );
       if (found.length) drawn.push(names(plot, balls, found[found.length - 1].velocities, em));
       const words = "Velocities after the first hit for ratios from 0 to 1";
-      return picture(box, words, this.held(found, em) + plot.drawn + drawn.join("") + this.present(setting, after, em));
+      return picture(
+        box,
+        words,
+        this.held(found) + plot.drawn + drawn.join("") + this.present(setting, after, em),
+      );
     }
 
     // Where a ratio is above its largest value and has no further effect there.
-    held(found, em) {
-      const first = found.findIndex((answer) => answer.saturated.length > 0);
-      if (first < 0) return "";
+    held(found) {
       const { x, top, bottom } = this.plot;
       const bands = stretches(found, ({ saturated }) => saturated.length > 0).map((part) => {
         const [from, to] = [x(part[0].ratio), x(part[part.length - 1].ratio)];
         return `<rect class="held" x="${from}" y="${top}" width="${px(to - from)}" height="${px(bottom - top)}"/>`;
       });
-      const room = this.plot.right - x(found[first].ratio) > 9 * em;
-      const label = room ? text(this.plot.right - 0.4 * em, top + em, "held at the largest ratio", 'text-anchor="end" class="small"') : "";
-      return bands.join("") + label;
+      return bands.join("");
     }
 
     present(setting, after, em) {
@@ -109,10 +118,14 @@
       const ratio = presentRatio(setting, this.inner);
       if (ratio === null)
         return [...after]
-          .map((v, ball) => `<path d="M${left} ${y(v)}H${right}" stroke="${explorer.colour(ball)}" class="level"/>`)
+          .map(
+            (v, ball) =>
+              `<path d="M${left} ${y(v)}H${right}" stroke="${explorer.colour(ball)}" class="level"/>`,
+          )
           .join("");
       const dots = [...after].map(
-        (v, ball) => `<circle class="dot" cx="${x(ratio)}" cy="${y(v)}" r="${px(0.36 * em)}" stroke="${explorer.colour(ball)}"/>`
+        (v, ball) =>
+          `<circle class="dot" cx="${x(ratio)}" cy="${y(v)}" r="${px(0.36 * em)}" stroke="${explorer.colour(ball)}"/>`,
       );
       return `<path class="cursor" d="M${x(ratio)} ${top}V${bottom}"/>${dots.join("")}`;
     }
@@ -141,7 +154,13 @@
         const left = ((Math.floor(k / CELLS) + 0.5) / CELLS) * LARGEST;
         const right = (((k % CELLS) + 0.5) / CELLS) * LARGEST;
         const masses = [1 / left, 1, 1 / right];
-        const { status, velocities, collisions, collapsed } = explorer.outcome({ masses, speeds, restitution, forward, backward });
+        const { status, velocities, collisions, collapsed } = explorer.outcome({
+          masses,
+          speeds,
+          restitution,
+          forward,
+          backward,
+        });
         if (status !== "finished") return { pattern: -1, odd: false };
         // As balls keep their order, the number of those that go back names them.
         const pattern = [...velocities].filter((v) => v < 0).length;
@@ -175,10 +194,12 @@
 
     svg(box, setting) {
       const { em } = box;
-      const plot = axes(box, [0, LARGEST], [0, LARGEST], [
-        `m${sub(2)} / m${sub(3)}`,
-        `m${sub(2)} / m${sub(1)}`,
-      ]);
+      const plot = axes(
+        box,
+        [0, LARGEST],
+        [0, LARGEST],
+        [`m${sub(2)} / m${sub(3)}`, `m${sub(2)} / m${sub(1)}`],
+      );
       this.plot = plot;
       const at = ratios(setting);
       const [x, y] = [at.right, at.left].map((value) => Math.min(value, LARGEST));
@@ -189,7 +210,12 @@
         `aria-valuenow="${px(at.right)}" aria-valuemin="0" aria-valuemax="${LARGEST}">` +
         `<circle class="reach" cx="${plot.x(x)}" cy="${plot.y(y)}" r="${px(1.6 * em)}"/>` +
         `<circle class="${beyond ? "beyond" : "present"}" cx="${plot.x(x)}" cy="${plot.y(y)}" r="${px(0.5 * em)}"/></g>`;
-      return picture(box, "Map of the balls that go back, by two mass ratios", plot.drawn + point, "group");
+      return picture(
+        box,
+        "Map of the balls that go back, by two mass ratios",
+        plot.drawn + point,
+        "group",
+      );
     }
   }
 

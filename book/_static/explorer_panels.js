@@ -26,7 +26,7 @@
       list.node,
       button("→", () => act.walk(1), { "aria-label": "next scene" }),
       place,
-      full
+      full,
     );
     function show({ scene }) {
       full.textContent = document.fullscreenElement ? "Leave full screen" : "Full screen";
@@ -59,7 +59,8 @@
   // What the sliders change: all balls, or one of them with what lies at it.
   function concerned(setting, scope) {
     const balls = all(setting.masses);
-    if (scope === "all") return { balls, contacts: all(setting.restitution), inner: all(setting.forward) };
+    if (scope === "all")
+      return { balls, contacts: all(setting.restitution), inner: all(setting.forward) };
     const ball = +scope;
     return {
       balls: [ball],
@@ -71,12 +72,30 @@
   function settingSliders(act) {
     const [lightest, heaviest] = LIMITS.masses;
     const ratio = (words, directions) =>
-      slider({ words, low: 0, high: 1, step: 0.01, input: (value) => act.ratio(value, directions) });
+      slider({
+        words,
+        low: 0,
+        high: 1,
+        step: 0.01,
+        input: (value) => act.ratio(value, directions),
+      });
     return {
       mass: slider({
-        words: "mass", low: lightest, high: heaviest, step: 0.02, logarithmic: true, unit: "kg", input: act.mass,
+        words: "mass",
+        low: lightest,
+        high: heaviest,
+        step: 0.02,
+        logarithmic: true,
+        unit: "kg",
+        input: act.mass,
       }),
-      restitution: slider({ words: "restitution", low: 0, high: 1, step: 0.01, input: act.restitution }),
+      restitution: slider({
+        words: "restitution",
+        low: 0,
+        high: 1,
+        step: 0.01,
+        input: act.restitution,
+      }),
       ratio: ratio("ratio", ["forward", "backward"]),
       forward: ratio("ratio, pushed from the left", ["forward"]),
       backward: ratio("ratio, pushed from the right", ["backward"]),
@@ -86,29 +105,48 @@
   function settingsPanel(act, parts) {
     const [fewest, most] = LIMITS.balls;
     const count = choice({
-      words: "number of balls", choose: (value) => act.count(+value),
-      options: Array.from({ length: most - fewest + 1 }, (_, k) => ({ value: String(fewest + k), text: String(fewest + k) })),
+      words: "number of balls",
+      choose: (value) => act.count(+value),
+      options: Array.from({ length: most - fewest + 1 }, (_, k) => ({
+        value: String(fewest + k),
+        text: String(fewest + k),
+      })),
     });
     const scope = choice({ words: "set for", options: [], choose: act.scope });
     const letters = [NONE, ...Object.keys(explorer.data.masses)];
     const material = choice({
-      words: "material", choose: act.letter,
+      words: "material",
+      choose: act.letter,
       options: letters.map((value) => ({
         value,
         text: value === NONE ? "any" : value,
-        title: value === NONE ? "masses, restitutions and ratios as set below" : `the paper's ball ${value}, ${1000 * explorer.data.masses[value]} g`,
+        title:
+          value === NONE
+            ? "masses, restitutions and ratios as set below"
+            : `the paper's ball ${value}, ${1000 * explorer.data.masses[value]} g`,
       })),
     });
     const sliders = settingSliders(act);
     const wanted = { count, scope, material, ...sliders };
     const has = (name) => parts.has({ forward: "ratio", backward: "ratio" }[name] ?? name);
-    const nodes = Object.keys(wanted).filter(has).map((name) => wanted[name].node);
+    const nodes = Object.keys(wanted)
+      .filter(has)
+      .map((name) => wanted[name].node);
     let offered = 0;
     function show({ setting, scope: chosen }) {
       const { balls, contacts, inner } = concerned(setting, chosen);
       const size = setting.masses.length;
       if (offered !== size) {
-        const each = all(setting.masses).map((ball) => ({ value: String(ball), text: `${ball + 1}`, title: `ball ${ball + 1}`, colour: explorer.colour(ball) }));
+        // A ball is offered if it has something to set: without masses, one with two neighbours.
+        const some = all(setting.masses).filter(
+          (ball) => parts.has("mass") || concerned(setting, ball).inner.length > 0,
+        );
+        const each = some.map((ball) => ({
+          value: String(ball),
+          text: `${ball + 1}`,
+          title: `ball ${ball + 1}`,
+          colour: explorer.colour(ball),
+        }));
         scope.offer([{ value: "all", text: "all" }, ...each]);
         offered = size;
       }
@@ -128,7 +166,11 @@
         sliders[name].node.hidden = values.length === 0;
         if (values.length) sliders[name].show(values);
       }
-      sliders.restitution.rename(one && contacts.length ? `restitution, balls ${contacts[0] + 1} and ${contacts[0] + 2}` : "restitution");
+      sliders.restitution.rename(
+        one && contacts.length
+          ? `restitution, balls ${contacts[0] + 1} and ${contacts[0] + 2}`
+          : "restitution",
+      );
     }
     return { node: make("div", { class: "settings" }, ...nodes), show };
   }
@@ -139,8 +181,20 @@
     const title = make("h3", {});
     const bars = make("div", { class: "plot" });
     const energy = make("div", { class: "plot" });
-    const caption = make("p", { class: "note" }, "The kinetic energy before the hit is 100 %. Grey: lost, or stored in the contacts.");
-    const node = make("div", { class: "outcome" }, title, bars, make("h3", {}, "Energy"), energy, caption);
+    const caption = make(
+      "p",
+      { class: "note" },
+      "The kinetic energy before the hit is 100\u00a0%. Grey: lost, or stored in the contacts.",
+    );
+    const node = make(
+      "div",
+      { class: "outcome" },
+      title,
+      bars,
+      make("h3", {}, "Energy"),
+      energy,
+      caption,
+    );
     function show({ setting, hit, number, now, part }, box) {
       const name = explorer.hitName(number);
       title.textContent = `${part < 1 ? "During" : "After"} ${name} (m/s)`;
@@ -170,7 +224,9 @@
     const code = make("code", {});
     const told = make("span", { class: "told", role: "status" });
     const copied = (what) => (done) => {
-      told.textContent = done ? `${what} copied` : "The browser does not allow copying; select the text by hand.";
+      told.textContent = done
+        ? `${what} copied`
+        : "The browser does not allow copying; select the text by hand.";
       setTimeout(() => (told.textContent = ""), 4000);
     };
     const node = make(
@@ -179,10 +235,18 @@
       button("Copy Python", () => act.copy(code.textContent).then(copied("Python"))),
       button("Copy link", () => act.copy(act.address()).then(copied("Link"))),
       told,
-      make("details", {}, make("summary", {}, "The same in Python"), make("pre", {}, code))
+      make("details", {}, make("summary", {}, "The same in Python"), make("pre", {}, code)),
     );
     return { node, show: ({ setting }) => (code.textContent = explorer.python(setting)) };
   }
 
-  explorer.panels = { concerned, outcomePanel, runPanel, scenesPanel, settingsPanel, sharePanel, wordsPanel };
+  explorer.panels = {
+    concerned,
+    outcomePanel,
+    runPanel,
+    scenesPanel,
+    settingsPanel,
+    sharePanel,
+    wordsPanel,
+  };
 })(globalThis.cradleExplorer);

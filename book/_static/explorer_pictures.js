@@ -13,21 +13,36 @@
     const contact = select({ words: "velocities of", options: [], choose: act.contact });
     const plot = make("div", { class: "plot" });
     const part = make("input", {
-      type: "range", min: 0, max: 1, step: 0.005, "aria-label": "how far the hit has come",
+      type: "range",
+      min: 0,
+      max: 1,
+      step: 0.005,
+      "aria-label": "how far the hit has come",
       oninput: () => act.part(+part.value),
     });
-    const scrub = make("label", { class: "scrub" }, make("span", {}, "start"), part, make("span", {}, "end"));
+    const scrub = make(
+      "label",
+      { class: "scrub" },
+      make("span", {}, "start"),
+      part,
+      make("span", {}, "end"),
+    );
     const note = make("p", { class: "note" });
     let offered = 0;
     let drawn = null;
     function offer(count) {
-      const pairs = Array.from({ length: count - 1 }, (_, c) => ({ value: String(c), text: `balls ${c + 1} and ${c + 2}` }));
+      const pairs = Array.from({ length: count - 1 }, (_, c) => ({
+        value: String(c),
+        text: `balls ${c + 1} and ${c + 2}`,
+      }));
       contact.offer([{ entries: [{ value: "all", text: "all balls" }, ...pairs] }]);
       offered = count;
     }
     function legend(record, chosen) {
       if (chosen === "all") return "Dashed line: where the hit is now.";
-      const kinds = new Set(record.events.filter((event) => event.contact === chosen).map(({ kind }) => kind));
+      const kinds = new Set(
+        record.events.filter((event) => event.contact === chosen).map(({ kind }) => kind),
+      );
       return [...kinds].map((kind) => explorer.data.events[kind].join(": ")).join("; ");
     }
     function show({ setting, record, hit, contact: chosen }, box) {
@@ -38,15 +53,29 @@
       drawn = record && explorer.diagram(box(plot), record, chosen);
       plot.innerHTML = drawn ? drawn.svg : "";
       if (record) note.textContent = legend(record, chosen);
-      else note.textContent = hit.happened ? "There is no answer to draw." : "There is no hit to draw.";
+      else
+        note.textContent = hit.happened
+          ? "There is no answer to draw."
+          : "There is no hit to draw.";
     }
     function move({ record, contact: chosen, part: now }, box) {
       if (!drawn || !record) return;
       if (document.activeElement !== part || +part.value !== now) part.value = now;
-      part.setAttribute("aria-valuetext", `${Math.round(100 * now)} %`);
-      plot.querySelector(".now").innerHTML = explorer.dots(drawn.plot, record, chosen, now, box(plot).em);
+      part.setAttribute("aria-valuetext", `${Math.round(100 * now)}\u00a0%`);
+      plot.querySelector(".now").innerHTML = explorer.dots(
+        drawn.plot,
+        record,
+        chosen,
+        now,
+        box(plot).em,
+      );
     }
-    return { node: make("div", {}, contact.node, plot, scrub, note), show, move, resume: () => false };
+    return {
+      node: make("div", {}, contact.node, plot, scrub, note),
+      show,
+      move,
+      resume: () => false,
+    };
   }
 
   // --- all ratios -----------------------------------------------------------------------------------
@@ -62,7 +91,11 @@
       const { left, width } = svg.getBoundingClientRect();
       const x = ((event.clientX - left) * svg.viewBox.baseVal.width) / width;
       const share = (x - sweep.plot.left) / (sweep.plot.right - sweep.plot.left);
-      act.ratio(Math.round(100 * Math.min(Math.max(share, 0), 1)) / 100, ["forward", "backward"], sweep.inner);
+      act.ratio(
+        Math.round(100 * Math.min(Math.max(share, 0), 1)) / 100,
+        ["forward", "backward"],
+        sweep.inner,
+      );
     };
     drag(plot, ratioAt);
     function draw(box) {
@@ -85,11 +118,13 @@
       tell();
     }
     function tell() {
+      const held = sweep.points.values.some((answer) => answer.saturated?.length);
       const refused = sweep.points.values.filter((answer) => answer.status !== "finished").length;
       note.textContent =
         (explorer.presentRatio(shown.setting, sweep.inner) === null
           ? "Level lines: the present outcome, whose ratios differ from ball to ball."
           : "Dashed line: the present ratio. Drag it.") +
+        (held ? " Grey: a ratio is above its largest value, and held at it." : "") +
         (refused ? ` At ${refused} ratios the hit takes more events than the page computes.` : "");
     }
     function resume(box) {
@@ -110,7 +145,9 @@
     const canvas = make("canvas", { class: "cells", "aria-hidden": true });
     const plot = make("div", { class: "plot" });
     const host = make("div", { class: "map" }, canvas, plot);
-    const patterns = PATTERNS.map((words, k) => make("span", { class: `pattern pattern-${k}` }, words));
+    const patterns = PATTERNS.map((words, k) =>
+      make("span", { class: `pattern pattern-${k}` }, words),
+    );
     const legend = make("p", { class: "patterns" }, ...patterns);
     const note = make("p", { class: "note" });
     const three = button("Take three balls", () => act.count(3));
@@ -130,7 +167,9 @@
     };
     drag(plot, pointAt);
     plot.addEventListener("keydown", (event) => {
-      const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+      const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[
+        event.key
+      ];
       if (!way || !event.target.closest(".point")) return;
       event.preventDefault();
       event.stopPropagation();
@@ -141,8 +180,13 @@
     let shown = null;
     function paint() {
       const style = getComputedStyle(host);
-      map.paint(canvas, [0, 1, 2, 3, "odd"].map((k) => style.getPropertyValue(`--pattern-${k}`)));
-      patterns.forEach((pattern, k) => (pattern.hidden = !map.points.values.some((cell) => cell.pattern === k)));
+      map.paint(
+        canvas,
+        [0, 1, 2, 3, "odd"].map((k) => style.getPropertyValue(`--pattern-${k}`)),
+      );
+      patterns.forEach(
+        (pattern, k) => (pattern.hidden = !map.points.values.some((cell) => cell.pattern === k)),
+      );
       painted = document.documentElement.dataset.theme + map.key + map.points.finished;
     }
     function show(state, box) {
@@ -164,11 +208,20 @@
       plot.innerHTML = map.svg(space, setting);
       if (focused) plot.querySelector(".point").focus({ preventScroll: true });
       const { left, right, top, bottom } = map.plot;
-      Object.assign(canvas.style, { left: `${left}px`, top: `${top}px`, width: `${right - left}px`, height: `${bottom - top}px` });
+      Object.assign(canvas.style, {
+        left: `${left}px`,
+        top: `${top}px`,
+        width: `${right - left}px`,
+        height: `${bottom - top}px`,
+      });
       const at = explorer.ratios(setting);
-      const beyond = Math.max(at.left, at.right) > explorer.LARGEST ? " The present masses lie beyond its edge." : "";
+      const beyond =
+        Math.max(at.left, at.right) > explorer.LARGEST
+          ? " The present masses lie beyond its edge."
+          : "";
       note.textContent = `Which balls go back. Each change of shade is one collision more or less. Drag the point.${beyond}`;
-      if (painted !== document.documentElement.dataset.theme + map.key + map.points.finished) paint();
+      if (painted !== document.documentElement.dataset.theme + map.key + map.points.finished)
+        paint();
     }
     function resume() {
       if (!map || map.points.finished) return false;
@@ -189,7 +242,8 @@
       follow(event);
     });
     node.addEventListener("pointermove", (event) => active && follow(event));
-    for (const end of ["pointerup", "pointercancel"]) node.addEventListener(end, () => (active = false));
+    for (const end of ["pointerup", "pointercancel"])
+      node.addEventListener(end, () => (active = false));
   }
 
   // --- the panel ------------------------------------------------------------------------------------

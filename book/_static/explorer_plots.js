@@ -7,7 +7,8 @@
     maximum_compression: (x, y, r) => `<circle cx="${x}" cy="${y}" r="${r}"/>`,
     end: (x, y, r) => `<rect x="${x - r}" y="${y - r}" width="${2 * r}" height="${2 * r}"/>`,
     close: (x, y, r) => `<path d="M${x} ${y - r}l${r} ${1.8 * r}h${-2 * r}z"/>`,
-    collapse: (x, y, r) => `<path d="M${x} ${y - 1.3 * r}l${r} ${1.3 * r} ${-r} ${1.3 * r} ${-r} ${-1.3 * r}z"/>`,
+    collapse: (x, y, r) =>
+      `<path d="M${x} ${y - 1.3 * r}l${r} ${1.3 * r} ${-r} ${1.3 * r} ${-r} ${-1.3 * r}z"/>`,
   };
 
   const px = (value) => Math.round(value * 100) / 100;
@@ -58,7 +59,9 @@
       parts.push(text(x(value), bottom + 1.15 * em, label, 'text-anchor="middle"'));
     }
     for (const { value, label } of levels) {
-      parts.push(`<path class="${+label === 0 ? "zero" : "grid"}" d="M${left} ${y(value)}H${right}"/>`);
+      parts.push(
+        `<path class="${+label === 0 ? "zero" : "grid"}" d="M${left} ${y(value)}H${right}"/>`,
+      );
       parts.push(text(left - 0.4 * em, y(value) + 0.35 * em, label, 'text-anchor="end"'));
     }
     parts.push(`<path class="frame" d="M${left} ${top}V${bottom}H${right}"/>`);
@@ -71,7 +74,9 @@
 
   // The number of each ball at the right end of its line, moved apart where lines end together.
   function names(plot, balls, values, em) {
-    const places = balls.map((ball, k) => ({ ball, y: plot.y(values[k]) })).sort((a, b) => a.y - b.y);
+    const places = balls
+      .map((ball, k) => ({ ball, y: plot.y(values[k]) }))
+      .sort((a, b) => a.y - b.y);
     const least = 0.95 * em;
     places.forEach((place, k) => {
       if (k > 0) place.y = Math.max(place.y, places[k - 1].y + least);
@@ -81,7 +86,9 @@
       places[k].y = Math.min(places[k].y, lowest);
     }
     return places
-      .map(({ ball, y }) => text(plot.right + 0.6 * em, y + 0.35 * em, ball + 1, `fill="${colour(ball)}" class="name"`))
+      .map(({ ball, y }) =>
+        text(plot.right + 0.6 * em, y + 0.35 * em, ball + 1, `fill="${colour(ball)}" class="name"`),
+      )
       .join("");
   }
 
@@ -117,7 +124,9 @@
         `<rect x="${Math.min(x(0), x(value))}" y="${top}" width="${px(Math.abs(x(value) - x(0)))}" ` +
         `height="${px(1.2 * em)}" rx="2" ${how}/>`;
       const letter = setting.letters[ball] === explorer.NONE ? "" : ` ${setting.letters[ball]}`;
-      parts.push(`<circle cx="${px(0.6 * em)}" cy="${px(top + 0.6 * em)}" r="${px(0.4 * em)}" fill="${colour(ball)}"/>`);
+      parts.push(
+        `<circle cx="${px(0.6 * em)}" cy="${px(top + 0.6 * em)}" r="${px(0.4 * em)}" fill="${colour(ball)}"/>`,
+      );
       parts.push(text(1.3 * em, top + em, `${ball + 1}${letter}`));
       parts.push(bar(before[ball], 'class="before"'), bar(now[ball], `fill="${colour(ball)}"`));
       const leftwards = +now[ball].toFixed(2) < 0;
@@ -142,15 +151,23 @@
       const wide = share * width;
       const part =
         `<rect x="${px(x)}" y="0" width="${px(wide)}" height="${px(height)}" ${how}/>` +
-        (wide > 2.6 * em ? text(x + wide / 2, 1.1 * em, label, 'text-anchor="middle" class="on-colour"') : "");
+        (wide > 2.6 * em
+          ? text(x + wide / 2, 1.1 * em, label, 'text-anchor="middle" class="on-colour"')
+          : "");
       x += wide;
       return part;
     };
-    const percent = (share) => `${fixed(100 * share, 0)} %`;
-    const parts = shares.map((share, ball) => piece(share, `fill="${colour(ball)}" class="part"`, percent(share)));
+    const percent = (share) => `${fixed(100 * share, 0)}\u00a0%`;
+    const parts = shares.map((share, ball) =>
+      piece(share, `fill="${colour(ball)}" class="part"`, percent(share)),
+    );
     parts.push(piece(gone, 'class="gone"', percent(gone)));
     const words = shares.map((share, ball) => `ball ${ball + 1} ${percent(share)}`).join(", ");
-    return picture({ width, height }, `Kinetic energy: ${words}; not in motion: ${percent(gone)}`, parts.join(""));
+    return picture(
+      { width, height },
+      `Kinetic energy: ${words}; not in motion: ${percent(gone)}`,
+      parts.join(""),
+    );
   }
 
   // Sum of all impulses at each row of a record's path.
@@ -167,7 +184,8 @@
     const from = Math.max(row - 1, 0);
     const step = along[row] - along[from];
     const share = part >= 1 ? 1 : step > 0 ? (target - along[from]) / step : 0;
-    const between = (rows) => rows[row].map((value, k) => rows[from][k] + share * (value - rows[from][k]));
+    const between = (rows) =>
+      rows[row].map((value, k) => rows[from][k] + share * (value - rows[from][k]));
     const pressed = record.pathImpulses[row].map((p, c) => p > record.pathImpulses[from][c]);
     return {
       velocities: share === 1 ? record.path[row] : between(record.path),
@@ -202,7 +220,7 @@
         if (kind === "close" && k > 0) collision += 1;
         const x = plot.x(record.pathImpulses[row][contact]);
         const drawn = [contact, contact + 1].map((ball) =>
-          MARKS[kind](x, plot.y(record.path[row][ball]), px(0.28 * em))
+          MARKS[kind](x, plot.y(record.path[row][ball]), px(0.28 * em)),
         );
         const letter = explorer.data.events[kind][0] + (several ? collision : "");
         const room = x > taken;
@@ -228,17 +246,31 @@
       "velocity (m/s)",
     ]);
     const drawn = balls.map((ball) =>
-      polyline(along.map((at, row) => [plot.x(at), plot.y(record.path[row][ball])]), stroke(ball))
+      polyline(
+        along.map((at, row) => [plot.x(at), plot.y(record.path[row][ball])]),
+        stroke(ball),
+      ),
     );
     const last = record.path[record.path.length - 1];
-    drawn.push(names(plot, balls, balls.map((ball) => last[ball]), em));
+    drawn.push(
+      names(
+        plot,
+        balls,
+        balls.map((ball) => last[ball]),
+        em,
+      ),
+    );
     const marked = contact === "all" ? "" : marks(record, contact, plot, em);
     const words = `Velocities of balls ${balls.map((ball) => ball + 1).join(", ")} during the hit`;
-    return { plot, svg: picture(box, words, plot.drawn + marked + drawn.join("") + '<g class="now"></g>') };
+    return {
+      plot,
+      svg: picture(box, words, plot.drawn + marked + drawn.join("") + '<g class="now"></g>'),
+    };
   }
 
   // Subscripts as Unicode: they need no markup.
-  const sub = (number) => [...String(number)].map((digit) => String.fromCharCode(0x2080 + +digit)).join("");
+  const sub = (number) =>
+    [...String(number)].map((digit) => String.fromCharCode(0x2080 + +digit)).join("");
 
   // The dots that travel along the diagram's lines.
   function dots(plot, record, contact, part, em) {
@@ -248,12 +280,29 @@
     return (
       `<path class="cursor" d="M${x} ${plot.top}V${plot.bottom}"/>` +
       balls
-        .map((ball) => `<circle class="dot" cx="${x}" cy="${plot.y(velocities[ball])}" r="${px(0.36 * em)}" stroke="${colour(ball)}"/>`)
+        .map(
+          (ball) =>
+            `<circle class="dot" cx="${x}" cy="${plot.y(velocities[ball])}" r="${px(0.36 * em)}" stroke="${colour(ball)}"/>`,
+        )
         .join("")
     );
   }
 
   Object.assign(explorer, {
-    axes, bars, colour, diagram, dots, during, energy, names, picture, polyline, px, span, stroke, sub, text,
+    axes,
+    bars,
+    colour,
+    diagram,
+    dots,
+    during,
+    energy,
+    names,
+    picture,
+    polyline,
+    px,
+    span,
+    stroke,
+    sub,
+    text,
   });
 })(globalThis.cradleExplorer);

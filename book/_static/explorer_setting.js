@@ -62,7 +62,7 @@
       Array.from({ length }, (_, k) => (k < row.length ? row[k] : (row[row.length - 1] ?? first)));
     const letters = setting.letters.padEnd(count, setting.letters[old - 1]).slice(0, count);
     const speeds = Array.from({ length: count }, (_, k) =>
-      k < old ? setting.speeds[k] : Math.min(0, setting.speeds[old - 1])
+      k < old ? setting.speeds[k] : Math.min(0, setting.speeds[old - 1]),
     );
     const ratio = 0.15;
     const sized = {
@@ -148,10 +148,14 @@
   function fromFragment(text) {
     const given = new Map(text.split("&").map((part) => part.split("=", 2)));
     const unknown = [...given.keys()].find(
-      (key) => !(key in LENGTHS || key === "letters" || key === "picture")
+      (key) => !(key in LENGTHS || key === "letters" || key === "picture"),
     );
     if (unknown !== undefined) return { error: `${unknown} is no part of a setting` };
-    const numbers = (name) => given.get(name).split(",").map((word) => (word === "" ? NaN : +word));
+    const numbers = (name) =>
+      given
+        .get(name)
+        .split(",")
+        .map((word) => (word === "" ? NaN : +word));
     const listed = (given.get("masses") ?? "").split(",").length;
     const others = Array((listed > 1 ? listed : 5) - 1).fill(0);
     const speeds = given.has("speeds") ? numbers("speeds") : [1, ...others];

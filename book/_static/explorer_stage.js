@@ -45,9 +45,9 @@
       const row = this.radii.reduce((total, r) => total + 2 * r, 0);
       const reach = Math.sin(ROOM * LENGTH);
       const free = (width - row) / 2 - 0.4 * em;
-      this.length = Math.min(free / reach, box.height - unit - 3.4 * em);
+      this.length = Math.min(free / reach, box.height - unit - 4.1 * em);
       this.top = 1.2 * em;
-      const height = this.top + this.length + unit + 1.9 * em;
+      const height = this.top + this.length + unit + 2.6 * em;
       let x = (width - row) / 2;
       this.pivots = this.radii.map((r) => (x += 2 * r) - r);
       this.svg.setAttribute("viewBox", `0 0 ${px(width)} ${px(height)}`);
@@ -63,14 +63,19 @@
         ball.name.setAttribute("y", r > 0.85 * em ? px(0.36 * em) : px(r + 1.1 * em));
         ball.string.setAttribute("x1", px(this.pivots[k]));
         ball.string.setAttribute("y1", px(this.top));
-        ball.pull.setAttribute("y", px(r + (r > 0.85 * em ? 1.2 : 2.2) * em));
+        // Side by side two numbers would touch.
+        const lower = k % 2 && speeds[k - 1] ? 1 : 0;
+        ball.pull.setAttribute("y", px(r + ((r > 0.85 * em ? 1.2 : 2.2) + lower) * em));
         ball.group.setAttribute("aria-valuenow", speeds[k]);
         const pull = speeds[k] === 0 ? "hangs at rest" : `comes in at ${fixed(speeds[k])} m/s`;
         ball.group.setAttribute("aria-valuetext", pull);
       });
       this.stars.forEach((star, c) => {
         const at = this.pivots[c] + this.radii[c];
-        star.setAttribute("transform", `translate(${px(at)} ${px(this.top + this.length)}) scale(${px(0.6 * em)})`);
+        star.setAttribute(
+          "transform",
+          `translate(${px(at)} ${px(this.top + this.length)}) scale(${px(0.6 * em)})`,
+        );
       });
     }
 
@@ -81,10 +86,19 @@
       this.balls = Array.from({ length: count }, (_, k) => {
         const [low, high] = explorer.LIMITS.speeds;
         const string = make("line", { class: "string" }, strings);
-        const group = make("g", {
-          class: "ball", "data-ball": k, tabindex: 0, role: "slider", "aria-label": `pull of ball ${k + 1}`,
-          "aria-valuemin": low, "aria-valuemax": high,
-        }, this.svg);
+        const group = make(
+          "g",
+          {
+            class: "ball",
+            "data-ball": k,
+            tabindex: 0,
+            role: "slider",
+            "aria-label": `pull of ball ${k + 1}`,
+            "aria-valuemin": low,
+            "aria-valuemax": high,
+          },
+          this.svg,
+        );
         const reach = make("circle", { class: "reach" }, group);
         const disc = make("circle", { class: "disc", style: `--ball: ${colour(k)}` }, group);
         const name = make("text", { "text-anchor": "middle", class: "name" }, group);
@@ -97,13 +111,14 @@
         return `${px(r * Math.sin(angle))},${px(-r * Math.cos(angle))}`;
       });
       this.stars = Array.from({ length: count - 1 }, () =>
-        make("polygon", { class: "star", points: points.join(" ") }, this.svg)
+        make("polygon", { class: "star", points: points.join(" ") }, this.svg),
       );
     }
 
     // Draw swings smaller if the fastest ball would leave the picture.
     scale(fastest) {
-      if (!this.drag) this.size = Math.min(1, (ROOM * FREQUENCY * LENGTH) / Math.max(fastest, 1e-9));
+      if (!this.drag)
+        this.size = Math.min(1, (ROOM * FREQUENCY * LENGTH) / Math.max(fastest, 1e-9));
       return this.size;
     }
 

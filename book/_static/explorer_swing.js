@@ -28,11 +28,13 @@
     let v = velocities.slice();
     const resting = v.map(() => false); // against the right neighbour
     for (;;) {
-      const found = v.findIndex((_, c) => c + 1 < v.length && !resting[c] && v[c] - v[c + 1] >= -least);
+      const found = v.findIndex(
+        (_, c) => c + 1 < v.length && !resting[c] && v[c] - v[c + 1] >= -least,
+      );
       if (found < 0) return v;
       for (let c = 0; c + 1 < v.length; c += 1) if (v[c] - v[c + 1] >= -least) resting[c] = true;
       for (let first = 0, last; first < v.length; first = last + 1) {
-        for (last = first; resting[last]; ) last += 1;
+        for (last = first; resting[last];) last += 1;
         if (last === first) continue;
         let mass = 0;
         let momentum = 0;
@@ -74,9 +76,12 @@
       if (last && last.status !== "finished") return last;
       const before = last ? last.after.map((v) => 0 - v) : this.setting.speeds;
       const happened = before.some((v, k) => k > 0 && before[k - 1] - v > this.least);
-      const answer = happened ? outcome(this.setting, before) : { status: "finished", velocities: before };
+      const answer = happened
+        ? outcome(this.setting, before)
+        : { status: "finished", velocities: before };
       const { status } = answer;
-      const after = status === "finished" ? settled(this.setting.masses, answer.velocities, this.least) : null;
+      const after =
+        status === "finished" ? settled(this.setting.masses, answer.velocities, this.least) : null;
       return { before, after, status, happened };
     }
 

@@ -32,17 +32,18 @@
     return list(
       groups.map(({ verb, balls }) => {
         const [first, last] = [balls[0] + 1, balls[balls.length - 1] + 1];
-        const names = ["", `ball ${first}`, `balls ${first} and ${last}`][balls.length] ?? `balls ${first} to ${last}`;
+        const names =
+          ["", `ball ${first}`, `balls ${first} and ${last}`][balls.length] ??
+          `balls ${first} to ${last}`;
         const speeds = balls.map((ball) => fixed(Math.abs(velocities[ball])));
         const each = speeds.every((speed) => speed === speeds[0]) ? speeds.slice(0, 1) : speeds;
         const how = /move/.test(verb[0]) ? ` at ${list(each)} m/s` : "";
         return `${names} ${verb[balls.length > 1 ? 1 : 0]}${how}`;
-      })
+      }),
     );
   }
 
-  const kinetic = (masses, velocities) =>
-    masses.map((m, ball) => 0.5 * m * velocities[ball] ** 2);
+  const kinetic = (masses, velocities) => masses.map((m, ball) => 0.5 * m * velocities[ball] ** 2);
   const sum = (row) => row.reduce((total, value) => total + value, 0);
 
   // `number` counts from 0.
@@ -73,19 +74,32 @@
     const said = [
       `Before ${hitName(number)} ${motions(hit.before)}.`,
       `After it ${motions(hit.after)}.`,
-      kept ? "All energy is kept." : `${fixed(100 * lost, lost < 0.1 ? 1 : 0)} % of the energy is lost.`,
+      kept
+        ? "All energy is kept."
+        : `${fixed(100 * lost, lost < 0.1 ? 1 : 0)}\u00a0% of the energy is lost.`,
     ];
     if (answer) {
       const total = sum(answer.collisions);
       said.push(`${total} collision${total === 1 ? "" : "s"} in all.`);
       if (answer.saturated.length) {
         const pairs = answer.saturated.map((c) => `${c + 1} and ${c + 2}`);
-        said.push(`A ratio is above its largest value: the contact of balls ${list(pairs)} is held.`);
+        said.push(
+          `A ratio is above its largest value: the contact of balls ${list(pairs)} is held.`,
+        );
       }
       if (answer.collapsed) said.push("A sequence of endless collisions came to its limit.");
     }
     return said.join(" ");
   }
 
-  Object.assign(explorer, { fixed, hitName, kinetic, list, motions, noAnswer, outcomeInWords: outcome, sum });
+  Object.assign(explorer, {
+    fixed,
+    hitName,
+    kinetic,
+    list,
+    motions,
+    noAnswer,
+    outcomeInWords: outcome,
+    sum,
+  });
 })(globalThis.cradleExplorer);
