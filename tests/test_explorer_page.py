@@ -1,73 +1,25 @@
 """The live explorer as a reader meets it: the built page, opened from its file in a browser."""
 
-import json
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
-from chains import random_chains, uniform
-from test_layout import MISFITS, browser, contrast  # noqa: F401
+from chains import random_chains
+from explorer import (
+    EXPLORER,
+    SETTING,
+    address_of_page,  # noqa: F401
+    chain_of,
+    drawn,
+    middle,
+    press,
+    same_outcome,
+    settings,
+    still,
+    visits,  # noqa: F401
+)
+from test_layout import browser  # noqa: F401
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, collide, paper_chain, swing
-from cradle.measures import bouncing_pattern
 from cradle.tables import paper_sequences
-
-EXPLORER = "cradleExplorer.live[0]"
-SETTING = f"{EXPLORER}.state.setting"
-
-
-@pytest.fixture(scope="module")
-def page(html: Path) -> str:
-    return (html / "book" / "explorer.html").as_uri()
-
-
-@pytest.fixture
-def visit(browser, page):  # noqa: F811
-    """Open the page; at the end: no error on the console, and no request that leaves the disk."""
-    contexts, faults = [], []
-
-    def open_page(fragment="", *, address=page, width=1400, height=900, **options):
-        context = browser.new_context(viewport={"width": width, "height": height}, **options)
-        contexts.append(context)
-        tab = context.new_page()
-        tab.on("console", lambda said: said.type == "error" and faults.append(said.text))
-        tab.on("pageerror", lambda error: faults.append(str(error)))
-        tab.on("request", lambda r: r.url.startswith(("file:", "data:")) or faults.append(r.url))
-        tab.goto(address + fragment)
-        if options.get("java_script_enabled", True):
-            tab.wait_for_function("globalThis.cradleExplorer?.live?.length > 0")
-        return tab
-
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert not faults
-
-
-def still(visit, fragment="", **options):
-    """Open the page for a reader who asked for less motion: nothing moves by itself."""
-    return visit(fragment, reduced_motion="reduce", **options)
-
-
-def drawn(tab):
-    """Wait until the page has drawn its state, and return the setting and the outcome shown."""
-    tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
-    return tab.evaluate(f"({{...{SETTING}, after: {EXPLORER}.state.swing.hit(0).after}})")
-
-
-def press(tab, name: str):
-    tab.get_by_role("button", name=name, exact=True).click()
-
-
-def chain_of(setting) -> tuple[Chain, ImpulseCorrelation]:
-    chain = Chain(setting["masses"], setting["speeds"], setting["restitution"])
-    return chain, ImpulseCorrelation(setting["forward"], setting["backward"], excess="saturate")
-
-
-def same_outcome(setting) -> bool:
-    return collide(*chain_of(setting)).velocities.tolist() == setting["after"]
-
 
 # --- the same numbers as Python --------------------------------------------------------------
 
@@ -76,7 +28,11 @@ def test_engine_in_the_page(visit):
     """Random chains, to the last bit: velocities, impulses, events and path."""
     rng = np.random.default_rng(13)
     tab = still(visit)
-    chains = [case for n in range(2, 8) for case in zip(*random_chains(rng, 50, n, decades=2), strict=True)]
+    chains = [
+        case
+        for n in range(2, 8)
+        for case in zip(*random_chains(rng, 50, n, decades=2), strict=True)
+    ]
     given = [
         dict(zip(("masses", "velocities", "restitution", "forward", "backward"), case, strict=True))
         for case in chains
@@ -96,23 +52,6 @@ def test_engine_in_the_page(visit):
         assert answer["pathImpulses"] == trace.path_impulses.tolist()
         events = [(event["kind"], event["contact"]) for event in answer["events"]]
         assert events == [tuple(event) for event in trace.events]
-
-
-def settings(count: int):
-    """Random settings as the page knows them: balls pulled back in any order that they can keep."""
-    rng = np.random.default_rng(31)
-    for k in range(count):
-        n = 2 + k % 6
-        rows = random_chains(rng, 1, n, decades=2)
-        masses, _, e, forward, backward = (row[0].tolist() for row in rows)
-        yield {
-            "masses": masses,
-            "speeds": np.sort(uniform(rng, -1, 1, n))[::-1].tolist(),
-            "restitution": e,
-            "forward": forward,
-            "backward": backward,
-            "letters": "-" * n,
-        }
 
 
 def swung(setting, strokes: int):
@@ -172,8 +111,10 @@ def test_balls_that_end_up_together(visit):
 def test_copied_python_gives_the_same_numbers(visit):
     """The text of the button, run as a program."""
     tab = still(visit)
-    tab.evaluate("navigator.clipboard.writeText = (text) => ((window.copied = text), Promise.resolve())")
-    for fragment in ("speeds=1,0.5,0,-0.35&forward=0.3,0.12&backward=0.2&masses=1,0.05,3,0.166&restitution=0.9",
+    tab.evaluate(
+        "navigator.clipboard.writeText = (text) => ((window.copied = text), Promise.resolve())"
+    )
+    for fragment in ("speeds=1,0.5,0,-0.35&forward=0.3,0.12&backward=0.2&masses=1,0.05,3,0.166",
                      "scene=ABCCAB", "scene=half"):  # fmt: skip
         tab.evaluate("(fragment) => (location.hash = fragment)", fragment)
         tab.wait_for_timeout(50)
@@ -192,9 +133,10 @@ def test_paper_chains_by_their_letters(visit):
     for sequence in paper_sequences():
         by_hand, scene = tab.evaluate(
             """(sequence) => {
-              let setting = cradleExplorer.resized(cradleExplorer.data.scenes[0].setting, sequence.length);
-              [...sequence].forEach((letter, k) => (setting = cradleExplorer.lettered(setting, [k], letter)));
-              return [setting, cradleExplorer.data.scenes.find((one) => one.key === sequence).setting];
+              const { data, lettered, resized } = cradleExplorer;
+              let setting = resized(data.scenes[0].setting, sequence.length);
+              [...sequence].forEach((letter, k) => (setting = lettered(setting, [k], letter)));
+              return [setting, data.scenes.find((one) => one.key === sequence).setting];
             }""",
             sequence,
         )
@@ -208,11 +150,6 @@ def test_paper_chains_by_their_letters(visit):
 
 
 # --- what one can do --------------------------------------------------------------------------
-
-
-def middle(tab, selector: str) -> tuple[float, float]:
-    box = tab.locator(selector).bounding_box()
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
 def test_a_ball_is_dragged_and_let_go(visit):
@@ -277,7 +214,9 @@ def test_sliders_change_the_outcome(visit, label: str, row: str):
     numbers = tab.locator(".outcome .number").all_text_contents()
     shown = [float(text.replace("\u2212", "-")) for text in numbers]
     assert shown == pytest.approx(after["after"], abs=0.0051)
-    assert tab.inner_text(".words").startswith("Before the first hit ball 1 moves right at 1.00 m/s")
+    assert tab.inner_text(".words").startswith(
+        "Before the first hit, ball 1 moves right at 1.00 m/s"
+    )
 
 
 def test_number_material_and_sweep(visit):

@@ -68,8 +68,9 @@ def story() -> list[dict[str, Any]]:
         ("two", "Pull back two balls", equal(5, 0.0, 2), "inside",
          "Two come, two go. Still the ratio 0. Pull back three, and one of them never stops."),
         ("small", "A small ratio", equal(5, 0.15), "inside",
-         "Now each inner ball passes some of a push on while it is still being pushed. That share is "
-         "the ratio. The last ball still takes most of the motion, but the first one comes back a little."),
+         "Now each inner ball passes some of a push on while it is still being pushed. That share "
+         "is the ratio. The last ball still takes most of the motion, but the first one comes back "
+         "a little."),
         ("half", "The ratio one half", equal(5, 0.5), "sweep",
          "Half of each push goes on at once. The last two balls leave together, and the first one "
          "bounces back. Energy and momentum are the same as at the ratio 0."),
@@ -83,14 +84,20 @@ def story() -> list[dict[str, Any]]:
          "A ball of a hundredth of the mass rattles between its heavy neighbours: one hit, many "
          "collisions. Make it lighter still."),
         ("meeting", "Two impacts that meet", meeting, "inside",
-         "The first ball comes in at full speed, the second at half of it: Fig. 8 of the paper. Two "
-         "stretches of the row are in contact at once, until the gap between them closes too."),
+         "The first ball comes in at full speed, the second at half of it: Fig. 8 of the paper. "
+         "Two stretches of the row are in contact at once, until the gap between them closes too."),
         ("map", "Who bounces back?", equal(3, 0.15, e=0.5), "map",
-         "Which balls come back depends on two ratios of masses. Drag the point over the map, which "
-         "is Fig. 6 of the paper."),
+         "Which balls come back depends on two ratios of masses. Drag the point over the map, "
+         "which is Fig. 6 of the paper."),
     ]  # fmt: skip
     return [
-        dict(zip(("key", "title", "setting", "picture", "text"), scene, strict=True))
+        dict(
+            zip(
+                ("key", "title", "setting", "picture", "text"),
+                scene,
+                strict=True,
+            )
+        )
         for scene in told
     ]
 
@@ -216,7 +223,8 @@ def write_data(app: Sphinx, exception: Exception | None) -> None:
     content = data()
     text = json.dumps(content, separators=(",", ":"))
     (static / "explorer_data.js").write_text(
-        f'globalThis.cradleExplorer = {{ data: {text} }};\n', encoding="utf-8"
+        f"globalThis.cradleExplorer = {{ data: {text} }};\n",
+        encoding="utf-8",
     )
     scenes = {scene["key"]: scene for scene in content["scenes"]}
     pages = Path(app.outdir).glob("**/*.html")

@@ -55,11 +55,17 @@
       const [first, last] = [this.pivots[0], this.pivots[count - 1]];
       const bar = `M${px(first - 2.2 * em)} ${px(this.top)}H${px(last + 2.2 * em)}`;
       this.bar.setAttribute("d", bar);
+      let named = -Infinity; // where the last name below a small ball stands
       this.balls.forEach((ball, k) => {
         const r = this.radii[k];
         ball.disc.setAttribute("r", px(r));
         ball.reach.setAttribute("r", px(Math.max(r, 1.4 * em)));
         ball.name.textContent = letters[k] === explorer.NONE ? k + 1 : letters[k];
+        // Names of small balls that would touch are left out.
+        const small = r <= 0.85 * em;
+        const hidden = small && this.pivots[k] - named < em;
+        ball.name.style.display = hidden ? "none" : "";
+        if (small && !hidden) named = this.pivots[k];
         ball.name.setAttribute("y", r > 0.85 * em ? px(0.36 * em) : px(r + 1.1 * em));
         ball.string.setAttribute("x1", px(this.pivots[k]));
         ball.string.setAttribute("y1", px(this.top));

@@ -55,7 +55,7 @@
     if (status === "unfinished")
       return (
         `This hit takes more than ${explorer.EVENTS} events, more than a page should compute ` +
-        "between two pictures. The Python below has no such limit."
+        "between two pictures. The Python package has no such limit."
       );
     return "The solver's answer did not pass its own checks, so none is shown.";
   }
@@ -72,8 +72,8 @@
     const lost = 1 - sum(kinetic(masses, hit.after)) / before;
     const kept = Math.abs(lost) < 1e-9;
     const said = [
-      `Before ${hitName(number)} ${motions(hit.before)}.`,
-      `After it ${motions(hit.after)}.`,
+      `Before ${hitName(number)}, ${motions(hit.before)}.`,
+      `After it, ${motions(hit.after)}.`,
       kept
         ? "All energy is kept."
         : `${fixed(100 * lost, lost < 0.1 ? 1 : 0)}\u00a0% of the energy is lost.`,
