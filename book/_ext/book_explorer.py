@@ -32,7 +32,8 @@ SCRIPTS = (
     "explorer.js",
 )
 
-STYLES = ("explorer.css", "explorer_pictures.css")
+#: The last one lays out what the others style.
+STYLES = ("explorer_controls.css", "explorer_pictures.css", "explorer.css")
 
 PLACE = re.compile(
     r'<div class="cradle-explorer"[^>]*data-scene="(?P<scene>[^"]*)"[^>]*>'
