@@ -62,16 +62,16 @@
         ball.reach.setAttribute("r", px(Math.max(r, 1.4 * em)));
         ball.name.textContent = letters[k] === explorer.NONE ? k + 1 : letters[k];
         // Names of small balls that would touch are left out.
-        const small = r <= 0.85 * em;
+        const small = r <= 0.7 * em;
         const hidden = small && this.pivots[k] - named < em;
         ball.name.style.display = hidden ? "none" : "";
         if (small && !hidden) named = this.pivots[k];
-        ball.name.setAttribute("y", r > 0.85 * em ? px(0.36 * em) : px(r + 1.1 * em));
+        ball.name.setAttribute("y", small ? px(r + 1.1 * em) : px(0.36 * em));
         ball.string.setAttribute("x1", px(this.pivots[k]));
         ball.string.setAttribute("y1", px(this.top));
         // Side by side two numbers would touch.
         const lower = k % 2 && speeds[k - 1] ? 1 : 0;
-        ball.pull.setAttribute("y", px(r + ((r > 0.85 * em ? 1.2 : 2.2) + lower) * em));
+        ball.pull.setAttribute("y", px(r + ((small ? 2.2 : 1.2) + lower) * em));
         ball.group.setAttribute("aria-valuenow", speeds[k]);
         const pull = speeds[k] === 0 ? "hangs at rest" : `comes in at ${fixed(speeds[k])} m/s`;
         ball.group.setAttribute("aria-valuetext", pull);
