@@ -1,0 +1,289 @@
+// The live explorer. Data flow one way: what a reader does changes the state, and the next frame
+// draws the state. Written by hand, without a library; the page says why.
+//
+//   explorer_setting.js   what is let go; the address; the same in Python
+//   explorer_swing.js     the sequence of hits, answered by the project's own solver
+//   explorer_words.js     a hit in words
+//   explorer_plots.js     pictures of one hit       explorer_fields.js     of many hits
+//   explorer_stage.js     the balls, to be pulled   explorer_controls.js   buttons and sliders
+//   explorer_panels.js, explorer_pictures.js        the parts of an explorer
+//   explorer_state.js     the state and its changes
+(function (explorer) {
+  "use strict";
+  const { Stage, State, controls, panels } = explorer;
+  const ALL_PARTS = "scenes count scope material mass restitution ratio inside sweep map share";
+  const LONGEST_FRAME = 0.1; // s; a page that was hidden must not jump
+
+  const less = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+  class Explorer {
+    // A host without `data-parts` has a page of its own: all parts, the address, the wall.
+    constructor(host) {
+      this.host = host;
+      const { scene, parts, picture } = host.dataset;
+      this.page = parts === undefined;
+      this.parts = new Set((parts ?? ALL_PARTS).split(" "));
+      this.state = new State({ scene, picture, playing: this.page && !less() });
+      this.visible = true;
+      this.box = this.box.bind(this);
+      this.build();
+      if (this.page) this.readAddress();
+      this.watch();
+      this.changed();
+    }
+
+    // --- the page's elements --------------------------------------------------------------------
+
+    build() {
+      const act = this.actions();
+      const { make } = controls;
+      this.panels = {
+        scenes: this.parts.has("scenes") ? panels.scenesPanel(act) : null,
+        run: panels.runPanel(act),
+        words: panels.wordsPanel(),
+        outcome: panels.outcomePanel(),
+        settings: panels.settingsPanel(act, this.parts),
+        pictures: panels.picturesPanel(act, this.parts),
+        share: this.parts.has("share") ? panels.sharePanel(act) : null,
+      };
+      const node = (name) => this.panels[name]?.node ?? "";
+      const cradle = make("div", { class: "cradle" });
+      const left = make("div", { class: "left" }, cradle, node("run"), node("words"));
+      const right = make("div", { class: "right" }, node("outcome"), node("pictures"));
+      this.link = make("a", { href: "explorer.html" }, "Open in the full explorer");
+      this.host.replaceChildren(
+        node("scenes"),
+        make("div", { class: "desk" }, left, node("settings"), right),
+        node("share"),
+        this.page ? "" : make("p", { class: "more" }, this.link),
+      );
+      this.host.classList.add("live");
+      this.host.setAttribute("role", "group");
+      this.host.setAttribute("aria-label", "live cradle");
+      this.stage = new Stage(cradle, this.pulling());
+      explorer.data.palette.forEach((colour, ball) => {
+        // Black lines take the colour of the text, as in all figures of the book.
+        const shown = colour === "#000000" ? "var(--pst-color-text-base, #000)" : colour;
+        this.host.style.setProperty(`--ball-${ball}`, shown);
+      });
+    }
+
+    watch() {
+      const redraw = () => this.changed();
+      new ResizeObserver(redraw).observe(this.host);
+      const theme = { attributeFilter: ["data-theme"] };
+      new MutationObserver(redraw).observe(document.documentElement, theme);
+      new IntersectionObserver(([entry]) => {
+        this.visible = entry.isIntersecting;
+        redraw();
+      }).observe(this.host);
+      document.addEventListener("fullscreenchange", redraw);
+      document.addEventListener("keydown", (event) => this.key(event));
+      if (this.page) window.addEventListener("hashchange", () => this.readAddress());
+    }
+
+    // --- what a reader can do ---------------------------------------------------------------------
+
+    actions() {
+      const { state } = this;
+      const { view, clock } = state;
+      const on =
+        (change) =>
+        (...values) => {
+          change(...values);
+          this.changed();
+        };
+      const concerned = () => panels.concerned(state.setting, view.scope);
+      const setting = (change) => on((...values) => state.set(change(state.setting, ...values)));
+      return {
+        scene: on((key) => key && state.take(key)),
+        walk: on((step) => state.walk(step)),
+        fullScreen: () => this.fullScreen(),
+        play: on(() => state.play()),
+        step: on(() => state.step()),
+        back: on(() => state.restart(false)),
+        slow: on(() => Object.assign(clock, { slow: !clock.slow, inside: null })),
+        scope: on((scope) => (view.scope = scope)),
+        picture: on((picture) => (view.picture = picture)),
+        contact: on((contact) => (view.contact = contact === "all" ? "all" : +contact)),
+        part: on((part) => {
+          view.part = part;
+          clock.inside = null;
+        }),
+        count: setting(explorer.resized),
+        letter: setting((old, letter) => explorer.lettered(old, concerned().balls, letter)),
+        mass: setting((old, mass) => explorer.withMass(old, concerned().balls, mass)),
+        restitution: setting((old, e) => explorer.withRestitution(old, concerned().contacts, e)),
+        ratio: setting((old, ratio, directions, inner = concerned().inner) =>
+          explorer.withRatio(old, inner, ratio, directions),
+        ),
+        masses: setting(explorer.withRatios),
+        address: () => `${location.href.split("#")[0]}#${state.fragment()}`,
+        copy: (text) =>
+          navigator.clipboard.writeText(text).then(
+            () => true,
+            () => false,
+          ),
+      };
+    }
+
+    // Balls are pulled from where they hang; a ball taken out of a swing finds all others at rest.
+    pulling() {
+      const { state } = this;
+      let before = null;
+      return {
+        grab: () => {
+          const held = state.clock.time <= 0;
+          before = held ? state.setting : explorer.atRest(state.setting);
+        },
+        pull: (ball, speed) => {
+          state.set(explorer.pulled(before, ball, speed));
+          state.clock.time = 0;
+          this.changed();
+        },
+        letGo: () => {
+          if (!less()) state.clock.playing = true;
+          this.changed();
+        },
+      };
+    }
+
+    key(event) {
+      if (!this.full && !this.host.contains(event.target)) return;
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.target.closest?.("input, select, textarea, summary, .ball, .point")) return;
+      const { state } = this;
+      const act = {
+        ArrowRight: () => state.walk(1),
+        PageDown: () => state.walk(1),
+        ArrowLeft: () => state.walk(-1),
+        PageUp: () => state.walk(-1),
+        " ": () => state.play(),
+        ".": () => state.step(),
+      }[event.key];
+      if (!act || !this.panels.scenes) return;
+      if (event.key.startsWith("Page") && !this.full) return; // they scroll
+      if (event.key === " " && event.target.closest?.("button")) return; // it presses the button
+      event.preventDefault();
+      act();
+      this.changed();
+    }
+
+    // --- the address and the screen -----------------------------------------------------------------
+
+    readAddress() {
+      const fragment = decodeURIComponent(location.hash.slice(1));
+      // Others are headings of the page.
+      if (!fragment.includes("=") || fragment === this.written) return;
+      this.state.read(fragment);
+      this.changed();
+    }
+
+    writeAddress() {
+      const { view } = this.state;
+      const fragment = this.state.fragment();
+      if (!this.page || view.notice || fragment === this.written) return;
+      // The plain address gives the first scene.
+      if (!this.written && !location.hash && view.scene === this.host.dataset.scene) return;
+      clearTimeout(this.writing);
+      this.writing = setTimeout(() => {
+        this.written = fragment;
+        history.replaceState(null, "", `#${fragment}`);
+      }, 200);
+    }
+
+    get full() {
+      return document.fullscreenElement === this.host;
+    }
+
+    // Full screen, and wide: the style sheet puts all side by side then.
+    get wall() {
+      return this.full && matchMedia("(min-aspect-ratio: 4/3)").matches;
+    }
+
+    fullScreen() {
+      if (this.full) document.exitFullscreen();
+      else this.host.requestFullscreen?.();
+    }
+
+    // --- drawing --------------------------------------------------------------------------------------
+
+    changed() {
+      this.stale = true;
+      this.wake();
+    }
+
+    wake() {
+      this.frame ||= requestAnimationFrame((now) => this.tick(now));
+    }
+
+    tick(now) {
+      this.frame = 0;
+      const seconds = Math.min((now - (this.last ?? now)) / 1000, LONGEST_FRAME);
+      this.last = now;
+      const running = this.state.clock.playing && this.visible && !this.stage.drag;
+      if (running && this.state.advance(seconds)) this.stale = true;
+      const scenery = this.state.scenery();
+      if (this.stale) this.draw(scenery);
+      this.move(scenery);
+      const working = this.visible && this.panels.pictures?.resume(scenery, this.box);
+      if (running || working) this.wake();
+      else this.last = undefined;
+    }
+
+    // Bring everything up to date with the state.
+    draw(scenery) {
+      this.stale = false;
+      for (const panel of Object.values(this.panels)) panel?.show(scenery, this.box);
+      this.stage.lay(scenery.setting, this.stageBox());
+      this.link.href = `explorer.html#${this.state.fragment()}`;
+      this.writeAddress();
+    }
+
+    // Move what moves between two changes: balls, and what travels through a hit.
+    move(scenery) {
+      const { clock, setting, record, firstAfter, part } = scenery;
+      const { swing } = this.state;
+      const positions = swing.positions(Math.max(clock.time, 0)) ?? setting.masses.map(() => 0);
+      this.stage.scale(Math.max(...[...setting.speeds, ...(firstAfter ?? [])].map(Math.abs)));
+      const inside = record && clock.time > 0 && part < 1;
+      const pressed = inside ? explorer.during(record, part).pressed : [];
+      this.stage.show(positions, { held: clock.time <= 0, speeds: setting.speeds, pressed });
+      if (clock.inside !== null) this.panels.outcome.show(scenery, this.box);
+      this.panels.pictures?.move(scenery, this.box);
+    }
+
+    // The size of a plot. On the wall it takes what is left of the height; `under`: its slider and
+    // notes, em.
+    box(host, under = 5) {
+      const em = parseFloat(getComputedStyle(host).fontSize);
+      const width = host.clientWidth;
+      const wall = Math.max(this.below(host) - under * em, 11 * em);
+      return { width, height: this.wall ? wall : Math.min(20 * em, 0.62 * width + 4 * em), em };
+    }
+
+    // The cradle's box; on the wall, what the rest of its column leaves.
+    stageBox() {
+      const host = this.stage.svg.parentElement;
+      const { width, em } = this.box(host);
+      const others = this.panels.run.node.offsetHeight + this.panels.words.node.offsetHeight;
+      const wall = Math.max(this.below(host) - others - 2 * em, 12 * em);
+      const most = (this.page ? 24 : 15) * em;
+      return { width, em, height: this.wall ? wall : Math.min(most, 0.72 * width) };
+    }
+
+    // On the wall: the height from the top of an element down to the settings.
+    below(host) {
+      const top = host.getBoundingClientRect().top - this.host.getBoundingClientRect().top;
+      return innerHeight - top - this.panels.settings.node.offsetHeight;
+    }
+  }
+
+  function start() {
+    const hosts = document.querySelectorAll(".cradle-explorer");
+    explorer.live = [...hosts].map((host) => new Explorer(host));
+  }
+
+  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
+  else start();
+})(globalThis.cradleExplorer);

@@ -1,0 +1,223 @@
+// Many hits at once: the sweep over the ratio and the map of mass ratios. Both are computed from
+// coarse to fine, a few milliseconds in each frame, and begin anew when their question changes.
+(function (explorer) {
+  "use strict";
+  const { axes, names, picture, polyline, px, span, stroke, sub } = explorer;
+
+  // `compute(k)` for k below `count`, every 16th first, then those between.
+  class Gradual {
+    constructor(count, compute) {
+      this.values = new Array(count);
+      this.compute = compute;
+      this.stride = 16;
+      this.next = 0;
+    }
+
+    get finished() {
+      return this.stride < 1;
+    }
+
+    resume(deadline) {
+      while (!this.finished && performance.now() < deadline) {
+        if (this.values[this.next] === undefined) this.values[this.next] = this.compute(this.next);
+        this.next += this.stride;
+        if (this.next >= this.values.length) {
+          this.next = 0;
+          this.stride = this.stride >> 1;
+        }
+      }
+    }
+  }
+
+  // --- the sweep ------------------------------------------------------------------------------
+
+  const STEPS = 200;
+
+  // The one ratio of the swept balls, or null if they have several.
+  function presentRatio(setting, inner) {
+    const ratios = inner.flatMap((k) => [setting.forward[k], setting.backward[k]]);
+    return ratios.length && ratios.every((ratio) => ratio === ratios[0]) ? ratios[0] : null;
+  }
+
+  // The stretches of a row whose entries pass a test.
+  function stretches(row, passes) {
+    const parts = [[]];
+    row.forEach((entry) => {
+      if (passes(entry)) parts[parts.length - 1].push(entry);
+      else parts.push([]);
+    });
+    return parts.filter((part) => part.length > 0);
+  }
+
+  class Sweep {
+    // `inner`: which balls with two neighbours, from 0, get the ratio of the axis.
+    constructor(setting, inner) {
+      this.key = Sweep.key(setting, inner);
+      this.setting = setting;
+      this.inner = inner;
+      this.points = new Gradual(STEPS + 1, (k) =>
+        explorer.outcome(explorer.withRatio(setting, inner, k / STEPS)),
+      );
+    }
+
+    // Two settings with equal keys have the same sweep.
+    static key(setting, inner) {
+      const { masses, speeds, restitution } = setting;
+      const { forward, backward } = explorer.withRatio(setting, inner, 0);
+      return JSON.stringify([masses, speeds, restitution, forward, backward, inner]);
+    }
+
+    // `after`: velocities of the present setting.
+    svg(box, setting, after) {
+      const { em } = box;
+      const known = this.points.values
+        .map((answer, k) => ({ ...answer, ratio: k / STEPS }))
+        .filter(Boolean);
+      const found = known.filter((answer) => answer.status === "finished");
+      const all = found.flatMap(({ velocities }) => [...velocities]);
+      const plot = axes(box, [0, 1], span([...all, ...(after || [])]), [
+        this.inner.length > 1
+          ? "ratio, the same at all inner balls"
+          : `ratio at ball ${this.inner[0] + 2}`,
+        "velocity after the hit (m/s)",
+      ]);
+      this.plot = plot;
+      const balls = explorer.all(setting.masses);
+      const drawn = balls.map((ball) =>
+        stretches(known, ({ status }) => status === "finished") // a gap where there is no answer
+          .map((part) =>
+            polyline(
+              part.map(({ ratio, velocities }) => [plot.x(ratio), plot.y(velocities[ball])]),
+              stroke(ball),
+            ),
+          )
+          .join(""),
+      );
+      if (found.length) drawn.push(names(plot, balls, found[found.length - 1].velocities, em));
+      const words = "Velocities after the first hit for ratios from 0 to 1";
+      return picture(
+        box,
+        words,
+        this.held(found) + plot.drawn + drawn.join("") + this.present(setting, after, em),
+      );
+    }
+
+    // Where a ratio is above its largest value and has no further effect there.
+    held(found) {
+      const { x, top, bottom } = this.plot;
+      const bands = stretches(found, ({ saturated }) => saturated.length > 0).map((part) => {
+        const [from, to] = [x(part[0].ratio), x(part[part.length - 1].ratio)];
+        return `<rect class="held" x="${from}" y="${top}" width="${px(to - from)}" height="${px(bottom - top)}"/>`;
+      });
+      return bands.join("");
+    }
+
+    present(setting, after, em) {
+      if (!after) return "";
+      const { x, y, top, bottom, left, right } = this.plot;
+      const ratio = presentRatio(setting, this.inner);
+      if (ratio === null)
+        return [...after]
+          .map(
+            (v, ball) =>
+              `<path d="M${left} ${y(v)}H${right}" stroke="${explorer.colour(ball)}" class="level"/>`,
+          )
+          .join("");
+      const dots = [...after].map(
+        (v, ball) =>
+          `<circle class="dot" cx="${x(ratio)}" cy="${y(v)}" r="${px(0.36 * em)}" stroke="${explorer.colour(ball)}"/>`,
+      );
+      return `<path class="cursor" d="M${x(ratio)} ${top}V${bottom}"/>${dots.join("")}`;
+    }
+  }
+
+  // --- the map --------------------------------------------------------------------------------
+
+  const CELLS = 180;
+  const LARGEST = 3; // of both axes, as in the paper's Fig. 6
+
+  const ratios = ({ masses }) => ({ right: masses[1] / masses[2], left: masses[1] / masses[0] });
+
+  // Three balls of these mass ratios, the middle one unchanged; within what masses may be.
+  function withRatios(setting, right, left) {
+    const [low, high] = explorer.LIMITS.masses;
+    const mass = (value) => +Math.min(Math.max(value, low), high).toPrecision(4);
+    const changed = explorer.withMass(setting, [0], mass(setting.masses[1] / left));
+    return explorer.withMass(changed, [2], mass(setting.masses[1] / right));
+  }
+
+  class RegionMap {
+    constructor(setting) {
+      this.key = RegionMap.key(setting);
+      const { speeds, restitution, forward, backward } = setting;
+      this.points = new Gradual(CELLS * CELLS, (k) => {
+        const left = ((Math.floor(k / CELLS) + 0.5) / CELLS) * LARGEST;
+        const right = (((k % CELLS) + 0.5) / CELLS) * LARGEST;
+        const masses = [1 / left, 1, 1 / right];
+        const { status, velocities, collisions, collapsed } = explorer.outcome({
+          masses,
+          speeds,
+          restitution,
+          forward,
+          backward,
+        });
+        if (status !== "finished") return { pattern: -1, odd: false };
+        // As balls keep their order, the number of those that go back names them.
+        const pattern = [...velocities].filter((v) => v < 0).length;
+        return { pattern, odd: !collapsed && (collisions[0] + collisions[1]) % 2 === 1 };
+      });
+    }
+
+    // The map does not change when its own point moves.
+    static key({ speeds, restitution, forward, backward }) {
+      return JSON.stringify([speeds, restitution, forward, backward]);
+    }
+
+    // Paint what is known, in the colours given for 0, 1, 2, 3 balls that go back.
+    paint(canvas, fills) {
+      canvas.width = CELLS;
+      canvas.height = CELLS;
+      const pen = canvas.getContext("2d");
+      const size = Math.max(this.points.stride * 2, 1);
+      this.points.values.forEach((cell, k) => {
+        if (cell.pattern < 0) return;
+        const row = CELLS - 1 - Math.floor(k / CELLS);
+        pen.fillStyle = fills[cell.pattern];
+        const wide = this.points.finished ? 1 : Math.min(size, 16);
+        pen.fillRect(k % CELLS, row, wide, 1);
+        if (cell.odd) {
+          pen.fillStyle = fills[4];
+          pen.fillRect(k % CELLS, row, wide, 1);
+        }
+      });
+    }
+
+    svg(box, setting) {
+      const { em } = box;
+      const plot = axes(
+        box,
+        [0, LARGEST],
+        [0, LARGEST],
+        [`m${sub(2)} / m${sub(3)}`, `m${sub(2)} / m${sub(1)}`],
+      );
+      this.plot = plot;
+      const at = ratios(setting);
+      const [x, y] = [at.right, at.left].map((value) => Math.min(value, LARGEST));
+      const beyond = at.right > LARGEST || at.left > LARGEST;
+      const words = `m2/m3 = ${explorer.fixed(at.right)}, m2/m1 = ${explorer.fixed(at.left)}`;
+      const point =
+        `<g class="point" tabindex="0" role="slider" aria-label="mass ratios" aria-valuetext="${words}" ` +
+        `aria-valuenow="${px(at.right)}" aria-valuemin="0" aria-valuemax="${LARGEST}">` +
+        `<circle class="reach" cx="${plot.x(x)}" cy="${plot.y(y)}" r="${px(1.6 * em)}"/>` +
+        `<circle class="${beyond ? "beyond" : "present"}" cx="${plot.x(x)}" cy="${plot.y(y)}" r="${px(0.5 * em)}"/></g>`;
+      return picture(
+        box,
+        "Map of the balls that go back, by two mass ratios",
+        plot.drawn + point,
+        "group",
+      );
+    }
+  }
+
+  Object.assign(explorer, { LARGEST, RegionMap, Sweep, presentRatio, ratios, withRatios });
+})(globalThis.cradleExplorer);

@@ -1,0 +1,252 @@
+// The parts of an explorer. A panel makes its elements once; `show` then brings them up to date
+// with the state. What a reader does is passed on as a call of `act`, nothing else is changed here.
+(function (explorer) {
+  "use strict";
+  const { LIMITS, NONE, all, controls } = explorer;
+  const { button, choice, make, select, slider } = controls;
+
+  // --- scenes: choose one, or walk through them -------------------------------------------------
+
+  function scenesPanel(act) {
+    const { scenes } = explorer.data;
+    const entries = (list) => list.map(({ key, title }) => ({ value: key, text: title }));
+    const options = [
+      { entries: [{ value: "", text: "a setting of your own" }] },
+      { group: "The story", entries: entries(scenes.filter((scene) => !scene.paper)) },
+      { group: "The paper's ten chains", entries: entries(scenes.filter((scene) => scene.paper)) },
+    ];
+    const list = select({ words: "Scene", options, choose: act.scene, hidden: true });
+    const place = make("span", { class: "place" });
+    const full = button("Full screen", act.fullScreen, { class: "full" });
+    const text = make("p", { class: "scene-text" });
+    const walk = make(
+      "div",
+      { class: "walk" },
+      button("←", () => act.walk(-1), { "aria-label": "previous scene" }),
+      list.node,
+      button("→", () => act.walk(1), { "aria-label": "next scene" }),
+      place,
+      full,
+    );
+    function show({ scene }) {
+      full.textContent = document.fullscreenElement ? "Leave full screen" : "Full screen";
+      const at = scenes.findIndex(({ key }) => key === scene);
+      list.show(scene);
+      place.textContent = at < 0 ? "" : `${at + 1} of ${scenes.length}`;
+      text.textContent = at < 0 ? "" : scenes[at].text;
+    }
+    return { node: make("div", { class: "scenes" }, walk, text), show };
+  }
+
+  // --- running: let go, step, slow motion ---------------------------------------------------------
+
+  function runPanel(act) {
+    const play = button("", act.play, { class: "main" });
+    const step = button("Next hit", act.step);
+    const back = button("Pull back", act.back);
+    const slow = button("Slow motion", act.slow);
+    function show({ clock }) {
+      const words = clock.playing ? "Pause" : clock.time > 0 ? "Go on" : "Let go";
+      if (play.textContent !== words) play.textContent = words;
+      back.disabled = clock.time <= 0 && !clock.playing;
+      slow.setAttribute("aria-pressed", clock.slow);
+    }
+    return { node: make("div", { class: "run" }, play, step, back, slow), show };
+  }
+
+  // --- settings -----------------------------------------------------------------------------------
+
+  // What the sliders change: all balls, or one of them with what lies at it.
+  function concerned(setting, scope) {
+    const balls = all(setting.masses);
+    if (scope === "all")
+      return { balls, contacts: all(setting.restitution), inner: all(setting.forward) };
+    const ball = +scope;
+    return {
+      balls: [ball],
+      contacts: ball + 1 < balls.length ? [ball] : [],
+      inner: ball > 0 && ball + 1 < balls.length ? [ball - 1] : [],
+    };
+  }
+
+  function settingSliders(act) {
+    const [lightest, heaviest] = LIMITS.masses;
+    const ratio = (words, directions) =>
+      slider({
+        words,
+        low: 0,
+        high: 1,
+        step: 0.01,
+        input: (value) => act.ratio(value, directions),
+      });
+    return {
+      mass: slider({
+        words: "mass",
+        low: lightest,
+        high: heaviest,
+        step: 0.02,
+        logarithmic: true,
+        unit: "kg",
+        input: act.mass,
+      }),
+      restitution: slider({
+        words: "restitution",
+        low: 0,
+        high: 1,
+        step: 0.01,
+        input: act.restitution,
+      }),
+      ratio: ratio("ratio", ["forward", "backward"]),
+      forward: ratio("ratio, pushed from the left", ["forward"]),
+      backward: ratio("ratio, pushed from the right", ["backward"]),
+    };
+  }
+
+  function settingsPanel(act, parts) {
+    const [fewest, most] = LIMITS.balls;
+    const count = choice({
+      words: "number of balls",
+      choose: (value) => act.count(+value),
+      options: Array.from({ length: most - fewest + 1 }, (_, k) => ({
+        value: String(fewest + k),
+        text: String(fewest + k),
+      })),
+    });
+    const scope = choice({ words: "set for", options: [], choose: act.scope });
+    const letters = [NONE, ...Object.keys(explorer.data.masses)];
+    const material = choice({
+      words: "material",
+      choose: act.letter,
+      options: letters.map((value) => ({
+        value,
+        text: value === NONE ? "any" : value,
+        title:
+          value === NONE
+            ? "masses, restitutions and ratios as set below"
+            : `the paper's ball ${value}, ${1000 * explorer.data.masses[value]} g`,
+      })),
+    });
+    const sliders = settingSliders(act);
+    const wanted = { count, scope, material, ...sliders };
+    const has = (name) => parts.has({ forward: "ratio", backward: "ratio" }[name] ?? name);
+    const nodes = Object.keys(wanted)
+      .filter(has)
+      .map((name) => wanted[name].node);
+    let offered = 0;
+    function show({ setting, scope: chosen }) {
+      const { balls, contacts, inner } = concerned(setting, chosen);
+      const size = setting.masses.length;
+      if (offered !== size) {
+        // A ball is offered if it has something to set: without masses, one with two neighbours.
+        const some = all(setting.masses).filter(
+          (ball) => parts.has("mass") || concerned(setting, ball).inner.length > 0,
+        );
+        const each = some.map((ball) => ({
+          value: String(ball),
+          text: `${ball + 1}`,
+          title: `ball ${ball + 1}`,
+          colour: explorer.colour(ball),
+        }));
+        scope.offer([{ value: "all", text: "all" }, ...each]);
+        offered = size;
+      }
+      count.show(String(size));
+      scope.show(chosen);
+      const worn = new Set(balls.map((ball) => setting.letters[ball]));
+      material.show(worn.size === 1 ? [...worn][0] : null);
+      const one = chosen !== "all";
+      const rows = {
+        mass: balls.map((ball) => setting.masses[ball]),
+        restitution: contacts.map((c) => setting.restitution[c]),
+        ratio: one ? [] : inner.flatMap((k) => [setting.forward[k], setting.backward[k]]),
+        forward: one ? inner.map((k) => setting.forward[k]) : [],
+        backward: one ? inner.map((k) => setting.backward[k]) : [],
+      };
+      for (const [name, values] of Object.entries(rows)) {
+        sliders[name].node.hidden = values.length === 0;
+        if (values.length) sliders[name].show(values);
+      }
+      sliders.restitution.rename(
+        one && contacts.length
+          ? `restitution, balls ${contacts[0] + 1} and ${contacts[0] + 2}`
+          : "restitution",
+      );
+    }
+    return { node: make("div", { class: "settings" }, ...nodes), show };
+  }
+
+  // --- the outcome of a hit -----------------------------------------------------------------------
+
+  function outcomePanel() {
+    const title = make("h3", {});
+    const bars = make("div", { class: "plot" });
+    const energy = make("div", { class: "plot" });
+    const caption = make(
+      "p",
+      { class: "note" },
+      "The kinetic energy before the hit is 100\u00a0%. Grey: lost, or stored in the contacts.",
+    );
+    const node = make(
+      "div",
+      { class: "outcome" },
+      title,
+      bars,
+      make("h3", {}, "Energy"),
+      energy,
+      caption,
+    );
+    function show({ setting, hit, number, now, part }, box) {
+      const name = explorer.hitName(number);
+      title.textContent = `${part < 1 ? "During" : "After"} ${name} (m/s)`;
+      bars.innerHTML = now ? explorer.bars(box(bars), setting, hit.before, now) : "";
+      energy.innerHTML = now ? explorer.energy(box(energy), setting, hit.before, now) : "";
+    }
+    return { node, show };
+  }
+
+  // --- what the page says and gives away ------------------------------------------------------------
+
+  function wordsPanel() {
+    const seen = make("p", { class: "words", "aria-hidden": true });
+    const heard = make("p", { class: "unseen", role: "status", "aria-live": "polite" });
+    let later = 0;
+    // Screen readers hear it once the reader has paused, not at every step of a slider.
+    function show({ words }) {
+      if (seen.textContent === words) return;
+      seen.textContent = words;
+      clearTimeout(later);
+      later = setTimeout(() => (heard.textContent = words), 700);
+    }
+    return { node: make("div", { class: "said" }, seen, heard), show };
+  }
+
+  function sharePanel(act) {
+    const code = make("code", {});
+    const told = make("span", { class: "told", role: "status" });
+    const copied = (what) => (done) => {
+      told.textContent = done
+        ? `${what} copied`
+        : "The browser does not allow copying; select the text by hand.";
+      setTimeout(() => (told.textContent = ""), 4000);
+    };
+    const node = make(
+      "div",
+      { class: "share" },
+      button("Copy Python", () => act.copy(code.textContent).then(copied("Python"))),
+      button("Copy link", () => act.copy(act.address()).then(copied("Link"))),
+      told,
+      make("details", {}, make("summary", {}, "The same in Python"), make("pre", {}, code)),
+    );
+    return { node, show: ({ setting }) => (code.textContent = explorer.python(setting)) };
+  }
+
+  explorer.panels = {
+    concerned,
+    outcomePanel,
+    runPanel,
+    scenesPanel,
+    settingsPanel,
+    sharePanel,
+    wordsPanel,
+  };
+})(globalThis.cradleExplorer);

@@ -1,0 +1,275 @@
+// The panel with one of three pictures: a hit from the inside, all ratios, or all mass ratios.
+(function (explorer) {
+  "use strict";
+  const { RegionMap, Sweep, controls, panels } = explorer;
+  const { button, choice, make, select } = controls;
+  const TITLES = { inside: "Inside the hit", sweep: "All ratios", map: "Mass ratios" };
+  // Milliseconds of each frame for sweeps and maps.
+  const BUDGET = 7;
+
+  // --- a hit from the inside ------------------------------------------------------------------------
+
+  function insidePicture(act) {
+    const contact = select({ words: "velocities of", options: [], choose: act.contact });
+    const plot = make("div", { class: "plot" });
+    const part = make("input", {
+      type: "range",
+      min: 0,
+      max: 1,
+      step: 0.005,
+      "aria-label": "how far the hit has come",
+      oninput: () => act.part(+part.value),
+    });
+    const scrub = make(
+      "label",
+      { class: "scrub" },
+      make("span", {}, "start"),
+      part,
+      make("span", {}, "end"),
+    );
+    const note = make("p", { class: "note" });
+    let offered = 0;
+    let drawn = null;
+    function offer(count) {
+      const pairs = Array.from({ length: count - 1 }, (_, c) => ({
+        value: String(c),
+        text: `balls ${c + 1} and ${c + 2}`,
+      }));
+      contact.offer([{ entries: [{ value: "all", text: "all balls" }, ...pairs] }]);
+      offered = count;
+    }
+    function legend(record, chosen) {
+      if (chosen === "all") return "Dashed line: where the hit is now.";
+      const kinds = new Set(
+        record.events.filter((event) => event.contact === chosen).map(({ kind }) => kind),
+      );
+      return [...kinds].map((kind) => explorer.data.events[kind].join(": ")).join("; ");
+    }
+    function show({ setting, record, hit, contact: chosen }, box) {
+      const count = setting.masses.length;
+      if (offered !== count) offer(count);
+      contact.show(String(chosen));
+      scrub.hidden = !record;
+      drawn = record && explorer.diagram(box(plot), record, chosen);
+      plot.innerHTML = drawn ? drawn.svg : "";
+      if (record) note.textContent = legend(record, chosen);
+      else
+        note.textContent = hit.happened
+          ? "There is no answer to draw."
+          : "There is no hit to draw.";
+    }
+    function move({ record, contact: chosen, part: now }, box) {
+      if (!drawn || !record) return;
+      if (document.activeElement !== part || +part.value !== now) part.value = now;
+      part.setAttribute("aria-valuetext", `${Math.round(100 * now)}\u00a0%`);
+      plot.querySelector(".now").innerHTML = explorer.dots(
+        drawn.plot,
+        record,
+        chosen,
+        now,
+        box(plot).em,
+      );
+    }
+    return {
+      node: make("div", {}, contact.node, plot, scrub, note),
+      show,
+      move,
+      resume: () => false,
+    };
+  }
+
+  // --- all ratios -----------------------------------------------------------------------------------
+
+  function sweepPicture(act) {
+    const plot = make("div", { class: "plot drags-x" });
+    const note = make("p", { class: "note" });
+    let sweep = null;
+    let shown = null;
+    const ratioAt = (event) => {
+      const svg = plot.querySelector("svg");
+      if (!svg || !sweep) return;
+      const { left, width } = svg.getBoundingClientRect();
+      const x = ((event.clientX - left) * svg.viewBox.baseVal.width) / width;
+      const share = (x - sweep.plot.left) / (sweep.plot.right - sweep.plot.left);
+      act.ratio(
+        Math.round(100 * Math.min(Math.max(share, 0), 1)) / 100,
+        ["forward", "backward"],
+        sweep.inner,
+      );
+    };
+    drag(plot, ratioAt);
+    function draw(box) {
+      const { setting, firstAfter } = shown;
+      plot.innerHTML = sweep.svg(box(plot), setting, firstAfter);
+    }
+    function show(state, box) {
+      const { setting, scope } = state;
+      const chosen = panels.concerned(setting, scope).inner;
+      const inner = chosen.length ? chosen : explorer.all(setting.forward);
+      shown = state;
+      if (!inner.length) {
+        sweep = null;
+        plot.replaceChildren();
+        note.textContent = "Two balls have no ratio: it belongs to a ball with two neighbours.";
+        return;
+      }
+      if (!sweep || sweep.key !== Sweep.key(setting, inner)) sweep = new Sweep(setting, inner);
+      draw(box);
+      tell();
+    }
+    function tell() {
+      const held = sweep.points.values.some((answer) => answer.saturated?.length);
+      const refused = sweep.points.values.filter((answer) => answer.status !== "finished").length;
+      note.textContent =
+        (explorer.presentRatio(shown.setting, sweep.inner) === null
+          ? "Level lines: the present outcome, whose ratios differ from ball to ball."
+          : "Dashed line: the present ratio. Drag it.") +
+        (held ? " Grey: a ratio is above its largest value, and held at it." : "") +
+        (refused ? ` At ${refused} ratios the hit takes more events than the page computes.` : "");
+    }
+    function resume(box) {
+      if (!sweep || sweep.points.finished) return false;
+      sweep.points.resume(performance.now() + BUDGET);
+      draw(box);
+      if (sweep.points.finished) tell();
+      return !sweep.points.finished;
+    }
+    return { node: make("div", {}, plot, note), show, move: () => {}, resume };
+  }
+
+  // --- all mass ratios of three balls ---------------------------------------------------------------
+
+  const PATTERNS = ["none (II)", "ball 1 (I)", "balls 1 and 2 (III)", "all"];
+
+  function mapPicture(act) {
+    const canvas = make("canvas", { class: "cells", "aria-hidden": true });
+    const plot = make("div", { class: "plot" });
+    const host = make("div", { class: "map" }, canvas, plot);
+    const patterns = PATTERNS.map((words, k) =>
+      make("span", { class: `pattern pattern-${k}` }, words),
+    );
+    const legend = make("p", { class: "patterns" }, ...patterns);
+    const note = make("p", { class: "note" });
+    const three = button("Take three balls", () => act.count(3));
+    let map = null;
+    let painted = "";
+    const pointAt = (event) => {
+      const svg = plot.querySelector("svg");
+      if (!svg || !map) return;
+      const { left, top, width } = svg.getBoundingClientRect();
+      const unit = svg.viewBox.baseVal.width / width;
+      const { plot: p } = map;
+      const at = [
+        ((event.clientX - left) * unit - p.left) / (p.right - p.left),
+        (p.bottom - (event.clientY - top) * unit) / (p.bottom - p.top),
+      ];
+      act.masses(...at.map((share) => explorer.LARGEST * Math.min(Math.max(share, 0.004), 1)));
+    };
+    drag(plot, pointAt);
+    plot.addEventListener("keydown", (event) => {
+      const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[
+        event.key
+      ];
+      if (!way || !event.target.closest(".point")) return;
+      event.preventDefault();
+      event.stopPropagation();
+      const { right, left } = explorer.ratios(shown.setting);
+      const step = event.shiftKey ? 0.01 : 0.1;
+      act.masses(Math.max(right + step * way[0], 0.01), Math.max(left + step * way[1], 0.01));
+    });
+    let shown = null;
+    function paint() {
+      const style = getComputedStyle(host);
+      map.paint(
+        canvas,
+        [0, 1, 2, 3, "odd"].map((k) => style.getPropertyValue(`--pattern-${k}`)),
+      );
+      patterns.forEach(
+        (pattern, k) => (pattern.hidden = !map.points.values.some((cell) => cell.pattern === k)),
+      );
+      painted = document.documentElement.dataset.theme + map.key + map.points.finished;
+    }
+    function show(state, box) {
+      shown = state;
+      const { setting } = state;
+      const fits = setting.masses.length === 3;
+      host.hidden = !fits;
+      three.hidden = fits;
+      legend.hidden = !fits;
+      if (!fits) {
+        map = null;
+        note.textContent = "This map is for three balls.";
+        return;
+      }
+      if (!map || map.key !== RegionMap.key(setting)) map = new RegionMap(setting);
+      const focused = plot.contains(document.activeElement);
+      const space = box(plot, 7);
+      space.width = Math.min(space.width, 1.25 * space.height);
+      plot.innerHTML = map.svg(space, setting);
+      if (focused) plot.querySelector(".point").focus({ preventScroll: true });
+      const { left, right, top, bottom } = map.plot;
+      Object.assign(canvas.style, {
+        left: `${left}px`,
+        top: `${top}px`,
+        width: `${right - left}px`,
+        height: `${bottom - top}px`,
+      });
+      const at = explorer.ratios(setting);
+      const beyond =
+        Math.max(at.left, at.right) > explorer.LARGEST
+          ? " The present masses lie beyond its edge."
+          : "";
+      note.textContent = `Which balls go back. Each change of shade is one collision more or less. Drag the point.${beyond}`;
+      if (painted !== document.documentElement.dataset.theme + map.key + map.points.finished)
+        paint();
+    }
+    function resume() {
+      if (!map || map.points.finished) return false;
+      map.points.resume(performance.now() + BUDGET);
+      paint();
+      return !map.points.finished;
+    }
+    return { node: make("div", {}, host, legend, note, three), show, move: () => {}, resume };
+  }
+
+  // Follow a pointer from its first press on.
+  function drag(node, follow) {
+    let active = false;
+    node.addEventListener("pointerdown", (event) => {
+      if (event.button || !event.target.closest("svg")) return;
+      active = true;
+      node.setPointerCapture(event.pointerId);
+      follow(event);
+    });
+    node.addEventListener("pointermove", (event) => active && follow(event));
+    for (const end of ["pointerup", "pointercancel"])
+      node.addEventListener(end, () => (active = false));
+  }
+
+  // --- the panel ------------------------------------------------------------------------------------
+
+  function picturesPanel(act, parts) {
+    const makers = { inside: insidePicture, sweep: sweepPicture, map: mapPicture };
+    const names = Object.keys(makers).filter((name) => parts.has(name));
+    if (!names.length) return null;
+    const pictures = Object.fromEntries(names.map((name) => [name, makers[name](act)]));
+    const options = names.map((value) => ({ value, text: TITLES[value] }));
+    const tabs = choice({ words: "picture", options, choose: act.picture, hidden: true });
+    tabs.node.classList.add("tabs");
+    tabs.node.hidden = names.length < 2;
+    const bodies = names.map((name) => pictures[name].node);
+    const chosen = (state) => pictures[state.picture] ?? pictures[names[0]];
+    return {
+      node: make("div", { class: "pictures" }, tabs.node, ...bodies),
+      show(state, box) {
+        tabs.show(names.includes(state.picture) ? state.picture : names[0]);
+        for (const name of names) pictures[name].node.hidden = pictures[name] !== chosen(state);
+        chosen(state).show(state, box);
+      },
+      move: (state, box) => chosen(state).move(state, box),
+      resume: (state, box) => chosen(state).resume(box),
+    };
+  }
+
+  panels.picturesPanel = picturesPanel;
+})(globalThis.cradleExplorer);

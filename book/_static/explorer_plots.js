@@ -1,0 +1,308 @@
+// Pictures of one hit as SVG text: bars, energy, and the diagrams of cradle/figures.py. Each takes
+// what it draws and the size of its box in pixels, and returns the whole picture; nothing is kept.
+(function (explorer) {
+  "use strict";
+  const { fixed, kinetic, sum } = explorer;
+  const MARKS = {
+    maximum_compression: (x, y, r) => `<circle cx="${x}" cy="${y}" r="${r}"/>`,
+    end: (x, y, r) => `<rect x="${x - r}" y="${y - r}" width="${2 * r}" height="${2 * r}"/>`,
+    close: (x, y, r) => `<path d="M${x} ${y - r}l${r} ${1.8 * r}h${-2 * r}z"/>`,
+    collapse: (x, y, r) =>
+      `<path d="M${x} ${y - 1.3 * r}l${r} ${1.3 * r} ${-r} ${1.3 * r} ${-r} ${-1.3 * r}z"/>`,
+  };
+
+  const px = (value) => Math.round(value * 100) / 100;
+  const colour = (ball) => `var(--ball-${ball})`;
+
+  function stroke(ball, width = 2.2) {
+    const dashes = explorer.data.dashes[ball].map((length) => px(length * width));
+    return `stroke="${colour(ball)}" stroke-width="${width}" stroke-dasharray="${dashes.join(" ")}"`;
+  }
+
+  function text(x, y, words, how = "") {
+    return `<text x="${px(x)}" y="${px(y)}" ${how}>${words}</text>`;
+  }
+
+  // Round numbers from low to high, about `count` of them.
+  function ticks(low, high, count) {
+    const rough = (high - low) / count;
+    const power = 10 ** Math.floor(Math.log10(rough));
+    const step = [1, 2, 5, 10].map((k) => k * power).find((size) => size >= rough * 0.999);
+    const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    const found = [];
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k += 1)
+      found.push({ value: k * step, label: fixed(k * step, digits) });
+    return found;
+  }
+
+  // A little more than the numbers need, so that no line lies on an edge.
+  function span(values, least = 0.1) {
+    const low = Math.min(0, ...values);
+    const high = Math.max(0, ...values);
+    const margin = 0.06 * Math.max(high - low, least);
+    return [low - margin, high + margin];
+  }
+
+  // Axes with a grid. `box`: {width, height, em}.
+  function axes(box, xs, ys, labels) {
+    const { width, height, em } = box;
+    const top = 0.7 * em;
+    const bottom = height - 3.1 * em;
+    const levels = ticks(ys[0], ys[1], (bottom - top) / (2.6 * em));
+    const left = (1.9 + 0.5 * Math.max(...levels.map(({ label }) => label.length))) * em;
+    const right = width - 1.7 * em;
+    const x = (value) => px(left + ((value - xs[0]) / (xs[1] - xs[0])) * (right - left));
+    const y = (value) => px(bottom - ((value - ys[0]) / (ys[1] - ys[0])) * (bottom - top));
+    const parts = [];
+    for (const { value, label } of ticks(xs[0], xs[1], (right - left) / (4.5 * em))) {
+      parts.push(`<path class="grid" d="M${x(value)} ${top}V${bottom}"/>`);
+      parts.push(text(x(value), bottom + 1.15 * em, label, 'text-anchor="middle"'));
+    }
+    for (const { value, label } of levels) {
+      parts.push(
+        `<path class="${+label === 0 ? "zero" : "grid"}" d="M${left} ${y(value)}H${right}"/>`,
+      );
+      parts.push(text(left - 0.4 * em, y(value) + 0.35 * em, label, 'text-anchor="end"'));
+    }
+    parts.push(`<path class="frame" d="M${left} ${top}V${bottom}H${right}"/>`);
+    parts.push(text((left + right) / 2, bottom + 2.6 * em, labels[0], 'text-anchor="middle"'));
+    const middle = (top + bottom) / 2;
+    const turned = `text-anchor="middle" transform="rotate(-90 ${px(0.9 * em)} ${px(middle)})"`;
+    parts.push(text(0.9 * em, middle, labels[1], turned));
+    return { x, y, left, right, top, bottom, drawn: parts.join("") };
+  }
+
+  // The number of each ball at the right end of its line, moved apart where lines end together.
+  function names(plot, balls, values, em) {
+    const places = balls
+      .map((ball, k) => ({ ball, y: plot.y(values[k]) }))
+      .sort((a, b) => a.y - b.y);
+    const least = 0.95 * em;
+    places.forEach((place, k) => {
+      if (k > 0) place.y = Math.max(place.y, places[k - 1].y + least);
+    });
+    for (let k = places.length - 1; k >= 0; k -= 1) {
+      const lowest = k + 1 < places.length ? places[k + 1].y - least : plot.bottom;
+      places[k].y = Math.min(places[k].y, lowest);
+    }
+    return places
+      .map(({ ball, y }) =>
+        text(plot.right + 0.6 * em, y + 0.35 * em, ball + 1, `fill="${colour(ball)}" class="name"`),
+      )
+      .join("");
+  }
+
+  function picture(box, words, content, role = "img") {
+    return (
+      `<svg viewBox="0 0 ${px(box.width)} ${px(box.height)}" role="${role}" aria-label="${words}" ` +
+      `width="${px(box.width)}" height="${px(box.height)}">${content}</svg>`
+    );
+  }
+
+  const polyline = (points, how) =>
+    `<polyline fill="none" ${how} points="${points.map(([x, y]) => `${x},${y}`).join(" ")}"/>`;
+
+  // Velocities as bars, a row for each ball, to the left and to the right as the balls move. Thin
+  // outlines show the velocities before.
+  function bars(box, setting, before, now) {
+    const { width, em } = box;
+    const count = now.length;
+    const row = 1.75 * em;
+    const name = 3.2 * em;
+    const number = 3.4 * em;
+    const largest = Math.max(...before.map(Math.abs), ...now.map(Math.abs), 1e-9);
+    const low = Math.min(0, ...before, ...now) / largest;
+    const high = Math.max(0, ...before, ...now) / largest;
+    // Room for a number beyond a bar that goes to the left.
+    const left = name + (low < 0 ? number : 0);
+    const scale = (width - number - left) / Math.max(high - low, 1e-9);
+    const x = (value) => px(left + (value / largest - low) * scale);
+    const parts = [];
+    for (let ball = 0; ball < count; ball += 1) {
+      const top = px(ball * row + 0.25 * em);
+      const bar = (value, how) =>
+        `<rect x="${Math.min(x(0), x(value))}" y="${top}" width="${px(Math.abs(x(value) - x(0)))}" ` +
+        `height="${px(1.2 * em)}" rx="2" ${how}/>`;
+      const letter = setting.letters[ball] === explorer.NONE ? "" : ` ${setting.letters[ball]}`;
+      parts.push(
+        `<circle cx="${px(0.6 * em)}" cy="${px(top + 0.6 * em)}" r="${px(0.4 * em)}" fill="${colour(ball)}"/>`,
+      );
+      parts.push(text(1.3 * em, top + em, `${ball + 1}${letter}`));
+      parts.push(bar(before[ball], 'class="before"'), bar(now[ball], `fill="${colour(ball)}"`));
+      const leftwards = +now[ball].toFixed(2) < 0;
+      const at = x(now[ball]) + (leftwards ? -0.35 : 0.35) * em;
+      const end = leftwards ? 'text-anchor="end" class="number"' : 'class="number"';
+      parts.push(text(at, top + em, fixed(now[ball]), end));
+    }
+    parts.push(`<path class="zero" d="M${x(0)} 0V${px(count * row)}"/>`);
+    const words = `Velocities in m/s: ${now.map((v, ball) => `ball ${ball + 1} ${fixed(v)}`).join(", ")}`;
+    return picture({ width, height: count * row + 0.2 * em }, words, parts.join(""));
+  }
+
+  // Where the kinetic energy is: one share for each ball, and what is stored or lost.
+  function energy(box, setting, before, now) {
+    const { width, em } = box;
+    const total = sum(kinetic(setting.masses, before));
+    const shares = kinetic(setting.masses, now).map((share) => (total > 0 ? share / total : 0));
+    const gone = total > 0 ? Math.max(0, 1 - sum(shares)) : 0;
+    const height = 1.5 * em;
+    let x = 0;
+    const piece = (share, how, label) => {
+      const wide = share * width;
+      const part =
+        `<rect x="${px(x)}" y="0" width="${px(wide)}" height="${px(height)}" ${how}/>` +
+        (wide > 2.6 * em
+          ? text(x + wide / 2, 1.1 * em, label, 'text-anchor="middle" class="on-colour"')
+          : "");
+      x += wide;
+      return part;
+    };
+    const percent = (share) => `${fixed(100 * share, 0)}\u00a0%`;
+    const parts = shares.map((share, ball) =>
+      piece(share, `fill="${colour(ball)}" class="part"`, percent(share)),
+    );
+    parts.push(piece(gone, 'class="gone"', percent(gone)));
+    const words = shares.map((share, ball) => `ball ${ball + 1} ${percent(share)}`).join(", ");
+    return picture(
+      { width, height },
+      `Kinetic energy: ${words}; not in motion: ${percent(gone)}`,
+      parts.join(""),
+    );
+  }
+
+  // Sum of all impulses at each row of a record's path.
+  const progress = (record) => record.pathImpulses.map(sum);
+
+  // Velocities and impulses when the hit has come so far, from 0 to 1.
+  function during(record, part) {
+    const along = progress(record);
+    const end = along[along.length - 1];
+    const target = part * end;
+    let row = 1;
+    while (row < along.length - 1 && along[row] < target) row += 1;
+    if (along.length < 2 || part >= 1) row = along.length - 1;
+    const from = Math.max(row - 1, 0);
+    const step = along[row] - along[from];
+    const share = part >= 1 ? 1 : step > 0 ? (target - along[from]) / step : 0;
+    const between = (rows) =>
+      rows[row].map((value, k) => rows[from][k] + share * (value - rows[from][k]));
+    const pressed = record.pathImpulses[row].map((p, c) => p > record.pathImpulses[from][c]);
+    return {
+      velocities: share === 1 ? record.path[row] : between(record.path),
+      impulses: between(record.pathImpulses),
+      pressed: part >= 1 ? pressed.map(() => false) : pressed,
+    };
+  }
+
+  // Where the diagram has its lines: of all balls over the sum of all impulses, or of a contact's
+  // two balls over its own impulse.
+  function lines(record, contact) {
+    const all = contact === "all";
+    return {
+      along: all ? progress(record) : record.pathImpulses.map((row) => row[contact]),
+      balls: all ? record.path[0].map((_, ball) => ball) : [contact, contact + 1],
+    };
+  }
+
+  // Beyond this many events of a contact, marks hide the lines.
+  const MARKED = 60;
+
+  function marks(record, contact, plot, em) {
+    const events = record.events
+      .map((event, k) => ({ ...event, row: k + 1 }))
+      .filter((event) => event.contact === contact);
+    if (events.length > MARKED) return "";
+    const several = events.filter((event) => event.kind === "end").length > 1;
+    let collision = 1;
+    let taken = -Infinity;
+    return events
+      .map(({ kind, row }, k) => {
+        if (kind === "close" && k > 0) collision += 1;
+        const x = plot.x(record.pathImpulses[row][contact]);
+        const drawn = [contact, contact + 1].map((ball) =>
+          MARKS[kind](x, plot.y(record.path[row][ball]), px(0.28 * em)),
+        );
+        const letter = explorer.data.events[kind][0] + (several ? collision : "");
+        const room = x > taken;
+        if (room) taken = x + 0.75 * em * letter.length;
+        return (
+          `<path class="event" d="M${x} ${plot.top}V${plot.bottom}"/><g class="mark">${drawn.join("")}</g>` +
+          (room ? text(x + 0.15 * em, plot.bottom - 0.3 * em, letter, 'class="small"') : "")
+        );
+      })
+      .join("");
+  }
+
+  // The hit from the inside.
+  function diagram(box, record, contact) {
+    const { along, balls } = lines(record, contact);
+    const { em } = box;
+    const shown = balls.flatMap((ball) => record.path.map((row) => row[ball]));
+    const end = along[along.length - 1];
+    const plot = axes(box, [0, end > 0 ? end : 1], span(shown), [
+      contact === "all"
+        ? "sum of all impulses (N s)"
+        : `impulse <tspan font-style="italic">τ</tspan>${sub(contact + 2)} (N s)`,
+      "velocity (m/s)",
+    ]);
+    const drawn = balls.map((ball) =>
+      polyline(
+        along.map((at, row) => [plot.x(at), plot.y(record.path[row][ball])]),
+        stroke(ball),
+      ),
+    );
+    const last = record.path[record.path.length - 1];
+    drawn.push(
+      names(
+        plot,
+        balls,
+        balls.map((ball) => last[ball]),
+        em,
+      ),
+    );
+    const marked = contact === "all" ? "" : marks(record, contact, plot, em);
+    const words = `Velocities of balls ${balls.map((ball) => ball + 1).join(", ")} during the hit`;
+    return {
+      plot,
+      svg: picture(box, words, plot.drawn + marked + drawn.join("") + '<g class="now"></g>'),
+    };
+  }
+
+  // Subscripts as Unicode: they need no markup.
+  const sub = (number) =>
+    [...String(number)].map((digit) => String.fromCharCode(0x2080 + +digit)).join("");
+
+  // The dots that travel along the diagram's lines.
+  function dots(plot, record, contact, part, em) {
+    const { velocities, impulses } = during(record, part);
+    const { balls } = lines(record, contact);
+    const x = plot.x(contact === "all" ? sum(impulses) : impulses[contact]);
+    return (
+      `<path class="cursor" d="M${x} ${plot.top}V${plot.bottom}"/>` +
+      balls
+        .map(
+          (ball) =>
+            `<circle class="dot" cx="${x}" cy="${plot.y(velocities[ball])}" r="${px(0.36 * em)}" stroke="${colour(ball)}"/>`,
+        )
+        .join("")
+    );
+  }
+
+  Object.assign(explorer, {
+    axes,
+    bars,
+    colour,
+    diagram,
+    dots,
+    during,
+    energy,
+    names,
+    picture,
+    polyline,
+    px,
+    span,
+    stroke,
+    sub,
+    text,
+  });
+})(globalThis.cradleExplorer);

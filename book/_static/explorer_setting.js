@@ -1,0 +1,226 @@
+// A setting: the balls, how far each is pulled back, and the numbers by which they collide.
+// Pure functions: each returns a new setting and leaves the old one as it is.
+(function (explorer) {
+  "use strict";
+  const data = explorer.data;
+  const LIMITS = {
+    balls: [2, 7],
+    masses: [0.01, 100],
+    speeds: [-2, 2],
+    restitution: [0, 1],
+    forward: [0, 1],
+    backward: [0, 1],
+  };
+  const LENGTHS = { masses: 0, speeds: 0, restitution: 1, forward: 2, backward: 2 };
+  const NONE = "-";
+
+  const changed = (row, places, value) => row.map((old, k) => (places.includes(k) ? value : old));
+  const all = (row) => row.map((_, k) => k);
+
+  // Say what is wrong with a setting; nothing if it can be computed.
+  function refusal(setting) {
+    const count = setting.masses.length;
+    if (!(count >= LIMITS.balls[0] && count <= LIMITS.balls[1]))
+      return `${count} balls; must be ${LIMITS.balls[0]} to ${LIMITS.balls[1]}`;
+    for (const [name, fewer] of Object.entries(LENGTHS)) {
+      const [low, high] = LIMITS[name];
+      if (setting[name].length !== count - fewer)
+        return `${name} has ${setting[name].length} values; ${count} balls need ${count - fewer}`;
+      const at = setting[name].findIndex((value) => !(value >= low && value <= high));
+      if (at >= 0) return `${name}[${at}] = ${setting[name][at]}; must lie in [${low}, ${high}]`;
+    }
+    const at = setting.speeds.findIndex((speed, k) => k > 0 && speed > setting.speeds[k - 1]);
+    if (at > 0) return `speeds[${at}] = ${setting.speeds[at]}; must not exceed the one before it`;
+    const known = [...setting.letters].every((letter) => letter === NONE || letter in data.masses);
+    if (setting.letters.length !== count || !known)
+      return `letters = ${setting.letters}; must be ${count} of A, B, C, D or -`;
+    return "";
+  }
+
+  // The paper's numbers wherever all balls concerned carry letters, and one of them is in `balls`.
+  function measured(setting, balls) {
+    const { letters } = setting;
+    const tabled = (row, size, table, read = (name) => name) =>
+      row.map((old, k) => {
+        const name = letters.slice(k, k + size);
+        const concerned = balls.some((ball) => ball >= k && ball < k + size);
+        return concerned && !name.includes(NONE) ? table[read(name)] : old;
+      });
+    return {
+      ...setting,
+      masses: tabled(setting.masses, 1, data.masses),
+      restitution: tabled(setting.restitution, 2, data.restitution),
+      forward: tabled(setting.forward, 3, data.ratios),
+      backward: tabled(setting.backward, 3, data.ratios, (name) => [...name].reverse().join("")),
+    };
+  }
+
+  // More balls repeat the last one; fewer leave the last ones out.
+  function resized(setting, count) {
+    const old = setting.masses.length;
+    const fit = (row, length, first) =>
+      Array.from({ length }, (_, k) => (k < row.length ? row[k] : (row[row.length - 1] ?? first)));
+    const letters = setting.letters.padEnd(count, setting.letters[old - 1]).slice(0, count);
+    const speeds = Array.from({ length: count }, (_, k) =>
+      k < old ? setting.speeds[k] : Math.min(0, setting.speeds[old - 1]),
+    );
+    const ratio = 0.15;
+    const sized = {
+      masses: fit(setting.masses, count),
+      speeds,
+      restitution: fit(setting.restitution, count - 1),
+      forward: fit(setting.forward, count - 2, ratio),
+      backward: fit(setting.backward, count - 2, ratio),
+      letters,
+    };
+    const added = all(sized.masses).filter((ball) => ball >= old);
+    return measured(sized, added);
+  }
+
+  function lettered(setting, balls, letter) {
+    const letters = changed([...setting.letters], balls, letter).join("");
+    return measured({ ...setting, letters }, balls);
+  }
+
+  // A ball of another mass is none of the paper's.
+  function withMass(setting, balls, mass) {
+    const letters = changed([...setting.letters], balls, NONE).join("");
+    return { ...setting, letters, masses: changed(setting.masses, balls, mass) };
+  }
+
+  const withRestitution = (setting, contacts, e) => ({
+    ...setting,
+    restitution: changed(setting.restitution, contacts, e),
+  });
+
+  // `inner` counts the balls with two neighbours from 0.
+  function withRatio(setting, inner, ratio, directions = ["forward", "backward"]) {
+    const rows = directions.map((name) => [name, changed(setting[name], inner, ratio)]);
+    return { ...setting, ...Object.fromEntries(rows) };
+  }
+
+  // Pull one ball so far that it comes to its lowest point with this speed; it takes along the
+  // balls in its way.
+  function pulled(setting, ball, speed) {
+    const [low, high] = LIMITS.speeds;
+    const pull = Math.min(Math.max(speed, low), high);
+    const speeds = setting.speeds.map((old, k) => {
+      if (k === ball) return pull;
+      return k < ball ? Math.max(old, pull) : Math.min(old, pull);
+    });
+    return { ...setting, speeds };
+  }
+
+  function atRest(setting) {
+    return { ...setting, speeds: setting.speeds.map(() => 0) };
+  }
+
+  const equal = (one, other) =>
+    one.letters === other.letters &&
+    Object.keys(LENGTHS).every((name) => String(one[name]) === String(other[name]));
+
+  // --- the address: one word where all values are equal ---------------------------------------
+
+  const short = (row) => (row.every((value) => value === row[0]) ? row.slice(0, 1) : row).join(",");
+
+  function toFragment(setting, picture) {
+    const { masses, speeds, restitution, forward, backward, letters } = setting;
+    const parts = [`speeds=${speeds.join(",")}`, `masses=${short(masses)}`];
+    parts.push(`restitution=${short(restitution)}`);
+    if (forward.length) parts.push(`forward=${short(forward)}`);
+    if (String(backward) !== String(forward)) parts.push(`backward=${short(backward)}`);
+    if (/[^-]/.test(letters)) parts.push(`letters=${letters}`);
+    parts.push(`picture=${picture}`);
+    return parts.join("&");
+  }
+
+  // What the solver itself does not take, such as a restitution of 1e-40.
+  function refused(setting) {
+    try {
+      explorer.outcome(setting);
+      return "";
+    } catch (error) {
+      return error.message;
+    }
+  }
+
+  // Read a fragment: {setting, picture}, or {error} in words. A key may be left out.
+  function fromFragment(text) {
+    const given = new Map(text.split("&").map((part) => part.split("=", 2)));
+    const unknown = [...given.keys()].find(
+      (key) => !(key in LENGTHS || key === "letters" || key === "picture"),
+    );
+    if (unknown !== undefined) return { error: `${unknown} is no part of a setting` };
+    const numbers = (name) =>
+      given
+        .get(name)
+        .split(",")
+        .map((word) => (word === "" ? NaN : +word));
+    const listed = (given.get("masses") ?? "").split(",").length;
+    const others = Array((listed > 1 ? listed : 5) - 1).fill(0);
+    const speeds = given.has("speeds") ? numbers("speeds") : [1, ...others];
+    const row = (name, first) => {
+      const values = given.has(name) ? numbers(name) : first;
+      const length = Math.max(speeds.length - LENGTHS[name], 0);
+      return values.length === 1 ? Array(length).fill(values[0]) : values;
+    };
+    const forward = row("forward", [0.15]);
+    const setting = {
+      masses: row("masses", [1]),
+      speeds,
+      restitution: row("restitution", [1]),
+      forward,
+      backward: row("backward", forward),
+      letters: given.get("letters") ?? NONE.repeat(speeds.length),
+    };
+    const error = refusal(setting) || refused(setting);
+    return error ? { error } : { setting, picture: given.get("picture") };
+  }
+
+  // --- the same in Python ---------------------------------------------------------------------
+
+  function python(setting) {
+    const list = (row) => `[${row.join(", ")}]`;
+    return `import numpy as np
+
+from cradle import Chain, ImpulseCorrelation, Pendulums, collide, swing
+
+chain = Chain(
+    masses=${list(setting.masses)},
+    velocities=${list(setting.speeds)},
+    restitution=${list(setting.restitution)},
+)
+model = ImpulseCorrelation(
+    forward=${list(setting.forward)},
+    backward=${list(setting.backward)},
+    excess="saturate",
+)
+trace = collide(chain, model)  # the first hit
+print(trace.velocities)
+
+pendulums = Pendulums(length=1.0)
+pulled = -chain.velocities / pendulums.natural_frequency(len(chain))
+released = Chain(chain.masses, np.zeros(len(chain)), chain.restitution)
+run = swing(released, model, pulled, np.arange(0, 10, 0.02), pendulums=pendulums)
+print(run)
+`;
+  }
+
+  Object.assign(explorer, {
+    LIMITS,
+    NONE,
+    all,
+    atRest,
+    equal,
+    fromFragment,
+    lettered,
+    pulled,
+    python,
+    refusal,
+    resized,
+    toFragment,
+    withMass,
+    withRatio,
+    withRestitution,
+  });
+})(globalThis.cradleExplorer);

@@ -1,0 +1,146 @@
+// The state of an explorer, and all that changes it: the setting, the clock, and what is looked at.
+// It knows nothing of the page.
+(function (explorer) {
+  "use strict";
+  const { Swing } = explorer;
+  const SLOW = 0.25; // of the true speed
+  const INSIDE = 3.5; // seconds that a hit takes in slow motion
+  const REST = 0.5; // seconds before the balls are let go again
+
+  const { scenes } = explorer.data;
+  const named = (key) => scenes.find((scene) => scene.key === key);
+
+  class State {
+    // `picture`: which one to show instead of that of a scene.
+    constructor({ scene, playing, picture }) {
+      this.picture = picture;
+      this.clock = { time: 0, playing, slow: false, inside: null };
+      this.view = {
+        scene: "", // a key, or none for a setting of the reader's own
+        scope: "all", // or the number of a ball
+        picture: "inside",
+        contact: "all",
+        number: 0, // of the hit that is shown
+        part: 1, // how far that hit has come
+        notice: "",
+      };
+      this.take(scene);
+    }
+
+    set(setting) {
+      this.setting = setting;
+      this.swing = new Swing(setting);
+      const { view } = this;
+      const count = setting.masses.length;
+      if (view.scope !== "all" && +view.scope >= count) view.scope = "all";
+      if (view.contact !== "all" && view.contact >= count - 1) view.contact = "all";
+      view.scene = scenes.find((scene) => explorer.equal(scene.setting, setting))?.key ?? "";
+      this.lastScene = view.scene || this.lastScene;
+      view.notice = "";
+      this.restart(this.clock.playing);
+    }
+
+    take(key) {
+      const scene = named(key);
+      Object.assign(this.view, {
+        picture: this.picture ?? scene.picture,
+        scope: "all",
+        contact: "all",
+      });
+      this.set(scene.setting);
+    }
+
+    // To the next scene or back, from the last one that was shown.
+    walk(step) {
+      const at = scenes.findIndex(({ key }) => key === this.lastScene) + step;
+      this.take(scenes[Math.min(Math.max(at, 0), scenes.length - 1)].key);
+    }
+
+    // What an address asks for; what cannot be is said, and changes nothing.
+    read(fragment) {
+      const scene = /^scene=(\w+)$/.exec(fragment)?.[1];
+      if (named(scene)) return this.take(scene);
+      const { setting, picture, error } = explorer.fromFragment(fragment);
+      if (error) {
+        this.view.notice = `The address asks for what cannot be: ${error}.`;
+        return undefined;
+      }
+      this.set(setting);
+      if (["inside", "sweep", "map"].includes(picture)) this.view.picture = picture;
+      return undefined;
+    }
+
+    fragment() {
+      return explorer.toFragment(this.setting, this.view.picture);
+    }
+
+    // --- the clock --------------------------------------------------------------------------------
+
+    // Hold the balls where they are pulled to; go on by oneself if asked.
+    restart(playing) {
+      Object.assign(this.clock, { time: playing ? -REST : 0, playing, inside: null });
+      this.show(0);
+    }
+
+    // Make a hit the one that all pictures show.
+    show(number, part = 1) {
+      Object.assign(this.view, { number, part });
+      this.record = this.swing.record(number);
+    }
+
+    play() {
+      const { clock } = this;
+      clock.playing = !clock.playing && this.swing.positions(clock.time) !== null;
+    }
+
+    step() {
+      const number = this.swing.latest(Math.max(this.clock.time, 0)) + 1;
+      Object.assign(this.clock, { time: Swing.time(number), playing: false, inside: null });
+      this.show(number);
+    }
+
+    // Let time pass; return whether more than positions has changed. In slow motion the clock
+    // stands still during a hit, which takes no time.
+    advance(seconds) {
+      const { clock, view, swing } = this;
+      if (clock.inside !== null) {
+        clock.inside += seconds / INSIDE;
+        view.part = Math.min(clock.inside, 1);
+        if (clock.inside < 1) return false;
+        clock.inside = null;
+        return true;
+      }
+      const next = swing.latest(clock.time) + 1;
+      clock.time += seconds * (clock.slow ? SLOW : 1);
+      if (clock.time < Swing.time(next)) return false;
+      const { status, happened } = swing.hit(next);
+      if (status !== "finished") {
+        Object.assign(clock, { time: Swing.time(next), playing: false });
+        this.show(next);
+        return true;
+      }
+      if (!clock.slow || !happened) return false;
+      Object.assign(clock, { time: Swing.time(next), inside: 0 });
+      this.show(next, 0);
+      return true;
+    }
+
+    // --- what is to be seen -----------------------------------------------------------------------
+
+    // Velocities of all balls at the part of the hit that is shown; null if it has no answer.
+    now(hit) {
+      if (hit.status !== "finished") return null;
+      return this.record ? explorer.during(this.record, this.view.part).velocities : hit.after;
+    }
+
+    scenery() {
+      const { setting, clock, view, swing, record } = this;
+      const hit = swing.hit(view.number);
+      const firstAfter = swing.hit(0).after;
+      const words = view.notice || explorer.outcomeInWords(setting, hit, view.number, record);
+      return { ...view, setting, clock, hit, record, firstAfter, now: this.now(hit), words };
+    }
+  }
+
+  explorer.State = State;
+})(globalThis.cradleExplorer);

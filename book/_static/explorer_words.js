@@ -1,0 +1,105 @@
+// What the pictures show, in words: for all readers, and for screen readers above all.
+(function (explorer) {
+  "use strict";
+
+  // Two digits after the point, with a true minus sign and without a negative zero.
+  function fixed(value, digits = 2) {
+    const text = value.toFixed(digits);
+    return (+text === 0 ? text.replace("-", "") : text).replace("-", "\u2212");
+  }
+
+  function list(words) {
+    if (words.length < 2) return words.join("");
+    return `${words.slice(0, -1).join(", ")} and ${words[words.length - 1]}`;
+  }
+
+  function way(v) {
+    if (v === 0) return ["rests", "rest"];
+    if (+v.toFixed(2) === 0) return ["almost rests", "almost rest"];
+    return v < 0 ? ["moves left", "move left"] : ["moves right", "move right"];
+  }
+
+  // "ball 1 moves left at 0.08 m/s, balls 2 and 3 almost rest and balls 4 and 5 move right at 0.09
+  // and 0.99 m/s". Balls keep their order, so those that go one way are neighbours.
+  function motions(velocities) {
+    const groups = [];
+    velocities.forEach((v, ball) => {
+      const verb = way(v);
+      const last = groups[groups.length - 1];
+      if (last && last.verb[0] === verb[0]) last.balls.push(ball);
+      else groups.push({ verb, balls: [ball] });
+    });
+    return list(
+      groups.map(({ verb, balls }) => {
+        const [first, last] = [balls[0] + 1, balls[balls.length - 1] + 1];
+        const names =
+          ["", `ball ${first}`, `balls ${first} and ${last}`][balls.length] ??
+          `balls ${first} to ${last}`;
+        const speeds = balls.map((ball) => fixed(Math.abs(velocities[ball])));
+        const each = speeds.every((speed) => speed === speeds[0]) ? speeds.slice(0, 1) : speeds;
+        const how = /move/.test(verb[0]) ? ` at ${list(each)} m/s` : "";
+        return `${names} ${verb[balls.length > 1 ? 1 : 0]}${how}`;
+      }),
+    );
+  }
+
+  const kinetic = (masses, velocities) => masses.map((m, ball) => 0.5 * m * velocities[ball] ** 2);
+  const sum = (row) => row.reduce((total, value) => total + value, 0);
+
+  // `number` counts from 0.
+  function hitName(number) {
+    return number === 0 ? "the first hit" : `hit ${number + 1}`;
+  }
+
+  function noAnswer(status) {
+    if (status === "unfinished")
+      return (
+        `This hit takes more than ${explorer.EVENTS} events, more than a page should compute ` +
+        "between two pictures. The Python package has no such limit."
+      );
+    return "The solver's answer did not pass its own checks, so none is shown.";
+  }
+
+  // One hit in full: `hit` and `answer` (its record or outcome) as explorer_swing.js makes them.
+  function outcome(setting, hit, number, answer) {
+    const { masses } = setting;
+    if (hit.status !== "finished") return noAnswer(hit.status);
+    if (!hit.happened) {
+      if (hit.before.every((v) => v === 0)) return "No ball is pulled back. Drag one to a side.";
+      return "The balls swing together: none strikes another.";
+    }
+    const before = sum(kinetic(masses, hit.before));
+    const lost = 1 - sum(kinetic(masses, hit.after)) / before;
+    const kept = Math.abs(lost) < 1e-9;
+    const said = [
+      `Before ${hitName(number)}, ${motions(hit.before)}.`,
+      `After it, ${motions(hit.after)}.`,
+      kept
+        ? "All energy is kept."
+        : `${fixed(100 * lost, lost < 0.1 ? 1 : 0)}\u00a0% of the energy is lost.`,
+    ];
+    if (answer) {
+      const total = sum(answer.collisions);
+      said.push(`${total} collision${total === 1 ? "" : "s"} in all.`);
+      if (answer.saturated.length) {
+        const pairs = answer.saturated.map((c) => `${c + 1} and ${c + 2}`);
+        said.push(
+          `A ratio is above its largest value: the contact of balls ${list(pairs)} is held.`,
+        );
+      }
+      if (answer.collapsed) said.push("A sequence of endless collisions came to its limit.");
+    }
+    return said.join(" ");
+  }
+
+  Object.assign(explorer, {
+    fixed,
+    hitName,
+    kinetic,
+    list,
+    motions,
+    noAnswer,
+    outcomeInWords: outcome,
+    sum,
+  });
+})(globalThis.cradleExplorer);

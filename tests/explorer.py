@@ -1,0 +1,88 @@
+"""The live explorer's page in a browser: how tests open it, and what they ask it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chains import random_chains, uniform
+
+from cradle import Chain, ImpulseCorrelation, collide
+
+EXPLORER = "cradleExplorer.live[0]"
+SETTING = f"{EXPLORER}.state.setting"
+
+
+@pytest.fixture(scope="module", name="page")
+def address_of_page(html: Path) -> str:
+    """Return the address of the explorer's page."""
+    return (html / "book" / "explorer.html").as_uri()
+
+
+@pytest.fixture(name="visit")
+def visits(request, page):
+    """Open the page; at the end: no error on the console, and no request that leaves the disk."""
+    browser = request.getfixturevalue("browser")
+    contexts, faults = [], []
+
+    def open_page(fragment="", *, address=page, width=1400, height=900, **options):
+        context = browser.new_context(viewport={"width": width, "height": height}, **options)
+        contexts.append(context)
+        tab = context.new_page()
+        tab.on("console", lambda said: said.type == "error" and faults.append(said.text))
+        tab.on("pageerror", lambda error: faults.append(str(error)))
+        tab.on("request", lambda r: r.url.startswith(("file:", "data:")) or faults.append(r.url))
+        tab.goto(address + fragment)
+        if options.get("java_script_enabled", True):
+            tab.wait_for_function("globalThis.cradleExplorer?.live?.length > 0")
+        return tab
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert not faults
+
+
+def still(visit, fragment="", **options):
+    """Open the page for a reader who asked for less motion: nothing moves by itself."""
+    return visit(fragment, reduced_motion="reduce", **options)
+
+
+def drawn(tab):
+    """Wait until the page has drawn its state, and return the setting and the outcome shown."""
+    tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
+    return tab.evaluate(f"({{...{SETTING}, after: {EXPLORER}.state.swing.hit(0).after}})")
+
+
+def press(tab, name: str):
+    tab.get_by_role("button", name=name, exact=True).click()
+
+
+def chain_of(setting) -> tuple[Chain, ImpulseCorrelation]:
+    chain = Chain(setting["masses"], setting["speeds"], setting["restitution"])
+    return chain, ImpulseCorrelation(setting["forward"], setting["backward"], excess="saturate")
+
+
+def same_outcome(setting) -> bool:
+    return collide(*chain_of(setting)).velocities.tolist() == setting["after"]
+
+
+def settings(count: int):
+    """Random settings as the page knows them: balls pulled back in any order that they can keep."""
+    rng = np.random.default_rng(31)
+    for k in range(count):
+        n = 2 + k % 6
+        rows = random_chains(rng, 1, n, decades=2)
+        masses, _, e, forward, backward = (row[0].tolist() for row in rows)
+        yield {
+            "masses": masses,
+            "speeds": np.sort(uniform(rng, -1, 1, n))[::-1].tolist(),
+            "restitution": e,
+            "forward": forward,
+            "backward": backward,
+            "letters": "-" * n,
+        }
+
+
+def middle(tab, selector: str) -> tuple[float, float]:
+    box = tab.locator(selector).bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

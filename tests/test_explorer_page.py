@@ -1,0 +1,239 @@
+"""The live explorer as a reader meets it: the built page, opened from its file in a browser."""
+
+import numpy as np
+import pytest
+from chains import random_chains
+from explorer import (
+    EXPLORER,
+    SETTING,
+    address_of_page,  # noqa: F401
+    chain_of,
+    drawn,
+    middle,
+    press,
+    same_outcome,
+    settings,
+    still,
+    visits,  # noqa: F401
+)
+from test_layout import browser  # noqa: F401
+
+from cradle import Chain, ImpulseCorrelation, Pendulums, collide, paper_chain, swing
+from cradle.tables import paper_sequences
+
+# --- the same numbers as Python --------------------------------------------------------------
+
+
+def test_engine_in_the_page(visit):
+    """Random chains, to the last bit: velocities, impulses, events and path."""
+    rng = np.random.default_rng(13)
+    tab = still(visit)
+    chains = [
+        case
+        for n in range(2, 8)
+        for case in zip(*random_chains(rng, 50, n, decades=2), strict=True)
+    ]
+    given = [
+        dict(zip(("masses", "velocities", "restitution", "forward", "backward"), case, strict=True))
+        for case in chains
+    ]
+    found = tab.evaluate(
+        "(chains) => chains.map((chain) => cradle.collide(chain))",
+        [{name: row.tolist() for name, row in case.items()} for case in given],
+    )
+    assert len(found) == 300
+    for case, answer in zip(given, found, strict=True):
+        model = ImpulseCorrelation(case["forward"], case["backward"], excess="saturate")
+        trace = collide(Chain(case["masses"], case["velocities"], case["restitution"]), model)
+        assert answer["status"] == "finished"
+        assert answer["velocities"] == trace.velocities.tolist()
+        assert answer["impulses"] == trace.impulses.tolist()
+        assert answer["path"] == trace.path.tolist()
+        assert answer["pathImpulses"] == trace.path_impulses.tolist()
+        events = [(event["kind"], event["contact"]) for event in answer["events"]]
+        assert events == [tuple(event) for event in trace.events]
+
+
+def swung(setting, strokes: int):
+    """The same cradle by `cradle.swing`."""
+    chain, model = chain_of(setting)
+    hanging = Pendulums(length=1.0)
+    frequency = hanging.natural_frequency(len(chain))
+    released = Chain(chain.masses, np.zeros(len(chain)), chain.restitution)
+    times = (0.7 + np.arange(strokes)) * np.pi / frequency[0]
+    return swing(released, model, -chain.velocities / frequency, times, pendulums=hanging)
+
+
+def test_swing_of_the_page(visit):
+    """Velocities after hits and positions between them are those of the package's own swing.
+
+    Rounding is another there, where sines give the velocities of a hit, and grows from hit to hit;
+    where it decides a tie the two part. So: few hits, and balls that are all in motion.
+    """
+    tab = still(visit)
+    for setting in settings(24):
+        run = swung(setting, 3)
+        hits, places = tab.evaluate(
+            """([setting, times]) => {
+              const swing = new cradleExplorer.Swing(setting);
+              const happened = [0, 1, 2].map((k) => swing.hit(k)).filter((hit) => hit.happened);
+              return [happened.map((hit) => hit.after), times.map((t) => swing.positions(t))];
+            }""",
+            [setting, run.times.tolist()],
+        )
+        after = [impact.after.tolist() for impact in run.impacts]
+        assert len(hits) == len(after)
+        np.testing.assert_allclose(hits, after, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(places, run.positions, rtol=0, atol=1e-8)
+
+
+def test_balls_that_end_up_together(visit):
+    """With losses the last hit comes at the same number as in Python."""
+    setting = {
+        "masses": [1.0, 2.0], "speeds": [1.0, 0.0], "restitution": [0.5], "forward": [],
+        "backward": [], "letters": "--",
+    }  # fmt: skip
+    tab = still(visit)
+    number = tab.evaluate(
+        """(setting) => {
+          const swing = new cradleExplorer.Swing(setting);
+          let k = 0;
+          while (swing.hit(k).happened) k += 1;
+          return [k, swing.hit(k).after];
+        }""",
+        setting,
+    )
+    run = swung(setting, 100)
+    assert number[0] == len(run.impacts) > 10
+    assert number[1] == pytest.approx([1 / 3, 1 / 3]) or number[1] == pytest.approx([-1 / 3] * 2)
+
+
+def test_copied_python_gives_the_same_numbers(visit):
+    """The text of the button, run as a program."""
+    tab = still(visit)
+    tab.evaluate(
+        "navigator.clipboard.writeText = (text) => ((window.copied = text), Promise.resolve())"
+    )
+    for fragment in ("speeds=1,0.5,0,-0.35&forward=0.3,0.12&backward=0.2&masses=1,0.05,3,0.166",
+                     "scene=ABCCAB", "scene=half"):  # fmt: skip
+        tab.evaluate("(fragment) => (location.hash = fragment)", fragment)
+        tab.wait_for_timeout(50)
+        shown = drawn(tab)
+        press(tab, "Copy Python")
+        assert "Python copied" in tab.inner_text(".told")
+        program = {}
+        exec(tab.evaluate("window.copied"), program)
+        assert program["trace"].velocities.tolist() == shown["after"]
+        np.testing.assert_allclose(program["run"].impacts[0].after, shown["after"], atol=1e-9)
+
+
+def test_paper_chains_by_their_letters(visit):
+    """Letter by letter as a reader does it, and as a scene: Tables 1 and 2 of the paper."""
+    tab = still(visit)
+    for sequence in paper_sequences():
+        by_hand, scene = tab.evaluate(
+            """(sequence) => {
+              const { data, lettered, resized } = cradleExplorer;
+              let setting = resized(data.scenes[0].setting, sequence.length);
+              [...sequence].forEach((letter, k) => (setting = lettered(setting, [k], letter)));
+              return [setting, data.scenes.find((one) => one.key === sequence).setting];
+            }""",
+            sequence,
+        )
+        chain, model = paper_chain(sequence, excess="saturate")
+        for setting in (by_hand, scene):
+            assert setting["masses"] == chain.masses.tolist()
+            assert setting["restitution"] == chain.restitution.tolist()
+            assert setting["forward"] == list(model.forward)
+            assert setting["backward"] == list(model.backward)
+            assert setting["speeds"] == chain.velocities.tolist()
+
+
+# --- what one can do --------------------------------------------------------------------------
+
+
+def test_a_ball_is_dragged_and_let_go(visit):
+    tab = visit()
+    press(tab, "Pause")
+    press(tab, "Pull back")
+    tab.evaluate(f"{EXPLORER}.state.set(cradleExplorer.atRest({SETTING})), {EXPLORER}.changed()")
+    drawn(tab)
+    x, y = middle(tab, ".ball[data-ball='4'] .disc")
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    for step in range(1, 9):
+        tab.mouse.move(x + 10 * step, y)
+    held = drawn(tab)
+    assert held["speeds"][:4] == [0] * 4
+    assert held["speeds"][4] < -0.3
+    # The ball is where the pointer is, to half a step of the pull, and has not moved by itself.
+    at, _ = middle(tab, ".ball[data-ball='4'] .disc")
+    assert abs(at - (x + 80)) < 8
+    tab.mouse.up()
+    assert same_outcome(drawn(tab))
+    assert tab.inner_text("button.main") == "Pause"
+    tab.wait_for_function(f"{EXPLORER}.state.clock.time > 0.8")
+    first, second = (middle(tab, f".ball[data-ball='{ball}'] .disc")[0] for ball in (0, 1))
+    assert second - first > 60  # the hit has sent ball 1 to the left; at rest they touch
+
+
+def test_balls_in_the_way_come_along(visit):
+    tab = still(visit)
+    x, y = middle(tab, ".ball[data-ball='2'] .disc")
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x - 60, y, steps=6)
+    taken = drawn(tab)["speeds"]
+    assert taken[0] == 1  # was pulled back further
+    assert taken[1] == taken[2] > 0
+    assert taken[3:] == [0, 0]
+    tab.mouse.move(x, y)  # and let go of on the way back
+    assert drawn(tab)["speeds"] == [1, 0, 0, 0, 0]
+    tab.mouse.up()
+    assert tab.inner_text("button.main") == "Let go"  # less motion: not by itself
+
+
+@pytest.mark.parametrize(
+    ("label", "row"),
+    [("mass", "masses"), ("restitution", "restitution"), ("ratio", "forward")],
+)
+def test_sliders_change_the_outcome(visit, label: str, row: str):
+    tab = still(visit, "#scene=small")
+    before = drawn(tab)
+    tab.click("label[title='ball 2']")
+    name = {"restitution": "restitution, balls 2 and 3", "ratio": "ratio, pushed from the left"}
+    slider = tab.get_by_label(name.get(label, label), exact=True)
+    for key in ("ArrowLeft", "ArrowLeft", "ArrowLeft"):
+        slider.press(key)
+    after = drawn(tab)
+    changed = [k for k, (a, b) in enumerate(zip(before[row], after[row], strict=True)) if a != b]
+    assert len(changed) == 1
+    assert after["after"] != before["after"]
+    assert same_outcome(after)
+    # What is shown is what was computed: the bars, the words, the code.
+    numbers = tab.locator(".outcome .number").all_text_contents()
+    shown = [float(text.replace("\u2212", "-")) for text in numbers]
+    assert shown == pytest.approx(after["after"], abs=0.0051)
+    assert tab.inner_text(".words").startswith(
+        "Before the first hit, ball 1 moves right at 1.00 m/s"
+    )
+
+
+def test_number_material_and_sweep(visit):
+    tab = still(visit, "#scene=small")
+    tab.click("fieldset:has-text('number of balls') label:has-text('3')")
+    tab.click("fieldset:has-text('material') label:has-text('D')")
+    setting = drawn(tab)
+    assert setting["letters"] == "DDD"
+    assert setting["masses"] == [0.166] * 3
+    assert same_outcome(setting)
+    tab.click("label:has-text('All ratios')")
+    tab.wait_for_function("document.querySelectorAll('.pictures polyline').length >= 3")
+    x, y = middle(tab, ".drags-x svg")
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + 30, y)
+    tab.mouse.up()
+    moved = drawn(tab)
+    assert moved["forward"] == moved["backward"] != setting["forward"]
+    assert same_outcome(moved)

@@ -1,0 +1,424 @@
+"""The live explorer for every reader: address, keys, words, widths, modes, motion, no scripts."""
+
+import re
+from urllib.parse import unquote
+
+import numpy as np
+import pytest
+from explorer import (
+    EXPLORER,
+    SETTING,
+    address_of_page,  # noqa: F401
+    chain_of,
+    drawn,
+    middle,
+    press,
+    same_outcome,
+    settings,
+    still,
+    visits,  # noqa: F401
+)
+from test_layout import MISFITS, browser, contrast  # noqa: F401
+
+from cradle import collide, post_impact_velocities
+from cradle.measures import bouncing_pattern
+
+# --- the address ------------------------------------------------------------------------------
+
+
+def test_address_keeps_the_setting(visit):
+    tab = still(visit)
+    for setting in settings(6):
+        tab.evaluate(f"(setting) => ({EXPLORER}.state.set(setting), {EXPLORER}.changed())", setting)
+        before = drawn(tab)
+        tab.wait_for_function("location.hash.includes('speeds')")
+        tab.wait_for_timeout(300)
+        address = tab.evaluate("location.hash")
+        other = drawn(still(visit, unquote(address)))
+        assert other == before
+        assert {name: other[name] for name in setting} == setting
+
+
+@pytest.mark.parametrize(
+    ("fragment", "reason"),
+    [
+        ("#restitution=1.2", "restitution[0] = 1.2; must lie in [0, 1]"),
+        ("#masses=1,2&speeds=1,0,0", "speeds has 3 values; 2 balls need 2"),
+        ("#speeds=0,1", "speeds[1] = 1; must not exceed the one before it"),
+        ("#speeds=1", "1 balls; must be 2 to 7"),
+        ("#masses=", "masses[0] = NaN; must lie in [0.01, 100]"),
+        ("#restitution=1e-40", "restitution[0] = 1e-40"),
+        ("#letters=ABXBA", "letters = ABXBA"),
+        ("#alpha=0.1", "alpha is no part of a setting"),
+    ],
+)
+def test_wrong_addresses_are_refused(visit, fragment: str, reason: str):
+    tab = still(visit, fragment)
+    shown = drawn(tab)
+    assert reason in tab.inner_text(".words")
+    assert same_outcome(shown)
+
+
+def test_a_reader_walks_on_from_a_changed_setting(visit):
+    """After a change no scene is named any more, and the keys go on from the last one."""
+    tab = still(visit, "#scene=half")
+    tab.get_by_label("ratio", exact=True).press("ArrowRight")
+    drawn(tab)
+    assert tab.locator(".walk select").input_value() == ""
+    assert tab.inner_text(".scene-text") == ""
+    press(tab, "next scene")
+    drawn(tab)
+    assert tab.locator(".walk select").input_value() == "three"
+
+
+# --- words and keys ---------------------------------------------------------------------------
+
+
+def test_outcome_is_said_in_words(visit):
+    """Polite, once the reader pauses, and the same words as on the screen."""
+    tab = still(visit, "#scene=three")
+    said = tab.locator(".said [aria-live=polite]")
+    slider = tab.get_by_label("ratio", exact=True)
+    slider.focus()
+    tab.evaluate("window.heard = []")
+    tab.evaluate(
+        """(() => {
+          const said = document.querySelector('.said [aria-live]');
+          new MutationObserver(() => heard.push(said.textContent)).observe(said, {childList: true});
+        })()"""
+    )
+    for _ in range(12):
+        slider.press("ArrowLeft")
+    tab.wait_for_timeout(1200)
+    shown = drawn(tab)
+    words = said.text_content()
+    assert words == tab.locator(".words").text_content()
+    assert tab.evaluate("heard") == [words]
+    after = [f"{abs(v):.2f}" for v in shown["after"]]
+    assert re.findall(r"\d\.\d\d", words.partition("After it")[2])[:3] == after
+    assert "All energy is kept." in words
+    assert "ball 1 moves left" in words.partition("After it")[2]
+
+
+def test_everything_by_keyboard(visit):
+    tab = still(visit)
+    tab.evaluate("document.querySelector('.walk button').focus()")
+    reached = []
+    for _ in range(40):
+        name = tab.evaluate(
+            """(() => { const node = document.activeElement;
+            const label = node.getAttribute('aria-label') || node.labels?.[0]?.textContent;
+            return node.closest('.cradle-explorer') && (label || node.textContent); })()"""
+        )
+        if not name:
+            break
+        reached.append(name)
+        tab.keyboard.press("Tab")
+    expected = "next scene, pull of ball 1, pull of ball 5, Let go, Next hit, 5, all, any, mass, "
+    expected += "restitution, ratio, Inside the hit, Copy Python"
+    assert set(expected.split(", ")) <= set(reached)
+    # Each of them shows where it is.
+    tab.locator(".ball[data-ball='0']").focus()
+    tab.keyboard.press("ArrowLeft")
+    assert drawn(tab)["speeds"][0] == 1.1
+    tab.keyboard.press("Shift+ArrowRight")
+    assert drawn(tab)["speeds"][0] == 1.05
+    reach = "getComputedStyle(document.querySelector('.ball .reach')).strokeWidth"
+    assert tab.evaluate(reach) == "3px"
+    assert (
+        tab.locator(".ball[data-ball='0']").get_attribute("aria-valuetext")
+        == "comes in at 1.05 m/s"
+    )
+    # Walk, let go, step.
+    tab.locator(".walk button").first.focus()
+    tab.keyboard.press("ArrowRight")
+    drawn(tab)
+    assert tab.locator(".walk select").input_value() == "two"
+    tab.keyboard.press(".")
+    drawn(tab)
+    tab.keyboard.press(".")
+    drawn(tab)
+    assert tab.locator(".outcome h3").first.inner_text() == "After hit 2 (m/s)"
+
+
+def test_full_screen_for_a_lecture(visit):
+    """Everything in one window, in letters that are seen from afar, and page keys walk on."""
+    tab = still(visit, width=1366, height=768)
+    press(tab, "Full screen")
+    tab.wait_for_function("document.fullscreenElement")
+    for count in range(1, 19):
+        tab.keyboard.press("PageDown")
+        drawn(tab)
+        tab.wait_for_timeout(60)
+        assert tab.inner_text(".place") == f"{count + 1} of 19"
+        scrolls = tab.evaluate("[document.fullscreenElement.scrollHeight, innerHeight]")
+        assert scrolls[0] <= scrolls[1] + 1, tab.locator(".walk select").input_value()
+    letters = tab.evaluate(
+        """(() => {
+          const says = (node) =>
+            [...node.childNodes].some((child) => child.nodeType === 3 && child.textContent.trim());
+          return [...document.querySelectorAll('.cradle-explorer *')]
+            .filter((node) => node.checkVisibility() && says(node))
+            .map((node) => parseFloat(getComputedStyle(node).fontSize) / innerHeight);
+        })()"""
+    )
+    assert len(letters) > 30
+    assert min(letters) > 0.016  # of the wall's height
+
+
+# --- widths, modes, motion --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1400])
+def test_fits_and_can_be_read(visit, width: int, mode: str):
+    tab = still(visit, width=width, color_scheme=mode)
+    for scene in ("one", "half", "map", "ABCCAB"):
+        tab.evaluate("(scene) => (location.hash = `scene=${scene}`)", scene)
+        tab.wait_for_timeout(100)
+        drawn(tab)
+        assert tab.evaluate(MISFITS) == []
+        # Letters of pictures lie inside them, and on each other nowhere.
+        cut = tab.evaluate(
+            """[...document.querySelectorAll('.cradle-explorer svg text')].filter((node) => {
+              const own = node.getBoundingClientRect();
+              const box = node.ownerSVGElement.getBoundingClientRect();
+              return own.width && (own.left < box.left - 1 || own.right > box.right + 1);
+            }).map((node) => node.textContent)"""
+        )
+        assert cut == []
+    colours = tab.evaluate(
+        """(() => {
+          const digits = (k) => (+k).toString(16).padStart(2, '0');
+          const hex = (text) => '#' + text.match(/\\d+/g).slice(0, 3).map(digits).join('');
+          const style = (selector) => getComputedStyle(document.querySelector(selector));
+          const colour = (selector, name) => hex(style(selector)[name]);
+          return [hex(getComputedStyle(document.querySelector('html')).backgroundColor),
+            colour('.words', 'color'), colour('.stage .name', 'fill'),
+            colour('.plot text', 'fill'), colour('.cradle-explorer button', 'color')];
+        })()"""
+    )
+    ground = {"light": "#ffffff", "dark": "#121212"}[mode]
+    assert all(contrast(colour, ground) > 7 for colour in colours[1:])
+
+
+def test_touch(visit):
+    """On a phone a ball follows the finger, and the page does not scroll under it."""
+    tab = still(visit, width=390, has_touch=True, is_mobile=True)
+    x, y = middle(tab, ".ball[data-ball='4'] .disc")
+    touch = tab.context.new_cdp_session(tab)
+
+    def send(kind, at):
+        points = [] if at is None else [{"x": at, "y": y}]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    send("touchStart", x)
+    for step in range(1, 6):
+        send("touchMove", x + 8 * step)
+    shown = drawn(tab)
+    send("touchEnd", None)
+    assert shown["speeds"][4] < -0.2
+    assert tab.evaluate("window.scrollY") == 0
+    sizes = tab.evaluate(
+        """(() => {
+          const kinds = ':is(button, select, .choice label, .ball .reach)';
+          return [...document.querySelectorAll(`.cradle-explorer ${kinds}`)]
+            .filter((node) => node.checkVisibility())
+            .map((node) => node.getBoundingClientRect().height);
+        })()"""
+    )
+    assert min(sizes) >= 24  # WCAG 2.2, 2.5.8
+
+
+def test_motion_is_asked_for(visit):
+    quiet, lively = still(visit), visit()
+    for tab in (quiet, lively):
+        tab.wait_for_timeout(1500)
+    assert quiet.evaluate(f"{EXPLORER}.state.clock.time") == 0
+    assert quiet.get_by_role("button", name="Let go").is_visible()
+    assert lively.evaluate(f"{EXPLORER}.state.clock.time") > 0
+    assert lively.get_by_role("button", name="Pause").is_visible()
+    # Out of sight it stands still.
+    lively.evaluate("document.querySelector('footer').scrollIntoView()")
+    lively.wait_for_timeout(300)
+    before = lively.evaluate(f"{EXPLORER}.state.clock.time")
+    lively.wait_for_timeout(400)
+    assert lively.evaluate(f"{EXPLORER}.state.clock.time") == before
+
+
+def test_time_of_a_frame(visit):
+    """What the page does in a frame takes a part of the 16 ms that sixty a second leave."""
+    tab = visit("#scene=ABCCAB")
+    tab.evaluate(
+        f"""(() => {{
+          window.spent = [];
+          const live = {EXPLORER}, tick = live.tick;
+          live.tick = function (now) {{
+            const start = performance.now();
+            tick.call(live, now);
+            spent.push(performance.now() - start);
+          }};
+        }})()"""
+    )
+    press(tab, "Slow motion")
+    tab.wait_for_timeout(4000)
+    spent = tab.evaluate("spent")
+    assert len(spent) > 20
+    assert np.median(spent) < 16
+
+
+def test_what_takes_too_long_is_said(visit):
+    """Five light balls between two heavy ones take more events than the page computes."""
+    masses = "100,0.01,0.01,0.01,0.01,0.01,100"
+    fragment = f"#speeds=2,0,0,0,0,0,0&masses={masses}&restitution=0.99&forward=0.02"
+    tab = still(visit, fragment)
+    drawn(tab)
+    status = tab.evaluate(f"{EXPLORER}.state.swing.hit(0).status")
+    assert status == "unfinished"
+    assert "more than 4000 events" in tab.inner_text(".words")
+    assert tab.locator(".outcome rect").count() == 0  # no stale bars
+    assert tab.locator(".pictures polyline").count() == 0
+    press(tab, "Let go")
+    tab.wait_for_timeout(1500)
+    assert tab.get_by_role("button", name="Pause").count() == 0
+
+
+# --- pictures of many hits ----------------------------------------------------------------------
+
+
+def test_map_is_the_solvers(visit):
+    """Every twentieth cell of the map against Python, and its own point."""
+    tab = still(visit, "#scene=map")
+    tab.locator(".map").scroll_into_view_if_needed()
+    tab.wait_for_function("document.querySelector('.map canvas').width > 0")
+    found = tab.evaluate(
+        f"""() => {{
+          const map = new cradleExplorer.RegionMap({SETTING});
+          map.points.resume(performance.now() + 60000);
+          return [map.points.finished, [...map.points.values].map((cell) => cell.pattern)];
+        }}"""
+    )
+    assert found[0]
+    side = round(len(found[1]) ** 0.5)
+    assert side >= 100
+    ratio = (np.arange(side) + 0.5) / side * 3
+    some = np.arange(0, side, 12)
+    left, right = np.meshgrid(ratio[some], ratio[some], indexing="ij")
+    masses = np.stack([1 / left, np.ones_like(left), 1 / right], axis=-1)
+    after = post_impact_velocities(masses, [1, 0, 0], 0.5, 0.15, excess="saturate")
+    back = {1: 1, 2: 0, 3: 2}  # pattern: balls that go back
+    expected = np.vectorize(back.get)(bouncing_pattern(after))
+    assert np.array_equal(np.reshape(found[1], (side, side))[np.ix_(some, some)], expected)
+    assert len(np.unique(expected)) == 3
+
+    # Drag the point to where the first ball bounces back, by pointer and by key.
+    x, y = middle(tab, ".point .present")
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + 20, y - 60, steps=4)
+    tab.mouse.up()
+    moved = drawn(tab)
+    assert moved["masses"][0] < 1
+    assert moved["masses"][1] == 1
+    assert same_outcome(moved)
+    tab.locator(".point").focus()
+    tab.keyboard.press("ArrowRight")
+    assert drawn(tab)["masses"][2] < moved["masses"][2]
+    assert tab.evaluate("document.activeElement.classList.contains('point')")
+
+
+def test_sweep_is_the_solvers(visit):
+    tab = still(visit, "#scene=half")
+    setting = drawn(tab)
+    values = tab.evaluate(
+        f"""() => {{
+          const sweep = new cradleExplorer.Sweep({SETTING}, [0, 1, 2]);
+          sweep.points.resume(performance.now() + 60000);
+          return [...sweep.points.values].map((answer) => answer.velocities);
+        }}"""
+    )
+    ratios = np.arange(201) / 200
+    python = post_impact_velocities(
+        setting["masses"], setting["speeds"], 1.0, np.tile(ratios[:, None], 3), excess="saturate"
+    )
+    np.testing.assert_allclose(values, python, rtol=0, atol=1e-12)
+
+
+# --- what the texts promise -------------------------------------------------------------------
+
+
+def test_scenes_do_what_their_texts_say(visit):
+    """In Python, from the settings that the page has."""
+    tab = still(visit)
+    scenes = tab.evaluate("cradleExplorer.data.scenes")
+    solved = {}
+    for scene in scenes:
+        trace = collide(*chain_of(scene["setting"]))
+        solved[scene["key"]] = trace.velocities, trace
+    velocities = {key: found[0] for key, found in solved.items()}
+    np.testing.assert_array_equal(velocities["one"], [0, 0, 0, 0, 1])
+    np.testing.assert_array_equal(velocities["two"], [0, 0, 0, 1, 1])
+    assert velocities["small"][0] < -0.05
+    assert 0.9 < velocities["small"][4] < 1
+    assert velocities["half"][0] < -0.2
+    assert velocities["half"][3] == pytest.approx(velocities["half"][4], abs=1e-6)
+    np.testing.assert_allclose(velocities["three"], [-1 / 3, 2 / 3, 2 / 3], atol=1e-6)
+    assert solved["light"][1].collisions.sum() > 10
+    kinds = [tuple(event) for event in solved["meeting"][1].events]
+    assert ("close", 1) in kinds  # the gap
+    # "One of them never stops": three of five pulled back, at the ratio 0.
+    middle_ball = tab.evaluate(
+        """() => {
+          const { withRatio, pulled, data, Swing } = cradleExplorer;
+          const swing = new Swing(pulled(data.scenes[0].setting, 2, 1));
+          return [0, 1, 2, 3].map((k) => Math.abs(swing.hit(k).after[2]));
+        }"""
+    )
+    assert middle_ball == [1, 1, 1, 1]
+    # "They end up swinging together."
+    together = tab.evaluate(
+        """() => {
+          const { data, Swing } = cradleExplorer;
+          const swing = new Swing(data.scenes.find((scene) => scene.key === "losses").setting);
+          return swing.hit(400);
+        }"""
+    )
+    assert not together["happened"]
+    np.testing.assert_allclose(np.abs(together["after"]), 0.2)
+
+
+@pytest.mark.parametrize(
+    ("chapter", "parts"),
+    [
+        ("problem", {"ratio"}),
+        ("three_balls", {"mass", "restitution", "ratio"}),
+        ("patterns", {"restitution", "ratio"}),
+        ("n_balls", {"ratio"}),
+    ],
+)
+def test_small_ones_in_chapters(visit, page, chapter: str, parts: set[str]):
+    """They wait to be let go, show what the chapter is about, and leave the address alone."""
+    address = page.replace("explorer.html", f"{chapter}.html")
+    tab = visit(address=address, width=390)
+    assert tab.evaluate("document.querySelectorAll('.cradle-explorer.live').length") == 1
+    host = tab.locator(".cradle-explorer")
+    labels = host.locator(".slider:visible label").all_text_contents()
+    assert set(labels) == parts
+    assert tab.evaluate(f"{EXPLORER}.state.clock.playing") is False
+    before = drawn(tab)
+    tab.get_by_label("ratio", exact=True).press("ArrowLeft")
+    after = drawn(tab)
+    assert after["forward"] != before["forward"]
+    assert same_outcome(after)
+    tab.wait_for_timeout(300)
+    assert tab.evaluate("location.hash") == ""
+    link = host.locator(".more a").get_attribute("href")
+    assert drawn(still(visit, "#" + link.partition("#")[2])) == after
+
+
+def test_without_scripts_there_is_a_picture(visit):
+    tab = visit(java_script_enabled=False)
+    picture = tab.locator(".cradle-explorer img")
+    assert picture.is_visible()
+    assert picture.evaluate("(image) => image.complete && image.naturalWidth") > 400
+    assert "velocities" in picture.get_attribute("alt")
