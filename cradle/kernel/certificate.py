@@ -14,15 +14,19 @@ def energies(n, state):
     what flies on untouched, says nothing here.
     """
     ball, unit = state.ball, math.ldexp(1.0, -state.tally[0].shift)
-    origin = 0.0
-    mass = 0.0
-    momentum = 0.0
+    k = -1  # the heaviest of them, from whose velocity all others are counted
     for i in range(n):
         b = ball[i]
         b.y = b.v * unit
         b.x = (b.hi - b.y) + b.lo
+        if b.x != 0.0 and (k < 0 or b.m > ball[k].m):
+            k = i
+    origin = ball[max(k, 0)].y
+    mass = 0.0
+    momentum = 0.0
+    for i in range(n):
+        b = ball[i]
         if b.x != 0.0:
-            origin = b.y if mass == 0.0 else origin
             mass += b.m
             momentum += b.m * (b.y - origin)
     change = 0.0

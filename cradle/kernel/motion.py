@@ -143,18 +143,21 @@ def arrive(c, low, high, ball, contact):
     k = low if c < low else high
     while low <= k <= high and contact[k].u == 0.0:
         k += step
-    if low <= k <= high:
-        _, _, left, right = bodies(k, low, high, ball, contact)
-        impulse = -closing(c, ball) * (left if c < low else right)
-        if abs(impulse) > LIMITS.digits * contact[k].p:
-            push(k, impulse, low, high, ball, contact)
+    top = len(ball) - 2
+    if not low <= k <= high:  # all of the run is one body: what is missing passes through c itself
+        set_closing_speed(c, 0.0, 0.0, 0, top, ball, contact)
+        return
+    first, last, left, right = bodies(k, 0, top, ball, contact)
+    impulse = -closing(c, ball) * (left if c < low else right)
+    if abs(impulse) > LIMITS.digits * contact[k].p:
+        push(k, impulse, 0, top, ball, contact)
     other = c if c < low else c + 1
     for j in range(low, high + 2):
         i = j if c < low else low + high + 1 - j
         ball[i].hi, ball[i].lo = ball[other].hi, ball[other].lo
         if i == (k if c < low else k + 1):
             break
-    for j in range(low, high + 1):
+    for j in range(max(first - 1, 0), min(last, top) + 1):
         if contact[j].u != 0.0:
             contact[j].u = closing(j, ball)
     contact[c].u = contact[c].blur = 0.0
