@@ -25,10 +25,7 @@ from sphinx.application import Sphinx
 from cradle import runtime
 
 #: Hand-written parts, beside this file: before the event loop, and after it.
-PARTS = (
-    ("engine_numbers.js",),
-    ("engine_collide.js", "engine_flight.js", "engine_swing.js"),
-)
+PARTS = ("engine_numbers.js", "engine_collide.js")
 #: The script in the built book.
 SCRIPT = "_static/explorer_engine.js"
 
@@ -296,17 +293,14 @@ def translate(source: str) -> str:
 def engine() -> str:
     """Return the whole script: one function that is called at once and leaves the name `cradle`."""
     before, after = (
-        [
-            (Path(__file__).parent / name).read_text(encoding="utf-8")
-            for name in names
-        ]
-        for names in PARTS
+        (Path(__file__).parent / name).read_text(encoding="utf-8")
+        for name in PARTS
     )
     loop = (
         "// The event loop of the package cradle, translated.\n"
         + translate(runtime.unit())
     )
-    inside = "\n".join([*before, loop, *after])
+    inside = "\n".join([before, loop, after])
     # In one room a second function of a name would replace the first without a word.
     names = Counter(re.findall(r"^function (\w+)", inside, re.MULTILINE))
     if names.most_common(1)[0][1] > 1:
