@@ -57,7 +57,9 @@ def certify(n, state):
     for i in range(n):
         after = contact[i].p if i < n - 1 else 0.0
         change = (ball[i].hi - ball[i].v * unit) + ball[i].lo
-        if not abs(ball[i].m * change - (before - after)) <= LIMITS.sound * (before + after):
+        if not abs(ball[i].m * change - (before - after)) <= LIMITS.sound * (
+            abs(before) + abs(after)
+        ):
             return MOMENTUM
         before = after
         fastest = max(fastest, abs(ball[i].hi - ball[0].hi), abs(ball[i].v - ball[0].v) * unit)

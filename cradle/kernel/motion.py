@@ -137,15 +137,18 @@ def arrive(c, low, high, ball, contact):
 
     The two differ by rounding, most often by that of what the run's last impulse did to this ball,
     and to those that zeros join to it.  Where it is more, the impulse of the contact inwards is
-    corrected first.
+    corrected first.  If there is none, a contact that has not quite arrived is left as it is: none
+    pulls.
     """
     step = 1 if c < low else -1
     k = low if c < low else high
     while low <= k <= high and contact[k].u == 0.0:
         k += step
     top = len(ball) - 2
-    if not low <= k <= high:  # all of the run is one body: what is missing passes through c itself
-        set_closing_speed(c, 0.0, 0.0, 0, top, ball, contact)
+    if not low <= k <= high:  # all of the run is one body, which only contact c itself can change
+        contact[c].u = closing(c, ball)
+        if contact[c].u > 0.0:
+            set_closing_speed(c, 0.0, 0.0, 0, top, ball, contact)
         return
     first, last, left, right = bodies(k, 0, top, ball, contact)
     impulse = -closing(c, ball) * (left if c < low else right)

@@ -250,15 +250,16 @@ def rounding_after(k, s):
 def comes_at(s, k):
     """Tell whether the next event of contact k comes at progress s, as far as rounding can tell.
 
-    It closes, or ends at u = 0, when u gets there; it ends otherwise when Q = 0, and then Q changes
-    by rate * u.
+    It closes, or ends at u = 0, when u gets there; it ends otherwise when Q = 0, and then, once
+    u < 0, Q changes by rate * u.
     """
     if not k.until < math.inf:
         return False
     late = k.until - s
     blur = rounding_after(k, s)
     if k.active == 1 and k.final < 0.0:
-        return late * -k.final <= blur * s + LIMITS.roundings * 2.0**-53 * k.w / k.rate
+        rest = blur * s + LIMITS.roundings * 2.0**-53 * k.w / k.rate
+        return late * -k.final <= rest and late * abs(k.slope) <= max(-k.final, blur)
     return late * abs(k.slope) <= blur
 
 
