@@ -238,22 +238,22 @@ def outcomes(
     options = Options(float(meeting), int(max_events), excess == "raise", False)
     large = count * n >= LARGE
 
-    def solve(begin: int, stop: threading.Event) -> Job:
-        """Solve the chunk of chains that begins there."""
+    def solve(begin: int, stop: threading.Event) -> tuple[int, int]:
+        """Solve the chunk of chains that begins there; return how it ended, and where."""
         rows = slice(begin, min(begin + chunk, count))
         part = Inputs(*(_rows(array, lead, rows) for array in arrays))
         job = Job(part, rows.stop - begin, options, large=large).run(stop)
         out[rows], hits[rows], collapsed[rows] = job.outputs[:3]
-        return job
+        # Not the job: its arrays would wait for those of the chunks before.
+        return job.status, begin + job.next
 
     starts = range(0, count, chunk)
     # At the first failure in the order of the chains; none has been returned before.
-    for begin, job in zip(starts, _in_order(solve, starts, progress), strict=True):
-        if job.status == REFUSED:
+    for status, failed in _in_order(solve, starts, progress):
+        if status == REFUSED:
             _check(given, excess)
             raise AssertionError("the kernel refused chains that the checks admit")
-        if job.status != FINISHED:
-            failed = begin + job.next
+        if status != FINISHED:
             # Alone, with its record; it stops where it stopped here, and raises.
             m, v, e, f, b = (_rows(array, lead, slice(failed, failed + 1))[0] for array in arrays)
             model = ImpulseCorrelation(
@@ -264,17 +264,17 @@ def outcomes(
 
 
 def _in_order(
-    solve: Callable[[int, threading.Event], Job], starts: range, progress: bool
-) -> Iterable[Job]:
+    solve: Callable[[int, threading.Event], tuple[int, int]], starts: range, progress: bool
+) -> Iterable[tuple[int, int]]:
     """Yield the results of `solve` in order, made by as many threads as there are processors."""
     stop = threading.Event()
     if progress:
         from tqdm.auto import tqdm
 
         with tqdm(total=len(starts), unit="chunk") as bar:
-            for job in _in_order(solve, starts, progress=False):
+            for ended in _in_order(solve, starts, progress=False):
                 bar.update()
-                yield job
+                yield ended
     elif (workers := min(len(starts), os.cpu_count() or 1)) < 2:
         yield from (solve(begin, stop) for begin in starts)
     else:
