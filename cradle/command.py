@@ -125,7 +125,8 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
         for k in range(len(chain))
     ]  # fmt: skip
     extra = {
-        "energy_lost": float(trace.energy_loss / chain.kinetic_energy) if rows else 0.0,
+        # Of balls at rest nothing is lost.
+        "energy_lost": float(trace.energy_loss / (chain.kinetic_energy or 1.0)),
         "collisions": trace.collisions.tolist(),
         "collapsed": trace.collapsed,
         "held_contacts": list(trace.saturated),

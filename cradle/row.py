@@ -96,6 +96,9 @@ class Row:
     --------
     An engine of ten lines, and three balls in it of which the first one flies:
 
+    >>> import numpy as np
+    >>> from cradle import Chain
+    >>> from cradle.row import Row
     >>> class Free:
     ...     def __init__(self, x, v):
     ...         self.x, self.v = np.array(x), np.array(v)

@@ -163,3 +163,7 @@ def test_first_answer_within_a_second(tmp_path):
     assert float(seconds) < 1
     assert loaded == "set()"
     assert "0.2782" in result.stdout
+
+
+def test_balls_at_rest_lose_nothing():
+    assert json.loads(call("solve AAAAA --speed 0 --json"))["energy_lost"] == 0
