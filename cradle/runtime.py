@@ -15,6 +15,7 @@ import logging
 import os
 import sys
 import tempfile
+import threading
 import warnings
 from importlib.resources import files
 from pathlib import Path
@@ -34,6 +35,8 @@ PAYS_AFTER, LOADS_AFTER = 10.0, 0.5
 
 logger = logging.getLogger("cradle")
 _spent = 0.0  # seconds of plain work so far, in this process
+_look = LOADS_AFTER  # seconds of plain work after which to look for compiled code on disk
+_deciding = threading.Lock()
 
 
 @functools.cache
@@ -67,7 +70,12 @@ def unit() -> str:
 
 
 def _name() -> str:
-    return f"cradle_kernel_{hashlib.sha256(unit().encode()).hexdigest()[:16]}"
+    return _named(unit())
+
+
+@functools.cache
+def _named(source: str) -> str:
+    return f"cradle_kernel_{hashlib.sha256(source.encode()).hexdigest()[:16]}"
 
 
 def _folder() -> Path:
@@ -193,15 +201,26 @@ def chosen(large: bool = False) -> Any:
     large : bool
         Whether the work is surely worth compiling for.
     """
+    global _look
     wish = os.environ.get(VARIABLE)
     if wish == "plain" or not available():
         return plain
-    worth = wish == "compiled" or large or loaded() or _spent > PAYS_AFTER
-    if not (worth or (_spent > LOADS_AFTER and on_disk())):
-        return plain
-    module = compiled()
-    if module is None:
-        return plain
-    if not ready():
-        logger.warning("compiling the event loop: some seconds, once on a machine")
-    return module
+    if not (wish == "compiled" or large or loaded() or _spent > PAYS_AFTER):
+        if _spent <= _look:
+            return plain
+        # To look costs more than a small impact, so not at each of them.
+        _look = _spent + LOADS_AFTER
+        if not on_disk():
+            return plain
+    # Threads that come here together share one module, which numba compiles once.
+    with _deciding:
+        module = compiled()
+        if module is not None and not ready():
+            _announce()
+    return plain if module is None else module
+
+
+@functools.cache
+def _announce() -> None:
+    where = "in this process" if _stored() is None else "once on this machine"
+    logger.warning("compiling the event loop, %s: up to a minute", where)

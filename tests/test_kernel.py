@@ -8,8 +8,10 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -48,8 +50,9 @@ def fresh_runtime(monkeypatch):
     """Let the runtime find out anew what there is; afterwards too."""
     monkeypatch.delenv(runtime.VARIABLE, raising=False)
     monkeypatch.setattr(runtime, "_spent", 0.0)
+    monkeypatch.setattr(runtime, "_look", runtime.LOADS_AFTER)
     # The caches of this process are kept: to load compiled code again would take seconds.
-    for name in ("available", "compiled", "_stored"):
+    for name in ("available", "compiled", "_stored", "_announce"):
         monkeypatch.setattr(runtime, name, functools.cache(vars(runtime)[name].__wrapped__))
 
 
@@ -176,6 +179,7 @@ def test_small_work_runs_plain_and_more_work_compiled(monkeypatch):
         ([1], 1.1 * runtime.LOADS_AFTER, False, "compiled"),
     ):
         ready[:] = on_disk
+        monkeypatch.setattr(runtime, "_look", runtime.LOADS_AFTER)
         monkeypatch.setattr(runtime, "_spent", spent)
         assert runtime.chosen(large) is expected
     monkeypatch.setenv(runtime.VARIABLE, "plain")
@@ -193,21 +197,63 @@ def test_plain_work_is_counted(plain, monkeypatch):
 
 @pytest.mark.usefixtures("fresh_runtime")
 @needs_numba
-def test_a_compilation_says_so_once(monkeypatch, caplog):
+@pytest.mark.parametrize(
+    ("folder", "when"), [(Path("somewhere"), "once on this machine"), (None, "in this process")]
+)
+def test_a_compilation_says_so_once(monkeypatch, caplog, folder, when):
     monkeypatch.setenv(runtime.VARIABLE, "compiled")
     monkeypatch.setattr(runtime, "compiled", lambda: "compiled")
     monkeypatch.setattr(runtime, "on_disk", lambda: False)
     monkeypatch.setattr(runtime, "loaded", lambda: False)
+    monkeypatch.setattr(runtime, "_stored", lambda: folder)
     with caplog.at_level(logging.WARNING, "cradle"):
         runtime.chosen()
+        runtime.chosen()
     assert [record.getMessage() for record in caplog.records] == [
-        "compiling the event loop: some seconds, once on a machine"
+        f"compiling the event loop, {when}: up to a minute"
     ]
-    caplog.clear()
+
+
+@pytest.mark.usefixtures("fresh_runtime")
+@needs_numba
+def test_ready_code_is_loaded_without_a_word(monkeypatch, caplog):
+    monkeypatch.setenv(runtime.VARIABLE, "compiled")
+    monkeypatch.setattr(runtime, "compiled", lambda: "compiled")
     monkeypatch.setattr(runtime, "loaded", lambda: True)
     with caplog.at_level(logging.WARNING, "cradle"):
         runtime.chosen()
     assert not caplog.records
+
+
+@pytest.mark.usefixtures("fresh_runtime")
+@needs_numba
+def test_compiled_code_is_looked_for_seldom(monkeypatch):
+    """Not before each of many small impacts, which take less time than a look."""
+    looks = []
+    monkeypatch.setattr(runtime, "loaded", lambda: False)
+    monkeypatch.setattr(runtime, "on_disk", lambda: bool(looks.append(runtime._spent)))
+    for _ in range(1000):
+        assert runtime.chosen() is kernel
+        runtime.spend(4 * runtime.LOADS_AFTER / 1000)
+    assert len(looks) == 3
+
+
+@pytest.mark.usefixtures("fresh_runtime")
+@needs_numba
+def test_threads_share_what_is_compiled(monkeypatch):
+    """Threads that need compiled code at the same time get one module, so it compiles once."""
+    monkeypatch.setattr(runtime, "_stored", lambda: time.sleep(0.2))
+    together = threading.Barrier(4)
+
+    def choose(_):
+        together.wait()
+        return runtime.chosen(large=True)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # no folder
+        with ThreadPoolExecutor(4) as pool:
+            modules = set(pool.map(choose, range(4)))
+    assert len(modules) == 1
 
 
 @needs_numba
