@@ -15,6 +15,8 @@ WIDTHS = (390, 1400)
 MODES = ("light", "dark")
 #: Contrast that letters need, and lines and marks (WCAG 2.1: 1.4.6 and 1.4.11).
 LETTERS, LINES = 7.0, 3.0
+#: Milliseconds until a browser that does not answer is given up: far above any slow machine's need.
+PATIENCE = 300_000
 
 # What a page shows that does not fit: [kind, beginning of its text, has, needs].
 MISFITS = """() => {
@@ -77,6 +79,9 @@ MISFITS = """() => {
   return found;
 }"""
 
+FRAMES = """() => new Promise((done) =>
+  requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"""
+
 
 @pytest.fixture(scope="module")
 def browser():
@@ -89,7 +94,9 @@ def browser():
             pytest.fail("CRADLE_REQUIRE_BROWSER is set and there is no Chromium")
         pytest.skip("no Chromium on this machine")
     with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=command, args=["--no-sandbox"])
+        browser = driver.chromium.launch(
+            executable_path=command, args=["--no-sandbox"], timeout=PATIENCE
+        )
         yield browser
         browser.close()
 
@@ -97,13 +104,16 @@ def browser():
 def misfits(tab, width: int) -> list:
     """List what does not fit into a window of this width."""
     tab.set_viewport_size({"width": width, "height": 900})
-    tab.wait_for_timeout(100)  # fit_equations.js follows the window
+    tab.wait_for_function("(width) => innerWidth === width", arg=width)
+    # fit_equations.js follows the window, and hears of it before the next frame.
+    tab.evaluate(FRAMES)
     return [[width, *misfit] for misfit in tab.evaluate(MISFITS)]
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_nothing_is_cut(html: Path, browser, mode: str):
     context = browser.new_context(viewport={"width": WIDTHS[0], "height": 900}, color_scheme=mode)
+    context.set_default_timeout(PATIENCE)
     tab = context.new_page()
     said: list[str] = []
     tab.on("console", lambda entry: said.append(entry.text) if entry.type == "error" else None)
