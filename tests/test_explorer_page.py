@@ -1,5 +1,7 @@
 """The live explorer as a reader meets it: the built page, opened from its file in a browser."""
 
+import json
+
 import numpy as np
 import pytest
 from chains import random_chains
@@ -39,9 +41,11 @@ def test_engine_in_the_page(visit):
         dict(zip(("masses", "velocities", "restitution", "forward", "backward"), case, strict=True))
         for case in chains
     ]
-    found = tab.evaluate(
-        "(chains) => chains.map((chain) => cradle.collide(chain))",
-        [{name: row.tolist() for name, row in case.items()} for case in given],
+    found = json.loads(
+        tab.evaluate(
+            "(chains) => JSON.stringify(chains.map((chain) => cradle.collide(chain)))",
+            [{name: row.tolist() for name, row in case.items()} for case in given],
+        )
     )
     assert len(found) == 300
     for case, answer in zip(given, found, strict=True):

@@ -30,15 +30,18 @@ from cradle.measures import bouncing_pattern
 
 def test_address_keeps_the_setting(visit):
     tab, address = still(visit, stopped=True), ""
+    other = still(visit)
     for setting in settings(6):
         tab.evaluate(f"(setting) => ({EXPLORER}.state.set(setting), {EXPLORER}.changed())", setting)
         before = later(tab, 190)
         assert tab.evaluate("location.hash") == address  # not at every step of a slider
         tab.clock.run_for(50)
         address = tab.evaluate("location.hash")
-        other = drawn(still(visit, unquote(address)))
-        assert other == before
-        assert {name: other[name] for name in setting} == setting
+        go_to(other, unquote(address).removeprefix("#"))
+        after = drawn(other)
+        assert after == before
+        assert {name: after[name] for name in setting} == setting
+    assert drawn(still(visit, unquote(address))) == before
 
 
 @pytest.mark.parametrize(
