@@ -105,10 +105,8 @@ def misfits(tab, width: int, mode: str) -> list:
     """List what does not fit into a window of this width in this mode."""
     tab.set_viewport_size({"width": width, "height": 900})
     tab.emulate_media(color_scheme=mode)
-    tab.wait_for_function(
-        "([width, mode]) => width === innerWidth && mode === document.documentElement.dataset.theme",
-        arg=[width, mode],
-    )
+    shown = "[innerWidth, document.documentElement.dataset.theme]"
+    tab.wait_for_function(f"(asked) => `${{{shown}}}` === `${{asked}}`", arg=[width, mode])
     # fit_equations.js follows the window, and hears of it before the next frame.
     tab.evaluate(FRAMES)
     return [[width, mode, *misfit] for misfit in tab.evaluate(MISFITS)]
