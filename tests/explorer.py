@@ -1,15 +1,30 @@
-"""The live explorer's page in a browser: how tests open it, and what they ask it."""
+"""The live explorer's page in a browser: how tests open it, and what they ask it.
+
+No test depends on how fast the machine is. Where time matters, the page gets a clock that stands
+still until the test moves it; elsewhere tests wait for a state.
+"""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 from chains import random_chains, uniform
+from test_layout import PATIENCE
 
 from cradle import Chain, ImpulseCorrelation, collide
 
 EXPLORER = "cradleExplorer.live[0]"
 SETTING = f"{EXPLORER}.state.setting"
+
+# A frame may change sizes and so ask for another one; sweeps and maps take many. With a swing in
+# motion there is no last one: see `later`.
+AT_REST = f"""async () => {{
+  for (let frame = 0; frame < 10000; frame += 1) {{
+    await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+    if (!{EXPLORER}.frame) return true;
+  }}
+  return false;
+}}"""
 
 
 @pytest.fixture(scope="module", name="page")
@@ -24,10 +39,14 @@ def visits(request, page):
     browser = request.getfixturevalue("browser")
     contexts, faults = [], []
 
-    def open_page(fragment="", *, address=page, width=1400, height=900, **options):
+    def open_page(fragment="", *, address=page, width=1400, height=900, stopped=False, **options):
         context = browser.new_context(viewport={"width": width, "height": height}, **options)
+        context.set_default_timeout(PATIENCE)
         contexts.append(context)
         tab = context.new_page()
+        if stopped:  # for dates, timers and frames alike; `tab.clock.run_for` lets time pass
+            tab.clock.install(time=0)
+            tab.clock.pause_at(10**6)
         tab.on("console", lambda said: said.type == "error" and faults.append(said.text))
         tab.on("pageerror", lambda error: faults.append(str(error)))
         tab.on("request", lambda r: r.url.startswith(("file:", "data:")) or faults.append(r.url))
@@ -48,9 +67,30 @@ def still(visit, fragment="", **options):
 
 
 def drawn(tab):
-    """Wait until the page has drawn its state, and return the setting and the outcome shown."""
-    tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
+    """Wait until the page has nothing more to draw, and return its setting and outcome."""
+    assert tab.evaluate(AT_REST), "the page never comes to rest"
+    return shown(tab)
+
+
+def later(tab, milliseconds: int):
+    """Let time pass on a page whose clock stands still, and return what is shown then."""
+    tab.clock.run_for(milliseconds)
+    return shown(tab)
+
+
+def shown(tab):
     return tab.evaluate(f"({{...{SETTING}, after: {EXPLORER}.state.swing.hit(0).after}})")
+
+
+def go_to(tab, fragment: str):
+    """Change the address, as a link does, and wait until the page has heard of it."""
+    tab.evaluate(
+        """(fragment) => new Promise((done) => {
+          addEventListener("hashchange", () => done(), { once: true });
+          location.hash = fragment;
+        })""",
+        fragment,
+    )
 
 
 def press(tab, name: str):

@@ -1,5 +1,7 @@
 """The live explorer as a reader meets it: the built page, opened from its file in a browser."""
 
+import json
+
 import numpy as np
 import pytest
 from chains import random_chains
@@ -9,6 +11,8 @@ from explorer import (
     address_of_page,  # noqa: F401
     chain_of,
     drawn,
+    go_to,
+    later,
     middle,
     press,
     same_outcome,
@@ -37,9 +41,11 @@ def test_engine_in_the_page(visit):
         dict(zip(("masses", "velocities", "restitution", "forward", "backward"), case, strict=True))
         for case in chains
     ]
-    found = tab.evaluate(
-        "(chains) => chains.map((chain) => cradle.collide(chain))",
-        [{name: row.tolist() for name, row in case.items()} for case in given],
+    found = json.loads(
+        tab.evaluate(
+            "(chains) => JSON.stringify(chains.map((chain) => cradle.collide(chain)))",
+            [{name: row.tolist() for name, row in case.items()} for case in given],
+        )
     )
     assert len(found) == 300
     for case, answer in zip(given, found, strict=True):
@@ -110,21 +116,23 @@ def test_balls_that_end_up_together(visit):
 
 def test_copied_python_gives_the_same_numbers(visit):
     """The text of the button, run as a program."""
-    tab = still(visit)
+    tab = still(visit, stopped=True)
     tab.evaluate(
         "navigator.clipboard.writeText = (text) => ((window.copied = text), Promise.resolve())"
     )
     for fragment in ("speeds=1,0.5,0,-0.35&forward=0.3,0.12&backward=0.2&masses=1,0.05,3,0.166",
                      "scene=ABCCAB", "scene=half"):  # fmt: skip
-        tab.evaluate("(fragment) => (location.hash = fragment)", fragment)
-        tab.wait_for_timeout(50)
-        shown = drawn(tab)
+        go_to(tab, fragment)
+        asked = later(tab, 50)
         press(tab, "Copy Python")
-        assert "Python copied" in tab.inner_text(".told")
+        tab.clock.run_for(3900)
+        assert tab.inner_text(".told") == "Python copied"
+        tab.clock.run_for(200)
+        assert tab.inner_text(".told") == ""
         program = {}
         exec(tab.evaluate("window.copied"), program)
-        assert program["trace"].velocities.tolist() == shown["after"]
-        np.testing.assert_allclose(program["run"].impacts[0].after, shown["after"], atol=1e-9)
+        assert program["trace"].velocities.tolist() == asked["after"]
+        np.testing.assert_allclose(program["run"].impacts[0].after, asked["after"], atol=1e-9)
 
 
 def test_paper_chains_by_their_letters(visit):
@@ -153,28 +161,50 @@ def test_paper_chains_by_their_letters(visit):
 
 
 def test_a_ball_is_dragged_and_let_go(visit):
-    tab = visit()
+    tab = visit(stopped=True)
+    tab.clock.run_for(1500)  # half a second of rest, then a swing
     press(tab, "Pause")
     press(tab, "Pull back")
     tab.evaluate(f"{EXPLORER}.state.set(cradleExplorer.atRest({SETTING})), {EXPLORER}.changed()")
-    drawn(tab)
+    tab.clock.run_for(50)
     x, y = middle(tab, ".ball[data-ball='4'] .disc")
     tab.mouse.move(x, y)
     tab.mouse.down()
     for step in range(1, 9):
         tab.mouse.move(x + 10 * step, y)
-    held = drawn(tab)
-    assert held["speeds"][:4] == [0] * 4
-    assert held["speeds"][4] < -0.3
-    # The ball is where the pointer is, to half a step of the pull, and has not moved by itself.
+        tab.clock.run_for(16)
     at, _ = middle(tab, ".ball[data-ball='4'] .disc")
     assert abs(at - (x + 80)) < 8
+    tab.clock.run_for(1000)  # it waits in the hand
+    assert middle(tab, ".ball[data-ball='4'] .disc")[0] == at
     tab.mouse.up()
-    assert same_outcome(drawn(tab))
+    assert same_outcome(later(tab, 50))
     assert tab.inner_text("button.main") == "Pause"
-    tab.wait_for_function(f"{EXPLORER}.state.clock.time > 0.8")
+    tab.clock.run_for(950)  # the hit comes after half a second
+    assert tab.evaluate(f"{EXPLORER}.state.clock.time") == pytest.approx(1, abs=0.05)
     first, second = (middle(tab, f".ball[data-ball='{ball}'] .disc")[0] for ball in (0, 1))
     assert second - first > 60  # the hit has sent ball 1 to the left; at rest they touch
+
+
+def test_pull_back_where_it_has_an_effect(visit):
+    """Balls that are held already cannot be pulled back; once let go they can."""
+    tab = visit(stopped=True)
+    pull_back = tab.get_by_role("button", name="Pull back")
+    tab.clock.run_for(100)
+    assert tab.evaluate(f"{EXPLORER}.state.clock.time") < 0
+    press(tab, "Pause")
+    tab.clock.run_for(1000)
+    assert pull_back.is_disabled()
+    press(tab, "Let go")
+    tab.clock.run_for(1000)
+    assert pull_back.is_enabled()
+    press(tab, "Pause")
+    tab.clock.run_for(50)
+    assert pull_back.is_enabled()
+    press(tab, "Pull back")
+    tab.clock.run_for(1000)
+    assert pull_back.is_disabled()
+    assert tab.evaluate(f"{EXPLORER}.state.clock.time") == 0
 
 
 def test_balls_in_the_way_come_along(visit):
@@ -228,7 +258,8 @@ def test_number_material_and_sweep(visit):
     assert setting["masses"] == [0.166] * 3
     assert same_outcome(setting)
     tab.click("label:has-text('All ratios')")
-    tab.wait_for_function("document.querySelectorAll('.pictures polyline').length >= 3")
+    drawn(tab)
+    assert tab.locator(".drags-x polyline").count() == 3
     x, y = middle(tab, ".drags-x svg")
     tab.mouse.move(x, y)
     tab.mouse.down()
