@@ -9,7 +9,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.checks import LIGHTEST, Vector, checked, one_number, whole_number
+from cradle.checks import (
+    LIGHTEST,
+    Vector,
+    number_or_row,
+    one_number,
+    refuse_where,
+    whole_number,
+)
 from cradle.models.motion import Motion, own_units
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -131,15 +138,12 @@ class SpringChain:
     max_evaluations: int = field(default=1_000_000, kw_only=True)
 
     def __post_init__(self) -> None:
-        k = checked("stiffness", self.stiffness, "must be above 0", 0.0, open_low=True)
-        if k.ndim > 1:
-            raise ValueError(f"stiffness has shape {k.shape}; must be () or (N - 1,)")
-        if k.size and k.min() < LIGHTEST * k.max():
-            raise ValueError(
-                f"stiffness[{int(k.argmin())}] = {float(k.min())!r}; "
-                f"must be at least {LIGHTEST} of the stiffest contact"
-            )
-        object.__setattr__(self, "stiffness", tuple(k.tolist()) if k.ndim else float(k))
+        above = "must be above 0"
+        kept = number_or_row("stiffness", self.stiffness, "N - 1", above, 0.0, open_low=True)
+        object.__setattr__(self, "stiffness", kept)
+        k = np.asarray(kept)
+        soft = k < LIGHTEST * k.max(initial=0.0)
+        refuse_where("stiffness", k, soft, f"must be at least {LIGHTEST} of the stiffest contact")
         rules = {
             "exponent": ("must be at least 1", 1.0, math.inf),
             "rtol": (f"must lie in [{_SMALLEST_RTOL:.3g}, 0.1]", _SMALLEST_RTOL, 0.1),
@@ -156,12 +160,8 @@ class SpringChain:
     def solve(self, chain: Chain) -> TimedTrace:
         """Solve the impact of `chain`; see `collide`."""
         k, unit, mass, speed = own_units(chain, self.stiffness)
-        if (chain.restitution < 1.0).any():
-            c = int(np.argmax(chain.restitution < 1.0))
-            raise ValueError(
-                f"restitution[{c}] = {float(chain.restitution[c])!r}; must be 1 for SpringChain: "
-                "a spring gives back all the energy that it stores"
-            )
+        rule = "must be 1 for SpringChain: a spring gives back all the energy that it stores"
+        refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
         logarithm = math.log(mass) + 2.0 * math.log(speed) - math.log(unit)
         logarithm = logarithm / (self.exponent + 1.0) - math.log(speed)
         if not abs(logarithm) <= 600.0:
