@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "benchmarks"))
 pytest.importorskip("numba", reason="the judge of the scene is compiled by numba")
 import cradle_scenes as scenes  # noqa: E402
-from measure import versions  # noqa: E402
+from measure import absent, versions  # noqa: E402
 
 # Box2D's bindings, made by SWIG, warn when they are imported.
 pytestmark = pytest.mark.filterwarnings("ignore:builtin type:DeprecationWarning")
@@ -121,8 +121,8 @@ def test_the_tables_are_complete():
 @pytest.mark.parametrize(("how", "mend"), [("as it is", False), ("mended", True)])
 def test_an_engine_repeats_what_is_stored(engine, how, mend):
     """Same version, same strokes; another one is asked only for what the row promises."""
-    if engine.name in scenes.absent():
-        pytest.skip(scenes.absent()[engine.name])
+    if engine.name in absent(scenes.ENGINES):
+        pytest.skip(absent(scenes.ENGINES)[engine.name])
     _, angles, rates = scenes.in_engine(engine, "default", 1, mend=mend, duration=5.6)
     found, expected = scenes.strokes(angles, rates), run(engine.name, how, "default")
     assert len(found) == 5
@@ -168,7 +168,7 @@ def test_absent_engines_are_named_and_skipped(monkeypatch):
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name, *a: None if name in hidden else find(name, *a)
     )
-    missing = scenes.absent()
+    missing = absent(scenes.ENGINES)
     assert list(missing) == ENGINES
     assert all("is not installed" in reason for reason in missing.values())
     rows = list(scenes.costs(missing, repeats=1, seconds=0.1))
@@ -190,8 +190,8 @@ def test_the_ratio_is_that_of_elastic_spheres():
 
 def test_bullet_gains_by_its_correction_of_overlaps():
     bullet = scenes.ENGINES[2]
-    if bullet.name in scenes.absent():
-        pytest.skip(scenes.absent()[bullet.name])
+    if bullet.name in absent(scenes.ENGINES):
+        pytest.skip(absent(scenes.ENGINES)[bullet.name])
     gain = []
     for options in ({}, {"contactERP": 0.0}):
         changed = replace(bullet, default=scenes.Setting(1 / 240, options))
