@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from cradle.checks import Vector, whole_number
+from cradle.checks import Vector, must_be, one_number, whole_number
 from cradle.figures import PALETTE, progress, velocities, velocity_impulse
 from cradle.film import KEY, Animation, keyframes, number, with_style
 from cradle.swing_trace import Swing
@@ -53,6 +53,8 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
     >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
     >>> animate(trace).save("impact.svg")  # doctest: +SKIP
     """
+    must_be(Trace, "trace", trace)
+    must_be(str, "alt", alt)
     with mpl.rc_context({"svg.hashsalt": "cradle", "svg.fonttype": "path", "font.size": 10}):
         # At 72 dots an inch, points of the figure are units of the file.
         figure = Figure(figsize=(6.4, 5.4), dpi=72, layout="constrained", facecolor="white")
@@ -223,8 +225,8 @@ def animate_swing(
     Raises
     ------
     ValueError
-        If a run has no duration, there are not as many labels as runs, or `columns` is no whole
-        number above 0.
+        If a run has no duration, there are not as many labels as runs, `speed` or `still` is out
+        of range, or `columns` is no whole number above 0.
 
     Examples
     --------
@@ -234,13 +236,19 @@ def animate_swing(
     >>> animate_swing(run).svg.count("@keyframes")
     5
     """
-    several = [runs] if isinstance(runs, Swing) else list(runs)
-    if labels and len(labels) != len(several):
-        raise ValueError(f"labels has {len(labels)} lines; {len(several)} swings need as many")
-    duration = min(run.times[-1] - run.times[0] for run in several) if several else 0.0
+    must_be(str, "alt", alt)
+    given = runs if isinstance(runs, Sequence) else [runs]
+    several = [must_be(Swing, "runs", run) for run in given]
+    duration = min((np.ptp(run.times) for run in several), default=0.0)
     if not duration > 0.0:
         raise ValueError("runs has no swing, or one without a duration")
-    beside = whole_number("columns", columns)
+    given_lines = labels if isinstance(labels, (list, tuple)) else [labels]
+    lines = [must_be(str, "labels", line) for line in given_lines]
+    if lines and len(lines) != len(several):
+        raise ValueError(f"labels has {len(lines)} lines; {len(several)} swings need as many")
+    one_number("speed", speed, "must lie in [1e-6, 1e6]", 1e-6, 1e6)
+    one_number("still", still)
+    beside = min(whole_number("columns", columns), len(several))
     swings = [
         _draw_swing(run, f"{KEY}s{k}b", duration, speed, still) for k, run in enumerate(several)
     ]
@@ -252,7 +260,7 @@ def animate_swing(
     for first in range(0, len(several), beside):
         heights = []
         for k, one in enumerate(swings[first : first + beside], start=first):
-            label = labels[k] if labels else ""
+            label = lines[k] if lines else ""
             text = (
                 f'<text x="{number(edge + 12)}" y="20" font-size="{letters}">{escape(label)}</text>'
                 if label

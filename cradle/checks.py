@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from cradle.kernel.state import LIMITS
 from cradle.reals import Vector, numbers
-from cradle.refusals import a, first, must_be, refusal, refuse_where, shown
+from cradle.refusals import a, first, must_be, one_of, place_in, refusal, refuse_where, shown
 
 #: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
 LIGHTEST = 1e-150
@@ -25,6 +25,8 @@ __all__ = [
     "number_or_row",
     "numbers",
     "one_number",
+    "one_of",
+    "place_in",
     "refusal",
     "refuse_overflow",
     "refuse_where",

@@ -1,13 +1,16 @@
-"""The words in which input is refused: the value by name and place, and the rule."""
+"""Refuse input in words: the value by name and place, and the rule."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["a", "first", "must_be", "place", "refusal", "refuse_where", "shown"]
+__all__ = [
+    "a", "first", "must_be", "one_of", "place", "place_in", "refusal", "refuse_where", "shown",
+]  # fmt: skip
 
 # The longest value that an error repeats, in characters.
 _SHOWN = 80
@@ -181,6 +184,77 @@ def must_be(kind: type[_Thing], name: str, thing: object) -> _Thing:
         what = f"the class {thing.__name__}" if isinstance(thing, type) else a(type(thing).__name__)
         raise TypeError(f"{name} is {what}; must be {a(kind.__name__)}")
     return thing
+
+
+def one_of(name: str, value: object, choices: Sequence[str]) -> str:
+    """Return `value` if it is one of some words.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in an error.
+    value : object
+        Anything.
+    choices : sequence of str
+        The words.
+
+    Returns
+    -------
+    str
+        `value` itself.
+
+    Raises
+    ------
+    ValueError
+        If it is none of them.
+
+    Examples
+    --------
+    >>> one_of("order", "up", ("left", "right"))
+    Traceback (most recent call last):
+    ...
+    ValueError: order = 'up'; must be 'left' or 'right'
+    """
+    if not isinstance(value, str) or value not in choices:
+        two = len(choices) == 2
+        rule = " or ".join(map(repr, choices)) if two else f"one of {', '.join(choices)}"
+        raise ValueError(f"{name} = {shown(value)}; must be {rule}")
+    return value
+
+
+def place_in(name: str, value: object, size: int) -> int:
+    """Return `value` as the place of a thing in a row.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in an error.
+    value : object
+        A whole number of Python's or NumPy's.
+    size : int
+        How many things there are, counted from 0.
+
+    Returns
+    -------
+    int
+        The value.
+
+    Raises
+    ------
+    ValueError
+        If there is no such thing.
+
+    Examples
+    --------
+    >>> place_in("contact", 2, 2)
+    Traceback (most recent call last):
+    ...
+    ValueError: contact = 2; must be one of 0 to 1
+    """
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not (whole and 0 <= value < size):  # type: ignore[operator]
+        raise ValueError(f"{name} = {shown(value)}; must be one of 0 to {size - 1}")
+    return int(value)  # type: ignore[call-overload, no-any-return]
 
 
 def a(name: str) -> str:

@@ -180,10 +180,6 @@ class Trace:
 
         if contact is None:
             return figures.velocities(self, ax)
-        if contact not in range(len(self.impulses)):
-            raise ValueError(
-                f"contact = {shown(contact)}; must be one of 0 to {len(self.impulses) - 1}"
-            )
         return figures.velocity_impulse(self, contact, ax)
 
     def _repr_html_(self) -> str:

@@ -159,7 +159,7 @@ class _Wish(NamedTuple):
     @property
     def uniform(self) -> bool:
         """Whether the contacts are equal springs, as all that were measured."""
-        return self.stiffness is None or np.ptp(self.stiffness) == 0.0
+        return len(set(np.ravel(1.0 if self.stiffness is None else self.stiffness))) == 1
 
     def model(self, row: Row) -> Model:
         """Return the model of a row, with what is known."""
@@ -182,9 +182,11 @@ class _Unfit(Exception):
 
 
 def _wishes(wanted: str | Collection[str]) -> tuple[str, ...]:
-    several = isinstance(wanted, Collection) and not isinstance(wanted, str)
-    wishes = tuple(wanted) if several else (str(wanted),)
-    if not wishes or not set(wishes) <= set(WANTED):
+    try:
+        wishes = (wanted,) if isinstance(wanted, str) else tuple(wanted)
+    except TypeError:
+        wishes = ()
+    if not wishes or not all(isinstance(one, str) and one in WANTED for one in wishes):
         rule = f"must be one or several of {', '.join(WANTED)}"
         raise ValueError(f"wanted = {shown(wanted)}; {rule}")
     return wishes

@@ -14,6 +14,7 @@ from cradle.checks import (
     Vector,
     number_or_row,
     one_number,
+    one_of,
     refuse_where,
     whole_number,
 )
@@ -150,8 +151,7 @@ class SpringChain:
         }
         for name, (rule, low, high) in rules.items():
             object.__setattr__(self, name, one_number(name, getattr(self, name), rule, low, high))
-        if self.method not in _METHODS:
-            raise ValueError(f"method = {self.method!r}; must be one of {', '.join(_METHODS)}")
+        one_of("method", self.method, _METHODS)
         if self.max_time is not None:
             limit = one_number("max_time", self.max_time, "must be at least 0", 0.0, math.inf)
             object.__setattr__(self, "max_time", limit)

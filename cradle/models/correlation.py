@@ -16,6 +16,7 @@ from cradle.checks import (
     must_be,
     number_or_row,
     one_number,
+    one_of,
     refuse_where,
     row_of,
 )
@@ -206,8 +207,7 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
     # The usual options first: they cost a call for one chain less than the checks in full.
     if not (type(meeting) is float and 0.0 <= meeting <= 1.0):
         one_number("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
-    if not isinstance(excess, str) or excess not in ("raise", "saturate"):
-        raise ValueError(f"excess = {excess!r}; must be 'raise' or 'saturate'")
+    one_of("excess", excess, ("raise", "saturate"))
     if isinstance(max_events, bool) or not isinstance(max_events, (int, np.integer)):
         raise ValueError(f"max_events = {max_events!r}; must be a whole number")
     if not 1 <= max_events < 2**63:
