@@ -46,6 +46,10 @@ class TimedTrace(Trace):
         Times of the steps of the integration, s.
     step_forces : ndarray, shape (S, N - 1)
         Contact forces there, N: curves of the force over the time.
+    step_velocities : ndarray, shape (S, N)
+        Velocities there, m/s.
+    step_impulses : ndarray, shape (S, N - 1)
+        Impulses so far, there, N s.
     evaluations : int
         How often the forces were evaluated.
 
@@ -68,6 +72,8 @@ class TimedTrace(Trace):
     durations: Vector
     step_times: Vector
     step_forces: Vector
+    step_velocities: Vector
+    step_impulses: Vector
     evaluations: int
 
     def _clock(self) -> dict[str, Vector]:
@@ -181,6 +187,8 @@ class SpringChain:
         path = chain.velocities + speed * change.T
         path_impulses = mass * speed * impulses.T
         newton = mass * speed / second
+        steps = np.concatenate([y for _, y in motion.steps], axis=1)
+        step_change, _, step_impulses = motion.parts(steps)
         trace = TimedTrace(
             chain=chain,
             model=self,
@@ -195,7 +203,9 @@ class SpringChain:
             forces=newton * motion.forces(np.array(states).T).T,
             durations=second * motion.durations,
             step_times=second * np.concatenate([t for t, _ in motion.steps]),
-            step_forces=newton * np.concatenate([motion.forces(y).T for _, y in motion.steps]),
+            step_forces=newton * motion.forces(steps).T,
+            step_velocities=chain.velocities + speed * step_change.T,
+            step_impulses=mass * speed * step_impulses.T,
             evaluations=motion.evaluations,
         )
         if reason:
