@@ -442,7 +442,7 @@ def test_refusals_say_what_to_give():
         recommend(THREE, model_error=1e-6)
     assert recommend(THREE, model_error=1e-6, stiffness=1).model_error == 0.0
     for chain in (LOSSY, striking([1, 1.01, 1], 0.9)):
-        with pytest.raises(ValueError, match="ask for .* or more") as refused:
+        with pytest.raises(ValueError, match=r"ask for .* or more") as refused:
             recommend(chain, accuracy=1e-15, stiffness=1)
         least = float(re.search(r"ask for (\S+) or more", str(refused.value)).group(1))
         assert recommend(chain, accuracy=least, stiffness=1).numerical_error <= least
