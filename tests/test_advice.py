@@ -438,7 +438,7 @@ def test_refusals_say_what_to_give():
     # Hertz: 4/3 E* sqrt(R*) of 200 GPa and 0.3; two equal balls halve the modulus and the radius.
     steel = 4 / 3 * (200e9 / (1 - 0.3**2) / 2) * (0.01 / 2) ** 0.5
     assert steel == pytest.approx(1e10, rel=0.1)
-    with pytest.raises(ValueError, match="give stiffness=1 for springs, which have none"):
+    with pytest.raises(ValueError, match="give stiffness=1 for springs, which have no model"):
         recommend(THREE, model_error=1e-6)
     assert recommend(THREE, model_error=1e-6, stiffness=1).model_error == 0.0
     for chain in (LOSSY, striking([1, 1.01, 1], 0.9)):

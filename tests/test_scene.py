@@ -3,6 +3,7 @@
 import csv
 import importlib.util
 import math
+import re
 import sys
 from dataclasses import replace
 from functools import cache
@@ -247,6 +248,27 @@ def test_the_recipe_shows_the_tested_programs(name: str):
     (output,) = Chapter("recipe").cells[f"recipe-{name}"].outputs
     text = (ROOT / "examples" / f"{name}_cradle.py").read_text(encoding="utf-8")
     assert output.data["text/markdown"] == f"```python\n{text}```"
+
+
+def test_the_recipe_tells_where_the_energy_is():
+    """Beside what is left, in brackets: the part of it on the ball that has most."""
+    chapter = Chapter("recipe")
+    (output,) = chapter.cells["recipe-table"].outputs
+    lines = re.findall(r"<tr>(.*?)</tr>", output.data["text/html"], flags=re.S)
+    cells = [re.findall(r"<t[hd]>(.*?)</t[hd]>", line) for line in lines]
+    table = {name: told for name, *told in filter(None, cells) if name in ENGINES}
+    assert list(table) == ENGINES
+    for name, told in table.items():
+        assert len(told) == 6
+        for setting, (own, row, alone) in zip(("default", "refined"), (told[:3], told[3:])):
+            for how, cell in (("as it is", own), ("mended", row)):
+                end = run(name, how, setting)[-1]
+                most = end.max() / end.sum()
+                assert cell == f"{100 * end.sum():.0f} ({100 * most:.0f})"
+                assert (most > 0.95) if how == "mended" else (most < 0.6), (name, setting)
+            assert alone == f"{100 * run(name, 'no impacts', setting, 5)[-1].sum():.0f}"
+    end = run(*HERTZ)[-1]
+    assert chapter.glued["one"] == f"{100 * end.max() / end.sum():.0f}"
 
 
 def test_the_figures_draw_the_tables():

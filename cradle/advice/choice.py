@@ -128,7 +128,10 @@ springs, which lose nothing; with losses, ask for impulses
         except _Unfit as why:
             failures.setdefault(why.args[0], []).append(why.args[1])
     if not found:
-        raise ValueError("; ".join(f"{one}; {', '.join(all_)}" for one, all_ in failures.items()))
+        told = [f"{one}; {', '.join(reasons)}" for one, reasons in failures.items()]
+        if model_error is not None and stiffness is None:
+            told.append("give stiffness=1 for springs, which have no model error")
+        raise ValueError("; ".join(told))
     return min(found, key=lambda one: one[0])[1]
 
 
@@ -267,8 +270,7 @@ def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recom
         apart = 0.0
     if wish.model_error is not None and (apart is None or apart > wish.model_error):
         known = "was not measured here" if apart is None else f"is {apart:.2g}"
-        better = "" if wish.stiffness else "; give stiffness=1 for springs, which have none"
-        raise _Unfit(f"model_error = {wish.model_error!r}", f"that of {name} {known}{better}")
+        raise _Unfit(f"model_error = {wish.model_error!r}", f"that of {name} {known}")
     known_error = best.measured and row.numerical_error is not None
     return (not best.measured, best.cost), Recommendation(
         model=wish.model(row),
@@ -304,7 +306,7 @@ def _cheapest(settings: list[Evidence], name: str, wish: _Wish) -> Evidence:
         return min(fit, key=lambda one: one.cost)
     least = min(settings, key=lambda one: one.error)
     stricter = "" if least.exact else f"; on other chains it must be {_MARGIN:g} times better"
-    stricter += f"; ask for {1.05 * margin * least.error:.1e} or more"
+    stricter += f": ask for {1.05 * margin * least.error:.1e} or more"
     raise _Unfit(
         f"accuracy = {wish.accuracy!r}",
         f"the least numerical error of {name} measured is {least.error:.2g} "
