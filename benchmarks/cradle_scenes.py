@@ -13,7 +13,6 @@ beside that of `swing` or of the engine alone, measured in turn: read the ratios
 import argparse
 import csv
 import importlib
-import importlib.util
 import math
 import statistics
 import sys
@@ -23,7 +22,7 @@ from pathlib import Path
 
 import numba
 import numpy as np
-from measure import versions
+from measure import absent, versions
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
 from cradle.drive import warm_up
@@ -115,15 +114,6 @@ ENGINES = (
         Setting(1e-4, {"contact": 0.002}, mended_step=1e-3),
     ),
 )  # fmt: skip
-
-
-def absent():
-    """Return the engines that are not installed."""
-    return {
-        engine.name: f'{engine.distribution} is not installed; pip install -e ".[engines]"'
-        for engine in ENGINES
-        if importlib.util.find_spec(engine.module) is None
-    }
 
 
 # One run: times, angles and rates of the balls, shape (T, N).
@@ -367,7 +357,7 @@ def main(arguments=None):
     parser.add_argument("--output", type=Path, default=ROOT / "data", help="a folder")
     parser.add_argument("--costs", action="store_true", help="measure the costs alone")
     options = parser.parse_args(arguments)
-    missing = absent()
+    missing = absent(ENGINES)
     for name, reason in missing.items():
         print(f"skipped {name}: {reason}")
     warm_up()

@@ -11,7 +11,6 @@ chain always has such numbers. Box2D takes it from a listener. MuJoCo has no coe
 restitution: its contact is a damped constraint, whose damping is found from two balls.
 """
 
-import importlib.util
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from measure import Row, distance, outcome, versions
+from measure import Row, absent, distance, outcome, versions
 from scenes import SCENES, Scene
 from solvers import model_error
 
@@ -297,15 +296,6 @@ ENGINES = (
 )  # fmt: skip
 
 
-def absent():
-    """Return the engines that are not installed."""
-    return {
-        engine.name: f'{engine.distribution} is not installed; pip install -e ".[engines]"'
-        for engine in ENGINES
-        if importlib.util.find_spec(engine.module) is None
-    }
-
-
 def run(world, step, longest):
     """Step until all balls are apart and in order of velocity; return steps and velocities."""
     taken, before = 0, None
@@ -340,7 +330,7 @@ def longest(setting, placement):
 
 def rows(clock, quick):
     """Yield a row for each engine, setting, placement and scene."""
-    missing = absent()
+    missing = absent(ENGINES)
     for engine in ENGINES:
         if engine.name in missing:
             continue

@@ -1,6 +1,7 @@
 """What one row of the table is, and how its time is taken."""
 
 import contextlib
+import importlib.util
 import math
 import os
 import platform
@@ -17,6 +18,15 @@ from cradle import post_impact_velocities, runtime
 #: The unit of time of the whole table: one impact of three balls, solved in a batch.
 REFERENCE = "one impact of three balls, in a batch of 2000 random chains"
 _BATCH = random_chains(3, 2000)
+
+
+def absent(engines):
+    """Return the names of engines that are not installed, and what to do about each."""
+    return {
+        engine.name: f'{engine.distribution} is not installed; pip install -e ".[engines]"'
+        for engine in engines
+        if importlib.util.find_spec(engine.module) is None
+    }
 
 
 @dataclass

@@ -19,7 +19,7 @@ from pathlib import Path
 import engines
 import savings
 import solvers
-from measure import COLUMNS, REFERENCE, Clock
+from measure import COLUMNS, REFERENCE, Clock, absent
 
 DATA = Path(__file__).parents[1] / "data" / "benchmarks.csv"
 
@@ -58,7 +58,7 @@ def main(arguments=None):
         for row in part(clock, options.quick):
             show(row)
             rows.append(row)
-    for name, reason in engines.absent().items():
+    for name, reason in absent(engines.ENGINES).items():
         print(f"skipped {name}: {reason}")
     if output:
         write(rows, output)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from html import escape
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from cradle.checks import Vector, whole_number
+from cradle.checks import Vector, must_be, one_number, whole_number
 from cradle.figures import PALETTE, progress, velocities, velocity_impulse
 from cradle.film import KEY, Animation, keyframes, number, with_style
 from cradle.swing_trace import Swing
@@ -53,6 +53,8 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
     >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
     >>> animate(trace).save("impact.svg")  # doctest: +SKIP
     """
+    must_be(Trace, "trace", trace)
+    must_be(str, "alt", alt)
     with mpl.rc_context({"svg.hashsalt": "cradle", "svg.fonttype": "path", "font.size": 10}):
         # At 72 dots an inch, points of the figure are units of the file.
         figure = Figure(figsize=(6.4, 5.4), dpi=72, layout="constrained", facecolor="white")
@@ -223,8 +225,8 @@ def animate_swing(
     Raises
     ------
     ValueError
-        If a run has no duration, there are not as many labels as runs, or `columns` is no whole
-        number above 0.
+        If a run has no duration, there are not as many labels as runs, `speed` or `still` is out
+        of range, or `columns` is no whole number above 0.
 
     Examples
     --------
@@ -234,32 +236,39 @@ def animate_swing(
     >>> animate_swing(run).svg.count("@keyframes")
     5
     """
-    several = [runs] if isinstance(runs, Swing) else list(runs)
-    if labels and len(labels) != len(several):
-        raise ValueError(f"labels has {len(labels)} lines; {len(several)} swings need as many")
-    duration = min(run.times[-1] - run.times[0] for run in several) if several else 0.0
+    must_be(str, "alt", alt)
+    given = runs if isinstance(runs, Sequence) else [runs]
+    several = [must_be(Swing, "runs", run) for run in given]
+    duration = min((np.ptp(run.times) for run in several), default=0.0)
     if not duration > 0.0:
         raise ValueError("runs has no swing, or one without a duration")
-    beside = whole_number("columns", columns)
+    given_lines = labels if isinstance(labels, (list, tuple)) else [labels]
+    lines = [must_be(str, "labels", line) for line in given_lines]
+    if lines and len(lines) != len(several):
+        raise ValueError(f"labels has {len(lines)} lines; {len(several)} swings need as many")
+    one_number("speed", speed, "must lie in [1e-6, 1e6]", 1e-6, 1e6)
+    one_number("still", still)
+    beside = min(whole_number("columns", columns), len(several))
+    swings = [
+        _draw_swing(run, f"{KEY}s{k}b", duration, speed, still) for k, run in enumerate(several)
+    ]
     # Side by side they stand closer: the room beside the balls is cut to what the swings need, and
     # letters are larger, for a page shows the whole smaller.
-    cell = 480.0 if beside == 1 else max(300.0, *(2 * _half_width(run) for run in several))
+    cell = 480.0 if beside == 1 else max(300.0, *(2 * one.half_width for one in swings))
     edge, letters = 240.0 - cell / 2, 15 if beside == 1 else 20
-    rows, style, top = [], [], 0.0
+    rows, top = [], 0.0
     for first in range(0, len(several), beside):
         heights = []
-        for k, run in enumerate(several[first : first + beside], start=first):
-            label = labels[k] if labels else ""
-            drawn, motion, height = _draw_swing(run, f"{KEY}s{k}b", duration, speed, still)
+        for k, one in enumerate(swings[first : first + beside], start=first):
+            label = lines[k] if lines else ""
             text = (
                 f'<text x="{number(edge + 12)}" y="20" font-size="{letters}">{escape(label)}</text>'
                 if label
                 else ""
             )
             place = f"{number((k - first) * cell - edge)} {number(top)}"
-            rows.append(f'<g transform="translate({place})">{text}{drawn}</g>')
-            style.append(motion)
-            heights.append(height + (14 if label else 0))
+            rows.append(f'<g transform="translate({place})">{text}{one.svg}</g>')
+            heights.append(one.height + (14 if label else 0))
         top += max(heights)
     size = f'width="{number(cell * beside)}" height="{number(top)}"'
     svg = (
@@ -267,33 +276,29 @@ def animate_swing(
         f'{number(top)}" {size} font-family="sans-serif"><rect {size} fill="white"/>'
         f"{''.join(rows)}</svg>"
     )
-    return Animation(with_style(svg, "".join(style), alt))
+    return Animation(with_style(svg, "".join(one.style for one in swings), alt))
 
 
-def _half_width(run: Swing) -> float:
-    """Return how far a swing reaches from the middle of its picture, with a margin."""
-    length = _lengths(run)
-    row = 17.0 * float(np.cbrt(run.chain.masses / run.chain.masses.max()).sum())
-    gaps = float(run.pendulums.row("gaps", len(length) - 1).sum())
-    out = float(np.abs(np.sin(run.positions / length) * length).max())
-    return row + (gaps / 2 + out) * 105.0 / float(length.max()) + 10.0
+class _Drawn(NamedTuple):
+    """A swing's picture and its keyframes, in units of the file."""
+
+    svg: str
+    style: str
+    height: float
+    #: How far the balls reach from the middle, with a margin.
+    half_width: float
 
 
-def _lengths(run: Swing) -> Vector:
-    return run.pendulums.row("length", len(run.chain))
-
-
-def _draw_swing(
-    run: Swing, name: str, duration: float, speed: float, still: float
-) -> tuple[str, str, float]:
-    """Return a swing's picture, its keyframes and its height."""
-    lengths = _lengths(run)
+def _draw_swing(run: Swing, name: str, duration: float, speed: float, still: float) -> _Drawn:
+    lengths = run.pendulums.row("length", len(run.chain))
     scale = 105.0 / float(lengths.max())  # units of the file in a metre
     # Ball sizes are free: the model needs none.  Here they leave room for the widest swing.
     radii = 17.0 * np.cbrt(run.chain.masses / run.chain.masses.max())
     gaps = run.pendulums.row("gaps", len(lengths) - 1) * scale
     pivots = np.concatenate([[0.0], np.cumsum(radii[:-1] + radii[1:] + gaps)])
     pivots += 240.0 - (pivots[0] - radii[0] + pivots[-1] + radii[-1]) / 2
+    row_width = pivots[-1] + radii[-1] - pivots[0] + radii[0]
+    out = np.abs(np.sin(run.positions / lengths) * lengths).max() * scale
     beam = 34.0
     low = beam + 105.0 + float(radii.max()) + 8.0
     inside = (run.times > run.times[0]) & (run.times <= run.times[0] + duration)
@@ -323,4 +328,4 @@ def _draw_swing(
     drawn.append(
         f'<path d="M{number(ends[0])} {beam}H{number(ends[1])}" stroke="#333" stroke-width="4"/>'
     )
-    return "".join(drawn), "".join(style), low
+    return _Drawn("".join(drawn), "".join(style), low, float(row_width / 2 + out + 10.0))

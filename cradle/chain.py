@@ -91,13 +91,14 @@ class Chain:
     def __repr__(self) -> str:
         """Return the call that makes this chain."""
         fields = ("masses", "velocities", "restitution")
-        return f"Chain({', '.join(f'{name}={getattr(self, name).tolist()}' for name in fields)})"
+        values = {name: (getattr(self, name) + 0.0).tolist() for name in fields}  # no -0
+        return f"Chain({', '.join(f'{name}={value}' for name, value in values.items())})"
 
     def _repr_html_(self) -> str:
         """Return a picture and a table for a notebook."""
         columns = {
             "mass (kg)": self.masses,
-            "velocity (m/s)": self.velocities,
+            "velocity (m/s)": self.velocities + 0.0,  # no -0
             "restitution with the next": self.restitution,
         }
         return as_html(self.masses, {"": self.velocities}, columns)

@@ -1,14 +1,15 @@
-"""What is asked of input: limits, masses, whole numbers, types; and the words of a refusal."""
+"""What is asked of input: limits, masses, whole numbers, rows."""
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.kernel.state import LIMITS
-from cradle.reals import Vector, numbers, refusal, shown
+from cradle.reals import Vector, numbers
+from cradle.refusals import a, first, must_be, one_of, place_in, refusal, refuse_where, shown
 
 #: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
 LIGHTEST = 1e-150
@@ -18,16 +19,21 @@ __all__ = [
     "a",
     "checked",
     "checked_masses",
+    "checked_restitution",
+    "first",
     "must_be",
+    "number_or_row",
     "numbers",
     "one_number",
+    "one_of",
+    "place_in",
     "refusal",
     "refuse_overflow",
+    "refuse_where",
+    "row_of",
     "shown",
     "whole_number",
 ]
-
-_Thing = TypeVar("_Thing")
 
 
 def checked(
@@ -75,9 +81,9 @@ def checked(
     if open_low:
         wrong |= array <= low
     if wrong.any():
-        at = np.unravel_index(int(np.argmax(wrong)), array.shape)
-        bad = float(array[at])
-        raise refusal(name, at, f" = {bad!r}; {rule if np.isfinite(bad) else 'must be finite'}")
+        refuse_where(
+            name, array, wrong, rule if np.isfinite(array[first(wrong)]) else "must be finite"
+        )
     return array
 
 
@@ -147,10 +153,8 @@ def checked_masses(masses: ArrayLike) -> Vector:
     array = checked("masses", masses, "must be above 0", 0.0, open_low=True)
     if array.size and array.ndim:
         small = array < LIGHTEST * array.max(axis=-1, keepdims=True)
-        if small.any():
-            at = np.unravel_index(int(np.argmax(small)), array.shape)
-            rule = f"must be at least {LIGHTEST} of the heaviest ball of its chain"
-            raise refusal("masses", at, f" = {float(array[at])!r}; {rule}")
+        rule = f"must be at least {LIGHTEST} of the heaviest ball of its chain"
+        refuse_where("masses", array, small, rule)
     return array
 
 
@@ -181,10 +185,7 @@ def checked_restitution(restitution: ArrayLike) -> Vector:
     """
     array = checked("restitution", restitution, "must lie in [0, 1]", 0.0, 1.0)
     small = (array > 0.0) & (array < LIMITS.least_restitution)
-    if small.any():
-        at = np.unravel_index(int(np.argmax(small)), array.shape)
-        rule = f"must be 0 or at least {LIMITS.least_restitution}"
-        raise refusal("restitution", at, f" = {float(array[at])!r}; {rule}")
+    refuse_where("restitution", array, small, f"must be 0 or at least {LIMITS.least_restitution}")
     return array
 
 
@@ -216,8 +217,8 @@ def refuse_overflow(velocities: Vector, masses: Vector) -> None:
         }
     for what, values in sums.items():
         if not np.isfinite(values).all():
-            lead = np.unravel_index(int(np.argmax(~np.isfinite(values))), values.shape)
-            at = (*lead, np.argmax(np.abs(v[lead])))
+            lead = first(~np.isfinite(values))
+            at = (*lead, int(np.argmax(np.abs(v[lead]))))
             rest = f" = {float(v[at])!r}; {what} overflows: choose larger units"
             raise refusal("velocities", at, rest)
 
@@ -254,57 +255,83 @@ def whole_number(name: str, value: object) -> int:
     return int(value)
 
 
-def must_be(kind: type[_Thing], name: str, thing: object) -> _Thing:
-    """Return `thing` if it is of the type `kind`.
+def number_or_row(
+    name: str,
+    values: ArrayLike | None,
+    length: str,
+    rule: str,
+    low: float = -np.inf,
+    high: float = np.inf,
+    open_low: bool = False,
+) -> float | tuple[float, ...]:
+    """Return one number for all balls or contacts, or a row with one for each, to be kept.
 
     Parameters
     ----------
-    kind : type
-        What it must be.
-    name : str
-        What it is called in an error.
-    thing : object
-        Anything.
+    name, values, rule, low, high, open_low
+        As for `checked`.
+    length : str
+        How long a row is, in an error: "N - 1".
 
     Returns
     -------
-    object
-        `thing` itself.
+    float or tuple of float
+        The values.
 
     Raises
     ------
-    TypeError
-        If it is of another type; a sentence says which.
+    ValueError
+        If it has more axes, or as `checked`.
 
     Examples
     --------
-    >>> must_be(float, "speed", [1.0])
+    >>> number_or_row("stiffness", [1, 2], "N - 1", "must be above 0", 0, open_low=True)
+    (1.0, 2.0)
+    >>> number_or_row("stiffness", [[1, 2]], "N - 1", "must be above 0", 0, open_low=True)
     Traceback (most recent call last):
     ...
-    TypeError: speed is a list; must be a float
+    ValueError: stiffness has shape (1, 2); must be () or (N - 1,)
     """
-    if not isinstance(thing, kind):
-        what = f"the class {thing.__name__}" if isinstance(thing, type) else a(type(thing).__name__)
-        raise TypeError(f"{name} is {what}; must be {a(kind.__name__)}")
-    return thing
+    array = checked(name, values, rule, low, high, open_low)
+    if array.ndim > 1:
+        raise ValueError(f"{name} has shape {array.shape}; must be () or ({length},)")
+    return tuple(array.tolist()) if array.ndim else float(array)
 
 
-def a(name: str) -> str:
-    """Return a name with its indefinite article.
+def row_of(name: str, kept: float | Sequence[float], size: int, balls: int) -> Vector:
+    """Return what `number_or_row` kept as a row for a chain.
 
     Parameters
     ----------
     name : str
-        A name in English.
+        What the values are called in an error.
+    kept : float or sequence of float
+        One number for all, or one for each.
+    size : int
+        How many there must be.
+    balls : int
+        How many balls the chain has.
 
     Returns
     -------
-    str
-        With "a" or "an" before it.
+    ndarray, shape (size,)
+        The values.
+
+    Raises
+    ------
+    ValueError
+        If there are not as many.
 
     Examples
     --------
-    >>> a("Trace"), a("ImpulseCorrelation")
-    ('a Trace', 'an ImpulseCorrelation')
+    >>> row_of("stiffness", 3.0, 2, 3).tolist()
+    [3.0, 3.0]
+    >>> row_of("stiffness", (1.0, 2.0, 3.0), 2, 3)
+    Traceback (most recent call last):
+    ...
+    ValueError: stiffness has 3 values; 3 balls need 2, or one number
     """
-    return f"{'an' if name[:1].lower() in tuple('aeiou') else 'a'} {name}"
+    row = np.asarray(kept, dtype=np.float64)
+    if row.ndim and row.size != size:
+        raise ValueError(f"{name} has {row.size} values; {balls} balls need {size}, or one number")
+    return np.broadcast_to(row, (size,)).copy()

@@ -10,8 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.checks import Vector, checked, numbers, one_number
+from cradle.kernel.state import LIMITS
 
 _Balls = tuple[Vector, ...]
+#: What is asked of a restitution that divides.
+_NO_ZERO = (f"must lie in [{LIMITS.least_restitution}, 1]", LIMITS.least_restitution, 1.0)
 
 
 def _split(
@@ -237,7 +240,7 @@ def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLi
     r2 : array_like
         Mass ratio m2/m3, at least 0.
     e2, e3, ratio : array_like
-        Restitution of the two contacts, e2 above 0, and the forward ratio; 0 to 1.
+        Restitution of the two contacts, e2 at least 1e-30, and the forward ratio; 0 to 1.
 
     Returns
     -------
@@ -259,7 +262,7 @@ def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLi
     0.8275
     """
     r2 = checked("r2", r2, "must be at least 0", 0.0)
-    e2 = checked("e2", e2, "must lie in (0, 1]", 0.0, 1.0, open_low=True)
+    e2 = checked("e2", e2, *_NO_ZERO)
     e3 = checked("e3", e3, "must lie in [0, 1]", 0.0, 1.0)
     ratio = checked("ratio", ratio, "must lie in [0, 1]", 0.0, 1.0)
     with np.errstate(invalid="ignore"):
@@ -273,7 +276,7 @@ def first_ball_stops(e2: float, ratio: float) -> float:
     Parameters
     ----------
     e2 : float
-        Restitution of contact 1-2, above 0 and at most 1.
+        Restitution of contact 1-2, 1e-30 to 1.
     ratio : float
         Forward ratio, 0 to 1.
 
@@ -296,7 +299,7 @@ def first_ball_stops(e2: float, ratio: float) -> float:
     >>> first_ball_stops(0.5, 0.15)
     1.7
     """
-    e2 = one_number("e2", e2, "must lie in (0, 1]", 0.0, 1.0, open_low=True)
+    e2 = one_number("e2", e2, *_NO_ZERO)
     return (1.0 - one_number("ratio", ratio, "must lie in [0, 1]", 0.0, 1.0)) / e2
 
 

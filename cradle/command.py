@@ -7,48 +7,26 @@ that is wrong or an impact that did not finish, 2 for a command that was not und
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from cradle.console import plot_fits, show, text
+from cradle.describing import chain_options, described
 from cradle.filming import film
-
-if TYPE_CHECKING:
-    from cradle.chain import Chain
-    from cradle.models.correlation import ImpulseCorrelation
+from cradle.recommending import recommend
 
 # What a command needs is imported in the command: the first answer comes within a second.
 
-_UNITS = {"kg": 1.0, "g": 1e-3}
-
-
-def _numbers(_: click.Context, __: click.Parameter, value: str | None) -> list[float] | None:
-    """Read numbers with commas between them."""
-    try:
-        return None if value is None else [float(part) for part in value.split(",")]
-    except ValueError:
-        raise click.BadParameter(f"{value!r}; write numbers with commas between") from None
-
-
-def _chain_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add what describes a chain of balls."""
-    options = [
-        click.argument("sequence", required=False),
-        click.option("--speed", default=1.0, help="Velocity of the first ball, m/s [1]."),
-        click.option("--masses", callback=_numbers, help="Masses, left to right: 45,53,53."),
-        click.option("--unit", type=click.Choice(list(_UNITS)), default="kg", help="Of masses."),
-        click.option("--velocities", callback=_numbers, help="Instead of --speed: 1,0,0."),
-        click.option("--restitution", callback=_numbers, help="One, or one per contact [1]."),
-        click.option("--ratio", callback=_numbers, help="One, or one per inner ball [0]."),
-        click.option("--backward", callback=_numbers, help="Ratios from the right [as --ratio]."),
-        click.option("--saturate", is_flag=True, help="Admit ratios above their bound."),
-    ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+# What errors say of arguments, as options.
+_OPTIONS = {
+    "excess='saturate'": "--saturate", "stiffness=": "--stiffness ", "wanted = ": "--wanted ",
+    "model_error = ": "--model-error ", "accuracy = ": "--accuracy ", "forward[": "--ratio[",
+    "forward = ": "--ratio = ", "forward has": "--ratio has",
+}  # fmt: skip
 
 
 def _format_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -58,40 +36,6 @@ def _format_options(command: Callable[..., None]) -> Callable[..., None]:
     )
 
 
-def _chain(
-    sequence: str | None, speed: float, masses: list[float] | None, unit: str,
-    velocities: list[float] | None, restitution: list[float] | None, ratio: list[float] | None,
-    backward: list[float] | None, saturate: bool,
-) -> tuple[Chain, ImpulseCorrelation]:  # fmt: skip
-    """Return the chain and the model that the options describe."""
-    from cradle.chain import Chain
-    from cradle.models.correlation import ImpulseCorrelation
-    from cradle.tables import paper_chain
-
-    if (sequence is None) == (masses is None):
-        raise click.UsageError("give either a sequence of ball types, such as ABCCA, or --masses")
-    excess = "saturate" if saturate else "raise"
-    if sequence is not None:
-        given = {"--velocities": velocities, "--restitution": restitution, "--ratio": ratio,
-                 "--backward": backward}  # fmt: skip
-        for name, value in given.items():
-            if value is not None:
-                raise click.UsageError(f"{name} goes with --masses; {sequence} has its own values")
-        return paper_chain(sequence, speed, excess="saturate" if saturate else "raise")
-    assert masses is not None
-    before = [speed] + [0.0] * (len(masses) - 1) if velocities is None else velocities
-    chain = Chain([_UNITS[unit] * m for m in masses], before, _one_or_all(restitution, 1.0))
-    forward = _one_or_all(ratio, 0.0)
-    back = None if backward is None else _one_or_all(backward, 0.0)
-    return chain, ImpulseCorrelation(forward, back, excess=excess)
-
-
-def _one_or_all(values: list[float] | None, default: float) -> float | list[float]:
-    if values is None:
-        return default
-    return values[0] if len(values) == 1 else values
-
-
 @click.group()
 @click.version_option(package_name="cradle-companion", prog_name="cradle")
 def main() -> None:
@@ -99,7 +43,7 @@ def main() -> None:
 
 
 @main.command()
-@_chain_options
+@chain_options
 @_format_options
 def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
     """Velocities after an impact.
@@ -108,16 +52,19 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
 
     \b
     Examples:
+      cradle solve --masses 1,1,1,1,1
       cradle solve ABACA --speed 1
       cradle solve ABCCA --saturate --json
       cradle solve --masses 45,53,53 --unit g --restitution 0.53,0.36 --ratio 0.104
-      cradle solve --masses 1,1,1 --velocities 1,0,-1 --csv
+      cradle solve --masses 1,1,1 --velocities 1,0,-1 --model sequential --csv
     """
+    from cradle.advice.recommendation import made
     from cradle.models import collide
 
     # One chain: faster as it stands than the compiler takes to load.
-    chain, model = _chain(**options)
-    trace = collide(chain, model)
+    given = described(**options)
+    chain = given.chain
+    trace = collide(chain, given.model)
     letters = options["sequence"] or ["-"] * len(chain)
     rows = [
         {"ball": k + 1, "type": letters[k], "mass": float(chain.masses[k]),
@@ -125,6 +72,8 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
         for k in range(len(chain))
     ]  # fmt: skip
     extra = {
+        "model": made(given.model),
+        "assumed": given.assumed,
         # Of balls at rest nothing is lost.
         "energy_lost": float(trace.energy_loss / (chain.kinetic_energy or 1.0)),
         "collisions": trace.collisions.tolist(),
@@ -132,8 +81,8 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
         "held_contacts": list(trace.saturated),
     }
     note = (
-        f"energy lost: {100 * extra['energy_lost']:.2f} %; collisions of the contacts: "
-        f"{', '.join(map(str, extra['collisions']))}"
+        f"energy lost: {100 * extra['energy_lost'] + 0.0:.2f} %; collisions of the contacts: "
+        f"{', '.join(map(str, extra['collisions']))}\n{given.note}"
     )
     show(rows, extra, note, as_json, as_csv)
 
@@ -222,7 +171,7 @@ def template() -> None:
 
 
 @main.command()
-@_chain_options
+@chain_options
 @click.option("--output", "-o", required=True, type=click.Path(dir_okay=False),
               help="File to draw to: .png, .svg or .pdf.")  # fmt: skip
 def plot(output: str, **options: Any) -> None:
@@ -238,19 +187,20 @@ def plot(output: str, **options: Any) -> None:
     matplotlib.use("Agg")
     from cradle import collide, figures
 
-    chain, model = _chain(**options)
+    given = described(**options)
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(figsize=(7, 4.3), layout="constrained")
-    figures.velocities(collide(chain, model), axes)
+    figures.velocities(collide(given.chain, given.model), axes)
     figure.savefig(output)
     plt.close(figure)
-    click.echo(f"drawn to {output}")
+    click.echo(f"drawn to {output}\n{given.note}")
 
 
 @main.command()
-@_chain_options
-@click.option("--pull", default=0.05, help="How far the first ball is pulled aside, m [0.05].")
+@chain_options
+@click.option("--pull", default=0.05, help="How far the first ball is pulled aside, m along its "
+              "arc, at most a quarter of a circle [0.05].")  # fmt: skip
 @click.option("--length", default=0.3, help="Of the pendulums, m [0.3].")
 @click.option("--seconds", default=2.0, help="How long it swings [2].")
 @click.option("--steps", default=20, help="How many rows to print [20].")
@@ -268,18 +218,24 @@ def swing(
       cradle swing ABACA --pull 0.05 --seconds 1
       cradle swing --masses 1,1,1,1,1 --csv
     """
+    from cradle.advice.recommendation import made
     from cradle.chain import Chain
+    from cradle.checks import one_number, whole_number
     from cradle.pendulums import Pendulums
     from cradle.swinging import swing as swing_freely
 
-    chain, model = _chain(**options)
+    given = described(**options)
+    chain, hanging = given.chain, Pendulums(length=length)
+    far = float(hanging.reach(1)[0])
+    rule = f"must be above 0 and at most a quarter of a circle of that --length, {far:.4g} m"
+    one_number("--pull", pull, rule, 0.0, far, open_low=True)
+    one_number("--seconds", seconds, "must be above 0", 0.0, open_low=True)
+    whole_number("--steps", steps)
     still = [0.0] * len(chain)
-    if not (seconds > 0 and steps >= 1):
-        raise ValueError(f"seconds = {seconds:g}, steps = {steps}; must be above 0")
     run = swing_freely(
-        Chain(chain.masses, still, chain.restitution), model, [-pull, *still[1:]],
+        Chain(chain.masses, still, chain.restitution), given.model, [-pull, *still[1:]],
         [seconds * k / steps for k in range(steps + 1)],
-        pendulums=Pendulums(length=length),
+        pendulums=hanging,
     )  # fmt: skip
     rows = [
         {"time": float(time), **{f"ball {k + 1}": float(x) + 0.0 for k, x in enumerate(places)}}
@@ -289,15 +245,22 @@ def swing(
         {"time": float(one.time), "before": one.before.tolist(), "after": one.after.tolist()}
         for one in run.impacts
     ]
-    show(rows, {"impacts": impacts}, f"impacts: {len(impacts)}; positions in m", as_json, as_csv)
+    # How fast the first ball strikes follows from the pull.
+    told = given._replace(assumed=tuple(one for one in given.assumed if "strikes" not in one))
+    extra = {"model": made(given.model), "assumed": told.assumed, "impacts": impacts}
+    note = f"impacts: {len(impacts)}; positions in m, times in s\n{told.note}"
+    show(rows, extra, note, as_json, as_csv)
 
 
 main.add_command(film)
+main.add_command(recommend)
 
 
 @main.command(name="warm-up")
 def warm_up() -> None:
-    """Compile the solver now, so that later runs start at once.
+    """Compile the event loop now, so that long work starts at once later.
+
+    Small work is never compiled, and need not wait for this.
 
     \b
     Examples:
@@ -305,8 +268,20 @@ def warm_up() -> None:
     """
     from cradle import drive, runtime
 
+    there, begun = runtime.on_disk(), time.perf_counter()
     drive.warm_up()
-    click.echo("ready" if runtime.ready() else "numba is not installed: the solver runs plain")
+    seconds = time.perf_counter() - begun
+    if not runtime.loaded():
+        click.echo(
+            f"not compiled: numba is missing or switched off, or {runtime.VARIABLE}=plain is set; "
+            "the event loop runs plain"
+        )
+    elif there:
+        click.echo(f"compiled already; loaded in {seconds:.1f} s")
+    elif runtime.on_disk():
+        click.echo(f"compiled in {seconds:.0f} s, once on this machine")
+    else:
+        click.echo(f"compiled in {seconds:.0f} s for this process alone: no folder can be written")
 
 
 def run(arguments: Sequence[str] | None = None) -> None:
@@ -327,6 +302,8 @@ def run(arguments: Sequence[str] | None = None) -> None:
     try:
         main(arguments, prog_name="cradle")
     except (ValueError, OSError, ImpactNotFinished, ImpactNotCertified) as error:
-        message = str(error).replace("excess='saturate'", "--saturate")
+        message = str(error)
+        for python, option in _OPTIONS.items():
+            message = message.replace(python, option)
         click.echo(f"cradle: {message}", err=True)
         sys.exit(1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -31,20 +32,36 @@ def show(
 
 def text(rows: Sequence[dict[str, Any]]) -> str:
     """Return rows as a table of text."""
+    columns = [_cells([row[name] for row in rows]) for name in rows[0]]
+    table = [list(rows[0]), *map(list, zip(*columns, strict=True))]
+    widths = [max(len(line[k]) for line in table) for k in range(len(table[0]))]
+    return "\n".join(
+        "  ".join(word.rjust(width) for word, width in zip(line, widths, strict=True)).rstrip()
+        for line in table
+    )
+
+
+def _cells(column: Sequence[Any]) -> list[str]:
+    """Return a column as text; its floats have as many decimals as show four digits of the largest.
+
+    Four at least, for people compare columns; and never minus zero.
+    """
+    floats = [abs(value) for value in column if isinstance(value, float) and math.isfinite(value)]
+    largest = max(floats, default=0.0) or 1.0
+    decimals = max(4, 3 - math.floor(math.log10(largest)))
 
     def cell(value: Any) -> str:
         if value is None:
             return "-"
         if isinstance(value, bool):
             return "yes" if value else "no"
-        return f"{value:.4f}" if isinstance(value, float) else str(value)
+        if not isinstance(value, float):
+            return str(value)
+        if decimals > 8 or largest >= 1e8:
+            return f"{value:.4g}"
+        return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
-    table = [list(rows[0]), *([cell(value) for value in row.values()] for row in rows)]
-    widths = [max(len(line[k]) for line in table) for k in range(len(table[0]))]
-    return "\n".join(
-        "  ".join(word.rjust(width) for word, width in zip(line, widths, strict=True)).rstrip()
-        for line in table
-    )
+    return [cell(value) for value in column]
 
 
 def plot_fits(fits: Sequence[Any], path: str) -> None:

@@ -58,6 +58,49 @@ def as_html(
     return f"<div>{_picture(masses, states, balls)}{_table(['ball', *columns], rows)}</div>"
 
 
+def as_text(values: _Vector) -> str:
+    """Return a row of velocities or impulses as people write it, six digits of each.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+        Numbers.
+
+    Returns
+    -------
+    str
+        In brackets.
+
+    Examples
+    --------
+    >>> as_text(np.array([-1 / 3, 1e-17, -0.0, 2]))
+    '[-0.333333, 0, 0, 2]'
+    """
+    return f"[{', '.join(f'{value:.6g}' for value in without_rounding(values).tolist())}]"
+
+
+def without_rounding(values: _Vector) -> _Vector:
+    """Return velocities or impulses without what is left of sums that should be zero.
+
+    Parameters
+    ----------
+    values : ndarray
+        Numbers.
+
+    Returns
+    -------
+    ndarray
+        Zero, not minus zero, where a value is below 1e-12 of the largest.
+
+    Examples
+    --------
+    >>> without_rounding(np.array([1.0, -1e-16, -0.0])).tolist()
+    [1.0, 0.0, 0.0]
+    """
+    small = np.abs(values) < 1e-12 * np.abs(values).max(initial=0.0)
+    return np.where(small, 0.0, values) + 0.0
+
+
 def _picture(masses: _Vector, states: Mapping[str, _Vector], balls: list[int]) -> str:
     """Draw the chain once for each state, with an arrow above each ball that moves."""
     # At least two pixels, or a light ball would not be seen.

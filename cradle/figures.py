@@ -20,7 +20,9 @@ from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.checks import Vector
+from cradle.checks import Vector, must_be, place_in, shown
+from cradle.models.compliant import TimedTrace
+from cradle.models.energy import EnergyTrace
 from cradle.trace import Trace
 
 __all__ = [
@@ -105,7 +107,9 @@ def progress(trace: Trace) -> Vector:
 
 
 def _axes(ax: Axes | None) -> Axes:
-    return plt.subplots(figsize=(5.6, 3.9), layout="constrained")[1] if ax is None else ax
+    if ax is None:
+        return plt.subplots(figsize=(5.6, 3.9), layout="constrained")[1]
+    return must_be(Axes, "ax", ax)
 
 
 def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
@@ -131,9 +135,14 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     >>> [line.get_label() for line in ax.get_lines()]
     ['$v_1$', '$v_2$', '$v_3$']
     """
+    must_be(Trace, "trace", trace)
     ax = _axes(ax)
-    for ball, velocity in enumerate(trace.path.T):
-        ax.plot(progress(trace), velocity, label=f"$v_{ball + 1}$", lw=2, **ball_style(ball))
+    along, path = progress(trace), trace.path
+    if isinstance(trace, (TimedTrace, EnergyTrace)):  # curves between the events
+        along = np.append(trace.step_impulses.sum(axis=1), trace.impulses.sum())
+        path = np.vstack([trace.step_velocities, trace.velocities])
+    for ball, velocity in enumerate(path.T):
+        ax.plot(along, velocity, label=f"$v_{ball + 1}$", lw=2, **ball_style(ball))
     ax.set(xlabel="sum of all impulses (N s)", ylabel="velocity (m/s)")
     ax.margins(x=0)
     ax.grid(alpha=0.3)
@@ -179,6 +188,7 @@ def velocity_impulse(
     >>> [line.get_label() for line in ax.get_lines()[:2]]
     ['$v_2$', '$v_3$']
     """
+    contact = place_in("contact", contact, len(must_be(Trace, "trace", trace).impulses))
     ax = _axes(ax)
     impulse = trace.path_impulses[:, contact]
     for ball in (contact, contact + 1):
@@ -388,6 +398,9 @@ def chain_sketch(chain: Chain, ax: Axes | None = None, *, letters: str = "") -> 
     >>> [round(patch.get_radius(), 3) for patch in ax.patches if isinstance(patch, Circle)]
     [0.5, 0.25]
     """
+    n = len(must_be(Chain, "chain", chain))
+    if len(must_be(str, "letters", letters)) not in (0, n):
+        raise ValueError(f"letters = {shown(letters)}; {n} balls need {n}, or none")
     ax = _axes(ax)
     radii = 0.5 * np.cbrt(chain.masses / np.max(chain.masses))
     left = np.concatenate([[0.0], np.cumsum(2 * radii)[:-1]])

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Vector = NDArray[np.float64]
+from cradle.refusals import first, place, refusal, shown
 
-# The longest value that an error repeats, in characters.
-_SHOWN = 80
+Vector = NDArray[np.float64]
 
 
 class _Masked:
@@ -84,7 +83,7 @@ def numbers(name: str, values: ArrayLike | None) -> Vector:
         result = array.astype(np.float64)
     lost = np.isinf(result) & np.isfinite(array)
     if lost.any():
-        at = tuple(int(k) for k in np.unravel_index(int(np.argmax(lost)), lost.shape))
+        at = first(lost)
         raise _beyond_floats(name, at, array[at])
     return result
 
@@ -162,80 +161,3 @@ def _refuse_ragged(name: str, values: Any, at: tuple[int, ...] = ()) -> None:
                 f"{name}{place((*at, k))} has shape {shape}, {name}{place((*at, 0))} has {first}; "
                 "must have one shape"
             )
-
-
-def refusal(name: str, at: tuple[Any, ...], rest: str) -> ValueError:
-    """Return the error that refuses a value; it knows its place, so that it can be moved.
-
-    Parameters
-    ----------
-    name : str
-        What the values are called.
-    at : tuple of int
-        Index of the value; empty for a single number.
-    rest : str
-        What follows: the value and the rule.
-
-    Returns
-    -------
-    ValueError
-        With `name`, `index` and `rest` as attributes.
-
-    Examples
-    --------
-    >>> error = refusal("masses", (2,), " = 0.0; must be above 0")
-    >>> print(error, error.index)
-    masses[2] = 0.0; must be above 0 (2,)
-    """
-    index = tuple(int(k) for k in at)
-    error = ValueError(f"{name}{place(index)}{rest}")
-    vars(error).update(name=name, index=index, rest=rest)
-    return error
-
-
-def place(at: tuple[Any, ...]) -> str:
-    """Return an index as an error names it.
-
-    Parameters
-    ----------
-    at : tuple of int
-        The index; empty for a single number.
-
-    Returns
-    -------
-    str
-        The index in brackets, or nothing.
-
-    Examples
-    --------
-    >>> "masses" + place((2, 0))
-    'masses[2, 0]'
-    """
-    return f"[{', '.join(str(int(k)) for k in at)}]" if at else ""
-
-
-def shown(value: object) -> str:
-    """Return a value as an error repeats it: on one line, and cut if it is long.
-
-    Parameters
-    ----------
-    value : object
-        Anything.
-
-    Returns
-    -------
-    str
-        Its repr, at most 80 characters of it.
-
-    Examples
-    --------
-    >>> shown("x" * 1000)[-10:]
-    'xxxxxxx...'
-    """
-    # NumPy's own scalars as plain numbers; of a long list no more than is shown.
-    if isinstance(value, (np.floating, np.complexfloating)):
-        return str(value)
-    if isinstance(value, (list, tuple)) and len(value) > _SHOWN:
-        value = [*value[:_SHOWN]]
-    text = " ".join(repr(value).split())
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.checks import Vector, checked, one_number
+from cradle.checks import Vector, a, checked, must_be, one_number
 from cradle.models import Model, collide
 from cradle.resting import common_velocities, stretches
 from cradle.swinging import part
@@ -85,6 +85,8 @@ class Row:
 
     Raises
     ------
+    TypeError
+        If an argument is of the wrong kind.
     ValueError
         If a value is wrong, or the balls are no row: balls that are no neighbours touch.
 
@@ -129,7 +131,13 @@ class Row:
         resting: float | None = None,
         acceleration: float = 9.81,
     ) -> None:
-        n = len(chain)
+        missing = [name for name in ("motion", "push", "advance") if not hasattr(bodies, name)]
+        if missing:
+            raise TypeError(
+                f"bodies is {a(type(bodies).__name__)} without {', '.join(missing)}; must be an "
+                "adapter with motion, push and advance"
+            )
+        n = len(must_be(Chain, "chain", chain))
         collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
         size = checked("radii", radii, "must be above 0", 0.0, open_low=True)
         if size.shape not in ((), (n,)):
@@ -170,8 +178,8 @@ class Row:
         RuntimeError
             If balls have passed through each other, or the impacts of the step do not end.
         """
-        if not duration > 0.0:
-            raise ValueError(f"duration = {duration!r}; must be above 0")
+        if not (type(duration) is float and 0.0 < duration < math.inf):  # one comparison a step
+            duration = one_number("duration", duration, "must be above 0", 0.0, open_low=True)
         self.quiet -= duration
         if self.quiet >= 0.0:
             self.bodies.advance(duration)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.checks import Vector, checked, one_number
+from cradle.checks import Vector, checked, must_be, one_number, refuse_where, shown, whole_number
 from cradle.flight import TIE, Flight, FullFlight, SmallAngleFlight, State
 from cradle.models import Model, collide
 from cradle.pendulums import Pendulums
@@ -44,7 +44,8 @@ def swing(
         the model's values for that part are used, with ``excess="saturate"`` if it has that field.
     positions : array_like, shape (N,)
         Where the balls are released, along their arcs from their lowest points, m; positive to
-        the right.  No ball may overlap its neighbour.
+        the right.  No ball may overlap its neighbour, nor be beyond `Pendulums.reach`: a quarter
+        of a circle, or half a circle with ``angle="full"``.
     times : array_like, shape (T,)
         When to report positions and velocities, s since the release; rising, from 0 on.  The run
         ends at the last one, at the latest.
@@ -79,16 +80,16 @@ def swing(
     >>> abs(run.positions[-1] * 1000).round(1).tolist()
     [0.0, 0.0, 0.0, 19.7, 19.7]
     """
-    hanging = Pendulums() if pendulums is None else pendulums
-    collide(Chain(chain.masses, np.zeros(len(chain)), chain.restitution), model)  # do they fit?
+    n = len(must_be(Chain, "chain", chain))
+    hanging = Pendulums() if pendulums is None else must_be(Pendulums, "pendulums", pendulums)
+    collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
     at = checked("times", times)
     if at.ndim != 1 or not at.size or at[0] < 0.0 or (np.diff(at) < 0.0).any():
-        raise ValueError(f"times = {times!r}; must be a row of rising numbers, none below 0")
-    if isinstance(max_impacts, bool) or max_impacts != int(max_impacts) or max_impacts < 1:
-        raise ValueError(f"max_impacts = {max_impacts!r}; must be a whole number, at least 1")
+        raise ValueError(f"times = {shown(times)}; must be a row of rising numbers, none below 0")
+    most = whole_number("max_impacts", max_impacts)
     least = one_number("min_energy", min_energy, "must lie in [0, 1]", 0.0, 1.0)
     run = _Run(chain, model, hanging, checked("positions", positions))
-    ended = run.to_the_end(at, int(max_impacts), least)
+    ended = run.to_the_end(at, most, least)
     found = at[: sum(len(x) for x, _ in run.series)]
     return Swing(
         chain=chain,
@@ -111,6 +112,11 @@ class _Run:
         n = len(chain)
         if x.shape != (n,):
             raise ValueError(f"positions has shape {x.shape}; {n} balls need ({n},)")
+        reach = pendulums.reach(n)
+        part = "a quarter of a circle" if pendulums.angle == "small" else "half a circle"
+        for far in np.unique(reach[np.abs(x) > reach]):
+            rule = f"must be within {far:.4g} m: pendulums of this length reach {part}"
+            refuse_where("positions", x, (np.abs(x) > reach) & (reach == far), rule)
         self.chain, self.model, self.pendulums = chain, model, pendulums
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
         self.gaps = pendulums.row("gaps", n - 1)

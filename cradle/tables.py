@@ -255,11 +255,13 @@ def paper_chain(
 
 def _letters(sequence: str | Iterable[str]) -> str:
     """Return the ball types of a sequence as one word, or refuse it."""
-    if not isinstance(sequence, Iterable):
-        raise TypeError(f"sequence is {a(type(sequence).__name__)}; must be letters, as in 'ABC'")
-    types, letters = list(ball_masses()), list(sequence)
+    try:
+        types, letters = list(ball_masses()), list(sequence)
+    except TypeError:
+        given = a(type(sequence).__name__)
+        raise TypeError(f"sequence is {given}; must be letters, as in 'ABC'") from None
     for position, ball in enumerate(letters):
-        if ball not in types:
+        if not (isinstance(ball, str) and ball in types):
             capital = isinstance(ball, str) and ball.upper() in types
             hint = f": a capital letter, {ball.upper()!r}" if capital else ""
             raise ValueError(

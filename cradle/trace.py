@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cradle.chain import Chain
 from cradle.checks import Vector, shown
-from cradle.drawing import as_html
+from cradle.drawing import as_html, as_text, without_rounding
 
 if TYPE_CHECKING:
     # At run time pandas and matplotlib are imported by the methods that need them.
@@ -180,19 +180,15 @@ class Trace:
 
         if contact is None:
             return figures.velocities(self, ax)
-        if contact not in range(len(self.impulses)):
-            raise ValueError(
-                f"contact = {shown(contact)}; must be one of 0 to {len(self.impulses) - 1}"
-            )
         return figures.velocity_impulse(self, contact, ax)
 
     def _repr_html_(self) -> str:
         """Return a picture and a table for a notebook."""
         columns = {
             "mass (kg)": self.chain.masses,
-            "before (m/s)": self.chain.velocities,
-            "after (m/s)": self.velocities + 0.0,  # no -0
-            "impulse with the next (N s)": self.impulses,
+            "before (m/s)": self.chain.velocities + 0.0,
+            "after (m/s)": without_rounding(self.velocities),
+            "impulse with the next (N s)": without_rounding(self.impulses),
             "collisions with the next": self.collisions,
         }
         states = {"before": self.chain.velocities, "after": self.velocities}
@@ -201,7 +197,7 @@ class Trace:
     def __repr__(self) -> str:
         """Return a short account."""
         return (
-            f"Trace(velocities={self.velocities.tolist()}, "
+            f"Trace(velocities={as_text(self.velocities)}, "
             f"collisions={self.collisions.tolist()}, collapsed={self.collapsed})"
         )
 

@@ -414,6 +414,45 @@ def test_what_is_shown():
     assert cells["time"] == lasting(advice.seconds)
 
 
+def test_the_time_of_plain_python_is_told_where_the_loop_is_compiled():
+    """Small work is not compiled: both times, from the table, and the slower one is slower."""
+    for impacts in (1, 1000):
+        advice = recommend(FIVE, ratios=0.167, impacts=impacts)
+        (row,) = table(setting="plain, one call with its path", chain="five equal")
+        assert advice.plain_seconds == pytest.approx(1e-6 * float(row["microseconds"]), rel=0.5)
+        assert advice.plain_seconds > advice.seconds
+        words = f"{lasting(advice.seconds)} compiled; {lasting(advice.plain_seconds)} in plain"
+        assert words in repr(advice)
+    assert recommend(FIVE, stiffness=1, accuracy=1e-3).plain_seconds is None
+    assert recommend(FIVE, ratios=0.1).plain_seconds is not None  # among those measured
+    assert recommend(striking([1] * 30, 0.9), ratios=0.1).plain_seconds is None
+
+
+def test_refusals_say_what_to_give():
+    """And what they say is enough."""
+    with pytest.raises(ValueError, match="Give stiffness=1 if all contacts are equal spheres"):
+        recommend(THREE)
+    assert recommend(THREE, stiffness=1).numerical_error <= 1e-6
+    with pytest.raises(ValueError, match="for two steel balls of radius 1 cm stiffness=1e10"):
+        recommend(THREE, "forces")
+    # Hertz: 4/3 E* sqrt(R*) of 200 GPa and 0.3; two equal balls halve the modulus and the radius.
+    steel = 4 / 3 * (200e9 / (1 - 0.3**2) / 2) * (0.01 / 2) ** 0.5
+    assert steel == pytest.approx(1e10, rel=0.1)
+    with pytest.raises(ValueError, match="give stiffness=1 for springs, which have no model"):
+        recommend(THREE, model_error=1e-6)
+    assert recommend(THREE, model_error=1e-6, stiffness=1).model_error == 0.0
+    for chain in (LOSSY, striking([1, 1.01, 1], 0.9)):
+        with pytest.raises(ValueError, match=r"ask for .* or more") as refused:
+            recommend(chain, accuracy=1e-15, stiffness=1)
+        least = float(re.search(r"ask for (\S+) or more", str(refused.value)).group(1))
+        assert recommend(chain, accuracy=least, stiffness=1).numerical_error <= least
+
+
+def test_the_reason_is_that_of_the_wish():
+    assert "any stiffness will do" in recommend(THREE, stiffness=1).reason
+    assert "of the stiffness given" in recommend(THREE, "times", stiffness=1).reason
+
+
 def test_times_in_words():
     assert [lasting(t) for t in (2.5e-7, 9.996e-4, 0.0123, 12.3)] == [
         "0.25 µs", "1 ms", "12 ms", "12 s",

@@ -136,16 +136,16 @@ def test_absent_engines_are_named_and_skipped(monkeypatch):
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name, *a: None if name in hidden else find(name, *a)
     )
-    assert list(engines.absent()) == [engine.name for engine in engines.ENGINES]
-    assert all("is not installed" in reason for reason in engines.absent().values())
+    assert list(measure.absent(engines.ENGINES)) == [engine.name for engine in engines.ENGINES]
+    assert all("is not installed" in reason for reason in measure.absent(engines.ENGINES).values())
     assert list(engines.rows(CLOCK, True)) == []
 
 
 @pytest.fixture(params=engines.ENGINES, ids=lambda engine: engine.name)
 def engine(request):
     """An engine, if it is installed."""
-    if request.param.name in engines.absent():
-        pytest.skip(engines.absent()[request.param.name])
+    if request.param.name in measure.absent(engines.ENGINES):
+        pytest.skip(measure.absent(engines.ENGINES)[request.param.name])
     return request.param
 
 
@@ -185,8 +185,8 @@ def test_engine_repeats_what_is_stored(engine, setting):
 
 def named(name):
     """The engine of that name, if it is installed."""
-    if name in engines.absent():
-        pytest.skip(engines.absent()[name])
+    if name in measure.absent(engines.ENGINES):
+        pytest.skip(measure.absent(engines.ENGINES)[name])
     return next(engine for engine in engines.ENGINES if engine.name == name)
 
 

@@ -11,7 +11,15 @@ import pytest
 import sympy
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide, post_impact_velocities
-from cradle.checks import must_be, numbers, one_number, whole_number
+from cradle.checks import (
+    must_be,
+    number_or_row,
+    numbers,
+    one_number,
+    refuse_where,
+    row_of,
+    whole_number,
+)
 
 
 class Uncertain:
@@ -140,3 +148,24 @@ def test_types_are_named():
         must_be(ImpulseCorrelation, "model", 3)
     chain = Chain([1, 1], [1, 0])
     assert must_be(Chain, "chain", chain) is chain
+
+
+def test_the_first_wrong_value_is_named():
+    """Of a value that stands for several, too: the place is the one where it is wrong."""
+    refuse_where("x", np.ones(2), np.zeros(2, dtype=bool), "must not be")
+    wrong = np.array([[False, False], [False, True]])
+    with pytest.raises(ValueError, match=r"^x\[1, 1\] = 3\.0; must not be$") as error:
+        refuse_where("x", np.array([2.0, 3.0]), wrong, "must not be")
+    assert error.value.index == (1, 1)
+    with pytest.raises(ValueError, match=r"^x = 3\.0; must not be$"):
+        refuse_where("x", np.array(3.0), np.array(True), "must not be")
+
+
+def test_one_number_or_a_row():
+    assert number_or_row("x", 1, "N", "must be above 0", 0.0, open_low=True) == 1.0
+    assert number_or_row("x", [], "N", "any") == ()
+    assert row_of("x", 2.0, 3, 3).tolist() == [2.0] * 3
+    assert row_of("x", (1.0, 2.0), 2, 3).tolist() == [1.0, 2.0]
+    for kept in ((1.0,), (1.0, 2.0, 3.0), ()):
+        with pytest.raises(ValueError, match=f"^x has {len(kept)} values; 3 balls need 2, or one"):
+            row_of("x", kept, 2, 3)

@@ -260,11 +260,11 @@ def test_largest_ratios_of_none():
 @pytest.mark.parametrize(
     ("function", "arguments", "message"),
     [
-        (back_impact_line, (1, 0, 0.5, 0.1), "e2 = 0.0; must lie in (0, 1]"),
+        (back_impact_line, (1, 0, 0.5, 0.1), "e2 = 0.0; must lie in [1e-30, 1]"),
         (back_impact_line, ([1, -1], 0.5, 0.5, 0.1), "r2[1] = -1.0; must be at least 0"),
         (back_impact_line, (1, 0.5, 1.5, 0.1), "e3 = 1.5; must lie in [0, 1]"),
         (back_impact_line, (1, 0.5, 0.5, np.nan), "ratio = nan; must be finite"),
-        (first_ball_stops, (0, 0.1), "e2 = 0.0; must lie in (0, 1]"),
+        (first_ball_stops, (0, 0.1), "e2 = 0.0; must lie in [1e-30, 1]"),
         (first_ball_stops, (0.5, 1.1), "ratio = 1.1; must lie in [0, 1]"),
         (first_ball_stops, ([0.5, 0.6], 0.1), "e2 = [0.5, 0.6]; must be one number"),
         (middle_ball_stops, (-0.5, 0.1), "e3 = -0.5; must lie in [0, 1]"),

@@ -15,8 +15,20 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from cradle import collide, paper_chain, runtime
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    drive,
+    paper_chain,
+    recommend,
+    runtime,
+)
 from cradle.command import main, run
+from cradle.console import text as shown
 from cradle.fit import read_shots
 
 ROOT = Path(__file__).parents[1]
@@ -86,9 +98,99 @@ def test_solve_agrees_with_the_solver():
 
 
 def test_solve_by_masses():
-    answer = json.loads(call("solve --masses 1,1,1 --velocities 1,0,-1 --json"))
+    answer = json.loads(call("solve --masses 1,1,1 --velocities 1,0,-1 --ratio 0 --json"))
     assert [row["after"] for row in answer["rows"]] == pytest.approx([-1, 0, 1], abs=1e-12)
     assert answer["energy_lost"] == pytest.approx(0, abs=1e-12)
+
+
+# --- what is assumed ---------------------------------------------------------------------------
+
+LOSSY = "--restitution 0.9"
+
+
+@pytest.mark.parametrize(
+    ("options", "model", "assumed"),
+    [
+        ("", SpringChain(), ["the first ball strikes at 1 m/s", "no energy is lost", "elastic sp"]),
+        (f"--speed 2 {LOSSY}", EnergyDistribution(), ["strikes at 2 m/s", "spheres with losses"]),
+        (f"--velocities 1,0,0 {LOSSY} --ratio 0.1", ImpulseCorrelation(0.1), []),
+        (f"{LOSSY} --velocities 1,0,0 --model spheres", EnergyDistribution(), []),
+        ("--velocities 1,0,0 --model sequential", SequentialCollisions(), ["no energy is lost"]),
+        ("--ratio 0.1,0.2", None, None),
+    ],
+)
+def test_what_is_not_given_is_said(options, model, assumed):
+    """The model is the one that is named, and each assumption is said once."""
+    line = f"solve --masses 1,1,1 {options}"
+    if model is None:
+        with pytest.raises(ValueError, match="forward has 2 values"):
+            call(line)
+        return
+    answer = json.loads(call(f"{line} --json"))
+    assert eval(answer["model"]) == model
+    assert len(answer["assumed"]) == len(assumed)
+    for said, words in zip(answer["assumed"], assumed, strict=True):
+        assert words in said
+    chain = Chain([1] * 3, [row["before"] for row in answer["rows"]], 0.9 if "0.9" in line else 1)
+    after = collide(chain, model).velocities
+    np.testing.assert_allclose([row["after"] for row in answer["rows"]], after, atol=1e-12)
+    text = call(line)
+    assert f"model: {answer['model']}" in text
+    assert ("assumed: " in text) == bool(assumed)
+
+
+def test_the_toy_of_the_readme():
+    text = call("solve --masses 1,1,1,1,1")
+    after = [float(line.split()[-1]) for line in text.splitlines()[1:6]]
+    assert np.round(after, 2).tolist() == [-0.07, -0.03, -0.01, 0.13, 0.99]
+
+
+def test_the_papers_balls_by_another_law():
+    answer = json.loads(call("solve AAAAA --model sequential --json"))
+    chain, _ = paper_chain("AAAAA")
+    after = collide(chain, SequentialCollisions()).velocities
+    np.testing.assert_allclose([row["after"] for row in answer["rows"]], after, atol=1e-15)
+    assert json.loads(call("solve AAAAA --json"))["assumed"] == []
+
+
+def test_numbers_are_for_people():
+    """Never minus zero; light balls have a mass; columns have as many decimals as they need."""
+    text = call("solve --masses 1,1,1 --ratio 0")
+    assert "-0.0" not in text
+    rows = [line.split() for line in call("solve --masses 1e-7,2e-7 --ratio 0").splitlines()[1:3]]
+    assert [row[2] for row in rows] == ["1e-07", "2e-07"]
+    grams = call("solve --masses 45,166 --unit g").splitlines()[1:3]
+    assert [float(line.split()[2]) for line in grams] == [0.045, 0.166]
+    assert shown([{"x": -1e-6, "y": float("nan")}, {"x": 1.0, "y": 2.0}]).split()[2] == "0.0000"
+
+
+def test_recommend_says_what_python_says():
+    chain = Chain([1] * 5, [1, 0, 0, 0, 0])
+    text = call("recommend --masses 1,1,1,1,1 --stiffness 1 --accuracy 1e-3 --wanted forces")
+    assert text.strip() == repr(recommend(chain, "forces", accuracy=1e-3, stiffness=1))
+    text = call("recommend --masses 1,1,1,1,1 --ratio 0.1 --impacts 500")
+    assert text.strip() == repr(recommend(chain, ratios=0.1, impacts=500))
+    text = call("recommend ABACA --stiffness 1,2,2,1")
+    balls, ratios = paper_chain("ABACA")
+    assert text.strip() == repr(recommend(balls, ratios=ratios, stiffness=[1, 2, 2, 1]))
+    assert call("recommend --masses 1,2").strip() == repr(recommend(Chain([1, 2], [1, 0])))
+
+
+@pytest.mark.parametrize(
+    ("loaded", "before", "after", "words"),
+    [
+        (False, False, False, "not compiled: numba is missing or switched off"),
+        (True, True, True, r"compiled already; loaded in \d+\.\d s"),
+        (True, False, True, r"compiled in \d+ s, once on this machine"),
+        (True, False, False, r"compiled in \d+ s for this process alone"),
+    ],
+)
+def test_warm_up_says_what_was_done(monkeypatch, loaded, before, after, words):
+    found = iter([before, after])
+    monkeypatch.setattr(drive, "warm_up", lambda: None)
+    monkeypatch.setattr(runtime, "on_disk", lambda: next(found))
+    monkeypatch.setattr(runtime, "loaded", lambda: loaded)
+    assert re.match(words, call("warm-up"))
 
 
 @pytest.mark.usefixtures("folder")
@@ -127,6 +229,21 @@ def test_film_gives_the_rows_of_the_table(folder):
         ("solve --masses 1,x", 2, "write numbers with commas"),
         ("solve --masses 1,1 --json --csv", 2, "give one of --json and --csv"),
         ("solve --masses 1,-1", 1, "masses[1] = -1.0; must be above 0"),
+        ("solve --masses 1,1,1 --model ratio", 2, "ratios need --ratio, such as 0.1"),
+        ("solve --masses 1,1,1 --backward 0.1", 2, "ratios need --ratio"),
+        ("solve --masses 1,1,1 --model spheres --ratio 0.1", 2, "--model spheres has no ratios"),
+        ("solve ABCCA --model sequential --saturate", 2, "--model sequential has no ratios"),
+        ("solve --masses 1,1,1 --ratio 0.6", 1, "--ratio[0] = 0.6; at ball 1"),
+        ("solve --masses 1,1,1 --ratio 0.1,0.1", 1, "--ratio has 2 values; 3 balls need 1"),
+        ("swing --masses 1,1,1 --pull 5", 1, "--pull = 5.0; must be above 0 and at most a quarter"),
+        ("swing --masses 1,1,1 --pull -1", 1, "--pull = -1.0; must be above 0 and at most a quar"),
+        ("swing --masses 1,1,1 --pull 0", 1, "--pull = 0.0; must be above 0 and at most a quarter"),
+        ("swing --masses 1,1,1 --length 0", 1, "length = 0.0; must be above 0"),
+        ("swing --masses 1,1,1 --seconds 0", 1, "--seconds = 0.0; must be above 0"),
+        ("swing --masses 1,1,1 --steps 0", 1, "--steps = 0; must be a whole number, at least 1"),
+        ("recommend --masses 1,1,1", 1, "Give --stiffness 1 if all contacts are equal spheres"),
+        ("recommend --masses 1,1,1 --model spheres", 2, "leave --model out"),
+        ("recommend --masses 1,1,1 --wanted speed", 1, "--wanted ('speed',); must be one or seve"),
         ("fit nothing.csv", 2, "does not exist"),
         ("fit shots.csv --mass-unit g --restitution AB", 2, "write NAME=NUMBER"),
         ("fit grams.csv", 1, "column mass: 45 kg is unlikely"),

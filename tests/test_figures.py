@@ -11,7 +11,15 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from cradle import Chain, ImpulseCorrelation, collide, figures, paper_chain
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpulseCorrelation,
+    SpringChain,
+    collide,
+    figures,
+    paper_chain,
+)
 
 
 @pytest.fixture
@@ -35,6 +43,24 @@ def test_velocities_draws_the_whole_path(ax, trace):
     for ball, line in enumerate(lines):
         np.testing.assert_array_equal(line.get_xdata(), trace.path_impulses.sum(axis=1))
         np.testing.assert_array_equal(line.get_ydata(), trace.path[:, ball])
+
+
+@pytest.mark.parametrize(
+    "model", [SpringChain(), EnergyDistribution()], ids=lambda m: type(m).__name__
+)
+def test_springs_are_drawn_as_curves(ax, model):
+    """Through all steps of the integration, each a state that the impulses so far explain."""
+    trace = collide(Chain([1, 2, 1], [1, 0, 0]), model)
+    assert len(trace.step_velocities) > 2 * len(trace.path)
+    ends = np.zeros((len(trace.step_impulses), 1))
+    gained = -np.diff(np.hstack([ends, trace.step_impulses, ends]), axis=1)
+    change = trace.chain.masses * (trace.step_velocities - trace.chain.velocities)
+    np.testing.assert_allclose(change, gained, atol=1e-12)
+    for ball, line in enumerate(figures.velocities(trace, ax).get_lines()):
+        np.testing.assert_array_equal(line.get_ydata()[:-1], trace.step_velocities[:, ball])
+        assert line.get_ydata()[-1] == trace.velocities[ball]
+        assert line.get_xdata()[-1] == trace.impulses.sum()
+        assert np.all(np.diff(line.get_xdata()) > -1e-12)
 
 
 def test_progress_grows_at_every_event(trace):

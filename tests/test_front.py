@@ -93,6 +93,26 @@ def test_version_costs_the_import_nothing():
     assert loaded.strip() == "False"
 
 
+# --- numbers for people --------------------------------------------------------------------
+
+
+def test_no_minus_zero_and_no_seventeen_digits():
+    """Also where an engine of impulses leaves a rounding error, or an input is minus zero."""
+    chain = Chain([1, 1, 1], [1, -0.0, 0])
+    for model in (ImpulseCorrelation(0.0), ImpulseCorrelation(0.15), SpringChain()):
+        trace = collide(chain, model)
+        shown = repr(trace), trace._repr_html_(), chain._repr_html_(), repr(chain)
+        for text in shown:
+            assert not re.search(r"-0(\.0*)?(?![.\d])", text), text
+            assert not re.search(r"\d\.\d{8}", text), text
+    told = re.findall(r"-?[\d.]+", repr(collide(chain, ImpulseCorrelation(0.15))).partition("]")[0])
+    exact = collide(chain, ImpulseCorrelation(0.15)).velocities
+    np.testing.assert_allclose([float(x) for x in told], exact, rtol=1e-5)
+    light = Chain([1, 1e-11], [1, 0])  # a small mass is no rounding error
+    assert "<td>1e-11</td>" in light._repr_html_()
+    assert eval(repr(light)) == light
+
+
 # --- pictures in notebooks -----------------------------------------------------------------
 
 MODELS = [

@@ -318,5 +318,5 @@ def test_an_engine_that_ignores_impulses_is_no_endless_loop(monkeypatch):
 @pytest.mark.parametrize("duration", [0.0, -1.0, math.nan])
 def test_a_step_takes_time(duration: float):
     row = hung(Hanging([0.0, 0.0]))
-    with pytest.raises(ValueError, match=r"duration = .*; must be above 0"):
+    with pytest.raises(ValueError, match=r"duration = .*; must be (above 0|finite)"):
         row.step(duration)

@@ -3,6 +3,7 @@
 import csv
 import importlib.util
 import math
+import re
 import sys
 from dataclasses import replace
 from functools import cache
@@ -18,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "benchmarks"))
 pytest.importorskip("numba", reason="the judge of the scene is compiled by numba")
 import cradle_scenes as scenes  # noqa: E402
-from measure import versions  # noqa: E402
+from measure import absent, versions  # noqa: E402
 
 # Box2D's bindings, made by SWIG, warn when they are imported.
 pytestmark = pytest.mark.filterwarnings("ignore:builtin type:DeprecationWarning")
@@ -121,8 +122,8 @@ def test_the_tables_are_complete():
 @pytest.mark.parametrize(("how", "mend"), [("as it is", False), ("mended", True)])
 def test_an_engine_repeats_what_is_stored(engine, how, mend):
     """Same version, same strokes; another one is asked only for what the row promises."""
-    if engine.name in scenes.absent():
-        pytest.skip(scenes.absent()[engine.name])
+    if engine.name in absent(scenes.ENGINES):
+        pytest.skip(absent(scenes.ENGINES)[engine.name])
     _, angles, rates = scenes.in_engine(engine, "default", 1, mend=mend, duration=5.6)
     found, expected = scenes.strokes(angles, rates), run(engine.name, how, "default")
     assert len(found) == 5
@@ -168,7 +169,7 @@ def test_absent_engines_are_named_and_skipped(monkeypatch):
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name, *a: None if name in hidden else find(name, *a)
     )
-    missing = scenes.absent()
+    missing = absent(scenes.ENGINES)
     assert list(missing) == ENGINES
     assert all("is not installed" in reason for reason in missing.values())
     rows = list(scenes.costs(missing, repeats=1, seconds=0.1))
@@ -190,8 +191,8 @@ def test_the_ratio_is_that_of_elastic_spheres():
 
 def test_bullet_gains_by_its_correction_of_overlaps():
     bullet = scenes.ENGINES[2]
-    if bullet.name in scenes.absent():
-        pytest.skip(scenes.absent()[bullet.name])
+    if bullet.name in absent(scenes.ENGINES):
+        pytest.skip(absent(scenes.ENGINES)[bullet.name])
     gain = []
     for options in ({}, {"contactERP": 0.0}):
         changed = replace(bullet, default=scenes.Setting(1 / 240, options))
@@ -247,6 +248,27 @@ def test_the_recipe_shows_the_tested_programs(name: str):
     (output,) = Chapter("recipe").cells[f"recipe-{name}"].outputs
     text = (ROOT / "examples" / f"{name}_cradle.py").read_text(encoding="utf-8")
     assert output.data["text/markdown"] == f"```python\n{text}```"
+
+
+def test_the_recipe_tells_where_the_energy_is():
+    """Beside what is left, in brackets: the part of it on the ball that has most."""
+    chapter = Chapter("recipe")
+    (output,) = chapter.cells["recipe-table"].outputs
+    lines = re.findall(r"<tr>(.*?)</tr>", output.data["text/html"], flags=re.S)
+    cells = [re.findall(r"<t[hd]>(.*?)</t[hd]>", line) for line in lines]
+    table = {name: told for name, *told in filter(None, cells) if name in ENGINES}
+    assert list(table) == ENGINES
+    for name, told in table.items():
+        assert len(told) == 6
+        for setting, (own, row, alone) in zip(("default", "refined"), (told[:3], told[3:])):
+            for how, cell in (("as it is", own), ("mended", row)):
+                end = run(name, how, setting)[-1]
+                most = end.max() / end.sum()
+                assert cell == f"{100 * end.sum():.0f} ({100 * most:.0f})"
+                assert (most > 0.95) if how == "mended" else (most < 0.6), (name, setting)
+            assert alone == f"{100 * run(name, 'no impacts', setting, 5)[-1].sum():.0f}"
+    end = run(*HERTZ)[-1]
+    assert chapter.glued["one"] == f"{100 * end.max() / end.sum():.0f}"
 
 
 def test_the_figures_draw_the_tables():

@@ -1,6 +1,7 @@
 """The swinging cradle against formulas, the independent solver, and springs under gravity."""
 
 import math
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -528,3 +529,27 @@ def test_ratio_zero_exact_in_fractions():
         v = sorted(v)  # equal elastic balls pass their velocities on: as if they ran through
         np.testing.assert_allclose(impact.after / speed, [float(a) for a in v], atol=1e-12)
         v = [-a for a in v]
+
+
+@pytest.mark.parametrize(("angle", "part"), [("small", 0.5), ("full", 1.0)])
+def test_no_ball_is_released_beyond_its_reach(angle, part):
+    """A quarter of a circle on strings; half a circle, but for the very top, on rods."""
+    hanging = Pendulums(0.3, angle=angle)
+    end = part * math.pi * 0.3
+    near = [-(1 - 1e-5) * end, 0, 0]
+    run = swing(balls(3), ImpulseCorrelation(0.1), near, [0, 0.5], pendulums=hanging)
+    assert np.abs(run.positions).max() <= end
+    for beyond in (-5.0, -(1 + 1e-9) * end):
+        words = f"positions[0] = {beyond!r}; must be within {end:.4g} m: "
+        with pytest.raises(ValueError, match="^" + re.escape(words)):
+            swing(balls(3), ImpulseCorrelation(0.1), [beyond, 0, 0], [1], pendulums=hanging)
+    with pytest.raises(ValueError, match=r"^positions\[2\] = 0.2; must be within 0.1571 m: "):
+        swing(balls(3), ImpulseCorrelation(0.1), [0, 0, 0.2], [1], pendulums=Pendulums([1, 1, 0.1]))
+
+
+def test_what_is_said_of_small_angles():
+    """How much too fast they swing, against the period of a pendulum of any angle."""
+    periods = [ellipk(math.sin(a / 2) ** 2) / (math.pi / 2) for a in (0.4, 1.0, math.pi / 2)]
+    assert [round(100 * (x - 1)) for x in periods[:2]] == [1, 7]
+    assert round(100 * (1 - 1 / periods[2])) == 15
+    assert periods[0] - 1 == pytest.approx(0.4**2 / 16, rel=0.05)

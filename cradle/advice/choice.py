@@ -29,7 +29,9 @@ _BATCH = "post_impact_velocities(masses, velocities, restitution, forward, backw
 _REASONS = {
     "event": "The ratios are known, so the impact is solved event by event: without a step, all "
     "digits have one price.",
-    "springs": "Elastic balls of known stiffness are springs; only these have forces and times.",
+    "springs": "Elastic balls push each other as springs do. Velocities depend on ratios of "
+    "stiffnesses alone: for equal contacts any stiffness will do.",
+    "timed": "Forces and times come from springs alone; they are those of the stiffness given.",
     "energy": "There are losses and no ratios: the energy law is what springs become with losses. "
     "How near it comes to real balls was not measured.",
     "outcome": "Restitution alone does not determine the impact; of the models that need no more, "
@@ -126,7 +128,10 @@ springs, which lose nothing; with losses, ask for impulses
         except _Unfit as why:
             failures.setdefault(why.args[0], []).append(why.args[1])
     if not found:
-        raise ValueError("; ".join(f"{one}; {', '.join(all_)}" for one, all_ in failures.items()))
+        told = [f"{one}; {', '.join(reasons)}" for one, reasons in failures.items()]
+        if model_error is not None and stiffness is None:
+            told.append("give stiffness=1 for springs, which have no model error")
+        raise ValueError("; ".join(told))
     return min(found, key=lambda one: one[0])[1]
 
 
@@ -140,6 +145,11 @@ class _Wish(NamedTuple):
     impacts: int
     ratios: ImpulseCorrelation | None
     stiffness: float | Sequence[float] | None
+
+    @property
+    def timed(self) -> str:
+        """The first wish that needs a time; empty if none does."""
+        return next((name for name in self.wanted if name in ("forces", "times")), "")
 
     @property
     def elastic(self) -> bool:
@@ -159,7 +169,7 @@ class _Wish(NamedTuple):
     @property
     def uniform(self) -> bool:
         """Whether the contacts are equal springs, as all that were measured."""
-        return self.stiffness is None or np.ptp(self.stiffness) == 0.0
+        return len(set(np.ravel(1.0 if self.stiffness is None else self.stiffness))) == 1
 
     def model(self, row: Row) -> Model:
         """Return the model of a row, with what is known."""
@@ -182,9 +192,11 @@ class _Unfit(Exception):
 
 
 def _wishes(wanted: str | Collection[str]) -> tuple[str, ...]:
-    several = isinstance(wanted, Collection) and not isinstance(wanted, str)
-    wishes = tuple(wanted) if several else (str(wanted),)
-    if not wishes or not set(wishes) <= set(WANTED):
+    try:
+        wishes = (wanted,) if isinstance(wanted, str) else tuple(wanted)
+    except TypeError:
+        wishes = ()
+    if not wishes or not all(isinstance(one, str) and one in WANTED for one in wishes):
         rule = f"must be one or several of {', '.join(WANTED)}"
         raise ValueError(f"wanted = {shown(wanted)}; {rule}")
     return wishes
@@ -197,15 +209,15 @@ def _refuse(wish: _Wish) -> None:
         raise ValueError(f"velocities = {chain.velocities.tolist()}; no balls approach: no impact")
     lossy = int(np.argmin(chain.restitution))
     loss = f"restitution[{lossy}] = {float(chain.restitution[lossy])!r}"
-    timed = [name for name in wish.wanted if name in ("forces", "times")]
-    if timed and not wish.elastic:
+    if wish.timed and not wish.elastic:
         raise ValueError(
-            f"wanted = {timed[0]!r}, {loss}; must be 1: forces and times come from springs, which "
-            "lose nothing; with losses, ask for impulses"
+            f"wanted = {wish.timed!r}, {loss}; must be 1: forces and times come from springs, "
+            "which lose nothing; with losses, ask for impulses"
         )
-    if timed and wish.stiffness is None:
+    if wish.timed and wish.stiffness is None:
         raise ValueError(
-            f"wanted = {timed[0]!r}; needs stiffness: rigid models have impulses alone"
+            f"wanted = {wish.timed!r}; needs stiffness: rigid models have impulses alone; give "
+            "that of the contacts in N/m^(3/2), for two steel balls of radius 1 cm stiffness=1e10"
         )
     if wish.model_error is not None and not wish.elastic:
         raise ValueError(
@@ -217,9 +229,10 @@ def _refuse(wish: _Wish) -> None:
         errors = [row.model_error for row in sequential if row.model_error is not None]
         raise ValueError(
             f"wanted = {wish.wanted[0]!r}; needs ratios or stiffness: restitution alone does not "
-            f"determine the impact of {len(chain)} balls.  SequentialCollisions, which needs no "
-            f"more, was off by {min(errors):.2g} to {max(errors):.2g} of the closing speed on the "
-            "elastic chains measured; it may tell the 'fastest ball'"
+            f"determine the impact of {len(chain)} balls.  Give stiffness=1 if all contacts are "
+            "equal spheres, or the ratios that were measured.  SequentialCollisions, which needs "
+            f"neither, was off by {min(errors):.2g} to {max(errors):.2g} of the closing speed on "
+            "the elastic chains measured; it may tell the 'fastest ball'"
         )
 
 
@@ -266,9 +279,23 @@ def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recom
         numerical_error=best.error if known_error else None,
         model_error=apart,
         seconds=best.cost * unit() if best.measured else None,
+        plain_seconds=_plain_seconds(like, wish) if row.setting.startswith("compiled") else None,
         measured_on=best.chains if best.measured else (),
-        reason=_REASONS["two balls" if group == "event" and len(chain) == 2 else group],
+        reason=_reason(group, wish),
     )
+
+
+def _reason(group: str, wish: _Wish) -> str:
+    if group == "event" and len(wish.chain) == 2:
+        return _REASONS["two balls"]
+    return _REASONS["timed" if group == "springs" and wish.timed else group]
+
+
+def _plain_seconds(chain: Chain | None, wish: _Wish) -> float | None:
+    """Return the time of one impact in the event loop as it stands."""
+    slow = tuple(row for row in rows("event", "plain") if row.model == "ImpulseCorrelation")
+    found = evidence(slow, chain, wish.ratios)[0]
+    return found.cost * unit() if found.measured else None
 
 
 def _cheapest(settings: list[Evidence], name: str, wish: _Wish) -> Evidence:
@@ -279,6 +306,7 @@ def _cheapest(settings: list[Evidence], name: str, wish: _Wish) -> Evidence:
         return min(fit, key=lambda one: one.cost)
     least = min(settings, key=lambda one: one.error)
     stricter = "" if least.exact else f"; on other chains it must be {_MARGIN:g} times better"
+    stricter += f": ask for {1.05 * margin * least.error:.1e} or more"
     raise _Unfit(
         f"accuracy = {wish.accuracy!r}",
         f"the least numerical error of {name} measured is {least.error:.2g} "

@@ -126,13 +126,15 @@ def lasting(seconds: float) -> str:
 
 
 @cache
-def rows(group: str) -> tuple[Row, ...]:
+def rows(group: str, kernel: str = "") -> tuple[Row, ...]:
     """Return the rows of a group, in settings that this installation and its calls have.
 
     Parameters
     ----------
     group : {"event", "springs", "energy", "outcome"}
         Group of the table.
+    kernel : {"", "compiled", "plain"}
+        How the event loop runs; compiled, if left out, where that can be.
 
     Returns
     -------
@@ -144,7 +146,7 @@ def rows(group: str) -> tuple[Row, ...]:
     >>> sorted({row.model for row in rows("outcome")})[:2]
     ['FusedChain', 'ImpulseCorrelation']
     """
-    kernel = "compiled" if runtime.available() else "plain"
+    kernel = kernel or ("compiled" if runtime.available() else "plain")
     batch = f"{kernel}, batch"
     found = []
     for line in _lines():

@@ -30,7 +30,11 @@ class Recommendation:
         says otherwise); no setting makes it smaller.  None: not measured, or, with losses, not to
         be measured: there is no such theory.
     seconds : float or None
-        Time of one impact on the machine that measured, to a factor of two.  None: not measured.
+        Time of one impact on the machine that measured, to a factor of two; once the event loop is
+        compiled, if the model has one.  None: not measured.
+    plain_seconds : float or None
+        The same of one call in plain Python, as small work runs: nothing is compiled before the
+        work pays for it.  None: not measured, or the same.
     measured_on : tuple of str
         The measured chains that these numbers come from: this very chain, or those around it, of
         which the worst counts.  Empty: none.
@@ -50,6 +54,7 @@ class Recommendation:
     numerical_error: float | None
     model_error: float | None
     seconds: float | None
+    plain_seconds: float | None
     measured_on: tuple[str, ...]
     reason: str
 
@@ -59,12 +64,15 @@ class Recommendation:
         def number(value: float | None) -> str:
             return "not measured" if value is None else f"{value:.1e}" if value else "0"
 
+        slower = ""
+        if self.plain_seconds is not None:
+            slower = f" compiled; {lasting(self.plain_seconds)} in plain Python, as small work runs"
         return {
             "setting": self.setting,
             "call": self.call,
             "numerical error": number(self.numerical_error),
             "model error": number(self.model_error),
-            "time": "not measured" if self.seconds is None else lasting(self.seconds),
+            "time": "not measured" if self.seconds is None else lasting(self.seconds) + slower,
             "measured on": "; ".join(self.measured_on) or "nothing like this",
             "reason": self.reason,
         }
@@ -72,18 +80,35 @@ class Recommendation:
     def __repr__(self) -> str:
         """Return the model and a line for each thing to know."""
         lines = [f"  {title + ':':<17}{text}" for title, text in self._lines().items()]
-        return "\n".join([f"Recommendation: {_made(self.model)}", *lines])
+        return "\n".join([f"Recommendation: {made(self.model)}", *lines])
 
     def _repr_html_(self) -> str:
         """Return a table for a notebook."""
-        lines = {"model": _made(self.model), **self._lines()}.items()
+        lines = {"model": made(self.model), **self._lines()}.items()
         style = ' style="overflow-wrap: anywhere"'  # on a phone, too, nothing is cut
         rows = [f"<tr><th>{escape(a)}</th><td{style}>{escape(b)}</td></tr>" for a, b in lines]
         return f'<table class="dataframe">{"".join(rows)}</table>'  # pages style it as a table
 
 
-def _made(model: Any) -> str:
-    """Return the call that makes a model, without what is as usual."""
+def made(model: Any) -> str:
+    """Return the call that makes a model, without what is as usual.
+
+    Parameters
+    ----------
+    model : Model
+        A model of the package.
+
+    Returns
+    -------
+    str
+        Python.
+
+    Examples
+    --------
+    >>> from cradle import SpringChain
+    >>> made(SpringChain(rtol=1e-4))
+    'SpringChain(rtol=0.0001)'
+    """
     values = {one.name: (getattr(model, one.name), one.default) for one in fields(model)}
     given = [f"{name}={value!r}" for name, (value, usual) in values.items() if value != usual]
     return f"{type(model).__name__}({', '.join(given)})"

@@ -21,6 +21,7 @@ from cradle.checks import (
     checked_restitution,
     numbers,
     refuse_overflow,
+    shown,
 )
 from cradle.drive import FINISHED, LARGE, REFUSED, Job
 from cradle.kernel import Inputs, Options
@@ -148,7 +149,9 @@ class Outcomes(NamedTuple):
                 "to_xarray needs xarray: pip install 'cradle-companion[book]'"
             ) from None
         lead = self.collapsed.ndim
-        names = tuple(f"chain_{k}" for k in range(lead)) if dims is None else tuple(dims)
+        names = tuple(f"chain_{k}" for k in range(lead)) if dims is None else dims
+        if not (isinstance(names, tuple) and all(isinstance(name, str) for name in names)):
+            raise TypeError(f"dims = {shown(dims)}; must be a tuple of names")
         if len(names) != lead:
             raise ValueError(f"dims = {names}; the outcomes have {lead} leading axes")
         balls = self.velocities.shape[-1]

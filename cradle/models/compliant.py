@@ -9,7 +9,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.checks import LIGHTEST, Vector, checked, one_number, whole_number
+from cradle.checks import (
+    LIGHTEST,
+    Vector,
+    number_or_row,
+    one_number,
+    one_of,
+    refuse_where,
+    whole_number,
+)
 from cradle.models.motion import Motion, own_units
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -38,6 +46,10 @@ class TimedTrace(Trace):
         Times of the steps of the integration, s.
     step_forces : ndarray, shape (S, N - 1)
         Contact forces there, N: curves of the force over the time.
+    step_velocities : ndarray, shape (S, N)
+        Velocities there, m/s.
+    step_impulses : ndarray, shape (S, N - 1)
+        Impulses so far, there, N s.
     evaluations : int
         How often the forces were evaluated.
 
@@ -60,6 +72,8 @@ class TimedTrace(Trace):
     durations: Vector
     step_times: Vector
     step_forces: Vector
+    step_velocities: Vector
+    step_impulses: Vector
     evaluations: int
 
     def _clock(self) -> dict[str, Vector]:
@@ -131,23 +145,19 @@ class SpringChain:
     max_evaluations: int = field(default=1_000_000, kw_only=True)
 
     def __post_init__(self) -> None:
-        k = checked("stiffness", self.stiffness, "must be above 0", 0.0, open_low=True)
-        if k.ndim > 1:
-            raise ValueError(f"stiffness has shape {k.shape}; must be () or (N - 1,)")
-        if k.size and k.min() < LIGHTEST * k.max():
-            raise ValueError(
-                f"stiffness[{int(k.argmin())}] = {float(k.min())!r}; "
-                f"must be at least {LIGHTEST} of the stiffest contact"
-            )
-        object.__setattr__(self, "stiffness", tuple(k.tolist()) if k.ndim else float(k))
+        above = "must be above 0"
+        kept = number_or_row("stiffness", self.stiffness, "N - 1", above, 0.0, open_low=True)
+        object.__setattr__(self, "stiffness", kept)
+        k = np.asarray(kept)
+        soft = k < LIGHTEST * k.max(initial=0.0)
+        refuse_where("stiffness", k, soft, f"must be at least {LIGHTEST} of the stiffest contact")
         rules = {
             "exponent": ("must be at least 1", 1.0, math.inf),
             "rtol": (f"must lie in [{_SMALLEST_RTOL:.3g}, 0.1]", _SMALLEST_RTOL, 0.1),
         }
         for name, (rule, low, high) in rules.items():
             object.__setattr__(self, name, one_number(name, getattr(self, name), rule, low, high))
-        if self.method not in _METHODS:
-            raise ValueError(f"method = {self.method!r}; must be one of {', '.join(_METHODS)}")
+        one_of("method", self.method, _METHODS)
         if self.max_time is not None:
             limit = one_number("max_time", self.max_time, "must be at least 0", 0.0, math.inf)
             object.__setattr__(self, "max_time", limit)
@@ -156,12 +166,8 @@ class SpringChain:
     def solve(self, chain: Chain) -> TimedTrace:
         """Solve the impact of `chain`; see `collide`."""
         k, unit, mass, speed = own_units(chain, self.stiffness)
-        if (chain.restitution < 1.0).any():
-            c = int(np.argmax(chain.restitution < 1.0))
-            raise ValueError(
-                f"restitution[{c}] = {float(chain.restitution[c])!r}; must be 1 for SpringChain: "
-                "a spring gives back all the energy that it stores"
-            )
+        rule = "must be 1 for SpringChain: a spring gives back all the energy that it stores"
+        refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
         logarithm = math.log(mass) + 2.0 * math.log(speed) - math.log(unit)
         logarithm = logarithm / (self.exponent + 1.0) - math.log(speed)
         if not abs(logarithm) <= 600.0:
@@ -181,6 +187,8 @@ class SpringChain:
         path = chain.velocities + speed * change.T
         path_impulses = mass * speed * impulses.T
         newton = mass * speed / second
+        steps = np.concatenate([y for _, y in motion.steps], axis=1)
+        step_change, _, step_impulses = motion.parts(steps)
         trace = TimedTrace(
             chain=chain,
             model=self,
@@ -195,7 +203,9 @@ class SpringChain:
             forces=newton * motion.forces(np.array(states).T).T,
             durations=second * motion.durations,
             step_times=second * np.concatenate([t for t, _ in motion.steps]),
-            step_forces=newton * np.concatenate([motion.forces(y).T for _, y in motion.steps]),
+            step_forces=newton * motion.forces(steps).T,
+            step_velocities=chain.velocities + speed * step_change.T,
+            step_impulses=mass * speed * step_impulses.T,
             evaluations=motion.evaluations,
         )
         if reason:

@@ -9,7 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.checks import Vector, checked, must_be, one_number, refusal
+from cradle.checks import (
+    Vector,
+    checked,
+    first,
+    must_be,
+    number_or_row,
+    one_number,
+    one_of,
+    refuse_where,
+    row_of,
+)
 from cradle.closed_form import largest_ratios
 from cradle.drive import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job
 from cradle.kernel import Inputs, Options
@@ -30,6 +40,8 @@ def _most_events(n: int) -> int:
     return max(_MOST_NUMBERS // n, 1000)
 
 
+#: What is asked of a ratio.
+_RANGE = ("must lie in [0, 1]", 0.0, 1.0)
 _KINDS = ("maximum_compression", "end", "close", "collapse")
 
 
@@ -93,10 +105,7 @@ class ImpulseCorrelation:
         for name, ratios in (("forward", forward), ("backward", backward)):
             value = None
             if ratios is not None or name == "forward":
-                array = checked_ratios(name, ratios)
-                if array.ndim > 1:
-                    raise ValueError(f"{name} has shape {array.shape}; must be () or (N - 2,)")
-                value = tuple(array.tolist()) if array.ndim else float(array)
+                value = number_or_row(name, ratios, "N - 2", *_RANGE)
             object.__setattr__(self, name, value)
         object.__setattr__(self, "meeting", float(meeting))
         object.__setattr__(self, "excess", excess)
@@ -125,14 +134,7 @@ class ImpulseCorrelation:
         ratios: list[Vector] = []
         for name in ("forward", "backward"):
             given = getattr(self, name)
-            if given is None:
-                ratios.append(ratios[0])
-                continue
-            if isinstance(given, tuple) and len(given) != n - 2:
-                raise ValueError(
-                    f"{name} has {len(given)} values; {n} balls need {n - 2}, or one number"
-                )
-            ratios.append(np.full(n - 2, given))
+            ratios.append(ratios[0] if given is None else row_of(name, given, n - 2, n))
 
         inputs = Inputs(
             *(part[None].copy() for part in (chain.masses, chain.velocities, chain.restitution)),
@@ -197,7 +199,7 @@ class ImpulseCorrelation:
 
 def checked_ratios(name: str, ratios: ArrayLike | None) -> Vector:
     """Return ratios as floats, all in [0, 1]."""
-    return checked(name, ratios, "must lie in [0, 1]", 0.0, 1.0)
+    return checked(name, ratios, *_RANGE)
 
 
 def check_options(meeting: float, excess: str, max_events: int) -> None:
@@ -205,8 +207,7 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
     # The usual options first: they cost a call for one chain less than the checks in full.
     if not (type(meeting) is float and 0.0 <= meeting <= 1.0):
         one_number("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
-    if not isinstance(excess, str) or excess not in ("raise", "saturate"):
-        raise ValueError(f"excess = {excess!r}; must be 'raise' or 'saturate'")
+    one_of("excess", excess, ("raise", "saturate"))
     if isinstance(max_events, bool) or not isinstance(max_events, (int, np.integer)):
         raise ValueError(f"max_events = {max_events!r}; must be a whole number")
     if not 1 <= max_events < 2**63:
@@ -216,14 +217,8 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
 def refuse_light(masses: Vector) -> None:
     """Raise if a ball is too light: how it parts the heavy ones is below rounding."""
     small = masses < LIMITS.lightest * masses.max(axis=-1, keepdims=True)
-    if small.any():
-        at = np.unravel_index(int(np.argmax(small)), masses.shape)
-        raise refusal(
-            "masses",
-            at,
-            f" = {float(masses[at])!r}; for this model it must be at least {LIMITS.lightest} of "
-            "the heaviest ball of its chain",
-        )
+    rule = f"for this model it must be at least {LIMITS.lightest} of the heaviest ball of its chain"
+    refuse_where("masses", masses, small, rule)
 
 
 def refuse_excess(masses: Vector, forward: Vector, backward: Vector) -> None:
@@ -232,13 +227,11 @@ def refuse_excess(masses: Vector, forward: Vector, backward: Vector) -> None:
     for name, ratios, bound in (("forward", forward, bounds[0]), ("backward", backward, bounds[1])):
         above = ratios > bound * LIMITS.rounded
         if above.any():
-            at = np.unravel_index(int(np.argmax(above)), above.shape)
-            ratio = float(np.broadcast_to(ratios, above.shape)[at])
+            at = first(above)
             mirrored = "" if name == "forward" else ", mirrored"
-            raise refusal(
-                name,
-                at,
-                f" = {ratio!r}; at ball {int(at[-1]) + 1}, counted from 0, it must "
-                f"not exceed {float(bound[at]):.6g} (Eq. 53{mirrored}): a larger ratio would make "
-                "a contact pull; excess='saturate' holds the contact closed instead",
+            rule = (
+                f"at ball {at[-1] + 1}, counted from 0, it must not exceed {float(bound[at]):.6g} "
+                f"(Eq. 53{mirrored}): a larger ratio would make a contact pull; excess='saturate' "
+                "holds the contact closed instead"
             )
+            refuse_where(name, ratios, above, rule)

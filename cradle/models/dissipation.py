@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cradle.chain import Chain
-from cradle.checks import Vector, checked, must_be, one_number, whole_number
+from cradle.checks import (
+    Vector,
+    must_be,
+    number_or_row,
+    one_number,
+    refuse_where,
+    row_of,
+    whole_number,
+)
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 # Beyond these the equations of one problem keep too few digits.
@@ -111,10 +119,7 @@ class QuadraticDissipation:
         rule = f"must lie in [0, {_LARGEST:g}]"
         value: float | tuple[float, ...] | None = None
         if coefficients is not None:
-            kappa = checked("coefficients", coefficients, rule, 0.0, _LARGEST)
-            if kappa.ndim > 1:
-                raise ValueError(f"coefficients has shape {kappa.shape}; must be () or (N - 1,)")
-            value = tuple(kappa.tolist()) if kappa.ndim else float(kappa)
+            value = number_or_row("coefficients", coefficients, "N - 1", rule, 0.0, _LARGEST)
         object.__setattr__(self, "max_problems", whole_number("max_problems", max_problems))
         object.__setattr__(self, "coefficients", value)
         object.__setattr__(self, "distance", one_number("distance", distance, rule, 0.0, _LARGEST))
@@ -131,13 +136,13 @@ class QuadraticDissipation:
         impulses, absorbed = np.zeros((2, n - 1))
         path, path_impulses, events = [v], [impulses], []
         left, right = np.maximum.accumulate(m), np.maximum.accumulate(m[::-1])[::-1]
-        light = m[1:-1] < _LIGHTEST * np.minimum(left[:-2], right[2:])
-        if light.any():
-            i = 1 + int(np.argmax(light))
-            raise ValueError(
-                f"masses[{i}] = {float(chain.masses[i])!r}; must be at least {_LIGHTEST} of "
-                "the heaviest ball on its left, or on its right, for QuadraticDissipation"
-            )
+        light = np.zeros(n, dtype=bool)
+        light[1:-1] = m[1:-1] < _LIGHTEST * np.minimum(left[:-2], right[2:])
+        rule = (
+            f"must be at least {_LIGHTEST} of the heaviest ball on its left, or on its right, for "
+            "QuadraticDissipation"
+        )
+        refuse_where("masses", chain.masses, light, rule)
         speed = np.abs(v - v.mean()).max()
 
         def closing(v: Vector) -> Vector:
@@ -183,22 +188,15 @@ class QuadraticDissipation:
 
     def _kappa(self, chain: Chain) -> Vector:
         """Return the coefficient of each contact."""
-        contacts = len(chain) - 1
         if self.coefficients is None:
             e = chain.restitution
-            if (1.0 - e < 2.0 / _LARGEST).any():
-                c = int(np.argmax(e))
-                raise ValueError(
-                    f"restitution[{c}] = {float(e[c])!r}; must be below 1 - {2.0 / _LARGEST:g} for "
-                    "QuadraticDissipation: e = 1 is the limit of an infinite coefficient"
-                )
-            return (1.0 + e) / (1.0 - e)
-        if np.ndim(self.coefficients) and np.size(self.coefficients) != contacts:
-            raise ValueError(
-                f"coefficients has {np.size(self.coefficients)} values; "
-                f"{contacts + 1} balls need {contacts}, or one"
+            rule = (
+                f"must be below 1 - {2.0 / _LARGEST:g} for QuadraticDissipation: e = 1 is the "
+                "limit of an infinite coefficient"
             )
-        return np.broadcast_to(np.asarray(self.coefficients, dtype=np.float64), (contacts,))
+            refuse_where("restitution", e, 1.0 - e < 2.0 / _LARGEST, rule)
+            return (1.0 + e) / (1.0 - e)
+        return row_of("coefficients", self.coefficients, len(chain) - 1, len(chain))
 
 
 def _impulses(m: Vector, u: Vector, active: NDArray[np.bool_], kappa: Vector) -> Vector:

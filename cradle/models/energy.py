@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.checks import Vector, one_number
+from cradle.checks import Vector, one_number, refuse_where
 from cradle.models.compliant import SpringChain
 from cradle.models.motion import Motion, TooManyEvaluations, own_units
 from cradle.trace import Event, ImpactNotFinished, Trace
@@ -144,12 +144,11 @@ class EnergyDistribution:
         """Solve the impact of `chain`; see `collide`."""
         k, unit, mass, speed = own_units(chain, self.stiffness)
         small = (chain.restitution > 0.0) & (chain.restitution < _SMALLEST)
-        if small.any():
-            c = int(np.argmax(small))
-            raise ValueError(
-                f"restitution[{c}] = {float(chain.restitution[c])!r}; must be 0 or at least "
-                f"{_SMALLEST} for EnergyDistribution: such a release is too short to follow"
-            )
+        rule = (
+            f"must be 0 or at least {_SMALLEST} for EnergyDistribution: such a release is too "
+            "short to follow"
+        )
+        refuse_where("restitution", chain.restitution, small, rule)
         scaled = (chain.masses / mass, chain.closing_speeds / speed, k / unit)
         process = _Process(*scaled, chain.restitution, self)
         reason = process.run("DOP853", math.inf, self.max_evaluations)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.checks import Vector, must_be
+from cradle.checks import Vector, must_be, row_of
 
 
 def own_units(
@@ -43,10 +43,7 @@ def own_units(
     (array([5.]), 5.0, 1.0, 3.0)
     """
     n, u = len(must_be(Chain, "chain", chain)), chain.closing_speeds
-    if np.ndim(stiffness) and np.size(stiffness) != n - 1:
-        raise ValueError(
-            f"stiffness has {np.size(stiffness)} values; {n} balls need {n - 1}, or one"
-        )
+    k = row_of("stiffness", stiffness, n - 1, n)
     c = int(np.argmax(u))
     with np.errstate(over="ignore"):
         mass = chain.masses[c] / (chain.masses[c] + chain.masses[c + 1]) * chain.masses[c + 1]
@@ -55,7 +52,6 @@ def own_units(
             f"masses[{c}] = {float(chain.masses[c])!r}; its reduced mass with masses[{c + 1}] = "
             f"{float(chain.masses[c + 1])!r} is beyond the range of floats: choose other units"
         )
-    k = np.broadcast_to(np.asarray(stiffness, dtype=np.float64), (n - 1,))
     return k, float(k[c]), float(mass), abs(float(u[c])) or 1.0
 
 

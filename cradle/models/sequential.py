@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.checks import Vector, must_be
+from cradle.checks import Vector, must_be, one_of
 from cradle.models.correlation import MAX_EVENTS, ImpulseCorrelation
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -65,8 +65,7 @@ class SequentialCollisions:
     max_events: int = field(default=MAX_EVENTS, kw_only=True)
 
     def __post_init__(self) -> None:
-        if self.order not in ("left", "right"):
-            raise ValueError(f"order = {self.order!r}; must be 'left' or 'right'")
+        one_of("order", self.order, ("left", "right"))
         ImpulseCorrelation(0.0, max_events=self.max_events)  # checks max_events
 
     def solve(self, chain: Chain) -> Trace:

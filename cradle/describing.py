@@ -1,0 +1,136 @@
+"""What a command is told of a chain: options, the chain and model they mean, what is assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import click
+
+if TYPE_CHECKING:
+    from cradle.chain import Chain
+    from cradle.models import Model
+
+# What a command needs is imported in the command: the first answer comes within a second.
+
+UNITS = {"kg": 1.0, "g": 1e-3}
+_MODELS = ("ratio", "spheres", "sequential")
+
+
+def numbers(_: click.Context, __: click.Parameter, value: str | None) -> list[float] | None:
+    """Read numbers with commas between them."""
+    try:
+        return None if value is None else [float(part) for part in value.split(",")]
+    except ValueError:
+        raise click.BadParameter(f"{value!r}; write numbers with commas between") from None
+
+
+def chain_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add what describes a chain of balls and its impact law."""
+    options = [
+        click.argument("sequence", required=False),
+        click.option("--speed", default=1.0, help="Velocity of the first ball, m/s [1]."),
+        click.option("--masses", callback=numbers, help="Masses, left to right: 45,53,53."),
+        click.option("--unit", type=click.Choice(list(UNITS)), default="kg", help="Of masses."),
+        click.option("--velocities", callback=numbers, help="Instead of --speed: 1,0,0."),
+        click.option("--restitution", callback=numbers, help="One, or one per contact [1]."),
+        click.option("--model", type=click.Choice(_MODELS), help="How the balls collide: by "
+                     "ratios, as elastic spheres (Hertz; with losses the energy law), or one pair "
+                     "after the other [ratio if there are ratios, else spheres]."),
+        click.option("--ratio", callback=numbers, help="One, or one per inner ball."),
+        click.option("--backward", callback=numbers, help="Ratios from the right [as --ratio]."),
+        click.option("--saturate", is_flag=True, help="Admit ratios above their bound."),
+    ]  # fmt: skip
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+class Described(NamedTuple):
+    """A chain and how it collides.
+
+    Examples
+    --------
+    >>> described(None, masses=[1.0, 1.0]).assumed
+    ('the first ball strikes at 1 m/s', 'no energy is lost (--restitution)')
+    """
+
+    chain: Chain
+    model: Model
+    #: What was not given and stands for it, in words.
+    assumed: tuple[str, ...]
+
+    @property
+    def note(self) -> str:
+        """The model, and what is assumed, for people."""
+        from cradle.advice.recommendation import made
+
+        lines = [f"model: {made(self.model)}"]
+        return "\n".join(lines + [f"assumed: {'; '.join(self.assumed)}"] * bool(self.assumed))
+
+
+def described(
+    sequence: str | None, speed: float = 1.0, masses: list[float] | None = None, unit: str = "kg",
+    velocities: list[float] | None = None, restitution: list[float] | None = None,
+    model: str | None = None, ratio: list[float] | None = None,
+    backward: list[float] | None = None, saturate: bool = False,
+) -> Described:  # fmt: skip
+    """Return the chain and the model that the options describe."""
+    from cradle.chain import Chain
+    from cradle.models.correlation import ImpulseCorrelation
+    from cradle.tables import paper_chain
+
+    if (sequence is None) == (masses is None):
+        raise click.UsageError("give either a sequence of ball types, such as ABCCA, or --masses")
+    if model not in (None, "ratio") and (ratio or backward or saturate):
+        raise click.UsageError(f"--model {model} has no ratios; leave them out, and --saturate")
+    excess = "saturate" if saturate else "raise"
+    if sequence is not None:
+        given = {"--velocities": velocities, "--restitution": restitution, "--ratio": ratio,
+                 "--backward": backward}  # fmt: skip
+        for name, value in given.items():
+            if value is not None:
+                raise click.UsageError(f"{name} goes with --masses; {sequence} has its own values")
+        chain, ratios = paper_chain(sequence, speed, excess="saturate" if saturate else "raise")
+        law = ratios if model in (None, "ratio") else _without_ratios(chain, model)
+        return Described(chain, law, ())
+    assert masses is not None
+    before = [speed] + [0.0] * (len(masses) - 1) if velocities is None else velocities
+    chain = Chain(
+        [UNITS[unit] * m for m in masses],
+        before,
+        1.0 if restitution is None else one_or_all(restitution),
+    )
+    assumed = [] if velocities else [f"the first ball strikes at {speed:g} m/s"]
+    assumed += [] if restitution else ["no energy is lost (--restitution)"]
+    if ratio is not None:
+        back = None if backward is None else one_or_all(backward)
+        law = ImpulseCorrelation(one_or_all(ratio), back, excess=excess)
+        return Described(chain, law, tuple(assumed))
+    if model == "ratio" or backward or saturate:
+        raise click.UsageError("ratios need --ratio, such as 0.1 or one for each inner ball")
+    if model is None and len(chain) == 2:  # they have no ratio, and all models agree
+        return Described(chain, ImpulseCorrelation(0.0), tuple(assumed))
+    if model is None:
+        kind = "elastic spheres" if (chain.restitution == 1.0).all() else "spheres with losses"
+        assumed.append(f"the balls collide as {kind} (--model, --ratio)")
+    return Described(chain, _without_ratios(chain, model), tuple(assumed))
+
+
+def _without_ratios(chain: Chain, model: str | None) -> Model:
+    if model == "sequential":
+        from cradle.models.sequential import SequentialCollisions
+
+        return SequentialCollisions()
+    if (chain.restitution == 1.0).all():
+        from cradle.models.compliant import SpringChain
+
+        return SpringChain()
+    from cradle.models.energy import EnergyDistribution
+
+    return EnergyDistribution()
+
+
+def one_or_all(values: list[float]) -> float | list[float]:
+    """Return one number for all, or the list."""
+    return values[0] if len(values) == 1 else values

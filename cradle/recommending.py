@@ -1,0 +1,58 @@
+"""`cradle recommend`: which impact law to use."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from cradle.describing import chain_options, described, numbers, one_or_all
+
+
+@click.command()
+@chain_options
+@click.option(
+    "--wanted",
+    multiple=True,
+    default=["velocities"],
+    help="velocities, impulses, path, "
+    "forces, times or fastest ball; may be given several times [velocities].",
+)
+@click.option(
+    "--accuracy",
+    default=1e-6,
+    help="Largest numerical error, as a part of the closing speed [1e-6].",
+)
+@click.option("--model-error", type=float, help="Largest distance from elastic spheres [any].")
+@click.option("--impacts", default=1, help="How many such impacts [1].")
+@click.option(
+    "--stiffness",
+    callback=numbers,
+    help="Of the contacts, N/m^1.5; 1 for equal spheres if neither forces nor times are wanted.",
+)
+def recommend(
+    wanted: Sequence[str], stiffness: list[float] | None, accuracy: float,
+    model_error: float | None, impacts: int, **options: Any,
+) -> None:  # fmt: skip
+    """Which impact law to use, with its measured error and time.
+
+    \b
+    Examples:
+      cradle recommend --masses 1,1,1,1,1 --stiffness 1 --accuracy 1e-3
+      cradle recommend ABACA --impacts 1000
+      cradle recommend --masses 1,2,1 --wanted "fastest ball"
+    """
+    from cradle.advice import recommend as recommend_from
+    from cradle.models.correlation import ImpulseCorrelation
+
+    if options.pop("model") is not None:
+        raise click.UsageError("leave --model out: it is what is recommended")
+    given = described(**options)
+    known = given.model if isinstance(given.model, ImpulseCorrelation) else None
+    advice = recommend_from(
+        given.chain, wanted, accuracy=accuracy, model_error=model_error, impacts=impacts,
+        ratios=known if len(given.chain) > 2 else None,
+        stiffness=None if stiffness is None else one_or_all(stiffness),
+    )  # fmt: skip
+    click.echo(repr(advice))

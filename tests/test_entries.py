@@ -1,0 +1,207 @@
+"""Every public entry point, called with what it cannot take: each argument in turn, in words.
+
+An answer is fine where a value can be read as one that is meant.  A refusal must come from a
+`raise` of the package itself: an error that Python, NumPy or SciPy meets on the way names neither
+the argument nor the rule.
+"""
+
+import ast
+import functools
+import inspect
+import traceback
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import cradle
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    FusedChain,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    Pendulums,
+    QuadraticDissipation,
+    SequentialCollisions,
+    SpringChain,
+    animation,
+    closed_form,
+    collide,
+    conserving,
+    figures,
+    fit,
+    measures,
+)
+from cradle.blocks import post_impact_block
+from cradle.row import Row
+
+PACKAGE = Path(cradle.__file__).parent
+DATA = Path(__file__).parents[1] / "data"
+
+THREE = Chain([1, 1, 1], [1, 0, 0])
+MODEL = ImpulseCorrelation(0.15)
+TRACE = collide(THREE, MODEL)
+RUN = cradle.swing(THREE, MODEL, [-0.02, 0, 0], [0.0, 0.1, 0.2])
+SEVERAL = cradle.outcomes([1, 1, 1], [1, 0, 0], 1, [[0.1], [0.2]])
+
+
+class Still:
+    """Bodies that no engine moves."""
+
+    def motion(self):
+        return [[0.0, 0.0], [0.3, 0.0], [0.6, 0.0]], [[0.0, 0.0]] * 3
+
+    def push(self, ball, impulse):
+        raise AssertionError
+
+    def advance(self, step):
+        pass
+
+
+def one_block(masses, velocities, restitution, forward, backward, **options):
+    """Arrays by place, as dask hands them over."""
+    return post_impact_block(masses, velocities, restitution, forward, backward, **options)
+
+
+BALLS = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "restitution": 1}
+SEVEN = BALLS | {"forward": 0.1, "backward": 0.1, "meeting": 0.5, "excess": "raise"}
+SPRINGS = {"stiffness": 1, "exponent": 1.5, "rtol": 1e-6, "max_evaluations": 10_000}
+PENDULUMS = {"length": 0.1, "gravity": 9.81, "gaps": 0.0, "damping": 0.0, "angle": "small"}
+SHOTS = fit.read_shots(DATA / "shots_synthetic.csv", velocity_unit="m/s")
+
+#: Entry points and arguments that they can take.
+ENTRIES = {
+    Chain: BALLS,
+    collide: {"chain": THREE, "model": MODEL},
+    ImpulseCorrelation: {
+        "forward": 0.1, "backward": 0.1, "meeting": 0.5, "excess": "raise", "max_events": 100,
+    },
+    SequentialCollisions: {"order": "left", "max_events": 100},
+    FusedChain: {},
+    SpringChain: SPRINGS | {"method": "RK45", "max_time": 10.0},
+    EnergyDistribution: SPRINGS | {"step": 0.1, "gaps": True},
+    QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
+    cradle.post_impact_velocities: SEVEN | {"max_events": 100},
+    cradle.outcomes: SEVEN | {"max_events": 100},
+    cradle.paper_chain: {"sequence": "ABC", "speed": 1.0, "excess": "saturate"},
+    cradle.recommend: {
+        "chain": THREE, "wanted": "velocities", "accuracy": 1e-3, "model_error": 0.5, "impacts": 1,
+        "ratios": 0.167, "stiffness": 1.0,
+    },
+    Pendulums: PENDULUMS,
+    cradle.swing: {
+        "chain": THREE, "model": MODEL, "positions": [-0.02, 0, 0], "times": [0, 0.1],
+        "pendulums": Pendulums(), "max_impacts": 10, "min_energy": 0.0,
+    },
+    Row: {
+        "bodies": Still(), "chain": THREE, "model": MODEL, "radii": 0.1,
+        "pivots": [[0, 1], [0.3, 1], [0.6, 1]], "touching": 1e-4, "resting": 1e-4,
+        "acceleration": 9.81,
+    },
+    Row(Still(), THREE, MODEL, 0.1).step: {"duration": 0.01},
+    TRACE.plot: {"ax": Figure().subplots(), "contact": 0},
+    SEVERAL.to_xarray: {"dims": ("ratio",)},
+    one_block: SEVEN,
+    measures.bouncing_pattern: {"velocities": [0, 0, 1]},
+    measures.condition_number: {"chain": THREE, "model": MODEL, "step": 1e-6},
+    measures.effective_ratio: {"trace": TRACE, "tolerance": 1e-6},
+    closed_form.three_balls: BALLS | {"restitution": [1, 1], "ratio": 0.1},
+    closed_form.final_impulses: BALLS | {"restitution": [1, 1], "ratio": 0.1},
+    closed_form.one_collision_each: BALLS | {"restitution": [1, 1], "ratio": 0.1},
+    closed_form.largest_ratios: {"masses": [1, 1, 1], "forward": [0.1], "backward": [0.1]},
+    closed_form.back_impact_line: {"r2": 1, "e2": 1, "e3": 1, "ratio": 0.1},
+    closed_form.first_ball_stops: {"e2": 0.9, "ratio": 0.1},
+    closed_form.middle_ball_stops: {"e3": 0.9, "ratio": 0.1},
+    conserving.conserving_outcomes: {"masses": [1, 1, 1], "velocities": [1, 0, 0], "angles": [0]},
+    conserving.conserving_angle: {"masses": [1, 1, 1], "velocities": [1, 0, 0]},
+    animation.animate: {"trace": TRACE, "contact": 0, "alt": "a"},
+    animation.animate_swing: {
+        "runs": RUN, "labels": ["a"], "speed": 1.0, "still": 0.0, "columns": 1, "alt": "a",
+    },
+    figures.velocities: {"trace": TRACE, "ax": Figure().subplots()},
+    figures.velocity_impulse: {"trace": TRACE, "contact": 0, "ax": Figure().subplots()},
+    figures.chain_sketch: {"chain": THREE, "ax": Figure().subplots(), "letters": "ABA"},
+}  # fmt: skip
+
+#: Formulas as they stand in the paper; their documentation says that ranges are not checked.
+UNCHECKED = {
+    closed_form.three_balls, closed_form.final_impulses, closed_form.one_collision_each,
+}  # fmt: skip
+
+#: What no argument takes as it is, or only few.
+BAD = [
+    None, True, "text", "", b"12", 1j, -1, 0, -0.5, 1.5, 2, 1e400, -1e400, float("nan"), 10**400,
+    1e-320, 1e308, [], [[]], [None], ["a"], [1], [1, 2], [1, 2, 3, 4], [1, -1, 1], [[1, 2], [3]],
+    [float("nan")] * 3, [1e300] * 3, [1, 1e-300, 1], np.ones((2, 2)), np.ones((0, 3)),
+    np.array(["a"] * 3), np.ma.masked, {}, {"a": 1}, {1, 2}, object(), Chain, lambda: None, THREE,
+    MODEL, TRACE, slice(None), range(3), (x for x in "ab"),
+]  # fmt: skip
+
+
+@functools.cache
+def raising_lines(path: str) -> frozenset[int]:
+    """Lines of a file that belong to a `raise`."""
+    tree = ast.parse(Path(path).read_text(encoding="utf-8"))
+    return frozenset(
+        line
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Raise)
+        for line in range(node.lineno, node.end_lineno + 1)
+    )
+
+
+def fault(call, arguments) -> str:
+    """Say what is wrong with how a call ends; nothing if it is right."""
+    try:
+        call(**arguments)
+    except (ValueError, TypeError, ImpactNotFinished) as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        own = Path(last.filename).is_relative_to(PACKAGE)
+        if own and last.lineno in raising_lines(last.filename):
+            return ""
+        return f"{Path(last.filename).name}:{last.lineno} {type(error).__name__}: {error}"
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    return ""
+
+
+CASES = [
+    pytest.param(call, arguments, name, id=f"{call.__qualname__}-{name}")
+    for call, arguments in ENTRIES.items()
+    for name in arguments
+]
+
+
+@pytest.mark.parametrize(("call", "arguments", "name"), CASES)
+def test_what_is_wrong_is_refused_in_words(call, arguments, name, monkeypatch):
+    monkeypatch.setenv("CRADLE_KERNEL", "plain")
+    free = "ignore" if call in UNCHECKED else None
+    with np.errstate(all=free), matplotlib.rc_context({"figure.max_open_warning": 0}):
+        call(**arguments)
+        faults = {}
+        for bad in BAD:
+            if found := fault(call, arguments | {name: bad}):
+                faults[repr(bad)[:40]] = found[:160]
+        matplotlib.pyplot.close("all")
+    assert not faults
+
+
+def test_no_entry_point_is_missing():
+    """All that `cradle` exports is called here, but for results and what takes no argument."""
+    results = {
+        "DissipationTrace", "EnergyTrace", "Event", "Impact", "ImpactNotCertified", "Model",
+        "ImpactNotFinished", "Outcomes", "Recommendation", "Swing", "TimedTrace", "Trace",
+    }  # fmt: skip
+    nothing = {"paper_sequences", "ratio_table", "restitution_table"}
+    called = {call.__name__ for call in ENTRIES}
+    assert set(cradle.__all__) - called == results | nothing
+    for module in (measures, closed_form, conserving, animation):
+        own = {
+            name
+            for name, thing in vars(module).items()
+            if inspect.isfunction(thing) and thing.__module__ == module.__name__
+        }
+        assert {name for name in own if name[0] != "_"} <= called, module.__name__
