@@ -68,10 +68,10 @@ def _grouped(value: int) -> str:
     return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "−")
 
 
-def row(values: np.ndarray, digits: int = 3) -> str:
+def aligned(values: np.ndarray, digits: int = 3) -> str:
     """Write velocities side by side, as a line of a table: no minus before a zero."""
     return "".join(
-        f"{round(float(value), digits) + 0.0:{digits + 4}.{digits}f}"
+        f" {round(float(value), digits) + 0.0:{digits + 3}.{digits}f}"
         for value in values
     )
 

@@ -8,7 +8,7 @@ from chapters import BOOK
 from cradle.textbook import Impact
 
 sys.path.insert(0, str(BOOK))
-from page import below, count, listing, people, row, said
+from page import aligned, below, count, listing, people, said
 
 sys.path.remove(str(BOOK))
 
@@ -47,8 +47,8 @@ def test_small_whole_numbers_are_words():
 
 
 def test_a_row_of_velocities():
-    assert row([-1 / 3, 2 / 3, -1e-9]) == " -0.333  0.667  0.000"
-    assert row([1], digits=1) == "  1.0"
+    assert aligned([-1 / 3, 2 / 3, -1e-9]) == " -0.333  0.667  0.000"
+    assert aligned([1], digits=1) == "  1.0"
 
 
 def test_below():
