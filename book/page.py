@@ -30,16 +30,11 @@ def people(value: float, digits: int = 2) -> str:
     `digits` significant digits are kept. An integer below one million is written out in full.
     """
     if float(value).is_integer() and abs(value) < 1_000_000:
-        text = (
-            f"{int(value):,}" if abs(value) >= 10_000 else f"{int(value)}"
-        )
-        return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace(
-            "-", "−"
-        )
+        return _grouped(int(value))
     for size, word in ((1e9, "billion"), (1e6, "million")):
-        if abs(value) >= size:
+        if size <= abs(value) < 1e12:
             return f"{_rounded(value / size, digits)} {word}"
-    if 1e-3 <= abs(value) < 1e5:
+    if 1e-3 <= abs(value) < 1e6:
         return _rounded(value, digits)
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     power = "10" + str(int(exponent)).translate(_SUPERSCRIPT)
@@ -61,7 +56,24 @@ def count(number: int, thing: str, things: str = "") -> str:
 
 def _rounded(value: float, digits: int) -> str:
     """Write a number in significant digits, without a power of ten."""
-    return f"{float(f'{value:.{digits}g}'):g}".replace("-", "−")
+    rounded = float(f"{value:.{digits}g}")
+    if abs(rounded) >= 10_000:
+        return _grouped(int(rounded))
+    return f"{rounded:g}".replace("-", "−")
+
+
+def _grouped(value: int) -> str:
+    """Write an integer, a large one in groups of three digits."""
+    text = f"{value:,}" if abs(value) >= 10_000 else f"{value}"
+    return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "−")
+
+
+def aligned(values: np.ndarray, digits: int = 3) -> str:
+    """Write velocities side by side, as a line of a table: no minus before a zero."""
+    return "".join(
+        f" {round(float(value), digits) + 0.0:{digits + 3}.{digits}f}"
+        for value in values
+    )
 
 
 def below(value: float, limit: float = 1e-12) -> str:

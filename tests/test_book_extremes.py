@@ -145,8 +145,7 @@ def test_table_of_cost():
     assert again.evaluations == pytest.approx(int(spring["evaluations"]), rel=0.1)
     # A cell of the table is the best of its row: the event solver needs least, nearly everywhere.
     table = Chapter("extremes_inventory").cells["inventory-11"].outputs[0].data["text/plain"]
-    for point in x.POINTS:
-        assert point in table
+    assert len(table.splitlines()) == 2 + len(x.POINTS)
 
 
 def test_table_of_unfinished_chains(inventory):
@@ -177,12 +176,12 @@ def test_exercise_of_the_wedge():
 def test_cells_show_what_they_claim():
     """Verdicts that a cell prints or tabulates, read back from the stored page."""
     page = Chapter("extremes_inventory")
-    assert page.printed("inventory-13").count("True") == 2
+    assert page.printed("inventory-13").count("same digits") == 2
     assert page.printed("inventory-05").count(": below ") == 2
     invariants = page.cells["inventory-03"].outputs[-1].data["text/plain"]
     assert invariants.count("never above") == 4
     elastic = page.cells["inventory-07"].outputs[-1].data["text/plain"]
-    assert elastic.count("True") == 3
+    assert elastic.count("yes") == 3
     lines = Chapter("extremes").printed("extremes-19").splitlines()
     for line, light in zip(lines, (1e-1, 1e-3, 1e-5), strict=True):
         walls = math.ceil(math.pi / math.atan(math.sqrt(light * (2 + light)))) - 1

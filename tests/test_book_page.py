@@ -8,7 +8,7 @@ from chapters import BOOK
 from cradle.textbook import Impact
 
 sys.path.insert(0, str(BOOK))
-from page import below, count, listing, people, said
+from page import aligned, below, count, listing, people, said
 
 sys.path.remove(str(BOOK))
 
@@ -19,12 +19,14 @@ sys.path.remove(str(BOOK))
         (2_234_567, "2.2 million"),
         (36_877, "36\N{NARROW NO-BREAK SPACE}877"),
         (5_235, "5235"),
+        (3e150, "3·10¹⁵⁰"),
         (1e-7, "10⁻⁷"),
         (3.2e-8, "3.2·10⁻⁸"),
         (0.0314, "0.031"),
         (-5, "−5"),
         (-3.2e-8, "−3.2·10⁻⁸"),
         (1234.5, "1200"),
+        (274_650.5, "270\N{NARROW NO-BREAK SPACE}000"),
         (100.0, "100"),
         (0, "0"),
     ],
@@ -42,6 +44,11 @@ def test_counts():
 
 def test_small_whole_numbers_are_words():
     assert [said(n) for n in (0, 12, 13, 2.0, 0.5)] == ["no", "twelve", "13", "2", "0.5"]
+
+
+def test_a_row_of_velocities():
+    assert aligned([-1 / 3, 2 / 3, -1e-9]) == " -0.333  0.667  0.000"
+    assert aligned([1], digits=1) == "  1.0"
 
 
 def test_below():

@@ -42,8 +42,9 @@ def test_minute():
     assert glued("period") == pytest.approx(PERIOD, abs=5e-4)
     assert glued("impacts") == math.floor((60 - PERIOD / 4) / (PERIOD / 2)) + 1
     assert glued("strike") == pytest.approx(BACK * math.sqrt(G / LENGTH), abs=5e-3)
-    energy = f"{0.5 * G / LENGTH * BACK**2:.12f}"
+    energy = f"{0.5 * G / LENGTH * BACK**2:.4f} J"
     assert CHAPTER.printed("minute").count(energy) == 2
+    assert "change < 10⁻¹² of it" in CHAPTER.printed("minute")
 
 
 def test_several():

@@ -5,8 +5,11 @@ writes each one a second time for dark mode: black becomes the colour of the tex
 the page, greys and pale tints change sides, and colours that tell lines apart stay. A page carries
 both; the theme's classes `only-light` and `only-dark` show one of them.
 
-The box around them knows how wide the figure was drawn. On a narrow screen the style sheet lets the
-figure scroll in this box rather than shrink to nothing.
+A map, a figure that contains a picture of points, has colours all over, with letters and lines on
+them. So the style sheet turns its light and dark as a whole, like those of a moving picture.
+
+The box around a figure knows how wide the figure has to be for its smallest letters to be read. On
+a narrow screen the style sheet lets a wider one scroll in this box.
 """
 
 import colorsys
@@ -31,6 +34,12 @@ COLOUR = re.compile(
     r"#(?:[0-9a-fA-F]{6}|[0-9a-fA-F]{3})\b|(?<=[\"' :])(?:white|black)(?=[\"';])"
 )
 NAMED = {"white": "#ffffff", "black": "#000000"}
+
+#: Pixels that the smallest letters of a figure have on a phone, at least. (Indices are smaller.)
+LEGIBLE = 7.8
+#: Sizes of letters: Matplotlib draws them as curves in units of a hundredth of a point.
+LETTERS = re.compile(r"\bscale\((0\.\d+) -0\.\d+\)")
+FONT_SIZE = re.compile(r'\bfont-size[:=]"?\s*([\d.]+)')
 
 
 def dark(colour: str) -> str:
@@ -74,6 +83,21 @@ def drawn_size(svg: str) -> tuple[int, int]:
     )
 
 
+def is_map(svg: str) -> bool:
+    """Return whether a drawing contains a picture of points."""
+    return "<image" in svg
+
+
+def letters(svg: str) -> float:
+    """Return the size of the smallest letters of a drawing in pixels.
+
+    >>> letters('<g transform="translate(7 7) scale(0.09 -0.09)">')
+    12.0
+    """
+    curves = (100 * float(size) * 4 / 3 for size in LETTERS.findall(svg))
+    return round(min((*curves, *map(float, FONT_SIZE.findall(svg)))), 2)
+
+
 def pair_images(
     app: Sphinx,
     page: str,
@@ -92,16 +116,29 @@ def pair_images(
         original = originals.get(Path(match["path"]).name + ".svg")
         if original is None:
             return match[0]
-        width, height = drawn_size(original.read_text(encoding="utf-8"))
+        svg = original.read_text(encoding="utf-8")
+        (width, height), smallest = drawn_size(svg), letters(svg)
+        colourings = (
+            {"map": ""}
+            if is_map(svg)
+            else {"only-light": "", "only-dark": "-dark"}
+        )
         # With its size given, a figure that is not loaded yet keeps its place.
-        light, dark = (
+        images = [
             f'<img class="{name}" width="{width}" height="{height}"'
             f'{match["other"]}src="{match["path"]}{ending}.svg"{match["rest"]}>'
-            for name, ending in (("only-light", ""), ("only-dark", "-dark"))
-        )
+            for name, ending in colourings.items()
+        ]
         # A lazy picture is not loaded before it is shown.
-        dark = dark.replace("<img", '<img loading="lazy"')
-        return f'<span class="figure-box" style="--drawn: {width}px">{light}{dark}</span>'
+        images[1:] = [
+            image.replace("<img", '<img loading="lazy"')
+            for image in images[1:]
+        ]
+        return (
+            f'<span class="figure-box" data-letters="{smallest}"'
+            f' style="--legible: {round(width * LEGIBLE / smallest)}px">'
+            f"{''.join(images)}</span>"
+        )
 
     if "body" in context:
         context["body"] = IMAGE.sub(box, context["body"])
@@ -111,10 +148,10 @@ def write_dark(app: Sphinx, exception: Exception | None) -> None:
     """Write the pictures of dark mode beside the others."""
     if exception is None and app.builder.format == "html":
         for path in Path(app.outdir, "_images").glob("*.svg"):
-            if not path.stem.endswith("-dark"):
-                drawing = darkened(path.read_text(encoding="utf-8"))
+            drawing = path.read_text(encoding="utf-8")
+            if not path.stem.endswith("-dark") and not is_map(drawing):
                 path.with_name(f"{path.stem}-dark.svg").write_text(
-                    drawing, encoding="utf-8"
+                    darkened(drawing), encoding="utf-8"
                 )
 
 
