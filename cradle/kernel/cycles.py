@@ -65,7 +65,7 @@ def cluster_around(c, level, n, state):
         right += 1
     first = right + 1
     last = left - 1
-    same = True
+    same = memory[c].p > 0.0  # else c has collided without an impulse
     loses = False
     for k in range(left, right + 1):
         same = same and memory[k].code == code(k, state)
@@ -105,7 +105,7 @@ def cycle(level, c, bend, n, state):
     cluster = cluster_around(c, level, n, state)
     if cluster.last < cluster.first:
         return c, c - 1, math.inf
-    total, off, size, doubt = limit(cluster, level, state)
+    total, off, size, unsure, doubt = limit(cluster, level, state)
     if total == 0.0:
         return c, c - 1, math.inf
     bent = 0.0
@@ -117,7 +117,7 @@ def cycle(level, c, bend, n, state):
             return c, c - 1, bent
     farthest = velocity_changes(cluster, total, level, state)
     steady = cluster.left < cluster.first or cluster.last < cluster.right
-    if steady and doubt + bent * farthest > LIMITS.doubt * threshold:
+    if steady and doubt + (unsure + bent) * farthest > LIMITS.doubt * threshold:
         return c, c - 1, bent
     if not neighbours_stay(cluster, total, farthest, level, n, state):
         return c, c - 1, math.inf
