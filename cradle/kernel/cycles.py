@@ -96,7 +96,8 @@ def cycle(level, c, bend, n, state):
     its limit at the present pace, and the pace was no lower (`bend`) over the snapshot before.
     Without steady neighbours the limit does not depend on it.  With them it does: then the part of
     the way that the bend leaves open, and what the digits of the neighbours' shares do, must be
-    too small to matter.
+    too small to matter.  Where these say nothing of the limit, the cycle ends where it is, if it is
+    too small to matter itself.
 
     Returns (first, last) of the contacts that have collapsed, empty, with nothing changed, if
     there is no cycle; and the bend.
@@ -115,6 +116,8 @@ def cycle(level, c, bend, n, state):
         bent = off * max(math.log(size / threshold), 1.0) * (total + 0.5)
         if not bent < min(LIMITS.bend, bend):
             return c, c - 1, bent
+    if unsure > 0.1:  # between balls held fast only the last digits tell how it goes on
+        total, unsure, doubt = 0.0, 0.0, size
     farthest = velocity_changes(cluster, total, level, state)
     steady = cluster.left < cluster.first or cluster.last < cluster.right
     if steady and doubt + (unsure + bent) * farthest > LIMITS.doubt * threshold:
