@@ -109,6 +109,8 @@ def cycle(level, c, bend, n, state):
     total, off, size, unsure, doubt = limit(cluster, level, state)
     if total == 0.0:
         return c, c - 1, math.inf
+    if unsure > 0.1:  # between balls held fast only the last digits tell how it goes on
+        total, unsure, doubt = 0.0, 0.0, size
     bent = 0.0
     if off > LIMITS.self_similar:
         # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
@@ -116,8 +118,6 @@ def cycle(level, c, bend, n, state):
         bent = off * max(math.log(size / threshold), 1.0) * (total + 0.5)
         if not bent < min(LIMITS.bend, bend):
             return c, c - 1, bent
-    if unsure > 0.1:  # between balls held fast only the last digits tell how it goes on
-        total, unsure, doubt = 0.0, 0.0, size
     farthest = velocity_changes(cluster, total, level, state)
     steady = cluster.left < cluster.first or cluster.last < cluster.right
     if steady and doubt + (unsure + bent) * farthest > LIMITS.doubt * threshold:
