@@ -147,7 +147,7 @@ def arrive(c, low, high, ball, contact):
     top = len(ball) - 2
     if not low <= k <= high:  # all of the run is one body, which only contact c itself can change
         contact[c].u = closing(c, ball)
-        if contact[c].u > 0.0:
+        if contact[c].u > -LIMITS.dust:
             set_closing_speed(c, 0.0, 0.0, 0, top, ball, contact)
         return
     near = -closing(c, ball)
