@@ -65,7 +65,7 @@ def cluster_around(c, level, n, state):
         right += 1
     first = right + 1
     last = left - 1
-    same = True
+    same = memory[c].p > 0.0  # else c has collided without an impulse
     loses = False
     for k in range(left, right + 1):
         same = same and memory[k].code == code(k, state)
@@ -96,7 +96,8 @@ def cycle(level, c, bend, n, state):
     its limit at the present pace, and the pace was no lower (`bend`) over the snapshot before.
     Without steady neighbours the limit does not depend on it.  With them it does: then the part of
     the way that the bend leaves open, and what the digits of the neighbours' shares do, must be
-    too small to matter.
+    too small to matter.  Where these say nothing of the limit, the cycle ends where it is, if it is
+    too small to matter itself.
 
     Returns (first, last) of the contacts that have collapsed, empty, with nothing changed, if
     there is no cycle; and the bend.
@@ -105,9 +106,11 @@ def cycle(level, c, bend, n, state):
     cluster = cluster_around(c, level, n, state)
     if cluster.last < cluster.first:
         return c, c - 1, math.inf
-    total, off, size, doubt = limit(cluster, level, state)
+    total, off, size, unsure, doubt = limit(cluster, level, state)
     if total == 0.0:
         return c, c - 1, math.inf
+    if unsure > 0.1:  # between balls held fast only the last digits tell how it goes on
+        total, unsure, doubt = 0.0, 0.0, size
     bent = 0.0
     if off > LIMITS.self_similar:
         # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
@@ -117,7 +120,7 @@ def cycle(level, c, bend, n, state):
             return c, c - 1, bent
     farthest = velocity_changes(cluster, total, level, state)
     steady = cluster.left < cluster.first or cluster.last < cluster.right
-    if steady and doubt + bent * farthest > LIMITS.doubt * threshold:
+    if steady and doubt + (unsure + bent) * farthest > LIMITS.doubt * threshold:
         return c, c - 1, bent
     if not neighbours_stay(cluster, total, farthest, level, n, state):
         return c, c - 1, math.inf

@@ -35,8 +35,9 @@ def limit(cluster, level, state):
     """Work out the limit: one velocity of the balls first..last + 1.
 
     Returns T, the sum of all cycles to come over the last one; how far the state is from its
-    snapshot scaled by T / (1 + T), relative to its own size; this size; and the doubt about the
-    common velocity that the digits of the neighbours' shares leave.  T is 0 if there is no limit.
+    snapshot scaled by T / (1 + T), relative to its own size; this size; and what the digits of the
+    neighbours' shares leave in doubt, relative to T and of the common velocity.  T is 0 if there is
+    no limit.
 
     T comes from the limit itself: the impulses that bring all balls to one velocity, over those of
     the last cycle.  With L the factor from cycle to cycle T = L / (1 - L), but 1 - L itself would
@@ -44,7 +45,7 @@ def limit(cluster, level, state):
     """
     ball, contact, memory = state.ball, state.contact, state.memory[level]
     left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
-    none = 0.0, math.inf, 0.0, 0.0
+    none = 0.0, math.inf, 0.0, 0.0, 0.0
     kept_left = kept_part(first - 1, first, first > left, memory)
     kept_right = kept_part(last + 1, last, last < right, memory)
     size = 0.0
@@ -53,11 +54,7 @@ def limit(cluster, level, state):
     ball[first].x = 0.0
     for i in range(first, last + 2):
         b = ball[i]
-        b.y = b.m
-        if i == first:
-            b.y /= kept_left
-        if i == last + 1:
-            b.y /= kept_right
+        b.y = b.m / (kept_left if i == first else kept_right if i == last + 1 else 1.0)
         mass += b.y
         momentum += b.y * b.x
         if i <= last:
@@ -86,12 +83,10 @@ def limit(cluster, level, state):
         off = max(off, abs(stored) / reduced_mass(c, ball) / size / size)
         if abs(contact[c].x - total * memory[c].p) > 0.01 * total * memory[c].p:
             return none
-    doubt = 0.0
-    if first > left:
-        doubt += abs(contact[first].x / kept_left / mass)
-    if last < right:
-        doubt += abs(contact[last].x / kept_right / mass)
-    return total, off, size, LIMITS.digits * doubt
+    one, other = LIMITS.digits / mass / kept_left, LIMITS.digits / mass / kept_right
+    unsure = abs(one * (mass - ball[first].y)) + abs(other * (mass - ball[last + 1].y))
+    doubt = abs(one * contact[first].x) + abs(other * contact[last].x)
+    return total, off, size, unsure, doubt
 
 
 @apart

@@ -147,21 +147,23 @@ def arrive(c, low, high, ball, contact):
     top = len(ball) - 2
     if not low <= k <= high:  # all of the run is one body, which only contact c itself can change
         contact[c].u = closing(c, ball)
-        if contact[c].u > 0.0:
+        if contact[c].u > -LIMITS.dust:
             set_closing_speed(c, 0.0, 0.0, 0, top, ball, contact)
         return
-    first, last, left, right = bodies(k, 0, top, ball, contact)
-    impulse = -closing(c, ball) * (left if c < low else right)
+    near = -closing(c, ball)
+    begin, end = (0, top) if near >= 0.0 else (low, high)
+    first, last, left, right = bodies(k, begin, end, ball, contact)
+    impulse = near * (left if c < low else right)
     if abs(impulse) > LIMITS.digits * contact[k].p:
-        push(k, impulse, 0, top, ball, contact)
+        push(k, impulse, begin, end, ball, contact)
     other = c if c < low else c + 1
     for j in range(low, high + 2):
         i = j if c < low else low + high + 1 - j
         ball[i].hi, ball[i].lo = ball[other].hi, ball[other].lo
         if i == (k if c < low else k + 1):
             break
-    for j in range(max(first - 1, 0), min(last, top) + 1):
-        if contact[j].u != 0.0:
+    for j in (first - 1, k, last):
+        if 0 <= j <= top:
             contact[j].u = closing(j, ball)
     contact[c].u = contact[c].blur = 0.0
 
