@@ -105,6 +105,44 @@ def run(
     return names
 
 
+def names_of(cell) -> tuple[set[str], set[str]]:
+    """Names that a code cell takes from the cells before it, and names that it gives."""
+    lines = [line for line in cell.source.splitlines() if not line.startswith("%")]
+    taken, given = set(), set()
+    for statement in ast.parse("\n".join(lines)).body:
+        inner, loaded, stored = set(), set(), set()
+        for node in ast.walk(statement):
+            match node:
+                case ast.Name(id=name, ctx=ast.Load()):
+                    loaded.add(name)
+                case ast.Name(id=name):
+                    stored.add(name)
+                case ast.alias():
+                    stored.add((node.asname or node.name).partition(".")[0])
+                case ast.For(target=target) | ast.comprehension(target=target):
+                    inner |= {part.id for part in ast.walk(target) if isinstance(part, ast.Name)}
+                case ast.arg(arg=name):
+                    inner.add(name)
+                case ast.AugAssign(target=ast.Name(id=name)):
+                    loaded.add(name)
+        if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+            inner, stored = inner | stored, {statement.name}  # what is stored inside stays there
+        taken |= loaded - inner - given
+        given |= stored
+    return taken, given
+
+
+def reached(cells: list) -> list[bool]:
+    """Tell for each code cell whether a change of the parameters reaches it, by others as well."""
+    found, changed = [], set()
+    for cell in cells:
+        taken, given = names_of(cell)
+        hit = bool(changed & taken) or "parameters" in cell.metadata.get("tags", [])
+        changed = changed | given if hit else changed - given
+        found.append(hit)
+    return found
+
+
 @contextlib.contextmanager
 def in_memory(show):
     """Draw without a screen and let `show` take the place of plt.show; undo everything after."""

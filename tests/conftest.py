@@ -3,17 +3,20 @@
 import os
 import subprocess
 import sys
-import time
+import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from built_book import built
+from hypothesis import HealthCheck, settings
 
 # The same examples at every run of the same sources. Hypothesis also draws the numbers that it
 # finds in the modules loaded so far: other sources, or a part of the tests, may give others. The
 # weekly run against the newest dependencies sets HYPOTHESIS_PROFILE=random and looks for new ones.
-settings.register_profile("same", derandomize=True, deadline=None, print_blob=True)
-settings.register_profile("random", deadline=None, print_blob=True)
+# Nothing hangs on how fast the machine is.
+any_speed = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow], "print_blob": True}
+settings.register_profile("same", derandomize=True, **any_speed)
+settings.register_profile("random", **any_speed)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 
@@ -24,7 +27,7 @@ def root() -> Path:
 
 
 #: Processor time of the whole suite in minutes, compiling included, as measured when last changed.
-MINUTES = 13
+MINUTES = 12
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
@@ -51,40 +54,48 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     return min(len(own(0)) if own else os.cpu_count() or 1, 4)
 
 
+#: Files that take longest, in this order: begun first, so that no process is left alone with one.
+LONG = (
+    "tests/test_book_parameters.py", "tests/test_defects.py", "tests/test_extremes.py",
+    "tests/test_explorer_reading.py", "tests/test_layout.py", "book/toy.ipynb",
+    "tests/test_book_figures_use.py", "book/patterns.ipynb", "book/three_balls.ipynb",
+    "tests/test_textbook.py", "tests/test_speed.py", "tests/test_book_figures.py",
+    "tests/test_explorer_page.py", "tests/test_explorer_engine.py", "tests/test_examples.py",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files that take longest first, in the order in which processes take them."""
+    place = {name: number for number, name in enumerate(LONG)}
+    items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(LONG)))
+
+
+#: Where the processes of a session find the book; the first process sets it.
+SHARED = "CRADLE_TESTS_SHARED"
+
+
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile before several processes would do it at once; they find the result on disk."""
-    if session.config.getoption("numprocesses", None) and not session.config.option.collectonly:
-        code = "from cradle.drive import warm_up; warm_up()"
-        subprocess.run([sys.executable, "-c", code], check=True)
+    """Compile before several processes would do it at once; they find the result on disk.
+
+    Beside it, as the compiler keeps but one processor busy, the book is built if it will be needed.
+    """
+    option = session.config.option
+    if not session.config.getoption("numprocesses", None) or option.collectonly:
+        return
+    shared = tempfile.TemporaryDirectory(prefix="cradle-tests-", ignore_cleanup_errors=True)
+    session.config.add_cleanup(shared.cleanup)
+    os.environ[SHARED] = shared.name
+    everything = option.markexpr == "not exhaustive" and not option.keyword
+    if everything and "tests" in session.config.args:
+        book = subprocess.Popen(
+            [sys.executable, Path(__file__).with_name("built_book.py"), shared.name]
+        )
+        session.config.add_cleanup(book.wait)
+    code = "from cradle.drive import warm_up; warm_up()"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.fixture(scope="session")
-def html(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
-    """Build the book, warnings as errors: once, by the first of several processes that asks."""
-    shared = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        shared = shared.parent
-    folder, report = shared / "book", shared / "book.txt"
-    try:
-        folder.mkdir()
-    except FileExistsError:
-        for _ in range(600):
-            if report.exists():
-                break
-            time.sleep(1)
-    else:
-        command = "from jupyter_book.cli.main import main; main()"
-        build = subprocess.run(
-            [sys.executable, "-c", command, "build", root, "--path-output", folder, "-W", "-n",
-             "--keep-going"],
-            cwd=root,
-            capture_output=True,
-            text=True,
-            check=False,
-        )  # fmt: skip
-        text = "done" if build.returncode == 0 else build.stdout + build.stderr
-        (shared / "book.part").write_text(text, encoding="utf-8")
-        (shared / "book.part").replace(report)
-    text = report.read_text(encoding="utf-8")
-    assert text == "done", text
-    return folder / "_build" / "html"
+def html(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The pages of the book, built once for all processes."""
+    return built(Path(os.environ.get(SHARED) or tmp_path_factory.mktemp("built")))

@@ -501,16 +501,20 @@ SLOW = {
 @pytest.mark.parametrize("work", SLOW)
 @pytest.mark.parametrize("wish", ["plain", pytest.param("compiled", marks=needs_numba)])
 def test_ctrl_c_works_at_once(work, wish):
-    """Impacts of many millions of collisions each."""
+    """Impacts of many millions of collisions each; counted in processor time, on any machine."""
     code = f"""if True:
-        import signal
+        import signal, time
         signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs begin without
         import cradle
         from cradle.drive import warm_up
         warm_up()
         m, v = [1, *[1e-14, 1] * 4], [1, *[0] * 8]
+        begun = time.process_time()
         print("begins", flush=True)
-        {SLOW[work]}
+        try:
+            {SLOW[work]}
+        except KeyboardInterrupt:
+            print(time.process_time() - begun)
     """
     with subprocess.Popen(
         [sys.executable, "-c", code],
@@ -521,16 +525,18 @@ def test_ctrl_c_works_at_once(work, wish):
     ) as process:
         try:
             assert process.stdout.readline() == "begins\n"
+            begun = time.perf_counter()
             time.sleep(1)
             assert process.poll() is None
             process.send_signal(signal.SIGINT)
-            begun = time.perf_counter()
-            _, error = process.communicate(timeout=60)
+            waited = time.perf_counter() - begun
+            output, error = process.communicate(timeout=300)
         finally:
             process.kill()
-    assert "KeyboardInterrupt" in error
-    # A second or less on an idle machine; without pauses it would be minutes.
-    assert time.perf_counter() - begun < 5
+    assert process.returncode == 0, error
+    # All threads together. A second or less after the interrupt; without pauses it would be
+    # minutes.
+    assert float(output) < waited * (os.cpu_count() or 1) + 5
 
 
 # --- the rooms stay plain -----------------------------------------------------------------------

@@ -1,0 +1,55 @@
+"""The book, built once for all tests that look at its pages, warnings as errors.
+
+`python tests/built_book.py FOLDER` builds it there, unless somebody has begun to.
+"""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+#: Seconds; on an idle machine it takes less than one minute.
+LONGEST = 1800
+
+
+def build(shared: Path) -> None:
+    """Build the book below this folder, and leave a report there."""
+    folder = shared / "book"
+    try:
+        folder.mkdir()
+    except FileExistsError:
+        return
+    text = "not built: interrupted"
+    try:
+        command = "from jupyter_book.cli.main import main; main()"
+        done = subprocess.run(
+            [sys.executable, "-c", command, "build", ROOT, "--path-output", folder, "-W", "-n",
+             "--keep-going"],
+            cwd=ROOT,
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",
+            check=False,
+        )  # fmt: skip
+        text = "done" if done.returncode == 0 else done.stdout + done.stderr
+    finally:
+        part = shared / "book.part"
+        part.write_text(text, encoding="utf-8")
+        part.replace(shared / "book.txt")
+
+
+def built(shared: Path) -> Path:
+    """Build the book or wait for who does, and return the folder of its pages."""
+    build(shared)
+    report, begun = shared / "book.txt", time.monotonic()
+    while not report.exists():
+        assert time.monotonic() - begun < LONGEST, "whoever builds the book does not finish"
+        time.sleep(0.2)
+    text = report.read_text(encoding="utf-8")
+    assert text == "done", text
+    return shared / "book" / "_build" / "html"
+
+
+if __name__ == "__main__":
+    build(Path(sys.argv[1]))
