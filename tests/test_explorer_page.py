@@ -207,6 +207,32 @@ def test_pull_back_where_it_has_an_effect(visit):
     assert tab.evaluate(f"{EXPLORER}.state.clock.time") == 0
 
 
+def test_only_a_drag_moves_a_ball(visit):
+    """A tap on a ball leaves the swing as it is, and a ball taken at its edge does not jump."""
+    tab = visit(stopped=True)
+    time, ball = f"{EXPLORER}.state.clock.time", ".ball[data-ball='4'] .disc"
+    tab.clock.run_for(1500)
+    before = tab.evaluate(time)
+    x, y = middle(tab, ball)
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + 1, y)
+    tab.clock.run_for(50)
+    tab.mouse.up()
+    tab.clock.run_for(500)
+    assert tab.evaluate(time) == pytest.approx(before + 0.5, abs=0.07)
+    assert tab.evaluate(SETTING)["speeds"] == [1, 0, 0, 0, 0]
+    press(tab, "Pause")
+    press(tab, "Pull back")
+    tab.clock.run_for(50)
+    x, y = middle(tab, ball)
+    tab.mouse.move(x + 15, y)
+    tab.mouse.down()
+    tab.mouse.move(x + 15 + 40, y)
+    tab.clock.run_for(50)
+    assert abs(middle(tab, ball)[0] - (x + 40)) < 8
+
+
 def test_balls_in_the_way_come_along(visit):
     tab = still(visit)
     x, y = middle(tab, ".ball[data-ball='2'] .disc")

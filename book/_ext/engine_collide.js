@@ -10,7 +10,6 @@ const DEFECTS = {
 };
 // Steps after which an impact is given up, unless told otherwise: some tenths of a second.
 const MAX_EVENTS = 20000;
-const POSITIVE = Number.MIN_VALUE;
 const ENDLESS = 2 ** 53;
 
 // Largest admissible ratio at each inner ball, forward (Eq. 53) and backward (its mirror image). The
@@ -29,7 +28,7 @@ function largestRatios(masses, forward = 0, backward = 0) {
 }
 
 function checkedMasses(masses) {
-  const m = row("masses", masses, undefined, "must be above 0", POSITIVE);
+  const m = row("masses", masses, undefined, "must be above 0", Number.MIN_VALUE);
   if (m.length > 1) return m;
   throw new Error(
     `masses has shape ${shape(masses)}; a chain needs (N,) with N >= 2: one row of two or more numbers`,

@@ -141,8 +141,8 @@
           state.clock.time = 0;
           this.changed();
         },
-        letGo: () => {
-          if (!less()) state.clock.playing = true;
+        letGo: (moved) => {
+          if (moved && !less()) state.clock.playing = true;
           this.changed();
         },
       };
@@ -172,7 +172,7 @@
     // --- the address and the screen -----------------------------------------------------------------
 
     readAddress() {
-      const fragment = decodeURIComponent(location.hash.slice(1));
+      const fragment = explorer.plain(location.hash.slice(1));
       // Others are headings of the page.
       if (!fragment.includes("=") || fragment === this.written) return;
       this.state.read(fragment);

@@ -147,21 +147,21 @@
     const gone = total > 0 ? Math.max(0, 1 - sum(shares)) : 0;
     const height = 1.5 * em;
     let x = 0;
-    const piece = (share, how, label) => {
+    const piece = (share, how, label, letters) => {
       const wide = share * width;
       const part =
         `<rect x="${px(x)}" y="0" width="${px(wide)}" height="${px(height)}" ${how}/>` +
         (wide > 2.6 * em
-          ? text(x + wide / 2, 1.1 * em, label, 'text-anchor="middle" class="on-colour"')
+          ? text(x + wide / 2, 1.1 * em, label, `text-anchor="middle" ${letters}`)
           : "");
       x += wide;
       return part;
     };
     const percent = (share) => `${fixed(100 * share, 0)}\u00a0%`;
     const parts = shares.map((share, ball) =>
-      piece(share, `fill="${colour(ball)}" class="part"`, percent(share)),
+      piece(share, `fill="${colour(ball)}" class="part"`, percent(share), 'class="on-colour"'),
     );
-    parts.push(piece(gone, 'class="gone"', percent(gone)));
+    parts.push(piece(gone, 'class="gone"', percent(gone), ""));
     const words = shares.map((share, ball) => `ball ${ball + 1} ${percent(share)}`).join(", ");
     return picture(
       { width, height },

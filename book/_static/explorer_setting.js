@@ -31,7 +31,7 @@
     }
     const at = setting.speeds.findIndex((speed, k) => k > 0 && speed > setting.speeds[k - 1]);
     if (at > 0) return `speeds[${at}] = ${setting.speeds[at]}; must not exceed the one before it`;
-    const known = [...setting.letters].every((letter) => letter === NONE || letter in data.masses);
+    const known = [...setting.letters].every((letter) => letter === NONE || Object.hasOwn(data.masses, letter));
     if (setting.letters.length !== count || !known)
       return `letters = ${setting.letters}; must be ${count} of A, B, C, D or -`;
     return "";
@@ -144,11 +144,20 @@
     }
   }
 
+  // Mail programs write `%2C` for a comma; what cannot be read stays as it is.
+  function plain(address) {
+    try {
+      return decodeURIComponent(address);
+    } catch {
+      return address;
+    }
+  }
+
   // Read a fragment: {setting, picture}, or {error} in words. A key may be left out.
   function fromFragment(text) {
     const given = new Map(text.split("&").map((part) => part.split("=", 2)));
     const unknown = [...given.keys()].find(
-      (key) => !(key in LENGTHS || key === "letters" || key === "picture"),
+      (key) => !(Object.hasOwn(LENGTHS, key) || key === "letters" || key === "picture"),
     );
     if (unknown !== undefined) return { error: `${unknown} is no part of a setting` };
     const numbers = (name) =>
@@ -214,9 +223,9 @@ print(run)
     equal,
     fromFragment,
     lettered,
+    plain,
     pulled,
     python,
-    refusal,
     resized,
     toFragment,
     withMass,

@@ -8,6 +8,8 @@
   const MOST = 1.25;
   // A pull is a whole number of these, m/s.
   const STEP = 0.05;
+  // Fewer pixels than these are no drag: a finger is never quite still.
+  const STILL = 3;
 
   function make(kind, attributes, parent) {
     const node = document.createElementNS(SVG, kind);
@@ -17,7 +19,7 @@
   }
 
   class Stage {
-    // `on`: {grab(), pull(ball, speed), letGo()}; the stage shows and asks, it decides nothing.
+    // `on`: {grab(), pull(ball, speed), letGo(moved)}; the stage shows and asks, it decides nothing.
     constructor(host, on) {
       this.svg = make("svg", { class: "stage", role: "group", "aria-label": "the cradle" }, host);
       this.on = on;
@@ -151,25 +153,34 @@
       event.preventDefault();
       group.focus({ preventScroll: true });
       this.svg.setPointerCapture(event.pointerId);
-      this.drag = { ball: +group.dataset.ball, moved: false };
+      const ball = +group.dataset.ball;
+      // A ball that is taken at its edge does not jump to the pointer.
+      const offset = this.place(event) - this.balls[ball].string.x2.baseVal.value;
+      this.drag = { ball, offset, from: event.clientX, moved: false };
       this.on.grab();
+    }
+
+    // Where a pointer is, in the units of the picture.
+    place(event) {
+      const { left, width } = this.svg.getBoundingClientRect();
+      return ((event.clientX - left) * this.svg.viewBox.baseVal.width) / width;
     }
 
     move(event) {
       if (!this.drag) return;
-      this.drag.moved = true;
-      const { left, width } = this.svg.getBoundingClientRect();
-      const unit = this.svg.viewBox.baseVal.width / width;
-      const sine = ((event.clientX - left) * unit - this.pivots[this.drag.ball]) / this.length;
+      const { ball, offset, from } = this.drag;
+      this.drag.moved ||= Math.abs(event.clientX - from) >= STILL;
+      if (!this.drag.moved) return;
+      const sine = (this.place(event) - offset - this.pivots[ball]) / this.length;
       const angle = Math.asin(Math.min(Math.max(sine, -0.95), 0.95));
-      this.on.pull(this.drag.ball, this.rounded((-angle / this.size) * LENGTH * FREQUENCY));
+      this.on.pull(ball, this.rounded((-angle / this.size) * LENGTH * FREQUENCY));
     }
 
     release() {
       if (!this.drag) return;
       const { moved } = this.drag;
       this.drag = null;
-      if (moved) this.on.letGo();
+      this.on.letGo(moved);
     }
 
     // The left key pulls to the left, which makes the ball come in to the right.

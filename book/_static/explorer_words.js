@@ -96,9 +96,6 @@
     fixed,
     hitName,
     kinetic,
-    list,
-    motions,
-    noAnswer,
     outcomeInWords: outcome,
     sum,
   });
