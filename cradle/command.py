@@ -137,7 +137,12 @@ def fit(
         "momentum_chi_square": momentum,
         "shots": count,
     }
-    notes = [f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}" for one in fits]
+    poor = {True: "", False: " (a poor fit: the errors do not explain the differences)"}
+    notes = [
+        f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}"
+        f"{poor[one.probability > 1e-3]}"
+        for one in fits
+    ]
     notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots")
     if predict is not None:
         predicted = fits[-1].predict(predict, speed)
