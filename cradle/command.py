@@ -80,8 +80,9 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
         "collapsed": trace.collapsed,
         "held_contacts": list(trace.saturated),
     }
+    still = "" if (chain.closing_speeds > 0.0).any() else "no balls approach: no impact\n"
     note = (
-        f"energy lost: {100 * extra['energy_lost'] + 0.0:.2f} %; collisions of the contacts: "
+        f"{still}energy lost: {100 * extra['energy_lost']:z.2f} %; collisions of the contacts: "
         f"{', '.join(map(str, extra['collisions']))}\n{given.note}"
     )
     show(rows, extra, note, as_json, as_csv)
