@@ -80,8 +80,9 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
         "collapsed": trace.collapsed,
         "held_contacts": list(trace.saturated),
     }
+    still = "" if (chain.closing_speeds > 0.0).any() else "no balls approach: no impact\n"
     note = (
-        f"energy lost: {100 * extra['energy_lost'] + 0.0:.2f} %; collisions of the contacts: "
+        f"{still}energy lost: {100 * extra['energy_lost']:z.2f} %; collisions of the contacts: "
         f"{', '.join(map(str, extra['collisions']))}\n{given.note}"
     )
     show(rows, extra, note, as_json, as_csv)
@@ -137,7 +138,12 @@ def fit(
         "momentum_chi_square": momentum,
         "shots": count,
     }
-    notes = [f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}" for one in fits]
+    poor = {True: "", False: " (a poor fit: the errors do not explain the differences)"}
+    notes = [
+        f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}"
+        f"{poor[one.probability > 1e-3]}"
+        for one in fits
+    ]
     notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots")
     if predict is not None:
         predicted = fits[-1].predict(predict, speed)

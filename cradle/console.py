@@ -59,7 +59,7 @@ def _cells(column: Sequence[Any]) -> list[str]:
             return str(value)
         if decimals > 8 or largest >= 1e8:
             return f"{value:.4g}"
-        return f"{round(value, decimals) + 0.0:.{decimals}f}"
+        return f"{value:z.{decimals}f}"
 
     return [cell(value) for value in column]
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from cradle.chain import Chain
 from cradle.checks import Vector
+from cradle.drawing import as_text
 from cradle.pendulums import Pendulums
 from cradle.trace import Trace
 
@@ -21,8 +22,8 @@ class Impact(NamedTuple):
 
     Examples
     --------
-    >>> Impact(0.5, (0,), np.zeros(2), np.array([1.0, 0.0]), np.array([0.0, 1.0]), 0.0, ()).contacts
-    (0,)
+    >>> Impact(0.5, (0,), np.zeros(2), np.array([1.0, 0.0]), np.array([0.0, 1.0]), 0.0, ())
+    Impact(time=0.5, contacts=(0,), before=[1, 0], after=[0, 1])
     """
 
     #: s since the release.
@@ -39,6 +40,13 @@ class Impact(NamedTuple):
     energy_loss: float
     #: The path of each chain that collided, from left to right.
     traces: tuple[Trace, ...]
+
+    def __repr__(self) -> str:
+        """Return a short account."""
+        return (
+            f"Impact(time={self.time:.6g}, contacts={self.contacts}, "
+            f"before={as_text(self.before)}, after={as_text(self.after)})"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

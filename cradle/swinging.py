@@ -85,7 +85,10 @@ def swing(
     collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
     at = checked("times", times)
     if at.ndim != 1 or not at.size or at[0] < 0.0 or (np.diff(at) < 0.0).any():
-        raise ValueError(f"times = {shown(times)}; must be a row of rising numbers, none below 0")
+        raise ValueError(
+            f"times = {shown(times)}; must be a row of rising numbers, none below 0, "
+            "such as [0, 0.5, 1]"
+        )
     most = whole_number("max_impacts", max_impacts)
     least = one_number("min_energy", min_energy, "must lie in [0, 1]", 0.0, 1.0)
     run = _Run(chain, model, hanging, checked("positions", positions))
@@ -111,7 +114,9 @@ class _Run:
     def __init__(self, chain: Chain, model: Model, pendulums: Pendulums, x: Vector) -> None:
         n = len(chain)
         if x.shape != (n,):
-            raise ValueError(f"positions has shape {x.shape}; {n} balls need ({n},)")
+            raise ValueError(
+                f"positions has shape {x.shape}; {n} balls need ({n},): a place for each ball"
+            )
         reach = pendulums.reach(n)
         part = "a quarter of a circle" if pendulums.angle == "small" else "half a circle"
         for far in np.unique(reach[np.abs(x) > reach]):

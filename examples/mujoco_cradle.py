@@ -83,5 +83,7 @@ if __name__ == "__main__":
     for step in range(5001):
         if step % 500 == 0:  # how far each ball is out
             at = [x for x, _ in row.bodies.motion()[0]]
-            print(*(f"{x - 2 * RADIUS * i:7.3f}" for i, x in enumerate(at)))
+            print(
+                *(f"{x - 2 * RADIUS * i:z7.3f}" for i, x in enumerate(at))
+            )
         row.step(1 / 1000)

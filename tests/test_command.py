@@ -153,6 +153,11 @@ def test_the_papers_balls_by_another_law():
     assert json.loads(call("solve AAAAA --json"))["assumed"] == []
 
 
+def test_balls_that_do_not_approach_are_named():
+    assert "no balls approach: no impact" in call("solve --masses 1,1,1 --velocities -1,0,0")
+    assert "no balls approach" not in call("solve --masses 1,1,1 --velocities 0,0,-1")
+
+
 def test_numbers_are_for_people():
     """Never minus zero; light balls have a mass; columns have as many decimals as they need."""
     text = call("solve --masses 1,1,1 --ratio 0")

@@ -496,3 +496,27 @@ def test_precision_is_what_the_script_makes(triplet):
         assert bool(row[name]) == bool(value) or value == 0
         if row[name] and float(row[name]) > 1e-4:
             assert float(value) == pytest.approx(float(row[name]), rel=2e-3, abs=2e-4), name
+
+
+def test_files_that_are_no_table_of_ours(tmp_path):
+    """As spreadsheets save them: each says what to do."""
+    lines = (ROOT / "data" / "shots_template.csv").read_text(encoding="utf-8").splitlines()
+    cases = {
+        "semicolons; put commas": [line.replace(",", ";") for line in lines],
+        r"13 values; the header has 9 columns \(decimals need a point": [
+            line.replace("0.", "0,") for line in lines
+        ],
+        "set ABA has the balls AB alone; is the row of ball 3 missing": lines[:-1],
+    }
+    for number, (words, table) in enumerate(cases.items()):
+        path = tmp_path / f"{number}.csv"
+        path.write_text("\n".join(table) + "\n", encoding="utf-8")
+        with pytest.raises(ValueError, match=words):
+            read_shots(path)
+    path.write_text("\n".join(lines), encoding="utf-16")
+    with pytest.raises(ValueError, match=r"2.csv is no UTF-8 text \(byte 0\); save it as CSV in"):
+        read_shots(path)
+    # Any other name is free, whatever balls it has.
+    for other in ("first day", "ABA-2", "ABAb"):
+        path.write_text("\n".join(lines).replace("\nABA,", f"\n{other},"), encoding="utf-8")
+        assert [one.name for one in read_shots(path).sets] == ["AB", other]

@@ -264,7 +264,7 @@ def test_the_recipe_tells_where_the_energy_is():
             for how, cell in (("as it is", own), ("mended", row)):
                 end = run(name, how, setting)[-1]
                 most = end.max() / end.sum()
-                assert cell == f"{100 * end.sum():.0f} ({100 * most:.0f})"
+                assert cell == f"{100 * end.sum():.0f}\u00a0({100 * most:.0f})"
                 assert (most > 0.95) if how == "mended" else (most < 0.6), (name, setting)
             assert alone == f"{100 * run(name, 'no impacts', setting, 5)[-1].sum():.0f}"
     end = run(*HERTZ)[-1]

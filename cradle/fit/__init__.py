@@ -2,7 +2,7 @@
 
     read_shots -> restitution (pairs) -> ratio (triplets and longer chains) -> predict
 
-- `cradle.fit.shots`: tables of measured velocities, read and checked.
+- `cradle.fit.shots`: tables of measured velocities, read and checked; `cradle.fit.lines`.
 - `cradle.fit.tracker`: positions exported by the video tool Tracker.
 - `cradle.fit.motion`: velocities from positions or heights.
 - `cradle.fit.parameters`: what is fitted, and its names.

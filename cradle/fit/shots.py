@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cradle.checks import Vector
+from cradle.fit.lines import table_lines
 
 #: Columns that every table of shots has, and what they hold.
 COLUMNS = {
@@ -193,7 +193,7 @@ def read_shots(
     >>> shots["AB"].masses
     array([0.045, 0.053])
     """
-    lines = _lines(source)
+    lines = table_lines(source)
     if not lines:
         raise ValueError("the table has no rows")
     needed = [name for name in COLUMNS if not (name == "sigma" and sigma is not None)]
@@ -215,37 +215,6 @@ def read_shots(
     for row in rows:
         groups.setdefault(row.set, {}).setdefault(row.shot, []).append(row)
     return Shots(tuple(_shot_set(name, shots) for name, shots in groups.items()))
-
-
-def _lines(source: Any) -> list[tuple[str, dict[str, Any]]]:
-    """Return the rows of the table with a name for each."""
-    if isinstance(source, (str, Path)) or hasattr(source, "open"):
-        path = Path(source) if isinstance(source, str) else source
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            numbered = [
-                (number, text) for number, text in enumerate(file, 1)
-                if text.strip() and not text.lstrip().startswith("#")
-            ]  # fmt: skip
-        reader = csv.reader(text for _, text in numbered)
-        header = [name.strip() for name in next(reader, [])]
-        lines = []
-        for (number, _), cells in zip(numbered[1:], reader, strict=True):
-            if len(cells) != len(header):
-                raise ValueError(
-                    f"line {number}: {len(cells)} values; the header has {len(header)} columns"
-                )
-            lines.append((f"line {number}", dict(zip(header, cells, strict=True))))
-        return lines
-    if not (isinstance(source, Mapping) or hasattr(source, "columns")):
-        raise TypeError(f"source is a {type(source).__name__}; must be a path or a table")
-    columns = {str(name): list(source[name]) for name in source}
-    lengths = {len(values) for values in columns.values()}
-    if len(lengths) > 1:
-        raise ValueError(f"columns have different lengths: {sorted(lengths)}")
-    return [
-        (f"row {k + 1}", {name: values[k] for name, values in columns.items()})
-        for k in range(lengths.pop() if lengths else 0)
-    ]
 
 
 def _unit(name: str, given: str | None, known: dict[str, float], default: str) -> float:
@@ -324,6 +293,13 @@ def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
         _check_physics(name, shot, rows)
         table.append(rows)
     assert first is not None
+    types = "".join(row.type for row in first)
+    rest = name.removeprefix(types)
+    if rest != name and rest.isalpha() and rest.isupper():  # all other names are free
+        raise ValueError(
+            f"{first[0].where}, column set: set {name} has the balls {types} alone; is the row of "
+            f"ball {len(first) + 1} missing?  If not, give the set another name"
+        )
     values = {
         column: np.array([[getattr(row, column) for row in rows] for rows in table])
         for column in ("before", "after", "sigma", "sigma_before")

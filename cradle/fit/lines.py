@@ -1,0 +1,68 @@
+"""The lines of a table, from a file or from columns."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+
+def table_lines(source: Any) -> list[tuple[str, dict[str, Any]]]:
+    """Return the rows of a table, each with a name of its place.
+
+    Parameters
+    ----------
+    source : path, DataFrame or mapping of columns
+        As for `read_shots`.
+
+    Returns
+    -------
+    list of tuple
+        "line 2" or "row 1", and the cells by their columns.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If it is no table; the message says what to do.
+
+    Examples
+    --------
+    >>> table_lines({"shot": [1, 2]})
+    [('row 1', {'shot': 1}), ('row 2', {'shot': 2})]
+    """
+    if isinstance(source, (str, Path)) or hasattr(source, "open"):
+        path = Path(source) if isinstance(source, str) else source
+        try:
+            with path.open(encoding="utf-8-sig", newline="") as file:
+                numbered = [
+                    (number, text) for number, text in enumerate(file, 1)
+                    if text.strip() and not text.lstrip().startswith("#")
+                ]  # fmt: skip
+        except UnicodeDecodeError as error:
+            raise ValueError(
+                f"{path.name} is no UTF-8 text (byte {error.start}); save it as CSV in UTF-8"
+            ) from None
+        if numbered and ";" in numbered[0][1] and "," not in numbered[0][1]:
+            raise ValueError(f"{path.name} has semicolons; put commas between the columns")
+        reader = csv.reader(text for _, text in numbered)
+        header = [name.strip() for name in next(reader, [])]
+        lines = []
+        for (number, _), cells in zip(numbered[1:], reader, strict=True):
+            if len(cells) != len(header):
+                raise ValueError(
+                    f"line {number}: {len(cells)} values; the header has {len(header)} columns "
+                    "(decimals need a point)"
+                )
+            lines.append((f"line {number}", dict(zip(header, cells, strict=True))))
+        return lines
+    if not (isinstance(source, Mapping) or hasattr(source, "columns")):
+        raise TypeError(f"source is a {type(source).__name__}; must be a path or a table")
+    columns = {str(name): list(source[name]) for name in source}
+    lengths = {len(values) for values in columns.values()}
+    if len(lengths) > 1:
+        raise ValueError(f"columns have different lengths: {sorted(lengths)}")
+    return [
+        (f"row {k + 1}", {name: values[k] for name, values in columns.items()})
+        for k in range(lengths.pop() if lengths else 0)
+    ]
