@@ -274,6 +274,46 @@ def test_an_elastic_sequence_without_end():
     assert difference(ENDLESS.collide().velocities, exact(ENDLESS).velocities) < 1e-12
 
 
+#: What came to zero, and what went on, at the last digits: these were refused or went on for ever.
+LAST_DIGITS = {
+    # Its gap could not close by so little as was left, so it opened and closed again.
+    "a gap as wide as the last digit": Problem(
+        [0.053, 0.045, 0.053, 0.053, 0.053], at_rest(5), [1.0, 0.9, 0.5, 1.0],
+        [0.1, 0.0, 1.0], [0.0, 1.0, 0.0],
+    ),
+    # How far such a cycle shrinks is in no digit: its sum was drawn from nothing.
+    "two balls that chatter between balls held fast": Problem(
+        [3.0, 1.0, 0.3, 3.0, 1.0, 1.0], [1.0, 0.5, 0.0, 0.5, 1.0, -0.5],
+        [1.0, 1.0, 0.9, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], 0.0,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LAST_DIGITS)
+def test_what_the_last_digits_leave_open(name):
+    trace, truth = LAST_DIGITS[name].collide(max_events=10_000), exact(LAST_DIGITS[name])
+    assert difference(trace.velocities, truth.velocities) < 1e-13
+    assert difference(trace.impulses, truth.impulses) < 1e-13
+
+
+def test_no_contact_pulls_where_a_run_arrives_on_both_sides():
+    """All balls come to rest, so momentum alone fixes every impulse; the first ball is not hit.
+
+    At the last digits the run arrives at the balls on both sides of it, and what one arrival took
+    back was taken from balls that rest beyond the other.
+    """
+    problem = Problem(
+        [0.053, *[0.166] * 6], [0, 0.5, 0.5, -0.5, 0.5, -0.5, -0.5], [0, 0, 0, 0.9, 0, 0.5],
+        [0, 1, 0, 0, 0], [0, 0, 0, 1, 0],
+    )  # fmt: skip
+    trace = problem.collide()
+    assert trace.impulses.min() >= 0
+    assert trace.impulses[0] == 0
+    assert np.abs(trace.velocities).max() < 1e-16
+    passed = np.cumsum(np.multiply(problem.masses, problem.velocities))[:-1]
+    np.testing.assert_allclose(trace.impulses, passed, rtol=0, atol=1e-15)
+
+
 #: Chains of many collapses, which made or lost momentum: in neighbours of a cycle that are held at
 #: u = 0 together, and in joined balls some of which were already parting.
 MANY_COLLAPSES = {

@@ -6,12 +6,14 @@ not finish, or its answer is not certified.
 """
 
 import math
+from dataclasses import astuple
 
 import mpmath
 import numpy as np
 import pytest
 import truth
 from plain import solve
+from test_defects import LAST_DIGITS, MANY_COLLAPSES, NAMED
 
 from cradle.kernel.state import FINISHED, UNFINISHED, UNSOUND
 
@@ -71,6 +73,16 @@ def lower_level_only(names):
         return (c, c - 1) if number == 1 else names["look"](number, c, n, state)
 
     return look
+
+
+def sure(names):
+    """In place of `limit`: the digits of the neighbours' shares leave nothing in doubt."""
+
+    def limit(*given):
+        *found, _, _ = names["limit"](*given)
+        return (*found, 0.0, 0.0)
+
+    return limit
 
 
 LIGHT_BETWEEN = ([1e-6, 1e-9, 1e-6, 1], [1, 0, 0, 0], [0.3, 0.1, 0.99], [0.3, 0.1], [0.5, 1], 1.0)
@@ -168,11 +180,7 @@ NEEDED = {
     ),
     "gaps beside a run that has moved": (
         {"touch_beside": lambda _: lambda *_: None},
-        (
-            [1, 1, 1, 0.3, 1, 1, 0.3, 0.3, 1, 1, 1, 1, 1, 3, 3, 3, 3], [1] + [0] * 16, 1,
-            [0, 0.1, 0, 1, 0, 0, 0, 0.1, 0.1, 0.1, 1, 1, 0, 0.1, 0],
-            [0, 0, 0, 0.1, 1, 0.1, 0, 0, 0.1, 0.1, 0, 0, 0.1, 0.1, 0], 1.0,
-        ),
+        astuple(NAMED["an end and a closing beside it at once"]),
         WRONG,
     ),
     "neighbours that come to their own event in a cycle": (
@@ -193,17 +201,18 @@ NEEDED = {
     ),
     "neighbours held at zero during a jump": (
         {"hold_together": lambda _: lambda *_: None},
-        (
-            [103.26201559217535, 0.0029458428086861876, 42.037175144265106, 368.4592301173039,
-             3.6033248776606968, 65.02699676001548],
-            [0.9276574737082792, 0.8165336320559369, 0.40052381164752004, 0.014953379291987146,
-             -0.4139783545152895, -0.6060795393367171],
-            [0.7679012279991019, 0.6890388067102825, 0.1473848239015375, 0.007660307222551066,
-             0.6598850616412061],
-            [0.6051257401104178, 0.49275940669505214, 0.8906014267771414, 0.06722149860770721],
-            [1.0, 0.8961740848105425, 1.0, 0.4339624923694204], 0.5,
-        ),
+        astuple(MANY_COLLAPSES["held neighbours"]),
         UNSOUND,
+    ),
+    "how far a cycle between balls held fast shrinks": (
+        {"limit": sure},
+        astuple(LAST_DIGITS["two balls that chatter between balls held fast"]),
+        UNSOUND,
+    ),
+    "a gap as wide as the last digit": (
+        {"dust": 0.0},
+        astuple(LAST_DIGITS["a gap as wide as the last digit"]),
+        UNFINISHED,
     ),
 }  # fmt: skip
 

@@ -137,8 +137,9 @@ def arrive(c, low, high, ball, contact):
 
     The two differ by rounding, most often by that of what the run's last impulse did to this ball,
     and to those that zeros join to it.  Where it is more, the impulse of the contact inwards is
-    corrected first.  If there is none, a contact that has not quite arrived is left as it is: none
-    pulls.
+    corrected first: a push moves whatever rests on its balls, but what is taken back is taken from
+    the run alone, since no contact pulls.  If there is no such contact, one that has not quite
+    arrived is left as it is, but for dust.
     """
     step = 1 if c < low else -1
     k = low if c < low else high

@@ -37,11 +37,18 @@ NO_EVENT, MOMENTUM, ORDER, ENERGY, LEDGER = 1, 2, 3, 4, 5
 
 
 class Limits(NamedTuple):
-    """What rounding and infinity are measured by; each has a test that fails without it."""
+    """What rounding and infinity are measured by.
+
+    Where a chain is known that goes wrong without a limit, `tests/test_safeguards.py` switches it
+    off: `dust`, `faint`, `bend`, `doubt`, `tie`, `simultaneous`, `roundings`, `same`, `vanishing`.
+    `exhausted`, `repeats` and `self_similar` only save rounds.  No such chain is known for
+    `rounded` and `cut`, nor for a larger `faint` or `doubt`, or a smaller `same`: these stay as
+    what rounding says.  The others bound the input, the closed form and the certificate.
+    """
 
     #: R9: an exhausted contact's speed, relative to the largest initial closing speed.
     exhausted: float
-    #: R9: closing speed below the last digit of velocities kept as sums of two numbers.
+    #: Closing speed below the last digit of velocities kept as sums of two numbers.
     dust: float
     #: R9: kinetic energy that a collapse may cost, relative to that of the initial closing.
     faint: float
