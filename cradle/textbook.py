@@ -14,7 +14,7 @@ from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
 Number = Any  # float, mpf, or another type that can be calculated with and has a `sqrt`
-FORWARD, BACKWARD, TIE = 1, -1, 1e-9  # R8: closer meetings, or distances, tie: the left wins
+FORWARD, BACKWARD, TIE = 1, -1, 10**9  # R8: within one part in 10^9 two are equal: the left wins
 
 
 class EventLimit(RuntimeError):
@@ -71,11 +71,10 @@ class Impact:
         """R1, R6: one ratio at each inner ball fixes all impulse rates but for a common factor."""
         balls, near = range(first, last + 2), range(max(first - 1, 0), min(last + 2, len(self.u)))
         ratio, bound = self.ratios_in_force(balls[1:-1])
-        rates = {
-            first: (0, self.zero + 1)
-        }  # R6: ratios of zero are one vanishing number, to a power
+        # R6: ratios of zero are one vanishing number, to a power
+        rates = {first: (0, self.zero + 1)}
         for i in balls[1:-1]:
-            way, factor, (power, size) = self.direction[i], ratio[i] or 1, rates[i - 1]
+            way, factor, (power, size) = self.direction[i], ratio[i] or self.zero + 1, rates[i - 1]
             rates[i] = power - way * (ratio[i] == 0), size * factor**way
         top = max(rates.values())  # in the limit what has another power has no rate
         rate = {c: x / top[1] if k == top[0] else self.zero for c, (k, x) in rates.items()}
@@ -141,7 +140,8 @@ class Impact:
     def goes_first(self, c: int, due: list[int]) -> bool:
         """R8.6: of two closings on one free ball the nearer goes first, at a tie the left one."""
         left = c if c + 1 in due else c - 1
-        return left not in due or (self.near[left + 1] < self.near[left] * (1 - TIE)) == (c > left)
+        nearer = TIE * self.near[left + 1] < (TIE - 1) * self.near[left]
+        return left not in due or nearer == (c > left)
 
     def parts_to_meeting(self, left: Run, right: Run) -> list[Number]:
         """R8.3: the parts of their segments after which two runs meet; none if they need not."""
@@ -164,7 +164,7 @@ class Impact:
             return -1, [(run, 1) for run in runs]  # R8.6
         for key in (max, min):  # the larger part is the least, at a tie the smaller; then the left
             least = min(key(parts) for _, parts in met)
-            met = [(pair, parts) for pair, parts in met if key(parts) <= least + TIE]
+            met = [(pair, parts) for pair, parts in met if TIE * (key(parts) - least) <= 1]
         (left, right), parts = met[0]
         # But a gap that one of the two would be carried past closes first, with that run alone.
         gaps, passed = [b.first - 1 for _, b in pairs], []

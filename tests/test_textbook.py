@@ -1,16 +1,18 @@
 """The textbook's rules by themselves, against the package, and against a march by small steps."""
 
 import ast
+import decimal
 import functools
 import math
 import random
+from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 
 import mpmath
 import numpy as np
 import pytest
-from chains import FIG_8, changes, local_orders
+from chains import FIG_8, changes, local_orders, random_chains
 from march import march
 from truth import EventLimit, solve
 
@@ -112,6 +114,24 @@ def test_momentum_and_energy_in_fractions():
         assert rounded.events == exact.events
         expected = [number(x.numerator) / x.denominator for x in after]
         assert max(abs(x - y) for x, y in zip(rounded.velocities, expected)) < error
+
+
+def test_decimal_numbers_do_as_well():
+    """Those of Python's own library, fifty digits of both, on generic chains."""
+    rng = np.random.default_rng(17)
+    with mpmath.workdps(50), decimal.localcontext(prec=50):
+        for n in (3, 5, 7):
+            for case in zip(*random_chains(rng, 4, n, decades=1), strict=True):
+                chain = [row.tolist() for row in case]
+                chain[3][0] = 0.0
+                one, other = (textbook.solve(*chain, number=x) for x in (mpmath.mpf, Decimal))
+                # A sequence without end goes on to the last digits, which are not the same.
+                if len(one.events) < 200:
+                    assert one.events == other.events
+                off = [
+                    abs(a - mpmath.mpf(str(b))) for a, b in zip(one.velocities, other.velocities)
+                ]
+                assert max(off) < 1e-38
 
 
 def test_a_scalar_stands_for_all_and_a_string_for_a_decimal():
