@@ -115,8 +115,8 @@ def _axes(ax: Axes | None) -> Axes:
 def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     """Draw the velocities of all balls against the progress of the impact.
 
-    Those of springs are curves: lines join the steps of the integration, and a smaller `rtol` of the
-    model gives more of them.
+    Those of springs are curves: lines join the steps of the integration, and a smaller `rtol` of
+    the model gives more of them.
 
     Parameters
     ----------
