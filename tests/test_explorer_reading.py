@@ -214,6 +214,14 @@ def test_fits_and_can_be_read(visit, width: int, mode: str):
     )
     ground = {"light": "#ffffff", "dark": "#121212"}[mode]
     assert all(contrast(colour, ground) > 7 for colour in colours[1:])
+    # The button that stands out does so under a pointer too; a touch leaves one there.
+    tab.hover("button.main")
+    colours = tab.locator("button.main").evaluate(
+        """(node) => ["color", "backgroundColor"].map((name) =>
+          "#" + getComputedStyle(node)[name].match(/\\d+/g).slice(0, 3)
+            .map((digits) => (+digits).toString(16).padStart(2, "0")).join(""))"""
+    )
+    assert contrast(*colours) > 7
 
 
 def test_touch(visit):

@@ -70,21 +70,22 @@
     }
     const before = sum(kinetic(masses, hit.before));
     const lost = 1 - sum(kinetic(masses, hit.after)) / before;
+    const percent = lost < 0.0005 ? "Less than 0.1" : fixed(100 * lost, lost < 0.1 ? 1 : 0);
     const kept = Math.abs(lost) < 1e-9;
     const said = [
       `Before ${hitName(number)}, ${motions(hit.before)}.`,
       `After it, ${motions(hit.after)}.`,
-      kept
-        ? "All energy is kept."
-        : `${fixed(100 * lost, lost < 0.1 ? 1 : 0)}\u00a0% of the energy is lost.`,
+      kept ? "All energy is kept." : `${percent}\u00a0% of the energy is lost.`,
     ];
     if (answer) {
       const total = sum(answer.collisions);
       said.push(`${total} collision${total === 1 ? "" : "s"} in all.`);
       if (answer.saturated.length) {
-        const pairs = answer.saturated.map((c) => `${c + 1} and ${c + 2}`);
+        const pairs = answer.saturated.map((c) => `of balls ${c + 1} and ${c + 2}`);
         said.push(
-          `A ratio is above its largest value: the contact of balls ${list(pairs)} is held.`,
+          pairs.length > 1
+            ? `Ratios are above their largest values: the contacts ${list(pairs)} are held.`
+            : `A ratio is above its largest value: the contact ${pairs[0]} is held.`,
         );
       }
       if (answer.collapsed) said.push("A sequence of endless collisions came to its limit.");
