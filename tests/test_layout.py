@@ -1,7 +1,5 @@
 """The pages in a browser: nothing cut, nothing wider than its window, in both widths and modes."""
 
-import base64
-import io
 import os
 import re
 import shutil
@@ -12,7 +10,6 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "book" / "_ext"))
 import book_figures
-from book_figures import CELLS
 
 WIDTHS = (390, 1400)
 MODES = ("light", "dark")
@@ -194,33 +191,6 @@ def test_colours_of_dark_mode_can_be_seen():
     assert light == sorted(light, reverse=True)
 
 
-def test_maps_of_dark_mode():
-    """Their cells change sides with the lines and letters on them, unless those are kept."""
-    import numpy as np
-    from PIL import Image
-
-    cells = np.uint8([[[255, 255, 255, 255], [0, 0, 0, 255], [0, 0, 0, 0], [255, 217, 160, 255]]])
-
-    def drawing(letters: str, colour: str) -> str:
-        stored = io.BytesIO()
-        Image.fromarray(cells).save(stored, format="PNG")
-        code = base64.b64encode(stored.getvalue()).decode()
-        image = f'<image xlink:href="data:image/png;base64,\n{code}"/>'
-        return f'<svg {image}<path style="fill: {colour}"/><text style="fill: {letters}"/></svg>'
-
-    turned = book_figures.darkened(drawing("#000000", "#ffd9a0"))
-    found = np.asarray(Image.open(io.BytesIO(base64.b64decode(CELLS.search(turned)[0]))))[0]
-    assert found[0].tolist() == [18, 18, 18, 255]
-    assert found[1].tolist() == [224, 224, 224, 255]
-    assert found[2][3] == 0
-    # What a legend shows is the colour of the cells, and letters can be read on it.
-    colours = book_figures.COLOUR.findall(turned.partition("<path")[2])
-    assert colours == [f"#{bytes(found[3][:3].tolist()).hex()}", "#e0e0e0"]
-    assert contrast(*colours) > 4.5
-    kept = drawing("#010101", "#ffd9a0")
-    assert CELLS.search(book_figures.darkened(kept))[0] == CELLS.search(kept)[0]
-
-
 def test_every_figure_has_both_colourings(html: Path):
     drawings = [
         path for path in (html / "_images").glob("*.svg") if not path.stem.endswith("-dark")
@@ -233,7 +203,7 @@ def test_every_figure_has_both_colourings(html: Path):
         colours = {match.lower() for match in book_figures.COLOUR.findall(drawing)}
         assert not colours & {"#ffffff", "#fff", "#000000", "#000", "white", "black"}, path
         # Colours alone differ.
-        blank = re.compile(f'fill="#e0e0e0" |{CELLS.pattern}|{book_figures.COLOUR.pattern}')
+        blank = re.compile(f'fill="#e0e0e0" |{book_figures.COLOUR.pattern}')
         assert blank.sub("", drawing) == blank.sub("", path.read_text(encoding="utf-8")), path
     shown = "".join(page.read_text(encoding="utf-8") for page in (html / "book").glob("*.html"))
     for path in drawings:

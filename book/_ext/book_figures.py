@@ -2,10 +2,8 @@
 
 Notebooks store their figures as SVG on white, which is right for Jupyter and for paper. The build
 writes each one a second time for dark mode: black becomes the colour of the text, white that of
-the page, greys and pale tints change sides, and colours that tell lines apart stay. Where a map of
-coloured cells lies under lines and letters, all colours change sides, so that these can be seen on
-it; a map whose letters are drawn in `KEPT` colours stays as it is. A page carries both drawings;
-the theme's classes `only-light` and `only-dark` show one of them.
+the page, greys and pale tints change sides, and colours that tell lines apart stay. A page carries
+both; the theme's classes `only-light` and `only-dark` show one of them.
 
 A map, a figure that contains a picture of points, has colours all over, with letters and lines on
 them. So the style sheet turns its light and dark as a whole, like those of a moving picture.
@@ -14,11 +12,8 @@ The box around a figure knows how wide the figure has to be for its smallest let
 a narrow screen the style sheet lets a wider one scroll in this box.
 """
 
-import base64
 import colorsys
-import io
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +33,6 @@ IMAGE = re.compile(
 COLOUR = re.compile(
     r"#(?:[0-9a-fA-F]{6}|[0-9a-fA-F]{3})\b|(?<=[\"' :])(?:white|black)(?=[\"';])"
 )
-CELLS = re.compile(r'(?<=href="data:image/png;base64,)[^"]+')
 NAMED = {"white": "#ffffff", "black": "#000000"}
 
 #: Pixels that the smallest letters of a figure have on a phone, at least. (Indices are smaller.)
@@ -48,14 +42,7 @@ LETTERS = re.compile(r"\bscale\((0\.\d+) -0\.\d+\)")
 FONT_SIZE = re.compile(r'\bfont-size[:=]"?\s*([\d.]+)')
 
 
-def turned(channels: Iterable[float]) -> tuple[float, ...]:
-    """Return a colour of the same hue on the other side: what was light is dark."""
-    hue, lightness, saturation = colorsys.rgb_to_hls(*channels)
-    lightness = TEXT + lightness * (GROUND - TEXT)
-    return colorsys.hls_to_rgb(hue, lightness, saturation)
-
-
-def dark(colour: str, colourful: float = COLOURFUL) -> str:
+def dark(colour: str) -> str:
     """Return the colour that takes the place of `colour` in dark mode.
 
     >>> dark("#000000"), dark("white"), dark("#0072b2")
@@ -67,39 +54,19 @@ def dark(colour: str, colourful: float = COLOURFUL) -> str:
     if f"#{digits}" in KEPT:
         return f"#{digits}"
     channels = [int(digits[k : k + 2], 16) / 255 for k in (0, 2, 4)]
-    if max(channels) - min(channels) >= colourful:
+    if max(channels) - min(channels) >= COLOURFUL:
         return f"#{digits}"
+    hue, lightness, saturation = colorsys.rgb_to_hls(*channels)
+    lightness = TEXT + lightness * (GROUND - TEXT)
+    channels = colorsys.hls_to_rgb(hue, lightness, saturation)
     return "#" + "".join(
-        f"{round(255 * channel):02x}" for channel in turned(channels)
+        f"{round(255 * channel):02x}" for channel in channels
     )
-
-
-def dark_cells(match: re.Match[str]) -> str:
-    """Return the cells of a map with all colours on the other side."""
-    import numpy as np
-    from PIL import Image
-
-    picture = Image.open(io.BytesIO(base64.b64decode(match[0])))
-    pixels = np.asarray(picture.convert("RGBA"))
-    colours, place = np.unique(
-        pixels.reshape(-1, 4), axis=0, return_inverse=True
-    )
-    for colour in colours:
-        channels = turned(colour[:3] / 255)
-        colour[:3] = [round(255 * channel) for channel in channels]
-    stored = io.BytesIO()
-    changed = colours[place.reshape(pixels.shape[:2])]
-    Image.fromarray(changed).save(stored, format="PNG", optimize=True)
-    return base64.b64encode(stored.getvalue()).decode("ascii")
 
 
 def darkened(svg: str) -> str:
     """Return a drawing in the colours of dark mode."""
-    map_turns = CELLS.search(svg) and not any(kept in svg for kept in KEPT)
-    colourful = 2 if map_turns else COLOURFUL
-    drawing = COLOUR.sub(lambda match: dark(match[0], colourful), svg)
-    if map_turns:
-        drawing = CELLS.sub(dark_cells, drawing)
+    drawing = COLOUR.sub(lambda match: dark(match[0]), svg)
     # What names no colour, such as black letters, is black.
     return drawing.replace("<svg ", f'<svg fill="{dark("black")}" ', 1)
 
