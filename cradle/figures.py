@@ -21,8 +21,6 @@ from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
 from cradle.checks import Vector, must_be, place_in, shown
-from cradle.models.compliant import TimedTrace
-from cradle.models.energy import EnergyTrace
 from cradle.trace import Trace
 
 __all__ = [
@@ -140,12 +138,9 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     """
     must_be(Trace, "trace", trace)
     ax = _axes(ax)
-    along, path = progress(trace), trace.path
-    if isinstance(trace, (TimedTrace, EnergyTrace)):  # curves between the events
-        along = np.append(trace.step_impulses.sum(axis=1), trace.impulses.sum())
-        path = np.vstack([trace.step_velocities, trace.velocities])
+    impulses, path = trace.curve()
     for ball, velocity in enumerate(path.T):
-        ax.plot(along, velocity, label=f"$v_{ball + 1}$", lw=2, **ball_style(ball))
+        ax.plot(impulses.sum(axis=1), velocity, label=f"$v_{ball + 1}$", lw=2, **ball_style(ball))
     ax.set(xlabel="sum of all impulses (N s)", ylabel="velocity (m/s)")
     ax.margins(x=0)
     ax.grid(alpha=0.3)

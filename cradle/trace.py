@@ -144,6 +144,25 @@ class Trace:
             }
         )
 
+    def curve(self) -> tuple[Vector, Vector]:
+        """Return impulses and velocities to be joined by straight lines in a picture.
+
+        Returns
+        -------
+        impulses : ndarray, shape (S, N - 1)
+            Impulses so far, N s.
+        velocities : ndarray, shape (S, N)
+            Velocities there, m/s.
+
+        Examples
+        --------
+        >>> from cradle import Chain, ImpulseCorrelation, collide
+        >>> impulses, velocities = collide(Chain([1, 1], [1, 0]), ImpulseCorrelation(0.0)).curve()
+        >>> impulses.ravel().tolist()
+        [0.0, 0.5, 1.0]
+        """
+        return self.path_impulses, self.path
+
     def _clock(self) -> dict[str, Vector]:
         """Return what tells the time of each row of the path; a rigid model has no time."""
         return {}

@@ -18,8 +18,8 @@ from cradle.checks import (
     refuse_where,
     whole_number,
 )
-from cradle.models.motion import Motion, own_units
-from cradle.trace import Event, ImpactNotFinished, Trace
+from cradle.models.motion import CurvedTrace, Motion, own_units
+from cradle.trace import ImpactNotFinished
 
 _METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 # SciPy takes no smaller relative tolerance.
@@ -27,7 +27,7 @@ _SMALLEST_RTOL = 100 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class TimedTrace(Trace):
+class TimedTrace(CurvedTrace):
     """The path of an impact that has a time; N balls, K events, S steps of the integration.
 
     Its events are joined by smooth curves, not by the straight lines of a rigid model, and every
@@ -72,9 +72,6 @@ class TimedTrace(Trace):
     durations: Vector
     step_times: Vector
     step_forces: Vector
-    step_velocities: Vector
-    step_impulses: Vector
-    evaluations: int
 
     def _clock(self) -> dict[str, Vector]:
         """Return the times of the rows of the path."""
@@ -181,32 +178,17 @@ class SpringChain:
         motion = Motion(*scaled, self.exponent, self.rtol)
         limit = math.inf if self.max_time is None else self.max_time / second
         reason = motion.run(self.method, limit, self.max_evaluations)
-        reached = motion.parts(motion.y)
-        times, kinds, contacts, states = zip(*motion.record, strict=True)
-        change, _, impulses = motion.parts(np.array(states).T)
-        path = chain.velocities + speed * change.T
-        path_impulses = mass * speed * impulses.T
+        times, _, _, states = zip(*motion.record, strict=True)
+        step_times, steps = zip(*motion.steps, strict=True)
         newton = mass * speed / second
-        steps = np.concatenate([y for _, y in motion.steps], axis=1)
-        step_change, _, step_impulses = motion.parts(steps)
         trace = TimedTrace(
-            chain=chain,
+            **motion.account(chain, mass, speed),
             model=self,
-            velocities=chain.velocities + speed * reached[0],
-            impulses=mass * speed * reached[2],
-            absorbed=mass * speed**2 * motion.absorbed,
-            collisions=motion.collisions,
-            path=path,
-            path_impulses=path_impulses,
-            events=tuple(map(Event, kinds[1:], contacts[1:])),
             times=second * np.array(times),
             forces=newton * motion.forces(np.array(states).T).T,
             durations=second * motion.durations,
-            step_times=second * np.concatenate([t for t, _ in motion.steps]),
-            step_forces=newton * motion.forces(steps).T,
-            step_velocities=chain.velocities + speed * step_change.T,
-            step_impulses=mass * speed * step_impulses.T,
-            evaluations=motion.evaluations,
+            step_times=second * np.concatenate(step_times),
+            step_forces=newton * motion.forces(np.concatenate(steps, axis=1)).T,
         )
         if reason:
             raise ImpactNotFinished(

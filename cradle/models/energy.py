@@ -12,8 +12,8 @@ import numpy as np
 from cradle.chain import Chain
 from cradle.checks import Vector, one_number, refuse_where
 from cradle.models.compliant import SpringChain
-from cradle.models.motion import Motion, TooManyEvaluations, own_units
-from cradle.trace import Event, ImpactNotFinished, Trace
+from cradle.models.motion import CurvedTrace, Motion, TooManyEvaluations, own_units
+from cradle.trace import ImpactNotFinished
 
 _EPSILON = float(np.finfo(np.float64).eps)
 
@@ -23,7 +23,7 @@ _SMALLEST = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class EnergyTrace(Trace):
+class EnergyTrace(CurvedTrace):
     """The path of an impact whose ratios of impulses change all the time; N balls, S steps.
 
     Its events are joined by smooth curves, not by the straight lines of a constant ratio.
@@ -48,10 +48,6 @@ class EnergyTrace(Trace):
     >>> trace.evaluations, trace.step_impulses[-1].round(6)
     (51, array([0.75]))
     """
-
-    step_velocities: Vector
-    step_impulses: Vector
-    evaluations: int
 
 
 @dataclass(frozen=True)
@@ -154,24 +150,8 @@ class EnergyDistribution:
         reason = process.run("DOP853", math.inf, self.max_evaluations)
         if not reason:
             process.part()
-        _, kinds, contacts, states = zip(*process.record, strict=True)
-        change, _, impulses = process.parts(np.array(states).T)
-        steps = np.concatenate([y for _, y in process.steps], axis=1)
-        step_change, _, step_impulses = process.parts(steps)
         trace = EnergyTrace(
-            chain=chain,
-            model=self,
-            velocities=chain.velocities + speed * process.parts(process.y)[0],
-            impulses=mass * speed * process.parts(process.y)[2],
-            absorbed=mass * speed**2 * process.absorbed,
-            collisions=process.collisions,
-            path=chain.velocities + speed * change.T,
-            path_impulses=mass * speed * impulses.T,
-            events=tuple(map(Event, kinds[1:], contacts[1:])),
-            collapsed=process.collapsed,
-            step_velocities=chain.velocities + speed * step_change.T,
-            step_impulses=mass * speed * step_impulses.T,
-            evaluations=process.evaluations,
+            **process.account(chain, mass, speed), model=self, collapsed=process.collapsed
         )
         if reason:
             raise ImpactNotFinished(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from cradle.chain import Chain
 from cradle.checks import Vector, must_be, row_of
+from cradle.trace import Event, Trace
 
 
 def own_units(
@@ -55,6 +57,40 @@ def own_units(
     return k, float(k[c]), float(mass), abs(float(u[c])) or 1.0
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class CurvedTrace(Trace):
+    """The path of an impact whose events are joined by smooth curves; N balls, S steps.
+
+    Attributes
+    ----------
+    step_velocities : ndarray, shape (S, N)
+        Velocities at each step of the integration, m/s.
+    step_impulses : ndarray, shape (S, N - 1)
+        Impulses so far at each step, N s.
+    evaluations : int
+        How often the rates of change were evaluated.
+
+    Examples
+    --------
+    >>> from cradle import SpringChain, collide
+    >>> trace = collide(Chain([1, 1], [1, 0]), SpringChain())
+    >>> impulses, velocities = trace.curve()
+    >>> len(velocities) == len(trace.step_velocities) + 1, velocities[-1, 1].round(6).item()
+    (True, 1.0)
+    """
+
+    step_velocities: Vector
+    step_impulses: Vector
+    evaluations: int
+
+    def curve(self) -> tuple[Vector, Vector]:
+        """Return impulses and velocities at the steps of the integration, and at the end."""
+        return (
+            np.vstack([self.step_impulses, self.impulses]),
+            np.vstack([self.step_velocities, self.velocities]),
+        )
+
+
 class TooManyEvaluations(Exception):
     """The forces were evaluated as often as allowed."""
 
@@ -84,6 +120,27 @@ class Motion:
         """Return changes of velocity, compressions and impulses, as views of y."""
         n = len(self.m)
         return np.split(y, [n, 2 * n - 1])
+
+    def account(self, chain: Chain, mass: float, speed: float) -> dict[str, Any]:
+        """Return what happened, in the chain's units, as fields of a `CurvedTrace`."""
+        _, kinds, contacts, states = zip(*self.record, strict=True)
+        change, _, impulses = self.parts(np.array(states).T)
+        steps = np.concatenate([y for _, y in self.steps], axis=1)
+        step_change, _, step_impulses = self.parts(steps)
+        reached = self.parts(self.y)
+        return {
+            "chain": chain,
+            "velocities": chain.velocities + speed * reached[0],
+            "impulses": mass * speed * reached[2],
+            "absorbed": mass * speed**2 * self.absorbed,
+            "collisions": self.collisions,
+            "path": chain.velocities + speed * change.T,
+            "path_impulses": mass * speed * impulses.T,
+            "events": tuple(map(Event, kinds[1:], contacts[1:])),
+            "step_velocities": chain.velocities + speed * step_change.T,
+            "step_impulses": mass * speed * step_impulses.T,
+            "evaluations": self.evaluations,
+        }
 
     def speeds(self, y: Vector) -> Vector:
         """Return the closing speeds."""
