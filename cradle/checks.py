@@ -9,7 +9,17 @@ from numpy.typing import ArrayLike
 
 from cradle.kernel.state import LIMITS
 from cradle.reals import Vector, numbers
-from cradle.refusals import a, first, must_be, one_of, place_in, refusal, refuse_where, shown
+from cradle.refusals import (
+    a,
+    first,
+    is_whole,
+    must_be,
+    one_of,
+    place_in,
+    refusal,
+    refuse_where,
+    shown,
+)
 
 #: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
 LIGHTEST = 1e-150
@@ -21,6 +31,7 @@ __all__ = [
     "checked_masses",
     "checked_restitution",
     "first",
+    "is_whole",
     "must_be",
     "number_or_row",
     "numbers",
@@ -250,9 +261,9 @@ def whole_number(name: str, value: object) -> int:
     ...
     ValueError: max_evaluations = 1000000.0; must be a whole number, at least 1
     """
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise ValueError(f"{name} = {shown(value)}; must be a whole number, at least 1")
-    return int(value)
+    if is_whole(value) and value >= 1:
+        return int(value)
+    raise ValueError(f"{name} = {shown(value)}; must be a whole number, at least 1")
 
 
 def number_or_row(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import click
 
@@ -84,14 +84,14 @@ def described(
         raise click.UsageError("give either a sequence of ball types, such as ABCCA, or --masses")
     if model not in (None, "ratio") and (ratio or backward or saturate):
         raise click.UsageError(f"--model {model} has no ratios; leave them out, and --saturate")
-    excess = "saturate" if saturate else "raise"
+    excess: Literal["raise", "saturate"] = "saturate" if saturate else "raise"
     if sequence is not None:
         given = {"--velocities": velocities, "--restitution": restitution, "--ratio": ratio,
                  "--backward": backward}  # fmt: skip
         for name, value in given.items():
             if value is not None:
                 raise click.UsageError(f"{name} goes with --masses; {sequence} has its own values")
-        chain, ratios = paper_chain(sequence, speed, excess="saturate" if saturate else "raise")
+        chain, ratios = paper_chain(sequence, speed, excess=excess)
         law = ratios if model in (None, "ratio") else _without_ratios(chain, model)
         return Described(chain, law, ())
     assert masses is not None

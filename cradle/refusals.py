@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeVar
+from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -251,10 +251,30 @@ def place_in(name: str, value: object, size: int) -> int:
     ...
     ValueError: contact = 2; must be one of 0 to 1
     """
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not (whole and 0 <= value < size):  # type: ignore[operator]
-        raise ValueError(f"{name} = {shown(value)}; must be one of 0 to {size - 1}")
-    return int(value)  # type: ignore[call-overload, no-any-return]
+    if is_whole(value) and 0 <= value < size:
+        return int(value)
+    raise ValueError(f"{name} = {shown(value)}; must be one of 0 to {size - 1}")
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Tell whether a value is a whole number: an int or NumPy's, but no bool.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+
+    Returns
+    -------
+    bool
+        Whether it counts.
+
+    Examples
+    --------
+    >>> is_whole(2), is_whole(2.0), is_whole(True)
+    (True, False, False)
+    """
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
 def a(name: str) -> str:

@@ -119,9 +119,11 @@ class _Run:
             )
         reach = pendulums.reach(n)
         part = "a quarter of a circle" if pendulums.angle == "small" else "half a circle"
-        for far in np.unique(reach[np.abs(x) > reach]):
+        beyond = np.abs(x) > reach
+        if beyond.any():
+            far = reach[np.argmax(beyond)]
             rule = f"must be within {far:.4g} m: pendulums of this length reach {part}"
-            refuse_where("positions", x, (np.abs(x) > reach) & (reach == far), rule)
+            refuse_where("positions", x, beyond, rule)
         self.chain, self.model, self.pendulums = chain, model, pendulums
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
         self.gaps = pendulums.row("gaps", n - 1)

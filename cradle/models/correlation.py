@@ -13,6 +13,7 @@ from cradle.checks import (
     Vector,
     checked,
     first,
+    is_whole,
     must_be,
     number_or_row,
     one_number,
@@ -208,7 +209,7 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
     if not (type(meeting) is float and 0.0 <= meeting <= 1.0):
         one_number("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
     one_of("excess", excess, ("raise", "saturate"))
-    if isinstance(max_events, bool) or not isinstance(max_events, (int, np.integer)):
+    if not is_whole(max_events):
         raise ValueError(f"max_events = {max_events!r}; must be a whole number")
     if not 1 <= max_events < 2**63:
         raise ValueError(f"max_events = {max_events!r}; must be at least 1 and below 2**63")
