@@ -7,7 +7,7 @@ Usage::
     python benchmarks/extremes.py map --keep exact.pickle    # keep exact outcomes for the next time
 
 Every part writes one small file `data/extremes_<part>.csv`.  The measuring functions are those of
-`tests/extremes.py`, and the tests compute a sample of the rows anew.
+`benchmarks/extreme_chains.py`, and the tests compute a sample of the rows anew.
 """
 
 import argparse
@@ -16,25 +16,22 @@ import itertools
 import math
 import multiprocessing
 import pickle
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
+import extreme_chains as x
 import mpmath
 import numpy as np
+from chains import power_of_ten
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
-
-import extremes as x  # noqa: E402
-from chains import power_of_ten  # noqa: E402
-
-from cradle import (  # noqa: E402
+from cradle import (
     outcomes,
     paper_chain,
 )
-from cradle.tables import paper_sequences  # noqa: E402
+from cradle.tables import paper_sequences
+
+ROOT = Path(__file__).parents[1]
 
 
 def write(part, header, rows):

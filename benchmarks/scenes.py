@@ -1,20 +1,15 @@
 """The chains of the benchmark: the first ball strikes the others, which rest and touch."""
 
-import sys
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import mpmath
 import numpy as np
-
-from cradle import Chain, ImpulseCorrelation, SpringChain, collide, paper_chain
-
-# The independent solvers of the tests: a march by small steps, an event loop in any number type.
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from chains import magnitudes, uniform
 from march import march
 from truth import solve
+
+from cradle import Chain, ImpulseCorrelation, SpringChain, collide, paper_chain
 
 __all__ = ["SCENES", "Scene", "march", "random_chains", "random_truth", "solve"]
 

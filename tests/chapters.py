@@ -6,7 +6,6 @@ import decimal
 import functools
 import io
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,13 +14,9 @@ import matplotlib.pyplot as plt
 import nbformat
 import numpy as np
 from matplotlib.figure import Figure
-
-from cradle import textbook
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "book"))
 from page import WORDS
 
-sys.path.pop(0)
+from cradle import textbook
 
 BOOK = Path(__file__).parents[1] / "book"
 
@@ -146,16 +141,15 @@ def reached(cells: list) -> list[bool]:
 @contextlib.contextmanager
 def in_memory(show):
     """Draw without a screen and let `show` take the place of plt.show; undo everything after."""
-    backend, shown, path = mpl.get_backend(), plt.show, list(sys.path)
+    backend, shown = mpl.get_backend(), plt.show
     plt.switch_backend("agg")
     plt.show = show
-    sys.path.insert(0, str(BOOK))  # page.py, as for a notebook
     try:
         with mpl.rc_context(), decimal.localcontext():
             yield
     finally:
         plt.close("all")
-        plt.show, sys.path[:] = shown, path
+        plt.show = shown
         plt.switch_backend(backend)
 
 

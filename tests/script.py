@@ -2,13 +2,9 @@
 
 import atexit
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "book" / "_ext"))
 
 # JSON has no -0, and 1.0 is 1 there.
 TO_JSON = 'value => JSON.stringify(value, (_, x) => Object.is(x, -0) ? "-0" : x)'

@@ -5,7 +5,6 @@ No number of the measured table stands here, because it is measured anew from ti
 
 import csv
 import re
-import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -298,7 +297,6 @@ def test_units_direction_and_frame_do_not_matter():
 
 
 def test_chains_have_the_names_of_the_benchmarks():
-    sys.path.append(str(ROOT / "benchmarks"))
     scenes = pytest.importorskip("scenes")
     for name, scene in scenes.SCENES.items():
         assert measured_chain(scene.chain) == name

@@ -2,23 +2,21 @@
 
 import csv
 import importlib.util
-import sys
 from pathlib import Path
 
+import engines
+import measure
 import numpy as np
 import pytest
+import run
+import savings
+import scenes
+import solvers
 from chains import HERTZ, LINEAR
 
 from cradle.closed_form import three_balls
 
 ROOT = Path(__file__).parents[1]
-sys.path.append(str(ROOT / "benchmarks"))
-import engines  # noqa: E402
-import measure  # noqa: E402
-import run  # noqa: E402
-import savings  # noqa: E402
-import scenes  # noqa: E402
-import solvers  # noqa: E402
 
 CLOCK = measure.Clock(repeats=1)
 

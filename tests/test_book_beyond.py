@@ -5,11 +5,11 @@ forms, by the independent solver in truth.py, and by another integrator.
 """
 
 import csv
-import importlib.util
 from functools import cache
 from pathlib import Path
 
 import dask.array as da
+import long_chains
 import mpmath
 import numpy as np
 import pytest
@@ -26,15 +26,6 @@ ROOT = Path(__file__).parents[1]
 CHAPTER = Chapter("beyond")
 
 
-def benchmark():
-    path = ROOT / "benchmarks" / "long_chains.py"
-    spec = importlib.util.spec_from_file_location("long_chains", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-long_chains = benchmark()
 needs_numba = pytest.mark.skipif(runtime.compiled() is None, reason="too long without numba")
 
 

@@ -4,7 +4,7 @@ import csv
 import math
 from pathlib import Path
 
-import extremes as x
+import extreme_chains as x
 import numpy as np
 import pytest
 from chapters import Chapter, number, points

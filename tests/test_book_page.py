@@ -1,16 +1,9 @@
 """Numbers as the pages of the book write them, and listings that say what the file says."""
 
-import sys
-
 import pytest
-from chapters import BOOK
-
-from cradle.textbook import Impact
-
-sys.path.insert(0, str(BOOK))
 from page import aligned, below, count, listing, people, said
 
-sys.path.remove(str(BOOK))
+from cradle.textbook import Impact
 
 
 @pytest.mark.parametrize(

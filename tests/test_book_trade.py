@@ -6,7 +6,6 @@ independent solver in truth.py, with closed formulas, and with converged springs
 
 import csv
 import re
-import sys
 from functools import cache
 from html import unescape
 from pathlib import Path
@@ -14,15 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chains import ELASTIC, HERTZ, LINEAR
-from chapters import BOOK, Chapter, number, points
+from chapters import Chapter, number, points
+from page import people
 from truth import solve
 
 from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, paper_chain
-
-sys.path.insert(0, str(BOOK))
-from page import people
-
-sys.path.remove(str(BOOK))
 
 ROOT = Path(__file__).parents[1]
 CHAPTER = Chapter("trade")

@@ -33,12 +33,11 @@ def test_every_program_is_here():
 
 
 @pytest.fixture(params=PROGRAMS)
-def program(request, monkeypatch):
+def program(request):
     """A program as a module, if its engine is installed."""
     module = PROGRAMS[request.param]
     name = DISTRIBUTIONS.get(module, module)
     pytest.importorskip(module, reason=f'{name} is not installed; pip install -e ".[engines]"')
-    monkeypatch.syspath_prepend(EXAMPLES)
     return importlib.import_module(request.param)
 
 
@@ -123,10 +122,9 @@ def test_ten_strokes(program, pulled):
     closed(alone)
 
 
-def test_springs_in_the_row_are_elastic_spheres(program, monkeypatch):
+def test_springs_in_the_row_are_elastic_spheres(program):
     """Two balls pulled back, where one ratio is not quite Hertz, and springs are."""
     pytest.importorskip("numba", reason="the judge of the scene is compiled by numba")
-    monkeypatch.syspath_prepend(EXAMPLES.parent / "benchmarks")
     scenes = importlib.import_module("cradle_scenes")
     bodies = program.cradle(pulled=2)
     row = program.mended(bodies)

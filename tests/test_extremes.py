@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-import extremes as x
+import extreme_chains as x
 import mpmath
 import numpy as np
 import pytest

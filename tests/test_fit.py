@@ -1,11 +1,11 @@
 """Fits to measured shots: data read and refused, searches, confidence sets, predictions."""
 
 import csv
-import importlib.util
-import sys
 from functools import cache
 from pathlib import Path
 
+import fit_example
+import fit_study
 import numpy as np
 import pandas as pd
 import pytest
@@ -29,16 +29,6 @@ from cradle.fit.tracker import Track
 
 ROOT = Path(__file__).parents[1]
 MASS = {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}
-
-
-@cache
-def script(name):
-    path = ROOT / "benchmarks" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(name, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 @cache
@@ -367,7 +357,6 @@ def test_other_files_are_not_taken_for_exports(tmp_path):
 @pytest.mark.parametrize("length", [None, 0.3])
 def test_velocities_from_exact_tracks(length):
     """Positions on a rail, or of pendulums by Runge-Kutta; the impact between two frames."""
-    example = script("fit_example")
     after, times = outcome("ABC"), (np.arange(49) - 24.3) / 240
     tracks = {}
     for k in range(3):
@@ -376,8 +365,8 @@ def test_velocities_from_exact_tracks(length):
         if length is None:
             way = speeds * times
         else:
-            way = np.where(times < 0, example.swing(before, times),
-                           example.swing(1.2 * after[k], times))  # fmt: skip
+            way = np.where(times < 0, fit_example.swing(before, times),
+                           fit_example.swing(1.2 * after[k], times))  # fmt: skip
         tracks["ABC"[k]] = Track(times + 3.0, 0.035 * k + way)
     found = velocities_from_tracks(tracks, length=length)
     assert found.time == pytest.approx(3.0, abs=2e-5)
@@ -389,11 +378,13 @@ def test_velocities_from_exact_tracks(length):
 
 def test_errors_of_velocities_are_those_of_the_marks():
     """The squares of errors over their standard errors average to 1, within four of its errors."""
-    example, random = script("fit_example"), np.random.default_rng(8)
+    random = np.random.default_rng(8)
     squares = []
     for _ in range(40):
-        tracks, _ = example.film("AB", 1.0, random)
-        found = velocities_from_tracks(tracks, length=example.LENGTH, scatter=example.SCATTER)
+        tracks, _ = fit_example.film("AB", 1.0, random)
+        found = velocities_from_tracks(
+            tracks, length=fit_example.LENGTH, scatter=fit_example.SCATTER
+        )
         squares += [((found.before[0] - 1) / found.sigma_before[0]) ** 2,
                     *((found.after - outcome("AB")) / found.sigma) ** 2]  # fmt: skip
     assert np.mean(squares) == pytest.approx(1, abs=4 * np.sqrt(2 / len(squares)))
@@ -425,10 +416,9 @@ def test_predictions_cover():
 
 
 def test_synthetic_example_is_what_the_script_makes(monkeypatch):
-    example = script("fit_example")
-    monkeypatch.setattr(example, "SETS", {"BAC": 1})
-    monkeypatch.setattr(example, "SPEEDS", example.SPEEDS[:1])
-    rows, text = example.experiment()
+    monkeypatch.setattr(fit_example, "SETS", {"BAC": 1})
+    monkeypatch.setattr(fit_example, "SPEEDS", fit_example.SPEEDS[:1])
+    rows, text = fit_example.experiment()
     assert text == (ROOT / "data" / "video_synthetic.txt").read_text(encoding="utf-8")
     lines = (ROOT / "data" / "shots_synthetic.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0].startswith("# SYNTHETIC")
@@ -479,7 +469,7 @@ def test_study_covers_as_often_as_it_says():
 
 @pytest.mark.parametrize(("triplet", "noise"), [("ABA", 0.03), ("CCA", 0.003)])
 def test_study_is_what_the_script_makes(triplet, noise):
-    made = script("fit_study").study(triplet, noise)
+    made = fit_study.study(triplet, noise)
     row = next(
         r for r in stored("fit_study.csv")
         if r["triplet"] == triplet and float(r["noise"]) == noise
@@ -490,9 +480,8 @@ def test_study_is_what_the_script_makes(triplet, noise):
 
 @pytest.mark.parametrize("triplet", ["AAA", "BBD", "CBD", "DAA"])
 def test_precision_is_what_the_script_makes(triplet):
-    study = script("fit_study")
     row = next(r for r in stored("fit_precision.csv") if r["triplet"] == triplet)
-    for name, value in zip(study.PRECISION[1:], study.precision(triplet)[1:], strict=True):
+    for name, value in zip(fit_study.PRECISION[1:], fit_study.precision(triplet)[1:], strict=True):
         assert bool(row[name]) == bool(value) or value == 0
         if row[name] and float(row[name]) > 1e-4:
             assert float(value) == pytest.approx(float(row[name]), rel=2e-3, abs=2e-4), name

@@ -3,13 +3,10 @@
 import os
 import re
 import shutil
-import sys
 from pathlib import Path
 
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "book" / "_ext"))
 import book_figures
+import pytest
 
 WIDTHS = (390, 1400)
 MODES = ("light", "dark")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from extremes import events_at_balls
+from extreme_chains import events_at_balls
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain
 

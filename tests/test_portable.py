@@ -1,7 +1,7 @@
 """Random inputs, and the solver's answers to them, have the same bits on every machine.
 
-`python tests/test_portable.py` prints what `DIGESTS` holds, for a change of the inputs or of the
-rounding of the solver that is meant.
+`PYTHONPATH=benchmarks python tests/test_portable.py` prints what `DIGESTS` holds, for a change of
+the inputs or of the rounding of the solver that is meant.
 """
 
 import hashlib
@@ -13,24 +13,22 @@ import subprocess
 import sys
 from pathlib import Path
 
+import extreme_chains as x
+import fuzz
+import implied_ratio
+import long_chains
 import numpy as np
 import pytest
+import scenes
+import test_closed_form
+import test_kernel
+import test_march
+import test_speed
+from chains import magnitudes, power_of_ten, random_chains, uniform
+
+from cradle import post_impact_velocities
 
 ROOT = Path(__file__).parents[1]
-sys.path.append(str(ROOT / "benchmarks"))
-
-import extremes as x  # noqa: E402
-import fuzz  # noqa: E402
-import implied_ratio  # noqa: E402
-import long_chains  # noqa: E402
-import scenes  # noqa: E402
-import test_closed_form  # noqa: E402
-import test_kernel  # noqa: E402
-import test_march  # noqa: E402
-import test_speed  # noqa: E402
-from chains import magnitudes, power_of_ten, random_chains, uniform  # noqa: E402
-
-from cradle import post_impact_velocities  # noqa: E402
 
 DIGESTS = {
     "magnitudes": "f4212c360ee85056",
@@ -139,6 +137,7 @@ def without_vector_code():
         "NPY_DISABLE_CPU_FEATURES": " ".join(found),
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=" + ",".join(f"-{unit}" for unit in units),
         "CRADLE_KERNEL": "plain",
+        "PYTHONPATH": str(ROOT / "benchmarks"),
     }
     run = subprocess.run(
         [sys.executable, __file__],

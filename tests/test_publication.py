@@ -10,11 +10,10 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import release
+import set_address
 
 ROOT = Path(__file__).parents[1]
-sys.path.append(str(ROOT / "publication"))
-import release  # noqa: E402
-import set_address  # noqa: E402
 
 
 @pytest.fixture(scope="module")

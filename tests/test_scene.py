@@ -4,7 +4,6 @@ import csv
 import importlib.util
 import math
 import re
-import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,7 +15,6 @@ from chapters import Chapter
 from cradle import Chain, SpringChain, collide
 
 ROOT = Path(__file__).parents[1]
-sys.path.append(str(ROOT / "benchmarks"))
 pytest.importorskip("numba", reason="the judge of the scene is compiled by numba")
 import cradle_scenes as scenes  # noqa: E402
 from measure import absent, versions  # noqa: E402

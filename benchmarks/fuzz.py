@@ -2,13 +2,13 @@
 
 Usage, with atheris from PyPI (not a dependency of the project)::
 
-    python tests/fuzz.py -max_total_time=3600 corpus/
+    python benchmarks/fuzz.py -max_total_time=3600 corpus/
 
 Every input is a string of bytes that becomes a call: numbers from the ends of their ranges, their
 neighbours, and any pattern of 64 bits. Single impacts run as plain Python, so that the search sees
 which lines of the event loop a chain reaches; the batch runs compiled. Allowed are the documented
-errors alone; every outcome must keep `extremes.faults` empty. What was found became named cases in
-`test_extremes.py`.
+errors alone; every outcome must keep `extreme_chains.faults` empty. What was found became named
+cases in `test_extremes.py`.
 """
 
 import math
@@ -18,8 +18,6 @@ import sys
 import warnings
 from pathlib import Path
 from unittest import mock
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 ENDS = {
     "unit": [0.0, 1.0, 1.0 - 2.0**-53, 0.5, 1e-16, 1e-300, 5e-324, 1 / 3, 0.15],
@@ -107,7 +105,7 @@ def attempt(data, max_events=400, kernel=""):
 
     `kernel` names the kernel of the single impact ("plain"); the batch takes the fastest.
     """
-    from extremes import faults
+    from extreme_chains import faults
 
     from cradle import (
         Chain,
