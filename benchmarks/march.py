@@ -200,30 +200,37 @@ def march(
             for c in range(max(run[0] - 1, 0), min(run[1] + 2, n))
         }
         closing = [c for c in (run[0] - 1, run[1] + 1) if du.get(c, 0.0) > 0 and not s.is_gap(c)]
+        v, u, balls = s.v, s.u, list(dv.items())
+        inside = [(c, du[c], rate[c]) for c in rate]
+        outside = [(c, change) for c, change in du.items() if c not in rate]
+        allowed = min(limit, left_over)
         done = 0
         while done < limit:
-            done += 1
-            left_over -= 1
-            if left_over < 0:
+            if done == allowed:
                 raise RuntimeError(f"not finished in max_steps = {max_steps}; reached {s.v}")
-            for i, change in dv.items():
-                s.v[i] += change
+            done += 1
+            for i, change in balls:
+                v[i] += change
             event = False
-            for c, change in du.items():
-                before = s.u[c]
-                s.u[c] = after = before + change
-                if c in rate:
-                    s.impulses[c] += rate[c] * h
-                    work = 0.5 * (before + after) * rate[c] * h
-                    if work > 0:
-                        s.absorbed[c] += work
-                    else:
-                        s.released[c] -= work
-                    if before > 0 >= after:
+            for c, change, share in inside:
+                before = u[c]
+                u[c] = after = before + change
+                s.impulses[c] += share * h
+                work = 0.5 * (before + after) * share * h
+                if work > 0:
+                    s.absorbed[c] += work
+                else:
+                    s.released[c] -= work
+                if after <= 0:
+                    if before > 0:
                         s.events.append(("maximum_compression", c))
                     event = event or (after < 0 and has_ended(s, c))
-            if event or any(s.u[c] >= 0 for c in closing):
+            for c, change in outside:
+                u[c] += change
+                event = event or (c in closing and u[c] >= 0)
+            if event:
                 break
+        left_over -= done
         s.steps += done
         s.held |= {c for c in held if done and rate[c] > 0}
         return done

@@ -9,6 +9,8 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+#: Names the folder that the processes of a session share; the first one sets it.
+SHARED = "CRADLE_TESTS_SHARED"
 #: Seconds; on an idle machine it takes less than one minute.
 LONGEST = 1800
 

@@ -5,6 +5,8 @@ import contextlib
 import decimal
 import functools
 import io
+import os
+import pickle
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +15,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import nbformat
 import numpy as np
+from built_book import SHARED
 from matplotlib.figure import Figure
 from page import WORDS
 
@@ -155,7 +158,14 @@ def in_memory(show):
 
 @functools.cache
 def drawn(chapter: str) -> dict[str, Figure]:
-    """Run a chapter as it is stored and return its figures by their names."""
+    """Run a chapter as it is stored and return its figures by their names.
+
+    The first process of a session that needs them leaves them to the others.
+    """
+    shared = os.environ.get(SHARED)
+    kept = Path(shared, f"{chapter}.figures") if shared else None
+    if kept and kept.exists():
+        return pickle.loads(kept.read_bytes())
     figures, names = {}, {}
 
     def keep():
@@ -166,6 +176,10 @@ def drawn(chapter: str) -> dict[str, Figure]:
 
     with in_memory(keep), contextlib.redirect_stdout(io.StringIO()):
         run(code(chapter), {}, names=names)
+    if kept:
+        part = kept.with_suffix(f".{os.getpid()}")
+        part.write_bytes(pickle.dumps(figures))
+        part.replace(kept)
     return figures
 
 

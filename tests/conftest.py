@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from built_book import built
+from built_book import SHARED, built
 from hypothesis import HealthCheck, settings
 
 # The same examples at every run of the same sources. Hypothesis also draws the numbers that it
@@ -68,10 +68,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the files that take longest first, in the order in which processes take them."""
     place = {name: number for number, name in enumerate(LONG)}
     items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(LONG)))
-
-
-#: Where the processes of a session find the book; the first process sets it.
-SHARED = "CRADLE_TESTS_SHARED"
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:

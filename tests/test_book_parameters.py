@@ -41,7 +41,17 @@ CHANGES = {
         {"ratio": 1, "sequence": "BCACBA", "triplet": "CAC", "velocity_error": 0.001},
     ],
 }
-RUNS = [(chapter, changes) for chapter, runs in CHANGES.items() for changes in runs]
+#: Chapters that take long: all but their first run belong to the weekly tests.
+LONG = ("multiple_impacts", "patterns", "toy", "trade")
+RUNS = [
+    pytest.param(
+        chapter, changes,
+        id=f"{chapter}-{changes}",
+        marks=[pytest.mark.exhaustive] * (chapter in LONG and changes is not runs[0]),
+    )
+    for chapter, runs in CHANGES.items()
+    for changes in runs
+]  # fmt: skip
 #: The other ratios, over what is written.
 FACTOR = 0.8
 
@@ -97,7 +107,7 @@ def first_run(chapter: str) -> tuple[dict, list]:
 
 
 @pytest.mark.usefixtures("pictures_in_memory")
-@pytest.mark.parametrize(("chapter", "changes"), RUNS, ids=str)
+@pytest.mark.parametrize(("chapter", "changes"), RUNS)
 def test_chapter_runs_with_other_numbers(chapter: str, changes: dict):
     names, given = first_run(chapter)
     if changes is CHANGES[chapter][0]:
