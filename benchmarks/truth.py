@@ -5,6 +5,7 @@ events, end plastically.  It knows no cycles: every impact of a sequence is made
 threshold that leaves thirty of fifty digits.
 """
 
+import decimal
 from itertools import groupby
 
 import mpmath
@@ -13,6 +14,15 @@ from cradle import textbook
 from cradle.textbook import EventLimit
 
 __all__ = ["EventLimit", "Impact", "solve"]
+
+
+def negligible(zero):
+    """What R9 takes for nothing, by the type of a number: six tenths of the digits in force."""
+    if isinstance(zero, float):
+        return 1e-12
+    decimals = isinstance(zero, decimal.Decimal)
+    digits = decimal.getcontext().prec if decimals else mpmath.mp.dps
+    return (zero + 1) / 10 ** int(0.6 * digits)
 
 
 class Impact(textbook.Impact):
@@ -24,8 +34,7 @@ class Impact(textbook.Impact):
     def __init__(self, *given):
         super().__init__(*given)
         self.reduced = [a * b / (a + b) for a, b in zip(self.m, self.m[1:])]
-        digits = 12 if isinstance(self.zero, float) else int(0.6 * mpmath.mp.dps)
-        below = (self.zero + 1) / 10**digits if self.collapse_below is None else self.collapse_below
+        below = negligible(self.zero) if self.collapse_below is None else self.collapse_below
         self.tiny = (below * max([*self.u, self.zero])) ** 2
         # Largest squared speed of a contact since its last event; its events in a row with this
         # below `tiny`; the contacts of the latest events, as long as all of these were calm.

@@ -1,9 +1,9 @@
 """Chains that went wrong once, by name; and families of chains like them."""
 
 from dataclasses import replace
+from decimal import Decimal, localcontext
 from fractions import Fraction
 
-import mpmath
 import numpy as np
 import pytest
 from families import FAMILIES, Problem, family
@@ -122,19 +122,19 @@ TWENTY = Problem(
 )
 
 
-def exact(problem, digits=50, number=mpmath.mpf, **options):
+def exact(problem, digits=50, number=Decimal, **options):
     """The outcome at fifty digits."""
-    with mpmath.workdps(digits):
+    with localcontext(prec=digits):
         return problem.solve(solve, excess="saturate", number=number, **options)
 
 
 def as_printed(x):
     """The number that 0.1 is meant to be, not the nearest double."""
-    return mpmath.mpf(repr(x))
+    return Decimal(repr(x))
 
 
 def difference(one, other):
-    return max(abs(float(a - b)) for a, b in zip(one, other))
+    return max(abs(float(Decimal(a) - Decimal(b))) for a, b in zip(one, other))
 
 
 def check(problem, trace):
