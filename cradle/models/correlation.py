@@ -75,6 +75,12 @@ class ImpulseCorrelation:
     ValueError
         If a value is outside its range; the message names the value and the rule.
 
+    Notes
+    -----
+    Where several contacts of a touching stretch approach, the leftmost one drives all the others
+    (rule R2 of the book), so balls that are struck from both sides do not end as their mirror
+    image does.  `SpringChain` has no such rule.
+
     References
     ----------
     Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, Eqs. 16, 47-53.
@@ -85,6 +91,8 @@ class ImpulseCorrelation:
     >>> model = ImpulseCorrelation(forward=0.15)
     >>> collide(Chain([1, 1, 1], [1, 0, 0], [1, 1]), model).velocities.round(4).tolist()
     [-0.0811, 0.0883, 0.9928]
+    >>> collide(Chain([1, 1, 1], [1, 0, -1]), model).velocities.round(3).tolist()
+    [-0.913, -0.155, 1.068]
     """
 
     forward: float | tuple[float, ...]
