@@ -178,7 +178,12 @@ def ratio(shots: Shots, restitution: Fit | Known, *, known: Known | None = None)
     if not sets:
         raise ValueError("no set has three balls or more; ratios come from triplets")
     values, errors = _restitution_values(restitution, sets)
-    fixed = {parameter_key(name): float(np.atleast_1d(v)[0]) for name, v in (known or {}).items()}
+    fixed = {
+        parameter_key(name): float(
+            checked(f"known[{name!r}]", np.atleast_1d(v)[0], "must lie in [0, 1]", 0.0, 1.0)
+        )
+        for name, v in (known or {}).items()
+    }
     bounds = {key: m for one in sets for key, m in _bounds(one).items() if key not in fixed}
     acting = {key for key in bounds if any(_acts(key, one, bounds, fixed, values) for one in sets)}
     estimates: dict[str, Estimate] = {}
@@ -208,8 +213,12 @@ def _restitution_values(
         pair = np.atleast_1d(checked(f"restitution[{name!r}]", value))
         number = float(checked(f"restitution[{name!r}]", pair[0], "must lie in [0, 1]", 0.0, 1.0))
         values[key] = number
-        if pair.size > 1 and pair[1] > 0:
-            errors[key] = float(pair[1])
+        if pair.size > 1:
+            error = float(
+                checked(f"error of restitution[{name!r}]", pair[1], "must be at least 0", 0.0)
+            )
+            if error > 0:
+                errors[key] = error
     for one in sets:
         for key in pair_keys(one.types):
             if key not in values:
