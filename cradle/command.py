@@ -39,7 +39,7 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
         r"\g<0>: shoot these two balls alone, or give --restitution \1=E:ERROR"
     ),
     r"the ratio of (\S+) is not known": r"\g<0> (--known \1=RATIO)",
-    r"(restitution|known)\['(.+?)'\] = ": r"--\1 \2: ",
+    r"(restitution|known)\['(.+?)'\](?:\[\d\])? = ": r"--\1 \2: ",
     r"\bforward\b(?=\[| = | has)": "ratio",
     _ROW + r"\[(\d+)\] = ": lambda found: f"--{found[1]}, value {int(found[2]) + 1}: ",
     _ROW + r" has shape \((\d+),\);[^:]*: ": r"--\1, \2 given: ",

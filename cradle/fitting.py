@@ -58,6 +58,8 @@ def fit(
     """
     from cradle.fit import read_shots
 
+    if predict is not None and as_csv:
+        raise click.UsageError("--csv prints the fitted values alone; with --predict give --json")
     given, known = options.pop("given"), options.pop("known")
     shots = read_shots(file, **options)
     used = shots.without(*(name.strip() for part in without for name in part.split(",")))

@@ -280,6 +280,7 @@ def test_a_confidence_set_of_two_pieces_is_shown_in_two_pieces(tmp_path, monkeyp
     assert parsed == row["intervals"]
     text = " or ".join(f"{low:.4f}-{high:.4f}" for low, high in row["intervals"])
     assert text in call(line).splitlines()[1]
+    assert "intervals in pieces: DAA; " in call(f"{line} --predict DAA")
 
 
 def test_narrow_intervals_have_the_digits_they_need():
@@ -391,7 +392,10 @@ def test_film_gives_the_rows_of_the_table(folder):
         ("fit shots.csv --without ABX", 1, "no set 'ABX' to leave out; there are AB, AC, ABA, B"),
         ("fit shots.csv --without AB,AC,ABA,BAC,CAB,ACA", 1, "no set is left without AB, AC, AB"),
         ("fit shots.csv --restitution AB=1.2", 1, "cradle: --restitution AB: 1.2; must lie in"),
+        ("fit shots.csv --restitution AB=1:-1", 1, "--restitution AB: -1.0; a standard error must"),
+        ("fit shots.csv --restitution AB=nan", 1, "cradle: --restitution AB: nan; must be finite"),
         ("fit shots.csv --known ABA=1.2", 1, "cradle: --known ABA: 1.2; must lie in [0, 1]"),
+        ("fit shots.csv --predict ABA --csv", 2, "--csv prints the fitted values alone"),
         ("fit pairs.csv --predict ABA", 1, "the ratio of ABA is not known (--known ABA=RATIO)"),
         ("frobnicate", 2, "No such command"),
     ],

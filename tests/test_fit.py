@@ -344,8 +344,10 @@ def test_missing_knowledge_is_named():
         ratio(shots, {"AC": 0.3})
     with pytest.raises(ValueError, match="must lie in"):
         ratio(shots, {"AB": 1.3})
-    with pytest.raises(ValueError, match=r"error of restitution\['AB'\] = -0.1; must be at least"):
+    with pytest.raises(ValueError, match=r"restitution\['AB'\]\[1\] = -0.1; a standard error"):
         ratio(shots, {"AB": (0.3, -0.1)})
+    with pytest.raises(ValueError, match="must be a number, or a number and its error"):
+        ratio(shots, {"AB": (0.3, 0.1, 0.1)})
     with pytest.raises(ValueError, match=r"known\['ABA'\] = 1.3; must lie in"):
         ratio(shots, {"AB": 0.3}, known={"ABA": 1.3})
     with pytest.raises(ValueError, match="no set has two balls"):
