@@ -6,34 +6,47 @@ that is wrong or an impact that did not finish, 2 for a command that was not und
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import click
 
-from cradle.console import plot_fits, show, text
+from cradle.console import format_options, show
 from cradle.describing import chain_options, described
 from cradle.filming import film
+from cradle.fitting import fit, template
 from cradle.recommending import recommend
 
 # What a command needs is imported in the command: the first answer comes within a second.
 
-# What errors say of arguments, as options.
-_OPTIONS = {
-    "excess='saturate'": "--saturate", "stiffness=": "--stiffness ", "wanted = ": "--wanted ",
-    "model_error = ": "--model-error ", "accuracy = ": "--accuracy ", "forward[": "--ratio[",
-    "forward = ": "--ratio = ", "forward has": "--ratio has",
-}  # fmt: skip
-
-
-def _format_options(command: Callable[..., None]) -> Callable[..., None]:
-    command = click.option("--csv", "as_csv", is_flag=True, help="Print the table as CSV.")(command)
-    return click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")(
-        command
-    )
+# What errors say of arguments, as options; a row of values counts from 1, like the tables.
+_ROW = r"\b(masses|velocities|restitution|ratio|backward|stiffness)"
+_OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
+    r"excess='saturate'": "--saturate",
+    r"(mass|velocity)_unit='(\S+)'": r"--\1-unit \2",
+    r"\bstiffness=": "--stiffness ",
+    r"\b(sigma|known)=": r"--\1",
+    r"\b(wanted|accuracy|length|speed) = ": r"--\1 ",
+    r"\bmodel_error = ": "--model-error ",
+    r"restitution has no '(.+?)', which set (.+) needs; it has (.*)": (
+        r"set \2 needs the restitution of \1: shoot these two balls alone, or give "
+        r"--restitution \1=E:ERROR (there are: \3)"
+    ),
+    r"the coefficient of restitution of (\S+) is not known": (
+        r"\g<0>: shoot these two balls alone, or give --restitution \1=E:ERROR"
+    ),
+    r"the ratio of (\S+) is not known": r"\g<0> (--known \1=RATIO)",
+    r"(restitution|known)\['(.+?)'\](?:\[\d\])? = ": r"--\1 \2: ",
+    r"\bforward\b(?=\[| = | has)": "ratio",
+    _ROW + r"\[(\d+)\] = ": lambda found: f"--{found[1]}, value {int(found[2]) + 1}: ",
+    _ROW + r" has shape \((\d+),\);[^:]*: ": r"--\1, \2 given: ",
+    _ROW + "(?= = | has)": r"--\1",
+    r"sequence\[(\d+)\] = ": lambda found: f"SEQUENCE, ball {int(found[1]) + 1}: ",
+    r"at ball (\d+), counted from 0,": lambda found: f"at ball {int(found[1]) + 1}",
+}
 
 
 @click.group()
@@ -44,7 +57,7 @@ def main() -> None:
 
 @main.command()
 @chain_options
-@_format_options
+@format_options
 def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
     """Velocities after an impact.
 
@@ -89,94 +102,6 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
 
 
 @main.command()
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--mass-unit", type=click.Choice(["kg", "g"]), help="Unit of the column mass [kg].")
-@click.option("--velocity-unit", type=click.Choice(["m/s", "cm/s", "mm/s"]),
-              help="Unit of before, after and sigma [m/s].")  # fmt: skip
-@click.option("--sigma", type=float, help="Error of all velocities, for a file without it.")
-@click.option("--restitution", "given", multiple=True, metavar="PAIR=E[:ERROR]",
-              help="For pairs that were not shot alone: AB=0.53:0.01.")  # fmt: skip
-@click.option("--known", multiple=True, metavar="TRIPLET=RATIO", help="Ratios not to be fitted.")
-@click.option("--predict", metavar="SEQUENCE", help="Predict a longer chain of these balls.")
-@click.option("--speed", default=1.0, help="Of its first ball, m/s [1].")
-@click.option("--plot", type=click.Path(dir_okay=False), help="Draw the likelihoods to a file.")
-@_format_options
-def fit(
-    file: Path, given: Sequence[str], known: Sequence[str], predict: str | None, speed: float,
-    plot: str | None, as_json: bool, as_csv: bool, **options: Any,
-) -> None:  # fmt: skip
-    """Fit coefficients of restitution and ratios to measured velocities.
-
-    FILE is a table of shots; `cradle template` prints one to fill in.
-
-    \b
-    Examples:
-      cradle fit shots.csv
-      cradle fit shots.csv --mass-unit g --restitution AC=0.31:0.01
-      cradle fit shots.csv --predict ABACA --speed 1.2
-      cradle fit shots.csv --json --plot fit.png
-    """
-    from cradle.fit import ratio, read_shots, restitution
-
-    shots = read_shots(file, **options)
-    fits = []
-    values: dict[str, tuple[float, float]] = {}
-    if any(len(one.types) == 2 for one in shots.sets):
-        fits.append(restitution(shots))
-        values.update(fits[0].values())
-    values.update(
-        {name: (pair[0], pair[1] if len(pair) > 1 else 0.0) for name, pair in map(_named, given)}
-    )
-    if any(len(one.types) > 2 for one in shots.sets):
-        fixed = {name: pair[0] for name, pair in map(_named, known)}
-        fits.append(ratio(shots, values, known=fixed))
-    momentum, count = shots.momentum_check()
-    rows = [row for one in fits for row in one.rows()]
-    extra = {
-        "chi_square": [one.chi_square for one in fits],
-        "degrees_of_freedom": [one.degrees_of_freedom for one in fits],
-        "momentum_chi_square": momentum,
-        "shots": count,
-    }
-    poor = {True: "", False: " (a poor fit: the errors do not explain the differences)"}
-    notes = [
-        f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}"
-        f"{poor[one.probability > 1e-3]}"
-        for one in fits
-    ]
-    notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots")
-    if predict is not None:
-        predicted = fits[-1].predict(predict, speed)
-        extra["prediction"] = predicted.rows()
-        notes += ["", f"{predict} at {speed:g} m/s:", text(predicted.rows())]
-    if plot is not None:
-        plot_fits(fits, plot)
-    show(rows, extra, "\n".join(notes), as_json, as_csv)
-
-
-def _named(given: str) -> tuple[str, list[float]]:
-    """Read NAME=NUMBER or NAME=NUMBER:ERROR."""
-    name, _, numbers = given.partition("=")
-    try:
-        return name, [float(part) for part in numbers.split(":")]
-    except ValueError:
-        raise click.UsageError(f"{given!r}: write NAME=NUMBER or NAME=NUMBER:ERROR") from None
-
-
-@main.command()
-def template() -> None:
-    """Print a table of shots to fill in.
-
-    \b
-    Examples:
-      cradle template
-    """
-    from cradle.tables import data_folder
-
-    click.echo((data_folder() / "shots_template.csv").read_text(encoding="utf-8"), nl=False)
-
-
-@main.command()
 @chain_options
 @click.option("--output", "-o", required=True, type=click.Path(dir_okay=False),
               help="File to draw to: .png, .svg or .pdf.")  # fmt: skip
@@ -210,7 +135,7 @@ def plot(output: str, **options: Any) -> None:
 @click.option("--length", default=0.3, help="Of the pendulums, m [0.3].")
 @click.option("--seconds", default=2.0, help="How long it swings [2].")
 @click.option("--steps", default=20, help="How many rows to print [20].")
-@_format_options
+@format_options
 def swing(
     pull: float, length: float, seconds: float, steps: int, as_json: bool, as_csv: bool,
     **options: Any,
@@ -259,7 +184,9 @@ def swing(
 
 
 main.add_command(film)
+main.add_command(fit)
 main.add_command(recommend)
+main.add_command(template)
 
 
 @main.command(name="warm-up")
@@ -310,6 +237,6 @@ def run(arguments: Sequence[str] | None = None) -> None:
     except (ValueError, OSError, ImpactNotFinished, ImpactNotCertified) as error:
         message = str(error)
         for python, option in _OPTIONS.items():
-            message = message.replace(python, option)
+            message = re.sub(python, option, message)
         click.echo(f"cradle: {message}", err=True)
         sys.exit(1)

@@ -6,10 +6,18 @@ import csv
 import io
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import click
+
+
+def format_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of `show`."""
+    command = click.option("--csv", "as_csv", is_flag=True, help="Print the table as CSV.")(command)
+    return click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")(
+        command
+    )
 
 
 def show(
@@ -24,7 +32,7 @@ def show(
         table = io.StringIO()
         writer = csv.DictWriter(table, list(rows[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows(rows)
+        writer.writerows({name: _plain(value) for name, value in row.items()} for row in rows)
         click.echo(table.getvalue(), nl=False)
     else:
         click.echo(f"{text(rows)}\n{note}")
@@ -46,6 +54,8 @@ def _cells(column: Sequence[Any]) -> list[str]:
 
     Four at least, for people compare columns; and never minus zero.
     """
+    if isinstance(column[0], tuple):
+        return _pieces(column)
     floats = [abs(value) for value in column if isinstance(value, float) and math.isfinite(value)]
     largest = max(floats, default=0.0) or 1.0
     decimals = max(4, 3 - math.floor(math.log10(largest)))
@@ -62,6 +72,23 @@ def _cells(column: Sequence[Any]) -> list[str]:
         return f"{value:z.{decimals}f}"
 
     return [cell(value) for value in column]
+
+
+def _pieces(column: Sequence[tuple[tuple[float, float], ...]]) -> list[str]:
+    """Return a column of unions of intervals; two digits of the narrowest one can be told apart."""
+    widths = [high - low for pieces in column for low, high in pieces if high > low]
+    decimals = min(12, max(4, 1 - math.floor(math.log10(min(widths, default=1.0)))))
+    return [
+        " or ".join(f"{low:.{decimals}f}-{high:.{decimals}f}" for low, high in pieces)
+        for pieces in column
+    ]
+
+
+def _plain(value: Any) -> Any:
+    """Return a value for a cell of CSV; a union of intervals as `0.1..0.2; 0.5..0.6`."""
+    if not isinstance(value, tuple):
+        return value
+    return "; ".join(f"{low!r}..{high!r}" for low, high in value)
 
 
 def plot_fits(fits: Sequence[Any], path: str) -> None:

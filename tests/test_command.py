@@ -26,6 +26,7 @@ from cradle import (
     paper_chain,
     recommend,
     runtime,
+    textbook,
 )
 from cradle.command import main, run
 from cradle.console import text as shown
@@ -54,11 +55,15 @@ def examples():
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with a table of shots: the first of each set of the synthetic example."""
+    """A folder with tables of shots: the first of each set of the synthetic example.
+
+    `shots.csv` has pairs and triplets, `long.csv` a chain of five too.
+    """
     lines = (ROOT / "data" / "shots_synthetic.csv").read_text(encoding="utf-8").splitlines()
-    kept = [line for line in lines[2:]
-            if int(line.split(",")[1]) in (1, 5, 9) and not line.startswith("ABACA")]  # fmt: skip
-    (tmp_path / "shots.csv").write_text("\n".join([*lines[:2], *kept]) + "\n", encoding="utf-8")
+    kept = lines[:2] + [line for line in lines[2:] if int(line.split(",")[1]) in (1, 5, 9)]
+    (tmp_path / "long.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
+    kept = [line for line in kept if not line.startswith("ABACA")]
+    (tmp_path / "shots.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
     shutil.copy(ROOT / "data" / "video_synthetic.txt", tmp_path / "film.txt")
     shutil.copy(tmp_path / "shots.csv", tmp_path / "grams.csv")
     rows = list(csv.reader(io.StringIO((tmp_path / "shots.csv").read_text().split("\n", 1)[1])))
@@ -66,6 +71,10 @@ def folder(tmp_path, monkeypatch):
         writer = csv.writer(file)
         writer.writerow(rows[0])
         writer.writerows([*r[:4], 1000 * float(r[4]), *r[5:]] for r in rows[1:])
+    for name, scale, sets in (("fast.csv", 100, ("AB", "AC")), ("pairs.csv", 1, ("AB", "AC"))):
+        some = [[*r[:5], *(scale * float(x) for x in r[5:])] for r in rows[1:] if r[0] in sets]
+        with (tmp_path / name).open("w", newline="") as file:
+            csv.writer(file).writerows([rows[0], *some])
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(runtime.VARIABLE, "plain")
     return tmp_path
@@ -202,10 +211,129 @@ def test_warm_up_says_what_was_done(monkeypatch, loaded, before, after, words):
 def test_fit_finds_what_the_example_was_made_with():
     answer = json.loads(call("fit shots.csv --json --known CAB=0.499 --known BAC=0.088"))
     rows = {row["name"]: row for row in answer["rows"]}
-    assert rows["AB"]["lower"] - 0.02 < 0.53 < rows["AB"]["upper"] + 0.02
-    assert rows["ABA"]["lower"] - 0.03 < 0.127 < rows["ABA"]["upper"] + 0.03
+    for name, true, margin in (("AB", 0.53, 0.02), ("ABA", 0.127, 0.03)):
+        ((lower, upper),) = rows[name]["intervals"]
+        assert lower - margin < true < upper + margin
     assert answer["shots"] == 18
     assert len(answer["chi_square"]) == 2
+
+
+def two_piece_shots():
+    """Return shots of DAA that two ranges of ratios explain; each velocity is off by 0 to 5 mm/s.
+
+    Rows of two parts: the names and the mass, the velocities and their error.
+    """
+    masses = [0.166, 0.045, 0.045]
+    after = textbook.solve(masses, [1.0, 0.0, 0.0], [0.94, 0.97], [0.215], [0.131]).velocities
+    rows = []
+    for shot, speed in enumerate((0.75, 1.0, 1.25, 1.5)):
+        for ball in range(3):
+            error = ((7 * shot + 5 * ball) % 11 - 5) * 1e-3
+            rows.append([("DAA", shot + 1, ball + 1, "DAA"[ball], masses[ball]),
+                         (0.0 if ball else speed, speed * after[ball] + error, 0.02)])  # fmt: skip
+    return rows
+
+
+def pieces_by_the_textbook(rows, grid):
+    """Confidence set of the ratio of DAA: the textbook's impact at each ratio of a grid.
+
+    Outcomes are as the striker's speed, so that the best speed of a shot is a weighted mean.
+    """
+    masses = [row[0][4] for row in rows[:3]]
+    table = np.array([row[1] for row in rows]).reshape(-1, 3, 3)
+    struck, after, sigma = table[:, 0, 0], table[:, :, 1], table[:, :, 2]
+    chi_square = []
+    for a in grid:
+        unit = np.array(
+            textbook.solve(masses, [1.0, 0.0, 0.0], [0.94, 0.97], [a], [0.131]).velocities
+        )
+        weights, known = (unit / sigma) ** 2, sigma[:, 0] ** -2
+        best = (struck * known + (unit * after / sigma**2).sum(axis=1)) / (
+            known + weights.sum(axis=1)
+        )
+        misses = ((after - best[:, None] * unit) / sigma) ** 2
+        chi_square.append(misses.sum() + (known * (struck - best) ** 2).sum())
+    inside = np.array(chi_square) <= min(chi_square) + 3.841459
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
+    return [(grid[a], grid[b - 1]) for a, b in zip(edges[::2], edges[1::2])]
+
+
+def test_a_confidence_set_of_two_pieces_is_shown_in_two_pieces(tmp_path, monkeypatch):
+    """Table, CSV and JSON of the command, against the textbook's likelihood on a fine grid."""
+    monkeypatch.chdir(tmp_path)
+    rows = two_piece_shots()
+    lines = ["set,shot,ball,type,mass,before,after,sigma"]
+    lines += [",".join(map(repr, [*names, *numbers])) for names, numbers in rows]
+    (tmp_path / "two.csv").write_text("\n".join(lines).replace("'", ""), encoding="utf-8")
+    step = 5e-4
+    expected = pieces_by_the_textbook(rows, np.arange(0.0, 0.5, step))
+    assert len(expected) == 2
+    # A hull would hold more than is outside of it.
+    assert expected[1][0] - expected[0][1] > 2 * sum(high - low for low, high in expected)
+    line = "fit two.csv --restitution AD=0.94 --restitution AA=0.97 --known AAD=0.131"
+    (row,) = json.loads(call(f"{line} --json"))["rows"]
+    np.testing.assert_allclose(row["intervals"], expected, atol=1.01 * step)
+    assert not {"lower", "upper"} & set(row)
+    assert any(low <= row["value"] <= high for low, high in row["intervals"])
+    (cells,) = csv.DictReader(io.StringIO(call(f"{line} --csv")))
+    parsed = [[float(end) for end in part.split("..")] for part in cells["intervals"].split("; ")]
+    assert parsed == row["intervals"]
+    text = " or ".join(f"{low:.4f}-{high:.4f}" for low, high in row["intervals"])
+    assert text in call(line).splitlines()[1]
+    assert "intervals in pieces: DAA; " in call(f"{line} --predict DAA")
+
+
+def test_narrow_intervals_have_the_digits_they_need():
+    rows = [{"intervals": ((0.78138, 0.78152),)}, {"intervals": ((0.0, 0.5), (0.6, 1.0))}]
+    assert shown(rows).split("\n")[1:] == [
+        "                   0.78138-0.78152", "0.00000-0.50000 or 0.60000-1.00000"]  # fmt: skip
+
+
+# --- what is left out, predicted and compared ---------------------------------------------------
+
+
+def test_a_set_left_out_is_compared_with_its_prediction(folder):
+    """Predictions are those of a file without the set; the mean of the shots by hand."""
+    line = "--predict ABACA --speed 2 --json"
+    without = json.loads(call(f"fit long.csv --without ABACA {line}"))
+    alone = json.loads(call(f"fit shots.csv {line}"))
+    assert without["rows"] == alone["rows"]
+    assert without["prediction"] == alone["prediction"]
+    assert without["without"] == ["ABACA"]
+    assert alone["without"] == alone["measured"] == []
+    (measured,) = without["measured"]
+    assert (measured["set"], measured["shots"], measured["fitted"]) == ("ABACA", 2, False)
+    rows = [row.split(",") for row in (folder / "long.csv").read_text().splitlines()
+            if row.startswith("ABACA")]  # fmt: skip
+    shots = np.array([[float(x) for x in row[5:9]] for row in rows]).reshape(2, 5, 4)
+
+    def mean(table):
+        return 2 * (table[:, :, 1] / table[:, :1, 0]).mean(axis=0)
+
+    np.testing.assert_allclose(measured["measured"], mean(shots), rtol=1e-12)
+    variance = np.zeros(5)
+    for shot, ball, column in np.ndindex(2, 5, 2):  # each velocity moved by a little
+        moved, error = shots.copy(), shots[shot, ball, (3, 2)[column]]
+        moved[shot, ball, column] += 1e-4 * error
+        variance += ((mean(moved) - mean(shots)) / 1e-4) ** 2
+    np.testing.assert_allclose(measured["error"], np.sqrt(variance), rtol=1e-3)
+    text = call("fit long.csv --without ABACA --predict ABACA")
+    assert "mean of 2 shots of set ABACA, each scaled to 1 m/s; the set was left out of" in text
+    assert "momentum: chi-square" in text
+    assert "20 shots (all of the file)" in text
+
+
+@pytest.mark.usefixtures("folder")
+def test_what_was_fitted_is_no_check():
+    line = "fit shots.csv --without ACA,CAB --without BAC --predict ABA"
+    answer = json.loads(call(f"{line} --json"))
+    assert answer["measured"][0]["fitted"] is True
+    assert answer["without"] == ["BAC", "CAB", "ACA"]
+    assert [row["name"] for row in answer["rows"]] == ["AB", "AC", "ABA"]
+    text = call(line)
+    assert "the set was part of the fit: this is no check\n" in text
+    header = ["ball", "type", "velocity", "lower", "upper", "measured", "error"]
+    assert header in [line.split() for line in text.splitlines()]
 
 
 def test_film_gives_the_rows_of_the_table(folder):
@@ -226,24 +354,28 @@ def test_film_gives_the_rows_of_the_table(folder):
 @pytest.mark.parametrize(
     ("line", "code", "message"),
     [
-        ("solve ABXA", 1, "sequence[2] = 'X'; must be one of A, B, C, D"),
+        ("solve ABXA", 1, "SEQUENCE, ball 3: 'X'; must be one of A, B, C, D"),
         ("solve ABCCA", 1, "--saturate holds the contact closed"),
         ("solve", 2, "give either a sequence of ball types"),
         ("solve ABA --masses 1,1", 2, "give either a sequence of ball types"),
         ("solve ABA --ratio 0.1", 2, "--ratio goes with --masses"),
         ("solve --masses 1,x", 2, "write numbers with commas"),
         ("solve --masses 1,1 --json --csv", 2, "give one of --json and --csv"),
-        ("solve --masses 1,-1", 1, "masses[1] = -1.0; must be above 0"),
+        ("solve --masses 1,-1", 1, "cradle: --masses, value 2: -1.0; must be above 0"),
+        ("solve --masses 1,1 --restitution 1.2", 1, "cradle: --restitution = 1.2; must lie in"),
+        ("solve --masses 1,1,1 --restitution 1,1.2", 1, "cradle: --restitution, value 2: 1.2; mu"),
+        ("solve --masses 1,1,1 --velocities 1,0", 1, "--velocities, 2 given: one velocity for ea"),
         ("solve --masses 1,1,1 --model ratio", 2, "ratios need --ratio, such as 0.1"),
         ("solve --masses 1,1,1 --backward 0.1", 2, "ratios need --ratio"),
         ("solve --masses 1,1,1 --model spheres --ratio 0.1", 2, "--model spheres has no ratios"),
         ("solve ABCCA --model sequential --saturate", 2, "--model sequential has no ratios"),
-        ("solve --masses 1,1,1 --ratio 0.6", 1, "--ratio[0] = 0.6; at ball 1"),
+        ("solve --masses 1,1,1 --ratio 0.6", 1, "--ratio, value 1: 0.6; at ball 2 it must"),
+        ("solve --masses 1,1,1 --ratio 0 --backward 1", 1, "--backward, value 1: 1.0; at ball 2 "),
         ("solve --masses 1,1,1 --ratio 0.1,0.1", 1, "--ratio has 2 values; 3 balls need 1"),
         ("swing --masses 1,1,1 --pull 5", 1, "--pull = 5.0; must be above 0 and at most a quarter"),
         ("swing --masses 1,1,1 --pull -1", 1, "--pull = -1.0; must be above 0 and at most a quar"),
         ("swing --masses 1,1,1 --pull 0", 1, "--pull = 0.0; must be above 0 and at most a quarter"),
-        ("swing --masses 1,1,1 --length 0", 1, "length = 0.0; must be above 0"),
+        ("swing --masses 1,1,1 --length 0", 1, "cradle: --length 0.0; must be above 0"),
         ("swing --masses 1,1,1 --seconds 0", 1, "--seconds = 0.0; must be above 0"),
         ("swing --masses 1,1,1 --steps 0", 1, "--steps = 0; must be a whole number, at least 1"),
         ("recommend --masses 1,1,1", 1, "Give --stiffness 1 if all contacts are equal spheres"),
@@ -253,6 +385,18 @@ def test_film_gives_the_rows_of_the_table(folder):
         ("fit shots.csv --mass-unit g --restitution AB", 2, "write NAME=NUMBER"),
         ("fit grams.csv", 1, "column mass: 45 kg is unlikely"),
         ("film film.txt --set BA --masses 1,1,1", 1, "has 3 tracks, --set 2 types"),
+        ("fit grams.csv", 1, "grams: say --mass-unit g (or in kg indeed: say --mass-unit kg)"),
+        ("fit fast.csv", 1, "cm/s: say --velocity-unit cm/s (or in m/s indeed: say --velocity-un"),
+        ("fit shots.csv --without AC --predict ABX", 1, "set BAC needs the restitution of AC: sh"),
+        ("fit shots.csv --without AC", 1, "give --restitution AC=E:ERROR (there are: AB)"),
+        ("fit shots.csv --without ABX", 1, "no set 'ABX' to leave out; there are AB, AC, ABA, B"),
+        ("fit shots.csv --without AB,AC,ABA,BAC,CAB,ACA", 1, "no set is left without AB, AC, AB"),
+        ("fit shots.csv --restitution AB=1.2", 1, "cradle: --restitution AB: 1.2; must lie in"),
+        ("fit shots.csv --restitution AB=1:-1", 1, "--restitution AB: -1.0; a standard error must"),
+        ("fit shots.csv --restitution AB=nan", 1, "cradle: --restitution AB: nan; must be finite"),
+        ("fit shots.csv --known ABA=1.2", 1, "cradle: --known ABA: 1.2; must lie in [0, 1]"),
+        ("fit shots.csv --predict ABA --csv", 2, "--csv prints the fitted values alone"),
+        ("fit pairs.csv --predict ABA", 1, "the ratio of ABA is not known (--known ABA=RATIO)"),
         ("frobnicate", 2, "No such command"),
     ],
 )

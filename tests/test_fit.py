@@ -130,6 +130,34 @@ def test_momentum_shows_a_wrong_mass():
     assert residuals[0] == pytest.approx(gain / (0.01 * np.sqrt(2 * 0.05**2 + 0.053**2)))
 
 
+def test_sets_are_left_out_by_name():
+    tables = [columns(name, [1.0], outcome(name), 0.01) for name in ("AB", "ABA", "ABACA")]
+    shots = read_shots({key: [x for table in tables for x in table[key]] for key in tables[0]})
+    kept = shots.without("ABACA", "AB")
+    assert kept.sets == (shots["ABA"],)
+    assert shots.without().sets == shots.sets
+    with pytest.raises(ValueError, match="no set 'ABC' to leave out; there are AB, ABA, ABACA"):
+        shots.without("ABC")
+    with pytest.raises(ValueError, match="no set is left without ABA"):
+        kept.without("ABA")
+
+
+def test_mean_of_shots_at_different_speeds():
+    """Shots without errors have the outcome as their mean; its error falls with their number."""
+    shots = read_shots(columns("ABA", [0.5, 1.0, 2.0], outcome("ABA"), 0.01))
+    mean, error = shots["ABA"].mean_after(1.5)
+    np.testing.assert_allclose(mean, 1.5 * outcome("ABA"), rtol=1e-14)
+    share = outcome("ABA")
+    # 0.01 of the velocity after, and 0.01 of the striker's: over 0.5, 1 and 2 m/s.
+    expected = 1.5 * 0.01 * np.sqrt((1 + share**2) * (4 + 1 + 0.25)) / 3
+    np.testing.assert_allclose(error, expected, rtol=1e-12)
+    both = columns("AB", [1.0], collide(Chain([0.045, 0.053], [1, -1], 0.5),
+                                        ImpulseCorrelation(0)).velocities, 0.01)  # fmt: skip
+    both["before"] = [1.0, -1.0]
+    with pytest.raises(ValueError, match="set AB has shots that do not begin with ball 1"):
+        read_shots(both)["AB"].mean_after()
+
+
 # --- search ------------------------------------------------------------------------------------
 
 
@@ -281,8 +309,10 @@ def test_two_ratios_explain_one_outcome():
     """DAA: outcomes at .215 and near .398 are a hundredth apart."""
     row = next(r for r in stored("fit_precision.csv") if r["triplet"] == "DAA")
     shots = read_shots(columns("DAA", [1.0] * 5, outcome("DAA"), 0.02))
-    one = ratio(shots, pairs_of("DAA", 0.0), known={"AAD": 0.131})["DAA"]
+    fit = ratio(shots, pairs_of("DAA", 0.0), known={"AAD": 0.131})
+    one = fit["DAA"]
     assert len(one.intervals) == 2
+    assert fit.rows()[0]["intervals"] == fit.table().loc["DAA", "intervals"] == one.intervals
     assert len([m for m in one.modes if m.excess < RISE]) == 2
     assert one.modes[1].value == pytest.approx(float(row["second"]), abs=0.005)
 
@@ -314,6 +344,12 @@ def test_missing_knowledge_is_named():
         ratio(shots, {"AC": 0.3})
     with pytest.raises(ValueError, match="must lie in"):
         ratio(shots, {"AB": 1.3})
+    with pytest.raises(ValueError, match=r"restitution\['AB'\]\[1\] = -0.1; a standard error"):
+        ratio(shots, {"AB": (0.3, -0.1)})
+    with pytest.raises(ValueError, match="must be a number, or a number and its error"):
+        ratio(shots, {"AB": (0.3, 0.1, 0.1)})
+    with pytest.raises(ValueError, match=r"known\['ABA'\] = 1.3; must lie in"):
+        ratio(shots, {"AB": 0.3}, known={"ABA": 1.3})
     with pytest.raises(ValueError, match="no set has two balls"):
         restitution(shots)
     with pytest.raises(ValueError, match="no set has three balls"):
@@ -444,6 +480,11 @@ def test_example_ends_in_the_values_it_was_made_with():
     assert (predicted.lower <= predicted.median).all()
     np.testing.assert_allclose(predicted.median, outcome("ABA"), atol=0.01)
     assert found.predict("AB", 2.0).median == pytest.approx(2 * outcome("AB"), abs=0.02)
+    assert (
+        repr(found.predict("A-B-A"))
+        == repr(found.predict("ABA"))
+        == repr(found.predict(("A", "B", "A")))
+    )
     with pytest.raises(ValueError, match="the ratio of BAB is not known"):
         found.predict("ABABA")
     with pytest.raises(ValueError, match="no mass is known of type 'D'"):
@@ -492,6 +533,9 @@ def test_files_that_are_no_table_of_ours(tmp_path):
     lines = (ROOT / "data" / "shots_template.csv").read_text(encoding="utf-8").splitlines()
     cases = {
         "semicolons; put commas": [line.replace(",", ";") for line in lines],
+        "semicolons between the columns and commas in the decimals; first turn every comma into": [
+            line.replace(",", ";").replace(".", ",") for line in lines
+        ],
         r"13 values; the header has 9 columns \(decimals need a point": [
             line.replace("0.", "0,") for line in lines
         ],
@@ -503,7 +547,7 @@ def test_files_that_are_no_table_of_ours(tmp_path):
         with pytest.raises(ValueError, match=words):
             read_shots(path)
     path.write_text("\n".join(lines), encoding="utf-16")
-    with pytest.raises(ValueError, match=r"2.csv is no UTF-8 text \(byte 0\); save it as CSV in"):
+    with pytest.raises(ValueError, match=r"3.csv is no UTF-8 text \(byte 0\); save it as CSV in"):
         read_shots(path)
     # Any other name is free, whatever balls it has.
     for other in ("first day", "ABA-2", "ABAb"):

@@ -2,7 +2,8 @@
 
     read_shots -> restitution (pairs) -> ratio (triplets and longer chains) -> predict
 
-- `cradle.fit.shots`: tables of measured velocities, read and checked; `cradle.fit.lines`.
+- `cradle.fit.shots`: measured velocities, in sets.
+- `cradle.fit.reading`: tables of them, read and checked; `cradle.fit.lines`.
 - `cradle.fit.tracker`: positions exported by the video tool Tracker.
 - `cradle.fit.motion`: velocities from positions or heights.
 - `cradle.fit.parameters`: what is fitted, and its names.
@@ -16,9 +17,10 @@
 from cradle.fit.answers import Estimate, Prediction
 from cradle.fit.estimate import ratio, restitution, restitution_from_heights
 from cradle.fit.motion import Velocities, speeds_from_heights, velocities_from_tracks
+from cradle.fit.reading import read_shots
 from cradle.fit.result import Fit
 from cradle.fit.search import Mode
-from cradle.fit.shots import Shots, ShotSet, read_shots
+from cradle.fit.shots import Shots, ShotSet
 from cradle.fit.tracker import Tracks, read_tracker
 
 __all__ = [

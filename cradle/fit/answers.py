@@ -128,7 +128,9 @@ class Prediction:
     ----------
     types : tuple of str, length N
     median, lower, upper : ndarray, shape (N,)
-        Middle and ends of the central 95 % of the predictions, m/s.
+        Median and ends of the central 95 % of the predictions, m/s.  Where a ratio has a confidence
+        set of several pieces, the predictions may come in several groups; what lies between the
+        groups is then inside these ends too.
     """
 
     types: tuple[str, ...]

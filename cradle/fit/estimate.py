@@ -178,7 +178,10 @@ def ratio(shots: Shots, restitution: Fit | Known, *, known: Known | None = None)
     if not sets:
         raise ValueError("no set has three balls or more; ratios come from triplets")
     values, errors = _restitution_values(restitution, sets)
-    fixed = {parameter_key(name): float(np.atleast_1d(v)[0]) for name, v in (known or {}).items()}
+    fixed = {
+        parameter_key(name): _with_error(f"known[{name!r}]", value)[0]
+        for name, value in (known or {}).items()
+    }
     bounds = {key: m for one in sets for key, m in _bounds(one).items() if key not in fixed}
     acting = {key for key in bounds if any(_acts(key, one, bounds, fixed, values) for one in sets)}
     estimates: dict[str, Estimate] = {}
@@ -197,6 +200,18 @@ def ratio(shots: Shots, restitution: Fit | Known, *, known: Known | None = None)
                chi_square, freedom, {label(k): v for k, v in fixed.items()})  # fmt: skip
 
 
+def _with_error(name: str, given: float | tuple[float, float]) -> tuple[float, float]:
+    """Return a value and its standard error, 0 if it was given alone."""
+    numbers = np.atleast_1d(checked(name, given))
+    if numbers.size not in (1, 2):
+        raise ValueError(f"{name} = {given!r}; must be a number, or a number and its error")
+    value = checked(name, numbers[0], "must lie in [0, 1]", 0.0, 1.0)
+    error = float(numbers[1]) if numbers.size > 1 else 0.0
+    if error < 0:
+        raise ValueError(f"{name}[1] = {error!r}; a standard error must be at least 0")
+    return float(value), error
+
+
 def _restitution_values(
     given: Fit | Known, sets: Sequence[ShotSet]
 ) -> tuple[dict[Key, float], dict[Key, float]]:
@@ -205,11 +220,9 @@ def _restitution_values(
     values, errors = {}, {}
     for name, value in table.items():
         key = tuple(sorted(parameter_key(name)))
-        pair = np.atleast_1d(checked(f"restitution[{name!r}]", value))
-        number = float(checked(f"restitution[{name!r}]", pair[0], "must lie in [0, 1]", 0.0, 1.0))
-        values[key] = number
-        if pair.size > 1 and pair[1] > 0:
-            errors[key] = float(pair[1])
+        values[key], error = _with_error(f"restitution[{name!r}]", value)
+        if error > 0:
+            errors[key] = error
     for one in sets:
         for key in pair_keys(one.types):
             if key not in values:

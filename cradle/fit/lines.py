@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,11 @@ def table_lines(source: Any) -> list[tuple[str, dict[str, Any]]]:
                 f"{path.name} is no UTF-8 text (byte {error.start}); save it as CSV in UTF-8"
             ) from None
         if numbered and ";" in numbered[0][1] and "," not in numbered[0][1]:
+            if any(re.search(r"\d,\d", text) for _, text in numbered):
+                raise ValueError(
+                    f"{path.name} has semicolons between the columns and commas in the decimals; "
+                    "first turn every comma into a point, then every semicolon into a comma"
+                )
             raise ValueError(f"{path.name} has semicolons; put commas between the columns")
         reader = csv.reader(text for _, text in numbered)
         header = [name.strip() for name in next(reader, [])]

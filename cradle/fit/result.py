@@ -90,15 +90,28 @@ class Fit:
         )
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return one row per estimate."""
+        """Return one row per estimate.
+
+        Returns
+        -------
+        list of dict
+            `intervals` holds the 95 % confidence set as (lower, upper) pairs, one for each range of
+            values that explains the data; values between two of them do not.
+
+        Examples
+        --------
+        >>> from cradle.fit import read_shots, restitution
+        >>> from cradle.tables import data_folder
+        >>> (row,) = restitution(read_shots(data_folder() / "shots_template.csv")).rows()
+        >>> [(round(lower, 4), round(upper, 4)) for lower, upper in row["intervals"]]
+        [(0.5113, 0.5429)]
+        """
         return [
             {
                 "name": name,
                 "kind": one.kind,
                 "value": one.value,
-                "lower": one.intervals[0][0] if one.identified else None,
-                "upper": one.intervals[-1][1] if one.identified else None,
-                "intervals": len(one.intervals) if one.identified else 0,
+                "intervals": one.intervals,
                 "minima": len(one.modes),
                 "identified": one.identified,
                 "at_bound": one.at_bound,
@@ -108,7 +121,7 @@ class Fit:
         ]
 
     def table(self) -> pd.DataFrame:
-        """Return the rows as a table; where nothing was identified the numbers are missing."""
+        """Return the rows as a table; where nothing was identified the value is missing."""
         import pandas as pd
 
         return pd.DataFrame(self.rows()).set_index("name")
@@ -137,7 +150,7 @@ class Fit:
         Parameters
         ----------
         types : str or sequence of str, length N
-            Types of the balls, left to right.
+            Types of the balls, left to right; in one string such as "ABA" or "steel-brass-steel".
         speed : float
             Of the first ball, m/s.
 
@@ -166,7 +179,7 @@ class Fit:
         >>> ratio(shots, restitution(shots)).predict("ABA")
         Prediction(ABA: 0.130 [0.112, 0.148], 0.244 [0.231, 0.257], 0.583 [0.571, 0.595] m/s)
         """
-        row = tuple(types)
+        row = parameter_key(types) if isinstance(types, str) else tuple(types)
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
         masses = self.shots.masses
         e, ratios = self._draws(row, masses)

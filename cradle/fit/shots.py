@@ -1,53 +1,12 @@
-"""Measured shots: one row per ball of each shot, read and checked."""
+"""Measured shots: velocities of the balls before and after impacts, in sets."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from cradle.checks import Vector
-from cradle.fit.lines import table_lines
-
-#: Columns that every table of shots has, and what they hold.
-COLUMNS = {
-    "set": "name of the arrangement; all shots of a set have the same balls in the same order",
-    "shot": "number or name of the shot within its set",
-    "ball": "position in the row, 1 at the left",
-    "type": "what kind of ball it is; balls of one type are alike",
-    "mass": "kg",
-    "before": "velocity just before the impact, m/s, positive to the right",
-    "after": "velocity after the impact, m/s",
-    "sigma": "standard error of `after`, m/s",
-}
-#: One more column that may be there.
-OPTIONAL = {
-    "sigma_before": "standard error of `before`; if left out, sigma for a moving ball, 0 at rest",
-}
-
-_MASS_UNITS = {"kg": 1.0, "g": 1e-3}
-_VELOCITY_UNITS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}
-# What no ball of a cradle is likely to exceed: beyond, the unit is probably another one.
-_HEAVIEST, _FASTEST = 5.0, 20.0
-# A defect of a measurement counts from so many standard errors on.
-_BEYOND = 5.0
-
-
-class _Row(NamedTuple):
-    set: str
-    shot: str
-    ball: int
-    type: str
-    mass: float
-    before: float
-    after: float
-    sigma: float
-    sigma_before: float
-    where: str
+from cradle.checks import Vector, one_number
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +28,7 @@ class ShotSet:
 
     Examples
     --------
+    >>> from cradle.fit import read_shots
     >>> from cradle.tables import data_folder
     >>> read_shots(data_folder() / "shots_template.csv")["AB"].types
     ('A', 'B')
@@ -90,6 +50,43 @@ class ShotSet:
         error = np.sqrt((self.sigma**2 + self.sigma_before**2) @ self.masses**2)
         return np.asarray(gain / error)
 
+    def mean_after(self, speed: float = 1.0) -> tuple[Vector, Vector]:
+        """Return the mean velocities after the impact, each shot scaled to one speed.
+
+        Parameters
+        ----------
+        speed : float
+            Of the first ball before the impact, m/s.
+
+        Returns
+        -------
+        mean, error : ndarray, shape (N,)
+            m/s; the standard errors follow from those of the velocities before and after.
+
+        Raises
+        ------
+        ValueError
+            If a shot begins otherwise than with the first ball striking the others at rest.
+
+        Examples
+        --------
+        >>> from cradle.fit import read_shots
+        >>> from cradle.tables import data_folder
+        >>> mean, error = read_shots(data_folder() / "shots_template.csv")["AB"].mean_after()
+        >>> mean.round(3).tolist(), error.round(3).tolist()
+        ([0.176, 0.7], [0.006, 0.007])
+        """
+        one_number("speed", speed, "must be above 0", 0.0, open_low=True)
+        striker = self.before[:, :1]
+        if (striker <= 0).any() or self.before[:, 1:].any():
+            raise ValueError(
+                f"set {self.name} has shots that do not begin with ball 1 striking the others at "
+                "rest"
+            )
+        share = self.after / striker
+        errors = np.hypot(self.sigma, share * self.sigma_before[:, :1]) / striker
+        return speed * share.mean(axis=0), speed * np.sqrt((errors**2).sum(axis=0)) / len(striker)
+
 
 @dataclass(frozen=True, eq=False)
 class Shots:
@@ -102,6 +99,7 @@ class Shots:
 
     Examples
     --------
+    >>> from cradle.fit import read_shots
     >>> from cradle.tables import data_folder
     >>> read_shots(data_folder() / "shots_template.csv")
     Shots(AB: 2 shots of 2 balls, ABA: 1 shot of 3 balls)
@@ -129,6 +127,39 @@ class Shots:
         """Mass of each type of ball, kg."""
         return {t: float(m) for s in self.sets for t, m in zip(s.types, s.masses, strict=True)}
 
+    def without(self, *names: str) -> Shots:
+        """Return the shots less some sets: what is not to be fitted, but to be predicted.
+
+        Parameters
+        ----------
+        names : str
+            Of the sets to leave out.
+
+        Returns
+        -------
+        Shots
+
+        Raises
+        ------
+        ValueError
+            If there is no set of that name, or no set is left.
+
+        Examples
+        --------
+        >>> from cradle.fit import read_shots
+        >>> from cradle.tables import data_folder
+        >>> read_shots(data_folder() / "shots_template.csv").without("ABA")
+        Shots(AB: 2 shots of 2 balls)
+        """
+        there = [one.name for one in self.sets]
+        for name in names:
+            if name not in there:
+                raise ValueError(f"no set {name!r} to leave out; there are {', '.join(there)}")
+        kept = tuple(one for one in self.sets if one.name not in names)
+        if not kept:
+            raise ValueError(f"no set is left without {', '.join(names)}")
+        return Shots(kept)
+
     def momentum_check(self) -> tuple[float, int]:
         """Return chi-square of the momentum gained and the number of shots.
 
@@ -142,6 +173,7 @@ class Shots:
 
         Examples
         --------
+        >>> from cradle.fit import read_shots
         >>> from cradle.tables import data_folder
         >>> shots = read_shots(data_folder() / "shots_template.csv")
         >>> shots.momentum_check()[1]
@@ -149,184 +181,3 @@ class Shots:
         """
         residuals = np.concatenate([s.momentum_residuals for s in self.sets])
         return float(residuals @ residuals), residuals.size
-
-
-def read_shots(
-    source: str | Path | Any,
-    *,
-    mass_unit: str | None = None,
-    velocity_unit: str | None = None,
-    sigma: float | None = None,
-) -> Shots:
-    """Read a table of shots and check it.
-
-    Parameters
-    ----------
-    source : path, DataFrame or mapping of columns
-        A CSV file (UTF-8, comma, one header line; lines that begin with # are skipped), a pandas
-        DataFrame, or columns by name.  Columns: `COLUMNS` and `OPTIONAL`.
-    mass_unit : {"kg", "g"}, optional
-        Unit of the masses.  Left out, it is kg, and masses that look like grams are refused.
-    velocity_unit : {"m/s", "cm/s", "mm/s"}, optional
-        Unit of the velocities and their errors; likewise.
-    sigma : float, optional
-        Standard error of all velocities, in the unit of the velocities, for a table without it.
-
-    Returns
-    -------
-    Shots
-        The measured shots, in kg and m/s.
-
-    Raises
-    ------
-    ValueError
-        If a column is missing, a value is wrong, balls pass through each other, or a shot gains
-        more energy than its errors allow; the message names row and column.
-
-    Examples
-    --------
-    >>> shots = read_shots(
-    ...     {"set": ["AB", "AB"], "shot": [1, 1], "ball": [1, 2], "type": ["A", "B"],
-    ...      "mass": [45, 53], "before": [1.0, 0.0], "after": [0.17, 0.70], "sigma": [0.01, 0.01]},
-    ...     mass_unit="g",
-    ... )
-    >>> shots["AB"].masses
-    array([0.045, 0.053])
-    """
-    lines = table_lines(source)
-    if not lines:
-        raise ValueError("the table has no rows")
-    needed = [name for name in COLUMNS if not (name == "sigma" and sigma is not None)]
-    missing = [name for name in needed if name not in lines[0][1]]
-    if missing:
-        raise ValueError(
-            f"column {missing[0]!r} is missing ({COLUMNS[missing[0]]}); "
-            f"there are {', '.join(lines[0][1])}"
-        )
-    scale = (_unit("mass_unit", mass_unit, _MASS_UNITS, "kg"),
-             _unit("velocity_unit", velocity_unit, _VELOCITY_UNITS, "m/s"))  # fmt: skip
-    rows = [_row(where, line, scale, sigma) for where, line in lines]
-    if mass_unit is None:
-        _refuse_large(rows, "mass", _HEAVIEST, "kg", "grams: say mass_unit='g'")
-    if velocity_unit is None:
-        for name in ("before", "after"):
-            _refuse_large(rows, name, _FASTEST, "m/s", "cm/s: say velocity_unit='cm/s'")
-    groups: dict[str, dict[str, list[_Row]]] = {}
-    for row in rows:
-        groups.setdefault(row.set, {}).setdefault(row.shot, []).append(row)
-    return Shots(tuple(_shot_set(name, shots) for name, shots in groups.items()))
-
-
-def _unit(name: str, given: str | None, known: dict[str, float], default: str) -> float:
-    if given is not None and given not in known:
-        raise ValueError(f"{name} = {given!r}; must be one of {', '.join(known)}")
-    return known[given or default]
-
-
-def _number(where: str, line: dict[str, Any], name: str) -> float:
-    try:
-        value = float(line[name])
-    except (TypeError, ValueError):
-        value = np.nan
-    if not np.isfinite(value):
-        raise ValueError(f"{where}, column {name}: {line[name]!r}; must be a number")
-    return value
-
-
-def _row(where: str, line: dict[str, Any], scale: tuple[float, float], sigma: float | None) -> _Row:
-    """Return one row in kg and m/s."""
-    ball, mass = _number(where, line, "ball"), _number(where, line, "mass") * scale[0]
-    before, after = (_number(where, line, name) * scale[1] for name in ("before", "after"))
-    error = _number(where, line, "sigma") if sigma is None else float(sigma)
-    if ball < 1 or ball != int(ball):
-        raise ValueError(f"{where}, column ball: {line['ball']!r}; must be 1, 2, ... from the left")
-    if not mass > 0:
-        raise ValueError(f"{where}, column mass: {line['mass']!r}; must be above 0")
-    if not error > 0:
-        raise ValueError(f"{where}, column sigma: {error!r}; must be above 0")
-    earlier = error * scale[1] if before else 0.0
-    if line.get("sigma_before") not in (None, ""):
-        earlier = _number(where, line, "sigma_before") * scale[1]
-        if earlier < 0:
-            raise ValueError(f"{where}, column sigma_before: {earlier!r}; must be at least 0")
-    names = (str(line[name]).strip() for name in ("set", "shot", "type"))
-    group, shot, kind = names
-    return _Row(
-        group, shot, int(ball), kind, mass, before, after, error * scale[1], earlier, where
-    )  # fmt: skip
-
-
-def _refuse_large(rows: Sequence[_Row], name: str, limit: float, unit: str, other: str) -> None:
-    for row in rows:
-        value = getattr(row, name)
-        if abs(value) > limit:
-            raise ValueError(
-                f"{row.where}, column {name}: {value:g} {unit} is unlikely; is it in {other} "
-                f"(or in {unit} indeed: say so)"
-            )
-
-
-def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
-    """Put the rows of a set together; all its shots have the same balls."""
-    table, first = [], None
-    for shot, given in shots.items():
-        rows = sorted(given, key=lambda row: row.ball)
-        places = [row.ball for row in rows]
-        if len(rows) < 2 or places != list(range(1, len(rows) + 1)):
-            raise ValueError(
-                f"{given[0].where}, column ball: set {name}, shot {shot} has balls {places}; "
-                "each shot needs 1, 2, ... N, each once, N >= 2"
-            )
-        first = first or rows
-        if len(rows) != len(first):
-            raise ValueError(
-                f"{rows[0].where}, column ball: set {name}, shot {shot} has {len(rows)} balls; "
-                f"the first shot of the set has {len(first)}"
-            )
-        for row, model in zip(rows, first, strict=True):
-            for column in ("type", "mass"):
-                if getattr(row, column) != getattr(model, column):
-                    raise ValueError(
-                        f"{row.where}, column {column}: {getattr(row, column)!r}; "
-                        f"ball {row.ball} of set {name} has {getattr(model, column)!r} elsewhere"
-                    )
-        _check_physics(name, shot, rows)
-        table.append(rows)
-    assert first is not None
-    types = "".join(row.type for row in first)
-    rest = name.removeprefix(types)
-    if rest != name and rest.isalpha() and rest.isupper():  # all other names are free
-        raise ValueError(
-            f"{first[0].where}, column set: set {name} has the balls {types} alone; is the row of "
-            f"ball {len(first) + 1} missing?  If not, give the set another name"
-        )
-    values = {
-        column: np.array([[getattr(row, column) for row in rows] for rows in table])
-        for column in ("before", "after", "sigma", "sigma_before")
-    }
-    masses = np.array([row.mass for row in first])
-    return ShotSet(name, tuple(row.type for row in first), tuple(shots), masses, **values)
-
-
-def _check_physics(name: str, shot: str, rows: Sequence[_Row]) -> None:
-    """Raise if no balls approach, balls pass through each other, or energy is gained."""
-    what = f"set {name}, shot {shot}"
-    if all(a.before <= b.before for a, b in pairwise(rows)):
-        raise ValueError(f"{rows[0].where}, column before: {what}: no balls approach")
-    for left, right in pairwise(rows):
-        error = np.hypot(left.sigma, right.sigma)
-        if left.after - right.after > _BEYOND * error:
-            raise ValueError(
-                f"{right.where}, column after: {what}: ball {left.ball} at {left.after:g} m/s "
-                f"would pass through ball {right.ball} at {right.after:g} m/s"
-            )
-    gain = sum(0.5 * r.mass * (r.after**2 - r.before**2) for r in rows)
-    variance = sum(
-        r.mass**2 * ((r.after * r.sigma) ** 2 + (r.before * r.sigma_before) ** 2) for r in rows
-    )
-    if gain > _BEYOND * np.sqrt(variance):
-        share = gain / sum(0.5 * r.mass * r.before**2 for r in rows)
-        raise ValueError(
-            f"{rows[0].where}, columns before and after: {what} gains {100 * share:.3g} % of its "
-            f"energy, {gain / np.sqrt(variance):.3g} standard errors; check units, signs and sigma"
-        )

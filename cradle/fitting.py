@@ -1,0 +1,170 @@
+"""`cradle fit`: restitution and ratios from a table of shots; `cradle template`: such a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from shlex import quote
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cradle.console import format_options, plot_fits, show, text
+
+if TYPE_CHECKING:
+    from cradle.fit import Fit, Shots
+
+# What a command needs is imported in the command: the first answer comes within a second.
+
+
+@click.command()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--mass-unit", type=click.Choice(["kg", "g"]), help="Unit of the column mass [kg].")
+@click.option("--velocity-unit", type=click.Choice(["m/s", "cm/s", "mm/s"]),
+              help="Unit of before, after and sigma [m/s].")  # fmt: skip
+@click.option("--sigma", type=float, help="Error of all velocities, for a file without it.")
+@click.option("--without", multiple=True, metavar="SET[,SET...]",
+              help="Sets of the file that are not to be fitted.")  # fmt: skip
+@click.option("--restitution", "given", multiple=True, metavar="PAIR=E[:ERROR]",
+              help="For pairs that were not shot alone: AB=0.53:0.01.")  # fmt: skip
+@click.option("--known", multiple=True, metavar="TRIPLET=RATIO", help="Ratios not to be fitted.")
+@click.option("--predict", metavar="SEQUENCE", help="Predict a chain of these balls, beside its "
+              "measured mean if the file has shots of it.")  # fmt: skip
+@click.option("--speed", default=1.0, help="Of its first ball, m/s [1].")
+@click.option("--plot", type=click.Path(dir_okay=False), help="Draw the likelihoods to a file.")
+@format_options
+def fit(
+    file: Path, without: Sequence[str], predict: str | None, speed: float, plot: str | None,
+    as_json: bool, as_csv: bool, **options: Any,
+) -> None:  # fmt: skip
+    """Fit coefficients of restitution and ratios to measured velocities.
+
+    FILE is a table of shots; `cradle template` prints one to fill in.
+
+    All sets of the file are fitted, chains of four and more balls too: a prediction is checked only
+    by shots that --without keeps out of the fit.
+
+    The column intervals is the 95 % confidence set.  If several ranges of values explain the shots
+    it has several pieces: 0.10-0.12 or 0.17-0.19.  With --csv this is 0.10..0.12; 0.17..0.19 in one
+    cell, with --json the list [[0.10, 0.12], [0.17, 0.19]].
+
+    \b
+    Examples:
+      cradle fit shots.csv
+      cradle fit shots.csv --mass-unit g --restitution AC=0.31:0.01
+      cradle fit shots.csv --predict ABACA --speed 1.2
+      cradle fit long.csv --without ABACA --predict ABACA
+      cradle fit shots.csv --json --plot fit.png
+    """
+    from cradle.fit import read_shots
+
+    if predict is not None and as_csv:
+        raise click.UsageError("--csv prints the fitted values alone; with --predict give --json")
+    given, known = options.pop("given"), options.pop("known")
+    shots = read_shots(file, **options)
+    used = shots.without(*(name.strip() for part in without for name in part.split(",")))
+    fits = _fits(used, dict(map(_named, given)), dict(map(_named, known)))
+    momentum, count = shots.momentum_check()
+    rows = [row for one in fits for row in one.rows()]
+    extra = {
+        "chi_square": [one.chi_square for one in fits],
+        "degrees_of_freedom": [one.degrees_of_freedom for one in fits],
+        "momentum_chi_square": momentum,
+        "shots": count,
+        "without": [one.name for one in shots.sets if one not in used.sets],
+    }
+    poor = {True: "", False: " (a poor fit: the errors do not explain the differences)"}
+    notes = ["intervals: 95 % confidence sets"] + [
+        f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}"
+        f"{poor[one.probability > 1e-3]}"
+        for one in fits
+    ]
+    everything = " (all of the file)" if extra["without"] else ""
+    notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{everything}")
+    if predict is not None:
+        more, lines = _predicted(fits[-1], shots, predict, speed)
+        extra.update(more)
+        notes += lines
+    if plot is not None:
+        plot_fits(fits, plot)
+    show(rows, extra, "\n".join(notes), as_json, as_csv)
+
+
+def _named(given: str) -> tuple[str, tuple[float, float]]:
+    """Read NAME=NUMBER or NAME=NUMBER:ERROR."""
+    name, _, numbers = given.partition("=")
+    value, _, error = numbers.partition(":")
+    try:
+        return name, (float(value), float(error or 0))
+    except ValueError:
+        raise click.UsageError(f"{given!r}: write NAME=NUMBER or NAME=NUMBER:ERROR") from None
+
+
+def _fits(
+    shots: Shots, given: dict[str, tuple[float, float]], known: dict[str, tuple[float, float]]
+) -> list[Fit]:
+    """Fit the pairs, then with what they gave all longer chains."""
+    from cradle.fit import ratio, restitution
+
+    fits = []
+    if any(len(one.types) == 2 for one in shots.sets):
+        fits.append(restitution(shots))
+    if any(len(one.types) > 2 for one in shots.sets):
+        values = {name: pair for one in fits for name, pair in one.values().items()}
+        fits.append(ratio(shots, {**values, **given}, known=known))
+    return fits
+
+
+def _predicted(
+    found: Fit, shots: Shots, sequence: str, speed: float
+) -> tuple[dict[str, Any], list[str]]:
+    """Return a prediction and what was measured of such chains: for JSON, and as lines."""
+    from cradle.fit.parameters import triplet_keys
+
+    predicted = found.predict(sequence, speed)
+    rows, measured = predicted.rows(), []
+    lines = ["", f"{sequence} at {speed:g} m/s; lower to upper: the central 95 % of predictions"]
+    tables, remarks = [rows], []
+    for one in (one for one in shots.sets if one.types == predicted.types):
+        fitted = one in found.shots.sets
+        try:
+            mean, error = one.mean_after(speed)
+        except ValueError as reason:
+            remarks.append(f"not compared: {reason}")
+            continue
+        columns = {"measured": mean.tolist(), "error": error.tolist()}
+        measured.append({"set": one.name, "shots": len(one.shots), "fitted": fitted, **columns})
+        tables.append(
+            [{**row, **{name: values[k] for name, values in columns.items()}}
+             for k, row in enumerate(rows)]
+        )  # fmt: skip
+        # Without a triplet's own set its ratio is known no longer.
+        hint = f" (for one: --without {quote(one.name)})" if len(one.types) > 3 else ""
+        part = f"part of the fit: this is no check{hint}" if fitted else "left out of the fit"
+        remarks.append(
+            f"measured: mean of {len(one.shots)} shots of set {one.name}, each scaled to "
+            f"{speed:g} m/s; the set was {part}"
+        )
+    lines += map(text, tables[1:] or tables)
+    lines += remarks
+    keys = {key for part in triplet_keys(predicted.types) for key in part}
+    several = [e.name for e in found.estimates.values() if e.key in keys and len(e.intervals) > 1]
+    if several:
+        lines.append(
+            f"intervals in pieces: {', '.join(several)}; the predictions may come in groups, and "
+            "lower to upper holds what lies between the groups too"
+        )
+    return {"prediction": rows, "measured": measured}, lines
+
+
+@click.command()
+def template() -> None:
+    """Print a table of shots to fill in.
+
+    \b
+    Examples:
+      cradle template
+    """
+    from cradle.tables import data_folder
+
+    click.echo((data_folder() / "shots_template.csv").read_text(encoding="utf-8"), nl=False)
