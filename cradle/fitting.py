@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -63,7 +63,9 @@ def fit(
     given, known = options.pop("given"), options.pop("known")
     shots = read_shots(file, **options)
     used = shots.without(*(name.strip() for part in without for name in part.split(",")))
-    fits = _fits(used, dict(map(_named, given)), dict(map(_named, known)))
+    values, ratios = dict(map(_named, given)), dict(map(_named, known))
+    _refuse_unused(values, ratios, used, predict)
+    fits = _fits(used, values, ratios)
     momentum, count = shots.momentum_check()
     rows = [row for one in fits for row in one.rows()]
     extra = {
@@ -98,6 +100,27 @@ def _named(given: str) -> tuple[str, tuple[float, float]]:
         return name, (float(value), float(error or 0))
     except ValueError:
         raise click.UsageError(f"{given!r}: write NAME=NUMBER or NAME=NUMBER:ERROR") from None
+
+
+def _refuse_unused(
+    given: Iterable[str], known: Iterable[str], shots: Shots, predict: str | None
+) -> None:
+    """Refuse a value that no chain needs: its name may be misspelt."""
+    from cradle.fit.parameters import label, pair_keys, parameter_key, triplet_keys
+
+    chains = [one.types for one in shots.sets] + ([parameter_key(predict)] if predict else [])
+    pairs = {key for types in chains for key in pair_keys(types)}
+    triplets = {key for types in chains for part in triplet_keys(types) for key in part}
+    for name in given:
+        if tuple(sorted(parameter_key(name))) not in pairs:
+            there = ", ".join(sorted(map(label, pairs)))
+            raise click.UsageError(
+                f"--restitution {name}: no chain has this pair; there are {there}"
+            )
+    for name in known:
+        if parameter_key(name) not in triplets:
+            there = ", ".join(sorted(map(label, triplets))) or "none"
+            raise click.UsageError(f"--known {name}: no chain has this triplet; there are {there}")
 
 
 def _fits(
