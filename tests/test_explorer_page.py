@@ -20,7 +20,7 @@ from explorer import (
     still,
     visits,  # noqa: F401
 )
-from test_layout import browser  # noqa: F401
+from test_layout import browser, contrast  # noqa: F401
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, collide, paper_chain, swing
 from cradle.tables import paper_sequences
@@ -273,6 +273,60 @@ def test_sliders_change_the_outcome(visit, label: str, row: str):
     assert tab.inner_text(".words").startswith(
         "Before the first hit, ball 1 moves right at 1.00 m/s"
     )
+
+
+REFUSED = [
+    ("mass", "1000", "mass must lie between 0.01 and 100 kg. In force: 1 kg."),
+    ("mass", "", "mass must lie between 0.01 and 100 kg. In force: 1 kg."),
+    ("restitution", "1.5", "restitution must lie between 0 and 1. In force: 1."),
+    ("ratio", "2", "ratio must lie between 0 and 1. In force: 0.15."),
+    ("ratio", "-1", "ratio must lie between 0 and 1. In force: 0.15."),
+    ("ratio", "0.1234567", "ratio can have six digits after the point. In force: 0.15."),
+]
+
+
+@pytest.mark.parametrize("mode", ["light", "dark"])
+def test_typed_values_out_of_range_are_refused(visit, mode: str):
+    """They stay, marked, with a sentence that says what is in force, and change nothing."""
+    tab = still(visit, "#scene=small", color_scheme=mode)
+    before = drawn(tab)
+    for key in ("Enter", "Tab"):
+        for label, typed, sentence in REFUSED:
+            box = tab.get_by_label(f"{label}, as a number", exact=True)
+            slider = box.locator("xpath=ancestor::div[@class='slider']")
+            box.fill(typed)
+            box.press(key)
+            assert drawn(tab) == before
+            assert slider.get_by_role("alert").inner_text() == sentence
+            assert box.input_value() == typed
+            assert box.get_attribute("aria-invalid") == "true"
+            named = box.get_attribute("aria-describedby")
+            assert slider.get_by_role("alert").get_attribute("id") == named
+            press(tab, "Next hit")  # a redraw wipes nothing away
+            press(tab, "Pull back")
+            drawn(tab)
+            assert box.input_value() == typed
+            digits = "(k) => (+k).toString(16).padStart(2, '0')"
+            colours = box.evaluate(
+                f"""(node) => ["borderTopColor", "backgroundColor"].map((name) =>
+                  "#" + getComputedStyle(node)[name].match(/\\d+/g).slice(0, 3)
+                    .map({digits}).join(""))"""
+            )
+            assert contrast(*colours) > 3
+            # What is right, if only the value in force, ends it.
+            box.fill(sentence.split("In force: ")[1].split()[0].rstrip("."))
+            box.press(key)
+            assert drawn(tab) == before
+            assert box.get_attribute("aria-invalid") == "false"
+            assert slider.get_by_role("alert").inner_text() == ""
+    # So does another setting: the box then shows what is in force.
+    box = tab.get_by_label("ratio, as a number", exact=True)
+    box.fill("2")
+    box.press("Tab")
+    press(tab, "next scene")
+    assert drawn(tab)["forward"] == [0.5] * 3
+    assert box.input_value() == "0.5"
+    assert box.get_attribute("aria-invalid") == "false"
 
 
 def test_number_material_and_sweep(visit):

@@ -1,6 +1,7 @@
 """The live explorer for every reader: address, keys, words, widths, modes, motion, no scripts."""
 
 import re
+from decimal import Decimal
 from urllib.parse import unquote
 
 import numpy as np
@@ -22,7 +23,7 @@ from explorer import (
 )
 from test_layout import MISFITS, browser, contrast  # noqa: F401
 
-from cradle import collide, post_impact_velocities
+from cradle import Chain, SpringChain, collide, post_impact_velocities, textbook
 from cradle.measures import bouncing_pattern
 
 # --- the address ------------------------------------------------------------------------------
@@ -451,6 +452,24 @@ def test_scenes_do_what_their_texts_say(visit):
     np.testing.assert_array_equal(velocities["two"], [0, 0, 0, 1, 1])
     assert velocities["small"][0] < -0.05
     assert 0.9 < velocities["small"][4] < 1
+    # Steel balls: in percent; of all rows of five with one ball pulled back "small" is nearest,
+    # and at no ratio of the slider balls 2 and 3 come back. Above one half it holds contacts.
+    steel = collide(Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain()).velocities
+    texts = {scene["key"]: scene["text"] for scene in scenes}
+    said = re.search(r"leave with (.*) and (.*) %", texts["one"].replace("\N{MINUS SIGN}", "-"))
+    assert [*map(int, said[1].split(", ")), int(said[2])] == np.rint(100 * steel).tolist()
+    rows = {
+        scene["key"]: np.abs(velocities[scene["key"]] - steel).max()
+        for scene in scenes
+        if np.array_equal(np.sign(scene["setting"]["speeds"]), [1, 0, 0, 0, 0])
+    }
+    assert len(rows) > 5
+    assert min(rows, key=rows.get) == "small"
+    assert steel[:3].max() < -0.01
+    everywhere = np.tile(np.arange(101)[:, None] / 100, 3)
+    after = post_impact_velocities([1] * 5, [1, 0, 0, 0, 0], 1, everywhere, excess="saturate")
+    assert after[:, 1:3].min() > -1e-14
+    assert np.abs(after[:51, 1:3]).max() < 1e-14
     assert velocities["half"][0] < -0.2
     assert velocities["half"][3] == pytest.approx(velocities["half"][4], abs=1e-6)
     np.testing.assert_allclose(velocities["three"], [-1 / 3, 2 / 3, 2 / 3], atol=1e-6)
@@ -476,6 +495,35 @@ def test_scenes_do_what_their_texts_say(visit):
     )
     assert not together["happened"]
     np.testing.assert_allclose(np.abs(together["after"]), 0.2)
+
+
+def test_links_of_scenes(visit, html):
+    """They lead to a heading that is there."""
+    tab = still(visit)
+    linked = {}
+    for scene in tab.evaluate("cradleExplorer.data.scenes"):
+        go_to(tab, f"scene={scene['key']}")
+        drawn(tab)
+        text = tab.locator(".scene-text")
+        assert text.inner_text().startswith(scene["text"][:60])
+        linked[scene["key"]] = [a.get_attribute("href") for a in text.locator("a").all()]
+    addresses = {key: found for key, found in linked.items() if found}
+    assert set(addresses) == {"one", "small"}
+    for (address,) in addresses.values():
+        page, _, heading = address.partition("#")
+        assert f'<section id="{heading}">' in (html / "book" / page).read_text(encoding="utf-8")
+
+
+def test_a_velocity_of_rounding_is_rest(visit):
+    """In exact numbers balls 2 and 3 stand still, as the landing page says."""
+    tab = still(visit, "#scene=small")
+    after = drawn(tab)["after"]
+    assert 0 < max(map(abs, after[1:3])) < 1e-15
+    words = tab.inner_text(".words")
+    assert "balls 2 and 3 rest and" in words
+    assert "almost" not in words
+    exact = textbook.solve([1] * 5, [1, 0, 0, 0, 0], 1, 0.15, number=Decimal).velocities
+    assert max(map(abs, exact[1:3])) < Decimal("1e-25")
 
 
 @pytest.mark.parametrize(

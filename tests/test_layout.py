@@ -8,7 +8,9 @@ from pathlib import Path
 import book_figures
 import pytest
 
-WIDTHS = (390, 1400)
+WIDTHS = (390, 1280)
+#: Widths of phones, and device pixels a pixel: letters of formulas are rounded to the latter.
+PHONES = [(width, density) for width in (360, 390) for density in (1, 2, 3)]
 MODES = ("light", "dark")
 #: Contrast that letters need, and lines and marks (WCAG 2.1: 1.4.6 and 1.4.11).
 LETTERS, LINES = 7.0, 3.0
@@ -45,6 +47,11 @@ MISFITS = """() => {
   for (const node of document.querySelectorAll('.bd-content mjx-container:not([display])'))
     if (wide(node) && getComputedStyle(node).overflowX !== "visible")
       say("formula", node, node.clientWidth, node.scrollWidth);
+  // Tables of numbers: on a desk no column is cut.
+  for (const node of document.querySelectorAll(".bd-content table.dataframe")) {
+    const box = node.closest(".output") ?? node.parentElement;
+    if (innerWidth > 1200 && wide(box)) say("table", node, box.clientWidth, box.scrollWidth);
+  }
   // Formulas in a table: they stay in their column.
   for (const node of document.querySelectorAll(".bd-content td mjx-container > svg")) {
     if (!node.checkVisibility()) continue;
@@ -75,6 +82,19 @@ MISFITS = """() => {
   }
   return found;
 }"""
+
+# Numbers of equations: [number, its right end, that of the column], and how large its letters are.
+NUMBERS = """() => [...document.querySelectorAll('.bd-content mjx-container[display="true"]')]
+  .flatMap((node) => {
+    const box = node.parentElement;
+    const number = node.querySelector('g[id^="mjx-eqn"]') ?? box.querySelector(".eqno");
+    if (!number || !node.checkVisibility()) return [];
+    const { right } = number.getBoundingClientRect();
+    const column = Math.min(...[node, box].map((edge) => edge.getBoundingClientRect().right));
+    const end = number.matches(".eqno") ? box.getBoundingClientRect().right : column;
+    const letters = parseFloat(getComputedStyle(node).fontSize);
+    return [[number.id || number.textContent, right, end, letters]];
+  })"""
 
 FRAMES = """() => new Promise((done) =>
   requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"""
@@ -130,6 +150,67 @@ def test_nothing_is_cut(html: Path, browser):
             found[page.stem] = faults + said
     context.close()
     assert not found, "\n".join(f"{page}: {fault}" for page in found for fault in found[page])
+
+
+def test_numbers_of_equations_on_a_phone(html: Path, browser):
+    """None is cut, and none needs letters that are smaller than those of figures."""
+    pages = [
+        page
+        for page in sorted((html / "book").glob("*.html"))
+        if re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8"))
+    ]
+    seen, cut = 0, []
+    for density in sorted({density for _, density in PHONES}):
+        context = browser.new_context(device_scale_factor=density)
+        context.set_default_timeout(PATIENCE)
+        tab = context.new_page()
+        for page in pages:
+            tab.goto(page.as_uri())
+            tab.evaluate("() => window.MathJax?.startup?.promise")
+            for width in [width for width, of in PHONES if of == density]:
+                tab.set_viewport_size({"width": width, "height": 800})
+                tab.wait_for_function("(asked) => innerWidth === asked", arg=width)
+                tab.evaluate(FRAMES)
+                numbers = tab.evaluate(NUMBERS)
+                seen += len(numbers)
+                cut += [
+                    (page.stem, width, density, *number)
+                    for number in numbers
+                    if number[1] > number[2] + 0.5 or number[3] < 7.8
+                ]
+        context.close()
+    assert seen >= 53 * len(PHONES)  # of the paper alone
+    assert not cut, "\n".join(map(str, cut))
+
+
+def test_maps_are_the_same_in_both_modes(html: Path, browser):
+    """Their colours are a scale, and mean the same by day and by night."""
+    tab = browser.new_page(viewport={"width": 1280, "height": 900})
+    tab.set_default_timeout(PATIENCE)
+    seen = 0
+    for page in sorted((html / "book").glob("*.html")):
+        count = page.read_text(encoding="utf-8").count('<img class="map"')
+        if not count:
+            continue
+        tab.goto(page.as_uri())
+        pictures = {}
+        for mode in MODES:
+            tab.emulate_media(color_scheme=mode)
+            theme = "(mode) => document.documentElement.dataset.theme === mode"
+            tab.wait_for_function(theme, arg=mode)
+            for number, shown in enumerate(tab.locator("img.map").all()):
+                shown.evaluate("(image) => image.decode()")
+                box = shown.bounding_box()
+                # Without the edge, which blends with the page.
+                inner = {"x": 2, "y": 2, "width": box["width"] - 4, "height": box["height"] - 4}
+                inner["x"] += box["x"]
+                inner["y"] += box["y"] + tab.evaluate("scrollY")
+                pictures[mode, number] = tab.screenshot(clip=inner, full_page=True)
+        for number in range(count):
+            assert pictures["light", number] == pictures["dark", number], (page.stem, number)
+        seen += count
+    tab.close()
+    assert seen > 5
 
 
 @pytest.mark.parametrize(
@@ -194,7 +275,7 @@ def test_every_figure_has_both_colourings(html: Path):
     ]
     assert len(drawings) > 40
     maps = [path for path in drawings if "<image" in path.read_text(encoding="utf-8")]
-    assert 5 < len(maps) < 15  # these the style sheet turns as a whole
+    assert 5 < len(maps) < 15  # these stay as they are
     for path in set(drawings) - set(maps):
         drawing = path.with_name(f"{path.stem}-dark.svg").read_text(encoding="utf-8")
         colours = {match.lower() for match in book_figures.COLOUR.findall(drawing)}

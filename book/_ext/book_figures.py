@@ -6,7 +6,8 @@ the page, greys and pale tints change sides, and colours that tell lines apart s
 both; the theme's classes `only-light` and `only-dark` show one of them.
 
 A map, a figure that contains a picture of points, has colours all over, with letters and lines on
-them. So the style sheet turns its light and dark as a whole, like those of a moving picture.
+them, and its scale of colours is read from pale to strong. Turned round it would say something
+else. So a map is one picture, which stands on its own white in both modes.
 
 The box around a figure knows how wide the figure has to be for its smallest letters to be read. On
 a narrow screen the style sheet lets a wider one scroll in this box.

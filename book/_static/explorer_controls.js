@@ -18,7 +18,8 @@
     return make("button", { type: "button", onclick: press, ...attributes }, words);
   }
 
-  // A slider with a box for exact numbers. A logarithmic one moves in equal factors.
+  // A slider with a box for exact numbers. A logarithmic one moves in equal factors. What the box
+  // cannot take stays in it, marked, with a sentence below, until the setting changes.
   function slider({ words, low, high, step, logarithmic = false, unit = "", input }) {
     const name = `explorer-${(names += 1)}`;
     const place = (value) => (logarithmic ? Math.log10(value) : value);
@@ -37,11 +38,14 @@
       max: high,
       step: "any",
       "aria-label": `${words}, as a number`,
-      onchange: () =>
-        box.value !== "" && box.checkValidity()
-          ? give(+(+box.value).toFixed(6))
-          : box.reportValidity(),
+      "aria-describedby": `${name}-refused`,
+      onchange: () => {
+        refuse(objection());
+        if (!refused.textContent) give(+box.value);
+      },
     });
+    const refused = make("p", { class: "refused", id: `${name}-refused`, role: "alert" });
+    let shown = {};
     const label = make("label", { for: name }, words);
     const node = make(
       "div",
@@ -50,18 +54,35 @@
       range,
       box,
       make("span", { class: "unit" }, unit),
+      refused,
     );
+    const measure = (number) => `${number} ${unit}`.trim();
+    function objection() {
+      const number = +box.value;
+      if (box.value === "" || !box.checkValidity())
+        return `must lie between ${low} and ${measure(high)}`;
+      return +number.toFixed(6) === number ? "" : "can have six digits after the point";
+    }
+    function refuse(why) {
+      box.setAttribute("aria-invalid", why !== "");
+      refused.textContent = why && `${label.textContent} ${why}. In force: ${shown.text}.`;
+    }
     function give(number) {
       input(Math.min(Math.max(number, low), high));
     }
-    // Several values are shown as such; the slider then stands at the first one.
-    function show(values) {
+    // Several values of a setting are shown as such; the slider then stands at the first one.
+    // Without any it is hidden.
+    function show(values, setting) {
+      node.hidden = values.length === 0;
       const one = values.every((v) => v === values[0]);
+      const text = one ? measure(values[0]) : `several values, ${values.join(", ")}`;
+      if (setting !== shown.setting || text !== shown.text) refuse("");
+      shown = { setting, text };
+      if (node.hidden) return;
       if (document.activeElement !== range || !one) range.value = place(values[0]);
       else if (value(+range.value) !== values[0]) range.value = place(values[0]);
-      if (document.activeElement !== box) box.value = one ? values[0] : "";
+      if (document.activeElement !== box && !refused.textContent) box.value = one ? values[0] : "";
       box.placeholder = one ? "" : "mixed";
-      const text = one ? `${values[0]} ${unit}`.trim() : `several values, ${values.join(", ")}`;
       range.setAttribute("aria-valuetext", text);
       node.classList.toggle("several", !one);
     }

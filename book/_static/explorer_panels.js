@@ -33,7 +33,9 @@
       const at = scenes.findIndex(({ key }) => key === scene);
       list.show(scene);
       place.textContent = at < 0 ? "" : `${at + 1} of ${scenes.length}`;
-      text.textContent = at < 0 ? "" : scenes[at].text;
+      const { text: said, link } = scenes[at] ?? { text: "" };
+      const more = link ? [" ", make("a", { href: link.address }, link.words)] : [];
+      text.replaceChildren(said, ...more);
     }
     return { node: make("div", { class: "scenes" }, walk, text), show };
   }
@@ -162,10 +164,7 @@
         forward: one ? inner.map((k) => setting.forward[k]) : [],
         backward: one ? inner.map((k) => setting.backward[k]) : [],
       };
-      for (const [name, values] of Object.entries(rows)) {
-        sliders[name].node.hidden = values.length === 0;
-        if (values.length) sliders[name].show(values);
-      }
+      for (const [name, values] of Object.entries(rows)) sliders[name].show(values, setting);
       sliders.restitution.rename(
         one && contacts.length
           ? `restitution, balls ${contacts[0] + 1} and ${contacts[0] + 2}`

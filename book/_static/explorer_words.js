@@ -13,13 +13,16 @@
     return `${words.slice(0, -1).join(", ")} and ${words[words.length - 1]}`;
   }
 
+  // Below this, m/s, a velocity is the rounding of zero.
+  const ROUNDING = 1e-12;
+
   function way(v) {
-    if (v === 0) return ["rests", "rest"];
+    if (Math.abs(v) < ROUNDING) return ["rests", "rest"];
     if (+v.toFixed(2) === 0) return ["almost rests", "almost rest"];
     return v < 0 ? ["moves left", "move left"] : ["moves right", "move right"];
   }
 
-  // "ball 1 moves left at 0.08 m/s, balls 2 and 3 almost rest and balls 4 and 5 move right at 0.09
+  // "ball 1 moves left at 0.08 m/s, balls 2 and 3 rest and balls 4 and 5 move right at 0.09
   // and 0.99 m/s". Balls keep their order, so those that go one way are neighbours.
   function motions(velocities) {
     const groups = [];

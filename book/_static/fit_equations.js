@@ -1,16 +1,18 @@
-// An equation that is wider than its column is set smaller, down to 55 % of the text; what is
-// still wider scrolls in its own box, from its beginning.
+// An equation that is wider than its column is set smaller, down to half of the text, which is the
+// size of the smallest letters of figures; what is still wider scrolls in its own box, from its
+// beginning.
 (() => {
-  const SMALLEST = 0.55;
+  const SMALLEST = 0.5;
+  // A font size is rounded, and the number of an equation does not shrink with it.
+  const PASSES = 12;
 
   function fit(equation) {
     const box = equation.parentElement;
     equation.style.fontSize = "";
     const full = parseFloat(getComputedStyle(equation).fontSize);
-    // Twice, as a font size is rounded and the number of the equation does not shrink with it.
-    for (let pass = 0, share = 1; pass < 3; pass += 1) {
+    for (let pass = 0, share = 1; pass < PASSES && share > SMALLEST; pass += 1) {
       const wide = Math.max(equation.scrollWidth / equation.clientWidth, box.scrollWidth / box.clientWidth);
-      if (!(wide > 1.002)) break;
+      if (!(wide > 1)) break;
       share = Math.max(SMALLEST, (share / wide) * 0.99);
       equation.style.fontSize = `${share * full}px`;
     }
