@@ -3,10 +3,13 @@
 import os
 import re
 import shutil
+from io import BytesIO
 from pathlib import Path
 
 import book_figures
+import numpy as np
 import pytest
+from matplotlib.image import imread
 
 WIDTHS = (390, 1280)
 #: Widths of phones, and device pixels a pixel: letters of formulas are rounded to the latter.
@@ -185,7 +188,7 @@ def test_numbers_of_equations_on_a_phone(html: Path, browser):
 
 def test_maps_are_the_same_in_both_modes(html: Path, browser):
     """Their colours are a scale, and mean the same by day and by night."""
-    tab = browser.new_page(viewport={"width": 1280, "height": 900})
+    tab = browser.new_page(viewport={"width": 1280, "height": 1400})
     tab.set_default_timeout(PATIENCE)
     seen = 0
     for page in sorted((html / "book").glob("*.html")):
@@ -193,6 +196,7 @@ def test_maps_are_the_same_in_both_modes(html: Path, browser):
         if not count:
             continue
         tab.goto(page.as_uri())
+        tab.evaluate("() => window.MathJax?.startup?.promise")  # nothing moves any more
         pictures = {}
         for mode in MODES:
             tab.emulate_media(color_scheme=mode)
@@ -200,14 +204,18 @@ def test_maps_are_the_same_in_both_modes(html: Path, browser):
             tab.wait_for_function(theme, arg=mode)
             for number, shown in enumerate(tab.locator("img.map").all()):
                 shown.evaluate("(image) => image.decode()")
+                shown.evaluate("(image) => image.scrollIntoView({ block: 'center' })")
                 box = shown.bounding_box()
                 # Without the edge, which blends with the page.
                 inner = {"x": 2, "y": 2, "width": box["width"] - 4, "height": box["height"] - 4}
                 inner["x"] += box["x"]
-                inner["y"] += box["y"] + tab.evaluate("scrollY")
-                pictures[mode, number] = tab.screenshot(clip=inner, full_page=True)
+                inner["y"] += box["y"]
+                taken = tab.screenshot(clip=inner)
+                pictures[mode, number] = imread(BytesIO(taken))
         for number in range(count):
-            assert pictures["light", number] == pictures["dark", number], (page.stem, number)
+            # The browser draws in tiles, whose place changes how lines are smoothed.
+            differ = np.abs(pictures["light", number] - pictures["dark", number])
+            assert differ.mean() < 1e-3, (page.stem, number)
         seen += count
     tab.close()
     assert seen > 5
