@@ -5,6 +5,7 @@ import math
 from cradle.kernel.collapse import end_plastically
 from cradle.kernel.motion import (
     add_impulse,
+    add_store,
     add_velocity,
     add_work,
     closing,
@@ -140,7 +141,7 @@ def neighbours_stay(cluster, total, farthest, level, n, state):
             continue  # held throughout; the change is rounding
         if k.u * then.u < 0.0 or k.u * speed < 0.0 or (k.u == 0.0) != (speed == 0.0):
             return False
-        work = then.a if k.u > 0.0 else k.q - then.q
+        work = then.a if k.u > 0.0 else (k.q - then.q) + (k.q_lo - then.q_lo)
         k.y = then.p * (total * k.u + change * squares) + (work - then.u * then.p) * squares
         if k.active == 1 and k.u < 0.0 and k.q + k.y <= 0.0:
             return False
@@ -216,9 +217,9 @@ def jump(cluster, total, level, n, state):
                 if k.active == 1 and k.u > 0.0:
                     work = k.y
                     k.w += work
-                    k.q += k.e * k.e * work
+                    add_store(k, k.e * k.e * work)
                 elif k.active == 1:
-                    k.q += k.y
+                    add_store(k, k.y)
         add_impulse(k, share)
         add_work(k, work)
         if level == 0:
