@@ -109,7 +109,7 @@ def cycle(level, c, bend, n, state):
     total, off, size, unsure, doubt = limit(cluster, level, state)
     if total == 0.0:
         return c, c - 1, math.inf
-    if unsure > LIMITS.one_digit:  # between balls held fast only the last digits tell how it goes on
+    if unsure > LIMITS.one_digit:  # between balls held fast only the last digits tell it
         total, unsure, doubt = 0.0, 0.0, size
     bent = 0.0
     if off > LIMITS.self_similar:

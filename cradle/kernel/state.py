@@ -40,10 +40,10 @@ class Limits(NamedTuple):
     """What rounding and infinity are measured by.
 
     Where a chain is known that goes wrong without a limit, `tests/test_safeguards.py` switches it
-    off: `dust`, `faint`, `bend`, `doubt`, `tie`, `simultaneous`, `roundings`, `same`, `vanishing`.
-    `exhausted`, `repeats` and `self_similar` only save rounds.  No such chain is known for
-    `rounded` and `cut`, nor for a larger `faint` or `doubt`, or a smaller `same`: these stay as
-    what rounding says.  The others bound the input, the closed form and the certificate.
+    off: `dust`, `faint`, `bend`, `doubt`, `one_digit`, `tie`, `simultaneous`, `roundings`, `same`,
+    `vanishing`.  `exhausted`, `repeats` and `self_similar` only save rounds.  No such chain is
+    known for `rounded` and `cut`, nor for a larger `faint` or `doubt`, or a smaller `same`: these
+    stay as what rounding says.  The others bound the input, the closed form and the certificate.
     """
 
     #: R9: an exhausted contact's speed, relative to the largest initial closing speed.
