@@ -13,7 +13,6 @@ from cradle.kernel.motion import (
     join_velocities,
     one_velocity,
     reduced_mass,
-    relative_energy,
     share_out,
 )
 from cradle.kernel.state import LIMITS, apart, jit, once
@@ -149,6 +148,20 @@ def neighbours_stay(cluster, total, farthest, level, n, state):
 
 
 @once
+def energy_lost(first, last, ball):
+    """Return the kinetic energy that balls first..last lose when each velocity changes by its x.
+
+    From the changes: the energies before and after may be so large that their last digit is more.
+    """
+    k = heaviest_of(first, last, ball)
+    lost = 0.0
+    for i in range(first, last + 1):
+        b = ball[i]
+        lost -= b.m * b.x * ((b.hi - ball[k].hi) + (b.lo - ball[k].lo) + 0.5 * b.x)
+    return lost
+
+
+@once
 def exact_squares(cluster, total, energy, state, memory, low, high):
     """Return the sum of L^2, L^4, ...: what disappears is (1 - e^2) of what is absorbed.
 
@@ -194,11 +207,10 @@ def jump(cluster, total, level, n, state):
     left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
     low = max(left - 1, 0)
     high = min(right + 1, n - 2)
-    energy = relative_energy(left, right + 1, ball)
+    energy = energy_lost(left, right + 1, ball)
     for i in range(left, right + 2):
         add_velocity(ball[i], ball[i].x)
     one_velocity(first, last + 1, heaviest_of(first, last + 1, ball), ball)
-    energy -= relative_energy(left, right + 1, ball)
     squares = exact_squares(cluster, total, energy, state, memory, low, high)
     before = memory[first - 1].p * total if first > left else 0.0
     after = memory[last + 1].p * total if last < right else 0.0
