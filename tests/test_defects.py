@@ -376,6 +376,28 @@ def rounding_of_the_ledger(trace):
     return float(abs(energies[0] - energies[1] - kept) / energies[0]) * 2.0**52
 
 
+#: Thousands of tiny cycles are taken to their limits while the balls beside them move fast: what
+#: each limit costs was the difference of two far larger energies, and their last digits added up.
+TINY_CYCLES = Problem(
+    [1000, 3.6, 0.0056, 0.0036, 30, 0.036, 0.037, 0.11],
+    [0, -0.42, -0.41, -0.51, -0.54, -0.74, -1.3, -1.7],
+    [0, 0.71, 0, 0.7, 0.0049, 0.56, 0.69],
+    [0.22, 0, 0.54, 0.42, 0.28, 1], [0.47, 0.51, 0.34, 0.49, 0.55, 0.55],
+)  # fmt: skip
+
+
+def test_energies_of_tiny_cycles_beside_fast_balls():
+    """All balls end at one velocity: momentum alone fixes it, and every impulse."""
+    trace = TINY_CYCLES.collide()
+    assert [event.kind for event in trace.events].count("collapse") > 20
+    assert rounding_of_the_ledger(trace) < 2
+    m, v = ([Fraction(x) for x in part] for part in (TINY_CYCLES.masses, TINY_CYCLES.velocities))
+    common = sum(a * b for a, b in zip(m, v)) / sum(m)
+    np.testing.assert_allclose(trace.velocities, float(common), rtol=1e-14)
+    passed = np.cumsum([float(a * (b - common)) for a, b in zip(m, v)])[:-1]
+    np.testing.assert_allclose(trace.impulses, passed, rtol=1e-13)
+
+
 def test_a_store_released_in_portions_below_its_last_digit():
     trace = PORTIONS.collide()
     assert trace.collapsed
