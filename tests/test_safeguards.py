@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import truth
 from plain import solve
-from test_defects import LAST_DIGITS, MANY_COLLAPSES, NAMED
+from test_defects import LAST_DIGITS, MANY_COLLAPSES, NAMED, PORTIONS
 
 from cradle.kernel.state import FINISHED, UNFINISHED, UNSOUND
 
@@ -49,6 +49,15 @@ def one_number(_):
         b.lo = 0.0
 
     return add_velocity
+
+
+def one_store(_):
+    """In place of `add_store`: what a contact can still release is one number."""
+
+    def add_store(k, x):
+        k.q = max(k.q + x, 0.0)
+
+    return add_store
 
 
 def first_room_only(_):
@@ -207,11 +216,24 @@ NEEDED = {
     "how far a cycle between balls held fast shrinks": (
         {"limit": sure},
         astuple(LAST_DIGITS["two balls that chatter between balls held fast"]),
+        WRONG,
+    ),
+    "a cycle's sum of which no digit is known": (
+        {"one_digit": math.inf},
+        astuple(LAST_DIGITS["two balls that chatter between balls held fast"]),
+        UNFINISHED,
+    ),
+    "a store that is released in portions below its last digit": (
+        {"add_store": one_store},
+        astuple(PORTIONS),
         UNSOUND,
     ),
-    "a gap as wide as the last digit": (
+    "an elastic sequence down to the last digit": (
         {"dust": 0.0},
-        astuple(LAST_DIGITS["a gap as wide as the last digit"]),
+        (
+            [0.166, 0.053, 0.053, 0.045, 0.053], [1, -0.5, 1, -0.5, 0.5], 1,
+            [1, 1, 0.1], [0, 0, 0], 0.5,
+        ),
         UNFINISHED,
     ),
 }  # fmt: skip
@@ -219,7 +241,8 @@ NEEDED = {
 
 def run(chain, **exchanged):
     *chain, meeting = chain
-    return solve(*chain, meeting=meeting, max_events=3000, **exchanged)
+    steps = 15_000 if chain[0] == PORTIONS.masses else 3000
+    return solve(*chain, meeting=meeting, max_events=steps, **exchanged)
 
 
 @pytest.mark.parametrize("name", NEEDED)

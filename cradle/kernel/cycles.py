@@ -35,7 +35,7 @@ def snapshot(level, n, state):
     contact, memory = state.contact, state.memory[level]
     for c in range(n - 1):
         memory[c].u = contact[c].u
-        memory[c].q = contact[c].q
+        memory[c].q, memory[c].q_lo = contact[c].q, contact[c].q_lo
         memory[c].hits = contact[c].hits
         memory[c].code = code(c, state)
 
@@ -109,7 +109,7 @@ def cycle(level, c, bend, n, state):
     total, off, size, unsure, doubt = limit(cluster, level, state)
     if total == 0.0:
         return c, c - 1, math.inf
-    if unsure > 0.1:  # between balls held fast only the last digits tell how it goes on
+    if unsure > LIMITS.one_digit:  # between balls held fast only the last digits tell it
         total, unsure, doubt = 0.0, 0.0, size
     bent = 0.0
     if off > LIMITS.self_similar:

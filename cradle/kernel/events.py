@@ -77,7 +77,7 @@ def start(n, state):
 @once
 def activate(c, from_left, from_right, ball, contact):
     """R4, R5: contact c becomes active, driven from the side or sides already active."""
-    contact[c].q = 0.0
+    contact[c].q = contact[c].q_lo = 0.0
     contact[c].w = 0.0
     contact[c].rate = 0.0  # it drives nobody in this round
     contact[c].slope = 0.0
@@ -117,7 +117,7 @@ def grow(c, n, state):
 @apart
 def deactivate(c, first, n, ball, contact, run, tally):
     """R4: contact c of a run ends and its relations go; contacts that it drove become sources."""
-    contact[c].q = 0.0
+    contact[c].q = contact[c].q_lo = 0.0
     contact[c].active = 0
     contact[c].before = -contact[c].u
     ball[c].turn = 0

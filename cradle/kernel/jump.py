@@ -5,6 +5,7 @@ import math
 from cradle.kernel.collapse import end_plastically
 from cradle.kernel.motion import (
     add_impulse,
+    add_store,
     add_velocity,
     add_work,
     closing,
@@ -12,7 +13,6 @@ from cradle.kernel.motion import (
     join_velocities,
     one_velocity,
     reduced_mass,
-    relative_energy,
     share_out,
 )
 from cradle.kernel.state import LIMITS, apart, jit, once
@@ -140,11 +140,25 @@ def neighbours_stay(cluster, total, farthest, level, n, state):
             continue  # held throughout; the change is rounding
         if k.u * then.u < 0.0 or k.u * speed < 0.0 or (k.u == 0.0) != (speed == 0.0):
             return False
-        work = then.a if k.u > 0.0 else k.q - then.q
+        work = then.a if k.u > 0.0 else (k.q - then.q) + (k.q_lo - then.q_lo)
         k.y = then.p * (total * k.u + change * squares) + (work - then.u * then.p) * squares
         if k.active == 1 and k.u < 0.0 and k.q + k.y <= 0.0:
             return False
     return True
+
+
+@once
+def energy_lost(first, last, ball):
+    """Return the kinetic energy that balls first..last lose when each velocity changes by its x.
+
+    From the changes: the energies before and after may be so large that their last digit is more.
+    """
+    k = heaviest_of(first, last, ball)
+    lost = 0.0
+    for i in range(first, last + 1):
+        b = ball[i]
+        lost -= b.m * b.x * ((b.hi - ball[k].hi) + (b.lo - ball[k].lo) + 0.5 * b.x)
+    return lost
 
 
 @once
@@ -193,11 +207,10 @@ def jump(cluster, total, level, n, state):
     left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
     low = max(left - 1, 0)
     high = min(right + 1, n - 2)
-    energy = relative_energy(left, right + 1, ball)
+    energy = energy_lost(left, right + 1, ball)
     for i in range(left, right + 2):
         add_velocity(ball[i], ball[i].x)
     one_velocity(first, last + 1, heaviest_of(first, last + 1, ball), ball)
-    energy -= relative_energy(left, right + 1, ball)
     squares = exact_squares(cluster, total, energy, state, memory, low, high)
     before = memory[first - 1].p * total if first > left else 0.0
     after = memory[last + 1].p * total if last < right else 0.0
@@ -216,9 +229,9 @@ def jump(cluster, total, level, n, state):
                 if k.active == 1 and k.u > 0.0:
                     work = k.y
                     k.w += work
-                    k.q += k.e * k.e * work
+                    add_store(k, k.e * k.e * work)
                 elif k.active == 1:
-                    k.q += k.y
+                    add_store(k, k.y)
         add_impulse(k, share)
         add_work(k, work)
         if level == 0:

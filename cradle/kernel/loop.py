@@ -8,6 +8,7 @@ from cradle.kernel.events import close_contacts, end_contacts, grow, start
 from cradle.kernel.meeting import first_meeting, part_beyond
 from cradle.kernel.motion import (
     add_impulse,
+    add_store,
     add_velocity,
     add_work,
     arrive,
@@ -57,7 +58,10 @@ def works(k, s, ended, recent):
         k.w = 5e-324  # a work that underflows is one nevertheless (R7)
     add_work(k, gain)
     recent.a += gain
-    k.q = 0.0 if ended else max(k.q + k.e * k.e * gain - give, 0.0)
+    if ended:
+        k.q = k.q_lo = 0.0
+    else:
+        add_store(k, k.e * k.e * gain - give)
 
 
 @once
@@ -226,7 +230,7 @@ def prepare(n, chain, meeting, state):
         if c < n - 2:
             k.forward, k.backward = chain.forward[c], chain.backward[c]
         k.u = u = ball[c].hi - ball[c + 1].hi
-        k.q = k.w = k.top = k.tip = k.rate = k.slope = k.blur = 0.0
+        k.q = k.q_lo = k.w = k.top = k.tip = k.rate = k.slope = k.blur = 0.0
         k.p = k.p_lo = k.a = k.a_lo = 0.0
         k.before = abs(u)
         k.active = k.tiny = k.hits = k.held = 0

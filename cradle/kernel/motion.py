@@ -36,6 +36,18 @@ def add_work(k, x):
 
 
 @jit
+def add_store(k, x):
+    """Add x to the work that contact k can still release, which ends at nothing.
+
+    A contact that rests on the edge of a long sequence gives it away in portions, hundreds of
+    thousands of them and each below the last digit of the whole.
+    """
+    k.q, k.q_lo = add(k.q, k.q_lo, x)
+    if k.q <= 0.0:
+        k.q = k.q_lo = 0.0
+
+
+@jit
 def closing(c, ball):
     """Return the closing speed of contact c from the velocities of its balls."""
     return (ball[c].hi - ball[c + 1].hi) + (ball[c].lo - ball[c + 1].lo)

@@ -40,10 +40,10 @@ class Limits(NamedTuple):
     """What rounding and infinity are measured by.
 
     Where a chain is known that goes wrong without a limit, `tests/test_safeguards.py` switches it
-    off: `dust`, `faint`, `bend`, `doubt`, `tie`, `simultaneous`, `roundings`, `same`, `vanishing`.
-    `exhausted`, `repeats` and `self_similar` only save rounds.  No such chain is known for
-    `rounded` and `cut`, nor for a larger `faint` or `doubt`, or a smaller `same`: these stay as
-    what rounding says.  The others bound the input, the closed form and the certificate.
+    off: `dust`, `faint`, `bend`, `doubt`, `one_digit`, `tie`, `simultaneous`, `roundings`, `same`,
+    `vanishing`.  `exhausted`, `repeats` and `self_similar` only save rounds.  No such chain is
+    known for `rounded` and `cut`, nor for a larger `faint` or `doubt`, or a smaller `same`: these
+    stay as what rounding says.  The others bound the input, the closed form and the certificate.
     """
 
     #: R9: an exhausted contact's speed, relative to the largest initial closing speed.
@@ -60,6 +60,8 @@ class Limits(NamedTuple):
     bend: float
     #: R9: what a jump beside a steady neighbour may leave in doubt, in exhausted speeds.
     doubt: float
+    #: R9: doubt of a cycle's sum, relative to itself, from which not one digit of it is known.
+    one_digit: float
     #: Relative accuracy of an impulse.
     digits: float
     #: R8: parts of segments, and distances, closer than this are equal.
@@ -99,6 +101,7 @@ LIMITS = Limits(
     self_similar=1e-13,
     bend=1e-2,
     doubt=1e5,
+    one_digit=0.1,
     digits=4 * 2.0**-52,
     tie=1e-9,
     simultaneous=1.0 + 64 * 2.0**-52,
@@ -141,7 +144,8 @@ class Contact:
     forward: float  # ratios at its right ball
     backward: float
     u: float  # closing speed, > 0 in compression
-    q: float  # work that it can still release, e^2 W+ - W-, since it became active
+    q: float  # work that it can still release, e^2 W+ - W-, since it became active,
+    q_lo: float  # as a sum of two numbers
     w: float  # work absorbed since it became active, W+
     top: float  # closing speed at which its compression began, as a sum of two numbers
     tip: float
@@ -197,6 +201,7 @@ class Memory:
 
     u: float  # the snapshot: closing speed, work, collisions, and who drives whom
     q: float
+    q_lo: float
     hits: int
     code: int
     p: float  # impulse and work absorbed since then; on the upper level without the lower one's
