@@ -452,6 +452,21 @@ def test_stored_limits_at_fifty_digits(name):
     assert [float(v) for v in exact.velocities] == pytest.approx(after, rel=4 * x.EPS)
 
 
+def test_eight_hundred_thousand_events():
+    """At fifty digits these are the velocities: `truth` takes 25 minutes to make twice as many.
+
+    One contact keeps a store all the while and gives it away in portions below its last digit.
+    """
+    found = outcomes(*x.any_chain("saturate", 6, 3468)[:5], excess="saturate")
+    after = [
+        -0.3104066001657222, -0.2780580459697974, 0.34595810025347036, 0.35674662414028144,
+        0.35674662414028144, 0.4054713260439979, 0.5290202114904042,
+    ]  # fmt: skip
+    assert found.collapsed
+    assert found.collisions.sum() > 300_000
+    np.testing.assert_allclose(found.velocities, after, rtol=0, atol=1e-15)
+
+
 @pytest.mark.exhaustive
 def test_chains_that_do_not_finish_are_explained():
     """Those that the default limit does not finish: what they do there, one by one."""
