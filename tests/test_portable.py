@@ -137,7 +137,9 @@ def without_vector_code():
         "NPY_DISABLE_CPU_FEATURES": " ".join(found),
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=" + ",".join(f"-{unit}" for unit in units),
         "CRADLE_KERNEL": "plain",
-        "PYTHONPATH": str(ROOT / "benchmarks"),
+        "PYTHONPATH": os.pathsep.join(
+            filter(None, [str(ROOT / "benchmarks"), os.environ.get("PYTHONPATH")])
+        ),
     }
     run = subprocess.run(
         [sys.executable, __file__],
