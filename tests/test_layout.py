@@ -9,8 +9,8 @@ import book_figures
 import pytest
 
 WIDTHS = (390, 1280)
-#: Widths of phones, and device pixels a pixel: letters of formulas are rounded to the latter.
-PHONES = [(width, density) for width in (360, 390) for density in (1, 2, 3)]
+#: Widths of phones.
+PHONES = (360, 390)
 MODES = ("light", "dark")
 #: Contrast that letters need, and lines and marks (WCAG 2.1: 1.4.6 and 1.4.11).
 LETTERS, LINES = 7.0, 3.0
@@ -157,7 +157,16 @@ def test_nothing_is_cut(html: Path, browser):
     assert not found, "\n".join(f"{page}: {fault}" for page in found for fault in found[page])
 
 
-def test_numbers_of_equations_on_a_phone(html: Path, browser):
+# Device pixels a pixel, to which letters of formulas are rounded; loading the pages takes long.
+@pytest.mark.parametrize(
+    "density",
+    [
+        2,
+        pytest.param(1, marks=pytest.mark.exhaustive),
+        pytest.param(3, marks=pytest.mark.exhaustive),
+    ],
+)
+def test_numbers_of_equations_on_a_phone(html: Path, browser, density: int):
     """None is cut, and none needs letters that are smaller than those of figures."""
     pages = [
         page
@@ -165,25 +174,24 @@ def test_numbers_of_equations_on_a_phone(html: Path, browser):
         if re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8"))
     ]
     seen, cut = 0, []
-    for density in sorted({density for _, density in PHONES}):
-        context = browser.new_context(device_scale_factor=density)
-        context.set_default_timeout(PATIENCE)
-        tab = context.new_page()
-        for page in pages:
-            tab.goto(page.as_uri())
-            tab.evaluate("() => window.MathJax?.startup?.promise")
-            for width in [width for width, of in PHONES if of == density]:
-                tab.set_viewport_size({"width": width, "height": 800})
-                tab.wait_for_function("(asked) => innerWidth === asked", arg=width)
-                tab.evaluate(FRAMES)
-                numbers = tab.evaluate(NUMBERS)
-                seen += len(numbers)
-                cut += [
-                    (page.stem, width, density, *number)
-                    for number in numbers
-                    if number[1] > number[2] + 0.5 or number[3] < 7.8
-                ]
-        context.close()
+    context = browser.new_context(device_scale_factor=density)
+    context.set_default_timeout(PATIENCE)
+    tab = context.new_page()
+    for page in pages:
+        tab.goto(page.as_uri())
+        tab.evaluate("() => window.MathJax?.startup?.promise")
+        for width in PHONES:
+            tab.set_viewport_size({"width": width, "height": 800})
+            tab.wait_for_function("(asked) => innerWidth === asked", arg=width)
+            tab.evaluate(FRAMES)
+            numbers = tab.evaluate(NUMBERS)
+            seen += len(numbers)
+            cut += [
+                (page.stem, width, *number)
+                for number in numbers
+                if number[1] > number[2] + 0.5 or number[3] < 7.8
+            ]
+    context.close()
     assert seen >= 53 * len(PHONES)  # of the paper alone
     assert not cut, "\n".join(map(str, cut))
 
