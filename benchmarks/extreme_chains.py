@@ -16,7 +16,8 @@ import numpy as np
 import plain
 from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
 from march import march
-from truth import EventLimit, solve
+from problem import Problem
+from truth import EventLimit
 
 from cradle import (
     Chain,
@@ -38,47 +39,11 @@ TINIEST = 5e-324  # the smallest number above zero
 FIELDS = ("masses", "velocities", "restitution", "forward", "backward")
 
 
-class Case(NamedTuple):
-    """A chain with its ratios, as plain lists."""
-
-    masses: list
-    velocities: list
-    restitution: list
-    forward: list
-    backward: list
-    meeting: float = 0.5
-
-    def collide(self, max_events=200_000):
-        """The trace, unfinished or not, and whether it finished."""
-        chain = Chain(self.masses, self.velocities, self.restitution)
-        model = ImpulseCorrelation(
-            self.forward,
-            self.backward,
-            meeting=self.meeting,
-            excess="saturate",
-            max_events=max_events,
-        )
-        try:
-            return collide(chain, model), True
-        except ImpactNotFinished as stopped:
-            return stopped.trace, False
-
-    def exact(self, max_events=20_000, **options):
-        """The outcome by the independent solver, at the digits in force."""
-        return solve(
-            *(list(map(float, part)) for part in self[:5]),
-            meeting=self.meeting,
-            excess="saturate",
-            max_events=max_events,
-            **options,
-        )
-
-
 def case(masses, velocities, restitution, forward, backward=None, meeting=0.5):
-    """A case from arrays or scalars."""
+    """A problem from arrays or scalars."""
     n = len(masses)
     backward = forward if backward is None else backward
-    return Case(
+    return Problem(
         [float(m) for m in masses],
         [float(v) for v in velocities],
         np.broadcast_to(np.asarray(restitution, float), n - 1).tolist(),
@@ -222,7 +187,7 @@ class Measured(NamedTuple):
 def measure(problem, trace=None, max_events=20_000, digits=50, conditioning=True):
     """Compare the package with fifty digits; raises `EventLimit` where these take too long."""
     if trace is None:
-        trace, finished = problem.collide()
+        trace, finished = problem.attempt()
         assert finished
     with mpmath.workdps(digits):
         exact = problem.exact(max_events)
@@ -475,13 +440,13 @@ def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
     Relative distance and the largest change of a velocity across it, relative to the largest
     speed; (inf, 0) if there is no edge up to `farthest` or to the end of the input's range.
     """
-    base = events_at_balls(problem.collide()[0])
+    base = events_at_balls(problem.attempt()[0])
 
     def at(distance):
         changed = moved(problem, name, k, side * distance * scale)
         if changed is None:
             return None
-        trace = changed.collide()[0]
+        trace = changed.attempt()[0]
         return trace.velocities, events_at_balls(trace) == base
 
     near, far = 0.0, 1e-12

@@ -57,7 +57,7 @@ def the_map(keep):
         for velocities in x.VELOCITIES:
             point = (*labels, velocities)
             problem = x.map_case(*point)
-            trace, finished = problem.collide()
+            trace, finished = problem.attempt()
             unfinished += not finished
             faulty += bool(x.faults(trace, finished))
             events = max(events, len(trace.events))
@@ -78,7 +78,7 @@ def lengths(_):
     for name, n in itertools.product(x.ROWS, x.SIZES):
         problem = x.row_case(name, n)
         # The path of a thousand balls is large: not more of it than needed.
-        trace, finished = problem.collide(4_000_000 // n)
+        trace, finished = problem.attempt(4_000_000 // n)
         defects = x.invariants(trace)
         error = math.nan
         with mpmath.workdps(50):
@@ -118,7 +118,7 @@ def elastic(_):
     for quarters, ratio in itertools.product(range(41), (0.0, 0.15)):
         light = power_of_ten(-quarters)
         problem = x.case([1, light, 1], [1, 0, 0], 1, ratio)
-        trace, finished = problem.collide(5_000_000)
+        trace, finished = problem.attempt(5_000_000)
         assert finished
         defects = x.invariants(trace)
         theory = math.pi * math.sqrt((1 - ratio) / (2 * light))

@@ -106,21 +106,18 @@ def _refuse_unused(
     given: Iterable[str], known: Iterable[str], shots: Shots, predict: str | None
 ) -> None:
     """Refuse a value that no chain needs: its name may be misspelt."""
-    from cradle.fit.parameters import label, pair_keys, parameter_key, triplet_keys
+    from cradle.fit.parameters import label, pair_keys, parameter_key, ratio_keys
 
     chains = [one.types for one in shots.sets] + ([parameter_key(predict)] if predict else [])
     pairs = {key for types in chains for key in pair_keys(types)}
-    triplets = {key for types in chains for part in triplet_keys(types) for key in part}
-    for name in given:
-        if tuple(sorted(parameter_key(name))) not in pairs:
-            there = ", ".join(sorted(map(label, pairs)))
-            raise click.UsageError(
-                f"--restitution {name}: no chain has this pair; there are {there}"
-            )
-    for name in known:
-        if parameter_key(name) not in triplets:
-            there = ", ".join(sorted(map(label, triplets))) or "none"
-            raise click.UsageError(f"--known {name}: no chain has this triplet; there are {there}")
+    triplets = {key for types in chains for key in ratio_keys(types)}
+    values = [("--restitution", name, tuple(sorted(parameter_key(name)))) for name in given]
+    values += [("--known", name, parameter_key(name)) for name in known]
+    for option, name, key in values:
+        kind, needed = ("triplet", triplets) if option == "--known" else ("pair", pairs)
+        if key not in needed:
+            there = ", ".join(sorted(map(label, needed))) or "none"
+            raise click.UsageError(f"{option} {name}: no chain has this {kind}; there are {there}")
 
 
 def _fits(
@@ -142,7 +139,7 @@ def _predicted(
     found: Fit, shots: Shots, sequence: str, speed: float
 ) -> tuple[dict[str, Any], list[str]]:
     """Return a prediction and what was measured of such chains: for JSON, and as lines."""
-    from cradle.fit.parameters import triplet_keys
+    from cradle.fit.parameters import ratio_keys
 
     predicted = found.predict(sequence, speed)
     rows, measured = predicted.rows(), []
@@ -170,7 +167,7 @@ def _predicted(
         )
     lines += map(text, tables[1:] or tables)
     lines += remarks
-    keys = {key for part in triplet_keys(predicted.types) for key in part}
+    keys = ratio_keys(predicted.types)
     several = [e.name for e in found.estimates.values() if e.key in keys and len(e.intervals) > 1]
     if several:
         lines.append(

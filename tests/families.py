@@ -6,57 +6,10 @@ round alike everywhere; printed, it is short.  Draws come from `random.Random`, 
 """
 
 import random
-from dataclasses import dataclass, replace
 
-from cradle import Chain, ImpulseCorrelation, collide
+from problem import Problem
 
 PAPER_MASSES = [0.045, 0.053, 0.053, 0.166]
-
-
-@dataclass(frozen=True)
-class Problem:
-    """A chain and the parameters of its impact, as plain numbers."""
-
-    masses: list
-    velocities: list
-    restitution: list
-    forward: list
-    backward: list
-    meeting: float = 0.5
-
-    def solve(self, solver, **options):
-        """By `textbook.solve`, `truth.solve` or anything that is called like them."""
-        parts = self.masses, self.velocities, self.restitution, self.forward, self.backward
-        return solver(*parts, meeting=self.meeting, **options)
-
-    def collide(self, **options):
-        """By the package."""
-        model = ImpulseCorrelation(
-            self.forward, self.backward, meeting=self.meeting, excess="saturate", **options
-        )
-        return collide(Chain(self.masses, self.velocities, self.restitution), model)
-
-    def mirrored(self):
-        return Problem(
-            self.masses[::-1],
-            [-v for v in self.velocities[::-1]],
-            self.restitution[::-1],
-            self.backward[::-1],
-            self.forward[::-1],
-            1 - self.meeting,
-        )
-
-    def boosted(self, speed):
-        """Seen from a moving frame; exact if velocities and speed are multiples of a power of 2."""
-        return replace(self, velocities=[v + speed for v in self.velocities])
-
-    def in_units(self, mass, velocity):
-        """In other units; exact if these are powers of two."""
-        return replace(
-            self,
-            masses=[m * mass for m in self.masses],
-            velocities=[v * velocity for v in self.velocities],
-        )
 
 
 class Draw:
@@ -113,7 +66,7 @@ def bounded_ties(draw, n):
     m, count = given.masses, len(given.forward)
     forward = within_bounds(m, [draw.choice([0.0, 0.5]) for _ in range(count)])
     backward = within_bounds(m[::-1], [draw.choice([0.0, 0.5]) for _ in range(count)])
-    return replace(given, forward=forward, backward=backward[::-1])
+    return given._replace(forward=forward, backward=backward[::-1])
 
 
 def tiny_ratios(draw, n):
@@ -125,7 +78,7 @@ def tiny_ratios(draw, n):
     given = ties(draw, n)
     values = draw.choice([[0.0, 1e-20], [0.0, 1e-20, 0.1], [0.0, 1e-20, 0.1, 1.0]])
     forward, backward = ([draw.choice(values) for _ in range(n - 2)] for _ in range(2))
-    return replace(given, forward=forward, backward=backward)
+    return given._replace(forward=forward, backward=backward)
 
 
 def mixed_zeros(draw, n):

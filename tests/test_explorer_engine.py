@@ -3,7 +3,8 @@
 import math
 
 import pytest
-from families import FAMILIES, Draw, Problem, family, within_bounds
+from families import FAMILIES, Draw, family, within_bounds
+from problem import Problem
 from script import Script, bits
 
 from cradle import (

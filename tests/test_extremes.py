@@ -14,6 +14,7 @@ from chains import power_of_ten, uniform
 from fuzz import attempt
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from problem import Problem
 
 from cradle import (
     Chain,
@@ -62,7 +63,7 @@ def sample(rows, count, seed=9):
 
 def test_a_fault_is_seen():
     """Every kind of fault, put into a sound trace by hand."""
-    trace, _ = x.case([1, 2, 1.5], [1, 0.25, 0], 0.5, 0.25).collide()
+    trace, _ = x.case([1, 2, 1.5], [1, 0.25, 0], 0.5, 0.25).attempt()
     assert x.faults(trace) == []
     off = 400 * x.EPS
     for field, value, word in (
@@ -82,7 +83,7 @@ def test_a_fault_is_seen():
 def test_measure_of_a_known_error():
     """A velocity that is off by seven roundings is measured as such; so is the conditioning."""
     problem = x.case([1, 1], [1, 0], 1, [])
-    trace, _ = problem.collide()
+    trace, _ = problem.attempt()
     assert x.measure(problem, trace).error == 0
     off = replace(trace, velocities=trace.velocities + np.array([0, 7 * x.EPS]))
     found = x.measure(problem, off)
@@ -125,7 +126,7 @@ def test_rows_of_the_map(seed):
         worst = np.zeros(3)
         for velocities in x.VELOCITIES:
             problem = x.map_case(*labels, row["ratio"], velocities)
-            trace, finished = problem.collide()
+            trace, finished = problem.attempt()
             assert x.faults(trace, finished) == []
             worst = np.fmax(worst, x.compare(trace, x.truth(problem, trace)))
         error, condition, own = worst
@@ -145,10 +146,10 @@ def test_compiled_and_plain_kernel_agree_on_the_map(shape, monkeypatch):
     ):
         problem = x.map_case(shape, power, e, ratio, velocities)
         monkeypatch.delenv(runtime.VARIABLE, raising=False)
-        one, finished = problem.collide(2000)
+        one, finished = problem.attempt(2000)
         monkeypatch.setenv(runtime.VARIABLE, "plain")
         assert runtime.chosen() is kernel
-        other, also = problem.collide(2000)
+        other, also = problem.attempt(2000)
         assert finished == also
         assert one.events == other.events
         for name in ("velocities", "impulses", "absorbed", "collisions", "path"):
@@ -165,7 +166,7 @@ def test_speeds_of_any_size(size):
     ):
         unit = post_impact_velocities(masses, [1, 0.3, 0, 0], e, ratio, excess="saturate")
         problem = x.case(masses, np.array([1, 0.3, 0, 0]) * size, e, ratio)
-        trace, finished = problem.collide()
+        trace, finished = problem.attempt()
         assert x.faults(trace, finished) == []
         np.testing.assert_allclose(trace.velocities, unit * size, rtol=0, atol=1e-13 * size)
 
@@ -174,7 +175,7 @@ def test_subnormal_energies_and_speeds():
     """Energies below the smallest number, then speeds there: to half of the smallest number."""
     for power in (-165, -200, -300, -310, -320):
         problem = x.case([1, 1.5, 0.7], [power_of_ten(4 * power), 0, 0], 0.8, 0.2)
-        trace, finished = problem.collide()
+        trace, finished = problem.attempt()
         assert x.faults(trace, finished) == []
         exact = [float(v) for v in problem.exact().velocities]
         atol = max(4 * x.EPS * max(exact), x.TINIEST)
@@ -192,7 +193,7 @@ def test_nearly_simultaneous_events(gap):
         ([1] * 4, [1, 1 - gap, 0, 0], 0.9, 0),
     ):
         problem = x.case(masses, velocities, e, ratio)
-        trace, finished = problem.collide()
+        trace, finished = problem.attempt()
         assert x.faults(trace, finished) == []
         with mpmath.workdps(50):
             exact = problem.exact()
@@ -219,7 +220,7 @@ def test_long_chains_keep_the_invariants():
         assert not row["error"] > THIRTEEN, row
     for row in sample([r for r in rows if r["events"] < 5000 and r["finished"]], 12):
         problem = x.row_case(row["row"], int(row["balls"]))
-        trace, finished = problem.collide()
+        trace, finished = problem.attempt()
         assert finished
         assert x.faults(trace) == []
         assert len(trace.events) == row["events"]
@@ -281,7 +282,7 @@ def test_no_digit_is_lost_at_ratio_zero(light, last, e):
             if mirrored:
                 problem = x.case([last, light, 1], [0, 0, -1], e, 0)
                 known = [-v for v in known[0][::-1]], known[1][::-1]
-            trace, _ = problem.collide()
+            trace, _ = problem.attempt()
             assert trace.collisions.sum() == number
             assert x.compare(trace, known)[2] <= 0.3
 
@@ -309,7 +310,7 @@ def test_infinite_sequences_in_bounded_work(light, e):
     """The common velocity, to the last digits, after at most a few thousand impacts."""
     for name, ratio in part_of_bound(light).items():
         problem = x.case([1, light, 1], [1, 0, 0], e, ratio)
-        trace, finished = problem.collide(40_000)
+        trace, finished = problem.attempt(40_000)
         assert finished, name
         assert x.faults(trace) == [], name
         assert trace.collisions.sum() < 10_000, name
@@ -324,7 +325,7 @@ def test_infinite_sequences_in_bounded_work(light, e):
 @pytest.mark.parametrize("light", [1e-3, 1e-5, 1e-7])
 def test_elastic_sequences_are_finite(light):
     for name, ratio in part_of_bound(light).items():
-        trace, finished = x.case([1, light, 1], [1, 0, 0], 1, ratio).collide(500_000)
+        trace, finished = x.case([1, light, 1], [1, 0, 0], 1, ratio).attempt(500_000)
         assert finished, name
         assert not trace.collapsed, name
         assert x.faults(trace) == [], name
@@ -401,7 +402,7 @@ def test_random_chains_finish():
             # Of a long impact the last digits decide after how many steps it ends: no limit near
             # that of the map is asked for.
             long = (family, decades, index) in named
-            trace, finished = x.any_chain(family, decades, index).collide(
+            trace, finished = x.any_chain(family, decades, index).attempt(
                 5000 if long else 1_000_000
             )
             assert finished != long, (family, decades, index)
@@ -435,7 +436,7 @@ SLOW = {
 @pytest.mark.parametrize("name", SLOW)
 def test_limits_of_slow_and_nested_cycles(name):
     problem, after = SLOW[name]
-    trace, finished = problem.collide()
+    trace, finished = problem.attempt()
     assert finished
     assert trace.collapsed
     assert len(trace.events) < 5000
@@ -482,7 +483,7 @@ def test_chains_that_do_not_finish_are_explained():
     # is compared there.  That it goes on, and how, shows much earlier.
     for row in sample(never, min(3, len(never))):
         problem = x.any_chain(row["family"], int(row["decades"]), int(row["index"]))
-        trace, finished = problem.collide(50_000)
+        trace, finished = problem.attempt(50_000)
         assert not finished, row
         assert x.faults(trace, finished) == [], row
         early = x.explain(problem, x.late(problem, 10_000))
@@ -509,7 +510,7 @@ def test_last_events():
         [0.093, 0.74, 1, 0.12, 0.87, 0, 0.34],
         [0.79, 0.41, 0.52, 0.72, 1, 0.54], [0.95, 0.58, 0.54, 0.79, 0.82, 0.84],
     )  # fmt: skip
-    trace, finished = problem.collide(1000)
+    trace, finished = problem.attempt(1000)
     assert not finished
     seen = x.late(problem, 1000, 200)
     kinds = ("maximum_compression", "end", "close", "collapse")
@@ -635,10 +636,10 @@ def test_edges_of_the_ten_sequences():
         own = chain.masses, chain.velocities, chain.restitution
         problem = x.case(*own, model.forward, model.backward)
         value = getattr(problem, row["input"])[int(row["index"])]
-        base = x.events_at_balls(problem.collide()[0])
+        base = x.events_at_balls(problem.attempt()[0])
         for part, same in ((1 - 1e-3, True), (1 + 1e-3, False)):
             change = row["side"] * row["distance"] * part * value
-            near_trace = x.moved(problem, row["input"], int(row["index"]), change).collide()[0]
+            near_trace = x.moved(problem, row["input"], int(row["index"]), change).attempt()[0]
             assert (x.events_at_balls(near_trace) == base) == same, row
 
 
@@ -679,14 +680,14 @@ def test_any_finite_numbers(data):
 
     m, v = draw(positive, n), draw(st.one_of(finite, st.sampled_from([0.0, 1.0, -1.0])), n)
     e, f, b = draw(unit, n - 1), draw(unit, n - 2), draw(unit, n - 2)
-    problem = x.Case(m, v, e, f, b, data.draw(unit))
+    problem = Problem(m, v, e, f, b, data.draw(unit))
     if (
         max(m) * 1e-15 > min(m)  # beyond it an answer may fail its certificate
         or any(0 < c < LIMITS.least_restitution for c in e)
         or any(mass * speed * speed > 1e300 for mass, speed in zip(m, v))
     ):
         try:
-            problem.collide(2000)
+            problem.attempt(2000)
         except ImpactNotCertified:
             refused = "masses["
         except ValueError as error:
@@ -695,7 +696,7 @@ def test_any_finite_numbers(data):
             refused = "masses["
         assert refused.startswith(("masses[", "velocities[", "restitution["))
     else:
-        trace, finished = problem.collide(2000)
+        trace, finished = problem.attempt(2000)
         assert x.faults(trace, finished) == []
 
 
@@ -798,9 +799,9 @@ def test_found_by_fuzzing(name, plain, monkeypatch):
         0 < e < LIMITS.least_restitution for e in problem.restitution
     ):
         with pytest.raises(ValueError, match=r"(must be|be|0 or) at least 1e-(25|30)"):
-            problem.collide(20_000)
+            problem.attempt(20_000)
         return
-    trace, finished = problem.collide(20_000)
+    trace, finished = problem.attempt(20_000)
     assert finished
     assert x.faults(trace) == []
     if not trace.collapsed:

@@ -104,7 +104,7 @@ def answers():
         yield "batch", post_impact_velocities(*random_chains(rng, 60, n, decades=2))
     for family, decades in x.FAMILIES:
         for index in range(60):
-            trace, _ = x.any_chain(family, decades, index).collide(500)
+            trace, _ = x.any_chain(family, decades, index).attempt(500)
             for name in ("path", "path_impulses", "absorbed", "collisions"):
                 yield "one by one", getattr(trace, name)
 

@@ -6,7 +6,6 @@ not finish, or its answer is not certified.
 """
 
 import math
-from dataclasses import astuple
 
 import mpmath
 import numpy as np
@@ -189,7 +188,7 @@ NEEDED = {
     ),
     "gaps beside a run that has moved": (
         {"touch_beside": lambda _: lambda *_: None},
-        astuple(NAMED["an end and a closing beside it at once"]),
+        NAMED["an end and a closing beside it at once"],
         WRONG,
     ),
     "neighbours that come to their own event in a cycle": (
@@ -210,22 +209,22 @@ NEEDED = {
     ),
     "neighbours held at zero during a jump": (
         {"hold_together": lambda _: lambda *_: None},
-        astuple(MANY_COLLAPSES["held neighbours"]),
+        MANY_COLLAPSES["held neighbours"],
         UNSOUND,
     ),
     "how far a cycle between balls held fast shrinks": (
         {"limit": sure},
-        astuple(LAST_DIGITS["two balls that chatter between balls held fast"]),
+        LAST_DIGITS["two balls that chatter between balls held fast"],
         WRONG,
     ),
     "a cycle's sum of which no digit is known": (
         {"one_digit": math.inf},
-        astuple(LAST_DIGITS["two balls that chatter between balls held fast"]),
+        LAST_DIGITS["two balls that chatter between balls held fast"],
         UNFINISHED,
     ),
     "a store that is released in portions below its last digit": (
         {"add_store": one_store},
-        astuple(PORTIONS),
+        PORTIONS,
         UNSOUND,
     ),
     "an elastic sequence down to the last digit": (

@@ -4,7 +4,8 @@ from typing import get_type_hints
 
 import plain
 import pytest
-from families import FAMILIES, Draw, Problem, family
+from families import FAMILIES, Draw, family
+from problem import Problem
 
 from cradle import drive
 

@@ -16,6 +16,7 @@ from cradle.fit.parameters import (
     label,
     pair_keys,
     parameter_key,
+    ratio_keys,
     triplet_keys,
 )
 from cradle.fit.result import Fit
@@ -247,7 +248,7 @@ def _acts(
     restitution: Mapping[Key, float],
 ) -> bool:  # fmt: skip
     """Tell whether a ratio changes any outcome of a set, tried at points all over the ranges."""
-    keys = {k for part in triplet_keys(one.types) for k in part}
+    keys = ratio_keys(one.types)
     if key not in keys:
         return False
     # Multiples of irrational numbers fill a box evenly.
@@ -271,7 +272,7 @@ def _components(sets: Sequence[ShotSet], acting: set[Key]) -> list[tuple[list[Ke
     """Return groups of ratios that act in the same sets, with those sets."""
     groups: list[tuple[set[Key], list[ShotSet]]] = []
     for one in sets:
-        keys = {k for part in triplet_keys(one.types) for k in part} & acting
+        keys = ratio_keys(one.types) & acting
         touched = [group for group in groups if group[0] & keys]
         groups = [group for group in groups if group not in touched]
         members = [member for group in touched for member in group[1]]
@@ -287,7 +288,7 @@ def _fit_group(
     values, errors = known
     needed = {key for one in sets for key in pair_keys(one.types)}
     uncertain = [(key, sigma) for key, sigma in sorted(errors.items()) if key in needed]
-    silent = {k for one in sets for part in triplet_keys(one.types) for k in part} - set(keys)
+    silent = {key for one in sets for key in ratio_keys(one.types)} - set(keys)
 
     def chi(points: Vector) -> Vector:
         columns = points[:, None] if points.ndim == 1 else points

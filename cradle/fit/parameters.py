@@ -96,6 +96,26 @@ def triplet_keys(types: Sequence[str]) -> tuple[list[Key], list[Key]]:
     return forward, [key[::-1] for key in forward]
 
 
+def ratio_keys(types: Sequence[str]) -> set[Key]:
+    """Return the ratio parameters of a chain, of both ways, each once.
+
+    Parameters
+    ----------
+    types : sequence of str, length N
+
+    Returns
+    -------
+    set of tuple
+
+    Examples
+    --------
+    >>> sorted(ratio_keys("ABAB"))
+    [('A', 'B', 'A'), ('B', 'A', 'B')]
+    """
+    forward, backward = triplet_keys(types)
+    return {*forward, *backward}
+
+
 @dataclass(frozen=True, eq=False)
 class Points:
     """Parameter points at which chains are solved; P points.

@@ -1,0 +1,62 @@
+"""One impact as plain numbers: for the package, for any other solver, and seen from elsewhere."""
+
+from typing import NamedTuple
+
+from truth import solve
+
+from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide
+
+
+class Problem(NamedTuple):
+    """A chain and the parameters of its impact, as plain lists; ratios above bounds saturate."""
+
+    masses: list
+    velocities: list
+    restitution: list
+    forward: list
+    backward: list
+    meeting: float = 0.5
+
+    def solve(self, solver, **options):
+        """By `textbook.solve`, `truth.solve` or anything that is called like them."""
+        *parts, meeting = self
+        return solver(*parts, meeting=meeting, **options)
+
+    def collide(self, **options):
+        """By the package."""
+        model = ImpulseCorrelation(
+            self.forward, self.backward, meeting=self.meeting, excess="saturate", **options
+        )
+        return collide(Chain(self.masses, self.velocities, self.restitution), model)
+
+    def attempt(self, max_events=200_000):
+        """The package's trace, finished or not, and whether it finished."""
+        try:
+            return self.collide(max_events=max_events), True
+        except ImpactNotFinished as stopped:
+            return stopped.trace, False
+
+    def exact(self, max_events=20_000):
+        """The outcome by fifty digits' solver, at the digits in force."""
+        return self.solve(solve, excess="saturate", max_events=max_events)
+
+    def mirrored(self):
+        return Problem(
+            self.masses[::-1],
+            [-v for v in self.velocities[::-1]],
+            self.restitution[::-1],
+            self.backward[::-1],
+            self.forward[::-1],
+            1 - self.meeting,
+        )
+
+    def boosted(self, speed):
+        """Seen from a moving frame; exact if velocities and speed are multiples of a power of 2."""
+        return self._replace(velocities=[v + speed for v in self.velocities])
+
+    def in_units(self, mass, velocity):
+        """In other units; exact if these are powers of two."""
+        return self._replace(
+            masses=[m * mass for m in self.masses],
+            velocities=[v * velocity for v in self.velocities],
+        )
