@@ -62,7 +62,9 @@ def fit(
         raise click.UsageError("--csv prints the fitted values alone; with --predict give --json")
     given, known = options.pop("given"), options.pop("known")
     shots = read_shots(file, **options)
-    used = shots.without(*(name.strip() for part in without for name in part.split(",")))
+    there = {one.name for one in shots.sets}  # a name may have a comma
+    lists = [[part] if part in there else part.split(",") for part in without]
+    used = shots.without(*(name.strip() for names in lists for name in names))
     values, ratios = dict(map(_named, given)), dict(map(_named, known))
     _refuse_unused(values, ratios, used, predict)
     fits = _fits(used, values, ratios)

@@ -323,6 +323,17 @@ def test_a_set_left_out_is_compared_with_its_prediction(folder):
     assert "20 shots (all of the file)" in text
 
 
+def test_a_set_with_a_comma_in_its_name_is_left_out(folder):
+    table = (folder / "shots.csv").read_text(encoding="utf-8")
+    named = table.replace("\nACA,", '\n"ACA, steel",')
+    assert named != table
+    (folder / "named.csv").write_text(named, encoding="utf-8")
+    answer = json.loads(call("fit named.csv --without 'ACA, steel' --json"))
+    alone = json.loads(call("fit shots.csv --without ACA --json"))
+    assert answer["without"] == ["ACA, steel"]
+    assert answer["rows"] == alone["rows"]
+
+
 @pytest.mark.usefixtures("folder")
 def test_what_was_fitted_is_no_check():
     line = "fit shots.csv --without ACA,CAB --without BAC --predict ABA"
