@@ -66,6 +66,12 @@ def code(chapter: str) -> list:
     return [cell for cell in cells if cell.cell_type == "code"]
 
 
+def parsed(cell) -> ast.Module:
+    """Return the syntax tree of a code cell, without IPython's own commands."""
+    lines = [line for line in cell.source.splitlines() if not line.startswith("%")]
+    return ast.parse("\n".join(lines))
+
+
 def written_ratios(tree: ast.AST) -> Iterator[ast.Constant]:
     """Find the ratios above 0 that code writes as numbers: in models, assignments and loops."""
     for node in ast.walk(tree):
@@ -93,8 +99,7 @@ def run(
     names["__name__"] = "__main__"
     for number, cell in enumerate(cells, start=1):
         names["__cell__"] = cell
-        lines = [line for line in cell.source.splitlines() if not line.startswith("%")]
-        tree = ast.parse("\n".join(lines))
+        tree = parsed(cell)
         for written in set(written_ratios(tree)):
             written.value *= factor
         exec(compile(tree, f"code cell {number}", "exec"), names)
@@ -105,9 +110,8 @@ def run(
 
 def names_of(cell) -> tuple[set[str], set[str]]:
     """Names that a code cell takes from the cells before it, and names that it gives."""
-    lines = [line for line in cell.source.splitlines() if not line.startswith("%")]
     taken, given = set(), set()
-    for statement in ast.parse("\n".join(lines)).body:
+    for statement in parsed(cell).body:
         inner, loaded, stored = set(), set(), set()
         for node in ast.walk(statement):
             match node:
@@ -130,12 +134,16 @@ def names_of(cell) -> tuple[set[str], set[str]]:
     return taken, given
 
 
-def reached(cells: list) -> list[bool]:
-    """Tell for each code cell whether a change of the parameters reaches it, by others as well."""
+def reached(cells: list, *, written: bool = False) -> list[bool]:
+    """Tell for each code cell whether a change of the parameters reaches it, by others as well.
+
+    With `written`, whether one of the other ratios that the code writes as numbers does so too.
+    """
     found, changed = [], set()
     for cell in cells:
         taken, given = names_of(cell)
         hit = bool(changed & taken) or "parameters" in cell.metadata.get("tags", [])
+        hit = hit or (written and any(written_ratios(parsed(cell))))
         changed = changed | given if hit else changed - given
         found.append(hit)
     return found
@@ -157,16 +165,9 @@ def in_memory(show):
 
 
 @functools.cache
-def drawn(chapter: str) -> dict[str, Figure]:
-    """Run a chapter as it is stored and return its figures by their names.
-
-    The first process of a session that needs them leaves them to the others.
-    """
-    shared = os.environ.get(SHARED)
-    kept = Path(shared, f"{chapter}.figures") if shared else None
-    if kept and kept.exists():
-        return pickle.loads(kept.read_bytes())
-    figures, names = {}, {}
+def stored_run(chapter: str) -> tuple[dict[str, Figure], list[dict]]:
+    """Run a chapter as it is stored: its figures by their names, and what each cell gives."""
+    figures, names, given = {}, {}, []
 
     def keep():
         settings = names["__cell__"].metadata.get("mystnb", {})
@@ -175,12 +176,27 @@ def drawn(chapter: str) -> dict[str, Figure]:
         plt.close(plt.gcf())
 
     with in_memory(keep), contextlib.redirect_stdout(io.StringIO()):
-        run(code(chapter), {}, names=names)
-    if kept:
-        part = kept.with_suffix(f".{os.getpid()}")
+        for cell in code(chapter):
+            run([cell], {}, names=names)
+            given.append({name: names[name] for name in names_of(cell)[1] & names.keys()})
+    shared = os.environ.get(SHARED)
+    if shared:
+        part = Path(shared, f"{chapter}.{os.getpid()}")
         part.write_bytes(pickle.dumps(figures))
-        part.replace(kept)
-    return figures
+        part.replace(Path(shared, f"{chapter}.figures"))
+    return figures, given
+
+
+@functools.cache
+def drawn(chapter: str) -> dict[str, Figure]:
+    """Return the figures of a chapter as it is stored, by their names.
+
+    The first process of a session that runs it leaves them to the others.
+    """
+    shared = os.environ.get(SHARED)
+    if shared and Path(shared, f"{chapter}.figures").exists():
+        return pickle.loads(Path(shared, f"{chapter}.figures").read_bytes())
+    return stored_run(chapter)[0]
 
 
 def lines(ax) -> dict[str, np.ndarray]:

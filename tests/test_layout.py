@@ -8,10 +8,12 @@ from pathlib import Path
 import book_figures
 import pytest
 
-WIDTHS = (390, 1280)
+#: Widths and modes of the window.  Widths decide what fits, modes which pictures are shown; pages
+#: take long to load, and the weekly tests look at the other pairs.
+VIEWS = ((1280, "dark"), (390, "light"))
+OTHER_VIEWS = ((1280, "light"), (390, "dark"))
 #: Widths of phones.
-PHONES = (360, 390)
-MODES = ("light", "dark")
+PHONES = (390, 360)
 #: Contrast that letters need, and lines and marks (WCAG 2.1: 1.4.6 and 1.4.11).
 LETTERS, LINES = 7.0, 3.0
 #: Milliseconds until a browser that does not answer is given up: far above any slow machine's need.
@@ -123,76 +125,65 @@ def browser():
         browser.close()
 
 
-def misfits(tab, width: int, mode: str) -> list:
-    """List what does not fit into a window of this width in this mode."""
+def show(tab, width: int, mode: str) -> None:
+    """Give the window this width and the page this mode, and wait until it has followed."""
     tab.set_viewport_size({"width": width, "height": 900})
     tab.emulate_media(color_scheme=mode)
     shown = "[innerWidth, document.documentElement.dataset.theme]"
     tab.wait_for_function(f"(asked) => `${{{shown}}}` === `${{asked}}`", arg=[width, mode])
     # fit_equations.js follows the window, and hears of it before the next frame.
     tab.evaluate(FRAMES)
-    return [[width, mode, *misfit] for misfit in tab.evaluate(MISFITS)]
 
 
-def test_nothing_is_cut(html: Path, browser):
-    context = browser.new_context(viewport={"width": WIDTHS[0], "height": 900})
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param((2, VIEWS), id="2"),
+        pytest.param((1, OTHER_VIEWS), id="1", marks=pytest.mark.exhaustive),
+        pytest.param((3, OTHER_VIEWS), id="3", marks=pytest.mark.exhaustive),
+    ],
+)
+def looked_at(request, html: Path, browser):
+    """Load every page once; return by page what does not fit, and the numbers of its equations.
+
+    Letters of formulas are rounded to device pixels: of these there are 1, 2 or 3 a pixel.
+    """
+    density, views = request.param
+    context = browser.new_context(device_scale_factor=density)
     context.set_default_timeout(PATIENCE)
     tab = context.new_page()
     said: list[str] = []
     tab.on("console", lambda entry: said.append(entry.text) if entry.type == "error" else None)
     tab.on("pageerror", lambda error: said.append(str(error)))
-    pages = sorted((html / "book").glob("*.html"))
-    assert len(pages) > 15
     found = {}
-    for page in pages:
+    for page in sorted((html / "book").glob("*.html")):
         said.clear()
         tab.goto(page.as_uri())
         tab.evaluate("() => window.MathJax?.startup?.promise")  # equations are set
-        faults = [
-            fault for width in WIDTHS for mode in MODES for fault in misfits(tab, width, mode)
-        ]
-        if faults + said:
-            found[page.stem] = faults + said
+        faults, numbers = [], []
+        for width, mode in views:
+            show(tab, width, mode)
+            faults += [[width, mode, *misfit] for misfit in tab.evaluate(MISFITS)]
+        if re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8")):
+            for width in PHONES:
+                show(tab, width, "light")
+                numbers += [(width, *number) for number in tab.evaluate(NUMBERS)]
+        found[page.stem] = faults + said, numbers
     context.close()
-    assert not found, "\n".join(f"{page}: {fault}" for page in found for fault in found[page])
+    return found
 
 
-# Device pixels a pixel, to which letters of formulas are rounded; loading the pages takes long.
-@pytest.mark.parametrize(
-    "density",
-    [
-        2,
-        pytest.param(1, marks=pytest.mark.exhaustive),
-        pytest.param(3, marks=pytest.mark.exhaustive),
-    ],
-)
-def test_numbers_of_equations_on_a_phone(html: Path, browser, density: int):
+def test_nothing_is_cut(looked_at: dict):
+    assert len(looked_at) > 15
+    faults = [(page, fault) for page, (faults, _) in looked_at.items() for fault in faults]
+    assert not faults, "\n".join(f"{page}: {fault}" for page, fault in faults)
+
+
+def test_numbers_of_equations_on_a_phone(looked_at: dict):
     """None is cut, and none needs letters that are smaller than those of figures."""
-    pages = [
-        page
-        for page in sorted((html / "book").glob("*.html"))
-        if re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8"))
-    ]
-    seen, cut = 0, []
-    context = browser.new_context(device_scale_factor=density)
-    context.set_default_timeout(PATIENCE)
-    tab = context.new_page()
-    for page in pages:
-        tab.goto(page.as_uri())
-        tab.evaluate("() => window.MathJax?.startup?.promise")
-        for width in PHONES:
-            tab.set_viewport_size({"width": width, "height": 800})
-            tab.wait_for_function("(asked) => innerWidth === asked", arg=width)
-            tab.evaluate(FRAMES)
-            numbers = tab.evaluate(NUMBERS)
-            seen += len(numbers)
-            cut += [
-                (page.stem, width, *number)
-                for number in numbers
-                if number[1] > number[2] + 0.5 or number[3] < 7.8
-            ]
-    context.close()
-    assert seen >= 53 * len(PHONES)  # of the paper alone
+    numbers = [(page, *number) for page, (_, numbers) in looked_at.items() for number in numbers]
+    assert len(numbers) >= 53 * len(PHONES)  # of the paper alone
+    cut = [number for number in numbers if number[3] > number[4] + 0.5 or number[5] < 7.8]
     assert not cut, "\n".join(map(str, cut))
 
 
