@@ -97,7 +97,7 @@ def problems(name, count, largest=12):
 
 
 COUNTS = {
-    "generic": 800,
+    "generic": 400,
     "ties": 700,
     "ties within bounds": 500,
     "tiny ratios": 300,
