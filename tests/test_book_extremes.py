@@ -219,7 +219,7 @@ def test_table_of_unfinished_chains(inventory):
         found = [r for r in never if r["finished"] == "0" and r["late_pattern"] == pattern]
         assert number(inventory[f"late-{pattern}"]) == len(found)
     predicted = [float(r["late_predicted"]) for r in never if r["finished"] == "0"]
-    kinds = [number(inventory[f"late-{kind}"]) for kind in ("soon", "later", "never")]
+    kinds = [number(inventory[f"late-{k}"].split()[0]) for k in ("soon", "later", "never")]
     bounds = np.searchsorted(sorted(predicted), [1e8, math.inf])
     assert np.cumsum(kinds).tolist() == [*bounds, len(left)]
     for family in ("within", "saturate"):
