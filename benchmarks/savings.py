@@ -81,7 +81,7 @@ def _one_by_one_or_at_once(clock, count):
 
 
 def _two_balls(clock, count):
-    """Yield: two balls by the event loop, or by Newton's rule."""
+    """Yield: two balls by the batch, which takes Eq. 24, or by Newton's rule."""
     m, v, e, f, b = random_chains(2, count)
 
     def formula():
@@ -89,7 +89,7 @@ def _two_balls(clock, count):
         return v + np.stack([-impulse, impulse], axis=-1) / m
 
     both = {
-        "all: the event loop": (
+        "all: post_impact_velocities": (
             lambda: post_impact_velocities(m, v, e, f, b), count, "velocities"
         ),
         "less: Newton's rule": (formula, count, "velocities, impulses"),
@@ -98,12 +98,12 @@ def _two_balls(clock, count):
 
 
 def _one_collision_each(clock, count):
-    """Yield: three balls that collide once per contact, by the event loop, or by Eqs. 22-33."""
+    """Yield: one collision per contact, by the batch, which takes Eqs. 24 and 30, or by these."""
     m, v, e, f, b = random_chains(3, 4 * count)
     once = np.flatnonzero(one_collision_each(m, v, e, f[:, 0]))[:count]
     m, v, e, f, b = (part[once] for part in (m, v, e, f, b))
     both = {
-        "all: the event loop": (
+        "all: post_impact_velocities": (
             lambda: post_impact_velocities(m, v, e, f, b), len(m), "velocities"
         ),
         "less: closed form": (lambda: three_balls(m, v, e, f[:, 0]), len(m), "velocities"),

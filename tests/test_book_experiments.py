@@ -240,6 +240,39 @@ def test_table_2_daa_has_two_sets_of_ratios():
     np.testing.assert_allclose(chapter.velocities, three_balls(*args), rtol=1e-12)
 
 
+def test_why_two_entries_are_open():
+    """Ball 2 slows down to the velocity of ball 1 while it pushes D; the two leave together."""
+    names = [FIGURES.glued[place] for place in ("widest", "second")]
+    assert sorted(names) == ["BBD", "CBD"]
+    for name in names:
+        chain, model = paper_chain(name, excess="saturate")
+        exact = solve(
+            chain.masses, [1, 0, 0], list(chain.restitution), model.forward, model.backward,
+            excess="saturate", number=float,
+        )  # fmt: skip
+        assert chain.masses.argmax() == 2
+        closes = exact.events.index(("close", 0)) + 1
+        before, met, after = exact.path[closes - 1], exact.path[closes], exact.path[-1]
+        assert before[1] > met[1] == pytest.approx(met[0])  # ball 2 comes down to ball 1
+        assert before[0] == pytest.approx(met[0])
+        assert after[0] == pytest.approx(after[1])
+        assert after[0] < met[0] < after[2]
+
+
+def test_the_second_striker_turns():
+    """The landing page: two strike three, elastic; where the second striker stops moving back."""
+
+    def after(ratio):
+        return [float(v) for v in solve(["1"] * 5, [1, 1, 0, 0, 0], 1, ratio).velocities]
+
+    turns = float(Chapter("intro").glued["turns"])
+    assert after(turns - 0.01)[1] < 0 < after(turns + 0.01)[1]
+    for percent in range(1, 50):
+        first, second, middle, *_ = after(percent / 100)
+        assert first < 0 < middle
+        assert abs(percent / 100 - turns) < 0.01 or (second < 0) == (percent / 100 < turns)
+
+
 def test_landing_five_equal_balls():
     """At ratio .15 nearly one ball leaves; the landing page prints these digits."""
     with mpmath.workdps(30):

@@ -2,6 +2,7 @@
 
 import io
 import math
+import re
 
 import mpmath
 import numpy as np
@@ -220,6 +221,17 @@ def test_fig_8_three_readings():
             atol=6e-5,
         )
         assert table.loc[reading, "collisions"] == sum(kind == "end" for kind, _ in exact.events)
+
+
+def test_exercise_3_the_march_stops_less_than_two_steps_late():
+    """Velocities are exact at each step; the work, with the first closing speed, is too large."""
+    exact = truth.solve([1] * 4, [1, "0.5", 0, 0], 1, "0.1")
+    row = exact.events.index(("end", 0)) + 1
+    end, at_end = float(exact.path_impulses[row][0]), float(exact.path[row][1])
+    rate = (at_end - 0.5) / end  # of v2 over the first impulse: one straight line up to there
+    for line in CHAPTER.printed("exercise-3").splitlines():
+        step, error = (number(text) for text in re.findall(r"(?:step|error) ([^\s:]+)", line))
+        assert 0 < error / abs(rate) / step < 2
 
 
 def test_fig_8_meeting_moves_two_of_ten_sequences():

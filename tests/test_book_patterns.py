@@ -236,6 +236,27 @@ def test_fig_6_infinite_region_at_ratio_zero(e):
         assert edge(r2, e, 0.0) == pytest.approx(r1, rel=1e-6)
 
 
+def test_an_infinite_sequence_needs_real_eigenvalues():
+    """Closing speeds by the two matrices: real, every one is positive; complex, some is not."""
+    rng = np.random.default_rng(61)
+    for e in (0.1, 0.5, 0.9):
+        for r1, r2 in 0.2 * magnitudes(rng, 1.0, (200, 2)):
+            k0, k1 = (1 + e) / (1 + r1), (1 + e) / (1 + r2)
+            first, second = np.array([[-e, 0], [k0, 1]]), np.array([[1, k1], [0, -e]])
+            eigenvalues = np.linalg.eigvals(second @ first)
+            real = bool(np.isreal(eigenvalues).all())
+            assert real == (k0 * k1 >= 4 * e)
+            u, met = np.array([1.0, 0.0]), []
+            for _ in range(100):
+                for contact, step in enumerate((first, second)):
+                    met.append(u[contact])
+                    u = step @ u
+                u /= np.abs(u).max()
+            assert (min(met) > 0) == real
+            if real:  # in the end each cycle is weaker by the larger eigenvalue
+                assert eigenvalues.real.max() < 1
+
+
 @pytest.mark.parametrize(("e", "alpha"), [(0.5, 0.15), (0.3, 0.4), (0.8, 0.05)])
 def test_fig_6_infinite_region(e, alpha):
     """Inside the border the map never stops and the solver collapses; outside both end."""
@@ -267,9 +288,14 @@ def test_fig_6_is_not_kept_for_other_parameters():
     # A vanishing middle ball: the outer two as if alone.
     v1 = solved(3e-7, 1e-7, 1.0).velocities[0]
     assert v1 == pytest.approx((1 / 3 - 1) / (1 / 3 + 1), abs=1e-5)
-    # For a ratio above e the meeting point is beyond the ratio's bound.
+    # Without restitution the map goes on for ever: it starts at 0 and gives back 0.
+    for r1, r2 in ((0.1, 3.0), (2.0, 0.4), (1.0, 1.0)):
+        assert by_turns(r1, r2, 0.0, ALPHA)[0] == 10_000
+    # For a ratio above e the line of Eq. 45, and with it the meeting point, which is the end of
+    # that of Eq. 46, are beyond the ratio's bound; the line of Eq. 44 is not.
     assert first_ball_stops(0.4, 0.5) > 1 / 0.5 - 1
     assert first_ball_stops(0.6, 0.5) < 1 / 0.5 - 1
+    assert back_impact_line(0.5, 0.4, 0.4, 0.5) < 1 / 0.5 - 1
 
 
 # --- Fig. 7 ------------------------------------------------------------------------------------

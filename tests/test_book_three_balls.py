@@ -4,11 +4,13 @@ The second routes are the independent solver in truth.py, the path of the packag
 (whose loop knows no formula of this chapter), and integrals worked out at fifty digits.
 """
 
+import math
+
 import mpmath
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
-from chapters import Chapter
+from chapters import Chapter, number
 from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
@@ -196,6 +198,7 @@ def test_eqs_24_to_33_on_the_grid():
     at_zero = ((part == 1) & (w == 0))[one]
     assert difference[~at_zero].max() < 1e-12
     assert difference[at_zero].max() < 1e-7
+    assert number(CHAPTER.glued["three-balls-grid-zero"]) == at_zero.sum()
 
 
 @pytest.mark.parametrize("e3", [0.2, 0.5, 1.0])
@@ -367,6 +370,21 @@ def test_equal_front_velocities_drive_the_first_contact_backward():
     np.testing.assert_allclose(trace.velocities, [float(x) for x in other.velocities], atol=1e-13)
 
 
+def test_the_ratio_acts_on_the_second_contact_in_two_ways():
+    """A larger ratio: a larger gain and impulse of compression, and a smaller radical."""
+    rng = np.random.default_rng(30)
+    for _ in range(50):
+        m1, m2, m3 = magnitudes(rng, 1, 3)
+        e2, e3 = uniform(rng, 0.3, 1, 2)
+        bound = m3 / (m2 + m3)
+        found = []
+        for a in (0.2 * bound, 0.5 * bound, 0.9 * bound):
+            tau_2, tau_3 = final_impulses([m1, m2, m3], [1, 0.2, 0], [e2, e3], a)
+            compressed = (tau_2 / m2 + 0.2) * m2 * m3 / (m2 + m3)  # mu3 G
+            found.append((tau_2 / m2, compressed, -(tau_3 / compressed - 1) / e3))
+        assert (np.diff(found, axis=0) > 0).all()
+
+
 def test_one_outcome_belongs_to_many_parameters():
     """Eqs. 24 and 30 solved for e2 and e3, at fifty digits; and a ratio that comes twice."""
     with mpmath.workdps(50):
@@ -378,6 +396,14 @@ def test_one_outcome_belongs_to_many_parameters():
             assert [float(x) for x in e] == pytest.approx(printed, abs=5.1e-7)
             again = solve([1, 1, 1], [1, 0, 0], list(e), a).velocities
             assert max(abs(x - y) for x, y in zip(again, target)) < mpmath.mpf(10) ** -45
+    # At the ends of the range one of the two is 1; beyond them it would have to be larger.
+    tau_2, tau_3 = (float(x) for x in (tau_2, tau_3))
+    for name, pair in (("low", (1.0, None)), ("high", (None, 1.0))):
+        end = float(CHAPTER.glued[f"three-balls-range-{name}"])
+        for a, inside in ((end - 1e-3, name == "high"), (end + 1e-3, name == "low")):
+            found = tau_2 * (2 - a) - 1, (2 * tau_3 / tau_2 - 1) / math.sqrt(1 - 2 * a)
+            assert (max(found) < 1) == inside
+            assert pair[int(found[1] > found[0])] == 1
     twice = [
         solve(["0.045", "0.045", "0.053"], [1, 0, 0], 1, ratio)
         for ratio in ("0.018", CHAPTER.glued["three-balls-other-ratio"])

@@ -89,7 +89,7 @@ def unit() -> float:
     Returns
     -------
     float
-        Seconds: one impact of three balls, solved in a batch.
+        Seconds: one impact of a random chain of three balls, solved in a batch.
 
     Examples
     --------
@@ -151,7 +151,7 @@ def rows(group: str, kernel: str = "") -> tuple[Row, ...]:
     found = []
     for line in _lines():
         if line["model"] == "two balls" and line["setting"].startswith("all: "):
-            # A batch of two balls, solved as any other.
+            # A batch of two balls, by `post_impact_velocities`.
             line = line | {"group": "event", "model": "ImpulseCorrelation", "setting": batch}
         if (
             line["group"] != group
