@@ -287,6 +287,16 @@ LAST_DIGITS = {
         [3.0, 1.0, 0.3, 3.0, 1.0, 1.0], [1.0, 0.5, 0.0, 0.5, 1.0, -0.5],
         [1.0, 1.0, 0.9, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], 0.0,
     ),
+    # Below the last digit nothing shrank any more: contacts that are ended by their neighbours
+    # took no part in the collapse of these, and the same events came again for ever.
+    "sequences within a sequence that no digit can end": Problem(
+        [200, 0.79, 38, 0.61, 12, 190], at_rest(6), [0.59, 0.029, 0.079, 1, 0.66],
+        [1, 1, 1, 0.25], [0.4, 1, 0.15, 0.73],
+    ),
+    "the same, of eight balls": Problem(
+        [8, 0.1, 0.3, 0.1, 7, 30, 2, 9], [-0.1, -0.03, -0.5, -0.4, -0.4, -0.1, -0.2, 0.3],
+        [0.1, 0.4, 0, 0.7, 0.5, 0.07, 1], [0.9, 0.4, 0, 0.9, 0.4, 0.2], [0.8, 0.2, 0.9, 1, 0, 0.6],
+    ),
 }  # fmt: skip
 
 

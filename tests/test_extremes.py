@@ -377,7 +377,6 @@ def test_edges_of_the_map_of_limits():
 # --- every chain finishes ----------------------------------------------------------------------
 
 
-@pytest.mark.exhaustive  # the stored table waits to be made anew, see data/README.md
 def test_random_chains_finish():
     """Of 100 000 chains, all but the ones that are named; these have gained no energy."""
     rows, unfinished = stored("finish"), stored("unfinished")
@@ -468,7 +467,6 @@ def test_eight_hundred_thousand_events():
     np.testing.assert_allclose(found.velocities, after, rtol=0, atol=1e-15)
 
 
-@pytest.mark.exhaustive
 def test_chains_that_do_not_finish_are_explained():
     """Those that the default limit does not finish: what they do there, one by one."""
     never = [row for row in stored("unfinished") if not row["finished"]]

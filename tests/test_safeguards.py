@@ -83,6 +83,20 @@ def lower_level_only(names):
     return look
 
 
+def just_been(names):
+    """In place of `chatters`: what its neighbours end takes no part, however slow it is."""
+
+    def chatters(c, n, state):
+        if not 0 <= c < n - 1:
+            return False
+        k, rest = state.contact[c], (state.tally[0].threshold, state.ball, state.contact)
+        if k.active == 1 and k.w > 0.0 and names["exhausted"](c, k.w, *rest):
+            return True
+        return k.tiny > 0 and names["exhausted"](c, k.q, *rest)
+
+    return chatters
+
+
 def sure(names):
     """In place of `limit`: the digits of the neighbours' shares leave nothing in doubt."""
 
@@ -220,6 +234,11 @@ NEEDED = {
     "a cycle's sum of which no digit is known": (
         {"one_digit": math.inf},
         LAST_DIGITS["two balls that chatter between balls held fast"],
+        UNFINISHED,
+    ),
+    "contacts that their neighbours end, below the last digit": (
+        {"chatters": just_been},
+        LAST_DIGITS["sequences within a sequence that no digit can end"],
         UNFINISHED,
     ),
     "a store that is released in portions below its last digit": (

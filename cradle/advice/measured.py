@@ -1,6 +1,6 @@
 """What was measured of the models: errors and times, on which chains; read from the data.
 
-The table is `benchmarks.csv`, the one that chapter 8 of the book shows.
+The table is `benchmarks.csv`, the one that the book shows ("Which model does your scene need?").
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ What they have left is far below rounding, and they end plastically.
 
 from cradle.kernel.events import deactivate, exhausted, stir
 from cradle.kernel.motion import closing, join_velocities, relative_energy
-from cradle.kernel.state import LIMITS, apart, jit
+from cradle.kernel.state import LIMITS, LOWER, apart, jit
 
 
 @apart
@@ -31,7 +31,10 @@ def end_plastically(first, last, n, state):
 
 @jit
 def chatters(c, n, state):
-    """Tell whether contact c exists and is in an exhausted collision, or has just been."""
+    """Tell whether contact c exists and is in an exhausted collision, or has just been.
+
+    Or if it has ended lately at a speed below the last digit: there sequences go on for ever.
+    """
     if not 0 <= c < n - 1:
         return False
     ball, contact, threshold = state.ball, state.contact, state.tally[0].threshold
@@ -41,7 +44,10 @@ def chatters(c, n, state):
         and exhausted(c, contact[c].w, threshold, ball, contact)
     ):
         return True
-    return contact[c].tiny > 0 and exhausted(c, contact[c].q, threshold, ball, contact)
+    if not exhausted(c, contact[c].q, threshold, ball, contact):
+        return False
+    ended = contact[c].active == 0 and contact[c].hits != state.memory[LOWER][c].hits
+    return contact[c].tiny > 0 or (ended and abs(contact[c].u) < LIMITS.dust)
 
 
 @apart
