@@ -482,7 +482,7 @@ def test_textbook_says_the_same(name):
         if trace.collapsed:
             continue
         try:
-            other = problem.solve(textbook.solve, max_events=2000)
+            other = problem.solve(textbook.solve, max_events=1000)
         except textbook.EventLimit:
             continue
         compared += 1
