@@ -36,9 +36,9 @@ class Problem(NamedTuple):
         except ImpactNotFinished as stopped:
             return stopped.trace, False
 
-    def exact(self, max_events=20_000):
-        """The outcome by fifty digits' solver, at the digits in force."""
-        return self.solve(solve, excess="saturate", max_events=max_events)
+    def exact(self, max_events=20_000, **options):
+        """By the independent solver, at the digits in force."""
+        return self.solve(solve, excess="saturate", max_events=max_events, **options)
 
     def mirrored(self):
         return Problem(

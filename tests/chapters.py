@@ -134,6 +134,11 @@ def names_of(cell) -> tuple[set[str], set[str]]:
     return taken, given
 
 
+def kept_of(cell, names: dict[str, object]) -> dict[str, object]:
+    """Return what a code cell has given, once it has run."""
+    return {name: names[name] for name in names_of(cell)[1] & names.keys()}
+
+
 def reached(cells: list, *, written: bool = False) -> list[bool]:
     """Tell for each code cell whether a change of the parameters reaches it, by others as well.
 
@@ -178,7 +183,7 @@ def stored_run(chapter: str) -> tuple[dict[str, Figure], list[dict]]:
     with in_memory(keep), contextlib.redirect_stdout(io.StringIO()):
         for cell in code(chapter):
             run([cell], {}, names=names)
-            given.append({name: names[name] for name in names_of(cell)[1] & names.keys()})
+            given.append(kept_of(cell, names))
     shared = os.environ.get(SHARED)
     if shared:
         part = Path(shared, f"{chapter}.{os.getpid()}")

@@ -4,6 +4,7 @@ No test depends on how fast the machine is. Where time matters, the page gets a 
 still until the test moves it; elsewhere tests wait for a state.
 """
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -126,3 +127,9 @@ def settings(count: int):
 def middle(tab, selector: str) -> tuple[float, float]:
     box = tab.locator(selector).bounding_box()
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def colour(node, name: str) -> str:
+    """Return a colour of an element as it is shown: #rrggbb."""
+    shown = node.evaluate("(node, name) => getComputedStyle(node)[name]", name)
+    return "#" + "".join(f"{int(part):02x}" for part in re.findall(r"\d+", shown)[:3])

@@ -13,7 +13,7 @@ import itertools
 import matplotlib.pyplot as plt
 import nbformat
 import pytest
-from chapters import code, in_memory, names_of, reached, run, stored_run
+from chapters import code, in_memory, kept_of, reached, run, stored_run
 
 # Chapter -> other admissible values: each line is one run of the whole chapter.
 CHANGES = {
@@ -102,7 +102,7 @@ def run_again(cells: list, changes: dict, hits: list[bool], kept: list[dict]) ->
     for cell, hit, old in zip(cells, hits, kept):
         if hit:
             run([cell], changes, FACTOR, names)
-            given.append({name: names[name] for name in names_of(cell)[1] & names.keys()})
+            given.append(kept_of(cell, names))
         else:
             names.update(old)
             given.append(old)

@@ -8,7 +8,6 @@ import pytest
 from extreme_chains import invariants
 from families import FAMILIES, family
 from problem import Problem
-from truth import solve
 
 from cradle import (
     Chain,
@@ -123,10 +122,10 @@ TWENTY = Problem(
 )
 
 
-def exact(problem, digits=50, number=Decimal, **options):
+def exact(problem, digits=50, number=Decimal, max_events=1_000_000):
     """The outcome at fifty digits."""
     with localcontext(prec=digits):
-        return problem.solve(solve, excess="saturate", number=number, **options)
+        return problem.exact(max_events, number=number)
 
 
 def as_printed(x):

@@ -10,6 +10,7 @@ from explorer import (
     SETTING,
     address_of_page,  # noqa: F401
     chain_of,
+    colour,
     drawn,
     go_to,
     later,
@@ -305,15 +306,10 @@ def test_typed_values_out_of_range_are_refused(visit):
             press(tab, "Pull back")
             drawn(tab)
             assert box.input_value() == typed
-            digits = "(k) => (+k).toString(16).padStart(2, '0')"
             for mode in ("light", "dark"):
                 show(tab, 1400, mode)
-                colours = box.evaluate(
-                    f"""(node) => ["borderTopColor", "backgroundColor"].map((name) =>
-                      "#" + getComputedStyle(node)[name].match(/\\d+/g).slice(0, 3)
-                        .map({digits}).join(""))"""
-                )
-                assert contrast(*colours) > 3
+                edge, ground = colour(box, "borderTopColor"), colour(box, "backgroundColor")
+                assert contrast(edge, ground) > 3
             # What is right, if only the value in force, ends it.
             box.fill(sentence.split("In force: ")[1].split()[0].rstrip("."))
             box.press(key)

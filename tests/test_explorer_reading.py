@@ -11,6 +11,7 @@ from explorer import (
     SETTING,
     address_of_page,  # noqa: F401
     chain_of,
+    colour,
     drawn,
     go_to,
     later,
@@ -206,27 +207,16 @@ def test_fits_and_can_be_read(visit, width: int):
     for mode, ground in (("light", "#ffffff"), ("dark", "#121212")):
         show(tab, width, mode)
         tab.mouse.move(0, 0)
-        colours = tab.evaluate(
-            """(() => {
-              const digits = (k) => (+k).toString(16).padStart(2, '0');
-              const hex = (text) => '#' + text.match(/\\d+/g).slice(0, 3).map(digits).join('');
-              const style = (selector) => getComputedStyle(document.querySelector(selector));
-              const colour = (selector, name) => hex(style(selector)[name]);
-              return [colour('body', 'backgroundColor'),
-                colour('.words', 'color'), colour('.stage .name', 'fill'),
-                colour('.plot text', 'fill'), colour('.cradle-explorer button', 'color')];
-            })()"""
-        )
-        assert colours[0] == ground
-        assert all(contrast(colour, ground) > 7 for colour in colours[1:])
+        assert colour(tab.locator("body"), "backgroundColor") == ground
+        for selector, name in (
+            (".words", "color"), (".stage .name", "fill"), (".plot text", "fill"),
+            (".cradle-explorer button", "color"),
+        ):  # fmt: skip
+            assert contrast(colour(tab.locator(selector).first, name), ground) > 7
         # The button that stands out does so under a pointer too; a touch leaves one there.
         tab.hover("button.main")
-        colours = tab.locator("button.main").evaluate(
-            """(node) => ["color", "backgroundColor"].map((name) =>
-              "#" + getComputedStyle(node)[name].match(/\\d+/g).slice(0, 3)
-                .map((digits) => (+digits).toString(16).padStart(2, "0")).join(""))"""
-        )
-        assert contrast(*colours) > 7
+        main = tab.locator("button.main")
+        assert contrast(colour(main, "color"), colour(main, "backgroundColor")) > 7
 
 
 def test_touch(visit):
