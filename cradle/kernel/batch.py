@@ -133,13 +133,12 @@ def admissible(n, chain, bounded):
 
 
 @apart
-def hand_out(k, n, out, state):
+def hand_out(k, n, out, ball, contact, tally):
     """Write the outcome of chain k in the caller's units."""
-    contact, tally = state.contact, state.tally[0]
     shift, mass_shift = tally.shift, tally.mass_shift
     out_v, hits = out.v[k], out.hits[k]
     for i in range(n):
-        out_v[i] = in_units(state.ball[i], state.ball[i].hi, shift)
+        out_v[i] = in_units(ball[i], ball[i].hi, tally.unit)
     out.collapsed[k] = tally.collapsed
     for c in range(n - 1):
         hits[c] = contact[c].hits
@@ -177,7 +176,7 @@ def batch(begin, resumed, n, inputs, options, out, state, effort):
                 return k, REFUSED
         status = impact(n, chain, options.meeting, options.max_events, resumed, state)
         resumed = False
-        hand_out(k, n, out, state)
+        hand_out(k, n, out, state.ball, state.contact, state.tally[0])
         if status != FINISHED:
             return k, status
     return rows, FINISHED

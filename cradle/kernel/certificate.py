@@ -1,19 +1,17 @@
 """Every answer is checked before it is returned: momentum, order, energy, ledger."""
 
-import math
-
 from cradle.kernel.motion import closing
 from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, apart, once
 
 
 @once
-def energies(n, state):
+def energies(n, ball, tally):
     """Return the change of kinetic energy, and the energies before and after of what has changed.
 
     Counted from the centre of mass of the balls that have changed: what a common velocity adds, and
     what flies on untouched, says nothing here.
     """
-    ball, unit = state.ball, math.ldexp(1.0, -state.tally[0].shift)
+    unit = tally.unit
     k = -1  # the heaviest of them, from whose velocity all others are counted
     for i in range(n):
         b = ball[i]
@@ -41,7 +39,7 @@ def energies(n, state):
 
 
 @apart
-def certify(n, state):
+def certify(n, ball, contact, tally):
     """Return what the outcome breaks, or 0; each sum within the rounding of its terms.
 
     Every increment of an impulse is rounded once in the impulse and once in each ball, so a ball's
@@ -49,7 +47,7 @@ def certify(n, state):
     products of impulses and closing speeds, so energies are known to a few roundings of all works,
     and of their sums over the balls.
     """
-    ball, contact, unit = state.ball, state.contact, math.ldexp(1.0, -state.tally[0].shift)
+    unit = tally.unit
     before = 0.0
     absorbed = 0.0
     lost = 0.0
@@ -68,7 +66,7 @@ def certify(n, state):
             return ORDER
         absorbed += contact[c].a
         lost += (1.0 - contact[c].e * contact[c].e) * contact[c].a
-    gained, size = energies(n, state)
+    gained, size = energies(n, ball, tally)
     slack = (LIMITS.sound + n * LIMITS.digits) * (size + absorbed)
     if not gained <= slack:
         return ENERGY

@@ -139,44 +139,49 @@ def forget(number, levels):
 
 
 @apart
+def come_round(number, c, n, state):
+    """See whether contact c, at whose end or collapse the snapshot was taken, ends a cycle."""
+    level = state.level[number]
+    early = 2 * level.count <= 3 * level.due
+    first, last, level.bent = cycle(number, c, 0.0 if early else level.bend, n, state)
+    return first, last
+
+
+@apart
+def remember(number, c, n, state):
+    """Take a snapshot at contact c, in place of the one before."""
+    level, memory = state.level[number], state.memory
+    level.bend = level.bent if level.mark == c else math.inf
+    level.bent = math.inf
+    level.mark = c
+    level.due = level.count
+    if number == 0:
+        settle(n, memory)
+    for k in range(n - 1):
+        memory[number][k].p = memory[number][k].a = 0.0
+    snapshot(number, n, state)
+
+
+@jit
 def look(number, c, n, state):
     """See whether contact c has come round; take a new snapshot if the last one is old.
 
     Snapshots are taken at doubling distances, so that a cycle of any length is found.
     """
-    level, memory = state.level[number], state.memory
+    level = state.level[number]
     if level.mark == c:
-        early = 2 * level.count <= 3 * level.due
-        first, last, level.bent = cycle(number, c, 0.0 if early else level.bend, n, state)
+        first, last = come_round(number, c, n, state)
         if first <= last:
             return first, last
     if level.count >= 2 * level.due:
-        level.bend = level.bent if level.mark == c else math.inf
-        level.bent = math.inf
-        level.mark = c
-        level.due = level.count
-        if number == 0:
-            settle(n, memory)
-        for k in range(n - 1):
-            memory[number][k].p = memory[number][k].a = 0.0
-        snapshot(number, n, state)
+        remember(number, c, n, state)
     return c, c - 1
 
 
 @apart
-def take_limits(ends, ended, worn, n, state):
-    """R9, after `ends` contacts have ended, `ended` the last; tell whether contacts collapsed."""
+def look_above(first, last, n, state):
+    """R9: contacts first..last have collapsed; see whether such collapses come round too."""
     level = state.level
-    level[0].count += ends
-    first, last = ended, ended - 1
-    if worn >= 0:
-        first, last = exhausted_stretch(worn, n, state)
-        if first <= last:
-            first, last = merge(first, last, n, state)
-    if last < first:
-        first, last = look(LOWER, ended, n, state)
-    if last < first:
-        return False
     forget(LOWER, level)
     settle(n, state.memory)
     level[1].count += 1
@@ -191,4 +196,20 @@ def take_limits(ends, ended, worn, n, state):
         record(COLLAPSE if loses else END, c, n, state)
     if loses:
         state.tally[0].collapsed = 1
+
+
+@once
+def take_limits(ends, ended, worn, n, state):
+    """R9, after `ends` contacts have ended, `ended` the last; tell whether contacts collapsed."""
+    state.level[0].count += ends
+    first, last = ended, ended - 1
+    if worn >= 0:
+        first, last = exhausted_stretch(worn, n, state)
+        if first <= last:
+            first, last = merge(first, last, n, state)
+    if last < first:
+        first, last = look(LOWER, ended, n, state)
+    if last < first:
+        return False
+    look_above(first, last, n, state)
     return True

@@ -90,12 +90,11 @@ def activate(c, from_left, from_right, ball, contact):
 
 
 @apart
-def grow(c, n, state):
+def grow(c, n, ball, contact, run, tally):
     """R5: take the contact c that has just closed into the run, or the two runs, beside it."""
-    contact, run, tally = state.contact, state.run, state.tally[0]
     from_left = c > 0 and contact[c - 1].active == 1
     from_right = c < n - 2 and contact[c + 1].active == 1
-    activate(c, from_left, from_right, state.ball, contact)
+    activate(c, from_left, from_right, ball, contact)
     if from_left and from_right:  # R8.5: several sources
         first, right = run[c - 1].last, c + 1
         last, after = run[right].last, run[right].onward
@@ -111,7 +110,6 @@ def grow(c, n, state):
         link(before, c, n, run, tally)
         link(c, after, n, run, tally)
     stir(c, n, run, contact)
-    record(CLOSE, c, n, state)
 
 
 @apart
@@ -218,7 +216,7 @@ def about_to_close(c, n, contact):
 @jit
 def close_contacts(n, state):
     """R5, R8.1: activate every idle contact that is about to close; left to right."""
-    contact, run, tally = state.contact, state.run, state.tally[0]
+    ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
     closes = 0
     first = tally.first
     while first < n:
@@ -226,7 +224,8 @@ def close_contacts(n, state):
         if run[first].stirred == 1:
             left, right = first - 1, run[first].last + 1
             if about_to_close(left, n, contact):
-                grow(left, n, state)
+                grow(left, n, ball, contact, run, tally)
+                record(CLOSE, left, n, state)
                 closes += 1
             if about_to_close(right, n, contact):
                 # Both sides of one ball, at equal distance within rounding: the left one.
@@ -236,7 +235,8 @@ def close_contacts(n, state):
                     and not is_gap(right, n, contact)
                     and contact[right + 1].before < further
                 ):
-                    grow(right, n, state)
+                    grow(right, n, ball, contact, run, tally)
+                    record(CLOSE, right, n, state)
                     closes += 1
         first = after
     return closes

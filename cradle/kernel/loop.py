@@ -20,6 +20,7 @@ from cradle.kernel.motion import (
 from cradle.kernel.record import record, record_compressions
 from cradle.kernel.rules import is_gap, rates, segment
 from cradle.kernel.state import (
+    CLOSE,
     COLLAPSE,
     FINISHED,
     LIMITS,
@@ -186,7 +187,8 @@ def meet(one, n, state):
         touch_beside(one, n, state)
         touch_beside(other, n, state)
     touch(gap, state)
-    grow(gap, n, state)
+    grow(gap, n, ball, state.contact, run, state.tally[0])
+    record(CLOSE, gap, n, state)
 
 
 @once
@@ -213,7 +215,8 @@ def prepare(n, chain, meeting, state):
     # The units themselves and their inverses are numbers too.
     tally.shift = min(max(math.frexp(largest)[1], -1000), 1023)
     tally.mass_shift = min(max(math.frexp(heaviest)[1], -1000), 1023)
-    unit, mass_unit = math.ldexp(1.0, -tally.shift), math.ldexp(1.0, -tally.mass_shift)
+    tally.unit = unit = math.ldexp(1.0, -tally.shift)
+    mass_unit = math.ldexp(1.0, -tally.mass_shift)
     tally.events = tally.rounds = tally.collapsed = tally.defect = 0
     tally.cut_off, tally.meeting = LIMITS.cut, meeting
     tally.threshold, tally.faint, tally.margin = 5e-324, 0.0, 1.0
@@ -301,11 +304,11 @@ def impact(n, chain, meeting, max_events, resumed, state):
         else:
             complete(n, state)
     last_limits(n, state)
-    tally.defect = certify(n, state)
+    tally.defect = certify(n, state.ball, contact, tally)
     return UNSOUND if tally.defect > 0 else FINISHED
 
 
-@apart
+@once
 def last_limits(n, state):
     """R9: sequences that shrank so fast that the last digit was the limit have collapsed too."""
     contact = state.contact

@@ -104,10 +104,10 @@ def bodies(c, low, high, ball, contact):
     return first, last, left, right
 
 
-@apart
-def push(c, impulse, low, high, ball, contact):
-    """Give contact c an impulse; contacts inside the two bodies pass on what their balls need."""
-    first, last, left, right = bodies(c, low, high, ball, contact)
+@jit
+def push(c, impulse, body, ball, contact):
+    """Give contact c an impulse; contacts inside its two bodies pass on what their balls need."""
+    first, last, left, right = body
     add_impulse(contact[c], impulse)
     part = 0.0
     for i in range(first, c + 1):
@@ -130,10 +130,11 @@ def set_closing_speed(c, speed, rest, low, high, ball, contact):
 
     At zero the balls of both bodies have one velocity to the last bit.
     """
-    first, last, left, right = bodies(c, low, high, ball, contact)
+    body = bodies(c, low, high, ball, contact)
+    first, last, left, right = body
     speed_now, rest_now = closing_parts(c, ball)
     x = (speed_now - speed) + (rest_now - rest)
-    push(c, x * (left / (left + right) * right), low, high, ball, contact)
+    push(c, x * (left / (left + right) * right), body, ball, contact)
     if speed == 0.0:
         one_velocity(first, last, heaviest_of(first, last, ball), ball)
     contact[c].u = speed
@@ -165,10 +166,11 @@ def arrive(c, low, high, ball, contact):
         return
     near = -closing(c, ball)
     begin, end = (0, top) if near >= 0.0 else (low, high)
-    first, last, left, right = bodies(k, begin, end, ball, contact)
+    body = bodies(k, begin, end, ball, contact)
+    first, last, left, right = body
     impulse = near * (left if c < low else right)
     if abs(impulse) > LIMITS.digits * contact[k].p:
-        push(k, impulse, begin, end, ball, contact)
+        push(k, impulse, body, ball, contact)
     other = c if c < low else c + 1
     for j in range(low, high + 2):
         i = j if c < low else low + high + 1 - j

@@ -6,11 +6,9 @@ from cradle.kernel.state import MAXIMUM_COMPRESSION, apart, jit
 
 
 @jit
-def in_units(b, speed, shift):
+def in_units(b, speed, unit):
     """Return a velocity of ball b in the caller's units: as given, if it has not changed."""
-    if speed == b.v * math.ldexp(1.0, -shift):
-        return b.v
-    return speed * math.ldexp(1.0, shift)
+    return b.v if speed == b.v * unit else speed / unit
 
 
 @apart
@@ -21,7 +19,7 @@ def write(k, kind, c, n, state):
     record.contacts[k] = c
     path = record.velocities[k + 1]
     for i in range(n):
-        path[i] = in_units(state.ball[i], state.ball[i].x, tally.shift)
+        path[i] = in_units(state.ball[i], state.ball[i].x, tally.unit)
     path = record.impulses[k + 1]
     for j in range(n - 1):
         path[j] = math.ldexp(state.contact[j].x, tally.shift + tally.mass_shift)

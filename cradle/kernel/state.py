@@ -219,6 +219,7 @@ class Tally:
     first: int  # first contact of the first run, or n
     shift: int  # binary exponents of the largest velocity and the largest mass
     mass_shift: int
+    unit: float  # what velocities are multiplied by, 2**-shift
     defect: int  # what the answer breaks
     cut_off: float  # rates below this are zero
     threshold: float  # R9: speed and energy below which a contact is exhausted
