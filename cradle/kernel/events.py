@@ -2,7 +2,7 @@
 
 from cradle.kernel.record import record
 from cradle.kernel.rules import has_ended, is_gap, opens_at_zero, source_of
-from cradle.kernel.state import CLOSE, END, LIMITS, apart, jit, once
+from cradle.kernel.state import CLOSE, END, LIMITS, SLOPED, apart, jit, once
 
 
 @jit
@@ -168,10 +168,10 @@ def count_exhausted(c, n, ball, contact, threshold):
 
 
 @jit
-def end_contacts(sloped, n, state):
+def end_contacts(which, n, state):
     """R3, R8.1: end every contact that needs no progress to end; left to right.
 
-    Once the slopes are known (`sloped`), those that open from u = 0; before, all others.
+    SLOPED are those that open from u = 0, once the slopes are known; CERTAIN all others, before.
     Returns the number of ends, the last contact ended, and one that is worn out (R9) or -1.
     """
     contact, run, tally = state.contact, state.run, state.tally[0]
@@ -184,7 +184,7 @@ def end_contacts(sloped, n, state):
         if run[first].stirred == 1:
             high = run[first].high
             for c in range(run[first].low, high + 1):
-                if not (opens_at_zero(c, contact) if sloped else has_ended(c, contact)):
+                if not (opens_at_zero(c, contact) if which == SLOPED else has_ended(c, contact)):
                     continue
                 if count_exhausted(c, n, state.ball, contact, tally.threshold):
                     worn = c

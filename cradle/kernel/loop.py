@@ -20,6 +20,7 @@ from cradle.kernel.motion import (
 from cradle.kernel.record import record, record_compressions
 from cradle.kernel.rules import is_gap, rates, segment
 from cradle.kernel.state import (
+    CERTAIN,
     CLOSE,
     COLLAPSE,
     FINISHED,
@@ -27,6 +28,7 @@ from cradle.kernel.state import (
     LOWER,
     NO_EVENT,
     PAUSED,
+    SLOPED,
     UNFINISHED,
     UNSOUND,
     UPPER,
@@ -260,7 +262,7 @@ def impact(n, chain, meeting, max_events, resumed, state):
         if tally.effort < 0 or tally.events > tally.room:
             return PAUSED
         # R8.1: ends first, those that are known without the slopes before the others; then R9.
-        ends, ended, worn = end_contacts(False, n, state)
+        ends, ended, worn = end_contacts(CERTAIN, n, state)
         opening = False
         first = tally.first
         while first < n:
@@ -271,7 +273,7 @@ def impact(n, chain, meeting, max_events, resumed, state):
             first = run[first].onward
         more = 0
         if opening:
-            more, last, last_worn = end_contacts(True, n, state)
+            more, last, last_worn = end_contacts(SLOPED, n, state)
             ends += more
             ended = last if more > 0 else ended
             worn = max(worn, last_worn)

@@ -30,6 +30,8 @@ if "jit" not in globals():
 FINISHED, UNFINISHED, REFUSED, PAUSED, UNSOUND = 0, 1, 2, 3, 4
 # Kinds of event.
 MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE = 0, 1, 2, 3
+# R8.1: ends that are known without the slopes, and those that need them.
+CERTAIN, SLOPED = 0, 1
 # R9: the two levels on which cycles are looked for.
 LOWER, UPPER = 0, 1
 # What an answer can break; 0 is none.
