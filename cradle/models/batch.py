@@ -278,7 +278,7 @@ def _in_order(
             for ended in _in_order(solve, starts, progress=False):
                 bar.update()
                 yield ended
-    elif (workers := min(len(starts), os.cpu_count() or 1)) < 2:
+    elif len(starts) < 2 or (workers := min(len(starts), os.cpu_count() or 1)) < 2:
         yield from (solve(begin, stop) for begin in starts)
     else:
         with ThreadPoolExecutor(workers) as pool:
