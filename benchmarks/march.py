@@ -3,6 +3,7 @@
 It shares no code with the solver and knows no event root: it only steps, looks, and applies
 the rule that has come due. Overshoot at an event is left as it is, so every result carries an error
 of first order in the step, and converges to the outcome of the exact rules as ``steps`` grows.
+The loop over the steps is compiled; rules and events are plain Python.
 
 Contact c joins balls c and c + 1; u = v[c] - v[c + 1] is its closing speed.
 Collapse (infinite sequences of impacts) is not treated: such a march raises at its limits.
@@ -15,6 +16,7 @@ from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 
 FORWARD, BACKWARD = "forward", "backward"
 
@@ -28,11 +30,11 @@ class March:
     contact became active, ``ledger`` sums the work absorbed in all its ended collisions.
     """
 
-    v: list[float]
-    u: list[float]
-    impulses: list[float]
-    absorbed: list[float]
-    released: list[float]
+    v: np.ndarray
+    u: np.ndarray
+    impulses: np.ndarray
+    absorbed: np.ndarray
+    released: np.ndarray
     active: list[bool]
     direction: list[str | None]
     collisions: list[int]
@@ -43,7 +45,7 @@ class March:
 
     @property
     def velocities(self) -> np.ndarray:
-        return np.array(self.v)
+        return self.v.copy()
 
     def copy(self) -> March:
         return March(**{name: copy(value) for name, value in vars(self).items()})
@@ -86,12 +88,49 @@ class March:
         self.events.append(("end", c))
 
 
-def start(v: list[float]) -> March:
+@njit(cache=True)
+def stride(v, u, impulses, absorbed, released, e, h, balls, inside, outside, limit, compressed):
+    """Take steps until one brings an event: return (steps, whether it did, maximum compressions).
+
+    Rows of `balls` are (ball, change of v a step), of the active contacts `inside` (contact, change
+    of u, rate), of those beside them `outside` (contact, change of u, whether it may close).  The
+    contacts that came to maximum compression are left in `compressed`.
+    """
+    done = count = 0
+    event = False
+    while done < limit and not event:
+        done += 1
+        for i, change in balls:
+            v[int(i)] += change
+        for k, change, rate in inside:
+            c = int(k)
+            before = u[c]
+            u[c] = after = before + change
+            impulses[c] += rate * h
+            work = 0.5 * (before + after) * rate * h
+            if work > 0:
+                absorbed[c] += work
+            else:
+                released[c] -= work
+            if after <= 0:
+                if before > 0:
+                    compressed[count] = c
+                    count += 1
+                # R3, seen after a step.
+                event = event or (after < 0 and e[c] ** 2 * absorbed[c] - released[c] <= 0)
+        for k, change, closing in outside:
+            c = int(k)
+            u[c] += change
+            event = event or (closing > 0 and u[c] >= 0)
+    return done, event, count
+
+
+def start(v: np.ndarray) -> March:
     """R2: the leftmost approaching contact of every touching stretch drives all the others."""
     n = len(v) - 1
-    u = [v[c] - v[c + 1] for c in range(n)]
-    zeros = [[0.0] * n for _ in range(4)]
-    s = March(list(v), u, *zeros[:3], [False] * n, [None] * (n + 1), [0] * n, zeros[3])
+    zeros = [np.zeros(n) for _ in range(3)]
+    s = March(v, v[:-1] - v[1:], *zeros, [False] * n, [None] * (n + 1), [0] * n, [0.0] * n)
+    u = s.u
     for source in range(n):
         if u[source] > 0 and not s.active[source]:
             left, right = source, source
@@ -135,7 +174,7 @@ def march(
     """
     m = [float(x) for x in masses]
     n = len(m) - 1
-    e = np.broadcast_to(np.asarray(restitution, float), n).tolist()
+    e = np.array(np.broadcast_to(np.asarray(restitution, float), n))
     a = [0.0, *np.broadcast_to(np.asarray(forward, float), n - 1).tolist(), 0.0]
     b = forward if backward is None else backward
     b = [0.0, *np.broadcast_to(np.asarray(b, float), n - 1).tolist(), 0.0]
@@ -144,7 +183,7 @@ def march(
         above_backward = b[i] > m[i - 1] / (m[i - 1] + m[i] * (1 - b[i - 1]))
         if excess == "raise" and (above_forward or above_backward):
             raise ValueError(f"forward, backward at ball {i} = {a[i]}, {b[i]}; above the bound")
-    s = start([float(x) for x in velocities])
+    s = start(np.array(velocities, float))
     if not any(s.active):
         return s
     h = min(m[c] * m[c + 1] / (m[c] + m[c + 1]) for c in range(n)) * max(s.u) / steps
@@ -200,36 +239,17 @@ def march(
             for c in range(max(run[0] - 1, 0), min(run[1] + 2, n))
         }
         closing = [c for c in (run[0] - 1, run[1] + 1) if du.get(c, 0.0) > 0 and not s.is_gap(c)]
-        v, u, balls = s.v, s.u, list(dv.items())
         inside = [(c, du[c], rate[c]) for c in rate]
-        outside = [(c, change) for c, change in du.items() if c not in rate]
-        allowed = min(limit, left_over)
-        done = 0
-        while done < limit:
-            if done == allowed:
-                raise RuntimeError(f"not finished in max_steps = {max_steps}; reached {s.v}")
-            done += 1
-            for i, change in balls:
-                v[i] += change
-            event = False
-            for c, change, share in inside:
-                before = u[c]
-                u[c] = after = before + change
-                s.impulses[c] += share * h
-                work = 0.5 * (before + after) * share * h
-                if work > 0:
-                    s.absorbed[c] += work
-                else:
-                    s.released[c] -= work
-                if after <= 0:
-                    if before > 0:
-                        s.events.append(("maximum_compression", c))
-                    event = event or (after < 0 and has_ended(s, c))
-            for c, change in outside:
-                u[c] += change
-                event = event or (c in closing and u[c] >= 0)
-            if event:
-                break
+        outside = [(c, change, c in closing) for c, change in du.items() if c not in rate]
+        rows = (np.array(list(part), float).reshape(-1, 3) for part in (inside, outside))
+        compressed = np.zeros(len(rate), dtype=np.int64)
+        done, event, count = stride(
+            s.v, s.u, s.impulses, s.absorbed, s.released, e, h,
+            np.array(list(dv.items())), *rows, min(limit, left_over), compressed,
+        )  # fmt: skip
+        s.events += [("maximum_compression", c) for c in compressed[:count].tolist()]
+        if not event and done < limit:
+            raise RuntimeError(f"not finished in max_steps = {max_steps}; reached {s.v.tolist()}")
         left_over -= done
         s.steps += done
         s.held |= {c for c in held if done and rate[c] > 0}
@@ -292,7 +312,9 @@ def march(
     while True:
         while event_without_progress(s, u_before):
             if len(s.events) > max_events:
-                raise RuntimeError(f"not finished in max_events = {max_events}; reached {s.v}")
+                raise RuntimeError(
+                    f"not finished in max_events = {max_events}; reached {s.v.tolist()}"
+                )
         if not s.runs():
             return s
         u_before = list(s.u)
