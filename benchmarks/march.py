@@ -3,7 +3,7 @@
 It shares no code with the solver and knows no event root: it only steps, looks, and applies
 the rule that has come due. Overshoot at an event is left as it is, so every result carries an error
 of first order in the step, and converges to the outcome of the exact rules as ``steps`` grows.
-The loop over the steps is compiled; rules and events are plain Python.
+The loop over the steps is compiled where numba is installed; rules and events are plain Python.
 
 Contact c joins balls c and c + 1; u = v[c] - v[c + 1] is its closing speed.
 Collapse (infinite sequences of impacts) is not treated: such a march raises at its limits.
@@ -16,7 +16,14 @@ from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
+
+try:
+    from numba import njit
+except ImportError:  # the same in plain Python
+
+    def njit(**_options):
+        return lambda function: function
+
 
 FORWARD, BACKWARD = "forward", "backward"
 

@@ -139,7 +139,7 @@ def march_rows(clock, quick):
                 needs="e, ratios, step",
                 gives="velocities, impulses",
                 versions=ours(),
-                note="brute force, plain Python, no code in common with the event solver",
+                note="brute force, its steps compiled, no code in common with the event solver",
                 **clock(run),
             )
 
