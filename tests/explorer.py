@@ -51,7 +51,8 @@ def visits(request, page):
         tab.on("console", lambda said: said.type == "error" and faults.append(said.text))
         tab.on("pageerror", lambda error: faults.append(str(error)))
         tab.on("request", lambda r: r.url.startswith(("file:", "data:")) or faults.append(r.url))
-        if address != page:  # a chapter: seconds go into its equations, which are not looked at here
+        if address != page:
+            # A chapter: seconds go into its equations, which are not looked at here.
             tab.route("**/tex-svg-full.js", lambda route: route.fulfill(body=""))
         tab.goto(address + fragment)
         if options.get("java_script_enabled", True):
