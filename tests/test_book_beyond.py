@@ -236,8 +236,8 @@ def test_fig_beyond_time():
         rows = [row for row in find("elastic", ratio=ratio) if row["balls"] >= 1000]
         for name in ("cpu_seconds", "time_ratio"):
             slope = np.polyfit(np.log(column(rows, "balls")), np.log(column(rows, name)), 1)[0]
-            # Where a ball costs least, that a long row does not fit into the cache is to be seen.
-            assert 0.9 < slope < (1.2 if ratio == 0 else 1.1)
+            # Seconds alone, not beside a reference, where a ball costs least: memory is to be seen.
+            assert 0.9 < slope < (1.2 if (ratio, name) == (0, "cpu_seconds") else 1.1)
     longest = find("elastic", balls=100_000.0)
     assert column(longest, "cpu_seconds").max() < 1.0  # a long chain in a second
     slowest = column(longest, "cpu_seconds").max()
@@ -263,8 +263,7 @@ def test_fig_beyond_stability():
             rows = find("losses", restitution=e, ratio=ratio)
             count = column(rows, "collisions") / (column(rows, "balls") ** 2 / 2)
             assert 0.5 < count.min() < 0.8
-            # The longest rows are chaotic: copies of the row that counts 2.09 count from 1.81 on.
-            assert 1.2 < count[-1] < 2.5
+            assert 1.2 < count[-1] < 2.0
             assert rows[-1]["orders"] == rows[-1]["chains"]
             assert rows[-1]["kept"] <= 2
     finite = find("losses", collapsed=0.0)
