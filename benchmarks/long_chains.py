@@ -7,7 +7,8 @@ Usage::
 
 All balls are equal and touch, and the first one strikes the others at speed 1.  Times are
 processor times, and each is divided by the time of one impact of three equal balls on Hertz
-springs, integrated beside it, so that a busy machine slows down both.
+springs, integrated beside it, so that a busy machine slows down both.  Seconds are these ratios
+times the median of all those times, so that they too are of one machine at one speed.
 """
 
 import argparse
@@ -62,8 +63,11 @@ def three_on_springs():
     return collide(Chain(*still_chain(3), 1.0), SpringChain(1.0))
 
 
-def cost(function, repeats):
-    """Return the fields of a row that tell the processor time of `function`."""
+def cost(function, repeats, units):
+    """Return the fields of a row that tell the processor time of `function`, over the unit.
+
+    The times of the unit itself go to the end of `units`.
+    """
 
     def seconds(solve, calls=1):
         begin = time.process_time()
@@ -74,8 +78,8 @@ def cost(function, repeats):
     function()
     calls = max(1, round(0.02 / max(seconds(function), 1e-6)))
     pairs = [(seconds(function, calls), seconds(three_on_springs, 3)) for _ in range(repeats)]
+    units.extend(unit for _, unit in pairs)
     return {
-        "cpu_seconds": statistics.median(taken for taken, _ in pairs),
         "time_ratio": statistics.median(taken / unit for taken, unit in pairs),
         "repeats": repeats,
     }
@@ -93,7 +97,7 @@ def leaving(velocities):
     }
 
 
-def elastic(ratio, balls, repeats):
+def elastic(ratio, balls, repeats, units):
     """Return a row: no losses, so every contact collides once, at any length."""
     chain = still_chain(balls)
     found = outcomes(*chain, 1.0, ratio)
@@ -105,7 +109,7 @@ def elastic(ratio, balls, repeats):
         "collisions": int(found.collisions.sum()),
         "collapsed": int(found.collapsed),
         **leaving(found.velocities),
-        **cost(lambda: outcomes(*chain, 1.0, ratio), repeats),
+        **cost(lambda: outcomes(*chain, 1.0, ratio), repeats, units),
     }
 
 
@@ -169,7 +173,7 @@ def map_of_three(side):
     return np.stack(np.broadcast_arrays(1.0 / ratios[:, None], 1.0, 1.0 / ratios), axis=-1)
 
 
-def large_map(side, repeats):
+def large_map(side, repeats, units):
     """Return a row: collisions of three balls over a square of mass ratios."""
     masses = map_of_three(side)
 
@@ -185,16 +189,16 @@ def large_map(side, repeats):
         "chains": side * side,
         "collisions": int(found.collisions[~found.collapsed].sum()),
         "collapsed": int(found.collapsed.sum()),
-        **cost(solve, repeats),
+        **cost(solve, repeats, units),
     }
 
 
-def rows():
-    """Yield all rows."""
-    yield large_map(MAP_SIDE, 9)
+def rows(units):
+    """Yield all rows, without seconds."""
+    yield large_map(MAP_SIDE, 9, units)
     for ratio in ELASTIC_RATIOS:
         for balls in ELASTIC_BALLS:
-            yield elastic(ratio, balls, 9 if balls <= 10_000 else 5)
+            yield elastic(ratio, balls, 9 if balls <= 10_000 else 5, units)
     for restitution, lengths in LOSSES.items():
         for ratio in LOSSES_RATIOS:
             for balls in lengths:
@@ -214,12 +218,15 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=OUTPUT)
     output = parser.parse_args(arguments).output
+    units: list[float] = []
+    found = list(rows(units))
+    for row in found:
+        if "time_ratio" in row:
+            row["cpu_seconds"] = row["time_ratio"] * statistics.median(units)
     with output.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
         writer.writeheader()
-        for row in rows():
-            writer.writerow({name: text(value) for name, value in row.items()})
-            file.flush()
+        writer.writerows({name: text(value) for name, value in row.items()} for row in found)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ import numpy as np
 from scenes import random_chains
 
 from cradle import post_impact_velocities, runtime
+from cradle.drive import warm_up
 
 #: The unit of time of the whole table: one impact of three balls, solved in a batch.
 REFERENCE = "one impact of three balls, in a batch of 2000 random chains"
@@ -50,8 +51,8 @@ class Row:
     model_reference: str = ""
     momentum_error: float | str = ""  #: relative
     energy_change: float | str = ""  #: of the kinetic energy, as a part of that before
-    microseconds: float | str = ""  #: median, an impact
-    time_ratio: float | str = ""  #: median of this time over that of `REFERENCE`, taken beside it
+    time_ratio: float | str = ""  #: median of an impact's time over that of `REFERENCE` beside it
+    microseconds: float | str = ""  #: this ratio times the median of all those of `REFERENCE`
     repeats: int | str = ""
     evaluations: int | str = ""  #: events, steps or evaluations of the forces
     needs: str = ""
@@ -90,10 +91,20 @@ def outcome(masses, before, after):
 
 
 class Clock:
-    """Takes times beside those of the reference, so that a busy machine slows down both."""
+    """Takes times beside those of the reference, so that a busy machine slows down both.
+
+    Processors change their speed while a table is made: so what is kept is the ratio, and `unit`
+    turns all ratios of a table into times of one and the same speed.
+    """
 
     def __init__(self, repeats):
         self.repeats = repeats
+        self.units = []  # seconds of the reference, whenever it was taken
+        warm_up()  # else its first calls, as small work, would run plain
+
+    def unit(self):
+        """Return the median time of the reference so far, in seconds."""
+        return statistics.median(self.units)
 
     def seconds(self, function, calls=1):
         """Return the time of one call."""
@@ -125,18 +136,14 @@ class Clock:
         reference()
         # As long as the row itself, within limits: what interrupts one interrupts the other.
         units = min(20, max(2, math.ceil(once * calls / self.seconds(reference))))
-        times, ratios = [], []
+        ratios = []
         for _ in range(self.repeats):
             unit = self.seconds(reference, units) / len(_BATCH[0])
             with running(kernel):
                 taken = measured() / impacts
-            times.append(taken)
+            self.units.append(unit)
             ratios.append(taken / unit)
-        return {
-            "microseconds": 1e6 * statistics.median(times),
-            "time_ratio": statistics.median(ratios),
-            "repeats": self.repeats,
-        }
+        return {"time_ratio": statistics.median(ratios), "repeats": self.repeats}
 
 
 @contextlib.contextmanager

@@ -58,6 +58,9 @@ def main(arguments=None):
         for row in part(clock, options.quick):
             show(row)
             rows.append(row)
+    for row in rows:
+        if row.time_ratio != "":
+            row.microseconds = 1e6 * clock.unit() * row.time_ratio
     for name, reason in absent(engines.ENGINES).items():
         print(f"skipped {name}: {reason}")
     if output:

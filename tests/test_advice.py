@@ -14,6 +14,7 @@ import pytest
 from chains import ELASTIC, HERTZ, magnitudes, uniform, within_bounds
 from truth import solve
 
+import cradle.advice.choice
 import cradle.advice.measured
 from cradle import (
     Chain,
@@ -204,6 +205,24 @@ def test_the_fastest_ball():
     assert wrong != np.abs(elastic_spheres(m, 4e-3)).argmax()
     # Whoever knows the stiffness is given springs there.
     assert isinstance(recommend(striking(m), "fastest ball", stiffness=1).model, SpringChain)
+
+
+def test_scatter_of_times_does_not_choose_the_model(monkeypatch):
+    """Each time may be a fifth more or less, as in another run: the same model is recommended."""
+    asked = {"wanted": "fastest ball", "ratios": 0.167}
+    models = {str(recommend(chain, **asked).model) for chain in (THREE, FIVE, LIGHT)}
+    measured, rng = cradle.advice.choice.rows, np.random.default_rng(8)
+
+    def scattered(*group):
+        return tuple(
+            row._replace(time_ratio=row.time_ratio * uniform(rng, 0.8, 1.2))
+            for row in measured(*group)
+        )
+
+    monkeypatch.setattr(cradle.advice.choice, "rows", scattered)
+    for _ in range(20):
+        models |= {str(recommend(chain, **asked).model) for chain in (THREE, FIVE, LIGHT)}
+    assert models == {str(ImpulseCorrelation(0.167))}
 
 
 def test_two_balls_need_no_ratio():

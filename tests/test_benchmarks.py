@@ -37,7 +37,7 @@ def test_every_group_has_rows_with_times(rows):
         "event", "march", "closed form", "springs", "penalty", "stiffness", "energy", "outcome",
         "saving",
     }  # fmt: skip
-    assert all(row.microseconds > 0 and row.time_ratio > 0 for row in rows)
+    assert all(row.time_ratio > 0 for row in rows)
     assert all(row.gives and row.needs and row.versions for row in rows)
 
 
@@ -116,6 +116,7 @@ def test_factors_of_the_balls_multiply_to_restitution():
 
 
 def test_quick_form_writes_its_table(tmp_path, monkeypatch, rows, capsys):
+    monkeypatch.setattr(run, "Clock", lambda **_: CLOCK)  # the one that timed these rows
     monkeypatch.setattr(run.solvers, "rows", lambda *_: iter(rows))
     monkeypatch.setattr(run.savings, "rows", lambda *_: iter(()))
     monkeypatch.setattr(engines, "ENGINES", ())
@@ -124,7 +125,10 @@ def test_quick_form_writes_its_table(tmp_path, monkeypatch, rows, capsys):
         table = list(csv.DictReader(file))
     assert list(table[0]) == measure.COLUMNS
     assert len(table) == len(rows)
-    assert float(table[0]["time_ratio"]) > 0
+    # Times and ratios tell the same, whatever the processor's clock did meanwhile.
+    units = [float(row["microseconds"]) / float(row["time_ratio"]) for row in table]
+    np.testing.assert_allclose(units, units[0], rtol=2e-3)
+    assert units[0] > 0
     assert f"{len(rows)} rows" in capsys.readouterr().out
 
 

@@ -193,7 +193,7 @@ def test_fits_and_can_be_read(visit, width: int):
         go_to(tab, f"scene={scene}")
         drawn(tab)
         for mode in ("light", "dark"):
-            show(tab, width, mode)
+            show(tab, width, mode, 900)
             assert tab.evaluate(MISFITS) == []
             # Letters of pictures lie inside them, and on each other nowhere.
             cut = tab.evaluate(
@@ -205,7 +205,7 @@ def test_fits_and_can_be_read(visit, width: int):
             )
             assert cut == []
     for mode, ground in (("light", "#ffffff"), ("dark", "#121212")):
-        show(tab, width, mode)
+        show(tab, width, mode, 900)
         tab.mouse.move(0, 0)
         assert colour(tab.locator("body"), "backgroundColor") == ground
         for selector, name in (
@@ -523,6 +523,7 @@ def test_a_velocity_of_rounding_is_rest(visit):
 @pytest.mark.parametrize(
     ("chapter", "parts"),
     [
+        ("intro", {"ratio"}),
         ("problem", {"ratio"}),
         ("three_balls", {"mass", "restitution", "ratio"}),
         ("patterns", {"restitution", "ratio"}),

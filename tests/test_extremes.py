@@ -182,6 +182,16 @@ def test_subnormal_energies_and_speeds():
         np.testing.assert_allclose(trace.velocities, exact, rtol=0, atol=atol)
 
 
+def test_what_nothing_reaches_keeps_its_velocity():
+    """To the last bit, also where the units that the loop counts in have no such small number."""
+    for slow in (-5e-324, -1.1e-311):
+        problem = x.case([1, 1, 1], [slow, 3, 0], 0.5, 0.2)
+        trace, finished = problem.attempt()
+        assert finished
+        assert (trace.path[:, 0] == slow).all()
+        assert trace.velocities[0] == slow
+
+
 @pytest.mark.parametrize("gap", [0.0, 2.0**-52, 1e-15, 1e-14, 1e-12, 1e-9, 1e-6])
 def test_nearly_simultaneous_events(gap):
     """Two runs meet on one ball, two gaps are reached together, contacts end at once."""

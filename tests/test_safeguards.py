@@ -293,3 +293,24 @@ def test_with_it_the_answer_is_that_of_fifty_digits(name):
         )  # fmt: skip
         off = max(abs(a - b) for a, b in zip(run(NEEDED[name][1]).velocities, exact.velocities))
     assert off < 1e-13
+
+
+def test_collisions_without_an_impulse_are_no_cycle():
+    """A limit divides by the impulses of a cycle.  No chain is known in which one of them is 0."""
+    found = []
+
+    def watched(names):
+        def cluster_around(c, level, n, state):
+            real = names["cluster_around"](c, level, n, state)
+            if real.first <= real.last:
+                remembered = state.memory[level][c]
+                kept, remembered.p = remembered.p, 0.0
+                found.append(names["cluster_around"](c, level, n, state))
+                remembered.p = kept
+            return real
+
+        return cluster_around
+
+    assert run(LIGHT_BETWEEN, cluster_around=watched).status == FINISHED
+    assert found
+    assert all(cluster.last < cluster.first for cluster in found)

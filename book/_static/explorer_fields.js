@@ -146,6 +146,18 @@
     return explorer.withMass(changed, [2], mass(setting.masses[1] / right));
   }
 
+  // The pixels that a canvas makes of colours: of each but the last, and of it with the last on it.
+  function shades(pen, fills) {
+    const shade = fills.length - 1;
+    for (const [k, fill] of fills.slice(0, shade).entries()) {
+      pen.fillStyle = fill;
+      pen.fillRect(k, 0, 1, 2);
+    }
+    pen.fillStyle = fills[shade];
+    pen.fillRect(0, 1, shade, 1);
+    return [0, 1].map((row) => new Uint32Array(pen.getImageData(0, row, shade, 1).data.buffer));
+  }
+
   class RegionMap {
     constructor(setting) {
       this.key = RegionMap.key(setting);
@@ -173,23 +185,23 @@
       return JSON.stringify([speeds, restitution, forward, backward]);
     }
 
-    // Paint what is known, in the colours given for 0, 1, 2, 3 balls that go back.
+    // Paint what is known, in the colours given for 0, 1, 2, 3 balls that go back; the last one
+    // shades cells with an odd number of collisions.
     paint(canvas, fills) {
       canvas.width = CELLS;
       canvas.height = CELLS;
-      const pen = canvas.getContext("2d");
-      const size = Math.max(this.points.stride * 2, 1);
-      this.points.values.forEach((cell, k) => {
-        if (cell.pattern < 0) return;
-        const row = CELLS - 1 - Math.floor(k / CELLS);
-        pen.fillStyle = fills[cell.pattern];
-        const wide = this.points.finished ? 1 : Math.min(size, 16);
-        pen.fillRect(k % CELLS, row, wide, 1);
-        if (cell.odd) {
-          pen.fillStyle = fills[4];
-          pen.fillRect(k % CELLS, row, wide, 1);
-        }
+      const pen = canvas.getContext("2d", { willReadFrequently: true });
+      const [plain, shaded] = shades(pen, fills);
+      const image = pen.createImageData(CELLS, CELLS);
+      const pixels = new Uint32Array(image.data.buffer);
+      const wide = this.points.finished ? 1 : Math.min(this.points.stride * 2, 16);
+      this.points.values.forEach(({ pattern, odd }, k) => {
+        if (pattern < 0) return;
+        const row = (CELLS - 1 - Math.floor(k / CELLS)) * CELLS;
+        const from = row + (k % CELLS);
+        pixels.fill((odd ? shaded : plain)[pattern], from, Math.min(from + wide, row + CELLS));
       });
+      pen.putImageData(image, 0, 0);
     }
 
     svg(box, setting) {
