@@ -541,13 +541,32 @@ def test_small_ones_in_chapters(visit, page, chapter: str, parts: set[str]):
     assert set(labels) == parts
     assert tab.evaluate(f"{EXPLORER}.state.clock.playing") is False
     before = later(tab, 50)
-    tab.get_by_label("ratio", exact=True).press("ArrowLeft")
+    tab.get_by_label("ratio", exact=True).press("ArrowRight")
     after = later(tab, 1000)
     assert after["forward"] != before["forward"]
     assert same_outcome(after)
     assert tab.evaluate("location.hash") == ""
     link = host.locator(".more a").get_attribute("href")
     assert drawn(still(visit, "#" + link.partition("#")[2])) == after
+
+
+def test_the_first_page_does_what_it_says(visit, page):
+    """Let go, pull back, drag ball 2: ball 1 comes along, and both swing when they are released."""
+    tab = visit(address=page.replace("explorer.html", "intro.html"), stopped=True)
+    tab.clock.run_for(1000)
+    press(tab, "Let go")
+    assert later(tab, 50)["speeds"] == [1, 0, 0, 0, 0]
+    press(tab, "Pull back")
+    x, y = middle(tab, ".ball[data-ball='1'] .disc")
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x - 60, y - 10, steps=4)
+    tab.mouse.up()
+    shown = later(tab, 50)
+    assert shown["speeds"][0] == shown["speeds"][1] > 0.5
+    assert shown["speeds"][2:] == [0, 0, 0]
+    assert tab.evaluate(f"{EXPLORER}.state.clock.playing")
+    np.testing.assert_allclose(shown["after"], shown["speeds"][::-1], atol=1e-15)
 
 
 def test_without_scripts_there_is_a_picture(visit):
