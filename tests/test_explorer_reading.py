@@ -46,6 +46,29 @@ def test_address_keeps_the_setting(visit):
     assert drawn(still(visit, unquote(address))) == before
 
 
+def test_a_link_is_followed_while_an_address_is_due(visit):
+    """The address is written late, and maybe just before the page hears of a new one."""
+    tab = still(visit)
+    drawn(tab)
+    tab.get_by_label("ratio", exact=True).press("ArrowRight")
+    drawn(tab)
+    tab.evaluate(
+        f"""(fragment) => {{
+          const later = setTimeout;
+          let write;
+          globalThis.setTimeout = (act) => (write = act);
+          {EXPLORER}.written = "";
+          {EXPLORER}.writeAddress();
+          globalThis.setTimeout = later;
+          location.hash = fragment;
+          write();
+        }}""",
+        "speeds=1,0,0",
+    )
+    tab.wait_for_function(f"{SETTING}.speeds.length === 3")
+    assert drawn(tab)["speeds"] == [1, 0, 0]
+
+
 WRONG_ADDRESSES = {
     "restitution=1.2": "restitution[0] = 1.2; must lie in [0, 1]",
     "masses=1,2&speeds=1,0,0": "speeds has 3 values; 2 balls need 2",

@@ -186,7 +186,10 @@
       // The plain address gives the first scene.
       if (!this.written && !location.hash && view.scene === this.host.dataset.scene) return;
       clearTimeout(this.writing);
+      const before = location.hash;
       this.writing = setTimeout(() => {
+        // A link has been followed, of which the page is just about to hear.
+        if (location.hash !== before) return;
         this.written = fragment;
         history.replaceState(null, "", `#${fragment}`);
       }, 200);
