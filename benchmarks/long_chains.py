@@ -63,11 +63,8 @@ def three_on_springs():
     return collide(Chain(*still_chain(3), 1.0), SpringChain(1.0))
 
 
-def cost(function, repeats, units):
-    """Return the fields of a row that tell the processor time of `function`, over the unit.
-
-    The times of the unit itself go to the end of `units`.
-    """
+def cost(function, repeats):
+    """Return the fields of a row that tell the processor time of `function`, and of the unit."""
 
     def seconds(solve, calls=1):
         begin = time.process_time()
@@ -78,8 +75,8 @@ def cost(function, repeats, units):
     function()
     calls = max(1, round(0.02 / max(seconds(function), 1e-6)))
     pairs = [(seconds(function, calls), seconds(three_on_springs, 3)) for _ in range(repeats)]
-    units.extend(unit for _, unit in pairs)
     return {
+        "units": [unit for _, unit in pairs],  # for `add_seconds`
         "time_ratio": statistics.median(taken / unit for taken, unit in pairs),
         "repeats": repeats,
     }
@@ -97,7 +94,7 @@ def leaving(velocities):
     }
 
 
-def elastic(ratio, balls, repeats, units):
+def elastic(ratio, balls, repeats):
     """Return a row: no losses, so every contact collides once, at any length."""
     chain = still_chain(balls)
     found = outcomes(*chain, 1.0, ratio)
@@ -109,7 +106,7 @@ def elastic(ratio, balls, repeats, units):
         "collisions": int(found.collisions.sum()),
         "collapsed": int(found.collapsed),
         **leaving(found.velocities),
-        **cost(lambda: outcomes(*chain, 1.0, ratio), repeats, units),
+        **cost(lambda: outcomes(*chain, 1.0, ratio), repeats),
     }
 
 
@@ -173,7 +170,7 @@ def map_of_three(side):
     return np.stack(np.broadcast_arrays(1.0 / ratios[:, None], 1.0, 1.0 / ratios), axis=-1)
 
 
-def large_map(side, repeats, units):
+def large_map(side, repeats):
     """Return a row: collisions of three balls over a square of mass ratios."""
     masses = map_of_three(side)
 
@@ -189,16 +186,16 @@ def large_map(side, repeats, units):
         "chains": side * side,
         "collisions": int(found.collisions[~found.collapsed].sum()),
         "collapsed": int(found.collapsed.sum()),
-        **cost(solve, repeats, units),
+        **cost(solve, repeats),
     }
 
 
-def rows(units):
+def rows():
     """Yield all rows, without seconds."""
-    yield large_map(MAP_SIDE, 9, units)
+    yield large_map(MAP_SIDE, 9)
     for ratio in ELASTIC_RATIOS:
         for balls in ELASTIC_BALLS:
-            yield elastic(ratio, balls, 9 if balls <= 10_000 else 5, units)
+            yield elastic(ratio, balls, 9 if balls <= 10_000 else 5)
     for restitution, lengths in LOSSES.items():
         for ratio in LOSSES_RATIOS:
             for balls in lengths:
@@ -206,6 +203,14 @@ def rows(units):
     for exponent, lengths in SPRINGS.items():
         for balls in lengths:
             yield springs(exponent, balls)
+
+
+def add_seconds(found):
+    """Turn the ratios of all timed rows into seconds by the median of all their units."""
+    timed = [row for row in found if "units" in row]
+    unit = statistics.median(one for row in timed for one in row.pop("units"))
+    for row in timed:
+        row["cpu_seconds"] = row["time_ratio"] * unit
 
 
 def text(value):
@@ -218,11 +223,8 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=OUTPUT)
     output = parser.parse_args(arguments).output
-    units: list[float] = []
-    found = list(rows(units))
-    for row in found:
-        if "time_ratio" in row:
-            row["cpu_seconds"] = row["time_ratio"] * statistics.median(units)
+    found = list(rows())
+    add_seconds(found)
     with output.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
         writer.writeheader()

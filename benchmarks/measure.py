@@ -100,7 +100,6 @@ class Clock:
     def __init__(self, repeats):
         self.repeats = repeats
         self.units = []  # seconds of the reference, whenever it was taken
-        warm_up()  # else its first calls, as small work, would run plain
 
     def unit(self):
         """Return the median time of the reference so far, in seconds."""
@@ -127,6 +126,7 @@ class Clock:
             given = [prepare()] if prepare else []
             return self.seconds(lambda: function(*given), calls)
 
+        warm_up()  # else the reference, as small work, would run plain at first
         calls = 1
         with running(kernel):
             measured()

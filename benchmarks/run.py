@@ -58,9 +58,10 @@ def main(arguments=None):
         for row in part(clock, options.quick):
             show(row)
             rows.append(row)
+    unit = 1e6 * clock.unit()
     for row in rows:
         if row.time_ratio != "":
-            row.microseconds = 1e6 * clock.unit() * row.time_ratio
+            row.microseconds = unit * row.time_ratio
     for name, reason in absent(engines.ENGINES).items():
         print(f"skipped {name}: {reason}")
     if output:

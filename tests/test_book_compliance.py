@@ -308,3 +308,9 @@ def test_exercises():
     for row, a in ((rows[1], ratio), (rows[2], 0)):
         v = [float(x) for x in solve([1] * 4, [1, 0, 0, 0], 1, a).velocities]
         np.testing.assert_allclose(row, v, rtol=0, atol=6e-5)
+    errors = np.abs(np.array(rows[1:]) - rows[0]).max(axis=1)
+    assert 0.3 < errors[0] / errors[1] < 0.4  # "about a third"
+    # No single ratio has the outcome of the springs: each leaves ball 2 at rest.
+    assert rows[0][1] < -0.05
+    for a in np.linspace(0, 0.5, 26):
+        assert abs(float(solve([1] * 4, [1, 0, 0, 0], 1, a).velocities[1])) < 1e-14

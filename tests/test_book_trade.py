@@ -244,9 +244,34 @@ def test_fig_trade_engines_rapier_and_mujoco():
         for placement in ("touching", "pressed"):
             row = engine("Rapier", f"{how}, {placement}", "three equal")
             assert row["energy_change"] == pytest.approx(-1 / 6, abs=1e-3)
+            for scene in ("three equal", "five equal", "ABCCA"):
+                striker = engine("Rapier", f"{how}, {placement}", scene)["velocities"][0]
+                assert fused(scene)[0] < striker < sequential(scene)[0]
+            ends = np.sort([fused("light middle"), sequential("light middle")], axis=0)
+            light = engine("Rapier", f"{how}, {placement}", "light middle")["velocities"]
+            assert ((light < ends[0]) | (light > ends[1])).all()
     for scene in ("three equal", "five equal"):
         row = engine("MuJoCo", "refined, pressed", scene)
         assert 0.01 < off(row, fused(scene)) < 0.1 < off(row, sequential(scene))
+
+
+def test_a_heavier_middle_ball_brings_the_two_answers_together():
+    """From twice the outer mass on; for a lighter one their distance goes up and down."""
+
+    def distance(m):
+        masses, v = np.array([1.0, m, 1.0]), np.array([1.0, 0.0, 0.0])
+        while (v[:-1] > v[1:] + 1e-14).any():  # one pair after the other
+            k = int(np.argmax(v[:-1] - v[1:]))
+            pair = masses[k : k + 2]
+            v[k : k + 2] = 2 * (pair @ v[k : k + 2]) / pair.sum() - v[k : k + 2]
+        together = np.array([-m, 2.0, 2.0]) / (2.0 + m)  # balls 2 and 3 as one body
+        return np.abs(v - together).max()
+
+    heavy = [distance(m) for m in np.geomspace(2, 1e4, 200)]
+    assert (np.diff(heavy) < 0).all()
+    light = np.diff([distance(m) for m in np.geomspace(0.01, 2, 200)])
+    assert (light > 0).any()
+    assert (light < 0).any()
 
 
 def test_fig_trade_engines_spread_and_none_like_hertz():

@@ -53,19 +53,19 @@ def test_a_link_is_followed_while_an_address_is_due(visit):
     tab.get_by_label("ratio", exact=True).press("ArrowRight")
     drawn(tab)
     tab.evaluate(
-        f"""(fragment) => {{
+        f"""(fragment) => new Promise((done) => {{
           const later = setTimeout;
           let write;
           globalThis.setTimeout = (act) => (write = act);
           {EXPLORER}.written = "";
           {EXPLORER}.writeAddress();
           globalThis.setTimeout = later;
+          addEventListener("hashchange", () => done(), {{ once: true }});
           location.hash = fragment;
           write();
-        }}""",
+        }})""",
         "speeds=1,0,0",
     )
-    tab.wait_for_function(f"{SETTING}.speeds.length === 3")
     assert drawn(tab)["speeds"] == [1, 0, 0]
 
 
@@ -216,7 +216,7 @@ def test_fits_and_can_be_read(visit, width: int):
         go_to(tab, f"scene={scene}")
         drawn(tab)
         for mode in ("light", "dark"):
-            show(tab, width, mode, 900)
+            show(tab, width, mode)
             assert tab.evaluate(MISFITS) == []
             # Letters of pictures lie inside them, and on each other nowhere.
             cut = tab.evaluate(
@@ -228,7 +228,7 @@ def test_fits_and_can_be_read(visit, width: int):
             )
             assert cut == []
     for mode, ground in (("light", "#ffffff"), ("dark", "#121212")):
-        show(tab, width, mode, 900)
+        show(tab, width, mode)
         tab.mouse.move(0, 0)
         assert colour(tab.locator("body"), "backgroundColor") == ground
         for selector, name in (

@@ -127,15 +127,15 @@ def browser():
         browser.close()
 
 
-def shape(tab, width: int, mode: str, height: int = HEIGHT) -> None:
+def shape(tab, width: int, mode: str) -> None:
     """Give the window this width and the page this mode."""
-    tab.set_viewport_size({"width": width, "height": height})
+    tab.set_viewport_size({**tab.viewport_size, "width": width})
     tab.emulate_media(color_scheme=mode)
 
 
-def show(tab, width: int, mode: str, height: int = HEIGHT) -> None:
+def show(tab, width: int, mode: str) -> None:
     """Give the window this width and the page this mode, and wait until it has followed."""
-    shape(tab, width, mode, height)
+    shape(tab, width, mode)
     shown = "[innerWidth, document.documentElement.dataset.theme]"
     tab.wait_for_function(f"(asked) => `${{{shown}}}` === `${{asked}}`", arg=[width, mode])
     # fit_equations.js follows the window, and hears of it before the next frame.
@@ -156,7 +156,9 @@ def looked_at(request, html: Path, browser):
     Letters of formulas are rounded to device pixels: of these there are 1, 2 or 3 a pixel.
     """
     density, views = request.param
-    context = browser.new_context(device_scale_factor=density)
+    context = browser.new_context(
+        device_scale_factor=density, viewport={"width": views[0][0], "height": HEIGHT}
+    )
     context.set_default_timeout(PATIENCE)
     tab = context.new_page()
     said: list[str] = []
@@ -175,8 +177,7 @@ def looked_at(request, html: Path, browser):
             faults += [[width, mode, *misfit] for misfit in tab.evaluate(MISFITS)]
         if re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8")):
             for width in PHONES:
-                if (width, "light") != views[-1]:
-                    show(tab, width, "light")
+                show(tab, width, "light")
                 numbers += [(width, *number) for number in tab.evaluate(NUMBERS)]
         found[page.stem] = faults + said, numbers
     context.close()
