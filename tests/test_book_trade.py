@@ -16,6 +16,7 @@ from chains import ELASTIC, HERTZ, LINEAR
 from chapters import Chapter, number, points
 from page import people
 from scenes import random_chains
+from scipy.optimize import minimize
 from truth import solve
 
 from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, paper_chain
@@ -653,3 +654,93 @@ def shown(cell):
         [unescape(cell) for cell in re.findall(r"<t[hd]>(.*?)</t[hd]>", row, flags=re.DOTALL)]
         for row in body.split("</tr>")[:-1]
     ]
+
+
+def strike(e, steps):
+    """Velocities and impulses of three equal balls on springs that are stiffer in release.
+
+    The energy law in time: a spring pushes with x^1.5; x follows the closing speed u in
+    compression and u / e^2 in release. A contact that has ended leaves a gap.
+    """
+    v, x, gap, impulse = np.array([1.0, 0, 0]), np.zeros(2), np.zeros(2), np.zeros(2)
+    closed, h, rows = np.full(2, True), 1 / steps, []
+    while closed.any() or (v[:-1] > v[1:]).any():
+        u = v[:-1] - v[1:]
+        x = np.where(closed, x + h * np.where(u > 0, u, u / e**2), 0.0)
+        gap = np.where(closed, 0.0, gap - h * u)
+        closed = np.where(closed, x > 0, gap < 0)
+        push = h * np.where(closed, np.maximum(x, 0.0), 0.0) ** 1.5
+        v = v - np.diff(push, prepend=0, append=0)
+        impulse = impulse + push
+        rows.append(impulse)
+    return v, np.array(rows)
+
+
+def paths_drawn():
+    """The arc, and for each law its paths without and with losses."""
+    ax = CHAPTER.figures["fig-trade-paths"].axes[0]
+    arc, *rest = points(ax)
+    names = [text.get_text() for text in ax.get_legend().get_texts()][1:]
+    return arc, {name: (rest[5 * k], rest[5 * k + 2]) for k, name in enumerate(names)}
+
+
+def test_fig_trade_paths_of_the_energy_law_and_of_the_ratio():
+    arc, laws = paths_drawn()
+    (hertz, lossy), (line, lossy_line) = laws["energy law, Hertz"], laws["constant ratio"]
+    x, y = arc.T
+    np.testing.assert_allclose((1 - x) ** 2 + (x - y) ** 2 + y**2, 1, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(arc[[0, -1]], [[1, 1], [4 / 3, 2 / 3]], rtol=0, atol=1e-7)
+    outcomes = {}
+    for path, e in ((hertz, 1.0), (lossy, 0.5)):
+        v, by_time = strike(e, 3000)
+        outcomes[e] = v
+        # Each point drawn is near one of the small steps.
+        apart = np.linalg.norm(path[:, None] - by_time[None, ::7], axis=-1).min(axis=1)
+        assert apart.max() < 3e-3
+        np.testing.assert_allclose(path[-1], by_time[-1], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(outcomes[1.0], HERTZ["three equal"], rtol=0, atol=1e-3)
+    ratio = 0.132503287
+    for path, e in ((line, 1), (lossy_line, 0.5)):
+        done = solve([1] * 3, [1, 0, 0], e, ratio)
+        end = [1 - float(done.velocities[0]), float(done.velocities[2])]
+        np.testing.assert_allclose(path[-1], end, rtol=0, atol=1e-7)
+        corner = path[path[:, 0] < end[0] - 1e-6]  # a straight line, then upwards
+        np.testing.assert_allclose(corner[:, 1], ratio * corner[:, 0], rtol=0, atol=1e-7)
+    other = [float(x) for x in done.velocities]
+    apart = np.abs(outcomes[0.5] - other).max()
+    assert number(CHAPTER.glued["laws-apart"]) == pytest.approx(apart, abs=1.5e-3)
+    assert number(CHAPTER.glued["laws-apart"]) > 0.01
+
+
+@pytest.mark.parametrize("p", [1.0, 1.5])
+def test_how_the_ratio_begins(p):
+    """Small steps of the springs, beside the power found by hand."""
+    h, v, x, impulse = 2e-5, np.array([1.0, 0, 0]), np.zeros(2), np.zeros(2)
+    while impulse[0] < 1e-3:
+        x = x + h * (v[:-1] - v[1:])
+        push = h * np.maximum(x, 0.0) ** p
+        v, impulse = v - np.diff(push, prepend=0, append=0), impulse + push
+    assert impulse[1] == pytest.approx(impulse[0] ** (p + 1) / ((p + 1) * (p + 2) ** p), rel=0.01)
+
+
+def test_convex_dissipation_keeps_the_struck_balls_together():
+    """The least sum of squares, searched for among velocities in order."""
+    before = np.array([1.0, 0, 0])
+    order = {"type": "ineq", "fun": np.diff}
+    found = {}
+    for e in (0.05, 0.3, 0.5, 0.9):
+        kappa = (1 + e) / (1 - e)
+
+        def cost(v, kappa=kappa):
+            mean = -np.diff(before + v) / 2
+            return 0.5 * ((v - before) ** 2).sum() + kappa * (mean**2).sum()
+
+        v = minimize(cost, [0.3, 0.3, 0.4], constraints=[order], tol=1e-14).x
+        by_hand = 4 * kappa / (4 + 3 * kappa) if e > 1 / 7 else 2 / 3
+        np.testing.assert_allclose(v, [1 - by_hand, by_hand / 2, by_hand / 2], rtol=0, atol=1e-6)
+        found[e] = 1 - v[0], v[2]
+    elastic, lossy = paths_drawn()[1]["convex dissipation"]
+    np.testing.assert_allclose(elastic[-1], [4 / 3, 2 / 3], rtol=0, atol=1e-7)
+    np.testing.assert_allclose(lossy[-1], found[0.5], rtol=0, atol=1e-6)
+    rebound = found[0.5][0] + found[0.5][1] - 1
+    assert number(CHAPTER.glued["laws-rebound"]) == pytest.approx(rebound, abs=5e-3)
