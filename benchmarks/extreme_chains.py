@@ -466,6 +466,45 @@ def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
     return far, float(np.abs(after - before).max() / np.abs(before).max())
 
 
+def jumps(problem, name, k, scale, least=1e-3, farthest=0.3, steps=6000):
+    """Where the outcome jumps while one input moves, one element a jump.
+
+    Relative change of the input, and the largest change of a velocity there, relative to the
+    largest speed.  Jumps below `least` are left out.  A step of the scan that moves a velocity as
+    far is halved, again and again: a steep slope then becomes small, and a jump stays.
+    """
+
+    def after(parts):
+        given = {field: np.tile(getattr(problem, field), (len(parts), 1)) for field in FIELDS}
+        given[name][:, k] += parts * scale
+        return post_impact_velocities(**given, meeting=problem.meeting, excess="saturate")
+
+    low, high = ranges(name)
+    parts = np.linspace(-farthest, farthest, steps + 1)
+    reached = getattr(problem, name)[k] + parts * scale
+    parts = parts[(low <= reached) & (reached <= high)]
+    velocities = after(parts)
+    largest = np.abs(velocities).max(axis=1)
+
+    def size(begin, end):
+        return np.abs(end - begin).max() / largest.min()
+
+    found = []
+    for i in np.flatnonzero(np.abs(np.diff(velocities, axis=0)).max(axis=1) > least * largest[:-1]):
+        (near, far), (begin, end) = parts[i : i + 2], velocities[i : i + 2]
+        while far - near > 1e-12:
+            half = 0.5 * (near + far)
+            (middle,) = after(np.array([half]))
+            if size(begin, middle) > size(middle, end):
+                far, end = half, middle
+            else:
+                near, begin = half, middle
+        jump = float(np.abs(end - begin).max() / np.abs(begin).max())
+        if jump > least:
+            found.append((float(far), jump))
+    return found
+
+
 # --- every chain finishes ----------------------------------------------------------------------
 
 FAMILIES = (("within", 3), ("within", 6), ("saturate", 3), ("saturate", 6))

@@ -103,15 +103,27 @@ def growth(_):
         yield spread, e, size, n, float(np.median(change)), float(change.max()), int(leading.min())
 
 
-def edges(_):
+def each_input():
+    """Yield the inputs of the ten chains of the paper's test."""
     for name in paper_sequences():
         chain, model = paper_chain(name, excess="saturate")
         own = chain.masses, chain.velocities, chain.restitution
         problem = x.case(*own, model.forward, model.backward)
         for part, k, scale in x.inputs(problem):
-            for side in (-1, 1):
-                distance, jump = x.nearest_edge(problem, part, k, side, scale)
-                yield name, part, k, side, distance, jump
+            yield name, problem, part, k, scale
+
+
+def edges(_):
+    for name, problem, part, k, scale in each_input():
+        for side in (-1, 1):
+            distance, jump = x.nearest_edge(problem, part, k, side, scale)
+            yield name, part, k, side, distance, jump
+
+
+def jumps(_):
+    for name, problem, part, k, scale in each_input():
+        for change, jump in x.jumps(problem, part, k, scale):
+            yield name, part, k, change, jump
 
 
 def elastic(_):
@@ -197,6 +209,7 @@ PARTS = {
     "lengths": (lengths, "row balls events finished momentum gain ledger error"),
     "growth": (growth, "spread restitution size balls median largest leading"),
     "edges": (edges, "sequence input index side distance jump"),
+    "jumps": (jumps, "sequence input index change jump"),
     "elastic": (elastic, "power ratio impacts theory error condition own gain collapsed"),
     "cost": (cost, "point method effort evaluations error"),
     "finish": (

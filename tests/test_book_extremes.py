@@ -66,6 +66,43 @@ def test_fig_extremes_edges(glued):
     assert float(glued["first-jump"]) == pytest.approx(100 * float(first["distance"]), abs=0.051)
 
 
+def test_jumps_behind_the_first_edge(glued):
+    """The stored jumps, the largest by fifty digits on both sides, and one input scanned anew."""
+    rows = stored("jumps")
+    assert number(glued["jumps"]) == len(rows)
+    assert glued["jumping"] == " and ".join(sorted({row["sequence"] for row in rows}))
+    largest = max(rows, key=lambda row: float(row["jump"]))
+    ball = int(largest["index"]) + 1
+    assert glued["largest-input"] == f"mass of ball {ball} of {largest['sequence']}"
+    chain, model = paper_chain(largest["sequence"], excess="saturate")
+    own = chain.masses, chain.velocities, chain.restitution
+    problem = x.case(*own, model.forward, model.backward)
+    scale = chain.masses[ball - 1]
+    change = float(largest["change"])
+    sides = [
+        np.array(
+            [
+                float(v)
+                for v in x.moved(problem, "masses", ball - 1, part * scale).exact().velocities
+            ]
+        )
+        for part in (change - 1e-4, change + 1e-4)
+    ]
+    jump = np.abs(sides[1] - sides[0]).max() / sides[0].max()
+    assert 100 * jump == pytest.approx(float(glued["largest-jump"]), abs=0.1)
+    assert number(glued["largest-at"]) == pytest.approx(-100 * change, abs=0.5)
+    again = x.jumps(problem, "masses", ball - 1, scale)
+    here = [
+        r
+        for r in rows
+        if (r["sequence"], r["input"], r["index"]) == (largest["sequence"], "masses", str(ball - 1))
+    ]
+    assert len(again) == len(here) > 1
+    np.testing.assert_allclose(
+        again, [(float(r["change"]), float(r["jump"])) for r in here], rtol=2e-3
+    )
+
+
 def test_fig_extremes_jump():
     """The two branches on either side of the nearest jump, solved anew with fifty digits."""
     rows = [row for row in stored("edges") if row["sequence"] == "BCACBA"]
