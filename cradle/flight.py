@@ -147,12 +147,19 @@ def _march(
             value = level + sum((c * wave).real for c, _, wave in waves)
             noise = 4e-16 * (abs(level) + size)
         slope = sum((c * rate * wave).real for c, rate, wave in waves)
-        if value <= noise and (slope < 0.0 or value < -noise):
-            return max(time + value / abs(slope), 0.0) if slope < 0.0 else time
         bound = bounds[0] * left
-        root = math.sqrt(slope * slope + 2.0 * bound * max(value, noise))
-        time += (root + slope) / bound if slope > 0.0 else 2.0 * max(value, noise) / (root - slope)
+        if value <= noise and (slope < 0.0 or value < -noise):
+            return time + _safe_step(max(value, 0.0), slope, bound)
+        time += _safe_step(max(value, noise), slope, bound)
     raise RuntimeError(f"no end of the search for a meeting after {_MOST_STEPS} steps")
+
+
+def _safe_step(value: float, slope: float, bound: float) -> float:
+    """Return how far the parabola ``value + slope h - bound h^2 / 2`` stays above zero."""
+    root = math.sqrt(slope * slope + 2.0 * bound * value)
+    if slope > 0.0:
+        return (root + slope) / bound
+    return 2.0 * value / (root - slope) if value else 0.0
 
 
 def _first_step(
@@ -269,7 +276,8 @@ class FullFlight:
 
     The difference f of two neighbours obeys f'' + 2 d f' + q f = 0 with q at most g/l, so by
     Sturm's comparison two balls that part cannot meet before pi / sqrt(g/l - d^2), half a swing of
-    the small angle.  For all others |f''| is bounded, and the search marches as in `first_fall`.
+    the small angle.  For all others this bounds f'' by f and f', and the search marches as in
+    `first_fall`.
 
     Examples
     --------
@@ -332,22 +340,18 @@ class FullFlight:
     def _search(self, k: int, time: float, end: float, path: Any) -> float:
         """March to the closing of the k-th gap; infinite if it stays open up to `end`."""
         bodies = len(self.first)
-        speed = math.sqrt(
-            float(np.max(self.start[bodies:] ** 2)) + 4.0 * self.pendulums.gravity * self.length
-        )
-        bound = 2.0 * (self.pendulums.gravity + 2.0 * self.damping * speed)
+        # |f''| is at most w^2 |f| + 2 d |f'|; so (w f, f') grows by no more than exp(rate h) in h.
+        rate = self.frequency + 2.0 * self.damping
         noise = _RTOL * self.length * max(float(np.abs(self.start[:bodies]).max()), 1e-3)
         for _ in range(_MOST_STEPS):
             if time > end:
                 return math.inf
             y = path(time)
             value, slope = float(y[k + 1] - y[k]), float(y[bodies + k + 1] - y[bodies + k])
+            bound = math.e * rate * math.hypot(self.frequency * max(value, noise), slope)
             if value <= noise and slope < 0.0:
-                return max(time + value / -slope, 0.0)
-            root = math.sqrt(slope * slope + 2.0 * bound * max(value, noise))
-            time += (
-                (root + slope) / bound if slope > 0.0 else 2.0 * max(value, noise) / (root - slope)
-            )
+                return time + _safe_step(max(value, 0.0), slope, bound)
+            time += min(_safe_step(max(value, noise), slope, bound), 1.0 / rate)
         raise RuntimeError(f"no end of the search for a meeting after {_MOST_STEPS} steps")
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:

@@ -2,9 +2,9 @@
 
 The rules, in the order in which `swing` applies them at every event:
 
-1. *Touching.* At an impact those contacts touch that close at this instant (within `TIE`), and
-   those whose balls move together.  Each stretch of touching contacts with one that approaches
-   faster than `RESTING` of the swing's speed is a chain of its own, solved by `collide`.
+1. *Touching.* Those contacts touch whose gap is closed within `TIE` of the swing's size, and those
+   whose balls move together.  Each stretch of touching contacts with one that approaches faster
+   than `RESTING` of the swing's speed is a chain of its own, solved by `collide`.
 2. *Resting.* Touching balls whose relative speed is then below `RESTING` of the swing's speed take
    their common velocity: from now on they touch and move together.  Without this rule balls that
    are pressed against each other would collide for ever, ever more softly, in a finite time.
@@ -12,7 +12,8 @@ The rules, in the order in which `swing` applies them at every event:
    would not separate: neighbouring balls are pooled while the left one would accelerate no less
    than the right one.  A pool moves as one body.  Equal pendulums without gaps swing alike, so
    they keep together, without a force, until another ball strikes them.
-4. *Pulling apart.* When the force in a contact of a body falls to zero, the contact opens.
+4. *Pulling apart.* When the force in a contact of a body falls to zero, the contact opens, and
+   stays open for this instant, whatever else happens in it.
 """
 
 from __future__ import annotations

@@ -22,6 +22,10 @@ from cradle.trace import Trace
 
 __all__ = ["swing"]
 
+#: Events without an impact that one instant can have, for each ball: each contact opens and closes
+#: a few times at most.
+MOST_IDLE = 20
+
 
 def swing(
     chain: Chain,
@@ -132,16 +136,18 @@ class _Run:
         self.speed = float(np.sqrt(2.0 * self.released / chain.masses.sum()))
         self.impacts: list[Impact] = []
         self.series: list[tuple[Vector, Vector]] = []
+        self.size = max(float(np.abs(x).max()), self.speed / float(self.frequency.min()))
         distance = self.gaps + np.diff(x)
-        size = max(float(np.abs(x).max()), self.speed / float(self.frequency.min()))
-        if (distance < -TIE * size).any():
+        if (distance < -TIE * self.size).any():
             c = int(np.argmin(distance))
             raise ValueError(
                 f"positions = {x.tolist()}; balls {c} and {c + 1} overlap by {-distance[c]:g} m"
             )
-        self.together = np.zeros(n - 1, dtype=bool)
-        self.parting = np.zeros(n - 1, dtype=bool)
-        self.settle(np.abs(distance) <= TIE * size, np.zeros(n - 1, dtype=bool))
+        none = np.zeros(n - 1, dtype=bool)
+        self.together, self.parting = none, none
+        self.tie = TIE / float(self.frequency.max())  # events nearer than this are one, s
+        self.freed = np.full(n - 1, -np.inf)  # when the force in each contact last fell to zero
+        self.settle(none, none)
 
     def present_energy(self) -> float:
         kinetic = 0.5 * float(self.chain.masses @ self.v**2)
@@ -150,6 +156,7 @@ class _Run:
     def to_the_end(self, times: Vector, most: int, least: float) -> str:
         """Fly from event to event; return why the run ended."""
         done, end = 0, float(times[-1])
+        instant, idle = 0.0, 0  # events without an impact at one instant
         while True:
             if len(self.impacts) >= most:
                 ended = "impacts"
@@ -167,11 +174,20 @@ class _Run:
                 self.t = end
                 return "times"
             x, v = flight.at(np.array([meeting.time]))
+            known = len(self.impacts)
             self.t, self.x, self.v = later, x[0], v[0]
             closing, releasing = np.zeros((2, len(self.gaps)), dtype=bool)
             closing[meeting.closing] = True
             releasing[meeting.releasing] = True
-            self.settle(closing | self.together, releasing)
+            self.settle(closing, releasing)
+            if self.t - instant > self.tie or len(self.impacts) > known:
+                instant, idle = self.t, 0
+            idle += 1
+            if idle > MOST_IDLE * len(self.x):
+                raise RuntimeError(
+                    f"the swing does not get beyond t = {self.t} s: contacts {meeting.closing} "
+                    f"close and {meeting.releasing} open there again and again without an impact"
+                )
         # The instant at which the run ends is reported if it was asked for.
         count = int(np.searchsorted(times[done:], self.t, side="right"))
         self.series.append((np.tile(self.x, (count, 1)), np.tile(self.v, (count, 1))))
@@ -182,18 +198,21 @@ class _Run:
         kind = SmallAngleFlight if self.pendulums.angle == "small" else FullFlight
         return kind(self.pendulums, state)
 
-    def settle(self, touching: NDArray[np.bool_], releasing: NDArray[np.bool_]) -> None:
+    def settle(self, closing: NDArray[np.bool_], releasing: NDArray[np.bool_]) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
         masses = self.chain.masses
+        near = self.gaps + np.diff(self.x) <= TIE * self.size
+        touching = near | closing | self.together
+        self.freed[releasing] = self.t
         for first, last in stretches(touching):
             self.align(first, last)
         self.collide(touching)
-        least = RESTING * self.speed
-        self.v, resting = common_velocities(masses, self.v, touching & ~releasing, least)
+        # What was released at this instant rests no more in it, whatever else happens.
+        kept = touching & (self.t - self.freed > self.tie)
+        self.v, resting = common_velocities(masses, self.v, kept, RESTING * self.speed)
         alone = self.pendulums.accelerations(self.x, self.v)
-        self.together = pressed(
-            masses, alone, resting, 1e-12 * self.speed * float(self.frequency.max())
-        )
+        least = 1e-12 * self.speed * float(self.frequency.max())
+        self.together = pressed(masses, alone, resting, least)
         self.parting = touching & ~self.together
 
     def align(self, first: int, last: int) -> None:

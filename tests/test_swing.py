@@ -18,8 +18,9 @@ from cradle import (
     SequentialCollisions,
     SpringChain,
     swing,
+    textbook,
 )
-from cradle.flight import first_fall
+from cradle.flight import FullFlight, Meeting, SmallAngleFlight, first_fall
 
 ONE_HERTZ = Pendulums(length=9.81 / (4 * math.pi**2))  # sqrt(g/l) = 2 pi / s: a period of 1 s
 
@@ -373,6 +374,110 @@ def test_balls_at_rest_stay_at_rest():
     assert run.together == (0, 1)
 
 
+# Several contacts at one instant
+
+
+def plastic_steps(m, x, pendulums, times, step):
+    """Plastic impacts by Moreau's time stepping: velocities that no touching balls pass each other.
+
+    Nearest to those of the balls left alone, in the mean square by mass: neighbours are pooled.
+    """
+    m, x = np.asarray(m, float), np.array(x, float)
+    v, found = np.zeros_like(x), []
+    square = pendulums.gravity / pendulums.row("length", len(m))
+    damping = pendulums.row("damping", len(m))
+    for k in range(round(times[-1] / step) + 1):
+        if np.isclose(k * step, times, rtol=0, atol=step / 2).any():
+            found.append(x.copy())
+        v = v - step * (square * x + 2 * damping * v)
+        pools = []
+        for c, (mass, speed) in enumerate(zip(m, v)):
+            pools.append((mass, speed, 1))
+            while len(pools) > 1 and pools[-2][1] > pools[-1][1]:
+                place = c + 1 - pools[-1][2]
+                if x[place] - x[place - 1] > 1e-12:
+                    break
+                (m1, v1, n1), (m2, v2, n2) = pools.pop(-2), pools.pop(-1)
+                pools.append((m1 + m2, (m1 * v1 + m2 * v2) / (m1 + m2), n1 + n2))
+        v = np.concatenate([np.full(count, speed) for _, speed, count in pools])
+        x = x + step * v
+        # Without this a gap narrower than a step would be passed.
+        for c in range(len(m) - 1):
+            if x[c] > x[c + 1]:
+                x[c : c + 2] = m[c : c + 2] @ x[c : c + 2] / m[c : c + 2].sum()
+    return np.array(found)
+
+
+def test_two_contacts_that_open_together_close_again():
+    """Plastic balls of unequal damping: without overlap, and where small steps have them."""
+    m, hanging = [1, 0.5, 2], Pendulums(0.1, damping=[0.2, 1, 0.5])
+    times = np.linspace(0, 2.5, 501)
+    run = swing(Chain(m, [0] * 3, 0), ImpulseCorrelation(0), [-0.01] * 3, times, pendulums=hanging)
+    assert np.diff(run.positions, axis=1).min() > -1e-11
+    at = np.array([1.5, 1.7, 1.9, 2.0])
+    by_steps = plastic_steps(m, [-0.01] * 3, hanging, at, 1e-4)
+    np.testing.assert_allclose(run.positions[[300, 340, 380, 400]], by_steps, rtol=0, atol=5e-6)
+
+
+@pytest.mark.parametrize(
+    ("m", "e", "x", "length", "damping"),
+    [
+        ([3, 0.5, 3], 0.3, [0, 0.01, 0.03], [0.2, 0.15, 0.1], 0.5),
+        ([2, 2, 1, 3], 0.0, [-0.03, -0.01, 0.01, 0.03], 0.1, [0.2, 0, 0.5, 0.2]),
+    ],
+)
+def test_an_instant_comes_to_an_end(m, e, x, length, damping):
+    """A ball between two that touch it, about to part: one event must not undo the other."""
+    hanging = Pendulums(length, damping=damping)
+    times = np.linspace(0, 2, 401)
+    run = swing(
+        Chain(m, [0] * len(m), e), ImpulseCorrelation(0), x, times, pendulums=hanging,
+        max_impacts=100,
+    )  # fmt: skip
+    assert run.ended == "times"
+    assert np.diff(run.positions, axis=1).min() > -1e-10
+    assert np.diff(run.energy).max() <= 1e-12 * run.energy[0]
+
+
+def test_balls_that_swing_alike_touch_all_the_time():
+    """Balls 1 and 2 never part, so ball 3 strikes both: in one run, and handed over in two."""
+    hanging, model = Pendulums(0.1, damping=[0, 0, 0.5]), ImpulseCorrelation(0.3)
+    whole = swing(balls(3), model, [-0.02] * 3, [0.6, 0.9], pendulums=hanging)
+    state = Chain([1] * 3, whole.velocities[0], 1)
+    rest = swing(state, model, whole.positions[0], [0.3], pendulums=hanging)
+    (impact,), (again,) = whole.impacts, rest.impacts
+    assert impact.contacts == again.contacts == (0, 1)
+    np.testing.assert_allclose(impact.after, again.after, rtol=0, atol=1e-13)
+    by_textbook = textbook.solve([1.0] * 3, impact.before.tolist(), [1.0] * 2, [0.3], [0.3])
+    np.testing.assert_allclose(impact.after, by_textbook.velocities, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(whole.positions[1], rest.positions[0], rtol=0, atol=1e-13)
+
+
+def test_a_run_that_stands_still_says_so(monkeypatch):
+    monkeypatch.setattr(SmallAngleFlight, "next_meeting", lambda *_: Meeting(0.0, [0], [1]))
+    with pytest.raises(RuntimeError, match=r"does not get beyond t = 0\.0 s: contacts \[0\] close"):
+        swing(balls(3), ImpulseCorrelation(0), [0.0] * 3, [1.0])
+
+
+def test_near_balls_of_any_angle_are_followed_in_few_steps(monkeypatch):
+    """Lossy balls end up close to each other: the search for their meetings must not creep."""
+    looked = []
+    search = FullFlight._search
+
+    def counted(self, k, time, end, path):
+        calls = []
+        found = search(self, k, time, end, lambda t: calls.append(t) or path(t))
+        looked.append(len(calls))
+        return found
+
+    monkeypatch.setattr(FullFlight, "_search", counted)
+    hanging = Pendulums(0.1, angle="full")
+    swing(Chain([1] * 3, [0] * 3, 0.5), ImpulseCorrelation(0), [-0.05, 0, 0], [6.0],
+          pendulums=hanging)  # fmt: skip
+    assert len(looked) > 50
+    assert max(looked) < 100
+
+
 # Roots
 
 
@@ -405,6 +510,12 @@ def test_first_fall_after_a_tiny_step_up():
     # Pull to zero: f'' = -1 with f = 0, f' = 1e-9 at the start.
     c1, c2 = complex(-1 / 3, -1e-9), complex(1 / 3, 0)
     assert first_fall(0.0, [(c1, a), (c2, b)], True, 1.0) == pytest.approx(2e-9, rel=1e-6)
+
+
+def test_a_root_that_rounding_hides_is_not_passed():
+    """cos 2t - cos t falls at once; at the start its value and slope are rounding errors."""
+    terms = [(1 + 5e-18j, 2j), (-(1 - 1.11e-16) + 0j, 1j)]
+    assert first_fall(0.0, terms, False, 10.0) < 1e-7
 
 
 def test_grazing_is_no_endless_loop():
