@@ -146,20 +146,25 @@ def _march(
         else:
             value = level + sum((c * wave).real for c, _, wave in waves)
             noise = 4e-16 * (abs(level) + size)
-        slope = sum((c * rate * wave).real for c, rate, wave in waves)
-        bound = bounds[0] * left
+        slope, *higher = (
+            sum((c * rate**n * wave).real for c, rate, wave in waves) for n in (1, 2, 3)
+        )
         if value <= noise and (slope < 0.0 or value < -noise):
-            return time + _safe_step(max(value, 0.0), slope, bound)
-        time += _safe_step(max(value, noise), slope, bound)
+            return time
+        step = _safe_step(max(value, noise), slope, bounds[0] * left)
+        # Where it rises more and more, the next terms of Taylor's series carry further.
+        for order, derivative in enumerate(higher, start=2):
+            if min(slope, derivative) < 0.0:
+                break
+            step = max(step, (order + 1) * derivative / (bounds[order - 1] * left))
+        time += step
     raise RuntimeError(f"no end of the search for a meeting after {_MOST_STEPS} steps")
 
 
 def _safe_step(value: float, slope: float, bound: float) -> float:
     """Return how far the parabola ``value + slope h - bound h^2 / 2`` stays above zero."""
     root = math.sqrt(slope * slope + 2.0 * bound * value)
-    if slope > 0.0:
-        return (root + slope) / bound
-    return 2.0 * value / (root - slope) if value else 0.0
+    return (root + slope) / bound if slope > 0.0 else 2.0 * value / (root - slope)
 
 
 def _first_step(
@@ -340,18 +345,25 @@ class FullFlight:
     def _search(self, k: int, time: float, end: float, path: Any) -> float:
         """March to the closing of the k-th gap; infinite if it stays open up to `end`."""
         bodies = len(self.first)
-        # |f''| is at most w^2 |f| + 2 d |f'|; so (w f, f') grows by no more than exp(rate h) in h.
+        size = max(
+            float(np.abs(self.start[:bodies]).max()),
+            float(np.abs(self.start[bodies:]).max()) / self.frequency,
+        )
+        if size == 0.0:
+            return math.inf
+        # The length of (w f, f') grows by less than exp(rate h) in a time h, and rate times that
+        # length bounds f''.  With five times the bound of now a step stays within ln 5 / rate.
         rate = self.frequency + 2.0 * self.damping
-        noise = _RTOL * self.length * max(float(np.abs(self.start[:bodies]).max()), 1e-3)
         for _ in range(_MOST_STEPS):
             if time > end:
                 return math.inf
-            y = path(time)
+            y = path(time) / size
             value, slope = float(y[k + 1] - y[k]), float(y[bodies + k + 1] - y[bodies + k])
-            bound = math.e * rate * math.hypot(self.frequency * max(value, noise), slope)
-            if value <= noise and slope < 0.0:
-                return time + _safe_step(max(value, 0.0), slope, bound)
-            time += min(_safe_step(max(value, noise), slope, bound), 1.0 / rate)
+            if value <= _RTOL and slope < 0.0:
+                return time
+            value = max(value, _RTOL)
+            bound = 5.0 * rate * math.hypot(self.frequency * value, slope)
+            time += _safe_step(value, slope, bound)
         raise RuntimeError(f"no end of the search for a meeting after {_MOST_STEPS} steps")
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:

@@ -147,7 +147,7 @@ class _Run:
         self.together, self.parting = none, none
         self.tie = TIE / float(self.frequency.max())  # events nearer than this are one, s
         self.freed = np.full(n - 1, -np.inf)  # when the force in each contact last fell to zero
-        self.settle(none, none)
+        self.settle(none)
 
     def present_energy(self) -> float:
         kinetic = 0.5 * float(self.chain.masses @ self.v**2)
@@ -176,10 +176,9 @@ class _Run:
             x, v = flight.at(np.array([meeting.time]))
             known = len(self.impacts)
             self.t, self.x, self.v = later, x[0], v[0]
-            closing, releasing = np.zeros((2, len(self.gaps)), dtype=bool)
-            closing[meeting.closing] = True
+            releasing = np.zeros(len(self.gaps), dtype=bool)
             releasing[meeting.releasing] = True
-            self.settle(closing, releasing)
+            self.settle(releasing)
             if self.t - instant > self.tie or len(self.impacts) > known:
                 instant, idle = self.t, 0
             idle += 1
@@ -198,21 +197,20 @@ class _Run:
         kind = SmallAngleFlight if self.pendulums.angle == "small" else FullFlight
         return kind(self.pendulums, state)
 
-    def settle(self, closing: NDArray[np.bool_], releasing: NDArray[np.bool_]) -> None:
+    def settle(self, releasing: NDArray[np.bool_]) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
         masses = self.chain.masses
-        near = self.gaps + np.diff(self.x) <= TIE * self.size
-        touching = near | closing | self.together
-        self.freed[releasing] = self.t
+        touching = self.gaps + np.diff(self.x) <= TIE * self.size
         for first, last in stretches(touching):
             self.align(first, last)
         self.collide(touching)
-        # What was released at this instant rests no more in it, whatever else happens.
+        # What opens at this instant rests no more in it, whatever else happens.
+        self.freed[releasing] = self.t
         kept = touching & (self.t - self.freed > self.tie)
         self.v, resting = common_velocities(masses, self.v, kept, RESTING * self.speed)
         alone = self.pendulums.accelerations(self.x, self.v)
-        least = 1e-12 * self.speed * float(self.frequency.max())
-        self.together = pressed(masses, alone, resting, least)
+        rounding = 1e-12 * self.speed * float(self.frequency.max())
+        self.together = pressed(masses, alone, resting, rounding)
         self.parting = touching & ~self.together
 
     def align(self, first: int, last: int) -> None:

@@ -17,6 +17,7 @@ from cradle import (
     Pendulums,
     SequentialCollisions,
     SpringChain,
+    flight,
     swing,
     textbook,
 )
@@ -81,6 +82,17 @@ def test_small_amplitudes_of_any_angle_are_small_angle():
     full = swing(*arguments, pendulums=Pendulums(angle="full"))
     small = swing(*arguments)
     np.testing.assert_allclose(full.positions, small.positions, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-8, 1e-12, 1e-100])
+def test_tiny_amplitudes_of_any_angle_are_as_exact(size):
+    arguments = balls(3, 0.9), ImpulseCorrelation(0.1), [-size, 0, 0], [3.0]
+    full = swing(*arguments, pendulums=Pendulums(angle="full"))
+    small = swing(*arguments)
+    assert len(full.impacts) == len(small.impacts) > 5
+    for one, other in zip(full.impacts, small.impacts, strict=True):
+        assert one.time == pytest.approx(other.time, rel=1e-11)
+        np.testing.assert_allclose(one.after, other.after, rtol=0, atol=1e-10 * size)
 
 
 def test_any_angle_loses_the_common_clock():
@@ -424,15 +436,17 @@ def test_two_contacts_that_open_together_close_again():
     [
         ([3, 0.5, 3], 0.3, [0, 0.01, 0.03], [0.2, 0.15, 0.1], 0.5),
         ([2, 2, 1, 3], 0.0, [-0.03, -0.01, 0.01, 0.03], 0.1, [0.2, 0, 0.5, 0.2]),
+        ([2, 2, 2, 2], 0.5, [-0.01, 0, 0.01, 0.02], 0.1, [0.1, 1, 0.5, 0]),
+        ([2, 2, 2, 1], 0.0, [-0.01, 0.02, 0.02, 0.02], 0.1, [1, 0.1, 0, 0.5]),
     ],
 )
 def test_an_instant_comes_to_an_end(m, e, x, length, damping):
-    """A ball between two that touch it, about to part: one event must not undo the other."""
+    """Contacts that open or close together, again and again: no event must undo another."""
     hanging = Pendulums(length, damping=damping)
     times = np.linspace(0, 2, 401)
     run = swing(
         Chain(m, [0] * len(m), e), ImpulseCorrelation(0), x, times, pendulums=hanging,
-        max_impacts=100,
+        max_impacts=1000,
     )  # fmt: skip
     assert run.ended == "times"
     assert np.diff(run.positions, axis=1).min() > -1e-10
@@ -510,6 +524,24 @@ def test_first_fall_after_a_tiny_step_up():
     # Pull to zero: f'' = -1 with f = 0, f' = 1e-9 at the start.
     c1, c2 = complex(-1 / 3, -1e-9), complex(1 / 3, 0)
     assert first_fall(0.0, [(c1, a), (c2, b)], True, 1.0) == pytest.approx(2e-9, rel=1e-6)
+
+
+def test_a_slow_rise_is_followed_in_few_steps(monkeypatch):
+    """A contact begins to part with hardly any acceleration; the rate of that carries it on."""
+    rates = [complex(-0.1, 1.0), complex(-0.3, 1.2)]
+    powers = np.array([[rate**n for rate in rates] for n in range(4)])
+    columns = np.concatenate([powers.real, -powers.imag], axis=1)
+    parts = np.linalg.solve(columns, [0, 0, 1e-10, 1])  # value and derivatives at the start
+    terms = [(complex(parts[k], parts[2 + k]), rate) for k, rate in enumerate(rates)]
+    looked = []
+    one = flight._exp_minus_one
+    monkeypatch.setattr(flight, "_exp_minus_one", lambda z: looked.append(z) or one(z))
+    root = first_fall(0.0, terms, True, 20.0)
+    assert len(looked) < 100
+    value = lambda t: sum((c * (np.exp(rate * t) - 1)).real for c, rate in terms)  # noqa: E731
+    assert 1 < root < 20
+    assert abs(value(root)) < 1e-13
+    assert value(np.linspace(1e-3, root - 1e-6, 20001)).min() > 0
 
 
 def test_a_root_that_rounding_hides_is_not_passed():
