@@ -73,6 +73,8 @@ def swing(
         If a value is wrong, balls overlap, or the model cannot treat an impact.
     ImpactNotFinished
         If an impact takes more steps than the model allows.
+    RuntimeError
+        If contacts open and close again and again at one instant, so that the run cannot go on.
 
     Examples
     --------
