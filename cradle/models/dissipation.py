@@ -216,18 +216,25 @@ def _impulses(m: Vector, u: Vector, active: NDArray[np.bool_], kappa: Vector) ->
     size = np.linalg.norm(rows, axis=1)  # mu^(-1/2)
     rows /= size[:, None]
     before = np.append(u, u.sum()) / size
-    # Nothing absorbs at an open contact; a kappa far below rounding is none.
-    soft = 0.5 / np.maximum(np.append(active, active.all()) * kappa, 1e-30)
+    # Nothing absorbs at an open contact.
+    kappa = np.append(active, active.all()) * kappa
+    part, rest = kappa / (1.0 + kappa), 1.0 / (1.0 + kappa)
     gram = rows @ rows.T
-    # (1 / 2 kappa + G / 2) q = u- - G r / 2, so that u+ = free - S r, with reactions r >= 0 of the
-    # contacts.  Written so that nothing cancels for a large kappa.
-    inverse = np.linalg.inv(np.diag(soft) + 0.5 * gram)
-    free = (soft[:, None] * inverse - 0.5 * gram @ inverse) @ before
-    response = gram @ inverse * soft
+    # q = kappa (u- + u+) with u+ = u- - G (q + r), so q = P (2 u- - G r) and u+ = free - S r, with
+    # P = (1 / kappa + G)^-1, S = G - G P G and reactions r >= 0 of the contacts.
+    root = np.sqrt(part)
+    inverse = np.linalg.inv(np.diag(rest) + root[:, None] * gram * root)
+    soft = root[:, None] * inverse * root
+    # 1 - G P, written so that nothing cancels for a large kappa.
+    kept = np.eye(n) - gram @ soft
+    stiff = kappa > 1.0
+    kept[stiff] = (rest[:, None] * inverse * root)[stiff] / root[stiff, None]
+    free = (kept - gram @ soft) @ before
     # u+ <= 0, r >= 0, r u+ = 0: non-negative least squares with S = L L'.
     at = np.flatnonzero(active)
+    response = kept @ gram
     lower = np.linalg.cholesky(0.5 * (response + response.T)[np.ix_(at, at)])
     reactions = np.zeros(n)
     reactions[at], _ = nnls(lower.T, solve_triangular(lower, free[at], lower=True))
-    impulses = (inverse @ (before - 0.5 * gram @ reactions) + reactions) / size
+    impulses = (2.0 * soft @ before + reactions @ kept) / size
     return np.asarray(impulses[:-1] + impulses[-1])
