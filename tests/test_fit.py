@@ -57,7 +57,9 @@ def any_shots(before, sigma, errors=None, moved=None):
     """Shots of balls A, B, C whichever of them move; ratio 0.1 to the right, 0.2 to the left."""
     rows = []
     for shot, v in enumerate(before):
-        after = collide(Chain([0.045, 0.053, 0.06], v, [0.6, 0.7]), ImpulseCorrelation([0.1], [0.2]))
+        after = collide(
+            Chain([0.045, 0.053, 0.06], v, [0.6, 0.7]), ImpulseCorrelation([0.1], [0.2])
+        )
         for ball, letter in enumerate("ABC"):
             error = 0.0 if errors is None else errors[shot][ball]
             uncertain = sigma * (v[ball] != 0 if moved is None else ball in moved)
@@ -350,6 +352,15 @@ def test_the_order_of_shots_does_not_matter(order):
     assert found["CBA"].value == pytest.approx(0.2, abs=1e-4)
     assert found.chi_square < 1e-3
     assert found.degrees_of_freedom == 7
+
+
+def test_shots_from_both_ends_are_drawn():
+    shots = any_shots([[1, 0, 0], [0, 0, -0.5]], 0.003)
+    _, data = ratio(shots, {"AB": 0.6, "BC": 0.7}).plot("ABC")
+    drawn = [bars.lines[0].get_xydata() for bars in data.containers]
+    for ball, points in enumerate(drawn):
+        share = shots["ABC"].after[:, ball] / [1, 0.5]
+        np.testing.assert_allclose(points, np.column_stack([[1, 0.5], share]), rtol=1e-15)
 
 
 def test_errors_of_restitution_widen_the_interval():
