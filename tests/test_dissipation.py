@@ -216,6 +216,24 @@ def test_a_ball_that_ran_away_is_caught_up_with():
     np.testing.assert_allclose(trace.velocities, [*second, first[1]], rtol=0, atol=1e-14)
 
 
+@pytest.mark.parametrize(
+    ("masses", "velocities", "kappa"),
+    [
+        ([10, 20, 1, 0.01], [0.25, -0.75, -0.25, -0.5], [1000, 60, 0]),
+        ([0.1, 10, 20, 0.02, 0.1], [-0.5, 0.5, -0.5, 0.5, -1], [60, 60, 1000, 0]),
+        ([10, 1, 1, 0.1, 10], [0.75, -0.5, -0.25, 0, 0], [60, 1, 60, 1000]),
+        ([10, 10, 0.05, 0.02], [0.75, -0.25, -1, -0.25], [1000, 0, 60]),
+    ],
+)
+def test_balls_held_together_take_part_together_in_the_next_problem(masses, velocities, kappa):
+    """Against one exact minimum after the other; light balls turn rounding into closing speeds."""
+    exact = velocities
+    while (np.diff(exact) < 0).any():
+        exact = minimum(Chain(masses, exact, 0), kappa)
+    after = collide(Chain(masses, velocities, 0), QuadraticDissipation(kappa)).velocities
+    np.testing.assert_allclose(after, exact, rtol=0, atol=1e-12)
+
+
 def test_unfinished_impact_shows_what_was_reached():
     model = QuadraticDissipation(9.0, max_problems=2)
     with pytest.raises(ImpactNotFinished, match="max_problems = 2;") as stopped:

@@ -144,13 +144,15 @@ class QuadraticDissipation:
         )
         refuse_where("masses", chain.masses, light, rule)
         speed = np.abs(v - v.mean()).max()
+        held = np.zeros(n - 1, dtype=bool)
 
         def closing(v: Vector) -> Vector:
             u = v[:-1] - v[1:]
-            # A rounding error of the speeds, or of the impulses over a light mass, is none.
+            # A reaction keeps the closing speed at 0.  A rounding error of the speeds, or of the
+            # impulses over a light mass, is none.
             ends = np.concatenate([[0.0], impulses, [0.0]])
             noise = 1e-14 * speed + 1e-15 * (ends[:-1] + ends[1:]) / m
-            return np.where(np.abs(u) <= np.maximum(noise[:-1], noise[1:]), 0.0, u)
+            return np.where(held | (np.abs(u) <= np.maximum(noise[:-1], noise[1:])), 0.0, u)
 
         problems = 0
         while (closing(v) > 0.0).any() and problems < self.max_problems:
@@ -158,7 +160,8 @@ class QuadraticDissipation:
             u = closing(v)
             stretch = np.cumsum(u < 0.0)
             active = (u >= 0.0) & np.isin(stretch, stretch[u > 0.0])
-            passed = np.where(active, _impulses(m, u, active, np.append(kappa, self.distance)), 0.0)
+            passed, reactions = _impulses(m, u, active, np.append(kappa, self.distance))
+            passed, held = np.where(active, passed, 0.0), np.where(active, reactions > 0.0, held)
             after = v + np.diff(np.concatenate([[0.0], -passed, [0.0]])) / m
             impulses = impulses + passed
             absorbed += passed * 0.5 * (u + closing(after))
@@ -199,8 +202,10 @@ class QuadraticDissipation:
         return row_of("coefficients", self.coefficients, len(chain) - 1, len(chain))
 
 
-def _impulses(m: Vector, u: Vector, active: NDArray[np.bool_], kappa: Vector) -> Vector:
-    """Return the impulses of one problem, passing through each contact.
+def _impulses(
+    m: Vector, u: Vector, active: NDArray[np.bool_], kappa: Vector
+) -> tuple[Vector, Vector]:
+    """Return the impulses of one problem, passing through each contact, and the reactions in them.
 
     u holds closing speeds; kappa those of the contacts, then of the outer balls.
     """
@@ -237,4 +242,4 @@ def _impulses(m: Vector, u: Vector, active: NDArray[np.bool_], kappa: Vector) ->
     reactions = np.zeros(n)
     reactions[at], _ = nnls(lower.T, solve_triangular(lower, free[at], lower=True))
     impulses = (2.0 * soft @ before + reactions @ kept) / size
-    return np.asarray(impulses[:-1] + impulses[-1])
+    return impulses[:-1] + impulses[-1], reactions[:-1]
