@@ -321,8 +321,9 @@ def test_chi_square_whichever_balls_move(before, moved):
     free = shots.sigma_before > 0
     e = {("A", "B"): 0.6, ("B", "C"): 0.7}
     for forward, backward in ((0.1, 0.2), (0.15, 0.1)):
+        model = ImpulseCorrelation([forward], [backward])
 
-        def residuals(shift, model=ImpulseCorrelation([forward], [backward])):
+        def residuals(shift, model=model):
             v = shots.before.astype(float)
             v[free] += sigma * shift
             after = [collide(Chain(shots.masses, row, [0.6, 0.7]), model).velocities for row in v]
