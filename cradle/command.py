@@ -31,6 +31,7 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"\b(sigma|known)=": r"--\1",
     r"\b(wanted|accuracy|length|speed) = ": r"--\1 ",
     r"\bmodel_error = ": "--model-error ",
+    r"\btypes = ": "--predict ",
     r"restitution has no '(.+?)', which set (.+) needs; it has (.*)": (
         r"set \2 needs the restitution of \1: shoot these two balls alone, or give "
         r"--restitution \1=E:ERROR (there are: \3)"

@@ -411,6 +411,8 @@ def test_film_gives_the_rows_of_the_table(folder):
         ("fit shots.csv --known ABA=1.2", 1, "cradle: --known ABA: 1.2; must lie in [0, 1]"),
         ("fit shots.csv --predict ABA --csv", 2, "--csv prints the fitted values alone"),
         ("fit pairs.csv --predict ABA", 1, "the ratio of ABA is not known (--known ABA=RATIO)"),
+        ("fit shots.csv --predict A", 1, "cradle: --predict 'A'; must name at least 2 balls"),
+        ("fit shots.csv --predict ''", 1, "cradle: --predict ''; must name at least 2 balls"),
         ("frobnicate", 2, "No such command"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import itertools
 import re
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -120,29 +121,89 @@ def test_conditions_of_the_minimum(case):
     assert abs(reactions[touching] * after_u).max() < 1e-12 * scale
 
 
-@given(cases())
-def test_against_every_active_set(case):
-    """The minimum, found by trying all sets of contacts that stay closed."""
-    chain, kappa, distance = case
-    if not (chain.closing_speeds > 0).any():
-        return
-    n, m, v = len(chain), chain.masses, chain.velocities
-    rows, k = problem(chain, kappa, distance)
-    half = rows.T @ (k[:, None] * rows) / 2
+def solved(matrix, right):
+    """Solve equations of rational numbers, by elimination."""
+    rows = np.column_stack([matrix, right])
+    for i in range(len(rows)):
+        rows[i] = rows[i] / rows[i, i]  # of a positive definite matrix: never 0
+        for j in set(range(len(rows))) - {i}:
+            rows[j] = rows[j] - rows[j, i] * rows[i]
+    return rows[:, -1]
+
+
+def minimum(chain, kappa, distance=0.0):
+    """The minimum in exact rational numbers: all sets of contacts that stay closed are tried."""
+    n = len(chain)
+    m, v = (np.array([*map(Fraction, row)]) for row in (chain.masses, chain.velocities))
     touching = np.flatnonzero(part(chain)).tolist()
-    best, least = None, np.inf
+    pairs = [(c, c + 1, Fraction(kappa[c])) for c in touching]
+    if n == 3 and len(touching) == 2:
+        pairs.append((0, 2, Fraction(distance)))
+    mass = np.diag(m)
+    half = 0 * mass
+    for i, j, coefficient in pairs:
+        row = np.array([(k == i) - (k == j) for k in range(n)])
+        half = half + coefficient * m[i] * m[j] / (m[i] + m[j]) * np.outer(row, row)
+    best, least = None, None
     for size in range(len(touching) + 1):
         for closed in itertools.combinations(touching, size):
             # Balls that stay together move as one: x = groups @ y.
             label = np.cumsum([0] + [c not in closed for c in range(n - 1)])
-            groups = np.eye(label[-1] + 1)[label]
-            matrix = groups.T @ (np.diag(m) + half) @ groups
-            x = groups @ np.linalg.solve(matrix, groups.T @ (np.diag(m) - half) @ v)
-            cost = m @ (x - v) ** 2 / 2 + k @ (rows @ (x + v) / 2) ** 2
-            if (x[:-1] - x[1:])[touching].max() < 1e-12 and cost < least:
+            groups = np.eye(label[-1] + 1, dtype=int)[label]
+            matrix = groups.T @ (mass + half) @ groups
+            x = groups @ solved(matrix, groups.T @ (mass - half) @ v)
+            cost = (m @ (x - v) ** 2 + (x + v) @ half @ (x + v)) / 2
+            if all(x[c] <= x[c + 1] for c in touching) and (best is None or cost < least):
                 best, least = x, cost
+    return best.astype(float)
+
+
+@given(cases())
+def test_against_every_active_set(case):
+    chain, kappa, distance = case
+    if not (chain.closing_speeds > 0).any():
+        return
     trace = collide(chain, QuadraticDissipation(kappa, distance=distance))
-    np.testing.assert_allclose(trace.path[1], best, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(trace.path[1], minimum(*case), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("last", [0.0, 1e-300, 1e-25, 1e-15, 1e-9, 1e-3])
+def test_a_light_pair_between_heavy_balls_and_a_coefficient_of_0_or_next_to_it(last):
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        masses = rng.integers(1, 9, 4) / [1, 32, 32, 1]
+        chain = Chain(masses, -np.sort(rng.integers(0, 9, 4)) / 8, 0)
+        if not (chain.closing_speeds > 0).any():
+            continue
+        kappa = [float(k) for k in rng.integers(1, 99, 2)] + [last]
+        trace = collide(chain, QuadraticDissipation(kappa))
+        np.testing.assert_allclose(trace.path[1], minimum(chain, kappa), rtol=0, atol=1e-12)
+    chain, kappa = Chain([6, 0.2, 0.1, 6], [-0.4, -0.9, -1, -1], 1), [30.0, 60.0, last]
+    after = collide(chain, QuadraticDissipation(kappa)).velocities
+    np.testing.assert_allclose(after, minimum(chain, kappa), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "sizes", "tolerance"),
+    [
+        ([0, 1e-300, 1e-18, 1e-12, 1e-6, 0.5, 1, 60, 1e3], [2, 3, 4, 5], 1e-12),
+        # Large ones cost digits, most of all where that of the outer balls is large too.
+        ([0, 0.5, 1e6, 1e8, 1e9], [3], 1e-6),
+    ],
+)
+def test_coefficients_of_all_magnitudes_in_one_chain(values, sizes, tolerance):
+    rng = np.random.default_rng(2)
+    for _ in range(300):
+        n = int(rng.choice(sizes))
+        masses = np.ldexp(rng.random(n) + 0.5, rng.integers(-4, 5, n))
+        chain = Chain(masses, rng.integers(-4, 5, n) / 4, 0)
+        if not (chain.closing_speeds > 0).any():
+            continue
+        drawn = rng.choice(values, n)
+        kappa, distance = drawn[1:].tolist(), float(drawn[0]) if n == 3 else 0.0
+        trace = collide(chain, QuadraticDissipation(kappa, distance=distance))
+        best = minimum(chain, kappa, distance)
+        np.testing.assert_allclose(trace.path[1], best, rtol=0, atol=tolerance)
 
 
 def test_a_ball_that_ran_away_is_caught_up_with():
@@ -153,6 +214,24 @@ def test_a_ball_that_ran_away_is_caught_up_with():
     first = collide(Chain([1, 5], [1, 0], 0.9), QuadraticDissipation()).velocities
     second = collide(Chain([1, 1], [0, first[0]], 0.9), QuadraticDissipation()).velocities
     np.testing.assert_allclose(trace.velocities, [*second, first[1]], rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("masses", "velocities", "kappa"),
+    [
+        ([10, 20, 1, 0.01], [0.25, -0.75, -0.25, -0.5], [1000, 60, 0]),
+        ([0.1, 10, 20, 0.02, 0.1], [-0.5, 0.5, -0.5, 0.5, -1], [60, 60, 1000, 0]),
+        ([10, 1, 1, 0.1, 10], [0.75, -0.5, -0.25, 0, 0], [60, 1, 60, 1000]),
+        ([10, 10, 0.05, 0.02], [0.75, -0.25, -1, -0.25], [1000, 0, 60]),
+    ],
+)
+def test_balls_held_together_take_part_together_in_the_next_problem(masses, velocities, kappa):
+    """Against one exact minimum after the other; light balls turn rounding into closing speeds."""
+    exact = velocities
+    while (np.diff(exact) < 0).any():
+        exact = minimum(Chain(masses, exact, 0), kappa)
+    after = collide(Chain(masses, velocities, 0), QuadraticDissipation(kappa)).velocities
+    np.testing.assert_allclose(after, exact, rtol=0, atol=1e-12)
 
 
 def test_unfinished_impact_shows_what_was_reached():

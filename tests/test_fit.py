@@ -2,6 +2,7 @@
 
 import csv
 from functools import cache
+from itertools import permutations
 from pathlib import Path
 
 import fit_example
@@ -9,7 +10,7 @@ import fit_study
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.optimize import brentq, minimize
+from scipy.optimize import brentq, least_squares, minimize
 from scipy.stats import binom
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain, ratio_table
@@ -24,6 +25,8 @@ from cradle.fit import (
     speeds_from_heights,
     velocities_from_tracks,
 )
+from cradle.fit.likelihood import chi_squares
+from cradle.fit.parameters import Points
 from cradle.fit.search import RISE, refine, scan
 from cradle.fit.tracker import Track
 
@@ -48,6 +51,22 @@ def columns(name, speeds, after, sigma, errors=None):
             for key, value in zip(table, row):
                 table[key].append(value)
     return table
+
+
+def any_shots(before, sigma, errors=None, moved=None):
+    """Shots of balls A, B, C whichever of them move; ratio 0.1 to the right, 0.2 to the left."""
+    rows = []
+    for shot, v in enumerate(before):
+        after = collide(
+            Chain([0.045, 0.053, 0.06], v, [0.6, 0.7]), ImpulseCorrelation([0.1], [0.2])
+        )
+        for ball, letter in enumerate("ABC"):
+            error = 0.0 if errors is None else errors[shot][ball]
+            uncertain = sigma * (v[ball] != 0 if moved is None else ball in moved)
+            rows.append((shot, ball + 1, letter, after.chain.masses[ball], v[ball],
+                         after.velocities[ball] + error, sigma, uncertain))  # fmt: skip
+    names = ("shot", "ball", "type", "mass", "before", "after", "sigma", "sigma_before")
+    return read_shots({"set": ["ABC"] * len(rows)} | dict(zip(names, map(list, zip(*rows)))))
 
 
 def outcome(name):
@@ -278,6 +297,71 @@ def test_confidence_set_by_another_route():
             for bracket in ((max(low - 0.5 * width, 0.0), one.value),
                             (one.value, high + 0.5 * width))]  # fmt: skip
     np.testing.assert_allclose([low, high], ends, atol=0.01 * width)
+
+
+@pytest.mark.parametrize(
+    ("before", "moved"),
+    [
+        ([[0, 0, -1]], None),
+        ([[0, 0, -1], [0, 0, -0.7]], None),
+        ([[2, 0.3, 0]], [0]),
+        ([[2, 0.3, 0]], [1]),
+        ([[2, 0.3, 0]], [0, 1]),
+        ([[2, 0, -1]], [0]),
+        ([[2, 0, -1]], []),
+        ([[1, 0, 0]], None),
+        ([[1, 0, 0], [0, 0, -1]], None),
+    ],
+)
+def test_chi_square_whichever_balls_move(before, moved):
+    """Against least squares over the velocities before, shot by shot, impacts one by one."""
+    sigma = 0.003
+    errors = sigma * np.random.default_rng(1).standard_normal((len(before), 3))
+    shots = any_shots(before, sigma, errors, moved)["ABC"]
+    free = shots.sigma_before > 0
+    e = {("A", "B"): 0.6, ("B", "C"): 0.7}
+    for forward, backward in ((0.1, 0.2), (0.15, 0.1)):
+        model = ImpulseCorrelation([forward], [backward])
+
+        def residuals(shift, model=model):
+            v = shots.before.astype(float)
+            v[free] += sigma * shift
+            after = [collide(Chain(shots.masses, row, [0.6, 0.7]), model).velocities for row in v]
+            return np.concatenate([shift, ((shots.after - after) / sigma).ravel()])
+
+        if free.any():
+            lowest = 2 * least_squares(residuals, np.zeros(free.sum()), xtol=1e-12).cost
+        else:
+            lowest = (residuals(np.zeros(0)) ** 2).sum()
+        ratios = {("A", "B", "C"): np.array([forward]), ("C", "B", "A"): np.array([backward])}
+        assert chi_squares([shots], Points(e, ratios), []) == pytest.approx(lowest, rel=1e-4)
+
+
+def test_one_shot_to_the_left_gives_the_ratio_back():
+    for before in ([[0, 0, -1]], [[0, 0, -1], [0, 0, -0.7]]):
+        found = ratio(any_shots(before, 0.003), {"AB": 0.6, "BC": 0.7})
+        assert found["CBA"].value == pytest.approx(0.2, abs=2e-6)
+        assert found.chi_square < 1e-3
+
+
+@pytest.mark.parametrize("order", [*permutations(range(3))])
+def test_the_order_of_shots_does_not_matter(order):
+    """Shots to the right tell one ratio, those to the left the other, whichever comes first."""
+    before = np.array([[1, 0, 0], [0, 0, -1], [0, 0, -0.7]])[[*order]].tolist()
+    found = ratio(any_shots(before, 0.003), {"AB": 0.6, "BC": 0.7})
+    assert found["ABC"].value == pytest.approx(0.1, abs=1e-4)
+    assert found["CBA"].value == pytest.approx(0.2, abs=1e-4)
+    assert found.chi_square < 1e-3
+    assert found.degrees_of_freedom == 7
+
+
+def test_shots_from_both_ends_are_drawn():
+    shots = any_shots([[1, 0, 0], [0, 0, -0.5]], 0.003)
+    _, data = ratio(shots, {"AB": 0.6, "BC": 0.7}).plot("ABC")
+    drawn = [bars.lines[0].get_xydata() for bars in data.containers]
+    for ball, points in enumerate(drawn):
+        share = shots["ABC"].after[:, ball] / [1, 0.5]
+        np.testing.assert_allclose(points, np.column_stack([[1, 0.5], share]), rtol=1e-15)
 
 
 def test_errors_of_restitution_widen_the_interval():

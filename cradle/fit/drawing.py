@@ -100,7 +100,7 @@ def draw_likelihood(estimate: Estimate, ax: Axes) -> Axes:
 
 def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> Axes:
     """Draw measured velocities over the striker's against the striker's, and what is predicted."""
-    speed = shots.before.max(axis=1)
+    speed = np.abs(shots.before).max(axis=1)
     predicted = _predicted(fit, estimate, shots)
     for k, kind in enumerate(shots.types):
         style = ball_style(k)

@@ -23,16 +23,16 @@ _CHUNK = 4096
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """Outcomes of one set at P points, per unit of what they are linear in.
+    """Outcomes of one set of K shots at P points, and what they change with.
 
     Attributes
     ----------
-    outcome : ndarray, shape (K or 1, P, N)
-        Velocities after the impact; for a single striker those of unit speed.
-    slopes : ndarray, shape (K or 1, P, N, E)
+    outcome : ndarray, shape (K, P, N)
+        Velocities after the impact.
+    slopes : ndarray, shape (K, P, N, E)
         Their change with each uncertain coefficient of restitution.
-    movers : ndarray, shape (K or 1, P, N, M)
-        Their change with each measured velocity before the impact.
+    movers : ndarray, shape (K, P, N, M)
+        Their change with one standard error of each measured velocity before the impact.
     """
 
     outcome: Vector
@@ -77,7 +77,8 @@ def responses(shots: ShotSet, points: Points, uncertain: Sequence[tuple[Key, flo
         slopes[..., k] = (ends[0] - ends[1]) / (up - down)
     if single:
         # Homogeneous of degree one: the slope with the striker's velocity is the outcome itself.
-        return Responses(outcome, slopes, outcome[..., None])
+        speed, error = (v[:, moving, None] for v in (shots.before, shots.sigma_before))
+        return Responses(outcome * speed, slopes * speed[..., None], (outcome * error)[..., None])
     movers = []
     for ball in np.flatnonzero((shots.sigma_before > 0).any(axis=0)):
         step = np.zeros(shots.masses.size)
@@ -85,7 +86,8 @@ def responses(shots: ShotSet, points: Points, uncertain: Sequence[tuple[Key, flo
         ends = [
             points.outcomes(shots.types, shots.masses, before + sign * step) for sign in (1, -1)
         ]
-        movers.append((ends[0] - ends[1]) / (2 * step[ball]))
+        error = shots.sigma_before[:, ball, None, None]
+        movers.append((ends[0] - ends[1]) / (2 * step[ball]) * error)
     columns = np.stack(movers, axis=-1) if movers else np.zeros((*outcome.shape, 0))
     return Responses(outcome, slopes, columns)
 
@@ -107,26 +109,14 @@ def normal_equations(shots: ShotSet, solved: Responses) -> tuple[Vector, Vector,
     curvature : ndarray, shape (P, E, E)
         Chi-square of restitution changed by d is chi_square - 2 slope d + d curvature d.
     """
-    outcome, slopes, movers = solved.outcome, solved.slopes, solved.movers
-    moving = np.flatnonzero((shots.sigma_before > 0).any(axis=0))
-    if outcome.shape[0] == 1 and len(shots.shots) >= 1 and movers.shape[-1] == 1:
-        speed = shots.before.max(axis=1)[:, None, None]
-        outcome, slopes = outcome * speed, slopes * speed[..., None]
-        moving = np.array([int(np.argmax(shots.before.max(axis=0)))])
-    residual = shots.after[:, None, :] - outcome
-    weight = (1.0 / shots.sigma**2)[:, None, :]
-    columns = np.concatenate([residual[..., None], slopes], axis=-1)
-    weighted = columns * weight[..., None]
-    products = np.einsum("kpni,kpnj->pij", columns, weighted)
-    if movers.shape[-1]:
-        spread = shots.sigma_before[:, moving]
-        scaled = np.broadcast_to(
-            movers * spread[:, None, None, :], (*residual.shape, spread.shape[1])
-        )
-        inner = np.einsum("kpnm,kpn,kpnl->kpml", scaled, np.broadcast_to(weight, residual.shape),
-                          scaled) + np.eye(spread.shape[1])  # fmt: skip
-        cross = np.einsum("kpnm,kpni->kpmi", scaled, weighted)
-        products = products - np.einsum("kpmi,kpmj->pij", cross, np.linalg.solve(inner, cross))
+    residual = shots.after[:, None, :] - solved.outcome
+    columns = np.concatenate([residual[..., None], solved.slopes], axis=-1)
+    weight = (1.0 / shots.sigma**2)[:, None, :, None]
+    products = np.einsum("kpni,kpnj->pij", columns, columns * weight)
+    weighted = solved.movers * weight
+    inner = np.einsum("kpnm,kpnl->kpml", solved.movers, weighted) + np.eye(weighted.shape[-1])
+    cross = np.einsum("kpnm,kpni->kpmi", weighted, columns)
+    products -= np.einsum("kpmi,kpmj->pij", cross, np.linalg.solve(inner, cross))
     return products[:, 0, 0], products[:, 0, 1:], products[:, 1:, 1:]
 
 

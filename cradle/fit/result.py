@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cradle.checks import Vector, one_number
+from cradle.checks import Vector, one_number, shown
 from cradle.fit.answers import Estimate, Group, Prediction
 from cradle.fit.parameters import (
     Key,
@@ -163,8 +163,8 @@ class Fit:
         Raises
         ------
         ValueError
-            If the mass of a type, the coefficient of restitution of a pair or the ratio of a
-            triplet (or of its reverse) is neither fitted nor given.
+            If fewer than 2 balls are named, or the mass of a type, the coefficient of restitution
+            of a pair or the ratio of a triplet (or of its reverse) is neither fitted nor given.
 
         Notes
         -----
@@ -180,6 +180,8 @@ class Fit:
         Prediction(ABA: 0.130 [0.112, 0.148], 0.244 [0.231, 0.257], 0.583 [0.571, 0.595] m/s)
         """
         row = parameter_key(types) if isinstance(types, str) else tuple(types)
+        if len(row) < 2:
+            raise ValueError(f"types = {shown(types)}; must name at least 2 balls")
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
         masses = self.shots.masses
         e, ratios = self._draws(row, masses)

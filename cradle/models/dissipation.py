@@ -144,13 +144,15 @@ class QuadraticDissipation:
         )
         refuse_where("masses", chain.masses, light, rule)
         speed = np.abs(v - v.mean()).max()
+        held = np.zeros(n - 1, dtype=bool)
 
         def closing(v: Vector) -> Vector:
             u = v[:-1] - v[1:]
-            # A rounding error of the speeds, or of the impulses over a light mass, is none.
+            # A reaction keeps the closing speed at 0.  A rounding error of the speeds, or of the
+            # impulses over a light mass, is none.
             ends = np.concatenate([[0.0], impulses, [0.0]])
             noise = 1e-14 * speed + 1e-15 * (ends[:-1] + ends[1:]) / m
-            return np.where(np.abs(u) <= np.maximum(noise[:-1], noise[1:]), 0.0, u)
+            return np.where(held | (np.abs(u) <= np.maximum(noise[:-1], noise[1:])), 0.0, u)
 
         problems = 0
         while (closing(v) > 0.0).any() and problems < self.max_problems:
@@ -158,7 +160,8 @@ class QuadraticDissipation:
             u = closing(v)
             stretch = np.cumsum(u < 0.0)
             active = (u >= 0.0) & np.isin(stretch, stretch[u > 0.0])
-            passed = np.where(active, _impulses(m, u, active, np.append(kappa, self.distance)), 0.0)
+            passed, reactions = _impulses(m, u, active, np.append(kappa, self.distance))
+            passed, held = np.where(active, passed, 0.0), np.where(active, reactions > 0.0, held)
             after = v + np.diff(np.concatenate([[0.0], -passed, [0.0]])) / m
             impulses = impulses + passed
             absorbed += passed * 0.5 * (u + closing(after))
@@ -199,8 +202,10 @@ class QuadraticDissipation:
         return row_of("coefficients", self.coefficients, len(chain) - 1, len(chain))
 
 
-def _impulses(m: Vector, u: Vector, active: NDArray[np.bool_], kappa: Vector) -> Vector:
-    """Return the impulses of one problem, passing through each contact.
+def _impulses(
+    m: Vector, u: Vector, active: NDArray[np.bool_], kappa: Vector
+) -> tuple[Vector, Vector]:
+    """Return the impulses of one problem, passing through each contact, and the reactions in them.
 
     u holds closing speeds; kappa those of the contacts, then of the outer balls.
     """
@@ -216,18 +221,25 @@ def _impulses(m: Vector, u: Vector, active: NDArray[np.bool_], kappa: Vector) ->
     size = np.linalg.norm(rows, axis=1)  # mu^(-1/2)
     rows /= size[:, None]
     before = np.append(u, u.sum()) / size
-    # Nothing absorbs at an open contact; a kappa far below rounding is none.
-    soft = 0.5 / np.maximum(np.append(active, active.all()) * kappa, 1e-30)
+    # Nothing absorbs at an open contact.
+    kappa = np.append(active, active.all()) * kappa
+    part, rest = kappa / (1.0 + kappa), 1.0 / (1.0 + kappa)
     gram = rows @ rows.T
-    # (1 / 2 kappa + G / 2) q = u- - G r / 2, so that u+ = free - S r, with reactions r >= 0 of the
-    # contacts.  Written so that nothing cancels for a large kappa.
-    inverse = np.linalg.inv(np.diag(soft) + 0.5 * gram)
-    free = (soft[:, None] * inverse - 0.5 * gram @ inverse) @ before
-    response = gram @ inverse * soft
+    # q = kappa (u- + u+) with u+ = u- - G (q + r), so q = P (2 u- - G r) and u+ = free - S r, with
+    # P = (1 / kappa + G)^-1, S = G - G P G and reactions r >= 0 of the contacts.
+    root = np.sqrt(part)
+    inverse = np.linalg.inv(np.diag(rest) + root[:, None] * gram * root)
+    soft = root[:, None] * inverse * root
+    # 1 - G P, written so that nothing cancels for a large kappa.
+    kept = np.eye(n) - gram @ soft
+    stiff = kappa > 1.0
+    kept[stiff] = (rest[:, None] * inverse * root)[stiff] / root[stiff, None]
+    free = (kept - gram @ soft) @ before
     # u+ <= 0, r >= 0, r u+ = 0: non-negative least squares with S = L L'.
     at = np.flatnonzero(active)
+    response = kept @ gram
     lower = np.linalg.cholesky(0.5 * (response + response.T)[np.ix_(at, at)])
     reactions = np.zeros(n)
     reactions[at], _ = nnls(lower.T, solve_triangular(lower, free[at], lower=True))
-    impulses = (inverse @ (before - 0.5 * gram @ reactions) + reactions) / size
-    return np.asarray(impulses[:-1] + impulses[-1])
+    impulses = (2.0 * soft @ before + reactions @ kept) / size
+    return impulses[:-1] + impulses[-1], reactions[:-1]
