@@ -57,7 +57,8 @@ def responses(shots: ShotSet, points: Points, uncertain: Sequence[tuple[Key, flo
     Responses
     """
     moving = np.flatnonzero((shots.before != 0).any(axis=0))
-    single = moving.size == 1 and (shots.before[:, moving[0]] > 0).all()
+    at_rest_exactly = not np.delete(shots.sigma_before, moving, axis=1).any()
+    single = moving.size == 1 and (shots.before[:, moving[0]] > 0).all() and at_rest_exactly
     if single:
         before = np.zeros((1, 1, shots.masses.size))
         before[..., moving] = 1.0
