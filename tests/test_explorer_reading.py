@@ -296,6 +296,7 @@ def test_keys_of_a_lecture_after_the_mouse(visit, selector: str, way: int):
         tab.keyboard.press(key)
         assert tab.evaluate(STATE)[1:] == done, key
         assert tab.evaluate(SETTING) == {name: before[name] for name in tab.evaluate(SETTING)}
+        assert tab.evaluate("document.activeElement === document.body")  # and none looks chosen
     assert tab.evaluate(FULL)
 
 
