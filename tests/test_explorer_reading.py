@@ -206,6 +206,171 @@ def test_full_screen_for_a_lecture(visit):
     assert min(letters) > 0.016  # of the wall's height
 
 
+# The scene, or none for a setting of one's own; whether the balls are let go; whether they
+# have been under way.
+STATE = (
+    f"""(({{ view, clock }}) => [view.scene, clock.playing, clock.time > 0])({EXPLORER}.state)"""
+)
+FULL = "document.fullscreenElement !== null"
+# What keys do in the second scene, from which one can walk both ways.
+WALKS = {"ArrowRight": "small", "ArrowLeft": "one", "PageDown": "small", "PageUp": "one"}
+
+
+def full_screen(visit):
+    """Go to full screen with the mouse; time stands still."""
+    tab = still(visit, width=1366, height=768, stopped=True)
+    later(tab, 50)
+    press(tab, "Full screen")
+    tab.wait_for_function(FULL)
+    return tab
+
+
+def take(tab, scene: str):
+    tab.evaluate(f"{EXPLORER}.state.take('{scene}'), {EXPLORER}.changed()")
+    return later(tab, 50)
+
+
+def touch(tab, selector: str, way: int = 0):
+    """Press the mouse on an element, move it to the side, and let it go."""
+    x, y = middle(tab, selector)
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + way, y, steps=4)
+    tab.mouse.up()
+    return later(tab, 50)
+
+
+def tab_to(tab, name: str):
+    """Press Tab until the element of this name has the focus."""
+    focused = (
+        "document.activeElement.getAttribute('aria-label') ?? document.activeElement.innerText"
+    )
+    for _ in range(60):
+        tab.keyboard.press("Tab")
+        if tab.evaluate(focused) == name:
+            return
+    pytest.fail(f"Tab does not reach {name}")
+
+
+def test_space_after_a_click_on_full_screen(visit):
+    """It lets the balls go: the button does not keep the keys, unless one comes to it with Tab."""
+    tab = full_screen(visit)
+    assert tab.evaluate("document.activeElement.matches('.cradle-explorer')")  # for Enter, too
+    tab.keyboard.press("Space")
+    assert tab.evaluate(STATE) == ["one", True, False]
+    later(tab, 50)
+    assert tab.evaluate(FULL)
+    assert tab.inner_text(".full") == "Leave full screen"
+    for key in ("Space", "Enter"):
+        tab_to(tab, "Leave full screen")
+        for full in (False, True):
+            before = tab.evaluate(STATE)
+            tab.keyboard.press(key)
+            assert tab.evaluate(STATE) == before
+            tab.wait_for_function(f"({FULL}) === {str(full).lower()}")
+            later(tab, 50)
+
+
+@pytest.mark.parametrize(
+    ("selector", "way"),
+    [
+        (".ball[data-ball='0'] .disc", -30),
+        (".ball[data-ball='4'] .disc", 0),
+        (".run button:has-text('Slow motion')", 0),
+        (".settings label[title='ball 2']", 0),
+        (".settings input[type=range] >> nth=1", 20),
+        (".pictures label:has-text('All ratios')", 0),
+    ],
+)
+def test_keys_of_a_lecture_after_the_mouse(visit, selector: str, way: int):
+    """In full screen what the mouse has pressed leaves the keys to the lecture."""
+    tab = full_screen(visit)
+    for key, scene in WALKS.items():
+        take(tab, "two")
+        touch(tab, selector, way)
+        tab.keyboard.press(key)
+        assert tab.evaluate(STATE) == [scene, False, False], key
+    for key, done in ((".", [False, True]), ("Space", [True, False])):
+        take(tab, "two")
+        before = touch(tab, selector, way)
+        tab.keyboard.press(key)
+        assert tab.evaluate(STATE)[1:] == done, key
+        assert tab.evaluate(SETTING) == {name: before[name] for name in tab.evaluate(SETTING)}
+        assert tab.evaluate("document.activeElement === document.body")  # and none looks chosen
+    assert tab.evaluate(FULL)
+
+
+def test_keys_of_a_lecture_after_tab(visit):
+    """In full screen a ball that Tab has reached keeps the arrows, and a button the space bar."""
+    tab = full_screen(visit)
+    take(tab, "two")
+    touch(tab, ".ball[data-ball='4'] .disc", 30)
+    take(tab, "two")
+    tab_to(tab, "pull of ball 1")
+    tab.keyboard.press("ArrowLeft")
+    assert later(tab, 50)["speeds"] == [1.1, 1, 0, 0, 0]
+    tab.keyboard.press("ArrowRight")
+    assert later(tab, 50)["speeds"] == [1, 1, 0, 0, 0]
+    reach = "getComputedStyle(document.activeElement.querySelector('.reach')).strokeWidth"
+    assert tab.evaluate(reach) == "3px"
+    for key, done in ((".", ["two", False, True]), ("PageUp", ["one", False, False]),
+                      ("PageDown", ["two", False, False]), ("Space", ["two", True, False]),
+                      ("Space", ["two", False, False])):  # fmt: skip
+        tab.keyboard.press(key)
+        assert tab.evaluate(STATE) == done, key
+    tab_to(tab, "Next hit")
+    tab.keyboard.press("Space")
+    assert tab.evaluate(STATE) == ["two", False, True]
+    tab.keyboard.press("ArrowLeft")
+    assert tab.evaluate(STATE) == ["one", False, False]
+
+
+def test_keys_of_a_lecture_on_the_page(visit):
+    """They work after a click into the cradle; page keys scroll, and a ball keeps the arrows."""
+    tab = still(visit, stopped=True)
+    take(tab, "two")
+    tab.keyboard.press("ArrowRight")
+    assert tab.evaluate(STATE) == ["two", False, False]
+    tab.click(".words")
+    for key, scene in (("ArrowRight", "small"), ("ArrowLeft", "two")):
+        tab.keyboard.press(key)
+        assert tab.evaluate(STATE) == [scene, False, False], key
+    later(tab, 50)
+    touch(tab, ".ball[data-ball='4'] .disc")
+    for key, done in ((".", [False, True]), ("Space", [True, True]), ("Space", [False, True])):
+        tab.keyboard.press(key)
+        assert tab.evaluate(STATE) == ["two", *done], key
+    tab.keyboard.press("ArrowRight")
+    assert later(tab, 50)["speeds"] == [0, 0, 0, 0, -0.1]  # of a swing the others hang at rest
+    take(tab, "two")
+    tab.evaluate("scrollTo({ top: 0, behavior: 'instant' })")
+    tab.keyboard.press("PageDown")
+    assert tab.evaluate(STATE) == ["two", False, False]
+    tab.wait_for_function("scrollY > 0")
+
+
+def test_a_box_keeps_the_keys_by_which_one_types(visit):
+    tab = full_screen(visit)
+    take(tab, "small")
+    box = tab.get_by_label("ratio, as a number", exact=True)
+    box.click()
+    for key in ("Control+a", "0", ".", "3", "ArrowLeft", "2", "Enter"):
+        tab.keyboard.press(key)
+    assert later(tab, 50)["forward"] == [0.23] * 3
+    assert tab.evaluate(STATE) == ["", False, False]
+
+
+def test_keys_of_a_lecture_after_the_list(visit):
+    """What a pointer has chosen from the list of scenes is let go by the space bar."""
+    tab = full_screen(visit)
+    chosen = tab.locator(".walk select")
+    chosen.dispatch_event("pointerdown")  # a true one opens a window that takes the keys of a test
+    chosen.focus()
+    chosen.select_option("half")
+    tab.keyboard.press("Space")
+    assert tab.evaluate(STATE) == ["half", True, False]
+
+
 # --- widths, modes, motion --------------------------------------------------------------------
 
 
@@ -383,6 +548,10 @@ def test_what_takes_too_long_is_said(visit):
     status = tab.evaluate(f"{EXPLORER}.state.swing.hit(0).status")
     assert status == "unfinished"
     assert "more than 4000 events" in tab.inner_text(".words")
+    limits = tab.inner_text("p:has-text('The limits.')")
+    assert "more than 4000 events" in limits
+    lightest, heaviest = tab.evaluate("cradleExplorer.LIMITS.masses")
+    assert f"Masses go from {lightest} to {heaviest} kg" in limits
     assert tab.locator(".outcome rect").count() == 0  # no stale bars
     assert tab.locator(".pictures polyline").count() == 0
     press(tab, "Let go")

@@ -16,6 +16,12 @@
 
   const less = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
+  // Whether an element has a use of its own for a key.
+  const uses = (node, key) =>
+    node.matches("input, select, summary") ||
+    (key === " " && node.matches("button")) ||
+    (key.startsWith("Arrow") && node.matches(".ball, .point"));
+
   class Explorer {
     // A host without `data-parts` has a page of its own: all parts, the address, the wall.
     constructor(host) {
@@ -25,6 +31,7 @@
       this.parts = new Set((parts ?? ALL_PARTS).split(" "));
       this.state = new State({ scene, picture, playing: this.page && !less() });
       this.visible = true;
+      this.pointed = false; // whether a pointer has chosen what has the focus
       this.box = this.box.bind(this);
       this.build();
       if (this.page) this.readAddress();
@@ -60,6 +67,7 @@
       this.host.classList.add("live");
       this.host.setAttribute("role", "group");
       this.host.setAttribute("aria-label", "live cradle");
+      if (this.page) this.host.tabIndex = -1; // a click on it gives it the keys
       this.stage = new Stage(cradle, this.pulling());
       explorer.data.palette.forEach((colour, ball) => {
         // Black lines take the colour of the text, as in all figures of the book.
@@ -78,7 +86,8 @@
         redraw();
       }).observe(this.host);
       document.addEventListener("fullscreenchange", redraw);
-      document.addEventListener("keydown", (event) => this.key(event));
+      this.host.addEventListener("pointerdown", () => (this.pointed = true));
+      document.addEventListener("keydown", (event) => this.key(event), true);
       if (this.page) window.addEventListener("hashchange", () => this.readAddress());
     }
 
@@ -148,10 +157,11 @@
       };
     }
 
+    // The keys of a lecture. In full screen what a pointer has pressed leaves all of them to the
+    // lecture; what was reached with Tab, and what is found on the page, keeps its own.
     key(event) {
-      if (!this.full && !this.host.contains(event.target)) return;
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
-      if (event.target.closest?.("input, select, textarea, summary, .ball, .point")) return;
+      const { key, target } = event;
+      if (key === "Tab") this.pointed = false;
       const { state } = this;
       const act = {
         ArrowRight: () => state.walk(1),
@@ -160,11 +170,16 @@
         PageUp: () => state.walk(-1),
         " ": () => state.play(),
         ".": () => state.step(),
-      }[event.key];
+      }[key];
       if (!act || !this.panels.scenes) return;
-      if (event.key.startsWith("Page") && !this.full) return; // they scroll
-      if (event.key === " " && event.target.closest?.("button")) return; // it presses the button
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (!this.full && !this.host.contains(target)) return;
+      if (!this.full && key.startsWith("Page")) return; // they scroll
+      const freed = this.full && this.pointed && !target.matches("input[type=number]");
+      if (!freed && uses(target, key)) return;
+      if (freed) target.blur();
       event.preventDefault();
+      event.stopPropagation();
       act();
       this.changed();
     }
@@ -205,6 +220,7 @@
     }
 
     fullScreen() {
+      if (this.pointed) this.host.focus({ preventScroll: true });
       if (this.full) document.exitFullscreen();
       else this.host.requestFullscreen?.();
     }

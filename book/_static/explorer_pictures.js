@@ -172,7 +172,6 @@
       ];
       if (!way || !event.target.closest(".point")) return;
       event.preventDefault();
-      event.stopPropagation();
       const { right, left } = explorer.ratios(shown.setting);
       const step = event.shiftKey ? 0.01 : 0.1;
       act.masses(Math.max(right + step * way[0], 0.01), Math.max(left + step * way[1], 0.01));

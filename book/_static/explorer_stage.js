@@ -189,7 +189,6 @@
       const way = { ArrowLeft: 1, ArrowRight: -1 }[event.key];
       if (!group || !way) return;
       event.preventDefault();
-      event.stopPropagation(); // the same keys walk through the scenes
       this.on.grab();
       const present = +group.getAttribute("aria-valuenow");
       const step = event.shiftKey ? STEP : 2 * STEP;
