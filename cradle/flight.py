@@ -157,7 +157,8 @@ def _march(
             if min(slope, derivative) < 0.0:
                 break
             step = max(step, (order + 1) * derivative / (bounds[order - 1] * left))
-        time += step
+        # Next to the root a step can be too small for the last digit of the time.
+        time = max(time + step, math.nextafter(time, math.inf))
     raise RuntimeError(f"no end of the search for a meeting after {_MOST_STEPS} steps")
 
 

@@ -2,9 +2,9 @@
 
 The rules, in the order in which `swing` applies them at every event:
 
-1. *Touching.* Those contacts touch whose gap is below `TIE` of the swing's size.  Each stretch of
-   touching contacts with one that approaches faster than `RESTING` of the swing's speed is a chain
-   of its own, solved by `collide`.
+1. *Touching.* Those contacts touch that close at this instant (within `TIE`), and those whose gap
+   is no more than a rounding error (`NEAR`).  Each stretch of touching contacts with one that
+   approaches faster than `RESTING` of the swing's speed is a chain of its own, solved by `collide`.
 2. *Resting.* Touching balls whose relative speed is then below `RESTING` of the swing's speed take
    their common velocity: from now on they touch and move together.  Without this rule balls that
    are pressed against each other would collide for ever, ever more softly, in a finite time.
@@ -25,6 +25,8 @@ from cradle.checks import Vector
 
 #: Speeds below this part of the swing's speed are none: they carry 1e-20 of its energy.
 RESTING = 1e-10
+#: Gaps below this part of the swing's size are none.
+NEAR = 1e-12
 
 
 def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:

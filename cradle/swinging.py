@@ -16,7 +16,7 @@ from cradle.checks import Vector, checked, must_be, one_number, refuse_where, sh
 from cradle.flight import TIE, Flight, FullFlight, SmallAngleFlight, State
 from cradle.models import Model, collide
 from cradle.pendulums import Pendulums
-from cradle.resting import RESTING, common_velocities, pressed, stretches
+from cradle.resting import NEAR, RESTING, common_velocities, pressed, stretches
 from cradle.swing_trace import Impact, Swing
 from cradle.trace import Trace
 
@@ -149,7 +149,7 @@ class _Run:
         self.together, self.parting = none, none
         self.tie = TIE / float(self.frequency.max())  # events nearer than this are one, s
         self.freed = np.full(n - 1, -np.inf)  # when the force in each contact last fell to zero
-        self.settle(none)
+        self.settle(np.abs(distance) <= TIE * self.size, none)
 
     def present_energy(self) -> float:
         kinetic = 0.5 * float(self.chain.masses @ self.v**2)
@@ -178,9 +178,10 @@ class _Run:
             x, v = flight.at(np.array([meeting.time]))
             known = len(self.impacts)
             self.t, self.x, self.v = later, x[0], v[0]
-            releasing = np.zeros(len(self.gaps), dtype=bool)
+            closing, releasing = np.zeros((2, len(self.gaps)), dtype=bool)
+            closing[meeting.closing] = True
             releasing[meeting.releasing] = True
-            self.settle(releasing)
+            self.settle(closing, releasing)
             if self.t - instant > self.tie or len(self.impacts) > known:
                 instant, idle = self.t, 0
             idle += 1
@@ -199,10 +200,10 @@ class _Run:
         kind = SmallAngleFlight if self.pendulums.angle == "small" else FullFlight
         return kind(self.pendulums, state)
 
-    def settle(self, releasing: NDArray[np.bool_]) -> None:
+    def settle(self, closing: NDArray[np.bool_], releasing: NDArray[np.bool_]) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
         masses = self.chain.masses
-        touching = self.gaps + np.diff(self.x) <= TIE * self.size
+        touching = closing | (self.gaps + np.diff(self.x) <= NEAR * self.size)
         for first, last in stretches(touching):
             self.align(first, last)
         self.collide(touching)

@@ -350,3 +350,15 @@ def test_repr_is_the_caption():
     assert repr(QuadraticDissipation([1, 2], distance=3)) == (
         "QuadraticDissipation(coefficients=(1.0, 2.0), distance=3.0, max_problems=10000)"
     )
+
+
+def test_a_row_that_moves_fast_as_a_whole_ends():
+    """Closing speeds are known no better than the velocities that they are differences of."""
+    m = [2.667898041887937, 0.1513775675083485, 2.985023514304723]
+    v = [-0.028269191764867287, -0.028561050917407852, -0.02836761474957303]
+    e = [0.1829277623249298, 0.9893257365314005]
+    after = collide(Chain(m, v, e), QuadraticDissipation()).velocities
+    # The same row, seen by somebody who moves along with its first ball.
+    seen = collide(Chain(m, np.subtract(v, v[0]), e), QuadraticDissipation()).velocities
+    np.testing.assert_allclose(after, seen + v[0], rtol=0, atol=1e-15)
+    assert (np.diff(after) > -1e-16).all()

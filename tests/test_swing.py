@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 from truth import solve
 
@@ -524,6 +525,20 @@ def test_first_fall_after_a_tiny_step_up():
     # Pull to zero: f'' = -1 with f = 0, f' = 1e-9 at the start.
     c1, c2 = complex(-1 / 3, -1e-9), complex(1 / 3, 0)
     assert first_fall(0.0, [(c1, a), (c2, b)], True, 1.0) == pytest.approx(2e-9, rel=1e-6)
+
+
+def test_a_root_between_two_times_next_to_each_other():
+    """The last step of the search is below the last digit of the time."""
+    terms = [
+        (-0.01448557016100738 + 0.02186895842441968j, 10.827079640119111j),
+        (0.018632421094327153 - 0.03978151421195931j, 5.726939861931363j),
+    ]
+    level = 0.0003635328839619234
+    root = first_fall(level, terms, False, 1.0)
+    assert root == pytest.approx(
+        brentq(lambda t: level + sum((c * np.exp(r * t)).real for c, r in terms), 0.4, 0.6),
+        abs=1e-11,
+    )
 
 
 def test_a_slow_rise_is_followed_in_few_steps(monkeypatch):

@@ -143,7 +143,7 @@ class QuadraticDissipation:
             "QuadraticDissipation"
         )
         refuse_where("masses", chain.masses, light, rule)
-        speed = np.abs(v - v.mean()).max()
+        rounding = 1e-14 * np.abs(v - v.mean()).max() + 4e-16 * np.abs(v).max()
         held = np.zeros(n - 1, dtype=bool)
 
         def closing(v: Vector) -> Vector:
@@ -151,7 +151,7 @@ class QuadraticDissipation:
             # A reaction keeps the closing speed at 0.  A rounding error of the speeds, or of the
             # impulses over a light mass, is none.
             ends = np.concatenate([[0.0], impulses, [0.0]])
-            noise = 1e-14 * speed + 1e-15 * (ends[:-1] + ends[1:]) / m
+            noise = rounding + 1e-15 * (ends[:-1] + ends[1:]) / m
             return np.where(held | (np.abs(u) <= np.maximum(noise[:-1], noise[1:])), 0.0, u)
 
         problems = 0
