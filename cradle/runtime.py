@@ -8,7 +8,9 @@ seconds, so small work runs plain until plain work has taken as long.
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
+import gc
 import hashlib
 import importlib.util
 import logging
@@ -17,6 +19,7 @@ import sys
 import tempfile
 import threading
 import warnings
+from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
@@ -37,6 +40,7 @@ logger = logging.getLogger("cradle")
 _spent = 0.0  # seconds of plain work so far, in this process
 _look = LOADS_AFTER  # seconds of plain work after which to look for compiled code on disk
 _deciding = threading.Lock()
+_compiling = threading.Lock()
 
 
 @functools.cache
@@ -180,6 +184,22 @@ def loaded() -> bool:
     """Tell whether compiled code has run in this process."""
     module = compiled() if compiled.cache_info().currsize else None
     return module is not None and bool(module.batch.overloads)
+
+
+@contextlib.contextmanager
+def few_collections() -> Iterator[None]:
+    """Look for garbage less often: while compiling, that would take a tenth of the time.
+
+    The compiler makes millions of objects that it needs to its end.
+    """
+    with _compiling:  # a second thread would take the changed thresholds for the usual ones
+        usual = gc.get_threshold()
+        if usual[0]:  # zero: it is switched off
+            gc.set_threshold(max(usual[0], 300_000), *usual[1:])
+        try:
+            yield
+        finally:
+            gc.set_threshold(*usual)
 
 
 def ready() -> bool:
