@@ -371,13 +371,31 @@ def test_the_order_of_shots_does_not_matter(order):
     assert found.degrees_of_freedom == 7
 
 
-def test_shots_from_both_ends_are_drawn():
-    shots = any_shots([[1, 0, 0], [0, 0, -0.5]], 0.003)
-    _, data = ratio(shots, {"AB": 0.6, "BC": 0.7}).plot("ABC")
+@pytest.mark.parametrize("name", ["ABC", "CBA"])
+@pytest.mark.parametrize("before", [[[1, 0, 0], [0, 0, -0.5]], [[0, 0, -1], [0, 0, -0.7]]])
+def test_shots_from_both_ends_are_drawn(name, before):
+    """Data and prediction, whichever of the two ratios is asked for."""
+    shots = any_shots(before, 0.003)
+    _, data = ratio(shots, {"AB": 0.6, "BC": 0.7}).plot(name)
     drawn = [bars.lines[0].get_xydata() for bars in data.containers]
+    speed = np.abs(before).max(axis=1)
+    after = shots["ABC"].after / speed[:, np.newaxis]
     for ball, points in enumerate(drawn):
-        share = shots["ABC"].after[:, ball] / [1, 0.5]
-        np.testing.assert_allclose(points, np.column_stack([[1, 0.5], share]), rtol=1e-15)
+        np.testing.assert_allclose(points, np.column_stack([speed, after[:, ball]]), rtol=1e-15)
+    # Exact data of the fitted parameters: a line for shots that begin alike, else a dash a shot.
+    lines = [line for line in data.lines if line.get_label() == "_predicted"]
+    predicted = np.transpose([line.get_ydata() for line in lines])
+    assert {line.get_marker() for line in lines} == {"_" if before[0][0] else "None"}
+    np.testing.assert_allclose(predicted, after, atol=1e-4)
+
+
+def test_prediction_of_two_moving_balls_is_drawn():
+    """Elastic equal balls exchange their velocities."""
+    table = columns("AA", [1.0] * 3, [-0.2, 1.0], 0.001)
+    table["before"] = [1.0, -0.2] * 3
+    _, data = restitution(read_shots(table)).plot("AA")
+    lines = [line.get_ydata() for line in data.lines if line.get_label() == "_predicted"]
+    np.testing.assert_allclose(lines, [[-0.2] * 2, [1.0] * 2], atol=1e-6)
 
 
 def test_errors_of_restitution_widen_the_interval():

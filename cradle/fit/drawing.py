@@ -8,9 +8,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
+from cradle.checks import Vector
 from cradle.figures import PALETTE, ball_style
 from cradle.fit.answers import Estimate
-from cradle.fit.parameters import pair_keys, triplet_keys
+from cradle.fit.parameters import pair_keys, ratio_keys
 from cradle.fit.result import Fit, predicted_points
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
@@ -53,7 +54,7 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
         _, axes = plt.subplots(2, 1, figsize=(5.6, 7), layout="constrained")
     draw_likelihood(estimate, axes[0])
     for one in fit.shots.sets:
-        keys = {*pair_keys(one.types)} if len(one.types) == 2 else {*triplet_keys(one.types)[0]}
+        keys = pair_keys(one.types) if len(one.types) == 2 else ratio_keys(one.types)
         if estimate.key in keys:
             _draw_data(fit, estimate, one, axes[1])
             break
@@ -99,15 +100,23 @@ def draw_likelihood(estimate: Estimate, ax: Axes) -> Axes:
 
 
 def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> Axes:
-    """Draw measured velocities over the striker's against the striker's, and what is predicted."""
+    """Draw measured velocities over the striker's against the striker's, and what is predicted.
+
+    Shots that begin alike are predicted by lines, others by a dash each.
+    """
     speed = np.abs(shots.before).max(axis=1)
-    predicted = _predicted(fit, estimate, shots)
+    begins = shots.before / speed[:, np.newaxis]
+    predicted = _predicted(fit, estimate, shots, begins)
+    alike = np.ptp(begins, axis=0).max() < 1e-9
     for k, kind in enumerate(shots.types):
         style = ball_style(k)
         ax.errorbar(speed, shots.after[:, k] / speed, shots.sigma[:, k] / speed, fmt="o", ms=4,
                     color=style["color"], label=f"ball {k + 1} ({kind})", capsize=2)  # fmt: skip
-        if predicted is not None:
-            ax.axhline(predicted[k], lw=1.5, **style)
+        if predicted is not None and alike:
+            ax.axhline(predicted[0, k], lw=1.5, label="_predicted", **style)
+        elif predicted is not None:
+            ax.plot(speed, predicted[:, k], "_", ms=14, mew=1.5, label="_predicted",
+                    color=style["color"])  # fmt: skip
     ax.set(xlabel="speed of the striker (m/s)", ylabel="velocity after / striker's speed",
            title=f"data of set {shots.name}")  # fmt: skip
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.08), ncols=len(shots.types),
@@ -115,17 +124,16 @@ def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> Axes:
     return ax
 
 
-def _predicted(fit: Fit, estimate: Estimate, shots: ShotSet) -> np.ndarray | None:
-    """Return the velocities that the best parameters give at unit speed of the first ball."""
-    unit = np.zeros((1, len(shots.types)))
-    unit[0, 0] = 1.0
-    if not (shots.before[:, 1:] == 0).all():
-        return None
+def _predicted(fit: Fit, estimate: Estimate, shots: ShotSet, begins: Vector) -> Vector | None:
+    """Return the velocities that the best parameters give after shots that begin so, (K, N)."""
     if estimate.kind == "restitution":
         if estimate.value is None:
             return None
         m1, m2 = shots.masses
-        total = m1 + m2
-        return np.array([(m1 - estimate.value * m2) / total, m1 * (1 + estimate.value) / total])
+        closing = begins[:, 0] - begins[:, 1]
+        impulse = (1.0 + estimate.value) * closing * (m1 * m2 / (m1 + m2))
+        return begins + np.outer(impulse, [-1.0 / m1, 1.0 / m2])
     points = predicted_points(fit, shots.types)
-    return None if points is None else points.outcomes(shots.types, shots.masses, unit)[0]
+    if points is None:
+        return None
+    return points.outcomes(shots.types, shots.masses, begins[:, np.newaxis])[:, 0]
