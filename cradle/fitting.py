@@ -56,10 +56,15 @@ def fit(
       cradle fit long.csv --without ABACA --predict ABACA
       cradle fit shots.csv --json --plot fit.png
     """
+    from cradle.checks import one_number
     from cradle.fit import read_shots
+    from cradle.fit.parameters import types_in_a_row
 
     if predict is not None and as_csv:
         raise click.UsageError("--csv prints the fitted values alone; with --predict give --json")
+    if predict is not None:  # what is wrong is said before the fit, not after it
+        types_in_a_row(predict)
+        one_number("speed", speed, "must be above 0", 0.0, open_low=True)
     given, known = options.pop("given"), options.pop("known")
     shots = read_shots(file, **options)
     there = {one.name for one in shots.sets}  # a name may have a comma

@@ -23,6 +23,7 @@ from cradle import (
     SpringChain,
     collide,
     drive,
+    fitting,
     paper_chain,
     recommend,
     runtime,
@@ -425,6 +426,15 @@ def test_errors_end_in_one_line_and_a_code(capsys, line, code, message):
     assert message in captured.err.replace("\n", " ")
     assert not captured.out
     assert "Traceback" not in captured.err
+
+
+@pytest.mark.parametrize("wrong", ["--predict A", "--predict ABA --speed 0"])
+@pytest.mark.usefixtures("folder")
+def test_a_wrong_prediction_is_refused_before_the_fit(monkeypatch, capsys, wrong):
+    monkeypatch.setattr(fitting, "_fits", lambda *_: pytest.fail("fitted all the same"))
+    with pytest.raises(SystemExit):
+        run(shlex.split(f"fit shots.csv {wrong}"))
+    assert "must " in capsys.readouterr().err
 
 
 def test_first_answer_within_a_second(tmp_path):

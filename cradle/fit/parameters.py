@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from cradle.checks import Vector
+from cradle.checks import Vector, shown
 from cradle.models.batch import post_impact_velocities
 
 #: A parameter: the types of two balls (restitution, in alphabetical order) or of three (ratio).
@@ -55,6 +55,34 @@ def parameter_key(name: str | Key) -> Key:
     if isinstance(name, tuple):
         return name
     return tuple(name.split("-")) if "-" in name else tuple(name)
+
+
+def types_in_a_row(types: str | Sequence[str]) -> tuple[str, ...]:
+    """Return the types of a row of balls, at least two.
+
+    Parameters
+    ----------
+    types : str or sequence of str, length N
+        In one string such as "ABA" or "steel-brass-steel".
+
+    Returns
+    -------
+    tuple of str, length N
+
+    Raises
+    ------
+    ValueError
+        If fewer than 2 balls are named.
+
+    Examples
+    --------
+    >>> types_in_a_row("ABA"), types_in_a_row("steel-brass")
+    (('A', 'B', 'A'), ('steel', 'brass'))
+    """
+    row = parameter_key(types) if isinstance(types, str) else tuple(types)
+    if len(row) < 2:
+        raise ValueError(f"types = {shown(types)}; must name at least 2 balls")
+    return row
 
 
 def pair_keys(types: Sequence[str]) -> list[Key]:

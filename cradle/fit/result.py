@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cradle.checks import Vector, one_number, shown
+from cradle.checks import Vector, one_number
 from cradle.fit.answers import Estimate, Group, Prediction
 from cradle.fit.parameters import (
     Key,
@@ -18,6 +18,7 @@ from cradle.fit.parameters import (
     pair_keys,
     parameter_key,
     triplet_keys,
+    types_in_a_row,
 )
 from cradle.fit.search import LEVEL
 from cradle.fit.shots import Shots
@@ -179,9 +180,7 @@ class Fit:
         >>> ratio(shots, restitution(shots)).predict("ABA")
         Prediction(ABA: 0.130 [0.112, 0.148], 0.244 [0.231, 0.257], 0.583 [0.571, 0.595] m/s)
         """
-        row = parameter_key(types) if isinstance(types, str) else tuple(types)
-        if len(row) < 2:
-            raise ValueError(f"types = {shown(types)}; must name at least 2 balls")
+        row = types_in_a_row(types)
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
         masses = self.shots.masses
         e, ratios = self._draws(row, masses)
