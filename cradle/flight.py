@@ -133,8 +133,9 @@ def _march(
 ) -> float:
     size = sum(abs(c) for c, _ in terms)
     decay = min(-rate.real for _, rate in terms)
-    speed, *bounds = (sum(abs(c) * abs(rate) ** n for c, rate in terms) for n in range(1, 5))
-    time = _first_step(terms, bounds, speed) if parting else 0.0
+    speed = sum(abs(c * rate) for c, rate in terms)
+    bounds = _Bounds(terms)
+    time = min(_first_step(terms, bounds), bounds.radian) if parting else 0.0
     for _ in range(_MOST_STEPS):
         left = math.exp(-decay * time)
         if time > horizon or size * left < level:
@@ -151,15 +152,49 @@ def _march(
         )
         if value <= noise and (slope < 0.0 or value < -noise):
             return time
-        step = _safe_step(max(value, noise), slope, bounds[0] * left)
+        second, *others = (left * bound for bound in bounds.after(time))
+        step = _safe_step(max(value, noise), slope, second)
         # Where it rises more and more, the next terms of Taylor's series carry further.
-        for order, derivative in enumerate(higher, start=2):
+        for order, (derivative, bound) in enumerate(zip(higher, others, strict=True), start=2):
             if min(slope, derivative) < 0.0:
                 break
-            step = max(step, (order + 1) * derivative / (bounds[order - 1] * left))
+            step = max(step, (order + 1) * derivative / bound)
         # Next to the root a step can be too small for the last digit of the time.
-        time = max(time + step, math.nextafter(time, math.inf))
+        time = max(time + min(step, bounds.radian), math.nextafter(time, math.inf))
     raise RuntimeError(f"no end of the search for a meeting after {_MOST_STEPS} steps")
+
+
+class _Bounds:
+    """Bounds on the derivatives of ``sum Re(C exp(rate t))``, without their decay.
+
+    Two bodies that swing nearly alike have nearly opposite C and nearly equal rates.  What is left
+    of them is ``(C + C') exp(rate t) + C' (exp(rate' t) - exp(rate t))``, and the last bracket is
+    at most ``abs(rate' - rate) t``.
+    """
+
+    def __init__(self, terms: Sequence[tuple[complex, complex]]) -> None:
+        orders = range(1, 5)
+        self.plain = [sum(abs(c) * abs(rate) ** n for c, rate in terms) for n in orders]
+        self.now, self.growth = self.plain, [0.0] * 4
+        #: What a step may not exceed.
+        self.radian = 1.0 / abs(terms[0][1])
+        if len(terms) == 2:
+            (one, rate), (other, near) = terms
+            self.now = [
+                abs(one + other) * abs(rate) ** n + abs(other) * abs(near**n - rate**n)
+                for n in orders
+            ]
+            self.growth = [abs(other) * abs(rate) ** n * abs(near - rate) for n in orders]
+
+    def after(self, time: float) -> list[float]:
+        """Return bounds on derivatives 2 to 4 from `time` on, for a radian."""
+        until = time + self.radian
+        return [
+            min(plain, now + growth * until)
+            for plain, now, growth in zip(
+                self.plain[1:], self.now[1:], self.growth[1:], strict=True
+            )
+        ]
 
 
 def _safe_step(value: float, slope: float, bound: float) -> float:
@@ -168,17 +203,15 @@ def _safe_step(value: float, slope: float, bound: float) -> float:
     return (root + slope) / bound if slope > 0.0 else 2.0 * value / (root - slope)
 
 
-def _first_step(
-    terms: Sequence[tuple[complex, complex]], bounds: Sequence[float], speed: float
-) -> float:
+def _first_step(terms: Sequence[tuple[complex, complex]], bounds: _Bounds) -> float:
     """Return a step that passes no root, for a function that rises from exactly zero.
 
     If its first derivative that is not zero is the n-th, d, and the next one is at most K, the
     function stays above d h^n / n! - K h^(n+1) / (n+1)!, so up to h = (n + 1) d / K.
     """
-    for order, bound in enumerate(bounds, start=1):
+    for order, bound in enumerate(bounds.after(0.0), start=1):
         derivative = sum((c * rate**order).real for c, rate in terms)
-        if derivative > _ROUNDING * (bounds[order - 2] if order > 1 else speed):
+        if derivative > _ROUNDING * bounds.plain[order - 1]:
             return (order + 1) * derivative / bound
     return TIE / max(abs(rate) for _, rate in terms)
 

@@ -17,6 +17,7 @@ from cradle.flight import TIE, Flight, FullFlight, SmallAngleFlight, State
 from cradle.models import Model, collide
 from cradle.pendulums import Pendulums
 from cradle.resting import NEAR, RESTING, common_velocities, pressed, stretches
+from cradle.swing_check import Account
 from cradle.swing_trace import Impact, Swing
 from cradle.trace import Trace
 
@@ -74,7 +75,9 @@ def swing(
     ImpactNotFinished
         If an impact takes more steps than the model allows.
     RuntimeError
-        If contacts open and close again and again at one instant, so that the run cannot go on.
+        If contacts open and close again and again at one instant, so that the run cannot go on; or
+        if balls would pass each other, or energy or momentum come from nothing or be lost: every
+        flight and every instant is checked.
 
     Examples
     --------
@@ -134,11 +137,13 @@ class _Run:
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
         self.gaps = pendulums.row("gaps", n - 1)
         self.frequency = pendulums.natural_frequency(n)
-        self.released = self.present_energy()
+        self.account = Account(chain.masses, self.gaps, pendulums, 0.0)
+        self.released = float(self.account.energies(self.x, self.v))
         self.speed = float(np.sqrt(2.0 * self.released / chain.masses.sum()))
         self.impacts: list[Impact] = []
         self.series: list[tuple[Vector, Vector]] = []
         self.size = max(float(np.abs(x).max()), self.speed / float(self.frequency.min()))
+        self.account.size = self.size
         distance = self.gaps + np.diff(x)
         if (distance < -TIE * self.size).any():
             c = int(np.argmin(distance))
@@ -151,10 +156,6 @@ class _Run:
         self.freed = np.full(n - 1, -np.inf)  # when the force in each contact last fell to zero
         self.settle(np.abs(distance) <= TIE * self.size, none)
 
-    def present_energy(self) -> float:
-        kinetic = 0.5 * float(self.chain.masses @ self.v**2)
-        return kinetic + float(self.pendulums.potential_energy(self.chain.masses, self.x))
-
     def to_the_end(self, times: Vector, most: int, least: float) -> str:
         """Fly from event to event; return why the run ended."""
         done, end = 0, float(times[-1])
@@ -163,19 +164,19 @@ class _Run:
             if len(self.impacts) >= most:
                 ended = "impacts"
                 break
-            if self.released and self.present_energy() < least * self.released:
+            if self.released and self.account.energy < least * self.released:
                 ended = "energy"
                 break
             flight = self.flight()
             meeting = flight.next_meeting(end - self.t)
             later = self.t + meeting.time
             here = int(np.searchsorted(times, later, side="left"))
-            self.series.append(flight.at(times[done:here] - self.t))
+            self.series.append(self.fly(flight, times[done:here] - self.t))
             done = here
             if later > end:
                 self.t = end
                 return "times"
-            x, v = flight.at(np.array([meeting.time]))
+            x, v = self.fly(flight, np.array([meeting.time]))
             known = len(self.impacts)
             self.t, self.x, self.v = later, x[0], v[0]
             closing, releasing = np.zeros((2, len(self.gaps)), dtype=bool)
@@ -200,17 +201,25 @@ class _Run:
         kind = SmallAngleFlight if self.pendulums.angle == "small" else FullFlight
         return kind(self.pendulums, state)
 
+    def fly(self, flight: Flight, times: Vector) -> tuple[Vector, Vector]:
+        x, v = flight.at(times)
+        self.account.fly(self.t, times, x, v)
+        return x, v
+
     def settle(self, closing: NDArray[np.bool_], releasing: NDArray[np.bool_]) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
         masses = self.chain.masses
         touching = closing | (self.gaps + np.diff(self.x) <= NEAR * self.size)
+        places, velocities = [self.x.copy()], [self.v.copy()]
         for first, last in stretches(touching):
             self.align(first, last)
         self.collide(touching)
+        velocities.append(self.v)
         # What opens at this instant rests no more in it, whatever else happens.
         self.freed[releasing] = self.t
         kept = touching & (self.t - self.freed > self.tie)
         self.v, resting = common_velocities(masses, self.v, kept, RESTING * self.speed)
+        self.account.settle(self.t, np.array([*places, self.x]), np.array([*velocities, self.v]))
         alone = self.pendulums.accelerations(self.x, self.v)
         rounding = 1e-12 * self.speed * float(self.frequency.max())
         self.together = pressed(masses, alone, resting, rounding)

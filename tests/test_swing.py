@@ -20,6 +20,7 @@ from cradle import (
     SpringChain,
     flight,
     swing,
+    swinging,
     textbook,
 )
 from cradle.flight import FullFlight, Meeting, SmallAngleFlight, first_fall
@@ -559,6 +560,37 @@ def test_a_slow_rise_is_followed_in_few_steps(monkeypatch):
     assert value(np.linspace(1e-3, root - 1e-6, 20001)).min() > 0
 
 
+@pytest.mark.parametrize("difference", [1e-2, 1e-6, 1e-10, 1e-12])
+@pytest.mark.parametrize("begin", [0.0, 1.0])
+def test_periods_that_hardly_differ_are_followed_in_few_steps(monkeypatch, begin, difference):
+    """cos t - cos(w t) = 2 sin((w + 1) t / 2) sin((w - 1) t / 2), first zero 2 pi / (w + 1)."""
+    w = 1.0 + difference
+    terms = [(1 + 0j, 1j), (-1 + 0j, w * 1j)]
+    if begin:
+        terms = [(c * np.exp(rate * begin), rate) for c, rate in terms]
+    looked = []
+    after = flight._Bounds.after
+    monkeypatch.setattr(flight._Bounds, "after", lambda *a: looked.append(a) or after(*a))
+    root = first_fall(0.0, terms, not begin, 1e5)
+    # Values are known to the rounding of their terms.
+    assert begin + root == pytest.approx(2 * np.pi / (w + 1), abs=1e-12 + 3e-15 / difference)
+    assert len(looked) < 100
+
+
+def test_bodies_whose_periods_differ_by_rounding():
+    """Lengths 12, 12, 15, 10 as one body swing like 12 alone, but for the last digit."""
+    run = swing(
+        Chain([1, 1, 1, 1, 0.5, 0.5], [-5e-6, -5e-6, 5e-6, 5e-6, -5e-6, 0],
+              [0.903096997790845, 0.5413840171222394, 0.01415760983467218, 0.1682179539137848,
+               0.9091342920361836]),
+        ImpulseCorrelation(0.1, excess="saturate"),
+        [-8.879757196714637e-07, -8.747119221197388e-07, -6.101770535442485e-07,
+         -5.839284452524474e-07, -1.2872856406189447e-07, 1.6491342754953653e-07],
+        np.linspace(0, 6, 40), pendulums=Pendulums([0.12, 0.12, 0.15, 0.1, 0.1, 0.12]),
+    )  # fmt: skip
+    assert run.ended == "times"
+
+
 def test_a_root_that_rounding_hides_is_not_passed():
     """cos 2t - cos t falls at once; at the start its value and slope are rounding errors."""
     terms = [(1 + 5e-18j, 2j), (-(1 - 1.11e-16) + 0j, 1j)]
@@ -571,6 +603,58 @@ def test_grazing_is_no_endless_loop():
     run = swing(balls(2), ImpulseCorrelation(0), [-0.02, 0], [20.0], pendulums=pendulums)
     assert len(run.impacts) <= 4
     assert run.energy[-1] == pytest.approx(run.energy[0], rel=1e-12)
+
+
+# The check of every flight and every instant
+
+
+def unsound(match, **options):
+    with pytest.raises(RuntimeError, match=f"not certified: at t = .* {match}"):
+        swing(balls(3), ImpulseCorrelation(0.2), [-0.02, 0, 0], [0.1, 1.0], **options)
+
+
+def test_balls_that_would_pass_each_other_are_refused(monkeypatch):
+    monkeypatch.setattr(SmallAngleFlight, "next_meeting", lambda *_: Meeting(math.inf, [], []))
+    unsound(r"balls overlap by 0\.0")
+
+
+@pytest.mark.parametrize(("kind", "angle"), [(SmallAngleFlight, "small"), (FullFlight, "full")])
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+def test_energy_that_a_flight_makes_is_refused(monkeypatch, kind, angle, damping):
+    fly = kind.at
+
+    def faster(self, times):
+        x, v = fly(self, times)
+        return x, v * (1.0 + 3e-10 + 0.2 * damping)
+
+    monkeypatch.setattr(kind, "at", faster)
+    hanging = Pendulums(angle=angle, damping=damping)
+    unsound("a flight has made or lost", pendulums=hanging)
+
+
+def test_energy_that_a_flight_loses_is_refused(monkeypatch):
+    fly = SmallAngleFlight.at
+
+    def slower(self, times):
+        x, v = fly(self, times)
+        return x, v * (1.0 - 3e-10)
+
+    monkeypatch.setattr(SmallAngleFlight, "at", slower)
+    unsound("a flight has made or lost -")
+
+
+def test_momentum_that_an_instant_makes_is_refused(monkeypatch):
+    join = swinging.common_velocities
+    monkeypatch.setattr(
+        swinging, "common_velocities", lambda m, v, *a: join(m, v * (1.0 + 1e-9), *a)
+    )
+    unsound("impacts have made or lost")
+
+
+def test_energy_that_an_instant_loses_beside_its_impacts_is_refused(monkeypatch):
+    """Balls that part slowly are taken for resting: momentum is kept, energy is not."""
+    monkeypatch.setattr(swinging, "RESTING", 0.8)
+    unsound("J are made or lost beside the impacts")
 
 
 # Ends and errors
