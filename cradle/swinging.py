@@ -137,7 +137,8 @@ class _Run:
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
         self.gaps = pendulums.row("gaps", n - 1)
         self.frequency = pendulums.natural_frequency(n)
-        self.account = Account(chain.masses, self.gaps, pendulums, 0.0)
+        fastest = float(self.frequency.max())
+        self.account = Account(chain.masses, self.gaps, pendulums, fastest, 0.0)
         self.released = float(self.account.energies(self.x, self.v))
         self.speed = float(np.sqrt(2.0 * self.released / chain.masses.sum()))
         self.impacts: list[Impact] = []
@@ -152,7 +153,7 @@ class _Run:
             )
         none = np.zeros(n - 1, dtype=bool)
         self.together, self.parting = none, none
-        self.tie = TIE / float(self.frequency.max())  # events nearer than this are one, s
+        self.tie = TIE / fastest  # events nearer than this are one, s
         self.freed = np.full(n - 1, -np.inf)  # when the force in each contact last fell to zero
         self.settle(np.abs(distance) <= TIE * self.size, none)
 
