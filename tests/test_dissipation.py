@@ -362,3 +362,14 @@ def test_a_row_that_moves_fast_as_a_whole_ends():
     seen = collide(Chain(m, np.subtract(v, v[0]), e), QuadraticDissipation()).velocities
     np.testing.assert_allclose(after, seen + v[0], rtol=0, atol=1e-15)
     assert (np.diff(after) > -1e-16).all()
+
+
+def test_heavy_balls_come_to_rest_by_impulses_below_their_last_digit():
+    """A light ball between two heavy ones chatters until all three have one velocity."""
+    m = [0.5, 0.01, 2.0]
+    v = [0.01602603859008885, 0.01562735139806692, 0.015915201918699724]
+    chain = Chain(m, v, [0.8324974858123636, 0.5648333423146973])
+    trace = collide(chain, QuadraticDissipation())
+    common = sum(map(Fraction, np.multiply(m, v))) / sum(map(Fraction, m))
+    np.testing.assert_allclose(trace.velocities, float(common), rtol=2e-15)
+    assert len(trace.events) < 1000

@@ -162,8 +162,9 @@ class QuadraticDissipation:
             active = (u >= 0.0) & np.isin(stretch, stretch[u > 0.0])
             passed, reactions = _impulses(m, u, active, np.append(kappa, self.distance))
             passed, held = np.where(active, passed, 0.0), np.where(active, reactions > 0.0, held)
-            after = v + np.diff(np.concatenate([[0.0], -passed, [0.0]])) / m
             impulses = impulses + passed
+            # From all impulses: one alone may be below the last digit of a heavy ball's velocity.
+            after = chain.velocities - np.diff(impulses, prepend=0.0, append=0.0) / m
             absorbed += passed * 0.5 * (u + closing(after))
             v = after
             contacts = np.flatnonzero(active).tolist()
