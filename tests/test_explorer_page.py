@@ -328,8 +328,9 @@ def test_typed_values_out_of_range_are_refused(visit):
 
 def test_number_material_and_sweep(visit):
     tab = still(visit, "#scene=small")
-    tab.click("fieldset:has-text('number of balls') label:has-text('3')")
-    tab.click("fieldset:has-text('material') label:has-text('D')")
+    for group, name in (("number of balls", "3"), ("material", "D")):
+        row = tab.get_by_role("radiogroup", name=group, exact=True)
+        row.locator("label", has_text=name).click()
     setting = drawn(tab)
     assert setting["letters"] == "DDD"
     assert setting["masses"] == [0.166] * 3
@@ -345,3 +346,30 @@ def test_number_material_and_sweep(visit):
     moved = drawn(tab)
     assert moved["forward"] == moved["backward"] != setting["forward"]
     assert same_outcome(moved)
+
+
+def test_keys_that_come_within_one_frame_count_each(visit):
+    """A browser may pass on several before it draws; no step is lost."""
+    twice = """(node) => {
+      for (let k = 0; k < 2; k += 1)
+        node.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true }));
+    }"""
+    tab = still(visit, "#scene=small")
+    tab.locator(".ball[data-ball='4']").evaluate(twice)
+    assert drawn(tab)["speeds"] == [1, 0, 0, 0, -0.2]
+    go_to(tab, "scene=map")
+    before = drawn(tab)["masses"]
+    assert before == [1, 1, 1]
+    tab.locator(".point").evaluate(twice)
+    assert drawn(tab)["masses"] == [1, 1, pytest.approx(1 / 1.2, rel=1e-3)]
+
+
+def test_a_browser_that_does_not_allow_copying(visit):
+    """A page that came over plain HTTP has no clipboard."""
+    tab = still(visit)
+    tab.evaluate("Object.defineProperty(navigator, 'clipboard', { value: undefined })")
+    for name in ("Copy Python", "Copy link"):
+        press(tab, name)
+        tab.wait_for_function("document.querySelector('.told').textContent")
+        assert tab.inner_text(".told").startswith("The browser does not allow copying")
+        tab.evaluate("document.querySelector('.told').textContent = ''")

@@ -127,12 +127,17 @@
           explorer.withRatio(old, inner, ratio, directions),
         ),
         masses: setting(explorer.withRatios),
+        moveMasses: setting(explorer.movedRatios),
         address: () => `${location.href.split("#")[0]}#${state.fragment()}`,
-        copy: (text) =>
-          navigator.clipboard.writeText(text).then(
-            () => true,
-            () => false,
-          ),
+        // A page that came over plain HTTP has no clipboard.
+        copy: async (text) => {
+          try {
+            await navigator.clipboard.writeText(text);
+            return true;
+          } catch {
+            return false;
+          }
+        },
       };
     }
 
@@ -145,6 +150,7 @@
           const held = state.clock.time <= 0;
           before = held ? state.setting : explorer.atRest(state.setting);
         },
+        speed: (ball) => state.setting.speeds[ball],
         pull: (ball, speed) => {
           state.set(explorer.pulled(before, ball, speed));
           state.clock.time = 0;

@@ -92,8 +92,13 @@
   // One of several, as a row of radio buttons that look like a switch.
   function choice({ words, options, choose, hidden = false }) {
     const name = `explorer-${(names += 1)}`;
-    const legend = make("legend", { class: hidden ? "unseen" : "" }, words);
-    const node = make("fieldset", { class: "choice" }, legend);
+    // No fieldset: engines do not agree where its legend goes in a row.
+    const legend = make("span", { class: hidden ? "unseen" : "legend", id: `${name}-legend` }, words);
+    const node = make(
+      "div",
+      { class: "choice", role: "radiogroup", "aria-labelledby": legend.id },
+      legend,
+    );
     let inputs = [];
     function offer(list) {
       inputs.forEach(({ label }) => label.remove());

@@ -146,6 +146,12 @@
     return explorer.withMass(changed, [2], mass(setting.masses[1] / right));
   }
 
+  // Their mass ratios changed by so much.
+  function movedRatios(setting, right, left) {
+    const at = ratios(setting);
+    return withRatios(setting, Math.max(at.right + right, 0.01), Math.max(at.left + left, 0.01));
+  }
+
   // The pixels that a canvas makes of colours: of each but the last, and of it with the last on it.
   function shades(pen, fills) {
     const shade = fills.length - 1;
@@ -231,5 +237,13 @@
     }
   }
 
-  Object.assign(explorer, { LARGEST, RegionMap, Sweep, presentRatio, ratios, withRatios });
+  Object.assign(explorer, {
+    LARGEST,
+    RegionMap,
+    Sweep,
+    movedRatios,
+    presentRatio,
+    ratios,
+    withRatios,
+  });
 })(globalThis.cradleExplorer);

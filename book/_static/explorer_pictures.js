@@ -172,11 +172,9 @@
       ];
       if (!way || !event.target.closest(".point")) return;
       event.preventDefault();
-      const { right, left } = explorer.ratios(shown.setting);
       const step = event.shiftKey ? 0.01 : 0.1;
-      act.masses(Math.max(right + step * way[0], 0.01), Math.max(left + step * way[1], 0.01));
+      act.moveMasses(step * way[0], step * way[1]);
     });
-    let shown = null;
     function paint() {
       const style = getComputedStyle(host);
       map.paint(
@@ -188,9 +186,7 @@
       );
       painted = document.documentElement.dataset.theme + map.key + map.points.finished;
     }
-    function show(state, box) {
-      shown = state;
-      const { setting } = state;
+    function show({ setting }, box) {
       const fits = setting.masses.length === 3;
       host.hidden = !fits;
       three.hidden = fits;

@@ -19,7 +19,8 @@
   }
 
   class Stage {
-    // `on`: {grab(), pull(ball, speed), letGo(moved)}; the stage shows and asks, it decides nothing.
+    // `on`: {grab(), speed(ball), pull(ball, speed), letGo(moved)}; the stage shows and asks, it
+    // decides nothing.
     constructor(host, on) {
       this.svg = make("svg", { class: "stage", role: "group", "aria-label": "the cradle" }, host);
       this.on = on;
@@ -190,9 +191,9 @@
       if (!group || !way) return;
       event.preventDefault();
       this.on.grab();
-      const present = +group.getAttribute("aria-valuenow");
+      const ball = +group.dataset.ball;
       const step = event.shiftKey ? STEP : 2 * STEP;
-      this.on.pull(+group.dataset.ball, this.rounded(present + way * step));
+      this.on.pull(ball, this.rounded(this.on.speed(ball) + way * step));
     }
 
     rounded(speed) {
