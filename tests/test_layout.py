@@ -232,6 +232,18 @@ def test_a_misfit_is_seen(browser, body: str, kind: str):
     tab.close()
 
 
+def test_search_from_a_disk(browser, html: Path):
+    """It finds pages, and asks for nothing that the browser refuses to a page from a disk."""
+    tab = browser.new_page()
+    faults = []
+    tab.on("console", lambda said: said.type == "error" and faults.append(said.text))
+    tab.goto((html / "search.html").as_uri() + "?q=restitution")
+    tab.wait_for_function("/found \\d+ page/.test(document.body.innerText)", timeout=PATIENCE)
+    assert tab.locator("#search-results li").count() > 10
+    assert not faults
+    tab.close()
+
+
 def luminance(colour: str) -> float:
     """Relative luminance as WCAG defines it."""
     parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
