@@ -297,3 +297,16 @@ def test_one_address_of_the_project(root: Path):
     for name in ("_config.yml", "CITATION.cff", "README.md", "book/cite.md"):
         text = (root / name).read_text(encoding="utf-8")
         assert set(re.findall(rf"{re.escape(host)}/[\w.-]+/[\w.-]+", text)) == {address}, name
+
+
+def test_a_formula_keeps_its_punctuation(html: Path):
+    """MathJax lets a line break at both ends of a formula, before a comma too."""
+    formula = r'<span class="math notranslate nohighlight">[^<]*</span>'
+    kept = 0
+    for page in (html / "book").glob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        whole = re.compile(rf'<span class="nowrap">[(\[]*{formula}[)\].,;:!?]*</span>')
+        kept += len(whole.findall(text))
+        loose = re.findall(rf".{{20}}{formula}[)\].,;:!?].{{9}}", whole.sub("", text))
+        assert not loose, page
+    assert kept > 300

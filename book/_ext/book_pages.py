@@ -6,12 +6,14 @@ r"""Sphinx extension: what Jupyter Book leaves to be put right in the pages.
   code is off. They are dropped.
 - Sphinx wraps an equation of several lines in `split`, where MathJax refuses the `\tag` that
   carries the paper's number. Such an equation is passed on as it is.
+- A line does not break between a formula and the comma behind it, nor behind the bracket before it.
 - Figures of the appendices carry a letter: Fig. A.1.
 - A page that is linked from elsewhere shows a title, a sentence and a picture.
 - Until the project has a public address, buttons that lead there are left out. `book_published` in
   `_config.yml` is the one switch.
 """
 
+import re
 from html import escape
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -31,6 +33,10 @@ ADDRESSED = (
     "use_repository_button",
     "use_source_button",
 )
+
+
+#: What may stand before a formula, and behind it, without a space.
+OPENING, CLOSING = re.compile(r"[(\[]+$"), re.compile(r"^[)\].,;:!?]+")
 
 
 def hide_what_needs_an_address(app: Sphinx, config: Config) -> None:
@@ -85,6 +91,33 @@ def keep_tags(app: Sphinx, doctree: nodes.document, page: str) -> None:
         if r"\tag" in equation.astext():
             # MyST passes blocks of this class on as they are, if its amsmath extension is on.
             equation["classes"].append("amsmath")
+
+
+def keep_punctuation(
+    app: Sphinx, doctree: nodes.document, page: str
+) -> None:
+    """Let no line break between a formula and its punctuation, where MathJax would allow it."""
+    for formula in list(doctree.findall(nodes.math)):
+        parent, at = formula.parent, formula.parent.index(formula)
+        before = parent[at - 1] if at else None
+        after = parent[at + 1] if at + 1 < len(parent) else None
+        opening = _end_of(before, OPENING)
+        closing = _end_of(after, CLOSING)
+        if not (opening or closing):
+            continue
+        whole = nodes.inline("", "", classes=["nowrap"])
+        parent.replace(formula, whole)
+        whole += [nodes.Text(opening), formula, nodes.Text(closing)]
+        if opening:
+            parent.replace(before, nodes.Text(before[: -len(opening)]))
+        if closing:
+            parent.replace(after, nodes.Text(after[len(closing) :]))
+
+
+def _end_of(node: nodes.Node | None, pattern: re.Pattern[str]) -> str:
+    """Return what a text has of a pattern; nothing if it is no text."""
+    found = pattern.search(node) if isinstance(node, nodes.Text) else None
+    return found[0] if found else ""
 
 
 def letter_figures(app: Sphinx, env: BuildEnvironment) -> list[str]:
@@ -145,6 +178,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("html-page-context", drop_thebe, priority=900)
     app.connect("html-page-context", describe)
     app.connect("doctree-resolved", keep_tags)
+    app.connect("doctree-resolved", keep_punctuation)
     # After Sphinx has numbered all figures.
     app.connect("env-get-updated", letter_figures, priority=900)
     app.connect("build-finished", copy_mathjax)
