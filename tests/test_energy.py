@@ -262,3 +262,20 @@ def test_restitution_next_to_zero_is_refused():
         collide(Chain([1, 1, 1], [1, 0, 0], [0.5, 1e-12]), EnergyDistribution(1.0))
     after = collide(Chain([1, 1], [1, 0], 1e-6), EnergyDistribution(1.0)).velocities
     assert after[1] - after[0] == pytest.approx(1e-6, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("masses", "velocities", "restitution", "impulses"),
+    [
+        # A wall that moves at 2 m/s takes along 2 kg and 1 kg: 1 * (2 + 1) and 2 * (2 - 1) more.
+        ([1e10, 1e16, 2, 1], [-1, 2, 1, -1], [0.3, 0, 0], [0, 5, 3]),
+        # 1 kg comes to rest with the others; the last takes its part by mass, 1e10 / (1e12 + 1e10).
+        ([1, 1e12, 1e10], [2, -1, -1], [0, 0], [3, 3 / 101]),
+    ],
+)
+def test_impulses_of_a_common_velocity_beside_heavy_balls(
+    masses, velocities, restitution, impulses
+):
+    """The end of a plastic impact: of a velocity's last digit, times 1e16 kg, nothing is seen."""
+    trace = collide(Chain(masses, velocities, restitution), EnergyDistribution())
+    np.testing.assert_allclose(trace.impulses, impulses, rtol=1e-7)

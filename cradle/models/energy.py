@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -325,15 +326,21 @@ class _Process(Motion):
         """Give a common velocity to balls that are left with closing speeds above zero."""
         from scipy.optimize import isotonic_regression
 
+        u = self.speeds(self.y)
+        if not (u > 0.0).any():
+            return
         self.y = self.y.copy()
         change, _, impulses = self.parts(self.y)
-        before = change - np.concatenate([[0.0], np.cumsum(self.u)])
         # Nearest in kinetic energy among the velocities in order: groups that collide plastically.
-        jump = isotonic_regression(before, weights=self.m).x - before
-        if (self.speeds(self.y) > 0.0).any():
-            change += jump
-            impulses -= np.cumsum(self.m * jump)[:-1]
-            self.record[-1] = (*self.record[-1][:3], self.y)
+        groups = isotonic_regression(-np.cumsum([0.0, *u]), weights=self.m).blocks
+        for first, last in itertools.pairwise(groups.tolist()):
+            # From the heaviest ball of the group: of a larger sum its mass would show the rounding.
+            m, lag = self.m[first:last], -np.cumsum([0.0, *u[first : last - 1]])
+            lag -= lag[np.argmax(m)]
+            jump = m @ lag / m.sum() - lag
+            change[first:last] += jump
+            impulses[first : last - 1] -= np.cumsum(m * jump)[:-1]
+        self.record[-1] = (*self.record[-1][:3], self.y)
 
 
 def _zero(value: Vector, slope: Vector, curvature: Vector) -> Vector:
