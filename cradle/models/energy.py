@@ -173,6 +173,7 @@ class _Process(Motion):
         super().__init__(m, u, k, model.exponent, model.rtol)
         self.e, self.q, self.step, self.gaps = e, self.p + 1.0, model.step, model.gaps
         self.reduced = m[:-1] / (m[:-1] + m[1:]) * m[1:]
+        self.weights = np.zeros_like(e)  # dx / (u dt) of each contact, up to the next event
         self.collapsed = False
         #: Speeds that are no more than errors of the integration.
         self.tiny = self.rtol if self.step is None else 0.01 * self.step
@@ -188,15 +189,10 @@ class _Process(Motion):
         """Return the energy that each contact stores."""
         return self.k * np.maximum(self.parts(y)[1], 0.0) ** (self.p + 1.0) / (self.p + 1.0)
 
-    def weight(self) -> Vector:
-        """Return dx / (u dt) of each contact."""
-        released = np.divide(1.0, self.e**2, out=np.ones_like(self.e), where=self.e > 0.0)
-        return np.where(self.closed & ~self.loading, released, self.closed | self.gaps)
-
     def rate(self, t: float, y: Vector) -> Vector:
         """Return dy/dt while no contact opens, closes or turns."""
         out = super().rate(t, y)
-        self.parts(out)[1][:] *= self.weight()
+        self.parts(out)[1][:] *= self.weights
         return out
 
     def crossing(self, c: int) -> Any:
@@ -224,6 +220,8 @@ class _Process(Motion):
 
     def integrate(self, method: str, limit: float) -> str:
         """Integrate to the next event; return why it failed, or nothing."""
+        released = np.divide(1.0, self.e**2, out=np.ones_like(self.e), where=self.e > 0.0)
+        self.weights = np.where(self.closed & ~self.loading, released, self.closed | self.gaps)
         return super().integrate(method, limit) if self.step is None else self.march(self.step)
 
     def march(self, step: float) -> str:
@@ -250,7 +248,7 @@ class _Process(Motion):
         h = min(step, limits.min(), ends.min(), closings.min())
 
         mean = u + 0.5 * a * h
-        energy += self.weight() * growth * mean * h
+        energy += self.weights * growth * mean * h
         change += pushes * h
         impulses += growth * h
         compression = (self.q * np.maximum(energy, 0.0) / self.k) ** (1.0 / self.q)
@@ -272,7 +270,7 @@ class _Process(Motion):
         P = k (x^q - d^q) / (q w u), q = p + 1.  At d = 0 this is the limit in which the law is 0/0.
         """
         k, q, pushed, growing = self.k, self.q, self.closed & (d > 0.0), self.closed & (u > 0.0)
-        d, rate = np.where(pushed, d, 0.0), self.weight() * u
+        d, rate = np.where(pushed, d, 0.0), self.weights * u
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             part = q * rate * step / (k * d**q)
             times = np.where(
