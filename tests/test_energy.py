@@ -279,3 +279,25 @@ def test_impulses_of_a_common_velocity_beside_heavy_balls(
     """The end of a plastic impact: of a velocity's last digit, times 1e16 kg, nothing is seen."""
     trace = collide(Chain(masses, velocities, restitution), EnergyDistribution())
     np.testing.assert_allclose(trace.impulses, impulses, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("masses", "e", "exponent", "rtol"),
+    [
+        ([1, 1, 1, 1, 1], 0.5, 1, 1e-9),
+        ([1, 1, 1, 1, 1, 1], 1, 1.5, 1e-5),
+        ([1, 1, 1, 1, 1], 0.5, 1.5, 1e-6),  # without an end, if the two contacts act in turn
+        ([2, 0.5, 0.3, 0.5, 2], 0.7, 2, 1e-6),
+    ],
+)
+def test_rigid_balls_struck_from_both_sides_alike(masses, e, exponent, rtol):
+    """Two contacts end and close at one instant, again and again; neither may be lost."""
+    chain = Chain(masses, np.eye(len(masses))[0] - np.eye(len(masses))[-1], e)
+    model = EnergyDistribution(1.0, exponent, gaps=False, rtol=rtol, max_evaluations=20_000)
+    trace = collide(chain, model)
+    np.testing.assert_allclose(trace.velocities, -trace.velocities[::-1], rtol=0, atol=10 * rtol)
+    left = 0.5 * chain.masses @ trace.velocities**2 + trace.energy_loss
+    assert left == pytest.approx(chain.kinetic_energy, abs=100 * rtol)
+    if exponent == 1:
+        # From explicit midpoint steps of 5e-5 in time, without events.
+        np.testing.assert_allclose(trace.velocities[:2], [-0.252856, -0.009891], atol=1e-6)
