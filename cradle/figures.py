@@ -57,7 +57,7 @@ EVENT_STYLES = {
 }
 
 # A longer legend takes several lines.
-_LEGEND = 10
+_LEGEND = 6
 
 # Labels nearer than this part of the axis would overlap.
 _CROWDED = 0.07
