@@ -170,6 +170,7 @@ def velocity_impulse(
     The velocities of the contact's two balls stand against its impulse. Where other contacts act
     while this one rests, its impulse does not grow, and a velocity jumps. Markers and letters
     show the contact's events (`EVENT_STYLES`); with several collisions the letter carries a number.
+    Springs have curves here too, as in `velocities`.
 
     Parameters
     ----------
@@ -202,10 +203,10 @@ def velocity_impulse(
     """
     contact = place_in("contact", contact, len(must_be(Trace, "trace", trace).impulses))
     ax = _axes(ax)
-    impulse = trace.path_impulses[:, contact]
+    impulses, path = trace.curve()
     for ball in (contact, contact + 1):
         label = _indexed("v", ball + 1)
-        ax.plot(impulse, trace.path[:, ball], label=label, lw=2, **ball_style(ball))
+        ax.plot(impulses[:, contact], path[:, ball], label=label, lw=2, **ball_style(ball))
     ax.set(xlabel=_impulse(contact), ylabel="velocity (m/s)")
     ax.grid(alpha=0.3)
 
@@ -292,10 +293,11 @@ def impulse_axis(
     >>> upper.get_xticks().round(4).tolist()
     [0.0, 0.5, 0.6667]
     """
-    lower, upper = trace.path_impulses[:, contact], trace.path_impulses[:, other]
     if values is None:
-        ticks = _event_ticks(lower, upper)
+        ticks = _event_ticks(trace.path_impulses[:, contact], trace.path_impulses[:, other])
     else:
+        impulses, _ = trace.curve()
+        lower, upper = impulses[:, contact], impulses[:, other]
         marked = np.atleast_1d(np.asarray(values, dtype=np.float64))
         places = np.interp(marked, upper, lower)
         ticks = [(float(x), f"{value:.3g}") for x, value in zip(places, marked, strict=True)]

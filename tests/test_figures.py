@@ -64,6 +64,11 @@ def test_springs_are_drawn_as_curves(ax, model):
         assert line.get_ydata()[-1] == trace.velocities[ball]
         assert line.get_xdata()[-1] == trace.impulses.sum()
         assert np.all(np.diff(line.get_xdata()) > -1e-12)
+    for contact in range(2):
+        lines = figures.velocity_impulse(trace, contact, Figure().subplots()).get_lines()[:2]
+        for ball, line in enumerate(lines, start=contact):
+            np.testing.assert_array_equal(line.get_ydata()[:-1], trace.step_velocities[:, ball])
+            np.testing.assert_array_equal(line.get_xdata()[:-1], trace.step_impulses[:, contact])
 
 
 def test_progress_grows_at_every_event(trace):
