@@ -301,3 +301,14 @@ def test_rigid_balls_struck_from_both_sides_alike(masses, e, exponent, rtol):
     if exponent == 1:
         # From explicit midpoint steps of 5e-5 in time, without events.
         np.testing.assert_allclose(trace.velocities[:2], [-0.252856, -0.009891], atol=1e-6)
+
+
+def test_the_last_rounding_of_an_energy_is_no_step():
+    """A release that ends with a step, but for the last digit, left steps of no time for ever."""
+    masses = [0.8580754, 1.03556249, 0.27661626, 0.83333764]
+    v = [0.10395905268200989, 0.0997425228251448, 0.09679250106930946, 0.09384640200032342]
+    fixed, controlled = (
+        collide(Chain(masses, v, 0.5), EnergyDistribution(1.0, 1, step, max_evaluations=2000))
+        for step in (0.05, None)
+    )
+    np.testing.assert_allclose(fixed.velocities, controlled.velocities, rtol=0, atol=1e-5)
