@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from cradle.checks import Vector, must_be, one_number, whole_number
-from cradle.figures import PALETTE, progress, velocities, velocity_impulse
+from cradle.figures import PALETTE, velocities, velocity_impulse
 from cradle.film import KEY, Animation, keyframes, number, with_style
 from cradle.swing_trace import Swing
 from cradle.trace import Trace
@@ -60,12 +60,13 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
         figure = Figure(figsize=(6.4, 5.4), dpi=72, layout="constrained", facecolor="white")
         row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.6])
         _draw_balls(trace, row)
+        impulses, _ = trace.curve()
         if contact is None:
             velocities(trace, diagram)
-            along, shown = progress(trace), range(len(trace.chain))
+            along, shown = impulses.sum(axis=1), range(len(trace.chain))
         else:
             velocity_impulse(trace, contact, diagram)
-            along, shown = trace.path_impulses[:, contact], range(contact, contact + 2)
+            along, shown = impulses[:, contact], range(contact, contact + 2)
         x, y = diagram.get_xlim(), diagram.get_ylim()
         cover = Rectangle((x[0], y[0]), x[1] - x[0], y[1] - y[0], fc="white", alpha=0.9, zorder=4)
         cover.set_gid(f"{KEY}cover")
@@ -91,7 +92,7 @@ def _radii(masses: Vector) -> Vector:
 
 def _bar_length(trace: Trace) -> float:
     """Return the length of a bar for 1 m/s, in diameters of the largest ball."""
-    return 0.95 / (float(np.abs(trace.path).max()) or 1.0)
+    return 0.95 / (float(np.abs(trace.curve()[1]).max()) or 1.0)
 
 
 def _draw_balls(trace: Trace, ax: Axes) -> None:
@@ -119,17 +120,17 @@ def _draw_balls(trace: Trace, ax: Axes) -> None:
 def _impact_style(
     trace: Trace, row: Axes, diagram: Axes, along: Vector, shown: Sequence[int]
 ) -> str:
-    """Return the keyframes: one at each event, and at the ends of the flights."""
+    """Return the keyframes: one at each point of the curves, and at the ends of the flights."""
     height = row.get_figure().bbox.height  # type: ignore[union-attr]
     before, slow, after, rest = _ACTS
-    events = len(trace.path)
-    done = progress(trace)
-    share = done / done[-1] if done[-1] else np.linspace(0, 1, events)
+    impulses, path = trace.curve()
+    points, done = len(path), impulses.sum(axis=1)
+    share = done / done[-1] if done[-1] else np.linspace(0, 1, points)
     times = np.concatenate(
         [[0.0], before + slow * share, [before + slow + after, sum(_ACTS[:3]) + rest]]
     )
-    index = np.clip(np.arange(-1, events + 2), 0, events - 1)
-    still = events  # the end of the impact
+    index = np.clip(np.arange(-1, points + 2), 0, points - 1)
+    still = points  # the end of the impact
     # Where each ball is drawn, in units of the file: it moves in the flights alone.
     unit = float(row.transData.transform((1, 0))[0] - row.transData.transform((0, 0))[0])
     per_speed = 1.9 / (float(np.abs(trace.path[[0, -1]]).max()) or 1.0)
@@ -145,7 +146,7 @@ def _impact_style(
     bar = _bar_length(trace)
     style: list[str] = []
     for ball, centre in enumerate(centres[:, 0].tolist()):
-        x, v = shift[:, ball], trace.path[index, ball] * bar
+        x, v = shift[:, ball], path[index, ball] * bar
         move = "transform:translateX({}px)"
         for name, values in (("ball", x), ("ballname", x), ("tip", x + unit * v)):
             part = f"{KEY}{name}{ball}"
@@ -156,7 +157,7 @@ def _impact_style(
             keyframes(f"{KEY}bar{ball}", times, np.column_stack([x, v]), form, 0.001, still)
         )
     # The diagram: dots on the curves, and a cover that draws back to the right.
-    places = np.dstack(np.broadcast_arrays(along[:, None], trace.path))
+    places = np.dstack(np.broadcast_arrays(along[:, None], path))
     drawn = diagram.transData.transform(places.reshape(-1, 2)).reshape(places.shape)
     for ball in shown:
         moved = (drawn[:, ball] - drawn[-1, ball]) * [1, -1]
@@ -169,14 +170,14 @@ def _impact_style(
     style.append(
         keyframes(f"{KEY}cover", times, hidden[:, None], "transform:scaleX({})", 0.0005, still + 1)
     )
-    style += _stars(trace, times)
+    style += _stars(impulses, times)
     return "".join(style)
 
 
-def _stars(trace: Trace, times: Vector) -> list[str]:
+def _stars(impulses: Vector, times: Vector) -> list[str]:
     """Return the keyframes of the stars: seen while the impulse of their contact grows."""
     style = []
-    for contact, grows in enumerate((np.diff(trace.path_impulses, axis=0) > 0.0).T.tolist()):
+    for contact, grows in enumerate((np.diff(impulses, axis=0) > 0.0).T.tolist()):
         name, frames, last = f"{KEY}star{contact}", ["0%{opacity:0}"], False
         for time, now in zip(times[1:], [*grows, False], strict=False):
             if now != last:

@@ -14,7 +14,7 @@ from typing import Any
 
 import click
 
-from cradle.console import format_options, show
+from cradle.console import format_options, image_format, show
 from cradle.describing import chain_options, described
 from cradle.filming import film
 from cradle.fitting import fit, template
@@ -124,7 +124,7 @@ def plot(output: str, **options: Any) -> None:
 
     figure, axes = plt.subplots(figsize=(7, 4.3), layout="constrained")
     figures.velocities(collide(given.chain, given.model), axes)
-    figure.savefig(output)
+    figure.savefig(output, format=image_format(output))
     plt.close(figure)
     click.echo(f"drawn to {output}\n{given.note}")
 
@@ -182,6 +182,9 @@ def swing(
     extra = {"model": made(given.model), "assumed": told.assumed, "impacts": impacts}
     note = f"impacts: {len(impacts)}; positions in m, times in s\n{told.note}"
     show(rows, extra, note, as_json, as_csv)
+    if run.ended != "times":
+        # Also where the table goes to a file.
+        click.echo(f"cradle: ended at {run.end:g} s, after {len(impacts)} impacts", err=True)
 
 
 main.add_command(film)

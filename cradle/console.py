@@ -7,6 +7,7 @@ import io
 import json
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
@@ -91,6 +92,11 @@ def _plain(value: Any) -> Any:
     return "; ".join(f"{low!r}..{high!r}" for low, high in value)
 
 
+def image_format(path: str) -> str:
+    """Return the format of a picture by the ending of its file; without one matplotlib adds one."""
+    return Path(path).suffix[1:] or "png"
+
+
 def plot_fits(fits: Sequence[Any], path: str) -> None:
     """Draw every identified estimate to a file."""
     import matplotlib
@@ -105,5 +111,5 @@ def plot_fits(fits: Sequence[Any], path: str) -> None:
                                 layout="constrained")  # fmt: skip
     for (one, name), row in zip(drawn, axes, strict=True):
         one.plot(name, row)
-    figure.savefig(path)
+    figure.savefig(path, format=image_format(path))
     plt.close(figure)

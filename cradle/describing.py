@@ -29,9 +29,9 @@ def chain_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add what describes a chain of balls and its impact law."""
     options = [
         click.argument("sequence", required=False),
-        click.option("--speed", default=1.0, help="Velocity of the first ball, m/s [1]."),
+        click.option("--speed", type=float, help="Velocity of the first ball, m/s [1]."),
         click.option("--masses", callback=numbers, help="Masses, left to right: 45,53,53."),
-        click.option("--unit", type=click.Choice(list(UNITS)), default="kg", help="Of masses."),
+        click.option("--unit", type=click.Choice(list(UNITS)), help="Of masses [kg]."),
         click.option("--velocities", callback=numbers, help="Instead of --speed: 1,0,0."),
         click.option("--restitution", callback=numbers, help="One, or one per contact [1]."),
         click.option("--model", type=click.Choice(_MODELS), help="How the balls collide: by "
@@ -70,8 +70,9 @@ class Described(NamedTuple):
 
 
 def described(
-    sequence: str | None, speed: float = 1.0, masses: list[float] | None = None, unit: str = "kg",
-    velocities: list[float] | None = None, restitution: list[float] | None = None,
+    sequence: str | None, speed: float | None = None, masses: list[float] | None = None,
+    unit: str | None = None, velocities: list[float] | None = None,
+    restitution: list[float] | None = None,
     model: str | None = None, ratio: list[float] | None = None,
     backward: list[float] | None = None, saturate: bool = False,
 ) -> Described:  # fmt: skip
@@ -84,24 +85,27 @@ def described(
         raise click.UsageError("give either a sequence of ball types, such as ABCCA, or --masses")
     if model not in (None, "ratio") and (ratio or backward or saturate):
         raise click.UsageError(f"--model {model} has no ratios; leave them out, and --saturate")
+    if not (speed is None or velocities is None):
+        raise click.UsageError("give one of --speed and --velocities")
+    striker = 1.0 if speed is None else speed
     excess: Literal["raise", "saturate"] = "saturate" if saturate else "raise"
     if sequence is not None:
-        given = {"--velocities": velocities, "--restitution": restitution, "--ratio": ratio,
-                 "--backward": backward}  # fmt: skip
+        given = {"--unit": unit, "--velocities": velocities, "--restitution": restitution,
+                 "--ratio": ratio, "--backward": backward}  # fmt: skip
         for name, value in given.items():
             if value is not None:
                 raise click.UsageError(f"{name} goes with --masses; {sequence} has its own values")
-        chain, ratios = paper_chain(sequence, speed, excess=excess)
+        chain, ratios = paper_chain(sequence, striker, excess=excess)
         law = ratios if model in (None, "ratio") else _without_ratios(chain, model)
         return Described(chain, law, ())
     assert masses is not None
-    before = [speed] + [0.0] * (len(masses) - 1) if velocities is None else velocities
+    before = [striker] + [0.0] * (len(masses) - 1) if velocities is None else velocities
     chain = Chain(
-        [UNITS[unit] * m for m in masses],
+        [UNITS[unit or "kg"] * m for m in masses],
         before,
         1.0 if restitution is None else one_or_all(restitution),
     )
-    assumed = [] if velocities else [f"the first ball strikes at {speed:g} m/s"]
+    assumed = [] if velocities else [f"the first ball strikes at {striker:g} m/s"]
     assumed += [] if restitution else ["no energy is lost (--restitution)"]
     if ratio is not None:
         back = None if backward is None else one_or_all(backward)

@@ -56,6 +56,9 @@ EVENT_STYLES = {
     "collapse": ("D", "l", "limit of an infinite sequence"),
 }
 
+# A longer legend takes several lines.
+_LEGEND = 6
+
 # Labels nearer than this part of the axis would overlap.
 _CROWDED = 0.07
 
@@ -104,6 +107,15 @@ def progress(trace: Trace) -> Vector:
     return np.asarray(trace.path_impulses.sum(axis=1))
 
 
+def _indexed(symbol: str, number: int) -> str:
+    """Return a symbol with its index; TeX takes two digits for one index in braces alone."""
+    return f"${symbol}_{number}$" if number < 10 else f"${symbol}_{{{number}}}$"
+
+
+def _impulse(contact: int) -> str:
+    return "impulse " + _indexed(r"\tau", contact + 2) + " (N s)"
+
+
 def _axes(ax: Axes | None) -> Axes:
     if ax is None:
         return plt.subplots(figsize=(5.6, 3.9), layout="constrained")[1]
@@ -140,11 +152,13 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     ax = _axes(ax)
     impulses, path = trace.curve()
     for ball, velocity in enumerate(path.T):
-        ax.plot(impulses.sum(axis=1), velocity, label=f"$v_{ball + 1}$", lw=2, **ball_style(ball))
+        label = _indexed("v", ball + 1)
+        ax.plot(impulses.sum(axis=1), velocity, label=label, lw=2, **ball_style(ball))
     ax.set(xlabel="sum of all impulses (N s)", ylabel="velocity (m/s)")
     ax.margins(x=0)
     ax.grid(alpha=0.3)
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=len(trace.chain), frameon=False)
+    beside = min(len(trace.chain), _LEGEND)
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=beside, frameon=False)
     return ax
 
 
@@ -156,6 +170,7 @@ def velocity_impulse(
     The velocities of the contact's two balls stand against its impulse. Where other contacts act
     while this one rests, its impulse does not grow, and a velocity jumps. Markers and letters
     show the contact's events (`EVENT_STYLES`); with several collisions the letter carries a number.
+    Springs have curves here too, as in `velocities`.
 
     Parameters
     ----------
@@ -188,11 +203,11 @@ def velocity_impulse(
     """
     contact = place_in("contact", contact, len(must_be(Trace, "trace", trace).impulses))
     ax = _axes(ax)
-    impulse = trace.path_impulses[:, contact]
+    impulses, path = trace.curve()
     for ball in (contact, contact + 1):
-        label = f"$v_{ball + 1}$"
-        ax.plot(impulse, trace.path[:, ball], label=label, lw=2, **ball_style(ball))
-    ax.set(xlabel=rf"impulse $\tau_{contact + 2}$ (N s)", ylabel="velocity (m/s)")
+        label = _indexed("v", ball + 1)
+        ax.plot(impulses[:, contact], path[:, ball], label=label, lw=2, **ball_style(ball))
+    ax.set(xlabel=_impulse(contact), ylabel="velocity (m/s)")
     ax.grid(alpha=0.3)
 
     _mark_events(trace, contact, ax)
@@ -278,17 +293,18 @@ def impulse_axis(
     >>> upper.get_xticks().round(4).tolist()
     [0.0, 0.5, 0.6667]
     """
-    lower, upper = trace.path_impulses[:, contact], trace.path_impulses[:, other]
     if values is None:
-        ticks = _event_ticks(lower, upper)
+        ticks = _event_ticks(trace.path_impulses[:, contact], trace.path_impulses[:, other])
     else:
+        impulses, _ = trace.curve()
+        lower, upper = impulses[:, contact], impulses[:, other]
         marked = np.atleast_1d(np.asarray(values, dtype=np.float64))
         places = np.interp(marked, upper, lower)
         ticks = [(float(x), f"{value:.3g}") for x, value in zip(places, marked, strict=True)]
     above = ax.twiny()
     above.set_xlim(ax.get_xlim())
     above.set_xticks([x for x, _ in ticks], [label for _, label in ticks], fontsize=9)
-    above.set_xlabel(rf"impulse $\tau_{other + 2}$ (N s)")
+    above.set_xlabel(_impulse(other))
     return above
 
 
@@ -336,6 +352,12 @@ def outcome_by_ball(
     -------
     Axes
 
+    Raises
+    ------
+    ValueError
+        If there is no impact, the chains differ in length, a first ball was at rest, or there are
+        not as many names as balls.
+
     Examples
     --------
     >>> from cradle import collide, paper_chain
@@ -346,8 +368,16 @@ def outcome_by_ball(
     ['1\nB', '2\nA', '3\nB', '4\nA']
     """
     ax = _axes(ax)
-    several = [traces] if isinstance(traces, Trace) else list(traces)
-    number = np.arange(1, len(several[0].chain) + 1)
+    given = [traces] if isinstance(traces, Trace) else list(traces)
+    several = [must_be(Trace, "traces", trace) for trace in given]
+    sizes = {len(trace.chain) for trace in several}
+    if len(sizes) != 1:
+        raise ValueError(f"traces has chains of {sorted(sizes)} balls; must be of one length")
+    number = np.arange(1, sizes.pop() + 1)
+    if len(letters) not in (0, len(number)):
+        raise ValueError(f"letters = {shown(letters)}; {len(number)} balls need as many, or none")
+    if not all(trace.chain.velocities[0] for trace in several):
+        raise ValueError("traces has a first ball at rest; velocities are shown over its speed")
     ax.axhline(0, color="0.4", lw=0.8)
     # Nested open markers: equal outcomes are seen as such, none hides another.
     for k, trace in enumerate(several):
@@ -405,17 +435,18 @@ def chain_sketch(chain: Chain, ax: Axes | None = None, *, letters: str = "") -> 
     fastest = np.abs(chain.velocities).max() or 1.0
     for ball, (radius, x) in enumerate(zip(radii.tolist(), (left + radii).tolist(), strict=True)):
         ax.add_patch(Circle((x, 0), radius, fc="0.93", ec=PALETTE[ball % len(PALETTE)], lw=2))
-        name = letters[ball] if letters else f"$B_{ball + 1}$"
+        name = letters[ball] if letters else _indexed("B", ball + 1)
         # A name that does not fit in its ball stands above it.
         ax.text(x, 0 if radius > 0.2 else radius + 0.12, name, ha="center", va="center")
-        ax.text(x, -0.85, f"$m_{ball + 1}$", ha="center", va="center", fontsize=9)
+        ax.text(x, -0.85, _indexed("m", ball + 1), ha="center", va="center", fontsize=9)
         if chain.velocities[ball]:
             length = 0.9 * chain.velocities[ball] / fastest
             tail, tip = (x - length / 2, 0.68), (x + length / 2, 0.68)
             ax.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": "black"})
-            ax.text(x, 0.86, f"$v_{ball + 1}$", ha="center", va="center")
+            ax.text(x, 0.86, _indexed("v", ball + 1), ha="center", va="center")
         if ball < len(chain) - 1:
-            ax.text(x + radius, -0.62, rf"$\tau_{ball + 2}$", ha="center", va="center", fontsize=9)
+            name = _indexed(r"\tau", ball + 2)
+            ax.text(x + radius, -0.62, name, ha="center", va="center", fontsize=9)
     ax.set(xlim=(-0.2, left[-1] + 2 * radii[-1] + 0.2), ylim=(-1.0, 1.0), aspect="equal")
     ax.set_axis_off()
     return ax

@@ -2,9 +2,9 @@
 
 A film of pixels would need some hundred frames.  Here the solver's own events are the keyframes:
 between two events of an impact every velocity is linear in the progress, and a browser
-interpolates linearly.  So the motion is exact, sharp at any size, and a few kilobytes long.  A
-style sheet, unlike SMIL, can also honour a reader who asks for less motion, and paper: both get
-the still.
+interpolates linearly.  So the motion is exact, sharp at any size, and a few kilobytes long; of
+springs the steps of the integration are the keyframes.  A style sheet, unlike SMIL, can also honour
+a reader who asks for less motion, and paper: both get the still.
 """
 
 from __future__ import annotations

@@ -69,8 +69,9 @@ class Row:
     radii : float or array_like, shape (N,)
         Of the balls, m; above 0.
     pivots : array_like, shape (N, 2), optional
-        Where the strings end, m.  A ball on a string takes up the part of an impulse along the
-        tangent of its arc; its string takes the rest.  Without pivots the balls are free.
+        Where the strings end, m, in the order of the row.  A ball on a string takes up the part of
+        an impulse along the tangent of its arc; its string takes the rest.  Without pivots the
+        balls are free.
     touching : float, optional
         Balls whose gap is at most this touch, m; a thousandth of the smallest radius r if left
         out.  Steel balls of a toy are pressed into each other by about that.
@@ -160,6 +161,14 @@ class Row:
         # Balls on equal strings that nearly touch are accelerated alike, others not.
         self.hang_alike = False
         if self.pivots is not None:
+            places = self.pivots @ (self.pivots[-1] - self.pivots[0])
+            back = np.diff(places) < 0.0
+            if back.any():
+                ball = int(np.argmax(back)) + 1
+                raise ValueError(
+                    f"pivots[{ball}] lies behind pivots[{ball - 1}] on the way from the first to "
+                    "the last; the balls must be told from one end of the row to the other"
+                )
             lengths = np.hypot(*(x - self.pivots).T)
             self.hang_alike = bool(np.ptp(lengths) <= 1e-3 * lengths.min())
         self.speeding = 0.0 if self.hang_alike else self.acceleration

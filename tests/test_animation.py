@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, collide, swing
+from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, swing
 from cradle.animation import animate, animate_swing
 from cradle.film import Animation, thin
 
@@ -37,6 +37,20 @@ def test_bars_are_the_velocities_at_every_event():
         times, values = keyframes(svg, f"bar{ball}")
         at = np.interp(1.5 + 5 * share, times, values[:, 1])
         np.testing.assert_allclose(at, 0.95 * TRACE.path[:, ball], atol=2e-3)
+
+
+def test_bars_of_springs_follow_their_curves():
+    """Three equal balls on linear springs, by their two modes, until the first contact opens."""
+    trace = collide(Chain([1, 1, 1], [1, 0, 0]), SpringChain(1.0, 1, rtol=1e-12))
+    svg = animate(trace).svg
+    t = np.linspace(0, 2.4, 13)[:, None]
+    slow, fast = np.cos(t) * [1 / 2, 0, -1 / 2], np.cos(np.sqrt(3) * t) * [1 / 6, -1 / 3, 1 / 6]
+    v = 1 / 3 + slow + fast
+    moment = 1.5 + 5 * (1 - v[:, 0] + v[:, 2]) / trace.impulses.sum()
+    for ball in range(3):
+        times, values = keyframes(svg, f"bar{ball}")
+        bars = np.interp(moment, times, values[:, 1])
+        np.testing.assert_allclose(bars, 0.95 * v[:, ball], atol=5e-3)
 
 
 def test_dots_and_cover_are_in_step():

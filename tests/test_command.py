@@ -1,8 +1,10 @@
 """The command line: tables, formats, exit codes, and every example of its help."""
 
 import csv
+import functools
 import io
 import json
+import math
 import os
 import re
 import shlex
@@ -27,6 +29,7 @@ from cradle import (
     paper_chain,
     recommend,
     runtime,
+    swinging,
     textbook,
 )
 from cradle.command import main, run
@@ -371,6 +374,8 @@ def test_film_gives_the_rows_of_the_table(folder):
         ("solve", 2, "give either a sequence of ball types"),
         ("solve ABA --masses 1,1", 2, "give either a sequence of ball types"),
         ("solve ABA --ratio 0.1", 2, "--ratio goes with --masses"),
+        ("solve ABA --unit g", 2, "--unit goes with --masses"),
+        ("solve --masses 1,1 --velocities 1,0 --speed 3", 2, "give one of --speed and --velocit"),
         ("solve --masses 1,x", 2, "write numbers with commas"),
         ("solve --masses 1,1 --json --csv", 2, "give one of --json and --csv"),
         ("solve --masses 1,-1", 1, "cradle: --masses, value 2: -1.0; must be above 0"),
@@ -459,3 +464,22 @@ def test_first_answer_within_a_second(tmp_path):
 
 def test_balls_at_rest_lose_nothing():
     assert json.loads(call("solve AAAAA --speed 0 --json"))["energy_lost"] == 0
+
+
+def test_a_swing_that_ends_early_says_so(monkeypatch):
+    """Of rows that are left out the table itself tells nothing."""
+    few = functools.partial(swinging.swing, max_impacts=3)
+    monkeypatch.setattr(swinging, "swing", few)
+    arguments = shlex.split("swing --masses 1,1 --seconds 4 --steps 8 --csv")
+    result = CliRunner().invoke(main, arguments, catch_exceptions=False)
+    assert len(result.stdout.splitlines()) == 4  # the names, and 0, 0.5 and 1 s
+    third = 5 / 4 * 2 * math.pi * math.sqrt(0.3 / 9.81)
+    assert result.stderr == f"cradle: ended at {third:g} s, after 3 impacts\n"
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_picture_has_the_name_that_was_given():
+    for line in ("plot ABA --output impact", "fit pairs.csv --plot fit"):
+        call(line)
+        name = line.split()[-1]
+        assert Path(name).read_bytes().startswith(b"\x89PNG"), name

@@ -262,3 +262,53 @@ def test_restitution_next_to_zero_is_refused():
         collide(Chain([1, 1, 1], [1, 0, 0], [0.5, 1e-12]), EnergyDistribution(1.0))
     after = collide(Chain([1, 1], [1, 0], 1e-6), EnergyDistribution(1.0)).velocities
     assert after[1] - after[0] == pytest.approx(1e-6, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("masses", "velocities", "restitution", "impulses"),
+    [
+        # A wall that moves at 2 m/s takes along 2 kg and 1 kg: 1 * (2 + 1) and 2 * (2 - 1) more.
+        ([1e10, 1e16, 2, 1], [-1, 2, 1, -1], [0.3, 0, 0], [0, 5, 3]),
+        # 1 kg comes to rest with the others; the last takes its part by mass, 1e10 / (1e12 + 1e10).
+        ([1, 1e12, 1e10], [2, -1, -1], [0, 0], [3, 3 / 101]),
+    ],
+)
+def test_impulses_of_a_common_velocity_beside_heavy_balls(
+    masses, velocities, restitution, impulses
+):
+    """The end of a plastic impact: of a velocity's last digit, times 1e16 kg, nothing is seen."""
+    trace = collide(Chain(masses, velocities, restitution), EnergyDistribution())
+    np.testing.assert_allclose(trace.impulses, impulses, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("masses", "e", "exponent", "rtol"),
+    [
+        ([1, 1, 1, 1, 1], 0.5, 1, 1e-9),
+        ([1, 1, 1, 1, 1, 1], 1, 1.5, 1e-5),
+        ([1, 1, 1, 1, 1], 0.5, 1.5, 1e-6),  # without an end, if the two contacts act in turn
+        ([2, 0.5, 0.3, 0.5, 2], 0.7, 2, 1e-6),
+    ],
+)
+def test_rigid_balls_struck_from_both_sides_alike(masses, e, exponent, rtol):
+    """Two contacts end and close at one instant, again and again; neither may be lost."""
+    chain = Chain(masses, np.eye(len(masses))[0] - np.eye(len(masses))[-1], e)
+    model = EnergyDistribution(1.0, exponent, gaps=False, rtol=rtol, max_evaluations=20_000)
+    trace = collide(chain, model)
+    np.testing.assert_allclose(trace.velocities, -trace.velocities[::-1], rtol=0, atol=10 * rtol)
+    left = 0.5 * chain.masses @ trace.velocities**2 + trace.energy_loss
+    assert left == pytest.approx(chain.kinetic_energy, abs=100 * rtol)
+    if exponent == 1:
+        # From explicit midpoint steps of 5e-5 in time, without events.
+        np.testing.assert_allclose(trace.velocities[:2], [-0.252856, -0.009891], atol=1e-6)
+
+
+def test_the_last_rounding_of_an_energy_is_no_step():
+    """A release that ends with a step, but for the last digit, left steps of no time for ever."""
+    masses = [0.8580754, 1.03556249, 0.27661626, 0.83333764]
+    v = [0.10395905268200989, 0.0997425228251448, 0.09679250106930946, 0.09384640200032342]
+    fixed, controlled = (
+        collide(Chain(masses, v, 0.5), EnergyDistribution(1.0, 1, step, max_evaluations=2000))
+        for step in (0.05, None)
+    )
+    np.testing.assert_allclose(fixed.velocities, controlled.velocities, rtol=0, atol=1e-5)

@@ -1,5 +1,7 @@
 """The drawings show the numbers of the trace, where the trace has them."""
 
+import io
+import re
 import struct
 import subprocess
 import sys
@@ -20,6 +22,7 @@ from cradle import (
     figures,
     paper_chain,
 )
+from cradle.animation import animate
 
 
 @pytest.fixture
@@ -61,6 +64,11 @@ def test_springs_are_drawn_as_curves(ax, model):
         assert line.get_ydata()[-1] == trace.velocities[ball]
         assert line.get_xdata()[-1] == trace.impulses.sum()
         assert np.all(np.diff(line.get_xdata()) > -1e-12)
+    for contact in range(2):
+        lines = figures.velocity_impulse(trace, contact, Figure().subplots()).get_lines()[:2]
+        for ball, line in enumerate(lines, start=contact):
+            np.testing.assert_array_equal(line.get_ydata()[:-1], trace.step_velocities[:, ball])
+            np.testing.assert_array_equal(line.get_xdata()[:-1], trace.step_impulses[:, contact])
 
 
 def test_progress_grows_at_every_event(trace):
@@ -174,3 +182,45 @@ def test_readme_picture_is_sharp_and_small(root):
     assert width >= 1500
     assert height >= 700
     assert len(head) < 200_000
+
+
+def drawn(draw):
+    """Return the words of a picture, as matplotlib writes them into the file."""
+    figure = Figure(layout="constrained")
+    draw(figure.subplots())
+    file = io.StringIO()
+    figure.savefig(file, format="svg")
+    return set(re.findall(r"<!-- (.+?) -->", file.getvalue()))
+
+
+def test_two_digits_are_one_index():
+    """Without braces TeX lowers the first digit alone."""
+    trace = collide(Chain([1] * 12, np.eye(12)[0]), ImpulseCorrelation(0.1))
+    words = drawn(lambda ax: figures.velocities(trace, ax))
+    words |= drawn(lambda ax: figures.velocity_impulse(trace, 10, ax, other=9))
+    words |= drawn(lambda ax: figures.chain_sketch(trace.chain, ax))
+    assert words >= {"$v_9$", "$v_{12}$", "$B_{10}$", "$m_{12}$", r"$\tau_{12}$"}
+    assert words >= {r"impulse $\tau_{12}$ (N s)", r"impulse $\tau_{11}$ (N s)"}
+    assert not [word for word in words if re.search(r"_\d\d", word)]
+
+
+def test_a_long_chain_leaves_room_for_its_curves():
+    """Its legend takes several lines; matplotlib warns where nothing is left, an error here."""
+    trace = collide(Chain([1] * 40, np.eye(40)[0]), ImpulseCorrelation(0.1))
+    assert animate(trace).svg.count("@keyframes") > 40
+    drawn(lambda ax: figures.velocities(trace, ax))
+
+
+@pytest.mark.parametrize(
+    ("chains", "letters", "message"),
+    [
+        ([], "", r"traces has chains of \[\] balls; must be of one length"),
+        ([[1, 0], [1, 0, 0]], "", r"traces has chains of \[2, 3\] balls"),
+        ([[1, 0], [0, -1]], "", "traces has a first ball at rest"),
+        ([[1, 0]], "ABC", "letters = 'ABC'; 2 balls need as many"),
+    ],
+)
+def test_outcome_by_ball_refuses(chains, letters, message):
+    traces = [collide(Chain(np.ones(len(v)), v), ImpulseCorrelation(0.0)) for v in chains]
+    with pytest.raises(ValueError, match=message):
+        figures.outcome_by_ball(traces, Figure().subplots(), letters=letters)

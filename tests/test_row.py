@@ -248,6 +248,7 @@ TRIANGLE = [[0, 0], [0.2, 0], [0.1, 0.17320508]]
         ({"radii": [0.1, 0.1]}, r"radii has shape \(2,\); 3 balls need \(\) or \(3,\)"),
         ({"radii": [0.1, -0.1, 0.1]}, r"radii\[1\] = -0.1; must be above 0"),
         ({"pivots": [[0, 0]]}, r"pivots has shape \(1, 2\); 3 balls need \(3, 2\)"),
+        ({"pivots": [[0, 1], [0.5, 1], [0.25, 1]]}, r"pivots\[2\] lies behind pivots\[1\]"),
         ({"touching": 0.0}, "touching = 0.0; must be above 0"),
         ({"resting": -1.0}, "resting = -1.0; must be above 0"),
         ({"acceleration": math.nan}, "acceleration"),

@@ -23,8 +23,9 @@ class Recommendation:
     call : str
         What to call.
     numerical_error : float or None
-        Distance from the exact answer of the same model: of any ball's velocity, at most, as a
-        part of the closing speed.  None: not measured.
+        Distance from the exact answer of the same model on the chains of `measured_on`: of any
+        ball's velocity, at most, as a part of the closing speed.  Another chain may have a few
+        times as much; `accuracy` leaves room for that.  None: not measured.
     model_error : float or None
         The same from Hertz springs, the theory of elastic spheres (equal ones, unless `stiffness`
         says otherwise); no setting makes it smaller.  None: not measured, or, with losses, not to

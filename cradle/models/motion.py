@@ -116,10 +116,10 @@ class Motion:
         self.steps = [(np.zeros(1), self.y[:, None])]
         self.evaluations, self.most = 0, 0
 
-    def parts(self, y: Vector) -> list[Vector]:
+    def parts(self, y: Vector) -> tuple[Vector, Vector, Vector]:
         """Return changes of velocity, compressions and impulses, as views of y."""
         n = len(self.m)
-        return np.split(y, [n, 2 * n - 1])
+        return y[:n], y[n : 2 * n - 1], y[2 * n - 1 :]
 
     def account(self, chain: Chain, mass: float, speed: float) -> dict[str, Any]:
         """Return what happened, in the chain's units, as fields of a `CurvedTrace`."""
@@ -162,7 +162,7 @@ class Motion:
         n = len(self.m)
         d = np.where(self.closed, y[n : 2 * n - 1], 0.0)
         force = self.k * np.copysign(np.abs(d) ** self.p, d)
-        out = np.zeros_like(y)
+        out = np.zeros(3 * n - 2)
         out[1:n] = force
         out[: n - 1] -= force
         out[:n] /= self.m
