@@ -214,6 +214,27 @@ def test_twenty_balls_of_which_some_collapse():
     check(TWENTY, trace)
 
 
+@pytest.mark.parametrize("seen", [lambda one: one, Problem.mirrored])
+def test_a_body_of_a_heavy_ball_does_not_take_a_lighter_ones_last_digit(seen):
+    """Two runs meet at a light ball that is held to one of 60 tonnes.
+
+    Whether this body or the ball beyond takes the other's velocity is a matter of the body's mass:
+    a last digit of its velocity is more than the impulse with which the next cycle begins.
+    """
+    problem = seen(
+        Problem(
+            [3.839996310134037e-05, 59946.364525196834, 0.47112130775431144, 26.834603038496773,
+             238.31721035704365, 4.122319611411592, 0.0032309896224416122],
+            [1, -1, -1, 0, -1, 1, 2],
+            [0, 0.5, 0.5, 0.9, 0, 0.5],
+            [0.3292366395553875] * 5,
+            [0.9662504292712348, 0.8637231879103753, 0.16750170862090774, 0.6459997277358269,
+             0.7752876143675417],
+        )
+    )  # fmt: skip
+    assert difference(problem.collide().velocities, exact(problem).velocities) < 1e-14
+
+
 def test_impulses_after_a_collapse_beside_a_light_ball():
     """All balls end at one velocity, so momentum alone fixes every impulse; and so mirrored."""
     problem = Problem([1000.0, 1e-3, 1000.0, 1e-9], [0.4, 0.4, 0.1, 0.0], [0.0] * 3, [0, 0], [0, 0])

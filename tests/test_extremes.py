@@ -466,6 +466,7 @@ def test_eight_hundred_thousand_events():
     """At fifty digits these are the velocities: `truth` takes 25 minutes to make twice as many.
 
     One contact keeps a store all the while and gives it away in portions below its last digit.
+    Other roundings on the way come within some last digits; a limit of R9 may leave 1e-13 in doubt.
     """
     found = outcomes(*x.any_chain("saturate", 6, 3468)[:5], excess="saturate")
     after = [
@@ -474,7 +475,7 @@ def test_eight_hundred_thousand_events():
     ]  # fmt: skip
     assert found.collapsed
     assert found.collisions.sum() > 300_000
-    np.testing.assert_allclose(found.velocities, after, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found.velocities, after, rtol=0, atol=1e-14)
 
 
 def test_chains_that_do_not_finish_are_explained():

@@ -12,6 +12,7 @@ from cradle.kernel.motion import (
     add_velocity,
     add_work,
     arrive,
+    bodies,
     closing,
     closing_parts,
     reduced_mass,
@@ -141,12 +142,17 @@ def move(first, part, n, state):
 
 @jit
 def touch(gap, state):
-    """Bring a gap to zero: the ball that has just moved takes the other's velocity."""
+    """Bring a gap to zero: the ball that has just moved takes the other's velocity.
+
+    If both have, the one does that is lighter, with the balls that zeros join to it: the last digit
+    of a heavy one's velocity is much momentum.
+    """
     run, ball = state.run, state.ball
     left, right = run[gap - 1].last, gap + 1
     left_moves = run[left].stirred == 1 and ball[gap].pull != 0.0
     right_moves = run[right].stirred == 1 and ball[gap + 1].pull != 0.0
-    if left_moves and not (right_moves and ball[gap + 1].m < ball[gap].m):
+    _, _, one, other = bodies(gap, run[left].low, run[right].high, ball, state.contact)
+    if left_moves and not (right_moves and other < one):
         arrive(gap, run[left].low, gap - 1, ball, state.contact)
     elif right_moves:
         arrive(gap, right, run[right].high, ball, state.contact)

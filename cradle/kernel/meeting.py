@@ -21,11 +21,12 @@ def gap_parts(first, after, run, ball, contact, meeting):
     if rise + fall <= wide + blur:
         return -1.0, 0.0
     # They overlap from low to high.  Each distance is exact at the ends, meeting = 0 and 1: a run
-    # that gets to its own next event must do it.
+    # that gets to its own next event must do it.  A narrow overlap keeps its digits.
     low = max(0.0, wide - fall)
     high = min(rise, wide)
-    at = low + meeting * (high - low) if meeting < 1.0 else high
-    back = min(fall, wide) - meeting * (high - low) if meeting < 1.0 else wide - high
+    overlap = rise - low if max(rise, fall) < wide else min(rise, min(fall, wide))
+    at = low + meeting * overlap if meeting < 1.0 else high
+    back = min(fall, wide) - meeting * overlap if meeting < 1.0 else wide - high
     left = at / rise if rise > 0.0 else 0.0
     right = back / fall if fall > 0.0 else 0.0
     if left * LIMITS.simultaneous >= 1.0:
