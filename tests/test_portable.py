@@ -47,8 +47,8 @@ DIGESTS = {
     "scenes": "13088f12c81b4e35",
     "long_chains": "eef8777637e3f854",
     "implied_ratio": "617f9eed01d94458",
-    "batch": "fc2c5bfe779feb9d",
-    "one by one": "afecc38b930b11c8",
+    "batch": "f2898fcc9e32cb2b",
+    "one by one": "1ca37840ff9f166d",
 }
 
 
