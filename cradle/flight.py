@@ -133,7 +133,6 @@ def _march(
 ) -> float:
     size = sum(abs(c) for c, _ in terms)
     decay = min(-rate.real for _, rate in terms)
-    speed = sum(abs(c * rate) for c, rate in terms)
     bounds = _Bounds(terms)
     time = min(_first_step(terms, bounds), bounds.radian) if parting else 0.0
     for _ in range(_MOST_STEPS):
@@ -143,7 +142,7 @@ def _march(
         waves = [(c, rate, cmath.exp(rate * time)) for c, rate in terms]
         if parting:  # f(0) = 0: the difference from the start keeps its digits
             value = sum((c * _exp_minus_one(rate * time)).real for c, rate in terms)
-            noise = 4e-16 * speed * time
+            noise = 4e-16 * bounds.plain[0] * time
         else:
             value = level + sum((c * wave).real for c, _, wave in waves)
             noise = 4e-16 * (abs(level) + size)
@@ -173,13 +172,13 @@ class _Bounds:
     """
 
     def __init__(self, terms: Sequence[tuple[complex, complex]]) -> None:
-        orders = range(1, 5)
-        self.plain = [sum(abs(c) * abs(rate) ** n for c, rate in terms) for n in orders]
-        self.now, self.growth = self.plain, [0.0] * 4
+        #: Of derivatives 1 to 4 at any time; `now` and `growth` are of derivatives 2 to 4.
+        self.plain = [sum(abs(c) * abs(rate) ** n for c, rate in terms) for n in range(1, 5)]
+        self.now, self.growth = self.plain[1:], [0.0] * 3
         #: What a step may not exceed.
         self.radian = 1.0 / abs(terms[0][1])
         if len(terms) == 2:
-            (one, rate), (other, near) = terms
+            orders, ((one, rate), (other, near)) = range(2, 5), terms
             self.now = [
                 abs(one + other) * abs(rate) ** n + abs(other) * abs(near**n - rate**n)
                 for n in orders
@@ -191,9 +190,7 @@ class _Bounds:
         until = time + self.radian
         return [
             min(plain, now + growth * until)
-            for plain, now, growth in zip(
-                self.plain[1:], self.now[1:], self.growth[1:], strict=True
-            )
+            for plain, now, growth in zip(self.plain[1:], self.now, self.growth, strict=True)
         ]
 
 

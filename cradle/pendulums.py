@@ -143,3 +143,14 @@ class Pendulums:
         sine = half if self.angle == "small" else np.sin(half)
         # 1 - cos a = 2 sin^2(a/2), without cancellation.
         return np.asarray((2.0 * masses * self.gravity * length * sine**2).sum(axis=-1))
+
+    def energy(self, masses: Vector, positions: Vector, velocities: Vector) -> Vector:
+        """Return kinetic and potential energy, J; the last axis is summed.
+
+        Examples
+        --------
+        >>> float(Pendulums(length=9.81).energy(np.ones(2), np.array([1.0, 0.0]), np.ones(2)))
+        1.5
+        """
+        kinetic = 0.5 * (masses * velocities**2).sum(axis=-1)
+        return np.asarray(kinetic + self.potential_energy(masses, positions))

@@ -53,11 +53,6 @@ class Account:
     size: float
     energy: float = 0.0
 
-    def energies(self, x: Vector, v: Vector) -> Vector:
-        """Return kinetic and potential energy at positions and velocities (..., N), J."""
-        kinetic = 0.5 * (self.masses * v**2).sum(axis=-1)
-        return np.asarray(kinetic + self.pendulums.potential_energy(self.masses, x))
-
     def fly(self, begin: float, times: Vector, x: Vector, v: Vector) -> None:
         """Demand of a flight that no ball passes another, and that energy is only damped.
 
@@ -79,7 +74,7 @@ class Account:
             return
         overlap = -(self.gaps + np.diff(x, axis=-1)).min(axis=-1)
         _demand(overlap <= TIE * self.size, begin + times, "balls overlap by {:g} m", overlap)
-        gain = self.energies(x, v) - self.energy
+        gain = self.pendulums.energy(self.masses, x, v) - self.energy
         wrong = gain if np.any(self.pendulums.damping) else np.abs(gain)
         sound = wrong <= RADIAN * (1.0 + times * self.frequency) * self.energy
         _demand(sound, begin + times, "a flight has made or lost {:g} J", gain)
@@ -107,7 +102,7 @@ class Account:
         gain = abs(float((momenta[1] - momenta[0]).sum()))
         sound = gain <= INSTANT * np.abs(momenta).sum()
         _demand(sound, time, "impacts have made or lost {:g} kg m/s", gain)
-        struck, self.energy = self.energies(x, v[1:]).tolist()
+        struck, self.energy = self.pendulums.energy(self.masses, x, v[1:]).tolist()
         gain = abs(self.energy - struck)
         sound = gain <= INSTANT * max(self.energy, struck)
         _demand(sound, time, "{:g} J are made or lost beside the impacts", gain)

@@ -97,10 +97,7 @@ class Swing:
     @property
     def energy(self) -> Vector:
         """Kinetic and potential energy of all balls at each time, shape (T,), J."""
-        kinetic = 0.5 * (self.chain.masses * self.velocities**2).sum(axis=1)
-        return np.asarray(
-            kinetic + self.pendulums.potential_energy(self.chain.masses, self.positions)
-        )
+        return self.pendulums.energy(self.chain.masses, self.positions, self.velocities)
 
     def to_frame(self) -> pd.DataFrame:
         """Return a row for each time and ball: time, ball, position, velocity.

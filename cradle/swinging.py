@@ -138,13 +138,12 @@ class _Run:
         self.gaps = pendulums.row("gaps", n - 1)
         self.frequency = pendulums.natural_frequency(n)
         fastest = float(self.frequency.max())
-        self.account = Account(chain.masses, self.gaps, pendulums, fastest, 0.0)
-        self.released = float(self.account.energies(self.x, self.v))
+        self.released = float(pendulums.energy(chain.masses, self.x, self.v))
         self.speed = float(np.sqrt(2.0 * self.released / chain.masses.sum()))
         self.impacts: list[Impact] = []
         self.series: list[tuple[Vector, Vector]] = []
         self.size = max(float(np.abs(x).max()), self.speed / float(self.frequency.min()))
-        self.account.size = self.size
+        self.account = Account(chain.masses, self.gaps, pendulums, fastest, self.size)
         distance = self.gaps + np.diff(x)
         if (distance < -TIE * self.size).any():
             c = int(np.argmin(distance))
@@ -211,18 +210,18 @@ class _Run:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
         masses = self.chain.masses
         touching = closing | (self.gaps + np.diff(self.x) <= NEAR * self.size)
-        places, velocities = [self.x.copy()], [self.v.copy()]
+        x, v = self.x.copy(), self.v.copy()
         for first, last in stretches(touching):
             self.align(first, last)
         self.collide(touching)
-        velocities.append(self.v)
+        struck = self.v
         # What opens at this instant rests no more in it, whatever else happens.
         self.freed[releasing] = self.t
         kept = touching & (self.t - self.freed > self.tie)
         self.v, resting = common_velocities(masses, self.v, kept, RESTING * self.speed)
-        self.account.settle(self.t, np.array([*places, self.x]), np.array([*velocities, self.v]))
+        self.account.settle(self.t, np.array([x, self.x]), np.array([v, struck, self.v]))
         alone = self.pendulums.accelerations(self.x, self.v)
-        rounding = 1e-12 * self.speed * float(self.frequency.max())
+        rounding = 1e-12 * self.speed * self.account.frequency
         self.together = pressed(masses, alone, resting, rounding)
         self.parting = touching & ~self.together
 

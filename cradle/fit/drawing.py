@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from cradle.checks import Vector
 from cradle.figures import PALETTE, ball_style
 from cradle.fit.answers import Estimate
-from cradle.fit.parameters import pair_keys, ratio_keys
+from cradle.fit.parameters import Points, pair_keys, ratio_keys
 from cradle.fit.result import Fit, predicted_points
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
@@ -129,11 +129,9 @@ def _predicted(fit: Fit, estimate: Estimate, shots: ShotSet, begins: Vector) -> 
     if estimate.kind == "restitution":
         if estimate.value is None:
             return None
-        m1, m2 = shots.masses
-        closing = begins[:, 0] - begins[:, 1]
-        impulse = (1.0 + estimate.value) * closing * (m1 * m2 / (m1 + m2))
-        return begins + np.outer(impulse, [-1.0 / m1, 1.0 / m2])
-    points = predicted_points(fit, shots.types)
+        points: Points | None = Points({estimate.key: estimate.value}, {})
+    else:
+        points = predicted_points(fit, shots.types)
     if points is None:
         return None
     return points.outcomes(shots.types, shots.masses, begins[:, np.newaxis])[:, 0]
