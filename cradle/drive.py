@@ -23,6 +23,7 @@ from cradle.kernel.state import FINISHED, PAUSED, REFUSED, UNFINISHED, UNSOUND
 #: What an answer can break, by the number that the kernel gives.
 DEFECTS = {
     rooms.NO_EVENT: "no event follows, though contacts are active",
+    rooms.PASSED: "two groups of balls that should have met have passed each other",
     rooms.MOMENTUM: "a ball's momentum is not that of its impulses",
     rooms.ORDER: "balls still approach",
     rooms.ENERGY: "kinetic energy has grown",

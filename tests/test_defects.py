@@ -317,6 +317,41 @@ LAST_DIGITS = {
         [8, 0.1, 0.3, 0.1, 7, 30, 2, 9], [-0.1, -0.03, -0.5, -0.4, -0.4, -0.1, -0.2, 0.3],
         [0.1, 0.4, 0, 0.7, 0.5, 0.07, 1], [0.9, 0.4, 0, 0.9, 0.4, 0.2], [0.8, 0.2, 0.9, 1, 0, 0.6],
     ),
+    # An idle contact whose ball nears it as all of them come to rest: that it had closed but for
+    # rounding was told by the rounding of fast motion, long ago; the slow ball beside was thrown.
+    "a cycle as slow as the rounding of a contact beside it": Problem(
+        [0.3, 1, 1, 0.166, 1, 0.166], [0, 1, -0.5, 0, -0.5, 0], [0.5, 0, 0, 0.5, 0.9],
+        [0, 0.1, 1e-20, 1e-20], [1e-20, 1e-20, 0, 0], 0.0,
+    ),
+    "the same, without a cycle": Problem(
+        [1, 0.053, 0.053, 1, 1, 1], [1, 0, 0.5, -0.5, 1, 0], [0.9, 0.5, 0, 0.5, 0.5],
+        [1, 0.1, 0.1, 0.1], [0.1, 0, 1e-20, 0.1], 1.0,
+    ),
+    # What one arrival shifts is more than a rounding of the slow contacts beyond it.
+    "an arrival beside slow balls": Problem(
+        [1.0] * 9, [0.5, -0.5, -0.5, 0.5, 1, 1, -0.5, 0, 0], [1, 0.5, 0.5, 1, 0.9, 0, 0.9, 0],
+        [0.1, 1e-20, 0.1, 1, 1, 0, 1e-20], [1e-20, 1, 0, 1, 0, 0.1, 0], 1.0,
+    ),
+    # Two gaps were reached at once; the one was passed by 1e-17, and so could not be met any more.
+    "a gap that rounding has closed": Problem(
+        [0.166, 0.045, 0.166, 0.053, 0.053, 0.053, 0.166, 0.166, 0.166],
+        [-0.5, 1, 0.5, 1, 0.5, 0, 0.5, 1, 0], [0, 0, 0, 0.9, 0, 1, 1, 0.5],
+        [0, 1e-20, 1, 0.1, 1e-20, 1e-20, 1], [1, 0.1, 1e-20, 0, 1e-20, 1e-20, 0.1], 1.0,
+    ),
+    # Joined balls took a new velocity; what contacts between them passed on was not booked.
+    "an arrival of joined balls": Problem(
+        [1.0] * 8, [1, 1, -0.5, 0.5, 1, 1, 1, -0.5], [0, 0, 0, 0, 0, 0, 0.9],
+        [1e-20] * 6, [0.1, 0, 0, 0, 0, 0.1], 0.0,
+    ),
+    # Momentum of a ball that nothing has struck: the last digit of two numbers.
+    "a ball that is reached, and no more": Problem(
+        [0.045, 0.166, 0.053, 0.053, 0.053, 0.053], [-0.5, 0.5, 1, 1, 0, 0],
+        [1, 0.5, 0, 0.5, 0.9], [0, 0, 1, 1], [1, 0, 0, 1], 0.0,
+    ),
+    "a ball that all others come to rest beside": Problem(
+        [1.0] * 6, [0, 0.5, 0, 0, -0.5, 0], [0, 0, 0.9, 0, 0.9],
+        [1e-20, 1e-20, 0, 1e-20], [0, 0, 1e-20, 1e-20], 0.5,
+    ),
 }  # fmt: skip
 
 
@@ -327,11 +362,25 @@ def test_what_the_last_digits_leave_open(name):
     assert difference(trace.impulses, truth.impulses) < 1e-13
 
 
-def test_no_contact_pulls_where_a_run_arrives_on_both_sides():
-    """All balls come to rest, so momentum alone fixes every impulse; the first ball is not hit.
+#: A light ball reaches a gap, and next to nothing is left of it: what rounding adds to the impulse
+#: of the contact beyond does work at full speed.  The ledger was off by 1e-10 of all that was lost.
+LITTLE_LEFT = Problem([1, 1e-6, 1e-3, 1e-6], [0, -0.5, 0, -0.5], [0, 0.9, 1], [1, 1], [0, 1], 1.0)
 
-    At the last digits the run arrives at the balls on both sides of it, and what one arrival took
-    back was taken from balls that rest beyond the other.
+
+def test_corrections_of_rounding_do_work():
+    trace = LITTLE_LEFT.collide()
+    assert invariants(trace)["ledger"] < 2
+    truth = exact(LITTLE_LEFT)
+    assert difference(trace.velocities, truth.velocities) < 1e-15
+    np.testing.assert_allclose(trace.absorbed, [float(x) for x in truth.absorbed], rtol=1e-9)
+
+
+def test_no_contact_pulls_where_a_run_arrives_on_both_sides():
+    """All balls come to rest, so momentum alone fixes every impulse; the first has next to none.
+
+    Whether it is touched as they come to rest is a matter of the last digit.  At the last digits
+    the run arrives at the balls on both sides of it, and what one arrival took back was taken from
+    balls that rest beyond the other.
     """
     problem = Problem(
         [0.053, *[0.166] * 6], [0, 0.5, 0.5, -0.5, 0.5, -0.5, -0.5], [0, 0, 0, 0.9, 0, 0.5],
@@ -339,7 +388,7 @@ def test_no_contact_pulls_where_a_run_arrives_on_both_sides():
     )  # fmt: skip
     trace = problem.collide()
     assert trace.impulses.min() >= 0
-    assert trace.impulses[0] == 0
+    assert trace.impulses[0] <= 2**-52 * trace.impulses[1]
     assert np.abs(trace.velocities).max() < 1e-16
     passed = np.cumsum(np.multiply(problem.masses, problem.velocities))[:-1]
     np.testing.assert_allclose(trace.impulses, passed, rtol=0, atol=1e-15)

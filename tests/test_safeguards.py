@@ -5,6 +5,7 @@ answer, for short impacts that of fifty digits; with the exchange it does not: i
 not finish, or its answer is not certified.
 """
 
+import inspect
 import math
 
 import mpmath
@@ -12,8 +13,9 @@ import numpy as np
 import pytest
 import truth
 from plain import solve
-from test_defects import LAST_DIGITS, MANY_COLLAPSES, NAMED, PORTIONS
+from test_defects import LAST_DIGITS, LITTLE_LEFT, MANY_COLLAPSES, NAMED, PORTIONS
 
+from cradle.kernel import meeting
 from cradle.kernel.state import FINISHED, UNFINISHED, UNSOUND
 
 WRONG = "wrong"
@@ -81,6 +83,32 @@ def lower_level_only(names):
         return (c, c - 1) if number == 1 else names["look"](number, c, n, state)
 
     return look
+
+
+def changed(room, name, part, other):
+    """In place of a function: the same, with a part of its text exchanged."""
+
+    def exchange(names):
+        code = inspect.getsource(getattr(room, name)).partition("\n")[2]
+        assert code.count(part) == 1
+        own = dict(names)
+        exec(code.replace(part, other), own)
+        return own[name]
+
+    return exchange
+
+
+def to_no_digit(names):
+    """In place of `certify`: with no allowance for the last digit of two numbers."""
+    everywhere = names["certify"].__globals__
+
+    def certify(*given):
+        everywhere["LIMITS"] = names["LIMITS"]._replace(dust=0.0)
+        found = names["certify"](*given)
+        everywhere["LIMITS"] = names["LIMITS"]
+        return found
+
+    return certify
 
 
 def just_been(names):
@@ -165,6 +193,11 @@ NEEDED = {
         ),
         UNFINISHED,
     ),
+    "a gap that rounding has closed": (
+        {"gap_parts": changed(meeting, "gap_parts", ".u, 0.0)", ".u, -math.inf)")},
+        LAST_DIGITS["a gap that rounding has closed"],
+        UNSOUND,
+    ),
     "parts of a segment that are whole but for rounding": (
         {"simultaneous": 1.0},
         (
@@ -204,6 +237,21 @@ NEEDED = {
         {"touch_beside": lambda _: lambda *_: None},
         NAMED["an end and a closing beside it at once"],
         WRONG,
+    ),
+    "corrections of rounding that are more than a run moves": (
+        {"slight": math.inf},
+        LAST_DIGITS["a cycle as slow as the rounding of a contact beside it"],
+        UNSOUND,
+    ),
+    "corrections of rounding that do work": (
+        {"push_at_work": lambda names: names["push"]},
+        LITTLE_LEFT,
+        UNSOUND,
+    ),
+    "momentum to the last digit of two numbers": (
+        {"certify": to_no_digit},
+        LAST_DIGITS["a ball that is reached, and no more"],
+        UNSOUND,
     ),
     "neighbours that come to their own event in a cycle": (
         {"neighbours_stay": any_neighbours},

@@ -43,7 +43,8 @@ def certify(n, ball, contact, tally):
     """Return what the outcome breaks, or 0; each sum within the rounding of its terms.
 
     Every increment of an impulse is rounded once in the impulse and once in each ball, so a ball's
-    momentum is known to a few roundings of the impulses that it has had, however many.  Works are
+    momentum is known to a few roundings of the impulses that it has had, however many; or to the
+    last digit of two numbers, where the velocity is far larger than what has changed it.  Works are
     products of impulses and closing speeds, so energies are known to a few roundings of all works,
     and of their sums over the balls.
     """
@@ -55,9 +56,8 @@ def certify(n, ball, contact, tally):
     for i in range(n):
         after = contact[i].p if i < n - 1 else 0.0
         change = (ball[i].hi - ball[i].v * unit) + ball[i].lo
-        if not abs(ball[i].m * change - (before - after)) <= LIMITS.sound * (
-            abs(before) + abs(after)
-        ):
+        slack = LIMITS.sound * (abs(before) + abs(after)) + LIMITS.dust * ball[i].m
+        if not abs(ball[i].m * change - (before - after)) <= slack:
             return MOMENTUM
         before = after
         fastest = max(fastest, abs(ball[i].hi - ball[0].hi), abs(ball[i].v - ball[0].v) * unit)

@@ -28,6 +28,7 @@ from cradle.kernel.state import (
     LIMITS,
     LOWER,
     NO_EVENT,
+    PASSED,
     PAUSED,
     SLOPED,
     UNFINISHED,
@@ -147,6 +148,9 @@ def touch(gap, state):
     If both have, the one does that is lighter, with the balls that zeros join to it: the last digit
     of a heavy one's velocity is much momentum.
     """
+    k = state.contact[gap]
+    if k.u > max(LIMITS.roundings * k.blur, LIMITS.sound):
+        state.tally[0].defect = PASSED
     run, ball = state.run, state.ball
     left, right = run[gap - 1].last, gap + 1
     left_moves = run[left].stirred == 1 and ball[gap].pull != 0.0
@@ -311,6 +315,8 @@ def impact(n, chain, meeting, max_events, resumed, state):
             meet(one, n, state)
         else:
             complete(n, state)
+        if tally.defect > 0:
+            return UNSOUND
     last_limits(n, state)
     tally.defect = certify(n, state.ball, contact, tally)
     return UNSOUND if tally.defect > 0 else FINISHED

@@ -10,11 +10,12 @@ from cradle.kernel.state import LIMITS, jit, once
 def gap_parts(first, after, run, ball, contact, meeting):
     """R8.3: parts of their two segments at which runs `first` and `after` meet.
 
-    The first part is -1 if they need not meet.  Velocities are counted from that of the gap's left
+    The first part is -1 if they need not meet.  A gap that rounding has closed is closed at once.
+    Velocities are counted from that of the gap's left
     ball; that ball only rises and the other only falls.
     """
     gap = run[first].last + 1
-    wide = -contact[gap].u
+    wide = max(-contact[gap].u, 0.0)
     rise = ball[gap].pull * run[first].reach if run[first].high == gap - 1 else 0.0
     fall = -ball[gap + 1].pull * run[after].reach if run[after].low == after else 0.0
     blur = LIMITS.roundings * (contact[gap].blur + 2.0**-53 * (rise + fall))

@@ -124,6 +124,21 @@ def push(c, impulse, body, ball, contact):
             add_impulse(contact[i - 1], impulse * (part / right))
 
 
+@jit
+def push_at_work(c, impulse, body, ball, contact):
+    """Push active contact c, and book the work, absorbed or released."""
+    k = contact[c]
+    u = k.u
+    push(c, impulse, body, ball, contact)
+    k.u = closing(c, ball)
+    work = 0.5 * impulse * (u + k.u)
+    if u > 0.0:
+        k.w += work
+        add_work(k, work)
+        work *= k.e * k.e
+    add_store(k, work)
+
+
 @apart
 def set_closing_speed(c, speed, rest, low, high, ball, contact):
     """Bring the closing speed of contact c to speed + rest by a push of its balls.
@@ -170,7 +185,7 @@ def arrive(c, low, high, ball, contact):
     first, last, left, right = body
     impulse = near * (left if c < low else right)
     if abs(impulse) > LIMITS.digits * contact[k].p:
-        push(k, impulse, body, ball, contact)
+        push_at_work(k, impulse, body, ball, contact)
     other = c if c < low else c + 1
     for j in range(low, high + 2):
         i = j if c < low else low + high + 1 - j

@@ -247,16 +247,17 @@ def rounding_after(k, s):
 
 
 @once
-def comes_at(s, k):
+def comes_at(s, k, fastest):
     """Tell whether the next event of contact k comes at progress s, as far as rounding can tell.
 
     It closes, or ends at u = 0, when u gets there; it ends otherwise when Q = 0, and then, once
-    u < 0, Q changes by rate * u.
+    u < 0, Q changes by rate * u.  Rounding of fast motion long ago tells nothing of a run that is
+    hardly faster than that: its events come as they are.
     """
     if not k.until < math.inf:
         return False
     late = k.until - s
-    blur = rounding_after(k, s)
+    blur = min(rounding_after(k, s), LIMITS.slight * fastest)
     if k.active == 1 and k.final < 0.0:
         rest = blur * s + LIMITS.roundings * 2.0**-53 * k.w / k.rate
         return late * -k.final <= rest and late * abs(k.slope) <= max(-k.final, blur)
@@ -286,10 +287,13 @@ def segment(first, n, run, ball, contact):
                 contact[c].until = -contact[c].u / contact[c].slope
                 s = min(s, contact[c].until)
     run[first].reach = s
+    fastest = 0.0
+    for c in range(low, high + 1):
+        fastest = max(fastest, abs(contact[c].u))
     for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
         k = contact[c]
         if low <= c <= high or k.active == 0:
-            k.due = 1 if comes_at(s, k) else 0
+            k.due = 1 if comes_at(s, k, fastest) else 0
             if k.until > s and k.until < second:
                 second = k.until
     return 1.0 - s / second if second < math.inf else 1.0

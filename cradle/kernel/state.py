@@ -35,17 +35,18 @@ CERTAIN, SLOPED = 0, 1
 # R9: the two levels on which cycles are looked for.
 LOWER, UPPER = 0, 1
 # What an answer can break; 0 is none.
-NO_EVENT, MOMENTUM, ORDER, ENERGY, LEDGER = 1, 2, 3, 4, 5
+NO_EVENT, PASSED, MOMENTUM, ORDER, ENERGY, LEDGER = 1, 2, 3, 4, 5, 6
 
 
 class Limits(NamedTuple):
     """What rounding and infinity are measured by.
 
     Where a chain is known that goes wrong without a limit, `tests/test_safeguards.py` switches it
-    off: `dust`, `faint`, `bend`, `doubt`, `one_digit`, `tie`, `simultaneous`, `roundings`, `same`,
-    `vanishing`.  `exhausted`, `repeats` and `self_similar` only save rounds.  No such chain is
-    known for `rounded` and `cut`, nor for a larger `faint` or `doubt`, or a smaller `same`: these
-    stay as what rounding says.  The others bound the input, the closed form and the certificate.
+    off: `dust`, `faint`, `bend`, `doubt`, `one_digit`, `tie`, `simultaneous`, `roundings`,
+    `slight`, `same`, `vanishing`.  `exhausted`, `repeats` and `self_similar` only save rounds.  No
+    such chain is known for `rounded` and `cut`, nor for a larger `faint` or `doubt`, or a smaller
+    `same`: these stay as what rounding says.  The others bound the input, the closed form and the
+    certificate.
     """
 
     #: R9: an exhausted contact's speed, relative to the largest initial closing speed.
@@ -72,6 +73,8 @@ class Limits(NamedTuple):
     simultaneous: float
     #: R8: closing speeds closer than this many of their roundings are equal.
     roundings: float
+    #: R8: part of a run's largest closing speed that rounding may be.
+    slight: float
     #: R3: an end speed this close to -e times the speed at the start of compression is meant so.
     same: float
     #: R7: a ratio this close to its bound is meant to be the bound.
@@ -108,6 +111,7 @@ LIMITS = Limits(
     tie=1e-9,
     simultaneous=1.0 + 64 * 2.0**-52,
     roundings=16.0,
+    slight=1e-3,
     same=16 * 2.0**-52,
     rounded=1.0 + 4 * 2.0**-52,
     cut=2.0**-120,
