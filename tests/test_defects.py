@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from chains import uniform
 from extreme_chains import invariants
 from families import FAMILIES, family
 from problem import Problem
@@ -373,6 +374,15 @@ def test_corrections_of_rounding_do_work():
     truth = exact(LITTLE_LEFT)
     assert difference(trace.velocities, truth.velocities) < 1e-15
     np.testing.assert_allclose(trace.absorbed, [float(x) for x in truth.absorbed], rtol=1e-9)
+
+
+def test_a_correction_does_not_revive_a_contact_that_ends():
+    """Balls equal but for the last digit: each contact of an elastic row collides once."""
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        masses = 1 + 1e-15 * uniform(rng, -1, 1, 20)
+        row = Problem(masses.tolist(), at_rest(20), [1.0] * 19, [0.3] * 18, [0.3] * 18)
+        assert row.collide().collisions.tolist() == [1] * 19
 
 
 def test_no_contact_pulls_where_a_run_arrives_on_both_sides():

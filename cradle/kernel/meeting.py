@@ -11,8 +11,8 @@ def gap_parts(first, after, run, ball, contact, meeting):
     """R8.3: parts of their two segments at which runs `first` and `after` meet.
 
     The first part is -1 if they need not meet.  A gap that rounding has closed is closed at once.
-    Velocities are counted from that of the gap's left
-    ball; that ball only rises and the other only falls.
+    Velocities are counted from that of the gap's left ball; that ball only rises and the other only
+    falls.
     """
     gap = run[first].last + 1
     wide = max(-contact[gap].u, 0.0)

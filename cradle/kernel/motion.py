@@ -126,7 +126,7 @@ def push(c, impulse, body, ball, contact):
 
 @jit
 def push_at_work(c, impulse, body, ball, contact):
-    """Push active contact c, and book the work, absorbed or released."""
+    """Push active contact c, and book the work, absorbed or released; one that ends has no more."""
     k = contact[c]
     u = k.u
     push(c, impulse, body, ball, contact)
@@ -135,8 +135,9 @@ def push_at_work(c, impulse, body, ball, contact):
     if u > 0.0:
         k.w += work
         add_work(k, work)
-        work *= k.e * k.e
-    add_store(k, work)
+        add_store(k, k.e * k.e * work)
+    elif k.q > 0.0:
+        add_store(k, work)
 
 
 @apart
