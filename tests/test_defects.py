@@ -318,6 +318,12 @@ LAST_DIGITS = {
         [8, 0.1, 0.3, 0.1, 7, 30, 2, 9], [-0.1, -0.03, -0.5, -0.4, -0.4, -0.1, -0.2, 0.3],
         [0.1, 0.4, 0, 0.7, 0.5, 0.07, 1], [0.9, 0.4, 0, 0.9, 0.4, 0.2], [0.8, 0.2, 0.9, 1, 0, 0.6],
     ),
+    # And so did contacts that have just closed, without work, when the others collapse.
+    "contacts that have just closed at the last digit": Problem(
+        [6.2, 0.077, 3.7, 0.089, 0.053, 0.12, 3.2, 0.35],
+        [0.8, 0.78, 0.75, 0.72, 0.34, 0.12, -0.16, -0.3], [0.6, 0.56, 0.94, 0.47, 0.83, 0, 0.48],
+        [1, 0.54, 0.77, 0.78, 0, 0.022], [0, 0.32, 0.92, 1, 0.96, 1],
+    ),
     # An idle contact whose ball nears it as all of them come to rest: that it had closed but for
     # rounding was told by the rounding of fast motion, long ago; the slow ball beside was thrown.
     "a cycle as slow as the rounding of a contact beside it": Problem(

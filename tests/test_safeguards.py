@@ -15,7 +15,7 @@ import truth
 from plain import solve
 from test_defects import LAST_DIGITS, LITTLE_LEFT, MANY_COLLAPSES, NAMED, PORTIONS
 
-from cradle.kernel import meeting
+from cradle.kernel import collapse, meeting
 from cradle.kernel.state import FINISHED, UNFINISHED, UNSOUND
 
 WRONG = "wrong"
@@ -287,6 +287,15 @@ NEEDED = {
     "contacts that their neighbours end, below the last digit": (
         {"chatters": just_been},
         LAST_DIGITS["sequences within a sequence that no digit can end"],
+        UNFINISHED,
+    ),
+    "contacts that have just closed, below the last digit": (
+        {
+            "chatters": changed(
+                collapse, "chatters", "lately = ", "lately = contact[c].active == 0 and "
+            )
+        },
+        LAST_DIGITS["contacts that have just closed at the last digit"],
         UNFINISHED,
     ),
     "a store that is released in portions below its last digit": (

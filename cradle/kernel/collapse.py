@@ -33,7 +33,7 @@ def end_plastically(first, last, n, state):
 def chatters(c, n, state):
     """Tell whether contact c exists and is in an exhausted collision, or has just been.
 
-    Or if it has ended lately at a speed below the last digit: there sequences go on for ever.
+    Or if it has collided lately at a speed below the last digit: there sequences go on for ever.
     """
     if not 0 <= c < n - 1:
         return False
@@ -46,8 +46,8 @@ def chatters(c, n, state):
         return True
     if not exhausted(c, contact[c].q, threshold, ball, contact):
         return False
-    ended = contact[c].active == 0 and contact[c].hits != state.memory[LOWER][c].hits
-    return contact[c].tiny > 0 or (ended and abs(contact[c].u) < LIMITS.dust)
+    lately = contact[c].hits != state.memory[LOWER][c].hits
+    return contact[c].tiny > 0 or (lately and abs(contact[c].u) < LIMITS.dust)
 
 
 @apart
