@@ -5,37 +5,28 @@ from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, apart, 
 
 
 @once
-def energies(n, ball, tally):
+def energies(n, k, ball):
     """Return the change of kinetic energy, and the energies before and after of what has changed.
 
     Counted from the centre of mass of the balls that have changed: what a common velocity adds, and
-    what flies on untouched, says nothing here.
+    what flies on untouched, says nothing here.  It is near ball k, the heaviest of them, from whose
+    velocity the sums are taken; velocities before and their changes are the balls' y and x.
     """
-    unit = tally.unit
-    k = -1  # the heaviest of them, from whose velocity all others are counted
-    for i in range(n):
-        b = ball[i]
-        b.y = b.v * unit
-        b.x = (b.hi - b.y) + b.lo
-        if b.x != 0.0 and (k < 0 or b.m > ball[k].m):
-            k = i
-    origin = ball[max(k, 0)].y
-    mass = 0.0
-    momentum = 0.0
+    mass = momentum = gained = change = size = 0.0
     for i in range(n):
         b = ball[i]
         if b.x != 0.0:
+            before = b.y - ball[k].y
+            after = before + b.x
             mass += b.m
-            momentum += b.m * (b.y - origin)
-    change = 0.0
-    size = 0.0
-    for i in range(n):
-        b = ball[i]
-        if b.x != 0.0:
-            before = (b.y - origin) - momentum / mass
+            momentum += b.m * before
+            gained += b.m * b.x
             change += b.m * b.x * (before + 0.5 * b.x)
-            size += 0.5 * b.m * (before * before + (before + b.x) * (before + b.x))
-    return change, size
+            size += 0.5 * b.m * (before * before + after * after)
+    if mass == 0.0:
+        return 0.0, 0.0
+    centre = momentum / mass
+    return change - centre * gained, size - centre * (momentum + gained)
 
 
 @apart
@@ -48,25 +39,30 @@ def certify(n, ball, contact, tally):
     products of impulses and closing speeds, so energies are known to a few roundings of all works,
     and of their sums over the balls.
     """
-    unit = tally.unit
     before = 0.0
     absorbed = 0.0
     lost = 0.0
     fastest = 0.0
+    heaviest = -1  # of the balls that have changed
     for i in range(n):
+        b = ball[i]
+        b.y = b.v * tally.unit
+        b.x = (b.hi - b.y) + b.lo
         after = contact[i].p if i < n - 1 else 0.0
-        change = (ball[i].hi - ball[i].v * unit) + ball[i].lo
-        slack = LIMITS.sound * (abs(before) + abs(after)) + LIMITS.dust * ball[i].m
-        if not abs(ball[i].m * change - (before - after)) <= slack:
+        slack = LIMITS.sound * (abs(before) + abs(after)) + LIMITS.dust * b.m
+        if not abs(b.m * b.x - (before - after)) <= slack:
             return MOMENTUM
         before = after
-        fastest = max(fastest, abs(ball[i].hi - ball[0].hi), abs(ball[i].v - ball[0].v) * unit)
+        fastest = max(fastest, abs(b.hi - ball[0].hi), abs(b.y - ball[0].y))
+        if b.x != 0.0 and (heaviest < 0 or b.m > ball[heaviest].m):
+            heaviest = i
     for c in range(n - 1):
+        k = contact[c]
         if not closing(c, ball) <= LIMITS.sound * fastest:
             return ORDER
-        absorbed += contact[c].a
-        lost += (1.0 - contact[c].e * contact[c].e) * contact[c].a
-    gained, size = energies(n, ball, tally)
+        absorbed += k.a
+        lost += (1.0 - k.e * k.e) * k.a
+    gained, size = energies(n, heaviest, ball)
     slack = (LIMITS.sound + n * LIMITS.digits) * (size + absorbed)
     if not gained <= slack:
         return ENERGY

@@ -155,8 +155,10 @@ def touch(gap, state):
     left, right = run[gap - 1].last, gap + 1
     left_moves = run[left].stirred == 1 and ball[gap].pull != 0.0
     right_moves = run[right].stirred == 1 and ball[gap + 1].pull != 0.0
-    _, _, one, other = bodies(gap, run[left].low, run[right].high, ball, state.contact)
-    if left_moves and not (right_moves and other < one):
+    if left_moves and right_moves:
+        _, _, one, other = bodies(gap, run[left].low, run[right].high, ball, state.contact)
+        left_moves = one <= other
+    if left_moves:
         arrive(gap, run[left].low, gap - 1, ball, state.contact)
     elif right_moves:
         arrive(gap, right, run[right].high, ball, state.contact)

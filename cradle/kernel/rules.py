@@ -273,10 +273,12 @@ def segment(first, n, run, ball, contact):
     """
     low, high = run[first].low, run[first].high
     s = second = math.inf
+    fastest = 0.0
     for c in range(low, high + 1):
         k = contact[c]
         k.until, k.final = end_progress(k.u, k.q, k.slope, k.rate, k.e)
         s = min(s, k.until)
+        fastest = max(fastest, abs(k.u))
     # Idle neighbours close; a gap, shared with another run, is no event of this run's own.
     for c in (low - 1, high + 1):
         if 0 <= c < n - 1 and contact[c].active == 0:
@@ -287,9 +289,6 @@ def segment(first, n, run, ball, contact):
                 contact[c].until = -contact[c].u / contact[c].slope
                 s = min(s, contact[c].until)
     run[first].reach = s
-    fastest = 0.0
-    for c in range(low, high + 1):
-        fastest = max(fastest, abs(contact[c].u))
     for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
         k = contact[c]
         if low <= c <= high or k.active == 0:
