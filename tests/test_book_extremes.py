@@ -261,7 +261,8 @@ def test_table_of_unfinished_chains(inventory):
     assert np.cumsum(kinds).tolist() == [*bounds, len(left)]
     for family in ("within", "saturate"):
         assert number(inventory[f"rest-{family}"]) == left.count(family)
-    assert number(inventory["rest-share"]) == pytest.approx(len(left) / 1000, abs=0.005)
+    # Half of the last digit; where it is just half, either way.
+    assert number(inventory["rest-share"]) == pytest.approx(len(left) / 1000, abs=0.005 + 1e-9)
     done = [int(r["collisions"]) for r in never if r["finished"] == "1"]
     assert number(inventory["default-most"]) == pytest.approx(max(done), rel=0.05)
 

@@ -8,25 +8,20 @@ from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, apart, 
 def energies(n, k, ball):
     """Return the change of kinetic energy, and the energies before and after of what has changed.
 
-    Counted from the centre of mass of the balls that have changed: what a common velocity adds, and
-    what flies on untouched, says nothing here.  It is near ball k, the heaviest of them, from whose
-    velocity the sums are taken; velocities before and their changes are the balls' y and x.
+    Counted from the velocity that ball k, the heaviest of these, had before: what a common velocity
+    adds, and what flies on untouched, says nothing here.  The balls' y are the velocities before,
+    their x the changes.
     """
-    mass = momentum = gained = change = size = 0.0
+    change = 0.0
+    size = 0.0
     for i in range(n):
         b = ball[i]
         if b.x != 0.0:
             before = b.y - ball[k].y
             after = before + b.x
-            mass += b.m
-            momentum += b.m * before
-            gained += b.m * b.x
             change += b.m * b.x * (before + 0.5 * b.x)
             size += 0.5 * b.m * (before * before + after * after)
-    if mass == 0.0:
-        return 0.0, 0.0
-    centre = momentum / mass
-    return change - centre * gained, size - centre * (momentum + gained)
+    return change, size
 
 
 @apart
