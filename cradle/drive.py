@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -211,6 +212,12 @@ class Job:
         """Return a count of the impact at hand."""
         tally = self.state.tally
         return tally[name][0].item() if self.compiled else getattr(tally[0], name)
+
+    def stored(self) -> float:
+        """Return the work that the contacts of the impact at hand can still release, J."""
+        contacts = self.state.contact
+        left = contacts["q"].sum() if self.compiled else sum(k.q for k in contacts)
+        return math.ldexp(left, 2 * self.tally("shift") + self.tally("mass_shift"))
 
     def _set_room(self, room: int) -> None:
         """Let the event loop write so many events."""

@@ -227,6 +227,21 @@ class ImpactNotFinished(RuntimeError):
     The path of that trace covers at most the first 100 000 events; its velocities, impulses and
     works are those reached.
 
+    Parameters
+    ----------
+    message : str
+        What to say.
+    trace : Trace
+        What was reached.
+    stored : float, optional
+        Work that the contacts can still release, J.  If left out, it is not known: all energy that
+        is not lost yet counts.
+
+    Attributes
+    ----------
+    trace : Trace
+        What was reached.
+
     Examples
     --------
     >>> from cradle import Chain, ImpulseCorrelation, collide
@@ -237,13 +252,62 @@ class ImpactNotFinished(RuntimeError):
     [-0.053, 0.947, 0.105]
     """
 
-    def __init__(self, message: str, trace: Trace) -> None:
-        super().__init__(message, trace)  # both, so that it can be pickled
+    def __init__(self, message: str, trace: Trace, stored: float | None = None) -> None:
+        super().__init__(message, trace, stored)  # all of them, so that it can be pickled
         self.trace = trace
+        self.stored = stored
+
+    @property
+    def bounds(self) -> Vector:
+        """What is decided all the same: least and largest final velocity of each ball, m/s.
+
+        Momentum stays, energy does not grow, and in the end no ball is faster than the next.
+
+        Returns
+        -------
+        ndarray, shape (2, N)
+            The least velocities and the largest.
+
+        Notes
+        -----
+        Count velocities from that of the centre of mass.  If ball i ends at x > 0, the balls from
+        i on, of mass A, are at least as fast: they have a momentum of A x or more, and the others,
+        of mass B, the opposite one.  The least energy of that is (A + A^2 / B) x^2 / 2.  What is
+        left is no less: where both are equal, x is largest.
+
+        Examples
+        --------
+        >>> from cradle import Chain, ImpulseCorrelation, collide
+        >>> try:
+        ...     collide(Chain([1, 1, 1], [1, 0, 0], 0.9), ImpulseCorrelation(0.1, max_events=1))
+        ... except ImpactNotFinished as stopped:
+        ...     print(stopped.trace.velocities.round(3).tolist())
+        ...     print(stopped.bounds.round(3).tolist())
+        [0.0, 0.9, 0.1]
+        [[-0.273, 0.03, 0.333], [0.333, 0.637, 0.94]]
+        """
+        chain, v = self.trace.chain, self.trace.velocities
+        heaviest, fastest = chain.masses.max(), np.abs(chain.velocities).max()
+        m, unit = chain.masses / heaviest, max(fastest, np.abs(v).max())
+        left = self.stored
+        if left is None:
+            v, left = chain.velocities, -self.trace.energy_loss
+        v, left = v / unit, left / heaviest / unit / unit
+        centre = v[0] + m @ (v - v[0]) / m.sum()
+        rounding = 2.0**-50
+        twice = max(m @ (np.abs(v - centre) + rounding) ** 2 + 2.0 * left, 0.0)
+        after = np.cumsum(m[::-1])[::-1]
+        until = np.cumsum(m)
+        largest = np.sqrt(twice * (until - m) / after / m.sum())
+        least = np.sqrt(twice * (after - m) / until / m.sum())
+        bounds: Vector = np.array([centre - least - rounding, centre + largest + rounding])
+        bounds *= unit
+        return bounds
 
     def __str__(self) -> str:
-        """Return the message."""
-        return str(self.args[0])
+        """Return the message, and what is decided."""
+        change = np.abs(self.bounds - self.trace.velocities).max()
+        return f"{self.args[0]}; no velocity can change by more than {change:.3g} m/s any more"
 
 
 class ImpactNotCertified(RuntimeError):

@@ -170,6 +170,7 @@ class ImpulseCorrelation:
                 f"the impact was not finished after max_events = {self.max_events} steps, "
                 f"{job.tally('events')} events; closing speeds so far {(v[:-1] - v[1:]).tolist()}",
                 trace,
+                job.stored(),
             )
         if job.status == UNSOUND:
             raise ImpactNotCertified(chain, self, DEFECTS[job.tally("defect")])

@@ -187,6 +187,7 @@ class QuadraticDissipation:
                 f"the impact was not finished after max_problems = {self.max_problems}; "
                 f"closing speeds so far {(v[:-1] - v[1:]).tolist()}",
                 trace,
+                0.0,  # between two problems nothing is stored
             )
         return trace
 

@@ -70,19 +70,19 @@ class SequentialCollisions:
 
     def solve(self, chain: Chain) -> Trace:
         """Solve the impact of `chain`; see `collide`."""
-        seen, message = must_be(Chain, "chain", chain), ""
+        seen, message, stored = must_be(Chain, "chain", chain), "", None
         if self.order == "right":
             # The leftmost contact of the mirror image is the rightmost of the chain.
             seen = Chain(chain.masses[::-1], 0.0 - chain.velocities[::-1], chain.restitution[::-1])
         try:
             trace = ImpulseCorrelation(0.0, max_events=self.max_events).solve(seen)
         except ImpactNotFinished as stopped:
-            trace, message = stopped.trace, str(stopped)
+            trace, message, stored = stopped.trace, stopped.args[0], stopped.stored
         if self.order == "right":
             trace = _mirrored(trace)
         trace = replace(trace, chain=chain, model=self)
         if message:
-            raise ImpactNotFinished(message, trace)
+            raise ImpactNotFinished(message, trace, stored)
         return trace
 
 
