@@ -532,18 +532,24 @@ def any_chain(family, decades, index):
 
 
 def work(problem, max_events):
-    """Collisions, whether collapsed, and the trace if it did not finish, of the fast run."""
+    """Collisions, whether collapsed, and what stopped it if it did not finish, of the fast run."""
     try:
         found = outcomes(*problem[:5], excess="saturate", max_events=max_events)
     except ImpactNotFinished as stopped:
-        return int(stopped.trace.collisions.sum()), False, stopped.trace
+        return int(stopped.trace.collisions.sum()), False, stopped
     return int(found.collisions.sum()), bool(found.collapsed), None
 
 
 def to_the_default(problem):
-    """Collisions at the solver's default limit, and 1 if that was enough."""
+    """Collisions at the solver's default limit, 1 if that was enough, and what is still open.
+
+    That is how much a velocity can still change, over the largest closing speed at the start.
+    """
     collisions, _, stopped = work(problem, MAX_EVENTS)
-    return collisions, int(stopped is None)
+    if stopped is None:
+        return collisions, 1, 0.0
+    change = np.abs(stopped.bounds - stopped.trace.velocities).max()
+    return collisions, 0, change / max(a - b for a, b in itertools.pairwise(problem.velocities))
 
 
 def relative_energy(masses, velocities):

@@ -169,9 +169,9 @@ def long_or_not(family, decades, index):
     row = (1, collapsed, collisions > 100, collisions > 1000, collisions > 10_000)
     unfinished = None
     if stopped:
-        seen = (*x.portrait(problem, stopped), *x.to_the_default(problem))
+        seen = (*x.portrait(problem, stopped.trace), *x.to_the_default(problem))
         why = [""] * len(x.Explanation._fields)
-        if not seen[-1]:
+        if not seen[-2]:
             why = x.explain(problem, x.late(problem, x.MAX_EVENTS))
         unfinished = (family, decades, index, n, *seen, *why)
     return n, (*row, stopped is not None), unfinished
@@ -191,7 +191,8 @@ def finish(_):
                 yield (family, decades, n, *table[n].tolist())
             print(family, decades, len(unfinished), flush=True)
     header = ["family", "decades", "index", "balls", "period", "energy_half", "energy"]
-    header += ["collisions", "finished", *(f"late_{name}" for name in x.Explanation._fields)]
+    header += ["collisions", "finished", "open"]
+    header += [f"late_{name}" for name in x.Explanation._fields]
     write("unfinished", header, unfinished)
 
 

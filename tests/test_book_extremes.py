@@ -263,6 +263,10 @@ def test_table_of_unfinished_chains(inventory):
         assert number(inventory[f"rest-{family}"]) == left.count(family)
     # Half of the last digit; where it is just half, either way.
     assert number(inventory["rest-share"]) == pytest.approx(len(left) / 1000, abs=0.005 + 1e-9)
+    still_open = sorted(float(r["open"]) for r in never if r["finished"] == "0")
+    for name, limit in (("six", 1e-6), ("three", 1e-3), ("one", 0.1)):
+        decided = np.searchsorted(still_open, limit, side="right")
+        assert 0 < number(inventory[f"decided-{name}"]) == decided < len(left)
     done = [int(r["collisions"]) for r in never if r["finished"] == "1"]
     assert number(inventory["default-most"]) == pytest.approx(max(done), rel=0.05)
 

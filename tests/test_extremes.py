@@ -488,6 +488,7 @@ def test_chains_that_do_not_finish_are_explained():
         # Something comes back, and shrinks, turns, or moves a steady contact.
         assert row["late_returns"] >= 4, row
         assert max(abs(row["late_shrink"]), row["late_turn"], row["late_drift"]) > 0, row
+        assert 0 < row["open"] < 1000, row
     # What exactly a chain does after millions of events hangs on every rounding before: nothing
     # is compared there.  That it goes on, and how, shows much earlier.
     for row in sample(never, min(3, len(never))):
