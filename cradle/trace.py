@@ -259,9 +259,10 @@ class ImpactNotFinished(RuntimeError):
 
     @property
     def bounds(self) -> Vector:
-        """What is decided all the same: least and largest final velocity of each ball, m/s.
+        """Least and largest velocity that each ball can end with, m/s.
 
-        Momentum stays, energy does not grow, and in the end no ball is faster than the next.
+        They follow from what holds until the end: momentum stays, energy does not grow, and in the
+        end no ball is faster than the next on its right.
 
         Returns
         -------
