@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import math
 import threading
 import time
 from collections.abc import Callable
@@ -214,10 +213,9 @@ class Job:
         return tally[name][0].item() if self.compiled else getattr(tally[0], name)
 
     def stored(self) -> float:
-        """Return the work that the contacts of the impact at hand can still release, J."""
+        """Return the work that contacts can still release, in the kernel's own units."""
         contacts = self.state.contact
-        left = contacts["q"].sum() if self.compiled else sum(k.q for k in contacts)
-        return math.ldexp(left, 2 * self.tally("shift") + self.tally("mass_shift"))
+        return float(contacts["q"].sum() if self.compiled else sum(k.q for k in contacts))
 
     def _set_room(self, room: int) -> None:
         """Let the event loop write so many events."""

@@ -234,8 +234,8 @@ class ImpactNotFinished(RuntimeError):
     trace : Trace
         What was reached.
     stored : float, optional
-        Work that the contacts can still release, J.  If left out, it is not known: all energy that
-        is not lost yet counts.
+        Work that the contacts can still release, over the heaviest mass times the square of the
+        largest speed before.  If left out, it is not known: all energy that is not lost yet counts.
 
     Attributes
     ----------
@@ -262,7 +262,8 @@ class ImpactNotFinished(RuntimeError):
         """Least and largest velocity that each ball can end with, m/s.
 
         They follow from what holds until the end: momentum stays, energy does not grow, and in the
-        end no ball is faster than the next on its right.
+        end no ball is faster than the next on its right.  `SpringChain` and `EnergyDistribution`
+        keep momentum and energy to the tolerance of their integration only, and so the bounds.
 
         Returns
         -------
@@ -287,13 +288,11 @@ class ImpactNotFinished(RuntimeError):
         [0.0, 0.9, 0.1]
         [[-0.273, 0.03, 0.333], [0.333, 0.637, 0.94]]
         """
-        chain, v = self.trace.chain, self.trace.velocities
-        heaviest, fastest = chain.masses.max(), np.abs(chain.velocities).max()
-        m, unit = chain.masses / heaviest, max(fastest, np.abs(v).max())
-        left = self.stored
+        chain, v, left = self.trace.chain, self.trace.velocities, self.stored
+        heaviest, unit = chain.masses.max(), np.abs(chain.velocities).max()
         if left is None:
-            v, left = chain.velocities, -self.trace.energy_loss
-        v, left = v / unit, left / heaviest / unit / unit
+            v, left = chain.velocities, -self.trace.energy_loss / unit / heaviest / unit
+        m, v = chain.masses / heaviest, v / unit
         centre = v[0] + m @ (v - v[0]) / m.sum()
         rounding = 2.0**-50
         twice = max(m @ (np.abs(v - centre) + rounding) ** 2 + 2.0 * left, 0.0)
@@ -307,7 +306,7 @@ class ImpactNotFinished(RuntimeError):
 
     def __str__(self) -> str:
         """Return the message, and what is decided."""
-        change = np.abs(self.bounds - self.trace.velocities).max()
+        change = 1.0051 * np.abs(self.bounds - self.trace.velocities).max()  # three digits, up
         return f"{self.args[0]}; no velocity can change by more than {change:.3g} m/s any more"
 
 

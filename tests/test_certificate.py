@@ -101,11 +101,14 @@ def test_work_that_was_not_done(contact, sign):
     assert verdict(state) == LEDGER
 
 
-@pytest.mark.parametrize("thing", ["ball", "contact"])
-def test_no_number_at_all(thing):
+@pytest.mark.parametrize("number", [float("nan"), float("inf")])
+@pytest.mark.parametrize("thing", ["ball", "impulse", "work"])
+def test_no_number_at_all(thing, number):
     state = solved(*LOSSY)
     if thing == "ball":
-        state.ball[2].hi = float("nan")
+        state.ball[2].hi = number
+    elif thing == "impulse":
+        state.contact[1].p = number
     else:
-        state.contact[1].a = float("nan")
+        state.contact[1].a = number
     assert verdict(state) != 0

@@ -47,8 +47,8 @@ DIGESTS = {
     "scenes": "13088f12c81b4e35",
     "long_chains": "eef8777637e3f854",
     "implied_ratio": "617f9eed01d94458",
-    "batch": "f2898fcc9e32cb2b",
-    "one by one": "1ca37840ff9f166d",
+    "batch": "34315d61a4a1b526",
+    "one by one": "bf75f300bf8429ad",
 }
 
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import truth
 from plain import solve
-from test_defects import LAST_DIGITS, LITTLE_LEFT, MANY_COLLAPSES, NAMED, PORTIONS
+from test_defects import LAST_DIGITS, LITTLE_LEFT, MANY_COLLAPSES, NAMED, PORTIONS, THROWN
 
-from cradle.kernel import collapse, meeting
+from cradle.kernel import collapse, loop, meeting
 from cradle.kernel.state import FINISHED, UNFINISHED, UNSOUND
 
 WRONG = "wrong"
@@ -238,10 +238,15 @@ NEEDED = {
         NAMED["an end and a closing beside it at once"],
         WRONG,
     ),
-    "corrections of rounding that are more than a run moves": (
-        {"slight": math.inf},
-        LAST_DIGITS["a cycle as slow as the rounding of a contact beside it"],
+    "a correction of rounding that would throw a light ball": (
+        {"handed_on": lambda _: lambda *_: 0.0},
+        THROWN["a light ball beyond a heavy one that light balls touch"],
         UNSOUND,
+    ),
+    "of two runs that meet, the one that hands on less": (
+        {"touch": changed(loop, "touch", "left_moves = one <= other", "left_moves = True")},
+        LAST_DIGITS["two balls that chatter between balls held fast"],
+        WRONG,
     ),
     "corrections of rounding that do work": (
         {"push_at_work": lambda names: names["push"]},
@@ -303,12 +308,9 @@ NEEDED = {
         PORTIONS,
         UNSOUND,
     ),
-    "an elastic sequence down to the last digit": (
+    "a sequence down to the last digit": (
         {"dust": 0.0},
-        (
-            [0.166, 0.053, 0.053, 0.045, 0.053], [1, -0.5, 1, -0.5, 0.5], 1,
-            [1, 1, 0.1], [0, 0, 0], 0.5,
-        ),
+        LAST_DIGITS["contacts that have just closed at the last digit"],
         UNFINISHED,
     ),
 }  # fmt: skip

@@ -1,5 +1,7 @@
 """Every answer is checked before it is returned: momentum, order, energy, ledger."""
 
+import math
+
 from cradle.kernel.motion import closing
 from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, apart, once
 
@@ -45,7 +47,7 @@ def certify(n, ball, contact, tally):
         b.x = (b.hi - b.y) + b.lo
         after = contact[i].p if i < n - 1 else 0.0
         slack = LIMITS.sound * (abs(before) + abs(after)) + LIMITS.dust * b.m
-        if not abs(b.m * b.x - (before - after)) <= slack:
+        if not abs(b.m * b.x - (before - after)) <= slack < math.inf:
             return MOMENTUM
         before = after
         fastest = max(fastest, abs(b.hi - ball[0].hi), abs(b.y - ball[0].y))
@@ -59,7 +61,7 @@ def certify(n, ball, contact, tally):
         lost += (1.0 - k.e * k.e) * k.a
     gained, size = energies(n, heaviest, ball)
     slack = (LIMITS.sound + n * LIMITS.digits) * (size + absorbed)
-    if not gained <= slack:
+    if not gained <= slack < math.inf:
         return ENERGY
     if not abs(gained + lost) <= slack:
         return LEDGER

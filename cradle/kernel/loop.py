@@ -12,9 +12,9 @@ from cradle.kernel.motion import (
     add_velocity,
     add_work,
     arrive,
-    bodies,
     closing,
     closing_parts,
+    handed_on,
     reduced_mass,
     set_closing_speed,
 )
@@ -145,8 +145,8 @@ def move(first, part, n, state):
 def touch(gap, state):
     """Bring a gap to zero: the ball that has just moved takes the other's velocity.
 
-    If both have, the one does that is lighter, with the balls that zeros join to it: the last digit
-    of a heavy one's velocity is much momentum.
+    If both have, it is the one for which the contact inwards hands on less: the last digit of a
+    heavy ball's velocity is a throw for a light one.
     """
     k = state.contact[gap]
     if k.u > max(LIMITS.roundings * k.blur, LIMITS.sound):
@@ -156,7 +156,8 @@ def touch(gap, state):
     left_moves = run[left].stirred == 1 and ball[gap].pull != 0.0
     right_moves = run[right].stirred == 1 and ball[gap + 1].pull != 0.0
     if left_moves and right_moves:
-        _, _, one, other = bodies(gap, run[left].low, run[right].high, ball, state.contact)
+        one = handed_on(gap, run[left].low, gap - 1, ball, state.contact)
+        other = handed_on(gap, right, run[right].high, ball, state.contact)
         left_moves = one <= other
     if left_moves:
         arrive(gap, run[left].low, gap - 1, ball, state.contact)

@@ -4,6 +4,8 @@ A light ball may shuttle a thousand times as fast as the heavy balls beside it. 
 alone would lose track of how these move, single velocities of how slowly some balls part.
 """
 
+import math
+
 from cradle.kernel.state import LIMITS, apart, jit
 
 
@@ -160,6 +162,29 @@ def set_closing_speed(c, speed, rest, low, high, ball, contact):
             contact[k].u = closing(k, ball)
 
 
+@jit
+def next_inwards(c, low, high, contact):
+    """Return the first contact of the run low..high beside contact c that is not at zero, or -1."""
+    step = 1 if c < low else -1
+    k = low if c < low else high
+    while low <= k <= high and contact[k].u == 0.0:
+        k += step
+    return k if low <= k <= high else -1
+
+
+@apart
+def handed_on(c, low, high, ball, contact):
+    """Tell how fast a body moves for one unit that `arrive` moves the run's ball at contact c.
+
+    It is the body beyond the contact that is corrected, and has that much less mass.
+    """
+    k = next_inwards(c, low, high, contact)
+    if k < 0:
+        return math.inf
+    _, _, left, right = bodies(k, low, high, ball, contact)
+    return left / right if c < low else right / left
+
+
 @apart
 def arrive(c, low, high, ball, contact):
     """Let contact c beside the run low..high be at zero: the run's ball takes the other's velocity.
@@ -167,20 +192,20 @@ def arrive(c, low, high, ball, contact):
     The two differ by rounding, most often by that of what the run's last impulse did to this ball,
     and to those that zeros join to it.  Where it is more, the impulse of the contact inwards is
     corrected first: a push moves whatever rests on its balls, but what is taken back is taken from
-    the run alone, since no contact pulls.  If there is no such contact, one that has not quite
-    arrived is left as it is, but for dust.
+    the run alone, since no contact pulls.  If there is no such contact, or a light ball beyond it
+    would be thrown, one that has not quite arrived is left as it is, but for dust.
     """
-    step = 1 if c < low else -1
-    k = low if c < low else high
-    while low <= k <= high and contact[k].u == 0.0:
-        k += step
+    k = next_inwards(c, low, high, contact)
     top = len(ball) - 2
-    if not low <= k <= high:  # all of the run is one body, which only contact c itself can change
-        contact[c].u = closing(c, ball)
-        if contact[c].u > -LIMITS.dust:
+    near = -closing(c, ball)
+    fastest = 0.0
+    for j in range(low, high + 1):
+        fastest = max(fastest, abs(contact[j].u), abs(contact[j].x))
+    if abs(near) * handed_on(c, low, high, ball, contact) > LIMITS.tie * fastest or k < 0:
+        contact[c].u = -near
+        if near < LIMITS.dust:
             set_closing_speed(c, 0.0, 0.0, 0, top, ball, contact)
         return
-    near = -closing(c, ball)
     begin, end = (0, top) if near >= 0.0 else (low, high)
     body = bodies(k, begin, end, ball, contact)
     first, last, left, right = body

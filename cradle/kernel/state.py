@@ -42,9 +42,9 @@ class Limits(NamedTuple):
     """What rounding and infinity are measured by.
 
     Where a chain is known that goes wrong without a limit, `tests/test_safeguards.py` switches it
-    off: `dust`, `faint`, `bend`, `doubt`, `one_digit`, `tie`, `simultaneous`, `roundings`,
-    `slight`, `same`, `vanishing`.  `exhausted`, `repeats` and `self_similar` only save rounds.  No
-    such chain is known for `rounded` and `cut`, nor for a larger `faint` or `doubt`, or a smaller
+    off: `dust`, `faint`, `bend`, `doubt`, `one_digit`, `tie`, `simultaneous`, `roundings`, `same`,
+    `vanishing`.  `exhausted`, `repeats` and `self_similar` only save rounds.  No such chain is
+    known for `rounded`, `cut` and `slight`, nor for a larger `faint` or `doubt`, or a smaller
     `same`: these stay as what rounding says.  The others bound the input, the closed form and the
     certificate.
     """
@@ -67,7 +67,8 @@ class Limits(NamedTuple):
     one_digit: float
     #: Relative accuracy of an impulse.
     digits: float
-    #: R8: parts of segments, and distances, closer than this are equal.
+    #: R8: parts of segments, and distances, closer than this are equal; part of a run's largest
+    #: closing speed that a correction of rounding may change a velocity by.
     tie: float
     #: R8: parts of segments closer to 1 than this are whole.
     simultaneous: float

@@ -170,7 +170,7 @@ class ImpulseCorrelation:
                 f"the impact was not finished after max_events = {self.max_events} steps, "
                 f"{job.tally('events')} events; closing speeds so far {(v[:-1] - v[1:]).tolist()}",
                 trace,
-                job.stored(),
+                _over_largest(job, chain),
             )
         if job.status == UNSOUND:
             raise ImpactNotCertified(chain, self, DEFECTS[job.tally("defect")])
@@ -205,6 +205,13 @@ class ImpulseCorrelation:
             saturated=tuple(np.flatnonzero(results.held).tolist()),
             margin=job.tally("margin"),
         )
+
+
+def _over_largest(job: Job, chain: Chain) -> float:
+    """Return what is stored, over the heaviest mass and the square of the largest speed."""
+    heaviest = np.ldexp(chain.masses.max(), -job.tally("mass_shift"))
+    fastest = np.ldexp(np.abs(chain.velocities).max(), -job.tally("shift"))
+    return float(job.stored() / (heaviest * fastest * fastest))
 
 
 def checked_ratios(name: str, ratios: ArrayLike | None) -> Vector:

@@ -82,7 +82,9 @@ class SequentialCollisions:
             trace = _mirrored(trace)
         trace = replace(trace, chain=chain, model=self)
         if message:
-            raise ImpactNotFinished(message, trace, stored)
+            speeds = (trace.velocities[:-1] - trace.velocities[1:]).tolist()
+            before = message.partition("; closing speeds")[0]
+            raise ImpactNotFinished(f"{before}; closing speeds so far {speeds}", trace, stored)
         return trace
 
 
