@@ -172,7 +172,7 @@ def next_inwards(c, low, high, contact):
     return k if low <= k <= high else -1
 
 
-@apart
+@jit
 def handed_on(c, low, high, ball, contact):
     """Tell how fast a body moves for one unit that `arrive` moves the run's ball at contact c.
 
@@ -183,6 +183,16 @@ def handed_on(c, low, high, ball, contact):
         return math.inf
     _, _, left, right = bodies(k, low, high, ball, contact)
     return left / right if c < low else right / left
+
+
+@jit
+def throws(c, near, low, high, ball, contact):
+    """Tell whether a correction by `near` changes a velocity by more than rounding of the run's."""
+    thrown = 0.0 if near == 0.0 else abs(near) * handed_on(c, low, high, ball, contact)
+    for j in range(low, high + 1):
+        if thrown <= LIMITS.tie * max(abs(contact[j].u), abs(contact[j].x)):
+            return False
+    return thrown > 0.0
 
 
 @apart
@@ -198,10 +208,7 @@ def arrive(c, low, high, ball, contact):
     k = next_inwards(c, low, high, contact)
     top = len(ball) - 2
     near = -closing(c, ball)
-    fastest = 0.0
-    for j in range(low, high + 1):
-        fastest = max(fastest, abs(contact[j].u), abs(contact[j].x))
-    if abs(near) * handed_on(c, low, high, ball, contact) > LIMITS.tie * fastest or k < 0:
+    if k < 0 or throws(c, near, low, high, ball, contact):
         contact[c].u = -near
         if near < LIMITS.dust:
             set_closing_speed(c, 0.0, 0.0, 0, top, ball, contact)
