@@ -169,9 +169,10 @@ def long_or_not(family, decades, index):
     row = (1, collapsed, collisions > 100, collisions > 1000, collisions > 10_000)
     unfinished = None
     if stopped:
-        seen = (*x.portrait(problem, stopped.trace), *x.to_the_default(problem))
+        later, finished, still_open = x.to_the_default(problem)
+        seen = (*x.portrait(problem, stopped.trace), later, finished, still_open)
         why = [""] * len(x.Explanation._fields)
-        if not seen[-2]:
+        if not finished:
             why = x.explain(problem, x.late(problem, x.MAX_EVENTS))
         unfinished = (family, decades, index, n, *seen, *why)
     return n, (*row, stopped is not None), unfinished

@@ -305,9 +305,13 @@ class ImpactNotFinished(RuntimeError):
         return bounds
 
     def __str__(self) -> str:
-        """Return the message, and what is decided."""
-        change = 1.0051 * np.abs(self.bounds - self.trace.velocities).max()  # three digits, up
-        return f"{self.args[0]}; no velocity can change by more than {change:.3g} m/s any more"
+        """Return the message, how fast balls still approach, and what is decided."""
+        v = self.trace.velocities
+        change = 1.0051 * np.abs(self.bounds - v).max()  # three digits, up
+        return (
+            f"{self.args[0]}; closing speeds so far {(v[:-1] - v[1:]).tolist()}; "
+            f"no velocity can change by more than {change:.3g} m/s any more"
+        )
 
 
 class ImpactNotCertified(RuntimeError):

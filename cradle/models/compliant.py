@@ -193,8 +193,7 @@ class SpringChain:
         if reason:
             raise ImpactNotFinished(
                 f"the impact was not finished after {second * motion.t:.6g} s and "
-                f"{len(trace.events)} events: {reason}; closing speeds so far "
-                f"{(trace.velocities[:-1] - trace.velocities[1:]).tolist()}",
+                f"{len(trace.events)} events: {reason}",
                 trace,
             )
         return trace

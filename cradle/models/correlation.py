@@ -165,10 +165,9 @@ class ImpulseCorrelation:
             raise AssertionError("the kernel refused a chain that the checks admit")
         trace = self._trace(chain, job)
         if job.status == UNFINISHED:
-            v = trace.velocities
             raise ImpactNotFinished(
                 f"the impact was not finished after max_events = {self.max_events} steps, "
-                f"{job.tally('events')} events; closing speeds so far {(v[:-1] - v[1:]).tolist()}",
+                f"{job.tally('events')} events",
                 trace,
                 _over_largest(job, chain),
             )

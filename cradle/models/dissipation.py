@@ -184,8 +184,7 @@ class QuadraticDissipation:
         )
         if (closing(v) > 0.0).any():
             raise ImpactNotFinished(
-                f"the impact was not finished after max_problems = {self.max_problems}; "
-                f"closing speeds so far {(v[:-1] - v[1:]).tolist()}",
+                f"the impact was not finished after max_problems = {self.max_problems}",
                 trace,
                 0.0,  # between two problems nothing is stored
             )

@@ -158,8 +158,7 @@ class EnergyDistribution:
         )
         if reason:
             raise ImpactNotFinished(
-                f"the impact was not finished after {len(trace.events)} events: {reason}; "
-                f"closing speeds so far {(trace.velocities[:-1] - trace.velocities[1:]).tolist()}",
+                f"the impact was not finished after {len(trace.events)} events: {reason}",
                 trace,
             )
         return trace

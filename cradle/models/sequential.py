@@ -82,9 +82,7 @@ class SequentialCollisions:
             trace = _mirrored(trace)
         trace = replace(trace, chain=chain, model=self)
         if message:
-            speeds = (trace.velocities[:-1] - trace.velocities[1:]).tolist()
-            before = message.partition("; closing speeds")[0]
-            raise ImpactNotFinished(f"{before}; closing speeds so far {speeds}", trace, stored)
+            raise ImpactNotFinished(message, trace, stored)
         return trace
 
 
