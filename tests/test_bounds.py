@@ -143,4 +143,5 @@ def test_the_message_says_what_is_decided():
 def test_closing_speeds_in_the_message_are_those_of_the_chain(order):
     chain = Chain([1, 2, 1, 3], [1, 0, -1, -1.5], 1)
     found = stopped(chain, SequentialCollisions(order, max_events=1))
+    assert found.stored is not None  # what its event loop knows is handed on
     assert f"closing speeds so far {(-np.diff(found.trace.velocities)).tolist()};" in str(found)
