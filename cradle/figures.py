@@ -54,6 +54,7 @@ EVENT_STYLES = {
     "end": ("s", "f", "end"),
     "close": ("^", "s", "start of a further collision"),
     "collapse": ("D", "l", "limit of an infinite sequence"),
+    "repetition": ("*", "r", "cycle, repeated many times"),
 }
 
 # A longer legend takes several lines.

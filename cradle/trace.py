@@ -27,7 +27,8 @@ class Event(NamedTuple):
     Event(kind='end', contact=0)
     """
 
-    #: "maximum_compression", "end", "close" or "collapse".
+    #: "maximum_compression", "end", "close", "collapse" (the limit of an infinite sequence) or
+    #: "repetition" (a cycle of events that has been repeated many times at once).
     kind: str
     #: Index of the contact; contact c joins balls c and c + 1.
     contact: int
@@ -53,7 +54,7 @@ class Trace:
         How often each contact became active.
     path : ndarray, shape (K + 1, N)
         Velocities before the impact and at every event, m/s.  Between two rows every velocity is
-        linear in every impulse.
+        linear in every impulse, but before a "collapse" or a "repetition", which stand for many.
     path_impulses : ndarray, shape (K + 1, N - 1)
         Impulses so far, at the same instants, N s.
     events : tuple of Event, length K

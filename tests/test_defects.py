@@ -370,11 +370,11 @@ def test_what_the_last_digits_leave_open(name):
 
 
 #: What rounding had left between two heavy balls was taken from a contact with a light one, which
-#: was thrown: by metres per second at 1e-20 of their mass, by 1e-5 m/s at 1e-12.  Its energy is too
+#: was thrown: by 1e-5 m/s at 1e-12 of their mass, by more if it is lighter.  Its energy is too
 #: little for the certificate.
 THROWN = {
     "a light ball behind the first of two that meet": Problem(
-        [1e-20, 1, 1, 1], [0, 1, -0.5, -1], [0.5, 0.9, 0.9], [0, 0], [0, 0]
+        [1e-15, 1, 1, 1], [0, 1, -0.5, -1], [0.5, 0.9, 0.9], [0, 0], [0, 0]
     ),
     "the same, not quite as light": Problem(
         [1e-12, 1, 1, 1], [1, 0, 1, -1], [0.01, 0, 0.01], [0.1, 0.1], [0, 1], 1.0
@@ -388,17 +388,17 @@ THROWN = {
         [0.001, 0.1, 0.1], [0, 1, 0], 0.0,
     ),
     "a heavy ball that a light one has all but stopped beside": Problem(
-        [1e-16, 1, 1, 1], [1, 0.5, 0, -1], [1, 0.01, 1], [1, 1], [0, 0], 1.0
+        [1e-15, 1, 1, 1], [1, 0.5, 0, -1], [1, 0.01, 1], [1, 1], [0, 0], 1.0
     ),
     "a light ball beyond a heavy one that light balls touch": Problem(
-        [1, 1e-20, 1, 1e-20], [0, 0.5, 0, 0], [1, 0, 0.001], [0, 0], [0, 0]
+        [1, 1e-15, 1, 1e-15], [0, 0.5, 0, 0], [1, 0, 0.001], [0, 0], [0, 0]
     ),
     "the same, beside heavy ones that collide": Problem(
-        [1, 1, 1, 1e-20, 1, 1e-20], [-1, -2, 0, 0.5, 0, 0], [0.5, 0.9, 1, 0, 0.001],
+        [1, 1, 1, 1e-15, 1, 1e-15], [-1, -2, 0, 0.5, 0, 0], [0.5, 0.9, 1, 0, 0.001],
         [0] * 4, [0] * 4,
     ),
     "light and heavy balls in turn": Problem(
-        [0.01, 1e-20, 0.01, 1e-20], [0.5, -1, 0.5, -1], [1, 0, 0], [0, 0], [0, 0]
+        [0.01, 1e-15, 0.01, 1e-15], [0.5, -1, 0.5, -1], [1, 0, 0], [0, 0], [0, 0]
     ),
 }  # fmt: skip
 
@@ -528,19 +528,44 @@ def test_a_store_released_in_portions_below_its_last_digit():
     assert invariants(trace)["ledger"] < 2
 
 
-def test_masses_of_eighteen_decades_are_solved_or_refused():
-    problem = Problem([1e-8, 1e-26, 1e-9, 1], [0, 1, 0, 0], [0, 1, 1], [0.3, 0.1], [0.3, 0.5])
-    try:
-        trace = problem.collide()
-    except ValueError as error:
-        refusal = str(error)
-    else:
-        refusal = ""
-    if refusal:
-        assert refusal.startswith("masses[1] = 1e-26; ")
-        return
-    momentum = sum(Fraction(m) * Fraction(v) for m, v in zip(problem.masses, trace.velocities))
-    assert float(momentum) == pytest.approx(1e-26, rel=1e-12, abs=0)
+def squeezed(light):
+    """Two pairs of heavy balls on a light one: which of them it leaves first is near a tie."""
+    return Problem(
+        [1, 1, light, 1, 1], [1, -0.5, -1, -0.5, 1], [0.5, 0, 0.9, 0.5], 0.001, [1, 1, 0.001]
+    )
+
+
+def test_masses_of_fifteen_decades_are_solved_and_of_more_refused():
+    """Twenty decades apart, heavy balls were wrong by .2 m/s."""
+    for light in (1e-13, 1e-14, 1e-15):
+        trace, truth = squeezed(light).collide(), exact(squeezed(light))
+        assert difference(trace.velocities, truth.velocities) < 1e-15
+    with pytest.raises(ValueError, match=r"^masses\[2\] = 9e-16; .* at least 1e-15 of the"):
+        squeezed(9e-16).collide()
+    with pytest.raises(ValueError, match=r"^masses\[1\] = 1e-26; "):
+        collide(Chain([1e-8, 1e-26, 1e-9, 1], [0, 1, 0, 0], [0, 1, 1]), ImpulseCorrelation(0.3))
+
+
+#: The work of an end with e = 1e-8 is 1e-16 of what the contact has absorbed, and known to all its
+#: digits; it was taken for zero, and the answer was refused.
+SLOW_ENDS = {
+    "a closing just before it": Problem([1, 1e-12, 1], [0, 1, 0], [0, 1e-8], [0], [0]),
+    "a closing just after": Problem([3, 3, 0.3], [1, -1, 0], [1e-8, 1e-8], [1], [1]),
+    "an end beside it": Problem([3, 1, 3], [1, 0, -1], [1e-8, 1e-13], [1], [0.1], 0.0),
+    "between others": Problem(
+        [3, 3, 1, 3, 1], [0.5, -1, 0.5, -0.5, 1], [1e-8, 0.001, 1e-8, 1e-20],
+        [0.001, 0.1, 0.001], [0, 1, 0],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("name", SLOW_ENDS)
+def test_ends_at_next_to_no_speed(name, mirrored):
+    problem = SLOW_ENDS[name].mirrored() if mirrored else SLOW_ENDS[name]
+    trace, truth = problem.collide(), exact(problem)
+    assert difference(trace.velocities, truth.velocities) < 1e-14
+    assert difference(trace.impulses, truth.impulses) < 1e-14
 
 
 def test_coefficients_whose_square_is_no_double():

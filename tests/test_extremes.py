@@ -808,7 +808,7 @@ def test_found_by_fuzzing(name, plain, monkeypatch):
     if least < LIMITS.lightest or any(
         0 < e < LIMITS.least_restitution for e in problem.restitution
     ):
-        with pytest.raises(ValueError, match=r"(must be|be|0 or) at least 1e-(25|30)"):
+        with pytest.raises(ValueError, match=r"(must be|be|0 or) at least 1e-(15|30)"):
             problem.attempt(20_000)
         return
     trace, finished = problem.attempt(20_000)

@@ -1,6 +1,6 @@
 // One impact: what is asked of input, the event loop's work area, the outcome.
 
-const KINDS = ["maximum_compression", "end", "close", "collapse"];
+const KINDS = ["maximum_compression", "end", "close", "collapse", "repetition"];
 const DEFECTS = {
   [NO_EVENT]: "no event follows, though contacts are active",
   [MOMENTUM]: "a ball's momentum is not that of its impulses",

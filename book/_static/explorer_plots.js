@@ -9,6 +9,8 @@
     close: (x, y, r) => `<path d="M${x} ${y - r}l${r} ${1.8 * r}h${-2 * r}z"/>`,
     collapse: (x, y, r) =>
       `<path d="M${x} ${y - 1.3 * r}l${r} ${1.3 * r} ${-r} ${1.3 * r} ${-r} ${-1.3 * r}z"/>`,
+    repetition: (x, y, r) =>
+      `<path d="M${x} ${y - 1.3 * r}l${0.4 * r} ${0.9 * r} ${0.9 * r} ${0.4 * r} ${-0.9 * r} ${0.4 * r} ${-0.4 * r} ${0.9 * r} ${-0.4 * r} ${-0.9 * r} ${-0.9 * r} ${-0.4 * r} ${0.9 * r} ${-0.4 * r}z"/>`,
   };
 
   const px = (value) => Math.round(value * 100) / 100;

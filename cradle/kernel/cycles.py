@@ -8,9 +8,20 @@ found in the same way, on a second level: there collapses are counted, not ends.
 import math
 
 from cradle.kernel.collapse import exhausted_stretch, merge
-from cradle.kernel.jump import jump, limit, neighbours_stay, velocity_changes
+from cradle.kernel.jump import go_on, limit, neighbours_stay, to_limit, velocity_changes
 from cradle.kernel.record import record
-from cradle.kernel.state import COLLAPSE, END, LIMITS, LOWER, UPPER, Cluster, apart, jit, once
+from cradle.kernel.state import (
+    COLLAPSE,
+    END,
+    LIMITS,
+    LOWER,
+    REPETITION,
+    UPPER,
+    Cluster,
+    apart,
+    jit,
+    once,
+)
 
 
 @jit
@@ -20,6 +31,16 @@ def settle(n, memory):
         memory[1][c].p += memory[0][c].p
         memory[1][c].a += memory[0][c].a
         memory[0][c].p = memory[0][c].a = 0.0
+
+
+@jit
+def forget(number, levels):
+    """Drop the snapshot of a level."""
+    level = levels[number]
+    level.mark = -1
+    level.due = 16 if number == 0 else 4
+    level.count = 0
+    level.bend = level.bent = math.inf
 
 
 @jit
@@ -87,9 +108,22 @@ def cluster_around(c, level, n, state):
     return Cluster(c, c, c - 1, c)
 
 
+@apart
+def repeat(c, n, state):
+    """Note that the cycle that contact c ends has been repeated; look for another one from here."""
+    run = state.run
+    first = state.tally[0].first
+    while first < n:
+        run[first].stirred = 1
+        first = run[first].onward
+    forget(LOWER, state.level)
+    settle(n, state.memory)
+    record(REPETITION, c, n, state)
+
+
 @once
 def cycle(level, c, bend, n, state):
-    """If the neighbourhood of contact c repeats itself on a smaller scale, go to the limit.
+    """If the neighbourhood of contact c repeats itself on another scale, go to the limit.
 
     Light balls need many cycles to settle on one factor.  It is enough that what still changes
     will not matter: the bend, how far the state turns by the time that it is exhausted, is below
@@ -99,8 +133,10 @@ def cycle(level, c, bend, n, state):
     too small to matter.  Where these say nothing of the limit, the cycle ends where it is, if it is
     too small to matter itself.
 
-    Returns (first, last) of the contacts that have collapsed, empty, with nothing changed, if
-    there is no cycle; and the bend.
+    Where there is none, or a neighbour comes to its event before it, the cycle is repeated as often
+    as it surely repeats itself.
+
+    Returns (first, last) of the contacts that have collapsed, empty if none have; and the bend.
     """
     threshold = state.tally[0].threshold
     cluster = cluster_around(c, level, n, state)
@@ -109,33 +145,31 @@ def cycle(level, c, bend, n, state):
     total, off, size, unsure, doubt = limit(cluster, level, state)
     if total == 0.0:
         return c, c - 1, math.inf
-    if unsure > LIMITS.one_digit:  # between balls held fast only the last digits tell it
-        total, unsure, doubt = 0.0, 0.0, size
+    if total > 0.0 and unsure > LIMITS.one_digit:
+        total, unsure, doubt = 0.0, 0.0, size  # only the last digits tell of the limit
     bent = 0.0
     if off > LIMITS.self_similar:
         # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
         # 1 / (T + 1/2), and as good as that for a slow cycle.
         bent = off * max(math.log(size / threshold), 1.0) * (total + 0.5)
-        if not bent < min(LIMITS.bend, bend):
+        if total < 0.0 or not bent < min(LIMITS.bend, bend):
             return c, c - 1, bent
     farthest = velocity_changes(cluster, total, level, state)
     steady = cluster.left < cluster.first or cluster.last < cluster.right
-    if steady and doubt + (unsure + bent) * farthest > LIMITS.doubt * threshold:
-        return c, c - 1, bent
-    if not neighbours_stay(cluster, total, farthest, level, n, state):
-        return c, c - 1, math.inf
-    jump(cluster, total, level, n, state)
-    return cluster.first, cluster.last, math.inf
-
-
-@jit
-def forget(number, levels):
-    """Drop the snapshot of a level."""
-    level = levels[number]
-    level.mark = -1
-    level.due = 16 if number == 0 else 4
-    level.count = 0
-    level.bend = level.bent = math.inf
+    # Of two contacts only the scale changes slowly; of more, `off` may be of something else too.
+    two = cluster.last < cluster.first + 2
+    turns = bent if two else max(bent, off * (total + 0.5))
+    error = doubt + (unsure + turns) * farthest if steady else 0.0
+    if total >= 0.0:
+        if error > LIMITS.doubt * threshold:
+            return c, c - 1, bent
+        if neighbours_stay(cluster, total, 1.0, level, n, state):
+            to_limit(cluster, total, level, n, state)
+            return cluster.first, cluster.last, math.inf
+    certain = bent == 0.0 and (two or not steady)
+    if level == LOWER and certain and go_on(cluster, total, error, n, state):
+        repeat(c, n, state)
+    return c, c - 1, math.inf
 
 
 @apart

@@ -247,19 +247,20 @@ def rounding_after(k, s):
 
 
 @once
-def comes_at(s, k, fastest):
+def comes_at(s, k):
     """Tell whether the next event of contact k comes at progress s, as far as rounding can tell.
 
-    It closes, or ends at u = 0, when u gets there; it ends otherwise when Q = 0, and then, once
-    u < 0, Q changes by rate * u.  Rounding of fast motion long ago tells nothing of a run that is
-    hardly faster than that: its events come as they are.
+    It closes, or ends at u = 0, when u gets there.  It ends otherwise when Q = 0: of rounding in
+    what it has absorbed Q has e^2, and once u < 0 it changes by rate * u.
     """
     if not k.until < math.inf:
         return False
     late = k.until - s
-    blur = min(rounding_after(k, s), LIMITS.slight * fastest)
+    blur = rounding_after(k, s)
     if k.active == 1 and k.final < 0.0:
-        rest = blur * s + LIMITS.roundings * 2.0**-53 * k.w / k.rate
+        at_zero = min(s, -k.u / k.slope) if k.u > 0.0 else 0.0
+        absorbed = blur * at_zero + LIMITS.roundings * 2.0**-53 * k.w / k.rate
+        rest = k.e * k.e * absorbed + blur * (s - at_zero)
         return late * -k.final <= rest and late * abs(k.slope) <= max(-k.final, blur)
     return late * abs(k.slope) <= blur
 
@@ -273,12 +274,10 @@ def segment(first, n, run, ball, contact):
     """
     low, high = run[first].low, run[first].high
     s = second = math.inf
-    fastest = 0.0
     for c in range(low, high + 1):
         k = contact[c]
         k.until, k.final = end_progress(k.u, k.q, k.slope, k.rate, k.e)
         s = min(s, k.until)
-        fastest = max(fastest, abs(k.u))
     # Idle neighbours close; a gap, shared with another run, is no event of this run's own.
     for c in (low - 1, high + 1):
         if 0 <= c < n - 1 and contact[c].active == 0:
@@ -292,7 +291,7 @@ def segment(first, n, run, ball, contact):
     for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
         k = contact[c]
         if low <= c <= high or k.active == 0:
-            k.due = 1 if comes_at(s, k, fastest) else 0
+            k.due = 1 if comes_at(s, k) else 0
             if k.until > s and k.until < second:
                 second = k.until
     return 1.0 - s / second if second < math.inf else 1.0

@@ -29,7 +29,7 @@ if "jit" not in globals():
 # Status codes.
 FINISHED, UNFINISHED, REFUSED, PAUSED, UNSOUND = 0, 1, 2, 3, 4
 # Kinds of event.
-MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE = 0, 1, 2, 3
+MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE, REPETITION = 0, 1, 2, 3, 4
 # R8.1: ends that are known without the slopes, and those that need them.
 CERTAIN, SLOPED = 0, 1
 # R9: the two levels on which cycles are looked for.
@@ -43,10 +43,10 @@ class Limits(NamedTuple):
 
     Where a chain is known that goes wrong without a limit, `tests/test_safeguards.py` switches it
     off: `dust`, `faint`, `bend`, `doubt`, `one_digit`, `tie`, `simultaneous`, `roundings`, `same`,
-    `vanishing`.  `exhausted`, `repeats` and `self_similar` only save rounds.  No such chain is
-    known for `rounded`, `cut` and `slight`, nor for a larger `faint` or `doubt`, or a smaller
-    `same`: these stay as what rounding says.  The others bound the input, the closed form and the
-    certificate.
+    `rounded`, `vanishing`.  `exhausted`, `repeats`, `many`, `self_similar` and `cut` only save
+    work (`tests/test_speed.py`).  No such chain is known for a larger `faint` or `doubt`, or a
+    smaller `same`: these stay as what rounding says.  The others bound the input, the closed form
+    and the certificate.
     """
 
     #: R9: an exhausted contact's speed, relative to the largest initial closing speed.
@@ -57,6 +57,8 @@ class Limits(NamedTuple):
     faint: float
     #: R9: exhausted collisions in a row that are a collapse.
     repeats: int
+    #: R9: how many cycles are worth taking at once.
+    many: int
     #: R9: how closely a cycle must repeat itself, relative to its own scale.
     self_similar: float
     #: R9: how far a cycle may turn before it is exhausted, relative to its own scale.
@@ -74,8 +76,6 @@ class Limits(NamedTuple):
     simultaneous: float
     #: R8: closing speeds closer than this many of their roundings are equal.
     roundings: float
-    #: R8: part of a run's largest closing speed that rounding may be.
-    slight: float
     #: R3: an end speed this close to -e times the speed at the start of compression is meant so.
     same: float
     #: R7: a ratio this close to its bound is meant to be the bound.
@@ -90,8 +90,8 @@ class Limits(NamedTuple):
     huge: float
     #: ... and for conditions that are met by this part of their largest term.
     clear: float
-    #: Mass of the lightest ball allowed, as a part of the heaviest: beyond it a double cannot tell
-    #: how heavy balls part that a light one has struck.
+    #: Mass of the lightest ball allowed, as a part of the heaviest: below 2**-53 the last digit of
+    #: a progress moves it by as much as its next event takes.
     lightest: float
     #: Least coefficient of restitution allowed, but zero: a slower end is below the last digit.
     least_restitution: float
@@ -104,6 +104,7 @@ LIMITS = Limits(
     dust=2.0**-100,
     faint=1e-20,
     repeats=8,
+    many=64,
     self_similar=1e-13,
     bend=1e-2,
     doubt=1e5,
@@ -112,7 +113,6 @@ LIMITS = Limits(
     tie=1e-9,
     simultaneous=1.0 + 64 * 2.0**-52,
     roundings=16.0,
-    slight=1e-3,
     same=16 * 2.0**-52,
     rounded=1.0 + 4 * 2.0**-52,
     cut=2.0**-120,
@@ -120,7 +120,7 @@ LIMITS = Limits(
     tiny=1e-60,
     huge=1e60,
     clear=1e-12,
-    lightest=1e-25,
+    lightest=1e-15,
     least_restitution=1e-30,
     sound=64 * 2.0**-52,
 )

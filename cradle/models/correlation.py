@@ -43,7 +43,7 @@ def _most_events(n: int) -> int:
 
 #: What is asked of a ratio.
 _RANGE = ("must lie in [0, 1]", 0.0, 1.0)
-_KINDS = ("maximum_compression", "end", "close", "collapse")
+_KINDS = ("maximum_compression", "end", "close", "collapse", "repetition")
 
 
 @dataclass(frozen=True)
