@@ -568,6 +568,36 @@ def test_ends_at_next_to_no_speed(name, mirrored):
     assert difference(trace.impulses, truth.impulses) < 1e-14
 
 
+#: Two runs that meet again and again, each time after a part of what is left to them: the sequence
+#: of collisions between the last three balls comes to its limit where the contact 1 of the other
+#: run ends.  Thirteen thousand collisions, and .0017 m/s, when that end came by its rounding.
+TWO_RUNS_WITH_ONE_LIMIT = Problem(
+    [25.6, 0.045, 3.22, 22.1, 11.2, 0.0392, 0.149],
+    [0.933, 0.599, -0.351, 0.809, 0.243, -0.58, -0.769],
+    [0.612, 0.396, 0.0, 0.739, 1.0, 0.126],
+    [0.484, 1.0, 1.0, 0.239, 0.193], [0.995, 0.94, 0.708, 0.241, 0.0],
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_two_runs_with_one_limit(mirrored):
+    problem = TWO_RUNS_WITH_ONE_LIMIT
+    problem = problem.mirrored() if mirrored else problem
+    trace, truth = problem.collide(), exact(problem)
+    assert trace.collapsed
+    assert trace.collisions.max() < 100
+    assert difference(trace.velocities, truth.velocities) < 1e-14
+    assert difference(trace.impulses, truth.impulses) < 1e-13
+
+
+def test_a_neighbour_that_closes_at_the_limit_itself():
+    """A cycle was repeated 2, 4, 8 ... times for ever: the neighbour stays until the limit."""
+    problem = Problem([0.053, 1, 0.053, 1], [0, 0.5, 0, -0.5], [0.5, 0, 0.9], [1, 0.1], [0, 0.1])
+    trace, truth = problem.collide(), exact(problem)
+    assert trace.collapsed
+    assert difference(trace.velocities, truth.velocities) < 1e-15
+
+
 def test_coefficients_whose_square_is_no_double():
     """A contact that ends at -1e-300 m/s has opened, but no velocity says so: it is refused."""
     with pytest.raises(

@@ -276,13 +276,14 @@ def go_on(cluster, total, error, n, state):
     """Repeat a cycle 2, 4, 8 ... times, before a neighbour comes to its event; tell if it did.
 
     After k cycles everything is L^k of what it was, L = T / (1 + T), and the balls have gone the
-    part 1 - L^k of the way to the limit: so far that the `error` of the whole way does not matter.
+    part 1 - L^k of the way to the limit: so far that the `error` of the whole way does not matter,
+    and half of it at most, as a neighbour's event may be at the limit itself.
     """
     contact, memory = state.contact, state.memory[LOWER]
     cycles, part = 1, 1.0 / (1.0 + total)
     while True:
         further = part * (2.0 - part)
-        if not abs(further) * error <= LIMITS.doubt * state.tally[0].threshold:
+        if further > 0.5 or not abs(further) * error <= LIMITS.doubt * state.tally[0].threshold:
             break
         if not neighbours_stay(cluster, total, further, LOWER, n, state):
             break
