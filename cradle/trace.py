@@ -51,7 +51,7 @@ class Trace:
     absorbed : ndarray, shape (N - 1,)
         Work that each contact absorbed in compression, over all its collisions, J.  Where an
         infinite sequence was taken to its limit, what all contacts lost is exact; how the rest of
-        the sequence shared it is what its last cycle shows, to 1e-5 of the largest of them.
+        the sequence shared it is what its last cycle shows, to 1e-4 of the largest of them.
     collisions : ndarray of int, shape (N - 1,)
         How often each contact became active.
     path : ndarray, shape (K + 1, N)

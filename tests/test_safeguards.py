@@ -421,3 +421,28 @@ def test_collisions_without_an_impulse_are_no_cycle():
     assert run(LIGHT_BETWEEN, cluster_around=watched).status == FINISHED
     assert found
     assert all(cluster.last < cluster.first for cluster in found)
+
+
+@pytest.mark.parametrize(
+    "chain",
+    [
+        (
+            [0.12340293906449111, 0.015272256033722932, 0.0010428007666734443, 0.2953516775518479],
+            [1, 0.3, 1, 0.5], [0.99, 0.1, 0.9], [0.1, 0],
+        ),
+        (
+            [0.465, 0.002, 0.0775, 0.00198, 0.363], [0, 1, -0.5, 0.5, -1], [0.1, 0.7, 0.1, 0.99],
+            [0.01, 0, 0],
+        ),
+    ],
+)  # fmt: skip
+def test_a_limit_tells_the_velocities_better_than_the_works(chain):
+    early, late = solve(*chain), solve(*chain, bend=0.0, self_similar=0.0, many=math.inf)
+    assert early.collapsed
+    assert late.collapsed
+    np.testing.assert_allclose(early.velocities, late.velocities, rtol=0, atol=1e-15)
+    kept = 1 - np.square(chain[2])
+    assert kept @ early.absorbed == pytest.approx(kept @ late.absorbed, rel=1e-14)
+    # What `Trace.absorbed` promises, and no more.
+    apart = np.abs(np.subtract(early.absorbed, late.absorbed)).max()
+    assert 1e-6 < apart / max(late.absorbed) < 1e-4

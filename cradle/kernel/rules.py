@@ -251,16 +251,16 @@ def comes_at(s, k):
     """Tell whether the next event of contact k comes at progress s, as far as rounding can tell.
 
     It closes, or ends at u = 0, when u gets there.  It ends otherwise when Q = 0: of rounding in
-    what it has absorbed Q has e^2, and once u < 0 it changes by rate * u.  What is as far off again
-    comes later: two runs that meet again and again halve all that is left to them.
+    what it has absorbed Q has e^2, and once u < 0 it changes by rate * u.  One that is as far off
+    again comes later: runs that meet again and again leave a part of it each time, to all digits.
     """
     if not k.until < math.inf:
         return False
     late = k.until - s
-    if late > s:
-        return False
     blur = rounding_after(k, s)
     if k.active == 1 and k.final < 0.0:
+        if late > s:
+            return False
         at_zero = min(s, -k.u / k.slope) if k.u > 0.0 else 0.0
         absorbed = blur * at_zero + LIMITS.roundings * 2.0**-53 * k.w / k.rate
         rest = k.e * k.e * absorbed + blur * (s - at_zero)
