@@ -648,7 +648,7 @@ class Explanation(NamedTuple):
 def explain(problem, seen):
     """See `Explanation`."""
     kinds, contacts, speeds, active = seen
-    tokens = 4 * contacts + kinds
+    tokens = 5 * contacts + kinds
     names, counts = np.unique(tokens, return_counts=True)
     again = counts >= 4
     rarest = names[again][np.argmin(counts[again])]

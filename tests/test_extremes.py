@@ -523,7 +523,7 @@ def test_last_events():
     trace, finished = problem.attempt(1000)
     assert not finished
     seen = x.late(problem, 1000, 200)
-    kinds = ("maximum_compression", "end", "close", "collapse")
+    kinds = ("maximum_compression", "end", "close", "collapse", "repetition")
     events = [tuple(event) for event in trace.events if event.kind != "maximum_compression"]
     assert [(kinds[k], c) for k, c in zip(seen.kinds, seen.contacts)] == events[-200:]
     unit = 2.0 ** math.frexp(np.abs(problem.velocities).max())[1]

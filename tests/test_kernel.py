@@ -484,7 +484,7 @@ def test_a_path_grows_with_its_impact(plain, on):
     count = len(trace.events)
     assert count > 4 * (64 + drive._ROUND * 30)
     assert trace.path.shape == (count + 1, 30)
-    names = {"maximum_compression": 0, "end": 1, "close": 2, "collapse": 3}
+    names = {"maximum_compression": 0, "end": 1, "close": 2, "collapse": 3, "repetition": 4}
     found = solve(*LONG, room=count)
     assert found.events == count
     assert found.state.record.contacts == [event.contact for event in trace.events]
