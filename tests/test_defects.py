@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from chains import uniform
-from extreme_chains import invariants
+from extreme_chains import any_chain, invariants
 from families import FAMILIES, family
 from problem import Problem
 
@@ -596,6 +596,14 @@ def test_a_neighbour_that_closes_at_the_limit_itself():
     trace, truth = problem.collide(), exact(problem)
     assert trace.collapsed
     assert difference(trace.velocities, truth.velocities) < 1e-15
+
+
+def test_works_of_a_cycle_that_grows_far():
+    """Ten billion times at once, its neighbour's work was known to six digits, and was refused."""
+    trace = any_chain("saturate", 6, 9806).collide()
+    assert trace.collapsed
+    assert "repetition" in {event.kind for event in trace.events}
+    assert invariants(trace)["ledger"] < 2
 
 
 def test_coefficients_whose_square_is_no_double():

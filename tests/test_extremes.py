@@ -33,6 +33,8 @@ from cradle.measures import condition_number
 from cradle.models.correlation import MAX_EVENTS
 from cradle.tables import paper_sequences
 
+needs_numba = pytest.mark.skipif(not runtime.available(), reason="numba is not installed")
+
 DATA = Path(__file__).parents[1] / "data"
 #: 13 digits, in units of eps.
 THIRTEEN = 1e-13 / x.EPS
@@ -510,6 +512,23 @@ def test_chains_go_on_to_the_default_limit():
         found = x.explain(problem, x.late(problem, MAX_EVENTS))
         assert found.returns >= 4, row
         assert max(abs(found.shrink), found.turn, found.drift) > 0, row
+
+
+@needs_numba
+def test_a_row_of_heavy_and_light_balls_is_long_but_not_endless(monkeypatch):
+    """Two and a half times as many collisions as the default limit allows."""
+    monkeypatch.setenv(runtime.VARIABLE, "compiled")
+    row = Chain([1, 1e-6, 1, 1e-6, 1], [1, 0, 0, 0, 0], 0.5)
+    with pytest.raises(ImpactNotFinished) as caught:
+        collide(row, ImpulseCorrelation(0.1, excess="saturate", max_events=10**5), record=False)
+    model = ImpulseCorrelation(0.1, excess="saturate", max_events=10**8)
+    trace = collide(row, model, record=False)
+    assert trace.collapsed
+    assert trace.collisions.sum() > 10**7
+    np.testing.assert_allclose(trace.velocities, 1 / row.masses.sum(), rtol=1e-14)
+    # What was said to be decided early on was.
+    low, high = caught.value.bounds
+    assert ((low <= trace.velocities) & (trace.velocities <= high)).all()
 
 
 def test_last_events():
