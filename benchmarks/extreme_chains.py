@@ -30,7 +30,7 @@ from cradle import (
     outcomes,
     post_impact_velocities,
 )
-from cradle.kernel.state import COLLAPSE, LIMITS
+from cradle.kernel.state import COLLAPSE, LIMITS, REPETITION
 from cradle.models.correlation import MAX_EVENTS
 
 EPS = 2.0**-52
@@ -648,7 +648,7 @@ class Explanation(NamedTuple):
 def explain(problem, seen):
     """See `Explanation`."""
     kinds, contacts, speeds, active = seen
-    tokens = 5 * contacts + kinds
+    tokens = (REPETITION + 1) * contacts + kinds
     names, counts = np.unique(tokens, return_counts=True)
     again = counts >= 4
     rarest = names[again][np.argmin(counts[again])]

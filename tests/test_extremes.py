@@ -15,6 +15,7 @@ from fuzz import attempt
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from problem import Problem
+from test_kernel import needs_numba
 
 from cradle import (
     Chain,
@@ -32,8 +33,6 @@ from cradle.kernel.state import LIMITS
 from cradle.measures import condition_number
 from cradle.models.correlation import MAX_EVENTS
 from cradle.tables import paper_sequences
-
-needs_numba = pytest.mark.skipif(not runtime.available(), reason="numba is not installed")
 
 DATA = Path(__file__).parents[1] / "data"
 #: 13 digits, in units of eps.

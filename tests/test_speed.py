@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 from chains import magnitudes, uniform
 from plain import solve as solved
+from test_kernel import needs_numba
 
 from cradle import ImpactNotFinished, outcomes, paper_chain, post_impact_velocities, runtime
 from cradle.kernel.state import FINISHED, LIMITS
 from cradle.models import batch
-
-needs_numba = pytest.mark.skipif(not runtime.available(), reason="numba is not installed")
 
 
 @pytest.fixture(autouse=True)

@@ -145,6 +145,12 @@ def velocity_changes(cluster, total, level, state):
     return farthest
 
 
+@jit
+def sum_of_squares(total, part):
+    """Return the sum of L^2, L^4, ... on this part of the way to the limit."""
+    return part * (2.0 - part) * total * (total / (1.0 + 2.0 * total))
+
+
 @apart
 def neighbours_stay(cluster, total, part, level, n, state):
     """Work out what the neighbours of a cycle absorb; tell whether none comes to its own event.
@@ -155,7 +161,7 @@ def neighbours_stay(cluster, total, part, level, n, state):
     """
     ball, contact, memory = state.ball, state.contact, state.memory[level]
     left, right = cluster.left, cluster.right
-    squares = part * (2.0 - part) * total * (total / (1.0 + 2.0 * total))
+    squares = sum_of_squares(total, part)
     steps = part * total * (part * (1.0 + total) - 1.0) / (1.0 + 2.0 * total)
     for c in range(max(left - 1, 0), min(right + 1, n - 2) + 1):
         if cluster.first <= c <= cluster.last:
@@ -209,7 +215,7 @@ def exact_squares(cluster, total, part, energy, state, memory, low, high):
             energy -= k.y
     if loss > 0.0:
         return max(energy / loss, 0.0)
-    return part * (2.0 - part) * total * (total / (1.0 + 2.0 * total))
+    return sum_of_squares(total, part)
 
 
 @once

@@ -259,12 +259,11 @@ def comes_at(s, k):
     late = k.until - s
     blur = rounding_after(k, s)
     if k.active == 1 and k.final < 0.0:
-        if late > s:
-            return False
         at_zero = min(s, -k.u / k.slope) if k.u > 0.0 else 0.0
         absorbed = blur * at_zero + LIMITS.roundings * 2.0**-53 * k.w / k.rate
         rest = k.e * k.e * absorbed + blur * (s - at_zero)
-        return late * -k.final <= rest and late * abs(k.slope) <= max(-k.final, blur)
+        slow = late * abs(k.slope) <= max(-k.final, blur)
+        return late <= s and slow and late * -k.final <= rest
     return late * abs(k.slope) <= blur
 
 
