@@ -117,7 +117,6 @@ def repeat(c, n, state):
         run[first].stirred = 1
         first = run[first].onward
     forget(LOWER, state.level)
-    settle(n, state.memory)
     record(REPETITION, c, n, state)
 
 
