@@ -73,8 +73,33 @@ def unit() -> str:
     return ast.unparse(ast.Module(body, [])) + "\n"
 
 
+class _Unsigned(ast.NodeTransformer):
+    """Write every index that is worked out as a number without a sign."""
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        self.generic_visit(node)
+        if not isinstance(node.slice, ast.Constant):
+            node.slice = ast.Call(ast.Name("unsigned", ast.Load()), [node.slice], [])
+        return node
+
+
+@functools.cache
+def _for_numba(source: str) -> str:
+    """Return a source in the form in which it is compiled.
+
+    An index below zero would count from the end.  The kernel has none, but numba would ask at each
+    of them, which takes a quarter of an impact's time.
+    """
+    tree = _Unsigned().visit(ast.parse(source))
+    return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
+
+
+def _compilable() -> str:
+    return _for_numba(unit())
+
+
 def _name() -> str:
-    return _named(unit())
+    return _named(_compilable())
 
 
 @functools.cache
@@ -105,7 +130,7 @@ def _stored() -> Path | None:
         with tempfile.NamedTemporaryFile(
             "w", encoding="utf-8", dir=path.parent, suffix=".tmp", delete=False
         ) as file:
-            file.write(unit())
+            file.write(_compilable())
         if path.exists():
             Path(file.name).unlink()
         else:
@@ -160,9 +185,9 @@ def compiled() -> Any | None:
         "door": {**options, "cache": path is not None},
     }
     marks = {mark: numba.njit(**chosen) for mark, chosen in meanings.items()}
-    vars(module).update(marks)
+    vars(module).update(marks, unsigned=np.uint64)
     sys.modules[name] = module
-    exec(compile(unit(), module.__file__, "exec"), vars(module))
+    exec(compile(_compilable(), module.__file__, "exec"), vars(module))
     # numba compiles a function anew for each whole number that is written down in a call; not so
     # for these.
     for constant, value in vars(module).items():

@@ -377,7 +377,7 @@ def test_compiled_code_stays_out_of_the_package(monkeypatch, tmp_path, variable)
     stored = runtime._stored()
     assert stored.parent.name == "cradle-companion"
     assert stored.is_relative_to(tmp_path)
-    assert stored.read_text(encoding="utf-8") == runtime.unit()
+    assert stored.read_text(encoding="utf-8") == runtime._compilable()
     assert set(package.rglob("*")) == before
 
 

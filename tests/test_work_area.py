@@ -1,9 +1,13 @@
-"""What the work area held before an impact, or a contact before it waited, changes nothing."""
+"""What the work area held before an impact, or a contact before it waited, changes nothing.
+
+And nothing outside it is touched: compiled code does not ask (`cradle.runtime`).
+"""
 
 from typing import get_type_hints
 
 import plain
 import pytest
+from extreme_chains import any_chain
 from families import FAMILIES, Draw, family
 from problem import Problem
 
@@ -68,6 +72,62 @@ seeds = pytest.mark.parametrize("seed", range(3))
 def test_the_work_area_is_laid_out_anew(name, seed, kernel):
     for problem in family(name, 5, seed=5):
         assert outcome(problem, kernel, area=filled(seed)) == outcome(problem, kernel)
+
+
+class Strict(list):
+    """A sequence that does not count from its end."""
+
+    def __getitem__(self, k):
+        assert k >= 0, k
+        return super().__getitem__(k)
+
+
+def strict(seed):
+    """How a work area is made whose sequences have no index below zero."""
+
+    def area(n, compiled, record):
+        state = filled(seed)(n, compiled, record)
+        memory = Strict(Strict(row) for row in state.memory)
+        parts = {name: Strict(getattr(state, name)) for name in state._fields[:4]}
+        record = type(record)(*map(Strict, record))
+        return state._replace(**parts, memory=memory, record=record)
+
+    return area
+
+
+def test_a_strict_sequence_refuses_an_index_below_zero():
+    state = strict(1)(3, False, plain.no_record())
+    for part in (state.ball, state.contact, state.run, state.level, state.memory, *state.memory):
+        assert part[0] is not None
+        with pytest.raises(AssertionError):
+            part[-1]
+
+
+@seeds
+@pytest.mark.parametrize("name", FAMILIES)
+def test_no_index_lies_outside_the_work_area(name, seed, kernel):
+    for problem in family(name, 20, seed=seed):
+        outcome(problem, kernel, area=strict(seed), room=200)
+
+
+@pytest.mark.parametrize("way", ["within", "saturate"])
+def test_no_index_lies_outside_the_work_area_where_sequences_are_infinite(way, kernel):
+    collapsed = 0
+    for index in range(60):
+        masses, velocities, e, forward, backward, *_ = any_chain(way, 3, index)
+        found = plain.solve(
+            masses, velocities, e, forward, backward, max_events=2000, room=200, kernel=kernel,
+            area=strict(1),
+        )  # fmt: skip
+        collapsed += found.collapsed
+    assert collapsed > 10
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_record_changes_no_outcome(name, kernel):
+    """Its compressions once wrote where a correction of rounding looked for closing speeds."""
+    for problem in family(name, 20, seed=1):
+        assert outcome(problem, kernel, room=200) == outcome(problem, kernel)
 
 
 def test_an_impact_forgets_the_one_before(kernel):

@@ -42,8 +42,8 @@ from cradle.kernel.state import (
 
 @once
 def works(k, s, ended, recent):
-    """Book the works of contact k over a progress s that took its closing speed from x to u."""
-    u0, u1, rate = k.x, k.u, k.rate
+    """Book the works of contact k over a progress s that took its closing speed from u0 to u."""
+    u0, u1, rate = k.u0, k.u, k.rate
     gain = 0.0  # absorbed
     give = 0.0  # released
     if u0 >= 0.0 and u1 >= 0.0:
@@ -110,7 +110,7 @@ def advance(first, part, n, state):
     for i in range(low, high + 2):
         add_velocity(ball[i], ball[i].pull * s)
     for c in range(low, high + 1):
-        contact[c].x = contact[c].u
+        contact[c].u0 = contact[c].u
         if contact[c].slope != 0.0:
             contact[c].u = closing(c, ball)
             contact[c].blur += 2.0**-53 * abs(contact[c].slope) * s

@@ -190,7 +190,7 @@ def throws(c, near, low, high, ball, contact):
     """Tell whether a correction by `near` changes a velocity by more than rounding of the run's."""
     thrown = 0.0 if near == 0.0 else abs(near) * handed_on(c, low, high, ball, contact)
     for j in range(low, high + 1):
-        if thrown <= LIMITS.tie * max(abs(contact[j].u), abs(contact[j].x)):
+        if thrown <= LIMITS.tie * max(abs(contact[j].u), abs(contact[j].u0)):
             return False
     return thrown > 0.0
 

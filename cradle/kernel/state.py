@@ -151,6 +151,7 @@ class Contact:
     forward: float  # ratios at its right ball
     backward: float
     u: float  # closing speed, > 0 in compression
+    u0: float  # closing speed before its run moved last
     q: float  # work that it can still release, e^2 W+ - W-, since it became active,
     q_lo: float  # as a sum of two numbers
     w: float  # work absorbed since it became active, W+
@@ -175,7 +176,6 @@ class Contact:
     power: int  # binary exponent of the rate; a flag
     x: float  # room for what a function works out in passing
     y: float
-    z: float
 
 
 class Run:
