@@ -130,4 +130,4 @@ class Chain:
     @property
     def kinetic_energy(self) -> float:
         """Total kinetic energy, J."""
-        return float(0.5 * self.masses @ self.velocities**2)
+        return float(0.5 * (self.masses * self.velocities) @ self.velocities)

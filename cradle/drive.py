@@ -25,6 +25,7 @@ DEFECTS = {
     rooms.NO_EVENT: "no event follows, though contacts are active",
     rooms.PASSED: "two groups of balls that should have met have passed each other",
     rooms.MOMENTUM: "a ball's momentum is not that of its impulses",
+    rooms.PULL: "a contact has pulled, or has absorbed less than nothing",
     rooms.ORDER: "balls still approach",
     rooms.ENERGY: "kinetic energy has grown",
     rooms.LEDGER: "the energy lost is not what the contacts keep back",

@@ -4,7 +4,7 @@ import plain
 import pytest
 from families import FAMILIES, family
 
-from cradle.kernel.state import ENERGY, LEDGER, MOMENTUM, ORDER
+from cradle.kernel.state import ENERGY, LEDGER, MOMENTUM, ORDER, PULL
 
 KERNEL = plain.rooms()
 LOSSY = ([1, 0.3, 0.6, 2], [1, 0.2, 0, -0.5], 0.8, 0.2)
@@ -62,6 +62,26 @@ def test_balls_that_still_approach(contact):
     apart = KERNEL["closing"](contact, state.ball)
     pull(state, contact, (SMALL - apart) * one.m * other.m / (one.m + other.m))
     assert verdict(state) == ORDER
+
+
+def test_a_contact_that_pulls():
+    """All else agrees: the energy that it takes from a ball which flies away is booked as lost."""
+    state = solved([1, 1, 1], [1, 0, 5], 0.5, 0.1)
+    contact = state.contact[1]
+    assert contact.p == 0.0
+    before = sum(ball.m * ball.hi**2 / 2 for ball in state.ball)
+    pull(state, 1, 1e-3)
+    after = sum(ball.m * ball.hi**2 / 2 for ball in state.ball)
+    contact.a = (before - after) / (1 - contact.e**2)
+    assert verdict(state) == PULL
+
+
+@pytest.mark.parametrize("contact", range(3))
+def test_works_below_nothing_that_balance(contact):
+    """What an elastic contact absorbs shows in no ledger."""
+    state = solved(*ELASTIC)
+    state.contact[contact].a = -SMALL
+    assert verdict(state) == PULL
 
 
 def test_energy_from_nothing():

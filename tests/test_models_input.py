@@ -84,6 +84,28 @@ def test_outcomes_have_no_unit_of_mass(model, power):
     )
 
 
+LAWS = [
+    *SPRINGS, EnergyDistribution(), QuadraticDissipation(3), SequentialCollisions("right"),
+    FusedChain(), ImpulseCorrelation(0.1),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("model", LAWS, ids=repr)
+@pytest.mark.parametrize(("mass", "speed"), [(-660, 530), (600, -400)])
+def test_works_of_speeds_whose_square_is_no_float(model, mass, speed):
+    """The square of such a speed overflowed, though its energy does not."""
+    chain = Chain([1, 2, 1], [1, 0, 0])
+    other = Chain(np.ldexp(chain.masses, mass), np.ldexp(chain.velocities, speed))
+    one, same = collide(chain, model), collide(other, model)
+    assert same.velocities.tolist() == np.ldexp(one.velocities, speed).tolist()
+    works = np.ldexp(one.absorbed, mass + 2 * speed)
+    np.testing.assert_allclose(same.absorbed, works, rtol=1e-12, atol=works.max() * 1e-15)
+    assert other.kinetic_energy == np.ldexp(chain.kinetic_energy, mass + 2 * speed)
+    assert same.energy_loss == pytest.approx(
+        np.ldexp(one.energy_loss, mass + 2 * speed), abs=works.max() * 1e-14
+    )
+
+
 @pytest.mark.parametrize("power", [-1074, -1030, 900])
 def test_dissipation_has_no_unit_of_mass(power):
     """To the smallest floats, where the equations in kilograms were singular."""

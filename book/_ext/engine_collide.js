@@ -3,7 +3,9 @@
 const KINDS = ["maximum_compression", "end", "close", "collapse", "repetition"];
 const DEFECTS = {
   [NO_EVENT]: "no event follows, though contacts are active",
+  [PASSED]: "two groups of balls that should have met have passed each other",
   [MOMENTUM]: "a ball's momentum is not that of its impulses",
+  [PULL]: "a contact has pulled, or has absorbed less than nothing",
   [ORDER]: "balls still approach",
   [ENERGY]: "kinetic energy has grown",
   [LEDGER]: "the energy lost is not what the contacts keep back",

@@ -1,9 +1,9 @@
-"""Every answer is checked before it is returned: momentum, order, energy, ledger."""
+"""Every answer is checked before it is returned: momentum, pushes, order, energy, ledger."""
 
 import math
 
 from cradle.kernel.motion import closing
-from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, apart, once
+from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, PULL, apart, once
 
 
 @once
@@ -34,10 +34,13 @@ def certify(n, ball, contact, tally):
     momentum is known to a few roundings of the impulses that it has had, however many; or to the
     last digit of two numbers, where the velocity is far larger than what has changed it.  Works are
     products of impulses and closing speeds, so energies are known to a few roundings of all works,
-    and of their sums over the balls.
+    and of their sums over the balls.  A contact only pushes, and only absorbs in compression, but
+    for the roundings of what it rests on.
     """
     before = 0.0
+    weakest = strongest = 0.0
     absorbed = 0.0
+    least = 0.0
     lost = 0.0
     fastest = 0.0
     heaviest = -1  # of the balls that have changed
@@ -49,6 +52,7 @@ def certify(n, ball, contact, tally):
         slack = LIMITS.sound * (abs(before) + abs(after)) + LIMITS.dust * b.m
         if not abs(b.m * b.x - (before - after)) <= slack < math.inf:
             return MOMENTUM
+        weakest, strongest = min(weakest, after), max(strongest, after)
         before = after
         fastest = max(fastest, abs(b.hi - ball[0].hi), abs(b.y - ball[0].y))
         if b.x != 0.0 and (heaviest < 0 or b.m > ball[heaviest].m):
@@ -59,8 +63,11 @@ def certify(n, ball, contact, tally):
             return ORDER
         absorbed += k.a
         lost += (1.0 - k.e * k.e) * k.a
+        least = min(least, k.a)
     gained, size = energies(n, heaviest, ball)
     slack = (LIMITS.sound + n * LIMITS.digits) * (size + absorbed)
+    if least < -slack or weakest < -(LIMITS.sound * strongest + LIMITS.dust):
+        return PULL
     if not gained <= slack < math.inf:
         return ENERGY
     if not abs(gained + lost) <= slack:

@@ -148,10 +148,12 @@ def cycle(level, c, bend, n, state):
         total, unsure, doubt = 0.0, 0.0, size  # only the last digits tell of the limit
     bent = 0.0
     if off > LIMITS.self_similar:
+        if total < 0.0:
+            return c, c - 1, math.inf  # it grows, but not yet by one factor
         # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
         # 1 / (T + 1/2), and as good as that for a slow cycle.
         bent = off * max(math.log(size / threshold), 1.0) * (total + 0.5)
-        if total < 0.0 or not bent < min(LIMITS.bend, bend):
+        if not bent < min(LIMITS.bend, bend):
             return c, c - 1, bent
     farthest = velocity_changes(cluster, total, level, state)
     steady = cluster.left < cluster.first or cluster.last < cluster.right

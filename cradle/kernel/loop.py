@@ -81,15 +81,15 @@ def end_exactly(low, high, ball, contact):
         if contact[c].due == 1 and contact[c].final == 0.0:
             set_closing_speed(c, 0.0, 0.0, low, high, ball, contact)
     for c in range(low, high + 1):
-        if contact[c].due == 1 and contact[c].final < 0.0:
-            e, top, tip = contact[c].e, contact[c].top, contact[c].tip
-            final = contact[c].final
+        k = contact[c]
+        if k.due == 1 and k.final < 0.0:
+            final = k.final
             rest = 0.0
-            speed = e * top
-            if e >= 0.5 and abs(final + speed) < LIMITS.same * speed:
+            speed = k.e * k.top
+            if k.e >= 0.5 and abs(final + speed) < LIMITS.same * speed:
                 final = -speed
-                rest = (1.0 - e) * top - (top - speed) - e * tip
-            contact[c].top = 0.0
+                rest = (1.0 - k.e) * k.top - (k.top - speed) - k.e * k.tip
+            k.top = 0.0
             set_closing_speed(c, final, rest, low, high, ball, contact)
 
 
@@ -105,20 +105,22 @@ def advance(first, part, n, state):
     s = run[first].reach * part
     whole = part == 1.0
     for c in range(low, high + 1):
-        if contact[c].u > 0.0 and contact[c].q == 0.0:
-            contact[c].top, contact[c].tip = closing_parts(c, ball)
+        k = contact[c]
+        if k.u > 0.0 and k.q == 0.0:
+            k.top, k.tip = closing_parts(c, ball)
     for i in range(low, high + 2):
         add_velocity(ball[i], ball[i].pull * s)
     for c in range(low, high + 1):
-        contact[c].u0 = contact[c].u
-        if contact[c].slope != 0.0:
-            contact[c].u = closing(c, ball)
-            contact[c].blur += 2.0**-53 * abs(contact[c].slope) * s
-        impulse = contact[c].rate * s
-        add_impulse(contact[c], impulse)
+        k = contact[c]
+        k.u0 = k.u
+        if k.slope != 0.0:
+            k.u = closing(c, ball)
+            k.blur += 2.0**-53 * abs(k.slope) * s
+        impulse = k.rate * s
+        add_impulse(k, impulse)
         recent[c].p += impulse
-        if contact[c].fixed == 1 and impulse > 0.0:
-            contact[c].held = 1
+        if k.fixed == 1 and impulse > 0.0:
+            k.held = 1
     if whole:
         end_exactly(low, high, ball, contact)
     for c in range(low, high + 1):

@@ -168,14 +168,15 @@ def rates(first, run, ball, contact, tally):
     ball[low].pull = -contact[low].rate / ball[low].m
     ball[high + 1].pull = contact[high].rate / ball[high + 1].m
     for i in range(low + 1, high + 1):
+        b = ball[i]
         # The difference of the rates leaves the sum of the momenta alone; where they are nearly
         # equal, what the driver keeps for the ball has more digits.
-        if ball[i].rest > 0.5:
-            ball[i].pull = (contact[i - 1].rate - contact[i].rate) / ball[i].m
-        elif ball[i].turn == 1:
-            ball[i].pull = contact[i - 1].rate * ball[i].rest / ball[i].m
+        if b.rest > 0.5:
+            b.pull = (contact[i - 1].rate - contact[i].rate) / b.m
+        elif b.turn == 1:
+            b.pull = contact[i - 1].rate * b.rest / b.m
         else:
-            ball[i].pull = -contact[i].rate * ball[i].rest / ball[i].m
+            b.pull = -contact[i].rate * b.rest / b.m
     # The balls of a contact that is held move as one, to the last bit.
     for c in range(low + 1, high + 1):
         if contact[c].fixed > 0 and ball[c].turn == 1:
@@ -194,16 +195,17 @@ def rates(first, run, ball, contact, tally):
 @jit
 def opens_at_zero(c, contact):
     """R3: tell whether contact c, at u = 0 with nothing to release, is about to open."""
-    return contact[c].u == 0.0 and contact[c].q <= 0.0 and contact[c].slope < 0.0
+    k = contact[c]
+    return k.u == 0.0 and k.q <= 0.0 and k.slope < 0.0
 
 
 @once
 def has_ended(c, contact):
     """R3: tell whether contact c has ended: it opens, or has e = 0 and no longer closes."""
-    if contact[c].q > 0.0:
+    k = contact[c]
+    if k.q > 0.0:
         return False
-    u = contact[c].u
-    return u < 0.0 or (u == 0.0 and contact[c].e == 0.0 and contact[c].w > 0.0)
+    return k.u < 0.0 or (k.u == 0.0 and k.e == 0.0 and k.w > 0.0)
 
 
 @once

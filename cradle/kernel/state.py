@@ -35,7 +35,7 @@ CERTAIN, SLOPED = 0, 1
 # R9: the two levels on which cycles are looked for.
 LOWER, UPPER = 0, 1
 # What an answer can break; 0 is none.
-NO_EVENT, PASSED, MOMENTUM, ORDER, ENERGY, LEDGER = 1, 2, 3, 4, 5, 6
+NO_EVENT, PASSED, MOMENTUM, PULL, ORDER, ENERGY, LEDGER = 1, 2, 3, 4, 5, 6, 7
 
 
 class Limits(NamedTuple):

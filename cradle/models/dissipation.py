@@ -165,7 +165,7 @@ class QuadraticDissipation:
             impulses = impulses + passed
             # From all impulses: one alone may be below the last digit of a heavy ball's velocity.
             after = chain.velocities - np.diff(impulses, prepend=0.0, append=0.0) / m
-            absorbed += passed * 0.5 * (u + closing(after))
+            absorbed += passed * unit * 0.5 * (u + closing(after))
             v = after
             contacts = np.flatnonzero(active).tolist()
             events += [Event("end", c) for c in contacts]
@@ -176,7 +176,7 @@ class QuadraticDissipation:
             model=self,
             velocities=v,
             impulses=impulses * unit,
-            absorbed=absorbed * unit,
+            absorbed=absorbed,
             collisions=np.bincount([event.contact for event in events], minlength=n - 1),
             path=np.array(path),
             path_impulses=np.array(path_impulses) * unit,

@@ -132,7 +132,7 @@ class Motion:
             "chain": chain,
             "velocities": chain.velocities + speed * reached[0],
             "impulses": mass * speed * reached[2],
-            "absorbed": mass * speed**2 * self.absorbed,
+            "absorbed": mass * speed * speed * self.absorbed,
             "collisions": self.collisions,
             "path": chain.velocities + speed * change.T,
             "path_impulses": mass * speed * impulses.T,

@@ -155,7 +155,7 @@ class FusedChain:
                 path[row + 1 :, : c + 1] = v[0] - impulse / left
                 path[row + 1 :, c + 1 :] = v[-1] + impulse / right
                 path_impulses[row + 1 :] = impulse * part * unit
-            absorbed[c] = 0.5 * reduced * u[c] ** 2 * unit
+            absorbed[c] = 0.5 * reduced * unit * u[c] * u[c]
             events = [Event("maximum_compression", c), *(Event("end", k) for k in (c, *inner))]
         return Trace(
             chain=chain,
