@@ -1,8 +1,8 @@
 """How the event loop runs: as it stands, or compiled by numba, with the same bits.
 
-The rooms of `cradle.kernel` are joined to one source file, named after a hash of their text, and
-compiled as one unit, kept on disk: an edit anywhere makes a new unit.  Compiling and loading take
-seconds, so small work runs plain until plain work has taken as long.
+The rooms of `cradle.kernel` are joined to one source file, named after a hash of their text and of
+how they are compiled, and compiled as one unit, kept on disk: an edit anywhere makes a new unit.
+Compiling and loading take seconds, so small work runs plain until plain work has taken as long.
 """
 
 from __future__ import annotations
@@ -35,6 +35,23 @@ VARIABLE = "CRADLE_KERNEL"
 #: Seconds of plain work after which compiling pays, and loading what is compiled already: about as
 #: long as these take.
 PAYS_AFTER, LOADS_AFTER = 10.0, 0.5
+
+# The same arithmetic as Python's: no reordering, no contraction; a division by zero gives infinity,
+# and the kernel makes none.  It allocates nothing, so arrays need no reference counts (`_nrt`),
+# without which the loop runs several times faster.  Only the door is called from Python.  A
+# function that says nothing about `forceinline` would take it over from its caller.
+_DOOR: dict[str, Any] = {
+    "nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": False,
+    "no_cfunc_wrapper": True,
+}  # fmt: skip
+_APART = {**_DOOR, "no_cpython_wrapper": True}
+#: What numba is told about the marks of the kernel's functions.
+_MEANINGS: dict[str, dict[str, Any]] = {
+    "jit": {**_APART, "forceinline": True},
+    "once": {**_APART, "inline": "always"},
+    "apart": _APART,
+    "door": _DOOR,
+}
 
 logger = logging.getLogger("cradle")
 _spent = 0.0  # seconds of plain work so far, in this process
@@ -99,12 +116,8 @@ def _compilable() -> str:
 
 
 def _name() -> str:
-    return _named(_compilable())
-
-
-@functools.cache
-def _named(source: str) -> str:
-    return f"cradle_kernel_{hashlib.sha256(source.encode()).hexdigest()[:16]}"
+    told = f"{_compilable()}{_MEANINGS}"
+    return f"cradle_kernel_{hashlib.sha256(told.encode()).hexdigest()[:16]}"
 
 
 def _folder() -> Path:
@@ -170,21 +183,8 @@ def compiled() -> Any | None:
     name = _name()
     module = ModuleType(name)
     module.__file__ = str(path or name)
-    # The same arithmetic as Python's: no reordering, no contraction; a division by zero gives
-    # infinity, and the kernel makes none.  It allocates nothing, so arrays need no reference counts
-    # (`_nrt`), without which the loop runs several times faster.
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False}
-    # Only the door is called from Python.  A function that says nothing about `forceinline` would
-    # take it over from its caller.
-    options |= {"forceinline": False, "no_cfunc_wrapper": True}
-    inner = {**options, "no_cpython_wrapper": True}
-    meanings: dict[str, dict[str, Any]] = {
-        "jit": {**inner, "forceinline": True},
-        "once": {**inner, "inline": "always"},
-        "apart": inner,
-        "door": {**options, "cache": path is not None},
-    }
-    marks = {mark: numba.njit(**chosen) for mark, chosen in meanings.items()}
+    marks = {mark: numba.njit(**options) for mark, options in _MEANINGS.items()}
+    marks["door"] = numba.njit(**_MEANINGS["door"], cache=path is not None)
     vars(module).update(marks, unsigned=np.uint64)
     sys.modules[name] = module
     exec(compile(_compilable(), module.__file__, "exec"), vars(module))

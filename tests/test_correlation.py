@@ -11,6 +11,7 @@ from chains import magnitudes, random_chains, uniform, with_ends
 import cradle
 from cradle import (
     Chain,
+    ImpactNotCertified,
     ImpactNotFinished,
     ImpulseCorrelation,
     collide,
@@ -339,6 +340,13 @@ def test_long_records_are_whole():
 
 
 # --- the batch -----------------------------------------------------------------------------
+
+
+def test_no_row_of_a_batch_is_left_out_in_silence(monkeypatch):
+    """Should the impact that stopped a batch not stop alone, those after it are not solved."""
+    monkeypatch.setattr(ImpulseCorrelation, "solve", lambda *_: None)
+    with pytest.raises(ImpactNotCertified, match="among others it stops, alone it does not"):
+        post_impact_velocities([[1, 1, 1, 1]] * 3, [1, 0, 0, 0], 1, 0.1, max_events=1)
 
 
 def test_batch_is_a_loop_of_single_impacts():

@@ -81,6 +81,10 @@ class Strict(list):
         assert k >= 0, k
         return super().__getitem__(k)
 
+    def __setitem__(self, k, value):
+        assert k >= 0, k
+        super().__setitem__(k, value)
+
 
 def strict(seed):
     """How a work area is made whose sequences have no index below zero."""
@@ -89,7 +93,9 @@ def strict(seed):
         state = filled(seed)(n, compiled, record)
         memory = Strict(Strict(row) for row in state.memory)
         parts = {name: Strict(getattr(state, name)) for name in state._fields[:4]}
-        record = type(record)(*map(Strict, record))
+        kinds, contacts, *paths = record
+        paths = (Strict(Strict(row) for row in path) for path in paths)
+        record = type(record)(Strict(kinds), Strict(contacts), *paths)
         return state._replace(**parts, memory=memory, record=record)
 
     return area
@@ -134,6 +140,24 @@ def test_an_impact_forgets_the_one_before(kernel):
     one = drive._area(9, False, plain.no_record())
     for problem in (BEFORE, WAITING):
         assert outcome(problem, kernel, area=lambda *_: one) == outcome(problem, kernel)
+
+
+#: Light balls that chatter, and an impact that leaves as many collisions as one of theirs has.
+CHATTERING = Problem(
+    [1e-12, 3, 1e-5, 1e-12, 1e-5], [1, 0, 0, 0, 0], [0, 0, 1e-6, 0.5], [1, 0, 0.5], [0, 0, 1]
+)
+LEAVING = Problem([1, 1, 1e-12, 1, 3], [1, 0, 0, 0, 0], [0, 0, 0, 1], [0.5, 0.5, 0], [1, 0.5, 0])
+
+
+def test_an_impact_forgets_the_collisions_of_the_one_before(kernel):
+    """They were compared with its own where a sequence is slower than the last digit."""
+    one = drive._area(5, False, plain.no_record())
+    for problem in (LEAVING, CHATTERING):
+        found = plain.solve(*problem[:5], kernel=kernel, area=lambda *_: one)
+        expected = plain.solve(*problem[:5], kernel=kernel)
+        assert found.status == 0
+        assert found.collisions == expected.collisions
+        assert found.impulses == expected.impulses
 
 
 def test_waiting_contacts_have_no_rate():

@@ -255,7 +255,9 @@ def prepare(n, chain, meeting, state):
         k.before = abs(u)
         k.active = k.tiny = k.hits = k.held = 0
         for row in range(2):
-            state.memory[row][c].p = state.memory[row][c].a = 0.0
+            then = state.memory[row][c]
+            then.p = then.a = 0.0
+            then.hits = 0
         if u > 0.0:
             tally.threshold = max(tally.threshold, LIMITS.exhausted * u)
             tally.faint = max(tally.faint, LIMITS.faint * reduced_mass(c, ball) * u * u)

@@ -33,6 +33,7 @@ from cradle.models.correlation import (
     refuse_excess,
     refuse_light,
 )
+from cradle.trace import ImpactNotCertified
 
 if TYPE_CHECKING:
     import xarray
@@ -80,6 +81,8 @@ def post_impact_velocities(
         If a value or a shape is wrong; the message names the first value and the rule.
     ImpactNotFinished
         If an impact takes more than `max_events` steps; `trace` is that of the first such chain.
+    ImpactNotCertified
+        If an outcome fails the check that every answer has to pass.
 
     References
     ----------
@@ -191,7 +194,7 @@ def outcomes(
 
     Raises
     ------
-    ValueError, ImpactNotFinished
+    ValueError, ImpactNotFinished, ImpactNotCertified
         As `post_impact_velocities`.
 
     References
@@ -262,7 +265,9 @@ def outcomes(
             model = ImpulseCorrelation(
                 f, b, meeting=meeting, excess="saturate", max_events=max_events
             )
-            model.solve(Chain(m, v, e))
+            chain = Chain(m, v, e)
+            model.solve(chain)
+            raise ImpactNotCertified(chain, model, "among others it stops, alone it does not")
     return Outcomes(out.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.reshape(lead) != 0)
 
 
