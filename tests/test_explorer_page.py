@@ -282,6 +282,9 @@ REFUSED = [
     ("restitution", "1.5", "restitution must lie between 0 and 1. In force: 1."),
     ("ratio", "2", "ratio must lie between 0 and 1. In force: 0.15."),
     ("ratio", "-1", "ratio must lie between 0 and 1. In force: 0.15."),
+    ("ratio", "0;1", "ratio must lie between 0 and 1. In force: 0.15."),
+    ("mass", "1.000,5", "mass must lie between 0.01 and 100 kg. In force: 1 kg."),
+    ("mass", "heavy", "mass must lie between 0.01 and 100 kg. In force: 1 kg."),
     ("ratio", "0.1234567", "ratio can have six digits after the point. In force: 0.15."),
 ]
 
@@ -323,6 +326,20 @@ def test_typed_values_out_of_range_are_refused(visit):
     press(tab, "next scene")
     assert drawn(tab)["forward"] == [0.5] * 3
     assert box.input_value() == "0.5"
+    assert box.get_attribute("aria-invalid") == "false"
+
+
+@pytest.mark.parametrize(
+    ("typed", "number"), [("0,25", 0.25), (".5", 0.5), ("1e-1", 0.1), (" 0.3 ", 0.3), ("+0,2", 0.2)]
+)
+def test_numbers_are_read_as_people_type_them(visit, typed, number):
+    """A comma is a point, whatever the browser's language: 0,25 is not 25."""
+    tab = still(visit, "#scene=small")
+    box = tab.get_by_label("ratio, as a number", exact=True)
+    box.fill(typed)
+    box.press("Tab")
+    assert set(drawn(tab)["forward"]) == {number}
+    assert box.input_value() == str(number)
     assert box.get_attribute("aria-invalid") == "false"
 
 

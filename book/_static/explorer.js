@@ -181,7 +181,7 @@
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       if (!this.full && !this.host.contains(target)) return;
       if (!this.full && key.startsWith("Page")) return; // they scroll
-      const freed = this.full && this.pointed && !target.matches("input[type=number]");
+      const freed = this.full && this.pointed && !target.matches("input[type=text]");
       if (!freed && uses(target, key)) return;
       if (freed) target.blur();
       event.preventDefault();

@@ -18,6 +18,13 @@
     return make("button", { type: "button", onclick: press, ...attributes }, words);
   }
 
+  // A number as people type it: with a point, a comma or a typographic minus; else NaN. A box of
+  // type "number" would drop a comma where the browser's language has none, and take 1,5 for 15.
+  function typed(words) {
+    const text = words.trim().replace(",", ".").replace("\u2212", "-");
+    return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(text) ? Number(text) : NaN;
+  }
+
   // A slider with a box for exact numbers. A logarithmic one moves in equal factors. What the box
   // cannot take stays in it, marked, with a sentence below, until the setting changes.
   function slider({ words, low, high, step, logarithmic = false, unit = "", input }) {
@@ -33,15 +40,14 @@
       oninput: () => give(value(+range.value)),
     });
     const box = make("input", {
-      type: "number",
-      min: low,
-      max: high,
-      step: "any",
+      type: "text",
+      inputmode: low < 0 ? "text" : "decimal", // the decimal keys of some phones have no minus
+      autocomplete: "off",
       "aria-label": `${words}, as a number`,
       "aria-describedby": `${name}-refused`,
       onchange: () => {
         refuse(objection());
-        if (!refused.textContent) give(+box.value);
+        if (!refused.textContent) give(typed(box.value));
       },
     });
     const refused = make("p", { class: "refused", id: `${name}-refused`, role: "alert" });
@@ -58,8 +64,8 @@
     );
     const measure = (number) => `${number} ${unit}`.trim();
     function objection() {
-      const number = +box.value;
-      if (box.value === "" || !box.checkValidity())
+      const number = typed(box.value);
+      if (!(low <= number && number <= high))
         return `must lie between ${low} and ${measure(high)}`;
       return +number.toFixed(6) === number ? "" : "can have six digits after the point";
     }
