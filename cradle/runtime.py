@@ -183,8 +183,8 @@ def compiled() -> Any | None:
     name = _name()
     module = ModuleType(name)
     module.__file__ = str(path or name)
-    marks = {mark: numba.njit(**options) for mark, options in _MEANINGS.items()}
-    marks["door"] = numba.njit(**_MEANINGS["door"], cache=path is not None)
+    kept = {"door"} if path is not None else set()
+    marks = {mark: numba.njit(**options, cache=mark in kept) for mark, options in _MEANINGS.items()}
     vars(module).update(marks, unsigned=np.uint64)
     sys.modules[name] = module
     exec(compile(_compilable(), module.__file__, "exec"), vars(module))

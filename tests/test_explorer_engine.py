@@ -1,8 +1,8 @@
 """The script of the live explorer against the package, to the last bit: V8 inside pytest."""
 
+import json
 import math
 import re
-from pathlib import Path
 
 import pytest
 from families import FAMILIES, Draw, family, within_bounds
@@ -17,7 +17,6 @@ from cradle import (
     drive,
 )
 from cradle.closed_form import largest_ratios
-from cradle.kernel import state
 from cradle.trace import ImpactNotCertified
 
 import explorer_engine  # isort: skip  (found by way of `script`)
@@ -171,10 +170,9 @@ def test_unfinished_impacts(script, limit):
     assert unfinished > 20
 
 
-def test_defects_have_the_package_s_words():
-    page = Path(explorer_engine.__file__).with_name("engine_collide.js").read_text(encoding="utf-8")
-    words = dict(re.findall(r'^  \[(\w+)\]: "(.*)",$', page, re.MULTILINE))
-    assert {getattr(state, name): text for name, text in words.items()} == drive.DEFECTS
+def test_defects_have_the_package_s_words(source):
+    (words,) = re.findall(r"^const DEFECTS = (.*);$", source, re.MULTILINE)
+    assert {int(number): text for number, text in json.loads(words).items()} == drive.DEFECTS
 
 
 def test_an_outcome_that_is_not_certified_has_no_numbers(source):

@@ -85,8 +85,8 @@ def test_outcomes_have_no_unit_of_mass(model, power):
 
 
 LAWS = [
-    *SPRINGS, EnergyDistribution(), QuadraticDissipation(3), SequentialCollisions("right"),
-    FusedChain(), ImpulseCorrelation(0.1),
+    *SPRINGS, QuadraticDissipation(3), SequentialCollisions("right"), FusedChain(),
+    ImpulseCorrelation(0.1),
 ]  # fmt: skip
 
 

@@ -1,15 +1,6 @@
 // One impact: what is asked of input, the event loop's work area, the outcome.
 
 const KINDS = ["maximum_compression", "end", "close", "collapse", "repetition"];
-const DEFECTS = {
-  [NO_EVENT]: "no event follows, though contacts are active",
-  [PASSED]: "two groups of balls that should have met have passed each other",
-  [MOMENTUM]: "a ball's momentum is not that of its impulses",
-  [PULL]: "a contact has pulled, or has absorbed less than nothing",
-  [ORDER]: "balls still approach",
-  [ENERGY]: "kinetic energy has grown",
-  [LEDGER]: "the energy lost is not what the contacts keep back",
-};
 // Steps after which an impact is given up, unless told otherwise: some tenths of a second.
 const MAX_EVENTS = 20000;
 const ENDLESS = 2 ** 53;

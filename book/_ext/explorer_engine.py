@@ -15,6 +15,7 @@ and means something else is not passed on as it stands:
 """
 
 import ast
+import json
 import re
 from collections import Counter
 from pathlib import Path
@@ -22,7 +23,7 @@ from typing import Any, NoReturn
 
 from sphinx.application import Sphinx
 
-from cradle import runtime
+from cradle import drive, runtime
 
 #: Hand-written parts, beside this file: before the event loop, and after it.
 PARTS = ("engine_numbers.js", "engine_collide.js")
@@ -299,6 +300,7 @@ def engine() -> str:
     loop = (
         "// The event loop of the package cradle, translated.\n"
         + translate(runtime.unit())
+        + f"\nconst DEFECTS = {json.dumps(drive.DEFECTS)};\n"
     )
     inside = "\n".join([before, loop, after])
     # In one room a second function of a name would replace the first without a word.
