@@ -116,7 +116,8 @@ def _compilable() -> str:
 
 
 def _name() -> str:
-    told = f"{_compilable()}{_MEANINGS}"
+    addresses = Path(__file__).with_name("addresses.py").read_text(encoding="utf-8")
+    told = f"{_compilable()}{_MEANINGS}{addresses}"
     return f"cradle_kernel_{hashlib.sha256(told.encode()).hexdigest()[:16]}"
 
 
@@ -173,6 +174,8 @@ def compiled() -> Any | None:
         import numba
     except ImportError:
         return None
+    from cradle.addresses import bare
+
     path = _stored()
     if path is None:
         warnings.warn(
@@ -185,7 +188,7 @@ def compiled() -> Any | None:
     module.__file__ = str(path or name)
     kept = {"door"} if path is not None else set()
     marks = {mark: numba.njit(**options, cache=mark in kept) for mark, options in _MEANINGS.items()}
-    vars(module).update(marks, unsigned=np.uint64)
+    vars(module).update(marks, unsigned=np.uint64, bare=bare)
     sys.modules[name] = module
     exec(compile(_compilable(), module.__file__, "exec"), vars(module))
     # numba compiles a function anew for each whole number that is written down in a call; not so

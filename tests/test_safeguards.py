@@ -24,7 +24,7 @@ WRONG = "wrong"
 def simple_zero(_):
     """In place of `arrive`: the closing speed alone is set to zero, the balls stay as they are."""
 
-    def arrive(c, _low, _high, _ball, contact):
+    def arrive(c, _low, _high, _n, _ball, contact):
         contact[c].u = 0.0
 
     return arrive

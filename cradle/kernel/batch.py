@@ -5,7 +5,18 @@ from typing import Any, NamedTuple
 
 from cradle.kernel.loop import impact
 from cradle.kernel.record import in_units
-from cradle.kernel.state import FINISHED, LIMITS, REFUSED, apart, door, jit
+from cradle.kernel.state import (
+    FINISHED,
+    LIMITS,
+    REFUSED,
+    Record,
+    State,
+    apart,
+    bare,
+    door,
+    jit,
+    once,
+)
 
 
 class Inputs(NamedTuple):
@@ -148,8 +159,24 @@ def hand_out(k, n, out, ball, contact, tally):
         out.held[c] = contact[c].held
 
 
+@once
+def bare_state(area):
+    """Return the work area as the event loop hands it on."""
+    record = area.record
+    state = State(
+        bare(area.ball), bare(area.contact), bare(area.run), bare(area.level), bare(area.memory),
+        bare(area.tally),
+        Record(
+            bare(record.kinds), bare(record.contacts), bare(record.velocities),
+            bare(record.impulses),
+        ),
+    )  # fmt: skip
+    state.tally[0].capacity = len(record.kinds)
+    return state
+
+
 @door
-def batch(begin, resumed, n, inputs, options, out, state, effort):
+def batch(begin, resumed, n, inputs, options, out, area, effort):
     """Solve the chains of `out` from number `begin` on; return the next one's number, and status.
 
     It stops at the first chain whose status is not FINISHED: PAUSED, when `effort` (contacts
@@ -160,6 +187,7 @@ def batch(begin, resumed, n, inputs, options, out, state, effort):
     by_m, by_v = min(len(inputs.m), 2) - 1, min(len(inputs.v), 2) - 1
     by_e = min(len(inputs.e), 2) - 1
     by_f, by_b = min(len(inputs.forward), 2) - 1, min(len(inputs.backward), 2) - 1
+    state = bare_state(area)
     state.tally[0].effort = effort
     for k in range(begin, rows):
         chain = Inputs(

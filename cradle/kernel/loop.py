@@ -128,7 +128,7 @@ def advance(first, part, n, state):
     for c in (low - 1, high + 1):
         if 0 <= c < n - 1 and contact[c].active == 0:
             if whole and contact[c].due == 1:
-                arrive(c, low, high, ball, contact)
+                arrive(c, low, high, n, ball, contact)
             else:
                 contact[c].u = closing(c, ball)
                 contact[c].blur += 2.0**-53 * abs(ball[low if c < low else c].pull) * s
@@ -138,13 +138,13 @@ def advance(first, part, n, state):
 @jit
 def move(first, part, n, state):
     """Take a run straight on by a part of its segment, with a record of it if wanted."""
-    if len(state.record.kinds) > 0:
+    if state.tally[0].capacity > 0:
         record_compressions(first, state.run[first].reach * part, part == 1.0, n, state)
     advance(first, part, n, state)
 
 
 @jit
-def touch(gap, state):
+def touch(gap, n, state):
     """Bring a gap to zero: the ball that has just moved takes the other's velocity.
 
     If both have, it is the one for which the contact inwards hands on less: the last digit of a
@@ -162,9 +162,9 @@ def touch(gap, state):
         other = handed_on(gap, right, run[right].high, ball, state.contact)
         left_moves = one <= other
     if left_moves:
-        arrive(gap, run[left].low, gap - 1, ball, state.contact)
+        arrive(gap, run[left].low, gap - 1, n, ball, state.contact)
     elif right_moves:
-        arrive(gap, right, run[right].high, ball, state.contact)
+        arrive(gap, right, run[right].high, n, ball, state.contact)
 
 
 @jit
@@ -175,15 +175,15 @@ def touch_beside(first, n, state):
         if not (0 <= gap < n - 1 and contact[gap].active == 0 and is_gap(gap, n, contact)):
             continue
         if contact[gap].u >= -LIMITS.roundings * contact[gap].blur:
-            touch(gap, state)
+            touch(gap, n, state)
 
 
 @once
-def meet(one, n, state):
-    """R8.4, R8.5: take run `one` and the next to where they meet, and close the gap between them.
+def parts_to_meeting(one, n, state):
+    """R8.4: let run `one` and the next go to where they meet, and the others stay.
 
     If one of them reaches the gap at its far side on the way, this gap closes first, and only that
-    run moves.
+    run moves.  Returns the gap that closes.
     """
     ball, run = state.ball, state.run
     other = run[one].onward
@@ -191,34 +191,37 @@ def meet(one, n, state):
     left, gap, right = one - 1, run[one].last + 1, run[other].last + 1
     beyond_left = part_beyond(one, part_one, -ball[one].pull, left, n, state)
     beyond_right = part_beyond(other, part_other, ball[right].pull, right, n, state)
-    between = gap
     if beyond_left < math.inf and beyond_left <= beyond_right:
         gap, part_one, part_other = left, beyond_left, -1.0
     elif beyond_right < math.inf:
         gap, part_one, part_other = right, -1.0, beyond_right
-    if part_one >= 0.0:
-        move(one, part_one, n, state)
-    if part_other >= 0.0:
-        move(other, part_other, n, state)
-    if gap == between:
-        touch_beside(one, n, state)
-        touch_beside(other, n, state)
-    touch(gap, state)
-    grow(gap, n, ball, state.contact, run, state.tally[0])
-    record(CLOSE, gap, n, state)
+    first = state.tally[0].first
+    while first < n:
+        run[first].part = -1.0
+        first = run[first].onward
+    run[one].part, run[other].part = part_one, part_other
+    return gap
 
 
 @once
-def complete(n, state):
-    """R8.6: take every run to its own next event."""
-    first = state.tally[0].first
+def go(one, n, state):
+    """R8.4 to R8.6: take every run to its own next event, or run `one` and the next to a gap."""
+    run, tally = state.run, state.tally[0]
+    gap = parts_to_meeting(one, n, state) if one >= 0 else -1
+    first = tally.first
     while first < n:
-        move(first, 1.0, n, state)
-        first = state.run[first].onward
-    first = state.tally[0].first
+        if run[first].part >= 0.0:
+            move(first, run[first].part, n, state)
+        first = run[first].onward
+    first = tally.first if gap < 0 or gap == run[one].last + 1 else n
     while first < n:
-        touch_beside(first, n, state)
-        first = state.run[first].onward
+        if run[first].part >= 0.0:
+            touch_beside(first, n, state)
+        first = run[first].onward
+    if gap >= 0:
+        touch(gap, n, state)
+        grow(gap, n, state.ball, state.contact, run, tally)
+        record(CLOSE, gap, n, state)
 
 
 @apart
@@ -316,12 +319,9 @@ def impact(n, chain, meeting, max_events, resumed, state):
             if not run[first].reach < math.inf:
                 tally.defect = NO_EVENT
                 return UNSOUND
-            run[first].stirred = 0
+            run[first].stirred, run[first].part = 0, 1.0
             first = run[first].onward
-        if one >= 0:
-            meet(one, n, state)
-        else:
-            complete(n, state)
+        go(one, n, state)
         if tally.defect > 0:
             return UNSOUND
     last_limits(n, state)

@@ -196,7 +196,7 @@ def throws(c, near, low, high, ball, contact):
 
 
 @apart
-def arrive(c, low, high, ball, contact):
+def arrive(c, low, high, n, ball, contact):
     """Let contact c beside the run low..high be at zero: the run's ball takes the other's velocity.
 
     The two differ by rounding, most often by that of what the run's last impulse did to this ball,
@@ -206,7 +206,7 @@ def arrive(c, low, high, ball, contact):
     would be thrown, one that has not quite arrived is left as it is, but for dust.
     """
     k = next_inwards(c, low, high, contact)
-    top = len(ball) - 2
+    top = n - 2
     near = -closing(c, ball)
     if k < 0 or throws(c, near, low, high, ball, contact):
         contact[c].u = -near

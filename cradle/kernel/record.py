@@ -39,7 +39,7 @@ def write_present(kind, c, n, state):
 @jit
 def record(kind, c, n, state):
     """Count an event; write it and the state after it, if there is room."""
-    if state.tally[0].events < len(state.record.kinds):
+    if state.tally[0].events < state.tally[0].capacity:
         write_present(kind, c, n, state)
     state.tally[0].events += 1
 
@@ -68,7 +68,7 @@ def record_compressions(first, s, whole, n, state):
             return
         contact[found].power = 0
         at = min(at, s)
-        if tally.events < len(state.record.kinds):
+        if tally.events < tally.capacity:
             for i in range(n):
                 b = ball[i]
                 moves = low <= i <= high + 1

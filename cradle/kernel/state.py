@@ -21,6 +21,10 @@ if "jit" not in globals():
         """Mark a function that is called from one place: a part of its caller."""
         return function
 
+    def bare(things: Any) -> Any:
+        """Hand on a sequence; compiled code then passes its address alone (`cradle.addresses`)."""
+        return things
+
     def door(function: Any) -> Any:
         """Mark the function that is called from outside, whose compiled code is kept on disk."""
         return function
@@ -189,6 +193,7 @@ class Run:
     back: int  # first contact of the run before, or -1
     stirred: int  # 1 if it has changed since its rates and its segment were worked out
     reach: float  # progress to the run's own next event
+    part: float  # how much of its segment the run goes in this round; negative if it stays
     left: float  # of the gap after the run: parts of the two segments at which it is reached,
     right: float  # left run's and right run's; `left` is negative if it must not meet
 
@@ -223,6 +228,7 @@ class Tally:
     collapsed: int  # 1 if contacts have collapsed
     effort: int  # contacts that may still be touched, and events written, before a pause
     room: int
+    capacity: int  # how many events the record holds
     first: int  # first contact of the first run, or n
     shift: int  # binary exponents of the largest velocity and the largest mass
     mass_shift: int
