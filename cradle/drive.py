@@ -41,7 +41,8 @@ _KNOWN = contextlib.nullcontext()
 # No limit.
 _ENDLESS = 2**62
 _NOTHING = rooms.Record([], [], [], [])
-#: Events that one round may write: each contact may end, close, collapse and pass its maximum.
+#: Events that one round may write: each contact may end, close, collapse, pass its maximum, and
+#: repeat itself.
 _ROUND = 5
 
 
@@ -63,9 +64,10 @@ _TALLY = _type(rooms.Tally)
 
 def _blank(record: type, size: int) -> list[Any]:
     """Return as many objects, all fields zero."""
+    kinds = get_type_hints(record).items()
     things = [record() for _ in range(size)]
     for thing in things:
-        for name, kind in get_type_hints(record).items():
+        for name, kind in kinds:
             setattr(thing, name, kind())
     return things
 
@@ -187,7 +189,7 @@ class Job:
                 self._grow()
             elif not resumed and self.status != FINISHED:
                 break
-        if not self.compiled:
+        if self.compiled is False:
             self._write_back()
         return self
 
@@ -257,5 +259,4 @@ def warm_up() -> None:
     """Compile the event loop, if it is not compiled yet and numba is there."""
     one = np.ones((1, 2))
     inputs = plain.Inputs(one, np.array([[1.0, 0.0]]), np.ones((1, 1)), *[np.ones((1, 0))] * 2)
-    runtime.spend(2 * runtime.PAYS_AFTER)
-    Job(inputs, 1, plain.Options(0.5, 1000, True, True)).run()
+    Job(inputs, 1, plain.Options(0.5, 1000, True, True), large=True).run()

@@ -33,7 +33,7 @@ class Options(NamedTuple):
     """How to solve them."""
 
     meeting: float
-    max_events: int
+    max_events: int  # most rounds; the textbook allows two for each event
     bounded: bool  # refuse ratios above Eq. 53
     whole: bool  # run the event loop even where the closed form would do
 
@@ -58,8 +58,9 @@ def short_cut(n, chain, bounded, out_v):
     loop's own units are needed.
     """
     m, v, e = chain.m, chain.v, chain.e
+    heaviest = max(m[0], m[1], m[n - 1])
     for i in range(n):
-        if not (LIMITS.tiny < m[i] < LIMITS.huge):
+        if not (LIMITS.tiny < m[i] < LIMITS.huge and m[i] >= LIMITS.lightest * heaviest):
             return False
         if not (v[i] == 0.0 or LIMITS.tiny < abs(v[i]) < LIMITS.huge):
             return False
@@ -163,7 +164,7 @@ def hand_out(k, n, out, ball, contact, tally):
 def bare_state(area):
     """Return the work area as the event loop hands it on."""
     record = area.record
-    state = State(
+    return State(
         bare(area.ball), bare(area.contact), bare(area.run), bare(area.level), bare(area.memory),
         bare(area.tally),
         Record(
@@ -171,8 +172,6 @@ def bare_state(area):
             bare(record.impulses),
         ),
     )  # fmt: skip
-    state.tally[0].capacity = len(record.kinds)
-    return state
 
 
 @door
@@ -188,7 +187,7 @@ def batch(begin, resumed, n, inputs, options, out, area, effort):
     by_e = min(len(inputs.e), 2) - 1
     by_f, by_b = min(len(inputs.forward), 2) - 1, min(len(inputs.backward), 2) - 1
     state = bare_state(area)
-    state.tally[0].effort = effort
+    state.tally[0].effort, state.tally[0].capacity = effort, len(area.record.kinds)
     for k in range(begin, rows):
         chain = Inputs(
             inputs.m[k * by_m], inputs.v[k * by_v], inputs.e[k * by_e],

@@ -19,7 +19,7 @@ from cradle.kernel.motion import (
     set_closing_speed,
 )
 from cradle.kernel.record import record, record_compressions
-from cradle.kernel.rules import is_gap, rates, segment
+from cradle.kernel.rules import rates, segment
 from cradle.kernel.state import (
     CERTAIN,
     CLOSE,
@@ -167,15 +167,17 @@ def touch(gap, n, state):
         arrive(gap, right, run[right].high, n, ball, state.contact)
 
 
-@jit
-def touch_beside(first, n, state):
-    """Bring the gaps beside a run that has moved to zero, if only rounding says otherwise."""
-    contact, last = state.contact, state.run[first].last
-    for gap in (first - 1, last + 1):
-        if not (0 <= gap < n - 1 and contact[gap].active == 0 and is_gap(gap, n, contact)):
-            continue
-        if contact[gap].u >= -LIMITS.roundings * contact[gap].blur:
+@once
+def touch_closed(n, state):
+    """Bring every gap beside a run that has moved to zero, if only rounding says otherwise."""
+    contact, run = state.contact, state.run
+    first = state.tally[0].first
+    while first < n:
+        gap, after = run[first].last + 1, run[first].onward
+        moved = after < n and (run[first].part >= 0.0 or run[after].part >= 0.0)
+        if moved and after == gap + 1 and contact[gap].u >= -LIMITS.roundings * contact[gap].blur:
             touch(gap, n, state)
+        first = after
 
 
 @once
@@ -213,11 +215,7 @@ def go(one, n, state):
         if run[first].part >= 0.0:
             move(first, run[first].part, n, state)
         first = run[first].onward
-    first = tally.first if gap < 0 or gap == run[one].last + 1 else n
-    while first < n:
-        if run[first].part >= 0.0:
-            touch_beside(first, n, state)
-        first = run[first].onward
+    touch_closed(n, state)
     if gap >= 0:
         touch(gap, n, state)
         grow(gap, n, state.ball, state.contact, run, tally)
