@@ -55,6 +55,7 @@ def snapshot(level, n, state):
     """Remember the state."""
     contact, memory = state.contact, state.memory[level]
     for c in range(n - 1):
+        memory[c].p = memory[c].a = 0.0
         memory[c].u = contact[c].u
         memory[c].q, memory[c].q_lo = contact[c].q, contact[c].q_lo
         memory[c].hits = contact[c].hits
@@ -192,8 +193,6 @@ def remember(number, c, n, state):
     level.due = level.count
     if number == 0:
         settle(n, memory)
-    for k in range(n - 1):
-        memory[number][k].p = memory[number][k].a = 0.0
     snapshot(number, n, state)
 
 

@@ -1,7 +1,8 @@
 """Events: contacts end, close and hand over; runs split and grow accordingly (R2 to R5)."""
 
+from cradle.kernel.motion import reduced_mass
 from cradle.kernel.record import record
-from cradle.kernel.rules import has_ended, is_gap, opens_at_zero, source_of
+from cradle.kernel.rules import has_ended, opens_at_zero, source_of
 from cradle.kernel.state import CLOSE, END, LIMITS, SLOPED, apart, jit, once
 
 
@@ -80,7 +81,6 @@ def activate(c, from_left, from_right, ball, contact):
     contact[c].q = contact[c].q_lo = 0.0
     contact[c].w = 0.0
     contact[c].rate = 0.0  # it drives nobody in this round
-    contact[c].slope = 0.0
     contact[c].active = 1
     contact[c].hits += 1
     if from_left:
@@ -148,8 +148,7 @@ def exhausted(c, work, threshold, ball, contact):
     """R9: tell whether next to nothing is left of contact c, neither closing speed nor `work`."""
     if abs(contact[c].u) >= threshold:
         return False
-    mu = ball[c].m / (ball[c].m + ball[c + 1].m) * ball[c + 1].m
-    return 2.0 * work < mu * threshold * threshold
+    return 2.0 * work < reduced_mass(c, ball) * threshold * threshold
 
 
 @once
@@ -201,10 +200,7 @@ def end_contacts(which, n, state):
 
 @jit
 def about_to_close(c, n, contact):
-    """R5: tell whether the idle contact c is at zero and about to rise, driven from one side.
-
-    Of two that close on one ball between two runs, the one that was nearer goes first (R8.6).
-    """
+    """R5: tell whether the idle contact c is at zero and about to rise, driven from one side."""
     if not 0 <= c < n - 1 or contact[c].active == 1 or contact[c].u < 0.0:
         return False
     from_left = c > 0 and contact[c - 1].active == 1
@@ -215,7 +211,10 @@ def about_to_close(c, n, contact):
 
 @jit
 def close_contacts(n, state):
-    """R5, R8.1: activate every idle contact that is about to close; left to right."""
+    """R5, R8.1: activate every idle contact that is about to close; left to right.
+
+    Of two that close on one ball between two runs, the one that was nearer goes first (R8.6).
+    """
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
     closes = 0
     first = tally.first
@@ -232,7 +231,6 @@ def close_contacts(n, state):
                 further = contact[right].before * (1.0 - LIMITS.tie)
                 if not (
                     about_to_close(right + 1, n, contact)
-                    and not is_gap(right, n, contact)
                     and contact[right + 1].before < further
                 ):
                     grow(right, n, ball, contact, run, tally)

@@ -147,7 +147,7 @@ def move(first, part, n, state):
 def touch(gap, n, state):
     """Bring a gap to zero: the ball that has just moved takes the other's velocity.
 
-    If both have, it is the one for which the contact inwards hands on less: the last digit of a
+    If both have, it is the one whose correction moves less what is behind it: the last digit of a
     heavy ball's velocity is a throw for a light one.
     """
     k = state.contact[gap]

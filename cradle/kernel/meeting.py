@@ -74,10 +74,10 @@ def part_beyond(first, part, outward, c, n, state):
 
     `outward` is the pull of its ball there, towards the gap; infinite if it does not get there.
     """
-    if not 0 <= c < n - 1 or state.contact[c].active == 1 or not is_gap(c, n, state.contact):
+    if not is_gap(c, n, state.contact):
         return math.inf
     way = outward * state.run[first].reach
-    wide = -state.contact[c].u
+    wide = max(-state.contact[c].u, 0.0)
     if way * part > wide + LIMITS.roundings * (state.contact[c].blur + 2.0**-53 * way):
         return wide / way
     return math.inf

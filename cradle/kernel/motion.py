@@ -11,7 +11,7 @@ from cradle.kernel.state import LIMITS, apart, jit
 
 @jit
 def add(high, low, x):
-    """Add x to a sum of two numbers, losing nothing (Knuth's two-sum); return the new two."""
+    """Add x to a sum of two numbers, keeping what the addition rounds off (Knuth's two-sum)."""
     total = high + x
     part = total - high
     x = ((high - (total - part)) + (x - part)) + low
@@ -39,7 +39,7 @@ def add_work(k, x):
 
 @jit
 def add_store(k, x):
-    """Add x to the work that contact k can still release, which ends at nothing.
+    """Add x to the work that contact k can still release, which is never below nothing.
 
     A contact that rests on the edge of a long sequence gives it away in portions, hundreds of
     thousands of them and each below the last digit of the whole.
@@ -174,9 +174,10 @@ def next_inwards(c, low, high, contact):
 
 @jit
 def handed_on(c, low, high, ball, contact):
-    """Tell how fast a body moves for one unit that `arrive` moves the run's ball at contact c.
+    """Return how fast what is behind it recoils for one unit that `arrive` moves the run's ball.
 
-    It is the body beyond the contact that is corrected, and has that much less mass.
+    That is the ratio of the masses of two bodies: of the ball at contact c, and of what lies beyond
+    the contact inwards, through which it is pushed.  It is infinite if there is no such contact.
     """
     k = next_inwards(c, low, high, contact)
     if k < 0:
@@ -186,13 +187,12 @@ def handed_on(c, low, high, ball, contact):
 
 
 @jit
-def throws(c, near, low, high, ball, contact):
-    """Tell whether a correction by `near` changes a velocity by more than rounding of the run's."""
-    thrown = 0.0 if near == 0.0 else abs(near) * handed_on(c, low, high, ball, contact)
-    for j in range(low, high + 1):
-        if thrown <= LIMITS.tie * max(abs(contact[j].u), abs(contact[j].u0)):
-            return False
-    return thrown > 0.0
+def is_throw(speed, low, high, contact):
+    """Tell whether a change of velocity by `speed` is more than rounding of the run low..high."""
+    fastest = 0.0
+    for c in range(low, high + 1):
+        fastest = max(fastest, abs(contact[c].u), abs(contact[c].u0))
+    return speed > LIMITS.tie * fastest
 
 
 @apart
@@ -206,27 +206,24 @@ def arrive(c, low, high, n, ball, contact):
     would be thrown, one that has not quite arrived is left as it is, but for dust.
     """
     k = next_inwards(c, low, high, contact)
-    top = n - 2
     near = -closing(c, ball)
-    if k < 0 or throws(c, near, low, high, ball, contact):
+    if k < 0 or is_throw(abs(near) * handed_on(c, low, high, ball, contact), low, high, contact):
         contact[c].u = -near
         if near < LIMITS.dust:
-            set_closing_speed(c, 0.0, 0.0, 0, top, ball, contact)
+            set_closing_speed(c, 0.0, 0.0, 0, n - 2, ball, contact)
         return
-    begin, end = (0, top) if near >= 0.0 else (low, high)
+    begin, end = (0, n - 2) if near >= 0.0 else (low, high)
     body = bodies(k, begin, end, ball, contact)
     first, last, left, right = body
     impulse = near * (left if c < low else right)
     if abs(impulse) > LIMITS.digits * contact[k].p:
         push_at_work(k, impulse, body, ball, contact)
-    other = c if c < low else c + 1
-    for j in range(low, high + 2):
-        i = j if c < low else low + high + 1 - j
-        ball[i].hi, ball[i].lo = ball[other].hi, ball[other].lo
-        if i == (k if c < low else k + 1):
-            break
+    if c < low:
+        one_velocity(low, k, c, ball)
+    else:
+        one_velocity(k + 1, high + 1, c + 1, ball)
     for j in (first - 1, k, last):
-        if 0 <= j <= top:
+        if 0 <= j <= n - 2:
             contact[j].u = closing(j, ball)
     contact[c].u = contact[c].blur = 0.0
 
