@@ -185,7 +185,7 @@ NEEDED = {
         UNFINISHED,
     ),
     "a gap that rounding has closed": (
-        {"gap_parts": changed(meeting, "gap_parts", ".u, 0.0)", ".u, -math.inf)")},
+        {"parts_to_meeting": changed(meeting, "parts_to_meeting", ".u, 0.0)", ".u, -math.inf)")},
         LAST_DIGITS["a gap that rounding has closed"],
         UNSOUND,
     ),
@@ -225,7 +225,7 @@ NEEDED = {
         UNSOUND,
     ),
     "gaps beside a run that has moved": (
-        {"touch_beside": lambda _: lambda *_: None},
+        {"touch_closed": lambda _: lambda *_: None},
         NAMED["an end and a closing beside it at once"],
         WRONG,
     ),
@@ -360,7 +360,7 @@ def test_with_it_the_answer_is_that_of_fifty_digits(name):
 #: light masses, and there all agree.
 DIGITS = {
     "balls held together go together in a cycle": (
-        {"held": lambda _: lambda *_: False},
+        {"stays_at_zero": lambda _: lambda *_: False},
         (
             [0.56365, 1.5552725560868464e-06, 1.96269, 1.39623, 6.188765e-07, 0.42382],
             [0, 0, 0.5, -1, 0, -0.5], [0, 0.3, 0.001, 0.5, 1], [0, 0.5, 0.1, 1],

@@ -89,7 +89,7 @@ def limit(cluster, level, state):
 
 
 @jit
-def held(c, contact, memory):
+def stays_at_zero(c, contact, memory):
     """Tell whether contact c has been at u = 0 since the snapshot: its balls move as one."""
     k, then = contact[c], memory[c]
     return k.active == 1 and k.u == 0.0 and then.u == 0.0 and then.a == 0.0 and k.q == then.q
@@ -99,9 +99,9 @@ def held(c, contact, memory):
 def one_body(cluster, contact, memory):
     """Return the first and the last ball of those of a cycle, and of those held to them."""
     one, other = cluster.first, cluster.last + 1
-    while one > cluster.left and held(one - 1, contact, memory):
+    while one > cluster.left and stays_at_zero(one - 1, contact, memory):
         one -= 1
-    while other <= cluster.right and held(other, contact, memory):
+    while other <= cluster.right and stays_at_zero(other, contact, memory):
         other += 1
     return one, other
 
@@ -123,7 +123,7 @@ def velocity_changes(cluster, total, level, state):
     while i <= right + 1:
         end = i
         mass = ball[i].m
-        while end <= right and (one <= end < other or held(end, contact, memory)):
+        while end <= right and (one <= end < other or stays_at_zero(end, contact, memory)):
             end += 1
             mass += ball[end].m
         if i == one:
@@ -170,7 +170,7 @@ def neighbours_stay(cluster, total, part, level, n, state):
         change = (ball[c].x if c >= left else 0.0) - (ball[c + 1].x if c <= right else 0.0)
         speed = k.u + part * change
         k.y = 0.0
-        if held(c, contact, memory):
+        if stays_at_zero(c, contact, memory):
             continue
         if k.u * then.u < 0.0 or k.u * speed < 0.0 or (k.u == 0.0) != (speed == 0.0):
             return False
@@ -255,7 +255,7 @@ def jump(cluster, total, part, level, n, state):
         work = 0.0
         if first <= c <= last:
             work = memory[c].a * squares
-        elif not held(c, contact, memory):
+        elif not stays_at_zero(c, contact, memory):
             k.u = closing(c, ball)
             if k.active == 1 and k.u > 0.0:
                 work = k.y

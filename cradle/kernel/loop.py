@@ -181,7 +181,7 @@ def touch_closed(n, state):
 
 
 @once
-def parts_to_meeting(one, n, state):
+def who_moves(one, n, state):
     """R8.4: let run `one` and the next go to where they meet, and the others stay.
 
     If one of them reaches the gap at its far side on the way, this gap closes first, and only that
@@ -209,7 +209,7 @@ def parts_to_meeting(one, n, state):
 def go(one, n, state):
     """R8.4 to R8.6: take every run to its own next event, or run `one` and the next to a gap."""
     run, tally = state.run, state.tally[0]
-    gap = parts_to_meeting(one, n, state) if one >= 0 else -1
+    gap = who_moves(one, n, state) if one >= 0 else -1
     first = tally.first
     while first < n:
         if run[first].part >= 0.0:

@@ -7,7 +7,7 @@ from cradle.kernel.state import LIMITS, jit, once
 
 
 @once
-def gap_parts(first, after, run, ball, contact, meeting):
+def parts_to_meeting(first, after, run, ball, contact, meeting):
     """R8.3: parts of their two segments at which runs `first` and `after` meet.
 
     The first part is -1 if they need not meet.  A gap that rounding has closed is closed at once.
@@ -52,7 +52,7 @@ def first_meeting(n, state):
         after = run[first].onward
         if after < n and after == run[first].last + 2:
             if run[first].stirred == 1 or run[after].stirred == 1:
-                run[first].left, run[first].right = gap_parts(
+                run[first].left, run[first].right = parts_to_meeting(
                     first, after, run, state.ball, state.contact, tally.meeting
                 )
             if run[first].left >= 0.0:

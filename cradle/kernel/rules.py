@@ -21,22 +21,20 @@ def source_of(first, last, ball):
 
 
 @jit
-def admissible_ratio(driver, driven, far, onward, nominal, ball, contact):
-    """R7: the ratio in force at ball `driver` between its driver and the contact `driven`.
+def keep_closed(i, driven, far, onward, ball, contact):
+    """R7: lower the ratio at ball i to its bound (Eq. 53) if the driven contact would open at once.
 
-    `far` is the other ball of the driven contact; `onward` the part of its impulse that this ball
-    keeps, 1 - ratio in force there, or 1.  Eq. 53: beyond its bound the contact would open at once;
-    it is held at u = 0 instead.
+    There the contact is held at u = 0.  `far` is its other ball, which keeps the part `onward` of
+    the contact's impulse: 1 - ratio in force there, or 1.
     """
-    ball[driver].ratio = nominal
-    ball[driver].rest = 1.0 - nominal
-    if contact[driven].u == 0.0 and contact[driven].w == 0.0:
-        kept = ball[driver].m * onward
+    b, k = ball[i], contact[driven]
+    if k.u == 0.0 and k.w == 0.0:
+        kept = b.m * onward
         bound = ball[far].m / (ball[far].m + kept)
-        if nominal * LIMITS.rounded >= bound:
-            contact[driven].fixed = 1 if nominal > bound * LIMITS.rounded else 2
-            ball[driver].ratio = bound
-            ball[driver].rest = kept / (ball[far].m + kept)
+        if b.ratio * LIMITS.rounded >= bound:
+            k.fixed = 1 if b.ratio > bound * LIMITS.rounded else 2
+            b.ratio = bound
+            b.rest = kept / (ball[far].m + kept)
 
 
 @once
@@ -47,24 +45,18 @@ def ratios_in_force(low, high, ball, contact):
     """
     for c in range(low, high + 1):
         contact[c].fixed = 0
+    for i in range(low + 1, high + 1):
+        b = ball[i]
+        b.ratio = contact[i - 1].forward if b.turn == 1 else contact[i - 1].backward
+        b.rest = 1.0 - b.ratio
     for c in range(high, low, -1):
-        if ball[c].turn == 1:
-            f = contact[c - 1].forward
-            if ball[c + 1].turn == -1:
-                ball[c].ratio = f
-                ball[c].rest = 1.0 - f
-            else:
-                onward = ball[c + 1].rest if c < high and ball[c + 1].turn == 1 else 1.0
-                admissible_ratio(c, c, c + 1, onward, f, ball, contact)
+        if ball[c].turn == 1 and ball[c + 1].turn != -1:
+            onward = ball[c + 1].rest if c < high and ball[c + 1].turn == 1 else 1.0
+            keep_closed(c, c, c + 1, onward, ball, contact)
     for c in range(low, high):
-        if ball[c + 1].turn == -1:
-            f = contact[c].backward
-            if ball[c].turn == 1:
-                ball[c + 1].ratio = f
-                ball[c + 1].rest = 1.0 - f
-            else:
-                onward = ball[c].rest if c > low and ball[c].turn == -1 else 1.0
-                admissible_ratio(c + 1, c, c, onward, f, ball, contact)
+        if ball[c + 1].turn == -1 and ball[c].turn != 1:
+            onward = ball[c].rest if c > low and ball[c].turn == -1 else 1.0
+            keep_closed(c + 1, c, c, onward, ball, contact)
 
 
 @apart
@@ -116,8 +108,9 @@ def wait(low, high, ball, contact, outer):
 
 @once
 def reached(first, run, smallest, ball, contact):
-    """R1: set low..high of a run, as far as impulses reach at the nominal ratios, or beyond.
+    """R1: set low..high of a run: as far as impulses reach at the nominal ratios, or beyond.
 
+    No ratio in force is larger than its nominal one.
     From the one source outwards rates only become less.  With several sources all contacts count.
     Those that were reached before, and no longer are, wait.
     """
@@ -143,16 +136,9 @@ def reached(first, run, smallest, ball, contact):
     wait(low, c - 1, ball, contact, 0)
 
 
-@jit
-def rates(first, run, ball, contact, tally):
-    """R1, R6, R7: impulse rates, pulls and slopes of a run.
-
-    Returns whether a contact at u = 0 with nothing to release is about to open.
-    """
-    smallest = tally.cut_off
-    reached(first, run, smallest, ball, contact)
-    low, high, source = run[first].low, run[first].high, run[first].source
-    ratios_in_force(low, high, ball, contact)
+@once
+def impulse_rates(low, high, source, smallest, ball, contact):
+    """R1, R6: impulse rates of contacts low..high of a run."""
     if source < 0:
         several_sources(low, high, smallest, ball, contact)
     else:
@@ -164,7 +150,10 @@ def rates(first, run, ball, contact, tally):
             x = contact[c + 1].rate * ball[c + 1].ratio
             contact[c].rate = x if x > smallest else 0.0
 
-    # Eqs. 47-48: m dv = dP on the left - dP on the right.
+
+@once
+def pulls(low, high, ball, contact):
+    """Eqs. 47-48: m dv = dP on the left - dP on the right, for the balls of contacts low..high."""
     ball[low].pull = -contact[low].rate / ball[low].m
     ball[high + 1].pull = contact[high].rate / ball[high + 1].m
     for i in range(low + 1, high + 1):
@@ -185,6 +174,19 @@ def rates(first, run, ball, contact, tally):
         c = low + high - 1 - j
         if contact[c].fixed > 0 and ball[c + 1].turn == -1:
             ball[c].pull = ball[c + 1].pull
+
+
+@jit
+def rates(first, run, ball, contact, tally):
+    """R1, R6, R7: impulse rates, pulls and slopes of a run.
+
+    Returns whether a contact at u = 0 with nothing to release is about to open.
+    """
+    reached(first, run, tally.cut_off, ball, contact)
+    low, high = run[first].low, run[first].high
+    ratios_in_force(low, high, ball, contact)
+    impulse_rates(low, high, run[first].source, tally.cut_off, ball, contact)
+    pulls(low, high, ball, contact)
     opens = False
     for c in range(low, high + 1):
         contact[c].slope = ball[c].pull - ball[c + 1].pull
@@ -253,8 +255,9 @@ def comes_at(s, k):
     """Tell whether the next event of contact k comes at progress s, as far as rounding can tell.
 
     It closes, or ends at u = 0, when u gets there.  It ends otherwise when Q = 0: of rounding in
-    what it has absorbed Q has e^2, and once u < 0 it changes by rate * u.  One that is as far off
-    again comes later: runs that meet again and again leave a part of it each time, to all digits.
+    what it has absorbed Q has e^2, and once u < 0 it changes by rate * u.  An end that is further
+    off than the whole segment comes later: runs that meet again and again come nearer to it by a
+    part of the rest each time, to all digits.
     """
     if not k.until < math.inf:
         return False
@@ -262,10 +265,10 @@ def comes_at(s, k):
     blur = rounding_after(k, s)
     if k.active == 1 and k.final < 0.0:
         at_zero = min(s, -k.u / k.slope) if k.u > 0.0 else 0.0
-        absorbed = blur * at_zero + LIMITS.roundings * 2.0**-53 * k.w / k.rate
-        rest = k.e * k.e * absorbed + blur * (s - at_zero)
+        unsure_work = blur * at_zero + LIMITS.roundings * 2.0**-53 * k.w / k.rate
+        unsure_store = k.e * k.e * unsure_work + blur * (s - at_zero)
         slow = late * abs(k.slope) <= max(-k.final, blur)
-        return late <= s and slow and late * -k.final <= rest
+        return late <= s and slow and late * -k.final <= unsure_store
     return late * abs(k.slope) <= blur
 
 
