@@ -74,7 +74,7 @@ def exhausted_stretch(c, n, state):
         fastest = max(fastest, abs(state.contact[k].u))
     if (loses or fastest < LIMITS.dust) and relative_energy(
         first, last + 1, state.ball
-    ) <= state.tally[0].faint:
+    ) <= LIMITS.faint * state.tally[0].energy:
         return first, last
     return c, c - 1
 

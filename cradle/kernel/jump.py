@@ -157,7 +157,8 @@ def neighbours_stay(cluster, total, part, level, n, state):
 
     Their works of all cycles on this part of the way are left in y; closing speeds are linear in
     the impulse so far, with the sums of L^2, L^4, ... as `squares` and of L - L, L^2 - L^3, ... as
-    `steps`.  A cycle that grows goes no further than the digits of the works in one cycle tell.
+    `steps`.  A cycle that grows goes on only while its neighbours' works stay below the energy of the
+    first closing: the digits of the works in one cycle tell no more.
     """
     ball, contact, memory = state.ball, state.contact, state.memory[level]
     left, right = cluster.left, cluster.right
@@ -174,7 +175,7 @@ def neighbours_stay(cluster, total, part, level, n, state):
             continue
         if k.u * then.u < 0.0 or k.u * speed < 0.0 or (k.u == 0.0) != (speed == 0.0):
             return False
-        if part < 0.0 and abs(LIMITS.faint * then.u * then.p * squares) > state.tally[0].faint:
+        if part < 0.0 and abs(then.u * then.p * squares) > state.tally[0].energy:
             return False
         work = then.a if k.u > 0.0 else (k.q - then.q) + (k.q_lo - then.q_lo)
         k.y = then.p * (part * total * k.u + change * steps)

@@ -237,7 +237,7 @@ def prepare(n, chain, meeting, state):
     mass_unit = math.ldexp(1.0, -tally.mass_shift)
     tally.events = tally.rounds = tally.collapsed = tally.defect = 0
     tally.cut_off, tally.meeting = LIMITS.cut, meeting
-    tally.threshold, tally.faint, tally.margin = 5e-324, 0.0, 1.0
+    tally.threshold, tally.energy, tally.margin = 5e-324, 0.0, 1.0
     for i in range(n):
         ball[i].v = chain.v[i]
         ball[i].m = chain.m[i] * mass_unit
@@ -261,19 +261,58 @@ def prepare(n, chain, meeting, state):
             then.hits = 0
         if u > 0.0:
             tally.threshold = max(tally.threshold, LIMITS.exhausted * u)
-            tally.faint = max(tally.faint, LIMITS.faint * reduced_mass(c, ball) * u * u)
+            tally.energy = max(tally.energy, reduced_mass(c, ball) * u * u)
     forget(LOWER, state.level)
     forget(UPPER, state.level)
     start(n, state)
 
 
 @once
-def impact(n, chain, meeting, max_events, resumed, state):
+def new_rates(n, state):
+    """Work out the rates of the runs that have changed; tell whether a contact is about to open."""
+    run, tally = state.run, state.tally[0]
+    opening = False
+    first = tally.first
+    while first < n:
+        if run[first].stirred == 1:
+            opens = rates(first, run, state.ball, state.contact, tally)
+            opening = opening or opens
+            tally.effort -= 2 + run[first].high - run[first].low
+        first = run[first].onward
+    return opening
+
+
+@once
+def new_segments(n, state):
+    """R8.2: work out the segments of the runs that have changed."""
+    run, tally = state.run, state.tally[0]
+    first = tally.first
+    while first < n:
+        if run[first].stirred == 1:
+            apart_by = segment(first, n, run, state.ball, state.contact)
+            tally.margin = min(tally.margin, apart_by)
+        first = run[first].onward
+
+
+@once
+def make_ready(n, state):
+    """Let every run be about to go to its own next event; if one has none, that is a defect."""
+    run, tally = state.run, state.tally[0]
+    first = tally.first
+    while first < n:
+        if not run[first].reach < math.inf:
+            tally.defect = NO_EVENT
+        run[first].stirred, run[first].part = 0, 1.0
+        first = run[first].onward
+
+
+@once
+def impact(n, chain, meeting, max_rounds, resumed, state):
     """Solve one impact: run rounds until no contact is active; return the status.
 
     With tally.effort or tally.room used up it stops, PAUSED, to be `resumed`.
     """
-    contact, run, tally = state.contact, state.run, state.tally[0]
+    tally = state.tally[0]
     if not resumed:
         prepare(n, chain, meeting, state)
     while True:
@@ -281,16 +320,8 @@ def impact(n, chain, meeting, max_events, resumed, state):
             return PAUSED
         # R8.1: ends first, those that are known without the slopes before the others; then R9.
         ends, ended, worn = end_contacts(CERTAIN, n, state)
-        opening = False
-        first = tally.first
-        while first < n:
-            if run[first].stirred == 1:
-                opens = rates(first, run, state.ball, contact, tally)
-                opening = opening or opens
-                tally.effort -= 2 + run[first].high - run[first].low
-            first = run[first].onward
         more = 0
-        if opening:
+        if new_rates(n, state):
             more, last, last_worn = end_contacts(SLOPED, n, state)
             ends += more
             ended = last if more > 0 else ended
@@ -299,31 +330,21 @@ def impact(n, chain, meeting, max_events, resumed, state):
         if tally.first >= n:
             break
         tally.rounds += 1
-        if tally.rounds > max_events:
+        if tally.rounds > max_rounds:
             return UNFINISHED
         # R8.1: then closings; both need no progress, so the next round looks again.
         if more > 0 or collapsed or close_contacts(n, state) > 0:
             continue
-        # R8.2: segments of the runs that have changed; R8.3: do two of them meet?
-        first = tally.first
-        while first < n:
-            if run[first].stirred == 1:
-                apart_by = segment(first, n, run, state.ball, contact)
-                tally.margin = min(tally.margin, apart_by)
-            first = run[first].onward
+        # R8.2; R8.3, R8.4: do two runs meet?  R8.4 to R8.6: go.
+        new_segments(n, state)
         one = first_meeting(n, state)
-        first = tally.first
-        while first < n:
-            if not run[first].reach < math.inf:
-                tally.defect = NO_EVENT
-                return UNSOUND
-            run[first].stirred, run[first].part = 0, 1.0
-            first = run[first].onward
-        go(one, n, state)
+        make_ready(n, state)
+        if tally.defect == 0:
+            go(one, n, state)
         if tally.defect > 0:
             return UNSOUND
     last_limits(n, state)
-    tally.defect = certify(n, state.ball, contact, tally)
+    tally.defect = certify(n, state.ball, state.contact, tally)
     return UNSOUND if tally.defect > 0 else FINISHED
 
 

@@ -235,8 +235,8 @@ class Tally:
     unit: float  # what velocities are multiplied by, 2**-shift
     defect: int  # what the answer breaks
     cut_off: float  # rates below this are zero
-    threshold: float  # R9: speed and energy below which a contact is exhausted
-    faint: float
+    threshold: float  # R9: closing speed below which a contact is exhausted
+    energy: float  # R9: the largest m u^2 of a contact at the start, m its reduced mass
     meeting: float  # R8: where two runs meet, as a part of the overlap
     margin: float  # least distance of two events of a run, relative to their progress
 
