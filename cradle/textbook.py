@@ -5,8 +5,8 @@ infinite sequence of impacts goes on to the last digits of its numbers, or to an
 
 Contact c joins balls c and c + 1.  Its closing speed u = v[c] - v[c + 1] is above 0 in compression.
 Inside a run of active contacts there is no time, only progress s.  Between two events velocities
-are linear and works quadratic in s: every event is the root of a formula.  The only guard against
-rounding: a closing speed that is zero by construction, or but for its last digits, is made zero.
+are linear and works quadratic in s: every event is the root of a formula.  Against rounding: what
+is zero but for its last digits is made zero, events within an `instant` are one, see also TIE.
 """
 
 import math
@@ -45,7 +45,7 @@ class Impact:
         self.ratio, self.direction = ratio, [0] * len(m)  # by ball: who drives there, and how much
         self.velocities, self.u = list(v), [a - b for a, b in pairwise(v)]
         self.near = [abs(u) for u in self.u]  # |u| before the last segments, or at its end since
-        self.active = [False] * len(m)  # one more than contacts: nothing is active beyond them
+        self.active = [False] * len(m)  # one more than contacts, and active[-1]: nothing beyond
         self.gained, self.given = [self.zero] * len(e), [self.zero] * len(e)  # W+ and W-
         self.impulses, self.absorbed = [self.zero] * len(e), [self.zero] * len(e)  # P, all its W+
         self.collisions, self.events = [0] * len(e), list[tuple[str, int]]()

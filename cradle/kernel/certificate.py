@@ -42,7 +42,7 @@ def certify(n, ball, contact, tally):
     absorbed = 0.0
     least = 0.0
     lost = 0.0
-    fastest = 0.0
+    spread = 0.0  # the largest velocity relative to ball 0
     heaviest = -1  # of the balls that have changed
     for i in range(n):
         b = ball[i]
@@ -54,12 +54,12 @@ def certify(n, ball, contact, tally):
             return MOMENTUM
         weakest, strongest = min(weakest, after), max(strongest, after)
         before = after
-        fastest = max(fastest, abs(b.hi - ball[0].hi), abs(b.y - ball[0].y))
+        spread = max(spread, abs(b.hi - ball[0].hi), abs(b.y - ball[0].y))
         if b.x != 0.0 and (heaviest < 0 or b.m > ball[heaviest].m):
             heaviest = i
     for c in range(n - 1):
         k = contact[c]
-        if not closing(c, ball) <= LIMITS.sound * fastest:
+        if not closing(c, ball) <= LIMITS.sound * spread:
             return ORDER
         absorbed += k.a
         lost += (1.0 - k.e * k.e) * k.a

@@ -28,9 +28,10 @@ from cradle.kernel.state import (
 def settle(n, memory):
     """Hand impulses and works since the last snapshot to the upper level, and begin anew."""
     for c in range(n - 1):
-        memory[1][c].p += memory[0][c].p
-        memory[1][c].a += memory[0][c].a
-        memory[0][c].p = memory[0][c].a = 0.0
+        then, above = memory[LOWER][c], memory[UPPER][c]
+        above.p += then.p
+        above.a += then.a
+        then.p = then.a = 0.0
 
 
 @jit
@@ -38,7 +39,8 @@ def forget(number, levels):
     """Drop the snapshot of a level."""
     level = levels[number]
     level.mark = -1
-    level.due = 16 if number == 0 else 4
+    # The first snapshot comes after 32 ends, or 8 collapses: short impacts need none.
+    level.seen = 16 if number == LOWER else 4
     level.count = 0
     level.bend = level.bent = math.inf
 
@@ -76,7 +78,7 @@ def cluster_around(c, level, n, state):
 
     Contacts left..right had an impulse since the snapshot; of these first..last collided anew and
     the others, steady neighbours, stayed active.  All must be active and driven as they were at the
-    snapshot.
+    snapshot, and one that collided must lose energy.
     """
     contact, memory = state.contact, state.memory[level]
     left = c
@@ -178,7 +180,7 @@ def cycle(level, c, bend, n, state):
 def come_round(number, c, n, state):
     """See whether contact c, at whose end or collapse the snapshot was taken, ends a cycle."""
     level = state.level[number]
-    early = 2 * level.count <= 3 * level.due
+    early = 2 * level.count <= 3 * level.seen
     first, last, level.bent = cycle(number, c, 0.0 if early else level.bend, n, state)
     return first, last
 
@@ -190,8 +192,8 @@ def remember(number, c, n, state):
     level.bend = level.bent if level.mark == c else math.inf
     level.bent = math.inf
     level.mark = c
-    level.due = level.count
-    if number == 0:
+    level.seen = level.count
+    if number == LOWER:
         settle(n, memory)
     snapshot(number, n, state)
 
@@ -207,7 +209,7 @@ def look(number, c, n, state):
         first, last = come_round(number, c, n, state)
         if first <= last:
             return first, last
-    if level.count >= 2 * level.due:
+    if level.count >= 2 * level.seen:
         remember(number, c, n, state)
     return c, c - 1
 
@@ -218,7 +220,7 @@ def look_above(first, last, n, state):
     level = state.level
     forget(LOWER, level)
     settle(n, state.memory)
-    level[1].count += 1
+    level[UPPER].count += 1
     one, other = look(UPPER, first, n, state)
     if one <= other:
         forget(UPPER, level)
@@ -235,7 +237,7 @@ def look_above(first, last, n, state):
 @once
 def take_limits(ends, ended, worn, n, state):
     """R9, after `ends` contacts have ended, `ended` the last; tell whether contacts collapsed."""
-    state.level[0].count += ends
+    state.level[LOWER].count += ends
     first, last = ended, ended - 1
     if worn >= 0:
         first, last = exhausted_stretch(worn, n, state)

@@ -24,12 +24,12 @@ def stir(c, n, run, contact):
     if contact[c].active == 0:
         k = c - 1
         if k >= 0 and contact[k].active == 1:
-            run[run[k].last].stirred = 1
+            run[run[k].first].stirred = 1
         k = c + 1
         if k < n - 1 and contact[k].active == 1:
             run[k].stirred = 1
     if c > 1 and contact[c - 1].active == 0 and contact[c - 2].active == 1:
-        run[run[c - 2].last].stirred = 1
+        run[run[c - 2].first].stirred = 1
     if c < n - 3 and contact[c + 1].active == 0 and contact[c + 2].active == 1:
         run[c + 2].stirred = 1
 
@@ -38,8 +38,7 @@ def stir(c, n, run, contact):
 def make_run(first, last, source, low, high, run):
     """Write a run down."""
     run[first].last = last
-    if last > first:
-        run[last].last = first
+    run[last].first = first
     run[first].source = source
     run[first].low = low
     run[first].high = high
@@ -96,12 +95,12 @@ def grow(c, n, ball, contact, run, tally):
     from_right = c < n - 2 and contact[c + 1].active == 1
     activate(c, from_left, from_right, ball, contact)
     if from_left and from_right:  # R8.5: several sources
-        first, right = run[c - 1].last, c + 1
+        first, right = run[c - 1].first, c + 1
         last, after = run[right].last, run[right].onward
         make_run(first, last, -1, first, last, run)
         link(first, after, n, run, tally)
     elif from_left:
-        first = run[c - 1].last
+        first = run[c - 1].first
         make_run(first, c, run[first].source, run[first].low, c, run)
     else:
         right = c + 1
@@ -230,8 +229,7 @@ def close_contacts(n, state):
                 # Both sides of one ball, at equal distance within rounding: the left one.
                 further = contact[right].before * (1.0 - LIMITS.tie)
                 if not (
-                    about_to_close(right + 1, n, contact)
-                    and contact[right + 1].before < further
+                    about_to_close(right + 1, n, contact) and contact[right + 1].before < further
                 ):
                     grow(right, n, ball, contact, run, tally)
                     record(CLOSE, right, n, state)

@@ -21,7 +21,8 @@ from cradle.kernel.state import LIMITS, LOWER, apart, jit, once
 def kept_part(neighbour, edge, exists, memory):
     """Return 1 - h for a steady neighbour whose impulse is h times that of the outermost contact.
 
-    The ball between them acts as one of mass m / (1 - h), whatever its sign.
+    The ball between them acts as one of mass m / (1 - h), whatever its sign.  With nothing kept
+    that mass is infinite: the last digit is kept instead.
     """
     if not exists:
         return 1.0
@@ -47,6 +48,7 @@ def limit(cluster, level, state):
     none = 0.0, math.inf, 0.0, 0.0, 0.0
     kept_left = kept_part(first - 1, first, first > left, memory)
     kept_right = kept_part(last + 1, last, last < right, memory)
+    # Velocities count from that of the first ball; masses are as the steady neighbours change them.
     size = 0.0
     mass = 0.0
     momentum = 0.0
@@ -156,9 +158,9 @@ def neighbours_stay(cluster, total, part, level, n, state):
     """Work out what the neighbours of a cycle absorb; tell whether none comes to its own event.
 
     Their works of all cycles on this part of the way are left in y; closing speeds are linear in
-    the impulse so far, with the sums of L^2, L^4, ... as `squares` and of L - L, L^2 - L^3, ... as
-    `steps`.  A cycle that grows goes on only while its neighbours' works stay below the energy of the
-    first closing: the digits of the works in one cycle tell no more.
+    the impulse so far, with the sums of L^2, L^4, ... as `squares` and of L - L, L^2 - L^3,
+    L^3 - L^5, ... as `steps`.  A cycle that grows goes on only while its neighbours' works stay
+    below the energy of the first closing: the digits of the works in one cycle tell no more.
     """
     ball, contact, memory = state.ball, state.contact, state.memory[level]
     left, right = cluster.left, cluster.right

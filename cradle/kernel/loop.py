@@ -100,7 +100,7 @@ def advance(first, part, n, state):
     Velocities are linear and works quadratic in the progress.  What is zero at the event becomes
     zero to the last bit, by impulses of the run's own contacts.
     """
-    ball, contact, run, recent = state.ball, state.contact, state.run, state.memory[0]
+    ball, contact, run, recent = state.ball, state.contact, state.run, state.memory[LOWER]
     low, high = run[first].low, run[first].high
     s = run[first].reach * part
     whole = part == 1.0
@@ -154,7 +154,7 @@ def touch(gap, n, state):
     if k.u > max(LIMITS.roundings * k.blur, LIMITS.sound):
         state.tally[0].defect = PASSED
     run, ball = state.run, state.ball
-    left, right = run[gap - 1].last, gap + 1
+    left, right = run[gap - 1].first, gap + 1
     left_moves = run[left].stirred == 1 and ball[gap].pull != 0.0
     right_moves = run[right].stirred == 1 and ball[gap + 1].pull != 0.0
     if left_moves and right_moves:
@@ -255,8 +255,8 @@ def prepare(n, chain, meeting, state):
         k.p = k.p_lo = k.a = k.a_lo = 0.0
         k.before = abs(u)
         k.active = k.tiny = k.hits = k.held = 0
-        for row in range(2):
-            then = state.memory[row][c]
+        for level in (LOWER, UPPER):
+            then = state.memory[level][c]
             then.p = then.a = 0.0
             then.hits = 0
         if u > 0.0:

@@ -55,18 +55,18 @@ def record_compressions(first, s, whole, n, state):
     for c in range(low, high + 1):
         k = contact[c]
         ends = whole and k.due == 1
-        k.power = 1 if k.u > 0.0 and (ends or k.u + k.slope * s <= 0.0) else 0
+        k.passes = 1 if k.u > 0.0 and (ends or k.u + k.slope * s <= 0.0) else 0
     while True:
         found = -1
         at = 0.0
         for c in range(low, high + 1):
             k = contact[c]
-            if k.power == 1 and (found < 0 or -k.u / k.slope < at):
+            if k.passes == 1 and (found < 0 or -k.u / k.slope < at):
                 found = c
                 at = -k.u / k.slope
         if found < 0:
             return
-        contact[found].power = 0
+        contact[found].passes = 0
         at = min(at, s)
         if tally.events < tally.capacity:
             for i in range(n):

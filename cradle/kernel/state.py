@@ -46,8 +46,8 @@ class Limits(NamedTuple):
     """What rounding and infinity are measured by.
 
     Where a chain is known that goes wrong without a limit, `tests/test_safeguards.py` switches it
-    off: `dust`, `faint`, `bend`, `doubt`, `one_digit`, `tie`, `simultaneous`, `roundings`, `same`,
-    `rounded`, `vanishing`.  `exhausted`, `repeats`, `many`, `self_similar` and `cut` only save
+    off: `exhausted`, `dust`, `faint`, `repeats`, `self_similar`, `bend`, `doubt`, `one_digit`,
+    `tie`, `simultaneous`, `roundings`, `same`, `rounded`, `vanishing`.  `many` and `cut` only save
     work (`tests/test_speed.py`).  No such chain is known for a larger `faint` or `doubt`, or a
     smaller `same`: these stay as what rounding says.  The others bound the input, the closed form
     and the certificate.
@@ -76,13 +76,13 @@ class Limits(NamedTuple):
     #: R8: parts of segments, and distances, closer than this are equal; part of a run's largest
     #: closing speed that a correction of rounding may change a velocity by.
     tie: float
-    #: R8: parts of segments closer to 1 than this are whole.
+    #: R8: a part of a segment that this factor brings to 1 is whole.
     simultaneous: float
     #: R8: closing speeds closer than this many of their roundings are equal.
     roundings: float
     #: R3: an end speed this close to -e times the speed at the start of compression is meant so.
     same: float
-    #: R7: a ratio this close to its bound is meant to be the bound.
+    #: R7: a ratio that this factor brings to its bound is meant to be the bound.
     rounded: float
     #: R1: a rate below this part of its run's largest, times the lightest ball's part of the
     #: heaviest, is zero: no ball could notice it.
@@ -99,7 +99,8 @@ class Limits(NamedTuple):
     lightest: float
     #: Least coefficient of restitution allowed, but zero: a slower end is below the last digit.
     least_restitution: float
-    #: The certificate: what each sum may be off, in units of the rounding of its terms.
+    #: The certificate: what each sum may be off, relative to its terms; and the speed at which two
+    #: balls that should touch have passed.
     sound: float
 
 
@@ -167,7 +168,7 @@ class Contact:
     final: float  # its closing speed there, if it ends
     due: int  # 1 if that comes at the end of the run's segment, but for rounding
     blur: float  # how much of u may be rounding: it grows with every change of u
-    before: float  # -u of an idle contact at the start of the round, or at its end
+    before: float  # -u of an idle contact before its run moved last, or when it ended
     p: float  # impulse since the start, as a sum of two numbers
     p_lo: float
     a: float  # work absorbed since the start, as a sum of two numbers
@@ -177,7 +178,8 @@ class Contact:
     held: int  # 1 if it had an impulse while held by a ratio above the bound
     hits: int  # how often it became active
     tiny: int  # how many exhausted collisions in a row
-    power: int  # binary exponent of the rate; a flag
+    power: int  # binary exponent of the rate
+    passes: int  # 1 while its maximum of compression is still to be recorded
     x: float  # room for what a function works out in passing
     y: float
 
@@ -185,7 +187,8 @@ class Contact:
 class Run:
     """One run, under the number of its first contact; linked from left to right."""
 
-    last: int  # last contact; under the number of a last contact, the first
+    last: int  # last contact
+    first: int  # under the number of a run's last contact: its first
     source: int  # the contact that drives all others, -1 if there are several
     low: int  # contacts low..high have impulses or moving balls; the others wait
     high: int
@@ -202,7 +205,7 @@ class Level:
     """R9: one of two levels on which cycles are looked for, ends of contacts and collapses."""
 
     mark: int  # contact at whose end, or collapse, the snapshot was taken; -1 for none
-    due: int  # how many ends, or collapses, had been counted then
+    seen: int  # how many ends, or collapses, had been counted then; the next one is taken at twice
     count: int  # how many have been counted so far
     bend: float  # how far the cycle before the snapshot turned; and since then
     bent: float
@@ -216,7 +219,8 @@ class Memory:
     q_lo: float
     hits: int
     code: int
-    p: float  # impulse and work absorbed since then; on the upper level without the lower one's
+    p: float  # impulse and work absorbed since then, without corrections of rounding; on the upper
+    # level without the lower one's
     a: float
 
 
