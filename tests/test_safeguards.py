@@ -128,6 +128,9 @@ LIGHT_BETWEEN = ([1e-6, 1e-9, 1e-6, 1], [1, 0, 0, 0], [0.3, 0.1, 0.99], [0.3, 0.
 #: falls back on a third.
 BEFORE_A_LIMIT = ([1, 1, 1e-7, 3], [0.5, 1, -1, 0], [1e-3, 0.9, 0.3], [1, 0], [0, 0.1], 1.0)
 
+#: Its last collisions are far below the last digit of its velocities.
+EXHAUSTED = ([0.07, 4, 0.08, 70], [0.8, 0.8, 0.6, -1], [1, 1, 0], [0.2, 0.9], [0.009, 0.8], 0.5)
+
 #: What is exchanged; the chain with its ratios and `meeting`; what becomes of it.
 NEEDED = {
     "velocities as sums of two numbers": (
@@ -174,6 +177,16 @@ NEEDED = {
             [0.37, 0.4, 0, 0, 0.1, 0.08, 0.1], [0.32, 0.21, 0.06, 0.2, 0, 0.41, 0.52], 0.5,
         ),
         WRONG,
+    ),
+    "contacts with next to nothing left": ({"exhausted": 1e-300}, EXHAUSTED, UNFINISHED),
+    "exhausted collisions in a row": ({"repeats": math.inf}, EXHAUSTED, UNFINISHED),
+    "a cycle that repeats itself but for rounding": (
+        {"self_similar": 0.0},
+        (
+            [100, 700, 0.006, 0.06, 20], [0.45, 0.44, 0.33, 0.19, -0.25], [0.5, 0.8, 0, 0.5],
+            [1.44e-5, 0.373, 0.996], [0.128, 0.178, 0], 0.5,
+        ),
+        UNFINISHED,
     ),
     "a collapse that costs next to no energy": (
         {"faint": 0.0},
@@ -357,7 +370,7 @@ def test_with_it_the_answer_is_that_of_fifty_digits(name):
 
 #: Cycles beside steady neighbours.  All digits are those of the loop that makes each collision, 20
 #: million of them in the first; of the others it needs too many, but not at a hundred times the
-#: light masses, and there all agree.
+#: light masses, and there all agree.  The last is known to 1e-12, without it to 1e-11.
 DIGITS = {
     "balls held together go together in a cycle": (
         {"stays_at_zero": lambda _: lambda *_: False},
@@ -373,6 +386,14 @@ DIGITS = {
             [1.160541747753352, 6.747e-07, 0.33448, 1.85497, 6.581e-05, 2.72338],
             [0.45804, 0.78246, 0.33838, 0.88286, -0.79193, -1.56234], [0.9, 0, 0.001, 0.9, 0.3],
             [0.1, 0.1, 0, 1], [0.1, 0.5, 1, 0.5], 0.5,
+        ),
+    ),
+    "how far a cycle turns, from a long way": (
+        {"look": changed(cycles, "look", "early = 2 *", "early = math.inf <")},
+        (
+            [11.7, 12.5, 7.44, 1.03, 1.85, 0.0375, 0.658],
+            [0.91, 0.804, 0.596, 0.477, 0.463, -0.159, -0.267], [0.17, 1, 0.78, 0.55, 0.4, 0.25],
+            [0, 0.35, 0.77, 0.96, 0], [1, 0.35, 0.65, 0.63, 0.32], 0.5,
         ),
     ),
 }  # fmt: skip

@@ -42,7 +42,6 @@ def forget(number, levels):
     # The first snapshot comes after 32 ends, or 8 collapses: short impacts need none.
     level.seen = 16 if number == LOWER else 4
     level.count = 0
-    level.bend = level.bent = math.inf
 
 
 @jit
@@ -123,14 +122,14 @@ def repeat(c, n, state):
     record(REPETITION, c, n, state)
 
 
-@once
-def cycle(level, c, bend, n, state):
+@apart
+def cycle(level, c, early, n, state):
     """If the neighbourhood of contact c repeats itself on another scale, go to the limit.
 
     Light balls need many cycles to settle on one factor.  It is enough that what still changes
     will not matter: the bend, how far the state turns by the time that it is exhausted, is below
-    its limit at the present pace, and the pace was no lower (`bend`) over the snapshot before.
-    Without steady neighbours the limit does not depend on it.  With them it does: then the part of
+    its limit at the pace since the snapshot; `early` after it that pace says little.  Without
+    steady neighbours the limit does not depend on the bend.  With them it does: then the part of
     the way that the bend leaves open, and what the digits of the neighbours' shares do, must be
     too small to matter.  Where these say nothing of the limit, the cycle ends where it is, if it is
     too small to matter itself.
@@ -138,26 +137,26 @@ def cycle(level, c, bend, n, state):
     Where there is none, or a neighbour comes to its event before it, the cycle is repeated as often
     as it surely repeats itself.
 
-    Returns (first, last) of the contacts that have collapsed, empty if none have; and the bend.
+    Returns (first, last) of the contacts that have collapsed, empty if none have.
     """
     threshold = state.tally[0].threshold
     cluster = cluster_around(c, level, n, state)
     if cluster.last < cluster.first:
-        return c, c - 1, math.inf
+        return c, c - 1
     total, off, size, unsure, doubt = limit(cluster, level, state)
     if total == 0.0:
-        return c, c - 1, math.inf
+        return c, c - 1
     if total > 0.0 and unsure > LIMITS.one_digit:
         total, unsure, doubt = 0.0, 0.0, size  # only the last digits tell of the limit
     bent = 0.0
     if off > LIMITS.self_similar:
-        if total < 0.0:
-            return c, c - 1, math.inf  # it grows, but not yet by one factor
+        if early or total < 0.0:
+            return c, c - 1  # a cycle that grows does so by one factor
         # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
         # 1 / (T + 1/2), and as good as that for a slow cycle.
         bent = off * max(math.log(size / threshold), 1.0) * (total + 0.5)
-        if not bent < min(LIMITS.bend, bend):
-            return c, c - 1, bent
+        if not bent < LIMITS.bend:
+            return c, c - 1
     farthest = velocity_changes(cluster, total, level, state)
     steady = cluster.left < cluster.first or cluster.last < cluster.right
     # Of two contacts only the scale changes slowly; of more, `off` may be of something else too.
@@ -166,31 +165,20 @@ def cycle(level, c, bend, n, state):
     error = doubt + (unsure + turns) * farthest if steady else 0.0
     if total >= 0.0:
         if error > LIMITS.doubt * threshold:
-            return c, c - 1, bent
+            return c, c - 1
         if neighbours_stay(cluster, total, 1.0, level, n, state):
             to_limit(cluster, total, level, n, state)
-            return cluster.first, cluster.last, math.inf
+            return cluster.first, cluster.last
     certain = bent == 0.0 and (two or not steady)
     if level == LOWER and certain and go_on(cluster, total, error, n, state):
         repeat(c, n, state)
-    return c, c - 1, math.inf
-
-
-@apart
-def come_round(number, c, n, state):
-    """See whether contact c, at whose end or collapse the snapshot was taken, ends a cycle."""
-    level = state.level[number]
-    early = 2 * level.count <= 3 * level.seen
-    first, last, level.bent = cycle(number, c, 0.0 if early else level.bend, n, state)
-    return first, last
+    return c, c - 1
 
 
 @apart
 def remember(number, c, n, state):
     """Take a snapshot at contact c, in place of the one before."""
     level, memory = state.level[number], state.memory
-    level.bend = level.bent if level.mark == c else math.inf
-    level.bent = math.inf
     level.mark = c
     level.seen = level.count
     if number == LOWER:
@@ -206,7 +194,8 @@ def look(number, c, n, state):
     """
     level = state.level[number]
     if level.mark == c:
-        first, last = come_round(number, c, n, state)
+        early = 2 * level.count <= 3 * level.seen
+        first, last = cycle(number, c, early, n, state)
         if first <= last:
             return first, last
     if level.count >= 2 * level.seen:

@@ -82,8 +82,6 @@ def limit(cluster, level, state):
         off = max(off, abs(contact[c].u - factor * memory[c].u) / size)
         stored = contact[c].q - factor * factor * memory[c].q
         off = max(off, abs(stored) / reduced_mass(c, ball) / size / size)
-        if abs(contact[c].x - total * memory[c].p) > 0.01 * abs(total) * memory[c].p:
-            return none
     one, other = LIMITS.digits / mass / kept_left, LIMITS.digits / mass / kept_right
     unsure = abs(one * (mass - ball[first].y)) + abs(other * (mass - ball[last + 1].y))
     doubt = abs(one * contact[first].x) + abs(other * contact[last].x)

@@ -207,8 +207,6 @@ class Level:
     mark: int  # contact at whose end, or collapse, the snapshot was taken; -1 for none
     seen: int  # how many ends, or collapses, had been counted then; the next one is taken at twice
     count: int  # how many have been counted so far
-    bend: float  # how far the cycle before the snapshot turned; and since then
-    bent: float
 
 
 class Memory:
