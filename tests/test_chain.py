@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from cradle import Chain, post_impact_velocities
+from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 
 GOOD = {"masses": [1, 2, 3], "velocities": [1, 0, -1], "restitution": [0.5, 1]}
 
@@ -114,6 +114,19 @@ def test_lightest_and_smallest_masses(mass):
     assert Chain([heavy, mass], [1, 0], 1).masses.tolist() == [heavy, mass]
     with pytest.raises(ValueError, match=r"^masses\[1\] = .*; must be at least 1e-150"):
         Chain([heavy * 2, mass], [1, 0], 1)
+
+
+@pytest.mark.parametrize("masses", [[1, 1e-20], [1e-20, 1], [1, 1, 1e-20], [1, 1e-16, 1]])
+def test_every_door_refuses_a_ball_too_light_for_the_event_loop(masses):
+    """Two or three balls that collide once take a short cut: it refuses what the loop refuses."""
+    velocities, message = (
+        [1.0] + [0.0] * (len(masses) - 1),
+        "must be at least 1e-15 of the heaviest",
+    )
+    with pytest.raises(ValueError, match=message):
+        collide(Chain(masses, velocities, 1), ImpulseCorrelation(0))
+    with pytest.raises(ValueError, match=message):
+        post_impact_velocities(masses, velocities, 1, 0)
 
 
 def test_copies_are_frozen_too():

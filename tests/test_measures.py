@@ -230,3 +230,19 @@ def test_ends_of_the_arc_of_masses_far_apart(where, other):
     for velocities, end, exact in ends:
         outcome = conserving_outcomes(masses, velocities)[1][end]
         np.testing.assert_allclose(outcome, list(map(float, exact)), rtol=1e-12, atol=1e-15)
+
+
+#: Ratios above their bounds, and an impact of 1800 events: whatever a last digit changes grows.
+CHAOTIC = (
+    Chain([27, 0.25, 0.58, 0.46, 1.1, 4.4], [1, 0, 0, 0, 0, 0], [0.23, 0, 0.099, 0, 0]),
+    ImpulseCorrelation([1, 1, 0.22, 1], [0.42, 0, 0.19, 0], excess="saturate"),
+)
+
+
+def test_the_margin_does_not_see_what_grows_and_the_condition_number_does():
+    chain, model = CHAOTIC
+    trace = collide(chain, model)
+    assert trace.margin > 1e-3
+    other = collide(Chain(chain.masses, 3 * chain.velocities, chain.restitution), model)
+    assert np.abs(other.velocities / 3 - trace.velocities).max() > 1e-8
+    assert condition_number(chain, model, 1e-10).number > 1e4

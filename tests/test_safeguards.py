@@ -179,7 +179,14 @@ NEEDED = {
         WRONG,
     ),
     "contacts with next to nothing left": ({"exhausted": 1e-300}, EXHAUSTED, UNFINISHED),
-    "exhausted collisions in a row": ({"repeats": math.inf}, EXHAUSTED, UNFINISHED),
+    "exhausted collisions in a row": (
+        {"repeats": math.inf},
+        (
+            [0.9, 20, 2, 10, 2], [1, 0, 0, 0, 0], [1, 0.00194, 1, 0.702], [1, 0.3, 0.05],
+            [1, 0, 0.4], 0.5,
+        ),
+        UNFINISHED,
+    ),
     "a cycle that repeats itself but for rounding": (
         {"self_similar": 0.0},
         (
