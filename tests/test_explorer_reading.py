@@ -411,18 +411,31 @@ def test_touch(visit):
     """On a phone a ball follows the finger, and the page does not scroll under it."""
     tab = still(visit, width=390, has_touch=True, is_mobile=True)
     x, y = middle(tab, ".ball[data-ball='4'] .disc")
+    mouse = still(visit, width=390)
+    mouse.mouse.move(x, y)
+    mouse.mouse.down()
+    mouse.mouse.move(x + 80, y, steps=20)
+    by_mouse = drawn(mouse)["speeds"][4]
+    mouse.mouse.up()
+    assert by_mouse < -0.5
     touch = tab.context.new_cdp_session(tab)
 
     def send(kind, at):
         points = [] if at is None else [{"x": at, "y": y}]
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
+    tab.evaluate(
+        "document.querySelector('.stage')"
+        ".addEventListener('pointercancel', () => (globalThis.lost = true))"
+    )
     send("touchStart", x)
-    for step in range(1, 6):
-        send("touchMove", x + 8 * step)
+    for step in range(1, 21):
+        send("touchMove", x + 4 * step)
+        later(tab, 20)
     shown = drawn(tab)
     send("touchEnd", None)
-    assert shown["speeds"][4] < -0.2
+    assert tab.evaluate("globalThis.lost") is None
+    assert shown["speeds"][4] == pytest.approx(by_mouse, abs=0.15)  # a finger is still at first
     assert tab.evaluate("window.scrollY") == 0
     sizes = tab.evaluate(
         """(() => {

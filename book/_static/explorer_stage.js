@@ -38,6 +38,7 @@
     lay(setting, box) {
       const { masses, letters, speeds } = setting;
       const { width, em } = box;
+      this.em = em;
       const count = masses.length;
       if (this.balls.length !== count) this.build(count);
       const heaviest = Math.max(...masses);
@@ -72,9 +73,7 @@
         ball.name.setAttribute("y", small ? px(r + 1.1 * em) : px(0.36 * em));
         ball.string.setAttribute("x1", px(this.pivots[k]));
         ball.string.setAttribute("y1", px(this.top));
-        // Side by side two numbers would touch.
-        const lower = k % 2 && speeds[k - 1] ? 1 : 0;
-        ball.pull.setAttribute("y", px(r + ((small ? 2.2 : 1.2) + lower) * em));
+        ball.pull.setAttribute("y", px(r + (small ? 2.2 : 1.2) * em));
         ball.group.setAttribute("aria-valuenow", speeds[k]);
         const pull = speeds[k] === 0 ? "hangs at rest" : `comes in at ${fixed(speeds[k])} m/s`;
         ball.group.setAttribute("aria-valuetext", pull);
@@ -141,7 +140,14 @@
         string.setAttribute("x2", x);
         string.setAttribute("y2", y);
         group.setAttribute("transform", `translate(${x} ${y})`);
-        pull.textContent = held && speeds[k] ? `${fixed(Math.abs(speeds[k]))} m/s` : "";
+        // Balls that are pulled together have one number, below the one nearest to the others.
+        const next = speeds[k] > 0 ? speeds[k + 1] : speeds[k - 1];
+        const told = held && speeds[k] && speeds[k] !== next;
+        pull.textContent = told ? `${fixed(Math.abs(speeds[k]))} m/s` : "";
+        // It stays within the picture.
+        const half = 2.6 * this.em;
+        const middle = Math.min(Math.max(+x, half), this.svg.viewBox.baseVal.width - half);
+        pull.setAttribute("x", px(middle - x));
       });
       this.stars.forEach((star, c) => star.classList.toggle("shown", Boolean(pressed[c])));
     }

@@ -82,16 +82,21 @@
     ];
     if (answer) {
       const total = sum(answer.collisions);
-      said.push(`${total} collision${total === 1 ? "" : "s"} in all.`);
+      said.push(
+        answer.collapsed
+          ? `The collisions never end; after ${total} of them the rest was taken in one step.`
+          : `${total} collision${total === 1 ? "" : "s"} in all.`,
+      );
       if (answer.saturated.length) {
         const pairs = answer.saturated.map((c) => `of balls ${c + 1} and ${c + 2}`);
         said.push(
           pairs.length > 1
-            ? `Ratios are above their largest values: the contacts ${list(pairs)} are held.`
-            : `A ratio is above its largest value: the contact ${pairs[0]} is held.`,
+            ? `Ratios are above their largest values: the contacts ${list(pairs)} are held ` +
+                "closed, as with the largest ratios."
+            : `A ratio is above its largest value: the contact ${pairs[0]} is held closed, ` +
+                "as with the largest ratio.",
         );
       }
-      if (answer.collapsed) said.push("A sequence of endless collisions came to its limit.");
     }
     return said.join(" ");
   }
