@@ -277,6 +277,27 @@ def test_effective_ratio_of_equal_springs():
     np.testing.assert_allclose(again, velocities, rtol=0, atol=1e-9)
 
 
+def test_effective_ratio_of_three_spheres():
+    """Hertz's force, integrated by SciPy."""
+
+    def rates(_, y):
+        force = (-np.diff(y[:3])).clip(min=0) ** 1.5
+        return np.concatenate([y[3:], -np.diff(force, prepend=0, append=0)])
+
+    path = solve_ivp(
+        rates, (0, 20), [0, 0, 0, 1, 0, 0], method="DOP853", rtol=1e-11, atol=1e-12, max_step=0.05
+    )
+    velocities = path.y[3:, -1]
+    assert (np.diff(path.y[:3, -1]) > 0).all()
+    ratio = constant_ratio(velocities)
+    assert CHAPTER.glued["spheres-ratio"] == f"{ratio:.4f}"
+    for ball, v in enumerate(velocities, start=1):
+        assert CHAPTER.glued[f"spheres-v{ball}"] == f"{v:.3f}".replace("-", "−")
+    assert CHAPTER.glued["linear-ratio"] == f"{constant_ratio(outcome(1, 1)):.4f}"
+    # The measured ratio lies between that of spheres and that of linear springs.
+    assert ratio < float(CHAPTER.glued["AAA"]) < constant_ratio(outcome(1, 1))
+
+
 def test_fig_own_compliance_effective():
     """The three ratios of the figure at some stiffnesses, and the law for a soft second spring."""
     for gamma in (0.1, 0.01):

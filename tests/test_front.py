@@ -61,6 +61,20 @@ def test_the_landing_page_says_the_same_of_the_toy():
     assert [told[f"desk-{ball}"] for ball in ("last", "fourth", "back")] == ["99", "13", "7"]
 
 
+def test_the_ratio_of_three_spheres_on_five():
+    """The landing page sets it beside five spheres: by our own integration, v1 = -a/(2 - a)."""
+    back, *_ = elastic_spheres(3, 2e-3)
+    ratio = -2 * back / (1 - back)
+    told = Chapter("intro").glued
+    assert told["spheres"] == f"{ratio:.4f}"
+    five = collide(Chain([1] * 5, [1, 0, 0, 0, 0]), ImpulseCorrelation(ratio)).velocities
+    numbers = re.findall(r"[-\d.]+", told["spheres-five"].replace("−", "-"))
+    assert [float(x) for x in numbers] == [round(float(v), 2) + 0.0 for v in five]
+    spheres = elastic_spheres(5, 2e-3)
+    assert (spheres[1:3] < -0.01).all()  # "spheres throw them back a little"
+    assert abs(five[1:3]).max() < 1e-12  # and the ratio leaves them at rest
+
+
 def test_mass_size_stiffness_and_speed_of_the_toy_cancel():
     after = collide(Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain()).velocities
     steel = collide(Chain([0.045] * 5, [0.3, 0, 0, 0, 0]), SpringChain(1.3e10))
