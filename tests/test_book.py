@@ -310,3 +310,22 @@ def test_a_formula_keeps_its_punctuation(html: Path):
         loose = re.findall(rf".{{20}}{formula}[)\].,;:!?].{{9}}", whole.sub("", text))
         assert not loose, page
     assert kept > 300
+
+
+def test_no_table_has_a_second_head_for_its_row_labels_alone(html: Path):
+    heads = 0
+    for path in pages(html):
+        for head in re.findall(r"(?s)<thead>.*?</thead>", path.read_text(encoding="utf-8")):
+            rows = re.findall(r"(?s)<tr.*?</tr>", head)
+            last = re.findall(r"(?s)<th[^>]*>(.*?)</th>", rows[-1])
+            assert len(rows) == 1 or last[-1], f"{path.name}: {head}"
+            heads += 1
+    assert heads > 50
+
+
+def test_code_in_tables_breaks_at_its_joints(html: Path):
+    text = (html / "book" / "notation.html").read_text(encoding="utf-8")
+    pieces = re.findall(r'(?s)<code[^>]*>((?:<span class="nowrap">.*?)+)</code>', text)
+    plain = [re.sub(r"<(?!wbr)[^>]*>", "", piece) for piece in pieces]
+    assert "chain.<wbr>restitution[<wbr>i-2]" in plain
+    assert any("<wbr>" not in piece for piece in plain)

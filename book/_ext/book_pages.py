@@ -7,6 +7,8 @@ r"""Sphinx extension: what Jupyter Book leaves to be put right in the pages.
 - Sphinx wraps an equation of several lines in `split`, where MathJax refuses the `\tag` that
   carries the paper's number. Such an equation is passed on as it is.
 - A line does not break between a formula and the comma behind it, nor behind the bracket before it.
+- A table of pandas names its row labels in a row of their own; they go into that of column names.
+- In a table a name of the code breaks after a point, a bracket or a comma, and nowhere else.
 - Figures of the appendices carry a letter: Fig. A.1.
 - A page that is linked from elsewhere shows a title, a sentence and a picture.
 - Until the project has a public address, buttons that lead there are left out. `book_published` in
@@ -37,6 +39,12 @@ ADDRESSED = (
 
 #: What may stand before a formula, and behind it, without a space.
 OPENING, CLOSING = re.compile(r"[(\[]+$"), re.compile(r"^[)\].,;:!?]+")
+
+#: The head of a table of pandas, and one of its cells.
+HEAD = re.compile(r"<thead>.*?</thead>", re.DOTALL)
+HEAD_CELL = re.compile(r"<th([^>]*)>(.*?)</th>", re.DOTALL)
+#: Code up to where it may break: behind a point, an opening bracket or a comma.
+JOINTS = re.compile(r"[^.(\[,]*[.(\[,]+\s*|[^.(\[,]+")
 
 
 def hide_what_needs_an_address(app: Sphinx, config: Config) -> None:
@@ -120,6 +128,52 @@ def _end_of(node: nodes.Node | None, pattern: re.Pattern[str]) -> str:
     return found[0] if found else ""
 
 
+def join_header_rows(
+    app: Sphinx, doctree: nodes.document, page: str
+) -> None:
+    """Move the names of a table's row labels into the row of its column names."""
+    for raw in list(doctree.findall(nodes.raw)):
+        if 'class="dataframe' in raw.astext():
+            joined = HEAD.sub(_one_row_less, raw.astext())
+            raw.replace_self(nodes.raw("", joined, **raw.attributes))
+
+
+def _one_row_less(head: re.Match[str]) -> str:
+    """Join the last two rows of a table's head, if no column has a word in both of them."""
+    rows = list(re.finditer(r"<tr.*?</tr>", head[0], re.DOTALL))
+    if len(rows) < 2:
+        return head[0]
+    above, below = (HEAD_CELL.findall(row[0]) for row in rows[-2:])
+    names = [text for _, text in below if text]
+    if len(above) != len(below) or any(
+        text for _, text in above[: len(names)] + below[len(names) :]
+    ):
+        return head[0]
+    words = iter(names)
+    row = HEAD_CELL.sub(
+        lambda cell: f"<th{cell[1]}>{cell[2] or next(words, '')}</th>",
+        rows[-2][0],
+    )
+    start, end = rows[-2].start(), rows[-1].end()
+    return head[0][:start] + row + head[0][end:]
+
+
+def break_code_in_tables(
+    app: Sphinx, doctree: nodes.document, page: str
+) -> None:
+    """Let a name of the code in a table break where it has a joint."""
+    for table in doctree.findall(nodes.table):
+        for literal in list(table.findall(nodes.literal)):
+            code = literal.astext()
+            # A short one, as forward[i - 2], stays whole.
+            pieces = JOINTS.findall(code) if len(code) > 16 else [code]
+            literal.clear()
+            for number, piece in enumerate(pieces):
+                if number:
+                    literal += nodes.raw("", "<wbr>", format="html")
+                literal += nodes.inline("", piece, classes=["nowrap"])
+
+
 def letter_figures(app: Sphinx, env: BuildEnvironment) -> list[str]:
     """Give the figures of the appendices the numbers A.1, A.2, ..., through all pages."""
     appendices = [
@@ -179,6 +233,8 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("html-page-context", describe)
     app.connect("doctree-resolved", keep_tags)
     app.connect("doctree-resolved", keep_punctuation)
+    app.connect("doctree-resolved", join_header_rows)
+    app.connect("doctree-resolved", break_code_in_tables)
     # After Sphinx has numbered all figures.
     app.connect("env-get-updated", letter_figures, priority=900)
     app.connect("build-finished", copy_mathjax)
