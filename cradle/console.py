@@ -22,27 +22,33 @@ def format_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def show(
-    rows: Sequence[dict[str, Any]], extra: dict[str, Any], note: str, as_json: bool, as_csv: bool
-) -> None:
-    """Print a table, as text with a note, as CSV, or as JSON with all there is."""
+    rows: Sequence[dict[str, Any]], extra: dict[str, Any], note: str, as_json: bool, as_csv: bool,
+    names: Sequence[str] = (),
+) -> None:  # fmt: skip
+    """Print a table, as text with a note, as CSV, or as JSON with all there is.
+
+    `names` are those of the columns, where there may be no row to tell them.
+    """
+    names = names or list(rows[0])
     if as_json and as_csv:
         raise click.UsageError("give one of --json and --csv")
     if as_json:
         click.echo(json.dumps({"rows": list(rows), **extra}, indent=2))
     elif as_csv:
         table = io.StringIO()
-        writer = csv.DictWriter(table, list(rows[0]), lineterminator="\n")
+        writer = csv.DictWriter(table, names, lineterminator="\n")
         writer.writeheader()
         writer.writerows({name: _plain(value) for name, value in row.items()} for row in rows)
         click.echo(table.getvalue(), nl=False)
     else:
-        click.echo(f"{text(rows)}\n{note}")
+        click.echo(f"{text(rows, names)}\n{note}")
 
 
-def text(rows: Sequence[dict[str, Any]]) -> str:
-    """Return rows as a table of text."""
-    columns = [_cells([row[name] for row in rows]) for name in rows[0]]
-    table = [list(rows[0]), *map(list, zip(*columns, strict=True))]
+def text(rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> str:
+    """Return rows as a table of text; its columns are those of the first row, if not `names`."""
+    names = names or list(rows[0])
+    columns = [_cells([row[name] for row in rows]) for name in names]
+    table = [list(names), *map(list, zip(*columns, strict=True))]
     widths = [max(len(line[k]) for line in table) for k in range(len(table[0]))]
     return "\n".join(
         "  ".join(word.rjust(width) for word, width in zip(line, widths, strict=True)).rstrip()
@@ -55,7 +61,7 @@ def _cells(column: Sequence[Any]) -> list[str]:
 
     Four at least, for people compare columns; and never minus zero.
     """
-    if isinstance(column[0], tuple):
+    if column and isinstance(column[0], tuple):
         return _pieces(column)
     floats = [abs(value) for value in column if isinstance(value, float) and math.isfinite(value)]
     largest = max(floats, default=0.0) or 1.0

@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 @click.option("--without", multiple=True, metavar="SET[,SET...]",
               help="Sets of the file that are not to be fitted.")  # fmt: skip
 @click.option("--restitution", "given", multiple=True, metavar="PAIR=E[:ERROR]",
-              help="For pairs that were not shot alone: AB=0.53:0.01.")  # fmt: skip
-@click.option("--known", multiple=True, metavar="TRIPLET=RATIO", help="Ratios not to be fitted.")
+              help="For pairs that no fitted set shoots alone: AB=0.53:0.01.")  # fmt: skip
+@click.option("--known", multiple=True, metavar="TRIPLET=RATIO",
+              help="Ratios not to be fitted, up to their bound.")  # fmt: skip
 @click.option("--predict", metavar="SEQUENCE", help="Predict a chain of these balls, beside its "
               "measured mean if the file has shots of it.")  # fmt: skip
 @click.option("--speed", default=1.0, help="Of its first ball, m/s [1].")
@@ -59,20 +60,22 @@ def fit(
     from cradle.checks import one_number
     from cradle.fit import read_shots
     from cradle.fit.parameters import types_in_a_row
+    from cradle.fit.result import COLUMNS
 
     if predict is not None and as_csv:
         raise click.UsageError("--csv prints the fitted values alone; with --predict give --json")
     if predict is not None:  # what is wrong is said before the fit, not after it
         types_in_a_row(predict)
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
-    given, known = options.pop("given"), options.pop("known")
+    given = [_named(one) for one in options.pop("given")]
+    known = [_ratio(one) for one in options.pop("known")]
     shots = read_shots(file, **options)
     there = {one.name for one in shots.sets}  # a name may have a comma
     lists = [[part] if part in there else part.split(",") for part in without]
     used = shots.without(*(name.strip() for names in lists for name in names))
-    values, ratios = dict(map(_named, given)), dict(map(_named, known))
-    _refuse_unused(values, ratios, used, predict)
-    fits = _fits(used, values, ratios)
+    _refuse_unused([name for name, _ in given], [name for name, _ in known], used, predict)
+    everything = _fits(used, dict(given), dict(known))
+    fits = [one for one in everything if one.estimates]
     momentum, count = shots.momentum_check()
     rows = [row for one in fits for row in one.rows()]
     extra = {
@@ -88,15 +91,17 @@ def fit(
         f"{poor[one.probability > 1e-3]}"
         for one in fits
     ]
-    everything = " (all of the file)" if extra["without"] else ""
-    notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{everything}")
+    if known and not everything[-1].estimates:
+        notes.append("fit: no ratio is fitted; those of --known are taken as they are")
+    whole = " (all of the file)" if extra["without"] else ""
+    notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{whole}")
     if predict is not None:
-        more, lines = _predicted(fits[-1], shots, predict, speed)
+        more, lines = _predicted(everything[-1], shots, predict, speed)
         extra.update(more)
         notes += lines
     if plot is not None:
         plot_fits(fits, plot)
-    show(rows, extra, "\n".join(notes), as_json, as_csv)
+    show(rows, extra, "\n".join(notes), as_json, as_csv, COLUMNS)
 
 
 def _named(given: str) -> tuple[str, tuple[float, float]]:
@@ -109,10 +114,18 @@ def _named(given: str) -> tuple[str, tuple[float, float]]:
         raise click.UsageError(f"{given!r}: write NAME=NUMBER or NAME=NUMBER:ERROR") from None
 
 
+def _ratio(given: str) -> tuple[str, float]:
+    """Read TRIPLET=RATIO."""
+    name, (value, _) = _named(given)
+    if ":" in given:
+        raise click.UsageError(f"{given!r}: write TRIPLET=RATIO; a known ratio has no error")
+    return name, value
+
+
 def _refuse_unused(
     given: Iterable[str], known: Iterable[str], shots: Shots, predict: str | None
 ) -> None:
-    """Refuse a value that no chain needs: its name may be misspelt."""
+    """Refuse a value that no chain needs (its name may be misspelt), and one that is there."""
     from cradle.fit.parameters import label, pair_keys, parameter_key, ratio_keys
 
     chains = [one.types for one in shots.sets] + ([parameter_key(predict)] if predict else [])
@@ -120,7 +133,13 @@ def _refuse_unused(
     triplets = {key for types in chains for key in ratio_keys(types)}
     values = [("--restitution", name, tuple(sorted(parameter_key(name)))) for name in given]
     values += [("--known", name, parameter_key(name)) for name in known]
+    there_by = {("--restitution", pair_keys(one.types)[0]): f"set {one.name} is fitted for it; "
+                f"leave one of them out (--without {quote(one.name)})"
+                for one in shots.sets if len(one.types) == 2}  # fmt: skip
     for option, name, key in values:
+        if (option, key) in there_by:
+            raise click.UsageError(f"{option} {name}: {there_by[option, key]}")
+        there_by[option, key] = "given twice"
         kind, needed = ("triplet", triplets) if option == "--known" else ("pair", pairs)
         if key not in needed:
             there = ", ".join(sorted(map(label, needed))) or "none"
@@ -128,18 +147,14 @@ def _refuse_unused(
 
 
 def _fits(
-    shots: Shots, given: dict[str, tuple[float, float]], known: dict[str, tuple[float, float]]
+    shots: Shots, given: dict[str, tuple[float, float]], known: dict[str, float]
 ) -> list[Fit]:
-    """Fit the pairs, then with what they gave all longer chains."""
+    """Fit the pairs, then with what they gave all longer chains; the last fit predicts."""
     from cradle.fit import ratio, restitution
 
-    fits = []
-    if any(len(one.types) == 2 for one in shots.sets):
-        fits.append(restitution(shots))
-    if any(len(one.types) > 2 for one in shots.sets):
-        values = {name: pair for one in fits for name, pair in one.values().items()}
-        fits.append(ratio(shots, {**values, **given}, known=known))
-    return fits
+    pairs = [restitution(shots)] if any(len(one.types) == 2 for one in shots.sets) else []
+    values = {name: value for one in pairs for name, value in one.values().items()}
+    return [*pairs, ratio(shots, {**values, **given}, known=known)]
 
 
 def _predicted(
@@ -152,8 +167,11 @@ def _predicted(
     rows, measured = predicted.rows(), []
     lines = ["", f"{sequence} at {speed:g} m/s; lower to upper: the central 95 % of predictions"]
     tables, remarks = [rows], []
+    keys = ratio_keys(predicted.types)
+    # A pair has given its restitution; ratios that are all known take nothing from the shots.
+    taught = not keys or any(keys & set(group.keys) for group in found.groups)
     for one in (one for one in shots.sets if one.types == predicted.types):
-        fitted = one in found.shots.sets
+        fitted = one in found.shots.sets and taught
         try:
             mean, error = one.mean_after(speed)
         except ValueError as reason:
@@ -168,13 +186,14 @@ def _predicted(
         # Without a triplet's own set its ratio is known no longer.
         hint = f" (for one: --without {quote(one.name)})" if len(one.types) > 3 else ""
         part = f"part of the fit: this is no check{hint}" if fitted else "left out of the fit"
+        if one in found.shots.sets and not fitted:
+            part = "not fitted: it changes no ratio"
         remarks.append(
             f"measured: mean of {len(one.shots)} shots of set {one.name}, each scaled to "
             f"{speed:g} m/s; the set was {part}"
         )
     lines += map(text, tables[1:] or tables)
     lines += remarks
-    keys = ratio_keys(predicted.types)
     several = [e.name for e in found.estimates.values() if e.key in keys and len(e.intervals) > 1]
     if several:
         lines.append(

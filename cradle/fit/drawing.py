@@ -45,6 +45,8 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
     >>> [axes.get_title() for axes in draw_fit(fit, "AB", Figure().subplots(1, 2))]
     ['likelihood of restitution AB', 'data of set AB']
     """
+    if not fit.estimates:
+        raise ValueError("nothing was fitted; there is nothing to draw")
     if name is None:
         name = next(
             (n for n, e in fit.estimates.items() if e.identified), next(iter(fit.estimates))

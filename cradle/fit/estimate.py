@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.checks import Vector, checked
+from cradle.checks import Vector, checked, one_number
 from cradle.fit.answers import Estimate, Group
 from cradle.fit.likelihood import chi_squares
 from cradle.fit.parameters import (
@@ -136,7 +136,9 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
     return Fit(Shots(()), {label(key): estimate}, {}, (), found.lowest, high.size - 1)
 
 
-def ratio(shots: Shots, restitution: Fit | Known, *, known: Known | None = None) -> Fit:
+def ratio(
+    shots: Shots, restitution: Fit | Known, *, known: Mapping[str, float] | None = None
+) -> Fit:
     """Fit the Impulse Correlation Ratio of every triplet in shots of three balls and more.
 
     Triplets whose ratios act in the same shots are fitted together.
@@ -149,19 +151,20 @@ def ratio(shots: Shots, restitution: Fit | Known, *, known: Known | None = None)
         Of every pair of neighbours: the result of `restitution`, or a mapping from the pair's name
         to the coefficient or to (coefficient, standard error).
     known : mapping, optional
-        Ratios that are not to be fitted, from the triplet's name to the ratio.
+        Ratios that are not to be fitted, from the triplet's name to the ratio.  With it no set
+        needs three balls: what is known predicts, and nothing is fitted.
 
     Returns
     -------
     Fit
-        One estimate for each triplet and direction.  The ratios lie between 0 and the bound of
-        three balls (Eq. 34).
+        One estimate for each triplet and direction that is not known.  The ratios lie between 0 and
+        the bound of three balls (Eq. 34).
 
     Raises
     ------
     ValueError
-        If no set has three balls, a coefficient of restitution is missing, or more than six ratios
-        act together.
+        If no set has three balls and nothing is known, a coefficient of restitution is missing, a
+        known ratio is above its bound, or more than six ratios act together.
 
     References
     ----------
@@ -176,13 +179,10 @@ def ratio(shots: Shots, restitution: Fit | Known, *, known: Known | None = None)
     Fit(ratio ABA = 0.109 [0.071, 0.146]; chi-square 0.2 of 2)
     """
     sets = [one for one in shots.sets if len(one.types) > 2]
-    if not sets:
+    if not sets and known is None:
         raise ValueError("no set has three balls or more; ratios come from triplets")
     values, errors = _restitution_values(restitution, sets)
-    fixed = {
-        parameter_key(name): _with_error(f"known[{name!r}]", value)[0]
-        for name, value in (known or {}).items()
-    }
+    fixed = _known_ratios(known or {}, shots.masses)
     bounds = {key: m for one in sets for key, m in _bounds(one).items() if key not in fixed}
     acting = {key for key in bounds if any(_acts(key, one, bounds, fixed, values) for one in sets)}
     estimates: dict[str, Estimate] = {}
@@ -232,6 +232,19 @@ def _restitution_values(
                     f"it has {', '.join(map(label, values)) or 'nothing'}"
                 )
     return values, errors
+
+
+def _known_ratios(known: Mapping[str, float], masses: Mapping[str, float]) -> dict[Key, float]:
+    """Return the ratios that are not fitted; none is above the bound of its balls, to be held."""
+    fixed = {}
+    for given, value in known.items():
+        key, name = parameter_key(given), f"known[{given!r}]"
+        fixed[key] = one_number(name, value, "must lie in [0, 1]", 0.0, 1.0)
+        if len(key) == 3 and masses.keys() >= set(key):
+            bound = masses[key[2]] / (masses[key[1]] + masses[key[2]])
+            rule = f"must not exceed the bound of these balls, {bound!r} (Eq. 34)"
+            one_number(name, value, rule, high=bound)
+    return fixed
 
 
 def _bounds(one: ShotSet) -> dict[Key, float]:

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+#: Columns of the table of a fit.
+COLUMNS = (
+    "name", "kind", "value", "intervals", "minima", "identified", "at_bound", "bound",
+)  # fmt: skip
 # Draws from the fitted parameters for a prediction.
 _DRAWS = 4000
 
@@ -108,24 +112,16 @@ class Fit:
         [(0.5113, 0.5429)]
         """
         return [
-            {
-                "name": name,
-                "kind": one.kind,
-                "value": one.value,
-                "intervals": one.intervals,
-                "minima": len(one.modes),
-                "identified": one.identified,
-                "at_bound": one.at_bound,
-                "bound": one.bound,
-            }
+            dict(zip(COLUMNS, (name, one.kind, one.value, one.intervals, len(one.modes),
+                               one.identified, one.at_bound, one.bound), strict=True))
             for name, one in self.estimates.items()
-        ]
+        ]  # fmt: skip
 
     def table(self) -> pd.DataFrame:
         """Return the rows as a table; where nothing was identified the value is missing."""
         import pandas as pd
 
-        return pd.DataFrame(self.rows()).set_index("name")
+        return pd.DataFrame(self.rows(), columns=COLUMNS).set_index("name")
 
     def plot(self, name: str | None = None, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
         """Draw the likelihood of one estimate, and its data with their predictions.
@@ -140,6 +136,11 @@ class Fit:
         Returns
         -------
         sequence of Axes
+
+        Raises
+        ------
+        ValueError
+            If nothing was fitted.
         """
         from cradle.fit.drawing import draw_fit
 
@@ -219,9 +220,8 @@ class Fit:
             elif name in self.estimates:
                 drawn[key] = self.estimates[name].bound * random.random(_DRAWS)
             else:
-                raise ValueError(
-                    f"the ratio of {name} is not known; fitted: {', '.join(self.estimates)}"
-                )
+                there = ", ".join(n for n, e in self.estimates.items() if e.kind == "ratio")
+                raise ValueError(f"the ratio of {name} is not known; fitted: {there or 'none'}")
         e = np.stack([restitution[key] for key in pair_keys(types)], axis=-1)
         empty = np.zeros((_DRAWS, 0))
         ratios = tuple(

@@ -1,0 +1,78 @@
+"""`cradle fit` on small tables: what is given beside the shots, and tables as they come."""
+
+import json
+
+import pytest
+from test_command import call
+
+from cradle import runtime
+from cradle.fit import ratio, read_shots
+from cradle.tables import data_folder
+
+
+def predicted(line):
+    return [row["velocity"] for row in json.loads(call(f"{line} --json"))["prediction"]]
+
+
+@pytest.fixture
+def shots(tmp_path, monkeypatch):
+    """The template as a file, and of it the pairs alone and the triplet alone; the header first."""
+    lines = (data_folder() / "shots_template.csv").read_text(encoding="utf-8").splitlines()[2:]
+    tables = {
+        "shots.csv": lines,
+        "pairs.csv": [line for line in lines if not line.startswith("ABA,")],
+        "triplet.csv": [line for line in lines if not line.startswith("AB,")],
+    }
+    for name, kept in tables.items():
+        (tmp_path / name).write_text("\n".join(kept) + "\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(runtime.VARIABLE, "plain")
+    return tmp_path
+
+
+# --- what is given and known ---------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("shots")
+def test_where_all_is_known_the_table_is_empty():
+    line = "fit triplet.csv --restitution AB=0.53:0.01 --known ABA=0.11"
+    header = ["name", "kind", "value", "intervals", "minima", "identified", "at_bound", "bound"]
+    first, *notes = call(line).splitlines()
+    assert first.split() == header
+    assert "fit: no ratio is fitted; those of --known are taken as they are" in notes
+    assert not any("chi-square 0.0 of 0" in note for note in notes)
+    assert call(f"{line} --csv").strip().split(",") == header
+    assert json.loads(call(f"{line} --json"))["rows"] == []
+    text = call(f"{line} --predict ABA")
+    assert "the set was not fitted: it changes no ratio" in text
+    assert "this is no check" not in text
+
+
+@pytest.mark.usefixtures("shots")
+def test_a_fit_of_nothing_has_a_table_and_no_picture():
+    fit = ratio(read_shots("triplet.csv"), {"AB": (0.53, 0.01)}, known={"ABA": 0.11})
+    assert fit.table().empty
+    assert fit.table().index.name == "name"
+    with pytest.raises(ValueError, match="nothing was fitted; there is nothing to draw"):
+        fit.plot()
+
+
+@pytest.mark.usefixtures("shots")
+def test_pairs_with_what_is_known_predict_longer_chains():
+    known = "--predict ABA --known ABA=0.1"
+    alone = predicted(f"fit pairs.csv {known}")
+    assert alone == predicted(f"fit shots.csv --without ABA {known}")
+    assert alone == predicted(f"fit shots.csv {known}")
+    # e = 0.9, and momentum.
+    assert predicted("fit pairs.csv --predict AA --restitution AA=0.9") == pytest.approx(
+        [0.05, 0.95], abs=1e-12
+    )
+
+
+@pytest.mark.usefixtures("shots")
+def test_a_known_ratio_is_one_number_up_to_its_bound():
+    table, bound = read_shots("shots.csv"), 0.045 / 0.098
+    assert ratio(table, {"AB": 0.53}, known={"ABA": bound}).known == {"ABA": bound}
+    for wrong, words in ((bound + 1e-6, "must not exceed the bound"), ((0.1, 0.2), "one number")):
+        with pytest.raises(ValueError, match=rf"known\['ABA'\] = .*; must .*{words[-9:]}"):
+            ratio(table, {"AB": 0.53}, known={"ABA": wrong})
