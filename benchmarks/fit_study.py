@@ -35,10 +35,12 @@ PRECISION = ["triplet", "ratio", "bound", "backward_acts", "sensitivity", "third
 
 
 def truth(triplet):
-    """Return masses, restitution, ratio, reverse ratio and the bound of a triplet."""
+    """Return chain, ratio, reverse ratio and bound of a triplet; no ratio is above its bound."""
     chain, model = paper_chain(triplet, excess="saturate")
-    bound = float(chain.masses[2] / (chain.masses[1] + chain.masses[2]))
-    return chain, min(model.forward[0], bound), model.backward[0], bound
+    left, middle, right = chain.masses
+    bound = float(right / (middle + right))
+    return (chain, min(model.forward[0], bound),
+            min(model.backward[0], float(left / (middle + left))), bound)  # fmt: skip
 
 
 def outcomes(chain, ratios, backward, restitution=None):

@@ -29,7 +29,7 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"(mass|velocity)_unit='(\S+)'": r"--\1-unit \2",
     r"\bstiffness=": "--stiffness ",
     r"\b(sigma|known)=": r"--\1",
-    r"\b(wanted|accuracy|length|speed) = ": r"--\1 ",
+    r"\b(wanted|accuracy|impacts|length|sigma|speed|window) = ": r"--\1 ",
     r"\bmodel_error = ": "--model-error ",
     r"\btypes = ": "--predict ",
     r"restitution has no '(.+?)', which set (.+) needs; it has (.*)": (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shlex import quote
@@ -18,7 +19,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument(
+    "file", type=click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
+)
 @click.option("--mass-unit", type=click.Choice(["kg", "g"]), help="Unit of the column mass [kg].")
 @click.option("--velocity-unit", type=click.Choice(["m/s", "cm/s", "mm/s"]),
               help="Unit of before, after and sigma [m/s].")  # fmt: skip
@@ -31,16 +34,16 @@ if TYPE_CHECKING:
               help="Ratios not to be fitted, up to their bound.")  # fmt: skip
 @click.option("--predict", metavar="SEQUENCE", help="Predict a chain of these balls, beside its "
               "measured mean if the file has shots of it.")  # fmt: skip
-@click.option("--speed", default=1.0, help="Of its first ball, m/s [1].")
+@click.option("--speed", type=float, help="Of its first ball, with --predict, m/s [1].")
 @click.option("--plot", type=click.Path(dir_okay=False), help="Draw the likelihoods to a file.")
 @format_options
 def fit(
-    file: Path, without: Sequence[str], predict: str | None, speed: float, plot: str | None,
+    file: Path, without: Sequence[str], predict: str | None, speed: float | None, plot: str | None,
     as_json: bool, as_csv: bool, **options: Any,
 ) -> None:  # fmt: skip
     """Fit coefficients of restitution and ratios to measured velocities.
 
-    FILE is a table of shots; `cradle template` prints one to fill in.
+    FILE is a table of shots, - one from standard input; `cradle template` prints one to fill in.
 
     All sets of the file are fitted, chains of four and more balls too: a prediction is checked only
     by shots that --without keeps out of the fit.
@@ -61,15 +64,19 @@ def fit(
     from cradle.fit import read_shots
     from cradle.fit.parameters import types_in_a_row
     from cradle.fit.result import COLUMNS
+    from cradle.fit.shots import chance
 
     if predict is not None and as_csv:
         raise click.UsageError("--csv prints the fitted values alone; with --predict give --json")
+    if predict is None and speed is not None:
+        raise click.UsageError("--speed is that of the chain to --predict; give both")
+    striker = 1.0 if speed is None else speed
     if predict is not None:  # what is wrong is said before the fit, not after it
         types_in_a_row(predict)
-        one_number("speed", speed, "must be above 0", 0.0, open_low=True)
+        one_number("speed", striker, "must be above 0", 0.0, open_low=True)
     given = [_named(one) for one in options.pop("given")]
     known = [_ratio(one) for one in options.pop("known")]
-    shots = read_shots(file, **options)
+    shots = read_shots(sys.stdin.buffer if str(file) == "-" else file, **options)
     there = {one.name for one in shots.sets}  # a name may have a comma
     lists = [[part] if part in there else part.split(",") for part in without]
     used = shots.without(*(name.strip() for names in lists for name in names))
@@ -86,6 +93,7 @@ def fit(
         "without": [one.name for one in shots.sets if one not in used.sets],
     }
     poor = {True: "", False: " (a poor fit: the errors do not explain the differences)"}
+    lost = {True: "", False: "; masses, velocities or their errors are wrong"}
     notes = ["intervals: 95 % confidence sets"] + [
         f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}"
         f"{poor[one.probability > 1e-3]}"
@@ -94,9 +102,10 @@ def fit(
     if known and not everything[-1].estimates:
         notes.append("fit: no ratio is fitted; those of --known are taken as they are")
     whole = " (all of the file)" if extra["without"] else ""
-    notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{whole}")
+    notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{whole}"
+                 f"{lost[chance(momentum, count) > 1e-3]}")  # fmt: skip
     if predict is not None:
-        more, lines = _predicted(everything[-1], shots, predict, speed)
+        more, lines = _predicted(everything[-1], shots, predict, striker)
         extra.update(more)
         notes += lines
     if plot is not None:

@@ -104,6 +104,7 @@ def good():
         (lambda t: t["before"].__setitem__(0, -1.0), "row 1, column before: .*no balls approach"),
         (lambda t: t["sigma"].__setitem__(2, 0.0), "row 3, column sigma: 0.0; must be above 0"),
         (lambda t: t["mass"].__setitem__(0, -0.045), "row 1, column mass: -0.045; must be above 0"),
+        (lambda t: t.update(Sigma=t.pop("sigma")), "Sigma: write Sigma in small letters"),
         (lambda t: t["set"].append("AB"), "columns have different lengths"),
         (lambda t: t.update({k: [] for k in t}), "the table has no rows"),
     ],
@@ -114,6 +115,26 @@ def test_wrong_tables_are_refused_by_row_and_column(change, message):
     change(table)
     with pytest.raises(ValueError, match=message):
         read_shots(table)
+
+
+def test_sigma_is_given_once():
+    table = good()
+    with pytest.raises(ValueError, match=r"sigma = 0.01; the table has a column sigma: leave out"):
+        read_shots(table, sigma=0.01)
+    errors = table.pop("sigma")
+    assert read_shots(table, sigma=errors[0])["AB"].sigma.tolist() == [errors[:2], errors[2:]]
+    with pytest.raises(ValueError, match=r"^sigma = -1.0; must be above 0"):
+        read_shots(table, sigma=-1)
+
+
+def test_a_repeated_column_is_refused(tmp_path):
+    """Which of them counts nobody would see."""
+    table = pd.DataFrame(good())
+    twice = pd.concat([table, table["after"]], axis=1)
+    twice.to_csv(tmp_path / "twice.csv", index=False)
+    for source in (twice, tmp_path / "twice.csv"):
+        with pytest.raises(ValueError, match="column 'after' is there 2 times; keep one"):
+            read_shots(source)
 
 
 def test_one_table_three_ways(tmp_path):
@@ -626,7 +647,7 @@ def test_study_covers_as_often_as_it_says():
         assert binom.ppf(1e-4, trials, 0.95) <= covered <= binom.ppf(1 - 1e-4, trials, 0.99)
 
 
-@pytest.mark.parametrize(("triplet", "noise"), [("ABA", 0.03), ("CCA", 0.003)])
+@pytest.mark.parametrize(("triplet", "noise"), [("ABA", 0.03), ("CCA", 0.003), ("ACC", 0.003)])
 def test_study_is_what_the_script_makes(triplet, noise):
     made = fit_study.study(triplet, noise)
     row = next(
@@ -651,6 +672,7 @@ def test_files_that_are_no_table_of_ours(tmp_path):
     lines = (ROOT / "data" / "shots_template.csv").read_text(encoding="utf-8").splitlines()
     cases = {
         "semicolons; put commas": [line.replace(",", ";") for line in lines],
+        "has tabs; put commas": [line.replace(",", "\t") for line in lines[2:]],
         "semicolons between the columns and commas in the decimals; first turn every comma into": [
             line.replace(",", ";").replace(".", ",") for line in lines
         ],
@@ -665,8 +687,11 @@ def test_files_that_are_no_table_of_ours(tmp_path):
         with pytest.raises(ValueError, match=words):
             read_shots(path)
     path.write_text("\n".join(lines), encoding="utf-16")
-    with pytest.raises(ValueError, match=r"3.csv is no UTF-8 text \(byte 0\); save it as CSV in"):
+    with pytest.raises(ValueError, match=r"4.csv is no UTF-8 text \(byte 0\); save it as CSV in"):
         read_shots(path)
+    # Rows without a cell filled say nothing.
+    path.write_text("\n".join([*lines, ",,,,,,,,", "", " , "]), encoding="utf-8")
+    assert len(read_shots(path)["AB"].shots) == 2
     # Any other name is free, whatever balls it has.
     for other in ("first day", "ABA-2", "ABAb"):
         path.write_text("\n".join(lines).replace("\nABA,", f"\n{other},"), encoding="utf-8")

@@ -3,9 +3,11 @@
 import json
 
 import pytest
+from click.testing import CliRunner
 from test_command import call
 
 from cradle import runtime
+from cradle.command import main
 from cradle.fit import ratio, read_shots
 from cradle.tables import data_folder
 
@@ -76,3 +78,21 @@ def test_a_known_ratio_is_one_number_up_to_its_bound():
     for wrong, words in ((bound + 1e-6, "must not exceed the bound"), ((0.1, 0.2), "one number")):
         with pytest.raises(ValueError, match=rf"known\['ABA'\] = .*; must .*{words[-9:]}"):
             ratio(table, {"AB": 0.53}, known={"ABA": wrong})
+
+
+# --- tables as they come -------------------------------------------------------------------------
+
+
+def test_a_table_comes_from_standard_input(shots):
+    text = (shots / "shots.csv").read_text()
+    piped = CliRunner().invoke(main, ["fit", "-"], input=text, catch_exceptions=False)
+    assert piped.output == call("fit shots.csv")
+
+
+def test_momentum_that_is_lost_is_marked(shots):
+    """Balls a fifth too heavy: each shot gains momentum by many of its errors."""
+    words = "; masses, velocities or their errors are wrong"
+    assert words not in call("fit shots.csv")
+    wrong = (shots / "shots.csv").read_text().replace("0.053,", "0.064,")
+    (shots / "wrong.csv").write_text(wrong)
+    assert words in call("fit wrong.csv")

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cradle.checks import one_number
 from cradle.fit.lines import table_lines
 from cradle.fit.shots import Shots, ShotSet
 
@@ -60,9 +61,9 @@ def read_shots(
 
     Parameters
     ----------
-    source : path, DataFrame or mapping of columns
-        A CSV file (UTF-8, comma, one header line; lines that begin with # are skipped), a pandas
-        DataFrame, or columns by name.  Columns: `COLUMNS` and `OPTIONAL`.
+    source : path, binary file, DataFrame or mapping of columns
+        A CSV file (UTF-8, comma, one header line; lines that begin with # and empty rows are
+        skipped), a pandas DataFrame, or columns by name.  Columns: `COLUMNS` and `OPTIONAL`.
     mass_unit : {"kg", "g"}, optional
         Unit of the masses.  Left out, it is kg, and masses that look like grams are refused.
     velocity_unit : {"m/s", "cm/s", "mm/s"}, optional
@@ -78,8 +79,9 @@ def read_shots(
     Raises
     ------
     ValueError
-        If a column is missing, a value is wrong, balls pass through each other, or a shot gains
-        more energy than its errors allow; the message names row and column.
+        If a column is missing or there twice, sigma is given beside a column sigma, a value is
+        wrong, balls pass through each other, or a shot gains more energy than its errors allow; the
+        message names row and column.
 
     Examples
     --------
@@ -98,10 +100,17 @@ def read_shots(
     missing = [name for name in needed if name not in lines[0][1]]
     if missing:
         other = "; or give sigma=" if missing[0] == "sigma" else ""
+        hint = "".join(f": write {name} in small letters" for name in lines[0][1]
+                       if name.lower() == missing[0])  # fmt: skip
         raise ValueError(
             f"column {missing[0]!r} is missing ({COLUMNS[missing[0]]}{other}); "
-            f"there are {', '.join(lines[0][1])}"
+            f"there are {', '.join(lines[0][1])}{hint}"
         )
+    if sigma is not None:
+        one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
+        if "sigma" in lines[0][1]:
+            raise ValueError(f"sigma = {sigma!r}; the table has a column sigma: leave out one of "
+                             "them")  # fmt: skip
     scale = (_unit("mass_unit", mass_unit, _MASS_UNITS, "kg"),
              _unit("velocity_unit", velocity_unit, _VELOCITY_UNITS, "m/s"))  # fmt: skip
     rows = [_row(where, line, scale, sigma) for where, line in lines]

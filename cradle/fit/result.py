@@ -21,7 +21,7 @@ from cradle.fit.parameters import (
     types_in_a_row,
 )
 from cradle.fit.search import LEVEL
-from cradle.fit.shots import Shots
+from cradle.fit.shots import Shots, chance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,9 +73,7 @@ class Fit:
     @property
     def probability(self) -> float:
         """Chance of a chi-square at least as large if model and errors were right."""
-        from scipy.special import chdtrc
-
-        return float(chdtrc(max(self.degrees_of_freedom, 1), self.chi_square))
+        return chance(self.chi_square, self.degrees_of_freedom)
 
     def values(self) -> dict[str, tuple[float, float]]:
         """Return each identified value with its standard error."""

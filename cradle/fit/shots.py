@@ -181,3 +181,25 @@ class Shots:
         """
         residuals = np.concatenate([s.momentum_residuals for s in self.sets])
         return float(residuals @ residuals), residuals.size
+
+
+def chance(chi_square: float, degrees_of_freedom: int) -> float:
+    """Return the chance of a chi-square at least as large if model and errors are right.
+
+    Parameters
+    ----------
+    chi_square : float
+    degrees_of_freedom : int
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> round(chance(3.84, 1), 3)
+    0.05
+    """
+    from scipy.special import chdtrc
+
+    return float(chdtrc(max(degrees_of_freedom, 1), chi_square))
