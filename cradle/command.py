@@ -14,7 +14,7 @@ from typing import Any
 
 import click
 
-from cradle.console import format_options, image_format, show
+from cradle.console import format_options, image_format, picture, show
 from cradle.describing import chain_options, described
 from cradle.filming import film
 from cradle.fitting import fit, template
@@ -60,7 +60,7 @@ def main() -> None:
 @chain_options
 @format_options
 def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
-    """Velocities after an impact.
+    """Velocities after an impact; balls and contacts count from 1, the left.
 
     SEQUENCE names the paper's balls, first ball first, such as ABACA; or give --masses.
 
@@ -92,19 +92,22 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
         "energy_lost": float(trace.energy_loss / (chain.kinetic_energy or 1.0)),
         "collisions": trace.collisions.tolist(),
         "collapsed": trace.collapsed,
-        "held_contacts": list(trace.saturated),
+        "held_contacts": [contact + 1 for contact in trace.saturated],
     }
-    still = "" if (chain.closing_speeds > 0.0).any() else "no balls approach: no impact\n"
-    note = (
-        f"{still}energy lost: {100 * extra['energy_lost']:z.2f} %; collisions of the contacts: "
-        f"{', '.join(map(str, extra['collisions']))}\n{given.note}"
+    held = ", ".join(map(str, extra["held_contacts"]))
+    lines = ["no balls approach: no impact"] * (not (chain.closing_speeds > 0.0).any())
+    lines.append(
+        f"energy lost: {100 * extra['energy_lost']:z.2f} %; collisions of the contacts: "
+        f"{', '.join(map(str, extra['collisions']))}"
     )
-    show(rows, extra, note, as_json, as_csv)
+    lines += [f"held closed at their largest ratio: contact {held} (--saturate)"] * bool(held)
+    lines += ["an infinite sequence of impacts was taken to its limit"] * trace.collapsed
+    show(rows, extra, "\n".join([*lines, given.note]), as_json, as_csv)
 
 
 @main.command()
 @chain_options
-@click.option("--output", "-o", required=True, type=click.Path(dir_okay=False),
+@click.option("--output", "-o", required=True, type=click.Path(dir_okay=False), callback=picture,
               help="File to draw to: .png, .svg or .pdf.")  # fmt: skip
 def plot(output: str, **options: Any) -> None:
     """Draw the velocities of all balls through an impact.
@@ -143,7 +146,7 @@ def swing(
 ) -> None:  # fmt: skip
     """Positions of a swinging cradle, impact after impact.
 
-    The first ball is pulled aside and let go; --speed and --velocities do not matter.
+    The first ball is pulled aside and let go: --speed and --velocities are refused.
 
     \b
     Examples:
@@ -156,6 +159,9 @@ def swing(
     from cradle.pendulums import Pendulums
     from cradle.swinging import swing as swing_freely
 
+    if (options["speed"], options["velocities"]) != (None, None):
+        raise click.UsageError("leave --speed and --velocities out: the first ball is pulled aside "
+                               "(--pull) and let go")  # fmt: skip
     given = described(**options)
     chain, hanging = given.chain, Pendulums(length=length)
     far = float(hanging.reach(1)[0])

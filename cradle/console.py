@@ -98,6 +98,13 @@ def _plain(value: Any) -> Any:
     return "; ".join(f"{low!r}..{high!r}" for low, high in value)
 
 
+def picture(_: click.Context, __: click.Parameter, path: str | None) -> str | None:
+    """Return where to draw; the sign for standard output is the name of no file."""
+    if path == "-":
+        raise click.BadParameter("'-'; a picture goes to a file: give its name")
+    return path
+
+
 def image_format(path: str) -> str:
     """Return the format of a picture by the ending of its file; without one matplotlib adds one."""
     return Path(path).suffix[1:] or "png"

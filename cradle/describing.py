@@ -78,6 +78,7 @@ def described(
 ) -> Described:  # fmt: skip
     """Return the chain and the model that the options describe."""
     from cradle.chain import Chain
+    from cradle.checks import one_number
     from cradle.models.correlation import ImpulseCorrelation
     from cradle.tables import paper_chain
 
@@ -87,7 +88,7 @@ def described(
         raise click.UsageError(f"--model {model} has no ratios; leave them out, and --saturate")
     if not (speed is None or velocities is None):
         raise click.UsageError("give one of --speed and --velocities")
-    striker = 1.0 if speed is None else speed
+    striker = 1.0 if speed is None else one_number("speed", speed)
     excess: Literal["raise", "saturate"] = "saturate" if saturate else "raise"
     if sequence is not None:
         given = {"--unit": unit, "--velocities": velocities, "--restitution": restitution,

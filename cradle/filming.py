@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import sys
 from pathlib import Path
 
 import click
@@ -25,17 +27,21 @@ def film(
 ) -> None:  # fmt: skip
     """Velocities from the marks in a film.
 
-    FILE is exported by the video tool Tracker, one track a ball, left to right; the first ball
-    strikes the others at rest.  Prints the rows of one shot for the table that `cradle fit` reads.
+    FILE is exported by the video tool Tracker, one track a ball, left to right; tracks named by
+    types are in the order of --set.  The first ball strikes the others at rest.  Prints the rows of
+    one shot for the table that `cradle fit` reads.
 
     \b
     Examples:
       cradle film film.txt --set BAC --masses 53,45,53 --unit g --length 0.3 --header
       cradle film film.txt --set BAC --masses 0.053,0.045,0.053 --shot 2 --slower 2
     """
+    from cradle.checks import one_number
     from cradle.fit import read_tracker, velocities_from_tracks
     from cradle.fit.parameters import parameter_key
+    from cradle.fit.reading import COLUMNS, OPTIONAL
 
+    one_number("--slower", slower, "must be above 0", 0.0, open_low=True)
     tracks = read_tracker(file, time_scale=1.0 / slower)
     types = parameter_key(name)
     try:
@@ -47,9 +53,16 @@ def film(
             f"{file.name} has {len(tracks)} tracks, --set {len(types)} types and --masses "
             f"{len(weights)} masses; must be as many"
         )
+    for place, (kind, track) in enumerate(zip(types, tracks, strict=True), 1):
+        if track in types and track != kind:
+            raise ValueError(
+                f"{file.name}: track {place} is named {track}, --set {name} has {kind} there; both "
+                "go from left to right"
+            )
     found = velocities_from_tracks(tracks, length=length, window=window)
+    writer = csv.writer(sys.stdout, lineterminator="\n")
     if header:
-        click.echo("set,shot,ball,type,mass,before,after,sigma,sigma_before")
+        writer.writerow([*COLUMNS, *OPTIONAL])
     for k, (kind, mass) in enumerate(zip(types, weights, strict=True)):
         numbers = (mass, found.before[k], found.after[k], found.sigma[k], found.sigma_before[k])
-        click.echo(",".join([name, shot, str(k + 1), kind, *(f"{x:.6g}" for x in numbers)]))
+        writer.writerow([name, shot, k + 1, kind, *(f"{x:.6g}" for x in numbers)])

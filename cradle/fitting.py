@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cradle.console import format_options, plot_fits, show, text
+from cradle.console import format_options, picture, plot_fits, show, text
 
 if TYPE_CHECKING:
     from cradle.fit import Fit, Shots
@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 @click.option("--predict", metavar="SEQUENCE", help="Predict a chain of these balls, beside its "
               "measured mean if the file has shots of it.")  # fmt: skip
 @click.option("--speed", type=float, help="Of its first ball, with --predict, m/s [1].")
-@click.option("--plot", type=click.Path(dir_okay=False), help="Draw the likelihoods to a file.")
+@click.option("--plot", type=click.Path(dir_okay=False), callback=picture,
+              help="Draw the likelihoods to a file.")  # fmt: skip
 @format_options
 def fit(
     file: Path, without: Sequence[str], predict: str | None, speed: float | None, plot: str | None,

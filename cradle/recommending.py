@@ -17,7 +17,7 @@ from cradle.describing import chain_options, described, numbers, one_or_all
     multiple=True,
     default=["velocities"],
     help="velocities, impulses, path, "
-    "forces, times or fastest ball; may be given several times [velocities].",
+    "forces, times or fastest ball, or several with commas between [velocities].",
 )
 @click.option(
     "--accuracy",
@@ -49,9 +49,10 @@ def recommend(
     if options.pop("model") is not None:
         raise click.UsageError("leave --model out: it is what is recommended")
     given = described(**options)
+    wishes = [name.strip() for names in wanted for name in names.split(",")]
     known = given.model if isinstance(given.model, ImpulseCorrelation) else None
     advice = recommend_from(
-        given.chain, wanted, accuracy=accuracy, model_error=model_error, impacts=impacts,
+        given.chain, wishes, accuracy=accuracy, model_error=model_error, impacts=impacts,
         ratios=known if len(given.chain) > 2 else None,
         stiffness=None if stiffness is None else one_or_all(stiffness),
     )  # fmt: skip

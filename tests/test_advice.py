@@ -381,7 +381,7 @@ REFUSED = [
     (THREE, {"wanted": "speed"}, "wanted = 'speed'; must be one or several of velocities, imp"),
     (THREE, {"wanted": []}, "wanted = []; must be one or several of"),
     (THREE, {"wanted": 3}, "wanted = 3; must be one or several of"),
-    (THREE, {"wanted": [3]}, "wanted = [3]; must be one or several of"),
+    (THREE, {"wanted": ["path", 3]}, "wanted = 3; must be one or several of"),
     (THREE, {"impacts": 0, "ratios": 0.1}, "impacts = 0; must be a whole number, at least 1"),
     (THREE, {"ratios": 0.6}, "forward[0] = 0.6; at ball 1, counted from 0, it must not exceed 0.5"),
     (THREE, {"ratios": [0.1, 0.1]}, "forward has 2 values; 3 balls need 1, or one number"),
@@ -472,5 +472,5 @@ def test_the_reason_is_that_of_the_wish():
 
 def test_times_in_words():
     assert [lasting(t) for t in (2.5e-7, 9.996e-4, 0.0123, 12.3)] == [
-        "0.25 µs", "1 ms", "12 ms", "12 s",
+        "0.25 us", "1 ms", "12 ms", "12 s",
     ]  # fmt: skip

@@ -69,6 +69,8 @@ def folder(tmp_path, monkeypatch):
     kept = [line for line in kept if not line.startswith("ABACA")]
     (tmp_path / "shots.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
     shutil.copy(ROOT / "data" / "video_synthetic.txt", tmp_path / "film.txt")
+    film = (tmp_path / "film.txt").read_text(encoding="utf-8")
+    (tmp_path / "wide.txt").write_text(film, encoding="utf-16")
     shutil.copy(tmp_path / "shots.csv", tmp_path / "grams.csv")
     rows = list(csv.reader(io.StringIO((tmp_path / "shots.csv").read_text().split("\n", 1)[1])))
     with (tmp_path / "grams.csv").open("w", newline="") as file:
@@ -171,6 +173,21 @@ def test_balls_that_do_not_approach_are_named():
     assert "no balls approach" not in call("solve --masses 1,1,1 --velocities 0,0,-1")
 
 
+def test_contacts_that_are_held_and_limits_are_told():
+    """Counted from 1, as the balls are."""
+    trace = collide(*paper_chain("ABCCA", excess="saturate"))
+    line = "solve ABCCA --saturate"
+    (contact,) = trace.saturated
+    assert json.loads(call(f"{line} --json"))["held_contacts"] == [contact + 1]
+    held = "held closed at their largest ratio: contact "
+    assert f"{held}{contact + 1} (--saturate)\n" in call(line)
+    limit = "an infinite sequence of impacts was taken to its limit\n"
+    text = call("solve --masses 1,1,1 --restitution 0 --ratio 0")
+    assert limit in text
+    assert held not in text
+    assert limit not in call(line)
+
+
 def test_numbers_are_for_people():
     """Never minus zero; light balls have a mass; columns have as many decimals as they need."""
     text = call("solve --masses 1,1,1 --ratio 0")
@@ -188,6 +205,9 @@ def test_recommend_says_what_python_says():
     assert text.strip() == repr(recommend(chain, "forces", accuracy=1e-3, stiffness=1))
     text = call("recommend --masses 1,1,1,1,1 --ratio 0.1 --impacts 500")
     assert text.strip() == repr(recommend(chain, ratios=0.1, impacts=500))
+    assert text.isascii()  # as a terminal may be
+    two = call("recommend --masses 1,1,1,1,1 --ratio 0.1 --wanted velocities,path")
+    assert two.strip() == repr(recommend(chain, ("velocities", "path"), ratios=0.1))
     text = call("recommend ABACA --stiffness 1,2,2,1")
     balls, ratios = paper_chain("ABACA")
     assert text.strip() == repr(recommend(balls, ratios=ratios, stiffness=[1, 2, 2, 1]))
@@ -366,6 +386,14 @@ def test_film_gives_the_rows_of_the_table(folder):
     np.testing.assert_allclose(2 * two.after[0], one.after[0], atol=0.05)
 
 
+@pytest.mark.usefixtures("folder")
+def test_a_name_with_a_comma_stays_one_cell():
+    line = "film film.txt --set BAC --masses 1,1,1 --shot 'a,b'"
+    rows = list(csv.reader(io.StringIO(call(line))))
+    assert [row[:4] for row in rows] == [["BAC", "a,b", str(k + 1), "BAC"[k]] for k in range(3)]
+    assert {len(row) for row in rows} == {9}
+
+
 @pytest.mark.parametrize(
     ("line", "code", "message"),
     [
@@ -396,8 +424,24 @@ def test_film_gives_the_rows_of_the_table(folder):
         ("swing --masses 1,1,1 --seconds 0", 1, "--seconds = 0.0; must be above 0"),
         ("swing --masses 1,1,1 --steps 0", 1, "--steps = 0; must be a whole number, at least 1"),
         ("recommend --masses 1,1,1", 1, "Give --stiffness 1 if all contacts are equal spheres"),
+        ("recommend --masses 1,1,1 --wanted path,x", 1, "--wanted 'x'; must be one or several"),
+        ("recommend --masses 1,1 --impacts 0", 1, "cradle: --impacts 0; must be a whole number"),
+        ("solve --masses 1,1 --speed nan", 1, "cradle: --speed nan; must be finite"),
+        ("swing ABA --speed 2", 2, "leave --speed and --velocities out: the first ball is pulled"),
+        ("swing --masses 1,1 --velocities 2,0", 2, "leave --speed and --velocities out"),
+        ("plot ABA --output -", 2, "'-'; a picture goes to a file: give its name"),
+        ("fit shots.csv --plot -", 2, "'-'; a picture goes to a file: give its name"),
+        ("film film.txt --set BAC --masses 1,1,1 --slower 0", 1, "--slower = 0.0; must be above 0"),
+        ("film film.txt --set BAC --masses 1,1,1 --slower -1", 1, "--slower = -1.0; must be above"),
+        (
+            "film film.txt --set BAC --masses 1,1,1 --window 0",
+            1,
+            "cradle: --window 0.0; must be ab",
+        ),
+        ("film film.txt --set CAB --masses 1,1,1", 1, "track 1 is named B, --set CAB has C there"),
+        ("film wide.txt --set BAC --masses 1,1,1", 1, "wide.txt is no UTF-8 text (byte 0); export"),
         ("recommend --masses 1,1,1 --model spheres", 2, "leave --model out"),
-        ("recommend --masses 1,1,1 --wanted speed", 1, "--wanted ('speed',); must be one or seve"),
+        ("recommend --masses 1,1,1 --wanted speed", 1, "--wanted 'speed'; must be one or seve"),
         ("fit nothing.csv", 2, "does not exist"),
         ("fit shots.csv --mass-unit g --restitution AB", 2, "write NAME=NUMBER"),
         ("fit grams.csv", 1, "column mass: 45 kg is unlikely"),

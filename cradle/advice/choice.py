@@ -201,9 +201,10 @@ def _wishes(wanted: str | Collection[str]) -> tuple[str, ...]:
         wishes = (wanted,) if isinstance(wanted, str) else tuple(wanted)
     except TypeError:
         wishes = ()
-    if not wishes or not all(isinstance(one, str) and one in WANTED for one in wishes):
+    wrong = [one for one in wishes if not (isinstance(one, str) and one in WANTED)]
+    if not wishes or wrong:
         rule = f"must be one or several of {', '.join(WANTED)}"
-        raise ValueError(f"wanted = {shown(wanted)}; {rule}")
+        raise ValueError(f"wanted = {shown(wrong[0] if wrong else wanted)}; {rule}")
     return wishes
 
 

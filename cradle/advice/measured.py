@@ -112,14 +112,14 @@ def lasting(seconds: float) -> str:
     Returns
     -------
     str
-        With its unit.
+        With its unit; microseconds are us, for terminals without the letter mu.
 
     Examples
     --------
     >>> lasting(2.13e-5), lasting(0.0843)
-    ('21 µs', '84 ms')
+    ('21 us', '84 ms')
     """
-    for name, size in (("µs", 1e-6), ("ms", 1e-3), ("s", 1.0)):
+    for name, size in (("us", 1e-6), ("ms", 1e-3), ("s", 1.0)):
         if seconds < 999.5 * size or name == "s":
             break
     return f"{np.format_float_positional(float(f'{seconds / size:.1e}'), trim='-')} {name}"

@@ -22,6 +22,7 @@ from cradle.fit.parameters import (
 from cradle.fit.result import Fit
 from cradle.fit.search import RISE, Mode, refine, scan
 from cradle.fit.shots import Shots, ShotSet
+from cradle.kernel.state import LIMITS
 
 # Values of a coefficient or ratio on the first grid.
 _GRID = 2001
@@ -242,8 +243,8 @@ def _known_ratios(known: Mapping[str, float], masses: Mapping[str, float]) -> di
         fixed[key] = one_number(name, value, "must lie in [0, 1]", 0.0, 1.0)
         if len(key) == 3 and masses.keys() >= set(key):
             bound = masses[key[2]] / (masses[key[1]] + masses[key[2]])
-            rule = f"must not exceed the bound of these balls, {bound!r} (Eq. 34)"
-            one_number(name, value, rule, high=bound)
+            rule = f"must not exceed the bound of these balls, {bound:.6g} (Eq. 34)"
+            one_number(name, value, rule, high=bound * LIMITS.rounded)
     return fixed
 
 

@@ -70,7 +70,13 @@ def read_tracker(
     one_number("time_scale", time_scale, "must be above 0", 0.0, open_low=True)
     one_number("unit", unit, "must be above 0", 0.0, open_low=True)
     file = Path(path) if isinstance(path, str) else path
-    lines = file.read_text(encoding="utf-8-sig").splitlines()
+    try:
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise ValueError(
+            f"{file.name} is no UTF-8 text (byte {error.start}); export it from Tracker, or save "
+            "it as text in UTF-8"
+        ) from None
     first = 1 if lines and lines[0].strip().rstrip(",;").strip() == "#multi:" else 0
     if len(lines) < first + 3:
         raise ValueError(f"{file.name}: too short for an export of Tracker")
