@@ -56,7 +56,7 @@ def fit(
     \b
     Examples:
       cradle fit shots.csv
-      cradle fit shots.csv --mass-unit g --restitution AC=0.31:0.01
+      cradle fit shots.csv --mass-unit g --without AC --restitution AC=0.31:0.01
       cradle fit shots.csv --predict ABACA --speed 1.2
       cradle fit long.csv --without ABACA --predict ABACA
       cradle fit shots.csv --json --plot fit.png
