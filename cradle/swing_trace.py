@@ -38,7 +38,8 @@ class Impact(NamedTuple):
     after: Vector
     #: What the contacts kept back, J.
     energy_loss: float
-    #: The path of each chain that collided, from left to right.
+    #: The path of each chain that collided, from left to right; a long one is cut, and its
+    #: `Trace.left_out` tells.
     traces: tuple[Trace, ...]
 
     def __repr__(self) -> str:

@@ -244,7 +244,8 @@ class _Run:
                 self.chain.masses[first:last], v, self.chain.restitution[first : last - 1]
             )
             try:
-                trace = collide(balls, part(self.model, len(before), first, last))
+                # Not by `collide`, whose advice on a long path cannot be taken here.
+                trace = part(self.model, len(before), first, last).solve(balls)
             except ValueError as refused:
                 refused.add_note(f"at the impact at t = {self.t} s, balls {first} to {last - 1}")
                 raise

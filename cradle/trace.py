@@ -53,7 +53,8 @@ class Trace:
         infinite sequence was taken to its limit, what all contacts lost is exact; how the rest of
         the sequence shared it is what its last cycle shows, to 1e-4 of the largest of them.
     collisions : ndarray of int, shape (N - 1,)
-        How often each contact became active.
+        How often each contact became active.  Collisions slower than the last digit of the
+        velocities mean nothing: an endless sequence may end there, without `collapsed`.
     path : ndarray, shape (K + 1, N)
         Velocities before the impact and at every event, m/s.  Between two rows every velocity is
         linear in every impulse, but before a "collapse" or a "repetition", which stand for many.
@@ -61,6 +62,8 @@ class Trace:
         Impulses so far, at the same instants, N s.
     events : tuple of Event, length K
         What happened at each row of the path but the first.
+    left_out : int
+        How many more events there were, if the path was cut; 0 with ``record=False``.
     collapsed : bool
         True if an infinite sequence of impacts was taken to its limit.
     saturated : tuple of int
@@ -72,6 +75,7 @@ class Trace:
         It sees close calls, one at a time.  An impact of hundreds of collisions can also amplify
         a last digit step by step, with ratios above their bounds about one in a thousand random
         chains does so by 1e8 and more; `condition_number` tells, with a `step` of 1e-10 or less.
+        Nor does it tell which `collisions` are too slow to mean anything.
 
     References
     ----------
@@ -83,8 +87,6 @@ class Trace:
     >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.5))
     >>> trace.velocities.round(3)
     array([-0.333,  0.667,  0.667])
-    >>> [event.kind for event in trace.events]
-    ['maximum_compression', 'end', 'end']
     """
 
     chain: Chain
@@ -99,6 +101,7 @@ class Trace:
     collapsed: bool = False
     saturated: tuple[int, ...] = ()
     margin: float = 1.0
+    left_out: int = 0
 
     @property
     def energy_loss(self) -> float:
@@ -242,11 +245,6 @@ class ImpactNotFinished(RuntimeError):
     stored : float, optional
         Work that the contacts can still release, over the heaviest mass times the square of the
         largest speed before.  If left out, it is not known: all energy that is not lost yet counts.
-
-    Attributes
-    ----------
-    trace : Trace
-        What was reached.
 
     Examples
     --------

@@ -476,7 +476,7 @@ def test_enough_events_are_enough():
 
 
 def test_long_unfinished_records_are_cut(monkeypatch):
-    monkeypatch.setattr("cradle.models.correlation._MOST_NUMBERS", 300_000)
+    monkeypatch.setattr("cradle.models.correlation._MOST_NUMBERS", 600_000)
     chain = Chain([1, 1e-12, 1], [1, 0, 0], 1)
     with pytest.raises(ImpactNotFinished) as caught:
         collide(chain, ImpulseCorrelation(0.0, max_events=120_000))

@@ -25,6 +25,7 @@ from cradle import (
     Chain,
     ImpactNotFinished,
     ImpulseCorrelation,
+    SequentialCollisions,
     collide,
     drive,
     kernel,
@@ -507,18 +508,35 @@ def test_the_path_is_kept_if_asked_for_or_up_to_a_bound(plain, on, monkeypatch):
     plain(on)
     chain, model = Chain(*LONG[:3]), ImpulseCorrelation(*LONG[3:])
     whole = collide(chain, model)
-    monkeypatch.setattr("cradle.models.correlation._MOST_NUMBERS", 1)
-    with pytest.warns(UserWarning, match=f"the first 1000 of {len(whole.events)} events"):
+    monkeypatch.setattr("cradle.models.correlation._MOST_NUMBERS", 1000 * 59)
+    with pytest.warns(
+        UserWarning, match=f"the first 1000 of {len(whole.events)} events; record"
+    ) as seen:
         part = collide(chain, model)
+    assert seen[0].filename == __file__
     asked = collide(chain, model, record=True)
     alone = collide(chain, model, record=False)
     assert part.events == whole.events[:1000]
     assert part.path.tobytes() == whole.path[:1001].tobytes()
     same(asked, whole)
     assert not alone.events
+    assert (whole.left_out, asked.left_out, alone.left_out) == (0, 0, 0)
+    assert part.left_out == len(whole.events) - 1000
     for trace in (part, alone):
         assert trace.velocities.tobytes() == whole.velocities.tobytes()
         assert trace.impulses.tobytes() == whole.impulses.tobytes()
+
+
+def test_a_path_holds_ten_million_numbers_unless_asked_for(monkeypatch):
+    """However many balls: N velocities and N - 1 impulses at each event, at least one event."""
+    chain, model = Chain(*LONG[:3]), ImpulseCorrelation(0)
+    for numbers, kept in ((59 * 7, 7), (59 * 8 - 1, 7), (1, 1)):
+        monkeypatch.setattr("cradle.models.correlation._MOST_NUMBERS", numbers)
+        with pytest.warns(UserWarning, match=f"the first {kept} of"):
+            assert len(collide(chain, model).events) == kept
+        # This model takes no `record`, so it is not advised.
+        with pytest.warns(UserWarning, match=r"events$"):
+            collide(chain, SequentialCollisions())
 
 
 @pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])

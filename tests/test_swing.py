@@ -381,6 +381,19 @@ def test_struck_balls_that_touch_collide_as_one_chain():
     assert [impact.contacts for impact in apart.impacts[:2]] == [(0,), (1, 2)]
 
 
+def test_a_long_path_is_cut_without_advice_that_a_swing_cannot_take(monkeypatch):
+    """Nothing is warned of: `swing` has no `record`."""
+    whole = swing(balls(5), ImpulseCorrelation(0.1), pulled(5), [1.2])
+    monkeypatch.setattr("cradle.models.correlation._MOST_NUMBERS", 9 * 4)
+    run = swing(balls(5), ImpulseCorrelation(0.1), pulled(5), [1.2])
+    assert run.positions.tobytes() == whole.positions.tobytes()
+    for cut, full in zip(run.impacts, whole.impacts, strict=True):
+        assert cut.after.tobytes() == full.after.tobytes()
+        for part, trace in zip(cut.traces, full.traces, strict=True):
+            assert part.events == trace.events[:4]
+            assert part.left_out == len(trace.events[4:])
+
+
 def test_balls_at_rest_stay_at_rest():
     run = swing(balls(3, 0.5), ImpulseCorrelation(0), [0, 0, 0], [0, 1e6])
     assert not run.positions.any()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import warnings
 from typing import Protocol, cast
 
 from cradle.chain import Chain
@@ -46,7 +47,8 @@ def collide(
         The impact law, such as `ImpulseCorrelation`.
     record : bool, optional
         Whether to keep the path; for models whose `solve` lets one choose, such as
-        `ImpulseCorrelation`.
+        `ImpulseCorrelation`.  Left out, a path of more than ten million numbers is cut, with a
+        warning.
     progress : bool
         Show how many events there have been so far; for models that count them, such as
         `ImpulseCorrelation`, the others ignore it.
@@ -80,5 +82,14 @@ def collide(
     if record is not None and not _takes(kind, "record"):
         raise TypeError(f"{kind.__name__} always keeps its path: record does not apply")
     if record is None and not (progress and _takes(kind, "progress")):
-        return model.solve(chain)
-    return cast("LongModel", model).solve(chain, record=record, progress=progress)
+        trace = model.solve(chain)
+    else:
+        trace = cast("LongModel", model).solve(chain, record=record, progress=progress)
+    if record is None and trace.left_out:
+        kept = len(trace.events)
+        advice = "; record=True keeps all, record=False none" if _takes(kind, "record") else ""
+        warnings.warn(
+            f"the path holds the first {kept} of {kept + trace.left_out} events{advice}",
+            stacklevel=2,
+        )
+    return trace

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +37,7 @@ _UNFINISHED_EVENTS = 100_000
 
 
 def _most_events(n: int) -> int:
-    return max(_MOST_NUMBERS // n, 1000)
+    return max(_MOST_NUMBERS // (2 * n - 1), 1)  # N velocities and N - 1 impulses each
 
 
 #: What is asked of a ratio.
@@ -128,8 +127,8 @@ class ImpulseCorrelation:
         chain : Chain
             The balls at the instant before.
         record : bool, optional
-            Whether to keep the path.  Left out, it is kept unless it has more than ten million
-            numbers; the trace's `path` and `events` then end early, with a warning.
+            Whether to keep the path.  Left out, its first ten million numbers are kept, 2 N - 1
+            for each event; `Trace.left_out` tells how many events follow, and `collide` warns.
         progress : bool
             Show how many events there have been so far.
 
@@ -183,12 +182,6 @@ class ImpulseCorrelation:
         kept = min(count, len(written.kinds))
         if job.status == UNFINISHED:
             kept = min(kept, _UNFINISHED_EVENTS)
-        if 0 < kept < count and job.status != UNFINISHED:
-            warnings.warn(
-                f"the path holds the first {kept} of {count} events; record=True keeps all, "
-                "record=False none",
-                stacklevel=5,
-            )
         kinds, contacts = written.kinds[:kept].tolist(), written.contacts[:kept].tolist()
         return Trace(
             chain=chain,
@@ -203,6 +196,7 @@ class ImpulseCorrelation:
             collapsed=bool(results.collapsed[0]),
             saturated=tuple(np.flatnonzero(results.held).tolist()),
             margin=job.tally("margin"),
+            left_out=count - kept if kept else 0,  # without a record not all are counted
         )
 
 
