@@ -89,7 +89,8 @@ class Row:
     TypeError
         If an argument is of the wrong kind.
     ValueError
-        If a value is wrong, or the balls are no row: balls that are no neighbours touch.
+        If a value is wrong, or the balls are no row: balls that are no neighbours touch, balls
+        overlap by more than `touching`, or pivots are not in the order of the balls.
 
     Notes
     -----
@@ -156,8 +157,13 @@ class Row:
         self.touching = one_number("touching", near, "must be above 0", 0.0, open_low=True)
         slow = 0.01 * math.sqrt(self.acceleration * min(self.radii)) if resting is None else resting
         self.resting = one_number("resting", slow, "must be above 0", 0.0, open_low=True)
-        x = np.array(bodies.motion()[0], dtype=np.float64)
+        x = checked("motion: positions", bodies.motion()[0])
         self._refuse_a_pack(x)
+        overlaps = self.reach - np.hypot(*np.diff(x, axis=0).T)
+        if (overlaps > self.touching).any():
+            c = int(np.argmax(overlaps))
+            rule = f"must be at most `touching` = {self.touching:g} at the start"
+            raise ValueError(f"balls {c} and {c + 1} overlap by {overlaps[c]:g} m; {rule}")
         # Balls on equal strings that nearly touch are accelerated alike, others not.
         self.hang_alike = False
         if self.pivots is not None:
@@ -169,6 +175,8 @@ class Row:
                     f"pivots[{ball}] lies behind pivots[{ball - 1}] on the way from the first to "
                     "the last; the balls must be told from one end of the row to the other"
                 )
+            if (x[-1] - x[0]) @ (self.pivots[-1] - self.pivots[0]) <= 0.0:
+                raise ValueError("pivots lead the other way than the balls; must be in their order")
             lengths = np.hypot(*(x - self.pivots).T)
             self.hang_alike = bool(np.ptp(lengths) <= 1e-3 * lengths.min())
         self.speeding = 0.0 if self.hang_alike else self.acceleration
@@ -183,7 +191,7 @@ class Row:
         Raises
         ------
         ValueError
-            If the duration is not above 0, or balls that touch do not lie in a row.
+            If the duration or what `motion` tells is wrong, or balls that touch are not in a row.
         RuntimeError
             If balls have passed through each other, or the impacts of the step do not end.
         """
@@ -229,12 +237,16 @@ class Row:
             dx, dy = xb - xa, yb - ya
             distance = math.hypot(dx, dy)
             gap = distance - reach
+            closing = (v[c][0] - v[c + 1][0]) * dx + (v[c][1] - v[c + 1][1]) * dy
+            if not math.isfinite(gap + closing):
+                checked("motion: positions", x)
+                checked("motion: velocities", v)
             if not gap > -0.5 * reach:
                 raise RuntimeError(
                     f"balls {c} and {c + 1} overlap by {-gap:g} m; the step is too long, or "
                     "something else pushes them"
                 )
-            closing = ((v[c][0] - v[c + 1][0]) * dx + (v[c][1] - v[c + 1][1]) * dy) / distance
+            closing /= distance
             if gap <= self.touching:
                 strike |= closing > self.resting
                 rest |= gap <= 0.0 and closing > 1e-3 * self.resting

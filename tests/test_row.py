@@ -249,6 +249,15 @@ TRIANGLE = [[0, 0], [0.2, 0], [0.1, 0.17320508]]
         ({"radii": [0.1, -0.1, 0.1]}, r"radii\[1\] = -0.1; must be above 0"),
         ({"pivots": [[0, 0]]}, r"pivots has shape \(1, 2\); 3 balls need \(3, 2\)"),
         ({"pivots": [[0, 1], [0.5, 1], [0.25, 1]]}, r"pivots\[2\] lies behind pivots\[1\]"),
+        ({"pivots": [[0.4, 1], [0.2, 1], [0, 1]]}, "pivots lead the other way than the balls"),
+        (
+            {"radii": 0.12},
+            r"balls 0 and 1 overlap by 0\.04 m; must be at most `touching` = 0\.00012",
+        ),
+        (
+            {"x": [[0, 0], [math.nan, 0], [0.4, 0]]},
+            r"motion: positions\[1, 0\] = nan; must be finite",
+        ),
         ({"touching": 0.0}, "touching = 0.0; must be above 0"),
         ({"resting": -1.0}, "resting = -1.0; must be above 0"),
         ({"acceleration": math.nan}, "acceleration"),
@@ -313,6 +322,18 @@ def test_an_engine_that_ignores_impulses_is_no_endless_loop(monkeypatch):
     bodies.push = lambda *_: None
     row = Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS)
     with pytest.raises(RuntimeError, match=r"more than 5 impacts in a step of 0\.01 s"):
+        row.step(0.01)
+
+
+@pytest.mark.parametrize("what", ["positions", "velocities"])
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize("hung_up", [True, False])
+def test_an_engine_that_tells_no_number_is_refused(what: str, value: float, hung_up: bool):
+    bodies = Free([[0, 0], [0.2, 0], [0.4, 0]], np.zeros((3, 2)), [1] * 3)
+    pivots = [[0, 1], [0.2, 1], [0.4, 1]] if hung_up else None
+    row = Row(bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS, pivots)
+    (bodies.x if what == "positions" else bodies.v)[2, 1] = value
+    with pytest.raises(ValueError, match=rf"motion: {what}\[2, 1\] = {value}; must be finite"):
         row.step(0.01)
 
 
