@@ -6,7 +6,6 @@ grow, and small work can begin plain and go on compiled.
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import threading
 import time
@@ -37,7 +36,6 @@ __all__ = ["DEFECTS", "FINISHED", "LARGE", "REFUSED", "UNFINISHED", "UNSOUND", "
 _EFFORT = {False: 5_000, True: 2_000_000}
 # Chains times balls from which on compiling is worth the wait at once.
 LARGE = 50_000
-_KNOWN = contextlib.nullcontext()
 # No limit.
 _ENDLESS = 2**62
 _NOTHING = rooms.Record([], [], [], [])
@@ -169,17 +167,17 @@ class Job:
                 resumed = False
             begun = time.perf_counter()
             known = kernel is plain or runtime.loaded()
-            with _KNOWN if known else runtime.few_collections():
-                self.next, self.status = kernel.batch(
-                    self.next,
-                    resumed,
-                    self.n,
-                    self.given,
-                    self.options,
-                    self.results,
-                    self.state,
-                    _EFFORT[bool(self.compiled)],
-                )
+            call = kernel.batch if known else functools.partial(runtime.first_call, kernel.batch)
+            self.next, self.status = call(
+                self.next,
+                resumed,
+                self.n,
+                self.given,
+                self.options,
+                self.results,
+                self.state,
+                _EFFORT[bool(self.compiled)],
+            )
             if not self.compiled:
                 runtime.spend(time.perf_counter() - begun)
             resumed = self.status == PAUSED

@@ -18,8 +18,7 @@ import os
 import sys
 import tempfile
 import threading
-import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
@@ -28,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from cradle import kernel as plain
+from cradle.refusals import one_of
 
 #: Set this environment variable to ``plain`` to run the kernel as it stands, to ``compiled`` to
 #: compile at the first call.
@@ -178,10 +178,10 @@ def compiled() -> Any | None:
 
     path = _stored()
     if path is None:
-        warnings.warn(
+        logger.warning(
             "no writable folder for compiled code: it is compiled anew in each process; set "
-            f"NUMBA_CACHE_DIR, or {VARIABLE}=plain to run without",
-            stacklevel=2,
+            "NUMBA_CACHE_DIR, or %s=plain to run without",
+            VARIABLE,
         )
     name = _name()
     module = ModuleType(name)
@@ -199,13 +199,17 @@ def compiled() -> Any | None:
     return module
 
 
+def _files(pattern: str) -> Iterator[Path]:
+    """Yield the files that numba keeps of this very kernel."""
+    path = _stored() if available() else None
+    if path is not None:
+        folder = path.parent if os.environ.get("NUMBA_CACHE_DIR") else path.parent / "__pycache__"
+        yield from folder.rglob(f"{_name()}.{pattern}")
+
+
 def on_disk() -> bool:
     """Tell whether compiled code of this very kernel is on disk."""
-    path = _stored() if available() else None
-    if path is None:
-        return False
-    folder = path.parent if os.environ.get("NUMBA_CACHE_DIR") else path.parent / "__pycache__"
-    return any(folder.rglob(f"{_name()}.batch-*.nbi"))
+    return any(_files("batch-*.nbi"))
 
 
 def loaded() -> bool:
@@ -230,6 +234,30 @@ def few_collections() -> Iterator[None]:
             gc.set_threshold(*usual)
 
 
+def first_call(door: Callable[..., Any], *arguments: Any) -> Any:
+    """Call compiled code that has not run yet: it is loaded, or compiled.
+
+    Code on disk that cannot be read, such as half a file of a full disk, is removed, once, and
+    compiled anew.
+    """
+    with few_collections():
+        try:
+            return door(*arguments)
+        except Exception as error:  # half a file can raise anything; the kernel itself nothing
+            broken = [] if loaded() else [*_files("*.nb[ci]")]
+            if not broken:
+                raise
+            for file in broken:
+                file.unlink(missing_ok=True)
+            why = f"{type(error).__name__}: {error}"
+        logger.warning(
+            "compiled code in %s cannot be read (%s); compiled anew, up to a minute",
+            broken[0].parent,
+            why,
+        )
+        return door(*arguments)
+
+
 def ready() -> bool:
     """Tell whether compiled code runs without a long wait."""
     return loaded() or on_disk()
@@ -248,9 +276,16 @@ def chosen(large: bool = False) -> Any:
     ----------
     large : bool
         Whether the work is surely worth compiling for.
+
+    Raises
+    ------
+    ValueError
+        If the environment variable is neither of its words.
     """
     global _look
     wish = os.environ.get(VARIABLE)
+    if wish:
+        one_of(VARIABLE, wish, ("plain", "compiled"))
     if wish == "plain" or not available():
         return plain
     if not (wish == "compiled" or large or loaded() or _spent > PAYS_AFTER):
