@@ -359,6 +359,17 @@ def test_max_evaluations_bounds_the_work(method):
     assert stopped.value.trace.evaluations == 100
 
 
+def test_an_impact_that_is_given_up_says_how_far_it_came_and_what_would_help():
+    chain = Chain([1, 1, 1e-9, 1], [1, 0, 0, 0], 1)
+    with pytest.raises(ImpactNotFinished) as stopped:
+        collide(chain, SpringChain(max_evaluations=1000))
+    message = stopped.value.args[0]
+    time = float(re.search(r"after (\S+) s and", message)[1])
+    assert time > 0
+    assert "reached; ball 2 on contact 1, the quickest of the springs, makes the steps" in message
+    assert "SequentialCollisions and ImpulseCorrelation (with a ratio) take no steps" in message
+
+
 # --- input ---------------------------------------------------------------------------------
 
 

@@ -214,7 +214,7 @@ def test_balls_that_do_not_approach():
     assert trace.evaluations == 0
 
 
-@pytest.mark.parametrize("step", [None, 0.001])
+@pytest.mark.parametrize("step", [None, 0.02])
 def test_unfinished_impact_shows_what_was_reached(step):
     model = EnergyDistribution(1.0, step=step, max_evaluations=50)
     with pytest.raises(ImpactNotFinished, match="max_evaluations = 50 reached") as stopped:
@@ -233,6 +233,7 @@ def test_unfinished_impact_shows_what_was_reached(step):
         ({"step": 0}, "step = 0.0; must lie in (0, 1]"),
         ({"step": 1.5}, "step = 1.5; must lie in (0, 1]"),
         ({"step": [0.1]}, "step = [0.1]; must be one number"),
+        ({"step": 1e-9}, "step = 1e-09; with max_evaluations = 1000000 it must be at least 1e-06"),
         ({"gaps": 1}, "gaps = 1; must be True or False"),
         ({"rtol": 0}, "rtol = 0.0; must lie in"),
         ({"max_evaluations": 0}, "max_evaluations = 0; must be a whole number, at least 1"),

@@ -98,7 +98,8 @@ class EnergyDistribution:
         (or 0.01 step) times that of the fastest closing is ended plastically: `Trace.collapsed`, if
         contacts that have acted would act on.
     max_evaluations : int
-        How often the ratios may be evaluated before the impact is given up.
+        How often the ratios may be evaluated before the impact is given up; with `step` at least
+        1 / step.
 
     Raises
     ------
@@ -136,6 +137,12 @@ class EnergyDistribution:
         if self.step is not None:
             step = one_number("step", self.step, "must lie in (0, 1]", 0.0, 1.0, open_low=True)
             object.__setattr__(self, "step", step)
+            # The fastest closing ends after an impulse of 1 in these units, or more.
+            if step * self.max_evaluations < 1.0:
+                raise ValueError(
+                    f"step = {step!r}; with max_evaluations = {self.max_evaluations} it must be at "
+                    f"least {1.0 / self.max_evaluations:g}, to reach the end of a compression"
+                )
         if not isinstance(self.gaps, bool):
             raise ValueError(f"gaps = {self.gaps!r}; must be True or False")
 
@@ -226,6 +233,10 @@ class _Process(Motion):
         released = np.divide(1.0, self.e**2, out=np.ones_like(self.e), where=self.e > 0.0)
         self.weights = np.where(self.closed & ~self.loading, released, self.closed | self.gaps)
         return super().integrate(method, limit) if self.step is None else self.march(self.step)
+
+    def advice(self) -> str:
+        """Return what makes the steps short: the one that is given, or the integration."""
+        return super().advice() if self.step is None else f" by step = {self.step!r}"
 
     def march(self, step: float) -> str:
         """Make one explicit step of the fastest growing impulse, to the next event at most."""

@@ -151,12 +151,13 @@ class Motion:
         """Return the contact forces, for states (3 N - 2, S)."""
         return self.k[:, None] * np.maximum(self.parts(y)[1], 0.0) ** self.p
 
-    def rate(self, _: float, y: Vector) -> Vector:
+    def rate(self, t: float, y: Vector) -> Vector:
         """Return dy/dt while no contact opens or closes.
 
         A closed contact that a trial step draws apart pulls, so that the step sees no kink.
         """
         if self.evaluations == self.most:
+            self.t = max(self.t, t)
             raise TooManyEvaluations
         self.evaluations += 1
         n = len(self.m)
@@ -183,10 +184,20 @@ class Motion:
                 elif failure := self.integrate(method, limit):
                     return failure
         except TooManyEvaluations:
-            return f"max_evaluations = {most} reached"
+            return f"max_evaluations = {most} reached{self.advice()}"
         except ValueError as error:  # SciPy's, where the interpolation of LSODA misses its steps
             return f"{method} failed: {error}"
         return "max_time reached"
+
+    def advice(self) -> str:
+        """Return what makes the steps of the integration short, and which models take none."""
+        pairs = np.minimum(self.m[:-1], self.m[1:])
+        c = int(np.argmax(self.k / pairs))
+        ball = c if self.m[c] <= self.m[c + 1] else c + 1
+        return (
+            f"; ball {ball} on contact {c}, the quickest of the springs, makes the steps short; "
+            "SequentialCollisions and ImpulseCorrelation (with a ratio) take no steps"
+        )
 
     def fly(self) -> bool:
         """Fly with all contacts open to the next closing; False if there is none."""
