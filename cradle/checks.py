@@ -19,6 +19,7 @@ from cradle.refusals import (
     refusal,
     refuse_where,
     shown,
+    whole_rule,
 )
 
 #: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
@@ -44,6 +45,7 @@ __all__ = [
     "row_of",
     "shown",
     "whole_number",
+    "whole_rule",
 ]
 
 
@@ -259,11 +261,11 @@ def whole_number(name: str, value: object) -> int:
     >>> whole_number("max_evaluations", 1e6)
     Traceback (most recent call last):
     ...
-    ValueError: max_evaluations = 1000000.0; must be a whole number, at least 1
+    ValueError: max_evaluations = 1000000.0; must be an int (1000000), at least 1
     """
     if is_whole(value) and value >= 1:
         return int(value)
-    raise ValueError(f"{name} = {shown(value)}; must be a whole number, at least 1")
+    raise ValueError(f"{name} = {shown(value)}; {whole_rule(value)}, at least 1")
 
 
 def number_or_row(

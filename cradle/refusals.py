@@ -277,6 +277,29 @@ def is_whole(value: object) -> TypeGuard[int]:
     return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
+def whole_rule(value: object) -> str:
+    """Return what an error says of a value that is no whole number, or not of that type.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+
+    Returns
+    -------
+    str
+        The rule.
+
+    Examples
+    --------
+    >>> whole_rule(1.5), whole_rule(1e6)
+    ('must be a whole number', 'must be an int (1000000)')
+    """
+    if isinstance(value, float) and value.is_integer() and abs(value) < 2.0**53:
+        return f"must be an int ({int(value)})"
+    return "must be a whole number"
+
+
 def a(name: str) -> str:
     """Return a name with its indefinite article.
 

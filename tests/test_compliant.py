@@ -392,7 +392,10 @@ def test_an_impact_that_is_given_up_says_how_far_it_came_and_what_would_help():
         ({"max_time": -1}, "max_time = -1.0; must be at least 0"),
         ({"max_time": np.nan}, "max_time = nan; must be finite"),
         ({"max_evaluations": 0}, "max_evaluations = 0; must be a whole number, at least 1"),
-        ({"max_evaluations": 1e6}, "max_evaluations = 1000000.0; must be a whole number"),
+        (
+            {"max_evaluations": 1e6},
+            "max_evaluations = 1000000.0; must be an int (1000000), at least 1",
+        ),
         ({"max_evaluations": True}, "max_evaluations = True; must be a whole number"),
     ],
 )

@@ -50,7 +50,7 @@ MODEL = [
     ),
     ({"max_events": 0}, "max_events = 0; must be at least 1"),
     ({"max_events": -1}, "max_events = -1; must be at least 1"),
-    ({"max_events": 1e6}, "max_events = 1000000.0; must be a whole number"),
+    ({"max_events": 1e6}, "max_events = 1000000.0; must be an int (1000000)"),
     ({"max_events": True}, "max_events = True; must be a whole number"),
     ({"max_events": "many"}, "max_events = 'many'; must be a whole number"),
 ]

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -19,6 +20,7 @@ import numpy as np
 import pytest
 from chains import random_chains, uniform, with_ends
 from plain import rooms, solve
+from tqdm import tqdm
 
 from cradle import (
     Chain,
@@ -32,6 +34,7 @@ from cradle import (
     runtime,
 )
 from cradle import post_impact_velocities as batch
+from cradle.progress import progress_bar
 
 FIELDS = ("velocities", "impulses", "absorbed", "collisions", "path", "path_impulses")
 
@@ -606,6 +609,17 @@ def test_a_path_holds_ten_million_numbers_unless_asked_for(monkeypatch):
         # This model takes no `record`, so it is not advised.
         with pytest.warns(UserWarning, match=r"events$"):
             collide(chain, SequentialCollisions())
+
+
+@pytest.mark.parametrize("widgets", [False, True])
+def test_without_widgets_a_bar_is_drawn_with_letters(monkeypatch, widgets):
+    """In a notebook without them `tqdm.auto` would warn."""
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: widgets or None)
+    fancy = types.ModuleType("tqdm.auto")
+    fancy.tqdm = lambda **_: "fancy"
+    monkeypatch.setitem(sys.modules, "tqdm.auto", fancy)
+    bar = progress_bar(disable=True)
+    assert bar == "fancy" if widgets else type(bar) is tqdm
 
 
 @pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])

@@ -33,6 +33,7 @@ from cradle.models.correlation import (
     refuse_excess,
     refuse_light,
 )
+from cradle.progress import progress_bar
 from cradle.trace import ImpactNotCertified
 
 if TYPE_CHECKING:
@@ -277,9 +278,7 @@ def _in_order(
     """Yield the results of `solve` in order, made by as many threads as there are processors."""
     stop = threading.Event()
     if progress:
-        from tqdm.auto import tqdm
-
-        with tqdm(total=len(starts), unit="chunk") as bar:
+        with progress_bar(total=len(starts), unit="chunk") as bar:
             for ended in _in_order(solve, starts, progress=False):
                 bar.update()
                 yield ended

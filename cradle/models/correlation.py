@@ -19,11 +19,13 @@ from cradle.checks import (
     one_of,
     refuse_where,
     row_of,
+    whole_rule,
 )
 from cradle.closed_form import largest_ratios
 from cradle.drive import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job
 from cradle.kernel import Inputs, Options
 from cradle.kernel.state import LIMITS
+from cradle.progress import progress_bar
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
 #: Steps after which an impact is given up, unless told otherwise.
@@ -152,9 +154,7 @@ class ImpulseCorrelation:
         options = Options(self.meeting, self.max_events, self.excess == "raise", True)
         job = Job(inputs, 1, options, room)
         if progress:
-            from tqdm.auto import tqdm
-
-            with tqdm(unit=" events") as bar:
+            with progress_bar(unit=" events") as bar:
                 job.run(pause=lambda: bar.update(job.tally("events") - bar.n))
         else:
             job.run()
@@ -219,7 +219,7 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
         one_number("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
     one_of("excess", excess, ("raise", "saturate"))
     if not is_whole(max_events):
-        raise ValueError(f"max_events = {max_events!r}; must be a whole number")
+        raise ValueError(f"max_events = {max_events!r}; {whole_rule(max_events)}")
     if not 1 <= max_events < 2**63:
         raise ValueError(f"max_events = {max_events!r}; must be at least 1 and below 2**63")
 
