@@ -7,7 +7,8 @@ One idea: every impact model is a rule from a chain of balls to a path of contac
 The rooms, in that order:
 
 - `cradle.chain`: the chain before the impact; `cradle.checks` and `cradle.reals`: what is asked of
-  input; `cradle.refusals`: the words of an error; `cradle.drawing`: pictures and tables.
+  input; `cradle.refusals`: the words of an error; `cradle.drawing`: pictures and tables;
+  `cradle.progress`: a bar.
 - `cradle.trace`: what happened.
 - `cradle.kernel`: the event loop; `cradle.runtime` compiles it, `cradle.drive` feeds it.
 - `cradle.models`: one file a model, and the verb `collide`.
