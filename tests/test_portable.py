@@ -48,7 +48,7 @@ DIGESTS = {
     "long_chains": "eef8777637e3f854",
     "implied_ratio": "617f9eed01d94458",
     "batch": "34315d61a4a1b526",
-    "one by one": "8503d98e54995143",
+    "one by one": "ba0077364890a7ef",
 }
 
 
