@@ -258,6 +258,7 @@ def test_sliders_change_the_outcome(visit, label: str, row: str):
     tab = still(visit, "#scene=small")
     before = drawn(tab)
     tab.click("label[title='ball 2']")
+    drawn(tab)  # its sliders are there
     name = {"restitution": "restitution, balls 2 and 3", "ratio": "ratio, pushed from the left"}
     slider = tab.get_by_label(name.get(label, label), exact=True)
     for key in ("ArrowLeft", "ArrowLeft", "ArrowLeft"):
