@@ -238,3 +238,13 @@ def take_limits(ends, ended, worn, n, state):
         return False
     look_above(first, last, n, state)
     return True
+
+
+@once
+def last_limits(n, state):
+    """R9: sequences that shrank so fast that the last digit was the limit have collapsed too."""
+    contact = state.contact
+    for c in range(n - 1):
+        if contact[c].tiny > 0 and contact[c].u == 0.0 and contact[c].e < 1.0:
+            state.tally[0].collapsed = 1
+            record(COLLAPSE, c, n, state)

@@ -3,7 +3,7 @@
 import math
 
 from cradle.kernel.certificate import certify
-from cradle.kernel.cycles import forget, take_limits
+from cradle.kernel.cycles import forget, last_limits, take_limits
 from cradle.kernel.events import close_contacts, end_contacts, grow, start
 from cradle.kernel.meeting import first_meeting, part_beyond
 from cradle.kernel.motion import (
@@ -23,7 +23,6 @@ from cradle.kernel.rules import rates, segment
 from cradle.kernel.state import (
     CERTAIN,
     CLOSE,
-    COLLAPSE,
     FINISHED,
     LIMITS,
     LOWER,
@@ -346,13 +345,3 @@ def impact(n, chain, meeting, max_rounds, resumed, state):
     last_limits(n, state)
     tally.defect = certify(n, state.ball, state.contact, tally)
     return UNSOUND if tally.defect > 0 else FINISHED
-
-
-@once
-def last_limits(n, state):
-    """R9: sequences that shrank so fast that the last digit was the limit have collapsed too."""
-    contact = state.contact
-    for c in range(n - 1):
-        if contact[c].tiny > 0 and contact[c].u == 0.0 and contact[c].e < 1.0:
-            state.tally[0].collapsed = 1
-            record(COLLAPSE, c, n, state)
