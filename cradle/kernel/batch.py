@@ -4,7 +4,8 @@ import math
 from typing import Any, NamedTuple
 
 from cradle.kernel.loop import impact
-from cradle.kernel.record import in_units
+from cradle.kernel.numbers import ZERO
+from cradle.kernel.record import velocity
 from cradle.kernel.state import (
     FINISHED,
     LIMITS,
@@ -49,64 +50,6 @@ class Outputs(NamedTuple):
     held: Any
 
 
-@jit
-def short_cut(n, chain, bounded, out_v):
-    """Eqs. 24 and 30: two balls, or three whose first strikes the others, one collision each.
-
-    Returns False, with nothing decided, if that is not so or not clear beyond rounding, if an input
-    is not well within the limits of `admissible`, or if the numbers are so far from 1 that the
-    loop's own units are needed.
-    """
-    m, v, e = chain.m, chain.v, chain.e
-    heaviest = max(m[0], m[1], m[n - 1])
-    for i in range(n):
-        if not (LIMITS.tiny < m[i] < LIMITS.huge and m[i] >= LIMITS.lightest * heaviest):
-            return False
-        if not (v[i] == 0.0 or LIMITS.tiny < abs(v[i]) < LIMITS.huge):
-            return False
-    u0 = v[0] - v[1]
-    if not (u0 > 0.0 and LIMITS.clear < e[0] <= 1.0):
-        return False
-    one, two = 1.0 / m[0], 1.0 / m[1]
-    if n == 2:
-        impulse = (1.0 + e[0]) * u0 * (m[0] / (m[0] + m[1]) * m[1])
-        out_v[0] = v[0] - impulse * one
-        out_v[1] = v[1] + impulse * two
-        return out_v[0] < out_v[1]
-    a = chain.forward[0]
-    if not (LIMITS.clear < e[1] <= 1.0 and a >= 0.0):
-        return False
-    if not a * (m[1] + m[2]) <= (1.0 - LIMITS.clear) * m[2]:
-        return False
-    # Nothing is driven backward, but a ratio that is none is refused.
-    b = chain.backward[0]
-    if not (b >= 0.0 and b * (m[0] + m[1] if bounded else 1.0) <= (m[0] if bounded else 1.0)):
-        return False
-    u1 = v[1] - v[2]
-    if u1 < 0.0:
-        return False
-    # Contact 0 drives contact 1 until it ends (Eqs. 17-24); speeds per impulse.
-    three = 1.0 / m[2]
-    first = (1.0 + e[0]) * u0 / (one + (1.0 - a) * two)
-    gain = first * ((1.0 - a) * two - a * three)
-    u2 = u1 + gain
-    # Contact 1 goes on alone, with all the work it has absorbed to give back (Eqs. 25-30).
-    both = two + three
-    opens = e[1] * math.sqrt(u2 * u2 + a * first * (u1 + u2) * both)
-    second = (u2 + opens) / both
-    apart_by = e[0] * u0 - second * two  # Eq. 43: ball 1 does not fall back on ball 0
-    if not (apart_by > LIMITS.clear * u0 and opens > LIMITS.clear * u0):
-        return False
-    out_v[0] = v[0] - first * one
-    out_v[2] = v[2] + (a * first + second) * three
-    # A light ball's velocity from its neighbour's, a heavy one's from its impulses.
-    if m[1] < m[0]:
-        out_v[1] = out_v[0] + apart_by
-    else:
-        out_v[1] = v[1] + ((1.0 - a) * first - second) * two
-    return out_v[0] < out_v[1] < out_v[2]
-
-
 @apart
 def admissible(n, chain, bounded):
     """Tell whether all inputs are within their limits, ratios within Eq. 53 too if `bounded`."""
@@ -149,14 +92,17 @@ def hand_out(k, n, out, ball, contact, tally):
     """Write the outcome of chain k in the caller's units."""
     shift, mass_shift = tally.shift, tally.mass_shift
     out_v, hits = out.v[k], out.hits[k]
+    before = ZERO
     for i in range(n):
-        out_v[i] = in_units(ball[i], ball[i].hi, tally.unit)
+        after = contact[i].p if i < n - 1 else ZERO
+        out_v[i] = velocity(i, before, after, ball, tally.unit)
+        before = after
     out.collapsed[k] = tally.collapsed
     for c in range(n - 1):
         hits[c] = contact[c].hits
     for c in range(len(out.p)):
-        out.p[c] = math.ldexp(contact[c].p, shift + mass_shift)
-        out.a[c] = math.ldexp(contact[c].a, 2 * shift + mass_shift)
+        out.p[c] = math.ldexp(contact[c].p.real, shift + mass_shift)
+        out.a[c] = math.ldexp(contact[c].a.real, 2 * shift + mass_shift)
         out.held[c] = contact[c].held
 
 
@@ -194,11 +140,6 @@ def batch(begin, resumed, n, inputs, options, out, area, effort):
             inputs.forward[k * by_f], inputs.backward[k * by_b],
         )  # fmt: skip
         if not resumed:
-            if n <= 3 and not options.whole and short_cut(n, chain, options.bounded, out.v[k]):
-                out.collapsed[k] = 0
-                for c in range(n - 1):
-                    out.hits[k][c] = 1
-                continue
             if not admissible(n, chain, options.bounded):
                 return k, REFUSED
         status = impact(n, chain, options.meeting, options.max_events, resumed, state)

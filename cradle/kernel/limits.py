@@ -1,0 +1,566 @@
+"""R9: infinite sequences of impacts, and how they are taken to their limits.
+
+There are two signs of one.  Contacts are exhausted: what they have left is far below the last digit
+of an answer, and they alone go on making events.  Or impacts repeat in cycles: the state at the end
+of a contact is that at its end a cycle before on a smaller scale.  Then all cycles to come are
+smaller copies of the last one, by the factor L, L^2, ..., and their sum is a geometric series.
+Cycles that contain collapses are found in the same way, on a second level: there collapses are
+counted, not ends.
+"""
+
+import math
+
+from cradle.kernel.events import deactivate, exhausted, reduced_mass, run_of, stir
+from cradle.kernel.numbers import ONE, ZERO, minus, over, plus, scaled, times
+from cradle.kernel.record import record
+from cradle.kernel.state import (
+    COLLAPSE,
+    LIMITS,
+    LOWER,
+    REPETITION,
+    UPPER,
+    Cluster,
+    apart,
+    jit,
+    once,
+)
+
+
+@apart
+def end_plastically(first, last, n, state):
+    """End those contacts of first..last that are active; their balls have one velocity."""
+    contact, run = state.contact, state.run
+    for c in range(first, last + 1):
+        contact[c].u = ZERO
+        contact[c].made = 0.0
+        contact[c].tiny = 0
+        if contact[c].active == 1:
+            deactivate(c, run_of(c, contact), n, state.ball, contact, run, state.tally[0])
+    for c in (first - 1, last + 1):
+        if 0 <= c < n - 1:
+            stir(c, n, run, contact)
+            if contact[c].active == 1:
+                run[run_of(c, contact)].stirred = 1
+
+
+@jit
+def change_of(c, low, high, ball, contact):
+    """Return how impulses x of contacts low..high change the closing speed of contact c."""
+    before = contact[c - 1].x if low <= c - 1 <= high else ZERO
+    here = contact[c].x if low <= c <= high else ZERO
+    after = contact[c + 1].x if low <= c + 1 <= high else ZERO
+    left = times(minus(before, here), ball[c].inverse)
+    return minus(left, times(minus(here, after), ball[c + 1].inverse))
+
+
+@apart
+def common_velocity(first, last, left_part, right_part, ball, contact):
+    """Leave in x of contacts first..last the impulses that bring all their balls to one velocity.
+
+    A steady neighbour whose impulse is h times that of the outermost contact beside it makes the
+    ball between them act as one of mass m / (1 - h); the parts are these 1 - h.
+    """
+    mass = momentum = speed = ZERO  # velocities count from that of the first ball
+    for i in range(first, last + 2):
+        b = ball[i]
+        b.x = b.m
+        if i == first:
+            b.x = over(b.x, left_part)
+        if i == last + 1:
+            b.x = over(b.x, right_part)
+        mass = plus(mass, b.x)
+        momentum = plus(momentum, times(b.x, speed))
+        if i <= last:
+            speed = minus(speed, contact[i].u)
+    common = over(momentum, mass)
+    impulse = speed = ZERO
+    for c in range(first, last + 1):
+        impulse = plus(impulse, times(ball[c].x, minus(speed, common)))
+        speed = minus(speed, contact[c].u)
+        contact[c].x = impulse
+
+
+# The first sign: exhausted contacts.
+
+
+@jit
+def chatters(c, n, state):
+    """Tell whether contact c exists and is in an exhausted collision, or has just been.
+
+    Or if it has collided lately at a speed that is as far below an exhausted one: dust.
+    """
+    if not 0 <= c < n - 1:
+        return False
+    k = state.contact[c]
+    work = k.w if k.active == 1 and k.w > 0.0 else k.q.real
+    if not exhausted(c, work, state.ball, state.contact, state.tally[0]):
+        return False
+    dust = k.hits > 0 and k.made < LIMITS.dust * state.tally[0].fastest
+    return dust or k.tiny > 0 or (k.active == 1 and k.w > 0.0)
+
+
+@jit
+def next_chatter(c, step, n, state):
+    """Return the next contact after c that chatters too, with nothing but zeros between; or c."""
+    k = c + step
+    while 0 <= k < n - 1 and state.contact[k].u.real == 0.0 and not chatters(k, n, state):
+        k += step
+    return k if chatters(k, n, state) else c
+
+
+@apart
+def exhausted_stretch(c, n, state):
+    """Return the stretch (first, last) around c of contacts that only chatter.
+
+    Empty if nothing in it can lose energy, unless it is dust: elastic sequences are finite, or hand
+    all their energy on; or if its balls move with more than a faint energy: heavy ones, slower than
+    a light ball that struck them.
+    """
+    ball, contact = state.ball, state.contact
+    first = last = c
+    while next_chatter(first, -1, n, state) < first:
+        first = next_chatter(first, -1, n, state)
+    while next_chatter(last, 1, n, state) > last:
+        last = next_chatter(last, 1, n, state)
+    loses = False
+    common_velocity(first, last, ONE, ONE, ball, contact)
+    energy = fastest = 0.0
+    for k in range(first, last + 1):
+        loses = loses or contact[k].e.real < 1.0
+        fastest = max(fastest, abs(contact[k].u.real))
+        energy += 0.5 * contact[k].x.real * contact[k].u.real
+    loses = loses or fastest < LIMITS.dust * state.tally[0].fastest
+    if loses and energy <= LIMITS.faint * state.tally[0].energy:
+        return first, last
+    return c, c - 1
+
+
+@apart
+def merge(first, last, n, state):
+    """End the contacts first..last plastically: their balls take the common velocity.
+
+    Balls that zeros beside them join to theirs go with them, and an idle neighbour that this makes
+    approach joins.
+    """
+    ball, contact = state.ball, state.contact
+    while True:
+        low, high = first, last
+        while low > 0 and contact[low - 1].u.real == 0.0:
+            low -= 1
+        while high < n - 2 and contact[high + 1].u.real == 0.0:
+            high += 1
+        common_velocity(low, high, ONE, ONE, ball, contact)
+        for c in (low - 1, high + 1):
+            if 0 <= c < n - 1:
+                contact[c].u = plus(contact[c].u, change_of(c, low, high, ball, contact))
+        for c in range(low, high + 1):
+            contact[c].p = plus(contact[c].p, contact[c].x)
+            contact[c].u = ZERO
+        if low > 0 and contact[low - 1].active == 0 and contact[low - 1].u.real > 0.0:
+            first = low - 1
+        elif high < n - 2 and contact[high + 1].active == 0 and contact[high + 1].u.real > 0.0:
+            last = high + 1
+        else:
+            break
+    end_plastically(first, last, n, state)
+    return first, last
+
+
+# The second sign: cycles.
+
+
+@jit
+def forget(number, levels):
+    """Drop the snapshot of a level, and begin to count anew: short impacts need none."""
+    level = levels[number]
+    level.mark = -1
+    level.count = level.taken = 0
+    level.due = 16 if number == LOWER else 4
+
+
+@jit
+def code(c, state):
+    """Return one number for whether contact c is active, and who drives whom at its balls."""
+    ball = state.ball
+    return 9 * state.contact[c].active + 3 * ball[c].turn + ball[c + 1].turn
+
+
+@apart
+def remember(number, c, n, state):
+    """Take a snapshot of the contacts around c.
+
+    It is kept for 1, 1, 2, 1, 1, 2, 4, 1, ... times the least distance, so that a short cycle is
+    found soon and a long one, too.
+    """
+    level, contact, memory = state.level[number], state.contact, state.memory[number]
+    level.mark = c
+    level.taken += 1
+    distance, k = 16 if number == LOWER else 4, level.taken
+    while k == 2 * (k // 2):
+        distance, k = 2 * distance, k // 2
+    level.due = level.count + distance
+    level.low, level.high = max(c - LIMITS.window, 0), min(c + LIMITS.window, n - 2)
+    for j in range(level.low, level.high + 1):
+        k, then = contact[j], memory[j]
+        then.u, then.q, then.p, then.a = k.u, k.q, k.p, k.a
+        then.hits, then.code = k.hits, code(j, state)
+
+
+@jit
+def since(c, contact, memory):
+    """Return the impulse of contact c since the snapshot."""
+    return minus(contact[c].p, memory[c].p)
+
+
+@jit
+def has_waited(c, level, state, memory):
+    """Tell whether contact c, if it was seen, is as it was at the snapshot, without a collision."""
+    if not level.low <= c <= level.high:
+        return True
+    return state.contact[c].hits == memory[c].hits and code(c, state) == memory[c].code
+
+
+@jit
+def alone(left, right, n, state):
+    """Tell whether no run is active but those at contacts left..right.
+
+    Each of infinitely many rounds lets all other runs go on, too.
+    """
+    run = state.run
+    first = state.tally[0].first
+    while first < n:
+        if run[first].last < left or first > right:
+            return False
+        first = run[first].onward
+    return True
+
+
+@apart
+def cluster_around(c, number, n, state):
+    """Return the contacts of a possible cycle around contact c; empty (last < first) if none.
+
+    Contacts left..right had an impulse since the snapshot; of these first..last collided anew and
+    the others, steady neighbours, stayed active.  All must be active and driven as they were at the
+    snapshot, and one that collided must lose energy.
+    """
+    level, contact, memory = state.level[number], state.contact, state.memory[number]
+    left = c
+    right = c
+    while left > level.low and since(left - 1, contact, memory).real > 0.0:
+        left -= 1
+    while right < level.high and since(right + 1, contact, memory).real > 0.0:
+        right += 1
+    first = right + 1
+    last = left - 1
+    loses = False
+    same = since(c, contact, memory).real > 0.0  # else c has collided without an impulse
+    same = same and (left > level.low or left == 0) and (right < level.high or right == n - 2)
+    for k in range(left, right + 1):
+        same = same and memory[k].code == code(k, state)
+        if contact[k].hits != memory[k].hits:
+            first = min(first, k)
+            last = k
+            loses = loses or contact[k].e.real < 1.0
+        else:
+            same = same and contact[k].active == 1
+    for k in range(first, last + 1):
+        same = same and contact[k].hits != memory[k].hits
+    # Whoever is active next to them has waited throughout, at a ratio of zero.
+    same = same and has_waited(left - 1, level, state, memory)
+    same = same and has_waited(right + 1, level, state, memory)
+    for k in (left - 2, right + 2):
+        same = same and not (
+            level.low <= k <= level.high and since(k, contact, memory).real > 0.0
+        )
+    if same and loses and alone(left, right, n, state):
+        return Cluster(left, first, last, right)
+    return Cluster(c, c, c - 1, c)
+
+
+@jit
+def kept_part(neighbour, edge, exists, contact, memory):
+    """Return 1 - h for a steady neighbour whose impulse is h times that of the outermost contact."""
+    if not exists:
+        return ONE
+    one = since(edge, contact, memory)
+    kept = over(minus(one, since(neighbour, contact, memory)), one)
+    if abs(kept.real) < LIMITS.kept:
+        return complex(LIMITS.kept, 0.0)  # nothing is kept: nearly infinite mass
+    return kept
+
+
+@apart
+def limit(cluster, number, state):
+    """Leave in x the impulses to the limit: the balls first..last + 1 come to one velocity.
+
+    Returns T, the sum of all cycles to come over the last one, T = L / (1 - L); how far the state
+    is from its snapshot scaled by L, relative to its own size; and this size.  T is 0 if there is
+    no limit, and below -1 if the cycles come from there and grow, driven by steady neighbours.
+    """
+    ball, contact, memory = state.ball, state.contact, state.memory[number]
+    left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
+    left_part = kept_part(first - 1, first, first > left, contact, memory)
+    right_part = kept_part(last + 1, last, last < right, contact, memory)
+    common_velocity(first, last, left_part, right_part, ball, contact)
+    to_come = done = ZERO
+    size = 0.0
+    for c in range(first, last + 1):
+        to_come = plus(to_come, contact[c].x)
+        done = plus(done, since(c, contact, memory))
+        speed = math.sqrt(2.0 * contact[c].q.real / reduced_mass(c, ball))
+        size = max(size, abs(contact[c].u.real), speed)
+    total = over(to_come, done).real
+    if size == 0.0 or not math.inf > abs(total) > 0.0 or -1.0 <= total <= 0.0:
+        return 0.0, math.inf, 0.0
+    factor = total / (1.0 + total)
+    off = 0.0
+    for c in range(first, last + 1):
+        off = max(off, abs(contact[c].u.real - factor * memory[c].u.real) / size)
+        stored = contact[c].q.real - factor * factor * memory[c].q.real
+        off = max(off, abs(stored) / reduced_mass(c, ball) / size / size)
+    # The steady neighbours' impulses go with those of the contacts beside them.
+    if left < first:
+        one = times(contact[first].x, minus(ONE, left_part))
+        one = over(one, since(first - 1, contact, memory))
+        for c in range(left, first):
+            contact[c].x = times(since(c, contact, memory), one)
+    if last < right:
+        other = times(contact[last].x, minus(ONE, right_part))
+        other = over(other, since(last + 1, contact, memory))
+        for c in range(last + 1, right + 1):
+            contact[c].x = times(since(c, contact, memory), other)
+    return total, off, size
+
+
+@jit
+def stays_at_zero(c, contact, memory):
+    """Tell whether contact c has been at u = 0 since the snapshot: its balls move as one."""
+    k, then = contact[c], memory[c]
+    return k.active == 1 and k.u.real == 0.0 and then.u.real == 0.0 and k.a == then.a
+
+
+@jit
+def sum_of_squares(total, part):
+    """Return the sum of L^2, L^4, ... on this part of the way to the limit."""
+    return part * (2.0 - part) * total * (total / (1.0 + 2.0 * total))
+
+
+@apart
+def neighbours_stay(cluster, total, part, number, n, state):
+    """Work out what the neighbours of a cycle absorb; tell whether none comes to its own event.
+
+    Their works on this part of the way are left in y.  Impulse and closing speed of a neighbour go
+    the same part of their ways, so its work is that of the straight line between, but for what it
+    was more in the last cycle, times the sum of L^2, L^4, ...  A cycle that grows goes on only
+    while its neighbours' works stay below the energy of the first closing.
+    """
+    ball, contact, memory = state.ball, state.contact, state.memory[number]
+    left, right = cluster.left, cluster.right
+    squares = sum_of_squares(total, part)
+    for c in range(max(left - 1, 0), min(right + 1, n - 2) + 1):
+        if cluster.first <= c <= cluster.last:
+            continue
+        k, then = contact[c], memory[c]
+        k.y = ZERO
+        if stays_at_zero(c, contact, memory):
+            continue
+        change = scaled_by(change_of(c, left, right, ball, contact), part)
+        speed = plus(k.u, change)
+        if k.u.real * then.u.real < 0.0 or k.u.real * speed.real < 0.0:
+            return False
+        if (k.u.real == 0.0) != (speed.real == 0.0):
+            return False
+        if c < left or c > right:
+            continue
+        impulse = since(c, contact, memory)
+        if part < 0.0 and abs(then.u.real * impulse.real * squares) > state.tally[0].energy:
+            return False
+        straight = times(impulse, scaled(plus(then.u, k.u), 0.5))
+        done = minus(k.a, then.a) if k.u.real > 0.0 else minus(k.q, then.q)
+        way = times(scaled_by(k.x, part), scaled(plus(k.u, speed), 0.5))
+        k.y = plus(way, scaled_by(minus(done, straight), squares))
+        if k.active == 1 and k.u.real < 0.0 and k.q.real + k.y.real <= 0.0:
+            return False
+    return True
+
+
+@jit
+def scaled_by(a, x):
+    """Return a x for any float x."""
+    return times(a, complex(x, 0.0))
+
+
+@apart
+def jump(cluster, part, number, n, state):
+    """Go a part of the way to the limit: impulses by x, neighbours' works by y.
+
+    The works of the cycle itself are known from what disappears of motion and stores: (1 - e^2) of
+    them.
+    """
+    ball, contact, memory = state.ball, state.contact, state.memory[number]
+    left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
+    lost = loss = 0.0
+    rest = 1.0 - part
+    for c in range(left, right + 1):
+        contact[c].x = scaled_by(contact[c].x, part)
+    for c in range(max(left - 1, 0), min(right + 1, n - 2) + 1):
+        k = contact[c]
+        before = k.u.real
+        if first <= c <= last:
+            lost += k.q.real * part * (1.0 + rest)
+            loss += (1.0 - k.square.real) * minus(k.a, memory[c].a).real
+            k.u, k.q = scaled_by(k.u, rest), scaled_by(k.q, rest * rest)
+            k.w *= rest * rest
+            k.made *= abs(rest)
+        elif not stays_at_zero(c, contact, memory):
+            k.u = plus(k.u, change_of(c, left, right, ball, contact))
+            lost -= k.y.real
+            if k.active == 1 and k.u.real > 0.0:
+                k.a = plus(k.a, k.y)
+                k.w += k.y.real
+                k.q = plus(k.q, times(k.square, k.y))
+            elif k.active == 1:
+                k.q = plus(k.q, k.y)
+        if left <= c <= right:
+            lost += 0.5 * k.x.real * (before + k.u.real)
+            k.p = plus(k.p, k.x)
+    squares = max(lost / loss, 0.0) if loss > 0.0 else 0.0
+    for c in range(first, last + 1):
+        more = minus(contact[c].a, memory[c].a)
+        contact[c].a = plus(contact[c].a, scaled_by(more, squares))
+
+
+@apart
+def go_on(cluster, total, n, state):
+    """Repeat a cycle 2, 4, 8 ... times, before a neighbour comes to its event; tell if it did.
+
+    After k cycles everything is L^k of what it was, L = T / (1 + T), and the balls have gone the
+    part 1 - L^k of the way to the limit: half of it at most, as a neighbour's event may be at the
+    limit itself.
+    """
+    contact, memory = state.contact, state.memory[LOWER]
+    cycles, part = 1, 1.0 / (1.0 + total)
+    while True:
+        further = part * (2.0 - part)
+        if further > 0.5 or not neighbours_stay(cluster, total, further, LOWER, n, state):
+            break
+        cycles, part = 2 * cycles, further
+    if cycles < LIMITS.many:
+        return False
+    neighbours_stay(cluster, total, part, LOWER, n, state)
+    jump(cluster, part, LOWER, n, state)
+    for c in range(cluster.first, cluster.last + 1):
+        contact[c].hits += cycles * (contact[c].hits - memory[c].hits)
+    return True
+
+
+@apart
+def repeated(c, n, state):
+    """Note that the cycle that contact c ends has been repeated; look for another one from here."""
+    run = state.run
+    first = state.tally[0].first
+    while first < n:
+        run[first].stirred = 1
+        first = run[first].onward
+    forget(LOWER, state.level)
+    record(REPETITION, c, n, state)
+
+
+@apart
+def cycle(number, c, n, state):
+    """If the neighbourhood of contact c repeats itself on another scale, go to the limit.
+
+    Light balls need many cycles to settle on one factor.  It is enough that what still changes
+    will not matter: the bend, how far the state turns by the time that it is exhausted, is below
+    its limit at the pace since the snapshot.  Without steady neighbours the limit does not depend
+    on the bend.  With them it does: then what it leaves open must be too small to matter.
+
+    Where there is no limit, or a neighbour comes to its event before it, the cycle is repeated as
+    often as it surely repeats itself.
+
+    Returns (first, last) of the contacts that have collapsed, empty if none have.
+    """
+    cluster = cluster_around(c, number, n, state)
+    if cluster.last < cluster.first:
+        return c, c - 1
+    total, off, size = limit(cluster, number, state)
+    if total == 0.0:
+        return c, c - 1
+    bent = 0.0
+    if off > LIMITS.self_similar:
+        if total < 0.0:
+            return c, c - 1  # a cycle that grows does so by one factor
+        # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
+        # 1 / (T + 1/2), and as good as that for a slow cycle.
+        threshold = LIMITS.exhausted * state.tally[0].fastest
+        bent = off * max(math.log(size / threshold), 1.0) * (total + 0.5)
+        if not bent < LIMITS.bend:
+            return c, c - 1
+    if total > 0.0:
+        if is_in_doubt(cluster, bent, state):
+            return c, c - 1
+        if neighbours_stay(cluster, total, 1.0, number, n, state):
+            jump(cluster, 1.0, number, n, state)
+            end_plastically(cluster.first, cluster.last, n, state)
+            return cluster.first, cluster.last
+    if number == LOWER and bent == 0.0 and go_on(cluster, total, n, state):
+        repeated(c, n, state)
+    return c, c - 1
+
+
+@once
+def is_in_doubt(cluster, bent, state):
+    """Tell whether steady neighbours leave open where a bent cycle's limit is."""
+    if cluster.left == cluster.first and cluster.last == cluster.right:
+        return False
+    farthest = 0.0
+    for i in range(cluster.left, cluster.right + 2):
+        before = state.contact[i - 1].x.real if i > cluster.left else 0.0
+        after = state.contact[i].x.real if i <= cluster.right else 0.0
+        farthest = max(farthest, abs(before - after) * state.ball[i].inverse.real)
+    return bent * farthest > LIMITS.doubt * state.tally[0].fastest
+
+
+@jit
+def look(number, c, n, state):
+    """See whether contact c has come round; take a new snapshot if the last one is old."""
+    level = state.level[number]
+    if level.mark == c:
+        first, last = cycle(number, c, n, state)
+        if first <= last:
+            return first, last
+    if level.count >= level.due:
+        remember(number, c, n, state)
+    return c, c - 1
+
+
+@apart
+def look_above(first, last, n, state):
+    """Contacts first..last have collapsed; see whether such collapses come round too."""
+    level = state.level
+    forget(LOWER, level)
+    level[UPPER].count += 1
+    one, other = look(UPPER, first, n, state)
+    if one <= other:
+        forget(UPPER, level)
+        first, last = one, other
+    for c in range(first, last + 1):
+        record(COLLAPSE, c, n, state)
+    state.tally[0].collapsed = 1
+
+
+@once
+def take_limits(ends, ended, worn, n, state):
+    """R9, after `ends` contacts have ended, `ended` the last; tell whether contacts collapsed."""
+    state.level[LOWER].count += ends
+    first, last = ended, ended - 1
+    if worn >= 0:
+        first, last = exhausted_stretch(worn, n, state)
+        if first <= last:
+            first, last = merge(first, last, n, state)
+    if last < first:
+        first, last = look(LOWER, ended, n, state)
+    if last < first:
+        return False
+    look_above(first, last, n, state)
+    return True
