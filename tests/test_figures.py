@@ -19,10 +19,10 @@ from cradle import (
     ImpulseCorrelation,
     SpringChain,
     collide,
-    figures,
     paper_chain,
 )
-from cradle.animation import animate
+from cradle.pictures import impacts as figures
+from cradle.pictures.animation import animate
 
 
 @pytest.fixture

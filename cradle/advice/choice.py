@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from cradle.advice.measured import Evidence, Row, evidence, measured_chain, rows, unit
 from cradle.advice.recommendation import Recommendation
 from cradle.chain import Chain
-from cradle.checks import must_be, one_number, shown, whole_number
+from cradle.input.values import must_be, one_number, shown, whole_number
 from cradle.models import Model
 from cradle.models.compliant import SpringChain
 from cradle.models.correlation import ImpulseCorrelation

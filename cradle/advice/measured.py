@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cradle import runtime
 from cradle.chain import Chain
 from cradle.models.correlation import ImpulseCorrelation
+from cradle.runtime import compile as runtime
 from cradle.tables import data_folder, paper_chain
 
 __all__ = ["Evidence", "Row", "evidence", "lasting", "measured_chain", "rows", "unit"]

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cradle.checks import Vector
 from cradle.fit.parameters import Key, Points, pair_keys
 from cradle.fit.shots import ShotSet
+from cradle.input.values import Vector
 
 # Parameter points evaluated at a time, to bound the memory.
 _CHUNK = 4096

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from cradle.checks import Vector, shown
+from cradle.input.values import Vector, shown
 from cradle.models.batch import post_impact_velocities
 
 #: A parameter: the types of two balls (restitution, in alphabetical order) or of three (ratio).

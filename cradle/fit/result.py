@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cradle.checks import Vector, one_number
 from cradle.fit.answers import Estimate, Group, Prediction
 from cradle.fit.parameters import (
     Key,
@@ -22,6 +21,7 @@ from cradle.fit.parameters import (
 )
 from cradle.fit.search import LEVEL
 from cradle.fit.shots import Shots, chance
+from cradle.input.values import Vector, one_number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -140,7 +140,7 @@ class Fit:
         ValueError
             If nothing was fitted.
         """
-        from cradle.fit.drawing import draw_fit
+        from cradle.pictures.fits import draw_fit
 
         return draw_fit(self, name, axes)
 

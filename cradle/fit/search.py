@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.checks import Vector
+from cradle.input.values import Vector
 
 #: A set holds the true value in 95 of 100 experiments where chi-square rises by no more than this.
 LEVEL = 0.95

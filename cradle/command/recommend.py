@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from cradle.describing import chain_options, described, numbers, one_or_all
+from cradle.command.describe import chain_options, described, numbers, one_or_all
 
 
 @click.command()

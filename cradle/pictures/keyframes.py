@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.checks import Vector
+from cradle.input.values import Vector
 
 # Stands before the name of every moving part, until the picture's own key takes its place.
 KEY = "moving-part-"

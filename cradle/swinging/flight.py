@@ -1,4 +1,20 @@
-"""Pendulums between impacts: motion in closed form or by SciPy, and when balls next meet."""
+"""Pendulums between impacts: their motion, when balls next meet, and which of them then rest.
+
+The rules of balls that touch, in the order in which `swing` applies them at every event:
+
+1. *Touching.* Those contacts touch that close at this instant (within `TIE`), and those whose gap
+   is no more than a rounding error (`NEAR`).  Each stretch of touching contacts with one that
+   approaches faster than `RESTING` of the swing's speed is a chain of its own, solved by `collide`.
+2. *Resting.* Touching balls whose relative speed is then below `RESTING` of the swing's speed take
+   their common velocity: from now on they touch and move together.  Without this rule balls that
+   are pressed against each other would collide for ever, ever more softly, in a finite time.
+3. *Pressing.* Of the contacts that move together those stay so in which the balls, left alone,
+   would not separate: neighbouring balls are pooled while the left one would accelerate no less
+   than the right one.  A pool moves as one body.  Equal pendulums without gaps swing alike, so
+   they keep together, without a force, until another ball strikes them.
+4. *Pulling apart.* When the force in a contact of a body falls to zero, the contact opens, and
+   stays open for this instant, whatever else happens in it.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +27,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.checks import Vector
-from cradle.pendulums import Pendulums
+from cradle.input.values import Vector
+from cradle.swinging.pendulums import Pendulums
 
 #: Events nearer than this part of a swing (over 2 pi) are one; so are lengths, of the amplitude.
 TIE = 1e-9
@@ -406,3 +422,106 @@ class FullFlight:
             found.append(y)
         x, v = np.split(np.array(found).reshape(len(times), len(self.start)), 2, axis=1)
         return x[:, self.body], v[:, self.body]
+
+
+#: Speeds below this part of the swing's speed are none: they carry 1e-20 of its energy.
+RESTING = 1e-10
+#: Gaps below this part of the swing's size are none.
+NEAR = 1e-12
+
+
+def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return the first ball of each stretch of marked contacts, and the one after its last.
+
+    Examples
+    --------
+    >>> stretches(np.array([True, True, False, True]))
+    [(0, 3), (3, 5)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], contacts, [False]]).astype(int)))
+    return [(int(a), int(b) + 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def common_velocities(
+    masses: Vector, velocities: Vector, touching: NDArray[np.bool_], least: float
+) -> tuple[Vector, NDArray[np.bool_]]:
+    """Give touching balls that hardly move against each other their common velocity (rule 2).
+
+    Parameters
+    ----------
+    masses, velocities : ndarray, shape (N,)
+        kg and m/s.
+    touching : ndarray of bool, shape (N - 1,)
+        Contacts that touch.
+    least : float
+        Contacts that open no faster than this are at rest, m/s.
+
+    Returns
+    -------
+    tuple of ndarray
+        Velocities, shape (N,), and which contacts rest, shape (N - 1,); momentum is kept.
+
+    Examples
+    --------
+    >>> v, resting = common_velocities(
+    ...     np.ones(3), np.array([0.0, 1e-12, 1.0]), np.array([True, True]), 1e-10
+    ... )
+    >>> v.tolist(), resting.tolist()
+    ([5e-13, 5e-13, 1.0], [True, False])
+    """
+    v, resting = velocities.copy(), np.zeros_like(touching)
+    while True:
+        slow = touching & (v[:-1] - v[1:] >= -least)
+        if not (slow & ~resting).any():
+            return v, resting
+        # The common velocity may be as slow against the next ball: look again.
+        resting |= slow
+        for first, last in stretches(resting):
+            body = slice(first, last)
+            if (v[body] != v[first]).any():
+                v[body] = masses[body] @ v[body] / masses[body].sum()
+
+
+def pressed(
+    masses: Vector, accelerations: Vector, resting: NDArray[np.bool_], least: float
+) -> NDArray[np.bool_]:
+    """Return the resting contacts whose balls, left alone, would not separate (rule 3).
+
+    The contact forces are those under which no ball passes its neighbour and no contact pulls.
+    Among all accelerations without passing, these come nearest to those of the balls left alone,
+    in the mean square weighted by mass (Gauss's principle of least constraint).  For a row of
+    balls that is isotonic regression, which pooling solves exactly.
+
+    Parameters
+    ----------
+    masses, accelerations : ndarray, shape (N,)
+        kg, and what each ball would do alone, m/s^2.
+    resting : ndarray of bool, shape (N - 1,)
+        Contacts whose balls touch at equal velocities.
+    least : float
+        Differences no larger than this are rounding errors, m/s^2.
+
+    Returns
+    -------
+    ndarray of bool, shape (N - 1,)
+        Contacts whose balls move together.
+
+    Examples
+    --------
+    The middle ball is pulled to the left, away from the right one:
+
+    >>> pressed(np.ones(3), np.array([0.0, -1.0, 1.0]), np.ones(2, bool), 1e-12).tolist()
+    [True, False]
+    """
+    kept = np.zeros_like(resting)
+    for first, last in stretches(resting):
+        pools: list[tuple[float, float, int]] = []  # mass, acceleration, number of balls
+        for m, alone in zip(masses[first:last], accelerations[first:last], strict=True):
+            pools.append((m, alone, 1))
+            while len(pools) > 1 and pools[-2][1] >= pools[-1][1] - least:
+                (m1, a1, n1), (m2, a2, n2) = pools.pop(-2), pools.pop(-1)
+                pools.append((m1 + m2, (m1 * a1 + m2 * a2) / (m1 + m2), n1 + n2))
+        kept[first : last - 1] = True
+        cuts = first + np.cumsum([count for _, _, count in pools[:-1]], dtype=int)
+        kept[cuts - 1] = False
+    return kept

@@ -20,7 +20,7 @@ from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.checks import Vector, must_be, place_in, shown
+from cradle.input.values import Vector, must_be, place_in, shown
 from cradle.trace import Trace
 
 __all__ = [

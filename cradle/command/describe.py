@@ -78,7 +78,7 @@ def described(
 ) -> Described:  # fmt: skip
     """Return the chain and the model that the options describe."""
     from cradle.chain import Chain
-    from cradle.checks import one_number
+    from cradle.input.values import one_number
     from cradle.models.correlation import ImpulseCorrelation
     from cradle.tables import paper_chain
 

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.checks import Vector, first, number_or_row, one_number, one_of, refuse_where, row_of
+from cradle.input.values import (
+    Vector,
+    first,
+    number_or_row,
+    one_number,
+    one_of,
+    refuse_where,
+    row_of,
+)
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -8,13 +8,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from cradle.checks import Vector
-from cradle.figures import PALETTE, ball_style
 from cradle.fit.answers import Estimate
 from cradle.fit.parameters import Points, pair_keys, ratio_keys
 from cradle.fit.result import Fit, predicted_points
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
+from cradle.input.values import Vector
+from cradle.pictures.impacts import PALETTE, ball_style
 
 # Beyond this a value of chi-square is of no interest.
 _TOP = 25.0

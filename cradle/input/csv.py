@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 from importlib.resources.abc import Traversable
 from typing import NamedTuple, NoReturn
 
-from cradle.checks import one_number
+from cradle.input.values import one_number
 
 
 class Row(NamedTuple):
@@ -37,7 +37,7 @@ class Row(NamedTuple):
         column : str
             Name of the column.
         rule, low, high, open_low
-            As for `cradle.checks.checked`.
+            As for `cradle.input.values.checked`.
 
         Returns
         -------
