@@ -2,8 +2,8 @@
 
 `cradle.runtime.compile.unit` joins the rooms of the kernel to one plain source: functions of
 numbers, loops, sequences and records. This module writes that source out as JavaScript, statement
-by statement, between hand-written parts (`engine_*.js`). Both languages count in the same doubles, so
-the script's answers are those of Python, to the last bit (tests/test_explorer_engine.py).
+by statement, between hand-written parts (`engine_*.js`). Both languages count in the same doubles,
+so the script's answers are those of Python, to the last bit (tests/test_explorer_engine.py).
 
 It knows what the kernel is made of and refuses anything else. What looks alike in the two languages
 and means something else is not passed on as it stands:

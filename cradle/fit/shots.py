@@ -1,4 +1,4 @@
-"""Measured shots, velocities of the balls before and after impacts, and the tables they stand in."""
+"""Measured shots, velocities of the balls before and after impacts; the lines of their tables."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The swinging cradle: impacts by any model of the package, pendulums between them.
 
-The rules of touching and resting balls: `cradle.swinging.flight`.  Every flight and every instant is
-checked before a run is returned: order, momentum, energy and ledger.
+The rules of touching and resting balls: `cradle.swinging.flight`.  Every flight and every
+instant is checked before a run is returned: order, momentum, energy and ledger.
 """
 
 from __future__ import annotations
