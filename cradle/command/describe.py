@@ -47,13 +47,7 @@ def chain_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 class Described(NamedTuple):
-    """A chain and how it collides.
-
-    Examples
-    --------
-    >>> described(None, masses=[1.0, 1.0]).assumed
-    ('the first ball strikes at 1 m/s', 'no energy is lost (--restitution)')
-    """
+    """A chain and how it collides."""
 
     chain: Chain
     model: Model

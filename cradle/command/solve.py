@@ -230,18 +230,7 @@ def warm_up() -> None:
 
 
 def run(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit; wrong input ends in one line on standard error.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        What follows the command's name; that of this process if left out.
-
-    Raises
-    ------
-    SystemExit
-        Always, with the exit code.
-    """
+    """Run the command line and exit; wrong input ends in one line on standard error."""
     from cradle.trace import ImpactNotCertified, ImpactNotFinished
 
     try:

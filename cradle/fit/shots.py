@@ -190,50 +190,14 @@ class Shots:
 
 
 def chance(chi_square: float, degrees_of_freedom: int) -> float:
-    """Return the chance of a chi-square at least as large if model and errors are right.
-
-    Parameters
-    ----------
-    chi_square : float
-    degrees_of_freedom : int
-
-    Returns
-    -------
-    float
-
-    Examples
-    --------
-    >>> round(chance(3.84, 1), 3)
-    0.05
-    """
+    """Return the chance of a chi-square at least as large if model and errors are right."""
     from scipy.special import chdtrc
 
     return float(chdtrc(max(degrees_of_freedom, 1), chi_square))
 
 
 def table_lines(source: Any) -> list[tuple[str, dict[str, Any]]]:
-    """Return the rows of a table, each with a name of its place.
-
-    Parameters
-    ----------
-    source : path, binary file, DataFrame or mapping of columns
-        As for `read_shots`.
-
-    Returns
-    -------
-    list of tuple
-        "line 2" or "row 1", and the cells by their columns.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If it is no table; the message says what to do.
-
-    Examples
-    --------
-    >>> table_lines({"shot": [1, 2]})
-    [('row 1', {'shot': 1}), ('row 2', {'shot': 2})]
-    """
+    """Return the rows of a table, each with a name of its place."""
     if isinstance(source, (str, Path)) or hasattr(source, "open"):
         path = Path(source) if isinstance(source, str) else source
         return _file_lines(path.name, path.read_bytes())

@@ -12,15 +12,7 @@ from cradle.input.values import one_number
 
 
 class Row(NamedTuple):
-    """One row of a table.
-
-    Examples
-    --------
-    >>> Row("ratios.csv, row 2", {"ratio": "1.5"}).number("ratio", "must lie in [0, 1]", 0.0, 1.0)
-    Traceback (most recent call last):
-    ...
-    ValueError: ratios.csv, row 2, column ratio = 1.5; must lie in [0, 1]
-    """
+    """One row of a table."""
 
     #: File and number of the row, counted from 1 as in an editor; the names of columns are row 1.
     place: str
@@ -30,25 +22,7 @@ class Row(NamedTuple):
     def number(
         self, column: str, rule: str, low: float, high: float = math.inf, open_low: bool = False
     ) -> float:
-        """Return a cell as a number inside its limits.
-
-        Parameters
-        ----------
-        column : str
-            Name of the column.
-        rule, low, high, open_low
-            As for `cradle.input.values.checked`.
-
-        Returns
-        -------
-        float
-            The number.
-
-        Raises
-        ------
-        ValueError
-            If the cell holds no number, or one outside.
-        """
+        """Return a cell as a number inside its limits."""
         text = self.cells[column]
         try:
             value = float(text)
@@ -58,18 +32,7 @@ class Row(NamedTuple):
         return one_number(name, value, rule, low, high, open_low)
 
     def refuse(self, column: str, rule: str) -> NoReturn:
-        """Raise, naming a cell and the rule that it breaks.
-
-        Parameters
-        ----------
-        column, rule : str
-            Name of the column, and the rule.
-
-        Raises
-        ------
-        ValueError
-            Always.
-        """
+        """Raise, naming a cell and the rule that it breaks."""
         text = self.cells[column]
         raise ValueError(f"{self.place}, column {column} = {text!r}; {rule}")
 
@@ -77,41 +40,7 @@ class Row(NamedTuple):
 def read_table(
     file: Traversable, columns: Sequence[str], keys: Collection[str] | None = None
 ) -> dict[str, Row]:
-    r"""Read a table whose first column names its rows.
-
-    Parameters
-    ----------
-    file : Traversable
-        The file: UTF-8, commas between the cells, the names of the columns in its first row.
-    columns : sequence of str
-        The names of the columns.
-    keys : collection of str, optional
-        The rows that there must be; any if left out.
-
-    Returns
-    -------
-    dict of str to Row
-        The rows by their first cells, in the order of the file.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If it is no such table; the message names file, row and column.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder, "masses.csv")
-    ...     _ = path.write_text("ball,mass_kg\nA,0.045\nB,0,053\n")
-    ...     read_table(path, ["ball", "mass_kg"])
-    Traceback (most recent call last):
-    ...
-    ValueError: masses.csv, row 3 is ['B', '0', '053']; must have 2 cells: ball, mass_kg
-    """
+    """Read a table whose first column names its rows."""
     name = file.name
     if not file.is_file():
         raise FileNotFoundError(f"{name} is missing: there is no file {file}")

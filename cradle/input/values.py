@@ -42,34 +42,6 @@ def numbers(name: str, values: ArrayLike | None) -> Vector:
 
     A number is whatever `float` takes: fractions and decimals too.  Not so text, truth values,
     masked values, complex numbers, and numbers with an uncertainty.
-
-    Parameters
-    ----------
-    name : str
-        What the values are called in an error.
-    values : array_like
-        Numbers of any shape.
-
-    Returns
-    -------
-    ndarray of float64
-        The values, same shape.
-
-    Raises
-    ------
-    ValueError
-        If a value is no real number or beyond the range of floats, or the rows of a list differ in
-        length; it names the first such value.
-
-    Examples
-    --------
-    >>> from fractions import Fraction
-    >>> numbers("ratio", [0.5, Fraction(1, 8)]).tolist()
-    [0.5, 0.125]
-    >>> numbers("ratio", [0.5, "x"])
-    Traceback (most recent call last):
-    ...
-    ValueError: ratio[1] = 'x'; must be a real number
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
@@ -211,36 +183,7 @@ def checked(
     high: float = np.inf,
     open_low: bool = False,
 ) -> Vector:
-    """Return `values` as floats, all finite and inside the limits.
-
-    Parameters
-    ----------
-    name : str
-        What the values are called in an error.
-    values : array_like
-        Numbers of any shape.
-    rule : str
-        What the error says of a value outside the limits.
-    low, high : float
-        Limits, included; `open_low` leaves the lower one out.
-
-    Returns
-    -------
-    ndarray of float64
-        The values, same shape.
-
-    Raises
-    ------
-    ValueError
-        If a value is no number, not finite, or outside; it names the first such value.
-
-    Examples
-    --------
-    >>> checked("restitution", [0.5, 1.2], "must lie in [0, 1]", 0, 1)
-    Traceback (most recent call last):
-    ...
-    ValueError: restitution[1] = 1.2; must lie in [0, 1]
-    """
+    """Return `values` as floats, all finite and inside the limits."""
     array = numbers(name, values)
     if array is values:
         array = array.copy()
@@ -262,30 +205,7 @@ def one_number(
     high: float = np.inf,
     open_low: bool = False,
 ) -> float:
-    """Return `value` as a float inside its limits.
-
-    Parameters
-    ----------
-    name, value, rule, low, high, open_low
-        As for `checked`.
-
-    Returns
-    -------
-    float
-        The value.
-
-    Raises
-    ------
-    ValueError
-        If it is more than one number, or as `checked`.
-
-    Examples
-    --------
-    >>> one_number("step", [0.1, 0.2])
-    Traceback (most recent call last):
-    ...
-    ValueError: step = [0.1, 0.2]; must be one number
-    """
+    """Return `value` as a float inside its limits."""
     number = checked(name, value, rule, low, high, open_low)
     if number.ndim:
         raise ValueError(f"{name} = {shown(value)}; must be one number")
@@ -293,30 +213,7 @@ def one_number(
 
 
 def checked_masses(masses: ArrayLike) -> Vector:
-    """Return masses as floats: positive, and none too light beside the heaviest of its chain.
-
-    Parameters
-    ----------
-    masses : array_like, shape (..., N)
-        Masses in kg.
-
-    Returns
-    -------
-    ndarray, shape (..., N)
-        The masses.
-
-    Raises
-    ------
-    ValueError
-        Naming the first bad mass and the rule.
-
-    Examples
-    --------
-    >>> checked_masses([1.0, 0.0])
-    Traceback (most recent call last):
-    ...
-    ValueError: masses[1] = 0.0; must be above 0
-    """
+    """Return masses as floats: positive, and none too light beside the heaviest of its chain."""
     array = checked("masses", masses, "must be above 0", 0.0, open_low=True)
     if array.size and array.ndim:
         small = array < LIGHTEST * array.max(axis=-1, keepdims=True)
@@ -326,30 +223,7 @@ def checked_masses(masses: ArrayLike) -> Vector:
 
 
 def checked_restitution(restitution: ArrayLike) -> Vector:
-    """Return coefficients of restitution as floats: in [0, 1], and if above 0 not too small.
-
-    Parameters
-    ----------
-    restitution : array_like
-        Coefficients of any shape.
-
-    Returns
-    -------
-    ndarray
-        The coefficients, same shape.
-
-    Raises
-    ------
-    ValueError
-        Naming the first bad coefficient and the rule.
-
-    Examples
-    --------
-    >>> checked_restitution([0.5, 1e-300])
-    Traceback (most recent call last):
-    ...
-    ValueError: restitution[1] = 1e-300; must be 0 or at least 1e-30
-    """
+    """Return coefficients of restitution as floats: in [0, 1], and if above 0 not too small."""
     array = checked("restitution", restitution, "must lie in [0, 1]", 0.0, 1.0)
     small = (array > 0.0) & (array < LIMITS.least_restitution)
     refuse_where("restitution", array, small, f"must be 0 or at least {LIMITS.least_restitution}")
@@ -357,25 +231,7 @@ def checked_restitution(restitution: ArrayLike) -> Vector:
 
 
 def refuse_overflow(velocities: Vector, masses: Vector) -> None:
-    """Raise if the kinetic energy or a momentum of a chain is no finite number.
-
-    Parameters
-    ----------
-    velocities, masses : ndarray, shape (..., N)
-        m/s and kg.
-
-    Raises
-    ------
-    ValueError
-        Naming the fastest ball of the first such chain and the rule.
-
-    Examples
-    --------
-    >>> refuse_overflow(np.array([1e200, 0.0]), np.ones(2))
-    Traceback (most recent call last):
-    ...
-    ValueError: velocities[0] = 1e+200; kinetic energy overflows: choose larger units
-    """
+    """Raise if the kinetic energy or a momentum of a chain is no finite number."""
     v, m = np.broadcast_arrays(velocities, masses)
     with np.errstate(over="ignore"):
         sums = {
@@ -391,32 +247,7 @@ def refuse_overflow(velocities: Vector, masses: Vector) -> None:
 
 
 def whole_number(name: str, value: object) -> int:
-    """Return `value` as a whole number of at least 1.
-
-    Parameters
-    ----------
-    name : str
-        What the value is called in an error.
-    value : object
-        A whole number of Python's or NumPy's.
-
-    Returns
-    -------
-    int
-        The value.
-
-    Raises
-    ------
-    ValueError
-        If it is anything else.
-
-    Examples
-    --------
-    >>> whole_number("max_evaluations", 1e6)
-    Traceback (most recent call last):
-    ...
-    ValueError: max_evaluations = 1000000.0; must be an int (1000000), at least 1
-    """
+    """Return `value` as a whole number of at least 1."""
     if is_whole(value) and value >= 1:
         return int(value)
     raise ValueError(f"{name} = {shown(value)}; {whole_rule(value)}, at least 1")
@@ -431,34 +262,7 @@ def number_or_row(
     high: float = np.inf,
     open_low: bool = False,
 ) -> float | tuple[float, ...]:
-    """Return one number for all balls or contacts, or a row with one for each, to be kept.
-
-    Parameters
-    ----------
-    name, values, rule, low, high, open_low
-        As for `checked`.
-    length : str
-        How long a row is, in an error: "N - 1".
-
-    Returns
-    -------
-    float or tuple of float
-        The values.
-
-    Raises
-    ------
-    ValueError
-        If it has more axes, or as `checked`.
-
-    Examples
-    --------
-    >>> number_or_row("stiffness", [1, 2], "N - 1", "must be above 0", 0, open_low=True)
-    (1.0, 2.0)
-    >>> number_or_row("stiffness", [[1, 2]], "N - 1", "must be above 0", 0, open_low=True)
-    Traceback (most recent call last):
-    ...
-    ValueError: stiffness has shape (1, 2); must be () or (N - 1,)
-    """
+    """Return one number for all balls or contacts, or a row with one for each, to be kept."""
     array = checked(name, values, rule, low, high, open_low)
     if array.ndim > 1:
         raise ValueError(f"{name} has shape {array.shape}; must be () or ({length},)")
@@ -466,38 +270,7 @@ def number_or_row(
 
 
 def row_of(name: str, kept: float | Sequence[float], size: int, balls: int) -> Vector:
-    """Return what `number_or_row` kept as a row for a chain.
-
-    Parameters
-    ----------
-    name : str
-        What the values are called in an error.
-    kept : float or sequence of float
-        One number for all, or one for each.
-    size : int
-        How many there must be.
-    balls : int
-        How many balls the chain has.
-
-    Returns
-    -------
-    ndarray, shape (size,)
-        The values.
-
-    Raises
-    ------
-    ValueError
-        If there are not as many.
-
-    Examples
-    --------
-    >>> row_of("stiffness", 3.0, 2, 3).tolist()
-    [3.0, 3.0]
-    >>> row_of("stiffness", (1.0, 2.0, 3.0), 2, 3)
-    Traceback (most recent call last):
-    ...
-    ValueError: stiffness has 3 values; 3 balls need 2, or one number
-    """
+    """Return what `number_or_row` kept as a row for a chain."""
     row = np.asarray(kept, dtype=np.float64)
     if row.ndim and row.size != size:
         raise ValueError(f"{name} has {row.size} values; {balls} balls need {size}, or one number")

@@ -39,13 +39,7 @@ _MOST_STEPS = 1_000_000
 
 
 class Meeting(NamedTuple):
-    """The next event of a flight.
-
-    Examples
-    --------
-    >>> Meeting(0.5, [0], []).closing
-    [0]
-    """
+    """The next event of a flight."""
 
     #: Time since the flight began, s; infinite if nothing happens.
     time: float
@@ -68,14 +62,7 @@ class Flight(Protocol):
 
 
 class State(NamedTuple):
-    """All that a flight needs to know of its start.
-
-    Examples
-    --------
-    >>> rest = State(np.ones(2), np.zeros(2), np.zeros(2), np.ones(1, bool), np.zeros(1, bool))
-    >>> rest.bodies()
-    [(0, 2)]
-    """
+    """All that a flight needs to know of its start."""
 
     masses: Vector
     positions: Vector
@@ -100,29 +87,6 @@ def first_fall(
     search marches from below: with a bound K on the second derivative from now on, the parabola
     ``f + f' h - K h^2 / 2`` lies below the function, so a step to its root passes no root of the
     function.  Near a crossing this is Newton's method.
-
-    Parameters
-    ----------
-    level : float
-        Constant part.
-    terms : sequence of (C, rate)
-        Rates have a positive imaginary part and no positive real part.
-    parting : bool
-        The function starts at exactly zero and is about to rise.
-    horizon : float
-        Where the search may end, s.
-
-    Returns
-    -------
-    float
-        Time, s; infinite if there is none within the horizon (later ones may be returned).
-
-    Examples
-    --------
-    >>> round(first_fall(0.0, [(-1j, 2j)], True, 10.0), 6)  # sin(2 t)
-    1.570796
-    >>> round(first_fall(0.5, [(1 + 0j, 1j)], False, 10.0), 6)  # cos t = -1/2
-    2.094395
     """
     terms = [(c, rate) for c, rate in terms if c != 0.0]
     if not terms:
@@ -239,12 +203,6 @@ class SmallAngleFlight:
 
     A ball swings alone as x'' = -w^2 x - 2 d x'.  Balls that rest against each other are one body:
     its frequency, damping and lowest point are means over its balls, weighted by mass.
-
-    Examples
-    --------
-    >>> state = State(np.ones(2), np.zeros(2), np.array([0.0, 1.0]), *np.array([[False], [True]]))
-    >>> SmallAngleFlight(Pendulums(length=9.81), state).next_meeting(9.0)
-    Meeting(time=3.141592653589793, closing=[0], releasing=[])
     """
 
     def __init__(self, pendulums: Pendulums, state: State) -> None:
@@ -330,13 +288,6 @@ class FullFlight:
     Sturm's comparison two balls that part cannot meet before pi / sqrt(g/l - d^2), half a swing of
     the small angle.  For all others this bounds f'' by f and f', and the search marches as in
     `first_fall`.
-
-    Examples
-    --------
-    >>> state = State(np.ones(2), np.zeros(2), np.array([0.0, 3.0]), *np.array([[False], [True]]))
-    >>> meeting = FullFlight(Pendulums(length=9.81, angle="full"), state).next_meeting(9.0)
-    >>> round(meeting.time, 6), meeting.closing
-    (3.160201, [0])
     """
 
     def __init__(self, pendulums: Pendulums, state: State) -> None:
@@ -431,13 +382,7 @@ NEAR = 1e-12
 
 
 def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first ball of each stretch of marked contacts, and the one after its last.
-
-    Examples
-    --------
-    >>> stretches(np.array([True, True, False, True]))
-    [(0, 3), (3, 5)]
-    """
+    """Return the first ball of each stretch of marked contacts, and the one after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], contacts, [False]]).astype(int)))
     return [(int(a), int(b) + 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -445,30 +390,7 @@ def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def common_velocities(
     masses: Vector, velocities: Vector, touching: NDArray[np.bool_], least: float
 ) -> tuple[Vector, NDArray[np.bool_]]:
-    """Give touching balls that hardly move against each other their common velocity (rule 2).
-
-    Parameters
-    ----------
-    masses, velocities : ndarray, shape (N,)
-        kg and m/s.
-    touching : ndarray of bool, shape (N - 1,)
-        Contacts that touch.
-    least : float
-        Contacts that open no faster than this are at rest, m/s.
-
-    Returns
-    -------
-    tuple of ndarray
-        Velocities, shape (N,), and which contacts rest, shape (N - 1,); momentum is kept.
-
-    Examples
-    --------
-    >>> v, resting = common_velocities(
-    ...     np.ones(3), np.array([0.0, 1e-12, 1.0]), np.array([True, True]), 1e-10
-    ... )
-    >>> v.tolist(), resting.tolist()
-    ([5e-13, 5e-13, 1.0], [True, False])
-    """
+    """Give touching balls that hardly move against each other their common velocity (rule 2)."""
     v, resting = velocities.copy(), np.zeros_like(touching)
     while True:
         slow = touching & (v[:-1] - v[1:] >= -least)
@@ -491,27 +413,6 @@ def pressed(
     Among all accelerations without passing, these come nearest to those of the balls left alone,
     in the mean square weighted by mass (Gauss's principle of least constraint).  For a row of
     balls that is isotonic regression, which pooling solves exactly.
-
-    Parameters
-    ----------
-    masses, accelerations : ndarray, shape (N,)
-        kg, and what each ball would do alone, m/s^2.
-    resting : ndarray of bool, shape (N - 1,)
-        Contacts whose balls touch at equal velocities.
-    least : float
-        Differences no larger than this are rounding errors, m/s^2.
-
-    Returns
-    -------
-    ndarray of bool, shape (N - 1,)
-        Contacts whose balls move together.
-
-    Examples
-    --------
-    The middle ball is pulled to the left, away from the right one:
-
-    >>> pressed(np.ones(3), np.array([0.0, -1.0, 1.0]), np.ones(2, bool), 1e-12).tolist()
-    [True, False]
     """
     kept = np.zeros_like(resting)
     for first, last in stretches(resting):

@@ -290,12 +290,6 @@ def part(model: Any, n: int, first: int, last: int) -> Model:
 
     A part may end where a ratio's bound counts on the next ball (Eq. 53), so ratios above the
     part's own bounds are held there (rule of the largest admissible ratio), not refused.
-
-    Examples
-    --------
-    >>> from cradle import ImpulseCorrelation
-    >>> part(ImpulseCorrelation([0.1, 0.2, 0.3]), 5, 1, 4).forward
-    (0.2,)
     """
     if last - first == n:
         return model  # type: ignore[no-any-return]
@@ -320,55 +314,17 @@ RADIAN = 1e-11
 
 @dataclass
 class Account:
-    """What the balls of a swing have, and what an unsound flight or instant would change.
-
-    Attributes
-    ----------
-    masses, gaps : ndarray, shapes (N,) and (N - 1,)
-        kg and m.
-    pendulums : Pendulums
-        How the balls hang.
-    frequency : float
-        Of the fastest ball, rad/s.
-    size : float
-        Of the swing, m.
-    energy : float
-        Where the present flight began, J.
-
-    Examples
-    --------
-    >>> account = Account(np.ones(2), np.zeros(1), Pendulums(length=9.81), 1.0, 1.0)
-    >>> account.settle(0.0, np.zeros((2, 2)), np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]]))
-    >>> account.fly(0.0, np.array([9.0]), np.array([[0.1, 0.0]]), np.array([[0.0, 1.0]]))
-    Traceback (most recent call last):
-    ...
-    RuntimeError: the swing is not certified: at t = 9.0 s balls overlap by 0.1 m
-    """
+    """What the balls of a swing have, and what an unsound flight or instant would change."""
 
     masses: Vector
     gaps: Vector
     pendulums: Pendulums
-    frequency: float
-    size: float
-    energy: float = 0.0
+    frequency: float  # of the fastest ball, rad/s
+    size: float  # of the swing, m
+    energy: float = 0.0  # where the present flight began, J
 
     def fly(self, begin: float, times: Vector, x: Vector, v: Vector) -> None:
-        """Demand of a flight that no ball passes another, and that energy is only damped.
-
-        Parameters
-        ----------
-        begin : float
-            When it began, s.
-        times : ndarray, shape (T,)
-            s since then.
-        x, v : ndarray, shape (T, N)
-            m and m/s.
-
-        Raises
-        ------
-        RuntimeError
-            If it is not so.
-        """
+        """Demand of a flight that no ball passes another, and that energy is only damped."""
         if not len(times):
             return
         overlap = -(self.gaps + np.diff(x, axis=-1)).min(axis=-1)
@@ -381,21 +337,9 @@ class Account:
     def settle(self, time: float, x: Vector, v: Vector) -> None:
         """Demand of an instant that all but its impacts keeps the energy, and all the momentum.
 
-        How much energy an impact keeps is told by its own trace.
-
-        Parameters
-        ----------
-        time : float
-            s.
-        x : ndarray, shape (2, N)
-            Where the balls came to be, and where they were put, m.
-        v : ndarray, shape (3, N)
-            Velocities with which they came, after the impacts, and at last, m/s.
-
-        Raises
-        ------
-        RuntimeError
-            If it is not so.
+        How much energy an impact keeps is told by its own trace.  Of `x` there are two rows: where
+        balls came to be, and where they were put; of `v` three: as they came, after the impacts,
+        and at last.
         """
         momenta = self.masses * v[::2]
         gain = abs(float((momenta[1] - momenta[0]).sum()))

@@ -1,0 +1,171 @@
+"""A digest of what the package answers, by area: equal digests mean equal answers, to the bit.
+
+For changes that are to change nothing: ``python tests/census.py`` before and after.  `kernel`
+alone runs the event loop; `fits`, `words`, `shown` and `command` hang on it in their last bits.
+"""
+
+import hashlib
+import io
+import os
+import re
+import shlex
+import sys
+import tempfile
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from click.testing import CliRunner
+
+import cradle
+from cradle import fit
+from cradle.command.solve import main
+from cradle.pictures import animation, impacts
+
+sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ("benchmarks", "tests")]
+
+from chains import random_chains, uniform  # noqa: E402
+from test_entries import BAD, DATA, ENTRIES  # noqa: E402
+
+FEW = {"max_evaluations": 1000}
+LAW, SHARES = cradle.ImpulseCorrelation, cradle.EnergyDistribution
+MODELS = {
+    "kernel": [
+        LAW(0.1, 0.05, excess="saturate"), LAW(0), LAW(1, excess="saturate", meeting=0.2),
+        cradle.FusedChain(),
+    ],
+    "sequential": [cradle.SequentialCollisions(x, max_events=300) for x in ("left", "right")],
+    "springs": [cradle.SpringChain(2.0, 1.5, **FEW), cradle.SpringChain(1.0, 1.0, **FEW)],
+    "energy": [SHARES(1.0, **FEW), SHARES(1.0, step=0.02, **FEW), SHARES(1.0, gaps=True, **FEW)],
+    "quadratic": [cradle.QuadraticDissipation(distance=x, max_problems=50) for x in (0, 0.1)],
+}  # fmt: skip
+REFUSED = """
+solve ABACA --speed x; solve ABXCA; solve; solve AB --masses 1,2; solve --masses 1,-1,1
+solve --masses 1,1,1 --restitution 1.2; solve --masses 1,1,1 --ratio 1.2; solve --masses 1,a,1
+solve --masses 1,1,1 --velocities 1,0; solve ABC --json --csv; solve --masses 1,1 --velocities 0,1
+plot ABC --output impact.gif; swing ABC --pull -1; swing ABC --steps 0; fit none.csv
+fit DATA/shots_synthetic.csv --known ABA=2; fit DATA/masses.csv; recommend ABACA --wanted hats
+fit DATA/shots_synthetic.csv --known AB=0.1; film DATA/masses.csv --set BAC --masses 1,1,1
+fit DATA/shots_synthetic.csv --predict ABACA; fit DATA/shots_template.csv --json; --help
+"""
+
+
+def told(thing) -> bytes:
+    """A thing as bytes: arrays to the bit, results by all that they hold and show of themselves."""
+    if isinstance(thing, np.ndarray) and thing.dtype != object:
+        return f"{thing.dtype}{thing.shape}".encode() + thing.tobytes()
+    if isinstance(thing, dict):
+        return b"".join(told(key) + told(value) for key, value in thing.items())
+    if isinstance(thing, (list, tuple, np.ndarray)):
+        return b"".join(told(value) for value in thing)
+    if hasattr(thing, "_repr_html_"):
+        return told([repr(thing), str(thing), thing._repr_html_(), vars(thing)])
+    if hasattr(thing, "__dataclass_fields__"):
+        return told([repr(thing), vars(thing)])
+    if hasattr(thing, "get_figure"):
+        file = io.BytesIO()
+        thing.get_figure().savefig(file, format="svg", metadata={"Date": None})
+        matplotlib.pyplot.close("all")
+        return file.getvalue()
+    return re.sub(" at 0x[0-9a-f]+", "", repr(thing)).encode()
+
+
+def answer(call, *given, **named) -> bytes:
+    """What a call returns, or the words in which it refuses."""
+    try:
+        return told(call(*given, **named))
+    except Exception as error:
+        return told([type(error), str(error), getattr(error, "__notes__", ())])
+
+
+def chains(models, sizes=(2, 3, 4, 5, 8), decades=6) -> Iterator[bytes]:
+    rng = np.random.default_rng(31)
+    for n in sizes:
+        for m, v, e in zip(*random_chains(rng, 20, n, decades)[:3], strict=True):
+            chain = cradle.Chain(m, v, e if rng.random() < 0.7 else 1.0)
+            yield from (answer(cradle.collide, chain, model) for model in models)
+
+
+def swings() -> Iterator[bytes]:
+    rng, times, model = np.random.default_rng(7), np.linspace(0, 3, 61), MODELS["sequential"][0]
+    for k in range(24):
+        n, full = int(rng.integers(2, 6)), k % 3 == 0
+        length = uniform(rng, 0.08, 0.12, n) if k % 2 and not full else 0.1
+        gaps, angle = (0.0, "full") if full else (0.001 * (k % 4), "small")
+        hanging = cradle.Pendulums(length=length, gaps=gaps, damping=0.05 * (k % 5), angle=angle)
+        chain = cradle.Chain(uniform(rng, 0.5, 2, n), np.zeros(n), 1.0 - 0.1 * (k % 4))
+        start = np.sort(uniform(rng, -0.04, 0.04, n))
+        yield answer(cradle.swing, chain, model, start, times, pendulums=hanging)
+
+
+def fitted() -> Iterator[bytes]:
+    for name in ("shots_synthetic.csv", "shots_template.csv"):
+        shots = fit.read_shots(DATA / name)
+        pairs = fit.restitution(shots)
+        for found in (pairs, fit.ratio(shots, pairs)):
+            yield told([shots, found, found.rows(), *found.plot()])
+    tracks = fit.read_tracker(DATA / "video_synthetic.txt")
+    for striker in range(3):
+        yield answer(fit.velocities_from_tracks, tracks, striker=striker, length=0.3)
+    yield answer(fit.speeds_from_heights, [0.1, 0.2], 0.1)
+
+
+def refusals() -> Iterator[bytes]:
+    for call, arguments in ENTRIES.items():
+        for name in arguments:
+            for bad in BAD:
+                found = answer(
+                    lambda call=call, **given: bool(call(**given)) or 1, **arguments | {name: bad}
+                )
+                yield told([call.__name__, name]) + found
+        matplotlib.pyplot.close("all")
+
+
+def commanded() -> Iterator[bytes]:
+    helps = [f"{name} --help" for name in main.commands]
+    examples = "".join(CliRunner().invoke(main, shlex.split(line)).output for line in helps)
+    lines = re.findall(r"^\s+cradle ([a-z].+)$", examples, flags=re.M)
+    for line in [*helps, *lines, *re.split("[;\n]", REFUSED.strip())]:
+        line = re.sub(r"\b(shots|long).csv", "DATA/shots_synthetic.csv", line)
+        line = line.replace("film.txt", "DATA/video_synthetic.txt").replace("DATA", str(DATA))
+        found = CliRunner().invoke(main, shlex.split(line))
+        yield f"{found.exit_code} {found.output} {found.exception!r}".replace(
+            str(DATA), ""
+        ).encode()
+
+
+def shown() -> Iterator[bytes]:
+    traces = [
+        cradle.collide(*cradle.paper_chain(row, excess="saturate")) for row in ("BAB", "AAAA")
+    ]
+    traces.append(cradle.collide(cradle.Chain([1, 1, 1], [1, 0, 0]), MODELS["springs"][0]))
+    for trace in traces:
+        yield told([trace, trace.chain, trace.to_frame().to_json(double_precision=15)])
+        yield told(impacts.velocities(trace)) + told(impacts.chain_sketch(trace.chain))
+        yield told(impacts.velocity_impulse(trace, 1, other=0)) + told(animation.animate(trace))
+        yield told(impacts.outcome_by_ball(trace, letters="ABCD"[: len(trace.chain)]))
+    model, start = MODELS["sequential"][0], [-0.02, 0, 0]
+    run = cradle.swing(cradle.Chain([1] * 3, [0] * 3), model, start, np.linspace(0, 2, 21))
+    yield told([run, run.impacts, run.to_frame().to_json(), run.impacts_to_frame().to_json()])
+    yield told([animation.animate_swing(run, labels=["a"]), cradle.ratio_table().to_json()])
+    for wanted in ("velocities", "fastest ball", "times", "forces", "path", "impulses"):
+        yield told([cradle.recommend(run.chain, wanted=wanted, impacts=n) for n in (1, 10**6)])
+
+
+AREAS = {name: lambda m=models: chains(m) for name, models in MODELS.items()}
+AREAS |= {name: lambda m=MODELS[name]: chains(m, (2, 3, 4), 2) for name in ("energy", "quadratic")}
+AREAS |= {"swings": swings, "fits": fitted, "words": refusals, "shown": shown, "command": commanded}
+
+if __name__ == "__main__":
+    os.environ["CRADLE_KERNEL"] = "compiled"  # no seconds of work decide what runs
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "census", "figure.max_open_warning": 0})
+    warnings.simplefilter("ignore")
+    np.seterr(all="ignore")
+    os.chdir(tempfile.mkdtemp())
+    for area in sys.argv[1:] or AREAS:
+        parts = list(AREAS[area]())
+        digest = hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts))
+        print(f"{area:10} {len(parts):6} {digest.hexdigest()[:16]}", flush=True)
