@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from cradle.chain import Chain
 from cradle.input.values import Vector, a, checked, must_be, one_number
 from cradle.models import Model, collide
-from cradle.swinging.flight import common_velocities, stretches
+from cradle.swinging.resting import common_velocities, stretches
 from cradle.swinging.swing import part
 
 __all__ = ["Bodies", "Row"]

@@ -27,8 +27,8 @@ from cradle.fit import (
 )
 from cradle.fit.likelihood import chi_squares
 from cradle.fit.parameters import Points
-from cradle.fit.reading import Track
 from cradle.fit.search import RISE, refine, scan
+from cradle.fit.shots import Track
 
 ROOT = Path(__file__).parents[1]
 MASS = {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}

@@ -195,6 +195,7 @@ def draw(setting: dict[str, Any], path: Path) -> None:
 
     from cradle import Chain, ImpulseCorrelation, collide
     from cradle.pictures import impacts as figures
+    from cradle.pictures.balls import chain_sketch
 
     chain = Chain(
         setting["masses"], setting["speeds"], setting["restitution"]
@@ -207,7 +208,7 @@ def draw(setting: dict[str, Any], path: Path) -> None:
     )
     row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.2])
     letters = setting["letters"].replace("-", "")
-    figures.chain_sketch(chain, row, letters=letters)
+    chain_sketch(chain, row, letters=letters)
     figures.velocities(collide(chain, model), diagram)
     figure.savefig(path, metadata={"Date": None})
 

@@ -16,10 +16,10 @@ from cradle.models.correlation import ImpulseCorrelation
 from cradle.runtime import compile as runtime
 from cradle.tables import data_folder, paper_chain
 
-__all__ = ["Evidence", "Row", "evidence", "lasting", "measured_chain", "rows", "unit"]
+__all__ = ["Evidence", "Measured", "evidence", "lasting", "measured_chain", "rows", "unit_time"]
 
 
-class Row(NamedTuple):
+class Measured(NamedTuple):
     """One model in one setting on one chain."""
 
     group: str
@@ -42,7 +42,7 @@ class Row(NamedTuple):
 class Evidence(NamedTuple):
     """What was measured of one setting, for one chain."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[Measured, ...]
     #: Measured on this very chain, which is then the only row.
     exact: bool
     #: Measured on it or on chains around it.
@@ -71,7 +71,7 @@ def _lines() -> tuple[dict[str, str], ...]:
 
 
 @cache
-def unit() -> float:
+def unit_time() -> float:
     """Return the unit of times, s: one impact of three balls in a batch, where it was measured."""
     timed = [line for line in _lines() if line["time_ratio"]]
     times = [float(line["microseconds"]) / float(line["time_ratio"]) for line in timed]
@@ -87,7 +87,7 @@ def lasting(seconds: float) -> str:
 
 
 @cache
-def rows(group: str, kernel: str = "") -> tuple[Row, ...]:
+def rows(group: str, kernel: str = "") -> tuple[Measured, ...]:
     """Return the rows of a group, in settings that this installation and its calls have."""
     kernel = kernel or ("compiled" if runtime.available() else "plain")
     batch = f"{kernel}, batch"
@@ -104,7 +104,7 @@ def rows(group: str, kernel: str = "") -> tuple[Row, ...]:
             continue
         apart = line["model_error"] if line["model_reference"].startswith("Hertz") else ""
         found.append(
-            Row(
+            Measured(
                 line["group"],
                 line["model"],
                 line["setting"],
@@ -123,10 +123,10 @@ _PATH = "one call with its path"
 
 
 def evidence(
-    rows: tuple[Row, ...], chain: Chain | None, ratios: ImpulseCorrelation | None = None
+    rows: tuple[Measured, ...], chain: Chain | None, ratios: ImpulseCorrelation | None = None
 ) -> list[Evidence]:
     """Return what was measured on a chain; else on chains around it; else on most chains."""
-    settings: dict[str, dict[str, Row]] = {}
+    settings: dict[str, dict[str, Measured]] = {}
     for row in rows:
         settings.setdefault(row.setting, {})[row.chain] = row
     name = measured_chain(chain, ratios) if chain else ""
@@ -153,7 +153,7 @@ def _chains() -> dict[str, tuple[Chain, ImpulseCorrelation]]:
 
 def measured_chain(chain: Chain, ratios: ImpulseCorrelation | None = None) -> str:
     """Return the name of the measured chain that this is."""
-    one = _struck(chain)
+    one = _from_one_end(chain)
     for name, (other, model) in _chains().items():
         if one is None or len(one) != len(other):
             continue
@@ -171,7 +171,7 @@ def _values(model: ImpulseCorrelation, balls: int) -> list[list[float]]:
     return [np.broadcast_to(part, (balls - 2,)).tolist() for part in (model.forward, backward)]
 
 
-def _struck(chain: Chain) -> Chain | None:
+def _from_one_end(chain: Chain) -> Chain | None:
     """Return a chain that is struck at one end, striker first and of mass 1; None for others."""
     m, e, u = chain.masses, chain.restitution, chain.closing_speeds
     if u[-1] > 0.0 and not u[:-1].any():
@@ -192,9 +192,10 @@ def _place(chain: Chain) -> list[list[float]]:
     return [[len(m), spread, float(e.min())], [len(m), spread, float(e.max())]]
 
 
-def _around(rows: tuple[Row, ...], chain: Chain | None) -> tuple[Row, ...]:
+def _around(rows: tuple[Measured, ...], chain: Chain | None) -> tuple[Measured, ...]:
     """Return the rows of chains around a chain: of each that reaches it alone, or else of all."""
-    if chain is None or _struck(chain) is None or any(row.numerical_error is None for row in rows):
+    unknown = any(row.numerical_error is None for row in rows)
+    if chain is None or _from_one_end(chain) is None or unknown:
         return ()
     least, most = np.array(_place(chain))
     known = [_DRAWN.get(row.chain) or _place(_chains()[row.chain][0]) for row in rows]

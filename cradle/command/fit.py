@@ -63,7 +63,7 @@ def fit(
     """
     from cradle.fit import read_shots
     from cradle.fit.parameters import types_in_a_row
-    from cradle.fit.result import COLUMNS
+    from cradle.fit.result import RESULT_COLUMNS
     from cradle.fit.shots import chance
     from cradle.input.values import one_number
 
@@ -111,7 +111,7 @@ def fit(
         notes += lines
     if plot is not None:
         plot_fits(fits, plot)
-    show(rows, extra, "\n".join(notes), as_json, as_csv, COLUMNS)
+    show(rows, extra, "\n".join(notes), as_json, as_csv, RESULT_COLUMNS)
 
 
 def _named(given: str) -> tuple[str, tuple[float, float]]:

@@ -17,10 +17,10 @@
 from cradle.fit.answers import Estimate, Prediction
 from cradle.fit.estimate import ratio, restitution, restitution_from_heights
 from cradle.fit.film import Velocities, speeds_from_heights, velocities_from_tracks
-from cradle.fit.reading import Tracks, read_shots, read_tracker
+from cradle.fit.reading import read_shots, read_tracker
 from cradle.fit.result import Fit
 from cradle.fit.search import Mode
-from cradle.fit.shots import Shots, ShotSet
+from cradle.fit.shots import Shots, ShotSet, Tracks
 
 __all__ = [
     "Estimate",

@@ -54,9 +54,9 @@ def ratio_keys(types: Sequence[str]) -> set[Key]:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """P parameter points at which chains are solved: ratios, shape (P,), and one restitution."""
+    """P parameter points at which chains are solved: of shape (P,), or one value for all."""
 
-    restitution: Mapping[Key, float]
+    restitution: Mapping[Key, float | Vector]
     ratios: Mapping[Key, Vector]
 
     def outcomes(self, types: Sequence[str], masses: Vector, velocities: Vector) -> Vector:
@@ -68,17 +68,9 @@ class Points:
             np.stack([self.ratios[key] for key in keys], axis=-1) if keys else np.zeros((size, 0))
             for keys in (forward, backward)
         ]
-        e = [self.restitution[key] for key in pair_keys(types)]
+        e = np.stack([self.restitution[key] for key in pair_keys(types)], axis=-1)
         return post_impact_velocities(masses, velocities, e, *ratios, excess="saturate")
 
-    def shifted(self, key: Key, amount: float) -> Points:
+    def shifted(self, key: Key, amount: float | Vector) -> Points:
         """Return the points with one coefficient of restitution changed."""
         return Points({**self.restitution, key: self.restitution[key] + amount}, self.ratios)
-
-
-def outcomes_of_draws(
-    masses: Sequence[float], speed: float, restitution: Vector, forward: Vector, backward: Vector
-) -> Vector:
-    """Solve one chain for drawn parameters, the first ball striking the others at rest."""
-    before = [speed] + [0.0] * (len(masses) - 1)
-    return post_impact_velocities(masses, before, restitution, forward, backward, excess="saturate")

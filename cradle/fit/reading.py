@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cradle.fit.shots import Shots, ShotSet, table_lines
+from cradle.fit.shots import Shots, ShotSet, Track, Tracks, table_lines
 from cradle.input.values import Vector, one_number
 
 #: Columns that every table of shots has, and what they hold.
@@ -158,11 +158,9 @@ def _row(where: str, line: dict[str, Any], scale: tuple[float, float], sigma: fl
         earlier = _number(where, line, "sigma_before") * scale[1]
         if earlier < 0:
             raise ValueError(f"{where}, column sigma_before: {earlier!r}; must be at least 0")
-    names = (str(line[name]).strip() for name in ("set", "shot", "type"))
-    group, shot, kind = names
-    return _Row(
-        group, shot, int(ball), kind, mass, before, after, error * scale[1], earlier, where
-    )  # fmt: skip
+    group, shot, kind = (str(line[name]).strip() for name in ("set", "shot", "type"))
+    error *= scale[1]
+    return _Row(group, shot, int(ball), kind, mass, before, after, error, earlier, where)
 
 
 def _refuse_large(
@@ -243,27 +241,12 @@ def _check_physics(name: str, shot: str, rows: Sequence[_Row]) -> None:
         )
 
 
-# Three layouts of Tracker's text export are read; the facts come from files that people published
-# and from the program's source (github.com/OpenSourcePhysics/tracker, `ExportDataDialog.java`):
-#
-# - one track, older versions: a line with its name, spaces as underscores (``mass_A``), a line with
-#   the columns (``t  x  y``), then the numbers;
-# - one track, version 6: the same, but the name comes after a delimiter, and lines end with one;
-# - several tracks, version 6: a line ``#multi:``, a line with the names above their columns, a line
-#   with ``t`` once and the columns of each track.
-#
-# Tabs, commas and semicolons delimit; a cell is empty where a ball was not marked.
-
-
-class Track(NamedTuple):
-    """Marks of one ball: times in s and positions along the row in m, both of shape (T,)."""
-
-    times: Vector
-    positions: Vector
-
-
-#: Marks of every ball, by the names of the tracks, in the order of the file.
-Tracks = dict[str, Track]
+# Tracker's text exports, by files that people published and by the program's source
+# (github.com/OpenSourcePhysics/tracker, `ExportDataDialog.java`).  One track: its name, spaces as
+# underscores (``mass_A``), a line of columns (``t  x  y``), the numbers; version 6 puts a delimiter
+# before the name and at the ends of lines.  Several tracks: ``#multi:``, the names above their
+# columns, then ``t`` once and the columns of each.  Tabs, commas and semicolons delimit; a cell is
+# empty where a ball was not marked.
 
 
 def read_tracker(
@@ -326,8 +309,7 @@ def read_tracker(
     tracks: Tracks = {}
     for place, title in enumerate(columns):
         if title == column:
-            marks = _marks(file.name, lines, first + 2, (delimiter, place, column))
-            times, positions = np.array(marks).reshape(-1, 2).T
+            times, positions = _marks(file.name, lines, first + 2, (delimiter, place, column))
             tracks[owners[place]] = Track(times * time_scale, positions * unit)
     return tracks
 
@@ -337,31 +319,26 @@ def _owners(names: list[str], columns: list[str], several: bool) -> list[str]:
     if not several:
         return [next((name for name in names if name), "track").replace("_", " ")] * len(columns)
     # Of several tracks, the name stands above the first of its columns.
-    filled = names + [""] * (len(columns) - len(names))
     owners = [""]
-    for name in filled[1 : len(columns)]:
+    for name in [*names[1:], *[""] * len(columns)][: len(columns) - 1]:
         owners.append(name or owners[-1])
     return owners
 
 
-def _marks(
-    name: str, lines: list[str], begin: int, where: tuple[str, int, str]
-) -> list[tuple[float, float]]:
+def _marks(name: str, lines: list[str], begin: int, where: tuple[str, int, str]) -> Vector:
+    """Return times and positions of a track's marks, shape (2, T)."""
     delimiter, place, column = where
-    marks = []
+    marks: list[float] = []
     for number, line in enumerate(lines[begin:], begin + 1):
         cells = [cell.strip() for cell in line.split(delimiter)]
         if place >= len(cells) or not cells[place]:
             continue
-        pair = []
         for title, cell in (("t", cells[0]), (column, cells[place])):
             # Tracker can be told to write decimal commas, with another delimiter then.
-            text = cell if delimiter == "," else cell.replace(",", ".")
             try:
-                pair.append(float(text))
+                marks.append(float(cell if delimiter == "," else cell.replace(",", ".")))
             except ValueError:
                 raise ValueError(
                     f"{name}, line {number}, column {title}: {cell!r}; must be a number"
                 ) from None
-        marks.append((pair[0], pair[1]))
-    return marks
+    return np.array(marks).reshape(-1, 2).T

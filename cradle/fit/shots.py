@@ -1,4 +1,4 @@
-"""Measured shots, velocities of the balls before and after impacts; the lines of their tables."""
+"""What is measured: shots, velocities before and after impacts, with their tables; tracks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -187,6 +187,17 @@ class Shots:
         """
         residuals = np.concatenate([s.momentum_residuals for s in self.sets])
         return float(residuals @ residuals), residuals.size
+
+
+class Track(NamedTuple):
+    """Marks of one ball: times in s and positions along the row in m, both of shape (T,)."""
+
+    times: Vector
+    positions: Vector
+
+
+#: Marks of every ball, by the names of the tracks, in the order of the file.
+Tracks = dict[str, Track]
 
 
 def chance(chi_square: float, degrees_of_freedom: int) -> float:

@@ -11,7 +11,7 @@ from typing import NamedTuple, NoReturn
 from cradle.input.values import one_number
 
 
-class Row(NamedTuple):
+class Line(NamedTuple):
     """One row of a table."""
 
     #: File and number of the row, counted from 1 as in an editor; the names of columns are row 1.
@@ -39,7 +39,7 @@ class Row(NamedTuple):
 
 def read_table(
     file: Traversable, columns: Sequence[str], keys: Collection[str] | None = None
-) -> dict[str, Row]:
+) -> dict[str, Line]:
     """Read a table whose first column names its rows."""
     name = file.name
     if not file.is_file():
@@ -54,12 +54,12 @@ def read_table(
     head, *lines = list(csv.reader(text.splitlines())) or [[]]
     if head != list(columns):
         raise ValueError(f"{name}, row 1 is {head}; must be {names}, with commas between")
-    rows: dict[str, Row] = {}
+    rows: dict[str, Line] = {}
     for number, cells in enumerate(lines, start=2):
         place = f"{name}, row {number}"
         if len(cells) != len(columns):
             raise ValueError(f"{place} is {cells}; must have {len(columns)} cells: {names}")
-        row = Row(place, dict(zip(columns, cells, strict=True)))
+        row = Line(place, dict(zip(columns, cells, strict=True)))
         if keys is not None and cells[0] not in keys:
             row.refuse(columns[0], f"must be one of {', '.join(keys)}")
         if cells[0] in rows:

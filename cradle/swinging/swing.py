@@ -1,6 +1,6 @@
 """The swinging cradle: impacts by any model of the package, pendulums between them.
 
-The rules of touching and resting balls: `cradle.swinging.flight`.  Every flight and every
+The rules of touching and resting balls: `cradle.swinging.resting`.  Every flight and every
 instant is checked before a run is returned: order, momentum, energy and ledger.
 """
 
@@ -23,20 +23,10 @@ from cradle.input.values import (
     whole_number,
 )
 from cradle.models import Model, collide
-from cradle.swinging.flight import (
-    NEAR,
-    RESTING,
-    TIE,
-    Flight,
-    FullFlight,
-    SmallAngleFlight,
-    State,
-    common_velocities,
-    pressed,
-    stretches,
-)
+from cradle.swinging.flight import TIE, Flight, FullFlight, SmallAngleFlight, Start
 from cradle.swinging.pendulums import Pendulums
 from cradle.swinging.record import Impact, Swing
+from cradle.swinging.resting import NEAR, RESTING, common_velocities, pressed, stretches
 from cradle.trace import Trace
 
 __all__ = ["swing"]
@@ -215,7 +205,7 @@ class _Run:
         return ended
 
     def flight(self) -> Flight:
-        state = State(self.chain.masses, self.x, self.v, self.together, self.parting)
+        state = Start(self.chain.masses, self.x, self.v, self.together, self.parting)
         kind = SmallAngleFlight if self.pendulums.angle == "small" else FullFlight
         return kind(self.pendulums, state)
 
@@ -272,17 +262,9 @@ class _Run:
             traces.append(trace)
         if traces:
             loss = sum(trace.energy_loss for trace in traces)
-            self.impacts.append(
-                Impact(
-                    self.t,
-                    tuple(contacts),
-                    self.x.copy(),
-                    before,
-                    self.v.copy(),
-                    loss,
-                    tuple(traces),
-                )
-            )
+            at, left = self.x.copy(), self.v.copy()
+            one = Impact(self.t, tuple(contacts), at, before, left, loss, tuple(traces))
+            self.impacts.append(one)
 
 
 def part(model: Any, n: int, first: int, last: int) -> Model:
