@@ -25,7 +25,7 @@ import numpy as np
 from measure import absent, versions
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
-from cradle.drive import warm_up
+from cradle.runtime.job import warm_up
 
 ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "examples"))

@@ -25,13 +25,13 @@ from cradle import (
     ImpulseCorrelation,
     SpringChain,
     collide,
-    drive,
     kernel,
     outcomes,
     post_impact_velocities,
 )
 from cradle.kernel.state import COLLAPSE, LIMITS, REPETITION
 from cradle.models.correlation import MAX_EVENTS
+from cradle.runtime import job as drive
 
 EPS = 2.0**-52
 TINIEST = 5e-324  # the smallest number above zero

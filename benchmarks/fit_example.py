@@ -19,7 +19,7 @@ import numpy as np
 
 from cradle import collide, paper_chain
 from cradle.fit import Tracks, velocities_from_tracks
-from cradle.fit.tracker import Track
+from cradle.fit.shots import Track
 
 DATA = Path(__file__).parents[1] / "data"
 LENGTH, GRAVITY = 0.3, 9.81

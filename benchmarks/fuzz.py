@@ -113,8 +113,8 @@ def attempt(data, max_events=400, kernel=""):
         ImpulseCorrelation,
         collide,
         post_impact_velocities,
-        runtime,
     )
+    from cradle.runtime import compile as runtime
 
     m, v, e, f, b, options = problem(data)
     refused = None

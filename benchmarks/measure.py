@@ -13,8 +13,9 @@ from importlib import metadata
 import numpy as np
 from scenes import random_chains
 
-from cradle import post_impact_velocities, runtime
-from cradle.drive import warm_up
+from cradle import post_impact_velocities
+from cradle.runtime import compile as runtime
+from cradle.runtime.job import warm_up
 
 #: The unit of time of the whole table: one impact of three balls, solved in a batch.
 REFERENCE = "one impact of three balls, in a batch of 2000 random chains"

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from cradle import drive, runtime
 from cradle.kernel.state import LIMITS, Record
+from cradle.runtime import compile as runtime
+from cradle.runtime import job as drive
 
 CODE = compile(runtime.unit(), "kernel.py", "exec")
 

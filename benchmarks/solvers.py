@@ -16,9 +16,9 @@ from cradle import (
     SpringChain,
     collide,
     post_impact_velocities,
-    runtime,
 )
 from cradle.closed_form import three_balls
+from cradle.runtime import compile as runtime
 
 FIFTY = "same rules, event loop of the tests in fifty digits"
 CONVERGED = "same springs, DOP853 with rtol 3e-14"

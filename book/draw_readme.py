@@ -4,7 +4,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from cradle import Chain, ImpulseCorrelation, collide, figures
+from cradle import Chain, ImpulseCorrelation, collide
+from cradle.pictures import impacts as figures
 
 PICTURE = Path(__file__).parent / "_static" / "cradle.png"
 

@@ -4,26 +4,18 @@ One idea: every impact model is a rule from a chain of balls to a path of contac
 
     Chain -> collide(chain, model) -> Trace -> measures -> figures
 
-The rooms, in that order:
+Folders are roles:
 
-- `cradle.chain`: the chain before the impact; `cradle.checks` and `cradle.reals`: what is asked of
-  input; `cradle.refusals`: the words of an error; `cradle.drawing`: pictures and tables;
-  `cradle.progress`: a bar.
-- `cradle.trace`: what happened.
-- `cradle.kernel`: the event loop; `cradle.runtime` compiles it, `cradle.drive` feeds it.
+- on top `cradle.chain`, the chain before the impact; `cradle.trace`, what happened;
+  `cradle.textbook`, `cradle.closed_form` and `cradle.tables`, what the paper gives;
+  `cradle.measures`, what is read off outcomes; `cradle.row`, balls that a physics engine moves.
+- `cradle.input`: what is asked of input, and the words of a refusal.
+- `cradle.kernel`: the event loop; `cradle.runtime` compiles it and feeds it.
 - `cradle.models`: one file a model, and the verb `collide`.
-- `cradle.swinging`: impacts and pendulums in turn; `cradle.pendulums`, `cradle.flight` and
-  `cradle.resting` say how balls hang, fly and rest against each other, `cradle.swing_trace`
-  what happened.
-- `cradle.row`: a row of balls that a physics engine moves.
-- `cradle.closed_form`: what the paper gives in closed form; `cradle.conserving`: all outcomes of
-  three balls that conserve energy.
-- `cradle.tables`: the paper's tables and chains, read by `cradle.reading`.
-- `cradle.advice`: which model a scene needs, by what was measured.
-- `cradle.measures`: what is read off outcomes; `cradle.blocks`: batches under dask.
+- `cradle.swinging`: impacts and pendulums in turn.
 - `cradle.fit`: ratios and restitution from measured velocities.
-- `cradle.figures` and `cradle.animation`: matplotlib, imported only when asked for;
-  `cradle.film`: keyframes.
+- `cradle.advice`: which model a scene needs, by what was measured.
+- `cradle.pictures`: matplotlib, imported only when asked for.
 - `cradle.command`: the command line, `python -m cradle`.
 
 Read `cradle.textbook` first: the rules of an impact in 250 lines.  The distribution is called
@@ -39,9 +31,9 @@ from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
-from cradle.pendulums import Pendulums
-from cradle.swing_trace import Impact, Swing
-from cradle.swinging import swing
+from cradle.swinging.pendulums import Pendulums
+from cradle.swinging.record import Impact, Swing
+from cradle.swinging.swing import swing
 from cradle.tables import paper_chain, paper_sequences, ratio_table, restitution_table
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 

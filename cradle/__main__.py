@@ -1,6 +1,6 @@
 """`python -m cradle`: the command line."""
 
-from cradle.command import run
+from cradle.command.solve import run
 
 if __name__ == "__main__":
     run()

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.checks import (
+from cradle.formatting import as_html
+from cradle.input.values import (
     Vector,
     checked,
     checked_masses,
     checked_restitution,
     refuse_overflow,
 )
-from cradle.drawing import as_html
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.checks import Vector, checked, numbers, one_number
+from cradle.input.values import Vector, checked, numbers, one_number
 from cradle.kernel.state import LIMITS
 
 _Balls = tuple[Vector, ...]
@@ -41,7 +41,7 @@ def _split(
     return m, v, e, alpha
 
 
-def _impulses(m: _Balls, v: _Balls, e: _Balls, alpha: Vector) -> tuple[Vector, Vector, Vector]:
+def _taus(m: _Balls, v: _Balls, e: _Balls, alpha: Vector) -> tuple[Vector, Vector, Vector]:
     """Return what contact 2-3 would gain from the whole impulse tau_2 at once, tau_2 and tau_3."""
     (m1, m2, m3), (v1, v2, v3), (e2, e3) = m, v, e
     gain = (1.0 + e2) * m1 * (v1 - v2) / ((1.0 - alpha) * m1 + m2)
@@ -95,7 +95,7 @@ def three_balls(
            [-0.333,  0.667,  0.667]])
     """
     m, v, e, alpha = _split(masses, velocities, restitution, ratio)
-    _, tau_2, tau_3 = _impulses(m, v, e, alpha)
+    _, tau_2, tau_3 = _taus(m, v, e, alpha)
     return np.stack(np.broadcast_arrays(*_after(m, v, tau_2, tau_3)), axis=-1)
 
 
@@ -128,7 +128,7 @@ def final_impulses(
     >>> final_impulses([1, 1, 1], [1, 0, 0], [1, 1], 0.0)
     (np.float64(1.0), np.float64(1.0))
     """
-    _, tau_2, tau_3 = _impulses(*_split(masses, velocities, restitution, ratio))
+    _, tau_2, tau_3 = _taus(*_split(masses, velocities, restitution, ratio))
     return tau_2, tau_3
 
 
@@ -165,7 +165,7 @@ def one_collision_each(
     array([ True, False])
     """
     m, v, e, alpha = _split(masses, velocities, restitution, ratio)
-    gain, tau_2, tau_3 = _impulses(m, v, e, alpha)
+    gain, tau_2, tau_3 = _taus(m, v, e, alpha)
     v1, v2, _ = _after(m, v, tau_2, tau_3)
     still_closes = alpha * (m[1] + m[2]) * gain <= (gain + (v[1] - v[2])) * m[2]
     return np.asarray(still_closes & (v1 <= v2))

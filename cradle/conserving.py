@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.checks import Vector, checked
+from cradle.input.values import Vector, checked
 
 _Three = tuple[float, float, float]
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.checks import Vector, checked, must_be, one_number
 from cradle.closed_form import largest_ratios
 from cradle.conserving import conserving_angle, conserving_outcomes
+from cradle.input.values import Vector, checked, must_be, one_number
 from cradle.models import Model, collide
 from cradle.models.batch import post_impact_velocities
 from cradle.trace import Event, Trace

@@ -10,21 +10,6 @@ def progress_bar(**options: Any) -> Any:
     """Return a bar of tqdm: a notebook's own where it can be drawn, else letters.
 
     A notebook draws its own with ipywidgets; without them `tqdm.auto` would warn.
-
-    Parameters
-    ----------
-    **options
-        As for `tqdm.tqdm`.
-
-    Returns
-    -------
-    tqdm.tqdm
-        The bar, to be used with ``with``.
-
-    Examples
-    --------
-    >>> with progress_bar(total=2, disable=True) as bar:
-    ...     _ = bar.update()
     """
     if importlib.util.find_spec("ipywidgets") is None:
         from tqdm import tqdm

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.checks import Vector, a, checked, must_be, one_number
+from cradle.input.values import Vector, a, checked, must_be, one_number
 from cradle.models import Model, collide
-from cradle.resting import common_velocities, stretches
-from cradle.swinging import part
+from cradle.swinging.resting import common_velocities, stretches
+from cradle.swinging.swing import part
 
 __all__ = ["Bodies", "Row"]
 

@@ -15,10 +15,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 from cradle.chain import Chain
-from cradle.checks import a, one_number, shown
 from cradle.closed_form import largest_ratios
+from cradle.input.csv import read_table
+from cradle.input.values import a, one_number, shown
 from cradle.models.correlation import ImpulseCorrelation
-from cradle.reading import read_table
 
 if TYPE_CHECKING:
     # At run time pandas is imported by the two functions that return a DataFrame, and only there:

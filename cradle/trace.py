@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cradle.chain import Chain
-from cradle.checks import Vector, shown
-from cradle.drawing import as_html, as_text, without_rounding
+from cradle.formatting import as_html, as_text, without_rounding
+from cradle.input.values import Vector, shown
 
 if TYPE_CHECKING:
     # At run time pandas and matplotlib are imported by the methods that need them.
@@ -189,7 +189,7 @@ class Trace:
         Returns
         -------
         matplotlib.axes.Axes
-            The axes, as from `cradle.figures.velocities` and `cradle.figures.velocity_impulse`.
+            The axes, as from `velocities` and `velocity_impulse` of `cradle.pictures.impacts`.
 
         Raises
         ------
@@ -204,7 +204,7 @@ class Trace:
         >>> len(trace.plot(Figure().subplots()).get_lines())
         2
         """
-        from cradle import figures
+        from cradle.pictures import impacts as figures
 
         if contact is None:
             return figures.velocities(self, ax)

@@ -87,7 +87,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
             [sys.executable, Path(__file__).with_name("built_book.py"), shared.name]
         )
         session.config.add_cleanup(book.wait)
-    code = "from cradle.drive import warm_up; warm_up()"
+    code = "from cradle.runtime.job import warm_up; warm_up()"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 numba = pytest.importorskip("numba")
 
-from cradle.addresses import bare  # noqa: E402
+from cradle.runtime.addresses import bare  # noqa: E402
 
 PAIR = np.dtype([("one", "f8"), ("other", "i8")])
 

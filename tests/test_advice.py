@@ -348,7 +348,7 @@ def test_the_worst_of_the_chains_around_counts():
 
 def test_the_other_kernel_has_rows_of_its_own(monkeypatch):
     """Without numba the times are those of the plain loop, in one call; batches have none."""
-    monkeypatch.setattr("cradle.runtime.available", lambda: False)
+    monkeypatch.setattr("cradle.runtime.compile.available", lambda: False)
     rows.cache_clear()
     try:
         plain = recommend(THREE, ratios=0.167, impacts=100)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, swing
-from cradle.animation import animate, animate_swing
-from cradle.film import Animation, thin
+from cradle.pictures.animation import animate, animate_swing
+from cradle.pictures.keyframes import Animation, thin
 
 TRACE = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
 RUN = swing(

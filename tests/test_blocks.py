@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cradle import ImpactNotFinished, post_impact_velocities
-from cradle.blocks import post_impact_block
+from cradle.models.blocks import post_impact_block
 
 
 def batch():

@@ -18,9 +18,10 @@ from chains import HERTZ, uniform
 from chapters import Chapter, number, points
 from truth import solve
 
-from cradle import Chain, SpringChain, collide, outcomes, post_impact_velocities, runtime
+from cradle import Chain, SpringChain, collide, outcomes, post_impact_velocities
 from cradle.closed_form import back_impact_line, one_collision_each
 from cradle.kernel.state import LIMITS
+from cradle.runtime import compile as runtime
 
 ROOT = Path(__file__).parents[1]
 CHAPTER = Chapter("beyond")

@@ -11,7 +11,7 @@ import pytest
 import sympy
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide, post_impact_velocities
-from cradle.checks import (
+from cradle.input.values import (
     must_be,
     number_or_row,
     numbers,

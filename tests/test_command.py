@@ -24,17 +24,17 @@ from cradle import (
     SequentialCollisions,
     SpringChain,
     collide,
-    drive,
-    fitting,
     paper_chain,
     recommend,
-    runtime,
-    swinging,
     textbook,
 )
-from cradle.command import main, run
-from cradle.console import text as shown
+from cradle.command import fit
+from cradle.command.console import text as shown
+from cradle.command.solve import main, run
 from cradle.fit import read_shots
+from cradle.runtime import compile as runtime
+from cradle.runtime import job as drive
+from cradle.swinging import swing
 
 ROOT = Path(__file__).parents[1]
 COMMANDS = list(main.commands)
@@ -499,7 +499,7 @@ def test_errors_end_in_one_line_and_a_code(capsys, line, code, message):
 @pytest.mark.parametrize("wrong", ["--predict A", "--predict ABA --speed 0"])
 @pytest.mark.usefixtures("folder")
 def test_a_wrong_prediction_is_refused_before_the_fit(monkeypatch, capsys, wrong):
-    monkeypatch.setattr(fitting, "_fits", lambda *_: pytest.fail("fitted all the same"))
+    monkeypatch.setattr(fit, "_fits", lambda *_: pytest.fail("fitted all the same"))
     with pytest.raises(SystemExit):
         run(shlex.split(f"fit shots.csv {wrong}"))
     assert "must " in capsys.readouterr().err
@@ -531,8 +531,8 @@ def test_balls_at_rest_lose_nothing():
 
 def test_a_swing_that_ends_early_says_so(monkeypatch):
     """Of rows that are left out the table itself tells nothing."""
-    few = functools.partial(swinging.swing, max_impacts=3)
-    monkeypatch.setattr(swinging, "swing", few)
+    few = functools.partial(swing.swing, max_impacts=3)
+    monkeypatch.setattr(swing, "swing", few)
     arguments = shlex.split("swing --masses 1,1 --seconds 4 --steps 8 --csv")
     result = CliRunner().invoke(main, arguments, catch_exceptions=False)
     assert len(result.stdout.splitlines()) == 4  # the names, and 0, 0.5 and 1 s

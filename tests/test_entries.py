@@ -27,15 +27,15 @@ from cradle import (
     QuadraticDissipation,
     SequentialCollisions,
     SpringChain,
-    animation,
     closed_form,
     collide,
     conserving,
-    figures,
     fit,
     measures,
 )
-from cradle.blocks import post_impact_block
+from cradle.models.blocks import post_impact_block
+from cradle.pictures import animation, balls
+from cradle.pictures import impacts as figures
 from cradle.row import Row
 
 PACKAGE = Path(cradle.__file__).parent
@@ -123,7 +123,7 @@ ENTRIES = {
     },
     figures.velocities: {"trace": TRACE, "ax": Figure().subplots()},
     figures.velocity_impulse: {"trace": TRACE, "contact": 0, "ax": Figure().subplots()},
-    figures.chain_sketch: {"chain": THREE, "ax": Figure().subplots(), "letters": "ABA"},
+    balls.chain_sketch: {"chain": THREE, "ax": Figure().subplots(), "letters": "ABA"},
 }  # fmt: skip
 
 #: Formulas as they stand in the paper; their documentation says that ranges are not checked.

@@ -9,14 +9,9 @@ from families import FAMILIES, Draw, family, within_bounds
 from problem import Problem
 from script import Script, bits
 
-from cradle import (
-    Chain,
-    ImpactNotFinished,
-    ImpulseCorrelation,
-    collide,
-    drive,
-)
+from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide
 from cradle.closed_form import largest_ratios
+from cradle.runtime import job as drive
 from cradle.trace import ImpactNotCertified
 
 import explorer_engine  # isort: skip  (found by way of `script`)

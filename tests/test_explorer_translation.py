@@ -10,7 +10,7 @@ import pytest
 import yaml
 from script import Script, bits
 
-from cradle import runtime
+from cradle.runtime import compile as runtime
 
 import explorer_engine  # isort: skip  (found by way of `script`)
 

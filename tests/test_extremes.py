@@ -27,11 +27,11 @@ from cradle import (
     outcomes,
     paper_chain,
     post_impact_velocities,
-    runtime,
 )
 from cradle.kernel.state import LIMITS
 from cradle.measures import condition_number
 from cradle.models.correlation import MAX_EVENTS
+from cradle.runtime import compile as runtime
 from cradle.tables import paper_sequences
 
 DATA = Path(__file__).parents[1] / "data"

@@ -19,10 +19,11 @@ from cradle import (
     ImpulseCorrelation,
     SpringChain,
     collide,
-    figures,
     paper_chain,
 )
-from cradle.animation import animate
+from cradle.pictures import impacts as figures
+from cradle.pictures.animation import animate
+from cradle.pictures.balls import chain_sketch, outcome_by_ball
 
 
 @pytest.fixture
@@ -142,7 +143,7 @@ def test_upper_axis_keeps_both_ends_and_does_not_crowd(ax, trace):
 
 def test_outcome_by_ball_normalises_by_the_striker(ax):
     traces = [collide(*paper_chain("CDAB", speed=speed)) for speed in (0.5, 2.0)]
-    figures.outcome_by_ball(traces, ax, letters="CDAB")
+    outcome_by_ball(traces, ax, letters="CDAB")
     points = [line for line in ax.get_lines() if line.get_linestyle() == "None"]
     assert len(points) == len(traces)
     for line, trace in zip(points, traces):
@@ -151,7 +152,7 @@ def test_outcome_by_ball_normalises_by_the_striker(ax):
 
 
 def test_chain_sketch_touches_and_scales_by_volume(ax):
-    figures.chain_sketch(Chain([1, 8, 0.001], [1, 0, -2], 1), ax)
+    chain_sketch(Chain([1, 8, 0.001], [1, 0, -2], 1), ax)
     balls = [patch for patch in ax.patches if isinstance(patch, Circle)]
     radii = np.array([ball.get_radius() for ball in balls])
     places = np.array([ball.get_center()[0] for ball in balls])
@@ -163,7 +164,7 @@ def test_chain_sketch_touches_and_scales_by_volume(ax):
 
 
 def test_chain_sketch_of_balls_at_rest(ax):
-    figures.chain_sketch(Chain([1, 1], [0, 0], 1), ax)
+    chain_sketch(Chain([1, 1], [0, 0], 1), ax)
     assert not [text for text in ax.texts if text.get_text() == ""]
 
 
@@ -198,7 +199,7 @@ def test_two_digits_are_one_index():
     trace = collide(Chain([1] * 12, np.eye(12)[0]), ImpulseCorrelation(0.1))
     words = drawn(lambda ax: figures.velocities(trace, ax))
     words |= drawn(lambda ax: figures.velocity_impulse(trace, 10, ax, other=9))
-    words |= drawn(lambda ax: figures.chain_sketch(trace.chain, ax))
+    words |= drawn(lambda ax: chain_sketch(trace.chain, ax))
     assert words >= {"$v_9$", "$v_{12}$", "$B_{10}$", "$m_{12}$", r"$\tau_{12}$"}
     assert words >= {r"impulse $\tau_{12}$ (N s)", r"impulse $\tau_{11}$ (N s)"}
     assert not [word for word in words if re.search(r"_\d\d", word)]
@@ -223,4 +224,4 @@ def test_a_long_chain_leaves_room_for_its_curves():
 def test_outcome_by_ball_refuses(chains, letters, message):
     traces = [collide(Chain(np.ones(len(v)), v), ImpulseCorrelation(0.0)) for v in chains]
     with pytest.raises(ValueError, match=message):
-        figures.outcome_by_ball(traces, Figure().subplots(), letters=letters)
+        outcome_by_ball(traces, Figure().subplots(), letters=letters)

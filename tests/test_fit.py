@@ -28,7 +28,7 @@ from cradle.fit import (
 from cradle.fit.likelihood import chi_squares
 from cradle.fit.parameters import Points
 from cradle.fit.search import RISE, refine, scan
-from cradle.fit.tracker import Track
+from cradle.fit.shots import Track
 
 ROOT = Path(__file__).parents[1]
 MASS = {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}

@@ -6,9 +6,9 @@ import pytest
 from click.testing import CliRunner
 from test_command import call
 
-from cradle import runtime
-from cradle.command import main
+from cradle.command.solve import main
 from cradle.fit import ratio, read_shots
+from cradle.runtime import compile as runtime
 from cradle.tables import data_folder
 
 

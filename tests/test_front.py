@@ -26,7 +26,7 @@ from cradle import (
     collide,
     paper_chain,
 )
-from cradle.drawing import as_html
+from cradle.formatting import as_html
 
 # --- the desk toy --------------------------------------------------------------------------
 

@@ -28,13 +28,13 @@ from cradle import (
     ImpulseCorrelation,
     SequentialCollisions,
     collide,
-    drive,
     kernel,
     outcomes,
-    runtime,
 )
 from cradle import post_impact_velocities as batch
 from cradle.progress import progress_bar
+from cradle.runtime import compile as runtime
+from cradle.runtime import job as drive
 
 FIELDS = ("velocities", "impulses", "absorbed", "collisions", "path", "path_impulses")
 
@@ -304,7 +304,9 @@ def test_warm_up_compiles():
 def test_compiled_code_is_found_on_disk():
     """In a new process, and by the name that numba gives it."""
     drive.warm_up()
-    code = "from cradle import runtime; print(runtime.loaded(), runtime.on_disk())"
+    code = (
+        "from cradle.runtime import compile as runtime; print(runtime.loaded(), runtime.on_disk())"
+    )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     if runtime._stored() is None:
         pytest.skip("no folder for compiled code")
@@ -423,7 +425,7 @@ def test_without_a_folder_answers_are_the_same(tmp_path):
     file.write_text("no folder")
     code = """if True:
         import cradle
-        from cradle import runtime
+        from cradle.runtime import compile as runtime
         runtime._folder = lambda: FOLDER
         print(runtime.on_disk())
         chain = cradle.Chain([1, 0.01, 1], [1, 0, 0], 0.9)
@@ -648,7 +650,7 @@ def test_ctrl_c_works_at_once(work, wish):
         import signal, time
         signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs begin without
         import cradle
-        from cradle.drive import warm_up
+        from cradle.runtime.job import warm_up
         warm_up()
         m, v = [1, *[1e-14, 1] * 4], [1, *[0] * 8]
         begun = time.process_time()

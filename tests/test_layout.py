@@ -257,7 +257,7 @@ def contrast(one: str, other: str) -> float:
 
 
 def test_colours_of_dark_mode_can_be_seen():
-    from cradle.figures import PALETTE
+    from cradle.pictures.impacts import PALETTE
 
     ground = book_figures.dark("white")
     assert contrast(book_figures.dark("black"), ground) > LETTERS

@@ -15,9 +15,10 @@ from chains import magnitudes, uniform
 from plain import solve as solved
 from test_kernel import needs_numba
 
-from cradle import ImpactNotFinished, outcomes, paper_chain, post_impact_velocities, runtime
+from cradle import ImpactNotFinished, outcomes, paper_chain, post_impact_velocities
 from cradle.kernel.state import FINISHED, LIMITS
 from cradle.models import batch
+from cradle.runtime import compile as runtime
 
 
 @pytest.fixture(autouse=True)

@@ -18,12 +18,12 @@ from cradle import (
     Pendulums,
     SequentialCollisions,
     SpringChain,
-    flight,
     swing,
-    swinging,
     textbook,
 )
-from cradle.flight import FullFlight, Meeting, SmallAngleFlight, first_fall
+from cradle.swinging import flight
+from cradle.swinging import swing as swinging
+from cradle.swinging.flight import FullFlight, Meeting, SmallAngleFlight, first_fall
 
 ONE_HERTZ = Pendulums(length=9.81 / (4 * math.pi**2))  # sqrt(g/l) = 2 pi / s: a period of 1 s
 
@@ -360,7 +360,7 @@ def test_where_slow_begins_does_not_matter(monkeypatch):
     arguments = Chain([1, 2, 1], [0] * 3, 0.6), ImpulseCorrelation(0.1), [-0.03, 0, 0.01]
     found, counts = [], []
     for least in (1e-10, 1e-8, 1e-6):
-        monkeypatch.setattr("cradle.swinging.RESTING", least)
+        monkeypatch.setattr("cradle.swinging.swing.RESTING", least)
         run = swing(*arguments, [5.0], pendulums=Pendulums([0.1, 0.12, 0.11]))
         found.append(run.positions[-1] / 0.03)
         counts.append(len(run.impacts))

@@ -1,6 +1,6 @@
 """What the work area held before an impact, or a contact before it waited, changes nothing.
 
-And nothing outside it is touched: compiled code does not ask (`cradle.runtime`).
+And nothing outside it is touched: compiled code does not ask (`cradle.runtime.compile`).
 """
 
 from typing import get_type_hints
@@ -11,7 +11,7 @@ from extreme_chains import any_chain
 from families import FAMILIES, Draw, family
 from problem import Problem
 
-from cradle import drive
+from cradle.runtime import job as drive
 
 #: Contacts that wait from the beginning: no impulse has reached them yet.
 WAITING = Problem(

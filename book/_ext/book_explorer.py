@@ -165,7 +165,7 @@ def measured() -> list[dict[str, Any]]:
 
 def data() -> dict[str, Any]:
     """Return all that the page does not compute itself."""
-    from cradle.figures import EVENT_STYLES, PALETTE, ball_style
+    from cradle.pictures.impacts import EVENT_STYLES, PALETTE, ball_style
     from cradle.tables import ball_masses, ratio_table, restitution_table
 
     pairs = restitution_table().stack()
@@ -193,7 +193,9 @@ def draw(setting: dict[str, Any], path: Path) -> None:
     """Draw a scene for readers without scripts: the balls, and their velocities during the hit."""
     from matplotlib.figure import Figure
 
-    from cradle import Chain, ImpulseCorrelation, collide, figures
+    from cradle import Chain, ImpulseCorrelation, collide
+    from cradle.pictures import impacts as figures
+    from cradle.pictures.balls import chain_sketch
 
     chain = Chain(
         setting["masses"], setting["speeds"], setting["restitution"]
@@ -206,7 +208,7 @@ def draw(setting: dict[str, Any], path: Path) -> None:
     )
     row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.2])
     letters = setting["letters"].replace("-", "")
-    figures.chain_sketch(chain, row, letters=letters)
+    chain_sketch(chain, row, letters=letters)
     figures.velocities(collide(chain, model), diagram)
     figure.savefig(path, metadata={"Date": None})
 

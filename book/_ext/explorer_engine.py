@@ -1,9 +1,9 @@
 """The live explorer's engine: the package's own event loop as a script for the browser.
 
-`cradle.runtime.unit` joins the rooms of the kernel to one plain source: functions of numbers,
-loops, sequences and records. This module writes that source out as JavaScript, statement by
-statement, between hand-written parts (`engine_*.js`). Both languages count in the same doubles, so
-the script's answers are those of Python, to the last bit (tests/test_explorer_engine.py).
+`cradle.runtime.compile.unit` joins the rooms of the kernel to one plain source: functions of
+numbers, loops, sequences and records. This module writes that source out as JavaScript, statement
+by statement, between hand-written parts (`engine_*.js`). Both languages count in the same doubles,
+so the script's answers are those of Python, to the last bit (tests/test_explorer_engine.py).
 
 It knows what the kernel is made of and refuses anything else. What looks alike in the two languages
 and means something else is not passed on as it stands:
@@ -23,7 +23,8 @@ from typing import Any, NoReturn
 
 from sphinx.application import Sphinx
 
-from cradle import drive, runtime
+from cradle.runtime import compile as runtime
+from cradle.runtime import job as drive
 
 #: Hand-written parts, beside this file: before the event loop, and after it.
 PARTS = ("engine_numbers.js", "engine_collide.js")

@@ -1,4 +1,4 @@
-// Pictures of one hit as SVG text: bars, energy, and the diagrams of cradle/figures.py. Each takes
+// Pictures of one hit as SVG text: bars, energy, and the diagrams of cradle/pictures/impacts.py. Each takes
 // what it draws and the size of its box in pixels, and returns the whole picture; nothing is kept.
 (function (explorer) {
   "use strict";

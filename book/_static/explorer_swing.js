@@ -8,7 +8,7 @@
   const GRAVITY = 9.81;
   const FREQUENCY = Math.sqrt(GRAVITY / LENGTH);
   const HALF_PERIOD = Math.PI / FREQUENCY;
-  // As in cradle/resting.py: slower motion against each other counts as none.
+  // As in cradle/swinging/resting.py: slower motion against each other counts as none.
   const RESTING = 1e-10;
   // Beyond this number of events a hit would hold up the picture.
   const EVENTS = 4000;
@@ -23,7 +23,7 @@
   });
 
   // Touching balls that hardly move against each other get their common velocity (rule 2 of
-  // cradle/resting.py).
+  // cradle/swinging/resting.py).
   function settled(masses, velocities, least) {
     let v = velocities.slice();
     const resting = v.map(() => false); // against the right neighbour

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.advice.measured import Evidence, Row, evidence, measured_chain, rows, unit
+from cradle.advice.measured import Evidence, Measured, evidence, measured_chain, rows, unit_time
 from cradle.advice.recommendation import Recommendation
 from cradle.chain import Chain
-from cradle.checks import must_be, one_number, shown, whole_number
+from cradle.input.values import must_be, one_number, shown, whole_number
 from cradle.models import Model
 from cradle.models.compliant import SpringChain
 from cradle.models.correlation import ImpulseCorrelation
@@ -176,7 +176,7 @@ class _Wish(NamedTuple):
         """Whether the contacts are equal springs, as all that were measured."""
         return len(set(np.ravel(1.0 if self.stiffness is None else self.stiffness))) == 1
 
-    def model(self, row: Row) -> Model:
+    def model(self, row: Measured) -> Model:
         """Return the model of a row, with what is known."""
         stiffness = 1.0 if self.stiffness is None else self.stiffness
         match row.group:
@@ -284,7 +284,7 @@ def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recom
         call=_BATCH if "batch" in row.setting else "collide(chain, model)",
         numerical_error=best.error if known_error else None,
         model_error=apart,
-        seconds=best.cost * unit() if best.measured else None,
+        seconds=best.cost * unit_time() if best.measured else None,
         plain_seconds=_plain_seconds(like, wish) if row.setting.startswith("compiled") else None,
         measured_on=best.chains if best.measured else (),
         reason=_reason(group, wish),
@@ -301,7 +301,7 @@ def _plain_seconds(chain: Chain | None, wish: _Wish) -> float | None:
     """Return the time of one impact in the event loop as it stands."""
     slow = tuple(row for row in rows("event", "plain") if row.model == "ImpulseCorrelation")
     found = evidence(slow, chain, wish.ratios)[0]
-    return found.cost * unit() if found.measured else None
+    return found.cost * unit_time() if found.measured else None
 
 
 def _cheapest(settings: list[Evidence], name: str, wish: _Wish) -> Evidence:

@@ -11,22 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cradle import runtime
 from cradle.chain import Chain
 from cradle.models.correlation import ImpulseCorrelation
+from cradle.runtime import compile as runtime
 from cradle.tables import data_folder, paper_chain
 
-__all__ = ["Evidence", "Row", "evidence", "lasting", "measured_chain", "rows", "unit"]
+__all__ = ["Evidence", "Measured", "evidence", "lasting", "measured_chain", "rows", "unit_time"]
 
 
-class Row(NamedTuple):
-    """One model in one setting on one chain.
-
-    Examples
-    --------
-    >>> {row.chain for row in rows("energy")} == {"three equal", "ABCCA"}
-    True
-    """
+class Measured(NamedTuple):
+    """One model in one setting on one chain."""
 
     group: str
     model: str
@@ -46,15 +40,9 @@ class Row(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What was measured of one setting, for one chain.
+    """What was measured of one setting, for one chain."""
 
-    Examples
-    --------
-    >>> [evidence(rows("energy"), Chain([1] * n, np.eye(n)[0]))[0].measured for n in (3, 30)]
-    [True, False]
-    """
-
-    rows: tuple[Row, ...]
+    rows: tuple[Measured, ...]
     #: Measured on this very chain, which is then the only row.
     exact: bool
     #: Measured on it or on chains around it.
@@ -83,42 +71,15 @@ def _lines() -> tuple[dict[str, str], ...]:
 
 
 @cache
-def unit() -> float:
-    """Return the unit of times on the machine that measured.
-
-    Returns
-    -------
-    float
-        Seconds: one impact of a random chain of three balls, solved in a batch.
-
-    Examples
-    --------
-    >>> 0 < unit() < 1e-3
-    True
-    """
+def unit_time() -> float:
+    """Return the unit of times, s: one impact of three balls in a batch, where it was measured."""
     timed = [line for line in _lines() if line["time_ratio"]]
     times = [float(line["microseconds"]) / float(line["time_ratio"]) for line in timed]
     return 1e-6 * float(np.median(times))
 
 
 def lasting(seconds: float) -> str:
-    """Return a time in two digits.
-
-    Parameters
-    ----------
-    seconds : float
-        The time, s.
-
-    Returns
-    -------
-    str
-        With its unit; microseconds are us, for terminals without the letter mu.
-
-    Examples
-    --------
-    >>> lasting(2.13e-5), lasting(0.0843)
-    ('21 us', '84 ms')
-    """
+    """Return a time in two digits; microseconds are us, for terminals without the letter mu."""
     for name, size in (("us", 1e-6), ("ms", 1e-3), ("s", 1.0)):
         if seconds < 999.5 * size or name == "s":
             break
@@ -126,26 +87,8 @@ def lasting(seconds: float) -> str:
 
 
 @cache
-def rows(group: str, kernel: str = "") -> tuple[Row, ...]:
-    """Return the rows of a group, in settings that this installation and its calls have.
-
-    Parameters
-    ----------
-    group : {"event", "springs", "energy", "outcome"}
-        Group of the table.
-    kernel : {"", "compiled", "plain"}
-        How the event loop runs; compiled, if left out, where that can be.
-
-    Returns
-    -------
-    tuple of Row
-        Without linear springs and single precision.
-
-    Examples
-    --------
-    >>> sorted({row.model for row in rows("outcome")})[:2]
-    ['FusedChain', 'ImpulseCorrelation']
-    """
+def rows(group: str, kernel: str = "") -> tuple[Measured, ...]:
+    """Return the rows of a group, in settings that this installation and its calls have."""
     kernel = kernel or ("compiled" if runtime.available() else "plain")
     batch = f"{kernel}, batch"
     found = []
@@ -161,7 +104,7 @@ def rows(group: str, kernel: str = "") -> tuple[Row, ...]:
             continue
         apart = line["model_error"] if line["model_reference"].startswith("Hertz") else ""
         found.append(
-            Row(
+            Measured(
                 line["group"],
                 line["model"],
                 line["setting"],
@@ -180,31 +123,10 @@ _PATH = "one call with its path"
 
 
 def evidence(
-    rows: tuple[Row, ...], chain: Chain | None, ratios: ImpulseCorrelation | None = None
+    rows: tuple[Measured, ...], chain: Chain | None, ratios: ImpulseCorrelation | None = None
 ) -> list[Evidence]:
-    """Return what was measured on a chain; else on chains around it; else on most chains.
-
-    Parameters
-    ----------
-    rows : tuple of Row
-        Of one model.
-    chain : Chain or None
-        The chain; None for one that is like none of those measured.
-    ratios : ImpulseCorrelation, optional
-        The model, if it is this one: a chain is the same if its ratios are.
-
-    Returns
-    -------
-    list of Evidence
-        One for each setting.
-
-    Examples
-    --------
-    >>> found = evidence(rows("springs"), Chain([1, 1, 1, 1], [1, 0, 0, 0]))
-    >>> found[0].exact, found[0].measured, found[0].chains
-    (False, True, ('three equal', 'five equal', 'light middle'))
-    """
-    settings: dict[str, dict[str, Row]] = {}
+    """Return what was measured on a chain; else on chains around it; else on most chains."""
+    settings: dict[str, dict[str, Measured]] = {}
     for row in rows:
         settings.setdefault(row.setting, {})[row.chain] = row
     name = measured_chain(chain, ratios) if chain else ""
@@ -230,26 +152,8 @@ def _chains() -> dict[str, tuple[Chain, ImpulseCorrelation]]:
 
 
 def measured_chain(chain: Chain, ratios: ImpulseCorrelation | None = None) -> str:
-    """Return the name of the measured chain that this is.
-
-    Parameters
-    ----------
-    chain : Chain
-        The chain; its units, its direction and a common velocity do not matter.
-    ratios : ImpulseCorrelation, optional
-        Ratios that must be the measured ones too.
-
-    Returns
-    -------
-    str
-        Empty if it is none of them.
-
-    Examples
-    --------
-    >>> measured_chain(Chain([7, 7, 7], [0.5, 0.5, -3]))
-    'three equal'
-    """
-    one = _struck(chain)
+    """Return the name of the measured chain that this is."""
+    one = _from_one_end(chain)
     for name, (other, model) in _chains().items():
         if one is None or len(one) != len(other):
             continue
@@ -267,7 +171,7 @@ def _values(model: ImpulseCorrelation, balls: int) -> list[list[float]]:
     return [np.broadcast_to(part, (balls - 2,)).tolist() for part in (model.forward, backward)]
 
 
-def _struck(chain: Chain) -> Chain | None:
+def _from_one_end(chain: Chain) -> Chain | None:
     """Return a chain that is struck at one end, striker first and of mass 1; None for others."""
     m, e, u = chain.masses, chain.restitution, chain.closing_speeds
     if u[-1] > 0.0 and not u[:-1].any():
@@ -288,9 +192,10 @@ def _place(chain: Chain) -> list[list[float]]:
     return [[len(m), spread, float(e.min())], [len(m), spread, float(e.max())]]
 
 
-def _around(rows: tuple[Row, ...], chain: Chain | None) -> tuple[Row, ...]:
+def _around(rows: tuple[Measured, ...], chain: Chain | None) -> tuple[Measured, ...]:
     """Return the rows of chains around a chain: of each that reaches it alone, or else of all."""
-    if chain is None or _struck(chain) is None or any(row.numerical_error is None for row in rows):
+    unknown = any(row.numerical_error is None for row in rows)
+    if chain is None or _from_one_end(chain) is None or unknown:
         return ()
     least, most = np.array(_place(chain))
     known = [_DRAWN.get(row.chain) or _place(_chains()[row.chain][0]) for row in rows]

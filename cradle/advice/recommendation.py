@@ -92,24 +92,7 @@ class Recommendation:
 
 
 def made(model: Any) -> str:
-    """Return the call that makes a model, without what is as usual.
-
-    Parameters
-    ----------
-    model : Model
-        A model of the package.
-
-    Returns
-    -------
-    str
-        Python.
-
-    Examples
-    --------
-    >>> from cradle import SpringChain
-    >>> made(SpringChain(rtol=1e-4))
-    'SpringChain(rtol=0.0001)'
-    """
+    """Return the call that makes a model, without what is as usual."""
     values = {one.name: (getattr(model, one.name), one.default) for one in fields(model)}
     given = [f"{name}={value!r}" for name, (value, usual) in values.items() if value != usual]
     return f"{type(model).__name__}({', '.join(given)})"

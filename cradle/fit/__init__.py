@@ -3,25 +3,24 @@
     read_shots -> restitution (pairs) -> ratio (triplets and longer chains) -> predict
 
 - `cradle.fit.shots`: measured velocities, in sets.
-- `cradle.fit.reading`: tables of them, read and checked; `cradle.fit.lines`.
-- `cradle.fit.tracker`: positions exported by the video tool Tracker.
-- `cradle.fit.motion`: velocities from positions or heights.
+- `cradle.fit.reading`: tables of them, read and checked; `cradle.fit.shots`.
+- `cradle.fit.reading`: positions exported by the video tool Tracker.
+- `cradle.fit.film`: velocities from positions or heights.
 - `cradle.fit.parameters`: what is fitted, and its names.
 - `cradle.fit.likelihood`: how well parameters explain shots.
 - `cradle.fit.search`: exhaustive search, confidence sets.
 - `cradle.fit.estimate`: the fits.
 - `cradle.fit.answers`, `cradle.fit.result`: what they return.
-- `cradle.fit.drawing`: their figures; loads matplotlib when asked for.
+- `cradle.pictures.fits`: their figures; loads matplotlib when asked for.
 """
 
 from cradle.fit.answers import Estimate, Prediction
 from cradle.fit.estimate import ratio, restitution, restitution_from_heights
-from cradle.fit.motion import Velocities, speeds_from_heights, velocities_from_tracks
-from cradle.fit.reading import read_shots
+from cradle.fit.film import Velocities, speeds_from_heights, velocities_from_tracks
+from cradle.fit.reading import read_shots, read_tracker
 from cradle.fit.result import Fit
 from cradle.fit.search import Mode
-from cradle.fit.shots import Shots, ShotSet
-from cradle.fit.tracker import Tracks, read_tracker
+from cradle.fit.shots import Shots, ShotSet, Tracks
 
 __all__ = [
     "Estimate",

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cradle.checks import Vector
 from cradle.fit.parameters import Key, label
 from cradle.fit.search import RISE, Mode, Scan
+from cradle.input.values import Vector
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.checks import Vector, checked, one_number
 from cradle.fit.answers import Estimate, Group
 from cradle.fit.likelihood import chi_squares
 from cradle.fit.parameters import (
@@ -22,6 +21,7 @@ from cradle.fit.parameters import (
 from cradle.fit.result import Fit
 from cradle.fit.search import RISE, Mode, refine, scan
 from cradle.fit.shots import Shots, ShotSet
+from cradle.input.values import Vector, checked, one_number
 from cradle.kernel.state import LIMITS
 
 # Values of a coefficient or ratio on the first grid.

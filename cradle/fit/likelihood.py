@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cradle.checks import Vector
 from cradle.fit.parameters import Key, Points, pair_keys
 from cradle.fit.shots import ShotSet
+from cradle.input.values import Vector
 
 # Parameter points evaluated at a time, to bound the memory.
 _CHUNK = 4096
@@ -23,39 +23,17 @@ _CHUNK = 4096
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """Outcomes of one set of K shots at P points, and what they change with.
+    """Outcomes of one set of K shots at P points, and what they change with."""
 
-    Attributes
-    ----------
-    outcome : ndarray, shape (K, P, N)
-        Velocities after the impact.
-    slopes : ndarray, shape (K, P, N, E)
-        Their change with each uncertain coefficient of restitution.
-    movers : ndarray, shape (K, P, N, M)
-        Their change with one standard error of each measured velocity before the impact.
-    """
-
+    #: Velocities after the impact, shape (K, P, N); their change with each uncertain restitution,
+    #: (K, P, N, E), and with one standard error of each measured velocity before, (K, P, N, M).
     outcome: Vector
     slopes: Vector
     movers: Vector
 
 
 def responses(shots: ShotSet, points: Points, uncertain: Sequence[tuple[Key, float]]) -> Responses:
-    """Solve one set of shots at all points, with the slopes that the profile needs.
-
-    Parameters
-    ----------
-    shots : ShotSet
-        One arrangement.
-    points : Points
-        P parameter points.
-    uncertain : sequence of (key, float)
-        Coefficients of restitution with an error, and their standard errors.
-
-    Returns
-    -------
-    Responses
-    """
+    """Solve one set of shots at all points, with the slopes that the profile needs."""
     moving = np.flatnonzero((shots.before != 0).any(axis=0))
     at_rest_exactly = not np.delete(shots.sigma_before, moving, axis=1).any()
     single = moving.size == 1 and (shots.before[:, moving[0]] > 0).all() and at_rest_exactly
@@ -96,19 +74,7 @@ def responses(shots: ShotSet, points: Points, uncertain: Sequence[tuple[Key, flo
 def normal_equations(shots: ShotSet, solved: Responses) -> tuple[Vector, Vector, Vector]:
     """Chi-square at the nominal restitution, its slope and curvature, profiled over `before`.
 
-    Parameters
-    ----------
-    shots : ShotSet
-        K shots.
-    solved : Responses
-        The same set at P points.
-
-    Returns
-    -------
-    chi_square : ndarray, shape (P,)
-    slope : ndarray, shape (P, E)
-    curvature : ndarray, shape (P, E, E)
-        Chi-square of restitution changed by d is chi_square - 2 slope d + d curvature d.
+    Of restitution changed by d it is chi_square - 2 slope d + d curvature d.
     """
     residual = shots.after[:, None, :] - solved.outcome
     columns = np.concatenate([residual[..., None], solved.slopes], axis=-1)
@@ -124,33 +90,7 @@ def normal_equations(shots: ShotSet, solved: Responses) -> tuple[Vector, Vector,
 def chi_squares(
     sets: Sequence[ShotSet], points: Points, uncertain: Sequence[tuple[Key, float]]
 ) -> Vector:
-    """Chi-square of all shots at each point, profiled over restitution and velocities before.
-
-    Parameters
-    ----------
-    sets : sequence of ShotSet
-        Measured shots.
-    points : Points
-        P parameter points.
-    uncertain : sequence of (key, float)
-        Coefficients of restitution with an error, and their standard errors.
-
-    Returns
-    -------
-    ndarray, shape (P,)
-
-    Examples
-    --------
-    Three ratios and 36 velocities; the middle one is the ratio they were made with:
-
-    >>> from cradle.fit import read_shots
-    >>> from cradle.tables import data_folder
-    >>> shots = read_shots(data_folder() / "shots_synthetic.csv")
-    >>> ratios = {("A", "B", "A"): np.array([0.05, 0.127, 0.2])}
-    >>> points = Points({("A", "B"): 0.53}, ratios)
-    >>> chi_squares([shots["ABA"]], points, [(("A", "B"), 0.003)]).round().tolist()
-    [249.0, 32.0, 328.0]
-    """
+    """Chi-square of all shots at each point, profiled over restitution and velocities before."""
     size = max((values.size for values in points.ratios.values()), default=1)
     parts = []
     for begin in range(0, size, _CHUNK):

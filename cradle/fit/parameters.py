@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from cradle.checks import Vector, shown
+from cradle.input.values import Vector, shown
 from cradle.models.batch import post_impact_velocities
 
 #: A parameter: the types of two balls (restitution, in alphabetical order) or of three (ratio).
@@ -16,69 +16,19 @@ Key = tuple[str, ...]
 
 
 def label(key: Key) -> str:
-    """Return the name of a parameter, such as "ABC" or "steel-brass".
-
-    Parameters
-    ----------
-    key : tuple of str
-        Types of two or three balls.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> label(("A", "B", "C")), label(("steel", "brass"))
-    ('ABC', 'steel-brass')
-    """
+    """Return the name of a parameter, such as "ABC" or "steel-brass"."""
     return ("" if all(len(name) == 1 for name in key) else "-").join(key)
 
 
 def parameter_key(name: str | Key) -> Key:
-    """Return the types of balls that a parameter's name joins.
-
-    Parameters
-    ----------
-    name : str or tuple of str
-        Such as "ABC" or "steel-brass".
-
-    Returns
-    -------
-    tuple of str
-
-    Examples
-    --------
-    >>> parameter_key("ABC"), parameter_key("steel-brass")
-    (('A', 'B', 'C'), ('steel', 'brass'))
-    """
+    """Return the types of balls that a parameter's name joins."""
     if isinstance(name, tuple):
         return name
     return tuple(name.split("-")) if "-" in name else tuple(name)
 
 
 def types_in_a_row(types: str | Sequence[str]) -> tuple[str, ...]:
-    """Return the types of a row of balls, at least two.
-
-    Parameters
-    ----------
-    types : str or sequence of str, length N
-        In one string such as "ABA" or "steel-brass-steel".
-
-    Returns
-    -------
-    tuple of str, length N
-
-    Raises
-    ------
-    ValueError
-        If fewer than 2 balls are named.
-
-    Examples
-    --------
-    >>> types_in_a_row("ABA"), types_in_a_row("steel-brass")
-    (('A', 'B', 'A'), ('steel', 'brass'))
-    """
+    """Return the types of a row of balls, at least two."""
     row = parameter_key(types) if isinstance(types, str) else tuple(types)
     if len(row) < 2:
         raise ValueError(f"types = {shown(types)}; must name at least 2 balls")
@@ -86,77 +36,27 @@ def types_in_a_row(types: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def pair_keys(types: Sequence[str]) -> list[Key]:
-    """Return the restitution parameter of each contact.
-
-    Parameters
-    ----------
-    types : sequence of str, length N
-
-    Returns
-    -------
-    list of tuple, length N - 1
-
-    Examples
-    --------
-    >>> pair_keys("BAB")
-    [('A', 'B'), ('A', 'B')]
-    """
+    """Return the restitution parameter of each contact."""
     return [tuple(sorted(pair)) for pair in pairwise(types)]
 
 
 def triplet_keys(types: Sequence[str]) -> tuple[list[Key], list[Key]]:
-    """Return the forward and the backward ratio parameter of each interior ball.
-
-    Parameters
-    ----------
-    types : sequence of str, length N
-
-    Returns
-    -------
-    forward, backward : list of tuple, length N - 2
-
-    Examples
-    --------
-    >>> triplet_keys("ABC")
-    ([('A', 'B', 'C')], [('C', 'B', 'A')])
-    """
+    """Return the forward and the backward ratio parameter of each interior ball."""
     forward = [tuple(types[i : i + 3]) for i in range(len(types) - 2)]
     return forward, [key[::-1] for key in forward]
 
 
 def ratio_keys(types: Sequence[str]) -> set[Key]:
-    """Return the ratio parameters of a chain, of both ways, each once.
-
-    Parameters
-    ----------
-    types : sequence of str, length N
-
-    Returns
-    -------
-    set of tuple
-
-    Examples
-    --------
-    >>> sorted(ratio_keys("ABAB"))
-    [('A', 'B', 'A'), ('B', 'A', 'B')]
-    """
+    """Return the ratio parameters of a chain, of both ways, each once."""
     forward, backward = triplet_keys(types)
     return {*forward, *backward}
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Parameter points at which chains are solved; P points.
+    """P parameter points at which chains are solved: of shape (P,), or one value for all."""
 
-    Attributes
-    ----------
-    restitution : mapping of key to float
-        Coefficients of restitution, the same at all points but for `shifted`.
-    ratios : mapping of key to ndarray, shape (P,)
-        Ratios at each point.
-    """
-
-    restitution: Mapping[Key, float]
+    restitution: Mapping[Key, float | Vector]
     ratios: Mapping[Key, Vector]
 
     def outcomes(self, types: Sequence[str], masses: Vector, velocities: Vector) -> Vector:
@@ -168,37 +68,9 @@ class Points:
             np.stack([self.ratios[key] for key in keys], axis=-1) if keys else np.zeros((size, 0))
             for keys in (forward, backward)
         ]
-        e = [self.restitution[key] for key in pair_keys(types)]
+        e = np.stack([self.restitution[key] for key in pair_keys(types)], axis=-1)
         return post_impact_velocities(masses, velocities, e, *ratios, excess="saturate")
 
-    def shifted(self, key: Key, amount: float) -> Points:
+    def shifted(self, key: Key, amount: float | Vector) -> Points:
         """Return the points with one coefficient of restitution changed."""
         return Points({**self.restitution, key: self.restitution[key] + amount}, self.ratios)
-
-
-def outcomes_of_draws(
-    masses: Sequence[float], speed: float, restitution: Vector, forward: Vector, backward: Vector
-) -> Vector:
-    """Solve one chain for drawn parameters, the first ball striking the others at rest.
-
-    Parameters
-    ----------
-    masses : sequence of float, length N
-        kg.
-    speed : float
-        Of the first ball, m/s.
-    restitution : ndarray, shape (D, N - 1)
-    forward, backward : ndarray, shape (D, N - 2)
-
-    Returns
-    -------
-    ndarray, shape (D, N)
-        Velocities after the impact, m/s.
-
-    Examples
-    --------
-    >>> outcomes_of_draws([1, 1], 1.0, np.array([[1.0]]), np.zeros((1, 0)), np.zeros((1, 0)))
-    array([[0., 1.]])
-    """
-    before = [speed] + [0.0] * (len(masses) - 1)
-    return post_impact_velocities(masses, before, restitution, forward, backward, excess="saturate")

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cradle.checks import Vector, one_number
 from cradle.fit.answers import Estimate, Group, Prediction
 from cradle.fit.parameters import (
     Key,
     Points,
     label,
-    outcomes_of_draws,
     pair_keys,
     parameter_key,
     triplet_keys,
@@ -22,13 +21,14 @@ from cradle.fit.parameters import (
 )
 from cradle.fit.search import LEVEL
 from cradle.fit.shots import Shots, chance
+from cradle.input.values import Vector, one_number
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
 #: Columns of the table of a fit.
-COLUMNS = (
+RESULT_COLUMNS = (
     "name", "kind", "value", "intervals", "minima", "identified", "at_bound", "bound",
 )  # fmt: skip
 # Draws from the fitted parameters for a prediction.
@@ -110,7 +110,7 @@ class Fit:
         [(0.5113, 0.5429)]
         """
         return [
-            dict(zip(COLUMNS, (name, one.kind, one.value, one.intervals, len(one.modes),
+            dict(zip(RESULT_COLUMNS, (name, one.kind, one.value, one.intervals, len(one.modes),
                                one.identified, one.at_bound, one.bound), strict=True))
             for name, one in self.estimates.items()
         ]  # fmt: skip
@@ -119,7 +119,7 @@ class Fit:
         """Return the rows as a table; where nothing was identified the value is missing."""
         import pandas as pd
 
-        return pd.DataFrame(self.rows(), columns=COLUMNS).set_index("name")
+        return pd.DataFrame(self.rows(), columns=RESULT_COLUMNS).set_index("name")
 
     def plot(self, name: str | None = None, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
         """Draw the likelihood of one estimate, and its data with their predictions.
@@ -140,7 +140,7 @@ class Fit:
         ValueError
             If nothing was fitted.
         """
-        from cradle.fit.drawing import draw_fit
+        from cradle.pictures.fits import draw_fit
 
         return draw_fit(self, name, axes)
 
@@ -182,16 +182,14 @@ class Fit:
         row = types_in_a_row(types)
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
         masses = self.shots.masses
-        e, ratios = self._draws(row, masses)
-        velocities = outcomes_of_draws([masses[kind] for kind in row], speed, e, *ratios)
+        drawn, balls = self._draws(row, masses), np.array([masses[kind] for kind in row])
+        velocities = drawn.outcomes(row, balls, np.array([[speed] + [0.0] * (len(row) - 1)]))
         lower, median, upper = np.quantile(
             velocities, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0
         )
         return Prediction(row, median, lower, upper)
 
-    def _draws(
-        self, types: tuple[str, ...], masses: Mapping[str, float]
-    ) -> tuple[Vector, tuple[Vector, Vector]]:
+    def _draws(self, types: tuple[str, ...], masses: Mapping[str, float]) -> Points:
         """Draw coefficients of restitution and ratios of a chain from what was fitted."""
         for kind in types:
             if kind not in masses:
@@ -199,7 +197,7 @@ class Fit:
                     f"no mass is known of type {kind!r}; there are {', '.join(masses)}"
                 )
         random = np.random.default_rng(0)
-        restitution: dict[Key, Vector] = {}
+        restitution: dict[Key, float | Vector] = {}
         for key in dict.fromkeys(pair_keys(types)):
             value, error = self._restitution(key)
             restitution[key] = np.clip(value + error * random.standard_normal(_DRAWS), 0.0, 1.0)
@@ -208,8 +206,7 @@ class Fit:
             for group in self.groups
             for key, points in zip(group.keys, group.draw(random.random(_DRAWS)).T, strict=True)
         }
-        forward, backward = triplet_keys(types)
-        for key in (*forward, *backward):
+        for key in chain.from_iterable(triplet_keys(types)):
             if key in drawn:
                 continue
             name = label(key)
@@ -220,13 +217,7 @@ class Fit:
             else:
                 there = ", ".join(n for n, e in self.estimates.items() if e.kind == "ratio")
                 raise ValueError(f"the ratio of {name} is not known; fitted: {there or 'none'}")
-        e = np.stack([restitution[key] for key in pair_keys(types)], axis=-1)
-        empty = np.zeros((_DRAWS, 0))
-        ratios = tuple(
-            np.stack([drawn[key] for key in keys], axis=-1) if keys else empty
-            for keys in (forward, backward)
-        )
-        return e, (ratios[0], ratios[1])
+        return Points(restitution, drawn)
 
     def _restitution(self, key: Key) -> tuple[float, float]:
         name = label(key)
@@ -238,9 +229,8 @@ class Fit:
 
 def predicted_points(fit: Fit, types: Sequence[str]) -> Points | None:
     """Return the best parameters for a set, or None if one of them is not identified."""
-    forward, backward = triplet_keys(types)
     ratios: dict[Key, Vector] = {}
-    for key in (*forward, *backward):
+    for key in chain.from_iterable(triplet_keys(types)):
         name = label(key)
         if name in fit.known:
             ratios[key] = np.array([fit.known[name]])

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.checks import Vector
+from cradle.input.values import Vector
 
 #: A set holds the true value in 95 of 100 experiments where chi-square rises by no more than this.
 LEVEL = 0.95
@@ -47,16 +47,7 @@ class Mode(NamedTuple):
 
 
 class Scan(NamedTuple):
-    """Chi-square of one parameter over its range.
-
-    Examples
-    --------
-    >>> found = scan(lambda x: 100 * (x - 0.3) ** 2, np.linspace(0, 1, 101))
-    >>> [(round(mode.value, 6), round(mode.excess, 6)) for mode in found.modes]
-    [(0.3, 0.0)]
-    >>> [(round(low, 4), round(high, 4)) for low, high in found.intervals]
-    [(0.104, 0.496)]
-    """
+    """Chi-square of one parameter over its range."""
 
     grid: Vector
     excess: Vector
@@ -66,21 +57,7 @@ class Scan(NamedTuple):
 
 
 def scan(function: Function, grid: Vector) -> Scan:
-    """Search one dimension: grid, then polish every minimum and every end of the confidence set.
-
-    Parameters
-    ----------
-    function : callable
-        Chi-square of many values at once, shape (P,) -> (P,).
-    grid : ndarray, shape (P,)
-        Values over the whole range, increasing.
-
-    Returns
-    -------
-    Scan
-        All minima, lowest first; the confidence set as disjoint intervals; and chi-square above its
-        lowest value on the grid.
-    """
+    """Search one dimension: grid, then polish every minimum and every end of the confidence set."""
     values = function(grid)
     padded = np.concatenate([[np.inf], values, [np.inf]])
     # The first point of a level stretch stands for it.
@@ -165,30 +142,7 @@ class Region(NamedTuple):
 
 
 def refine(function: Function, upper: Vector) -> Region:
-    """Search several dimensions from 0 to `upper`: a grid of cells, then the best cells divided.
-
-    Parameters
-    ----------
-    function : callable
-        Chi-square of many points at once, shape (P, D) -> (P,).
-    upper : ndarray, shape (D,)
-        Ends of the ranges; D from 2 to 6.
-
-    Returns
-    -------
-    Region
-
-    Raises
-    ------
-    ValueError
-        If there are more than six parameters.
-
-    Examples
-    --------
-    >>> found = refine(lambda x: 1e4 * ((x - [0.3, 0.1]) ** 2).sum(axis=-1), np.array([0.5, 0.5]))
-    >>> found.best.round(4).tolist()
-    [0.3, 0.1]
-    """
+    """Search several dimensions from 0 to `upper`: a grid of cells, then the best cells divided."""
     size = upper.size
     if size not in _CELLS:
         raise ValueError(

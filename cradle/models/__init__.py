@@ -8,7 +8,7 @@ import warnings
 from typing import Protocol, cast
 
 from cradle.chain import Chain
-from cradle.checks import a, must_be
+from cradle.input.values import a, must_be
 from cradle.trace import Trace
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.checks import (
+from cradle.input.values import (
     Vector,
     checked,
     checked_masses,
@@ -23,7 +23,6 @@ from cradle.checks import (
     refuse_overflow,
     shown,
 )
-from cradle.drive import FINISHED, LARGE, REFUSED, Job
 from cradle.kernel import Inputs, Options
 from cradle.models.correlation import (
     MAX_EVENTS,
@@ -34,6 +33,7 @@ from cradle.models.correlation import (
     refuse_light,
 )
 from cradle.progress import progress_bar
+from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job
 from cradle.trace import ImpactNotCertified
 
 if TYPE_CHECKING:

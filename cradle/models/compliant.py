@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.checks import (
+from cradle.input.values import (
     LIGHTEST,
     Vector,
     number_or_row,

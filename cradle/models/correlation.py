@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.checks import (
+from cradle.closed_form import largest_ratios
+from cradle.input.values import (
     Vector,
     checked,
     first,
@@ -21,11 +22,10 @@ from cradle.checks import (
     row_of,
     whole_rule,
 )
-from cradle.closed_form import largest_ratios
-from cradle.drive import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job
 from cradle.kernel import Inputs, Options
 from cradle.kernel.state import LIMITS
 from cradle.progress import progress_bar
+from cradle.runtime.job import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
 #: Steps after which an impact is given up, unless told otherwise.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cradle.chain import Chain
-from cradle.checks import (
+from cradle.input.values import (
     Vector,
     must_be,
     number_or_row,

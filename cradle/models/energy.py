@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from cradle.chain import Chain
-from cradle.checks import one_number, refuse_where
+from cradle.input.values import one_number, refuse_where
 from cradle.models.compliant import SpringChain
 from cradle.models.motion import CurvedTrace, own_units
 from cradle.models.release import Process

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.checks import Vector, must_be, row_of
+from cradle.input.values import Vector, must_be, row_of
 from cradle.trace import Event, Trace
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cradle.checks import Vector
+from cradle.input.values import Vector
 from cradle.models.motion import Motion, TooManyEvaluations
 
 if TYPE_CHECKING:

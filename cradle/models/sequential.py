@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.checks import Vector, must_be, one_of
+from cradle.input.values import Vector, must_be, one_of
 from cradle.models.correlation import MAX_EVENTS, ImpulseCorrelation
 from cradle.trace import Event, ImpactNotFinished, Trace
 

@@ -24,29 +24,7 @@ _ROW, _RADIUS, _ARROW, _OMITTED = 70, 18.0, 30.0, 28.0
 def as_html(
     masses: _Vector, states: Mapping[str, _Vector], columns: Mapping[str, NDArray[Any]]
 ) -> str:
-    """Return a picture of a chain in one or several states, and a table below it.
-
-    Parameters
-    ----------
-    masses : ndarray, shape (N,)
-        kg; balls are drawn as if of one density.
-    states : mapping of str to ndarray, shape (N,)
-        Velocities in m/s by the name of the state; one row of balls each.
-    columns : mapping of str to ndarray, shape (N,) or (N - 1,)
-        Columns of the table, a row for each ball.  Values of contacts stand beside their left
-        ball.
-
-    Returns
-    -------
-    str
-        HTML; of more than 12 balls the first 8 and the last 4.
-
-    Examples
-    --------
-    >>> html = as_html(np.ones(2), {"before": np.array([1.0, 0.0])}, {"mass (kg)": np.ones(2)})
-    >>> [html.count(tag) for tag in ("<circle", "<path", "<tr>")]
-    [2, 1, 3]
-    """
+    """Return a picture of a chain in one or several states, and a table below it."""
     n = len(masses)
     balls = list(range(n)) if n <= _LEFT + _RIGHT else [*range(_LEFT), *range(n - _RIGHT, n)]
     rows = []
@@ -59,44 +37,12 @@ def as_html(
 
 
 def as_text(values: _Vector) -> str:
-    """Return a row of velocities or impulses as people write it, six digits of each.
-
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-        Numbers.
-
-    Returns
-    -------
-    str
-        In brackets.
-
-    Examples
-    --------
-    >>> as_text(np.array([-1 / 3, 1e-17, -0.0, 2]))
-    '[-0.333333, 0, 0, 2]'
-    """
+    """Return a row of velocities or impulses as people write it, six digits of each."""
     return f"[{', '.join(f'{value:.6g}' for value in without_rounding(values).tolist())}]"
 
 
 def without_rounding(values: _Vector) -> _Vector:
-    """Return velocities or impulses without what is left of sums that should be zero.
-
-    Parameters
-    ----------
-    values : ndarray
-        Numbers.
-
-    Returns
-    -------
-    ndarray
-        Zero, not minus zero, where a value is below 1e-12 of the largest.
-
-    Examples
-    --------
-    >>> without_rounding(np.array([1.0, -1e-16, -0.0])).tolist()
-    [1.0, 0.0, 0.0]
-    """
+    """Return velocities or impulses without what is left of sums that should be zero."""
     small = np.abs(values) < 1e-12 * np.abs(values).max(initial=0.0)
     return np.where(small, 0.0, values) + 0.0
 

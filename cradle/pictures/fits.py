@@ -8,13 +8,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from cradle.checks import Vector
-from cradle.figures import PALETTE, ball_style
 from cradle.fit.answers import Estimate
 from cradle.fit.parameters import Points, pair_keys, ratio_keys
 from cradle.fit.result import Fit, predicted_points
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
+from cradle.input.values import Vector
+from cradle.pictures.impacts import PALETTE, ball_style
 
 # Beyond this a value of chi-square is of no interest.
 _TOP = 25.0
@@ -108,7 +108,7 @@ def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> Axes:
     """
     speed = np.abs(shots.before).max(axis=1)
     begins = shots.before / speed[:, np.newaxis]
-    predicted = _predicted(fit, estimate, shots, begins)
+    predicted = _prediction(fit, estimate, shots, begins)
     alike = np.ptp(begins, axis=0).max() < 1e-9
     for k, kind in enumerate(shots.types):
         style = ball_style(k)
@@ -126,7 +126,7 @@ def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> Axes:
     return ax
 
 
-def _predicted(fit: Fit, estimate: Estimate, shots: ShotSet, begins: Vector) -> Vector | None:
+def _prediction(fit: Fit, estimate: Estimate, shots: ShotSet, begins: Vector) -> Vector | None:
     """Return the velocities that the best parameters give after shots that begin so, (K, N)."""
     if estimate.kind == "restitution":
         if estimate.value is None:

@@ -8,19 +8,11 @@ from collections.abc import Collection, Sequence
 from importlib.resources.abc import Traversable
 from typing import NamedTuple, NoReturn
 
-from cradle.checks import one_number
+from cradle.input.values import one_number
 
 
-class Row(NamedTuple):
-    """One row of a table.
-
-    Examples
-    --------
-    >>> Row("ratios.csv, row 2", {"ratio": "1.5"}).number("ratio", "must lie in [0, 1]", 0.0, 1.0)
-    Traceback (most recent call last):
-    ...
-    ValueError: ratios.csv, row 2, column ratio = 1.5; must lie in [0, 1]
-    """
+class Line(NamedTuple):
+    """One row of a table."""
 
     #: File and number of the row, counted from 1 as in an editor; the names of columns are row 1.
     place: str
@@ -30,25 +22,7 @@ class Row(NamedTuple):
     def number(
         self, column: str, rule: str, low: float, high: float = math.inf, open_low: bool = False
     ) -> float:
-        """Return a cell as a number inside its limits.
-
-        Parameters
-        ----------
-        column : str
-            Name of the column.
-        rule, low, high, open_low
-            As for `cradle.checks.checked`.
-
-        Returns
-        -------
-        float
-            The number.
-
-        Raises
-        ------
-        ValueError
-            If the cell holds no number, or one outside.
-        """
+        """Return a cell as a number inside its limits."""
         text = self.cells[column]
         try:
             value = float(text)
@@ -58,60 +32,15 @@ class Row(NamedTuple):
         return one_number(name, value, rule, low, high, open_low)
 
     def refuse(self, column: str, rule: str) -> NoReturn:
-        """Raise, naming a cell and the rule that it breaks.
-
-        Parameters
-        ----------
-        column, rule : str
-            Name of the column, and the rule.
-
-        Raises
-        ------
-        ValueError
-            Always.
-        """
+        """Raise, naming a cell and the rule that it breaks."""
         text = self.cells[column]
         raise ValueError(f"{self.place}, column {column} = {text!r}; {rule}")
 
 
 def read_table(
     file: Traversable, columns: Sequence[str], keys: Collection[str] | None = None
-) -> dict[str, Row]:
-    r"""Read a table whose first column names its rows.
-
-    Parameters
-    ----------
-    file : Traversable
-        The file: UTF-8, commas between the cells, the names of the columns in its first row.
-    columns : sequence of str
-        The names of the columns.
-    keys : collection of str, optional
-        The rows that there must be; any if left out.
-
-    Returns
-    -------
-    dict of str to Row
-        The rows by their first cells, in the order of the file.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If it is no such table; the message names file, row and column.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder, "masses.csv")
-    ...     _ = path.write_text("ball,mass_kg\nA,0.045\nB,0,053\n")
-    ...     read_table(path, ["ball", "mass_kg"])
-    Traceback (most recent call last):
-    ...
-    ValueError: masses.csv, row 3 is ['B', '0', '053']; must have 2 cells: ball, mass_kg
-    """
+) -> dict[str, Line]:
+    """Read a table whose first column names its rows."""
     name = file.name
     if not file.is_file():
         raise FileNotFoundError(f"{name} is missing: there is no file {file}")
@@ -125,12 +54,12 @@ def read_table(
     head, *lines = list(csv.reader(text.splitlines())) or [[]]
     if head != list(columns):
         raise ValueError(f"{name}, row 1 is {head}; must be {names}, with commas between")
-    rows: dict[str, Row] = {}
+    rows: dict[str, Line] = {}
     for number, cells in enumerate(lines, start=2):
         place = f"{name}, row {number}"
         if len(cells) != len(columns):
             raise ValueError(f"{place} is {cells}; must have {len(columns)} cells: {names}")
-        row = Row(place, dict(zip(columns, cells, strict=True)))
+        row = Line(place, dict(zip(columns, cells, strict=True)))
         if keys is not None and cells[0] not in keys:
             row.refuse(columns[0], f"must be one of {', '.join(keys)}")
         if cells[0] in rows:

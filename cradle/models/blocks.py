@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.checks import Vector, refusal
+from cradle.input.values import Vector, refusal
 from cradle.models.batch import post_impact_velocities
 from cradle.trace import ImpactNotFinished
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.checks import Vector
+from cradle.input.values import Vector
 
 #: Speeds below this part of the swing's speed are none: they carry 1e-20 of its energy.
 RESTING = 1e-10
@@ -30,13 +30,7 @@ NEAR = 1e-12
 
 
 def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first ball of each stretch of marked contacts, and the one after its last.
-
-    Examples
-    --------
-    >>> stretches(np.array([True, True, False, True]))
-    [(0, 3), (3, 5)]
-    """
+    """Return the first ball of each stretch of marked contacts, and the one after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], contacts, [False]]).astype(int)))
     return [(int(a), int(b) + 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -44,30 +38,7 @@ def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def common_velocities(
     masses: Vector, velocities: Vector, touching: NDArray[np.bool_], least: float
 ) -> tuple[Vector, NDArray[np.bool_]]:
-    """Give touching balls that hardly move against each other their common velocity (rule 2).
-
-    Parameters
-    ----------
-    masses, velocities : ndarray, shape (N,)
-        kg and m/s.
-    touching : ndarray of bool, shape (N - 1,)
-        Contacts that touch.
-    least : float
-        Contacts that open no faster than this are at rest, m/s.
-
-    Returns
-    -------
-    tuple of ndarray
-        Velocities, shape (N,), and which contacts rest, shape (N - 1,); momentum is kept.
-
-    Examples
-    --------
-    >>> v, resting = common_velocities(
-    ...     np.ones(3), np.array([0.0, 1e-12, 1.0]), np.array([True, True]), 1e-10
-    ... )
-    >>> v.tolist(), resting.tolist()
-    ([5e-13, 5e-13, 1.0], [True, False])
-    """
+    """Give touching balls that hardly move against each other their common velocity (rule 2)."""
     v, resting = velocities.copy(), np.zeros_like(touching)
     while True:
         slow = touching & (v[:-1] - v[1:] >= -least)
@@ -90,27 +61,6 @@ def pressed(
     Among all accelerations without passing, these come nearest to those of the balls left alone,
     in the mean square weighted by mass (Gauss's principle of least constraint).  For a row of
     balls that is isotonic regression, which pooling solves exactly.
-
-    Parameters
-    ----------
-    masses, accelerations : ndarray, shape (N,)
-        kg, and what each ball would do alone, m/s^2.
-    resting : ndarray of bool, shape (N - 1,)
-        Contacts whose balls touch at equal velocities.
-    least : float
-        Differences no larger than this are rounding errors, m/s^2.
-
-    Returns
-    -------
-    ndarray of bool, shape (N - 1,)
-        Contacts whose balls move together.
-
-    Examples
-    --------
-    The middle ball is pulled to the left, away from the right one:
-
-    >>> pressed(np.ones(3), np.array([0.0, -1.0, 1.0]), np.ones(2, bool), 1e-12).tolist()
-    [True, False]
     """
     kept = np.zeros_like(resting)
     for first, last in stretches(resting):

@@ -36,10 +36,10 @@ def film(
       cradle film film.txt --set BAC --masses 53,45,53 --unit g --length 0.3 --header
       cradle film film.txt --set BAC --masses 0.053,0.045,0.053 --shot 2 --slower 2
     """
-    from cradle.checks import one_number
     from cradle.fit import read_tracker, velocities_from_tracks
     from cradle.fit.parameters import parameter_key
     from cradle.fit.reading import COLUMNS, OPTIONAL
+    from cradle.input.values import one_number
 
     one_number("--slower", slower, "must be above 0", 0.0, open_low=True)
     tracks = read_tracker(file, time_scale=1.0 / slower)

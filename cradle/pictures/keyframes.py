@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.checks import Vector
+from cradle.input.values import Vector
 
 # Stands before the name of every moving part, until the picture's own key takes its place.
 KEY = "moving-part-"
@@ -71,13 +71,7 @@ class Animation:
 
 
 def thin(times: Vector, values: Vector, tolerance: float) -> NDArray[np.int64]:
-    """Return the rows that straight lines need to stay within the tolerance (Douglas, Peucker).
-
-    Examples
-    --------
-    >>> thin(np.arange(4.0), np.array([[0.0], [1.0], [2.0], [0.0]]), 0.1).tolist()
-    [0, 2, 3]
-    """
+    """Return the rows that straight lines need to stay within the tolerance (Douglas, Peucker)."""
     keep = np.zeros(len(times), dtype=bool)
     keep[[0, -1]] = True
     spans = [(0, len(times) - 1)]
@@ -96,13 +90,7 @@ def thin(times: Vector, values: Vector, tolerance: float) -> NDArray[np.int64]:
 
 
 def number(value: float) -> str:
-    """Return a number as CSS, to a thousandth.
-
-    Examples
-    --------
-    >>> number(2.50), number(-0.0001)
-    ('2.5', '0')
-    """
+    """Return a number as CSS, to a thousandth."""
     value = round(value, 3) + 0.0  # no -0
     return f"{value:.3f}".rstrip("0").rstrip(".")
 
@@ -110,34 +98,7 @@ def number(value: float) -> str:
 def keyframes(
     name: str, times: Vector, values: Vector, form: str, tolerance: float, still: int
 ) -> str:
-    """Return the style of one moving part: where it rests, and how it moves.
-
-    Parameters
-    ----------
-    name : str
-        Of the part in the picture.
-    times : ndarray, shape (K,)
-        s, from 0 on.
-    values : ndarray, shape (K, M)
-        The numbers at each time.
-    form : str
-        CSS with M places for them.
-    tolerance : float
-        Rows that a straight line replaces to within this are left out.
-    still : int
-        Row of the still.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> values = np.array([[0.0], [1.0], [2.0]])
-    >>> print(keyframes("a", np.array([0.0, 2.0, 4.0]), values, "opacity:{}", 0.1, 2), end="")
-    #a{opacity:2;animation:a 4s linear infinite}
-    @keyframes a{0%{opacity:0} 100%{opacity:2}}
-    """
+    """Return the style of one moving part: where it rests, and how it moves."""
 
     def css(row: int) -> str:
         return form.format(*(number(float(value)) for value in values[row]))
@@ -153,11 +114,6 @@ def with_style(svg: str, style: str, alt: str) -> str:
 
     In a page the names of all pictures share one space, so each gets a key of its own in the
     place of `KEY`.
-
-    Examples
-    --------
-    >>> "prefers-reduced-motion" in with_style("<svg></svg>", "", alt="")
-    True
     """
     still = "".join(
         f"@media {media} {{ [id^={KEY}] {{ animation: none !important }} }}\n"

@@ -17,7 +17,7 @@ UNITS = {"kg": 1.0, "g": 1e-3}
 _MODELS = ("ratio", "spheres", "sequential")
 
 
-def numbers(_: click.Context, __: click.Parameter, value: str | None) -> list[float] | None:
+def numbers_of(_: click.Context, __: click.Parameter, value: str | None) -> list[float] | None:
     """Read numbers with commas between them."""
     try:
         return None if value is None else [float(part) for part in value.split(",")]
@@ -30,15 +30,15 @@ def chain_options(command: Callable[..., None]) -> Callable[..., None]:
     options = [
         click.argument("sequence", required=False),
         click.option("--speed", type=float, help="Velocity of the first ball, m/s [1]."),
-        click.option("--masses", callback=numbers, help="Masses, left to right: 45,53,53."),
+        click.option("--masses", callback=numbers_of, help="Masses, left to right: 45,53,53."),
         click.option("--unit", type=click.Choice(list(UNITS)), help="Of masses [kg]."),
-        click.option("--velocities", callback=numbers, help="Instead of --speed: 1,0,0."),
-        click.option("--restitution", callback=numbers, help="One, or one per contact [1]."),
+        click.option("--velocities", callback=numbers_of, help="Instead of --speed: 1,0,0."),
+        click.option("--restitution", callback=numbers_of, help="One, or one per contact [1]."),
         click.option("--model", type=click.Choice(_MODELS), help="How the balls collide: by "
                      "ratios, as elastic spheres (Hertz; with losses the energy law), or one pair "
                      "after the other [ratio if there are ratios, else spheres]."),
-        click.option("--ratio", callback=numbers, help="One, or one per inner ball."),
-        click.option("--backward", callback=numbers, help="Ratios from the right [as --ratio]."),
+        click.option("--ratio", callback=numbers_of, help="One, or one per inner ball."),
+        click.option("--backward", callback=numbers_of, help="Ratios from the right [as --ratio]."),
         click.option("--saturate", is_flag=True, help="Admit ratios above their bound."),
     ]  # fmt: skip
     for option in reversed(options):
@@ -47,13 +47,7 @@ def chain_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 class Described(NamedTuple):
-    """A chain and how it collides.
-
-    Examples
-    --------
-    >>> described(None, masses=[1.0, 1.0]).assumed
-    ('the first ball strikes at 1 m/s', 'no energy is lost (--restitution)')
-    """
+    """A chain and how it collides."""
 
     chain: Chain
     model: Model
@@ -78,7 +72,7 @@ def described(
 ) -> Described:  # fmt: skip
     """Return the chain and the model that the options describe."""
     from cradle.chain import Chain
-    from cradle.checks import one_number
+    from cradle.input.values import one_number
     from cradle.models.correlation import ImpulseCorrelation
     from cradle.tables import paper_chain
 

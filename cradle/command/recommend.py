@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from cradle.describing import chain_options, described, numbers, one_or_all
+from cradle.command.describe import chain_options, described, numbers_of, one_or_all
 
 
 @click.command()
@@ -28,7 +28,7 @@ from cradle.describing import chain_options, described, numbers, one_or_all
 @click.option("--impacts", default=1, help="How many such impacts [1].")
 @click.option(
     "--stiffness",
-    callback=numbers,
+    callback=numbers_of,
     help="Of the contacts, N/m^1.5; 1 for equal spheres if neither forces nor times are wanted.",
 )
 def recommend(

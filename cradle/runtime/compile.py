@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from cradle import kernel as plain
-from cradle.refusals import one_of
+from cradle.input.words import one_of
 
 #: Set this environment variable to ``plain`` to run the kernel as it stands, to ``compiled`` to
 #: compile at the first call.
@@ -174,7 +174,7 @@ def compiled() -> Any | None:
         import numba
     except ImportError:
         return None
-    from cradle.addresses import bare
+    from cradle.runtime.addresses import bare
 
     path = _stored()
     if path is None:

@@ -1,4 +1,4 @@
-"""Drawings of chains and of their impacts; the only room that loads matplotlib.
+"""Drawings of impacts.
 
 Balls and impulses carry the paper's numbers here: ball i is B(i + 1) with velocity v(i + 1), and
 the impulse of contact c is tau(c + 2). Colours come from the palette of Okabe and Ito; a second
@@ -9,27 +9,22 @@ Every function draws on the axes it is given, or on new ones, and returns them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
-from cradle.chain import Chain
-from cradle.checks import Vector, must_be, place_in, shown
+from cradle.input.values import Vector, must_be, place_in
 from cradle.trace import Trace
 
 __all__ = [
     "EVENT_STYLES",
     "PALETTE",
     "ball_style",
-    "chain_sketch",
     "impulse_axis",
-    "outcome_by_ball",
     "progress",
     "velocities",
     "velocity_impulse",
@@ -101,23 +96,23 @@ def progress(trace: Trace) -> Vector:
 
     Examples
     --------
-    >>> from cradle import ImpulseCorrelation, collide
+    >>> from cradle import Chain, ImpulseCorrelation, collide
     >>> progress(collide(Chain([1, 1], [1, 0], 1), ImpulseCorrelation(0))).tolist()
     [0.0, 0.5, 1.0]
     """
     return np.asarray(trace.path_impulses.sum(axis=1))
 
 
-def _indexed(symbol: str, number: int) -> str:
+def indexed(symbol: str, number: int) -> str:
     """Return a symbol with its index; TeX takes two digits for one index in braces alone."""
     return f"${symbol}_{number}$" if number < 10 else f"${symbol}_{{{number}}}$"
 
 
 def _impulse(contact: int) -> str:
-    return "impulse " + _indexed(r"\tau", contact + 2) + " (N s)"
+    return "impulse " + indexed(r"\tau", contact + 2) + " (N s)"
 
 
-def _axes(ax: Axes | None) -> Axes:
+def axes_or_new(ax: Axes | None) -> Axes:
     if ax is None:
         return plt.subplots(figsize=(5.6, 3.9), layout="constrained")[1]
     return must_be(Axes, "ax", ax)
@@ -142,7 +137,7 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from cradle import ImpulseCorrelation, collide
+    >>> from cradle import Chain, ImpulseCorrelation, collide
     >>> from matplotlib.figure import Figure
     >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
     >>> ax = velocities(trace, Figure().subplots())
@@ -150,10 +145,10 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     ['$v_1$', '$v_2$', '$v_3$']
     """
     must_be(Trace, "trace", trace)
-    ax = _axes(ax)
+    ax = axes_or_new(ax)
     impulses, path = trace.curve()
     for ball, velocity in enumerate(path.T):
-        label = _indexed("v", ball + 1)
+        label = indexed("v", ball + 1)
         ax.plot(impulses.sum(axis=1), velocity, label=label, lw=2, **ball_style(ball))
     ax.set(xlabel="sum of all impulses (N s)", ylabel="velocity (m/s)")
     ax.margins(x=0)
@@ -195,7 +190,7 @@ def velocity_impulse(
 
     Examples
     --------
-    >>> from cradle import ImpulseCorrelation, collide
+    >>> from cradle import Chain, ImpulseCorrelation, collide
     >>> from matplotlib.figure import Figure
     >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
     >>> ax = velocity_impulse(trace, 1, Figure().subplots(), other=0)
@@ -203,10 +198,10 @@ def velocity_impulse(
     ['$v_2$', '$v_3$']
     """
     contact = place_in("contact", contact, len(must_be(Trace, "trace", trace).impulses))
-    ax = _axes(ax)
+    ax = axes_or_new(ax)
     impulses, path = trace.curve()
     for ball in (contact, contact + 1):
-        label = _indexed("v", ball + 1)
+        label = indexed("v", ball + 1)
         ax.plot(impulses[:, contact], path[:, ball], label=label, lw=2, **ball_style(ball))
     ax.set(xlabel=_impulse(contact), ylabel="velocity (m/s)")
     ax.grid(alpha=0.3)
@@ -286,7 +281,7 @@ def impulse_axis(
 
     Examples
     --------
-    >>> from cradle import ImpulseCorrelation, collide
+    >>> from cradle import Chain, ImpulseCorrelation, collide
     >>> from matplotlib.figure import Figure
     >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.5))
     >>> ax = velocity_impulse(trace, 1, Figure().subplots())
@@ -333,121 +328,3 @@ def _event_ticks(lower: Vector, upper: Vector) -> list[tuple[float, str]]:
         return first if first == last else f"{first} → {last}"
 
     return [(x, label(x)) for x in sorted(kept)]
-
-
-def outcome_by_ball(
-    traces: Trace | Sequence[Trace], ax: Axes | None = None, *, letters: str = ""
-) -> Axes:
-    r"""Draw post-impact velocities over the striker's speed by ball, as in the paper's Figs. 10-12.
-
-    Parameters
-    ----------
-    traces : Trace or sequence of Trace
-        Impacts of one chain by its first ball, at one or several speeds.
-    ax : Axes, optional
-        Where to draw; new axes if left out.
-    letters : str
-        A name for each ball, written under its number.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    ValueError
-        If there is no impact, the chains differ in length, a first ball was at rest, or there are
-        not as many names as balls.
-
-    Examples
-    --------
-    >>> from cradle import collide, paper_chain
-    >>> from matplotlib.figure import Figure
-    >>> trace = collide(*paper_chain("BABA", speed=2.0))
-    >>> ax = outcome_by_ball(trace, Figure().subplots(), letters="BABA")
-    >>> [label.get_text() for label in ax.get_xticklabels()]
-    ['1\nB', '2\nA', '3\nB', '4\nA']
-    """
-    ax = _axes(ax)
-    given = [traces] if isinstance(traces, Trace) else list(traces)
-    several = [must_be(Trace, "traces", trace) for trace in given]
-    sizes = {len(trace.chain) for trace in several}
-    if len(sizes) != 1:
-        raise ValueError(f"traces has chains of {sorted(sizes)} balls; must be of one length")
-    number = np.arange(1, sizes.pop() + 1)
-    if len(letters) not in (0, len(number)):
-        raise ValueError(f"letters = {shown(letters)}; {len(number)} balls need as many, or none")
-    if not all(trace.chain.velocities[0] for trace in several):
-        raise ValueError("traces has a first ball at rest; velocities are shown over its speed")
-    ax.axhline(0, color="0.4", lw=0.8)
-    # Nested open markers: equal outcomes are seen as such, none hides another.
-    for k, trace in enumerate(several):
-        speed = trace.chain.velocities[0]
-        ax.plot(
-            number,
-            trace.velocities / speed,
-            "osDhXP*"[k % 7],
-            ms=5 + 4 * k,
-            mfc="none",
-            mew=1.5,
-            color=PALETTE[k % len(PALETTE)],
-            label=rf"$v_1^-$ = {speed:g} m/s",
-        )
-    ax.plot(number, several[0].velocities / several[0].chain.velocities[0], "0.6", lw=1, zorder=1)
-    names = (
-        [f"{n}\n{letter}" for n, letter in zip(number, letters, strict=True)] if letters else None
-    )
-    ax.set_xticks(number, names)
-    ax.margins(y=0.12)  # room for the large markers
-    ax.set(xlabel="ball number", ylabel=r"$v^+ / v_1^-$", xlim=(0, number[-1] + 1))
-    ax.grid(alpha=0.3)
-    return ax
-
-
-def chain_sketch(chain: Chain, ax: Axes | None = None, *, letters: str = "") -> Axes:
-    """Draw a chain as a row of balls: radii as for one density, arrows for velocities.
-
-    Parameters
-    ----------
-    chain : Chain
-        The balls.
-    ax : Axes, optional
-        Where to draw; new axes if left out.
-    letters : str
-        Names written in the balls; B1, B2, ... if left out.
-
-    Returns
-    -------
-    Axes
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = chain_sketch(Chain([8, 1], [1, 0], 1), Figure().subplots())
-    >>> [round(patch.get_radius(), 3) for patch in ax.patches if isinstance(patch, Circle)]
-    [0.5, 0.25]
-    """
-    n = len(must_be(Chain, "chain", chain))
-    if len(must_be(str, "letters", letters)) not in (0, n):
-        raise ValueError(f"letters = {shown(letters)}; {n} balls need {n}, or none")
-    ax = _axes(ax)
-    radii = 0.5 * np.cbrt(chain.masses / np.max(chain.masses))
-    left = np.concatenate([[0.0], np.cumsum(2 * radii)[:-1]])
-    fastest = np.abs(chain.velocities).max() or 1.0
-    for ball, (radius, x) in enumerate(zip(radii.tolist(), (left + radii).tolist(), strict=True)):
-        ax.add_patch(Circle((x, 0), radius, fc="0.93", ec=PALETTE[ball % len(PALETTE)], lw=2))
-        name = letters[ball] if letters else _indexed("B", ball + 1)
-        # A name that does not fit in its ball stands above it.
-        ax.text(x, 0 if radius > 0.2 else radius + 0.12, name, ha="center", va="center")
-        ax.text(x, -0.85, _indexed("m", ball + 1), ha="center", va="center", fontsize=9)
-        if chain.velocities[ball]:
-            length = 0.9 * chain.velocities[ball] / fastest
-            tail, tip = (x - length / 2, 0.68), (x + length / 2, 0.68)
-            ax.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": "black"})
-            ax.text(x, 0.86, _indexed("v", ball + 1), ha="center", va="center")
-        if ball < len(chain) - 1:
-            name = _indexed(r"\tau", ball + 2)
-            ax.text(x + radius, -0.62, name, ha="center", va="center", fontsize=9)
-    ax.set(xlim=(-0.2, left[-1] + 2 * radii[-1] + 0.2), ylim=(-1.0, 1.0), aspect="equal")
-    ax.set_axis_off()
-    return ax

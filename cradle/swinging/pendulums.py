@@ -7,7 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.checks import Vector, first, number_or_row, one_number, one_of, refuse_where, row_of
+from cradle.input.values import (
+    Vector,
+    first,
+    number_or_row,
+    one_number,
+    one_of,
+    refuse_where,
+    row_of,
+)
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -75,13 +83,7 @@ class Pendulums:
         object.__setattr__(self, "angle", angle)
 
     def row(self, name: str, size: int) -> Vector:
-        """Return `length`, `gaps` or `damping` for each of `size` balls or contacts.
-
-        Examples
-        --------
-        >>> Pendulums(gaps=0.001).row("gaps", 2).tolist()
-        [0.001, 0.001]
-        """
+        """Return `length`, `gaps` or `damping` for each of `size` balls or contacts."""
         return row_of(name, getattr(self, name), size, size + (name == "gaps"))
 
     def reach(self, size: int) -> Vector:
@@ -90,11 +92,6 @@ class Pendulums:
         Small-angle pendulums hang on strings, which are slack above their pivots: a quarter of a
         circle, where the period is 15 % too short already.  Others may hang on rods: half a circle,
         not quite to the top, where a ball would stand.
-
-        Examples
-        --------
-        >>> Pendulums(length=1.0).reach(2).round(3).tolist()
-        [1.571, 1.571]
         """
         part = 0.5 if self.angle == "small" else 1.0 - 2.0**-20
         return part * np.pi * self.row("length", size)
@@ -117,13 +114,7 @@ class Pendulums:
         return frequency
 
     def accelerations(self, positions: Vector, velocities: Vector) -> Vector:
-        """Return the acceleration of each ball if it swung alone, m/s^2.
-
-        Examples
-        --------
-        >>> Pendulums(length=9.81).accelerations(np.array([1.0, 0.0]), np.zeros(2)).round(3)
-        array([-1.,  0.])
-        """
+        """Return the acceleration of each ball if it swung alone, m/s^2."""
         n = len(positions)
         length = self.row("length", n)
         angle = positions / length
@@ -131,13 +122,7 @@ class Pendulums:
         return np.asarray(0.0 - self.gravity * sine - 2.0 * self.row("damping", n) * velocities)
 
     def potential_energy(self, masses: Vector, positions: Vector) -> Vector:
-        """Return the potential energy above the lowest points, J; the last axis is summed.
-
-        Examples
-        --------
-        >>> float(Pendulums(length=9.81).potential_energy(np.ones(2), np.array([1.0, 0.0])))
-        0.5
-        """
+        """Return the potential energy above the lowest points, J; the last axis is summed."""
         length = self.row("length", positions.shape[-1])
         half = 0.5 * positions / length
         sine = half if self.angle == "small" else np.sin(half)
@@ -145,12 +130,6 @@ class Pendulums:
         return np.asarray((2.0 * masses * self.gravity * length * sine**2).sum(axis=-1))
 
     def energy(self, masses: Vector, positions: Vector, velocities: Vector) -> Vector:
-        """Return kinetic and potential energy, J; the last axis is summed.
-
-        Examples
-        --------
-        >>> float(Pendulums(length=9.81).energy(np.ones(2), np.array([1.0, 0.0]), np.ones(2)))
-        1.5
-        """
+        """Return kinetic and potential energy, J; the last axis is summed."""
         kinetic = 0.5 * (masses * velocities**2).sum(axis=-1)
         return np.asarray(kinetic + self.potential_energy(masses, positions))

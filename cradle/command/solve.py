@@ -14,11 +14,11 @@ from typing import Any
 
 import click
 
-from cradle.console import format_options, image_format, picture, show
-from cradle.describing import chain_options, described
-from cradle.filming import film
-from cradle.fitting import fit, template
-from cradle.recommending import recommend
+from cradle.command.console import format_options, image_format, picture, show
+from cradle.command.describe import chain_options, described
+from cradle.command.film import film
+from cradle.command.fit import fit, template
+from cradle.command.recommend import recommend
 
 # What a command needs is imported in the command: the first answer comes within a second.
 
@@ -120,7 +120,8 @@ def plot(output: str, **options: Any) -> None:
     import matplotlib
 
     matplotlib.use("Agg")
-    from cradle import collide, figures
+    from cradle import collide
+    from cradle.pictures import impacts as figures
 
     given = described(**options)
     from matplotlib import pyplot as plt
@@ -155,9 +156,9 @@ def swing(
     """
     from cradle.advice.recommendation import made
     from cradle.chain import Chain
-    from cradle.checks import one_number, whole_number
-    from cradle.pendulums import Pendulums
-    from cradle.swinging import swing as swing_freely
+    from cradle.input.values import one_number, whole_number
+    from cradle.swinging.pendulums import Pendulums
+    from cradle.swinging.swing import swing as swing_freely
 
     if (options["speed"], options["velocities"]) != (None, None):
         raise click.UsageError("leave --speed and --velocities out: the first ball is pulled aside "
@@ -209,7 +210,8 @@ def warm_up() -> None:
     Examples:
       cradle warm-up
     """
-    from cradle import drive, runtime
+    from cradle.runtime import compile as runtime
+    from cradle.runtime import job as drive
 
     there, begun = runtime.on_disk(), time.perf_counter()
     drive.warm_up()
@@ -228,18 +230,7 @@ def warm_up() -> None:
 
 
 def run(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit; wrong input ends in one line on standard error.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        What follows the command's name; that of this process if left out.
-
-    Raises
-    ------
-    SystemExit
-        Always, with the exit code.
-    """
+    """Run the command line and exit; wrong input ends in one line on standard error."""
     from cradle.trace import ImpactNotCertified, ImpactNotFinished
 
     try:

@@ -15,9 +15,9 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from cradle import kernel as plain
-from cradle import runtime
 from cradle.kernel import state as rooms
 from cradle.kernel.state import FINISHED, PAUSED, REFUSED, UNFINISHED, UNSOUND
+from cradle.runtime import compile as runtime
 
 #: What an answer can break, by the number that the kernel gives.
 DEFECTS = {

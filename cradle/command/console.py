@@ -47,7 +47,7 @@ def show(
 def text(rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> str:
     """Return rows as a table of text; its columns are those of the first row, if not `names`."""
     names = names or list(rows[0])
-    columns = [_cells([row[name] for row in rows]) for name in names]
+    columns = [_texts([row[name] for row in rows]) for name in names]
     table = [list(names), *map(list, zip(*columns, strict=True))]
     widths = [max(len(line[k]) for line in table) for k in range(len(table[0]))]
     return "\n".join(
@@ -56,7 +56,7 @@ def text(rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> str:
     )
 
 
-def _cells(column: Sequence[Any]) -> list[str]:
+def _texts(column: Sequence[Any]) -> list[str]:
     """Return a column as text; its floats have as many decimals as show four digits of the largest.
 
     Four at least, for people compare columns; and never minus zero.

@@ -1,16 +1,29 @@
-"""What counts as a real number, and how an error names a value that does not."""
+"""What is asked of input: real numbers, limits, masses, whole numbers, rows."""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.refusals import first, place, refusal, shown
+from cradle.input.words import (
+    a,
+    first,
+    is_whole,
+    must_be,
+    one_of,
+    place,
+    place_in,
+    refusal,
+    refuse_where,
+    shown,
+    whole_rule,
+)
+from cradle.kernel.state import LIMITS
 
 Vector = NDArray[np.float64]
 
@@ -29,34 +42,6 @@ def numbers(name: str, values: ArrayLike | None) -> Vector:
 
     A number is whatever `float` takes: fractions and decimals too.  Not so text, truth values,
     masked values, complex numbers, and numbers with an uncertainty.
-
-    Parameters
-    ----------
-    name : str
-        What the values are called in an error.
-    values : array_like
-        Numbers of any shape.
-
-    Returns
-    -------
-    ndarray of float64
-        The values, same shape.
-
-    Raises
-    ------
-    ValueError
-        If a value is no real number or beyond the range of floats, or the rows of a list differ in
-        length; it names the first such value.
-
-    Examples
-    --------
-    >>> from fractions import Fraction
-    >>> numbers("ratio", [0.5, Fraction(1, 8)]).tolist()
-    [0.5, 0.125]
-    >>> numbers("ratio", [0.5, "x"])
-    Traceback (most recent call last):
-    ...
-    ValueError: ratio[1] = 'x'; must be a real number
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
@@ -161,3 +146,132 @@ def _refuse_ragged(name: str, values: Any, at: tuple[int, ...] = ()) -> None:
                 f"{name}{place((*at, k))} has shape {shape}, {name}{place((*at, 0))} has {first}; "
                 "must have one shape"
             )
+
+
+#: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
+LIGHTEST = 1e-150
+
+__all__ = [
+    "Vector",
+    "a",
+    "checked",
+    "checked_masses",
+    "checked_restitution",
+    "first",
+    "is_whole",
+    "must_be",
+    "number_or_row",
+    "numbers",
+    "one_number",
+    "one_of",
+    "place_in",
+    "refusal",
+    "refuse_overflow",
+    "refuse_where",
+    "row_of",
+    "shown",
+    "whole_number",
+    "whole_rule",
+]
+
+
+def checked(
+    name: str,
+    values: ArrayLike | None,
+    rule: str = "must be finite",
+    low: float = -np.inf,
+    high: float = np.inf,
+    open_low: bool = False,
+) -> Vector:
+    """Return `values` as floats, all finite and inside the limits."""
+    array = numbers(name, values)
+    if array is values:
+        array = array.copy()
+    wrong = ~np.isfinite(array) | (array < low) | (array > high)
+    if open_low:
+        wrong |= array <= low
+    if wrong.any():
+        refuse_where(
+            name, array, wrong, rule if np.isfinite(array[first(wrong)]) else "must be finite"
+        )
+    return array
+
+
+def one_number(
+    name: str,
+    value: ArrayLike,
+    rule: str = "must be finite",
+    low: float = -np.inf,
+    high: float = np.inf,
+    open_low: bool = False,
+) -> float:
+    """Return `value` as a float inside its limits."""
+    number = checked(name, value, rule, low, high, open_low)
+    if number.ndim:
+        raise ValueError(f"{name} = {shown(value)}; must be one number")
+    return float(number)
+
+
+def checked_masses(masses: ArrayLike) -> Vector:
+    """Return masses as floats: positive, and none too light beside the heaviest of its chain."""
+    array = checked("masses", masses, "must be above 0", 0.0, open_low=True)
+    if array.size and array.ndim:
+        small = array < LIGHTEST * array.max(axis=-1, keepdims=True)
+        rule = f"must be at least {LIGHTEST} of the heaviest ball of its chain"
+        refuse_where("masses", array, small, rule)
+    return array
+
+
+def checked_restitution(restitution: ArrayLike) -> Vector:
+    """Return coefficients of restitution as floats: in [0, 1], and if above 0 not too small."""
+    array = checked("restitution", restitution, "must lie in [0, 1]", 0.0, 1.0)
+    small = (array > 0.0) & (array < LIMITS.least_restitution)
+    refuse_where("restitution", array, small, f"must be 0 or at least {LIMITS.least_restitution}")
+    return array
+
+
+def refuse_overflow(velocities: Vector, masses: Vector) -> None:
+    """Raise if the kinetic energy or a momentum of a chain is no finite number."""
+    v, m = np.broadcast_arrays(velocities, masses)
+    with np.errstate(over="ignore"):
+        sums = {
+            "kinetic energy": (m * v * v).sum(axis=-1),
+            "momentum": 2.0 * (m * np.abs(v)).sum(axis=-1),  # an impulse is no larger
+        }
+    for what, values in sums.items():
+        if not np.isfinite(values).all():
+            lead = first(~np.isfinite(values))
+            at = (*lead, int(np.argmax(np.abs(v[lead]))))
+            rest = f" = {float(v[at])!r}; {what} overflows: choose larger units"
+            raise refusal("velocities", at, rest)
+
+
+def whole_number(name: str, value: object) -> int:
+    """Return `value` as a whole number of at least 1."""
+    if is_whole(value) and value >= 1:
+        return int(value)
+    raise ValueError(f"{name} = {shown(value)}; {whole_rule(value)}, at least 1")
+
+
+def number_or_row(
+    name: str,
+    values: ArrayLike | None,
+    length: str,
+    rule: str,
+    low: float = -np.inf,
+    high: float = np.inf,
+    open_low: bool = False,
+) -> float | tuple[float, ...]:
+    """Return one number for all balls or contacts, or a row with one for each, to be kept."""
+    array = checked(name, values, rule, low, high, open_low)
+    if array.ndim > 1:
+        raise ValueError(f"{name} has shape {array.shape}; must be () or ({length},)")
+    return tuple(array.tolist()) if array.ndim else float(array)
+
+
+def row_of(name: str, kept: float | Sequence[float], size: int, balls: int) -> Vector:
+    """Return what `number_or_row` kept as a row for a chain."""
+    row = np.asarray(kept, dtype=np.float64)
+    if row.ndim and row.size != size:
+        raise ValueError(f"{name} has {row.size} values; {balls} balls need {size}, or one number")
+    return np.broadcast_to(row, (size,)).copy()

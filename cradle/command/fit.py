@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cradle.console import format_options, picture, plot_fits, show, text
+from cradle.command.console import format_options, picture, plot_fits, show, text
 
 if TYPE_CHECKING:
     from cradle.fit import Fit, Shots
@@ -61,11 +61,11 @@ def fit(
       cradle fit long.csv --without ABACA --predict ABACA
       cradle fit shots.csv --json --plot fit.png
     """
-    from cradle.checks import one_number
     from cradle.fit import read_shots
     from cradle.fit.parameters import types_in_a_row
-    from cradle.fit.result import COLUMNS
+    from cradle.fit.result import RESULT_COLUMNS
     from cradle.fit.shots import chance
+    from cradle.input.values import one_number
 
     if predict is not None and as_csv:
         raise click.UsageError("--csv prints the fitted values alone; with --predict give --json")
@@ -111,7 +111,7 @@ def fit(
         notes += lines
     if plot is not None:
         plot_fits(fits, plot)
-    show(rows, extra, "\n".join(notes), as_json, as_csv, COLUMNS)
+    show(rows, extra, "\n".join(notes), as_json, as_csv, RESULT_COLUMNS)
 
 
 def _named(given: str) -> tuple[str, tuple[float, float]]:

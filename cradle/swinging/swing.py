@@ -1,24 +1,32 @@
 """The swinging cradle: impacts by any model of the package, pendulums between them.
 
-The rules of touching and resting balls: `cradle.resting`.
+The rules of touching and resting balls: `cradle.swinging.resting`.  Every flight and every
+instant is checked before a run is returned: order, momentum, energy and ledger.
 """
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.checks import Vector, checked, must_be, one_number, refuse_where, shown, whole_number
-from cradle.flight import TIE, Flight, FullFlight, SmallAngleFlight, State
+from cradle.input.values import (
+    Vector,
+    checked,
+    must_be,
+    one_number,
+    refuse_where,
+    shown,
+    whole_number,
+)
 from cradle.models import Model, collide
-from cradle.pendulums import Pendulums
-from cradle.resting import NEAR, RESTING, common_velocities, pressed, stretches
-from cradle.swing_check import Account
-from cradle.swing_trace import Impact, Swing
+from cradle.swinging.flight import TIE, Flight, FullFlight, SmallAngleFlight, Start
+from cradle.swinging.pendulums import Pendulums
+from cradle.swinging.record import Impact, Swing
+from cradle.swinging.resting import NEAR, RESTING, common_velocities, pressed, stretches
 from cradle.trace import Trace
 
 __all__ = ["swing"]
@@ -197,7 +205,7 @@ class _Run:
         return ended
 
     def flight(self) -> Flight:
-        state = State(self.chain.masses, self.x, self.v, self.together, self.parting)
+        state = Start(self.chain.masses, self.x, self.v, self.together, self.parting)
         kind = SmallAngleFlight if self.pendulums.angle == "small" else FullFlight
         return kind(self.pendulums, state)
 
@@ -254,17 +262,9 @@ class _Run:
             traces.append(trace)
         if traces:
             loss = sum(trace.energy_loss for trace in traces)
-            self.impacts.append(
-                Impact(
-                    self.t,
-                    tuple(contacts),
-                    self.x.copy(),
-                    before,
-                    self.v.copy(),
-                    loss,
-                    tuple(traces),
-                )
-            )
+            at, left = self.x.copy(), self.v.copy()
+            one = Impact(self.t, tuple(contacts), at, before, left, loss, tuple(traces))
+            self.impacts.append(one)
 
 
 def part(model: Any, n: int, first: int, last: int) -> Model:
@@ -272,12 +272,6 @@ def part(model: Any, n: int, first: int, last: int) -> Model:
 
     A part may end where a ratio's bound counts on the next ball (Eq. 53), so ratios above the
     part's own bounds are held there (rule of the largest admissible ratio), not refused.
-
-    Examples
-    --------
-    >>> from cradle import ImpulseCorrelation
-    >>> part(ImpulseCorrelation([0.1, 0.2, 0.3]), 5, 1, 4).forward
-    (0.2,)
     """
     if last - first == n:
         return model  # type: ignore[no-any-return]
@@ -290,3 +284,57 @@ def part(model: Any, n: int, first: int, last: int) -> Model:
             missing = n - len(value)  # 1: one for each contact; 2: one for each inner ball
             changes[field.name] = tuple(value[first : last - missing])
     return replace(model, **changes) if changes else model  # type: ignore[no-any-return]
+
+
+#: Part of the momentum that an instant may make or lose, and of the energy beside its impacts: what
+#: balls lose that come to rest against each other, or are moved to where they touch.
+INSTANT = 1e-10
+#: Part of the energy that a flight may make or lose while the fastest ball swings by a radian;
+#: pendulums of any angle are integrated to a tenth of it, the others are known to rounding.
+RADIAN = 1e-11
+
+
+@dataclass
+class Account:
+    """What the balls of a swing have, and what an unsound flight or instant would change."""
+
+    masses: Vector
+    gaps: Vector
+    pendulums: Pendulums
+    frequency: float  # of the fastest ball, rad/s
+    size: float  # of the swing, m
+    energy: float = 0.0  # where the present flight began, J
+
+    def fly(self, begin: float, times: Vector, x: Vector, v: Vector) -> None:
+        """Demand of a flight that no ball passes another, and that energy is only damped."""
+        if not len(times):
+            return
+        overlap = -(self.gaps + np.diff(x, axis=-1)).min(axis=-1)
+        _demand(overlap <= TIE * self.size, begin + times, "balls overlap by {:g} m", overlap)
+        gain = self.pendulums.energy(self.masses, x, v) - self.energy
+        wrong = gain if np.any(self.pendulums.damping) else np.abs(gain)
+        sound = wrong <= RADIAN * (1.0 + times * self.frequency) * self.energy
+        _demand(sound, begin + times, "a flight has made or lost {:g} J", gain)
+
+    def settle(self, time: float, x: Vector, v: Vector) -> None:
+        """Demand of an instant that all but its impacts keeps the energy, and all the momentum.
+
+        How much energy an impact keeps is told by its own trace.  Of `x` there are two rows: where
+        balls came to be, and where they were put; of `v` three: as they came, after the impacts,
+        and at last.
+        """
+        momenta = self.masses * v[::2]
+        gain = abs(float((momenta[1] - momenta[0]).sum()))
+        sound = gain <= INSTANT * np.abs(momenta).sum()
+        _demand(sound, time, "impacts have made or lost {:g} kg m/s", gain)
+        struck, self.energy = self.pendulums.energy(self.masses, x, v[1:]).tolist()
+        gain = abs(self.energy - struck)
+        sound = gain <= INSTANT * max(self.energy, struck)
+        _demand(sound, time, "{:g} J are made or lost beside the impacts", gain)
+
+
+def _demand(sound: Any, times: Any, what: str, defect: Any) -> None:
+    if not np.all(sound):
+        k = int(np.argmin(sound))
+        time, size = np.ravel(times)[k], np.ravel(defect)[k]
+        raise RuntimeError(f"the swing is not certified: at t = {time} s {what.format(size)}")

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.checks import Vector
-from cradle.drawing import as_text
-from cradle.pendulums import Pendulums
+from cradle.formatting import as_text
+from cradle.input.values import Vector
+from cradle.swinging.pendulums import Pendulums
 from cradle.trace import Trace
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Moving pictures of an impact, drawn by matplotlib, and of a swing; see `cradle.film`."""
+"""Moving pictures of an impact, drawn by matplotlib, and of a swing; see `keyframes`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from cradle.checks import Vector, must_be, one_number, whole_number
-from cradle.figures import PALETTE, velocities, velocity_impulse
-from cradle.film import KEY, Animation, keyframes, number, with_style
-from cradle.swing_trace import Swing
+from cradle.input.values import Vector, must_be, one_number, whole_number
+from cradle.pictures.impacts import PALETTE, velocities, velocity_impulse
+from cradle.pictures.keyframes import KEY, Animation, keyframes, number, with_style
+from cradle.swinging.record import Swing
 from cradle.trace import Trace
 
 __all__ = ["Animation", "animate", "animate_swing"]

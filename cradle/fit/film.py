@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.checks import Vector, checked, one_number
-from cradle.fit.tracker import Track
+from cradle.fit.shots import Track
+from cradle.input.values import Vector, checked, one_number
 
 _GRAVITY = 9.81
 

@@ -6,13 +6,13 @@ import cmath
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cradle.checks import Vector
-from cradle.pendulums import Pendulums
+from cradle.input.values import Vector
+from cradle.swinging.pendulums import Pendulums
 
 #: Events nearer than this part of a swing (over 2 pi) are one; so are lengths, of the amplitude.
 TIE = 1e-9
@@ -23,13 +23,7 @@ _MOST_STEPS = 1_000_000
 
 
 class Meeting(NamedTuple):
-    """The next event of a flight.
-
-    Examples
-    --------
-    >>> Meeting(0.5, [0], []).closing
-    [0]
-    """
+    """The next event of a flight."""
 
     #: Time since the flight began, s; infinite if nothing happens.
     time: float
@@ -39,27 +33,8 @@ class Meeting(NamedTuple):
     releasing: list[int]
 
 
-class Flight(Protocol):
-    """What the event loop asks of a motion between two events."""
-
-    def next_meeting(self, horizon: float) -> Meeting:
-        """Return the first event within `horizon` seconds."""
-        ...
-
-    def at(self, times: Vector) -> tuple[Vector, Vector]:
-        """Return positions and velocities at T times since the start, shapes (T, N)."""
-        ...
-
-
-class State(NamedTuple):
-    """All that a flight needs to know of its start.
-
-    Examples
-    --------
-    >>> rest = State(np.ones(2), np.zeros(2), np.zeros(2), np.ones(1, bool), np.zeros(1, bool))
-    >>> rest.bodies()
-    [(0, 2)]
-    """
+class Start(NamedTuple):
+    """All that a flight needs to know of its start."""
 
     masses: Vector
     positions: Vector
@@ -84,29 +59,6 @@ def first_fall(
     search marches from below: with a bound K on the second derivative from now on, the parabola
     ``f + f' h - K h^2 / 2`` lies below the function, so a step to its root passes no root of the
     function.  Near a crossing this is Newton's method.
-
-    Parameters
-    ----------
-    level : float
-        Constant part.
-    terms : sequence of (C, rate)
-        Rates have a positive imaginary part and no positive real part.
-    parting : bool
-        The function starts at exactly zero and is about to rise.
-    horizon : float
-        Where the search may end, s.
-
-    Returns
-    -------
-    float
-        Time, s; infinite if there is none within the horizon (later ones may be returned).
-
-    Examples
-    --------
-    >>> round(first_fall(0.0, [(-1j, 2j)], True, 10.0), 6)  # sin(2 t)
-    1.570796
-    >>> round(first_fall(0.5, [(1 + 0j, 1j)], False, 10.0), 6)  # cos t = -1/2
-    2.094395
     """
     terms = [(c, rate) for c, rate in terms if c != 0.0]
     if not terms:
@@ -223,15 +175,9 @@ class SmallAngleFlight:
 
     A ball swings alone as x'' = -w^2 x - 2 d x'.  Balls that rest against each other are one body:
     its frequency, damping and lowest point are means over its balls, weighted by mass.
-
-    Examples
-    --------
-    >>> state = State(np.ones(2), np.zeros(2), np.array([0.0, 1.0]), *np.array([[False], [True]]))
-    >>> SmallAngleFlight(Pendulums(length=9.81), state).next_meeting(9.0)
-    Meeting(time=3.141592653589793, closing=[0], releasing=[])
     """
 
-    def __init__(self, pendulums: Pendulums, state: State) -> None:
+    def __init__(self, pendulums: Pendulums, state: Start) -> None:
         n = len(state.masses)
         self.state = state
         self.gaps = pendulums.row("gaps", n - 1)
@@ -314,16 +260,9 @@ class FullFlight:
     Sturm's comparison two balls that part cannot meet before pi / sqrt(g/l - d^2), half a swing of
     the small angle.  For all others this bounds f'' by f and f', and the search marches as in
     `first_fall`.
-
-    Examples
-    --------
-    >>> state = State(np.ones(2), np.zeros(2), np.array([0.0, 3.0]), *np.array([[False], [True]]))
-    >>> meeting = FullFlight(Pendulums(length=9.81, angle="full"), state).next_meeting(9.0)
-    >>> round(meeting.time, 6), meeting.closing
-    (3.160201, [0])
     """
 
-    def __init__(self, pendulums: Pendulums, state: State) -> None:
+    def __init__(self, pendulums: Pendulums, state: Start) -> None:
         n = len(state.masses)
         self.state, self.pendulums = state, pendulums
         self.length = float(pendulums.row("length", n)[0])
@@ -406,3 +345,6 @@ class FullFlight:
             found.append(y)
         x, v = np.split(np.array(found).reshape(len(times), len(self.start)), 2, axis=1)
         return x[:, self.body], v[:, self.body]
+
+
+Flight = SmallAngleFlight | FullFlight

@@ -1,0 +1,1 @@
+"""What is asked of input, the words of a refusal, and tables."""

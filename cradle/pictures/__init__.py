@@ -1,0 +1,1 @@
+"""Figures and moving pictures; matplotlib is imported here and nowhere else."""

@@ -1,0 +1,1 @@
+"""From arrays to the event loop and back, plain or compiled."""

@@ -1,0 +1,1 @@
+"""Impacts and pendulums in turn."""
