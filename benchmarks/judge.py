@@ -1,0 +1,313 @@
+"""The judge: answers of the package against the textbook's rules over decimals of 100 digits.
+
+Usage::
+
+    python benchmarks/judge.py                             # a hundred chains of every family
+    python benchmarks/judge.py --family losses --count 10000 --seed 7
+    python benchmarks/judge.py --reading either            # right under either reading of inputs
+
+An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
+within 600 events.  A float means what it prints as if that is short, see `meaning`: ties of an
+exact run are those of the decimals that a reader sees.  Wrong chains are shrunk and printed as
+they can be pasted.  Where the exact run has no end, see `second_opinion`.
+"""
+
+import argparse
+import decimal
+import os
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from decimal import Decimal
+from typing import NamedTuple
+
+import truth
+from families import JUDGED, family
+from problem import Problem
+
+from cradle import ImpactNotFinished, post_impact_velocities, textbook
+from cradle.trace import ImpactNotCertified
+
+DIGITS, EVENTS, WRONG = 100, 600, 1e-9
+#: Where an infinite sequence was taken to its limit, answers may differ by this.
+LIMIT = 1e-6
+#: Chains of one task of the pool.
+TASK = 50
+
+#: Wrong once, with clean certificates; masses of the first and the last are those of a search.
+NAMED = {
+    "a rounding ended an idle contact": Problem(
+        [0.9395274204242703, 0.13162874375217531, 0.8787652613133802,
+         8.666424460086086, 0.4642354568832623, 1.4071765793971693],
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.8, 0.95, 0.8, 0.8, 0.9],
+        [0.1, 0.0, 0.0, 0.0],
+        [0.1, 0.1, 0.0, 0.1],
+        1.0,
+    ),
+    "six equal, one round early": Problem(
+        [1.0] * 6,
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.8, 0.9, 0.8, 0.95, 0.9],
+        [0.0, 0.0, 0.0, 0.1],
+        [0.0, 0.0, 0.1, 0.0],
+    ),
+    "seven equal": Problem(
+        [1.0] * 7,
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.95, 0.9, 0.9, 0.9, 0.9, 0.8],
+        [0.0, 0.1, 0.0, 0.05, 0.0],
+        [0.1, 0.05, 0.1, 0.0, 0.0],
+    ),
+    "nine balls": Problem(
+        [4.3639302160559, 2.9120226348453953, 0.8581936094543515,
+         2.0061646045881667, 5.829783354676066, 2.236215035414757,
+         2.2556046634037394, 0.38269385236942605, 1.6450906384595456],
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.9] * 8,
+        [0.1, 0.0, 0.0, 0.0, 0.1, 0.1, 0.0],
+        [0.0, 0.05, 0.1, 0.0, 0.05, 0.05, 0.05],
+        1.0,
+    ),
+}  # fmt: skip
+
+
+# --- what is true ------------------------------------------------------------------------------
+
+
+def meaning(x):
+    """The number that a float means: of 15 digits at most, from 1e-7 to 1e15, what it prints as.
+
+    Every other float means its exact value.
+    """
+    exact, printed = Decimal(x), Decimal(repr(float(x)))
+    digits = printed.normalize(decimal.Context(prec=17)).as_tuple().digits
+    short = len(digits) <= 15 and Decimal("1e-7") <= abs(printed) < Decimal("1e15")
+    return printed if short else exact
+
+
+#: What the inputs may be read as.
+READINGS = {"meaning": (meaning,), "doubles": (Decimal,), "either": (meaning, Decimal)}
+
+
+class Exact(textbook.Impact):
+    """The textbook's impact: zero and equal is what is so to six tenths of the digits; no path."""
+
+    def __init__(self, *given):
+        super().__init__(*given)
+        wider = Decimal(1) / self.tie / self.small
+        self.small, self.last_digits = self.small * wider, self.last_digits * wider
+
+    def record(self, kind, c):
+        self.events.append((kind, c))
+
+
+def exact(problem, read=meaning, *, digits=None, events=EVENTS):
+    """Velocities by the rules alone; None if the sequence does not end within so many events.
+
+    100 digits; four times as many where a ratio is so small that products of several matter.
+    """
+    tiny = any(0 < ratio < 1e-9 for ratio in (*problem.forward, *problem.backward))
+    with decimal.localcontext(prec=digits or DIGITS * (4 if tiny else 1)):
+        try:
+            options = {"number": read, "max_events": events, "impact": Exact}
+            return problem.solve(textbook.solve, **options).velocities
+        except textbook.EventLimit:
+            return None
+
+
+def off(problem, one, other):
+    """How far two outcomes are apart, as a part of the largest speed before the impact."""
+    most = max(abs(a - Decimal(b)) for a, b in zip(map(Decimal, one), other, strict=True))
+    return float(most / (Decimal(max(map(abs, problem.velocities))) or 1))
+
+
+# --- what is answered --------------------------------------------------------------------------
+
+
+class Verdict(NamedTuple):
+    """What was found out about a chain."""
+
+    #: "right", "wrong", "unfinished", or who could not judge it.
+    word: str
+    #: Distance from the nearest truth.
+    off: float = 0.0
+
+
+def answer(problem, *, single=False):
+    """The package's velocities, of a batch or of `collide`; None if it gives none."""
+    *parts, meeting = problem
+    try:
+        if single:
+            return problem.collide().velocities.tolist()
+        options = {"meeting": meeting, "excess": "saturate"}
+        return post_impact_velocities(*parts, **options).tolist()
+    except (ImpactNotFinished, ImpactNotCertified):
+        return None
+
+
+def judge(problem, reads=(meaning,), ask=answer):
+    """The verdict on one chain."""
+    given = ask(problem)
+    least = None
+    for read in reads:
+        right = exact(problem, read)
+        if right is None:
+            least = None
+            break
+        if given is None:
+            return Verdict("unfinished")
+        here = off(problem, given, right)
+        least = here if least is None else min(least, here)
+        if least <= WRONG:
+            return Verdict("right", least)
+    if least is not None:
+        return Verdict("wrong", least)
+    return Verdict("endless, unfinished") if given is None else second_opinion(problem, given, ask)
+
+
+def second_opinion(problem, given, ask=answer):
+    """On a chain whose exact run has no end: by rule R9 at fifty digits, then by relations."""
+    with decimal.localcontext(prec=50):
+        try:
+            limit = problem.exact(2000, number=meaning).velocities
+            far = off(problem, given, limit)
+            return Verdict("as fifty digits" if far <= LIMIT else "unlike fifty digits", far)
+        except truth.EventLimit:
+            pass
+    far = [off(problem, given, other) for other in seen_otherwise(problem, ask)]
+    word = "as its relations" if far and max(far) <= LIMIT else "nobody knows"
+    return Verdict(word, max(far, default=1.0))
+
+
+def seen_otherwise(problem, ask=answer):
+    """Answers for the same chain seen from elsewhere, where these inputs mean the very same."""
+    speed, mass, unit = 4.0, 2.0, 0.5
+    others = [
+        (problem.boosted(speed), lambda v: [x - speed for x in v]),
+        (problem.in_units(mass, unit), lambda v: [x / unit for x in v]),
+    ]
+    if sum(a > b for a, b in zip(problem.velocities, problem.velocities[1:])) == 1:
+        others.append((problem.mirrored(), lambda v: [-x for x in reversed(v)]))
+    for other, back in others:
+        given = ask(other)
+        if given is not None and [meaning(x) for x in back(other.velocities)] == [
+            meaning(x) for x in problem.velocities
+        ]:
+            yield back(given)
+
+
+# --- wrong chains, shrunk ----------------------------------------------------------------------
+
+
+def without(problem, i):
+    """The chain with ball i taken out; its neighbours' ratios stay."""
+
+    def drop(values, k):
+        k = min(max(k, 0), len(values) - 1)
+        return values[:k] + values[k + 1 :]
+
+    m, v, e, f, b, meeting = problem
+    return Problem(drop(m, i), drop(v, i), drop(e, i), drop(f, i - 1), drop(b, i - 1), meeting)
+
+
+SIMPLER = {
+    "masses": (1.0, 2.0),
+    "velocities": (0.0, 1.0),
+    "restitution": (1.0, 0.9, 0.5),
+    "forward": (0.0, 0.1, 0.5),
+    "backward": (0.0, 0.1, 0.5),
+}
+
+
+def simpler(problem):
+    """Chains of fewer balls, or with one simpler number."""
+    if len(problem.masses) > 3:
+        yield from (without(problem, i) for i in range(len(problem.masses)))
+    if problem.meeting != 0.5:
+        yield problem._replace(meeting=0.5)
+    for name, values in SIMPLER.items():
+        given = getattr(problem, name)
+        for i, x in enumerate(given):
+            better = values[: values.index(x)] if x in values else values
+            rounded = [
+                y for y in (round(x, 1), round(x, 2), round(x, 3)) if len(repr(y)) < len(repr(x))
+            ]
+            for y in (*better, *rounded):
+                if y > 0 or name != "masses":
+                    yield problem._replace(**{name: [*given[:i], y, *given[i + 1 :]]})
+
+
+def shrunk(problem, is_wrong, most=400):
+    """A smallest chain near this one that is still wrong, after at most so many trials."""
+    trials = 0
+    found = True
+    while found:
+        found = False
+        for other in simpler(problem):
+            trials += 1
+            if trials > most:
+                return problem
+            if is_wrong(other):
+                problem, found = other, True
+                break
+    return problem
+
+
+# --- many chains -------------------------------------------------------------------------------
+
+
+def chains(name, count, seed):
+    """Chains of a family in tasks, each with a seed of its own."""
+    for start in range(0, count, TASK):
+        yield name, min(TASK, count - start), seed * 1_000_003 + start
+
+
+def task(name, count, seed, reading):
+    """Judge some chains; counts, and those that are wrong or doubtful."""
+    counts, found = Counter(), []
+    for problem in family(name, count, seed):
+        verdict = judge(problem, READINGS[reading])
+        counts[verdict.word] += 1
+        if verdict.word.startswith(("wrong", "unlike")):
+            found.append((verdict, problem))
+    return name, counts, found
+
+
+COLUMNS = [
+    "right", "wrong", "unfinished", "as fifty digits", "unlike fifty digits", "as its relations",
+    "nobody knows", "endless, unfinished",
+]  # fmt: skip
+
+
+def run(names, count, seed, reading, workers=2):
+    """Judge so many chains of each family; counts by family, and those that are wrong."""
+    counts, found = {name: Counter() for name in names}, []
+    tasks = [(*each, reading) for name in names for each in chains(name, count, seed)]
+    with ProcessPoolExecutor(workers, initializer=os.nice, initargs=(10,)) as pool:
+        for name, part, wrong in pool.map(task, *zip(*tasks, strict=True)):
+            counts[name].update(part)
+            found.extend((name, *each) for each in wrong)
+    return counts, found
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--family", choices=JUDGED, action="append")
+    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--reading", choices=READINGS, default="meaning")
+    parser.add_argument("--shrink", type=int, default=5, help="how many wrong chains to shrink")
+    given = parser.parse_args()
+    counts, found = run(given.family or list(JUDGED), given.count, given.seed, given.reading)
+    print(f"{'':18}" + "".join(f"{word:>21}" for word in COLUMNS))
+    for name, count in counts.items():
+        print(f"{name:18}" + "".join(f"{count[word]:21}" for word in COLUMNS))
+    reads = READINGS[given.reading]
+    for name, verdict, problem in found:
+        print(f"\n{name}: {verdict.word}, off by {verdict.off:.1e}\n{problem!r}")
+    for _, _, problem in [each for each in found if each[1].word == "wrong"][: given.shrink]:
+        print("\nshrunk", shrunk(problem, lambda p: judge(p, reads).word == "wrong"))
+
+
+if __name__ == "__main__":
+    main()
