@@ -102,15 +102,15 @@ class Exact(textbook.Impact):
         self.events.append((kind, c))
 
 
-def exact(problem, read=meaning, *, twice=False):
-    """Velocities by the rules alone; None if the sequence does not end within 600 events.
+def exact(problem, read=meaning, *, events=EVENTS, twice=False):
+    """Velocities by the rules alone; None if the sequence does not end within so many events.
 
     100 digits; four times as many where a ratio is so small that products of several matter; twice
     as many if asked.
     """
     tiny = any(0 < ratio < 1e-9 for ratio in (*problem.forward, *problem.backward))
     with decimal.localcontext(prec=DIGITS * (4 if tiny else 1) * (2 if twice else 1)):
-        options = {"number": read, "max_events": EVENTS, "impact": Exact}
+        options = {"number": read, "max_events": events, "impact": Exact}
         try:
             return problem.solve(textbook.solve, **options).velocities
         except textbook.EventLimit:
@@ -161,10 +161,10 @@ def single(problem):
         return None
 
 
-def judge(problem, *ask):
+def judge(problem, *ask, events=EVENTS):
     """The verdict on one chain, by the worse of its answers; "endless" if that must be others'."""
     given = [answer(problem) for answer in ask or (batch, single)]
-    right = exact(problem)
+    right = exact(problem, events=events)
     if right is None:
         return Verdict("endless")
     if None in given:

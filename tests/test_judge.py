@@ -21,18 +21,18 @@ def test_named_chain(name):
 
 #: Chains of each family in the tests: as many as some seconds allow.
 SAMPLE = {
-    "losses": 400, "wide": 150, "generic": 150, "at bounds": 150, "extremes": 100, "ties": 60,
-    "ties within bounds": 60, "tiny ratios": 15, "mixed zeros": 60, "light balls": 60,
+    "losses": 300, "wide": 150, "generic": 400, "at bounds": 300, "extremes": 120, "ties": 120,
+    "ties within bounds": 120, "tiny ratios": 15, "mixed zeros": 120, "light balls": 120,
 }  # fmt: skip
 
 
-def no_wrong_chain(name, count, seed):
+def no_wrong_chain(name, count, seed, **options):
     """All of so many chains of a family whose exact run ends are right, and these are most."""
-    verdicts = [(judge(problem), problem) for problem in family(name, count, seed)]
+    verdicts = [(judge(problem, **options), problem) for problem in family(name, count, seed)]
     wrong = [f"{verdict}: {problem}" for verdict, problem in verdicts if verdict.word in REFUTED]
     right = sum(verdict.word == "right" for verdict, _ in verdicts)
     assert not wrong, f"{len(wrong)} of {count} chains:\n" + "\n".join(wrong)
-    assert right > 0.75 * count
+    assert right > 0.6 * count
 
 
 REFUTED = ("wrong", "other reading")
@@ -40,7 +40,7 @@ REFUTED = ("wrong", "other reading")
 
 @pytest.mark.parametrize("name", SAMPLE)
 def test_sample_of_a_family(name):
-    no_wrong_chain(name, SAMPLE[name], seed=30)
+    no_wrong_chain(name, SAMPLE[name], seed=30, events=200)
 
 
 @pytest.mark.exhaustive

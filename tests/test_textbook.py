@@ -395,6 +395,18 @@ def test_double_closing_within_the_tie(number, tie, side, first):
     assert outcome.events[:2] == [("close", first), ("close", 3 - first)]
 
 
+def test_nearness_is_that_of_the_last_segments():
+    """R8.6: contacts 2 and 3 close on one ball; |u| counts where the round starts, not before."""
+    outcome = textbook.solve([1] * 6, [1, "-0.1", "-0.1", 1, "0.2", "-0.5"], "0.9", "0.1")
+    assert outcome.events[2:7] == [
+        *(("end", 0), ("end", 3), ("maximum_compression", 4)),
+        *(("close", 2), ("close", 3)),
+    ]
+    first, before = outcome.path[0], outcome.path[4]
+    assert first[3] - first[4] < first[3] - first[2]  # contact 3 was the nearer one
+    assert before[4] - before[3] > 3 * (before[3] - before[2]) > 0
+
+
 def test_ties_do_not_depend_on_the_digits():
     """What coincides in decimal numbers coincides in all: rounding decides no event."""
     n = 13
