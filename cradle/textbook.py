@@ -92,8 +92,8 @@ class Impact:
                 far, c, ratio[i] = i + way, i if way == FORWARD else i - 1, self.ratio[way][i]
                 if self.direction[far] != -way and self.u[c] == self.gained[c] == 0:
                     limit = self.m[far] / (self.m[far] + self.m[i] * (1 - ratio.get(far, 0)))
-                    if (excess := ratio[i] / limit - 1) >= -self.small:
-                        ratio[i], bound[c] = limit, excess > self.small
+                    if ratio[i] >= (1 - self.small) * limit:
+                        ratio[i], bound[c] = limit, ratio[i] > (1 + self.small) * limit
         return ratio, bound
 
     def look_ahead(self, rate: dict[int, Number], slope: dict[int, Number]) -> list[Any]:
