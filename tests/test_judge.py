@@ -7,7 +7,7 @@ from decimal import Decimal
 import judge as court
 import pytest
 from families import JUDGED, family
-from judge import NAMED, Verdict, exact, judge, meaning, off, second_opinion, shrunk
+from judge import NAMED, Verdict, exact, judge, meaning, off, on_bounds, second_opinion, shrunk
 from problem import Problem
 
 # --- the package -------------------------------------------------------------------------------
@@ -21,9 +21,12 @@ def test_named_chain(name):
 
 #: Chains of each family in the tests: as many as some seconds allow.
 SAMPLE = {
-    "losses": 300, "wide": 150, "generic": 400, "at bounds": 300, "extremes": 120, "ties": 120,
+    "losses": 250, "wide": 150, "generic": 400, "at bounds": 300, "extremes": 80, "ties": 120,
     "ties within bounds": 120, "tiny ratios": 15, "mixed zeros": 120, "light balls": 120,
 }  # fmt: skip
+#: Begins with fifty chains of "losses" of which one was wrong by .1 when first judged.
+SEED = 2026007778
+REFUTED = ("wrong", "other reading")
 
 
 def no_wrong_chain(name, count, seed, **options):
@@ -35,12 +38,9 @@ def no_wrong_chain(name, count, seed, **options):
     assert right > 0.6 * count
 
 
-REFUTED = ("wrong", "other reading")
-
-
 @pytest.mark.parametrize("name", SAMPLE)
 def test_sample_of_a_family(name):
-    no_wrong_chain(name, SAMPLE[name], seed=30, events=200)
+    no_wrong_chain(name, SAMPLE[name], seed=SEED, events=200)
 
 
 @pytest.mark.exhaustive
@@ -91,18 +91,21 @@ def test_it_can_say_no():
     assert judge(TIE, answering(), answering(2e-9)).word == "wrong"
     assert judge(TIE, answering(), lambda _: None).word == "unfinished"
     assert judge(TIE, answering(read=Decimal)).word == "other reading"
+    beside = Problem([1.0, 3.0, 4.0], [1.0, 0.0, 0.0], [1.0, 1.0], [4 / 7], [0.0])
+    assert exact(beside) != exact(on_bounds(beside))
+    assert judge(beside, lambda _: exact(on_bounds(beside))).word == "other reading"
 
 
 @pytest.mark.parametrize("name", ["losses", "wide", "at bounds", "ties"])
 def test_twice_the_digits_say_the_same(name):
     """No decision is left to the last digits; an infinite sequence may take longer to fade."""
     compared = 0
-    for problem in family(name, 25, seed=32):
+    for problem in family(name, 15, seed=32):
         one, other = exact(problem), exact(problem, twice=True)
         if one and other:
             assert off(problem, one, other) < 1e-55, problem
             compared += 1
-    assert compared > 18
+    assert compared > 10
 
 
 def test_relations():
