@@ -150,8 +150,8 @@ class Impact:
         if p - r <= self.last_digits:
             return []
         at = (1 - self.meeting) * max(self.zero, r) + self.meeting * min(p, q)
-        ways = (left, at, p), (right, at - q, r - q)
-        parts = [(run, part / whole if whole else self.zero) for run, part, whole in ways]
+        ways = (left, at, p), (right, q - at, q - r)
+        parts = [(run, x / whole if x > self.last_digits else self.zero) for run, x, whole in ways]
         return [1 if (1 - x) * run.length <= run.instant else x for run, x in parts]
 
     def first_meeting(self, runs: list[Run]) -> tuple[int, list[tuple[Run, Number]]]:

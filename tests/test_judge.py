@@ -108,6 +108,19 @@ def test_twice_the_digits_say_the_same(name):
     assert compared > 10
 
 
+def test_a_gap_that_closes_at_once():
+    """It lay at zero: no rounding is absorbed by contact 2 of e = 0, which would end it."""
+    problem = Problem(
+        [0.1, 1.0, 0.053, 0.053, 0.166, 0.166, 1.0],
+        [1.0, 0.0, 0.5, -0.5, 0.5, -0.5, 0.0],
+        [1.0, 1.0, 0.0, 1.0, 1.0, 0.0],
+        [0.2955870108243131, 0.3084507042253521, 0.3789954337899544, 0.0, 0.25],
+        [0.0, 0.25, 0.2857142857142857, 0.15445462114904246, 0.27092262576133547],
+        meeting=0.0,
+    )
+    assert off(problem, exact(problem), exact(problem, twice=True)) < 1e-60
+
+
 def test_relations():
     """The exact outcome of a single striker seen from elsewhere."""
     for problem in family("generic", 20, seed=33):
