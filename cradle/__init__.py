@@ -15,7 +15,7 @@ The rooms, in that order:
 - `cradle.swinging`: impacts and pendulums in turn; `cradle.pendulums`, `cradle.flight` and
   `cradle.resting` say how balls hang, fly and rest against each other, `cradle.swing_trace`
   what happened.
-- `cradle.row`: a row of balls that a physics engine moves.
+- `cradle.row`: a row of balls that a physics engine moves; `cradle.stride`: one step of it.
 - `cradle.closed_form`: what the paper gives in closed form; `cradle.conserving`: all outcomes of
   three balls that conserve energy.
 - `cradle.tables`: the paper's tables and chains, read by `cradle.reading`.
