@@ -32,6 +32,7 @@ cradle-companion; its version is `cradle.__version__`.
 
 from cradle.advice import Recommendation, recommend
 from cradle.chain import Chain
+from cradle.drive import warm_up
 from cradle.models import Model, collide
 from cradle.models.batch import Outcomes, outcomes, post_impact_velocities
 from cradle.models.compliant import SpringChain, TimedTrace
@@ -75,6 +76,7 @@ __all__ = [
     "recommend",
     "restitution_table",
     "swing",
+    "warm_up",
 ]
 
 

@@ -82,10 +82,10 @@ class Row(Alone):
         Balls that touch and close no faster than this do not rebound: they go on together, m/s;
         sqrt(a r) / 100 with the acceleration a if left out.
     acceleration : float
-        The largest acceleration between neighbours that is to be expected, usually that of
-        gravity, m/s^2.  From it follows for how long nobody need look at balls that do not hang
-        on equal strings.  All are looked at every hundredth of a second, if the steps are shorter,
-        in case something else strikes them.
+        That of gravity, m/s^2, or what else draws neighbours together at most.  From it follows
+        for how long nobody need look at balls that do not hang on equal strings, and how a long
+        step bends the way of those that hang.  All are looked at every hundredth of a second, if
+        the steps are shorter, in case something else strikes them.
 
     Raises
     ------
@@ -95,8 +95,20 @@ class Row(Alone):
         If a value is wrong, or the balls are no row: balls that are no neighbours touch, balls
         overlap by more than `touching`, or pivots are not in the order of the balls.
 
+    Attributes
+    ----------
+    on_hit : callable, optional
+        Called with each `Hit` of a step, when the step is made: set it to play a sound.
+    impacts, settled : int
+        How many impacts were solved so far, and how often touching balls were brought to rest.
+    time : float
+        For how long the row has been stepped, s.
+
     Notes
     -----
+    A step never compiles: impacts run plain, a millisecond or two each for five balls, unless
+    `cradle.warm_up` was called before.  Rows of one world are stepped by `step_rows`.
+
     Any units will do, such as pixels, if all lengths have the same one, and the acceleration too.
 
     Examples
@@ -145,11 +157,8 @@ class Row(Alone):
         x = bodies.motion()[0]
         super().__init__(x, chain, model, radii, pivots, touching, resting, acceleration)
         self.bodies = bodies
-        #: Called with each `Hit` of a step, when the step is made.
         self.on_hit: Callable[[Hit], object] | None = None
-        #: How many impacts were solved so far, and how often touching balls were brought to rest.
         self.impacts, self.settled = 0, 0
-        #: For how long the row has been stepped, s.
         self.time = 0.0
         #: Where the speed of a step lies: 0 is the velocity before it, 1 the one after it.
         self.lag = 0.5
@@ -168,15 +177,20 @@ class Row(Alone):
             If balls have passed through each other, the impacts of the step do not end, or the
             world is seen to move on between the steps of this row: see `step_rows`.
         """
-        step_rows((self,), duration)
+        if type(duration) is float and 0.0 < duration <= self.quiet:  # the usual case, and fast
+            self.quiet -= duration
+            self.time += duration
+            self.bodies.advance(duration)
+        else:
+            step_rows((self,), duration)
 
     def wake(self) -> None:
         """Look at the balls at the next step: call it after moving or kicking one of them."""
         self.quiet, self._last = 0.0, None
 
     def _motion(self) -> tuple[list[complex], list[complex]]:
-        x, v = self.bodies.motion()
-        return [complex(*p) for p in x], [complex(*p) for p in v]
+        places, speeds = self.bodies.motion()
+        return [complex(x, y) for x, y in places], [complex(x, y) for x, y in speeds]
 
     def _push(self, own: Plane, x: Plane) -> None:
         impulses = self.chain.masses * own * self.ways(x)
@@ -193,7 +207,7 @@ class Row(Alone):
         touches, arrival, self.quiet = self.look(*told)
         self.quiet -= duration
         near = touches or arrival < 1.5 * duration  # the step itself makes them faster or slower
-        learning = self._lessons < _LESSONS and max(map(abs, told[1])) > self.resting
+        learning = self._lessons < _LESSONS and any(abs(v) > self.resting for v in told[1])
         if not (near or learning):
             self._last = None
             return None

@@ -184,7 +184,7 @@ class Alone:
             elif closing > self.resting:
                 arrival = min(arrival, gap / closing)
             # The first t > 0 with room = closing t + speeding t^2 / 2; none if they part for good.
-            room = max(gap, 0.0) + self.touching
+            room = gap if gap > self.touching else max(gap, 0.0) + self.touching
             root = math.sqrt(closing * closing + 2.0 * self.speeding * room)
             if closing + root > 0.0:
                 quiet = min(quiet, 2.0 * room / (closing + root))
