@@ -215,6 +215,7 @@ class Row(Alone):
         own = self.own(v, x)
         if learning:
             self._learn(x, own, duration)
+            self.quiet = 0.0  # to compare two neighbouring looks
         flight = self.fly(x, own + self.lag * duration * self._pull(x), duration) if near else None
         if flight is None:
             return None
