@@ -267,7 +267,7 @@ class Row(Alone):
             )
         # Near the turning points the lag is seen: the kicks are in proportion to the pulls.
         first, second = self._pull(was).real, self._pull(x).real
-        seen = (gained > 0.25 * speed) & (np.abs(first) > 0.05 * self.acceleration)
+        seen = (gained > 0.05 * speed) & (np.abs(first) > 0.05 * self.acceleration)
         if seen.any() and math.isclose(passed, step, rel_tol=1e-6):
             share = ((mean - before)[seen] / gain[seen]).real
             late = share * second[seen]
