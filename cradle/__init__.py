@@ -12,7 +12,7 @@ Folders are roles:
 - `cradle.input`: what is asked of input, and the words of a refusal.
 - `cradle.kernel`: the event loop; `cradle.runtime` compiles it and feeds it.
 - `cradle.models`: one file a model, and the verb `collide`.
-- `cradle.swinging`: impacts and pendulums in turn.
+- `cradle.swinging`: impacts and pendulums in turn; `cradle.swinging.stride`, one step of a `Row`.
 - `cradle.fit`: ratios and restitution from measured velocities.
 - `cradle.advice`: which model a scene needs, by what was measured.
 - `cradle.pictures`: matplotlib, imported only when asked for.
@@ -31,6 +31,7 @@ from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
+from cradle.runtime.job import warm_up
 from cradle.swinging.pendulums import Pendulums
 from cradle.swinging.record import Impact, Swing
 from cradle.swinging.swing import swing
@@ -67,6 +68,7 @@ __all__ = [
     "recommend",
     "restitution_table",
     "swing",
+    "warm_up",
 ]
 
 

@@ -2,34 +2,37 @@
 
 Engines solve one contact after another, or all at once as one body; neither is what a row of
 elastic balls does.  `Row` takes the contacts of one row over: the engine is told not to collide
-these balls with each other, and `Row.step` takes the place of the engine's step.  It looks where
-the balls are, lets the engine step to the instant of a contact, solves the balls that touch there
-as one chain, and gives the impulses back.  All else stays with the engine.
+these balls with each other, and `Row.step` takes the place of the engine's step.
+
+The engine's steps stay whole.  An engine keeps an energy that belongs to the length h of its step
+(for v += h a, x += h v it is v^2/2 + V - h v V'/2), so to cut a step at each contact pumps energy.
+From step to step a ball moves on a polygon: straight on with the speed w of the step, then a kick.
+With the corners x and x' of a side, and k the stiffness that draws the ball back, w^2 + k x x'
+stays the same.  A contact turns the side: with a time t of the step left, x' becomes x' + t u, and
+w becomes w + u.  Where the balls hang alike and touch, that changes the energy of the row by the
+sum of m ((w + u)^2 - w^2), up to terms whose mean is zero; and that sum is what `collide` keeps.
+Two pushes do it: m u t / h before the engine's step, the rest after it, when w is known.  It lies
+between the velocities before and after the step; where, the row learns from steps without contact.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.input.values import Vector, a, checked, must_be, one_number
-from cradle.models import Model, collide
-from cradle.swinging.resting import common_velocities, stretches
-from cradle.swinging.swing import part
+from cradle.input.values import a, one_number
+from cradle.models import Model
+from cradle.swinging.stride import Alone, Flight, Hit, Plane
 
-__all__ = ["Bodies", "Row"]
+__all__ = ["Bodies", "Hit", "Row", "step_rows"]
 
-# Contact lines of one cluster may differ by this angle, rad: beyond it the balls are no row.
-_BEND = 0.1
-# Somebody looks at the balls at least that often, s.
-_LONGEST = 0.01
-# More impacts than this in one step are no row of balls: with a resting rule they end long before.
-_MOST_IMPACTS = 10_000
+# From so many looks at moving balls the row learns how the engine steps.
+_LESSONS = 200
 
 Pairs = Sequence[Sequence[float]]
 
@@ -53,7 +56,7 @@ class Bodies(Protocol):
         ...
 
 
-class Row:
+class Row(Alone):
     """A row of balls that an engine moves and the package collides.
 
     Parameters
@@ -79,10 +82,10 @@ class Row:
         Balls that touch and close no faster than this do not rebound: they go on together, m/s;
         sqrt(a r) / 100 with the acceleration a if left out.
     acceleration : float
-        The largest acceleration between neighbours that is to be expected, usually that of
-        gravity, m/s^2.  From it follows for how long nobody need look at balls that do not hang
-        on equal strings.  All are looked at every hundredth of a second, if the steps are shorter,
-        in case something else strikes them.
+        That of gravity, m/s^2, or what else draws neighbours together at most.  From it follows
+        for how long nobody need look at balls that do not hang on equal strings, and how a long
+        step bends the way of those that hang.  All are looked at every hundredth of a second, if
+        the steps are shorter, in case something else strikes them.
 
     Raises
     ------
@@ -92,8 +95,20 @@ class Row:
         If a value is wrong, or the balls are no row: balls that are no neighbours touch, balls
         overlap by more than `touching`, or pivots are not in the order of the balls.
 
+    Attributes
+    ----------
+    on_hit : callable, optional
+        Called with each `Hit` of a step, when the step is made: set it to play a sound.
+    impacts, settled : int
+        How many impacts were solved so far, and how often touching balls were brought to rest.
+    time : float
+        For how long the row has been stepped, s.
+
     Notes
     -----
+    A step never compiles: impacts run plain, a millisecond or two each for five balls, unless
+    `cradle.warm_up` was called before.  Rows of one world are stepped by `step_rows`.
+
     Any units will do, such as pixels, if all lengths have the same one, and the acceleration too.
 
     Examples
@@ -139,210 +154,145 @@ class Row:
                 f"bodies is {a(type(bodies).__name__)} without {', '.join(missing)}; must be an "
                 "adapter with motion, push and advance"
             )
-        n = len(must_be(Chain, "chain", chain))
-        collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
-        size = checked("radii", radii, "must be above 0", 0.0, open_low=True)
-        if size.shape not in ((), (n,)):
-            raise ValueError(f"radii has shape {size.shape}; {n} balls need () or ({n},)")
-        self.bodies, self.chain, self.model = bodies, chain, model
-        self.radii: list[float] = np.broadcast_to(size, (n,)).tolist()
-        self.reach = [a + b for a, b in zip(self.radii, self.radii[1:], strict=False)]
-        self.pivots = None if pivots is None else checked("pivots", pivots)
-        if self.pivots is not None and self.pivots.shape != (n, 2):
-            raise ValueError(f"pivots has shape {self.pivots.shape}; {n} balls need ({n}, 2)")
-        self.acceleration = one_number(
-            "acceleration", acceleration, "must be above 0", 0.0, open_low=True
-        )
-        near = 1e-3 * min(self.radii) if touching is None else touching
-        self.touching = one_number("touching", near, "must be above 0", 0.0, open_low=True)
-        slow = 0.01 * math.sqrt(self.acceleration * min(self.radii)) if resting is None else resting
-        self.resting = one_number("resting", slow, "must be above 0", 0.0, open_low=True)
-        x = checked("motion: positions", bodies.motion()[0])
-        self._refuse_a_pack(x)
-        overlaps = self.reach - np.hypot(*np.diff(x, axis=0).T)
-        if (overlaps > self.touching).any():
-            c = int(np.argmax(overlaps))
-            rule = f"must be at most `touching` = {self.touching:g} at the start"
-            raise ValueError(f"balls {c} and {c + 1} overlap by {overlaps[c]:g} m; {rule}")
-        # Balls on equal strings that nearly touch are accelerated alike, others not.
-        self.hang_alike = False
-        if self.pivots is not None:
-            places = self.pivots @ (self.pivots[-1] - self.pivots[0])
-            back = np.diff(places) < 0.0
-            if back.any():
-                ball = int(np.argmax(back)) + 1
-                raise ValueError(
-                    f"pivots[{ball}] lies behind pivots[{ball - 1}] on the way from the first to "
-                    "the last; the balls must be told from one end of the row to the other"
-                )
-            if (x[-1] - x[0]) @ (self.pivots[-1] - self.pivots[0]) <= 0.0:
-                raise ValueError("pivots lead the other way than the balls; must be in their order")
-            lengths = np.hypot(*(x - self.pivots).T)
-            self.hang_alike = bool(np.ptp(lengths) <= 1e-3 * lengths.min())
-        self.speeding = 0.0 if self.hang_alike else self.acceleration
-        #: How many impacts were solved so far, and how often touching balls were brought to rest.
+        x = bodies.motion()[0]
+        super().__init__(x, chain, model, radii, pivots, touching, resting, acceleration)
+        self.bodies = bodies
+        self.on_hit: Callable[[Hit], object] | None = None
         self.impacts, self.settled = 0, 0
-        #: For how long nothing can happen, s.
-        self.quiet = 0.0
+        self.time = 0.0
+        #: Where the speed of a step lies: 0 is the velocity before it, 1 the one after it.
+        self.lag = 0.5
+        self._samples: list[float] = []
+        self._last: tuple[Plane, Plane, float, float] | None = None
+        self._lessons = self._doubts = 0
 
     def step(self, duration: float) -> None:
-        """Move the scene on by one step; the engine steps at least once, and to every contact.
+        """Move the scene on by one step, which the engine makes as a whole.
 
         Raises
         ------
         ValueError
             If the duration or what `motion` tells is wrong, or balls that touch are not in a row.
         RuntimeError
-            If balls have passed through each other, or the impacts of the step do not end.
+            If balls have passed through each other, the impacts of the step do not end, or the
+            world is seen to move on between the steps of this row: see `step_rows`.
         """
-        if not (type(duration) is float and 0.0 < duration < math.inf):  # one comparison a step
-            duration = one_number("duration", duration, "must be above 0", 0.0, open_low=True)
-        self.quiet -= duration
-        if self.quiet >= 0.0:
+        if type(duration) is float and 0.0 < duration <= self.quiet:  # the usual case, and fast
+            self.quiet -= duration
+            self.time += duration
             self.bodies.advance(duration)
-            return
-        left, most = duration, self.impacts + _MOST_IMPACTS
-        while True:
-            arrival, self.quiet = self._look()
-            if arrival >= left:
-                break
-            if arrival > 0.0:
-                self.bodies.advance(arrival)
-                left -= arrival
-            elif self.impacts > most:
-                raise RuntimeError(
-                    f"more than {_MOST_IMPACTS} impacts in a step of {duration!r} s; the balls are "
-                    f"squeezed between others, or `resting` = {self.resting!r} is too low"
-                )
-        self.bodies.advance(left)
-        self.quiet -= left
+        else:
+            step_rows((self,), duration)
 
     def wake(self) -> None:
         """Look at the balls at the next step: call it after moving or kicking one of them."""
-        self.quiet = 0.0
+        self.quiet, self._last = 0.0, None
 
-    def _look(self) -> tuple[float, float]:
-        """Solve what touches now.  Return when the next contact arrives, and how long is quiet.
+    def _motion(self) -> tuple[list[complex], list[complex]]:
+        places, speeds = self.bodies.motion()
+        return [complex(x, y) for x, y in places], [complex(x, y) for x, y in speeds]
 
-        The first time goes by the present velocities, and is 0 after an impact: look again.  For
-        the second, neighbours may also be accelerated towards each other.
-        """
-        x, v = self.bodies.motion()
-        if not self.hang_alike:  # nothing else keeps the balls in order
-            self._refuse_a_pack(np.array(x, dtype=np.float64))
-        arrival, quiet = math.inf, _LONGEST
-        strike = rest = False
-        for c, reach in enumerate(self.reach):
-            (xa, ya), (xb, yb) = x[c], x[c + 1]
-            dx, dy = xb - xa, yb - ya
-            distance = math.hypot(dx, dy)
-            gap = distance - reach
-            closing = (v[c][0] - v[c + 1][0]) * dx + (v[c][1] - v[c + 1][1]) * dy
-            if not math.isfinite(gap + closing):
-                checked("motion: positions", x)
-                checked("motion: velocities", v)
-            if not gap > -0.5 * reach:
-                raise RuntimeError(
-                    f"balls {c} and {c + 1} overlap by {-gap:g} m; the step is too long, or "
-                    "something else pushes them"
-                )
-            closing /= distance
-            if gap <= self.touching:
-                strike |= closing > self.resting
-                rest |= gap <= 0.0 and closing > 1e-3 * self.resting
-            elif closing > self.resting:
-                arrival = min(arrival, gap / closing)
-            # The first t > 0 with room = closing t + speeding t^2 / 2; none if they part for good.
-            room = max(gap, 0.0) + self.touching
-            root = math.sqrt(closing * closing + 2.0 * self.speeding * room)
-            if closing + root > 0.0:
-                quiet = min(quiet, 2.0 * room / (closing + root))
-        if strike or rest:
-            self._solve(np.array(x, dtype=np.float64), np.array(v, dtype=np.float64))
-        return (0.0 if strike else arrival), quiet
+    def _push(self, own: Plane, x: Plane) -> None:
+        impulses = self.chain.masses * own * self.ways(x)
+        for ball, impulse in enumerate(impulses.tolist()):
+            if impulse:
+                self.bodies.push(ball, (impulse.real, impulse.imag))
 
-    def _solve(self, x: Vector, v: Vector) -> None:
-        """Solve each cluster of touching balls, and give the impulses to the engine."""
-        lines = np.diff(x, axis=0)
-        distance = np.hypot(*lines.T)
-        lines /= distance[:, None]
-        gaps = distance - self.reach
-        for first, last in stretches(gaps <= self.touching):
-            contacts = slice(first, last - 1)
-            axis = lines[contacts].sum(axis=0)
-            axis /= math.hypot(*axis)
-            self._refuse_a_bend(lines[contacts], axis, first)
-            along = self._along(x[first:last], axis, first)
-            masses = self.chain.masses[first:last] / along**2
-            before = v[first:last] @ axis
-            after = self._after(masses, before, gaps[contacts], first)
-            # The part of the impulse along the arc; all of it where balls are free.
-            for ball, impulse in enumerate(masses * (after - before), start=first):
-                if impulse:
-                    self.bodies.push(ball, self._given(x[ball], axis, impulse, ball))
+    def _before(self, duration: float) -> tuple[Plane, Plane, Flight] | None:
+        """Push the balls so that the engine's step takes them where their contacts would."""
+        self.quiet -= duration
+        if self.quiet >= 0.0:
+            return None
+        told = self._motion()
+        touches, arrival, self.quiet = self.look(*told)
+        self.quiet -= duration
+        near = touches or arrival < 1.5 * duration  # the step itself makes them faster or slower
+        learning = self._lessons < _LESSONS and any(abs(v) > self.resting for v in told[1])
+        if not (near or learning):
+            self._last = None
+            return None
+        x, v = (np.array(part) for part in told)
+        own = self.own(v, x)
+        if learning:
+            self._learn(x, own, duration)
+            self.quiet = 0.0  # to compare two neighbouring looks
+        flight = self.fly(x, own + self.lag * duration * self._pull(x), duration) if near else None
+        if flight is None:
+            return None
+        self._last = None
+        self._push(flight.early, x)
+        return x, own, flight
 
-    def _after(self, masses: Vector, before: Vector, gaps: Vector, first: int) -> Vector:
-        """Return the velocities of a cluster along its axis, after impact and rest."""
-        contacts, v = slice(first, first + len(gaps)), before
-        if (v[:-1] - v[1:] > self.resting).any():
-            chain = Chain(masses, v, self.chain.restitution[contacts])
-            model = part(self.model, len(self.chain), first, first + len(masses))
-            v = collide(chain, model).velocities
-            self.impacts += 1
-        slow = v[:-1] - v[1:] > 0.0
-        if slow.any():
-            v, _ = common_velocities(masses, v, slow, 0.0)
-            self.settled += 1
-        deep = gaps < -self.touching
-        if deep.any():
-            # Balls that overlap by more than is unseen part, slower than what counts as an impact.
-            ramp = np.concatenate([[0.0], np.cumsum(np.where(deep, 0.5 * self.resting, 0.0))])
-            v = v + ramp - masses @ ramp / masses.sum()
-        return v
+    def _after(self, begun: tuple[Plane, Plane, Flight] | None, duration: float) -> None:
+        """Push the balls so that they go on as after their contacts: now their speed is known."""
+        started, self.time = self.time, self.time + duration
+        if begun is None:
+            return
+        x, own, (_, early, _, _) = begun
+        now, v = (np.array(part) for part in self._motion())
+        # The speed of the step, whether its kick comes first, last, or half and half.
+        speeds = own + self.lag * (self.own(v, now) - early - own)
+        bent = self._pull(x) - self._pull(now)
+        speeds += self.lag * (1.0 - self.lag) * duration * bent
+        change, _, hits, settled = self.fly(x, speeds, duration) or Flight(0.0 * own, early, [], 0)
+        self._push(change - early, now)
+        self.impacts += len(hits)
+        self.settled += settled
+        for hit in hits:
+            if self.on_hit is not None:
+                self.on_hit(hit._replace(time=started + hit.time))
 
-    def _tangent(self, position: Vector, ball: int) -> Vector:
-        assert self.pivots is not None
-        x, y = position - self.pivots[ball]
-        tangent: Vector = np.array([-y, x]) / math.hypot(x, y)
-        return tangent
+    def _pull(self, x: Plane) -> Plane:
+        """Return what gravity gives along the arcs, m/s^2; 0 if balls are free."""
+        return -self.acceleration * self.ways(x).imag + 0j
 
-    def _along(self, x: Vector, axis: Vector, first: int) -> Vector:
-        """Return the cosine between each ball's arc and the axis of the cluster; 1 if free."""
-        if self.pivots is None:
-            return np.ones(len(x))
-        found = np.array([self._tangent(p, i) @ axis for i, p in enumerate(x, start=first)])
-        if (np.abs(found) < 0.1).any():
-            ball = first + int(np.argmin(np.abs(found)))
-            raise ValueError(f"ball {ball} is struck along its string; its arc leads elsewhere")
-        return found
-
-    def _given(
-        self, position: Vector, axis: Vector, impulse: float, ball: int
-    ) -> tuple[float, float]:
-        """Return the impulse that a ball takes up: along its arc, if it hangs."""
-        given = impulse * axis
-        if self.pivots is not None:
-            tangent = self._tangent(position, ball)
-            given = (given @ tangent) * tangent
-        return float(given[0]), float(given[1])
-
-    def _refuse_a_bend(self, lines: NDArray[np.float64], axis: Vector, first: int) -> None:
-        off = np.arccos(np.clip(lines @ axis, -1.0, 1.0))
-        if off.max() > _BEND:
-            raise ValueError(
-                f"balls {first} to {first + len(lines)} touch, but not in a straight row: a line "
-                f"of centres is {math.degrees(off.max()):.0f} degrees off; at most "
-                f"{math.degrees(_BEND):.0f} are allowed"
+    def _learn(self, x: Plane, own: Plane, duration: float) -> None:
+        """Compare the ways since the last look with the velocities then and now."""
+        last, self._last = self._last, (x, own, self.time, duration)
+        if last is None:
+            return
+        was, before, then, step = last
+        passed = self.time - then
+        mean, gain = self.travelled(was, x) / passed, own - before
+        speed, gained = np.abs(0.5 * (own + before)), np.abs(gain)
+        fast = speed > np.maximum(4.0 * gained, self.resting)
+        self._lessons += 1
+        if fast.any():
+            twice = (np.abs(mean[fast]) > 1.5 * speed[fast]).all()
+            self._doubts = self._doubts + 1 if twice else 0
+        if self._doubts > 2:
+            raise RuntimeError(
+                "the world moves on between the steps of this row; rows of one world are stepped "
+                "together, by cradle.row.step_rows, and by nobody else"
             )
+        # Near the turning points the lag is seen: the kicks are in proportion to the pulls.
+        first, second = self._pull(was).real, self._pull(x).real
+        seen = (gained > 0.05 * speed) & (np.abs(first) > 0.05 * self.acceleration)
+        if seen.any() and math.isclose(passed, step, rel_tol=1e-6):
+            share = ((mean - before)[seen] / gain[seen]).real
+            late = share * second[seen]
+            self._samples += (late / (late + (1.0 - share) * first[seen])).tolist()
+            self.lag = float(np.clip(np.median(self._samples), 0.0, 1.0))
 
-    def _refuse_a_pack(self, x: Vector) -> None:
-        n = len(self.chain)
-        if x.shape != (n, 2):
-            raise ValueError(f"motion() tells positions of shape {x.shape}; must be ({n}, 2)")
-        for i in range(n):
-            for j in range(i + 2, n):
-                if math.hypot(*(x[j] - x[i])) <= self.radii[i] + self.radii[j] + self.touching:
-                    raise ValueError(
-                        f"balls {i} and {j} touch and are no neighbours; a row alone can be "
-                        "solved, no pack"
-                    )
+
+def step_rows(rows: Sequence[Row], duration: float) -> None:
+    """Move a world with several rows on by one step, made by the first row's engine.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        All rows of one world.
+    duration : float
+        Of the step, s.
+
+    Raises
+    ------
+    ValueError, RuntimeError
+        As `Row.step` does.
+    """
+    if not (type(duration) is float and 0.0 < duration < math.inf):  # one comparison a step
+        duration = one_number("duration", duration, "must be above 0", 0.0, open_low=True)
+    begun = [row._before(duration) for row in rows]
+    rows[0].bodies.advance(duration)
+    for row, push in zip(rows, begun, strict=True):
+        row._after(push, duration)

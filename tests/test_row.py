@@ -1,12 +1,12 @@
-"""A row in an engine: against `swing`, its rests, what it refuses. The engines here are exact."""
+"""A row in an engine: against `swing`, its energy, its rests, what it tells and refuses."""
 
 import math
 
 import numpy as np
 import pytest
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, swing
-from cradle.row import Row
+from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, runtime, swing
+from cradle.row import Row, step_rows
 
 RADIUS, LENGTH, GRAVITY = 0.1, 1.0, 9.81
 MODEL = ImpulseCorrelation(0.1325)
@@ -102,6 +102,145 @@ def test_a_row_swings_as_swing_does(pulled: int):
     assert row.impacts < 200
 
 
+class Plain(Hanging):
+    """Pendulums as a game has them: one kick of gravity a step, on strings of 20 cm."""
+
+    def __init__(self, masses, kind, kicks=1):
+        super().__init__([-0.5] + [0.0] * (len(masses) - 1), masses, spacing=0.04)
+        self.kind, self.kicks = kind, kicks
+
+    def motion(self):
+        x, v = super().motion()
+        arms = (np.array(x) - self.pivots) * SHORT
+        return (self.pivots + arms).tolist(), (SHORT * np.array(v)).tolist()
+
+    def push(self, ball, impulse):
+        super().push(ball, np.array(impulse) / SHORT)
+
+    def advance(self, step):
+        first = {"first": 1.0, "half": 0.5, "last": 0.0}[self.kind]
+        h = step / self.kicks
+        for _ in range(self.kicks):
+            self.rates -= first * h * GRAVITY / SHORT * np.sin(self.angles)
+            self.angles += h * self.rates
+            self.rates -= (1.0 - first) * h * GRAVITY / SHORT * np.sin(self.angles)
+
+    def energy(self):
+        height = 2 * SHORT * np.sin(self.angles / 2) ** 2
+        return self.masses * (0.5 * (SHORT * self.rates) ** 2 + GRAVITY * height)
+
+
+SHORT = 0.2
+FIVE, MIXED, LIGHT = [1.0] * 5, [0.5, 1.0, 2.0], [1.0, 0.2, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "kicks", "masses"),
+    [
+        ("first", 1, FIVE),
+        ("first", 1, MIXED),
+        ("first", 1, LIGHT),
+        ("last", 1, FIVE),
+        ("last", 1, MIXED),
+        ("half", 1, FIVE),
+        ("half", 1, MIXED),
+        ("first", 4, FIVE),
+    ],
+)
+def test_half_a_minute_at_60_hz_leaves_the_energy_that_one_pendulum_keeps(kind, kicks, masses):
+    """The mean over the last ten seconds: energy swings with the phase of each ball."""
+    means = []
+    for alone in (True, False):
+        bodies = Plain(masses, kind, kicks)
+        row = Row(bodies, Chain(masses, [0] * len(masses)), MODEL, 0.02, bodies.pivots)
+        start, total = bodies.energy().sum(), 0.0
+        for k in range(1800):
+            (bodies.advance if alone else row.step)(1 / 60)
+            total += bodies.energy().sum() / start if k >= 1200 else 0.0
+        means.append(total / 600)
+    assert row.impacts > 100
+    assert row.lag == pytest.approx(LAGS[kind, kicks], abs=2e-3)
+    assert means[1] == pytest.approx(means[0], abs=5e-3)
+
+
+#: Kicks first: the speed of a step is that after it; four kicks: the mean of 1/4, 2/4, 3/4 and 1.
+LAGS = {("first", 1): 1.0, ("last", 1): 0.0, ("half", 1): 0.5, ("first", 4): 0.625}
+
+
+def test_the_engine_makes_whole_steps():
+    bodies, taken = Hanging([-0.5, 0.0, 0.0]), []
+    advance = bodies.advance
+    bodies.advance = lambda step: taken.append(step) or advance(step)
+    row = hung(bodies)
+    steps(row, 100, 1 / 60)
+    assert row.impacts > 0
+    assert taken == [1 / 60] * 100
+
+
+def test_a_step_never_compiles(monkeypatch):
+    """However much plain work was done, and whatever is on disk."""
+    asked = []
+    monkeypatch.setattr(runtime, "_spent", 1e9)
+    monkeypatch.setattr(runtime, "available", lambda: True)
+    monkeypatch.setattr(runtime, "loaded", lambda: False)
+    monkeypatch.setattr(runtime, "compiled", lambda: asked.append("compiled"))
+    bodies = Hanging([-0.5, 0.0, 0.0])
+    row = hung(bodies)
+    steps(row, 60, 1 / 60)
+    assert row.impacts > 0
+    assert asked == []
+    # Elsewhere it would have been compiled by now.
+    collide(Chain([1, 1], [1, 0]), ImpulseCorrelation([]))
+    assert asked == ["compiled"]
+
+
+def two_rows():
+    """Two rows in one world; each adapter steps it."""
+    one, other = Hanging([-0.5, 0.0, 0.0]), Hanging([0.0, 0.0, 0.4])
+    worlds = one.advance, other.advance
+    one.advance = other.advance = lambda step: [advance(step) for advance in worlds]
+    return (one, hung(one)), (other, hung(other))
+
+
+def test_two_rows_of_one_world_that_step_it_twice_are_refused():
+    rows = [row for _, row in two_rows()]
+
+    def each():
+        for _ in range(60):
+            for row in rows:
+                row.step(1 / 60)
+
+    with pytest.raises(RuntimeError, match=r"stepped together, by cradle\.row\.step_rows"):
+        each()
+
+
+def test_two_rows_of_one_world_are_stepped_together():
+    together = two_rows()
+    for _ in range(120):
+        step_rows([row for _, row in together], 1 / 60)
+    for (bodies, row), angles in zip(together, [[-0.5, 0, 0], [0, 0, 0.4]], strict=True):
+        single = Hanging(angles)
+        alone = hung(single)
+        steps(alone, 120, 1 / 60)
+        np.testing.assert_array_equal(bodies.angles, single.angles)
+        assert row.impacts == alone.impacts > 0
+
+
+def test_a_hit_is_told_when_the_step_is_made():
+    bodies = Free([[-0.45, 0], [0, 0], [0.2, 0]], [[1, 0], [0, 0], [0, 0]], [1, 2, 1])
+    row, told = Row(bodies, Chain([1, 2, 1], [0] * 3), MODEL, RADIUS), []
+    row.on_hit = lambda hit: told.append((hit, bodies.v[:, 0].copy()))
+    steps(row, 4, 0.1)
+    ((hit, then),) = told
+    assert hit.time == pytest.approx(0.25, abs=1e-12)  # gap .25 m at 1 m/s
+    assert (hit.balls, hit.loudest) == (range(3), 0)
+    expected = collide(Chain([1, 2, 1], [1, 0, 0]), MODEL)
+    np.testing.assert_allclose(hit.before, [1, 0, 0], atol=1e-14)
+    np.testing.assert_allclose(hit.after, expected.velocities, atol=1e-14)
+    np.testing.assert_allclose(then, hit.after, atol=1e-14)
+    assert hit.impulse == pytest.approx(max(expected.impulses), rel=1e-12)
+
+
 def test_one_impact_of_free_balls_is_that_of_collide():
     masses, e = [1.0, 3.0, 2.0, 1.0], [1.0, 0.5, 0.25]
     angle = 0.3  # the row lies askew in the plane
@@ -133,13 +272,14 @@ def test_an_impact_up_the_arc_keeps_the_energy():
     bodies = Hanging([-0.4, 0.3, 0.3], masses=[1.0, 2.0, 0.5])
     bodies.angles[:] = 0.3
     bodies.rates[:] = [1.0, 0.0, 0.0]
-    before = bodies.energy()
+    x, v = (np.array(part) @ [1, 1j] for part in bodies.motion())
     row = hung(bodies)
-    row._solve(*(np.array(part) for part in bodies.motion()))
-    assert bodies.energy().sum() == pytest.approx(before.sum(), rel=1e-14)
+    own = row.own(v, x)
+    after = own + row.fly(x, own, 1e-9).change
+    assert bodies.masses @ after**2 == pytest.approx(bodies.masses @ own**2, rel=1e-14)
     # All arcs are parallel: as on a straight line.
     chain = Chain(bodies.masses, [1.0, 0.0, 0.0])
-    np.testing.assert_allclose(bodies.rates, collide(chain, MODEL).velocities, atol=1e-13)
+    np.testing.assert_allclose(after, collide(chain, MODEL).velocities, atol=1e-13)
 
 
 def test_any_model_and_rows_of_parameters():
@@ -244,7 +384,7 @@ TRIANGLE = [[0, 0], [0.2, 0], [0.1, 0.17320508]]
     ("change", "message"),
     [
         ({"x": TRIANGLE}, "balls 0 and 2 touch and are no neighbours; a row alone"),
-        ({"x": [[0, 0], [0.2, 0]]}, r"positions of shape \(2, 2\); must be \(3, 2\)"),
+        ({"x": [[0, 0], [0.2, 0]]}, r"positions has shape \(2, 2\); 3 balls need \(3, 2\)"),
         ({"radii": [0.1, 0.1]}, r"radii has shape \(2,\); 3 balls need \(\) or \(3,\)"),
         ({"radii": [0.1, -0.1, 0.1]}, r"radii\[1\] = -0.1; must be above 0"),
         ({"pivots": [[0, 0]]}, r"pivots has shape \(1, 2\); 3 balls need \(3, 2\)"),
@@ -316,13 +456,20 @@ def test_balls_that_passed_each_other_are_an_error():
         row.step(1e-3)
 
 
-def test_an_engine_that_ignores_impulses_is_no_endless_loop(monkeypatch):
-    monkeypatch.setattr("cradle.row._MOST_IMPACTS", 5)
+def test_an_engine_that_ignores_impulses_is_an_error():
     bodies = Free([[0, 0], [0.2, 0]], [[1, 0], [0, 0]], [1, 1])
     bodies.push = lambda *_: None
     row = Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS)
-    with pytest.raises(RuntimeError, match=r"more than 5 impacts in a step of 0\.01 s"):
-        row.step(0.01)
+    with pytest.raises(RuntimeError, match=r"balls 0 and 1 overlap by 0\.1"):
+        steps(row, 100, 0.01)
+
+
+def test_a_step_with_too_many_impacts_is_an_error(monkeypatch):
+    monkeypatch.setattr("cradle.swinging.stride._MOST_IMPACTS", 5)
+    bodies = Free([[0, 0], [0.205, 0], [0.42, 0]], [[1, 0], [0, 0], [-1, 0]], [1, 1e-4, 1])
+    row = Row(bodies, Chain(bodies.masses, [0] * 3), MODEL, RADIUS, touching=1e-9)
+    with pytest.raises(RuntimeError, match=r"more than 5 impacts in a step of 0\.1 s"):
+        row.step(0.1)
 
 
 @pytest.mark.parametrize("what", ["positions", "velocities"])

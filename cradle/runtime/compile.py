@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import contextvars
 import functools
 import gc
 import hashlib
@@ -56,6 +57,7 @@ _MEANINGS: dict[str, dict[str, Any]] = {
 logger = logging.getLogger("cradle")
 _spent = 0.0  # seconds of plain work so far, in this process
 _look = LOADS_AFTER  # seconds of plain work after which to look for compiled code on disk
+_hurry = contextvars.ContextVar("hurry", default=False)  # a frame of a game cannot wait
 _deciding = threading.Lock()
 _compiling = threading.Lock()
 
@@ -269,6 +271,16 @@ def spend(seconds: float) -> None:
     _spent += seconds
 
 
+@contextlib.contextmanager
+def without_waiting() -> Iterator[None]:
+    """Neither compile nor load code meanwhile: what has not run yet in this process runs plain."""
+    before = _hurry.set(True)
+    try:
+        yield
+    finally:
+        _hurry.reset(before)
+
+
 def chosen(large: bool = False) -> Any:
     """Return the kernel in force.
 
@@ -286,7 +298,7 @@ def chosen(large: bool = False) -> Any:
     wish = os.environ.get(VARIABLE)
     if wish:
         one_of(VARIABLE, wish, ("plain", "compiled"))
-    if wish == "plain" or not available():
+    if wish == "plain" or not available() or (_hurry.get() and not loaded()):
         return plain
     if not (wish == "compiled" or large or loaded() or _spent > PAYS_AFTER):
         if _spent <= _look:

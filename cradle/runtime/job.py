@@ -254,7 +254,15 @@ class Job:
 
 @functools.cache
 def warm_up() -> None:
-    """Compile the event loop, if it is not compiled yet and numba is there."""
+    """Compile the event loop, or load it compiled, if numba is there: then nothing waits for it.
+
+    The first time on a machine takes up to a minute, afterwards a second.  Programs that must not
+    stop, such as games with a `cradle.row.Row`, call it while they load.
+
+    Examples
+    --------
+    >>> warm_up()
+    """
     one = np.ones((1, 2))
     inputs = plain.Inputs(one, np.array([[1.0, 0.0]]), np.ones((1, 1)), *[np.ones((1, 0))] * 2)
     Job(inputs, 1, plain.Options(0.5, 1000, True, True), large=True).run()

@@ -1,0 +1,262 @@
+"""A row of balls that makes one step alone: straight on, or along its arcs, and its contacts.
+
+`Alone` knows no engine; `cradle.row.Row` is one that an engine moves.  Places and velocities are
+complex numbers, x + i y in the plane of the row.  A ball's own velocity is that in its own way:
+along its arc, a real number, where it hangs; where it is free, all of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cradle.chain import Chain
+from cradle.input.values import Vector, checked, must_be, one_number
+from cradle.models import Model, collide
+from cradle.runtime.compile import without_waiting
+from cradle.swinging.resting import common_velocities, stretches
+from cradle.swinging.swing import part
+
+# Contact lines of one cluster may differ by this angle, rad: beyond it the balls are no row.
+_BEND = 0.1
+# Somebody looks at the balls at least that often, s.
+_LONGEST = 0.01
+# More impacts than this in one step are no row of balls: with a resting rule they end long before.
+_MOST_IMPACTS = 10_000
+
+Plane = NDArray[np.complexfloating[Any, Any]]
+
+
+class Hit(NamedTuple):
+    """One impact of a row, as `Row.on_hit` is told of it."""
+
+    time: float  #: s, of the steps since the row was made
+    balls: range  #: that touched each other
+    before: Vector  #: their velocities along the row, from left to right, m/s
+    after: Vector  #: the same after the impact, m/s
+    loudest: int  #: the contact of the largest impulse: between this ball and the next one
+    impulse: float  #: of that contact, N s
+
+
+class Flight(NamedTuple):
+    """What the contacts of a step do to the balls' own velocities, m/s."""
+
+    change: Plane  #: all of it
+    early: Plane  #: the part that, from the start on, takes the balls to where the step ends
+    hits: list[Hit]
+    settled: int  #: how often balls that touch were brought to rest
+
+
+class Alone:
+    """A row of balls; the parameters are those of `cradle.row.Row`."""
+
+    def __init__(
+        self,
+        x: ArrayLike,
+        chain: Chain,
+        model: Model,
+        radii: ArrayLike,
+        pivots: ArrayLike | None,
+        touching: float | None,
+        resting: float | None,
+        acceleration: float,
+    ) -> None:
+        n = len(must_be(Chain, "chain", chain))
+        with without_waiting():
+            collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
+        size = checked("radii", radii, "must be above 0", 0.0, open_low=True)
+        if size.shape not in ((), (n,)):
+            raise ValueError(f"radii has shape {size.shape}; {n} balls need () or ({n},)")
+        self.chain, self.model = chain, model
+        self.radii: list[float] = np.broadcast_to(size, (n,)).tolist()
+        self.reach = [a + b for a, b in zip(self.radii, self.radii[1:], strict=False)]
+        self.acceleration = one_number(
+            "acceleration", acceleration, "must be above 0", 0.0, open_low=True
+        )
+        near = 1e-3 * min(self.radii) if touching is None else touching
+        self.touching = one_number("touching", near, "must be above 0", 0.0, open_low=True)
+        slow = 0.01 * math.sqrt(self.acceleration * min(self.radii)) if resting is None else resting
+        self.resting = one_number("resting", slow, "must be above 0", 0.0, open_low=True)
+        at = self._plane("motion: positions", x)
+        self._refuse_a_pack(at)
+        overlaps = self.reach - np.abs(np.diff(at))
+        if (overlaps > self.touching).any():
+            c = int(np.argmax(overlaps))
+            rule = f"must be at most `touching` = {self.touching:g} at the start"
+            raise ValueError(f"balls {c} and {c + 1} overlap by {overlaps[c]:g} m; {rule}")
+        # Balls on equal strings that nearly touch are accelerated alike, others not.
+        self.pivots: Plane | None = None
+        self.hang_alike = False
+        if pivots is not None:
+            self.pivots = self._plane("pivots", pivots)
+            way = self.pivots[-1] - self.pivots[0]
+            back = (np.diff(self.pivots) / way).real < 0.0
+            if back.any():
+                ball = int(np.argmax(back)) + 1
+                raise ValueError(
+                    f"pivots[{ball}] lies behind pivots[{ball - 1}] on the way from the first to "
+                    "the last; the balls must be told from one end of the row to the other"
+                )
+            if ((at[-1] - at[0]) / way).real <= 0.0:
+                raise ValueError("pivots lead the other way than the balls; must be in their order")
+            lengths = np.abs(at - self.pivots)
+            self.hang_alike = bool(np.ptp(lengths) <= 1e-3 * lengths.min())
+        self.speeding = 0.0 if self.hang_alike else self.acceleration
+        #: For how long nothing can happen, s.
+        self.quiet = 0.0
+
+    def ways(self, x: Plane) -> Plane:
+        """Return the directions in which balls at these places can move; 1 if they are free."""
+        if self.pivots is None:
+            return np.ones(len(x), complex)
+        arms = x - self.pivots
+        return 1j * arms / np.abs(arms)
+
+    def own(self, v: Plane, x: Plane) -> Plane:
+        """Return velocities in the balls' own ways."""
+        return v if self.pivots is None else (v / self.ways(x)).real + 0j
+
+    def travelled(self, x: Plane, y: Plane) -> Plane:
+        """Return the own ways from places x to places y, m."""
+        if self.pivots is None:
+            return y - x
+        arms = x - self.pivots
+        return np.abs(arms) * np.angle((y - self.pivots) / arms) + 0j
+
+    def moved(self, x: Plane, ways: Plane) -> Plane:
+        """Return where balls are after such own ways."""
+        if self.pivots is None:
+            return x + ways
+        arms = x - self.pivots
+        return self.pivots + arms * np.exp(1j * ways.real / np.abs(arms))
+
+    def fly(self, x: Plane, own: Plane, duration: float) -> Flight | None:
+        """Make a step with these own velocities; None if nothing touches."""
+        change, early = np.zeros((2, len(x)), complex)
+        hits: list[Hit] = []
+        left, settled, touched = duration, 0, False
+        for _ in range(_MOST_IMPACTS):
+            touches, arrival, self.quiet = self.look(x.tolist(), (own * self.ways(x)).tolist())
+            if touches:
+                gained, rests = self._solve(x, own, duration - left, hits)
+                own = own + gained
+                change += gained
+                early += left / duration * gained
+                settled, touched = settled + rests, True
+            if arrival >= left:
+                self.quiet -= left
+                return Flight(change, early, hits, settled) if touched else None
+            x, left = self.moved(x, arrival * own), left - arrival
+        raise RuntimeError(
+            f"more than {_MOST_IMPACTS} impacts in a step of {duration!r} s; the balls are "
+            f"squeezed between others, or `resting` = {self.resting!r} is too low"
+        )
+
+    def look(self, x: Sequence[complex], v: Sequence[complex]) -> tuple[bool, float, float]:
+        """Tell whether something touches now, when the next contact arrives, how long is quiet.
+
+        The second goes by the present velocities, and is 0 with an impact: look again.  For the
+        third, neighbours may also be accelerated towards each other.
+        """
+        arrival, quiet = math.inf, _LONGEST
+        strike = rest = False
+        for c, reach in enumerate(self.reach):
+            line = x[c + 1] - x[c]
+            distance = abs(line)
+            gap = distance - reach
+            closing = ((v[c] - v[c + 1]) * line.conjugate()).real
+            if not math.isfinite(gap + closing):
+                for name, told in (("positions", x), ("velocities", v)):
+                    checked(f"motion: {name}", [(z.real, z.imag) for z in told])
+            if not gap > -0.5 * reach:
+                raise RuntimeError(
+                    f"balls {c} and {c + 1} overlap by {-gap:g} m; the step is too long, or "
+                    "something else pushes them"
+                )
+            closing /= distance
+            if gap <= self.touching:
+                strike |= closing > self.resting
+                rest |= gap <= 0.0 and closing > 1e-3 * self.resting
+            elif closing > self.resting:
+                arrival = min(arrival, gap / closing)
+            # The first t > 0 with room = closing t + speeding t^2 / 2; none if they part for good.
+            room = gap if gap > self.touching else max(gap, 0.0) + self.touching
+            root = math.sqrt(closing * closing + 2.0 * self.speeding * room)
+            if closing + root > 0.0:
+                quiet = min(quiet, 2.0 * room / (closing + root))
+        if not self.hang_alike:  # nothing else keeps the balls in order
+            self._refuse_a_pack(np.array(x))
+        return strike or rest, 0.0 if strike else arrival, quiet
+
+    def _solve(self, x: Plane, own: Plane, time: float, hits: list[Hit]) -> tuple[Plane, int]:
+        """Solve each cluster of touching balls; return what their own velocities gain."""
+        gained, settled, ways = np.zeros(len(x), complex), 0, self.ways(x)
+        lines, v = np.diff(x), own * ways
+        gaps = np.abs(lines) - self.reach
+        for first, last in stretches(gaps <= self.touching):
+            balls = slice(first, last)
+            axis = lines[first : last - 1].sum()
+            axis /= abs(axis)
+            self._refuse_a_bend(lines[first : last - 1], axis, first)
+            # How a ball's own way lies to the axis; a free ball's is the axis.
+            along = np.ones(last - first)
+            if self.pivots is not None:
+                along = (ways[balls] / axis).real
+            if (np.abs(along) < 0.1).any():
+                ball = first + int(np.argmin(np.abs(along)))
+                raise ValueError(f"ball {ball} is struck along its string; its arc leads elsewhere")
+            masses, before = self.chain.masses[balls] / along**2, (v[balls] / axis).real
+            after = before
+            if (before[:-1] - before[1:] > self.resting).any():
+                chain = Chain(masses, before, self.chain.restitution[first : last - 1])
+                with without_waiting():
+                    after = collide(chain, part(self.model, len(x), first, last)).velocities
+                impulses = np.cumsum(masses * (before - after))[:-1]
+                c = int(np.argmax(impulses))
+                hit = Hit(time, range(first, last), before, after, first + c, float(impulses[c]))
+                hits.append(hit)
+            after, rests = self._rested(masses, after, gaps[first : last - 1])
+            settled += rests
+            gained[balls] = (after - before) * (axis if self.pivots is None else 1.0 / along)
+        return gained, settled
+
+    def _rested(self, masses: Vector, v: Vector, gaps: Vector) -> tuple[Vector, bool]:
+        """Return velocities after those that touch have come to rest, and whether any have."""
+        slow = v[:-1] - v[1:] > 0.0
+        if slow.any():
+            v, _ = common_velocities(masses, v, slow, 0.0)
+        deep = gaps < -self.touching
+        if deep.any():
+            # Balls that overlap by more than is unseen part, slower than what counts as an impact.
+            ramp = np.concatenate([[0.0], np.cumsum(np.where(deep, 0.5 * self.resting, 0.0))])
+            v = v + ramp - masses @ ramp / masses.sum()
+        return v, bool(slow.any())
+
+    def _plane(self, name: str, places: ArrayLike) -> Plane:
+        """Return places in the plane as complex numbers."""
+        x, n = checked(name, places), len(self.chain)
+        if x.shape != (n, 2):
+            raise ValueError(f"{name} has shape {x.shape}; {n} balls need ({n}, 2)")
+        return x[:, 0] + 1j * x[:, 1]
+
+    def _refuse_a_bend(self, lines: Plane, axis: complex, first: int) -> None:
+        off = np.abs(np.angle(lines / axis)).max()
+        if off > _BEND:
+            raise ValueError(
+                f"balls {first} to {first + len(lines)} touch, but not in a straight row: a line "
+                f"of centres is {math.degrees(off):.0f} degrees off; at most "
+                f"{math.degrees(_BEND):.0f} are allowed"
+            )
+
+    def _refuse_a_pack(self, x: Plane) -> None:
+        room = np.add.outer(self.radii, self.radii) + self.touching
+        near = np.argwhere(np.triu(np.abs(np.subtract.outer(x, x)) <= room, 2))
+        if len(near):
+            i, j = near[0]
+            raise ValueError(
+                f"balls {i} and {j} touch and are no neighbours; a row alone can be solved, no pack"
+            )
