@@ -336,7 +336,8 @@ def limit(cluster, number, state):
 def stays_at_zero(c, contact, memory):
     """Tell whether contact c has been at u = 0 since the snapshot: its balls move as one."""
     k, then = contact[c], memory[c]
-    return k.active == 1 and k.u.real == 0.0 and then.u.real == 0.0 and k.a == then.a
+    idle = k.a.real == then.a.real and k.a.imag == then.a.imag
+    return k.active == 1 and k.u.real == 0.0 and then.u.real == 0.0 and idle
 
 
 @jit
