@@ -604,7 +604,7 @@ def late(problem, steps, room=20_000):
     def keep(kind, c, n, state):
         """The kernel's `record`: closing speeds to all their digits."""
         state.tally[0].events += 1
-        last.append((kind, c, [names["closing"](j, state.ball) for j in range(n - 1)]))
+        last.append((kind, c, [state.contact[j].u.real for j in range(n - 1)]))
 
     names = plain.rooms(record=lambda _: keep)
     state = job.state

@@ -24,6 +24,7 @@ from typing import NamedTuple
 import truth
 from families import JUDGED, family
 from problem import Problem
+from truth import meaning
 
 from cradle import ImpactNotFinished, post_impact_velocities, textbook
 from cradle.trace import ImpactNotCertified
@@ -77,19 +78,6 @@ NAMED = {
 
 
 # --- what is true ------------------------------------------------------------------------------
-
-
-def meaning(x):
-    """The number that a float means: of 15 digits at most, from 1e-7 to 1e15, what it prints as.
-
-    Every other float means its exact value, and a decimal means itself.
-    """
-    if isinstance(x, Decimal):
-        return x
-    exact, printed = Decimal(x), Decimal(repr(float(x)))
-    digits = printed.normalize(decimal.Context(prec=17)).as_tuple().digits
-    short = len(digits) <= 15 and Decimal("1e-7") <= abs(printed) < Decimal("1e15")
-    return printed if short else exact
 
 
 class Exact(textbook.Impact):
@@ -155,8 +143,8 @@ class Verdict(NamedTuple):
     off: float = 0.0
 
 
-#: Where the exact run ends: "other reading" is wrong by `meaning`, right for the exact values of
-#: all floats or `on_bounds`; "open" hangs on more than so many digits; "unfinished" has no answer.
+#: Where the exact run ends: "other reading" is wrong by `meaning` and `on_bounds`, right for the
+#: exact values of all floats, or with ratios beside their bounds; "open" hangs on more than so many digits; "unfinished" has no answer.
 ENDS = ["right", "wrong", "other reading", "open", "unfinished"]
 #: Where it has no end: who agrees with the answer; "given up" has no answer.
 ENDLESS = ["as 50 digits", "unlike them", "as relations", "nobody knows", "given up"]
@@ -184,7 +172,8 @@ def single(problem):
 def judge(problem, *ask, events=EVENTS):
     """The verdict on one chain, by the worse of its answers; "endless" if that must be others'."""
     given = [answer(problem) for answer in ask or (batch, single)]
-    right = exact(problem, events=events)
+    meant = on_bounds(problem)
+    right = exact(meant, events=events)
     if right is None:
         return Verdict("endless")
     if None in given:
@@ -192,10 +181,10 @@ def judge(problem, *ask, events=EVENTS):
     far = max(off(problem, one, right) for one in given)
     if far <= WRONG:
         return Verdict("right", far)
-    again = exact(problem, twice=True)
+    again = exact(meant, twice=True)
     if again is None or off(problem, again, right) > WRONG:
         return Verdict("open", far)
-    for other in exact(problem, Decimal), exact(on_bounds(problem)):
+    for other in exact(problem, Decimal), exact(problem):
         if other and max(off(problem, one, other) for one in given) <= WRONG:
             return Verdict("other reading", far)
     return Verdict("wrong", far)

@@ -17,7 +17,7 @@ def certify(n, ball, contact, tally):
     the work that each absorbed.  Momentum is that of the velocities as they are handed out.
     """
     unit = tally.unit
-    momentum = terms = 0.0
+    momentum = terms = grain = 0.0
     lost = kept = absorbed = energy = 0.0
     strongest = weakest = least = 0.0
     before = ZERO
@@ -28,6 +28,7 @@ def certify(n, ball, contact, tally):
         change = velocity(i, before, after, ball, unit) * unit - b.v * unit
         momentum += b.m.real * change
         terms += b.m.real * (abs(change) + abs(b.start.real)) + abs(after.real)
+        grain += b.m.real * 5e-324 * unit  # no finer velocity is a float
         before = after
         if i == n - 1:
             break
@@ -48,7 +49,7 @@ def certify(n, ball, contact, tally):
             max(strongest, k.p.real), min(weakest, k.p.real), min(least, k.a.real)
         )  # fmt: skip
     slack = (LIMITS.sound + n * 2.0**-52) * (energy + absorbed)
-    if not abs(momentum) <= LIMITS.sound * terms < math.inf:
+    if not abs(momentum) <= LIMITS.sound * terms + grain < math.inf:
         return MOMENTUM
     if least < -slack or weakest < -LIMITS.sound * strongest:
         return PULL
