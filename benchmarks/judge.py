@@ -144,7 +144,8 @@ class Verdict(NamedTuple):
 
 
 #: Where the exact run ends: "other reading" is wrong by `meaning` and `on_bounds`, right for the
-#: exact values of all floats, or with ratios beside their bounds; "open" hangs on more than so many digits; "unfinished" has no answer.
+#: exact values of all floats, or with ratios beside their bounds; "open" hangs on more than so many
+#: digits; "unfinished" has no answer.
 ENDS = ["right", "wrong", "other reading", "open", "unfinished"]
 #: Where it has no end: who agrees with the answer; "given up" has no answer.
 ENDLESS = ["as 50 digits", "unlike them", "as relations", "nobody knows", "given up"]

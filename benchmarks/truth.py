@@ -153,8 +153,8 @@ def solve(
 ):
     """Post-impact state by rules R1 to R9, with the digits of `number`.
 
-    A float means what it prints as (`meaning`), a string such as "0.1" that decimal number.  `collapse_below` is the threshold of R9
-    relative to the largest initial closing speed.
+    A float means what it prints as (`meaning`), a string such as "0.1" that decimal number.
+    `collapse_below` is the threshold of R9 relative to the largest initial closing speed.
     """
 
     class Chosen(impact):

@@ -4,9 +4,8 @@ Rules R1 to R8 of the book's chapter on N balls, for numbers of any type.  R9 is
 infinite sequence of impacts goes on to the last digits of its numbers, or to an `EventLimit`.
 
 Contact c joins balls c and c + 1.  Its closing speed u = v[c] - v[c + 1] is above 0 in compression.
-Inside a run of active contacts there is no time, only progress s.  Between two events velocities
-are linear and works quadratic in s: every event is the root of a formula.  Against rounding: a
-`small` part is nothing, events within an `instant` are one, six tenths of all digits a `tie`.
+Inside a run there is no time, only progress: velocities are linear and works quadratic in it, every
+event is the root of a formula.  Of numbers six tenths of the digits tell a `tie` from a difference.
 """
 
 import math
@@ -126,16 +125,15 @@ class Impact:
 
     def end(self, c: int) -> None:
         """R4: the relations of a contact go with it; what it drove goes on by itself."""
-        self.active[c], self.near[c] = False, abs(self.u[c])
-        self.direction[c] = self.direction[c + 1] = 0
+        self.active[c], self.near[c], self.direction[c : c + 2] = False, abs(self.u[c]), (0, 0)
         self.record("end", c)
 
     def close(self, c: int) -> None:
         """R4, R8.5: a contact that closes is driven by those that are active beside it."""
         self.u[c] = self.gained[c] = self.given[c] = self.zero
         self.active[c], self.collisions[c] = True, self.collisions[c] + 1
-        self.direction[c] = FORWARD if self.active[c - 1] else 0
-        self.direction[c + 1] = BACKWARD if self.active[c + 1] else 0
+        self.direction[c] = FORWARD * self.active[c - 1]
+        self.direction[c + 1] = BACKWARD * self.active[c + 1]
         self.record("close", c)
 
     def goes_first(self, c: int, due: list[int]) -> bool:

@@ -15,7 +15,6 @@ from cradle.kernel.state import (
     apart,
     bare,
     door,
-    jit,
     once,
 )
 
@@ -139,9 +138,8 @@ def batch(begin, resumed, n, inputs, options, out, area, effort):
             inputs.m[k * by_m], inputs.v[k * by_v], inputs.e[k * by_e],
             inputs.forward[k * by_f], inputs.backward[k * by_b],
         )  # fmt: skip
-        if not resumed:
-            if not admissible(n, chain, options.bounded):
-                return k, REFUSED
+        if not resumed and not admissible(n, chain, options.bounded):
+            return k, REFUSED
         status = impact(n, chain, options.meeting, options.max_events, resumed, state)
         resumed = False
         hand_out(k, n, out, state.ball, state.contact, state.tally[0])

@@ -37,7 +37,8 @@ def certify(n, ball, contact, tally):
         next_speed = plus(right.start, times(minus(k.p, onward), right.inverse))
         closing = minus(speed, next_speed).real
         spread = abs(speed.real) + abs(next_speed.real) + tally.fastest
-        if not (closing <= LIMITS.sound * spread and abs(closing - k.u.real) <= LIMITS.sound * spread):
+        slack = LIMITS.sound * spread
+        if not (closing <= slack and abs(closing - k.u.real) <= slack):
             return ORDER
         speed = next_speed
         work = 0.5 * k.p.real * (minus(b.start, right.start).real + closing)

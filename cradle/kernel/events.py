@@ -3,7 +3,7 @@
 from cradle.kernel.numbers import ZERO, minus, negative
 from cradle.kernel.record import record
 from cradle.kernel.rules import has_ended, is_clear, opens_at_zero, source_of
-from cradle.kernel.state import CLOSE, END, LIMITS, SLOPED, apart, jit, once
+from cradle.kernel.state import CERTAIN, CLOSE, END, LIMITS, SLOPED, apart, jit, once
 
 
 @jit
@@ -198,7 +198,8 @@ def end_contacts(which, n, state):
         if run[first].stirred == 1:
             high = run[first].high
             for c in range(run[first].low, high + 1):
-                if not (opens_at_zero(c, ball, contact) if which == SLOPED else has_ended(c, contact)):
+                sloped = which == SLOPED and opens_at_zero(c, ball, contact)
+                if not (sloped or (which == CERTAIN and has_ended(c, contact))):
                     continue
                 if count_exhausted(c, n, ball, contact, tally):
                     worn = c

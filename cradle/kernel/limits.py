@@ -269,9 +269,8 @@ def cluster_around(c, number, n, state):
     same = same and has_waited(left - 1, level, state, memory)
     same = same and has_waited(right + 1, level, state, memory)
     for k in (left - 2, right + 2):
-        same = same and not (
-            level.low <= k <= level.high and since(k, contact, memory).real > 0.0
-        )
+        if level.low <= k <= level.high and since(k, contact, memory).real > 0.0:
+            same = False
     if same and loses and alone(left, right, n, state):
         return Cluster(left, first, last, right)
     return Cluster(c, c, c - 1, c)
@@ -279,7 +278,7 @@ def cluster_around(c, number, n, state):
 
 @jit
 def kept_part(neighbour, edge, exists, contact, memory):
-    """Return 1 - h for a steady neighbour whose impulse is h times that of the outermost contact."""
+    """Return 1 - h for a steady neighbour with h times the impulse of the outermost contact."""
     if not exists:
         return ONE
     one = since(edge, contact, memory)

@@ -9,7 +9,7 @@ from cradle.kernel.state import LIMITS, jit, once
 
 @once
 def parts_to_meeting(first, after, run, ball, contact, tally):
-    """R8.3: work out whether runs `first` and `after` must meet, and at what parts of their segments.
+    """R8.3: work out whether runs `first` and `after` must meet, at what parts of their segments.
 
     Velocities are counted from that of the gap's left ball; that ball only rises and the other only
     falls.
@@ -21,8 +21,9 @@ def parts_to_meeting(first, after, run, ball, contact, tally):
     fall = negative(times(ball[gap + 1].pull, other.reach)) if other.low == after else ZERO
     passed = minus(plus(rise, fall), wide).real
     made = contact[gap].made
+    size = made + rise.real + fall.real
     # At zero it closes, even if both pushes vanish.
-    meets = wide.real == 0.0 or (is_clear(passed, made + rise.real + fall.real, tally) and passed > 0.0)
+    meets = wide.real == 0.0 or (is_clear(passed, size, tally) and passed > 0.0)
     one.meets = 1 if meets else 0
     if not meets:
         return
@@ -64,7 +65,9 @@ def first_meeting(n, state):
         if after < n and after == run[first].last + 2:
             if run[first].stirred == 1 or run[after].stirred == 1:
                 parts_to_meeting(first, after, run, state.ball, state.contact, tally)
-            if run[first].meets == 1 and (best < 0 or is_reached_sooner(run[first], run[best], tally)):
+            if run[first].meets == 1 and (
+                best < 0 or is_reached_sooner(run[first], run[best], tally)
+            ):
                 best = first
         first = after
     return best

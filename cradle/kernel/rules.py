@@ -231,9 +231,9 @@ def way_to_end(k, tally):
         now = times(k.u, k.u)
         part = over(times(k.slope, k.q), k.rate)
         square = minus(times(k.square, now) if closes else now, plus(part, part))
-        if not closes and k.slope.real > 0.0:
-            if not is_clear(square.real, now.real, tally) or square.real < 0.0:
-                return NEVER, ZERO  # it is compressed again before that
+        again = not closes and k.slope.real > 0.0
+        if again and not (is_clear(square.real, now.real, tally) and square.real > 0.0):
+            return NEVER, ZERO  # it is compressed again before that
         speed = root(square)
     # Each of these two roots is a sum of positive terms.
     if closes:
