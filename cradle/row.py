@@ -175,7 +175,7 @@ class Row(Alone):
             If balls have passed through each other, the impacts of the step do not end, or the
             world is seen to move on between the steps of this row: see `step_rows`.
         """
-        if 0.0 < duration <= self.quiet:  # the usual case, and fast
+        if type(duration) is float and 0.0 < duration <= self.quiet:  # the usual case, and fast
             self.quiet -= duration
             self.time += duration
             self.bodies.advance(duration)

@@ -267,8 +267,9 @@ class Alone:
             )
 
     def _refuse_a_pack(self, x: Plane) -> None:
-        room = np.add.outer(self.radii, self.radii) + self.touching
-        near = np.argwhere(np.triu(np.abs(np.subtract.outer(x, x)) <= room, 2))
+        half = 0.5 * np.array(self.radii)  # halves add up to no more than a float can hold
+        room = np.add.outer(half, half) + 0.5 * self.touching
+        near = np.argwhere(np.triu(0.5 * np.abs(np.subtract.outer(x, x)) <= room, 2))
         if len(near):
             i, j = near[0]
             raise ValueError(
