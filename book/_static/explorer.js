@@ -128,6 +128,8 @@
         ),
         masses: setting(explorer.withRatios),
         moveMasses: setting(explorer.movedRatios),
+        snapshot: () => state.snapshot(),
+        restore: on((restore) => restore()),
         address: () => `${location.href.split("#")[0]}#${state.fragment()}`,
         // A page that came over plain HTTP has no clipboard.
         copy: async (text) => {
@@ -142,22 +144,41 @@
     }
 
     // Balls are pulled from where they hang; a ball taken out of a swing finds all others at rest.
+    // Each finger pulls a ball of its own; where they disagree, the one that moved last is followed.
     pulling() {
       const { state } = this;
-      let before = null;
+      const held = new Map(); // the balls in somebody's hand; their pull, once there is one
+      let speeds = []; // of all balls, without those pulls
+      let restore = null;
       return {
-        grab: () => {
-          const held = state.clock.time <= 0;
-          before = held ? state.setting : explorer.atRest(state.setting);
+        grab: (ball) => {
+          if (!held.size) {
+            const { setting, clock } = state;
+            ({ speeds } = clock.time <= 0 ? setting : explorer.atRest(setting));
+            restore = state.snapshot();
+          }
+          held.set(ball, null);
         },
         speed: (ball) => state.setting.speeds[ball],
         pull: (ball, speed) => {
-          state.set(explorer.pulled(before, ball, speed));
+          if (speeds.length !== state.setting.speeds.length) return; // there are other balls now
+          held.delete(ball);
+          held.set(ball, speed);
+          const pulls = [...held].filter((pull) => pull[1] !== null);
+          const start = { ...state.setting, speeds };
+          state.set(pulls.reduce((setting, pull) => explorer.pulled(setting, ...pull), start));
           state.clock.time = 0;
           this.changed();
         },
-        letGo: (moved) => {
-          if (moved && !less()) state.clock.playing = true;
+        letGo: (ball, moved) => {
+          held.delete(ball);
+          ({ speeds } = state.setting);
+          if (moved && !held.size && !less()) state.clock.playing = true;
+          this.changed();
+        },
+        giveUp: (undo = false) => {
+          held.clear();
+          if (undo) restore();
           this.changed();
         },
       };
@@ -246,7 +267,7 @@
       this.frame = 0;
       const seconds = Math.min((now - (this.last ?? now)) / 1000, LONGEST_FRAME);
       this.last = now;
-      const running = this.state.clock.playing && this.visible && !this.stage.drag;
+      const running = this.state.clock.playing && this.visible && !this.stage.drags.size;
       if (running && this.state.advance(seconds)) this.stale = true;
       const scenery = this.state.scenery();
       if (this.stale) this.draw(scenery);

@@ -40,6 +40,18 @@
       this.restart(this.clock.playing);
     }
 
+    // Return what brings everything back to where it is now.
+    snapshot() {
+      const { setting } = this;
+      const [clock, view] = [{ ...this.clock }, { ...this.view }];
+      return () => {
+        this.set(setting);
+        Object.assign(this.clock, clock);
+        Object.assign(this.view, view);
+        this.show(view.number, view.part);
+      };
+    }
+
     take(key) {
       const scene = named(key);
       Object.assign(this.view, {
