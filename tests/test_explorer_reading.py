@@ -24,7 +24,14 @@ from explorer import (
 )
 from test_layout import MISFITS, browser, contrast, show  # noqa: F401
 
-from cradle import Chain, SpringChain, collide, post_impact_velocities, textbook
+from cradle import (
+    Chain,
+    SpringChain,
+    collide,
+    paper_chain,
+    post_impact_velocities,
+    textbook,
+)
 from cradle.measures import bouncing_pattern
 
 # --- the address ------------------------------------------------------------------------------
@@ -82,6 +89,9 @@ WRONG_ADDRESSES = {
     "toString=1": "toString is no part of a setting",
     "speeds=1,%": "speeds[1] = NaN",
     "scene=none": "scene is no part of a setting",
+    "speeds=1e-300,0": "speeds[0] = 1e-300; must be 0 or at least 0.000001 in size",
+    "speeds=0,-1e-200": "speeds[1] = -1e-200; must be 0 or at least 0.000001 in size",
+    "letters=ABABA&masses=1": "masses[0] = 1; ball A has 0.045 kg",
 }
 
 
@@ -96,6 +106,31 @@ def test_wrong_addresses_are_refused(visit):
         assert same_outcome(shown), fragment
     go_to(tab, "speeds%3D1%2C0%2C0")  # as some mail programs write it
     assert drawn(tab)["speeds"] == [1, 0, 0]
+
+
+def test_letters_bring_their_numbers(visit):
+    """A link may name the paper's balls and nothing else; a ball of another mass has no letter."""
+    tab = still(visit, "#letters=ABACA")
+    found = drawn(tab)
+    chain, model = paper_chain("ABACA", excess="saturate")
+    assert found["masses"] == chain.masses.tolist()
+    assert found["restitution"] == chain.restitution.tolist()
+    assert found["forward"] == list(model.forward)
+    assert found["backward"] == list(model.backward)
+    go_to(tab, "letters=AB-&restitution=0.5")
+    found = drawn(tab)
+    assert found["masses"] == [*chain.masses[:2], 1]
+    assert found["restitution"] == [0.5, 0.5]
+
+
+def test_the_address_of_a_heading_stays(visit):
+    """Until the reader changes something, it is what was asked for."""
+    tab = still(visit, "#in-a-lecture", stopped=True)
+    tab.clock.run_for(1000)
+    assert tab.evaluate("location.hash") == "#in-a-lecture"
+    tab.get_by_label("ratio", exact=True).press("ArrowRight")
+    tab.clock.run_for(1000)
+    assert "forward=0.01" in tab.evaluate("location.hash")
 
 
 def test_a_reader_walks_on_from_a_changed_setting(visit):
@@ -672,7 +707,13 @@ def test_scenes_do_what_their_texts_say(visit):
     assert velocities["half"][0] < -0.2
     assert velocities["half"][3] == pytest.approx(velocities["half"][4], abs=1e-6)
     np.testing.assert_allclose(velocities["three"], [-1 / 3, 2 / 3, 2 / 3], atol=1e-6)
-    assert solved["light"][1].collisions.sum() > 10
+    assert solved["light"][1].collisions.sum() == 12  # a dozen
+    # "Make it lighter still": the slider has room, and there are more of them.
+    light = next(scene["setting"] for scene in scenes if scene["key"] == "light")
+    lightest = tab.evaluate("cradleExplorer.LIMITS.masses[0]")
+    assert light["masses"][1] > 2 * lightest
+    lighter = collide(*chain_of(light | {"masses": [1, lightest, 1]}))
+    assert lighter.collisions.sum() > 12
     kinds = [tuple(event) for event in solved["meeting"][1].events]
     assert ("close", 1) in kinds  # the gap
     # "One of them never stops": three of five pulled back, at the ratio 0.

@@ -225,8 +225,9 @@
       const { view } = this.state;
       const fragment = this.state.fragment();
       if (!this.page || view.notice || fragment === this.written) return;
-      // The plain address gives the first scene.
-      if (!this.written && !location.hash && view.scene === this.host.dataset.scene) return;
+      // The plain address, or that of a heading, gives the first scene.
+      const asked = explorer.plain(location.hash).includes("=");
+      if (!this.written && !asked && view.scene === this.host.dataset.scene) return;
       clearTimeout(this.writing);
       const before = location.hash;
       this.writing = setTimeout(() => {
