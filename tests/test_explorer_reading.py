@@ -214,7 +214,7 @@ def test_everything_by_keyboard(visit):
     drawn(tab)
     tab.keyboard.press(".")
     drawn(tab)
-    assert tab.locator(".outcome h3").first.inner_text() == "After hit 2 (m/s)"
+    assert tab.locator(".outcome h2").first.inner_text() == "After hit 2 (m/s)"
 
 
 def test_full_screen_for_a_lecture(visit):
@@ -550,10 +550,14 @@ def test_work_of_a_frame(visit):
     tab.clock.run_for(1600)  # beyond the first hit
     tab.evaluate(COUNT_WORK)
     swing = counted(tab, 16 * frames)
-    # Each hit is solved once. Between hits balls and dots move, and nothing is laid out.
-    assert swing["solved"] == swing["hits"] == 2
-    assert swing["drawn"] == 0
-    assert 3 * balls * frames <= swing["changed"] < 6 * balls * frames
+    # Each hit is solved twice, for its outcome and for its history, and laid out once. Between hits
+    # balls move, and nothing is laid out.
+    assert swing["hits"] == swing["drawn"] == 2
+    assert swing["solved"] == 4
+    assert 2 * balls * frames <= swing["changed"] < 6 * balls * frames
+    between = counted(tab, 16 * 20)
+    assert between["hits"] == between["solved"] == between["drawn"] == 0
+    assert between["changed"] <= 3 * balls * 20
     press(tab, "Slow motion")
     slow = counted(tab, 16 * 500)
     # A hit is solved again for its history. Inside it bars and shares of energy are made anew.
@@ -561,6 +565,58 @@ def test_work_of_a_frame(visit):
     assert slow["solved"] == 2 * slow["hits"]
     assert slow["drawn"] <= 1 + 2 * slow["hits"]
     assert slow["changed"] < 20 * balls * 500
+
+
+def test_what_does_not_move_is_not_drawn(visit):
+    """Balls at rest, though let go; those beside one that swings; the cradle beside a sweep."""
+    tab = still(visit, "#speeds=0,0,0,0,0", stopped=True)
+    tab.clock.run_for(50)
+    tab.evaluate(COUNT_WORK)
+    press(tab, "Let go")
+    tab.clock.run_for(50)
+    assert counted(tab, 2000) == {"solved": 0, "drawn": 0, "changed": 0, "hits": 0}
+    assert not tab.evaluate(f"{EXPLORER}.frame")
+    go_to(tab, "scene=one")
+    tab.clock.run_for(600)
+    press(tab, "Pull back")
+    press(tab, "Let go")
+    tab.clock.run_for(100)
+    frames = 20
+    assert 0 < counted(tab, 16 * frames)["changed"] <= 3 * frames  # of one ball in five
+    press(tab, "Pause")
+    tab.click("label:has-text('All ratios')")
+    tab.clock.run_for(50)
+    tab.evaluate("(() => { let now = 0; performance.now = () => (now += 0.5); })()")
+    tab.get_by_label("restitution", exact=True).press("ArrowLeft")
+    tab.clock.run_for(16)
+    stage = f"{EXPLORER}.stage.svg"
+    tab.evaluate(
+        f"new MutationObserver((all) => (window.moved = all.length))"
+        f".observe({stage}, {{ attributes: true, childList: true, subtree: true }})"
+    )
+    assert counted(tab, 16 * 5)["solved"] > 20
+    assert tab.evaluate("window.moved") is None
+
+
+def test_bars_follow_the_swing(visit):
+    """They show each hit, and so do title and words; a voice tells the first one alone."""
+    tab = visit("#scene=losses", stopped=True)
+    tab.clock.run_for(1500)
+    title, numbers = tab.locator(".outcome h2").first, tab.locator(".outcome .number")
+    heard = tab.locator(".said [aria-live=polite]").text_content()
+    assert "Before the first hit" in heard
+    for number in range(1, 4):
+        tab.clock.run_for(1004)  # half a period
+        hit = tab.evaluate(f"{EXPLORER}.state.swing.hit({number})")
+        assert title.inner_text() == f"After hit {number + 1} (m/s)"
+        shown = [float(text.replace("\u2212", "-")) for text in numbers.all_text_contents()]
+        assert shown == pytest.approx(hit["after"], abs=0.0051)
+        assert "After it, ball 1" in tab.inner_text(".words")
+        assert tab.inner_text(".words").startswith(f"Before hit {number + 1}, ")
+        assert tab.locator(".said [aria-live=polite]").text_content() == heard
+    press(tab, "Pause")
+    tab.clock.run_for(1000)
+    assert tab.locator(".said [aria-live=polite]").text_content() == tab.inner_text(".words")
 
 
 def test_sweeps_and_maps_share_the_frame(visit):

@@ -48,7 +48,7 @@
         scenes: this.parts.has("scenes") ? panels.scenesPanel(act) : null,
         run: panels.runPanel(act),
         words: panels.wordsPanel(),
-        outcome: panels.outcomePanel(),
+        outcome: panels.outcomePanel(this.level()),
         settings: panels.settingsPanel(act, this.parts),
         pictures: panels.picturesPanel(act, this.parts),
         share: this.parts.has("share") ? panels.sharePanel(act) : null,
@@ -76,16 +76,27 @@
       });
     }
 
+    // A heading one step below the one that the explorer stands under.
+    level() {
+      const before = [...document.querySelectorAll("h1, h2, h3, h4")].filter(
+        (node) => node.compareDocumentPosition(this.host) & Node.DOCUMENT_POSITION_FOLLOWING,
+      );
+      return `h${+(before.pop()?.tagName[1] ?? 1) + 1}`;
+    }
+
     watch() {
       const redraw = () => this.changed();
       new ResizeObserver(redraw).observe(this.host);
       const theme = { attributeFilter: ["data-theme"] };
-      new MutationObserver(redraw).observe(document.documentElement, theme);
+      // At once: a page that is printed turns light, and waits for no frame.
+      const recolour = () => this.draw(this.state.scenery());
+      new MutationObserver(recolour).observe(document.documentElement, theme);
       new IntersectionObserver(([entry]) => {
         this.visible = entry.isIntersecting;
         redraw();
       }).observe(this.host);
       document.addEventListener("fullscreenchange", redraw);
+      window.addEventListener("beforeprint", () => this.print());
       this.host.addEventListener("pointerdown", () => (this.pointed = true));
       document.addEventListener("keydown", (event) => this.key(event), true);
       if (this.page) window.addEventListener("hashchange", () => this.readAddress());
@@ -268,7 +279,8 @@
       this.frame = 0;
       const seconds = Math.min((now - (this.last ?? now)) / 1000, LONGEST_FRAME);
       this.last = now;
-      const running = this.state.clock.playing && this.visible && !this.stage.drags.size;
+      const { clock, moves } = this.state;
+      const running = clock.playing && moves && this.visible && !this.stage.drags.size;
       if (running && this.state.advance(seconds)) this.stale = true;
       const scenery = this.state.scenery();
       if (this.stale) this.draw(scenery);
@@ -285,6 +297,14 @@
       this.stage.lay(scenery.setting, this.stageBox());
       this.link.href = `explorer.html#${this.state.fragment()}`;
       this.writeAddress();
+    }
+
+    // What is printed is finished, seen or not.
+    print() {
+      const scenery = this.state.scenery();
+      this.draw(scenery);
+      this.move(scenery);
+      while (this.panels.pictures?.resume(scenery, this.box));
     }
 
     // Move what moves between two changes: balls, and what travels through a hit.

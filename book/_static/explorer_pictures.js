@@ -61,14 +61,11 @@
     function move({ record, contact: chosen, part: now }, box) {
       if (!drawn || !record) return;
       if (document.activeElement !== part || +part.value !== now) part.value = now;
+      if (drawn.now === now) return;
+      drawn.now = now;
       part.setAttribute("aria-valuetext", `${Math.round(100 * now)}\u00a0%`);
-      plot.querySelector(".now").innerHTML = explorer.dots(
-        drawn.plot,
-        record,
-        chosen,
-        now,
-        box(plot).em,
-      );
+      const { em } = box(plot);
+      plot.querySelector(".now").innerHTML = explorer.dots(drawn.plot, record, chosen, now, em);
     }
     return {
       node: make("div", {}, contact.node, plot, scrub, note),

@@ -11,6 +11,11 @@
   // Fewer pixels than these are no drag: a finger is never quite still.
   const STILL = 3;
 
+  // Nothing is drawn anew that is there already.
+  function set(node, name, value) {
+    if (node.getAttribute(name) !== String(value)) node.setAttribute(name, value);
+  }
+
   function make(kind, attributes, parent) {
     const node = document.createElementNS(SVG, kind);
     for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
@@ -139,17 +144,18 @@
         const x = px(this.pivots[k] + this.length * Math.sin(angle));
         const y = px(this.top + this.length * Math.cos(angle));
         const { string, group, pull } = this.balls[k];
-        string.setAttribute("x2", x);
-        string.setAttribute("y2", y);
-        group.setAttribute("transform", `translate(${x} ${y})`);
+        set(string, "x2", x);
+        set(string, "y2", y);
+        set(group, "transform", `translate(${x} ${y})`);
         // Balls that are pulled together have one number, below the one nearest to the others.
         const next = speeds[k] > 0 ? speeds[k + 1] : speeds[k - 1];
         const told = held && speeds[k] && speeds[k] !== next;
-        pull.textContent = told ? `${fixed(Math.abs(speeds[k]))} m/s` : "";
+        const words = told ? `${fixed(Math.abs(speeds[k]))} m/s` : "";
+        if (pull.textContent !== words) pull.textContent = words;
         // It stays within the picture.
         const half = 2.6 * this.em;
         const middle = Math.min(Math.max(+x, half), this.svg.viewBox.baseVal.width - half);
-        pull.setAttribute("x", px(middle - x));
+        set(pull, "x", px(middle - x));
       });
       this.stars.forEach((star, c) => star.classList.toggle("shown", Boolean(pressed[c])));
     }
