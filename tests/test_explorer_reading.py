@@ -573,22 +573,24 @@ def test_what_does_not_move_is_not_drawn(visit):
     tab.clock.run_for(50)
     tab.evaluate(COUNT_WORK)
     press(tab, "Let go")
-    tab.clock.run_for(50)
+    tab.clock.run_for(1000)  # a voice is told once
     assert counted(tab, 2000) == {"solved": 0, "drawn": 0, "changed": 0, "hits": 0}
     assert not tab.evaluate(f"{EXPLORER}.frame")
     go_to(tab, "scene=one")
     tab.clock.run_for(600)
     press(tab, "Pull back")
+    tab.clock.run_for(50)
     press(tab, "Let go")
     tab.clock.run_for(100)
     frames = 20
-    assert 0 < counted(tab, 16 * frames)["changed"] <= 3 * frames  # of one ball in five
+    assert 0 < counted(tab, 16 * frames)["changed"] <= 3 * (frames + 1)  # of one ball in five
     press(tab, "Pause")
+    tab.clock.run_for(50)
     tab.click("label:has-text('All ratios')")
     tab.clock.run_for(50)
     tab.evaluate("(() => { let now = 0; performance.now = () => (now += 0.5); })()")
     tab.get_by_label("restitution", exact=True).press("ArrowLeft")
-    tab.clock.run_for(16)
+    tab.clock.run_for(50)
     stage = f"{EXPLORER}.stage.svg"
     tab.evaluate(
         f"new MutationObserver((all) => (window.moved = all.length))"
@@ -611,7 +613,7 @@ def test_bars_follow_the_swing(visit):
         assert title.inner_text() == f"After hit {number + 1} (m/s)"
         shown = [float(text.replace("\u2212", "-")) for text in numbers.all_text_contents()]
         assert shown == pytest.approx(hit["after"], abs=0.0051)
-        assert "After it, ball 1" in tab.inner_text(".words")
+        assert "After it, ball" in tab.inner_text(".words")
         assert tab.inner_text(".words").startswith(f"Before hit {number + 1}, ")
         assert tab.locator(".said [aria-live=polite]").text_content() == heard
     press(tab, "Pause")
