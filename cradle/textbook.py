@@ -5,8 +5,8 @@ infinite sequence of impacts goes on to the last digits of its numbers, or to an
 
 Contact c joins balls c and c + 1.  Its closing speed u = v[c] - v[c + 1] is above 0 in compression.
 Inside a run of active contacts there is no time, only progress s.  Between two events velocities
-are linear and works quadratic in s: every event is the root of a formula.  Against rounding: what
-is zero but for its last digits is made zero, events within an `instant` are one, see also TIE.
+are linear and works quadratic in s: every event is the root of a formula.  Against rounding: a
+`small` part is nothing, events within an `instant` are one, six tenths of all digits a `tie`.
 """
 
 import math
@@ -14,7 +14,7 @@ from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
 Number = Any  # float, mpf, or another type that can be calculated with and has a `sqrt`
-FORWARD, BACKWARD, TIE = 1, -1, 10**9  # R8: within one part in 10^9 two are equal: the left wins
+FORWARD, BACKWARD = 1, -1
 
 
 class EventLimit(RuntimeError):
@@ -41,7 +41,8 @@ class Impact:
     def __init__(self, m: list[Any], v: list[Any], e: list[Any], ratio: Any, meeting: Any) -> None:
         self.m, self.e, self.meeting, self.zero = m, e, meeting, 0 * meeting
         rounding = abs(3 * ((self.zero + 4) / 3 - 1) - 1)  # of the number 1; none in exact numbers
-        self.last_digits = 8 * rounding * max(abs(a - b) for a, b in pairwise(v))
+        self.tie, self.small = int((float(rounding) or 1e-300) ** -0.6), 8 * rounding
+        self.last_digits = self.small * max(abs(a - b) for a, b in pairwise(v))
         self.ratio, self.direction = ratio, [0] * len(m)  # by ball: who drives there, and how much
         self.velocities, self.u = list(v), [a - b for a, b in pairwise(v)]
         self.near = [abs(u) for u in self.u]  # |u| before the last segments, or at its end since
@@ -71,8 +72,7 @@ class Impact:
         """R1, R6: one ratio at each inner ball fixes all impulse rates but for a common factor."""
         balls, near = range(first, last + 2), range(max(first - 1, 0), min(last + 2, len(self.u)))
         ratio, bound = self.ratios_in_force(balls[1:-1])
-        # R6: ratios of zero are one vanishing number, to a power
-        rates = {first: (0, self.zero + 1)}
+        rates = {first: (0, self.zero + 1)}  # R6: zeros are one vanishing number, to a power
         for i in balls[1:-1]:
             way, factor, (power, size) = self.direction[i], ratio[i] or self.zero + 1, rates[i - 1]
             rates[i] = power - way * (ratio[i] == 0), size * factor**way
@@ -85,16 +85,15 @@ class Impact:
         return Run(first, last, rate, pull, slope, bound, ahead, min(ahead)[0], instant)
 
     def ratios_in_force(self, inner: range) -> tuple[dict[int, Number], dict[int, bool]]:
-        """R7: a driven contact at u = 0 that has absorbed nothing cannot open: Eqs. 34, 53."""
+        """R7: what one driver alone drives and has absorbed nothing cannot open: Eqs. 34, 53."""
         ratio, bound = dict[int, Number](), dict[int, bool]()
         for way, balls in ((FORWARD, inner[::-1]), (BACKWARD, inner)):  # from each drive's far end
             for i in (i for i in balls if self.direction[i] == way):
                 far, c, ratio[i] = i + way, i if way == FORWARD else i - 1, self.ratio[way][i]
-                one_driver = self.direction[far] != -way  # two of them never open it
-                if one_driver and self.u[c] == self.gained[c] == self.given[c] == 0:
+                if self.direction[far] != -way and self.u[c] == self.gained[c] == 0:
                     limit = self.m[far] / (self.m[far] + self.m[i] * (1 - ratio.get(far, 0)))
-                    if ratio[i] >= limit:
-                        ratio[i], bound[c] = limit, ratio[i] > limit
+                    if ratio[i] >= (1 - self.small) * limit:
+                        ratio[i], bound[c] = limit, ratio[i] > (1 + self.small) * limit
         return ratio, bound
 
     def look_ahead(self, rate: dict[int, Number], slope: dict[int, Number]) -> list[Any]:
@@ -118,7 +117,7 @@ class Impact:
             store, u = store + e * e * rate * u * way / 2, self.zero
         # While u < 0, the store changes by the integral of u dP = rate (u s + slope s^2 / 2).
         square = u * u - 2 * slope * store / rate
-        if u < 0 and square <= 0:
+        if u < 0 and square <= self.small * u * u:
             return ()  # it is compressed again before that
         last = -(square.sqrt() if hasattr(square, "sqrt") else math.sqrt(square))
         return way - 2 * store / rate / (u + last) if last else way, last
@@ -140,7 +139,7 @@ class Impact:
     def goes_first(self, c: int, due: list[int]) -> bool:
         """R8.6: of two closings on one free ball the nearer goes first, at a tie the left one."""
         left = c if c + 1 in due else c - 1
-        nearer = TIE * self.near[left + 1] < (TIE - 1) * self.near[left]
+        nearer = self.tie * self.near[left + 1] < (self.tie - 1) * self.near[left]
         return left not in due or nearer == (c > left)
 
     def parts_to_meeting(self, left: Run, right: Run) -> list[Number]:
@@ -150,11 +149,10 @@ class Impact:
         r = q + right.pull[right.first] * right.length
         if p - r <= self.last_digits:
             return []
-        low, high = max(self.zero, r), min(p, q)
-        at = high if self.meeting == 1 else low + self.meeting * (high - low)
-        parts = [at / p if p else self.zero, (at - q) / (r - q) if r != q else self.zero]
-        used = zip(parts, (left, right), strict=True)
-        return [1 if (1 - x) * run.length <= run.instant else x for x, run in used]
+        at = (1 - self.meeting) * max(self.zero, r) + self.meeting * min(p, q)
+        ways = (left, at, p), (right, q - at, q - r)
+        parts = [(run, x / whole if x > self.last_digits else self.zero) for run, x, whole in ways]
+        return [1 if (1 - x) * run.length <= run.instant else x for run, x in parts]
 
     def first_meeting(self, runs: list[Run]) -> tuple[int, list[tuple[Run, Number]]]:
         """R8.4: the gap that is reached first, and who goes how far to it; -1 if none is met."""
@@ -164,7 +162,7 @@ class Impact:
             return -1, [(run, 1) for run in runs]  # R8.6
         for key in (max, min):  # the larger part is the least, at a tie the smaller; then the left
             least = min(key(parts) for _, parts in met)
-            met = [(pair, parts) for pair, parts in met if TIE * (key(parts) - least) <= 1]
+            met = [(pair, parts) for pair, parts in met if self.tie * (key(parts) - least) <= 1]
         (left, right), parts = met[0]
         # But a gap that one of the two would be carried past closes first, with that run alone.
         gaps, passed = [b.first - 1 for _, b in pairs], []
@@ -172,7 +170,9 @@ class Impact:
             change = run.slope.get(c, 0) * run.length
             if c in gaps and self.u[c] + change * part > self.last_digits:
                 passed.append((-self.u[c] / change, c, [(run, -self.u[c] / change)]))
-        return min(passed)[1:] if passed else (left.last + 1, [(left, parts[0]), (right, parts[1])])
+        if not passed:
+            return left.last + 1, [(left, parts[0]), (right, parts[1])]
+        return passed[-1 if self.tie * (passed[0][0] - passed[-1][0]) > 1 else 0][1:]
 
     def advance(self, run: Run, part: Number) -> None:
         """Take a run through a part of its segment; what is zero there is stored as zero."""

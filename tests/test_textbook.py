@@ -382,13 +382,29 @@ def test_abcca_is_above_its_bound():
 
 
 @pytest.mark.parametrize(
-    ("nudge", "first"), [(0, 1), (1e-11, 1), (-1e-11, 1), (1e-7, 1), (-1e-7, 2)]
+    ("number", "tie"), [(float, 1e-11), (mpmath.mpf, 1e-33), (Decimal, "1e-19"), (Fraction, 0)]
 )
-def test_double_closing_within_the_tie(nudge, first):
-    """R8.6: of two contacts on one ball the nearer closes; within 1e-9 they tie, the left goes."""
-    velocities = [1, mpmath.mpf("-0.1"), 0, mpmath.mpf("0.1") + mpmath.mpf(nudge), -1]
-    outcome = textbook.solve([1] * 5, velocities, 1, "0.1", number=mpmath.mpf)
+@pytest.mark.parametrize(("side", "first"), [(0, 1), (1, 1), (-1, 1), (1e4, 1), (-1e4, 2)])
+def test_double_closing_within_the_tie(number, tie, side, first):
+    """R8.6: of two contacts on one ball the nearer closes; at a tie, whatever number, the left."""
+    nudge = number(tie) * number(side) if tie else number(side) / 10**40
+    if number is Fraction and side == -1:
+        first = 2  # the least there is: exact numbers tie when they are equal
+    velocities = [1, number("-0.1"), 0, number("0.1") + nudge, -1]
+    outcome = textbook.solve([1] * 5, velocities, 1, "0.1", number=number)
     assert outcome.events[:2] == [("close", first), ("close", 3 - first)]
+
+
+def test_nearness_is_that_of_the_last_segments():
+    """R8.6: contacts 2 and 3 close on one ball; |u| counts where the round starts, not before."""
+    outcome = textbook.solve([1] * 6, [1, "-0.1", "-0.1", 1, "0.2", "-0.5"], "0.9", "0.1")
+    assert outcome.events[2:7] == [
+        *(("end", 0), ("end", 3), ("maximum_compression", 4)),
+        *(("close", 2), ("close", 3)),
+    ]
+    first, before = outcome.path[0], outcome.path[4]
+    assert first[3] - first[4] < first[3] - first[2]  # contact 3 was the nearer one
+    assert before[4] - before[3] > 3 * (before[3] - before[2]) > 0
 
 
 def test_ties_do_not_depend_on_the_digits():

@@ -107,6 +107,102 @@ def light_balls(draw, n):
     return Problem(masses, velocities, restitution, forward, backward)
 
 
+def any_number(draw, low, high):
+    """With all its digits, or with two decimals."""
+    if draw.chance(50):
+        return low + (high - low) * draw.source.random()
+    return draw.decimal(low, high, 2)
+
+
+def any_masses(draw, n, decades=2):
+    """Equal, the paper's, or random over some decades."""
+    kind = draw.below(4)
+    if kind == 0:
+        return [1.0] * n
+    if kind == 1:
+        return [draw.choice(PAPER_MASSES) for _ in range(n)]
+    octaves = round(decades * 1.66)  # on either side of 1
+    powers = [2.0 ** (draw.below(2 * octaves) - octaves) for _ in range(n)]
+    return [x * any_number(draw, 1, 2) for x in powers]
+
+
+def few_velocities(draw, n):
+    """The first ball strikes, or few different numbers, zeros and equal ones among them."""
+    if draw.chance(50):
+        return [1.0] + [0.0] * (n - 1)
+    return [draw.choice([0.0, 1.0, 0.5, -0.5]) for _ in range(n)]
+
+
+def losses(draw, n):
+    """Chains with losses and few different ratios, in which ties decide."""
+    values = draw.choice([[0.0, 0.1], [0.0, 0.05, 0.1], [0.05, 0.1], [0.0, 1e-20]])
+    coefficients = draw.choice([[0.9], [0.8, 0.9, 0.95]])
+    return Problem(
+        any_masses(draw, n),
+        few_velocities(draw, n),
+        [draw.choice(coefficients) for _ in range(n - 1)],
+        *([draw.choice(values) for _ in range(n - 2)] for _ in range(2)),
+        draw.choice([0.0, 0.5, 1.0]),
+    )
+
+
+def wide(draw, n):
+    """Every coefficient and ratio there is, masses over up to twelve decades."""
+
+    def numbers(lists, size):
+        values = draw.choice(lists)
+        return [draw.choice(values) if values else any_number(draw, 0, 1) for _ in range(size)]
+
+    ways = [numbers([[0.0, 0.1], [0.0, 0.1, 0.5, 1.0], [0.3], [1.0], []], n - 2) for _ in range(2)]
+    if draw.chance(10) and n > 2:
+        draw.choice(ways)[draw.below(n - 2)] = 1e-20
+    return Problem(
+        any_masses(draw, n, draw.choice([2, 2, 12])),
+        few_velocities(draw, n) if draw.chance(60) else numbers([[]], n),
+        numbers([[0.9], [0.5, 0.8, 0.9], [0.0, 0.5, 0.9, 1.0], [1.0], []], n - 1),
+        *ways,
+        draw.choice([0.0, 0.3, 0.5, 1.0]),
+    )
+
+
+def generic(draw, n):
+    """No ties: every number with all its digits."""
+
+    def numbers(low, high, size):
+        return [low + (high - low) * draw.source.random() for _ in range(size)]
+
+    m = numbers(0.2, 4, n)
+    ways = [within_bounds(masses, numbers(0, 1, n - 2)) for masses in (m, m[::-1])]
+    v, e = numbers(-1, 1, n), numbers(0.3, 1, n - 1)
+    return Problem(m, v, e, ways[0], ways[1][::-1], draw.source.random())
+
+
+def at_bounds(draw, n):
+    """Ratios exactly on their bounds where these are short decimals, or one digit beside them."""
+    m = [draw.choice([1.0, 1.0, 1.5, 3.0, 4.0, 0.25]) for _ in range(n)]
+    parts = [[draw.choice([0.0, 0.5, 1.0, 1.0]) for _ in range(n - 2)] for _ in range(2)]
+    if draw.chance(60):  # no ratio beside another: all bounds are quotients of two masses
+        parts = [[part * (i % 2) for i, part in enumerate(way)] for way in parts]
+    forward, backward = within_bounds(m, parts[0]), within_bounds(m[::-1], parts[1])[::-1]
+    coefficients = draw.choice([[1.0], [0.9], [0.5, 0.9, 1.0]])
+    e = [draw.choice(coefficients) for _ in range(n - 1)]
+    meeting = draw.choice([0.0, 0.5, 1.0])
+    return Problem(m, few_velocities(draw, n), e, forward, backward, meeting)
+
+
+def extremes(draw, n):
+    """Nothing but ends: e and ratios 0 and 1, meeting 0 and 1, masses twelve decades apart."""
+    masses = draw.choice([[1.0], [1.0, 2.0], [1.0, 1e-6, 1e6], [0.045, 0.053, 0.166]])
+    ends = draw.choice([[0.0, 1.0], [0.0], [1.0]]), draw.choice([[0.0, 1.0], [1.0], [0.5, 1.0]])
+    return Problem(
+        [draw.choice(masses) for _ in range(n)],
+        few_velocities(draw, n),
+        [draw.choice(ends[1]) for _ in range(n - 1)],
+        *([draw.choice(ends[0]) for _ in range(n - 2)] for _ in range(2)),
+        draw.choice([0.0, 1.0]),
+    )
+
+
 #: name: generator, least and largest number of balls
 FAMILIES = {
     "ties": (ties, 2, 20),
@@ -116,10 +212,20 @@ FAMILIES = {
     "light balls": (light_balls, 3, 5),
 }
 
+#: The same for the judge of `judge.py`.
+JUDGED = {
+    "losses": (losses, 4, 14),
+    "wide": (wide, 2, 10),
+    "generic": (generic, 2, 10),
+    "at bounds": (at_bounds, 3, 10),
+    "extremes": (extremes, 2, 10),
+    **FAMILIES,
+}
+
 
 def family(name, count, seed=2001):
     """Yield problems of a family; the same for the same seed, everywhere."""
     draw = Draw(seed)
-    generate, least, largest = FAMILIES[name]
+    generate, least, largest = JUDGED[name]
     for _ in range(count):
         yield generate(draw, least + draw.below(largest - least + 1))

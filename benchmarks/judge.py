@@ -1,0 +1,344 @@
+"""The judge: answers of the package against the textbook's rules over decimals of 100 digits.
+
+Usage::
+
+    python benchmarks/judge.py                             # a hundred chains of every family
+    python benchmarks/judge.py --family losses --count 10000 --seed 7
+
+An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
+within 600 events.  A float means what it prints as if that is short, see `meaning`: ties of an
+exact run are those of the decimals that a reader sees.  Wrong chains are shrunk and printed as
+they can be pasted.  Where the exact run has no end, see `second_opinion`.
+
+Every chain counted as right or wrong was judged by the exact run, at some hundred chains a second.
+"""
+
+import argparse
+import decimal
+import os
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from decimal import Decimal
+from typing import NamedTuple
+
+import truth
+from families import JUDGED, family
+from problem import Problem
+
+from cradle import ImpactNotFinished, post_impact_velocities, textbook
+from cradle.trace import ImpactNotCertified
+
+DIGITS, EVENTS, WRONG = 100, 600, 1e-9
+#: Events after which the package gives up: far beyond those of an exact run that ends.
+LONGEST = 200_000
+#: Where an infinite sequence was taken to its limit, answers may differ by this.
+LIMIT = 1e-6
+#: Verdicts that are printed with their chain.
+DOUBTFUL = ("wrong", "other reading", "open", "unfinished", "unlike them")
+#: Chains of one task of the pool.
+TASK = 50
+
+#: Wrong once, with clean certificates; masses of the first and the last are those of a search.
+NAMED = {
+    "a rounding ended an idle contact": Problem(
+        [0.9395274204242703, 0.13162874375217531, 0.8787652613133802,
+         8.666424460086086, 0.4642354568832623, 1.4071765793971693],
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.8, 0.95, 0.8, 0.8, 0.9],
+        [0.1, 0.0, 0.0, 0.0],
+        [0.1, 0.1, 0.0, 0.1],
+        1.0,
+    ),
+    "six equal, one round early": Problem(
+        [1.0] * 6,
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.8, 0.9, 0.8, 0.95, 0.9],
+        [0.0, 0.0, 0.0, 0.1],
+        [0.0, 0.0, 0.1, 0.0],
+    ),
+    "seven equal": Problem(
+        [1.0] * 7,
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.95, 0.9, 0.9, 0.9, 0.9, 0.8],
+        [0.0, 0.1, 0.0, 0.05, 0.0],
+        [0.1, 0.05, 0.1, 0.0, 0.0],
+    ),
+    "nine balls": Problem(
+        [4.3639302160559, 2.9120226348453953, 0.8581936094543515,
+         2.0061646045881667, 5.829783354676066, 2.236215035414757,
+         2.2556046634037394, 0.38269385236942605, 1.6450906384595456],
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.9] * 8,
+        [0.1, 0.0, 0.0, 0.0, 0.1, 0.1, 0.0],
+        [0.0, 0.05, 0.1, 0.0, 0.05, 0.05, 0.05],
+        1.0,
+    ),
+}  # fmt: skip
+
+
+# --- what is true ------------------------------------------------------------------------------
+
+
+def meaning(x):
+    """The number that a float means: of 15 digits at most, from 1e-7 to 1e15, what it prints as.
+
+    Every other float means its exact value, and a decimal means itself.
+    """
+    if isinstance(x, Decimal):
+        return x
+    exact, printed = Decimal(x), Decimal(repr(float(x)))
+    digits = printed.normalize(decimal.Context(prec=17)).as_tuple().digits
+    short = len(digits) <= 15 and Decimal("1e-7") <= abs(printed) < Decimal("1e15")
+    return printed if short else exact
+
+
+class Exact(textbook.Impact):
+    """The textbook's impact: zero and equal is what is so to six tenths of the digits; no path."""
+
+    def __init__(self, *given):
+        super().__init__(*given)
+        wider = Decimal(1) / self.tie / self.small
+        self.small, self.last_digits = self.small * wider, self.last_digits * wider
+
+    def record(self, kind, c):
+        self.events.append((kind, c))
+
+
+def exact(problem, read=meaning, *, events=EVENTS, twice=False):
+    """Velocities by the rules alone; None if the sequence does not end within so many events.
+
+    100 digits; four times as many where a ratio is so small that products of several matter; twice
+    as many if asked.
+    """
+    tiny = any(0 < ratio < 1e-9 for ratio in (*problem.forward, *problem.backward))
+    with decimal.localcontext(prec=DIGITS * (4 if tiny else 1) * (2 if twice else 1)):
+        options = {"number": read, "max_events": events, "impact": Exact}
+        try:
+            return problem.solve(textbook.solve, **options).velocities
+        except textbook.EventLimit:
+            return None
+
+
+def on_bounds(problem):
+    """The chain with its ratios within 1e-15 of their bounds (Eq. 53, its mirror image) on them."""
+
+    def one_way(masses, ratios):
+        found, onward = [], Decimal(0)
+        m = [meaning(x) for x in masses]
+        for here, beyond, ratio in reversed(list(zip(m[1:], m[2:], map(meaning, ratios)))):
+            bound = beyond / (beyond + here * (1 - onward))
+            onward = bound if abs(ratio / bound - 1) < Decimal("1e-15") else ratio
+            found.insert(0, onward)
+        return found
+
+    with decimal.localcontext(prec=4 * DIGITS):
+        forward = one_way(problem.masses, problem.forward)
+        backward = one_way(problem.masses[::-1], problem.backward[::-1])[::-1]
+    return problem._replace(forward=forward, backward=backward)
+
+
+def off(problem, one, other):
+    """How far two outcomes are apart, as a part of the largest speed before the impact."""
+    most = max(abs(a - Decimal(b)) for a, b in zip(map(Decimal, one), other, strict=True))
+    return float(most / (Decimal(max(map(abs, problem.velocities))) or 1))
+
+
+# --- what is answered --------------------------------------------------------------------------
+
+
+class Verdict(NamedTuple):
+    """What was found out about a chain."""
+
+    #: One of `WORDS`.
+    word: str
+    #: Distance from the truth.
+    off: float = 0.0
+
+
+#: Where the exact run ends: "other reading" is wrong by `meaning`, right for the exact values of
+#: all floats or `on_bounds`; "open" hangs on more than so many digits; "unfinished" has no answer.
+ENDS = ["right", "wrong", "other reading", "open", "unfinished"]
+#: Where it has no end: who agrees with the answer; "given up" has no answer.
+ENDLESS = ["as 50 digits", "unlike them", "as relations", "nobody knows", "given up"]
+WORDS = ENDS + ENDLESS
+
+
+def batch(problem):
+    """The package's velocities, of a batch; None if it gives none."""
+    *parts, meeting = problem
+    options = {"meeting": meeting, "excess": "saturate", "max_events": LONGEST}
+    try:
+        return post_impact_velocities(*parts, **options).tolist()
+    except (ImpactNotFinished, ImpactNotCertified):
+        return None
+
+
+def single(problem):
+    """The same, of `collide`."""
+    try:
+        return problem.collide(max_events=LONGEST).velocities.tolist()
+    except (ImpactNotFinished, ImpactNotCertified):
+        return None
+
+
+def judge(problem, *ask, events=EVENTS):
+    """The verdict on one chain, by the worse of its answers; "endless" if that must be others'."""
+    given = [answer(problem) for answer in ask or (batch, single)]
+    right = exact(problem, events=events)
+    if right is None:
+        return Verdict("endless")
+    if None in given:
+        return Verdict("unfinished")
+    far = max(off(problem, one, right) for one in given)
+    if far <= WRONG:
+        return Verdict("right", far)
+    again = exact(problem, twice=True)
+    if again is None or off(problem, again, right) > WRONG:
+        return Verdict("open", far)
+    for other in exact(problem, Decimal), exact(on_bounds(problem)):
+        if other and max(off(problem, one, other) for one in given) <= WRONG:
+            return Verdict("other reading", far)
+    return Verdict("wrong", far)
+
+
+def second_opinion(problem):
+    """On a chain whose exact run has no end: by rule R9 at fifty digits, then by relations."""
+    given = batch(problem)
+    if given is None:
+        return Verdict("given up")
+    with decimal.localcontext(prec=50):
+        try:
+            limit = problem.exact(2000, number=meaning).velocities
+            far = off(problem, given, limit)
+            return Verdict("as 50 digits" if far <= LIMIT else "unlike them", far)
+        except truth.EventLimit:
+            pass
+    far = [off(problem, given, other) for other in seen_otherwise(problem)]
+    word = "as relations" if far and max(far) <= LIMIT else "nobody knows"
+    return Verdict(word, max(far, default=1.0))
+
+
+def seen_otherwise(problem):
+    """Answers for the same chain seen from elsewhere, where these inputs mean the very same."""
+    others = [
+        (problem.boosted(4.0), lambda v: [x - 4 for x in v]),
+        (problem.in_units(1.0, 2.0), lambda v: [x / 2 for x in v]),
+    ]
+    if sum(a > b for a, b in zip(problem.velocities, problem.velocities[1:])) == 1:
+        others.append((problem.mirrored(), lambda v: [-x for x in reversed(v)]))
+    here = [meaning(v) for v in problem.velocities]
+    for other, back in others:
+        given = batch(other)
+        if given is not None and back([meaning(v) for v in other.velocities]) == here:
+            yield back(given)
+
+
+# --- wrong chains, shrunk ----------------------------------------------------------------------
+
+
+def without(problem, i):
+    """The chain with ball i taken out; its neighbours' ratios stay."""
+
+    def drop(values, k):
+        k = min(max(k, 0), len(values) - 1)
+        return values[:k] + values[k + 1 :]
+
+    m, v, e, f, b, meeting = problem
+    return Problem(drop(m, i), drop(v, i), drop(e, i), drop(f, i - 1), drop(b, i - 1), meeting)
+
+
+SIMPLER = {
+    "masses": (1.0, 2.0),
+    "velocities": (0.0, 1.0),
+    "restitution": (1.0, 0.9, 0.5),
+    "forward": (0.0, 0.1, 0.5),
+    "backward": (0.0, 0.1, 0.5),
+}
+
+
+def simpler(problem):
+    """Chains of fewer balls, or with one simpler number."""
+    if len(problem.masses) > 2:
+        yield from (without(problem, i) for i in range(len(problem.masses)))
+    if problem.meeting != 0.5:
+        yield problem._replace(meeting=0.5)
+    for name, values in SIMPLER.items():
+        given = getattr(problem, name)
+        for i, x in enumerate(given):
+            better = values[: values.index(x)] if x in values else values
+            rounded = [
+                y for y in (round(x, 1), round(x, 2), round(x, 3)) if len(repr(y)) < len(repr(x))
+            ]
+            for y in (*better, *rounded):
+                if y > 0 or name != "masses":
+                    yield problem._replace(**{name: [*given[:i], y, *given[i + 1 :]]})
+
+
+def shrunk(problem, is_wrong, most=400):
+    """A smallest chain near this one that is still wrong, after at most so many trials."""
+    trials = 0
+    found = True
+    while found:
+        found = False
+        for other in simpler(problem):
+            trials += 1
+            if trials > most:
+                return problem
+            if is_wrong(other):
+                problem, found = other, True
+                break
+    return problem
+
+
+# --- many chains -------------------------------------------------------------------------------
+
+
+def chains(name, count, seed):
+    """Chains of a family in tasks, each with a seed of its own."""
+    for start in range(0, count, TASK):
+        yield name, min(TASK, count - start), seed * 1_000_003 + start
+
+
+def task(name, count, seed):
+    """Judge some chains; counts, and those that are wrong or doubtful."""
+    counts, found = Counter(), []
+    for problem in family(name, count, seed):
+        verdict = judge(problem)
+        if verdict.word == "endless":
+            verdict = second_opinion(problem)
+        counts[verdict.word] += 1
+        if verdict.word in DOUBTFUL:
+            found.append((verdict, problem))
+    return name, counts, found
+
+
+def run(names, count, seed, workers=2):
+    """Judge so many chains of each family; counts by family, and those that are wrong."""
+    counts, found = {name: Counter() for name in names}, []
+    tasks = [each for name in names for each in chains(name, count, seed)]
+    with ProcessPoolExecutor(workers, initializer=os.nice, initargs=(10,)) as pool:
+        for name, part, wrong in pool.map(task, *zip(*tasks, strict=True)):
+            counts[name].update(part)
+            found.extend((name, *each) for each in wrong)
+    return counts, found
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--family", choices=JUDGED, action="append")
+    parser.add_argument("--count", type=int, default=100, help="chains of each family")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--shrink", type=int, default=5, help="how many wrong chains to shrink")
+    given = parser.parse_args()
+    counts, found = run(given.family or list(JUDGED), given.count, given.seed)
+    print(f"{'':18}" + "".join(f"{word:>14}" for word in WORDS))
+    for name, count in counts.items():
+        print(f"{name:18}" + "".join(f"{count[word]:14}" for word in WORDS))
+    for name, verdict, problem in found:
+        print(f"\n{name}: {verdict.word}, off by {verdict.off:.1e}\n{problem!r}")
+    for _, _, problem in [each for each in found if each[1].word == "wrong"][: given.shrink]:
+        print("\nshrunk:", shrunk(problem, lambda p: judge(p).word == "wrong"))
+
+
+if __name__ == "__main__":
+    main()
