@@ -24,6 +24,7 @@ from typing import NamedTuple
 import truth
 from families import JUDGED, family
 from problem import Problem
+from truth import meaning
 
 from cradle import ImpactNotFinished, post_impact_velocities, textbook
 from cradle.trace import ImpactNotCertified
@@ -77,19 +78,6 @@ NAMED = {
 
 
 # --- what is true ------------------------------------------------------------------------------
-
-
-def meaning(x):
-    """The number that a float means: of 15 digits at most, from 1e-7 to 1e15, what it prints as.
-
-    Every other float means its exact value, and a decimal means itself.
-    """
-    if isinstance(x, Decimal):
-        return x
-    exact, printed = Decimal(x), Decimal(repr(float(x)))
-    digits = printed.normalize(decimal.Context(prec=17)).as_tuple().digits
-    short = len(digits) <= 15 and Decimal("1e-7") <= abs(printed) < Decimal("1e15")
-    return printed if short else exact
 
 
 class Exact(textbook.Impact):

@@ -13,7 +13,25 @@ import mpmath
 from cradle import textbook
 from cradle.textbook import EventLimit
 
-__all__ = ["EventLimit", "Impact", "solve"]
+__all__ = ["EventLimit", "Impact", "meaning", "solve"]
+
+
+def meaning(x):
+    """The number that a float means: of 15 digits at most, from 1e-7 to 1e15, what it prints as.
+
+    Every other float means its exact value, and a decimal means itself.
+    """
+    if isinstance(x, decimal.Decimal):
+        return x
+    exact, printed = decimal.Decimal(x), decimal.Decimal(repr(float(x)))
+    digits = printed.normalize(decimal.Context(prec=17)).as_tuple().digits
+    short = len(digits) <= 15 and decimal.Decimal("1e-7") <= abs(printed) < decimal.Decimal("1e15")
+    return printed if short else exact
+
+
+def as_meant(x):
+    """Return what a number means, in the digits in force."""
+    return mpmath.mpf(x) if isinstance(x, str | mpmath.mpf) else mpmath.mpf(str(meaning(x)))
 
 
 def negligible(zero):
@@ -127,7 +145,7 @@ def solve(
     backward=None,
     *,
     excess="raise",
-    number=mpmath.mpf,
+    number=as_meant,
     max_events=1_000_000,
     collapse_below=None,
     impact=Impact,
@@ -135,8 +153,8 @@ def solve(
 ):
     """Post-impact state by rules R1 to R9, with the digits of `number`.
 
-    A string such as "0.1" is read as that decimal number.  `collapse_below` is the threshold of R9
-    relative to the largest initial closing speed.
+    A float means what it prints as (`meaning`), a string such as "0.1" that decimal number.
+    `collapse_below` is the threshold of R9 relative to the largest initial closing speed.
     """
 
     class Chosen(impact):
