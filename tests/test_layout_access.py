@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from explorer import EXPLORER, address_of_page, drawn, later, still, visits  # noqa: F401
-from test_layout import ALL_SET, PATIENCE, browser, contrast, show  # noqa: F401
+from test_layout import ALL_SET, PATIENCE, browser, contrast, shape, show  # noqa: F401
 
 #: WCAG 2.1, 1.4.3 (AA).
 READABLE = 4.5
@@ -75,6 +75,8 @@ def seen(html: Path, browser):  # noqa: F811
     for page in [*sorted((html / "book").glob("*.html")), *sorted(html.glob("*.html"))]:
         if page.name == "index.html":
             continue  # leads to the first page
+        tab.goto("about:blank")
+        shape(tab, 320, "light")
         tab.goto(page.as_uri() + ("?q=restitution" if page.stem == "search" else ""))
         if page.stem == "search":
             tab.wait_for_function("/found \\d+ page/.test(document.body.innerText)")
@@ -85,7 +87,6 @@ def seen(html: Path, browser):  # noqa: F811
         for mode in ("light", "dark"):
             show(tab, 1280, mode)
             view[mode] = tab.evaluate(PALE, READABLE)
-        tab.set_viewport_size({"width": 320, "height": 640})
         found[page.stem] = view
     context.close()
     assert len(found) > 25
