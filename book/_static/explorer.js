@@ -48,7 +48,7 @@
         scenes: this.parts.has("scenes") ? panels.scenesPanel(act) : null,
         run: panels.runPanel(act),
         words: panels.wordsPanel(),
-        outcome: panels.outcomePanel(this.level()),
+        outcome: panels.outcomePanel(this.host),
         settings: panels.settingsPanel(act, this.parts),
         pictures: panels.picturesPanel(act, this.parts),
         share: this.parts.has("share") ? panels.sharePanel(act) : null,
@@ -74,14 +74,6 @@
         const shown = colour === "#000000" ? "var(--pst-color-text-base, #000)" : colour;
         this.host.style.setProperty(`--ball-${ball}`, shown);
       });
-    }
-
-    // A heading one step below the one that the explorer stands under.
-    level() {
-      const before = [...document.querySelectorAll("h1, h2, h3, h4")].filter(
-        (node) => node.compareDocumentPosition(this.host) & Node.DOCUMENT_POSITION_FOLLOWING,
-      );
-      return `h${+(before.pop()?.tagName[1] ?? 1) + 1}`;
     }
 
     watch() {

@@ -176,8 +176,16 @@
 
   // --- the outcome of a hit -----------------------------------------------------------------------
 
-  // `level`: of its headings, below that of what stands before it on its page.
-  function outcomePanel(level) {
+  // A heading one step below the one that an explorer stands under.
+  function headingBelow(host) {
+    const before = [...document.querySelectorAll("h1, h2, h3, h4")].filter(
+      (node) => node.compareDocumentPosition(host) & Node.DOCUMENT_POSITION_FOLLOWING,
+    );
+    return `h${+(before.pop()?.tagName[1] ?? 1) + 1}`;
+  }
+
+  function outcomePanel(host) {
+    const level = headingBelow(host);
     const title = make(level, {});
     const bars = make("div", { class: "plot" });
     const energy = make("div", { class: "plot" });
