@@ -13,7 +13,7 @@ import mpmath
 from cradle import textbook
 from cradle.textbook import EventLimit
 
-__all__ = ["EventLimit", "Impact", "meaning", "solve"]
+__all__ = ["EventLimit", "Impact", "as_meant", "meaning", "solve"]
 
 
 def meaning(x):
@@ -25,7 +25,7 @@ def meaning(x):
         return x
     exact, printed = decimal.Decimal(x), decimal.Decimal(repr(float(x)))
     digits = printed.normalize(decimal.Context(prec=17)).as_tuple().digits
-    short = len(digits) <= 15 and 1e-7 <= abs(x) < 1e15
+    short = len(digits) <= 15 and decimal.Decimal("1e-7") <= abs(printed) < decimal.Decimal("1e15")
     return printed if short else exact
 
 

@@ -33,6 +33,7 @@ def execute(path: Path) -> None:
         resources={"metadata": {"path": str(path.parent)}},
     )
     client.execute()
+    drop_stderr(notebook)
     strip(notebook)
     nbformat.validate(notebook)
     nbformat.write(notebook, path)
@@ -63,6 +64,19 @@ def put_colab_cell(
                 source, id=COLAB, metadata={"tags": ["remove-cell"]}
             ),
         )
+
+
+def drop_stderr(notebook: nbformat.NotebookNode) -> None:
+    """Pass on to the terminal what cells wrote to stderr: a compiler's or a library's remarks."""
+    for number, cell in enumerate(notebook.cells):
+        kept = []
+        for output in cell.get("outputs", ()):
+            if output.get("name") == "stderr":
+                print(f"cell {number}: {output.text}", file=sys.stderr)
+            else:
+                kept.append(output)
+        if "outputs" in cell:
+            cell.outputs = kept
 
 
 def strip(notebook: nbformat.NotebookNode) -> None:

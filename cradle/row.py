@@ -27,14 +27,12 @@ from numpy.typing import ArrayLike
 from cradle.chain import Chain
 from cradle.input.values import a, one_number
 from cradle.models import Model
-from cradle.swinging.stride import Alone, Flight, Hit, Plane
+from cradle.swinging.stride import Alone, Flight, Hit, Pairs, Plane, plane
 
 __all__ = ["Bodies", "Hit", "Row", "step_rows"]
 
 # From so many looks at moving balls the row learns how the engine steps.
 _LESSONS = 200
-
-Pairs = Sequence[Sequence[float]]
 
 
 class Bodies(Protocol):
@@ -188,10 +186,6 @@ class Row(Alone):
         """Look at the balls at the next step: call it after moving or kicking one of them."""
         self.quiet, self._last = 0.0, None
 
-    def _motion(self) -> tuple[list[complex], list[complex]]:
-        places, speeds = self.bodies.motion()
-        return [complex(x, y) for x, y in places], [complex(x, y) for x, y in speeds]
-
     def _push(self, own: Plane, x: Plane) -> None:
         impulses = self.chain.masses * own * self.ways(x)
         for ball, impulse in enumerate(impulses.tolist()):
@@ -203,15 +197,17 @@ class Row(Alone):
         self.quiet -= duration
         if self.quiet >= 0.0:
             return None
-        told = self._motion()
+        told = self.bodies.motion()
         touches, arrival, self.quiet = self.look(*told)
         self.quiet -= duration
         near = touches or arrival < 1.5 * duration  # the step itself makes them faster or slower
-        learning = self._lessons < _LESSONS and any(abs(v) > self.resting for v in told[1])
+        learning = self._lessons < _LESSONS and any(
+            abs(s[0]) > self.resting or abs(s[1]) > self.resting for s in told[1]
+        )
         if not (near or learning):
             self._last = None
             return None
-        x, v = (np.array(part) for part in told)
+        x, v = map(plane, told)
         own = self.own(v, x)
         if learning:
             self._learn(x, own, duration)
@@ -229,7 +225,7 @@ class Row(Alone):
         if begun is None:
             return
         x, own, (_, early, _, _) = begun
-        now, v = (np.array(part) for part in self._motion())
+        now, v = map(plane, self.bodies.motion())
         # The speed of the step, whether its kick comes first, last, or half and half.
         speeds = own + self.lag * (self.own(v, now) - early - own)
         bent = self._pull(x) - self._pull(now)

@@ -18,19 +18,20 @@ PLACEHOLDER = "/cradle-companion/cradle-companion"
 NOBODY = "The cradle companion's authors"
 
 
-def project() -> dict:
+def project(root: Path = ROOT) -> dict:
     """Return the table of pyproject.toml."""
-    with (ROOT / "pyproject.toml").open("rb") as file:
+    with (root / "pyproject.toml").open("rb") as file:
         return tomllib.load(file)["project"]
 
 
-def missing(tag: str) -> list[str]:
+def missing(tag: str, root: Path = ROOT) -> list[str]:
     """Return what forbids the release of this tag."""
 
     def text(name):
-        return (ROOT / name).read_text(encoding="utf-8")
+        return (root / name).read_text(encoding="utf-8")
 
-    version = project()["version"]
+    version = project(root)["version"]
+    newest = re.search(r"^## (.*)$", text("CHANGELOG.md"), re.MULTILINE)
     citation = text("CITATION.cff")
     date = re.search(r'^date-released: "?(\d{4}-\d\d-\d\d)"?$', citation, re.MULTILINE)
     checks = {
@@ -42,9 +43,17 @@ def missing(tag: str) -> list[str]:
         == version,
         f"README.md does not name version {version}": f"version {version}" in text("README.md"),
         "CITATION.cff has no date": date is not None,
-        "CHANGELOG.md has no entry of this version with the date of CITATION.cff": date is not None
-        and f"## {version} ({date[1]})" in text("CHANGELOG.md"),
-        "pyproject.toml has no public address": not project()["urls"]["Repository"].endswith(
+        "CHANGELOG.md does not begin with this version and the date of CITATION.cff": None
+        not in (date, newest)
+        and newest[1] == f"{version} ({date[1]})",
+        f"publication/conda/recipe.yaml has another version than {version}": (
+            f'version: "{version}"\n' in text("publication/conda/recipe.yaml")
+        ),
+        f"publication/npm/package.json has another version than {version}": json.loads(
+            text("publication/npm/package.json")
+        )["version"]
+        == version,
+        "pyproject.toml has no public address": not project(root)["urls"]["Repository"].endswith(
             PLACEHOLDER
         ),
         **{

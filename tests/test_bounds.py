@@ -56,14 +56,14 @@ def widest(found, i, sign):
     largest = np.abs(chain.velocities).max()
     energy = m @ v**2 / 2 + found.stored * m.max() * largest**2
     rules = [
-        {"type": "eq", "fun": lambda x: m @ (x - v)},
-        {"type": "ineq", "fun": lambda x: energy - m @ x**2 / 2},
-        {"type": "ineq", "fun": np.diff},
+        {"type": "eq", "fun": lambda x: m @ (x - v), "jac": lambda _: m},
+        {"type": "ineq", "fun": lambda x: energy - m @ x**2 / 2, "jac": lambda x: -m * x},
+        {"type": "ineq", "fun": np.diff, "jac": lambda _: np.diff(np.eye(len(m)), axis=0)},
     ]
     start = np.full(len(m), m @ v / m.sum())
     best = minimize(
-        lambda x: -sign * x[i], start, method="SLSQP", constraints=rules,
-        options={"ftol": 1e-12, "maxiter": 500},
+        lambda x: -sign * x[i], start, jac=lambda _: -sign * np.eye(len(m))[i],
+        method="SLSQP", constraints=rules, options={"ftol": 1e-10, "maxiter": 500},
     )  # fmt: skip
     assert best.success
     return best.x[i]

@@ -286,6 +286,7 @@ REFUSED = [
     ("ratio", "0;1", "ratio must lie between 0 and 1. In force: 0.15."),
     ("mass", "1.000,5", "mass must lie between 0.01 and 100 kg. In force: 1 kg."),
     ("mass", "heavy", "mass must lie between 0.01 and 100 kg. In force: 1 kg."),
+    ("mass", "1,000", "mass could be 1 or 1000: please write one of these. In force: 1 kg."),
     ("ratio", "0.1234567", "ratio can have six digits after the point. In force: 0.15."),
 ]
 
@@ -331,7 +332,8 @@ def test_typed_values_out_of_range_are_refused(visit):
 
 
 @pytest.mark.parametrize(
-    ("typed", "number"), [("0,25", 0.25), (".5", 0.5), ("1e-1", 0.1), (" 0.3 ", 0.3), ("+0,2", 0.2)]
+    ("typed", "number"),
+    [("0,25", 0.25), (".5", 0.5), ("1e-1", 0.1), (" 0.3 ", 0.3), ("+0,2", 0.2), ("0,125", 0.125)],
 )
 def test_numbers_are_read_as_people_type_them(visit, typed, number):
     """A comma is a point, whatever the browser's language: 0,25 is not 25."""

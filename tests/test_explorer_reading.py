@@ -24,7 +24,14 @@ from explorer import (
 )
 from test_layout import MISFITS, browser, contrast, show  # noqa: F401
 
-from cradle import Chain, SpringChain, collide, post_impact_velocities, textbook
+from cradle import (
+    Chain,
+    SpringChain,
+    collide,
+    paper_chain,
+    post_impact_velocities,
+    textbook,
+)
 from cradle.measures import bouncing_pattern
 
 # --- the address ------------------------------------------------------------------------------
@@ -82,6 +89,9 @@ WRONG_ADDRESSES = {
     "toString=1": "toString is no part of a setting",
     "speeds=1,%": "speeds[1] = NaN",
     "scene=none": "scene is no part of a setting",
+    "speeds=1e-300,0": "speeds[0] = 1e-300; must be 0 or at least 0.000001 in size",
+    "speeds=0,-1e-200": "speeds[1] = -1e-200; must be 0 or at least 0.000001 in size",
+    "letters=ABABA&masses=1": "masses[0] = 1; ball A has 0.045 kg",
 }
 
 
@@ -96,6 +106,31 @@ def test_wrong_addresses_are_refused(visit):
         assert same_outcome(shown), fragment
     go_to(tab, "speeds%3D1%2C0%2C0")  # as some mail programs write it
     assert drawn(tab)["speeds"] == [1, 0, 0]
+
+
+def test_letters_bring_their_numbers(visit):
+    """A link may name the paper's balls and nothing else; a ball of another mass has no letter."""
+    tab = still(visit, "#letters=ABACA")
+    found = drawn(tab)
+    chain, model = paper_chain("ABACA", excess="saturate")
+    assert found["masses"] == chain.masses.tolist()
+    assert found["restitution"] == chain.restitution.tolist()
+    assert found["forward"] == list(model.forward)
+    assert found["backward"] == list(model.backward)
+    go_to(tab, "letters=AB-&restitution=0.5")
+    found = drawn(tab)
+    assert found["masses"] == [*chain.masses[:2], 1]
+    assert found["restitution"] == [0.5, 0.5]
+
+
+def test_the_address_of_a_heading_stays(visit):
+    """Until the reader changes something, it is what was asked for."""
+    tab = still(visit, "#in-a-lecture", stopped=True)
+    tab.clock.run_for(1000)
+    assert tab.evaluate("location.hash") == "#in-a-lecture"
+    tab.get_by_label("ratio", exact=True).press("ArrowRight")
+    tab.clock.run_for(1000)
+    assert "forward=0.01" in tab.evaluate("location.hash")
 
 
 def test_a_reader_walks_on_from_a_changed_setting(visit):
@@ -179,7 +214,7 @@ def test_everything_by_keyboard(visit):
     drawn(tab)
     tab.keyboard.press(".")
     drawn(tab)
-    assert tab.locator(".outcome h3").first.inner_text() == "After hit 2 (m/s)"
+    assert tab.locator(".outcome h2").first.inner_text() == "After hit 2 (m/s)"
 
 
 def test_full_screen_for_a_lecture(visit):
@@ -515,10 +550,14 @@ def test_work_of_a_frame(visit):
     tab.clock.run_for(1600)  # beyond the first hit
     tab.evaluate(COUNT_WORK)
     swing = counted(tab, 16 * frames)
-    # Each hit is solved once. Between hits balls and dots move, and nothing is laid out.
-    assert swing["solved"] == swing["hits"] == 2
-    assert swing["drawn"] == 0
-    assert 3 * balls * frames <= swing["changed"] < 6 * balls * frames
+    # Each hit is solved twice, for its outcome and for its history, and laid out once. Between hits
+    # balls move, and nothing is laid out.
+    assert swing["hits"] == swing["drawn"] == 2
+    assert swing["solved"] == 4
+    assert 2 * balls * frames <= swing["changed"] < 6 * balls * frames
+    between = counted(tab, 16 * 20)
+    assert between["hits"] == between["solved"] == between["drawn"] == 0
+    assert between["changed"] <= 3 * balls * 20
     press(tab, "Slow motion")
     slow = counted(tab, 16 * 500)
     # A hit is solved again for its history. Inside it bars and shares of energy are made anew.
@@ -526,6 +565,60 @@ def test_work_of_a_frame(visit):
     assert slow["solved"] == 2 * slow["hits"]
     assert slow["drawn"] <= 1 + 2 * slow["hits"]
     assert slow["changed"] < 20 * balls * 500
+
+
+def test_what_does_not_move_is_not_drawn(visit):
+    """Balls at rest, though let go; those beside one that swings; the cradle beside a sweep."""
+    tab = still(visit, "#speeds=0,0,0,0,0", stopped=True)
+    tab.clock.run_for(50)
+    tab.evaluate(COUNT_WORK)
+    press(tab, "Let go")
+    tab.clock.run_for(1000)  # a voice is told once
+    assert counted(tab, 2000) == {"solved": 0, "drawn": 0, "changed": 0, "hits": 0}
+    assert not tab.evaluate(f"{EXPLORER}.frame")
+    go_to(tab, "scene=one")
+    tab.clock.run_for(600)
+    press(tab, "Pull back")
+    tab.clock.run_for(50)
+    press(tab, "Let go")
+    tab.clock.run_for(100)
+    frames = 20
+    assert 0 < counted(tab, 16 * frames)["changed"] <= 3 * (frames + 1)  # of one ball in five
+    press(tab, "Pause")
+    tab.clock.run_for(50)
+    tab.click("label:has-text('All ratios')")
+    tab.clock.run_for(50)
+    tab.evaluate("(() => { let now = 0; performance.now = () => (now += 0.5); })()")
+    tab.get_by_label("restitution", exact=True).press("ArrowLeft")
+    tab.clock.run_for(50)
+    stage = f"{EXPLORER}.stage.svg"
+    tab.evaluate(
+        f"new MutationObserver((all) => (window.moved = all.length))"
+        f".observe({stage}, {{ attributes: true, childList: true, subtree: true }})"
+    )
+    assert counted(tab, 16 * 5)["solved"] > 20
+    assert tab.evaluate("window.moved") is None
+
+
+def test_bars_follow_the_swing(visit):
+    """They show each hit, and so do title and words; a voice tells the first one alone."""
+    tab = visit("#scene=losses", stopped=True)
+    tab.clock.run_for(1500)
+    title, numbers = tab.locator(".outcome h2").first, tab.locator(".outcome .number")
+    heard = tab.locator(".said [aria-live=polite]").text_content()
+    assert "Before the first hit" in heard
+    for number in range(1, 4):
+        tab.clock.run_for(1004)  # half a period
+        hit = tab.evaluate(f"{EXPLORER}.state.swing.hit({number})")
+        assert title.inner_text() == f"After hit {number + 1} (m/s)"
+        shown = [float(text.replace("\u2212", "-")) for text in numbers.all_text_contents()]
+        assert shown == pytest.approx(hit["after"], abs=0.0051)
+        assert "After it, ball" in tab.inner_text(".words")
+        assert tab.inner_text(".words").startswith(f"Before hit {number + 1}, ")
+        assert tab.locator(".said [aria-live=polite]").text_content() == heard
+    press(tab, "Pause")
+    tab.clock.run_for(1000)
+    assert tab.locator(".said [aria-live=polite]").text_content() == tab.inner_text(".words")
 
 
 def test_sweeps_and_maps_share_the_frame(visit):
@@ -672,7 +765,13 @@ def test_scenes_do_what_their_texts_say(visit):
     assert velocities["half"][0] < -0.2
     assert velocities["half"][3] == pytest.approx(velocities["half"][4], abs=1e-6)
     np.testing.assert_allclose(velocities["three"], [-1 / 3, 2 / 3, 2 / 3], atol=1e-6)
-    assert solved["light"][1].collisions.sum() > 10
+    assert solved["light"][1].collisions.sum() == 12  # a dozen
+    # "Make it lighter still": the slider has room, and there are more of them.
+    light = next(scene["setting"] for scene in scenes if scene["key"] == "light")
+    lightest = tab.evaluate("cradleExplorer.LIMITS.masses[0]")
+    assert light["masses"][1] > 2 * lightest
+    lighter = collide(*chain_of(light | {"masses": [1, lightest, 1]}))
+    assert lighter.collisions.sum() > 12
     kinds = [tuple(event) for event in solved["meeting"][1].events]
     assert ("close", 1) in kinds  # the gap
     # "One of them never stops": three of five pulled back, at the ratio 0.

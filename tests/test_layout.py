@@ -71,7 +71,7 @@ MISFITS = """() => {
     for (const image of shown) {
       const share = image.getBoundingClientRect().width / image.getAttribute("width");
       const letters = share * box.dataset.letters;
-      if (!(letters > 7.7)) say("small letters", image, letters, 7.7);
+      if (!(letters > 10.9)) say("small letters", image, letters, 10.9);
       // Colours of a map are a scale, and mean the same in both modes.
       const filters = [];
       for (let node = image; node && image.matches(".map"); node = node.parentElement)
@@ -104,6 +104,12 @@ NUMBERS = """() => [...document.querySelectorAll('.bd-content mjx-container[disp
     const letters = parseFloat(getComputedStyle(node).fontSize);
     return [[number.id || number.textContent, right, end, letters]];
   })"""
+
+# Equations wait until they are about to be seen: set them all.
+ALL_SET = """async () => {
+  await window.MathJax?.startup?.promise;
+  await window.MathJax?.startup?.document?.lazyTypesetAll?.();
+}"""
 
 FRAMES = """() => new Promise((done) =>
   requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"""
@@ -170,7 +176,7 @@ def looked_at(request, html: Path, browser):
         tab.goto("about:blank")  # so that nothing is laid out anew for the first view
         shape(tab, *views[0])
         tab.goto(page.as_uri())
-        tab.evaluate("() => window.MathJax?.startup?.promise")  # equations are set
+        tab.evaluate(ALL_SET)
         faults, numbers = [], []
         for width, mode in views:
             show(tab, width, mode)

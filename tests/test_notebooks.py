@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import execute
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
@@ -143,7 +144,7 @@ def test_each_fault_is_seen(spoil, fault):
 # Decimals that the text may state: given by the paper, by an exercise, or chosen for an example.
 # All others are computed by a cell, and the text takes them from there ({glue:text}`...`).
 GIVEN = {
-    "intro": "0.15 1.1344902 10.1115 3.11 3.13 4.0",  # a ratio, doi, Python, licence
+    "intro": "0.15 1.1344902 10.1115 3.11 3.14 4.0",  # a ratio, doi, Python, licence
     "problem": "",
     "compliance": "",
     "three_balls": "0.01 0.09 0.1 0.11 3.9 0.25 0.5 0.6 0.75",
@@ -217,3 +218,14 @@ def test_no_number_is_typed_into_a_description(chapter: str):
     for cell in nbformat.read(BOOK / f"{chapter}.ipynb", as_version=4).cells:
         alt = cell.metadata.get("mystnb", {}).get("image", {}).get("alt", "")
         assert not decimals(alt), cell.id
+
+
+def test_what_a_compiler_says_is_not_stored(capsys):
+    """It goes to the terminal; what a cell prints stays."""
+    notebook = sample()
+    said = new_output("stream", name="stderr", text="ld: warning")
+    notebook.cells[1].outputs.insert(0, said)
+    execute.drop_stderr(notebook)
+    assert faults(notebook) == []
+    assert [output.name for output in notebook.cells[1].outputs] == ["stdout"]
+    assert "cell 1: ld: warning" in capsys.readouterr().err

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import release
 import set_address
+import yaml
 
 ROOT = Path(__file__).parents[1]
 
@@ -78,10 +79,109 @@ def test_a_wrong_address_is_refused(address, tmp_path):
 
 def test_one_version(project):
     """All that a release asks for is there, but for what only its authors can fill in."""
-    allowed = re.compile("names no authors|placeholder|no public address|CHANGELOG.md has no entry")
+    allowed = re.compile(
+        "names no authors|placeholder|no public address|CHANGELOG.md does not begin"
+    )
     missing = release.missing(f"v{project['version']}")
     assert [fault for fault in missing if not allowed.search(fault)] == []
     assert "tag v9.9 is not version" in " ".join(release.missing("v9.9"))
+
+
+@pytest.fixture
+def ready(tmp_path):
+    """A copy of all that a release looks at, as its authors would have filled it in."""
+    version = release.project()["version"]
+    names = "pyproject.toml CITATION.cff .zenodo.json README.md CHANGELOG.md _config.yml "
+    names += "publication/conda/recipe.yaml publication/npm/package.json"
+    for name in names.split():
+        copy = tmp_path / name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        content = text(name).replace(release.PLACEHOLDER, "/somebody/cradle")
+        content = content.replace(release.NOBODY, "Some Body").replace("placeholder", "place")
+        copy.write_text(content.replace(f"{version} (unreleased)", f"{version} (2026-11-21)"))
+    return tmp_path, f"v{version}"
+
+
+def test_a_release_that_is_ready(ready):
+    folder, tag = ready
+    assert release.missing(tag, folder) == []
+    (only,) = release.missing("v9.9", folder)
+    assert only.startswith("tag v9.9 is not version")
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("pyproject.toml", 'version = "0', 'version = "1'),
+        ("CITATION.cff", "\nversion: 0", "\nversion: 1"),
+        ("CITATION.cff", "date-released", "date-made"),
+        (".zenodo.json", '"version": "0', '"version": "1'),
+        ("README.md", "version 0", "version 1"),
+        ("CHANGELOG.md", "(2026-11-21)", "(unreleased)"),
+        ("CHANGELOG.md", "(2026-11-21)", "(2026-11-20)"),
+        ("CHANGELOG.md", "\n## 0", "\n## 9.9.9 (2026-12-01)\n\n## 0"),
+        ("publication/conda/recipe.yaml", 'version: "0', 'version: "1'),
+        ("publication/npm/package.json", '"version": "0', '"version": "1'),
+        ("_config.yml", "place ", "placeholder "),
+    ],
+)
+def test_a_release_that_is_not_ready(ready, name, old, new):
+    """Each file is looked at: the tag against the version, citation, changelog, both recipes."""
+    folder, tag = ready
+    content = (folder / name).read_text(encoding="utf-8")
+    assert old in content
+    (folder / name).write_text(content.replace(old, new, 1), encoding="utf-8")
+    found = release.missing(tag, folder)
+    assert found
+    assert any(name in fault or f"tag {tag}" in fault for fault in found)
+
+
+def test_conda_asks_for_what_pip_asks_for(project):
+    """The same packages from the same versions on, the command, and both licences."""
+    recipe = yaml.safe_load(text("publication/conda/recipe.yaml"))
+    names = {"matplotlib-base": "matplotlib"}  # without the windows that nobody opens here
+    asked = dict(one.split(" >=") for one in recipe["requirements"]["run"])
+    assert asked.pop("python") == project["requires-python"].removeprefix(">=")
+    wanted = dict(re.match(r"([\w-]+)>=([\w.]+)", one).groups() for one in project["dependencies"])
+    assert {names.get(name, name): version for name, version in asked.items()} == wanted
+    commands = [f"{name} = {target}" for name, target in project["scripts"].items()]
+    assert recipe["build"]["python"]["entry_points"] == commands
+    assert recipe["about"]["license_file"] == project["license-files"]
+
+
+def test_every_python_is_tested(project):
+    """Those that pyproject.toml names, and no others; the lock is made for them."""
+    named = [one.rsplit(" ", 1)[1] for one in project["classifiers"] if ":: 3." in one]
+    workflow = yaml.safe_load(text(".github/workflows/test.yml"))
+    assert workflow["jobs"]["everything"]["strategy"]["matrix"]["python"] == named
+    newest = yaml.safe_load(text(".github/workflows/weekly.yml"))["jobs"]["newest"]["steps"][1]
+    assert newest["with"]["python-version"] == named[-1]
+    said = f"CPython {named[0]} to {named[-1]}"
+    assert said in text("requirements-lock.txt").splitlines()[0]
+
+
+def test_one_bot_renews_the_lock():
+    """Its command is the one that is explained, and nothing else writes the lock."""
+    workflow = yaml.safe_load(text(".github/workflows/lock.yml"))
+    script = "\n".join(step.get("run", "") for step in workflow["jobs"]["renew"]["steps"])
+    (command,) = re.findall(r"uv pip compile .*", script)
+    explained = " ".join(text("environment-notes.md").split())
+    assert command.removesuffix(" --upgrade") in explained
+    assert workflow["jobs"]["renew"]["permissions"] == {
+        "contents": "write",
+        "pull-requests": "write",
+    }
+    ecosystems = [
+        one["package-ecosystem"]
+        for one in yaml.safe_load(text(".github/dependabot.yml"))["updates"]
+    ]
+    assert ecosystems == ["github-actions"]
+    others = [
+        path.name
+        for path in (ROOT / ".github/workflows").glob("*.yml")
+        if "pip compile" in path.read_text(encoding="utf-8")
+    ]
+    assert others == ["lock.yml"]
 
 
 def test_readme_on_pypi_has_no_relative_link():

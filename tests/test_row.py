@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, runtime, swing
+from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, swing
 from cradle.row import Row, step_rows
+from cradle.runtime import compile as runtime
 
 RADIUS, LENGTH, GRAVITY = 0.1, 1.0, 9.81
 MODEL = ImpulseCorrelation(0.1325)

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import local_orders
-from truth import solve
+from truth import as_meant, solve
 
 from cradle import Chain, ImpulseCorrelation, collide
 from cradle.models.correlation import MAX_EVENTS
@@ -27,6 +27,7 @@ def agrees(trace, atol=1e-13, **options):
             model.backward,
             meeting=model.meeting,
             excess="saturate",
+            number=as_meant,
             **options,
         )
         after = [float(v) for v in exact.velocities]

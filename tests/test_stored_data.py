@@ -13,8 +13,10 @@ DATA = Path(__file__).parents[1] / "data"
 CHECKSUMS = DATA / "checksums.csv"
 MEASURED = (
     "benchmarks.csv",
+    "cradle_*.csv",
     "explorer_speed.csv",
     "extremes_*.csv",
+    "film_strikes.csv",
     "implied_ratio.csv",
     "long_chains.csv",
     "scene_*.csv",

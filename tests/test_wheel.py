@@ -19,7 +19,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
     source = folder / "source"
     for name in ("cradle", "data"):
         shutil.copytree(root / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in ("pyproject.toml", "README.md", "LICENSE", "LICENSE-TEXT"):
         shutil.copy(root / name, source)
     run(
         [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--no-index",
@@ -47,7 +47,10 @@ def test_content(wheel: Path, root: Path):
     expected |= {f"cradle/data/{path.name}" for path in (root / "data").iterdir()}
     assert package == expected
     assert "cradle/py.typed" in package
-    assert any(name.endswith("licenses/LICENSE") for name in names)
+    # The code's licence, and that of README.md and data/README.md, which travel along.
+    for licence in ("LICENSE", "LICENSE-TEXT"):
+        (name,) = (name for name in names if name.endswith(f"licenses/{licence}"))
+        assert zipfile.ZipFile(wheel).read(name) == (root / licence).read_bytes()
 
 
 def test_works_from_elsewhere(wheel: Path, tmp_path: Path):

@@ -81,7 +81,7 @@ STEEL = {
 def story() -> list[dict[str, Any]]:
     """Return the scenes that walk through the book's story."""
     light = equal(3, 0.15)
-    light["masses"] = [1.0, 0.01, 1.0]
+    light["masses"] = [1.0, 0.03, 1.0]
     meeting = equal(4, 0.1)
     meeting["speeds"] = [1.0, 0.5, 0.0, 0.0]
     told = [
@@ -108,8 +108,8 @@ def story() -> list[dict[str, Any]]:
          "Each contact gives back less than it took. Let the balls swing for a while: they end up "
          "swinging together, as real ones do."),
         ("light", "A light ball in the middle", light, "inside",
-         "A ball of a hundredth of the mass rattles between its heavy neighbours: one hit, many "
-         "collisions. Make it lighter still."),
+         "A ball of three hundredths of the mass rattles between its heavy neighbours: one hit, a "
+         "dozen collisions. Make it lighter still, and count them."),
         ("meeting", "Two impacts that meet", meeting, "inside",
          "The first ball comes in at full speed, the second at half of it: Fig. 8 of the paper. "
          "Two stretches of the row are in contact at once, until the gap between them closes too."),

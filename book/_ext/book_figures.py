@@ -37,7 +37,7 @@ COLOUR = re.compile(
 NAMED = {"white": "#ffffff", "black": "#000000"}
 
 #: Pixels that the smallest letters of a figure have on a phone, at least. (Indices are smaller.)
-LEGIBLE = 7.8
+LEGIBLE = 11
 #: Sizes of letters: Matplotlib draws them as curves in units of a hundredth of a point.
 LETTERS = re.compile(r"\bscale\((0\.\d+) -0\.\d+\)")
 FONT_SIZE = re.compile(r'\bfont-size[:=]"?\s*([\d.]+)')

@@ -1,7 +1,9 @@
 r"""Sphinx extension: what Jupyter Book leaves to be put right in the pages.
 
-- MathJax is served with the book. The file comes from sphinx-mathjax-offline, whose own
-  extension would copy 18 MB of alternatives; one self-contained file of 2 MB is all a page needs.
+- MathJax is served with the book. The files come from sphinx-mathjax-offline, whose own extension
+  would copy 18 MB of alternatives; one of 2 MB is all a page needs, and a small one by which an
+  equation waits until it is about to be seen. In one page of the whole book, made for print, none
+  waits. A page without equations loads neither.
 - sphinx-thebe, which Jupyter Book always loads, writes scripts that name a server even when live
   code is off. They are dropped.
 - Sphinx wraps an equation of several lines in `split`, where MathJax refuses the `\tag` that
@@ -10,6 +12,7 @@ r"""Sphinx extension: what Jupyter Book leaves to be put right in the pages.
 - A table of pandas names its row labels in a row of their own; they go into that of column names.
 - In a table a name of the code breaks after a point, a bracket or a comma, and nowhere else.
 - Figures of the appendices carry a letter: Fig. A.1.
+- The summary of what is folded is read as it is written, and a notebook is kept, not shown.
 - A page that is linked from elsewhere shows a title, a sentence and a picture.
 - Until the project has a public address, buttons that lead there are left out. `book_published` in
   `_config.yml` is the one switch.
@@ -40,6 +43,11 @@ ADDRESSED = (
 #: What may stand before a formula, and behind it, without a space.
 OPENING, CLOSING = re.compile(r"[(\[]+$"), re.compile(r"^[)\].,;:!?]+")
 
+#: The button that gives a page's notebook.
+NOTEBOOK = re.compile(
+    r'(<a href="[^"]*_sources/[^"]*\.ipynb") target="_blank"'
+)
+
 #: The head of a table of pandas, and one of its cells.
 HEAD = re.compile(r"<thead>.*?</thead>", re.DOTALL)
 HEAD_CELL = re.compile(r"<th([^>]*)>(.*?)</th>", re.DOTALL)
@@ -54,16 +62,70 @@ def hide_what_needs_an_address(app: Sphinx, config: Config) -> None:
             config.html_theme_options.pop(option, None)
 
 
+#: The part of MathJax by which an equation is set when it is about to be seen.
+LAZY = "ui/lazy"
+
+
+def set_all_for_print(app: Sphinx) -> None:
+    """Let no equation wait where the whole book is one page."""
+    if app.builder.name == "singlehtml":
+        loader = app.config.mathjax3_config["loader"]
+        loader["load"] = [part for part in loader["load"] if part != LAZY]
+
+
 def copy_mathjax(app: Sphinx, exception: Exception | None) -> None:
-    """Put the file that `mathjax_path` names into the built book."""
+    """Put the file that `mathjax_path` names, and what it loads later, into the built book."""
     if exception is not None or app.builder.format != "html":
         return
-    target = Path(app.outdir, "_static", app.config.mathjax_path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with as_file(
-        files("sphinx-mathjax-offline") / "static" / app.config.mathjax_path
-    ) as source:
-        copy_asset_file(str(source), str(target))
+    whole = Path(app.config.mathjax_path)
+    for path in (whole, whole.parent / f"{LAZY}.js"):
+        target = Path(app.outdir, "_static", path)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with as_file(
+            files("sphinx-mathjax-offline") / "static" / path.as_posix()
+        ) as source:
+            copy_asset_file(str(source), str(target))
+
+
+def drop_mathjax(
+    app: Sphinx,
+    page: str,
+    template: str,
+    context: dict[str, Any],
+    doctree: nodes.document | None,
+) -> None:
+    """Remove MathJax from a page that has no equation itself; Sphinx asks its chapters as well."""
+    equations = app.env.get_domain("math").data["has_equations"]
+    if app.builder.name == "html" and not equations.get(page):
+        context["script_files"] = [
+            asset
+            for asset in context["script_files"]
+            if "mathjax" not in _text(asset).lower()
+        ]
+
+
+def name_summaries(
+    app: Sphinx,
+    page: str,
+    template: str,
+    context: dict[str, Any],
+    doctree: nodes.document | None,
+) -> None:
+    """Remove the label that MyST-NB gives to all summaries alike, and that hides their words."""
+    if "body" in context:
+        context["body"] = context["body"].replace(
+            '<summary aria-label="Toggle hidden content">', "<summary>"
+        )
+
+
+def keep_notebooks(app: Sphinx, exception: Exception | None) -> None:
+    """Let the button for a notebook save it; a browser would show its source."""
+    if exception is None and app.builder.format == "html":
+        for path in Path(app.outdir).glob("**/*.html"):
+            text = path.read_text(encoding="utf-8")
+            kept = NOTEBOOK.sub(r"\1 download", text)
+            if kept != text:
+                path.write_text(kept, encoding="utf-8")
 
 
 def drop_thebe(
@@ -217,9 +279,13 @@ def describe(
     )
 
 
+def _text(asset: Any) -> str:
+    """Return the address of a script or style sheet, and what stands in it."""
+    return f"{asset.filename or ''} {getattr(asset, 'attributes', {}).get('body', '')}"
+
+
 def _is_thebe(asset: Any) -> bool:
-    text = f"{asset.filename or ''} {getattr(asset, 'attributes', {}).get('body', '')}"
-    return "thebe" in text.lower()
+    return "thebe" in _text(asset).lower()
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -230,7 +296,11 @@ def setup(app: Sphinx) -> dict[str, Any]:
     # Late, so that every other extension has added its part.
     app.connect("doctree-resolved", drop_thebe_settings, priority=900)
     app.connect("html-page-context", drop_thebe, priority=900)
+    app.connect("html-page-context", drop_mathjax, priority=900)
+    app.connect("html-page-context", name_summaries)
     app.connect("html-page-context", describe)
+    app.connect("build-finished", keep_notebooks)
+    app.connect("builder-inited", set_all_for_print)
     app.connect("doctree-resolved", keep_tags)
     app.connect("doctree-resolved", keep_punctuation)
     app.connect("doctree-resolved", join_header_rows)

@@ -48,7 +48,7 @@
         scenes: this.parts.has("scenes") ? panels.scenesPanel(act) : null,
         run: panels.runPanel(act),
         words: panels.wordsPanel(),
-        outcome: panels.outcomePanel(),
+        outcome: panels.outcomePanel(this.host),
         settings: panels.settingsPanel(act, this.parts),
         pictures: panels.picturesPanel(act, this.parts),
         share: this.parts.has("share") ? panels.sharePanel(act) : null,
@@ -80,12 +80,15 @@
       const redraw = () => this.changed();
       new ResizeObserver(redraw).observe(this.host);
       const theme = { attributeFilter: ["data-theme"] };
-      new MutationObserver(redraw).observe(document.documentElement, theme);
+      // At once: a page that is printed turns light, and waits for no frame.
+      const recolour = () => this.draw(this.state.scenery());
+      new MutationObserver(recolour).observe(document.documentElement, theme);
       new IntersectionObserver(([entry]) => {
         this.visible = entry.isIntersecting;
         redraw();
       }).observe(this.host);
       document.addEventListener("fullscreenchange", redraw);
+      window.addEventListener("beforeprint", () => this.print());
       this.host.addEventListener("pointerdown", () => (this.pointed = true));
       document.addEventListener("keydown", (event) => this.key(event), true);
       if (this.page) window.addEventListener("hashchange", () => this.readAddress());
@@ -128,6 +131,8 @@
         ),
         masses: setting(explorer.withRatios),
         moveMasses: setting(explorer.movedRatios),
+        snapshot: () => state.snapshot(),
+        restore: on((restore) => restore()),
         address: () => `${location.href.split("#")[0]}#${state.fragment()}`,
         // A page that came over plain HTTP has no clipboard.
         copy: async (text) => {
@@ -142,22 +147,41 @@
     }
 
     // Balls are pulled from where they hang; a ball taken out of a swing finds all others at rest.
+    // Each finger pulls a ball of its own; where they disagree, the one that moved last is followed.
     pulling() {
       const { state } = this;
-      let before = null;
+      const held = new Map(); // the balls in somebody's hand; their pull, once there is one
+      let speeds = []; // of all balls, without those pulls
+      let restore = null;
       return {
-        grab: () => {
-          const held = state.clock.time <= 0;
-          before = held ? state.setting : explorer.atRest(state.setting);
+        grab: (ball) => {
+          if (!held.size) {
+            const { setting, clock } = state;
+            ({ speeds } = clock.time <= 0 ? setting : explorer.atRest(setting));
+            restore = state.snapshot();
+          }
+          held.set(ball, null);
         },
         speed: (ball) => state.setting.speeds[ball],
         pull: (ball, speed) => {
-          state.set(explorer.pulled(before, ball, speed));
+          if (speeds.length !== state.setting.speeds.length) return; // there are other balls now
+          held.delete(ball);
+          held.set(ball, speed);
+          const pulls = [...held].filter((pull) => pull[1] !== null);
+          const start = { ...state.setting, speeds };
+          state.set(pulls.reduce((setting, pull) => explorer.pulled(setting, ...pull), start));
           state.clock.time = 0;
           this.changed();
         },
-        letGo: (moved) => {
-          if (moved && !less()) state.clock.playing = true;
+        letGo: (ball, moved) => {
+          held.delete(ball);
+          ({ speeds } = state.setting);
+          if (moved && !held.size && !less()) state.clock.playing = true;
+          this.changed();
+        },
+        giveUp: (undo = false) => {
+          held.clear();
+          if (undo) restore();
           this.changed();
         },
       };
@@ -204,8 +228,9 @@
       const { view } = this.state;
       const fragment = this.state.fragment();
       if (!this.page || view.notice || fragment === this.written) return;
-      // The plain address gives the first scene.
-      if (!this.written && !location.hash && view.scene === this.host.dataset.scene) return;
+      // The plain address, or that of a heading, gives the first scene.
+      const asked = explorer.plain(location.hash).includes("=");
+      if (!this.written && !asked && view.scene === this.host.dataset.scene) return;
       clearTimeout(this.writing);
       const before = location.hash;
       this.writing = setTimeout(() => {
@@ -246,7 +271,8 @@
       this.frame = 0;
       const seconds = Math.min((now - (this.last ?? now)) / 1000, LONGEST_FRAME);
       this.last = now;
-      const running = this.state.clock.playing && this.visible && !this.stage.drag;
+      const { clock, moves } = this.state;
+      const running = clock.playing && moves && this.visible && !this.stage.drags.size;
       if (running && this.state.advance(seconds)) this.stale = true;
       const scenery = this.state.scenery();
       if (this.stale) this.draw(scenery);
@@ -263,6 +289,14 @@
       this.stage.lay(scenery.setting, this.stageBox());
       this.link.href = `explorer.html#${this.state.fragment()}`;
       this.writeAddress();
+    }
+
+    // What is printed is finished, seen or not.
+    print() {
+      const scenery = this.state.scenery();
+      this.draw(scenery);
+      this.move(scenery);
+      while (this.panels.pictures?.resume(scenery, this.box));
     }
 
     // Move what moves between two changes: balls, and what travels through a hit.

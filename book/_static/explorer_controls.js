@@ -25,6 +25,9 @@
     return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(text) ? Number(text) : NaN;
   }
 
+  // 1,000 is one in some countries and a thousand in others.
+  const twofold = (words) => /^[-+]?[1-9]\d{0,2},\d{3}$/.test(words.trim());
+
   // A slider with a box for exact numbers. A logarithmic one moves in equal factors. What the box
   // cannot take stays in it, marked, with a sentence below, until the setting changes.
   function slider({ words, low, high, step, logarithmic = false, unit = "", input }) {
@@ -64,6 +67,10 @@
     );
     const measure = (number) => `${number} ${unit}`.trim();
     function objection() {
+      if (twofold(box.value)) {
+        const [small, large] = [".", ""].map((point) => Number(box.value.replace(",", point)));
+        return `could be ${small} or ${large}: please write one of these`;
+      }
       const number = typed(box.value);
       if (!(low <= number && number <= high))
         return `must lie between ${low} and ${measure(high)}`;

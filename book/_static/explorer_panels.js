@@ -176,8 +176,17 @@
 
   // --- the outcome of a hit -----------------------------------------------------------------------
 
-  function outcomePanel() {
-    const title = make("h3", {});
+  // A heading one step below the one that an explorer stands under.
+  function headingBelow(host) {
+    const before = [...document.querySelectorAll("h1, h2, h3, h4")].filter(
+      (node) => node.compareDocumentPosition(host) & Node.DOCUMENT_POSITION_FOLLOWING,
+    );
+    return `h${+(before.pop()?.tagName[1] ?? 1) + 1}`;
+  }
+
+  function outcomePanel(host) {
+    const level = headingBelow(host);
+    const title = make(level, {});
     const bars = make("div", { class: "plot" });
     const energy = make("div", { class: "plot" });
     const caption = make(
@@ -190,7 +199,7 @@
       { class: "outcome" },
       title,
       bars,
-      make("h3", {}, "Energy"),
+      make(level, {}, "Energy"),
       energy,
       caption,
     );
@@ -209,10 +218,13 @@
     const seen = make("p", { class: "words", "aria-hidden": true });
     const heard = make("p", { class: "unseen", role: "status", "aria-live": "polite" });
     let later = 0;
-    // Screen readers hear it once the reader has paused, not at every step of a slider.
-    function show({ words }) {
-      if (seen.textContent === words) return;
-      seen.textContent = words;
+    let next = ""; // what is heard, or soon will be
+    // Screen readers hear it once the reader has paused, not at every step of a slider; of a swing
+    // that goes on they hear the first hit.
+    function show({ words, number, clock }) {
+      if (seen.textContent !== words) seen.textContent = words;
+      if (seen.textContent === next || (clock.playing && number > 0)) return;
+      next = words;
       clearTimeout(later);
       later = setTimeout(() => (heard.textContent = words), 700);
     }

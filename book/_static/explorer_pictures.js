@@ -61,14 +61,11 @@
     function move({ record, contact: chosen, part: now }, box) {
       if (!drawn || !record) return;
       if (document.activeElement !== part || +part.value !== now) part.value = now;
+      if (drawn.now === now) return;
+      drawn.now = now;
       part.setAttribute("aria-valuetext", `${Math.round(100 * now)}\u00a0%`);
-      plot.querySelector(".now").innerHTML = explorer.dots(
-        drawn.plot,
-        record,
-        chosen,
-        now,
-        box(plot).em,
-      );
+      const { em } = box(plot);
+      plot.querySelector(".now").innerHTML = explorer.dots(drawn.plot, record, chosen, now, em);
     }
     return {
       node: make("div", {}, contact.node, plot, scrub, note),
@@ -97,7 +94,7 @@
         sweep.inner,
       );
     };
-    drag(plot, ratioAt);
+    drag(plot, ratioAt, act);
     function draw(box) {
       const { setting, firstAfter } = shown;
       plot.innerHTML = sweep.svg(box(plot), setting, firstAfter);
@@ -165,7 +162,7 @@
       ];
       act.masses(...at.map((share) => explorer.LARGEST * Math.min(Math.max(share, 0.004), 1)));
     };
-    drag(plot, pointAt);
+    drag(plot, pointAt, act);
     plot.addEventListener("keydown", (event) => {
       const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[
         event.key
@@ -227,18 +224,36 @@
     return { node: make("div", {}, host, legend, note, three), show, move: () => {}, resume };
   }
 
-  // Follow a pointer from its first press on.
-  function drag(node, follow) {
-    let active = false;
+  // Follow a pointer: a mouse from its first press on; a finger once it goes to a side, or where it
+  // taps. A finger that scrolls the page, which the browser then takes, has changed nothing.
+  const STILL = 6;
+  function drag(node, follow, act) {
+    let active = null;
     node.addEventListener("pointerdown", (event) => {
-      if (event.button || !event.target.closest("svg")) return;
-      active = true;
-      node.setPointerCapture(event.pointerId);
-      follow(event);
+      if (active || event.button || !event.target.closest("svg")) return;
+      const { pointerId, pointerType, clientX, clientY } = event;
+      const waits = pointerType === "touch";
+      active = { pointerId, waits, from: [clientX, clientY], restore: act.snapshot() };
+      node.setPointerCapture(pointerId);
+      if (!waits) follow(event);
     });
-    node.addEventListener("pointermove", (event) => active && follow(event));
-    for (const end of ["pointerup", "pointercancel"])
-      node.addEventListener(end, () => (active = false));
+    const own = (event) => active && event.pointerId === active.pointerId;
+    node.addEventListener("pointermove", (event) => {
+      if (!own(event)) return;
+      const [x, y] = active.from;
+      active.waits &&= Math.hypot(event.clientX - x, event.clientY - y) < STILL;
+      if (!active.waits) follow(event);
+    });
+    node.addEventListener("pointerup", (event) => {
+      if (!own(event)) return;
+      if (active.waits) follow(event);
+      active = null;
+    });
+    node.addEventListener("pointercancel", (event) => {
+      if (!own(event)) return;
+      act.restore(active.restore);
+      active = null;
+    });
   }
 
   // --- the panel ------------------------------------------------------------------------------------

@@ -16,6 +16,17 @@
   const px = (value) => Math.round(value * 100) / 100;
   const colour = (ball) => `var(--ball-${ball})`;
 
+  // Letters on a ball's colour: black or white, whichever has more contrast (WCAG 2: relative
+  // luminance). A black ball has the colour of the text.
+  function letters(ball) {
+    const code = explorer.data.palette[ball];
+    if (code === "#000000") return "var(--ground)";
+    const parts = [1, 3, 5].map((k) => parseInt(code.slice(k, k + 2), 16) / 255);
+    const linear = parts.map((p) => (p <= 0.04045 ? p / 12.92 : ((p + 0.055) / 1.055) ** 2.4));
+    const luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
+    return (luminance + 0.05) ** 2 > 0.05 * 1.05 ? "#000" : "#fff";
+  }
+
   function stroke(ball, width = 2.2) {
     const dashes = explorer.data.dashes[ball].map((length) => px(length * width));
     return `stroke="${colour(ball)}" stroke-width="${width}" stroke-dasharray="${dashes.join(" ")}"`;
@@ -89,7 +100,7 @@
     }
     return places
       .map(({ ball, y }) =>
-        text(plot.right + 0.6 * em, y + 0.35 * em, ball + 1, `fill="${colour(ball)}" class="name"`),
+        text(plot.right + 0.6 * em, y + 0.35 * em, ball + 1, `style="--ball: ${colour(ball)}" class="name"`),
       )
       .join("");
   }
@@ -149,19 +160,19 @@
     const gone = total > 0 ? Math.max(0, 1 - sum(shares)) : 0;
     const height = 1.5 * em;
     let x = 0;
-    const piece = (share, how, label, letters) => {
+    const piece = (share, how, label, fill) => {
       const wide = share * width;
       const part =
         `<rect x="${px(x)}" y="0" width="${px(wide)}" height="${px(height)}" ${how}/>` +
         (wide > 2.6 * em
-          ? text(x + wide / 2, 1.1 * em, label, `text-anchor="middle" ${letters}`)
+          ? text(x + wide / 2, 1.1 * em, label, `text-anchor="middle" ${fill}`)
           : "");
       x += wide;
       return part;
     };
     const percent = (share) => `${fixed(100 * share, 0)}\u00a0%`;
     const parts = shares.map((share, ball) =>
-      piece(share, `fill="${colour(ball)}" class="part"`, percent(share), 'class="on-colour"'),
+      piece(share, `fill="${colour(ball)}" class="part"`, percent(share), `fill="${letters(ball)}"`),
     );
     parts.push(piece(gone, 'class="gone"', percent(gone), ""));
     const words = shares.map((share, ball) => `ball ${ball + 1} ${percent(share)}`).join(", ");

@@ -13,6 +13,8 @@
   };
   const LENGTHS = { masses: 0, speeds: 0, restitution: 1, forward: 2, backward: 2 };
   const NONE = "-";
+  // m/s; the square of a smaller speed, an energy, might be no number.
+  const SLOWEST = 1e-6;
 
   const changed = (row, places, value) => row.map((old, k) => (places.includes(k) ? value : old));
   const all = (row) => row.map((_, k) => k);
@@ -29,11 +31,19 @@
       const at = setting[name].findIndex((value) => !(value >= low && value <= high));
       if (at >= 0) return `${name}[${at}] = ${setting[name][at]}; must lie in [${low}, ${high}]`;
     }
+    const slow = setting.speeds.findIndex((speed) => speed !== 0 && Math.abs(speed) < SLOWEST);
+    if (slow >= 0)
+      return `speeds[${slow}] = ${setting.speeds[slow]}; must be 0 or at least ${SLOWEST} in size`;
     const at = setting.speeds.findIndex((speed, k) => k > 0 && speed > setting.speeds[k - 1]);
     if (at > 0) return `speeds[${at}] = ${setting.speeds[at]}; must not exceed the one before it`;
     const known = [...setting.letters].every((letter) => letter === NONE || Object.hasOwn(data.masses, letter));
     if (setting.letters.length !== count || !known)
       return `letters = ${setting.letters}; must be ${count} of A, B, C, D or -`;
+    const other = setting.masses.findIndex((mass, k) => mass !== (data.masses[setting.letters[k]] ?? mass));
+    if (other >= 0) {
+      const letter = setting.letters[other];
+      return `masses[${other}] = ${setting.masses[other]}; ball ${letter} has ${data.masses[letter]} kg`;
+    }
     return "";
   }
 
@@ -44,7 +54,7 @@
       row.map((old, k) => {
         const name = letters.slice(k, k + size);
         const concerned = balls.some((ball) => ball >= k && ball < k + size);
-        return concerned && !name.includes(NONE) ? table[read(name)] : old;
+        return concerned && !name.includes(NONE) ? (table[read(name)] ?? old) : old;
       });
     return {
       ...setting,
@@ -165,7 +175,10 @@
         .get(name)
         .split(",")
         .map((word) => (word === "" ? NaN : +word));
-    const listed = (given.get("masses") ?? "").split(",").length;
+    const listed = Math.max(
+      (given.get("masses") ?? "").split(",").length,
+      (given.get("letters") ?? "").length,
+    );
     const others = Array((listed > 1 ? listed : 5) - 1).fill(0);
     const speeds = given.has("speeds") ? numbers("speeds") : [1, ...others];
     const row = (name, first) => {
@@ -173,15 +186,19 @@
       const length = Math.max(speeds.length - LENGTHS[name], 0);
       return values.length === 1 ? Array(length).fill(values[0]) : values;
     };
+    const letters = given.get("letters") ?? NONE.repeat(speeds.length);
     const forward = row("forward", [0.15]);
-    const setting = {
+    const plainly = {
       masses: row("masses", [1]),
       speeds,
       restitution: row("restitution", [1]),
       forward,
       backward: row("backward", forward),
-      letters: given.get("letters") ?? NONE.repeat(speeds.length),
+      letters,
     };
+    // What an address leaves out, the letters say where they can.
+    const left = Object.entries(measured(plainly, all(speeds))).filter(([name]) => !given.has(name));
+    const setting = { ...plainly, ...Object.fromEntries(left) };
     const error = refusal(setting) || refused(setting);
     return error ? { error } : { setting, picture: given.get("picture") };
   }

@@ -11,6 +11,11 @@
   // Fewer pixels than these are no drag: a finger is never quite still.
   const STILL = 3;
 
+  // Nothing is drawn anew that is there already.
+  function set(node, name, value) {
+    if (node.getAttribute(name) !== String(value)) node.setAttribute(name, value);
+  }
+
   function make(kind, attributes, parent) {
     const node = document.createElementNS(SVG, kind);
     for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
@@ -19,18 +24,18 @@
   }
 
   class Stage {
-    // `on`: {grab(), speed(ball), pull(ball, speed), letGo(moved)}; the stage shows and asks, it
-    // decides nothing.
+    // `on`: {grab(ball), speed(ball), pull(ball, speed), letGo(ball, moved), giveUp()}; the stage
+    // shows and asks, it decides nothing.
     constructor(host, on) {
       this.svg = make("svg", { class: "stage", role: "group", "aria-label": "the cradle" }, host);
       this.on = on;
       this.balls = [];
-      this.drag = null;
+      this.drags = new Map(); // by pointer: each finger holds a ball of its own
       this.size = 1;
       this.svg.addEventListener("pointerdown", (event) => this.grab(event));
       this.svg.addEventListener("pointermove", (event) => this.move(event));
-      for (const end of ["pointerup", "pointercancel"])
-        this.svg.addEventListener(end, () => this.release());
+      this.svg.addEventListener("pointerup", (event) => this.release(event));
+      this.svg.addEventListener("pointercancel", (event) => this.cancel(event));
       this.svg.addEventListener("keydown", (event) => this.key(event));
     }
 
@@ -88,6 +93,8 @@
     }
 
     build(count) {
+      this.drags.clear(); // the balls that were held are gone
+      this.on.giveUp();
       this.svg.replaceChildren();
       this.bar = make("path", { class: "beam" }, this.svg);
       const strings = make("g", {}, this.svg);
@@ -125,7 +132,7 @@
 
     // Draw swings smaller if the fastest ball would leave the picture.
     scale(fastest) {
-      if (!this.drag)
+      if (!this.drags.size)
         this.size = Math.min(1, (ROOM * FREQUENCY * LENGTH) / Math.max(fastest, 1e-9));
       return this.size;
     }
@@ -137,17 +144,18 @@
         const x = px(this.pivots[k] + this.length * Math.sin(angle));
         const y = px(this.top + this.length * Math.cos(angle));
         const { string, group, pull } = this.balls[k];
-        string.setAttribute("x2", x);
-        string.setAttribute("y2", y);
-        group.setAttribute("transform", `translate(${x} ${y})`);
+        set(string, "x2", x);
+        set(string, "y2", y);
+        set(group, "transform", `translate(${x} ${y})`);
         // Balls that are pulled together have one number, below the one nearest to the others.
         const next = speeds[k] > 0 ? speeds[k + 1] : speeds[k - 1];
         const told = held && speeds[k] && speeds[k] !== next;
-        pull.textContent = told ? `${fixed(Math.abs(speeds[k]))} m/s` : "";
+        const words = told ? `${fixed(Math.abs(speeds[k]))} m/s` : "";
+        if (pull.textContent !== words) pull.textContent = words;
         // It stays within the picture.
         const half = 2.6 * this.em;
         const middle = Math.min(Math.max(+x, half), this.svg.viewBox.baseVal.width - half);
-        pull.setAttribute("x", px(middle - x));
+        set(pull, "x", px(middle - x));
       });
       this.stars.forEach((star, c) => star.classList.toggle("shown", Boolean(pressed[c])));
     }
@@ -157,14 +165,15 @@
     grab(event) {
       const group = event.target.closest(".ball");
       if (!group || event.button) return;
+      const ball = +group.dataset.ball;
+      if ([...this.drags.values()].some((drag) => drag.ball === ball)) return;
       event.preventDefault();
       group.focus({ preventScroll: true });
       this.svg.setPointerCapture(event.pointerId);
-      const ball = +group.dataset.ball;
       // A ball that is taken at its edge does not jump to the pointer.
       const offset = this.place(event) - this.balls[ball].string.x2.baseVal.value;
-      this.drag = { ball, offset, from: event.clientX, moved: false };
-      this.on.grab();
+      this.drags.set(event.pointerId, { ball, offset, from: event.clientX, moved: false });
+      this.on.grab(ball);
     }
 
     // Where a pointer is, in the units of the picture.
@@ -174,20 +183,26 @@
     }
 
     move(event) {
-      if (!this.drag) return;
-      const { ball, offset, from } = this.drag;
-      this.drag.moved ||= Math.abs(event.clientX - from) >= STILL;
-      if (!this.drag.moved) return;
-      const sine = (this.place(event) - offset - this.pivots[ball]) / this.length;
+      const drag = this.drags.get(event.pointerId);
+      if (!drag) return;
+      drag.moved ||= Math.abs(event.clientX - drag.from) >= STILL;
+      if (!drag.moved) return;
+      const sine = (this.place(event) - drag.offset - this.pivots[drag.ball]) / this.length;
       const angle = Math.asin(Math.min(Math.max(sine, -0.95), 0.95));
-      this.on.pull(ball, this.rounded((-angle / this.size) * LENGTH * FREQUENCY));
+      this.on.pull(drag.ball, this.rounded((-angle / this.size) * LENGTH * FREQUENCY));
     }
 
-    release() {
-      if (!this.drag) return;
-      const { moved } = this.drag;
-      this.drag = null;
-      this.on.letGo(moved);
+    release(event) {
+      const drag = this.drags.get(event.pointerId);
+      this.drags.delete(event.pointerId);
+      if (drag) this.on.letGo(drag.ball, drag.moved);
+    }
+
+    // The browser has taken a finger to scroll the page: it has pulled nothing.
+    cancel(event) {
+      if (!this.drags.delete(event.pointerId)) return;
+      this.drags.clear();
+      this.on.giveUp(true);
     }
 
     // The left key pulls to the left, which makes the ball come in to the right.
@@ -196,10 +211,11 @@
       const way = { ArrowLeft: 1, ArrowRight: -1 }[event.key];
       if (!group || !way) return;
       event.preventDefault();
-      this.on.grab();
       const ball = +group.dataset.ball;
+      this.on.grab(ball);
       const step = event.shiftKey ? STEP : 2 * STEP;
       this.on.pull(ball, this.rounded(this.on.speed(ball) + way * step));
+      this.on.letGo(ball, false);
     }
 
     rounded(speed) {

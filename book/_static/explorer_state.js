@@ -40,6 +40,18 @@
       this.restart(this.clock.playing);
     }
 
+    // Return what brings everything back to where it is now.
+    snapshot() {
+      const { setting } = this;
+      const [clock, view] = [{ ...this.clock }, { ...this.view }];
+      return () => {
+        this.set(setting);
+        Object.assign(this.clock, clock);
+        Object.assign(this.view, view);
+        this.show(view.number, view.part);
+      };
+    }
+
     take(key) {
       const scene = named(key);
       Object.assign(this.view, {
@@ -119,10 +131,15 @@
         this.show(next);
         return true;
       }
-      if (!clock.slow || !happened) return false;
-      Object.assign(clock, { time: Swing.time(next), inside: 0 });
-      this.show(next, 0);
+      if (!happened) return false;
+      if (clock.slow) Object.assign(clock, { time: Swing.time(next), inside: 0 });
+      this.show(next, clock.slow ? 0 : 1);
       return true;
+    }
+
+    // Whether time changes anything: some ball is, or will be, in motion.
+    get moves() {
+      return this.setting.speeds.some((speed) => speed !== 0);
     }
 
     // --- what is to be seen -----------------------------------------------------------------------

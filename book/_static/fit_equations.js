@@ -1,6 +1,5 @@
-// An equation that is wider than its column is set smaller, down to half of the text, which is the
-// size of the smallest letters of figures; what is still wider scrolls in its own box, from its
-// beginning.
+// An equation that is wider than its column is set smaller, down to half of the text; what is still
+// wider scrolls in its own box, from its beginning.
 (() => {
   const SMALLEST = 0.5;
   // A font size is rounded, and the number of an equation does not shrink with it.
@@ -20,8 +19,16 @@
     box.scrollLeft = 0;
   }
 
+  const EQUATIONS = 'mjx-container[display="true"]';
+
   function fitAll() {
-    document.querySelectorAll('mjx-container[display="true"]').forEach(fit);
+    document.querySelectorAll(EQUATIONS).forEach(fit);
+  }
+
+  // Equations are set when they are about to be seen.
+  function fitNew(changes) {
+    const found = changes.map(({ target }) => target.closest(EQUATIONS));
+    new Set(found.filter(Boolean)).forEach(fit);
   }
 
   window.addEventListener("load", () => {
@@ -29,6 +36,7 @@
     if (!typeset) return;
     typeset.then(() => {
       fitAll();
+      new MutationObserver(fitNew).observe(document.body, { childList: true, subtree: true });
       // Folded solutions have no width until they are opened; nor does the page keep its own.
       document.addEventListener("toggle", fitAll, true);
       window.addEventListener("resize", fitAll);

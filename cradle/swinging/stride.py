@@ -29,6 +29,19 @@ _LONGEST = 0.01
 _MOST_IMPACTS = 10_000
 
 Plane = NDArray[np.complexfloating[Any, Any]]
+Pairs = Sequence[Sequence[float]]
+
+
+def plane(told: Pairs) -> Plane:
+    """Return pairs of coordinates as complex numbers."""
+    x = np.array(told, dtype=np.float64)
+    return x[:, 0] + 1j * x[:, 1]
+
+
+def pairs(x: Plane) -> list[list[float]]:
+    """Return complex numbers as pairs of coordinates."""
+    told: list[list[float]] = np.column_stack([x.real, x.imag]).tolist()
+    return told
 
 
 class Hit(NamedTuple):
@@ -140,7 +153,7 @@ class Alone:
         hits: list[Hit] = []
         left, settled, touched = duration, 0, False
         for _ in range(_MOST_IMPACTS):
-            touches, arrival, self.quiet = self.look(x.tolist(), (own * self.ways(x)).tolist())
+            touches, arrival, self.quiet = self.look(pairs(x), pairs(own * self.ways(x)))
             if touches:
                 gained, rests = self._solve(x, own, duration - left, hits)
                 own = own + gained
@@ -156,7 +169,7 @@ class Alone:
             f"squeezed between others, or `resting` = {self.resting!r} is too low"
         )
 
-    def look(self, x: Sequence[complex], v: Sequence[complex]) -> tuple[bool, float, float]:
+    def look(self, x: Pairs, v: Pairs) -> tuple[bool, float, float]:
         """Tell whether something touches now, when the next contact arrives, how long is quiet.
 
         The second goes by the present velocities, and is 0 with an impact: look again.  For the
@@ -165,13 +178,14 @@ class Alone:
         arrival, quiet = math.inf, _LONGEST
         strike = rest = False
         for c, reach in enumerate(self.reach):
-            line = x[c + 1] - x[c]
-            distance = abs(line)
+            (xa, ya), (xb, yb) = x[c], x[c + 1]
+            dx, dy = xb - xa, yb - ya
+            distance = math.hypot(dx, dy)
             gap = distance - reach
-            closing = ((v[c] - v[c + 1]) * line.conjugate()).real
+            closing = (v[c][0] - v[c + 1][0]) * dx + (v[c][1] - v[c + 1][1]) * dy
             if not math.isfinite(gap + closing):
-                for name, told in (("positions", x), ("velocities", v)):
-                    checked(f"motion: {name}", [(z.real, z.imag) for z in told])
+                checked("motion: positions", x)
+                checked("motion: velocities", v)
             if not gap > -0.5 * reach:
                 raise RuntimeError(
                     f"balls {c} and {c + 1} overlap by {-gap:g} m; the step is too long, or "
@@ -189,7 +203,7 @@ class Alone:
             if closing + root > 0.0:
                 quiet = min(quiet, 2.0 * room / (closing + root))
         if not self.hang_alike:  # nothing else keeps the balls in order
-            self._refuse_a_pack(np.array(x))
+            self._refuse_a_pack(plane(x))
         return strike or rest, 0.0 if strike else arrival, quiet
 
     def _solve(self, x: Plane, own: Plane, time: float, hits: list[Hit]) -> tuple[Plane, int]:
@@ -241,7 +255,7 @@ class Alone:
         x, n = checked(name, places), len(self.chain)
         if x.shape != (n, 2):
             raise ValueError(f"{name} has shape {x.shape}; {n} balls need ({n}, 2)")
-        return x[:, 0] + 1j * x[:, 1]
+        return plane(x.tolist())
 
     def _refuse_a_bend(self, lines: Plane, axis: complex, first: int) -> None:
         off = np.abs(np.angle(lines / axis)).max()
@@ -253,8 +267,9 @@ class Alone:
             )
 
     def _refuse_a_pack(self, x: Plane) -> None:
-        room = np.add.outer(self.radii, self.radii) + self.touching
-        near = np.argwhere(np.triu(np.abs(np.subtract.outer(x, x)) <= room, 2))
+        half = 0.5 * np.array(self.radii)  # halves add up to no more than a float can hold
+        room = np.add.outer(half, half) + 0.5 * self.touching
+        near = np.argwhere(np.triu(0.5 * np.abs(np.subtract.outer(x, x)) <= room, 2))
         if len(near):
             i, j = near[0]
             raise ValueError(

@@ -1,0 +1,169 @@
+"""The live explorer under fingers: two at once, and those that only scroll the page."""
+
+import pytest
+from explorer import (
+    EXPLORER,
+    SETTING,
+    address_of_page,  # noqa: F401
+    drawn,
+    go_to,
+    middle,
+    same_outcome,
+    still,
+    visits,  # noqa: F401
+)
+from test_layout import browser  # noqa: F401
+
+TIME = f"{EXPLORER}.state.clock.time"
+
+
+class Hand:
+    """Fingers on a phone's screen, each at a place of its own."""
+
+    def __init__(self, tab):
+        self.tab, self.places = tab, {}
+        self.session = tab.context.new_cdp_session(tab)
+
+    def _send(self, kind):
+        points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in self.places.items()]
+        self.session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    def down(self, finger: int, place):
+        self.places[finger] = tuple(place)
+        self._send("touchStart")
+
+    def move(self, finger: int, x: float, y: float, steps: int = 10):
+        """Move by so many pixels."""
+        start = self.places[finger]
+        for step in range(1, steps + 1):
+            share = step / steps
+            self.places[finger] = start[0] + share * x, start[1] + share * y
+            self._send("touchMove")
+            drawn(self.tab)
+
+    def up(self, finger: int):
+        del self.places[finger]
+        self._send("touchEnd")
+
+
+@pytest.fixture(name="phone")
+def phones(visit):
+    return lambda fragment="": still(visit, fragment, width=390, has_touch=True, is_mobile=True)
+
+
+def ball(number: int) -> str:
+    return f".ball[data-ball='{number}'] .disc"
+
+
+def test_two_fingers_pull_two_balls(phone):
+    """Each follows its own finger, and one that is let go stays where it was pulled to."""
+    tab = phone("#speeds=0,0,0,0,0&forward=0.1")
+    drawn(tab)
+    hand, (left, y), (right, _) = Hand(tab), middle(tab, ball(0)), middle(tab, ball(4))
+    hand.down(1, (left, y))
+    hand.move(1, -60, 0)
+    first = drawn(tab)["speeds"]
+    assert first[0] > 0.4
+    assert first[1:] == [0] * 4
+    hand.down(2, (right, y))
+    hand.move(2, 60, 0)
+    both = drawn(tab)["speeds"]
+    assert both[0] == first[0]
+    assert both[4] < -0.4
+    assert both[1:4] == [0] * 3
+    hand.move(1, 10, 0)  # while the other one is held
+    assert 0 < drawn(tab)["speeds"][0] < first[0]
+    assert drawn(tab)["speeds"][1:] == both[1:]
+    hand.up(2)
+    hand.move(1, 10, 0)
+    shown = drawn(tab)
+    assert 0 < shown["speeds"][0] < first[0]
+    assert shown["speeds"][1:] == both[1:]
+    hand.up(1)
+    assert same_outcome(drawn(tab))
+    assert drawn(tab)["speeds"] == shown["speeds"]
+
+
+def test_a_second_finger_on_the_same_ball_is_none(phone):
+    tab = phone("#speeds=0,0,0,0,0&forward=0.1")
+    drawn(tab)
+    hand, (x, y) = Hand(tab), middle(tab, ball(0))
+    hand.down(1, (x - 3, y))
+    hand.down(2, (x + 3, y))
+    hand.move(2, -60, 0)
+    assert drawn(tab)["speeds"] == [0] * 5
+    hand.move(1, -60, 0)
+    assert drawn(tab)["speeds"][0] > 0.4
+
+
+def show_middle(tab, place: str):
+    tab.locator(place).evaluate(
+        "(node) => node.scrollIntoView({ block: 'center', behavior: 'instant' })"
+    )
+
+
+@pytest.mark.parametrize("place", [".drags-x svg", ".map svg", ball(3)])
+def test_scrolling_past_a_picture_changes_nothing(phone, place):
+    """Up or down, with the slant of a thumb: the page scrolls and the experiment stays."""
+    tab = phone("#scene=map&picture=map" if "map" in place else "#scene=half")
+    go_to(tab, "speeds=1,0,0&picture=map" if "map" in place else "speeds=1,0,0,0,0&picture=sweep")
+    before = drawn(tab)
+    show_middle(tab, place)
+    x, y = middle(tab, place)
+    scrolled = tab.evaluate("scrollY")
+    hand = Hand(tab)
+    hand.down(1, (x + 40 if "map" in place else x, y))
+    hand.move(1, 12, -150, steps=15)
+    hand.up(1)
+    tab.wait_for_function("(before) => scrollY > before + 40", arg=scrolled)
+    assert drawn(tab) == before
+    assert tab.evaluate(TIME) == 0
+
+
+@pytest.mark.parametrize(("place", "row"), [(".drags-x svg", "forward"), (".map svg", "masses")])
+def test_a_tap_and_a_finger_to_the_side_do_their_work(phone, place, row):
+    tab = phone("#speeds=1,0,0&picture=" + ("map" if "map" in place else "sweep"))
+    before = drawn(tab)
+    show_middle(tab, place)
+    x, y = middle(tab, place)
+    hand = Hand(tab)
+    hand.down(1, (x + 20, y - 20))
+    hand.up(1)
+    tapped = drawn(tab)
+    assert tapped[row] != before[row]
+    hand.down(1, (x, y))
+    hand.move(1, 60, 0)
+    hand.up(1)
+    moved = drawn(tab)
+    assert moved[row] != tapped[row]
+    assert same_outcome(moved)
+
+
+def test_another_setting_while_a_ball_is_held(visit):
+    """Typed, or followed as a link: balls that are gone are let go, the others stay in the hand."""
+    tab = still(visit)
+    x, y = middle(tab, ball(4))
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + 40, y, steps=4)
+    held = drawn(tab)["speeds"]
+    assert held[4] < 0
+    # Other masses stay in force while it is pulled further.
+    for label, number in (("mass", "3"), ("restitution", "0.5")):
+        tab.get_by_label(f"{label}, as a number", exact=True).evaluate(
+            "(box, value) => { box.value = value; box.dispatchEvent(new Event('change')); }", number
+        )
+    tab.mouse.move(x + 50, y)
+    shown = drawn(tab)
+    assert shown["speeds"][4] < held[4]
+    assert shown["masses"] == [3] * 5
+    assert shown["restitution"] == [0.5] * 4
+    # Fewer balls, before and after the next frame.
+    for wait in (lambda: None, lambda: drawn(tab)):
+        tab.evaluate(f"{EXPLORER}.state.read('speeds=1,0'), {EXPLORER}.changed()")
+        wait()
+        tab.mouse.move(x + 60, y)
+        assert drawn(tab)["speeds"] == [1, 0]
+    tab.mouse.up()
+    assert drawn(tab)["speeds"] == [1, 0]
+    assert "NaN" not in tab.evaluate(f"{EXPLORER}.host.outerHTML + JSON.stringify({SETTING})")
