@@ -16,7 +16,7 @@ import truth
 from plain import rooms, solve
 from test_defects import LAST_DIGITS
 
-from cradle.kernel import limits
+from cradle.kernel import cycles
 from cradle.kernel.numbers import NEVER
 from cradle.kernel.state import FINISHED, REFUSED, UNFINISHED, UNSOUND
 
@@ -154,7 +154,7 @@ NEEDED = {
         UNFINISHED,
     ),
     "a cycle that grows": (
-        {"limit": changed(limits, "limit", "-1.0 <= total <= 0.0", "total <= 0.0")},
+        {"limit": changed(cycles, "limit", "-1.0 <= total <= 0.0", "total <= 0.0")},
         ([1, 1, 1e-9, 1], [1, 0.5, 0, 0], 0, 0.1, 0.1, 0.5),
         UNFINISHED,
     ),

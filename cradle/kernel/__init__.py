@@ -6,7 +6,9 @@
     record       what is written down
     events       start, hand-over, closing                                    R2, R4, R5
     meeting      two runs that meet                                           R8.3, R8.4
-    limits       infinite sequences of impacts                                R9
+    collapse     contacts that are exhausted, and how they end                R9
+    snapshot     what has repeated itself since                               R9
+    cycles       impacts that repeat themselves on another scale              R9
     certificate  momentum, order, energy, ledger of every answer
     loop         the rounds                                                   R8
     batch        many chains; the door
@@ -19,8 +21,8 @@ from cradle.kernel.batch import Inputs, Options, Outputs, batch
 
 #: The rooms in an order in which each uses only those before it.
 ROOMS = (
-    "state", "numbers", "rules", "record", "events", "meeting", "limits", "certificate", "loop",
-    "batch",
+    "state", "numbers", "rules", "record", "events", "meeting", "collapse", "snapshot",
+    "cycles", "certificate", "loop", "batch",
 )  # fmt: skip
 
 __all__ = ["ROOMS", "Inputs", "Options", "Outputs", "batch"]

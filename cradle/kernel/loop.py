@@ -3,12 +3,13 @@
 import math
 
 from cradle.kernel.certificate import certify
+from cradle.kernel.cycles import take_limits
 from cradle.kernel.events import close_contacts, end_contacts, grow, reduced_mass, start
-from cradle.kernel.limits import forget, take_limits
 from cradle.kernel.meeting import first_meeting, who_goes
 from cradle.kernel.numbers import ONE, ZERO, minus, negative, over, plus, read, scaled, times
 from cradle.kernel.record import record, record_compressions
 from cradle.kernel.rules import pulls_at, rates, segment
+from cradle.kernel.snapshot import forget
 from cradle.kernel.state import (
     CERTAIN,
     CLOSE,

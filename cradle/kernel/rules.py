@@ -126,10 +126,12 @@ def several_sources(low, high, smallest, ball, contact):
             if ratio.real == 0.0:
                 k -= way * LIMITS.vanishing
             else:
+                # The least ratio is 2**-1074: halfway up there is room for it and its rounding.
+                x = scaled(x, math.ldexp(1.0, way * 600))
                 x = times(x, ratio) if way == 1 else over(x, ratio)
                 j = math.frexp(x.real)[1]
                 x = scaled(x, math.ldexp(1.0, -j))
-                k += j
+                k += j - way * 600
         contact[c].rate = x
         contact[c].power = k
         top = max(top, k) if c > low else k

@@ -1,279 +1,34 @@
-"""R9: infinite sequences of impacts, and how they are taken to their limits.
+"""R9: the second sign of a collapse: impacts that repeat themselves in cycles.
 
-There are two signs of one.  Contacts are exhausted: what they have left is far below the last digit
-of an answer, and they alone go on making events.  Or impacts repeat in cycles: the state at the end
-of a contact is that at its end a cycle before on a smaller scale.  Then all cycles to come are
-smaller copies of the last one, by the factor L, L^2, ..., and their sum is a geometric series.
-Cycles that contain collapses are found in the same way, on a second level: there collapses are
-counted, not ends.
+The state at the end of a contact is that at its end a cycle before on a smaller scale.  Then all
+cycles to come are smaller copies of the last one, by the factor L, L^2, ..., and their sum is a
+geometric series.  Cycles that contain collapses are found in the same way, on a second level: there
+collapses are counted, not ends.
 """
 
 import math
 
-from cradle.kernel.events import deactivate, exhausted, reduced_mass, run_of, stir
+from cradle.kernel.collapse import (
+    change_of,
+    common_velocity,
+    end_plastically,
+    exhausted_stretch,
+    merge,
+)
+from cradle.kernel.events import reduced_mass
 from cradle.kernel.numbers import ONE, ZERO, minus, over, plus, scaled, times
 from cradle.kernel.record import record
+from cradle.kernel.snapshot import cluster_around, forget, remember, since
 from cradle.kernel.state import (
     COLLAPSE,
     LIMITS,
     LOWER,
     REPETITION,
     UPPER,
-    Cluster,
     apart,
     jit,
     once,
 )
-
-
-@apart
-def end_plastically(first, last, n, state):
-    """End those contacts of first..last that are active; their balls have one velocity."""
-    contact, run = state.contact, state.run
-    for c in range(first, last + 1):
-        contact[c].u = ZERO
-        contact[c].made = 0.0
-        contact[c].tiny = 0
-        if contact[c].active == 1:
-            deactivate(c, run_of(c, contact), n, state.ball, contact, run, state.tally[0])
-    for c in (first - 1, last + 1):
-        if 0 <= c < n - 1:
-            stir(c, n, run, contact)
-            if contact[c].active == 1:
-                run[run_of(c, contact)].stirred = 1
-
-
-@jit
-def change_of(c, low, high, ball, contact):
-    """Return how impulses x of contacts low..high change the closing speed of contact c."""
-    before = contact[c - 1].x if low <= c - 1 <= high else ZERO
-    here = contact[c].x if low <= c <= high else ZERO
-    after = contact[c + 1].x if low <= c + 1 <= high else ZERO
-    left = times(minus(before, here), ball[c].inverse)
-    return minus(left, times(minus(here, after), ball[c + 1].inverse))
-
-
-@apart
-def common_velocity(first, last, left_part, right_part, ball, contact):
-    """Leave in x of contacts first..last the impulses that bring all their balls to one velocity.
-
-    A steady neighbour whose impulse is h times that of the outermost contact beside it makes the
-    ball between them act as one of mass m / (1 - h); the parts are these 1 - h.
-    """
-    mass = momentum = speed = ZERO  # velocities count from that of the first ball
-    for i in range(first, last + 2):
-        b = ball[i]
-        b.x = b.m
-        if i == first:
-            b.x = over(b.x, left_part)
-        if i == last + 1:
-            b.x = over(b.x, right_part)
-        mass = plus(mass, b.x)
-        momentum = plus(momentum, times(b.x, speed))
-        if i <= last:
-            speed = minus(speed, contact[i].u)
-    common = over(momentum, mass)
-    impulse = speed = ZERO
-    for c in range(first, last + 1):
-        impulse = plus(impulse, times(ball[c].x, minus(speed, common)))
-        speed = minus(speed, contact[c].u)
-        contact[c].x = impulse
-
-
-# The first sign: exhausted contacts.
-
-
-@jit
-def chatters(c, n, state):
-    """Tell whether contact c exists and is in an exhausted collision, or has just been.
-
-    Or if it has collided lately at a speed that is as far below an exhausted one: dust.
-    """
-    if not 0 <= c < n - 1:
-        return False
-    k = state.contact[c]
-    work = k.w if k.active == 1 and k.w > 0.0 else k.q.real
-    if not exhausted(c, work, state.ball, state.contact, state.tally[0]):
-        return False
-    dust = k.hits > 0 and k.made < LIMITS.dust * state.tally[0].fastest
-    return dust or k.tiny > 0 or (k.active == 1 and k.w > 0.0)
-
-
-@jit
-def next_chatter(c, step, n, state):
-    """Return the next contact after c that chatters too, with nothing but zeros between; or c."""
-    k = c + step
-    while 0 <= k < n - 1 and state.contact[k].u.real == 0.0 and not chatters(k, n, state):
-        k += step
-    return k if chatters(k, n, state) else c
-
-
-@apart
-def exhausted_stretch(c, n, state):
-    """Return the stretch (first, last) around c of contacts that only chatter.
-
-    Empty if nothing in it can lose energy, unless it is dust: elastic sequences are finite, or hand
-    all their energy on; or if its balls move with more than a faint energy: heavy ones, slower than
-    a light ball that struck them.
-    """
-    ball, contact = state.ball, state.contact
-    first = last = c
-    while next_chatter(first, -1, n, state) < first:
-        first = next_chatter(first, -1, n, state)
-    while next_chatter(last, 1, n, state) > last:
-        last = next_chatter(last, 1, n, state)
-    loses = False
-    common_velocity(first, last, ONE, ONE, ball, contact)
-    energy = fastest = 0.0
-    for k in range(first, last + 1):
-        loses = loses or contact[k].e.real < 1.0
-        fastest = max(fastest, abs(contact[k].u.real))
-        energy += 0.5 * contact[k].x.real * contact[k].u.real
-    loses = loses or fastest < LIMITS.dust * state.tally[0].fastest
-    if loses and energy <= LIMITS.faint * state.tally[0].energy:
-        return first, last
-    return c, c - 1
-
-
-@apart
-def merge(first, last, n, state):
-    """End the contacts first..last plastically: their balls take the common velocity.
-
-    Balls that zeros beside them join to theirs go with them, and an idle neighbour that this makes
-    approach joins.
-    """
-    ball, contact = state.ball, state.contact
-    while True:
-        low, high = first, last
-        while low > 0 and contact[low - 1].u.real == 0.0:
-            low -= 1
-        while high < n - 2 and contact[high + 1].u.real == 0.0:
-            high += 1
-        common_velocity(low, high, ONE, ONE, ball, contact)
-        for c in (low - 1, high + 1):
-            if 0 <= c < n - 1:
-                contact[c].u = plus(contact[c].u, change_of(c, low, high, ball, contact))
-        for c in range(low, high + 1):
-            contact[c].p = plus(contact[c].p, contact[c].x)
-            contact[c].u = ZERO
-        if low > 0 and contact[low - 1].active == 0 and contact[low - 1].u.real > 0.0:
-            first = low - 1
-        elif high < n - 2 and contact[high + 1].active == 0 and contact[high + 1].u.real > 0.0:
-            last = high + 1
-        else:
-            break
-    end_plastically(first, last, n, state)
-    return first, last
-
-
-# The second sign: cycles.
-
-
-@jit
-def forget(number, levels):
-    """Drop the snapshot of a level, and begin to count anew: short impacts need none."""
-    level = levels[number]
-    level.mark = -1
-    level.count = level.taken = 0
-    level.due = 16 if number == LOWER else 4
-
-
-@jit
-def code(c, state):
-    """Return one number for whether contact c is active, and who drives whom at its balls."""
-    ball = state.ball
-    return 9 * state.contact[c].active + 3 * ball[c].turn + ball[c + 1].turn
-
-
-@apart
-def remember(number, c, n, state):
-    """Take a snapshot of the contacts around c.
-
-    It is kept for 1, 1, 2, 1, 1, 2, 4, 1, ... times the least distance, so that a short cycle is
-    found soon and a long one, too.
-    """
-    level, contact, memory = state.level[number], state.contact, state.memory[number]
-    level.mark = c
-    level.taken += 1
-    distance, k = 16 if number == LOWER else 4, level.taken
-    while k == 2 * (k // 2):
-        distance, k = 2 * distance, k // 2
-    level.due = level.count + distance
-    level.low, level.high = max(c - LIMITS.window, 0), min(c + LIMITS.window, n - 2)
-    for j in range(level.low, level.high + 1):
-        k, then = contact[j], memory[j]
-        then.u, then.q, then.p, then.a = k.u, k.q, k.p, k.a
-        then.hits, then.code = k.hits, code(j, state)
-
-
-@jit
-def since(c, contact, memory):
-    """Return the impulse of contact c since the snapshot."""
-    return minus(contact[c].p, memory[c].p)
-
-
-@jit
-def has_waited(c, level, state, memory):
-    """Tell whether contact c, if it was seen, is as it was at the snapshot, without a collision."""
-    if not level.low <= c <= level.high:
-        return True
-    return state.contact[c].hits == memory[c].hits and code(c, state) == memory[c].code
-
-
-@jit
-def alone(left, right, n, state):
-    """Tell whether no run is active but those at contacts left..right.
-
-    Each of infinitely many rounds lets all other runs go on, too.
-    """
-    run = state.run
-    first = state.tally[0].first
-    while first < n:
-        if run[first].last < left or first > right:
-            return False
-        first = run[first].onward
-    return True
-
-
-@apart
-def cluster_around(c, number, n, state):
-    """Return the contacts of a possible cycle around contact c; empty (last < first) if none.
-
-    Contacts left..right had an impulse since the snapshot; of these first..last collided anew and
-    the others, steady neighbours, stayed active.  All must be active and driven as they were at the
-    snapshot, and one that collided must lose energy.
-    """
-    level, contact, memory = state.level[number], state.contact, state.memory[number]
-    left = c
-    right = c
-    while left > level.low and since(left - 1, contact, memory).real > 0.0:
-        left -= 1
-    while right < level.high and since(right + 1, contact, memory).real > 0.0:
-        right += 1
-    first = right + 1
-    last = left - 1
-    loses = False
-    same = since(c, contact, memory).real > 0.0  # else c has collided without an impulse
-    same = same and (left > level.low or left == 0) and (right < level.high or right == n - 2)
-    for k in range(left, right + 1):
-        same = same and memory[k].code == code(k, state)
-        if contact[k].hits != memory[k].hits:
-            first = min(first, k)
-            last = k
-            loses = loses or contact[k].e.real < 1.0
-        else:
-            same = same and contact[k].active == 1
-    for k in range(first, last + 1):
-        same = same and contact[k].hits != memory[k].hits
-    # Whoever is active next to them has waited throughout, at a ratio of zero.
-    same = same and has_waited(left - 1, level, state, memory)
-    same = same and has_waited(right + 1, level, state, memory)
-    for k in (left - 2, right + 2):
-        if level.low <= k <= level.high and since(k, contact, memory).real > 0.0:
-            same = False
-    if same and loses and alone(left, right, n, state):
-        return Cluster(left, first, last, right)
-    return Cluster(c, c, c - 1, c)
 
 
 @jit
@@ -400,7 +155,8 @@ def jump(cluster, part, number, n, state):
     ball, contact, memory = state.ball, state.contact, state.memory[number]
     left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
     lost = loss = 0.0
-    rest = 1.0 - part
+    left_over = minus(ONE, complex(part, 0.0))
+    rest = left_over.real
     for c in range(left, right + 1):
         contact[c].x = scaled_by(contact[c].x, part)
     for c in range(max(left - 1, 0), min(right + 1, n - 2) + 1):
@@ -409,7 +165,7 @@ def jump(cluster, part, number, n, state):
         if first <= c <= last:
             lost += k.q.real * part * (1.0 + rest)
             loss += (1.0 - k.square.real) * minus(k.a, memory[c].a).real
-            k.u, k.q = scaled_by(k.u, rest), scaled_by(k.q, rest * rest)
+            k.u, k.q = times(k.u, left_over), times(k.q, times(left_over, left_over))
             k.w *= rest * rest
             k.made *= abs(rest)
         elif not stays_at_zero(c, contact, memory):
