@@ -248,7 +248,7 @@ def cycle(number, c, n, state):
             return c, c - 1  # a cycle that grows does so by one factor
         # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
         # 1 / (T + 1/2), and as good as that for a slow cycle.
-        threshold = LIMITS.exhausted * state.tally[0].fastest
+        threshold = max(LIMITS.exhausted * state.tally[0].fastest, 5e-324)
         bent = off * max(math.log(size / threshold), 1.0) * (total + 0.5)
         if not bent < LIMITS.bend:
             return c, c - 1

@@ -6,7 +6,7 @@ A record is made beside the run and changes nothing in it.
 import math
 
 from cradle.kernel.numbers import NEVER, ZERO, least, less, minus, negative, over, plus, times
-from cradle.kernel.state import MAXIMUM_COMPRESSION, apart, jit
+from cradle.kernel.state import LIMITS, MAXIMUM_COMPRESSION, apart, jit
 
 
 @jit
@@ -69,7 +69,9 @@ def record_compressions(first, way, n, state):
         passes = k.u.real > 0.0 and k.slope.real < 0.0
         k.y = over(k.u, negative(k.slope)) if passes else NEVER
         ends = run[first].goes == 2 and k.due == 1
-        k.passes = 1 if passes and (ends or not less(way, k.y)) else 0
+        # One that comes at the end of the way is one of it, whatever its last digits say.
+        late = minus(k.y, way).real if passes else math.inf
+        k.passes = 1 if (ends and passes) or late <= LIMITS.tie * k.age else 0
     while True:
         found = -1
         for c in range(low, high + 1):

@@ -75,7 +75,7 @@ def reached(first, run, smallest, ball, contact):
 
 
 @jit
-def keep_closed(i, driven, far, onward, ball, contact):
+def keep_closed(i, driven, far, onward, ball, contact, tally):
     """R7: lower the ratio at ball i to its bound (Eq. 53) if the driven contact would open at once.
 
     There the contact is held at u = 0.  `far` is its other ball, which passes the part `onward` of
@@ -85,14 +85,16 @@ def keep_closed(i, driven, far, onward, ball, contact):
     if k.u.real == 0.0 and k.w == 0.0:
         one = ball[far].m
         both = plus(one, times(b.m, minus(ONE, onward)))
-        ratio = b.ratio.real * LIMITS.rounded
-        if ratio * both.real >= one.real:
-            k.fixed = 1 if b.ratio.real * both.real > one.real * LIMITS.rounded else 2
+        nominal, bound = b.ratio.real * both.real, one.real
+        if nominal * LIMITS.rounded >= bound:
+            k.fixed = 1 if nominal > bound * LIMITS.rounded else 2
             b.ratio = over(one, both)
+        if k.fixed != 2:
+            tally.margin = min(tally.margin, abs(nominal - bound) / bound)
 
 
 @once
-def ratios_in_force(low, high, ball, contact):
+def ratios_in_force(low, high, ball, contact, tally):
     """R7: the ratios in force in a run, each chain of drives from its far end to its driver.
 
     A contact driven from both sides cannot open, so it is never held.
@@ -104,11 +106,11 @@ def ratios_in_force(low, high, ball, contact):
     for c in range(high, low, -1):
         if ball[c].turn == 1 and ball[c + 1].turn != -1:
             onward = ball[c + 1].ratio if c < high and ball[c + 1].turn == 1 else ZERO
-            keep_closed(c, c, c + 1, onward, ball, contact)
+            keep_closed(c, c, c + 1, onward, ball, contact, tally)
     for c in range(low, high):
         if ball[c + 1].turn == -1 and ball[c].turn != 1:
             onward = ball[c].ratio if c > low and ball[c].turn == -1 else ZERO
-            keep_closed(c + 1, c, c, onward, ball, contact)
+            keep_closed(c + 1, c, c, onward, ball, contact, tally)
 
 
 @apart
@@ -182,7 +184,7 @@ def rates(first, run, ball, contact, tally):
     """
     reached(first, run, tally.cut_off, ball, contact)
     low, high = run[first].low, run[first].high
-    ratios_in_force(low, high, ball, contact)
+    ratios_in_force(low, high, ball, contact, tally)
     impulse_rates(low, high, run[first].source, tally.cut_off, ball, contact)
     ball[low].pull = negative(times(contact[low].rate, ball[low].inverse))
     opens = False
