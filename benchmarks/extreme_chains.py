@@ -588,15 +588,16 @@ class Late(NamedTuple):
     active: np.ndarray
 
 
-def late(problem, steps, room=20_000):
+def late(problem, steps, room=20_000, **limits):
     """The last events, no more than `room`, of a chain that is stopped after so many steps.
 
-    Up to near the limit by the event loop as it is; then on, plain, with another record.
+    Up to near the limit by the event loop as it is; then on, plain, with another record, and with
+    other limits of the kernel if told.
     """
     n = len(problem.masses)
     limit = max(steps - 2 * room, 0)
     inputs = kernel.Inputs(*(np.array([part], float) for part in problem[:5]))
-    options = kernel.Options(problem.meeting, max(limit, 1), False, True)
+    options = kernel.Options(problem.meeting, max(limit, 1), False)
     job = drive.Job(inputs, 1, options, large=limit > 100_000).run()
     assert job.status == drive.UNFINISHED
     last = collections.deque(maxlen=room)
@@ -606,7 +607,7 @@ def late(problem, steps, room=20_000):
         state.tally[0].events += 1
         last.append((kind, c, [state.contact[j].u.real for j in range(n - 1)]))
 
-    names = plain.rooms(record=lambda _: keep)
+    names = plain.rooms(record=lambda _: keep, **limits)
     state = job.state
     if job.compiled:
         state = plain.as_objects(state, n)

@@ -41,7 +41,7 @@ def means_its_bits(x):
 
 
 def as_bits(numbers, power):
-    """The next numbers that mean their bits, here and times 2**power: .1 is one tenth here alone."""
+    """The next numbers that mean their bits, here and in other units: there .1 is no tenth."""
     found = []
     for x in numbers.tolist():
         while not (means_its_bits(x) and means_its_bits(math.ldexp(x, power))):

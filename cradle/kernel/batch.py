@@ -1,4 +1,4 @@
-"""Many impacts, outcome alone or with a record of one: checks of input, closed form, event loop."""
+"""Many impacts, outcome alone or with a record of one: checks of input, event loop, outcome."""
 
 import math
 from typing import Any, NamedTuple
@@ -35,7 +35,6 @@ class Options(NamedTuple):
     meeting: float
     max_events: int  # most rounds; the textbook allows two for each event
     bounded: bool  # refuse ratios above Eq. 53
-    whole: bool  # run the event loop even where the closed form would do
 
 
 class Outputs(NamedTuple):

@@ -265,4 +265,4 @@ def warm_up() -> None:
     """
     one = np.ones((1, 2))
     inputs = plain.Inputs(one, np.array([[1.0, 0.0]]), np.ones((1, 1)), *[np.ones((1, 0))] * 2)
-    Job(inputs, 1, plain.Options(0.5, 1000, True, True), large=True).run()
+    Job(inputs, 1, plain.Options(0.5, 1000, True), large=True).run()
