@@ -4,6 +4,7 @@ Usage::
 
     python benchmarks/judge.py                             # a hundred chains of every family
     python benchmarks/judge.py --family losses --count 10000 --seed 7
+    python benchmarks/judge.py --count 4000 --output data/judge.csv     # some hours
 
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
 within 600 events.  A float means what it prints as if that is short, see `meaning`: ties of an
@@ -14,11 +15,13 @@ Every chain counted as right or wrong was judged by the exact run, at some hundr
 """
 
 import argparse
+import csv
 import decimal
 import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from decimal import Decimal
+from pathlib import Path
 from typing import NamedTuple
 
 import truth
@@ -319,11 +322,18 @@ def main():
     parser.add_argument("--count", type=int, default=100, help="chains of each family")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--shrink", type=int, default=5, help="how many wrong chains to shrink")
+    parser.add_argument("--output", type=Path, help="write the counts as CSV")
     given = parser.parse_args()
     counts, found = run(given.family or list(JUDGED), given.count, given.seed)
     print(f"{'':18}" + "".join(f"{word:>14}" for word in WORDS))
     for name, count in counts.items():
         print(f"{name:18}" + "".join(f"{count[word]:14}" for word in WORDS))
+    if given.output:
+        with given.output.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(["family", *WORDS])
+            for name, count in counts.items():
+                writer.writerow([name, *(count[word] for word in WORDS)])
     for name, verdict, problem in found:
         print(f"\n{name}: {verdict.word}, off by {verdict.off:.1e}\n{problem!r}")
     for _, _, problem in [each for each in found if each[1].word == "wrong"][: given.shrink]:

@@ -23,7 +23,7 @@ if "jit" not in globals():
         return function
 
     def bare(things: Any) -> Any:
-        """Hand on a sequence; compiled code then passes its address alone (`cradle.runtime.addresses`)."""
+        """Hand on a sequence; compiled code passes its address alone (`cradle.runtime.addresses`)."""
         return things
 
     def door(function: Any) -> Any:
