@@ -17,7 +17,7 @@ import plain
 from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
 from march import march
 from problem import Problem
-from truth import EventLimit
+from truth import EventLimit, as_meant
 
 from cradle import (
     Chain,
@@ -249,14 +249,14 @@ def truth(problem, trace, longest=400, conditioned=80):
     Three balls whose impacts have no end take their common velocity.
     """
     with mpmath.workdps(50):
-        if trace.collapsed and len(trace.chain) == 3 and len(trace.events) > conditioned:
-            m, v = ([mpmath.mpf(x) for x in part] for part in problem[:2])
-            common = sum(a * b for a, b in zip(m, v)) / sum(m)
-            return [common] * 3, None
         try:
             exact = problem.exact(longest)
         except EventLimit:
-            return None
+            if not trace.collapsed or len(trace.chain) > 3:
+                return None
+            m, v = ([as_meant(x) for x in part] for part in problem[:2])
+            common = sum(a * b for a, b in zip(m, v)) / sum(m)
+            return [common] * 3, None
         change = None
         if len(exact.events) <= conditioned:
             parts = (part(problem, exact, longest) for part in (unavoidable, slack_of_bound))
@@ -301,7 +301,7 @@ def row_case(name, n):
 def handed_on(masses, e):
     """Velocities after one binary collision a pair, left to right, in the digits in force."""
     v = [mpmath.mpf(1)] + [mpmath.mpf(0)] * (len(masses) - 1)
-    masses, e = [mpmath.mpf(m) for m in masses], mpmath.mpf(e)
+    masses, e = [as_meant(m) for m in masses], as_meant(e)
     for c, (a, b) in enumerate(zip(masses, masses[1:])):
         v[c], v[c + 1] = v[c] * (a - e * b) / (a + b), v[c] * (1 + e) * a / (a + b)
     return v
@@ -309,7 +309,7 @@ def handed_on(masses, e):
 
 def equal_elastic(n, ratio):
     """Velocities of n equal elastic balls, the first striking, one ratio: book/beyond.ipynb."""
-    a = mpmath.mpf(ratio)
+    a = as_meant(ratio)
     root = mpmath.sqrt(1 - 2 * a)
     return [-a / (2 - a)] + [mpmath.mpf(0)] * (n - 3) + [(1 - root) / (2 - a), (1 + root) / (2 - a)]
 
@@ -356,8 +356,8 @@ def alternating(masses, restitution):
     ceil(pi / theta) - 1 of them.  Closing speeds map linearly: n impacts are a power of a matrix.
     With e an ulp below 1 another impact may follow.
     """
-    a, b, c = (mpmath.mpf(m) for m in masses)
-    e, f = (mpmath.mpf(x) for x in restitution)
+    a, b, c = (as_meant(m) for m in masses)
+    e, f = (as_meant(x) for x in restitution)
     angle = mpmath.atan(mpmath.sqrt(b * (a + b + c) / (a * c)))
     number = int(mpmath.ceil(mpmath.pi / angle)) - 1
     left = mpmath.matrix([[-e, 0], [(1 + e) * a / (a + b), 1]])

@@ -26,7 +26,9 @@ def solved(masses, velocities, e, ratio, boost=0.0):
 
 
 def verdict(state, kernel=KERNEL):
-    return kernel["certify"](len(state.ball), state.ball, state.contact, state.tally[0])
+    given = len(state.ball), state.ball, state.contact
+    kernel["settle"](*given, state.tally[0].unit)
+    return kernel["certify"](*given, state.tally[0])
 
 
 def pull(state, c, impulse):

@@ -3,13 +3,14 @@
 import math
 from typing import Any, NamedTuple
 
+from cradle.kernel.certificate import certify
 from cradle.kernel.loop import impact
-from cradle.kernel.numbers import ZERO
-from cradle.kernel.record import velocity
+from cradle.kernel.record import settle
 from cradle.kernel.state import (
     FINISHED,
     LIMITS,
     REFUSED,
+    UNSOUND,
     Record,
     State,
     apart,
@@ -90,11 +91,8 @@ def hand_out(k, n, out, ball, contact, tally):
     """Write the outcome of chain k in the caller's units."""
     shift, mass_shift = tally.shift, tally.mass_shift
     out_v, hits = out.v[k], out.hits[k]
-    before = ZERO
     for i in range(n):
-        after = contact[i].p if i < n - 1 else ZERO
-        out_v[i] = velocity(i, before, after, ball, tally.unit)
-        before = after
+        out_v[i] = ball[i].after
     out.collapsed[k] = tally.collapsed
     for c in range(n - 1):
         hits[c] = contact[c].hits
@@ -141,6 +139,10 @@ def batch(begin, resumed, n, inputs, options, out, area, effort):
             return k, REFUSED
         status = impact(n, chain, options.meeting, options.max_events, resumed, state)
         resumed = False
+        settle(n, state.ball, state.contact, state.tally[0].unit)
+        if status == FINISHED:
+            state.tally[0].defect = certify(n, state.ball, state.contact, state.tally[0])
+            status = UNSOUND if state.tally[0].defect > 0 else FINISHED
         hand_out(k, n, out, state.ball, state.contact, state.tally[0])
         if status != FINISHED:
             return k, status

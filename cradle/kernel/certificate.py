@@ -3,7 +3,6 @@
 import math
 
 from cradle.kernel.numbers import ZERO, minus, plus, times
-from cradle.kernel.record import velocity
 from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, PULL, apart
 
 
@@ -14,22 +13,21 @@ def certify(n, ball, contact, tally):
     The loop follows closing speeds and works; velocities come from impulses alone.  So it is a
     check of all of these that the velocities part as the closing speeds say, and that the energy
     lost, the sum of impulse times mean closing speed, is what the contacts keep back, (1 - e^2) of
-    the work that each absorbed.  Momentum is that of the velocities as they are handed out.
+    the work that each absorbed.  Momentum and order are those of
+    the velocities as they are handed out.
     """
     unit = tally.unit
     momentum = terms = grain = 0.0
     lost = kept = absorbed = energy = 0.0
     strongest = weakest = least = 0.0
-    before = ZERO
     speed = plus(ball[0].start, times(minus(ZERO, contact[0].p), ball[0].inverse))
     for i in range(n):
         b = ball[i]
         after = contact[i].p if i < n - 1 else ZERO
-        change = velocity(i, before, after, ball, unit) * unit - b.v * unit
+        change = b.after * unit - b.v * unit
         momentum += b.m.real * change
         terms += b.m.real * (abs(change) + abs(b.start.real)) + abs(after.real)
         grain += b.m.real * 5e-324 * unit  # no finer velocity is a float
-        before = after
         if i == n - 1:
             break
         k, right = contact[i], ball[i + 1]
@@ -38,7 +36,7 @@ def certify(n, ball, contact, tally):
         closing = minus(speed, next_speed).real
         spread = abs(speed.real) + abs(next_speed.real) + tally.fastest
         slack = LIMITS.sound * spread
-        if not (closing <= slack and abs(closing - k.u.real) <= slack):
+        if not (closing <= slack and abs(closing - k.u.real) <= slack and b.after <= right.after):
             return ORDER
         speed = next_speed
         work = 0.5 * k.p.real * (minus(b.start, right.start).real + closing)

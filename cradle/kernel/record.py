@@ -23,6 +23,32 @@ def velocity(i, before, after, ball, unit):
 
 
 @apart
+def settle(n, ball, contact, unit):
+    """Leave the velocities in `after`, in the caller's units.
+
+    Balls that move as one have one velocity: that of the ball which impulses have changed least.
+    """
+    first = 0
+    while first < n:
+        last = best = first
+        least_change = math.inf
+        while True:
+            before = contact[last - 1].p if last > 0 else ZERO
+            impulse = minus(before, contact[last].p if last < n - 1 else ZERO)
+            change = abs(impulse.real * ball[last].inverse.real)
+            if change < least_change:
+                best, least_change = last, change
+            if last == n - 1 or contact[last].u.real != 0.0:
+                break
+            last += 1
+        before = contact[best - 1].p if best > 0 else ZERO
+        v = velocity(best, before, contact[best].p if best < n - 1 else ZERO, ball, unit)
+        for i in range(first, last + 1):
+            ball[i].after = v
+        first = last + 1
+
+
+@apart
 def write(k, kind, c, n, state):
     """Write event number k, with impulses x of the contacts and the velocities that these give."""
     record, tally = state.record, state.tally[0]

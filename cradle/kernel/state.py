@@ -23,7 +23,7 @@ if "jit" not in globals():
         return function
 
     def bare(things: Any) -> Any:
-        """Hand on a sequence; compiled code passes its address alone (`cradle.runtime.addresses`)."""
+        """Hand on a sequence; compiled code passes its address (`cradle.runtime.addresses`)."""
         return things
 
     def door(function: Any) -> Any:
@@ -113,6 +113,7 @@ class Ball:
     start: complex  # and in the chain's own
     m: complex  # mass
     inverse: complex  # 1 / mass
+    after: float  # velocity after the impact, in the caller's units
     pull: complex  # velocity per unit of progress of the ball's run, dv/ds
     ratio: complex  # ratio in force at the ball
     turn: int  # direction: 1 forward, -1 backward, 0 none
