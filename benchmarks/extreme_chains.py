@@ -270,9 +270,10 @@ def compare(trace, known):
     with mpmath.workdps(50):
         off = [abs(mpmath.mpf(a) - b) for a, b in zip(trace.velocities.tolist(), velocities)]
         largest = max(abs(x) for x in velocities) or mpmath.mpf(1)
+        if change is None:  # a limit at rest is at rest to half of the fifty digits
+            largest = largest if largest > mpmath.mpf(10) ** -25 else mpmath.mpf(1)
+            return float(max(off) / largest / EPS), math.nan, math.nan
         error = float(max(off) / largest / EPS)
-        if change is None:
-            return error, math.nan, math.nan
         own = max(a / (EPS * abs(b) + c + TINIEST) for a, b, c in zip(off, velocities, change))
         return error, float(max(change) / largest / EPS), float(own)
 
