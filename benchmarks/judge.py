@@ -4,7 +4,7 @@ Usage::
 
     python benchmarks/judge.py                             # a hundred chains of every family
     python benchmarks/judge.py --family losses --count 10000 --seed 7
-    python benchmarks/judge.py --count 4000 --output data/judge.csv     # some hours
+    python benchmarks/judge.py --count 1000 --seed 2026 --output data/judge.csv     # ten minutes
 
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
 within 600 events.  A float means what it prints as if that is short, see `meaning`: ties of an
