@@ -78,14 +78,19 @@
 
     watch() {
       const redraw = () => this.changed();
-      new ResizeObserver(redraw).observe(this.host);
+      // Only the wall asks for the height, which what is drawn below the cradle changes too.
+      new ResizeObserver(([{ contentRect: { width, height } }]) => {
+        const size = `${width} ${this.full ? height : ""}`;
+        if (size !== this.size) redraw();
+        this.size = size;
+      }).observe(this.host);
       const theme = { attributeFilter: ["data-theme"] };
       // At once: a page that is printed turns light, and waits for no frame.
       const recolour = () => this.draw(this.state.scenery());
       new MutationObserver(recolour).observe(document.documentElement, theme);
       new IntersectionObserver(([entry]) => {
         this.visible = entry.isIntersecting;
-        redraw();
+        this.wake();
       }).observe(this.host);
       document.addEventListener("fullscreenchange", redraw);
       window.addEventListener("beforeprint", () => this.print());
