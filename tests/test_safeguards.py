@@ -88,7 +88,7 @@ NEEDED = {
     "closing speeds that are zero but for rounding": (
         {"tie": 0.0},
         ([1] * 9, [1] + [0] * 8, 1, [0.1, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0.1, 0.1], 0.5),
-        UNSOUND,
+        WRONG,
     ),
     "ratios of zero are far below all others": (
         {"vanishing": 2},

@@ -36,7 +36,9 @@ def certify(n, ball, contact, tally):
         closing = minus(speed, next_speed).real
         spread = abs(speed.real) + abs(next_speed.real) + tally.fastest
         slack = LIMITS.sound * spread
-        if not (closing <= slack and abs(closing - k.u.real) <= slack and b.after <= right.after):
+        if not (closing <= slack and abs(closing - k.u.real) <= slack):
+            return ORDER
+        if (b.after - right.after) * unit > LIMITS.tie * spread:
             return ORDER
         speed = next_speed
         work = 0.5 * k.p.real * (minus(b.start, right.start).real + closing)

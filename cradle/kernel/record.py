@@ -26,23 +26,25 @@ def velocity(i, before, after, ball, unit):
 def settle(n, ball, contact, unit):
     """Leave the velocities in `after`, in the caller's units.
 
-    Balls that move as one have one velocity: that of the ball which impulses have changed least.
+    Balls that move as one, or whose order is lost in the last of 32 digits, have one velocity:
+    that of the ball which impulses have changed least.
     """
+    before = ZERO
+    for i in range(n):
+        after = contact[i].p if i < n - 1 else ZERO
+        ball[i].after = velocity(i, before, after, ball, unit)
+        ball[i].x = times(minus(before, after), ball[i].inverse)
+        before = after
     first = 0
     while first < n:
         last = best = first
-        least_change = math.inf
-        while True:
-            before = contact[last - 1].p if last > 0 else ZERO
-            impulse = minus(before, contact[last].p if last < n - 1 else ZERO)
-            change = abs(impulse.real * ball[last].inverse.real)
-            if change < least_change:
-                best, least_change = last, change
-            if last == n - 1 or contact[last].u.real != 0.0:
-                break
+        while last < n - 1 and (
+            contact[last].u.real == 0.0 or ball[last].after > ball[last + 1].after
+        ):
             last += 1
-        before = contact[best - 1].p if best > 0 else ZERO
-        v = velocity(best, before, contact[best].p if best < n - 1 else ZERO, ball, unit)
+            if abs(ball[last].x.real) < abs(ball[best].x.real):
+                best = last
+        v = ball[best].after
         for i in range(first, last + 1):
             ball[i].after = v
         first = last + 1
