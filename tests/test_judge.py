@@ -58,7 +58,8 @@ def test_no_family_is_left_out():
 
 def test_the_stored_run():
     """Of many chains of every family none was wrong, and most had an exact run with an end."""
-    rows = {row.pop("family"): row for row in csv.DictReader(STORED.open(encoding="utf-8"))}
+    with STORED.open(encoding="utf-8") as file:
+        rows = {row.pop("family"): row for row in csv.DictReader(file)}
     assert list(rows) == list(JUDGED)
     for name, row in rows.items():
         assert list(row) == list(court.WORDS)

@@ -39,7 +39,8 @@ def settle(n, ball, contact, unit):
     while first < n:
         last = best = first
         while last < n - 1 and (
-            contact[last].u.real == 0.0 or ball[last].after > ball[last + 1].after
+            contact[last].u.real == 0.0
+            or (contact[last].u.real < 0.0 and ball[last].after > ball[last + 1].after)
         ):
             last += 1
             if abs(ball[last].x.real) < abs(ball[best].x.real):
