@@ -8,7 +8,7 @@ Usage::
 Strikes: velocities relative to the row, over the striker's, the striking side first.  Lengths in
 Hertz units of the first release, (m v^2 / k)^(2/5); v its striker's speed.  The striker's speed was
 read in part from the sum of momentum: of the five numbers of a release one may not be free, so the
-degrees of freedom printed are too many by up to one a release.
+degrees of freedom are too many by up to one a release.  `strikes` writes data/film_fits.csv.
 """
 
 import csv
@@ -31,6 +31,7 @@ from cradle import (
 
 DATA = Path(__file__).parents[1] / "data"
 READINGS = (1, 2, 3, 4)
+EQUAL = (1, 1, 1, 1, 1)
 SLOWER = 0.766  # strikers of the second release over the one of the first, relative to the row
 
 
@@ -86,29 +87,29 @@ def spheres(speeds, gaps, loss, limit=400.0):
     return state[n:]
 
 
-def by_law(model, restitution, release, apart):
-    """Return velocities of five equal balls; `model(k)` is the law of the balls from k on.
+def by_law(model, restitution, release, apart, masses=EQUAL):
+    """Return velocities of five balls; `model(k)` is the law of the balls from k on.
 
     Strikers that are apart come one after another: all meet in pairs after the first one.
     """
     late = release - 1 if apart else 0
     speeds = [1.0] * (release - late) + [0.0] * (5 - release)
     e = np.broadcast_to(restitution, 4)
-    v = collide(Chain(np.ones(5 - late), speeds, e[late:]), model(late)).velocities
+    v = collide(Chain(masses[late:], speeds, e[late:]), model(late)).velocities
     for k in range(late, 0, -1):
-        chain = Chain(np.ones(6 - k), [1.0, *v], e[k - 1 :])
+        chain = Chain(masses[k - 1 :], [1.0, *v], e[k - 1 :])
         v = collide(chain, SequentialCollisions()).velocities
     return v
 
 
-def ratios(p, e, release, apart, backward=None):
+def ratios(p, e, release, apart, backward=None, masses=EQUAL):
     """Return velocities by the ratios p of balls 2, 3, 4."""
 
     def model(k):
         back = None if backward is None else backward[k:]
         return ImpulseCorrelation(p[k:], back, excess="saturate")
 
-    return by_law(model, e, release, apart)
+    return by_law(model, e, release, apart, masses)
 
 
 def by_spheres(p, release, apart=False):
@@ -138,6 +139,11 @@ LAWS = {
         lambda p, r, a: ratios([p[0]] * 3, p[1], r, a),
         [[0.05, 0.99], [0.12, 0.99], [0.3, 0.98]],
         [(0, 0.5), E],
+    ),
+    "one ratio, e, four masses": (
+        lambda p, r, a: ratios([p[0]] * 3, p[1], r, a, masses=[1, *p[2:]]),
+        [[s, 0.985, 1, 1, 1, 1] for s in (0.05, 0.1, 0.13)],
+        [(0, 0.45), E] + [(0.95, 1.05)] * 4,
     ),
     "three ratios, e": (
         lambda p, r, a: ratios(p[:3], p[3], r, a),
@@ -177,7 +183,8 @@ LAWS = {
     ),
 }  # fmt: skip
 TOGETHER = [name for name in LAWS if name != "spheres, three gaps, A"]
-ONE_BY_ONE = [name for name in LAWS if "four" not in name and "each way" not in name]
+ONE_BY_ONE = [n for n in LAWS if n not in ("three ratios, four e", "three ratios each way, e",
+                                           "spheres, four gaps, A")]  # fmt: skip
 # The number that one release alone depends on: it is fitted to that release even where the others
 # were fitted to the other one.
 OWN = {
@@ -238,25 +245,32 @@ def tuned(law, apart, p, index, data, release):
     return with_number(minimize_scalar(misfit, bounds=around, method="bounded").x)
 
 
+def fits_of(reading, law, apart):
+    """Return rows of a law fitted to both releases, and to one that predicts the other."""
+    data, rows = first_strikes(reading), []
+    count, own = len(LAWS[law][2]), OWN.get((law, apart), {})
+    how = "own gap" if "four gaps" in law else "apart" if apart else "together"
+    for fit, releases in (("both", (1, 2)), ("one", (1,)), ("two", (2,))):
+        p, other = fitted(law, apart, data, releases), 3 - releases[0]
+        free = 10 - count if fit == "both" else 5 - (other in own)
+        if fit != "both" and other in own:
+            p = tuned(law, apart, p, own[other], data, other)
+        p = [float(f"{x:.5g}") for x in p]  # as stored
+        chi = [f"{chi_square(law, p, apart, data, (r,)):.4g}" for r in (1, 2)]
+        rows.append([reading, law, how, fit, free, *chi, " ".join(f"{x:.5g}" for x in p)])
+        print(*rows[-1], sep=", ", flush=True)
+    return rows
+
+
 def strikes():
-    """Fit every law to both releases, and to one to predict the other; write film_fits.csv."""
-    rows = []
-    for reading in (4, 2):
-        data = first_strikes(reading)
-        for apart, laws in ((False, TOGETHER), (True, ONE_BY_ONE)):
-            for law in laws:
-                count, own = len(LAWS[law][2]), OWN.get((law, apart), {})
-                for fit, releases in (("both", (1, 2)), ("one", (1,)), ("two", (2,))):
-                    p, other = fitted(law, apart, data, releases), 3 - releases[0]
-                    free = 10 - count if fit == "both" else 5 - (other in own)
-                    if fit != "both" and other in own:
-                        p = tuned(law, apart, p, own[other], data, other)
-                    p = [float(f"{x:.5g}") for x in p]  # as stored
-                    chi = [f"{chi_square(law, p, apart, data, (r,)):.4g}" for r in (1, 2)]
-                    how = "own gap" if "four gaps" in law else "apart" if apart else "together"
-                    row = [reading, law, how, fit, free, *chi, " ".join(f"{x:.5g}" for x in p)]
-                    rows.append(row)
-                    print(*row, sep=", ", flush=True)
+    """Fit every law to readings 4 and 2; write film_fits.csv."""
+    rows = [
+        row
+        for reading in (4, 2)
+        for apart, laws in ((False, TOGETHER), (True, ONE_BY_ONE))
+        for law in laws
+        for row in fits_of(reading, law, apart)
+    ]
     with (DATA / "film_fits.csv").open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
 
