@@ -31,7 +31,8 @@ def rows(cell):
     for line in CHAPTER.printed(cell).splitlines()[1:]:
         words = line.split()
         numbers = [word for word in words if word.lstrip("-").replace(".", "", 1).isdigit()]
-        found[" ".join(words[: len(words) - len(numbers)])] = [float(x) for x in numbers]
+        if numbers:
+            found[" ".join(words[: len(words) - len(numbers)])] = [float(x) for x in numbers]
     return found
 
 
