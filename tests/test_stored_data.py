@@ -16,7 +16,7 @@ MEASURED = (
     "cradle_*.csv",
     "explorer_speed.csv",
     "extremes_*.csv",
-    "film_strikes.csv",
+    "film_*.csv",
     "implied_ratio.csv",
     "long_chains.csv",
     "scene_*.csv",
