@@ -104,7 +104,10 @@ def growth(_):
 
 
 def unequal(_):
-    for family, n, ratio in itertools.product(x.UNEQUAL, (20, 40, 80), (0.1, 0.2, 0.3, 0.45)):
+    # Of the last two families 80 balls need more than five million steps.
+    sizes = {family: (20, 40, 80) if "1 kg" in family else (20, 40) for family in x.UNEQUAL}
+    cases = [(family, n) for family in sizes for n in sizes[family]]
+    for (family, n), ratio in itertools.product(cases, (0.1, 0.2, 0.3, 0.45)):
         change = x.unequal_jumps(family, n, ratio)
         yield (
             family,
