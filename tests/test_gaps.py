@@ -9,9 +9,19 @@ import numpy as np
 import pytest
 import real_cradles
 from chains import HERTZ
+from chapters import Chapter
 
-from cradle import Chain, EnergyDistribution, SequentialCollisions, collide, paper_chain
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    collide,
+    paper_chain,
+    ratio_table,
+)
 
+CHAPTER = Chapter("experiments")
 DATA = Path(__file__).parents[1] / "data"
 
 
@@ -92,4 +102,24 @@ def test_what_the_chapter_says():
     assert rms["with_own_quotient"] < rms["stiffness_of_pair"] / 2 < rms["one_ratio"] / 2
     quotient = {r["triplet"]: float(r["own_quotient"]) for r in rows}
     product = [quotient[t] * quotient[t[::-1]] for t in quotient if t[0] < t[2]]
-    assert np.median(product) > 10
+    told = {name.removeprefix("scored-"): text for name, text in CHAPTER.glued.items()}
+    assert float(told["product"]) == pytest.approx(np.median(product), abs=0.5)
+    assert int(told["stiffer"]) == sum(q > 1 for q in quotient.values())
+    # F = k s^1.5 with s = .1 (m v^2 / k)^.4 and v = 1: F = .1^1.5 k^.4 m^.6.
+    k = 4 / 3 * 210e9 / 1.82 * np.sqrt((0.135 / (4 * np.pi * 7800)) ** (1 / 3) / 2)
+    assert float(told["lean-force"]) == pytest.approx(0.1**1.5 * k**0.4 * 0.045**0.6, abs=0.5)
+    lively = [set(r["triplet"]) <= set("AD") for r in rows]
+    spheres = column["energy_hertz"][lively]
+    assert float(told["lively"]) == pytest.approx(np.sqrt((spheres**2).mean()), abs=6e-4)
+
+
+def test_ratio_of_touching_spheres():
+    """ADD by another integration: 51 entries of Table 2 lie above what elastic spheres imply."""
+    rows = {r["triplet"]: float(r["implied"]) for r in table("gaps_triplets.csv")}
+    listed = ratio_table().set_index("triplet")["ratio"]
+    above = sum(listed[t] > ratio for t, ratio in rows.items())
+    assert int(CHAPTER.glued["scored-above-spheres"]) == above
+    masses = gaps.of_triplets(["ADD"])[0]
+    after = gaps.strike(masses, [1, 0, 0], 1.0, [[0, 0]])
+    held = collide(Chain(masses[0], [1, 0, 0], 1), ImpulseCorrelation(rows["ADD"])).velocities
+    np.testing.assert_allclose(after[0], held, atol=5e-4)
