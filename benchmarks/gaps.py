@@ -59,7 +59,8 @@ def strike(masses, velocities, restitution, gaps, stiffness=1.0, step=0.02, long
     nothing pushes any more, goes on as pairs, one after the other.
     """
     m, v, e, s = (np.asarray(x, float) for x in (masses, velocities, restitution, gaps))
-    row = np.broadcast_shapes(m.shape, v.shape, (*s.shape[:-1], m.shape[-1]))
+    balls = m.shape[-1]
+    row = np.broadcast_shapes(m.shape, v.shape, *((*x.shape[:-1], balls) for x in (e, s)))
     m, v = np.broadcast_to(m, row), np.array(np.broadcast_to(v, row))
     s = -np.array(np.broadcast_to(s, (*row[:-1], row[-1] - 1)))
     e = np.broadcast_to(e, s.shape)

@@ -23,9 +23,14 @@ def verdicts():
     return rows
 
 
-def first_of(rule):
-    """The least e of the page's grid with a property that holds from there on."""
-    return next(e for e in np.round(np.arange(0.71, 1, 0.02), 2) if rule(e))
+E = np.round(np.arange(0.71, 1, 0.02), 2)
+
+
+def from_where(agrees):
+    """The least e of the page's grid from which on all agree."""
+    first = int(np.argmax(agrees))
+    assert agrees[first:].all()
+    return f"e ≥ {E[first]:.2f}"
 
 
 def test_who_goes_back():
@@ -33,18 +38,16 @@ def test_who_goes_back():
     row = verdicts()["1 striker goes back"]
     assert row["pairs"] == "no"
     assert row["one body"] == row["convex"] == "yes"
-    assert row["ratio"] == f"e ≥ {first_of(lambda e: e > 1 - 0.15):.2f}"
-    spheres = first_of(lambda e: gaps.strike([1] * 3, [1, 0, 0], e, [0, 0])[0] < 0)
-    assert row["spheres"] == f"e ≥ {spheres:.2f}"
+    assert row["ratio"] == from_where(E > 1 - 0.15)
+    spheres = gaps.strike([1] * 3, [1, 0, 0], E[:, None], [0, 0])
+    assert row["spheres"] == from_where(spheres[:, 0] < 0)
 
 
 def test_who_follows():
-    def follows(e):
-        *behind, fourth, last = gaps.strike([1] * 5, np.eye(5)[0], e, [0] * 4)
-        return last > fourth > 1.5 * np.abs(behind).max()
-
+    *behind, fourth, last = gaps.strike([1] * 5, np.eye(5)[0], E[:, None], [0] * 4).T
     row = verdicts()["5 last but one follows"]
-    assert row["spheres"] == f"e ≥ {first_of(follows):.2f}"
+    agrees = (last > fourth) & (fourth > 1.5 * np.abs(behind).max(axis=0))
+    assert row["spheres"] == from_where(agrees)
     assert row["pairs"] == row["one body"] == "no"
 
 
