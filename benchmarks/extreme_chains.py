@@ -345,6 +345,30 @@ def perturbed(spread, n, e, size):
     return off.max(axis=-1), np.array(leading)
 
 
+UNEQUAL = {
+    # name: masses of n balls, and by which part each is off
+    "1 kg, off by 1 %": (lambda n: np.ones(n), 0.01),
+    "1 kg, off by 10 %": (lambda n: np.ones(n), 0.1),
+    "1 and 0.3 kg in turn, off by 10 %": (lambda n: np.where(np.arange(n) % 2, 0.3, 1.0), 0.1),
+    "each 2 % lighter, off by 10 %": (lambda n: np.cumprod([1.0, *[0.98] * (n - 1)]), 0.1),
+}
+
+
+def unequal_jumps(family, n, ratio, chains=24, size=1e-12, e=0.9):
+    """Change of a velocity, one a chain, if every input of unequal rows changes by the part `size`.
+
+    The first ball strikes; ratios above their bounds are held.
+    """
+    masses, spread = UNEQUAL[family]
+    rng = np.random.default_rng([2001, n, round(1000 * ratio)])
+    masses = masses(n) * uniform(rng, 1 - spread, 1 + spread, (chains, n))
+    velocities = np.tile(np.eye(n)[0], (chains, 1))
+    parts = [masses, velocities, np.full((chains, n - 1), e), np.full((chains, n - 2), ratio)]
+    changed = [part * (1 + size * rng.choice([-1, 1], part.shape)) for part in parts]
+    one, other = (post_impact_velocities(*p, excess="saturate") for p in (parts, changed))
+    return np.abs(other - one).max(axis=-1)
+
+
 # --- a light ball between two heavy ones -------------------------------------------------------
 
 

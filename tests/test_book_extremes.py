@@ -225,6 +225,24 @@ def test_fig_extremes_growth(glued):
             assert r["size"] in ("1e-12", "1e-09")
 
 
+def test_fig_extremes_unequal(glued, figures):
+    rows = stored("unequal")
+    families = list(dict.fromkeys(r["family"] for r in rows))
+    for name, family, balls, ratio in (
+        ("ten", families[1], "80", "0.3"),
+        ("most", families[1], "80", "0.45"),
+        ("turn", families[2], "40", "0.45"),
+    ):
+        (row,) = (
+            r for r in rows if (r["family"], r["balls"], r["ratio"]) == (family, balls, ratio)
+        )
+        assert glued[f"jump-{name}"] == f"{row['jumps']} of 24 rows"
+    for ax, family in zip(figures["fig-extremes-unequal"].axes, families, strict=True):
+        shown = np.concatenate([np.asarray(b.lines[0].get_ydata(), float) for b in ax.containers])
+        expected = [float(r["median"]) for r in rows if r["family"] == family]
+        np.testing.assert_allclose(np.sort(shown), np.sort(expected))
+
+
 def test_table_of_cost():
     rows = stored("cost")
     for point, (masses, e, ratio) in x.POINTS.items():

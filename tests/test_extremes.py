@@ -256,6 +256,20 @@ def test_growth_of_a_perturbation():
             assert leading.min() == row["leading"]
 
 
+def test_unequal_rows_jump_at_large_ratios():
+    """Where nothing jumps the numbers come again; where all do, they do so again."""
+    rows = {(r["family"], r["balls"], r["ratio"]): r for r in stored("unequal")}
+    assert len(rows) == 40
+    calm, wild = ("1 kg, off by 1 %", 40, 0.1), ("1 and 0.3 kg in turn, off by 10 %", 40, 0.45)
+    change = x.unequal_jumps(calm[0], 40, 0.1)
+    assert np.median(change) == pytest.approx(rows[calm]["median"], rel=0.2)
+    assert change.max() < 1e-10
+    assert (x.unequal_jumps(wild[0], 40, 0.45) > 1e-6).sum() >= 20
+    for (_, _, ratio), row in rows.items():
+        assert row["jumps"] == 0 or ratio > 0.2
+        assert (row["largest"] > 1e-6) == (row["jumps"] > 0)
+
+
 # --- a light ball between two heavy ones -------------------------------------------------------
 
 

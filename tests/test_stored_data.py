@@ -17,6 +17,7 @@ MEASURED = (
     "explorer_speed.csv",
     "extremes_*.csv",
     "film_*.csv",
+    "gaps_*.csv",
     "implied_ratio.csv",
     "long_chains.csv",
     "scene_*.csv",
