@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +46,8 @@ def _most_events(n: int) -> int:
 #: What is asked of a ratio.
 _RANGE = ("must lie in [0, 1]", 0.0, 1.0)
 _KINDS = ("maximum_compression", "end", "close", "collapse", "repetition")
+# Each event once: the same ones come again and again.
+_event = functools.cache(lambda kind, contact: Event(_KINDS[kind], contact))
 
 
 @dataclass(frozen=True)
@@ -180,7 +183,7 @@ class ImpulseCorrelation:
         kept = min(count, len(written.kinds))
         if job.status == UNFINISHED:
             kept = min(kept, _UNFINISHED_EVENTS)
-        kinds = map(_KINDS.__getitem__, written.kinds[:kept].tolist())
+        events = map(_event, written.kinds[:kept].tolist(), written.contacts[:kept].tolist())
         return Trace(
             chain=chain,
             model=self,
@@ -190,7 +193,7 @@ class ImpulseCorrelation:
             collisions=results.hits[0],
             path=written.velocities[: kept + 1],
             path_impulses=written.impulses[: kept + 1],
-            events=tuple(map(Event, kinds, written.contacts[:kept].tolist())),
+            events=tuple(events),
             collapsed=bool(results.collapsed[0]),
             saturated=tuple(c for c, held in enumerate(results.held.tolist()) if held),
             margin=job.tally("margin"),
