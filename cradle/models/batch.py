@@ -7,7 +7,6 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -284,6 +283,8 @@ def _in_order(
     elif len(starts) < 2 or (workers := min(len(starts), os.cpu_count() or 1)) < 2:
         yield from map(solve, starts)
     else:
+        from concurrent.futures import ThreadPoolExecutor
+
         stop = threading.Event()
         with ThreadPoolExecutor(workers) as pool:
             try:

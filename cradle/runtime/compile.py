@@ -11,15 +11,12 @@ import ast
 import contextlib
 import contextvars
 import functools
-import hashlib
 import importlib.util
 import logging
 import os
 import sys
-import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -65,7 +62,7 @@ def unit() -> str:
     """Return the rooms of the kernel as one source, without comments and docstrings."""
     body: list[ast.stmt] = []
     for room in plain.ROOMS:
-        tree = ast.parse((files(plain) / f"{room}.py").read_text(encoding="utf-8"))
+        tree = ast.parse(Path(plain.__file__).with_name(f"{room}.py").read_text(encoding="utf-8"))
         for node in ast.walk(tree):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
                 first = node.body[0]
@@ -105,6 +102,8 @@ def _compilable() -> str:
 
 
 def _name() -> str:
+    import hashlib
+
     told = f"{_compilable()}{_MEANINGS}"
     return f"cradle_kernel_{hashlib.sha256(told.encode()).hexdigest()[:16]}"
 
@@ -125,6 +124,8 @@ def _folder() -> Path:
 @functools.cache
 def _stored() -> Path | None:
     """Write the unit where compiled code can be kept beside it; None if that cannot be written."""
+    import tempfile
+
     try:
         path = _folder() / f"{_name()}.py"
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -307,8 +307,8 @@ class Account:
         gaps = self.hanging.gaps + (x[:, 1:] - x[:, :-1])
         sound = gaps >= -self.overlap
         if not sound.all():
-            sound, worst = sound.all(axis=-1), -gaps.min(axis=-1)
-            _refuse(sound, begin + times, "balls overlap by {:g} m", worst)
+            worst = -gaps.min(axis=-1)
+            _refuse(sound.all(axis=-1), begin + times, "balls overlap by {:g} m", worst)
         gain = self.hanging.energy(x, v) - self.energy
         wrong = gain if self.damped else np.abs(gain)
         sound = np.asarray(wrong <= RADIAN * (1.0 + times * self.hanging.fastest) * self.energy)
