@@ -5,12 +5,10 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, NamedTuple, NoReturn
+from importlib.resources.abc import Traversable
+from typing import NamedTuple, NoReturn
 
 from cradle.input.values import one_number
-
-if TYPE_CHECKING:
-    from importlib.resources.abc import Traversable
 
 
 class Line(NamedTuple):

@@ -90,7 +90,7 @@ def _march(
             return math.inf
         waves = [(c, rate, cmath.exp(rate * time)) for c, rate in terms]
         if parting:  # f(0) = 0: the difference from the start keeps its digits
-            value = sum((c * _exp_minus_one(rate * time)).real for c, rate in terms)
+            value = sum((c * complex(np.expm1(rate * time))).real for c, rate in terms)
             noise = 4e-16 * bounds.plain[0] * time
         else:
             value = level + sum((c * wave).real for c, _, wave in waves)
@@ -101,7 +101,9 @@ def _march(
         if value <= noise and (slope < 0.0 or value < -noise):
             return time
         second, *others = (left * bound for bound in bounds.after(time))
-        step = _safe_step(max(value, noise), slope, second)
+        value = max(value, noise)
+        root = math.sqrt(slope * slope + 2.0 * second * value)
+        step = (root + slope) / second if slope > 0.0 else 2.0 * value / (root - slope)
         # Where it rises more and more, the next terms of Taylor's series carry further.
         for order, (derivative, bound) in enumerate(zip(higher, others, strict=True), start=2):
             if min(slope, derivative) < 0.0:
@@ -143,12 +145,6 @@ class _Bounds:
         ]
 
 
-def _safe_step(value: float, slope: float, bound: float) -> float:
-    """Return how far the parabola ``value + slope h - bound h^2 / 2`` stays above zero."""
-    root = math.sqrt(slope * slope + 2.0 * bound * value)
-    return (root + slope) / bound if slope > 0.0 else 2.0 * value / (root - slope)
-
-
 def _first_step(terms: Sequence[tuple[complex, complex]], bounds: _Bounds) -> float:
     """Return a step that passes no root, for a function that rises from exactly zero.
 
@@ -160,11 +156,6 @@ def _first_step(terms: Sequence[tuple[complex, complex]], bounds: _Bounds) -> fl
         if derivative > _ROUNDING * bounds.plain[order - 1]:
             return (order + 1) * derivative / bound
     return TIE / max(abs(rate) for _, rate in terms)
-
-
-def _exp_minus_one(z: complex) -> complex:
-    """Return exp(z) - 1 without cancellation."""
-    return complex(np.expm1(z))
 
 
 class _Bodies(NamedTuple):
