@@ -16,6 +16,7 @@ from cradle import (
     SpringChain,
     collide,
     post_impact_velocities,
+    swing,
 )
 from cradle.closed_form import three_balls
 from cradle.runtime import compile as runtime
@@ -397,8 +398,35 @@ def outcome_rows(clock, _):
             )
 
 
+def door_rows(clock, _):
+    """Yield what surrounds an impact: a chain that is made, a strike of a swing to its end."""
+    scene = SCENES["five equal"]
+    m, v, e = (part.tolist() for part in (scene.masses, scene.velocities, scene.restitution))
+    still, times = Chain(m, [0.0] * len(m), e), [0.0, 10.0]
+
+    def swings():
+        return swing(still, scene.model, [-0.02, *[0.0] * (len(m) - 1)], times)
+
+    strikes = len(swings().impacts)
+    for setting, function, count in (
+        ("a chain of lists", lambda: Chain(m, v, e), 1),
+        ("one strike of a swing", swings, strikes),
+    ):
+        yield Row(
+            group="door",
+            model="ImpulseCorrelation",
+            setting=setting,
+            chain=scene.name,
+            needs="e, ratios",
+            gives="the chain" if count == 1 else f"{PATH}, flights",
+            versions=ours(),
+            **clock(function, count),
+        )
+
+
 FAMILIES = (
-    event_rows, march_rows, closed_form_rows, spring_rows, penalty_rows, energy_rows, outcome_rows
+    event_rows, march_rows, closed_form_rows, spring_rows, penalty_rows, energy_rows, outcome_rows,
+    door_rows,
 )  # fmt: skip
 
 

@@ -14,8 +14,15 @@ from cradle.input.values import (
     checked,
     checked_masses,
     checked_restitution,
+    numbers,
     refuse_overflow,
 )
+from cradle.kernel.state import LIMITS
+
+
+def _within(values: Vector, low: float, high: float) -> bool:
+    """Tell whether all values are usual ones, of which nothing need be asked."""
+    return all(low <= value <= high for value in values.ravel().tolist())
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -59,30 +66,47 @@ class Chain:
     def __init__(
         self, masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike = 1.0
     ) -> None:
-        m = checked_masses(masses)
+        m = numbers("masses", masses)
+        usual = _within(m, 1e-70, 1e70)
+        if not usual:
+            m = checked_masses(m)
         if m.ndim != 1 or m.size < 2:
             raise ValueError(
                 f"masses has shape {m.shape}; a chain needs (N,) with N >= 2: "
                 "one row of two or more numbers"
             )
-        v = checked("velocities", velocities)
+        v = numbers("velocities", velocities)
+        if not _within(v, -1e70, 1e70):
+            v, usual = checked("velocities", v), False
         if v.shape != m.shape:
             raise ValueError(
                 f"velocities has shape {v.shape}; {m.size} masses need ({m.size},): "
                 f"one velocity for each of {m.size} balls"
             )
-        refuse_overflow(v, m)
-        e = checked_restitution(restitution)
+        if not usual:
+            refuse_overflow(v, m)
+        e = numbers("restitution", restitution)
+        if not _within(e, LIMITS.least_restitution, 1.0):
+            e = checked_restitution(e)
         if e.shape not in ((), (m.size - 1,)):
             contacts = "1 contact" if m.size == 2 else f"{m.size - 1} contacts"
             raise ValueError(
                 f"restitution has shape {e.shape}; {m.size} balls need () or ({m.size - 1},): "
                 f"{m.size} balls have {contacts}, restitution needs one number or {m.size - 1}"
             )
-        e = np.broadcast_to(e, (m.size - 1,)).copy()
-        for name, value in (("masses", m), ("velocities", v), ("restitution", e)):
+        self._keep(np.array(m), np.array(v), np.full(m.size - 1, e))
+
+    @classmethod
+    def _of(cls, masses: Vector, velocities: Vector, restitution: Vector) -> Chain:
+        """Return the chain of new arrays, or parts of a chain's, without asking them again."""
+        chain = object.__new__(cls)
+        chain._keep(masses, velocities, restitution)
+        return chain
+
+    def _keep(self, *values: Vector) -> None:
+        for name, value in zip(("masses", "velocities", "restitution"), values, strict=True):
             value.flags.writeable = False
-            object.__setattr__(self, name, value)
+            vars(self)[name] = value
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Make copies through the constructor: they are frozen too."""

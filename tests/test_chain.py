@@ -7,7 +7,13 @@ import re
 import numpy as np
 import pytest
 
-from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
+from cradle import (
+    Chain,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    collide,
+    post_impact_velocities,
+)
 
 GOOD = {"masses": [1, 2, 3], "velocities": [1, 0, -1], "restitution": [0.5, 1]}
 
@@ -165,6 +171,48 @@ def test_lengths_are_told_without_shapes_too(values, words):
         Chain(**(GOOD | values))
     with pytest.raises(ValueError, match="2 balls have 1 contact, restitution needs one number or"):
         Chain([1, 1], [1, 0], [1, 1])
+
+
+#: Of usual values nothing more is asked; these lie just beyond, and have to be asked.
+UNUSUAL = [
+    ({"masses": [1e70, 1e71, 1e-81]}, "masses[2] = 1e-81; must be at least 1e-150 of the heaviest"),
+    ({"velocities": [1, 0, -1e160]}, "velocities[2] = -1e+160; kinetic energy overflows"),
+    ({"masses": [1e200] * 3, "velocities": [1e70, 0, 0]}, "velocities[0] = 1e+70; kinetic energy"),
+    ({"restitution": [1, 1e-31]}, "restitution[1] = 1e-31; must be 0 or at least 1e-30"),
+    ({"restitution": np.nextafter(1, 2)}, "restitution = 1.0000000000000002; must lie in [0, 1]"),
+]
+
+
+@pytest.mark.parametrize(("values", "words"), UNUSUAL)
+def test_unusual_values_are_asked(values, words):
+    with pytest.raises(ValueError, match="^" + re.escape(words)):
+        Chain(**(GOOD | values))
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_unusual_values_that_are_good_are_kept(name):
+    value = {"masses": 1e-80, "velocities": 1e80, "restitution": 0.0}[name]
+    values = [value] * len(GOOD[name])
+    assert getattr(Chain(**(GOOD | {name: values})), name).tolist() == values
+
+
+@pytest.mark.parametrize(
+    ("part", "words"),
+    [
+        ({"velocities": [1, np.nan, 0]}, "velocities[1] = nan; must be finite"),
+        ({"velocities": [1e160, 0, 0]}, "velocities[0] = 1e+160; kinetic energy overflows"),
+        ({"masses": [1, -1, 1]}, "masses[1] = -1.0; must be above 0"),
+        ({"restitution": [1, 1.5]}, "restitution[1] = 1.5; must lie in [0, 1]"),
+    ],
+)
+@pytest.mark.parametrize("model", [ImpulseCorrelation(0.1), SequentialCollisions("right")])
+def test_a_chain_that_was_not_asked_is_refused_where_it_is_solved(part, words, model):
+    """Such as a part of a swing: the event loop asks, and the words are those of `Chain`."""
+    values = {name: np.array(value, float) for name, value in (GOOD | part).items()}
+    chain = Chain._of(*values.values())
+    name = words[: words.index("[")]
+    with pytest.raises(ValueError, match=f"^{name}.*" + re.escape(words[words.index(";") :])):
+        collide(chain, model)
 
 
 # --- equality, defaults --------------------------------------------------------------------

@@ -2,9 +2,7 @@
 
 import ast
 import builtins
-import contextlib
 import functools
-import gc
 import logging
 import os
 import signal
@@ -260,44 +258,11 @@ def test_threads_share_what_is_compiled(monkeypatch):
     assert len(modules) == 1
 
 
-@pytest.mark.parametrize(("usual", "fewer"), [(700, 300_000), (10**6, 10**6), (0, 0)])
-def test_garbage_is_looked_for_less_often_by_threads_together(usual, fewer):
-    """Each one puts back what was there before the first."""
-    before, seen = gc.get_threshold(), set()
-
-    def work(_):
-        with runtime.few_collections():
-            time.sleep(0.02)
-            seen.add(gc.get_threshold()[0])
-
-    try:
-        gc.set_threshold(usual)
-        with ThreadPoolExecutor(4) as pool:
-            list(pool.map(work, range(4)))
-        assert (seen, gc.get_threshold()[0]) == ({fewer}, usual)
-    finally:
-        gc.set_threshold(*before)
-
-
-@needs_numba
-@pytest.mark.usefixtures("plain")
-def test_garbage_is_looked_for_less_often_only_while_compiling(monkeypatch):
-    calls = []
-    monkeypatch.setattr(
-        runtime, "few_collections", lambda: contextlib.nullcontext(calls.append("compiles"))
-    )
-    for known in (False, True):
-        monkeypatch.setattr(runtime, "loaded", lambda known=known: known)
-        collide(Chain([1, 1], [1, 0], 1), ImpulseCorrelation(0))
-        assert calls == ["compiles"]
-
-
 @needs_numba
 @pytest.mark.usefixtures("plain")
 def test_warm_up_compiles():
     drive.warm_up()
     assert runtime.loaded()
-    assert runtime.ready()
     assert runtime.chosen() is runtime.compiled()
 
 

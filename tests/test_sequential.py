@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from chains import magnitudes, uniform
 
-from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide
+from cradle import Chain, ImpactNotFinished, collide
 from cradle.models.sequential import FusedChain, SequentialCollisions
 
 ARRAYS = ("velocities", "impulses", "absorbed", "collisions", "path", "path_impulses")
@@ -171,22 +171,6 @@ def test_fused_bodies_collide_like_two_balls(n):
         assert trace.energy_loss == pytest.approx(lost, abs=1e-14 * chain.kinetic_energy)
         assert trace.events[:2] == (("maximum_compression", struck), ("end", struck))
         assert trace.path[1].tolist() == pytest.approx(np.full(n, m @ v / m.sum()).tolist())
-
-
-@pytest.mark.parametrize("n", range(2, 7))
-def test_fused_is_the_largest_admissible_ratio_everywhere(n):
-    rng = np.random.default_rng(n)
-    largest = ImpulseCorrelation(1, 1, excess="saturate")
-    for struck in range(n - 1):
-        v = np.where(np.arange(n) <= struck, 1.0, 0.0)
-        chain = Chain(magnitudes(rng, 2, n), v, uniform(rng, 0, 1, n - 1))
-        fused, expected = collide(chain, FusedChain()), collide(chain, largest)
-        for name in ARRAYS:
-            np.testing.assert_allclose(
-                getattr(fused, name), getattr(expected, name), rtol=1e-12, atol=1e-13
-            )
-        assert sorted(fused.events) == sorted(expected.events)
-        assert fused.saturated == expected.saturated
 
 
 def test_fused_masses_whose_sum_overflows():

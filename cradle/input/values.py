@@ -245,7 +245,6 @@ def number_or_row(
 
 def row_of(name: str, kept: float | Sequence[float], size: int, balls: int) -> Vector:
     """Return what `number_or_row` kept as a row for a chain."""
-    row = np.asarray(kept, dtype=np.float64)
-    if row.ndim and row.size != size:
-        raise ValueError(f"{name} has {row.size} values; {balls} balls need {size}, or one number")
-    return np.broadcast_to(row, (size,)).copy()
+    if not isinstance(kept, float) and len(kept) != size:
+        raise ValueError(f"{name} has {len(kept)} values; {balls} balls need {size}, or one number")
+    return np.full(size, kept)

@@ -5,19 +5,11 @@ from __future__ import annotations
 import functools
 import inspect
 import warnings
-from typing import Protocol, cast
+from typing import Protocol
 
 from cradle.chain import Chain
 from cradle.input.values import a, must_be
 from cradle.trace import Trace
-
-
-class LongModel(Protocol):
-    """A model whose impacts may be long: it can leave the path out, and show its progress."""
-
-    def solve(self, chain: Chain, *, record: bool | None = None, progress: bool = False) -> Trace:
-        """Return the outcome of the impact of `chain`, with or without its path."""
-        ...
 
 
 class Model(Protocol):
@@ -78,16 +70,18 @@ def collide(
         raise TypeError(f"model is the class {model.__name__}; must be made: {model.__name__}(...)")
     if not hasattr(model, "solve"):
         raise TypeError(f"model is {a(type(model).__name__)}; must be an impact model")
-    kind = type(model)
-    if record is not None and not _takes(kind, "record"):
-        raise TypeError(f"{kind.__name__} always keeps its path: record does not apply")
-    if record is None and not (progress and _takes(kind, "progress")):
-        trace = model.solve(chain)
-    else:
-        trace = cast("LongModel", model).solve(chain, record=record, progress=progress)
+    options: dict[str, bool] = {}
+    if record is not None:
+        if not _takes(type(model), "record"):
+            raise TypeError(f"{type(model).__name__} always keeps its path: record does not apply")
+        options["record"] = record
+    if progress and _takes(type(model), "progress"):
+        options["progress"] = True
+    trace = model.solve(chain, **options)
     if record is None and trace.left_out:
         kept = len(trace.events)
-        advice = "; record=True keeps all, record=False none" if _takes(kind, "record") else ""
+        takes = _takes(type(model), "record")
+        advice = "; record=True keeps all, record=False none" if takes else ""
         warnings.warn(
             f"the path holds the first {kept} of {kept + trace.left_out} events{advice}",
             stacklevel=2,

@@ -7,7 +7,6 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,7 +22,7 @@ from cradle.input.values import (
     refuse_overflow,
     shown,
 )
-from cradle.kernel import Inputs, Options
+from cradle.kernel import Inputs, Options, Outputs
 from cradle.models.correlation import (
     MAX_EVENTS,
     ImpulseCorrelation,
@@ -33,7 +32,7 @@ from cradle.models.correlation import (
     refuse_light,
 )
 from cradle.progress import progress_bar
-from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job
+from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
 from cradle.trace import ImpactNotCertified
 
 if TYPE_CHECKING:
@@ -229,8 +228,9 @@ def outcomes(
                 f"{list(given)[k]} has shape {arrays[k].shape}; "
                 f"must be () or (..., {size}) for {n} balls"
             )
+    leads = {array.shape[:-1] for array in arrays}
     try:
-        lead = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+        lead = leads.pop() if len(leads) == 1 else np.broadcast_shapes(*leads)
     except ValueError:
         shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
         raise ValueError(f"leading axes do not broadcast: {shapes}") from None
@@ -238,18 +238,17 @@ def outcomes(
     count, chunk = math.prod(lead), _chunk(n)
     if count == 0:
         _check(given, excess)
-    out = np.empty((count, n))
-    hits = np.empty((count, n - 1), dtype=np.int64)
-    collapsed = np.empty(count, dtype=np.int64)
+    whole = outputs(count, n)
     options = Options(float(meeting), int(max_events), excess == "raise")
     large = count * n >= LARGE
 
-    def solve(begin: int, stop: threading.Event) -> tuple[int, int]:
+    def solve(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
         """Solve the chunk of chains that begins there; return how it ended, and where."""
         rows = slice(begin, min(begin + chunk, count))
         part = Inputs(*(_rows(array, lead, rows) for array in arrays))
-        job = Job(part, rows.stop - begin, options, large=large).run(stop)
-        out[rows], hits[rows], collapsed[rows] = job.outputs[:3]
+        v, hits, collapsed, *last = whole
+        out = Outputs(v[rows], hits[rows], collapsed[rows], *last)
+        job = Job(part, out, options, large=large).run(stop)
         # Not the job: its arrays would wait for those of the chunks before.
         return job.status, begin + job.next
 
@@ -268,22 +267,25 @@ def outcomes(
             chain = Chain(m, v, e)
             model.solve(chain)
             raise ImpactNotCertified(chain, model, "among others it stops, alone it does not")
-    return Outcomes(out.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.reshape(lead) != 0)
+    v, hits, collapsed, *_ = whole
+    return Outcomes(v.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.reshape(lead) != 0)
 
 
 def _in_order(
-    solve: Callable[[int, threading.Event], tuple[int, int]], starts: range, progress: bool
+    solve: Callable[..., tuple[int, int]], starts: range, progress: bool
 ) -> Iterable[tuple[int, int]]:
     """Yield the results of `solve` in order, made by as many threads as there are processors."""
-    stop = threading.Event()
     if progress:
         with progress_bar(total=len(starts), unit="chunk") as bar:
             for ended in _in_order(solve, starts, progress=False):
                 bar.update()
                 yield ended
     elif len(starts) < 2 or (workers := min(len(starts), os.cpu_count() or 1)) < 2:
-        yield from (solve(begin, stop) for begin in starts)
+        yield from map(solve, starts)
     else:
+        from concurrent.futures import ThreadPoolExecutor
+
+        stop = threading.Event()
         with ThreadPoolExecutor(workers) as pool:
             try:
                 yield from pool.map(solve, starts, itertools.repeat(stop))

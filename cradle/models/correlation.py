@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,7 @@ from cradle.input.values import (
 from cradle.kernel import Inputs, Options
 from cradle.kernel.state import LIMITS
 from cradle.progress import progress_bar
-from cradle.runtime.job import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job
+from cradle.runtime.job import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job, outputs
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
 #: Steps after which an impact is given up, unless told otherwise.
@@ -45,6 +46,8 @@ def _most_events(n: int) -> int:
 #: What is asked of a ratio.
 _RANGE = ("must lie in [0, 1]", 0.0, 1.0)
 _KINDS = ("maximum_compression", "end", "close", "collapse", "repetition")
+# Each event once: the same ones come again and again.
+_event = functools.cache(lambda kind, contact: Event(_KINDS[kind], contact))
 
 
 @dataclass(frozen=True)
@@ -141,26 +144,24 @@ class ImpulseCorrelation:
         """
         must_be(Chain, "chain", chain)
         n = len(chain)
-        ratios: list[Vector] = []
-        for name in ("forward", "backward"):
-            given = getattr(self, name)
-            ratios.append(ratios[0] if given is None else row_of(name, given, n - 2, n))
-
-        inputs = Inputs(
-            *(part[None].copy() for part in (chain.masses, chain.velocities, chain.restitution)),
-            *(part[None] for part in ratios),
-        )
+        forward = row_of("forward", self.forward, n - 2, n)
+        given = self.backward
+        backward = forward if given is None else row_of("backward", given, n - 2, n)
+        # Copies: compiled code is made for arrays that may be written to.
+        own = (chain.masses, chain.velocities, chain.restitution, forward, backward)
+        inputs = Inputs(*(part[None].copy() for part in own))
         room = _most_events(n) if record is None else _EVERY if record else 0
         options = Options(self.meeting, self.max_events, self.excess == "raise")
-        job = Job(inputs, 1, options, room)
+        job = Job(inputs, outputs(1, n, last=True), options, room)
         if progress:
             with progress_bar(unit=" events") as bar:
                 job.run(pause=lambda: bar.update(job.tally("events") - bar.n))
         else:
             job.run()
         if job.status == REFUSED:
+            Chain(chain.masses, chain.velocities, chain.restitution)  # a part that nobody asked
             refuse_light(chain.masses)
-            refuse_excess(chain.masses, *ratios)
+            refuse_excess(chain.masses, forward, backward)
             raise AssertionError("the kernel refused a chain that the checks admit")
         trace = self._trace(chain, job)
         if job.status == UNFINISHED:
@@ -176,13 +177,13 @@ class ImpulseCorrelation:
 
     def _trace(self, chain: Chain, job: Job) -> Trace:
         """Return what the event loop left."""
-        results, written = job.outputs, job.record
+        results, written = job.outputs, job.state.record
         written.velocities[0] = chain.velocities
         count = job.tally("events")
         kept = min(count, len(written.kinds))
         if job.status == UNFINISHED:
             kept = min(kept, _UNFINISHED_EVENTS)
-        kinds, contacts = written.kinds[:kept].tolist(), written.contacts[:kept].tolist()
+        events = map(_event, written.kinds[:kept].tolist(), written.contacts[:kept].tolist())
         return Trace(
             chain=chain,
             model=self,
@@ -192,9 +193,9 @@ class ImpulseCorrelation:
             collisions=results.hits[0],
             path=written.velocities[: kept + 1],
             path_impulses=written.impulses[: kept + 1],
-            events=tuple(Event(_KINDS[k], c) for k, c in zip(kinds, contacts, strict=True)),
+            events=tuple(events),
             collapsed=bool(results.collapsed[0]),
-            saturated=tuple(np.flatnonzero(results.held).tolist()),
+            saturated=tuple(c for c, held in enumerate(results.held.tolist()) if held),
             margin=job.tally("margin"),
             left_out=count - kept if kept else 0,  # without a record not all are counted
         )

@@ -16,33 +16,10 @@ from cradle.trace import Event, Trace
 def own_units(
     chain: Chain, stiffness: float | Sequence[float]
 ) -> tuple[Vector, float, float, float]:
-    """Return the stiffnesses, and the units in which a chain of springs is solved.
+    """Return the stiffness of each contact, and the units in which springs are solved.
 
-    Parameters
-    ----------
-    chain : Chain
-        N balls.
-    stiffness : float or sequence, length N - 1
-        Of each contact, N/m^p.
-
-    Returns
-    -------
-    stiffness : ndarray, shape (N - 1,)
-        Of each contact.
-    unit, mass, speed : float
-        Stiffness, reduced mass (kg) and closing speed (m/s) of the contact that closes fastest; the
-        speed is 1 if none moves.
-
-    Raises
-    ------
-    ValueError
-        If there are not as many values as contacts, or the reduced mass of that contact has too few
-        digits left as a float.
-
-    Examples
-    --------
-    >>> own_units(Chain([2, 2], [3, 0]), 5.0)
-    (array([5.]), 5.0, 1.0, 3.0)
+    These are stiffness, reduced mass and closing speed of the contact that closes fastest; the
+    speed is 1 if none moves.
     """
     n, u = len(must_be(Chain, "chain", chain)), chain.closing_speeds
     k = row_of("stiffness", stiffness, n - 1, n)
@@ -59,25 +36,7 @@ def own_units(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class CurvedTrace(Trace):
-    """The path of an impact whose events are joined by smooth curves; N balls, S steps.
-
-    Attributes
-    ----------
-    step_velocities : ndarray, shape (S, N)
-        Velocities at each step of the integration, m/s.
-    step_impulses : ndarray, shape (S, N - 1)
-        Impulses so far at each step, N s.
-    evaluations : int
-        How often the rates of change were evaluated.
-
-    Examples
-    --------
-    >>> from cradle import SpringChain, collide
-    >>> trace = collide(Chain([1, 1], [1, 0]), SpringChain())
-    >>> impulses, velocities = trace.curve()
-    >>> len(velocities) == len(trace.step_velocities) + 1, velocities[-1, 1].round(6).item()
-    (True, 1.0)
-    """
+    """The path of an impact whose events are joined by smooth curves; N balls, S steps."""
 
     step_velocities: Vector
     step_impulses: Vector
@@ -313,15 +272,15 @@ class Motion:
         d[crossed] = 0.0
         u = self.speeds(self.y)
         closed = np.where(self.closed, (d > 0.0) | (u >= 0.0), (d >= 0.0) & (u > 0.0))
-        # Balls that touch at rest feel a push on their neighbour: their contact closes as well.
-        resting = ~closed & (d == 0.0) & (u == 0.0)
-        for c in range(1, len(u)):
-            closed[c] |= resting[c] & closed[c - 1]
-        for c in range(len(u) - 2, -1, -1):
-            closed[c] |= resting[c] & closed[c + 1]
+        self.pass_on(closed, ~closed & (d == 0.0) & (u == 0.0))
         opens, closes = self.closed & ~closed, closed & ~self.closed
         for kind, where in (("end", opens), ("close", closes)):
             self.record += [(self.t, kind, c, self.y) for c in np.flatnonzero(where).tolist()]
         self.collisions += closes
         self.loading = (self.loading & closed) | closes
         self.closed = closed
+
+    def pass_on(self, closed: Vector, resting: Vector) -> None:
+        """Close contacts that touch at rest beside one that pushes on their ball."""
+        for c in [*range(1, len(closed)), *range(len(closed) - 2, -1, -1)]:
+            closed[c] |= resting[c] & closed[max(c - 1, 0) : c + 2].any()

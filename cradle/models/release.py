@@ -166,11 +166,9 @@ class Process(Motion):
         u = self.speeds(self.y)
         touching = d >= 0.0
         closed = ~plastic & np.where(self.closed, (d > 0.0) | (u > 0.0), touching & (u > 0.0))
-        # Balls that touch at rest feel a push on their neighbour: their contact closes as well.
         resting = ~closed & touching & ((u == 0.0) | plastic)
         resting[crossed] |= ~self.closed[crossed]
-        for c in [*range(1, len(u)), *range(len(u) - 2, -1, -1)]:
-            closed[c] |= resting[c] & closed[max(c - 1, 0) : c + 2].any()
+        self.pass_on(closed, resting)
         stay = self.closed & closed & ~plastic
         opens, closes = self.closed & ~stay, closed & ~stay
         self.record += [(self.t, "end", c, self.y) for c in np.flatnonzero(opens).tolist()]

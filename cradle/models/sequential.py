@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.input.values import Vector, must_be, one_of
+from cradle.input.values import must_be, one_of
 from cradle.models.correlation import MAX_EVENTS, ImpulseCorrelation
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -70,35 +71,28 @@ class SequentialCollisions:
 
     def solve(self, chain: Chain) -> Trace:
         """Solve the impact of `chain`; see `collide`."""
-        seen, message, stored = must_be(Chain, "chain", chain), "", None
+        seen = must_be(Chain, "chain", chain)
         if self.order == "right":
             # The leftmost contact of the mirror image is the rightmost of the chain.
-            seen = Chain(chain.masses[::-1], 0.0 - chain.velocities[::-1], chain.restitution[::-1])
+            m, v, e = chain.masses[::-1], 0.0 - chain.velocities[::-1], chain.restitution[::-1]
+            seen = Chain._of(m, v, e)
         try:
             trace = ImpulseCorrelation(0.0, max_events=self.max_events).solve(seen)
         except ImpactNotFinished as stopped:
-            trace, message, stored = stopped.trace, stopped.args[0], stopped.stored
+            reached = self._own(stopped.trace, chain)
+            raise ImpactNotFinished(stopped.args[0], reached, stopped.stored) from None
+        return self._own(trace, chain)
+
+    def _own(self, trace: Trace, chain: Chain) -> Trace:
+        """Return the trace as that of this model, seen from the side from which the chain is."""
+        own: dict[str, Any] = {"chain": chain, "model": self}
         if self.order == "right":
-            trace = _mirrored(trace)
-        trace = replace(trace, chain=chain, model=self)
-        if message:
-            raise ImpactNotFinished(message, trace, stored)
-        return trace
-
-
-def _mirrored(trace: Trace) -> Trace:
-    """Return the trace as seen from the other side of the line of balls."""
-    last = len(trace.impulses) - 1
-    return replace(
-        trace,
-        velocities=0.0 - trace.velocities[::-1],  # no -0.0
-        impulses=trace.impulses[::-1],
-        absorbed=trace.absorbed[::-1],
-        collisions=trace.collisions[::-1],
-        path=0.0 - trace.path[:, ::-1],
-        path_impulses=trace.path_impulses[:, ::-1],
-        events=tuple(Event(kind, last - contact) for kind, contact in trace.events),
-    )
+            turned = ("impulses", "absorbed", "collisions", "path_impulses")
+            own |= {name: getattr(trace, name)[..., ::-1] for name in turned}
+            own |= {name: 0.0 - getattr(trace, name)[..., ::-1] for name in ("velocities", "path")}
+            last = len(trace.impulses) - 1
+            own["events"] = tuple(Event(kind, last - contact) for kind, contact in trace.events)
+        return replace(trace, **own)
 
 
 @dataclass(frozen=True)
@@ -109,8 +103,8 @@ class FusedChain:
     to its right collide like two balls, with the energetic restitution of the struck contact.  The
     other contacts are neither compressed nor opened, so their own restitution has no say: they
     pass on just the impulse that keeps the balls of a body together.  That is the largest
-    admissible ratio at every ball (Eq. 53), so `ImpulseCorrelation(1, 1, excess="saturate")`
-    gives the same, and `Trace.saturated` names those contacts here as there.
+    admissible ratio at every ball (Eq. 53): ``ImpulseCorrelation(1, 1, excess="saturate")`` solves
+    it, and `Trace.saturated` names those contacts.
 
     Raises
     ------
@@ -132,54 +126,15 @@ class FusedChain:
 
     def solve(self, chain: Chain) -> Trace:
         """Solve the impact of `chain`; see `collide`."""
-        n, u, v = len(must_be(Chain, "chain", chain)), chain.closing_speeds, chain.velocities
-        c = _struck(u)
-        path = np.tile(v, (n + 1 if c >= 0 else 1, 1))
-        path_impulses = np.zeros((len(path), n - 1))
-        absorbed = np.zeros(n - 1)
-        events: list[Event] = []
-        inner = [k for k in range(n - 1) if k != c] if c >= 0 else []
-        if c >= 0:
-            unit = np.ldexp(1.0, int(np.frexp(chain.masses.max())[1]) - 1)  # no sum overflows
-            m = chain.masses / unit
-            left, right = m[: c + 1].sum(), m[c + 1 :].sum()
-            reduced = left / (left + right) * right
-            # Each contact passes on the part of its body's mass that lies beyond it.
-            part = np.concatenate(
-                [np.cumsum(m[:c]) / left, [1.0], np.cumsum(m[: c + 1 : -1])[::-1] / right]
+        u = must_be(Chain, "chain", chain).closing_speeds
+        approaching, opening = (np.flatnonzero(where).tolist() for where in (u > 0.0, u < 0.0))
+        if len(approaching) > 1 or (approaching and opening):
+            what = f"contacts {approaching} approach" + (f" and {opening} open" if opening else "")
+            raise ValueError(
+                f"velocities leave it undefined which balls move as one body: {what}; FusedChain "
+                "needs one approaching contact and equal velocities on either side of it"
             )
-            # Row 1 is the maximum compression, the others are the ends, at one instant.
-            for row, impulse in enumerate(
-                reduced * u[c] * np.array([1.0, 1.0 + chain.restitution[c]])
-            ):
-                path[row + 1 :, : c + 1] = v[0] - impulse / left
-                path[row + 1 :, c + 1 :] = v[-1] + impulse / right
-                path_impulses[row + 1 :] = impulse * part * unit
-            absorbed[c] = 0.5 * reduced * unit * u[c] * u[c]
-            events = [Event("maximum_compression", c), *(Event("end", k) for k in (c, *inner))]
-        return Trace(
-            chain=chain,
-            model=self,
-            velocities=path[-1],
-            impulses=path_impulses[-1],
-            absorbed=absorbed,
-            collisions=np.full(n - 1, int(c >= 0)),
-            path=path,
-            path_impulses=path_impulses,
-            events=tuple(events),
-            saturated=tuple(inner),
-        )
+        return replace(_LARGEST.solve(chain), model=self)
 
 
-def _struck(u: Vector) -> int:
-    """Return the one approaching contact, or -1 if no balls approach."""
-    approaching, opening = (np.flatnonzero(where).tolist() for where in (u > 0.0, u < 0.0))
-    if not approaching:
-        return -1
-    if len(approaching) > 1 or opening:
-        what = f"contacts {approaching} approach" + (f" and {opening} open" if opening else "")
-        raise ValueError(
-            f"velocities leave it undefined which balls move as one body: {what}; FusedChain "
-            "needs one approaching contact and equal velocities on either side of it"
-        )
-    return int(approaching[0])
+_LARGEST = ImpulseCorrelation(1.0, 1.0, excess="saturate")

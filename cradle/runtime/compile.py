@@ -11,16 +11,12 @@ import ast
 import contextlib
 import contextvars
 import functools
-import gc
-import hashlib
 import importlib.util
 import logging
 import os
 import sys
-import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -59,26 +55,14 @@ _spent = 0.0  # seconds of plain work so far, in this process
 _look = LOADS_AFTER  # seconds of plain work after which to look for compiled code on disk
 _hurry = contextvars.ContextVar("hurry", default=False)  # a frame of a game cannot wait
 _deciding = threading.Lock()
-_compiling = threading.Lock()
 
 
 @functools.cache
 def unit() -> str:
-    """Return the rooms of the kernel as one source, without comments and docstrings.
-
-    Returns
-    -------
-    str
-        Python source that imports nothing but `math` and `typing`.
-
-    Examples
-    --------
-    >>> "from cradle" in unit()
-    False
-    """
+    """Return the rooms of the kernel as one source, without comments and docstrings."""
     body: list[ast.stmt] = []
     for room in plain.ROOMS:
-        tree = ast.parse((files(plain) / f"{room}.py").read_text(encoding="utf-8"))
+        tree = ast.parse(Path(plain.__file__).with_name(f"{room}.py").read_text(encoding="utf-8"))
         for node in ast.walk(tree):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
                 first = node.body[0]
@@ -118,8 +102,9 @@ def _compilable() -> str:
 
 
 def _name() -> str:
-    addresses = Path(__file__).with_name("addresses.py").read_text(encoding="utf-8")
-    told = f"{_compilable()}{_MEANINGS}{addresses}"
+    import hashlib
+
+    told = f"{_compilable()}{_MEANINGS}"
     return f"cradle_kernel_{hashlib.sha256(told.encode()).hexdigest()[:16]}"
 
 
@@ -139,6 +124,8 @@ def _folder() -> Path:
 @functools.cache
 def _stored() -> Path | None:
     """Write the unit where compiled code can be kept beside it; None if that cannot be written."""
+    import tempfile
+
     try:
         path = _folder() / f"{_name()}.py"
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -176,8 +163,6 @@ def compiled() -> Any | None:
         import numba
     except ImportError:
         return None
-    from cradle.runtime.addresses import bare
-
     path = _stored()
     if path is None:
         logger.warning(
@@ -190,7 +175,7 @@ def compiled() -> Any | None:
     module.__file__ = str(path or name)
     kept = {"door"} if path is not None else set()
     marks = {mark: numba.njit(**options, cache=mark in kept) for mark, options in _MEANINGS.items()}
-    vars(module).update(marks, unsigned=np.uint64, bare=bare)
+    vars(module).update(marks, unsigned=np.uint64, bare=marks["once"](lambda things: things))
     sys.modules[name] = module
     exec(compile(_compilable(), module.__file__, "exec"), vars(module))
     # numba compiles a function anew for each whole number that is written down in a call; not so
@@ -220,49 +205,25 @@ def loaded() -> bool:
     return module is not None and bool(module.batch.overloads)
 
 
-@contextlib.contextmanager
-def few_collections() -> Iterator[None]:
-    """Look for garbage less often: while compiling, that would take a tenth of the time.
-
-    The compiler makes millions of objects that it needs to its end.
-    """
-    with _compiling:  # a second thread would take the changed thresholds for the usual ones
-        usual = gc.get_threshold()
-        if usual[0]:  # zero: it is switched off
-            gc.set_threshold(max(usual[0], 300_000), *usual[1:])
-        try:
-            yield
-        finally:
-            gc.set_threshold(*usual)
-
-
 def first_call(door: Callable[..., Any], *arguments: Any) -> Any:
     """Call compiled code that has not run yet: it is loaded, or compiled.
 
     Code on disk that cannot be read, such as half a file of a full disk, is removed, once, and
     compiled anew.
     """
-    with few_collections():
-        try:
-            return door(*arguments)
-        except Exception as error:  # half a file can raise anything; the kernel itself nothing
-            broken = [] if loaded() else [*_files("*.nb[ci]")]
-            if not broken:
-                raise
-            for file in broken:
-                file.unlink(missing_ok=True)
-            why = f"{type(error).__name__}: {error}"
-        logger.warning(
-            "compiled code in %s cannot be read (%s); compiled anew, up to a minute",
-            broken[0].parent,
-            why,
-        )
+    try:
         return door(*arguments)
-
-
-def ready() -> bool:
-    """Tell whether compiled code runs without a long wait."""
-    return loaded() or on_disk()
+    except Exception as error:  # half a file can raise anything; the kernel itself nothing
+        broken = [] if loaded() else [*_files("*.nb[ci]")]
+        if not broken:
+            raise
+        for file in broken:
+            file.unlink(missing_ok=True)
+        logger.warning(
+            "compiled code in %s cannot be read (%s: %s); compiled anew, up to a minute",
+            broken[0].parent, type(error).__name__, error,
+        )  # fmt: skip
+    return door(*arguments)
 
 
 def spend(seconds: float) -> None:
@@ -282,25 +243,16 @@ def without_waiting() -> Iterator[None]:
 
 
 def chosen(large: bool = False) -> Any:
-    """Return the kernel in force.
-
-    Parameters
-    ----------
-    large : bool
-        Whether the work is surely worth compiling for.
-
-    Raises
-    ------
-    ValueError
-        If the environment variable is neither of its words.
-    """
+    """Return the kernel in force; `large` work is surely worth compiling for."""
     global _look
     wish = os.environ.get(VARIABLE)
     if wish:
         one_of(VARIABLE, wish, ("plain", "compiled"))
-    if wish == "plain" or not available() or (_hurry.get() and not loaded()):
+    if wish != "plain" and loaded():
+        return compiled()
+    if wish == "plain" or not available() or _hurry.get():
         return plain
-    if not (wish == "compiled" or large or loaded() or _spent > PAYS_AFTER):
+    if not (wish == "compiled" or large or _spent > PAYS_AFTER):
         if _spent <= _look:
             return plain
         # To look costs more than a small impact, so not at each of them.
@@ -310,7 +262,7 @@ def chosen(large: bool = False) -> Any:
     # Threads that come here together share one module, which numba compiles once.
     with _deciding:
         module = compiled()
-        if module is not None and not ready():
+        if module is not None and not on_disk():
             _announce()
     return plain if module is None else module
 

@@ -38,7 +38,6 @@ _EFFORT = {False: 5_000, True: 2_000_000}
 LARGE = 50_000
 # No limit.
 _ENDLESS = 2**62
-_NOTHING = rooms.Record([], [], [], [])
 #: Events that one round may write: each contact may end, close, collapse, pass its maximum, and
 #: repeat itself.
 _ROUND = 5
@@ -48,38 +47,32 @@ class Stopped(Exception):
     """Another thread has failed, or the user has had enough."""
 
 
-def _type(record: type) -> np.dtype[Any]:
-    """Return the NumPy type of one of the kernel's records."""
-    kinds = {int: "i8", float: "f8", complex: "c16"}
-    return np.dtype([(name, kinds[kind]) for name, kind in get_type_hints(record).items()])
-
-
-_TYPES = {
-    name: _type(getattr(rooms, name)) for name in ("Ball", "Contact", "Run", "Level", "Memory")
+#: The kernel's records: their fields, all zero; and as NumPy's types.
+_ZEROS: dict[str, dict[str, Any]] = {
+    name: {field: kind() for field, kind in get_type_hints(getattr(rooms, name)).items()}
+    for name in ("Ball", "Contact", "Run", "Level", "Memory", "Tally")
 }
-_TALLY = _type(rooms.Tally)
-
-
-def _blank(record: type, size: int) -> list[Any]:
-    """Return as many objects, all fields zero."""
-    kinds = get_type_hints(record).items()
-    things = [record() for _ in range(size)]
-    for thing in things:
-        for name, kind in kinds:
-            setattr(thing, name, kind())
-    return things
+_TYPES = {
+    name: np.dtype([(field, np.array(zero, None).dtype) for field, zero in fields.items()])
+    for name, fields in _ZEROS.items()
+}
 
 
 def _area(n: int, compiled: bool, record: rooms.Record) -> rooms.State:
     """Return a work area: NumPy records for compiled code, Python objects for plain."""
-    sizes = {"Ball": n, "Contact": n, "Run": n, "Level": 2}
-    if compiled:
-        arrays: list[Any] = [np.zeros(size, _TYPES[name]) for name, size in sizes.items()]
-        arrays += [np.zeros((2, n), _TYPES["Memory"]), np.zeros(1, _TALLY), record]
-        return rooms.State(*arrays)
-    things: list[Any] = [_blank(getattr(rooms, name), size) for name, size in sizes.items()]
-    things += [[_blank(rooms.Memory, n) for _ in range(2)], _blank(rooms.Tally, 1), record]
-    return rooms.State(*things)
+
+    def blank(name: str, size: int) -> Any:
+        if compiled:
+            return np.zeros(size, _TYPES[name])
+        things = [getattr(rooms, name)() for _ in range(size)]
+        for thing in things:
+            vars(thing).update(_ZEROS[name])
+        return things
+
+    memory = blank("Memory", 2 * n)
+    memory = memory.reshape(2, n) if compiled else [memory[:n], memory[n:]]
+    groups = blank("Ball", n), blank("Contact", n), blank("Run", n)
+    return rooms.State(*groups, blank("Level", 2), memory, blank("Tally", 1), record)
 
 
 _kept = threading.local()
@@ -87,67 +80,48 @@ _kept = threading.local()
 
 def _kept_area(n: int, compiled: bool) -> rooms.State:
     """Return this thread's work area for n balls, without a record, kept for its next call."""
-    kept = getattr(_kept, "areas", None)
-    if kept is None:
-        kept = _kept.areas = {}
-    found = kept.get(compiled)
-    if found is None or len(found.ball) != n:
-        empty = _record(0, n) if compiled else _NOTHING
-        found = kept[compiled] = _area(n, compiled, empty)
-    return found
+    areas: dict[Any, rooms.State] = vars(_kept)
+    if compiled not in areas or len(areas[compiled].ball) != n:
+        areas[compiled] = _area(n, compiled, _record(0, n))
+    return areas[compiled]
 
 
 def _record(room: int, n: int) -> rooms.Record:
     """Return room for that many events."""
-    integer = np.int64
     return rooms.Record(
-        np.zeros(room, integer),
-        np.zeros(room, integer),
-        np.zeros((room + 1, n)),
-        np.zeros((room + 1, n - 1)),
-    )
+        np.zeros(room, np.int64), np.zeros(room, np.int64),
+        np.zeros((room + 1, n)), np.zeros((room + 1, n - 1)),
+    )  # fmt: skip
+
+
+def outputs(rows: int, n: int, last: bool = False) -> plain.Outputs:
+    """Return room for the outcomes of so many chains; `last`: impulses of the last one too."""
+    integer, one = np.int64, n - 1 if last else 0
+    hits, collapsed = np.empty((rows, n - 1), integer), np.empty(rows, integer)
+    parts = np.zeros(one), np.zeros(one), np.zeros(one, integer)
+    return plain.Outputs(np.empty((rows, n)), hits, collapsed, *parts)
 
 
 class Job:
-    """Chains of n balls on their way through the event loop.
+    """Chains of n balls on their way through the event loop, from `inputs` into `outputs`.
 
-    Parameters
-    ----------
-    inputs : Inputs
-        Arrays of floats with a row for each chain, or one row for all.
-    rows : int
-        How many chains.
-    options : Options
-        How to solve them.
-    room : int or None
-        Most events to record, of the last chain; None for the outcome alone.
-    large : bool
-        Whether the work is surely worth compiling for.
+    Inputs have a row for each chain, or one row for all.  Of the last chain up to `room` events are
+    recorded; `large` work is surely worth compiling for.
     """
 
     def __init__(
         self,
         inputs: plain.Inputs,
-        rows: int,
+        outputs: plain.Outputs,
         options: plain.Options,
-        room: int | None = None,
+        room: int = 0,
         large: bool = False,
     ) -> None:
-        n = inputs.m.shape[-1]
-        self.n, self.rows, self.inputs, self.options, self.limit = n, rows, inputs, options, room
-        self.large = large
+        self.inputs, self.outputs, self.options = inputs, outputs, options
+        self.n, self.rows = inputs.m.shape[-1], len(outputs.v)
+        self.room, self.large = room, large
         # The number of the next chain, and how the one before it ended.
         self.next, self.status = 0, FINISHED
-        one = 0 if room is None else n - 1
-        integer = np.int64
-        self.outputs = plain.Outputs(
-            np.empty((rows, n)),
-            np.empty((rows, n - 1), dtype=integer),
-            np.empty(rows, dtype=integer),
-            np.zeros(one),
-            np.zeros(one),
-            np.zeros(one, dtype=integer),
-        )
         self.compiled: bool | None = None
 
     def run(
@@ -166,90 +140,56 @@ class Job:
                 self._begin(kernel is not plain)
                 resumed = False
             begun = time.perf_counter()
-            known = kernel is plain or runtime.loaded()
+            known = not self.compiled or runtime.loaded()
             call = kernel.batch if known else functools.partial(runtime.first_call, kernel.batch)
+            effort = _EFFORT[bool(self.compiled)]
             self.next, self.status = call(
-                self.next,
-                resumed,
-                self.n,
-                self.given,
-                self.options,
-                self.results,
-                self.state,
-                _EFFORT[bool(self.compiled)],
-            )
+                self.next, resumed, self.n, self.given, self.options, self.outputs, self.state,
+                effort,
+            )  # fmt: skip
             if not self.compiled:
                 runtime.spend(time.perf_counter() - begun)
-            resumed = self.status == PAUSED
             if pause is not None:
                 pause()
+            resumed = self.status == PAUSED
             if resumed and self.tally("events") > self.tally("room"):
-                self._grow()
+                self._make_room(2 * len(self.state.record.kinds))
             elif not resumed and self.status != FINISHED:
                 break
-        if self.compiled is False:
-            self._write_back()
         return self
 
     def _begin(self, compiled: bool) -> None:
-        """Lay out work area and outputs for one runtime; what is solved so far stays."""
-        if self.compiled is False:
-            self._write_back()
-        self.compiled = compiled
-        self.given, self.results = self.inputs, self.outputs
+        """Lay out the work area for one runtime; what is solved so far stays."""
+        self.compiled, self.given = compiled, self.inputs
         if not compiled:
             # Python's own numbers: faster than NumPy's one at a time, and the same digits.
             self.given = plain.Inputs(*(part.tolist() for part in self.inputs))
-            self.results = plain.Outputs(*(part.tolist() for part in self.outputs))
         self.state = _kept_area(self.n, compiled)
-        if self.limit is None:
-            self._set_room(_ENDLESS)
-        else:
-            self.record = _NOTHING
-            self._grow()
+        self._make_room(64 + _ROUND * self.n)
 
     def tally(self, name: str) -> Any:
         """Return a count of the impact at hand."""
         tally = self.state.tally
-        return tally[name][0].item() if self.compiled else getattr(tally[0], name)
+        return tally[name].item() if self.compiled else getattr(tally[0], name)
 
     def stored(self) -> float:
         """Return the work that contacts can still release, in the kernel's own units."""
         contacts = self.state.contact
         return float(sum(k["q"].real if self.compiled else k.q.real for k in contacts))
 
-    def _set_room(self, room: int) -> None:
-        """Let the event loop write so many events."""
-        if self.compiled:
-            self.state.tally["room"] = room
-        else:
-            self.state.tally[0].room = room
-
-    def _grow(self) -> None:
-        """Make room for more events, twice as many as before, up to the limit."""
-        assert self.limit is not None
-        old, spare = self.record, _ROUND * self.n
-        room = min(max(2 * len(old.kinds), 64 + spare), self.limit)
-        self.record = _record(room, self.n)
+    def _make_room(self, wanted: int) -> None:
+        """Make room for so many events, within the limit, and keep what is written."""
+        room, old = min(wanted, self.room), self.state.record
+        record = _record(room, self.n)
         if len(old.kinds):
-            done = min(self.tally("events"), len(old.kinds))
-            written = self.state.record
-            for new, part, more in zip(self.record, written, (0, 0, 1, 1), strict=True):
-                new[: done + more] = part[: done + more]
-        record = self.record
-        if not self.compiled:
-            record = rooms.Record(*(part.tolist() for part in self.record))
-        self.state = self.state._replace(record=record)
-        self._set_room(_ENDLESS if room == self.limit else room - spare)
-
-    def _write_back(self) -> None:
-        """Copy what the plain loop wrote into the arrays."""
-        parts = [*zip(self.outputs, self.results, strict=True)]
-        if self.limit is not None:
-            parts += zip(self.record, self.state.record, strict=True)
-        for array, values in parts:
-            if array.size:
-                array[...] = values
+            for part, written in zip(record, old, strict=True):
+                part[: len(written)] = written
+        self.state = rooms.State(*self.state[:-1], record)
+        limit = _ENDLESS if room == self.room else room - _ROUND * self.n
+        if self.compiled:
+            self.state.tally["room"] = limit
+        else:
+            self.state.tally[0].room = limit
 
 
 @functools.cache
@@ -265,4 +205,4 @@ def warm_up() -> None:
     """
     one = np.ones((1, 2))
     inputs = plain.Inputs(one, np.array([[1.0, 0.0]]), np.ones((1, 1)), *[np.ones((1, 0))] * 2)
-    Job(inputs, 1, plain.Options(0.5, 1000, True), large=True).run()
+    Job(inputs, outputs(1, 2), plain.Options(0.5, 1000, True), large=True).run()

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import cmath
+import functools
 import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cradle.input.values import Vector
-from cradle.swinging.pendulums import Pendulums
+from cradle.swinging.pendulums import TIE, Hanging
 
-#: Events nearer than this part of a swing (over 2 pi) are one; so are lengths, of the amplitude.
-TIE = 1e-9
 # Below this part of its largest value a derivative is a rounding error.
 _ROUNDING = 1e-11
 _RTOL = 1e-12
@@ -36,18 +34,17 @@ class Meeting(NamedTuple):
 class Start(NamedTuple):
     """All that a flight needs to know of its start."""
 
-    masses: Vector
     positions: Vector
     velocities: Vector
-    #: Contacts whose balls touch and move together.
-    together: NDArray[np.bool_]
-    #: Contacts whose balls touch and part.
-    parting: NDArray[np.bool_]
+    #: Of each contact, whether its balls touch and move together.
+    together: tuple[bool, ...]
+    #: Of each contact, whether its balls touch and part.
+    parting: list[bool]
 
-    def bodies(self) -> list[tuple[int, int]]:
-        """Return the first ball of each body and the one after its last."""
-        cuts = [0, *(np.flatnonzero(~self.together) + 1).tolist(), len(self.masses)]
-        return list(pairwise(cuts))
+
+def _first_balls(together: Sequence[bool]) -> list[int]:
+    """Return the first ball of each body: balls that move together are one."""
+    return [0, *(c + 1 for c, one in enumerate(together) if not one)]
 
 
 def first_fall(
@@ -93,7 +90,7 @@ def _march(
             return math.inf
         waves = [(c, rate, cmath.exp(rate * time)) for c, rate in terms]
         if parting:  # f(0) = 0: the difference from the start keeps its digits
-            value = sum((c * _exp_minus_one(rate * time)).real for c, rate in terms)
+            value = sum((c * complex(np.expm1(rate * time))).real for c, rate in terms)
             noise = 4e-16 * bounds.plain[0] * time
         else:
             value = level + sum((c * wave).real for c, _, wave in waves)
@@ -104,7 +101,9 @@ def _march(
         if value <= noise and (slope < 0.0 or value < -noise):
             return time
         second, *others = (left * bound for bound in bounds.after(time))
-        step = _safe_step(max(value, noise), slope, second)
+        value = max(value, noise)
+        root = math.sqrt(slope * slope + 2.0 * second * value)
+        step = (root + slope) / second if slope > 0.0 else 2.0 * value / (root - slope)
         # Where it rises more and more, the next terms of Taylor's series carry further.
         for order, (derivative, bound) in enumerate(zip(higher, others, strict=True), start=2):
             if min(slope, derivative) < 0.0:
@@ -146,12 +145,6 @@ class _Bounds:
         ]
 
 
-def _safe_step(value: float, slope: float, bound: float) -> float:
-    """Return how far the parabola ``value + slope h - bound h^2 / 2`` stays above zero."""
-    root = math.sqrt(slope * slope + 2.0 * bound * value)
-    return (root + slope) / bound if slope > 0.0 else 2.0 * value / (root - slope)
-
-
 def _first_step(terms: Sequence[tuple[complex, complex]], bounds: _Bounds) -> float:
     """Return a step that passes no root, for a function that rises from exactly zero.
 
@@ -165,183 +158,159 @@ def _first_step(terms: Sequence[tuple[complex, complex]], bounds: _Bounds) -> fl
     return TIE / max(abs(rate) for _, rate in terms)
 
 
-def _exp_minus_one(z: complex) -> complex:
-    """Return exp(z) - 1 without cancellation."""
-    return complex(np.expm1(z))
+class _Bodies(NamedTuple):
+    """How balls swing at small angles that move together or alone."""
+
+    #: First ball of each body, the number of its balls, its lowest point and its rate.
+    each: list[tuple[int, int, float, complex]]
+    #: Of each ball, where it hangs, and its rate: it is at centre + Re(amplitude exp(rate t)).
+    centre: Vector
+    rate: Vector
+    #: Of each contact between two bodies the gap at rest; of one inside a body the force at rest,
+    #: that per amplitude, and what both are measured by.
+    gaps: list[float]
+    forces: dict[int, tuple[float, complex, float, float]]
+
+
+@functools.lru_cache(64)
+def _bodies(hanging: Hanging, together: tuple[bool, ...]) -> _Bodies:
+    """Return the bodies: their frequencies, dampings and lowest points are means over the mass."""
+    n, square, first = len(hanging.masses), hanging.gravity / hanging.length, _first_balls(together)
+    centre, rates = np.zeros(n), np.zeros(n, dtype=complex)
+    each, forces = [], {}
+    for a, b in pairwise([*first, n]):
+        m, w2, d = (row[a:b] for row in (hanging.masses, square, hanging.damping))
+        offset = -np.concatenate([[0.0], np.cumsum(hanging.gaps[a : b - 1])])
+
+        def mean(values: Vector, m: Vector = m) -> float:
+            # Equal values stay what they are, to the bit.
+            return float(values[0] if (values == values[0]).all() else m @ values / m.sum())
+
+        lowest = -mean(w2 * offset) / mean(w2)
+        rate = complex(-mean(d), math.sqrt(mean(w2) - mean(d) * mean(d)))
+        centre[a:b], rates[a:b] = lowest + offset, rate
+        each.append((a, b - a, lowest, rate))
+        for k in range(1, b - a):  # what stops the balls before k from moving as they would alone
+            level, weight = -float(m[:k] @ (w2 * (lowest + offset))[:k]), float(m[:k] @ w2[:k])
+            wave = complex(m[:k] @ (w2 + 2.0 * d * rate + rate * rate)[:k])
+            forces[a + k - 1] = level, wave, weight, float(np.abs(centre[a : a + k]).max())
+    gaps = (hanging.gaps + centre[1:] - centre[:-1]).tolist()
+    return _Bodies(each, centre, rates, gaps, forces)
 
 
 class SmallAngleFlight:
     """Damped harmonic motion of bodies of one or more balls.
 
-    A ball swings alone as x'' = -w^2 x - 2 d x'.  Balls that rest against each other are one body:
-    its frequency, damping and lowest point are means over its balls, weighted by mass.
+    A ball swings alone as x'' = -w^2 x - 2 d x'.  Balls that rest against each other are one body.
     """
 
-    def __init__(self, pendulums: Pendulums, state: Start) -> None:
-        n = len(state.masses)
-        self.state = state
-        self.gaps = pendulums.row("gaps", n - 1)
-        self.square = pendulums.gravity / pendulums.row("length", n)
-        self.damping = pendulums.row("damping", n)
-        self.slowest = float(pendulums.natural_frequency(n).max())
-        # Ball k is at centre[k] + Re(amplitude[k] exp(rate[k] t)).
-        self.centre = np.zeros(n)
-        self.amplitude = np.zeros(n, dtype=complex)
-        self.rate = np.zeros(n, dtype=complex)
-        for first, last in state.bodies():
-            self._hang(slice(first, last))
-
-    def _hang(self, body: slice) -> None:
-        m, square, damping = self.state.masses[body], self.square[body], self.damping[body]
-        offset = -np.concatenate([[0.0], np.cumsum(self.gaps[body.start : body.stop - 1])])
-
-        def mean(values: Vector) -> float:
-            # Equal values stay what they are, to the bit.
-            return float(values[0] if (values == values[0]).all() else m @ values / m.sum())
-
-        w2, d = mean(square), mean(damping)
-        lowest = -mean(square * offset) / w2
-        rate = complex(-d, math.sqrt(w2 - d * d))
-        start = self.state.positions[body.start] - lowest
-        speed = float(self.state.velocities[body.start])
-        self.centre[body] = lowest + offset
-        self.amplitude[body] = complex(start, -(speed + d * start) / rate.imag)
-        self.rate[body] = rate
+    def __init__(self, hanging: Hanging, state: Start) -> None:
+        self.state, self.tie = state, hanging.tie
+        self.bodies = _bodies(hanging, state.together)
+        x, v = state.positions.tolist(), state.velocities.tolist()
+        #: Of each ball.
+        self.amplitude: list[complex] = []
+        for first, count, lowest, rate in self.bodies.each:
+            start = x[first] - lowest
+            swings = complex(start, -(v[first] - rate.real * start) / rate.imag)
+            self.amplitude += [swings] * count
 
     def next_meeting(self, horizon: float) -> Meeting:
         """Return the first event within `horizon` seconds."""
-        times = np.full((2, len(self.gaps)), np.inf)
-        for c, together in enumerate(self.state.together.tolist()):
-            if together:
-                times[1, c] = self._release(c, horizon)
-            else:
-                times[0, c] = self._meeting(c, horizon)
-        first = float(times.min())
+        together, rates = self.state.together, self.bodies.rate.tolist()
+        times = [
+            (self._release if one else self._meeting)(c, rates, horizon)
+            for c, one in enumerate(together)
+        ]
+        first = min(times)
         if first > horizon:
             return Meeting(math.inf, [], [])
-        due = times <= first + TIE / self.slowest
         return Meeting(
-            first, np.flatnonzero(due[0]).tolist(), np.flatnonzero(times[1] == first).tolist()
+            first,
+            [c for c, t in enumerate(times) if t <= first + self.tie and not together[c]],
+            [c for c, t in enumerate(times) if t == first and together[c]],
         )
 
-    def _meeting(self, c: int, horizon: float) -> float:
+    def _meeting(self, c: int, rates: list[complex], horizon: float) -> float:
         """Return when the gap of contact c closes."""
-        a, rate = self.amplitude[c : c + 2].tolist(), self.rate[c : c + 2].tolist()
-        level = float(self.gaps[c] + self.centre[c + 1] - self.centre[c])
-        terms = (
-            [(a[1] - a[0], rate[0])] if rate[0] == rate[1] else [(a[1], rate[1]), (-a[0], rate[0])]
-        )
-        return first_fall(level, terms, bool(self.state.parting[c]), horizon)
+        (one, other), (rate, near) = self.amplitude[c : c + 2], rates[c : c + 2]
+        terms = [(other - one, rate)] if rate == near else [(other, near), (-one, rate)]
+        return first_fall(self.bodies.gaps[c], terms, self.state.parting[c], horizon)
 
-    def _release(self, c: int, horizon: float) -> float:
+    def _release(self, c: int, rates: list[complex], horizon: float) -> float:
         """Return when the force in contact c, whose balls move together, falls to zero."""
-        first = next(a for a, b in self.state.bodies() if b > c)
-        part = slice(first, c + 1)
-        m, w2, d = self.state.masses[part], self.square[part], self.damping[part]
-        rate, amplitude = complex(self.rate[c]), complex(self.amplitude[c])
-        # The force stops the balls up to c from moving as they would alone.
-        level = -float(m @ (w2 * self.centre[part]))
-        wave = -amplitude * complex(m @ (w2 + 2.0 * d * rate + rate * rate))
-        weight = float(m @ w2) * (abs(amplitude) + float(np.abs(self.centre[part]).max()))
-        if abs(wave) + abs(level) <= _ROUNDING * weight:
+        level, wave, weight, far = self.bodies.forces[c]
+        wave = -self.amplitude[c] * wave
+        if abs(wave) + abs(level) <= _ROUNDING * (weight * (abs(self.amplitude[c]) + far)):
             return math.inf  # they swing together by themselves
-        return first_fall(level, [(wave, rate)], False, horizon)
+        return first_fall(level, [(wave, rates[c])], False, horizon)
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
         """Return positions and velocities at T times since the start, shapes (T, N)."""
-        wave = self.amplitude * np.exp(np.multiply.outer(times, self.rate))
-        return self.centre + wave.real + 0.0, (self.rate * wave).real + 0.0  # no -0.0
+        wave = np.array(self.amplitude) * np.exp(np.multiply.outer(times, self.bodies.rate))
+        return self.bodies.centre + wave.real + 0.0, (self.bodies.rate * wave).real + 0.0  # no -0.0
 
 
 class FullFlight:
     """Equal pendulums of any angle, integrated by SciPy; bodies swing like single balls.
 
     The difference f of two neighbours obeys f'' + 2 d f' + q f = 0 with q at most g/l, so by
-    Sturm's comparison two balls that part cannot meet before pi / sqrt(g/l - d^2), half a swing of
-    the small angle.  For all others this bounds f'' by f and f', and the search marches as in
-    `first_fall`.
+    Sturm's comparison its zeros are no closer than pi / sqrt(g/l - d^2), half a swing of the small
+    angle: steps of a quarter of that miss none, and balls that part do not meet before.
     """
 
-    def __init__(self, pendulums: Pendulums, state: Start) -> None:
-        n = len(state.masses)
-        self.state, self.pendulums = state, pendulums
-        self.length = float(pendulums.row("length", n)[0])
-        self.damping = float(pendulums.row("damping", n)[0])
-        self.frequency = float(pendulums.natural_frequency(n)[0])
-        bodies = state.bodies()
-        self.first = np.array([a for a, _ in bodies])
-        self.body = np.repeat(np.arange(len(bodies)), [b - a for a, b in bodies])
+    def __init__(self, hanging: Hanging, state: Start) -> None:
+        self.state, self.hanging, self.gravity = state, hanging, hanging.gravity
+        self.length, self.damping = float(hanging.length[0]), float(hanging.damping[0])
+        self.first = _first_balls(state.together)
+        #: The number of each ball's body.
+        self.body = np.cumsum([0, *(not one for one in state.together)])
         self.start = np.concatenate([state.positions[self.first], state.velocities[self.first]])
 
     def _rate(self, _: float, y: Vector) -> Vector:
         x, v = np.split(y, 2)
-        return np.concatenate(
-            [v, -self.pendulums.gravity * np.sin(x / self.length) - 2.0 * self.damping * v]
-        )
+        return np.concatenate([v, -self.gravity * np.sin(x / self.length) - 2.0 * self.damping * v])
 
-    def _integrate(self, begin: float, y: Vector, end: float, dense: bool) -> Any:
+    def _integrate(self, begin: float, y: Vector, end: float, **options: Any) -> Any:
         # SciPy is slow to import, and only pendulums of any angle need it here.
         from scipy.integrate import solve_ivp
 
         scale = max(float(np.abs(self.start).max()), 1e-300)
-        found = solve_ivp(
-            self._rate, (begin, end), y, "DOP853", rtol=_RTOL, atol=_RTOL * scale,
-            dense_output=dense,
-        )  # fmt: skip
+        tolerances = {"rtol": _RTOL, "atol": _RTOL * scale}
+        found = solve_ivp(self._rate, (begin, end), y, "DOP853", **tolerances, **options)
         if found.status < 0:
             raise RuntimeError(f"the integration of the pendulums failed: {found.message}")
         return found
 
     def next_meeting(self, horizon: float) -> Meeting:
         """Return the first event within `horizon` seconds."""
-        half = math.pi / math.sqrt(self.frequency**2 - self.damping**2)
-        open_ = np.flatnonzero(~self.state.together)
-        blocked = np.where(self.state.parting[open_], half * (1.0 - TIE), 0.0)
-        begin, y = 0.0, self.start
-        while begin < horizon:
-            end = min(begin + half / 4.0, horizon)
-            found = self._integrate(begin, y, end, dense=True)
-            times = [
-                self._search(k, float(max(begin, blocked[k])), end, found.sol)
-                for k in range(len(open_))
-            ]
-            first = min(times, default=math.inf)
-            if first <= end:
-                due = np.array(times) <= first + TIE / self.frequency
-                return Meeting(first, open_[due].tolist(), [])
-            begin, y = end, found.y[:, -1]
-        return Meeting(math.inf, [], [])
+        half = math.pi / math.sqrt(self.hanging.fastest**2 - self.damping**2)
+        contacts = [ball - 1 for ball in self.first[1:]]
+        waits = [half * (1.0 - TIE) * self.state.parting[c] for c in contacts]
 
-    def _search(self, k: int, time: float, end: float, path: Any) -> float:
-        """March to the closing of the k-th gap; infinite if it stays open up to `end`."""
-        bodies = len(self.first)
-        size = max(
-            float(np.abs(self.start[:bodies]).max()),
-            float(np.abs(self.start[bodies:]).max()) / self.frequency,
-        )
-        if size == 0.0:
-            return math.inf
-        # The length of (w f, f') grows by less than exp(rate h) in a time h, and rate times that
-        # length bounds f''.  With five times the bound of now a step stays within ln 5 / rate.
-        rate = self.frequency + 2.0 * self.damping
-        for _ in range(_MOST_STEPS):
-            if time > end:
-                return math.inf
-            y = path(time) / size
-            value, slope = float(y[k + 1] - y[k]), float(y[bodies + k + 1] - y[bodies + k])
-            if value <= _RTOL and slope < 0.0:
-                return time
-            value = max(value, _RTOL)
-            bound = 5.0 * rate * math.hypot(self.frequency * value, slope)
-            time += _safe_step(value, slope, bound)
-        raise RuntimeError(f"no end of the search for a meeting after {_MOST_STEPS} steps")
+        def gap(k: int) -> Any:
+            def event(t: float, y: Vector) -> float:
+                # At the start a gap is open, or its balls are about to meet.
+                return float(y[k + 1] - y[k]) if t > waits[k] else 1.0
+
+            vars(event).update(terminal=True, direction=-1)
+            return event
+
+        events = [gap(k) for k in range(len(contacts))]
+        found = self._integrate(0.0, self.start, horizon, events=events, max_step=half / 4.0)
+        if found.status == 0:
+            return Meeting(math.inf, [], [])
+        time, (x, v) = float(found.t[-1]), np.split(found.y[:, -1], 2)
+        soon = (np.diff(x) + self.hanging.tie * np.diff(v) <= 0.0) & (time > np.array(waits))
+        met = [len(times) > 0 for times in found.t_events]
+        return Meeting(time, [c for c, now in zip(contacts, met | soon, strict=True) if now], [])
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
         """Return positions and velocities at T times since the start, shapes (T, N)."""
         found, begin, y = [], 0.0, self.start
         for time in times.tolist():
             if time > begin:
-                begin, y = time, self._integrate(begin, y, time, dense=False).y[:, -1]
+                begin, y = time, self._integrate(begin, y, time).y[:, -1]
             found.append(y)
         x, v = np.split(np.array(found).reshape(len(times), len(self.start)), 2, axis=1)
         return x[:, self.body], v[:, self.body]

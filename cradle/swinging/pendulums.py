@@ -17,6 +17,9 @@ from cradle.input.values import (
     row_of,
 )
 
+#: Events nearer than this part of a swing (over 2 pi) are one; so are lengths, of the amplitude.
+TIE = 1e-9
+
 
 @dataclass(frozen=True, eq=False, init=False)
 class Pendulums:
@@ -113,23 +116,34 @@ class Pendulums:
             refuse_where("damping", damping, slow, rule)
         return frequency
 
+
+class Hanging:
+    """The pendulums of one chain: a row of each kind, and what follows from them alone."""
+
+    def __init__(self, pendulums: Pendulums, masses: Vector) -> None:
+        n = len(masses)
+        self.masses, self.gravity, self.small = (
+            masses,
+            pendulums.gravity,
+            pendulums.angle == "small",
+        )
+        self.gaps = pendulums.row("gaps", n - 1)
+        self.frequency = pendulums.natural_frequency(n)
+        self.length, self.damping = pendulums.row("length", n), pendulums.row("damping", n)
+        self.fastest = float(self.frequency.max())
+        self.tie = TIE / self.fastest  # events nearer than this are one, s
+        self._weight = 2.0 * masses * self.gravity * self.length
+
     def accelerations(self, positions: Vector, velocities: Vector) -> Vector:
         """Return the acceleration of each ball if it swung alone, m/s^2."""
-        n = len(positions)
-        length = self.row("length", n)
-        angle = positions / length
-        sine = angle if self.angle == "small" else np.sin(angle)
-        return np.asarray(0.0 - self.gravity * sine - 2.0 * self.row("damping", n) * velocities)
+        angle = positions / self.length
+        sine = angle if self.small else np.sin(angle)
+        return np.asarray(0.0 - self.gravity * sine - 2.0 * self.damping * velocities)
 
-    def potential_energy(self, masses: Vector, positions: Vector) -> Vector:
-        """Return the potential energy above the lowest points, J; the last axis is summed."""
-        length = self.row("length", positions.shape[-1])
-        half = 0.5 * positions / length
-        sine = half if self.angle == "small" else np.sin(half)
-        # 1 - cos a = 2 sin^2(a/2), without cancellation.
-        return np.asarray((2.0 * masses * self.gravity * length * sine**2).sum(axis=-1))
-
-    def energy(self, masses: Vector, positions: Vector, velocities: Vector) -> Vector:
+    def energy(self, positions: Vector, velocities: Vector) -> Vector:
         """Return kinetic and potential energy, J; the last axis is summed."""
-        kinetic = 0.5 * (masses * velocities**2).sum(axis=-1)
-        return np.asarray(kinetic + self.potential_energy(masses, positions))
+        half = 0.5 * positions / self.length
+        sine = half if self.small else np.sin(half)
+        kinetic = 0.5 * (self.masses * velocities**2).sum(axis=-1)
+        # 1 - cos a = 2 sin^2(a/2), without cancellation.
+        return np.asarray(kinetic + (self._weight * sine**2).sum(axis=-1))

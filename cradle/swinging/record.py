@@ -10,7 +10,7 @@ import numpy as np
 from cradle.chain import Chain
 from cradle.formatting import as_text
 from cradle.input.values import Vector
-from cradle.swinging.pendulums import Pendulums
+from cradle.swinging.pendulums import Hanging, Pendulums
 from cradle.trace import Trace
 
 if TYPE_CHECKING:
@@ -98,7 +98,8 @@ class Swing:
     @property
     def energy(self) -> Vector:
         """Kinetic and potential energy of all balls at each time, shape (T,), J."""
-        return self.pendulums.energy(self.chain.masses, self.positions, self.velocities)
+        hanging = Hanging(self.pendulums, self.chain.masses)
+        return hanging.energy(self.positions, self.velocities)
 
     def to_frame(self) -> pd.DataFrame:
         """Return a row for each time and ball: time, ball, position, velocity.

@@ -18,8 +18,8 @@ The rules, in the order in which `swing` applies them at every event:
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 from cradle.input.values import Vector
 
@@ -29,23 +29,30 @@ RESTING = 1e-10
 NEAR = 1e-12
 
 
-def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def stretches(contacts: Iterable[bool]) -> list[tuple[int, int]]:
     """Return the first ball of each stretch of marked contacts, and the one after its last."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], contacts, [False]]).astype(int)))
-    return [(int(a), int(b) + 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    found: list[tuple[int, int]] = []
+    for c, marked in enumerate(contacts):
+        if marked and found and found[-1][1] == c + 1:
+            found[-1] = found[-1][0], c + 2
+        elif marked:
+            found.append((c, c + 2))
+    return found
 
 
 def common_velocities(
-    masses: Vector, velocities: Vector, touching: NDArray[np.bool_], least: float
-) -> tuple[Vector, NDArray[np.bool_]]:
+    masses: Vector, velocities: Vector, touching: Sequence[bool], least: float
+) -> tuple[Vector, list[bool]]:
     """Give touching balls that hardly move against each other their common velocity (rule 2)."""
-    v, resting = velocities.copy(), np.zeros_like(touching)
+    v, resting = velocities.copy(), [False] * len(touching)
     while True:
-        slow = touching & (v[:-1] - v[1:] >= -least)
-        if not (slow & ~resting).any():
+        opening = [b - a > least for a, b in pairwise(v.tolist())]
+        slow = [t and not opens for t, opens in zip(touching, opening, strict=True)]
+        found = [s or rests for s, rests in zip(slow, resting, strict=True)]
+        if found == resting:
             return v, resting
         # The common velocity may be as slow against the next ball: look again.
-        resting |= slow
+        resting = found
         for first, last in stretches(resting):
             body = slice(first, last)
             if (v[body] != v[first]).any():
@@ -53,8 +60,8 @@ def common_velocities(
 
 
 def pressed(
-    masses: Vector, accelerations: Vector, resting: NDArray[np.bool_], least: float
-) -> NDArray[np.bool_]:
+    masses: Vector, accelerations: Vector, resting: Sequence[bool], least: float
+) -> list[bool]:
     """Return the resting contacts whose balls, left alone, would not separate (rule 3).
 
     The contact forces are those under which no ball passes its neighbour and no contact pulls.
@@ -62,15 +69,16 @@ def pressed(
     in the mean square weighted by mass (Gauss's principle of least constraint).  For a row of
     balls that is isotonic regression, which pooling solves exactly.
     """
-    kept = np.zeros_like(resting)
+    kept = [False] * len(resting)
+    alone = list(zip(masses.tolist(), accelerations.tolist(), strict=True))
     for first, last in stretches(resting):
         pools: list[tuple[float, float, int]] = []  # mass, acceleration, number of balls
-        for m, alone in zip(masses[first:last], accelerations[first:last], strict=True):
-            pools.append((m, alone, 1))
+        for m, a in alone[first:last]:
+            pools.append((m, a, 1))
             while len(pools) > 1 and pools[-2][1] >= pools[-1][1] - least:
                 (m1, a1, n1), (m2, a2, n2) = pools.pop(-2), pools.pop(-1)
                 pools.append((m1 + m2, (m1 * a1 + m2 * a2) / (m1 + m2), n1 + n2))
-        kept[first : last - 1] = True
-        cuts = first + np.cumsum([count for _, _, count in pools[:-1]], dtype=int)
-        kept[cuts - 1] = False
+        for _, _, count in pools:
+            kept[first : first + count - 1] = [True] * (count - 1)
+            first += count
     return kept

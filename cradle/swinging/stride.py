@@ -211,7 +211,7 @@ class Alone:
         gained, settled, ways = np.zeros(len(x), complex), 0, self.ways(x)
         lines, v = np.diff(x), own * ways
         gaps = np.abs(lines) - self.reach
-        for first, last in stretches(gaps <= self.touching):
+        for first, last in stretches((gaps <= self.touching).tolist()):
             balls = slice(first, last)
             axis = lines[first : last - 1].sum()
             axis /= abs(axis)
@@ -242,7 +242,7 @@ class Alone:
         """Return velocities after those that touch have come to rest, and whether any have."""
         slow = v[:-1] - v[1:] > 0.0
         if slow.any():
-            v, _ = common_velocities(masses, v, slow, 0.0)
+            v, _ = common_velocities(masses, v, slow.tolist(), 0.0)
         deep = gaps < -self.touching
         if deep.any():
             # Balls that overlap by more than is unseen part, slower than what counts as an impact.

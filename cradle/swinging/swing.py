@@ -6,11 +6,14 @@ instant is checked before a run is returned: order, momentum, energy and ledger.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any
+import functools
+import math
+from dataclasses import fields, replace
+from itertools import pairwise
+from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
 from cradle.input.values import (
@@ -23,8 +26,8 @@ from cradle.input.values import (
     whole_number,
 )
 from cradle.models import Model, collide
-from cradle.swinging.flight import TIE, Flight, FullFlight, SmallAngleFlight, Start
-from cradle.swinging.pendulums import Pendulums
+from cradle.swinging.flight import Flight, FullFlight, Meeting, SmallAngleFlight, Start
+from cradle.swinging.pendulums import TIE, Hanging, Pendulums
 from cradle.swinging.record import Impact, Swing
 from cradle.swinging.resting import NEAR, RESTING, common_velocities, pressed, stretches
 from cradle.trace import Trace
@@ -135,39 +138,36 @@ class _Run:
                 f"positions has shape {x.shape}; {n} balls need ({n},): a place for each ball"
             )
         reach = pendulums.reach(n)
-        part = "a quarter of a circle" if pendulums.angle == "small" else "half a circle"
+        most = "a quarter of a circle" if pendulums.angle == "small" else "half a circle"
         beyond = np.abs(x) > reach
         if beyond.any():
             far = reach[np.argmax(beyond)]
-            rule = f"must be within {far:.4g} m: pendulums of this length reach {part}"
+            rule = f"must be within {far:.4g} m: pendulums of this length reach {most}"
             refuse_where("positions", x, beyond, rule)
-        self.chain, self.model, self.pendulums = chain, model, pendulums
+        self.chain, self.hanging = chain, (hanging := Hanging(pendulums, chain.masses))
+        self.model = functools.lru_cache(None)(functools.partial(part, model, n))
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
-        self.gaps = pendulums.row("gaps", n - 1)
-        self.frequency = pendulums.natural_frequency(n)
-        fastest = float(self.frequency.max())
-        self.released = float(pendulums.energy(chain.masses, self.x, self.v))
+        self.released = float(hanging.energy(self.x, self.v))
         self.speed = float(np.sqrt(2.0 * self.released / chain.masses.sum()))
         self.impacts: list[Impact] = []
         self.series: list[tuple[Vector, Vector]] = []
-        self.size = max(float(np.abs(x).max()), self.speed / float(self.frequency.min()))
-        self.account = Account(chain.masses, self.gaps, pendulums, fastest, self.size)
-        distance = self.gaps + np.diff(x)
+        self.size = max(float(np.abs(x).max()), self.speed / float(hanging.frequency.min()))
+        self.account = Account(hanging, self.size)
+        distance = hanging.gaps + np.diff(x)
         if (distance < -TIE * self.size).any():
             c = int(np.argmin(distance))
             raise ValueError(
                 f"positions = {x.tolist()}; balls {c} and {c + 1} overlap by {-distance[c]:g} m"
             )
-        none = np.zeros(n - 1, dtype=bool)
-        self.together, self.parting = none, none
-        self.tie = TIE / fastest  # events nearer than this are one, s
-        self.freed = np.full(n - 1, -np.inf)  # when the force in each contact last fell to zero
-        self.settle(np.abs(distance) <= TIE * self.size, none)
+        self.freed = [-math.inf] * (n - 1)  # when the force in each contact last fell to zero
+        near = np.abs(distance) <= TIE * self.size
+        self.settle(Meeting(0.0, np.flatnonzero(near).tolist(), []))
 
     def to_the_end(self, times: Vector, most: int, least: float) -> str:
         """Fly from event to event; return why the run ended."""
         done, end = 0, float(times[-1])
         instant, idle = 0.0, 0  # events without an impact at one instant
+        kind = SmallAngleFlight if self.hanging.small else FullFlight
         while True:
             if len(self.impacts) >= most:
                 ended = "impacts"
@@ -175,11 +175,12 @@ class _Run:
             if self.released and self.account.energy < least * self.released:
                 ended = "energy"
                 break
-            flight = self.flight()
+            flight = kind(self.hanging, Start(self.x, self.v, self.together, self.parting))
             meeting = flight.next_meeting(end - self.t)
             later = self.t + meeting.time
-            here = int(np.searchsorted(times, later, side="left"))
-            self.series.append(self.fly(flight, times[done:here] - self.t))
+            here = int(times.searchsorted(later, side="left"))
+            if here > done or later > end:
+                self.series.append(self.fly(flight, times[done:here] - self.t))
             done = here
             if later > end:
                 self.t = end
@@ -187,11 +188,8 @@ class _Run:
             x, v = self.fly(flight, np.array([meeting.time]))
             known = len(self.impacts)
             self.t, self.x, self.v = later, x[0], v[0]
-            closing, releasing = np.zeros((2, len(self.gaps)), dtype=bool)
-            closing[meeting.closing] = True
-            releasing[meeting.releasing] = True
-            self.settle(closing, releasing)
-            if self.t - instant > self.tie or len(self.impacts) > known:
+            self.settle(meeting)
+            if self.t - instant > self.hanging.tie or len(self.impacts) > known:
                 instant, idle = self.t, 0
             idle += 1
             if idle > MOST_IDLE * len(self.x):
@@ -204,56 +202,58 @@ class _Run:
         self.series.append((np.tile(self.x, (count, 1)), np.tile(self.v, (count, 1))))
         return ended
 
-    def flight(self) -> Flight:
-        state = Start(self.chain.masses, self.x, self.v, self.together, self.parting)
-        kind = SmallAngleFlight if self.pendulums.angle == "small" else FullFlight
-        return kind(self.pendulums, state)
-
     def fly(self, flight: Flight, times: Vector) -> tuple[Vector, Vector]:
         x, v = flight.at(times)
         self.account.fly(self.t, times, x, v)
         return x, v
 
-    def settle(self, closing: NDArray[np.bool_], releasing: NDArray[np.bool_]) -> None:
+    def settle(self, meeting: Meeting) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
-        masses = self.chain.masses
-        touching = closing | (self.gaps + np.diff(self.x) <= NEAR * self.size)
+        hanging, masses = self.hanging, self.chain.masses
+        touching = (hanging.gaps + (self.x[1:] - self.x[:-1]) <= NEAR * self.size).tolist()
+        for c in meeting.closing:
+            touching[c] = True
         x, v = self.x.copy(), self.v.copy()
-        for first, last in stretches(touching):
+        groups = stretches(touching)
+        for first, last in groups:
             self.align(first, last)
-        self.collide(touching)
+        self.collide(groups)
         struck = self.v
         # What opens at this instant rests no more in it, whatever else happens.
-        self.freed[releasing] = self.t
-        kept = touching & (self.t - self.freed > self.tie)
+        for c in meeting.releasing:
+            self.freed[c] = self.t
+        kept = [
+            t and self.t - freed > hanging.tie
+            for t, freed in zip(touching, self.freed, strict=True)
+        ]
         self.v, resting = common_velocities(masses, self.v, kept, RESTING * self.speed)
         self.account.settle(self.t, np.array([x, self.x]), np.array([v, struck, self.v]))
-        alone = self.pendulums.accelerations(self.x, self.v)
-        rounding = 1e-12 * self.speed * self.account.frequency
-        self.together = pressed(masses, alone, resting, rounding)
-        self.parting = touching & ~self.together
+        if any(resting):
+            alone = hanging.accelerations(self.x, self.v)
+            resting = pressed(masses, alone, resting, 1e-12 * self.speed * hanging.fastest)
+        self.together = tuple(resting)
+        self.parting = [t and not one for t, one in zip(touching, resting, strict=True)]
 
     def align(self, first: int, last: int) -> None:
         """Move balls that touch, but for rounding, to where they touch; keep their centre."""
-        offset = np.concatenate([[0.0], np.cumsum(self.gaps[first : last - 1])])
+        offset = np.concatenate([[0.0], np.cumsum(self.hanging.gaps[first : last - 1])])
         m, x = self.chain.masses[first:last], self.x[first:last] + offset
         if (x != x[0]).any():
             x = np.full_like(x, m @ x / m.sum())
         self.x[first:last] = x - offset
 
-    def collide(self, touching: NDArray[np.bool_]) -> None:
+    def collide(self, groups: list[tuple[int, int]]) -> None:
         """Solve the impacts of this instant and record them as one."""
         before, contacts, traces = self.v.copy(), list[int](), list[Trace]()
-        for first, last in stretches(touching):
-            v = before[first:last]
-            if (v[:-1] - v[1:] <= RESTING * self.speed).all():
+        speeds, slow = before.tolist(), RESTING * self.speed
+        for first, last in groups:
+            if all(a - b <= slow for a, b in pairwise(speeds[first:last])):
                 continue
-            balls = Chain(
-                self.chain.masses[first:last], v, self.chain.restitution[first : last - 1]
-            )
+            m, e = self.chain.masses[first:last], self.chain.restitution[first : last - 1]
+            balls = Chain._of(m, before[first:last].copy(), e)
             try:
                 # Not by `collide`, whose advice on a long path cannot be taken here.
-                trace = part(self.model, len(before), first, last).solve(balls)
+                trace = self.model(first, last).solve(balls)
             except ValueError as refused:
                 refused.add_note(f"at the impact at t = {self.t} s, balls {first} to {last - 1}")
                 raise
@@ -294,27 +294,26 @@ INSTANT = 1e-10
 RADIAN = 1e-11
 
 
-@dataclass
 class Account:
     """What the balls of a swing have, and what an unsound flight or instant would change."""
 
-    masses: Vector
-    gaps: Vector
-    pendulums: Pendulums
-    frequency: float  # of the fastest ball, rad/s
-    size: float  # of the swing, m
-    energy: float = 0.0  # where the present flight began, J
+    def __init__(self, hanging: Hanging, size: float) -> None:
+        self.hanging, self.damped = hanging, bool(hanging.damping.any())
+        self.overlap = TIE * size
+        self.energy = 0.0  # where the present flight began, J
 
     def fly(self, begin: float, times: Vector, x: Vector, v: Vector) -> None:
         """Demand of a flight that no ball passes another, and that energy is only damped."""
-        if not len(times):
-            return
-        overlap = -(self.gaps + np.diff(x, axis=-1)).min(axis=-1)
-        _demand(overlap <= TIE * self.size, begin + times, "balls overlap by {:g} m", overlap)
-        gain = self.pendulums.energy(self.masses, x, v) - self.energy
-        wrong = gain if np.any(self.pendulums.damping) else np.abs(gain)
-        sound = wrong <= RADIAN * (1.0 + times * self.frequency) * self.energy
-        _demand(sound, begin + times, "a flight has made or lost {:g} J", gain)
+        gaps = self.hanging.gaps + (x[:, 1:] - x[:, :-1])
+        sound = gaps >= -self.overlap
+        if not sound.all():
+            worst = -gaps.min(axis=-1)
+            _refuse(sound.all(axis=-1), begin + times, "balls overlap by {:g} m", worst)
+        gain = self.hanging.energy(x, v) - self.energy
+        wrong = gain if self.damped else np.abs(gain)
+        sound = np.asarray(wrong <= RADIAN * (1.0 + times * self.hanging.fastest) * self.energy)
+        if not sound.all():
+            _refuse(sound, begin + times, "a flight has made or lost {:g} J", gain)
 
     def settle(self, time: float, x: Vector, v: Vector) -> None:
         """Demand of an instant that all but its impacts keeps the energy, and all the momentum.
@@ -323,18 +322,18 @@ class Account:
         balls came to be, and where they were put; of `v` three: as they came, after the impacts,
         and at last.
         """
-        momenta = self.masses * v[::2]
+        momenta = self.hanging.masses * v[::2]
         gain = abs(float((momenta[1] - momenta[0]).sum()))
-        sound = gain <= INSTANT * np.abs(momenta).sum()
-        _demand(sound, time, "impacts have made or lost {:g} kg m/s", gain)
-        struck, self.energy = self.pendulums.energy(self.masses, x, v[1:]).tolist()
+        if not gain <= INSTANT * np.abs(momenta).sum():
+            _refuse(False, time, "impacts have made or lost {:g} kg m/s", gain)
+        struck, self.energy = self.hanging.energy(x, v[1:]).tolist()
         gain = abs(self.energy - struck)
-        sound = gain <= INSTANT * max(self.energy, struck)
-        _demand(sound, time, "{:g} J are made or lost beside the impacts", gain)
+        if not gain <= INSTANT * max(self.energy, struck):
+            _refuse(False, time, "{:g} J are made or lost beside the impacts", gain)
 
 
-def _demand(sound: Any, times: Any, what: str, defect: Any) -> None:
-    if not np.all(sound):
-        k = int(np.argmin(sound))
-        time, size = np.ravel(times)[k], np.ravel(defect)[k]
-        raise RuntimeError(f"the swing is not certified: at t = {time} s {what.format(size)}")
+def _refuse(sound: Any, times: Any, what: str, defect: Any) -> NoReturn:
+    """Raise for the first of some times at which the swing is not sound."""
+    k = int(np.argmin(sound))
+    time, size = np.ravel(times)[k], np.ravel(defect)[k]
+    raise RuntimeError(f"the swing is not certified: at t = {time} s {what.format(size)}")
