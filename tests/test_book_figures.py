@@ -22,6 +22,7 @@ CHAPTERS = [
     "multiple_impacts",
     "patterns",
     "n_balls",
+    "reading",
     "notation",
 ]
 EQUAL = [1, 1, 1], [1, 0, 0], 1
@@ -83,8 +84,8 @@ def test_opening_figures(chapter, figure, chain, ratio):
     [
         ("three_balls", "fig-p3", 0, 0, THREE, 0.25),
         ("three_balls", "fig-p3", 1, 1, THREE, 0.25),
-        ("multiple_impacts", "fig-p5", 0, 0, FIVE, 0.05),
-        ("multiple_impacts", "fig-p5", 1, 1, FIVE, 0.05),
+        ("reading", "fig-p5", 0, 0, FIVE, 0.05),
+        ("reading", "fig-p5", 1, 1, FIVE, 0.05),
         ("patterns", "fig-p7", 0, 0, LIGHT, 0.15),
         ("patterns", "fig-p7", 1, 1, LIGHT, 0.15),
     ],
@@ -222,7 +223,7 @@ def test_fig_4():
 
 
 def test_fig_three_ranges():
-    shown = panel("three_balls", "fig-own-three-ranges")
+    shown = panel("reading", "fig-own-three-ranges")
     x = shown["$1+X$"][:, 0]
     for name, bound in (
         ("Eq. 34", 1 + 0 * x), ("$1+X$", 1 + x), ("$1+(1+e_3)X$", 1 + 1.5 * x),
@@ -239,7 +240,7 @@ def test_fig_three_ranges():
 
 def test_fig_three_ratio():
     for number, (masses, e) in enumerate((([1, 1, 1], 0.5), ([2, 1, 1], 1))):
-        shown = panel("three_balls", "fig-own-three-ratio", number)
+        shown = panel("reading", "fig-own-three-ratio", number)
         for k in (0, 137, 900, 1500, 1900):
             v = after((masses, [1, 0, 0], e), shown["$v_1^+$"][k, 0])
             values = [shown[f"$v_{i}^+$"][k, 1] for i in (1, 2, 3)]

@@ -147,8 +147,8 @@ GIVEN = {
     "intro": "0.15 1.1344902 10.1115 3.11 3.14 4.0",  # a ratio, doi, Python, licence
     "problem": "",
     "compliance": "",
-    "three_balls": "0.01 0.09 0.1 0.11 3.9 0.25 0.5 0.6 0.75",
-    "multiple_impacts": "0.1 0.2 0.8",
+    "three_balls": "0.01 0.09 0.1 0.11 3.9",
+    "multiple_impacts": "0.2 0.8",
     "patterns": "0.003 0.01 0.1 0.15 0.3 0.3475 0.348 0.5 0.6 0.9 0.999",
     "n_balls": "0.1 0.2 0.5 1.5 1.75",
     "experiments": "0.01 0.171 0.17121 0.40 0.5 0.62 1.5 1.59",
@@ -163,6 +163,7 @@ GIVEN = {
     "extremes": "0.1 0.3 0.8 0.9 36.9",
     "extremes_inventory": "0.1 0.5",
     "notation": "",
+    "reading": "0.05 0.1 0.2 0.3 0.5 0.6 0.75 0.8",
     "ledger": "",
 }
 
