@@ -156,8 +156,9 @@ def test_fig_problem_definitions():
 
 
 def test_fig_compliance_ratio():
-    for number in (0, 1):
-        shown = panel("compliance", "fig-own-compliance-ratio", number)
+    figures = ("compliance", "fig-own-compliance-ratio"), ("reading", "fig-own-compliance-soft")
+    for number, figure in enumerate(figures):
+        shown = panel(*figure)
         for name, line in shown.items():
             if name.startswith(r"$\gamma$ = "):
                 gamma = float(name.rpartition("=")[2])
@@ -174,15 +175,16 @@ def test_fig_compliance_ratio():
 
 
 def test_fig_compliance_effective():
-    shown = panel("compliance", "fig-own-compliance-effective")
+    shown = panel("reading", "fig-own-compliance-effective")
     (at_end, at_loss, effective, law, eq_14, eq_15, dot) = shown.values()
     gammas = effective[:, 0]
     np.testing.assert_allclose(eq_14, np.column_stack([gammas, gammas]))
     np.testing.assert_allclose(law[:, 1], (math.pi**2 / 8 - 1) * gammas, rtol=1e-12)
     assert (eq_15[:, 1] == 0.5).all()
-    for k in (20, 80, 100, 130):
-        minus_2, minus_3 = printed_10_and_11(gammas[k], 1, first_loss(gammas[k])[0])
-        assert at_loss[k, 1] == pytest.approx(minus_3 / minus_2, rel=1e-8)
+    for gamma, ratio in at_loss[[20, 80, 100, 130]]:
+        minus_2, minus_3 = printed_10_and_11(gamma, 1, first_loss(gamma)[0])
+        assert ratio == pytest.approx(minus_3 / minus_2, rel=1e-8)
+    for k in (4, 16, 20, 26):
         v = outcome(1, gammas[k])
         assert at_end[k, 1] == pytest.approx(v[2] / (1 - v[0]), abs=1e-6)
         assert effective[k, 1] == pytest.approx(-2 * v[0] / (1 - v[0]), abs=1e-6)
