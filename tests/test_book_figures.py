@@ -145,7 +145,7 @@ def test_fig_problem_family():
 
 
 def test_fig_problem_definitions():
-    shown = panel("problem", "fig-own-problem-definitions")
+    shown = panel("reading", "fig-own-problem-definitions")
     a = shown["Stronge: work"][:, 0]
     for name, energy in (
         ("Poisson: impulses", (4 + a**2) / (2 - a) ** 2),
