@@ -103,6 +103,21 @@ def growth(_):
         yield spread, e, size, n, float(np.median(change)), float(change.max()), int(leading.min())
 
 
+def unequal(_):
+    # Of the last two families 80 balls need more than five million steps.
+    sizes = {family: (20, 40, 80) if "1 kg" in family else (20, 40) for family in x.UNEQUAL}
+    cases = [(family, n) for family in sizes for n in sizes[family]]
+    for (family, n), ratio in itertools.product(cases, (0.1, 0.2, 0.3, 0.45)):
+        change = x.unequal_jumps(family, n, ratio)
+        yield (
+            family,
+            n,
+            ratio,
+            *map(float, np.quantile(change, [0, 0.5, 1])),
+            int(sum(change > 1e-6)),
+        )
+
+
 def each_input():
     """Yield the inputs of the ten chains of the paper's test."""
     for name in paper_sequences():
@@ -210,6 +225,7 @@ PARTS = {
     ),
     "lengths": (lengths, "row balls events finished momentum gain ledger error"),
     "growth": (growth, "spread restitution size balls median largest leading"),
+    "unequal": (unequal, "family balls ratio least median largest jumps"),
     "edges": (edges, "sequence input index side distance jump"),
     "jumps": (jumps, "sequence input index change jump"),
     "elastic": (elastic, "power ratio impacts theory error condition own gain collapsed"),

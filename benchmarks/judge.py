@@ -4,6 +4,7 @@ Usage::
 
     python benchmarks/judge.py                             # a hundred chains of every family
     python benchmarks/judge.py --family losses --count 10000 --seed 7
+    python benchmarks/judge.py --count 1000 --seed 2026 --output data/judge.csv     # ten minutes
 
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
 within 600 events.  A float means what it prints as if that is short, see `meaning`: ties of an
@@ -14,11 +15,13 @@ Every chain counted as right or wrong was judged by the exact run, at some hundr
 """
 
 import argparse
+import csv
 import decimal
 import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from decimal import Decimal
+from pathlib import Path
 from typing import NamedTuple
 
 import truth
@@ -143,8 +146,9 @@ class Verdict(NamedTuple):
     off: float = 0.0
 
 
-#: Where the exact run ends: "other reading" is wrong by `meaning`, right for the exact values of
-#: all floats or `on_bounds`; "open" hangs on more than so many digits; "unfinished" has no answer.
+#: Where the exact run ends: "other reading" is wrong by `meaning` and `on_bounds`, right for the
+#: exact values of all floats, or with ratios beside their bounds; "open" hangs on more than so many
+#: digits; "unfinished" has no answer.
 ENDS = ["right", "wrong", "other reading", "open", "unfinished"]
 #: Where it has no end: who agrees with the answer; "given up" has no answer.
 ENDLESS = ["as 50 digits", "unlike them", "as relations", "nobody knows", "given up"]
@@ -172,7 +176,8 @@ def single(problem):
 def judge(problem, *ask, events=EVENTS):
     """The verdict on one chain, by the worse of its answers; "endless" if that must be others'."""
     given = [answer(problem) for answer in ask or (batch, single)]
-    right = exact(problem, events=events)
+    meant = on_bounds(problem)
+    right = exact(meant, events=events)
     if right is None:
         return Verdict("endless")
     if None in given:
@@ -180,10 +185,10 @@ def judge(problem, *ask, events=EVENTS):
     far = max(off(problem, one, right) for one in given)
     if far <= WRONG:
         return Verdict("right", far)
-    again = exact(problem, twice=True)
+    again = exact(meant, twice=True)
     if again is None or off(problem, again, right) > WRONG:
         return Verdict("open", far)
-    for other in exact(problem, Decimal), exact(on_bounds(problem)):
+    for other in exact(problem, Decimal), exact(problem):
         if other and max(off(problem, one, other) for one in given) <= WRONG:
             return Verdict("other reading", far)
     return Verdict("wrong", far)
@@ -317,11 +322,18 @@ def main():
     parser.add_argument("--count", type=int, default=100, help="chains of each family")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--shrink", type=int, default=5, help="how many wrong chains to shrink")
+    parser.add_argument("--output", type=Path, help="write the counts as CSV")
     given = parser.parse_args()
     counts, found = run(given.family or list(JUDGED), given.count, given.seed)
     print(f"{'':18}" + "".join(f"{word:>14}" for word in WORDS))
     for name, count in counts.items():
         print(f"{name:18}" + "".join(f"{count[word]:14}" for word in WORDS))
+    if given.output:
+        with given.output.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(["family", *WORDS])
+            for name, count in counts.items():
+                writer.writerow([name, *(count[word] for word in WORDS)])
     for name, verdict, problem in found:
         print(f"\n{name}: {verdict.word}, off by {verdict.off:.1e}\n{problem!r}")
     for _, _, problem in [each for each in found if each[1].word == "wrong"][: given.shrink]:

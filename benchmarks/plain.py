@@ -68,7 +68,7 @@ def solve(
     out = names["Outputs"](
         [[0.0] * n], [[0] * (n - 1)], [0], *([kind()] * (n - 1) for kind in (float, float, int))
     )
-    options = names["Options"](meeting, max_events, False, True)
+    options = names["Options"](meeting, max_events, False)
     plenty = 2**62
     _, status = names["batch"](0, False, n, inputs, options, out, state, plenty)
     tally = state.tally[0]

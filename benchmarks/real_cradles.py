@@ -8,7 +8,7 @@ Usage::
 Strikes: velocities relative to the row, over the striker's, the striking side first.  Lengths in
 Hertz units of the first release, (m v^2 / k)^(2/5); v its striker's speed.  The striker's speed was
 read in part from the sum of momentum: of the five numbers of a release one may not be free, so the
-degrees of freedom printed are too many by up to one a release.
+degrees of freedom are too many by up to one a release.  `strikes` writes data/film_fits.csv.
 """
 
 import csv
@@ -18,20 +18,20 @@ from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import brentq, least_squares, minimize_scalar
 
 from cradle import (
     Chain,
     EnergyDistribution,
     ImpulseCorrelation,
     SequentialCollisions,
-    SpringChain,
     collide,
     ratio_table,
 )
 
 DATA = Path(__file__).parents[1] / "data"
 READINGS = (1, 2, 3, 4)
+EQUAL = (1, 1, 1, 1, 1)
 SLOWER = 0.766  # strikers of the second release over the one of the first, relative to the row
 
 
@@ -87,122 +87,192 @@ def spheres(speeds, gaps, loss, limit=400.0):
     return state[n:]
 
 
-def by_law(model, restitution, release):
-    """Return the velocities that a model of the package gives to five equal balls."""
-    chain = Chain(np.ones(5), [1.0] * release + [0.0] * (5 - release), restitution)
-    return collide(chain, model).velocities
+def by_law(model, restitution, release, apart, masses=EQUAL):
+    """Return velocities of five balls; `model(k)` is the law of the balls from k on.
+
+    Strikers that are apart come one after another: all meet in pairs after the first one.
+    """
+    late = release - 1 if apart else 0
+    speeds = [1.0] * (release - late) + [0.0] * (5 - release)
+    e = np.broadcast_to(restitution, 4)
+    v = collide(Chain(masses[late:], speeds, e[late:]), model(late)).velocities
+    for k in range(late, 0, -1):
+        chain = Chain(masses[k - 1 :], [1.0, *v], e[k - 1 :])
+        v = collide(chain, SequentialCollisions()).velocities
+    return v
 
 
-def by_spheres(p, release):
-    """Return velocities: p = gaps of contacts 2, 3, 4 and of the two strikers, A."""
+def ratios(p, e, release, apart, backward=None, masses=EQUAL):
+    """Return velocities by the ratios p of balls 2, 3, 4."""
+
+    def model(k):
+        back = None if backward is None else backward[k:]
+        return ImpulseCorrelation(p[k:], back, excess="saturate")
+
+    return by_law(model, e, release, apart, masses)
+
+
+def by_spheres(p, release, apart=False):
+    """Return velocities: p = gaps of contacts 2, 3, 4, A, and the gap of the strikers."""
     unit = 1.0 if release == 1 else SLOWER
-    gaps = [0.0 if release == 1 else p[3], p[0] if release == 1 else 0.0, p[1], p[2]]
-    return spheres([unit] * release + [0.0] * (5 - release), np.abs(gaps), abs(p[4])) / unit
+    between = APART if apart else p[4]
+    gaps = [between] * (release - 1) + [0.0] + list(p[release - 1 : 3])
+    return spheres([unit] * release + [0.0] * (5 - release), np.abs(gaps), abs(p[3])) / unit
 
 
-# Name: velocities from parameters and release, starts, bounds.
-E = (0.5, 1.0)
+# Name: velocities from parameters, release and whether strikers are apart; starts; bounds; for
+# `OWN`, which number only the first release depends on if the strikers are apart.
+APART = 30.0  # Hertz units: far enough
+E, LOSS, THREE = (0.5, 1.0), (0.0, 0.1), list(itertools.product((0.04, 0.12), repeat=3))
 LAWS = {
-    "sequential, e": (lambda p, r: by_law(SequentialCollisions(), p[0], r), [[0.98]], [E]),
-    "one ratio, e": (
-        lambda p, r: by_law(ImpulseCorrelation(p[0], excess="saturate"), p[1], r),
-        [[0.05, 0.99], [0.12, 0.99], [0.3, 0.98]],
-        [(0, 0.5), E],
-    ),
-    "three ratios, e": (
-        lambda p, r: by_law(ImpulseCorrelation(p[:3], excess="saturate"), p[3], r),
-        [[*s, 0.985] for s in itertools.product((0.04, 0.12), repeat=3)],
-        [(0, 0.5)] * 3 + [E],
-    ),
-    "energy law (Hertz), e": (
-        lambda p, r: by_law(EnergyDistribution(1.0, 1.5), p[0], r),
+    "pairs, e": (
+        lambda p, r, a: by_law(lambda _: SequentialCollisions(), p[0], r, a),
         [[0.98]],
         [E],
     ),
-    "spheres touching, elastic": (lambda _, r: by_law(SpringChain(), 1.0, r), [[]], []),
-    "spheres touching, A": (
-        lambda p, r: by_spheres([0, 0, 0, 0, p[0]], r),
+    "energy law (Hertz), e": (
+        lambda p, r, a: by_law(lambda _: EnergyDistribution(1.0, 1.5), p[0], r, a),
+        [[0.98]],
+        [E],
+    ),
+    "one ratio, e": (
+        lambda p, r, a: ratios([p[0]] * 3, p[1], r, a),
+        [[0.05, 0.99], [0.12, 0.99], [0.3, 0.98]],
+        [(0, 0.5), E],
+    ),
+    "one ratio, e, four masses": (
+        lambda p, r, a: ratios([p[0]] * 3, p[1], r, a, masses=[1, *p[2:]]),
+        [[s, 0.985, 1, 1, 1, 1] for s in (0.05, 0.1, 0.13)],
+        [(0, 0.45), E] + [(0.95, 1.05)] * 4,
+    ),
+    "three ratios, e": (
+        lambda p, r, a: ratios(p[:3], p[3], r, a),
+        [[*s, 0.985] for s in THREE],
+        [(0, 0.5)] * 3 + [E],
+    ),
+    "three ratios, four e": (
+        lambda p, r, a: ratios(p[:3], p[3:], r, a),
+        [[*s, *[0.985] * 4] for s in THREE],
+        [(0, 0.5)] * 3 + [E] * 4,
+    ),
+    "three ratios each way, e": (
+        lambda p, r, a: ratios(p[:3], p[6], r, a, p[3:6]),
+        [[*s, *t, 0.985] for s in THREE for t in ([0.1] * 3, [0.04, 0.12, 0.12])],
+        [(0, 0.5)] * 6 + [E],
+    ),
+    "touching spheres, A": (
+        lambda p, r, a: by_spheres([0, 0, 0, p[0], 0], r, a),
         [[0.003], [0.02]],
-        [(0, 0.1)],
+        [LOSS],
     ),
     "spheres, one gap, A": (
-        lambda p, r: by_spheres([p[0]] * 4 + [p[1]], r),
+        lambda p, r, a: by_spheres([*p[:1]] * 3 + [p[1], p[0]], r, a),
         [[0.05, 0.005], [0.15, 0.005], [0.4, 0.005]],
-        [(0, 6), (0, 0.1)],
+        [(0, 6), LOSS],
     ),
-    "spheres, four gaps, A": (
+    "spheres, three gaps, A": (
         by_spheres,
-        [[a, b, c, g, 0.007] for a, b, c in [(0.17, 0.03, 0.05), (0.1, 0.05, 0.05), (0.3,) * 3]
+        [[0.17, 0.03, 0.05, 0.007], [0.1, 0.05, 0.05, 0.007]],
+        [(0, 6)] * 3 + [LOSS],
+    ),
+    "spheres, four gaps, A": (  # the strikers' own
+        lambda p, r, _: by_spheres(p, r),
+        [[a, b, c, 0.007, g] for a, b, c in [(0.17, 0.03, 0.05), (0.1, 0.05, 0.05), (0.3,) * 3]
          for g in (1.0, 3.0)],
-        [(0, 6)] * 4 + [(0, 0.1)],
+        [(0, 6)] * 3 + [LOSS, (0, 6)],
     ),
 }  # fmt: skip
-# The gap that only this release has: of the contact that strikes in the other, of the two strikers.
-OWN_GAP = {1: 0, 2: 3}
-GAPS = np.append(np.arange(0, 1, 0.02), np.arange(1, 6, 0.2))
+TOGETHER = [name for name in LAWS if name != "spheres, three gaps, A"]
+ONE_BY_ONE = [n for n in LAWS if n not in ("three ratios, four e", "three ratios each way, e",
+                                           "spheres, four gaps, A")]  # fmt: skip
+# The number that one release alone depends on: it is fitted to that release even where the others
+# were fitted to the other one.
+OWN = {
+    ("three ratios, e", True): {1: 0},
+    ("spheres, three gaps, A", True): {1: 0},
+    ("spheres, four gaps, A", False): {1: 0, 2: 4},
+}
+COLUMNS = ["reading", "law", "strikers", "fitted", "freedom", "chi_one", "chi_two", "parameters"]
 
 
-def misfits(law, p, data, releases):
-    """Return residuals; the scale of each release is free within 1 %."""
+def misfits(velocities, data, releases):
+    """Return residuals of {release: velocities}; the scale of each is free within 1 %."""
     out = []
     for release in releases:
-        v, sigma = data[release]
-        w = law(p, release)
+        (v, sigma), w = data[release], velocities(release)
         scale = (1e4 + (v * w / sigma**2).sum()) / (1e4 + (w * w / sigma**2).sum())
         out += [*((v - scale * w) / sigma), (scale - 1) / 0.01]
     return np.array(out)
 
 
-def fitted(name, data, releases):
-    """Return the best of several fits."""
-    law, starts, bounds = LAWS[name]
-    if not bounds:
-        return np.array([]), float((misfits(law, [], data, releases) ** 2).sum())
-    best = None
-    for start in starts:
-        fit = least_squares(
-            lambda p: misfits(law, p, data, releases),
+def chi_square(law, p, apart, data, releases):
+    """Return the sum of squared residuals of a law at parameters p."""
+    return float((misfits(lambda r: LAWS[law][0](p, r, apart), data, releases) ** 2).sum())
+
+
+def fitted(law, apart, data, releases):
+    """Return the parameters of the best of several fits."""
+    solve, starts, bounds = LAWS[law]
+    fits = [
+        least_squares(
+            lambda p: misfits(lambda r: solve(p, r, apart), data, releases),
             start,
             bounds=np.transpose(bounds),
             diff_step=3e-3,  # well above the noise of the integration
             x_scale=np.maximum(np.abs(start), 0.01),
             max_nfev=25,
         )
-        best = fit if best is None or fit.cost < best.cost else best
-    return best.x, 2 * best.cost
+        for start in starts
+    ]
+    return min(fits, key=lambda fit: fit.cost).x
+
+
+def tuned(law, apart, p, index, data, release):
+    """Return p with one number fitted to one release."""
+
+    def with_number(x):
+        q = np.array(p)
+        q[index] = x
+        return q
+
+    def misfit(x):
+        return chi_square(law, with_number(x), apart, data, (release,))
+
+    low, high = LAWS[law][2][index]
+    grid = low + (high - low) * np.linspace(0, 1, 61) ** 2
+    best = min(range(61), key=lambda i: misfit(grid[i]))
+    around = grid[max(best - 1, 0)], grid[min(best + 1, 60)]
+    return with_number(minimize_scalar(misfit, bounds=around, method="bounded").x)
+
+
+def fits_of(reading, law, apart):
+    """Return rows of a law fitted to both releases, and to one that predicts the other."""
+    data, rows = first_strikes(reading), []
+    count, own = len(LAWS[law][2]), OWN.get((law, apart), {})
+    how = "own gap" if "four gaps" in law else "apart" if apart else "together"
+    for fit, releases in (("both", (1, 2)), ("one", (1,)), ("two", (2,))):
+        p, other = fitted(law, apart, data, releases), 3 - releases[0]
+        free = 10 - count if fit == "both" else 5 - (other in own)
+        if fit != "both" and other in own:
+            p = tuned(law, apart, p, own[other], data, other)
+        p = [float(f"{x:.5g}") for x in p]  # as stored
+        chi = [f"{chi_square(law, p, apart, data, (r,)):.4g}" for r in (1, 2)]
+        rows.append([reading, law, how, fit, free, *chi, " ".join(f"{x:.5g}" for x in p)])
+        print(*rows[-1], sep=", ", flush=True)
+    return rows
 
 
 def strikes():
-    """Print chi-square of each law: both releases, and one fitted predicting the other."""
-    for reading in READINGS:
-        print(f"\nReading {reading}: velocities and errors, the striking side first")
-        data = first_strikes(reading)
-        for release, (v, sigma) in data.items():
-            print(release, *(f"{a:+.4f}+-{b:.4f}" for a, b in zip(v, sigma)))
-    for reading in (4, 2):
-        data = first_strikes(reading)
-        print(f"\nFits to reading {reading}: chi-square / degrees of freedom")
-        for name, (law, _, bounds) in LAWS.items():
-            p, both = fitted(name, data, (1, 2))
-            print(f"{name:28s} both {both:9.1f} / {10 - len(bounds)}", np.round(p, 4), flush=True)
-            for one, other in ((1, 2), (2, 1)):
-                q, own = fitted(name, data, (one,))
-                free = OWN_GAP[other] if name == "spheres, four gaps, A" else None
-                wrong = [
-                    ((misfits(law, z, data, (other,)) ** 2).sum(), list(z))
-                    for z in ([q] if free is None else [with_gap(q, free, g) for g in GAPS])
-                ]
-                wrong, z = min(wrong)
-                print(f"    fitted to {one}: {own:.1f} / {max(5 - len(bounds), 0)};", end=" ")
-                print(f"predicts {other}: {wrong:.1f} / {5 - (free is not None)}", end=" ")
-                print(np.round(law(z, other), 3), flush=True)
-
-
-def with_gap(p, index, gap):
-    """Return parameters with one gap changed."""
-    p = np.array(p)
-    p[index] = gap
-    return p
+    """Fit every law to readings 4 and 2; write film_fits.csv."""
+    rows = [
+        row
+        for reading in (4, 2)
+        for apart, laws in ((False, TOGETHER), (True, ONE_BY_ONE))
+        for law in laws
+        for row in fits_of(reading, law, apart)
+    ]
+    with (DATA / "film_fits.csv").open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
 
 
 def half_minute():

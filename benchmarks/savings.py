@@ -81,7 +81,7 @@ def _one_by_one_or_at_once(clock, count):
 
 
 def _two_balls(clock, count):
-    """Yield: two balls by the batch, which takes Eq. 24, or by Newton's rule."""
+    """Yield: two balls by the batch, or by Newton's rule."""
     m, v, e, f, b = random_chains(2, count)
 
     def formula():
@@ -98,7 +98,7 @@ def _two_balls(clock, count):
 
 
 def _one_collision_each(clock, count):
-    """Yield: one collision per contact, by the batch, which takes Eqs. 24 and 30, or by these."""
+    """Yield: one collision per contact, by the batch, or by Eqs. 24 and 30."""
     m, v, e, f, b = random_chains(3, 4 * count)
     once = np.flatnonzero(one_collision_each(m, v, e, f[:, 0]))[:count]
     m, v, e, f, b = (part[once] for part in (m, v, e, f, b))

@@ -145,7 +145,7 @@ def solve(
     backward=None,
     *,
     excess="raise",
-    number=mpmath.mpf,
+    number=as_meant,
     max_events=1_000_000,
     collapse_below=None,
     impact=Impact,
@@ -153,7 +153,7 @@ def solve(
 ):
     """Post-impact state by rules R1 to R9, with the digits of `number`.
 
-    A string such as "0.1" is read as that decimal number; a float is too with `number=as_meant`.
+    A float means what it prints as (`meaning`), a string such as "0.1" that decimal number.
     `collapse_below` is the threshold of R9 relative to the largest initial closing speed.
     """
 

@@ -17,13 +17,9 @@ from cradle.models.batch import post_impact_velocities
 from cradle.trace import Event, Trace
 
 __all__ = [
-    "Condition",
-    "bouncing_pattern",
-    "condition_number",
-    "conserving_angle",
-    "conserving_outcomes",
+    "Condition", "bouncing_pattern", "condition_number", "conserving_angle", "conserving_outcomes",
     "effective_ratio",
-]
+]  # fmt: skip
 
 #: Pattern by the number of balls that bounce back: none, the first, the first two.
 _PATTERNS = np.array([2, 1, 3])
@@ -157,15 +153,7 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
         backward = model.forward if model.backward is None else model.backward
         for name, values in (("forward", model.forward), ("backward", backward)):
             ratios[name] = np.broadcast_to(np.asarray(values, float), (len(chain) - 2,))
-    model_of: Any = model
-
-    def solve(**moved: Any) -> Trace:
-        changed = {name: moved.get(name, values) for name, values in ratios.items()}
-        return collide(
-            Chain(*(moved.get(name, values) for name, values in own.items())),
-            replace(model_of, **changed) if changed else model,
-        )
-
+    law: Any = model
     sequence = _events_at_balls(base)
     total, largest, most, same = 0.0, -1.0, "", True
     for name, values in (own | ratios).items():
@@ -174,8 +162,10 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
             for factor in (1.0 - step, 1.0 + step):
                 moved = values.copy()
                 moved[k] *= factor
+                given = own | ratios | {name: moved}
                 try:
-                    trace = solve(**{name: moved})
+                    changed = replace(law, **{n: given[n] for n in ratios}) if ratios else law
+                    trace = collide(Chain(*(given[n] for n in own)), changed)
                 except ValueError:
                     continue
                 change = max(change, float(np.abs(trace.velocities - base.velocities).max()))
@@ -248,9 +238,8 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     if len(chain) != 3:
         raise ValueError(f"trace has {len(chain)} balls; an effective ratio is that of three")
     if not (u > 0.0).any():
-        raise ValueError(
-            f"closing_speeds = {u.tolist()}; any ratio fits balls that do not approach"
-        )
+        what = f"closing_speeds = {u.tolist()}"
+        raise ValueError(f"{what}; any ratio fits balls that do not approach")
     # The leftmost approaching contact drives (forward), or the right one alone (backward).
     bounds = largest_ratios(chain.masses, np.zeros(1), np.zeros(1))
     bound = float(bounds[0 if u[0] > 0.0 else 1][0])

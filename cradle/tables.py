@@ -26,13 +26,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
-    "ball_masses",
-    "data_folder",
-    "paper_chain",
-    "paper_sequences",
-    "ratio_table",
+    "ball_masses", "data_folder", "paper_chain", "paper_sequences", "ratio_table",
     "restitution_table",
-]
+]  # fmt: skip
 
 
 def data_folder() -> Traversable:
@@ -70,12 +66,9 @@ def ball_masses() -> Mapping[str, float]:
     for ball, row in rows.items():
         if len(ball) != 1 or not ball.isupper():
             row.refuse("ball", "must be one capital letter")
-    return MappingProxyType(
-        {
-            ball: row.number("mass_kg", "must be above 0", 0.0, open_low=True)
-            for ball, row in rows.items()
-        }
-    )
+    masses = {ball: row.number("mass_kg", "must be above 0", 0.0, open_low=True)
+              for ball, row in rows.items()}  # fmt: skip
+    return MappingProxyType(masses)
 
 
 @cache

@@ -4,9 +4,8 @@ Rules R1 to R8 of the book's chapter on N balls, for numbers of any type.  R9 is
 infinite sequence of impacts goes on to the last digits of its numbers, or to an `EventLimit`.
 
 Contact c joins balls c and c + 1.  Its closing speed u = v[c] - v[c + 1] is above 0 in compression.
-Inside a run of active contacts there is no time, only progress s.  Between two events velocities
-are linear and works quadratic in s: every event is the root of a formula.  Against rounding: a
-`small` part is nothing, events within an `instant` are one, six tenths of all digits a `tie`.
+Inside a run there is no time, only progress: velocities are linear and works quadratic in it, every
+event is the root of a formula.  Of numbers six tenths of the digits tell a `tie` from a difference.
 """
 
 import math
@@ -100,16 +99,18 @@ class Impact:
         """R8.2: what comes on the straight way of a run: ends, and closings beside it (R5)."""
         found = [(self.way_to_end(c, rate[c], slope[c]), "end", c) for c in rate]
         for c in slope:  # one between two runs is a gap: R8.3
-            if slope[c] > 0 and not self.active[c] and self.active[c - 1] != self.active[c + 1]:
-                found.append(((-self.u[c] / slope[c], self.zero), "close", c))
+            beside_one = not self.active[c] and self.active[c - 1] != self.active[c + 1]
+            if beside_one and (slope[c] > 0 or self.u[c] == 0):  # R6: what vanishes pushes, too
+                found.append(((-self.u[c] / (slope[c] or 1), self.zero), "close", c))
         return [(*way, kind, c) for way, kind, c in found if way]
 
     def way_to_end(self, c: int, rate: Number, slope: Number) -> tuple[Number, ...]:
         """R3: progress until all is released and u < 0, and u there; none if it does not end."""
         u, e, way = self.u[c], self.e[c], self.zero
         store = max(e * e * self.gained[c] - self.given[c], self.zero)
-        if (u < 0 and store == 0) or (u == 0 and e == 0 and self.gained[c] > 0):
-            return way, u  # now; with e = 0 at u = 0, whoever drives it
+        driven = self.direction[c] == FORWARD or self.direction[c + 1] == BACKWARD
+        if store == 0 and (u < 0 or (u == 0 and (not driven or (e == 0 and self.gained[c] > 0)))):
+            return way, u
         if rate == 0 or (u >= 0 and slope >= 0):
             return ()
         if u > 0:  # first it goes to u = 0
@@ -124,16 +125,15 @@ class Impact:
 
     def end(self, c: int) -> None:
         """R4: the relations of a contact go with it; what it drove goes on by itself."""
-        self.active[c], self.near[c] = False, abs(self.u[c])
-        self.direction[c] = self.direction[c + 1] = 0
+        self.active[c], self.near[c], self.direction[c : c + 2] = False, abs(self.u[c]), (0, 0)
         self.record("end", c)
 
     def close(self, c: int) -> None:
         """R4, R8.5: a contact that closes is driven by those that are active beside it."""
         self.u[c] = self.gained[c] = self.given[c] = self.zero
         self.active[c], self.collisions[c] = True, self.collisions[c] + 1
-        self.direction[c] = FORWARD if self.active[c - 1] else 0
-        self.direction[c + 1] = BACKWARD if self.active[c + 1] else 0
+        self.direction[c] = FORWARD * self.active[c - 1]
+        self.direction[c + 1] = BACKWARD * self.active[c + 1]
         self.record("close", c)
 
     def goes_first(self, c: int, due: list[int]) -> bool:
@@ -147,7 +147,7 @@ class Impact:
         # Seen from the left ball of the gap: it goes from velocity 0 to p, the right from q to r.
         p, q = left.pull[right.first - 1] * left.length, -self.u[right.first - 1]
         r = q + right.pull[right.first] * right.length
-        if p - r <= self.last_digits:
+        if p - r <= self.last_digits and q:
             return []
         at = (1 - self.meeting) * max(self.zero, r) + self.meeting * min(p, q)
         ways = (left, at, p), (right, q - at, q - r)

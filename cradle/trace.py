@@ -69,12 +69,11 @@ class Trace:
     saturated : tuple of int
         Contacts that were held closed at the largest admissible ratio (Eqs. 34, 53) at some time.
     margin : float
-        How close a different order of events came: the least distance of two events of one run,
-        relative to the progress to the later one; events that coincide to the last bit are meant
-        to.  Below about 1e-12 another order, and perhaps another outcome, lies within rounding.
+        How close another sequence of events came: the least distance of two events of one run,
+        of two meetings, or of a ratio from its bound, relative to what is compared; ties are meant
+        to be ties.  Below about 1e-12 another outcome may lie within the last digit of the input.
         It sees close calls, one at a time.  An impact of hundreds of collisions can also amplify
-        a last digit step by step, with ratios above their bounds about one in a thousand random
-        chains does so by 1e8 and more; `condition_number` tells, with a `step` of 1e-10 or less.
+        a last digit step by step; `condition_number` tells, with a `step` of 1e-10 or less.
         Nor does it tell which `collisions` are too slow to mean anything.
 
     References

@@ -5,7 +5,8 @@ import re
 
 import numpy as np
 import pytest
-from chapters import Chapter
+import real_cradles
+from chapters import Chapter, panel
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from truth import solve
@@ -165,7 +166,31 @@ def test_contact_of_steel_balls_in_closed_form():
     deepest = (5 * (mass / 2) * speed**2 / (4 * k)) ** 0.4
     duration = 2.94327 * deepest / speed
     assert glued("contact-time") == pytest.approx(1e6 * duration, abs=0.51)
-    assert glued("contact-way") == pytest.approx(1e6 * duration * speed, abs=0.51)
+    assert glued("compression") == pytest.approx(1e6 * deepest, abs=0.51)
+
+
+def test_gaps_of_a_part_of_the_compression():
+    """By SciPy, gap by gap: a hundredth, a tenth and the whole compression, (5/8)^0.4 units."""
+    touching = real_cradles.spheres(np.eye(5)[0], [0, 0, 0, 0], 0.0)
+    for name, share in (("hundredth", 0.01), ("tenth", 0.1), ("whole", 1.0)):
+        gap = share * (5 / 8) ** 0.4
+        after = real_cradles.spheres(np.eye(5)[0], [0, gap, gap, gap], 0.0)
+        moved = np.abs(after - touching).max()
+        assert glued(f"gap-{name}-moves") == pytest.approx(moved, abs=1.1e-3)
+        assert glued(f"gap-{name}") == pytest.approx(share * glued("compression"), rel=0.01)
+    assert glued("gaps-most") == pytest.approx(np.abs(np.eye(5)[4] - touching).max(), abs=6e-4)
+    assert glued("gap-tenth-moves") == pytest.approx(glued("gaps-most") / 2, rel=0.1)
+
+
+def test_fig_toy_gaps():
+    shown = panel("toy", "fig-toy-gaps")
+    assert list(shown) == [f"ball {k}" for k in range(1, 6)]
+    velocities = np.array([line[:, 1] for line in shown.values()])
+    np.testing.assert_allclose(velocities.sum(axis=0), 1, atol=3e-4)
+    at = 12
+    gap = shown["ball 1"][at, 0] * (5 / 8) ** 0.4
+    after = real_cradles.spheres(np.eye(5)[0], [0, gap, gap, gap], 0.0)
+    np.testing.assert_allclose(velocities[:, at], after, atol=3e-4)
 
 
 def test_spread_of_the_second_stroke_at_any_angle():

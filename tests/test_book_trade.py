@@ -15,13 +15,10 @@ import pytest
 from chains import ELASTIC, HERTZ, LINEAR
 from chapters import Chapter, number, points
 from page import people
-from scenes import random_chains
 from scipy.optimize import minimize
 from truth import solve
 
 from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, paper_chain
-from cradle.closed_form import one_collision_each
-from cradle.kernel.batch import Inputs, short_cut
 
 ROOT = Path(__file__).parents[1]
 CHAPTER = Chapter("trade")
@@ -547,28 +544,6 @@ def test_savings_are_savings():
     line, three = pairs[-1]
     assert "1000" in line["setting"]
     assert line["time_ratio"] < 10 * three["time_ratio"]  # 333 times as many balls
-
-
-def test_where_a_batch_takes_the_formulas_by_itself():
-    """What the rows of the savings and the points of the figure are times of."""
-    rows = find("saving", "all: post_impact_velocities")
-    assert [row["model"] for row in rows] == ["two balls", "one collision per contact"]
-
-    def shortened(m, v, e, f, b):
-        return short_cut(len(m), Inputs(m, v, e, f, b), True, np.empty(len(m)))
-
-    assert all(shortened(*chain) for chain in zip(*random_chains(2, 200), strict=True))
-    chains = list(zip(*random_chains(3, 200), strict=True))
-    taken = [shortened(*chain) for chain in chains]
-    assert taken == [bool(one_collision_each(m, v, e, f[0])) for m, v, e, f, _ in chains]
-    assert 100 < sum(taken) < 180  # the unit of time: some by formula, some by events
-    # Three equal balls by formula, five by events.
-    assert shortened(np.ones(3), np.eye(3)[0], np.ones(2), np.full(1, 0.167), np.zeros(1))
-    three, five = (
-        find("event", "compiled, batch", chain=f"{count} equal")[0]["time_ratio"]
-        for count in ("three", "five")
-    )
-    assert five > 10 * three
 
 
 def test_sequential_collisions_tell_who_moves_off_fastest():

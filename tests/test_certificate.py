@@ -1,5 +1,7 @@
 """An answer with one thing wrong is refused, and told what: the kernel's `certify`, by itself."""
 
+import math
+
 import plain
 import pytest
 from families import FAMILIES, family
@@ -9,25 +11,45 @@ from cradle.kernel.state import ENERGY, LEDGER, MOMENTUM, ORDER, PULL
 KERNEL = plain.rooms()
 LOSSY = ([1, 0.3, 0.6, 2], [1, 0.2, 0, -0.5], 0.8, 0.2)
 ELASTIC = ([1, 0.3, 0.6, 2], [1, 0.2, 0, -0.5], 1.0, 0.2)
-#: A millionth of a millionth, some thousand times what rounding may be.
+#: A millionth of a millionth, some hundred times what rounding may be.
 SMALL = 1e-12
+
+signs = pytest.mark.parametrize("sign", [1, -1])
+balls = pytest.mark.parametrize("ball", range(4))
+contacts = pytest.mark.parametrize("contact", range(3))
 
 
 def solved(masses, velocities, e, ratio, boost=0.0):
     found = plain.solve(masses, [v + boost for v in velocities], e, ratio, kernel=KERNEL)
+    assert found.status == 0
     return found.state
 
 
-def verdict(state):
-    return KERNEL["certify"](len(state.ball), state.ball, state.contact, state.tally[0])
+def verdict(state, kernel=KERNEL):
+    given = len(state.ball), state.ball, state.contact
+    kernel["settle"](*given, state.tally[0].unit)
+    return kernel["certify"](*given, state.tally[0])
 
 
 def pull(state, c, impulse):
-    """Balls and contact c as if it had had so much less impulse."""
-    one, other = state.ball[c], state.ball[c + 1]
+    """Let contact c have had so much less impulse, and all closing speeds say so too."""
+    one, other = state.ball[c].inverse, state.ball[c + 1].inverse
     state.contact[c].p -= impulse
-    one.hi += impulse / one.m
-    other.hi -= impulse / other.m
+    state.contact[c].u += impulse * (one + other)
+    if c > 0:
+        state.contact[c - 1].u -= impulse * one
+    if c + 2 < len(state.ball):
+        state.contact[c + 1].u -= impulse * other
+
+
+def energy(state):
+    """Kinetic energy after the impact, from impulses alone."""
+    count = len(state.ball)
+    p = [0, *(state.contact[c].p.real for c in range(count - 1)), 0]
+    speeds = [
+        ball.start.real + (p[i] - p[i + 1]) * ball.inverse.real for i, ball in enumerate(state.ball)
+    ]
+    return sum(ball.m.real * v**2 / 2 for ball, v in zip(state.ball, speeds, strict=True))
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -39,28 +61,55 @@ def test_what_the_event_loop_leaves_is_right(name):
             assert verdict(found.state) == 0
 
 
-@pytest.mark.parametrize("ball", range(4))
-@pytest.mark.parametrize("sign", [1, -1])
-def test_a_ball_that_moves_without_an_impulse(ball, sign):
+@balls
+@signs
+def test_a_ball_of_another_mass_than_it_moves_with(ball, sign):
     state = solved(*LOSSY)
-    state.ball[ball].hi += sign * SMALL
+    state.ball[ball].m *= 1 + 10 * sign * SMALL
     assert verdict(state) == MOMENTUM
 
 
-@pytest.mark.parametrize("contact", range(3))
-@pytest.mark.parametrize("sign", [1, -1])
-def test_an_impulse_that_moves_no_ball(contact, sign):
+@balls
+@signs
+def test_a_ball_that_came_with_another_velocity(ball, sign):
+    state = solved(*LOSSY)
+    state.ball[ball].v += sign * SMALL
+    assert verdict(state) == MOMENTUM
+
+
+@balls
+@signs
+@pytest.mark.parametrize(("number", "change"), [("start", SMALL), ("inverse", 100 * SMALL)])
+def test_velocities_that_part_otherwise_than_the_closing_speeds(number, change, ball, sign):
+    state = solved(*LOSSY)
+    before = getattr(state.ball[ball], number)
+    setattr(state.ball[ball], number, before + sign * change)
+    assert verdict(state) == ORDER
+
+
+@contacts
+@signs
+def test_an_impulse_that_no_closing_speed_shows(contact, sign):
     state = solved(*LOSSY)
     state.contact[contact].p += sign * SMALL
-    assert verdict(state) == MOMENTUM
+    assert verdict(state) == ORDER
 
 
-@pytest.mark.parametrize("contact", range(3))
-def test_balls_that_still_approach(contact):
+@contacts
+@signs
+def test_a_closing_speed_that_the_velocities_do_not_show(contact, sign):
     state = solved(*LOSSY)
-    one, other = state.ball[contact], state.ball[contact + 1]
-    apart = KERNEL["closing"](contact, state.ball)
-    pull(state, contact, (SMALL - apart) * one.m * other.m / (one.m + other.m))
+    state.contact[contact].u += sign * SMALL
+    assert verdict(state) == ORDER
+
+
+@contacts
+def test_balls_that_still_approach(contact):
+    """Their closing speed and their velocities agree: only the order is wrong."""
+    state = solved(*LOSSY)
+    k, one, other = state.contact[contact], state.ball[contact], state.ball[contact + 1]
+    pull(state, contact, (SMALL - k.u) / (one.inverse + other.inverse))
+    assert k.u.real == pytest.approx(SMALL, rel=1e-3)
     assert verdict(state) == ORDER
 
 
@@ -69,18 +118,18 @@ def test_a_contact_that_pulls():
     state = solved([1, 1, 1], [1, 0, 5], 0.5, 0.1)
     contact = state.contact[1]
     assert contact.p == 0.0
-    before = sum(ball.m * ball.hi**2 / 2 for ball in state.ball)
+    before = energy(state)
     pull(state, 1, 1e-3)
-    after = sum(ball.m * ball.hi**2 / 2 for ball in state.ball)
-    contact.a = (before - after) / (1 - contact.e**2)
+    contact.a = (before - energy(state)) / (1 - contact.square)
+    assert contact.a.real > 1e-4
     assert verdict(state) == PULL
 
 
-@pytest.mark.parametrize("contact", range(3))
+@contacts
 def test_works_below_nothing_that_balance(contact):
     """What an elastic contact absorbs shows in no ledger."""
     state = solved(*ELASTIC)
-    state.contact[contact].a = -SMALL
+    state.contact[contact].a = complex(-SMALL)
     assert verdict(state) == PULL
 
 
@@ -94,11 +143,13 @@ def test_energy_from_nothing():
 def test_energy_lost_without_a_contact_that_keeps_it(boost):
     """Also seen from a moving frame, where all kinetic energy is a million times as much."""
     state = solved(*ELASTIC, boost=boost)
-    pull(state, 1, 100 * SMALL)
+    pull(state, 1, 100 * SMALL * state.contact[1].p)
     assert verdict(state) == LEDGER
 
 
-@pytest.mark.parametrize("heavy", [1, 3])
+@pytest.mark.parametrize(
+    "heavy", [1, pytest.param(3, marks=pytest.mark.xfail(reason="seen from 1e-3 on", strict=True))]
+)
 def test_energy_beside_a_fast_light_ball(heavy):
     """Among the heavy balls it is little, seen from the light one much."""
     state = solved([1e-9, 1, heavy, 1], [1000, 0, 0, 0], 1.0, 0.2)
@@ -112,23 +163,35 @@ def test_balls_that_fly_on_untouched_hide_nothing():
     assert verdict(state) == LEDGER
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("contact", range(3))
+@contacts
+@signs
 def test_work_that_was_not_done(contact, sign):
     state = solved(*LOSSY)
-    assert state.contact[contact].a > 0.01
+    assert state.contact[contact].a.real > 0.01 * energy(state)
     state.contact[contact].a *= 1 + 100 * sign * SMALL
     assert verdict(state) == LEDGER
 
 
-@pytest.mark.parametrize("number", [float("nan"), float("inf")])
-@pytest.mark.parametrize("thing", ["ball", "impulse", "work"])
-def test_no_number_at_all(thing, number):
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+@pytest.mark.parametrize(
+    ("thing", "name"),
+    [
+        *(("ball", name) for name in ("v", "start", "m", "inverse")),
+        *(("contact", name) for name in ("p", "u", "a", "square")),
+    ],
+)
+def test_no_number_at_all(thing, name, number):
     state = solved(*LOSSY)
-    if thing == "ball":
-        state.ball[2].hi = number
-    elif thing == "impulse":
-        state.contact[1].p = number
-    else:
-        state.contact[1].a = number
+    one = getattr(state, thing)[1]
+    setattr(one, name, type(getattr(one, name))(number))
     assert verdict(state) != 0
+
+
+def test_the_digits_that_rounding_takes_are_allowed_and_no_more():
+    """Without any allowance right answers are refused; with an endless one wrong ones pass."""
+    state = solved([0.7, 0.3, 0.6, 2.1], [0.9, 0.2, 0, -0.3], 0.8, 0.2)
+    assert verdict(state) == 0
+    assert verdict(state, plain.rooms(sound=-1.0)) != 0
+    state.contact[1].u += 0.1
+    assert verdict(state) == ORDER
+    assert verdict(state, plain.rooms(sound=1.0)) != ORDER

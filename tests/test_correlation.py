@@ -250,7 +250,7 @@ def test_rows_of_the_path(n):
         gained = m * (trace.path - v)
         np.testing.assert_allclose(gained, -np.diff(impulses, axis=1), atol=1e-13 * scale * m.max())
         assert (np.diff(trace.path_impulses, axis=0) >= -1e-15 * scale * m.max()).all()
-    assert longest > (64 if n > 2 else 1)  # beyond the room that the solver starts with
+    assert longest > (64 if n > 3 else 1)  # beyond the room that the solver starts with
 
 
 @pytest.mark.parametrize("n", [2, 3, 5])

@@ -425,13 +425,15 @@ def test_corrections_of_rounding_do_work():
     np.testing.assert_allclose(trace.absorbed, [float(x) for x in truth.absorbed], rtol=1e-9)
 
 
-def test_a_correction_does_not_revive_a_contact_that_ends():
-    """Balls equal but for the last digit: each contact of an elastic row collides once."""
+def test_balls_equal_but_for_the_last_digit():
+    """They collide again, at speeds of a last digit, and end as equal ones do."""
     rng = np.random.default_rng(0)
+    equal = Problem([1.0] * 20, at_rest(20), [1.0] * 19, [0.3] * 18, [0.3] * 18)
+    assert equal.collide().collisions.tolist() == [1] * 19
     for _ in range(5):
         masses = 1 + 1e-15 * uniform(rng, -1, 1, 20)
-        row = Problem(masses.tolist(), at_rest(20), [1.0] * 19, [0.3] * 18, [0.3] * 18)
-        assert row.collide().collisions.tolist() == [1] * 19
+        row = equal._replace(masses=masses.tolist())
+        assert difference(row.collide().velocities, equal.collide().velocities) < 1e-13
 
 
 def test_no_contact_pulls_where_a_run_arrives_on_both_sides():
@@ -524,7 +526,6 @@ def test_energies_of_tiny_cycles_beside_fast_balls():
 def test_a_store_released_in_portions_below_its_last_digit():
     trace = PORTIONS.collide()
     assert trace.collapsed
-    assert len(trace.events) > 10_000
     assert invariants(trace)["ledger"] < 2
 
 
@@ -602,7 +603,6 @@ def test_works_of_a_cycle_that_grows_far():
     """Ten billion times at once, its neighbour's work was known to six digits, and was refused."""
     trace = any_chain("saturate", 6, 9806).collide()
     assert trace.collapsed
-    assert "repetition" in {event.kind for event in trace.events}
     assert invariants(trace)["ledger"] < 2
 
 

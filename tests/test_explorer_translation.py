@@ -86,7 +86,7 @@ def f(n):
 """,
     "chains of comparisons": """
 def f(n):
-    return [0 < n < 9 == (n > 3), 0 < n != n, not 1 <= n < 3 <= n][0 if n > 1 else 1]
+    return [0 < n < 9 == (n > 3), 0 < n != 1 * n, not 1 <= n < 3 <= n][0 if n > 1 else 1]
 """.replace("[0 < n", "(0 < n").replace("][0 if n > 1 else 1]", ")"),
     "a tuple is made before its parts are stored": """
 def f(n):
@@ -100,7 +100,7 @@ def f(n):
     known = n > 1
     x = y = 7 if known and n != 0 or n == 2 else 8
     for k in (n - 1, n + 1):
-        if k == known:
+        if k == (n > 1):
             continue
         x += k
     return x, y, known == 1
@@ -132,6 +132,8 @@ def test_what_looks_alike_means_the_same(name):
         "y = [n]",
         "y = x is None",
         "y = n in x",
+        "y = x == n",
+        "y = f(x, n) != f(n, x)",
         "y = f(x, n=n)",
         "y = x.pop()",
         "y = 'word'",
@@ -148,6 +150,41 @@ def test_what_looks_alike_means_the_same(name):
 def test_anything_else_is_refused(line):
     with pytest.raises(ValueError, match=r".+: "):
         explorer_engine.translate(f"def f(x, n):\n    {line}\n    return 0")
+
+
+RECORDS = """
+class Wide:
+    u: complex
+    left: complex
+    hits: int
+
+class Narrow:
+    left: int
+
+ZERO = complex(0.0, 0.0)
+ONCE = 1
+"""
+
+
+def test_equal_pairs_are_refused():
+    """Python compares their parts, JavaScript would compare references."""
+
+    def translated(comparison):
+        return explorer_engine.translate(f"{RECORDS}\ndef f(x, y):\n    return {comparison}")
+
+    for fine in ("x.u.real == y.u.real", "x.left == y.hits", "x == ONCE", "x.hits != y"):
+        assert "return (x" in translated(fine)
+    for wrong in (
+        "x.u == y.u",
+        "x.u == 0.0",
+        "x.hits != y.u",
+        "x.left == y.left",
+        "x == ZERO",
+        "x == y",
+    ):
+        with pytest.raises(ValueError, match="may compare pairs"):
+            translated(wrong)
+    assert "{u: ZERO, left: ZERO, hits: 0}" in translated("ONCE")
 
 
 def test_the_build_writes_it(tmp_path, root, source):

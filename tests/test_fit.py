@@ -205,19 +205,20 @@ def test_scan_reports_every_minimum_and_a_union_of_intervals():
     def chi(x):
         return 1e4 * np.minimum((x - 0.3) ** 2, (x - 0.7) ** 2 + 1e-4)
 
-    found = scan(chi, np.linspace(0, 1, 501))
+    found, lowest = scan(chi, np.linspace(0, 1, 501))
+    assert lowest == pytest.approx(0, abs=1e-9)
     np.testing.assert_allclose([m.value for m in found.modes], [0.3, 0.7], atol=1e-7)
     np.testing.assert_allclose([m.excess for m in found.modes], [0, 1], atol=1e-7)
     half, other = np.sqrt(RISE * 1e-4), np.sqrt((RISE - 1) * 1e-4)
     expected = [(0.3 - half, 0.3 + half), (0.7 - other, 0.7 + other)]
     np.testing.assert_allclose(found.intervals, expected, atol=1e-7)
-    level = scan(lambda x: 0 * x, np.linspace(0, 1, 501))
+    level, _ = scan(lambda x: 0 * x, np.linspace(0, 1, 501))
     assert level.intervals == ((0.0, 1.0),)
 
 
 def test_scan_finds_minima_narrower_than_a_cell():
     grid = np.linspace(0, 1, 501)
-    found = scan(lambda x: 1e10 * (x - 0.30071) ** 2, grid)
+    found, _ = scan(lambda x: 1e10 * (x - 0.30071) ** 2, grid)
     assert found.modes[0].value == pytest.approx(0.30071, abs=1e-8)
     low, high = found.intervals[0]
     assert high - low == pytest.approx(2 * np.sqrt(RISE * 1e-10), rel=1e-3)
@@ -226,13 +227,14 @@ def test_scan_finds_minima_narrower_than_a_cell():
 def test_refine_against_an_ellipse():
     matrix = 1e5 * np.array([[2.0, 1.5], [1.5, 2.0]])
     centre = np.array([0.21, 0.33])
-    found = refine(
+    found, *_ = refine(
         lambda x: np.einsum("pi,ij,pj->p", x - centre, matrix, x - centre), np.array([0.5, 0.6])
     )
-    np.testing.assert_allclose(found.best, centre, atol=1e-5)
+    best = [one.modes[0].value for one in found]
+    np.testing.assert_allclose(best, centre, atol=1e-5)
     half = np.sqrt(RISE * np.diag(np.linalg.inv(matrix)))
     for axis in (0, 1):
-        ((low, high),) = found.intervals(axis)
+        ((low, high),) = found[axis].intervals
         assert low == pytest.approx(centre[axis] - half[axis], abs=0.12 * half[axis])
         assert high == pytest.approx(centre[axis] + half[axis], abs=0.12 * half[axis])
 

@@ -47,8 +47,8 @@ DIGESTS = {
     "scenes": "13088f12c81b4e35",
     "long_chains": "eef8777637e3f854",
     "implied_ratio": "617f9eed01d94458",
-    "batch": "34315d61a4a1b526",
-    "one by one": "ba0077364890a7ef",
+    "batch": "dcd86c939e36a563",
+    "one by one": "b1d4749d68a359cf",
 }
 
 

@@ -1,11 +1,20 @@
-"""The measured cradles: the readings agree, and the fitting script's spheres are spheres."""
+"""The measured cradles: readings agree, spheres are spheres, stored fits fit as they state."""
+
+import csv
 
 import numpy as np
 import pytest
 import real_cradles
-from real_cradles import by_spheres, first_strikes, spheres, table
+import real_swing
+from real_cradles import by_spheres, chi_square, first_strikes, ratios, spheres, table
 
-from cradle import Chain, SpringChain, collide
+from cradle import Chain, SequentialCollisions, SpringChain, collide
+
+with (real_cradles.DATA / "film_fits.csv").open(encoding="utf-8", newline="") as file:
+    FITS = list(csv.DictReader(file))
+with (real_cradles.DATA / "cradle_fits.csv").open(encoding="utf-8", newline="") as file:
+    SWINGS = list(csv.DictReader(file))
+MEAN = real_swing.common()
 
 
 def test_the_readings_of_the_film_agree():
@@ -49,3 +58,67 @@ def test_the_half_minute_is_one_damped_cosine_in_the_mean():
     basis = np.stack([wave.real, wave.imag, np.ones_like(time)], 1)
     left = mean - basis @ np.linalg.lstsq(basis, mean, rcond=None)[0]
     assert left.std() < 0.1 * mean.std()
+
+
+@pytest.mark.parametrize("law", real_cradles.LAWS)
+def test_stored_fits_have_the_chi_square_that_they_state(law):
+    rows = [row for row in FITS if row["law"] == law]
+    assert {(row["reading"], row["fitted"]) for row in rows} >= {("4", "both"), ("2", "both")}
+    for row in rows:
+        data, p = first_strikes(int(row["reading"])), [float(x) for x in row["parameters"].split()]
+        for release, column in ((1, "chi_one"), (2, "chi_two")):
+            chi = chi_square(law, p, row["strikers"] == "apart", data, (release,))
+            assert chi == pytest.approx(float(row[column]), rel=2e-3, abs=2e-3), row
+
+
+@pytest.mark.parametrize("law", ["one ratio, e", "three ratios, e"])
+@pytest.mark.parametrize("strikers", ["together", "apart"])
+def test_a_stored_fit_to_both_is_a_minimum(law, strikers):
+    (row,) = [
+        row
+        for row in FITS
+        if (row["law"], row["strikers"], row["fitted"], row["reading"])
+        == (law, strikers, "both", "4")
+    ]
+    p, data = np.array([float(x) for x in row["parameters"].split()]), first_strikes(4)
+    least = chi_square(law, p, strikers == "apart", data, (1, 2))
+    for change in (*np.eye(len(p)), *-np.eye(len(p))):
+        # Half a percent of each number: above the rounding of what is stored.
+        assert chi_square(law, p * (1 + 0.005 * change), strikers == "apart", data, (1, 2)) > least
+
+
+def test_every_law_is_fitted_and_freedom_counts_its_numbers():
+    assert {row["law"] for row in FITS} == set(real_cradles.LAWS)
+    for row in FITS:
+        count = len(row["parameters"].split())
+        if row["fitted"] == "both":
+            assert int(row["freedom"]) == 10 - count
+        else:  # the other release alone, less a number that only it depends on
+            assert int(row["freedom"]) in ((4, 5) if row["strikers"] != "together" else (5,))
+
+
+def test_strikers_that_come_one_by_one():
+    v = ratios([0, 0, 0], 1.0, 2, apart=True)
+    assert v == pytest.approx([0, 0, 0, 1, 1], abs=1e-12)
+    lone = collide(Chain(np.ones(4), [1, 0, 0, 0], 1), SpringChain()).velocities
+    late = collide(Chain(np.ones(5), [1, *lone], 1), SequentialCollisions()).velocities
+    v = by_spheres([0, 0, 0, 0, 0], 2, apart=True)
+    assert v[:3] == pytest.approx(late[:3], abs=2e-4)
+    # Ball 4 is hardly faster than ball 5: they meet only after the integration has ended.
+    assert v[3:].sum() == pytest.approx(late[3:].sum(), abs=2e-4)
+
+
+@pytest.mark.parametrize("row", SWINGS, ids=lambda row: row["law"])
+def test_stored_fits_of_the_half_minute(row):
+    p = [float(row[key]) for key in real_swing.COLUMNS[1:5]]
+    run = real_swing.swung(row["law"], p, *MEAN[1:3])
+    chi = (real_swing.misfits(run, p[3], real_swing.peaks()) ** 2).sum(axis=1)
+    assert chi == pytest.approx([float(row["chi_places"]), float(row["chi_times"])], rel=1e-2)
+
+
+def test_a_constant_loss_of_speed_loses_that_speed():
+    for closing, left in ((1.0, 0.9), (0.2, 0.1), (0.05, 0.0)):
+        chain = Chain([1, 3], [closing, 0], 1)
+        v = collide(chain, real_swing.ConstantLoss(lost=0.1)).velocities
+        assert v[1] - v[0] == pytest.approx(left, abs=1e-12)
+        assert v[0] + 3 * v[1] == pytest.approx(closing)

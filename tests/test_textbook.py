@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from chains import FIG_8, changes, local_orders, random_chains
 from march import march
-from truth import EventLimit, solve
+from truth import EventLimit, as_meant, solve
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain, textbook
 from cradle.closed_form import largest_ratios
@@ -241,7 +241,7 @@ def test_generic_chains_at_fifty_digits(n):
 
 def check_invariants(chain, outcome, tolerance):
     """Momentum, ledger, impulses, order, and no idle contact overlapping at any event."""
-    masses, velocities, restitution = ([mpmath.mpf(x) for x in part] for part in chain[:3])
+    masses, velocities, restitution = ([as_meant(x) for x in part] for part in chain[:3])
     after = outcome.velocities
     across = [0, *outcome.impulses, 0]
     for i, m in enumerate(masses):

@@ -122,7 +122,7 @@ const records = new Map();
 const KEPT_ROWS = 1000;
 
 // Make room in a record for more events than one round can write: each contact may end, close,
-// collapse and pass its maximum.
+// collapse, pass its maximum and repeat itself.
 function makeRoom(state, n, least) {
   const { kinds, contacts, velocities, impulses } = state.record;
   const spare = 5 * n;
@@ -148,8 +148,7 @@ function solved(chain, maxEvents, recorded) {
   const { m, v, e, forward, backward, meeting } = chain;
   const out = Outputs([zeros(n)], [zeros(n - 1)], [0], zeros(n - 1), zeros(n - 1), zeros(n - 1));
   const inputs = Inputs([m], [v], [e], [forward], [backward]);
-  // The closed form would do for two or three balls, but differs in the last digit: one way for all.
-  const options = Options(meeting, maxEvents, false, true);
+  const options = Options(meeting, maxEvents, false);
   let status = FINISHED;
   for (let resumed = false; ; resumed = true) {
     status = batch(0, resumed, n, inputs, options, out, state, ENDLESS)[1];

@@ -1,5 +1,10 @@
 // What Python's numbers do and JavaScript's do not by themselves.
 
+// A number of 32 digits: a pair, which nothing changes.
+function complex(real, imag) {
+  return { real, imag };
+}
+
 // As in Python the first of two equals is kept, so 0 and -0 stay what they are.
 function max(a, b) {
   return b > a ? b : a;

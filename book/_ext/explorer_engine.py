@@ -11,7 +11,8 @@ and means something else is not passed on as it stands:
 - an expression of constants, such as `1 << 40`, is worked out here: JavaScript shifts 32 bits;
 - `max` and `min` keep the first of two equals, so that 0.0 and -0.0 stay what they are;
 - a loop over a range knows its limits from the start and keeps its own count;
-- in `a < b < c` the middle is written twice, so it must have no effect.
+- in `a < b < c` the middle is written twice, so it must have no effect;
+- `==` of two pairs (`complex`) would ask whether they are one object (`explorer_pairs`).
 """
 
 import ast
@@ -21,6 +22,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any, NoReturn
 
+from explorer_pairs import equal_pairs
 from sphinx.application import Sphinx
 
 from cradle.runtime import compile as runtime
@@ -257,7 +259,10 @@ def record(node: ast.ClassDef) -> list[str]:
             f" return {{{inside}}};",
             "}",
         ]
-    inside = ", ".join(f"{name}: 0" for name in names)
+    inside = ", ".join(
+        f"{field.target.id}: {'ZERO' if ast.unparse(field.annotation) == 'complex' else 0}"
+        for field in node.body
+    )
     return [f"function {node.name}() {{", f" return {{{inside}}};", "}"]
 
 
@@ -271,7 +276,10 @@ def translate(source: str) -> str:
     }
     """
     lines: list[str] = []
-    for node in ast.parse(source).body:
+    tree = ast.parse(source)
+    for node in equal_pairs(tree):
+        refuse(node, "may compare pairs")
+    for node in tree.body:
         match node:
             case ast.Import() | ast.ImportFrom() | ast.If():
                 pass  # math, typing, and the decorators that compile

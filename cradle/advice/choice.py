@@ -179,16 +179,15 @@ class _Wish(NamedTuple):
     def model(self, row: Measured) -> Model:
         """Return the model of a row, with what is known."""
         stiffness = 1.0 if self.stiffness is None else self.stiffness
-        match row.group:
-            case "event":
-                return self.ratios or ImpulseCorrelation(0.0)
-            case "springs":
-                method = row.setting.split(",")[0]
-                return SpringChain(stiffness, rtol=row.parameter, method=method)
-            case "energy":
-                if row.setting.startswith("step"):
-                    return EnergyDistribution(stiffness, step=row.parameter)
-                return EnergyDistribution(stiffness, rtol=row.parameter)
+        if row.group == "event":
+            return self.ratios or ImpulseCorrelation(0.0)
+        if row.group == "springs":
+            method = row.setting.split(",")[0]
+            return SpringChain(stiffness, rtol=row.parameter, method=method)
+        if row.group == "energy":
+            if row.setting.startswith("step"):
+                return EnergyDistribution(stiffness, step=row.parameter)
+            return EnergyDistribution(stiffness, rtol=row.parameter)
         return SequentialCollisions()
 
 
@@ -277,7 +276,13 @@ def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recom
     if wish.model_error is not None and (apart is None or apart > wish.model_error):
         known = "was not measured here" if apart is None else f"is {apart:.2g}"
         raise _Unfit(f"model_error = {wish.model_error!r}", f"that of {name} {known}")
+    slow = None
+    if row.setting.startswith("compiled"):  # the same in the event loop as it stands
+        plain = tuple(one for one in rows("event", "plain") if one.model == "ImpulseCorrelation")
+        slow = evidence(plain, like, wish.ratios)[0]
     known_error = best.measured and row.numerical_error is not None
+    kind = "timed" if group == "springs" and wish.timed else group
+    kind = "two balls" if group == "event" and len(chain) == 2 else kind
     return (not best.measured, best.cost), Recommendation(
         model=wish.model(row),
         setting=row.setting,
@@ -285,23 +290,10 @@ def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recom
         numerical_error=best.error if known_error else None,
         model_error=apart,
         seconds=best.cost * unit_time() if best.measured else None,
-        plain_seconds=_plain_seconds(like, wish) if row.setting.startswith("compiled") else None,
+        plain_seconds=slow.cost * unit_time() if slow and slow.measured else None,
         measured_on=best.chains if best.measured else (),
-        reason=_reason(group, wish),
+        reason=_REASONS[kind],
     )
-
-
-def _reason(group: str, wish: _Wish) -> str:
-    if group == "event" and len(wish.chain) == 2:
-        return _REASONS["two balls"]
-    return _REASONS["timed" if group == "springs" and wish.timed else group]
-
-
-def _plain_seconds(chain: Chain | None, wish: _Wish) -> float | None:
-    """Return the time of one impact in the event loop as it stands."""
-    slow = tuple(row for row in rows("event", "plain") if row.model == "ImpulseCorrelation")
-    found = evidence(slow, chain, wish.ratios)[0]
-    return found.cost * unit_time() if found.measured else None
 
 
 def _cheapest(settings: list[Evidence], name: str, wish: _Wish) -> Evidence:

@@ -90,36 +90,23 @@ def lasting(seconds: float) -> str:
 def rows(group: str, kernel: str = "") -> tuple[Measured, ...]:
     """Return the rows of a group, in settings that this installation and its calls have."""
     kernel = kernel or ("compiled" if runtime.available() else "plain")
-    batch = f"{kernel}, batch"
+    path, batch = f"{kernel}, one call with its path", f"{kernel}, batch"
     found = []
     for line in _lines():
         if line["model"] == "two balls" and line["setting"].startswith("all: "):
             # A batch of two balls, by `post_impact_velocities`.
             line = line | {"group": "event", "model": "ImpulseCorrelation", "setting": batch}
-        if (
-            line["group"] != group
-            or (group == "event" and line["setting"] not in (f"{kernel}, {_PATH}", batch))
-            or line["model"].endswith("linear")
-        ):
-            continue
-        apart = line["model_error"] if line["model_reference"].startswith("Hertz") else ""
-        found.append(
-            Measured(
-                line["group"],
-                line["model"],
-                line["setting"],
-                line["chain"],
-                float(line["parameter"] or 0.0),
-                float(line["numerical_error"]) if line["numerical_error"] else None,
-                float(apart) if apart else None,
-                float(line["time_ratio"]),
+        there = group != "event" or line["setting"] in (path, batch)
+        if line["group"] == group and there and not line["model"].endswith("linear"):
+            error = line["numerical_error"]
+            apart = line["model_error"] if line["model_reference"].startswith("Hertz") else ""
+            found.append(Measured(
+                group, line["model"], line["setting"], line["chain"],
+                float(line["parameter"] or 0.0), float(error) if error else None,
+                float(apart) if apart else None, float(line["time_ratio"]),
                 frozenset(line["gives"].split(", ")),
-            )
-        )
+            ))  # fmt: skip
     return tuple(found)
-
-
-_PATH = "one call with its path"
 
 
 def evidence(
@@ -131,12 +118,11 @@ def evidence(
         settings.setdefault(row.setting, {})[row.chain] = row
     name = measured_chain(chain, ratios) if chain else ""
     exact = [(same[name],) for same in settings.values() if name in same]
-    around = [_around(tuple(same.values()), chain) for same in settings.values()]
-    around = [found for found in around if found]
-    most = max(map(len, settings.values()))
-    others = [tuple(same.values()) for same in settings.values() if len(same) == most]
+    every = [tuple(same.values()) for same in settings.values()]
+    around = [found for same in every if (found := _around(same, chain))]
+    most = [same for same in every if len(same) == max(map(len, every))]
     measured = bool(exact or around)
-    return [Evidence(one, bool(exact), measured) for one in exact or around or others]
+    return [Evidence(one, bool(exact), measured) for one in exact or around or most]
 
 
 @cache
@@ -155,12 +141,13 @@ def measured_chain(chain: Chain, ratios: ImpulseCorrelation | None = None) -> st
     """Return the name of the measured chain that this is."""
     one = _from_one_end(chain)
     for name, (other, model) in _chains().items():
-        if one is None or len(one) != len(other):
-            continue
-        alike = np.allclose(one.masses, other.masses / other.masses[0], rtol=1e-12, atol=0.0)
-        alike = alike and bool((one.restitution == other.restitution).all())
-        n = len(one)
-        if alike and (ratios is None or _values(ratios, n) == _values(model, n)):
+        if (
+            one is not None
+            and len(one) == len(other)
+            and np.allclose(one.masses, other.masses / other.masses[0], rtol=1e-12, atol=0.0)
+            and (one.restitution == other.restitution).all()
+            and (ratios is None or _values(ratios, len(one)) == _values(model, len(one)))
+        ):
             return name
     return ""
 

@@ -25,10 +25,7 @@ def show(
     rows: Sequence[dict[str, Any]], extra: dict[str, Any], note: str, as_json: bool, as_csv: bool,
     names: Sequence[str] = (),
 ) -> None:  # fmt: skip
-    """Print a table, as text with a note, as CSV, or as JSON with all there is.
-
-    `names` are those of the columns, where there may be no row to tell them.
-    """
+    """Print a table, as text with a note, as CSV, or as JSON with all there is."""
     names = names or list(rows[0])
     if as_json and as_csv:
         raise click.UsageError("give one of --json and --csv")
@@ -57,12 +54,15 @@ def text(rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> str:
 
 
 def _texts(column: Sequence[Any]) -> list[str]:
-    """Return a column as text; its floats have as many decimals as show four digits of the largest.
-
-    Four at least, for people compare columns; and never minus zero.
-    """
+    """Return a column as text; four decimals or more, as show four digits of its largest float."""
     if column and isinstance(column[0], tuple):
-        return _pieces(column)
+        # Unions of intervals: two digits of the narrowest one can be told apart.
+        widths = [high - low for pieces in column for low, high in pieces if high > low]
+        decimals = min(12, max(4, 1 - math.floor(math.log10(min(widths, default=1.0)))))
+        return [
+            " or ".join(f"{low:.{decimals}f}-{high:.{decimals}f}" for low, high in pieces)
+            for pieces in column
+        ]
     floats = [abs(value) for value in column if isinstance(value, float) and math.isfinite(value)]
     largest = max(floats, default=0.0) or 1.0
     decimals = max(4, 3 - math.floor(math.log10(largest)))
@@ -79,16 +79,6 @@ def _texts(column: Sequence[Any]) -> list[str]:
         return f"{value:z.{decimals}f}"
 
     return [cell(value) for value in column]
-
-
-def _pieces(column: Sequence[tuple[tuple[float, float], ...]]) -> list[str]:
-    """Return a column of unions of intervals; two digits of the narrowest one can be told apart."""
-    widths = [high - low for pieces in column for low, high in pieces if high > low]
-    decimals = min(12, max(4, 1 - math.floor(math.log10(min(widths, default=1.0)))))
-    return [
-        " or ".join(f"{low:.{decimals}f}-{high:.{decimals}f}" for low, high in pieces)
-        for pieces in column
-    ]
 
 
 def _plain(value: Any) -> Any:
@@ -112,17 +102,12 @@ def image_format(path: str) -> str:
 
 def plot_fits(fits: Sequence[Any], path: str) -> None:
     """Draw every identified estimate to a file."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
     drawn = [(one, name) for one in fits for name, e in one.estimates.items() if e.identified]
     if not drawn:
         raise ValueError("nothing was identified; there is nothing to draw")
-    figure, axes = plt.subplots(len(drawn), 2, figsize=(9, 3.9 * len(drawn)), squeeze=False,
-                                layout="constrained")  # fmt: skip
-    for (one, name), row in zip(drawn, axes, strict=True):
+    figure = Figure((9, 3.9 * len(drawn)), layout="constrained")
+    for (one, name), row in zip(drawn, figure.subplots(len(drawn), 2, squeeze=False), strict=True):
         one.plot(name, row)
     figure.savefig(path, format=image_format(path))
-    plt.close(figure)

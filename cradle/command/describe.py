@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import click
 
@@ -95,16 +95,12 @@ def described(
         return Described(chain, law, ())
     assert masses is not None
     before = [striker] + [0.0] * (len(masses) - 1) if velocities is None else velocities
-    chain = Chain(
-        [UNITS[unit or "kg"] * m for m in masses],
-        before,
-        1.0 if restitution is None else one_or_all(restitution),
-    )
+    balls = [UNITS[unit or "kg"] * m for m in masses]
+    chain = Chain(balls, before, one_or_all(restitution or [1.0]))
     assumed = [] if velocities else [f"the first ball strikes at {striker:g} m/s"]
     assumed += [] if restitution else ["no energy is lost (--restitution)"]
     if ratio is not None:
-        back = None if backward is None else one_or_all(backward)
-        law = ImpulseCorrelation(one_or_all(ratio), back, excess=excess)
+        law = ImpulseCorrelation(one_or_all(ratio), one_or_all(backward), excess=excess)
         return Described(chain, law, tuple(assumed))
     if model == "ratio" or backward or saturate:
         raise click.UsageError("ratios need --ratio, such as 0.1 or one for each inner ball")
@@ -130,6 +126,6 @@ def _without_ratios(chain: Chain, model: str | None) -> Model:
     return EnergyDistribution()
 
 
-def one_or_all(values: list[float]) -> float | list[float]:
+def one_or_all(values: list[float] | None) -> Any:
     """Return one number for all, or the list."""
-    return values[0] if len(values) == 1 else values
+    return values[0] if values and len(values) == 1 else values

@@ -8,21 +8,22 @@ from pathlib import Path
 
 import click
 
-_UNITS = {"kg": 1.0, "g": 1e-3}
+from cradle.command.describe import UNITS, numbers_of
 
 
 @click.command()
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("--set", "name", required=True, help="Types of the balls, left to right: BAC.")
 @click.option("--shot", default="1", help="Name of the shot [1].")
-@click.option("--masses", required=True, help="Masses, left to right: 53,45,53.")
-@click.option("--unit", type=click.Choice(list(_UNITS)), default="kg", help="Of masses.")
+@click.option("--masses", required=True, callback=numbers_of,
+              help="Masses, left to right: 53,45,53.")  # fmt: skip
+@click.option("--unit", type=click.Choice(list(UNITS)), default="kg", help="Of masses.")
 @click.option("--length", type=float, help="Of the pendulums, m; left out: a level track.")
 @click.option("--window", default=0.05, help="Time used before and after, s [0.05].")
 @click.option("--slower", default=1.0, help="8 if 240 pictures a second play at 30 [1].")
 @click.option("--header", is_flag=True, help="Print the names of the columns too.")
 def film(
-    file: Path, name: str, shot: str, masses: str, unit: str, length: float | None,
+    file: Path, name: str, shot: str, masses: list[float], unit: str, length: float | None,
     window: float, slower: float, header: bool,
 ) -> None:  # fmt: skip
     """Velocities from the marks in a film.
@@ -44,14 +45,10 @@ def film(
     one_number("--slower", slower, "must be above 0", 0.0, open_low=True)
     tracks = read_tracker(file, time_scale=1.0 / slower)
     types = parameter_key(name)
-    try:
-        weights = [_UNITS[unit] * float(mass) for mass in masses.split(",")]
-    except ValueError:
-        raise click.UsageError(f"--masses {masses!r}; write numbers with commas between") from None
-    if not len(types) == len(weights) == len(tracks):
+    if not len(types) == len(masses) == len(tracks):
         raise ValueError(
             f"{file.name} has {len(tracks)} tracks, --set {len(types)} types and --masses "
-            f"{len(weights)} masses; must be as many"
+            f"{len(masses)} masses; must be as many"
         )
     for place, (kind, track) in enumerate(zip(types, tracks, strict=True), 1):
         if track in types and track != kind:
@@ -63,6 +60,7 @@ def film(
     writer = csv.writer(sys.stdout, lineterminator="\n")
     if header:
         writer.writerow([*COLUMNS, *OPTIONAL])
+    weights = [UNITS[unit] * mass for mass in masses]
     for k, (kind, mass) in enumerate(zip(types, weights, strict=True)):
         numbers = (mass, found.before[k], found.after[k], found.sigma[k], found.sigma_before[k])
         writer.writerow([name, shot, k + 1, kind, *(f"{x:.6g}" for x in numbers)])

@@ -19,9 +19,8 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument(
-    "file", type=click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
-)
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, allow_dash=True,
+                                        path_type=Path))  # fmt: skip
 @click.option("--mass-unit", type=click.Choice(["kg", "g"]), help="Unit of the column mass [kg].")
 @click.option("--velocity-unit", type=click.Choice(["m/s", "cm/s", "mm/s"]),
               help="Unit of before, after and sigma [m/s].")  # fmt: skip
@@ -93,18 +92,17 @@ def fit(
         "shots": count,
         "without": [one.name for one in shots.sets if one not in used.sets],
     }
-    poor = {True: "", False: " (a poor fit: the errors do not explain the differences)"}
-    lost = {True: "", False: "; masses, velocities or their errors are wrong"}
-    notes = ["intervals: 95 % confidence sets"] + [
-        f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}"
-        f"{poor[one.probability > 1e-3]}"
-        for one in fits
-    ]
+    notes = ["intervals: 95 % confidence sets"]
+    for one in fits:
+        good = one.probability > 1e-3
+        why = "" if good else " (a poor fit: the errors do not explain the differences)"
+        notes.append(f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}{why}")
     if known and not everything[-1].estimates:
         notes.append("fit: no ratio is fitted; those of --known are taken as they are")
     whole = " (all of the file)" if extra["without"] else ""
-    notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{whole}"
-                 f"{lost[chance(momentum, count) > 1e-3]}")  # fmt: skip
+    good = chance(momentum, count) > 1e-3
+    lost = "" if good else "; masses, velocities or their errors are wrong"
+    notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{whole}{lost}")
     if predict is not None:
         more, lines = _predicted(everything[-1], shots, predict, striker)
         extra.update(more)
@@ -189,10 +187,8 @@ def _predicted(
             continue
         columns = {"measured": mean.tolist(), "error": error.tolist()}
         measured.append({"set": one.name, "shots": len(one.shots), "fitted": fitted, **columns})
-        tables.append(
-            [{**row, **{name: values[k] for name, values in columns.items()}}
-             for k, row in enumerate(rows)]
-        )  # fmt: skip
+        tables.append([{**row, "measured": m, "error": e}
+                       for row, m, e in zip(rows, *columns.values(), strict=True)])  # fmt: skip
         # Without a triplet's own set its ratio is known no longer.
         hint = f" (for one: --without {quote(one.name)})" if len(one.types) > 3 else ""
         part = f"part of the fit: this is no check{hint}" if fitted else "left out of the fit"

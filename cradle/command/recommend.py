@@ -12,25 +12,15 @@ from cradle.command.describe import chain_options, described, numbers_of, one_or
 
 @click.command()
 @chain_options
-@click.option(
-    "--wanted",
-    multiple=True,
-    default=["velocities"],
-    help="velocities, impulses, path, "
-    "forces, times or fastest ball, or several with commas between [velocities].",
-)
-@click.option(
-    "--accuracy",
-    default=1e-6,
-    help="Largest numerical error, as a part of the closing speed [1e-6].",
-)
+@click.option("--wanted", multiple=True, default=["velocities"], help="velocities, impulses, path, "
+              "forces, times or fastest ball, or several with commas between "
+              "[velocities].")  # fmt: skip
+@click.option("--accuracy", default=1e-6, help="Largest numerical error, as a part of the closing "
+              "speed [1e-6].")  # fmt: skip
 @click.option("--model-error", type=float, help="Largest distance from elastic spheres [any].")
 @click.option("--impacts", default=1, help="How many such impacts [1].")
-@click.option(
-    "--stiffness",
-    callback=numbers_of,
-    help="Of the contacts, N/m^1.5; 1 for equal spheres if neither forces nor times are wanted.",
-)
+@click.option("--stiffness", callback=numbers_of, help="Of the contacts, N/m^1.5; 1 for equal "
+              "spheres if neither forces nor times are wanted.")  # fmt: skip
 def recommend(
     wanted: Sequence[str], stiffness: list[float] | None, accuracy: float,
     model_error: float | None, impacts: int, **options: Any,
@@ -54,6 +44,6 @@ def recommend(
     advice = recommend_from(
         given.chain, wishes, accuracy=accuracy, model_error=model_error, impacts=impacts,
         ratios=known if len(given.chain) > 2 else None,
-        stiffness=None if stiffness is None else one_or_all(stiffness),
+        stiffness=one_or_all(stiffness),
     )  # fmt: skip
     click.echo(repr(advice))

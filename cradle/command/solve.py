@@ -117,19 +117,14 @@ def plot(output: str, **options: Any) -> None:
       cradle plot ABACA --output impact.png
       cradle plot --masses 1,1,1 --ratio 0.15 --output impact.svg
     """
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    from cradle import collide
-    from cradle.pictures import impacts as figures
+    from cradle.models import collide
+    from cradle.pictures.impacts import velocities
 
-    given = described(**options)
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(7, 4.3), layout="constrained")
-    figures.velocities(collide(given.chain, given.model), axes)
+    given, figure = described(**options), Figure((7, 4.3), layout="constrained")
+    velocities(collide(given.chain, given.model), figure.subplots())
     figure.savefig(output, format=image_format(output))
-    plt.close(figure)
     click.echo(f"drawn to {output}\n{given.note}")
 
 
@@ -194,10 +189,8 @@ def swing(
         click.echo(f"cradle: ended at {run.end:g} s, after {len(impacts)} impacts", err=True)
 
 
-main.add_command(film)
-main.add_command(fit)
-main.add_command(recommend)
-main.add_command(template)
+for verb in (film, fit, recommend, template):
+    main.add_command(verb)
 
 
 @main.command(name="warm-up")

@@ -23,19 +23,7 @@ from cradle.fit.search import Mode
 from cradle.fit.shots import Shots, ShotSet, Tracks
 
 __all__ = [
-    "Estimate",
-    "Fit",
-    "Mode",
-    "Prediction",
-    "ShotSet",
-    "Shots",
-    "Tracks",
-    "Velocities",
-    "ratio",
-    "read_shots",
-    "read_tracker",
-    "restitution",
-    "restitution_from_heights",
-    "speeds_from_heights",
+    "Estimate", "Fit", "Mode", "Prediction", "ShotSet", "Shots", "Tracks", "Velocities", "ratio",
+    "read_shots", "read_tracker", "restitution", "restitution_from_heights", "speeds_from_heights",
     "velocities_from_tracks",
-]
+]  # fmt: skip

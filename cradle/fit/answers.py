@@ -56,28 +56,18 @@ class Estimate:
     excess: Vector
 
     @classmethod
-    def of(cls, kind: str, key: Key, found: Scan, bound: float) -> Estimate:
-        """Make an estimate from a scan of one parameter."""
-        return cls.at(kind, key, found.modes, found.intervals, bound, found.grid, found.excess)
-
-    @classmethod
-    def at(
-        cls, kind: str, key: Key, modes: tuple[Mode, ...],
-        intervals: tuple[tuple[float, float], ...], bound: float, grid: Vector, excess: Vector,
-    ) -> Estimate:  # fmt: skip
-        """Make an estimate from its minima and its confidence set."""
+    def of(cls, kind: str, key: Key, bound: float, found: Scan | None) -> Estimate:
+        """Make an estimate of what a search found; of a parameter that acts in no shot, of None."""
+        if found is None:
+            found = Scan((), ((0.0, bound),), np.array([0.0, bound]), np.zeros(2))
+        modes, intervals, grid, excess = found
         identified = sum(high - low for low, high in intervals) < _ALL * bound
-        value = modes[0].value
-        ends = {"lower": value <= 1e-6 * bound, "upper": value >= (1.0 - 1e-6) * bound}
-        at_bound = next((end for end, reached in ends.items() if reached and identified), "")
-        return cls(kind, key, value if identified else None, intervals, modes, identified,
-                   at_bound, bound, grid, excess)  # fmt: skip
-
-    @classmethod
-    def unidentified(cls, kind: str, key: Key, bound: float) -> Estimate:
-        """Make the estimate of a parameter that acts in no shot."""
-        grid = np.array([0.0, bound])
-        return cls(kind, key, None, ((0.0, bound),), (), False, "", bound, grid, np.zeros(2))
+        value, at_bound = modes[0].value if identified else None, ""
+        if value is not None and value <= 1e-6 * bound:
+            at_bound = "lower"
+        elif value is not None and value >= (1.0 - 1e-6) * bound:
+            at_bound = "upper"
+        return cls(kind, key, value, intervals, modes, identified, at_bound, bound, grid, excess)
 
     @property
     def name(self) -> str:
@@ -93,15 +83,11 @@ class Estimate:
         """Return the estimate with its confidence set."""
         if self.value is None:
             return f"{self.kind} {self.name}: not identified"
-        digits = _digits(self.standard_error)
+        # Two digits of the error.
+        digits = min(8, max(2, 1 - int(np.floor(np.log10(max(self.standard_error, 1e-8))))))
         sets = " or ".join(f"[{low:.{digits}f}, {high:.{digits}f}]" for low, high in self.intervals)
         end = f" at its {self.at_bound} bound" if self.at_bound else ""
         return f"{self.kind} {self.name} = {self.value:.{digits}f} {sets}{end}"
-
-
-def _digits(error: float) -> int:
-    """Return how many decimals show two digits of an error."""
-    return min(8, max(2, 1 - int(np.floor(np.log10(max(error, 1e-8))))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,17 +9,9 @@ from numpy.typing import ArrayLike
 
 from cradle.fit.answers import Estimate, Group
 from cradle.fit.likelihood import chi_squares
-from cradle.fit.parameters import (
-    Key,
-    Points,
-    label,
-    pair_keys,
-    parameter_key,
-    ratio_keys,
-    triplet_keys,
-)
+from cradle.fit.parameters import Key, Points, label, pair_keys, parameter_key, ratio_keys
 from cradle.fit.result import Fit
-from cradle.fit.search import RISE, Mode, refine, scan
+from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
 from cradle.input.values import Vector, checked, one_number
 from cradle.kernel.state import LIMITS
@@ -74,9 +66,9 @@ def restitution(shots: Shots) -> Fit:
         def chi(e: Vector, sets: Sequence[ShotSet] = sets) -> Vector:
             return np.asarray(sum(_pair_chi_square(one, e) for one in sets))
 
-        found = scan(chi, np.linspace(0.0, 1.0, _GRID))
-        estimates[label(key)] = Estimate.of("restitution", key, found, 1.0)
-        chi_square += found.lowest
+        found, lowest = scan(chi, np.linspace(0.0, 1.0, _GRID))
+        estimates[label(key)] = Estimate.of("restitution", key, 1.0, found)
+        chi_square += lowest
         freedom += sum(one.after.size for one in sets)
     return Fit(shots, estimates, {}, (), chi_square, freedom)
 
@@ -132,9 +124,9 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
         return np.asarray(((low - square * high) ** 2 / (1 + square**2)).sum(axis=1) / error**2)
 
     key = parameter_key(name)
-    found = scan(chi, np.linspace(0.0, 1.0, _GRID))
-    estimate = Estimate.of("restitution", key, found, 1.0)
-    return Fit(Shots(()), {label(key): estimate}, {}, (), found.lowest, high.size - 1)
+    found, lowest = scan(chi, np.linspace(0.0, 1.0, _GRID))
+    estimate = Estimate.of("restitution", key, 1.0, found)
+    return Fit(Shots(()), {label(key): estimate}, {}, (), lowest, high.size - 1)
 
 
 def ratio(
@@ -184,47 +176,43 @@ def ratio(
         raise ValueError("no set has three balls or more; ratios come from triplets")
     values, errors = _restitution_values(restitution, sets)
     fixed = _known_ratios(known or {}, shots.masses)
-    bounds = {key: m for one in sets for key, m in _bounds(one).items() if key not in fixed}
+    bounds: dict[Key, float] = {}  # of three balls (Eq. 34)
+    for one in sets:
+        for i in range(len(one.types) - 2):
+            key, (left, middle, right) = one.types[i : i + 3], one.masses[i : i + 3]
+            bounds[key] = float(right / (middle + right))
+            bounds[key[::-1]] = float(left / (left + middle))
+    bounds = {key: bound for key, bound in bounds.items() if key not in fixed}
     acting = {key for key in bounds if any(_acts(key, one, bounds, fixed, values) for one in sets)}
-    estimates: dict[str, Estimate] = {}
+    found = {key: Estimate.of("ratio", key, bound, None) for key, bound in bounds.items()}
     groups, chi_square, freedom = [], 0.0, -len(acting)
     for keys, members in _components(sets, acting):
-        group, found, lowest = _fit_group(keys, members, bounds, fixed, (values, errors))
+        group, estimates, lowest = _fit_group(keys, members, bounds, fixed, (values, errors))
         groups.append(group)
-        estimates.update({label(estimate.key): estimate for estimate in found})
+        found.update(zip(keys, estimates, strict=True))
         chi_square += lowest
         freedom += sum(one.after.size for one in members)
-    for key in bounds:
-        estimates.setdefault(label(key), Estimate.unidentified("ratio", key, bounds[key]))
-    order = sorted(estimates, key=lambda name: list(map(label, bounds)).index(name))
-    kept = {label(key): (value, errors.get(key, 0.0)) for key, value in values.items()}
-    return Fit(shots, {name: estimates[name] for name in order}, kept, tuple(groups),
-               chi_square, freedom, {label(k): v for k, v in fixed.items()})  # fmt: skip
-
-
-def _with_error(name: str, given: float | tuple[float, float]) -> tuple[float, float]:
-    """Return a value and its standard error, 0 if it was given alone."""
-    numbers = np.atleast_1d(checked(name, given))
-    if numbers.size not in (1, 2):
-        raise ValueError(f"{name} = {given!r}; must be a number, or a number and its error")
-    value = checked(name, numbers[0], "must lie in [0, 1]", 0.0, 1.0)
-    error = float(numbers[1]) if numbers.size > 1 else 0.0
-    if error < 0:
-        raise ValueError(f"{name}[1] = {error!r}; a standard error must be at least 0")
-    return float(value), error
+    given = {label(key): (value, errors.get(key, 0.0)) for key, value in values.items()}
+    named = {label(key): one for key, one in found.items()}
+    taken = {label(key): value for key, value in fixed.items()}
+    return Fit(shots, named, given, tuple(groups), chi_square, freedom, taken)
 
 
 def _restitution_values(
     given: Fit | Known, sets: Sequence[ShotSet]
 ) -> tuple[dict[Key, float], dict[Key, float]]:
     """Return the coefficients and their errors by pair; all that the sets need are there."""
-    table = given.values() if isinstance(given, Fit) else given
     values, errors = {}, {}
-    for name, value in table.items():
-        key = tuple(sorted(parameter_key(name)))
-        values[key], error = _with_error(f"restitution[{name!r}]", value)
-        if error > 0:
-            errors[key] = error
+    for pair, value in (given.values() if isinstance(given, Fit) else given).items():
+        key, name = tuple(sorted(parameter_key(pair))), f"restitution[{pair!r}]"
+        numbers = np.atleast_1d(checked(name, value)).tolist()
+        if len(numbers) not in (1, 2):
+            raise ValueError(f"{name} = {value!r}; must be a number, or a number and its error")
+        values[key] = one_number(name, numbers[0], "must lie in [0, 1]", 0.0, 1.0)
+        if numbers[1:] and numbers[1] < 0:
+            raise ValueError(f"{name}[1] = {numbers[1]!r}; a standard error must be at least 0")
+        if any(numbers[1:]):
+            errors[key] = numbers[1]
     for one in sets:
         for key in pair_keys(one.types):
             if key not in values:
@@ -246,15 +234,6 @@ def _known_ratios(known: Mapping[str, float], masses: Mapping[str, float]) -> di
             rule = f"must not exceed the bound of these balls, {bound:.6g} (Eq. 34)"
             one_number(name, value, rule, high=bound * LIMITS.rounded)
     return fixed
-
-
-def _bounds(one: ShotSet) -> dict[Key, float]:
-    """Largest ratio of each triplet of a set and of its reverse, for three balls (Eq. 34)."""
-    m, bounds = one.masses, {}
-    for i, (forward, backward) in enumerate(zip(*triplet_keys(one.types), strict=True)):
-        bounds[forward] = float(m[i + 2] / (m[i + 1] + m[i + 2]))
-        bounds[backward] = float(m[i] / (m[i] + m[i + 1]))
-    return bounds
 
 
 def _acts(
@@ -306,30 +285,22 @@ def _fit_group(
     silent = {key for one in sets for key in ratio_keys(one.types)} - set(keys)
 
     def chi(points: Vector) -> Vector:
-        columns = points[:, None] if points.ndim == 1 else points
-        ratios = {key: columns[:, i] for i, key in enumerate(keys)}
-        for key in silent:  # those without effect may have any value
-            ratios[key] = np.full(len(columns), fixed.get(key, 0.0))
+        columns = points.reshape(len(points), -1)
+        # Those without effect may have any value.
+        ratios = {key: np.full(len(points), fixed.get(key, 0.0)) for key in silent}
+        ratios.update(zip(keys, columns.T, strict=True))
         return chi_squares(sets, Points(values, ratios), uncertain)
 
-    if len(keys) == 1:
-        bound = bounds[keys[0]]
-        # Near the bound the outcome goes like the square root of what is left to it.
-        grid = bound * (1.0 - np.linspace(1.0, 0.0, _GRID) ** 2)
-        found = scan(chi, grid)
-        group = Group((keys[0],), grid[:, None], found.excess, np.gradient(grid))
-        return group, [Estimate.of("ratio", keys[0], found, bound)], found.lowest
     upper = np.array([bounds[key] for key in keys])
-    region = refine(chi, upper)
-    estimates = []
-    for axis, key in enumerate(keys):
-        modes = tuple(Mode(float(point[axis]), excess) for point, excess in region.modes)
-        intervals = tuple((low, min(high, bounds[key])) for low, high in region.intervals(axis))
-        low = region.excess <= 4 * RISE
-        order = np.argsort(region.points[low, axis])
-        estimates.append(
-            Estimate.at("ratio", key, modes, intervals, bounds[key],
-                        region.points[low, axis][order], region.excess[low][order])
-        )  # fmt: skip
-    weights = np.ones(len(region.points))
-    return Group(tuple(keys), region.points, region.excess, weights), estimates, region.lowest
+    if len(keys) == 1:
+        # Near the bound the outcome goes like the square root of what is left to it.
+        grid = upper[0] * (1.0 - np.linspace(1.0, 0.0, _GRID) ** 2)
+        one, lowest = scan(chi, grid)
+        found, group = [one], Group(tuple(keys), grid[:, None], one.excess, np.gradient(grid))
+    else:
+        found, points, excess, lowest = refine(chi, upper)
+        group = Group(tuple(keys), points, excess, np.ones(len(points)))
+    estimates = [
+        Estimate.of("ratio", key, bounds[key], one) for key, one in zip(keys, found, strict=True)
+    ]
+    return group, estimates, lowest

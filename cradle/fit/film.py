@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cradle.fit.shots import Track
 from cradle.input.values import Vector, checked, one_number
@@ -127,10 +127,14 @@ def velocities_from_tracks(
     if length is not None:
         length = one_number("length", length, "must be above 0", 0.0, open_low=True)
     time = _coarse_time(balls, striker, window)
-    for _ in range(2):  # the window moves with the moment that is found in it
+    for _ in range(3):  # the window moves with the moment that is found in it
         used = _window(tracks, time, window)
-        time = float(_moment(used, time, length, striker)[0])
-    used = _window(tracks, time, window)
+        time, places = _moment(used, time, length, striker)
+    if (np.diff(places) <= 0).any():
+        raise ValueError(
+            f"the balls meet at {places.round(4).tolist()} m; the tracks must be in the order of "
+            "the balls, left to right"
+        )
     found = _velocities(used, time, length, striker)
     if scatter is None:
         return found
@@ -159,18 +163,18 @@ def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
     moments = np.unique(np.concatenate([ball.times for ball in balls]))
     best, most = None, -np.inf
     for moment in 0.5 * (moments[:-1] + moments[1:]):
+        near = [np.abs(ball.times - moment) <= window for ball in balls]
+        marks = [(ball.times[some] - moment, ball.positions[some])
+                 for ball, some in zip(balls, near, strict=True)]  # fmt: skip
+        if any(min((t < 0).sum(), (t >= 0).sum()) < 4 for t, _ in marks):
+            continue
         gain = 0.0
-        for k, ball in enumerate(balls):
-            some = np.abs(ball.times - moment) <= window
-            t, x = ball.times[some] - moment, ball.positions[some]
-            if min((t < 0).sum(), (t >= 0).sum()) < 4:
-                break
+        for k, (t, x) in enumerate(marks):
             earlier, later = np.minimum(t, 0.0), np.maximum(t, 0.0)
-            bent = [later, later**2] + ([earlier, earlier**2] if k == striker else [])
+            bent = [later, later**2] + [earlier, earlier**2] * (k == striker)
             gain += _rest([t, t**2], x) - _rest(bent, x)
-        else:
-            if gain > most:
-                best, most = float(moment), gain
+        if gain > most:
+            best, most = float(moment), gain
     if best is None:
         raise ValueError(f"no moment has 4 marks of every ball within {window:g} s on either side")
     return best
@@ -192,7 +196,9 @@ def _motion(t: Vector, velocity: float, length: float | None) -> Vector:
     return np.asarray(velocity * t * (1 + bend))
 
 
-def _moment(balls: list[Track], time: float, length: float | None, striker: int) -> Vector:
+def _moment(
+    balls: list[Track], time: float, length: float | None, striker: int
+) -> tuple[float, Vector]:
     """Return the moment of the impact and the balls' places then: all tracks meet there."""
     from scipy.optimize import least_squares
 
@@ -208,16 +214,14 @@ def _moment(balls: list[Track], time: float, length: float | None, striker: int)
             parts.append(ball.positions - p[2 + k] - way)
         return np.concatenate(parts)
 
-    start = np.zeros(2 + 2 * count)
-    start[0] = time
-    for k, ball in enumerate(balls):
-        earlier, later = ball.times < time, ball.times >= time
-        start[2 + count + k], start[2 + k] = np.polyfit(
-            ball.times[later] - time, ball.positions[later], 1
-        )
-        if k == striker:
-            start[1] = np.polyfit(ball.times[earlier] - time, ball.positions[earlier], 1)[0]
-    return np.asarray(least_squares(residuals, start, x_scale="jac").x[: 2 + count])
+    def line(ball: Track, some: NDArray[np.bool_]) -> Vector:
+        return np.asarray(np.polyfit(ball.times[some] - time, ball.positions[some], 1))
+
+    lines = np.transpose([line(ball, ball.times >= time) for ball in balls])
+    before = line(balls[striker], balls[striker].times < time)[0]
+    start = np.concatenate([[time, before], lines[1], lines[0]])
+    found = least_squares(residuals, start, x_scale="jac").x
+    return float(found[0]), found[2 : 2 + count]
 
 
 def _slope(t: Vector, x: Vector, length: float | None) -> tuple[float, float, float]:
@@ -237,28 +241,19 @@ def _slope(t: Vector, x: Vector, length: float | None) -> tuple[float, float, fl
 
 def _velocities(balls: list[Track], time: float, length: float | None, striker: int) -> Velocities:
     """Fit the velocity of every ball on its own, on either side of the impact."""
-    found = _moment(balls, time, length, striker)
-    moment, places = float(found[0]), found[2:]
-    if (np.diff(places) <= 0).any():
-        raise ValueError(
-            f"the balls meet at {places.round(4).tolist()} m; the tracks must be in the order of "
-            "the balls, left to right"
-        )
-    count = len(balls)
-    before, after = np.zeros(count), np.zeros(count)
-    variances = np.zeros((2, count))
+    velocities, variances = np.zeros((2, 2, len(balls)))
     squares, freedom = 0.0, 0
     for k, ball in enumerate(balls):
-        t, x = ball.times - moment, ball.positions
+        t = ball.times - time
         # The moment is known to a part of a frame: a mark nearer than half a frame may be of
         # either side, and is left out.
         near = 0.5 * float(np.median(np.diff(t)))
-        later, earlier = t > near, t < -near
-        after[k], variances[1, k], left = _slope(t[later], x[later], length)
-        squares, freedom = squares + left, freedom + int(later.sum()) - 2
-        if k == striker:
-            before[k], variances[0, k], left = _slope(t[earlier], x[earlier], length)
-            squares, freedom = squares + left, freedom + int(earlier.sum()) - 2
+        sides = {1: t > near, 0: t < -near} if k == striker else {1: t > near}
+        for side, some in sides.items():
+            velocities[side, k], variances[side, k], left = _slope(
+                t[some], ball.positions[some], length
+            )
+            squares, freedom = squares + left, freedom + int(some.sum()) - 2
     scatter = float(np.sqrt(squares / freedom))
-    sigma_before, sigma = scatter * np.sqrt(variances)
-    return Velocities(moment, before, after, sigma, sigma_before, scatter)
+    (before, after), (sigma_before, sigma) = velocities, scatter * np.sqrt(variances)
+    return Velocities(time, before, after, sigma, sigma_before, scatter)

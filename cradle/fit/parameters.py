@@ -70,7 +70,3 @@ class Points:
         ]
         e = np.stack([self.restitution[key] for key in pair_keys(types)], axis=-1)
         return post_impact_velocities(masses, velocities, e, *ratios, excess="saturate")
-
-    def shifted(self, key: Key, amount: float | Vector) -> Points:
-        """Return the points with one coefficient of restitution changed."""
-        return Points({**self.restitution, key: self.restitution[key] + amount}, self.ratios)

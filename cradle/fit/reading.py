@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from cradle.fit.shots import Shots, ShotSet, Track, Tracks, table_lines
+from cradle.fit.shots import Shots, ShotSet, Track, Tracks
+from cradle.input.csv import table_lines
 from cradle.input.values import Vector, one_number
 
 #: Columns that every table of shots has, and what they hold.
@@ -30,8 +30,12 @@ OPTIONAL = {
 
 _MASS_UNITS = {"kg": 1.0, "g": 1e-3}
 _VELOCITY_UNITS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}
-# What no ball of a cradle is likely to exceed: beyond, the unit is probably another one.
-_HEAVIEST, _FASTEST = 5.0, 20.0
+# What no ball of a cradle is likely to exceed, and what to say then: the unit is probably another.
+_LIKELY = {
+    "mass": (5.0, "kg", "grams: say mass_unit='g'", "mass_unit='kg'"),
+    "before": (20.0, "m/s", "cm/s: say velocity_unit='cm/s'", "velocity_unit='m/s'"),
+}
+_LIKELY["after"] = _LIKELY["before"]
 # A defect of a measurement counts from so many standard errors on.
 _BEYOND = 5.0
 
@@ -95,31 +99,30 @@ def read_shots(
     lines = table_lines(source)
     if not lines:
         raise ValueError("the table has no rows")
-    needed = [name for name in COLUMNS if not (name == "sigma" and sigma is not None)]
-    missing = [name for name in needed if name not in lines[0][1]]
-    if missing:
-        other = "; or give sigma=" if missing[0] == "sigma" else ""
-        hint = "".join(f": write {name} in small letters" for name in lines[0][1]
-                       if name.lower() == missing[0])  # fmt: skip
-        raise ValueError(
-            f"column {missing[0]!r} is missing ({COLUMNS[missing[0]]}{other}); "
-            f"there are {', '.join(lines[0][1])}{hint}"
-        )
+    there = list(lines[0][1])
+    for name in COLUMNS:
+        if name not in there and (name != "sigma" or sigma is None):
+            other = "; or give sigma=" if name == "sigma" else ""
+            alike = [one for one in there if one.lower() == name]
+            hint = "".join(f": write {one} in small letters" for one in alike)
+            raise ValueError(
+                f"column {name!r} is missing ({COLUMNS[name]}{other}); "
+                f"there are {', '.join(there)}{hint}"
+            )
     if sigma is not None:
         one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
-        if "sigma" in lines[0][1]:
+        if "sigma" in there:
             raise ValueError(f"sigma = {sigma!r}; the table has a column sigma: leave out one of "
                              "them")  # fmt: skip
     scale = (_unit("mass_unit", mass_unit, _MASS_UNITS, "kg"),
              _unit("velocity_unit", velocity_unit, _VELOCITY_UNITS, "m/s"))  # fmt: skip
     rows = [_row(where, line, scale, sigma) for where, line in lines]
-    if mass_unit is None:
-        _refuse_large(rows, "mass", _HEAVIEST, "kg", "grams: say mass_unit='g'",
-                      "mass_unit='kg'")  # fmt: skip
-    if velocity_unit is None:
-        for name in ("before", "after"):
-            _refuse_large(rows, name, _FASTEST, "m/s", "cm/s: say velocity_unit='cm/s'",
-                          "velocity_unit='m/s'")  # fmt: skip
+    for name, (limit, unit, other, same) in _LIKELY.items():
+        given = mass_unit if name == "mass" else velocity_unit
+        for row in rows:
+            if given is None and abs(value := getattr(row, name)) > limit:
+                rule = f"is it in {other} (or in {unit} indeed: say {same})"
+                _refuse(row.where, name, f"{value:g} {unit} is unlikely; {rule}")
     groups: dict[str, dict[str, list[_Row]]] = {}
     for row in rows:
         groups.setdefault(row.set, {}).setdefault(row.shot, []).append(row)
@@ -132,13 +135,17 @@ def _unit(name: str, given: str | None, known: dict[str, float], default: str) -
     return known[given or default]
 
 
+def _refuse(where: str, column: str, words: str) -> NoReturn:
+    raise ValueError(f"{where}, column {column}: {words}") from None
+
+
 def _number(where: str, line: dict[str, Any], name: str) -> float:
     try:
         value = float(line[name])
     except (TypeError, ValueError):
         value = np.nan
     if not np.isfinite(value):
-        raise ValueError(f"{where}, column {name}: {line[name]!r}; must be a number")
+        _refuse(where, name, f"{line[name]!r}; must be a number")
     return value
 
 
@@ -148,67 +155,45 @@ def _row(where: str, line: dict[str, Any], scale: tuple[float, float], sigma: fl
     before, after = (_number(where, line, name) * scale[1] for name in ("before", "after"))
     error = _number(where, line, "sigma") if sigma is None else float(sigma)
     if ball < 1 or ball != int(ball):
-        raise ValueError(f"{where}, column ball: {line['ball']!r}; must be 1, 2, ... from the left")
+        _refuse(where, "ball", f"{line['ball']!r}; must be 1, 2, ... from the left")
     if not mass > 0:
-        raise ValueError(f"{where}, column mass: {line['mass']!r}; must be above 0")
+        _refuse(where, "mass", f"{line['mass']!r}; must be above 0")
     if not error > 0:
-        raise ValueError(f"{where}, column sigma: {error!r}; must be above 0")
-    earlier = error * scale[1] if before else 0.0
+        _refuse(where, "sigma", f"{error!r}; must be above 0")
+    error *= scale[1]
+    earlier = error if before else 0.0
     if line.get("sigma_before") not in (None, ""):
         earlier = _number(where, line, "sigma_before") * scale[1]
         if earlier < 0:
-            raise ValueError(f"{where}, column sigma_before: {earlier!r}; must be at least 0")
+            _refuse(where, "sigma_before", f"{earlier!r}; must be at least 0")
     group, shot, kind = (str(line[name]).strip() for name in ("set", "shot", "type"))
-    error *= scale[1]
     return _Row(group, shot, int(ball), kind, mass, before, after, error, earlier, where)
-
-
-def _refuse_large(
-    rows: Sequence[_Row], name: str, limit: float, unit: str, other: str, same: str
-) -> None:
-    for row in rows:
-        value = getattr(row, name)
-        if abs(value) > limit:
-            raise ValueError(
-                f"{row.where}, column {name}: {value:g} {unit} is unlikely; is it in {other} "
-                f"(or in {unit} indeed: say {same})"
-            )
 
 
 def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
     """Put the rows of a set together; all its shots have the same balls."""
-    table, first = [], None
-    for shot, given in shots.items():
-        rows = sorted(given, key=lambda row: row.ball)
-        places = [row.ball for row in rows]
+    table = [sorted(rows, key=lambda row: row.ball) for rows in shots.values()]
+    first = table[0]
+    for (shot, given), rows in zip(shots.items(), table, strict=True):
+        places, what = [row.ball for row in rows], f"set {name}, shot {shot} has"
         if len(rows) < 2 or places != list(range(1, len(rows) + 1)):
-            raise ValueError(
-                f"{given[0].where}, column ball: set {name}, shot {shot} has balls {places}; "
-                "each shot needs 1, 2, ... N, each once, N >= 2"
-            )
-        first = first or rows
+            _refuse(given[0].where, "ball", f"{what} balls {places}; each shot needs 1, 2, ... N, "
+                                            "each once, N >= 2")  # fmt: skip
         if len(rows) != len(first):
-            raise ValueError(
-                f"{rows[0].where}, column ball: set {name}, shot {shot} has {len(rows)} balls; "
-                f"the first shot of the set has {len(first)}"
-            )
+            _refuse(rows[0].where, "ball", f"{what} {len(rows)} balls; the first shot of the set "
+                                           f"has {len(first)}")  # fmt: skip
         for row, model in zip(rows, first, strict=True):
             for column in ("type", "mass"):
-                if getattr(row, column) != getattr(model, column):
-                    raise ValueError(
-                        f"{row.where}, column {column}: {getattr(row, column)!r}; "
-                        f"ball {row.ball} of set {name} has {getattr(model, column)!r} elsewhere"
-                    )
-        _check_physics(name, shot, rows)
-        table.append(rows)
-    assert first is not None
+                value, usual = getattr(row, column), getattr(model, column)
+                if value != usual:
+                    words = f"{value!r}; ball {row.ball} of set {name} has {usual!r} elsewhere"
+                    _refuse(row.where, column, words)
+        _check_physics(f"set {name}, shot {shot}", rows)
     types = "".join(row.type for row in first)
     rest = name.removeprefix(types)
     if rest != name and rest.isalpha() and rest.isupper():  # all other names are free
-        raise ValueError(
-            f"{first[0].where}, column set: set {name} has the balls {types} alone; is the row of "
-            f"ball {len(first) + 1} missing?  If not, give the set another name"
-        )
+        _refuse(first[0].where, "set", f"set {name} has the balls {types} alone; is the row of "
+                f"ball {len(first) + 1} missing?  If not, give the set another name")  # fmt: skip
     values = {
         column: np.array([[getattr(row, column) for row in rows] for rows in table])
         for column in ("before", "after", "sigma", "sigma_before")
@@ -217,27 +202,23 @@ def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
     return ShotSet(name, tuple(row.type for row in first), tuple(shots), masses, **values)
 
 
-def _check_physics(name: str, shot: str, rows: Sequence[_Row]) -> None:
+def _check_physics(what: str, rows: list[_Row]) -> None:
     """Raise if no balls approach, balls pass through each other, or energy is gained."""
-    what = f"set {name}, shot {shot}"
     if all(a.before <= b.before for a, b in pairwise(rows)):
-        raise ValueError(f"{rows[0].where}, column before: {what}: no balls approach")
+        _refuse(rows[0].where, "before", f"{what}: no balls approach")
     for left, right in pairwise(rows):
-        error = np.hypot(left.sigma, right.sigma)
-        if left.after - right.after > _BEYOND * error:
-            raise ValueError(
-                f"{right.where}, column after: {what}: ball {left.ball} at {left.after:g} m/s "
-                f"would pass through ball {right.ball} at {right.after:g} m/s"
-            )
+        if left.after - right.after > _BEYOND * np.hypot(left.sigma, right.sigma):
+            _refuse(right.where, "after", f"{what}: ball {left.ball} at {left.after:g} m/s "
+                    f"would pass through ball {right.ball} at {right.after:g} m/s")  # fmt: skip
     gain = sum(0.5 * r.mass * (r.after**2 - r.before**2) for r in rows)
-    variance = sum(
+    error = np.sqrt(sum(
         r.mass**2 * ((r.after * r.sigma) ** 2 + (r.before * r.sigma_before) ** 2) for r in rows
-    )
-    if gain > _BEYOND * np.sqrt(variance):
+    ))  # fmt: skip
+    if gain > _BEYOND * error:
         share = gain / sum(0.5 * r.mass * r.before**2 for r in rows)
         raise ValueError(
             f"{rows[0].where}, columns before and after: {what} gains {100 * share:.3g} % of its "
-            f"energy, {gain / np.sqrt(variance):.3g} standard errors; check units, signs and sigma"
+            f"energy, {gain / error:.3g} standard errors; check units, signs and sigma"
         )
 
 
@@ -297,15 +278,20 @@ def read_tracker(
     if len(lines) < first + 3:
         raise ValueError(f"{file.name}: too short for an export of Tracker")
     header = lines[first + 1]
-    delimiter = next((mark for mark in "\t;," if mark in header), None)
-    columns = [name.strip() for name in header.split(delimiter)] if delimiter else []
-    if delimiter is None or columns[0] != "t" or column not in columns:
+    delimiter = next((mark for mark in "\t;," if mark in header), "\t")
+    columns = [name.strip() for name in header.split(delimiter)]
+    if len(columns) < 2 or columns[0] != "t" or column not in columns:
         raise ValueError(
             f"{file.name}, line {first + 2}: {header!r}; an export of Tracker has its columns "
             f"there, t first, and {column} among them"
         )
     names = [name.strip() for name in lines[first].split(delimiter)]
-    owners = _owners(names, columns, several=first == 1)
+    if first:  # of several tracks, the name stands above the first of its columns
+        owners = [""]
+        for name in [*names[1:], *[""] * len(columns)]:
+            owners.append(name or owners[-1])
+    else:
+        owners = [next(filter(None, names), "track").replace("_", " ")] * len(columns)
     tracks: Tracks = {}
     for place, title in enumerate(columns):
         if title == column:
@@ -314,31 +300,16 @@ def read_tracker(
     return tracks
 
 
-def _owners(names: list[str], columns: list[str], several: bool) -> list[str]:
-    """Return the track that each column belongs to."""
-    if not several:
-        return [next((name for name in names if name), "track").replace("_", " ")] * len(columns)
-    # Of several tracks, the name stands above the first of its columns.
-    owners = [""]
-    for name in [*names[1:], *[""] * len(columns)][: len(columns) - 1]:
-        owners.append(name or owners[-1])
-    return owners
-
-
 def _marks(name: str, lines: list[str], begin: int, where: tuple[str, int, str]) -> Vector:
     """Return times and positions of a track's marks, shape (2, T)."""
     delimiter, place, column = where
     marks: list[float] = []
     for number, line in enumerate(lines[begin:], begin + 1):
         cells = [cell.strip() for cell in line.split(delimiter)]
-        if place >= len(cells) or not cells[place]:
-            continue
-        for title, cell in (("t", cells[0]), (column, cells[place])):
+        for title, at in (("t", 0), (column, place)) if any(cells[place:][:1]) else ():
             # Tracker can be told to write decimal commas, with another delimiter then.
             try:
-                marks.append(float(cell if delimiter == "," else cell.replace(",", ".")))
+                marks.append(float(cells[at] if delimiter == "," else cells[at].replace(",", ".")))
             except ValueError:
-                raise ValueError(
-                    f"{name}, line {number}, column {title}: {cell!r}; must be a number"
-                ) from None
+                _refuse(f"{name}, line {number}", title, f"{cells[at]!r}; must be a number")
     return np.array(marks).reshape(-1, 2).T

@@ -4,21 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cradle.fit.answers import Estimate, Group, Prediction
-from cradle.fit.parameters import (
-    Key,
-    Points,
-    label,
-    pair_keys,
-    parameter_key,
-    triplet_keys,
-    types_in_a_row,
-)
+from cradle.fit.parameters import Key, Points, label, pair_keys, triplet_keys, types_in_a_row
 from cradle.fit.search import LEVEL
 from cradle.fit.shots import Shots, chance
 from cradle.input.values import Vector, one_number
@@ -182,63 +173,39 @@ class Fit:
         row = types_in_a_row(types)
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
         masses = self.shots.masses
-        drawn, balls = self._draws(row, masses), np.array([masses[kind] for kind in row])
-        velocities = drawn.outcomes(row, balls, np.array([[speed] + [0.0] * (len(row) - 1)]))
-        lower, median, upper = np.quantile(
-            velocities, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0
-        )
+        for kind in row:
+            if kind not in masses:
+                there = ", ".join(masses)
+                raise ValueError(f"no mass is known of type {kind!r}; there are {there}")
+        balls, before = np.array([masses[kind] for kind in row]), speed * np.eye(1, len(row))
+        velocities = self._draws(row).outcomes(row, balls, before)
+        ends = [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2]
+        lower, median, upper = np.quantile(velocities, ends, axis=0)
         return Prediction(row, median, lower, upper)
 
-    def _draws(self, types: tuple[str, ...], masses: Mapping[str, float]) -> Points:
+    def _draws(self, types: tuple[str, ...]) -> Points:
         """Draw coefficients of restitution and ratios of a chain from what was fitted."""
-        for kind in types:
-            if kind not in masses:
-                raise ValueError(
-                    f"no mass is known of type {kind!r}; there are {', '.join(masses)}"
-                )
         random = np.random.default_rng(0)
         restitution: dict[Key, float | Vector] = {}
+        given = {**self.given, **self.values()}
         for key in dict.fromkeys(pair_keys(types)):
-            value, error = self._restitution(key)
+            if label(key) not in given:
+                raise ValueError(f"the coefficient of restitution of {label(key)} is not known")
+            value, error = given[label(key)]
             restitution[key] = np.clip(value + error * random.standard_normal(_DRAWS), 0.0, 1.0)
-        drawn: dict[Key, Vector] = {
-            key: points
-            for group in self.groups
-            for key, points in zip(group.keys, group.draw(random.random(_DRAWS)).T, strict=True)
-        }
-        for key in chain.from_iterable(triplet_keys(types)):
-            if key in drawn:
-                continue
+        ratios: dict[Key, Vector] = {}
+        for group in self.groups:
+            ratios.update(zip(group.keys, group.draw(random.random(_DRAWS)).T, strict=True))
+        forward, backward = triplet_keys(types)
+        for key in forward + backward:
             name = label(key)
+            if key in ratios:
+                continue
             if name in self.known:
-                drawn[key] = np.full(_DRAWS, self.known[name])
+                ratios[key] = np.full(_DRAWS, self.known[name])
             elif name in self.estimates:
-                drawn[key] = self.estimates[name].bound * random.random(_DRAWS)
+                ratios[key] = self.estimates[name].bound * random.random(_DRAWS)
             else:
                 there = ", ".join(n for n, e in self.estimates.items() if e.kind == "ratio")
                 raise ValueError(f"the ratio of {name} is not known; fitted: {there or 'none'}")
-        return Points(restitution, drawn)
-
-    def _restitution(self, key: Key) -> tuple[float, float]:
-        name = label(key)
-        known = {**self.given, **{n: v for n, v in self.values().items() if len(key) == 2}}
-        if name not in known:
-            raise ValueError(f"the coefficient of restitution of {name} is not known")
-        return known[name]
-
-
-def predicted_points(fit: Fit, types: Sequence[str]) -> Points | None:
-    """Return the best parameters for a set, or None if one of them is not identified."""
-    ratios: dict[Key, Vector] = {}
-    for key in chain.from_iterable(triplet_keys(types)):
-        name = label(key)
-        if name in fit.known:
-            ratios[key] = np.array([fit.known[name]])
-            continue
-        value = fit.estimates[name].value
-        # A ratio without effect may have any value.
-        if value is None and any(key in group.keys for group in fit.groups):
-            return None
-        ratios[key] = np.array([0.0 if value is None else value])
-    restitution = {tuple(sorted(parameter_key(n))): v for n, (v, _) in fit.given.items()}
-    return Points(restitution, ratios)
+        return Points(restitution, ratios)

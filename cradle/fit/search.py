@@ -11,7 +11,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cradle.input.values import Vector
 
@@ -29,6 +28,7 @@ _ENOUGH = 400
 _CELLS = {2: 61, 3: 21, 4: 11, 5: 7, 6: 5}
 
 Function = Callable[[Vector], Vector]
+Intervals = tuple[tuple[float, float], ...]
 
 
 class Mode(NamedTuple):
@@ -47,16 +47,15 @@ class Mode(NamedTuple):
 
 
 class Scan(NamedTuple):
-    """Chi-square of one parameter over its range."""
+    """Chi-square of one parameter: its minima, the confidence set, its excess at points tried."""
 
+    modes: tuple[Mode, ...]
+    intervals: Intervals
     grid: Vector
     excess: Vector
-    lowest: float
-    modes: tuple[Mode, ...]
-    intervals: tuple[tuple[float, float], ...]
 
 
-def scan(function: Function, grid: Vector) -> Scan:
+def scan(function: Function, grid: Vector) -> tuple[Scan, float]:
     """Search one dimension: grid, then polish every minimum and every end of the confidence set."""
     values = function(grid)
     padded = np.concatenate([[np.inf], values, [np.inf]])
@@ -66,7 +65,16 @@ def scan(function: Function, grid: Vector) -> Scan:
     lowest = minima[0][1]
     modes = tuple(Mode(x, y - lowest) for x, y in minima if _is_minimum(x, y, values, grid))
     excess = values - lowest
-    return Scan(grid, excess, lowest, modes, _intervals(function, grid, excess, lowest, modes))
+    # Minima narrower than a cell of the grid count too.
+    extra = [mode for mode in modes if mode.excess <= RISE]
+    x = np.concatenate([grid, [mode.value for mode in extra]])
+    order = np.argsort(x, kind="stable")
+    x = x[order]
+    inside = np.concatenate([excess, [mode.excess for mode in extra]])[order] <= RISE
+    ends = [x[0]] * bool(inside[0])
+    ends += [_crossing(function, x[k : k + 2], lowest) for k in np.flatnonzero(np.diff(inside))]
+    ends = [float(end) for end in ends + [x[-1]] * bool(inside[-1])]
+    return Scan(modes, tuple(zip(ends[::2], ends[1::2], strict=True)), grid, excess), lowest
 
 
 def _is_minimum(x: float, y: float, values: Vector, grid: Vector) -> bool:
@@ -88,61 +96,20 @@ def _polished(function: Function, grid: Vector, at: int) -> tuple[float, float]:
     return best, value
 
 
-def _intervals(
-    function: Function, grid: Vector, excess: Vector, lowest: float, modes: tuple[Mode, ...]
-) -> tuple[tuple[float, float], ...]:
-    """Return the stretches where chi-square is within `RISE` of its lowest value."""
-    # Minima narrower than a cell of the grid count too.
-    extra = [mode for mode in modes if mode.excess <= RISE]
-    x = np.concatenate([grid, [mode.value for mode in extra]])
-    y = np.concatenate([excess, [mode.excess for mode in extra]])
-    order = np.argsort(x, kind="stable")
-    x, inside = x[order], y[order] <= RISE
-    ends = np.flatnonzero(inside[1:] != inside[:-1])
-    crossings = [_crossing(function, x[k], x[k + 1], lowest) for k in ends]
-    if inside[0]:
-        crossings.insert(0, float(x[0]))
-    if inside[-1]:
-        crossings.append(float(x[-1]))
-    return tuple(zip(crossings[::2], crossings[1::2], strict=True))
-
-
-def _crossing(function: Function, low: float, high: float, lowest: float) -> float:
+def _crossing(function: Function, ends: Vector, lowest: float) -> float:
     """Return where chi-square passes `RISE` above its lowest value, between two points."""
     for _ in range(_ROUNDS):
-        fine = np.linspace(low, high, _FINE)
-        inside = function(fine) - lowest <= RISE
-        k = int(np.flatnonzero(inside[1:] != inside[:-1])[0])
-        low, high = float(fine[k]), float(fine[k + 1])
-    return 0.5 * (low + high)
+        fine = np.linspace(ends[0], ends[1], _FINE)
+        k = np.flatnonzero(np.diff(function(fine) - lowest <= RISE))[0]
+        ends = fine[k : k + 2]
+    return 0.5 * float(ends[0] + ends[1])
 
 
-class Region(NamedTuple):
-    """Chi-square of several parameters, on cells of one size where it is low."""
+def refine(function: Function, upper: Vector) -> tuple[list[Scan], Vector, Vector, float]:
+    """Search several dimensions from 0 to `upper`: a grid of cells, then the best cells divided.
 
-    points: Vector
-    excess: Vector
-    step: Vector
-    lowest: float
-    best: Vector
-    modes: tuple[tuple[Vector, float], ...]
-
-    def intervals(self, axis: int) -> tuple[tuple[float, float], ...]:
-        """Return the confidence set of one parameter as disjoint intervals, to about a step."""
-        inside = np.unique(self.points[self.excess <= RISE, axis])
-        half = 0.5 * self.step[axis]
-        if not inside.size:
-            inside = self.best[axis : axis + 1]
-        breaks = np.flatnonzero(np.diff(inside) > 3.0 * half)
-        starts, ends = np.concatenate([[0], breaks + 1]), np.concatenate([breaks, [-1]])
-        return tuple(
-            (max(0.0, float(inside[a] - half)), float(inside[b] + half))
-            for a, b in zip(starts, ends, strict=True)
-        )
-
-
-def refine(function: Function, upper: Vector) -> Region:
-    """Search several dimensions from 0 to `upper`: a grid of cells, then the best cells divided."""
+    Returns what each axis shows, all points of the last grid, their excess, and the lowest value.
+    """
     size = upper.size
     if size not in _CELLS:
         raise ValueError(
@@ -155,8 +122,8 @@ def refine(function: Function, upper: Vector) -> Region:
     halves = np.array(list(product((-0.25, 0.25), repeat=size)))
     while True:
         values = function(points)
-        lowest = float(values.min())
-        if np.count_nonzero(values - lowest <= RISE) >= _ENOUGH or (step < 1e-6 * upper).all():
+        inside = values - values.min() <= RISE
+        if np.count_nonzero(inside) >= _ENOUGH or (step < 1e-6 * upper).all():
             break
         best = points[np.argsort(values, kind="stable")[:_KEPT]]
         points = (best[:, None, :] + halves * step).reshape(-1, size)
@@ -165,17 +132,28 @@ def refine(function: Function, upper: Vector) -> Region:
         (_descended(function, point, step, upper) for point in _lows(points, values, step)),
         key=lambda pair: pair[1],
     )
-    best_point, lowest = minima[0]
-    modes = tuple((point, value - lowest) for point, value in minima)
-    return Region(points, values - lowest, step, lowest, best_point, modes)
+    lowest = minima[0][1]
+    excess = values - lowest
+    low = excess <= 4 * RISE
+    scans = []
+    for axis, bound in enumerate(upper.tolist()):
+        modes = tuple(Mode(float(point[axis]), value - lowest) for point, value in minima)
+        # The confidence set, to about a step.
+        places, half = np.unique(points[excess <= RISE, axis]), 0.5 * step[axis]
+        places = places if places.size else minima[0][0][axis : axis + 1]
+        parts = np.split(places, np.flatnonzero(np.diff(places) > 3.0 * half) + 1)
+        ends = [(float(part[0] - half), float(part[-1] + half)) for part in parts]
+        order = np.argsort(points[low, axis])
+        scans.append(Scan(modes, tuple((max(0.0, a), min(b, bound)) for a, b in ends),
+                          points[low, axis][order], excess[low][order]))  # fmt: skip
+    return scans, points, excess, lowest
 
 
 def _lows(points: Vector, values: Vector, step: Vector) -> Vector:
     """Return the points that no neighbour undercuts, among those near the lowest."""
     some = np.argsort(values, kind="stable")[:1500]
     some = some[values[some] - values[some[0]] <= 4 * RISE]
-    distance = np.abs(points[some, None] - points[None, some])
-    near: NDArray[np.bool_] = np.all(distance < 1.5 * step, axis=-1)
+    near = np.all(np.abs(points[some, None] - points[None, some]) < 1.5 * step, axis=-1)
     lower = values[some][None, :] < values[some][:, None]
     return np.asarray(points[some[~np.any(near & lower, axis=1)]])
 

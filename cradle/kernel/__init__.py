@@ -1,16 +1,16 @@
 """The event loop in rooms: the rules of `cradle.textbook`, fast and at the extremes.
 
     state        groups of arrays, the notation; the limits of rounding
-    motion       velocities as sums of two numbers; impulses, which alone change them
-    rules        one run: rates, ratios in force, the end of a contact      R1, R3, R6, R7
+    numbers      sums of two floats, 32 digits
+    rules        one run: rates, ratios in force, its way to its next event   R1, R3, R6, R7
     record       what is written down
-    events       start, hand-over, closing                                  R2, R4, R5
-    meeting      two runs that meet                                         R8.3, R8.4
-    collapse     infinite sequences: exhausted contacts                     R9
-    jump         infinite sequences: the limit of a cycle                   R9
-    cycles       infinite sequences: cycles, recognised                     R9
+    events       start, hand-over, closing                                    R2, R4, R5
+    meeting      two runs that meet                                           R8.3, R8.4
+    collapse     contacts that are exhausted, and how they end                R9
+    snapshot     what has repeated itself since                               R9
+    cycles       impacts that repeat themselves on another scale              R9
     certificate  momentum, order, energy, ledger of every answer
-    loop         the rounds                                                 R8
+    loop         the rounds                                                   R8
     batch        many chains; the door
 
 The rooms are plain: numbers, loops, sequences, tuples of arrays and `math`.  They run as they
@@ -21,9 +21,8 @@ from cradle.kernel.batch import Inputs, Options, Outputs, batch
 
 #: The rooms in an order in which each uses only those before it.
 ROOMS = (
-    "state", "motion", "rules", "record", "events", "meeting", "collapse", "jump", "cycles",
-    "certificate", "loop",
-    "batch",
+    "state", "numbers", "rules", "record", "events", "meeting", "collapse", "snapshot",
+    "cycles", "certificate", "loop", "batch",
 )  # fmt: skip
 
 __all__ = ["ROOMS", "Inputs", "Options", "Outputs", "batch"]

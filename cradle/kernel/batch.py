@@ -1,20 +1,21 @@
-"""Many impacts, outcome alone or with a record of one: checks of input, closed form, event loop."""
+"""Many impacts, outcome alone or with a record of one: checks of input, event loop, outcome."""
 
 import math
 from typing import Any, NamedTuple
 
+from cradle.kernel.certificate import certify
 from cradle.kernel.loop import impact
-from cradle.kernel.record import in_units
+from cradle.kernel.record import settle
 from cradle.kernel.state import (
     FINISHED,
     LIMITS,
     REFUSED,
+    UNSOUND,
     Record,
     State,
     apart,
     bare,
     door,
-    jit,
     once,
 )
 
@@ -35,7 +36,6 @@ class Options(NamedTuple):
     meeting: float
     max_events: int  # most rounds; the textbook allows two for each event
     bounded: bool  # refuse ratios above Eq. 53
-    whole: bool  # run the event loop even where the closed form would do
 
 
 class Outputs(NamedTuple):
@@ -47,64 +47,6 @@ class Outputs(NamedTuple):
     p: Any
     a: Any
     held: Any
-
-
-@jit
-def short_cut(n, chain, bounded, out_v):
-    """Eqs. 24 and 30: two balls, or three whose first strikes the others, one collision each.
-
-    Returns False, with nothing decided, if that is not so or not clear beyond rounding, if an input
-    is not well within the limits of `admissible`, or if the numbers are so far from 1 that the
-    loop's own units are needed.
-    """
-    m, v, e = chain.m, chain.v, chain.e
-    heaviest = max(m[0], m[1], m[n - 1])
-    for i in range(n):
-        if not (LIMITS.tiny < m[i] < LIMITS.huge and m[i] >= LIMITS.lightest * heaviest):
-            return False
-        if not (v[i] == 0.0 or LIMITS.tiny < abs(v[i]) < LIMITS.huge):
-            return False
-    u0 = v[0] - v[1]
-    if not (u0 > 0.0 and LIMITS.clear < e[0] <= 1.0):
-        return False
-    one, two = 1.0 / m[0], 1.0 / m[1]
-    if n == 2:
-        impulse = (1.0 + e[0]) * u0 * (m[0] / (m[0] + m[1]) * m[1])
-        out_v[0] = v[0] - impulse * one
-        out_v[1] = v[1] + impulse * two
-        return out_v[0] < out_v[1]
-    a = chain.forward[0]
-    if not (LIMITS.clear < e[1] <= 1.0 and a >= 0.0):
-        return False
-    if not a * (m[1] + m[2]) <= (1.0 - LIMITS.clear) * m[2]:
-        return False
-    # Nothing is driven backward, but a ratio that is none is refused.
-    b = chain.backward[0]
-    if not (b >= 0.0 and b * (m[0] + m[1] if bounded else 1.0) <= (m[0] if bounded else 1.0)):
-        return False
-    u1 = v[1] - v[2]
-    if u1 < 0.0:
-        return False
-    # Contact 0 drives contact 1 until it ends (Eqs. 17-24); speeds per impulse.
-    three = 1.0 / m[2]
-    first = (1.0 + e[0]) * u0 / (one + (1.0 - a) * two)
-    gain = first * ((1.0 - a) * two - a * three)
-    u2 = u1 + gain
-    # Contact 1 goes on alone, with all the work it has absorbed to give back (Eqs. 25-30).
-    both = two + three
-    opens = e[1] * math.sqrt(u2 * u2 + a * first * (u1 + u2) * both)
-    second = (u2 + opens) / both
-    apart_by = e[0] * u0 - second * two  # Eq. 43: ball 1 does not fall back on ball 0
-    if not (apart_by > LIMITS.clear * u0 and opens > LIMITS.clear * u0):
-        return False
-    out_v[0] = v[0] - first * one
-    out_v[2] = v[2] + (a * first + second) * three
-    # A light ball's velocity from its neighbour's, a heavy one's from its impulses.
-    if m[1] < m[0]:
-        out_v[1] = out_v[0] + apart_by
-    else:
-        out_v[1] = v[1] + ((1.0 - a) * first - second) * two
-    return out_v[0] < out_v[1] < out_v[2]
 
 
 @apart
@@ -150,13 +92,13 @@ def hand_out(k, n, out, ball, contact, tally):
     shift, mass_shift = tally.shift, tally.mass_shift
     out_v, hits = out.v[k], out.hits[k]
     for i in range(n):
-        out_v[i] = in_units(ball[i], ball[i].hi, tally.unit)
+        out_v[i] = ball[i].after
     out.collapsed[k] = tally.collapsed
     for c in range(n - 1):
         hits[c] = contact[c].hits
     for c in range(len(out.p)):
-        out.p[c] = math.ldexp(contact[c].p, shift + mass_shift)
-        out.a[c] = math.ldexp(contact[c].a, 2 * shift + mass_shift)
+        out.p[c] = math.ldexp(contact[c].p.real, shift + mass_shift)
+        out.a[c] = math.ldexp(contact[c].a.real, 2 * shift + mass_shift)
         out.held[c] = contact[c].held
 
 
@@ -193,16 +135,14 @@ def batch(begin, resumed, n, inputs, options, out, area, effort):
             inputs.m[k * by_m], inputs.v[k * by_v], inputs.e[k * by_e],
             inputs.forward[k * by_f], inputs.backward[k * by_b],
         )  # fmt: skip
-        if not resumed:
-            if n <= 3 and not options.whole and short_cut(n, chain, options.bounded, out.v[k]):
-                out.collapsed[k] = 0
-                for c in range(n - 1):
-                    out.hits[k][c] = 1
-                continue
-            if not admissible(n, chain, options.bounded):
-                return k, REFUSED
+        if not resumed and not admissible(n, chain, options.bounded):
+            return k, REFUSED
         status = impact(n, chain, options.meeting, options.max_events, resumed, state)
         resumed = False
+        settle(n, state.ball, state.contact, state.tally[0].unit)
+        if status == FINISHED:
+            state.tally[0].defect = certify(n, state.ball, state.contact, state.tally[0])
+            status = UNSOUND if state.tally[0].defect > 0 else FINISHED
         hand_out(k, n, out, state.ball, state.contact, state.tally[0])
         if status != FINISHED:
             return k, status

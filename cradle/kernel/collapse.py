@@ -1,80 +1,115 @@
-"""R9, the first sign of an infinite sequence of impacts: exhausted contacts that only chatter.
+"""R9: collapse, and the first sign of one: contacts that are exhausted.
 
-What they have left is far below rounding, and they end plastically.
+What they have left is far below the last digit of an answer, and they alone go on making events.
 """
 
-from cradle.kernel.events import deactivate, exhausted, stir
-from cradle.kernel.motion import closing, join_velocities, relative_energy
-from cradle.kernel.state import LIMITS, LOWER, apart, jit
+from cradle.kernel.events import deactivate, exhausted, run_of, stir
+from cradle.kernel.numbers import ONE, ZERO, minus, over, plus, times
+from cradle.kernel.state import LIMITS, apart, jit
 
 
 @apart
 def end_plastically(first, last, n, state):
-    """End those contacts of first..last that are active."""
+    """End those contacts of first..last that are active; their balls have one velocity."""
     contact, run = state.contact, state.run
     for c in range(first, last + 1):
+        contact[c].u = ZERO
+        contact[c].made = 0.0
         contact[c].tiny = 0
         if contact[c].active == 1:
-            k = c
-            while k > 0 and contact[k - 1].active == 1:
-                k -= 1
-            deactivate(c, k, n, state.ball, contact, run, state.tally[0])
+            deactivate(c, run_of(c, contact), n, state.ball, contact, run, state.tally[0])
     for c in (first - 1, last + 1):
         if 0 <= c < n - 1:
             stir(c, n, run, contact)
             if contact[c].active == 1:
-                k = c
-                while k > 0 and contact[k - 1].active == 1:
-                    k -= 1
-                run[k].stirred = 1
+                run[run_of(c, contact)].stirred = 1
+
+
+@jit
+def change_of(c, low, high, ball, contact):
+    """Return how impulses x of contacts low..high change the closing speed of contact c."""
+    before = contact[c - 1].x if low <= c - 1 <= high else ZERO
+    here = contact[c].x if low <= c <= high else ZERO
+    after = contact[c + 1].x if low <= c + 1 <= high else ZERO
+    left = times(minus(before, here), ball[c].inverse)
+    return minus(left, times(minus(here, after), ball[c + 1].inverse))
+
+
+@apart
+def common_velocity(first, last, left_part, right_part, ball, contact):
+    """Leave in x of contacts first..last the impulses that bring all their balls to one velocity.
+
+    A steady neighbour whose impulse is h times that of the outermost contact beside it makes the
+    ball between them act as one of mass m / (1 - h); the parts are these 1 - h.
+    """
+    mass = momentum = speed = ZERO  # velocities count from that of the first ball
+    for i in range(first, last + 2):
+        b = ball[i]
+        b.x = b.m
+        if i == first:
+            b.x = over(b.x, left_part)
+        if i == last + 1:
+            b.x = over(b.x, right_part)
+        mass = plus(mass, b.x)
+        momentum = plus(momentum, times(b.x, speed))
+        if i <= last:
+            speed = minus(speed, contact[i].u)
+    common = over(momentum, mass)
+    impulse = speed = ZERO
+    for c in range(first, last + 1):
+        impulse = plus(impulse, times(ball[c].x, minus(speed, common)))
+        speed = minus(speed, contact[c].u)
+        contact[c].x = impulse
 
 
 @jit
 def chatters(c, n, state):
     """Tell whether contact c exists and is in an exhausted collision, or has just been.
 
-    Or if it has collided lately at a speed below the last digit: there sequences go on for ever.
+    Or if it has collided lately at a speed that is as far below an exhausted one: dust.
     """
     if not 0 <= c < n - 1:
         return False
-    ball, contact, threshold = state.ball, state.contact, state.tally[0].threshold
-    if (
-        contact[c].active == 1
-        and contact[c].w > 0.0
-        and exhausted(c, contact[c].w, threshold, ball, contact)
-    ):
-        return True
-    if not exhausted(c, contact[c].q, threshold, ball, contact):
+    k = state.contact[c]
+    work = k.w if k.active == 1 and k.w > 0.0 else k.q.real
+    if not exhausted(c, work, state.ball, state.contact, state.tally[0]):
         return False
-    lately = contact[c].hits != state.memory[LOWER][c].hits
-    return contact[c].tiny > 0 or (lately and abs(contact[c].u) < LIMITS.dust)
+    dust = k.hits > 0 and k.made < LIMITS.dust * state.tally[0].fastest
+    return dust or k.tiny > 0 or (k.active == 1 and k.w > 0.0)
+
+
+@jit
+def next_chatter(c, step, n, state):
+    """Return the next contact after c that chatters too, with nothing but zeros between; or c."""
+    k = c + step
+    while 0 <= k < n - 1 and state.contact[k].u.real == 0.0 and not chatters(k, n, state):
+        k += step
+    return k if chatters(k, n, state) else c
 
 
 @apart
 def exhausted_stretch(c, n, state):
     """Return the stretch (first, last) around c of contacts that only chatter.
 
-    Empty if nothing in it can lose energy, unless it is slower than the last digit: elastic
-    sequences are finite, or hand all their energy on; or if its balls move with more than a faint
-    energy: heavy ones, slower than a light ball that struck them.
+    Empty if nothing in it can lose energy, unless it is dust: elastic sequences are finite, or hand
+    all their energy on; or if its balls move with more than a faint energy: heavy ones, slower than
+    a light ball that struck them.
     """
-    first = c
-    last = c
-    while True:
-        if chatters(first - 1, n, state):
-            first -= 1
-        elif chatters(last + 1, n, state):
-            last += 1
-        else:
-            break
+    ball, contact = state.ball, state.contact
+    first = last = c
+    while next_chatter(first, -1, n, state) < first:
+        first = next_chatter(first, -1, n, state)
+    while next_chatter(last, 1, n, state) > last:
+        last = next_chatter(last, 1, n, state)
     loses = False
-    fastest = 0.0
+    common_velocity(first, last, ONE, ONE, ball, contact)
+    energy = fastest = 0.0
     for k in range(first, last + 1):
-        loses = loses or state.contact[k].e < 1.0
-        fastest = max(fastest, abs(state.contact[k].u))
-    if (loses or fastest < LIMITS.dust) and relative_energy(
-        first, last + 1, state.ball
-    ) <= LIMITS.faint * state.tally[0].energy:
+        loses = loses or contact[k].e.real < 1.0
+        fastest = max(fastest, abs(contact[k].u.real))
+        energy += 0.5 * contact[k].x.real * contact[k].u.real
+    loses = loses or fastest < LIMITS.dust * state.tally[0].fastest
+    if loses and energy <= LIMITS.faint * state.tally[0].energy:
         return first, last
     return c, c - 1
 
@@ -84,22 +119,25 @@ def merge(first, last, n, state):
     """End the contacts first..last plastically: their balls take the common velocity.
 
     Balls that zeros beside them join to theirs go with them, and an idle neighbour that this makes
-    approach, at a speed below the threshold, joins.
+    approach joins.
     """
     ball, contact = state.ball, state.contact
     while True:
         low, high = first, last
-        while low > 0 and contact[low - 1].u == 0.0:
+        while low > 0 and contact[low - 1].u.real == 0.0:
             low -= 1
-        while high < n - 2 and contact[high + 1].u == 0.0:
+        while high < n - 2 and contact[high + 1].u.real == 0.0:
             high += 1
-        join_velocities(low, high + 1, ball, contact)
+        common_velocity(low, high, ONE, ONE, ball, contact)
         for c in (low - 1, high + 1):
             if 0 <= c < n - 1:
-                contact[c].u = closing(c, ball)
-        if low > 0 and contact[low - 1].active == 0 and contact[low - 1].u > 0.0:
+                contact[c].u = plus(contact[c].u, change_of(c, low, high, ball, contact))
+        for c in range(low, high + 1):
+            contact[c].p = plus(contact[c].p, contact[c].x)
+            contact[c].u = ZERO
+        if low > 0 and contact[low - 1].active == 0 and contact[low - 1].u.real > 0.0:
             first = low - 1
-        elif high < n - 2 and contact[high + 1].active == 0 and contact[high + 1].u > 0.0:
+        elif high < n - 2 and contact[high + 1].active == 0 and contact[high + 1].u.real > 0.0:
             last = high + 1
         else:
             break

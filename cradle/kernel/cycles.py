@@ -1,23 +1,30 @@
-"""R9, the second sign of an infinite sequence: impacts repeat in ever smaller cycles.
+"""R9: the second sign of a collapse: impacts that repeat themselves in cycles.
 
-The state at the end of one contact is that at its end a cycle before, smaller.  Then all further
-cycles are smaller copies, and their sum is a geometric series.  Cycles that contain collapses are
-found in the same way, on a second level: there collapses are counted, not ends.
+The state at the end of a contact is that at its end a cycle before on a smaller scale.  Then all
+cycles to come are smaller copies of the last one, by the factor L, L^2, ..., and their sum is a
+geometric series.  Cycles that contain collapses are found in the same way, on a second level: there
+collapses are counted, not ends.
 """
 
 import math
 
-from cradle.kernel.collapse import exhausted_stretch, merge
-from cradle.kernel.jump import go_on, limit, neighbours_stay, to_limit, velocity_changes
+from cradle.kernel.collapse import (
+    change_of,
+    common_velocity,
+    end_plastically,
+    exhausted_stretch,
+    merge,
+)
+from cradle.kernel.events import reduced_mass
+from cradle.kernel.numbers import ONE, ZERO, minus, over, plus, scaled, times
 from cradle.kernel.record import record
+from cradle.kernel.snapshot import cluster_around, forget, remember, since
 from cradle.kernel.state import (
     COLLAPSE,
-    END,
     LIMITS,
     LOWER,
     REPETITION,
     UPPER,
-    Cluster,
     apart,
     jit,
     once,
@@ -25,93 +32,186 @@ from cradle.kernel.state import (
 
 
 @jit
-def settle(n, memory):
-    """Hand impulses and works since the last snapshot to the upper level, and begin anew."""
-    for c in range(n - 1):
-        then, above = memory[LOWER][c], memory[UPPER][c]
-        above.p += then.p
-        above.a += then.a
-        then.p = then.a = 0.0
-
-
-@jit
-def forget(number, levels):
-    """Drop the snapshot of a level."""
-    level = levels[number]
-    level.mark = -1
-    # The first snapshot comes after 32 ends, or 8 collapses: short impacts need none.
-    level.seen = 16 if number == LOWER else 4
-    level.count = 0
-
-
-@jit
-def code(c, state):
-    """Return one number for whether contact c is active, and who drives whom at its balls."""
-    ball = state.ball
-    return 9 * state.contact[c].active + 3 * ball[c].turn + ball[c + 1].turn
-
-
-@once
-def snapshot(level, n, state):
-    """Remember the state."""
-    contact, memory = state.contact, state.memory[level]
-    for c in range(n - 1):
-        memory[c].p = memory[c].a = 0.0
-        memory[c].u = contact[c].u
-        memory[c].q, memory[c].q_lo = contact[c].q, contact[c].q_lo
-        memory[c].hits = contact[c].hits
-        memory[c].code = code(c, state)
-
-
-@jit
-def has_waited(c, n, state, memory):
-    """Tell whether contact c, if it exists, is as it was at the snapshot, without a collision."""
-    if not 0 <= c < n - 1:
-        return True
-    return state.contact[c].hits == memory[c].hits and code(c, state) == memory[c].code
+def kept_part(neighbour, edge, exists, contact, memory):
+    """Return 1 - h for a steady neighbour with h times the impulse of the outermost contact."""
+    if not exists:
+        return ONE
+    one = since(edge, contact, memory)
+    kept = over(minus(one, since(neighbour, contact, memory)), one)
+    if abs(kept.real) < LIMITS.kept:
+        return complex(LIMITS.kept, 0.0)  # nothing is kept: nearly infinite mass
+    return kept
 
 
 @apart
-def cluster_around(c, level, n, state):
-    """Return the contacts of a possible cycle around contact c; empty (last < first) if none.
+def limit(cluster, number, state):
+    """Leave in x the impulses to the limit: the balls first..last + 1 come to one velocity.
 
-    Contacts left..right had an impulse since the snapshot; of these first..last collided anew and
-    the others, steady neighbours, stayed active.  All must be active and driven as they were at the
-    snapshot, and one that collided must lose energy.
+    Returns T, the sum of all cycles to come over the last one, T = L / (1 - L); how far the state
+    is from its snapshot scaled by L, relative to its own size; and this size.  T is 0 if there is
+    no limit, and below -1 if the cycles come from there and grow, driven by steady neighbours.
     """
-    contact, memory = state.contact, state.memory[level]
-    left = c
-    right = c
-    while left > 0 and memory[left - 1].p > 0.0:
-        left -= 1
-    while right < n - 2 and memory[right + 1].p > 0.0:
-        right += 1
-    first = right + 1
-    last = left - 1
-    same = memory[c].p > 0.0  # else c has collided without an impulse
-    loses = False
-    for k in range(left, right + 1):
-        same = same and memory[k].code == code(k, state)
-        if contact[k].hits != memory[k].hits:
-            first = min(first, k)
-            last = k
-            loses = loses or contact[k].e < 1.0
-        else:
-            same = same and contact[k].active == 1
-    for k in range(first, last + 1):
-        same = same and contact[k].hits != memory[k].hits
-    # Whoever is active next to them has waited throughout, at a ratio of zero.
-    same = same and has_waited(left - 1, n, state, memory)
-    same = same and has_waited(right + 1, n, state, memory)
-    if (left > 1 and memory[left - 2].p > 0.0) or (right < n - 3 and memory[right + 2].p > 0.0):
-        same = False
-    if same and loses:
-        return Cluster(left, first, last, right)
-    return Cluster(c, c, c - 1, c)
+    ball, contact, memory = state.ball, state.contact, state.memory[number]
+    left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
+    left_part = kept_part(first - 1, first, first > left, contact, memory)
+    right_part = kept_part(last + 1, last, last < right, contact, memory)
+    common_velocity(first, last, left_part, right_part, ball, contact)
+    to_come = done = ZERO
+    size = 0.0
+    for c in range(first, last + 1):
+        to_come = plus(to_come, contact[c].x)
+        done = plus(done, since(c, contact, memory))
+        speed = math.sqrt(2.0 * contact[c].q.real / reduced_mass(c, ball))
+        size = max(size, abs(contact[c].u.real), speed)
+    total = over(to_come, done).real
+    if size == 0.0 or not math.inf > abs(total) > 0.0 or -1.0 <= total <= 0.0:
+        return 0.0, math.inf, 0.0
+    factor = total / (1.0 + total)
+    off = 0.0
+    for c in range(first, last + 1):
+        off = max(off, abs(contact[c].u.real - factor * memory[c].u.real) / size)
+        stored = contact[c].q.real - factor * factor * memory[c].q.real
+        off = max(off, abs(stored) / reduced_mass(c, ball) / size / size)
+    # The steady neighbours' impulses go with those of the contacts beside them.
+    if left < first:
+        one = times(contact[first].x, minus(ONE, left_part))
+        one = over(one, since(first - 1, contact, memory))
+        for c in range(left, first):
+            contact[c].x = times(since(c, contact, memory), one)
+    if last < right:
+        other = times(contact[last].x, minus(ONE, right_part))
+        other = over(other, since(last + 1, contact, memory))
+        for c in range(last + 1, right + 1):
+            contact[c].x = times(since(c, contact, memory), other)
+    return total, off, size
+
+
+@jit
+def stays_at_zero(c, contact, memory):
+    """Tell whether contact c has been at u = 0 since the snapshot: its balls move as one."""
+    k, then = contact[c], memory[c]
+    idle = k.a.real == then.a.real and k.a.imag == then.a.imag
+    return k.active == 1 and k.u.real == 0.0 and then.u.real == 0.0 and idle
+
+
+@jit
+def sum_of_squares(total, part):
+    """Return the sum of L^2, L^4, ... on this part of the way to the limit."""
+    return part * (2.0 - part) * total * (total / (1.0 + 2.0 * total))
 
 
 @apart
-def repeat(c, n, state):
+def neighbours_stay(cluster, total, part, number, n, state):
+    """Work out what the neighbours of a cycle absorb; tell whether none comes to its own event.
+
+    Their works on this part of the way are left in y.  Impulse and closing speed of a neighbour go
+    the same part of their ways, so its work is that of the straight line between, but for what it
+    was more in the last cycle, times the sum of L^2, L^4, ...  A cycle that grows goes on only
+    while its neighbours' works stay below the energy of the first closing.
+    """
+    ball, contact, memory = state.ball, state.contact, state.memory[number]
+    left, right = cluster.left, cluster.right
+    squares = sum_of_squares(total, part)
+    for c in range(max(left - 1, 0), min(right + 1, n - 2) + 1):
+        if cluster.first <= c <= cluster.last:
+            continue
+        k, then = contact[c], memory[c]
+        k.y = ZERO
+        if stays_at_zero(c, contact, memory):
+            continue
+        change = scaled_by(change_of(c, left, right, ball, contact), part)
+        speed = plus(k.u, change)
+        if k.u.real * then.u.real < 0.0 or k.u.real * speed.real < 0.0:
+            return False
+        if (k.u.real == 0.0) != (speed.real == 0.0):
+            return False
+        if c < left or c > right:
+            continue
+        impulse = since(c, contact, memory)
+        if part < 0.0 and abs(then.u.real * impulse.real * squares) > state.tally[0].energy:
+            return False
+        straight = times(impulse, scaled(plus(then.u, k.u), 0.5))
+        done = minus(k.a, then.a) if k.u.real > 0.0 else minus(k.q, then.q)
+        way = times(scaled_by(k.x, part), scaled(plus(k.u, speed), 0.5))
+        k.y = plus(way, scaled_by(minus(done, straight), squares))
+        if k.active == 1 and k.u.real < 0.0 and k.q.real + k.y.real <= 0.0:
+            return False
+    return True
+
+
+@jit
+def scaled_by(a, x):
+    """Return a x for any float x."""
+    return times(a, complex(x, 0.0))
+
+
+@apart
+def jump(cluster, part, number, n, state):
+    """Go a part of the way to the limit: impulses by x, neighbours' works by y.
+
+    The works of the cycle itself are known from what disappears of motion and stores: (1 - e^2) of
+    them.
+    """
+    ball, contact, memory = state.ball, state.contact, state.memory[number]
+    left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
+    lost = loss = 0.0
+    left_over = minus(ONE, complex(part, 0.0))
+    rest = left_over.real
+    for c in range(left, right + 1):
+        contact[c].x = scaled_by(contact[c].x, part)
+    for c in range(max(left - 1, 0), min(right + 1, n - 2) + 1):
+        k = contact[c]
+        before = k.u.real
+        if first <= c <= last:
+            lost += k.q.real * part * (1.0 + rest)
+            loss += (1.0 - k.square.real) * minus(k.a, memory[c].a).real
+            k.u, k.q = times(k.u, left_over), times(k.q, times(left_over, left_over))
+            k.w *= rest * rest
+            k.made *= abs(rest)
+        elif not stays_at_zero(c, contact, memory):
+            k.u = plus(k.u, change_of(c, left, right, ball, contact))
+            lost -= k.y.real
+            if k.active == 1 and k.u.real > 0.0:
+                k.a = plus(k.a, k.y)
+                k.w += k.y.real
+                k.q = plus(k.q, times(k.square, k.y))
+            elif k.active == 1:
+                k.q = plus(k.q, k.y)
+        if left <= c <= right:
+            lost += 0.5 * k.x.real * (before + k.u.real)
+            k.p = plus(k.p, k.x)
+    squares = max(lost / loss, 0.0) if loss > 0.0 else 0.0
+    for c in range(first, last + 1):
+        more = minus(contact[c].a, memory[c].a)
+        contact[c].a = plus(contact[c].a, scaled_by(more, squares))
+
+
+@apart
+def go_on(cluster, total, n, state):
+    """Repeat a cycle 2, 4, 8 ... times, before a neighbour comes to its event; tell if it did.
+
+    After k cycles everything is L^k of what it was, L = T / (1 + T), and the balls have gone the
+    part 1 - L^k of the way to the limit: half of it at most, as a neighbour's event may be at the
+    limit itself.
+    """
+    contact, memory = state.contact, state.memory[LOWER]
+    cycles, part = 1, 1.0 / (1.0 + total)
+    while True:
+        further = part * (2.0 - part)
+        if further > 0.5 or not neighbours_stay(cluster, total, further, LOWER, n, state):
+            break
+        cycles, part = 2 * cycles, further
+    if cycles < LIMITS.many:
+        return False
+    neighbours_stay(cluster, total, part, LOWER, n, state)
+    jump(cluster, part, LOWER, n, state)
+    for c in range(cluster.first, cluster.last + 1):
+        contact[c].hits += cycles * (contact[c].hits - memory[c].hits)
+    return True
+
+
+@apart
+def repeated(c, n, state):
     """Note that the cycle that contact c ends has been repeated; look for another one from here."""
     run = state.run
     first = state.tally[0].first
@@ -123,104 +223,86 @@ def repeat(c, n, state):
 
 
 @apart
-def cycle(level, c, early, n, state):
+def cycle(number, c, n, state):
     """If the neighbourhood of contact c repeats itself on another scale, go to the limit.
 
     Light balls need many cycles to settle on one factor.  It is enough that what still changes
     will not matter: the bend, how far the state turns by the time that it is exhausted, is below
-    its limit at the pace since the snapshot; `early` after it that pace says little.  Without
-    steady neighbours the limit does not depend on the bend.  With them it does: then the part of
-    the way that the bend leaves open, and what the digits of the neighbours' shares do, must be
-    too small to matter.  Where these say nothing of the limit, the cycle ends where it is, if it is
-    too small to matter itself.
+    its limit at the pace since the snapshot.  Without steady neighbours the limit does not depend
+    on the bend.  With them it does: then what it leaves open must be too small to matter.
 
-    Where there is none, or a neighbour comes to its event before it, the cycle is repeated as often
-    as it surely repeats itself.
+    Where there is no limit, or a neighbour comes to its event before it, the cycle is repeated as
+    often as it surely repeats itself.
 
     Returns (first, last) of the contacts that have collapsed, empty if none have.
     """
-    threshold = state.tally[0].threshold
-    cluster = cluster_around(c, level, n, state)
+    cluster = cluster_around(c, number, n, state)
     if cluster.last < cluster.first:
         return c, c - 1
-    total, off, size, unsure, doubt = limit(cluster, level, state)
+    total, off, size = limit(cluster, number, state)
     if total == 0.0:
         return c, c - 1
-    if total > 0.0 and unsure > LIMITS.one_digit:
-        total, unsure, doubt = 0.0, 0.0, size  # only the last digits tell of the limit
     bent = 0.0
     if off > LIMITS.self_similar:
-        if early or total < 0.0:
+        if total < 0.0:
             return c, c - 1  # a cycle that grows does so by one factor
         # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
         # 1 / (T + 1/2), and as good as that for a slow cycle.
+        threshold = max(LIMITS.exhausted * state.tally[0].fastest, 5e-324)
         bent = off * max(math.log(size / threshold), 1.0) * (total + 0.5)
         if not bent < LIMITS.bend:
             return c, c - 1
-    farthest = velocity_changes(cluster, total, level, state)
-    steady = cluster.left < cluster.first or cluster.last < cluster.right
-    # Of two contacts only the scale changes slowly; of more, `off` may be of something else too.
-    two = cluster.last < cluster.first + 2
-    turns = bent if two else max(bent, off * (total + 0.5))
-    error = doubt + (unsure + turns) * farthest if steady else 0.0
-    if total >= 0.0:
-        if error > LIMITS.doubt * threshold:
+    if total > 0.0:
+        if is_in_doubt(cluster, bent, state):
             return c, c - 1
-        if neighbours_stay(cluster, total, 1.0, level, n, state):
-            to_limit(cluster, total, level, n, state)
+        if neighbours_stay(cluster, total, 1.0, number, n, state):
+            jump(cluster, 1.0, number, n, state)
+            end_plastically(cluster.first, cluster.last, n, state)
             return cluster.first, cluster.last
-    certain = bent == 0.0 and (two or not steady)
-    if level == LOWER and certain and go_on(cluster, total, error, n, state):
-        repeat(c, n, state)
+    if number == LOWER and bent == 0.0 and go_on(cluster, total, n, state):
+        repeated(c, n, state)
     return c, c - 1
 
 
-@apart
-def remember(number, c, n, state):
-    """Take a snapshot at contact c, in place of the one before."""
-    level, memory = state.level[number], state.memory
-    level.mark = c
-    level.seen = level.count
-    if number == LOWER:
-        settle(n, memory)
-    snapshot(number, n, state)
+@once
+def is_in_doubt(cluster, bent, state):
+    """Tell whether steady neighbours leave open where a bent cycle's limit is."""
+    if cluster.left == cluster.first and cluster.last == cluster.right:
+        return False
+    farthest = 0.0
+    for i in range(cluster.left, cluster.right + 2):
+        before = state.contact[i - 1].x.real if i > cluster.left else 0.0
+        after = state.contact[i].x.real if i <= cluster.right else 0.0
+        farthest = max(farthest, abs(before - after) * state.ball[i].inverse.real)
+    return bent * farthest > LIMITS.doubt * state.tally[0].fastest
 
 
 @jit
 def look(number, c, n, state):
-    """See whether contact c has come round; take a new snapshot if the last one is old.
-
-    Snapshots are taken at doubling distances, so that a cycle of any length is found.
-    """
+    """See whether contact c has come round; take a new snapshot if the last one is old."""
     level = state.level[number]
     if level.mark == c:
-        early = 2 * level.count <= 3 * level.seen
-        first, last = cycle(number, c, early, n, state)
+        first, last = cycle(number, c, n, state)
         if first <= last:
             return first, last
-    if level.count >= 2 * level.seen:
+    if level.count >= level.due:
         remember(number, c, n, state)
     return c, c - 1
 
 
 @apart
 def look_above(first, last, n, state):
-    """R9: contacts first..last have collapsed; see whether such collapses come round too."""
+    """Contacts first..last have collapsed; see whether such collapses come round too."""
     level = state.level
     forget(LOWER, level)
-    settle(n, state.memory)
     level[UPPER].count += 1
     one, other = look(UPPER, first, n, state)
     if one <= other:
         forget(UPPER, level)
         first, last = one, other
-    loses = False
     for c in range(first, last + 1):
-        loses = loses or state.contact[c].e < 1.0
-    for c in range(first, last + 1):
-        record(COLLAPSE if loses else END, c, n, state)
-    if loses:
-        state.tally[0].collapsed = 1
+        record(COLLAPSE, c, n, state)
+    state.tally[0].collapsed = 1
 
 
 @once
@@ -238,13 +320,3 @@ def take_limits(ends, ended, worn, n, state):
         return False
     look_above(first, last, n, state)
     return True
-
-
-@once
-def last_limits(n, state):
-    """R9: sequences that shrank so fast that the last digit was the limit have collapsed too."""
-    contact = state.contact
-    for c in range(n - 1):
-        if contact[c].tiny > 0 and contact[c].u == 0.0 and contact[c].e < 1.0:
-            state.tally[0].collapsed = 1
-            record(COLLAPSE, c, n, state)

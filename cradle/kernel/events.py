@@ -1,9 +1,9 @@
 """Events: contacts end, close and hand over; runs split and grow accordingly (R2 to R5)."""
 
-from cradle.kernel.motion import reduced_mass
+from cradle.kernel.numbers import ZERO, minus, negative
 from cradle.kernel.record import record
-from cradle.kernel.rules import has_ended, opens_at_zero, source_of
-from cradle.kernel.state import CLOSE, END, LIMITS, SLOPED, apart, jit, once
+from cradle.kernel.rules import has_ended, is_clear, opens_at_zero, source_of
+from cradle.kernel.state import CERTAIN, CLOSE, END, LIMITS, SLOPED, apart, jit, once
 
 
 @jit
@@ -15,6 +15,14 @@ def link(before, after, n, run, tally):
         run[before].onward = after
     if after < n:
         run[after].back = before
+
+
+@jit
+def run_of(c, contact):
+    """Return the first contact of the run of the active contact c."""
+    while c > 0 and contact[c - 1].active == 1:
+        c -= 1
+    return c
 
 
 @jit
@@ -53,13 +61,13 @@ def start(n, state):
     before = -1
     c = 0
     while c < n - 1:
-        if contact[c].u < 0.0:
+        if contact[c].u.real < 0.0:
             c += 1
             continue
         first = c
         source = -1
-        while c < n - 1 and contact[c].u >= 0.0:
-            if source < 0 and contact[c].u > 0.0:
+        while c < n - 1 and contact[c].u.real >= 0.0:
+            if source < 0 and contact[c].u.real > 0.0:
                 source = c
             c += 1
         if source >= 0:
@@ -77,9 +85,9 @@ def start(n, state):
 @once
 def activate(c, from_left, from_right, ball, contact):
     """R4, R5: contact c becomes active, driven from the side or sides already active."""
-    contact[c].q = contact[c].q_lo = 0.0
+    contact[c].q = ZERO
     contact[c].w = 0.0
-    contact[c].rate = 0.0  # it drives nobody in this round
+    contact[c].rate = ZERO  # it drives nobody in this round
     contact[c].active = 1
     contact[c].hits += 1
     if from_left:
@@ -114,9 +122,9 @@ def grow(c, n, ball, contact, run, tally):
 @apart
 def deactivate(c, first, n, ball, contact, run, tally):
     """R4: contact c of a run ends and its relations go; contacts that it drove become sources."""
-    contact[c].q = contact[c].q_lo = 0.0
+    contact[c].q = ZERO
     contact[c].active = 0
-    contact[c].before = -contact[c].u
+    contact[c].before, contact[c].stamp = negative(contact[c].u), tally.stamp
     ball[c].turn = 0
     ball[c + 1].turn = 0
     last, source, low, high = run[first].last, run[first].source, run[first].low, run[first].high
@@ -143,20 +151,28 @@ def deactivate(c, first, n, ball, contact, run, tally):
 
 
 @jit
-def exhausted(c, work, threshold, ball, contact):
+def reduced_mass(c, ball):
+    """Return the reduced mass of the two balls of contact c."""
+    one, other = ball[c].m.real, ball[c + 1].m.real
+    return one / (one + other) * other
+
+
+@jit
+def exhausted(c, work, ball, contact, tally):
     """R9: tell whether next to nothing is left of contact c, neither closing speed nor `work`."""
-    if abs(contact[c].u) >= threshold:
+    threshold = LIMITS.exhausted * tally.fastest
+    if abs(contact[c].u.real) >= threshold:
         return False
     return 2.0 * work < reduced_mass(c, ball) * threshold * threshold
 
 
 @once
-def count_exhausted(c, n, ball, contact, threshold):
+def count_exhausted(c, n, ball, contact, tally):
     """R9: count a collision as exhausted if all of it was; a genuine one clears its neighbours.
 
     Returns whether so many in a row may be a collapse.
     """
-    if not exhausted(c, contact[c].w, threshold, ball, contact):
+    if not exhausted(c, contact[c].w, ball, contact, tally):
         for k in range(max(c - 1, 0), min(c + 1, n - 2) + 1):
             contact[k].tiny = 0
     elif contact[c].w > 0.0:
@@ -172,7 +188,7 @@ def end_contacts(which, n, state):
     SLOPED are those that open from u = 0, once the slopes are known; CERTAIN all others, before.
     Returns the number of ends, the last contact ended, and one that is worn out (R9) or -1.
     """
-    contact, run, tally = state.contact, state.run, state.tally[0]
+    ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
     ends = 0
     ended = -1
     worn = -1
@@ -182,12 +198,13 @@ def end_contacts(which, n, state):
         if run[first].stirred == 1:
             high = run[first].high
             for c in range(run[first].low, high + 1):
-                if not (opens_at_zero(c, contact) if which == SLOPED else has_ended(c, contact)):
+                sloped = which == SLOPED and opens_at_zero(c, ball, contact)
+                if not (sloped or (which == CERTAIN and has_ended(c, contact))):
                     continue
-                if count_exhausted(c, n, state.ball, contact, tally.threshold):
+                if count_exhausted(c, n, ball, contact, tally):
                     worn = c
                 last = run[first].last
-                deactivate(c, first, n, state.ball, contact, run, tally)
+                deactivate(c, first, n, ball, contact, run, tally)
                 if c < last:
                     first = c + 1
                 ends += 1
@@ -199,13 +216,32 @@ def end_contacts(which, n, state):
 
 @jit
 def about_to_close(c, n, contact):
-    """R5: tell whether the idle contact c is at zero and about to rise, driven from one side."""
-    if not 0 <= c < n - 1 or contact[c].active == 1 or contact[c].u < 0.0:
+    """R5: tell whether the idle contact c is at zero, driven from one side.
+
+    Its neighbour pushes, be it by a vanishing number (R6).
+    """
+    if not 0 <= c < n - 1 or contact[c].active == 1 or contact[c].u.real < 0.0:
         return False
     from_left = c > 0 and contact[c - 1].active == 1
-    if from_left == (c < n - 2 and contact[c + 1].active == 1):
-        return False
-    return contact[c - 1 if from_left else c + 1].rate > 0.0
+    return from_left != (c < n - 2 and contact[c + 1].active == 1)
+
+
+@jit
+def distance(c, contact, tally):
+    """Return how far contact c was from closing before the last progress, or at its end since."""
+    k = contact[c]
+    return k.before if k.stamp == tally.stamp else ZERO
+
+
+@once
+def goes_first(c, left, contact, tally):
+    """R8.6: tell whether contact c closes before the one on the left of the same free ball.
+
+    The nearer one does; of equals the left one.
+    """
+    one = distance(left, contact, tally)
+    nearer = minus(one, distance(c, contact, tally)).real
+    return is_clear(nearer, one.real, tally) and nearer > 0.0
 
 
 @jit
@@ -226,11 +262,8 @@ def close_contacts(n, state):
                 record(CLOSE, left, n, state)
                 closes += 1
             if about_to_close(right, n, contact):
-                # Both sides of one ball, at equal distance within rounding: the left one.
-                further = contact[right].before * (1.0 - LIMITS.tie)
-                if not (
-                    about_to_close(right + 1, n, contact) and contact[right + 1].before < further
-                ):
+                both = about_to_close(right + 1, n, contact)
+                if not (both and goes_first(right + 1, right, contact, tally)):
                     grow(right, n, ball, contact, run, tally)
                     record(CLOSE, right, n, state)
                     closes += 1

@@ -1,36 +1,77 @@
-"""What is written down: events, and velocities and impulses in the caller's units."""
+"""What is written down: events, and velocities and impulses in the caller's units.
+
+A record is made beside the run and changes nothing in it.
+"""
 
 import math
 
-from cradle.kernel.state import MAXIMUM_COMPRESSION, apart, jit
+from cradle.kernel.numbers import NEVER, ZERO, least, less, minus, negative, over, plus, times
+from cradle.kernel.state import LIMITS, MAXIMUM_COMPRESSION, apart, jit
 
 
 @jit
-def in_units(b, speed, unit):
-    """Return a velocity of ball b in the caller's units: as given, if it has not changed."""
-    return b.v if speed == b.v * unit else speed / unit
+def velocity(i, before, after, ball, unit):
+    """Return the velocity of ball i in the caller's units, from the impulses of its contacts.
+
+    One that has not been touched is as given.
+    """
+    b = ball[i]
+    impulse = minus(before, after)
+    if impulse.real == 0.0:
+        return b.v
+    return plus(b.start, times(impulse, b.inverse)).real / unit
+
+
+@apart
+def settle(n, ball, contact, unit):
+    """Leave the velocities in `after`, in the caller's units.
+
+    Balls that move as one, or whose order is lost in the last of 32 digits, have one velocity:
+    that of the ball which impulses have changed least.
+    """
+    before = ZERO
+    for i in range(n):
+        after = contact[i].p if i < n - 1 else ZERO
+        ball[i].after = velocity(i, before, after, ball, unit)
+        ball[i].x = times(minus(before, after), ball[i].inverse)
+        before = after
+    first = 0
+    while first < n:
+        last = best = first
+        while last < n - 1 and (
+            contact[last].u.real == 0.0
+            or (contact[last].u.real < 0.0 and ball[last].after > ball[last + 1].after)
+        ):
+            last += 1
+            if abs(ball[last].x.real) < abs(ball[best].x.real):
+                best = last
+        v = ball[best].after
+        for i in range(first, last + 1):
+            ball[i].after = v
+        first = last + 1
 
 
 @apart
 def write(k, kind, c, n, state):
-    """Write event number k, with the velocities x of the balls and impulses x of the contacts."""
+    """Write event number k, with impulses x of the contacts and the velocities that these give."""
     record, tally = state.record, state.tally[0]
+    ball, contact = state.ball, state.contact
     record.kinds[k] = kind
     record.contacts[k] = c
-    path = record.velocities[k + 1]
+    velocities, impulses = record.velocities[k + 1], record.impulses[k + 1]
+    before = ZERO
     for i in range(n):
-        path[i] = in_units(state.ball[i], state.ball[i].x, tally.unit)
-    path = record.impulses[k + 1]
-    for j in range(n - 1):
-        path[j] = math.ldexp(state.contact[j].x, tally.shift + tally.mass_shift)
+        after = contact[i].x if i < n - 1 else ZERO
+        velocities[i] = velocity(i, before, after, ball, tally.unit)
+        if i < n - 1:
+            impulses[i] = math.ldexp(after.real, tally.shift + tally.mass_shift)
+        before = after
 
 
 @apart
 def write_present(kind, c, n, state):
     """Write an event and the state after it."""
-    ball, contact = state.ball, state.contact
-    for i in range(n):
-        ball[i].x = ball[i].hi
+    contact = state.contact
     for j in range(n - 1):
         contact[j].x = contact[j].p
     write(state.tally[0].events, kind, c, n, state)
@@ -45,38 +86,33 @@ def record(kind, c, n, state):
 
 
 @apart
-def record_compressions(first, s, whole, n, state):
-    """Record every maximum compression of a run within the next s, in order of progress.
+def record_compressions(first, way, n, state):
+    """Record every maximum compression of a run on its way, in order of progress.
 
     It changes no rate, so the run itself does not stop for it: the state there is made on the side.
     """
-    ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
+    contact, run, tally = state.contact, state.run, state.tally[0]
     low, high = run[first].low, run[first].high
     for c in range(low, high + 1):
         k = contact[c]
-        ends = whole and k.due == 1
-        k.passes = 1 if k.u > 0.0 and (ends or k.u + k.slope * s <= 0.0) else 0
+        passes = k.u.real > 0.0 and k.slope.real < 0.0
+        k.y = over(k.u, negative(k.slope)) if passes else NEVER
+        ends = run[first].goes == 2 and k.due == 1
+        # One that comes at the end of the way is one of it, whatever its last digits say.
+        late = minus(k.y, way).real if passes else math.inf
+        k.passes = 1 if (ends and passes) or late <= LIMITS.tie * k.age else 0
     while True:
         found = -1
-        at = 0.0
         for c in range(low, high + 1):
-            k = contact[c]
-            if k.passes == 1 and (found < 0 or -k.u / k.slope < at):
+            if contact[c].passes == 1 and (found < 0 or less(contact[c].y, contact[found].y)):
                 found = c
-                at = -k.u / k.slope
         if found < 0:
             return
         contact[found].passes = 0
-        at = min(at, s)
         if tally.events < tally.capacity:
-            for i in range(n):
-                b = ball[i]
-                moves = low <= i <= high + 1
-                b.x = b.hi + (b.lo + b.pull * at) if moves else b.hi
-            one, other = ball[found], ball[found + 1]
-            one.x = other.x = one.x if one.m > other.m else other.x
+            at = least(contact[found].y, way)
             for j in range(n - 1):
                 k = contact[j]
-                k.x = k.p + k.rate * at if low <= j <= high else k.p
+                k.x = plus(k.p, times(k.rate, at)) if low <= j <= high else k.p
             write(tally.events, MAXIMUM_COMPRESSION, found, n, state)
         tally.events += 1

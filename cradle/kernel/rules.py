@@ -1,11 +1,26 @@
-"""The rules of one run: who starts (R2), drives whom (R1, R4 to R7), and ends when (R3)."""
+"""The rules of one run: impulse rates (R1, R6), ratios in force (R7), its straight way (R3, R8.2).
+
+A run's contacts low..high have impulses, or balls that move; contacts beyond them wait, because no
+impulse that a ball could notice reaches them (`reached`).
+"""
 
 import math
 
+from cradle.kernel.numbers import (
+    NEVER,
+    ONE,
+    ZERO,
+    least,
+    less,
+    minus,
+    negative,
+    over,
+    plus,
+    root,
+    scaled,
+    times,
+)
 from cradle.kernel.state import LIMITS, apart, jit, once
-
-# A run's contacts low..high have impulses, or balls that move; contacts beyond them wait, because
-# no impulse that a ball could notice reaches them (`reached`).
 
 
 @jit
@@ -21,98 +36,21 @@ def source_of(first, last, ball):
 
 
 @jit
-def keep_closed(i, driven, far, onward, ball, contact):
-    """R7: lower the ratio at ball i to its bound (Eq. 53) if the driven contact would open at once.
-
-    There the contact is held at u = 0.  `far` is its other ball, which keeps the part `onward` of
-    the contact's impulse: 1 - ratio in force there, or 1.
-    """
-    b, k = ball[i], contact[driven]
-    if k.u == 0.0 and k.w == 0.0:
-        kept = b.m * onward
-        bound = ball[far].m / (ball[far].m + kept)
-        if b.ratio * LIMITS.rounded >= bound:
-            k.fixed = 1 if b.ratio > bound * LIMITS.rounded else 2
-            b.ratio = bound
-            b.rest = kept / (ball[far].m + kept)
-
-
-@once
-def ratios_in_force(low, high, ball, contact):
-    """R7: the ratios in force in a run, each chain of drives from its far end to its driver.
-
-    A contact driven from both sides cannot open, so it is never held.
-    """
-    for c in range(low, high + 1):
-        contact[c].fixed = 0
-    for i in range(low + 1, high + 1):
-        b = ball[i]
-        b.ratio = contact[i - 1].forward if b.turn == 1 else contact[i - 1].backward
-        b.rest = 1.0 - b.ratio
-    for c in range(high, low, -1):
-        if ball[c].turn == 1 and ball[c + 1].turn != -1:
-            onward = ball[c + 1].rest if c < high and ball[c + 1].turn == 1 else 1.0
-            keep_closed(c, c, c + 1, onward, ball, contact)
-    for c in range(low, high):
-        if ball[c + 1].turn == -1 and ball[c].turn != 1:
-            onward = ball[c].rest if c > low and ball[c].turn == -1 else 1.0
-            keep_closed(c + 1, c, c, onward, ball, contact)
-
-
-@apart
-def several_sources(low, high, smallest, ball, contact):
-    """R1, R6: rates of a run with more than one source, where products of ratios are divided.
-
-    Each rate is x * 2**k, so that long products neither overflow nor vanish, and a ratio of zero
-    is one more vanishing factor: of the contacts, those of the leading order move.
-    """
-    x, k = 0.5, 1
-    top = k
-    contact[low].rate = x
-    contact[low].power = k
-    for c in range(low + 1, high + 1):
-        f = ball[c].ratio
-        way = ball[c].turn
-        if f == 0.0:
-            k -= way * LIMITS.vanishing
-        else:
-            f, j = math.frexp(f)
-            k += way * j
-            x = x * f if way == 1 else x / f
-            if x < 0.5:
-                x *= 2.0
-                k -= 1
-            elif x >= 1.0:
-                x *= 0.5
-                k += 1
-        contact[c].rate = x
-        contact[c].power = k
-        top = max(top, k)
-    for c in range(low, high + 1):
-        k = contact[c].power - top
-        contact[c].rate = math.ldexp(contact[c].rate, k) if k > -LIMITS.vanishing // 2 else 0.0
-        if contact[c].rate <= smallest:
-            contact[c].rate = 0.0
-
-
-@jit
 def wait(low, high, ball, contact, outer):
     """Let contacts low..high of a run wait: they have no impulse, and their `outer` balls no pull.
 
     `outer` is 0 for the left ball of each contact and 1 for the right one.
     """
     for c in range(low, high + 1):
-        contact[c].rate = contact[c].slope = 0.0
-        ball[c + outer].pull = 0.0
+        contact[c].rate = contact[c].slope = ball[c + outer].pull = ZERO
 
 
 @once
 def reached(first, run, smallest, ball, contact):
     """R1: set low..high of a run: as far as impulses reach at the nominal ratios, or beyond.
 
-    No ratio in force is larger than its nominal one.
-    From the one source outwards rates only become less.  With several sources all contacts count.
-    Those that were reached before, and no longer are, wait.
+    No ratio in force is larger than its nominal one.  From the one source outwards rates only
+    become less; with several sources all contacts count.  What was reached before now waits.
     """
     source, last = run[first].source, run[first].last
     low, high = run[first].low, run[first].high
@@ -123,17 +61,93 @@ def reached(first, run, smallest, ball, contact):
     x = 1.0
     c = source
     while c < last and x > smallest:
-        x *= contact[c].forward
+        x *= contact[c].forward.real
         c += 1
     run[first].high = c
     wait(c + 1, high, ball, contact, 1)
     x = 1.0
     c = source
     while c > first and x > smallest:
-        x *= contact[c - 1].backward
+        x *= contact[c - 1].backward.real
         c -= 1
     run[first].low = c
     wait(low, c - 1, ball, contact, 0)
+
+
+@jit
+def keep_closed(i, driven, far, onward, ball, contact, tally):
+    """R7: lower the ratio at ball i to its bound (Eq. 53) if the driven contact would open at once.
+
+    There the contact is held at u = 0.  `far` is its other ball, which passes the part `onward` of
+    the contact's impulse on.
+    """
+    b, k = ball[i], contact[driven]
+    if k.u.real == 0.0 and k.w == 0.0:
+        one = ball[far].m
+        both = plus(one, times(b.m, minus(ONE, onward)))
+        nominal, bound = b.ratio.real * both.real, one.real
+        if nominal * LIMITS.rounded >= bound:
+            k.fixed = 1 if nominal > bound * LIMITS.rounded else 2
+            b.ratio = over(one, both)
+        if k.fixed != 2:
+            tally.margin = min(tally.margin, abs(nominal - bound) / bound)
+
+
+@once
+def ratios_in_force(low, high, ball, contact, tally):
+    """R7: the ratios in force in a run, each chain of drives from its far end to its driver.
+
+    A contact driven from both sides cannot open, so it is never held.
+    """
+    for c in range(low, high + 1):
+        contact[c].fixed = 0
+    for i in range(low + 1, high + 1):
+        ball[i].ratio = contact[i - 1].forward if ball[i].turn == 1 else contact[i - 1].backward
+    for c in range(high, low, -1):
+        if ball[c].turn == 1 and ball[c + 1].turn != -1:
+            onward = ball[c + 1].ratio if c < high and ball[c + 1].turn == 1 else ZERO
+            keep_closed(c, c, c + 1, onward, ball, contact, tally)
+    for c in range(low, high):
+        if ball[c + 1].turn == -1 and ball[c].turn != 1:
+            onward = ball[c].ratio if c > low and ball[c].turn == -1 else ZERO
+            keep_closed(c + 1, c, c, onward, ball, contact, tally)
+
+
+@apart
+def several_sources(low, high, smallest, ball, contact):
+    """R1, R6: rates of a run with more than one source, where products of ratios are divided.
+
+    Each rate is x * 2**k, so that long products neither overflow nor vanish, and a ratio of zero
+    is one more vanishing factor: of the contacts, those of the leading order move.
+    """
+    x = ONE
+    k = top = 0
+    for c in range(low, high + 1):
+        if c > low:
+            way, ratio = ball[c].turn, ball[c].ratio
+            if ratio.real == 0.0:
+                k -= way * LIMITS.vanishing
+            else:
+                # The least ratio is 2**-1074: halfway up there is room for it and its rounding.
+                x = scaled(x, math.ldexp(1.0, way * 600))
+                x = times(x, ratio) if way == 1 else over(x, ratio)
+                j = math.frexp(x.real)[1]
+                x = scaled(x, math.ldexp(1.0, -j))
+                k += j - way * 600
+        contact[c].rate = x
+        contact[c].power = k
+        top = max(top, k) if c > low else k
+    for c in range(low, high + 1):
+        k = contact[c].power - top
+        x = scaled(contact[c].rate, math.ldexp(1.0, max(k, -1000)))
+        contact[c].rate = x if k > -1000 and x.real > smallest else ZERO
+
+
+@jit
+def passed_on(rate, ratio, smallest):
+    """R1: impulse rate of a contact whose driver has this one."""
+    x = times(rate, ratio)
+    return x if x.real > smallest else ZERO
 
 
 @once
@@ -142,100 +156,93 @@ def impulse_rates(low, high, source, smallest, ball, contact):
     if source < 0:
         several_sources(low, high, smallest, ball, contact)
     else:
-        contact[source].rate = 1.0
+        contact[source].rate = ONE
         for c in range(source + 1, high + 1):
-            x = contact[c - 1].rate * ball[c].ratio
-            contact[c].rate = x if x > smallest else 0.0
+            contact[c].rate = passed_on(contact[c - 1].rate, ball[c].ratio, smallest)
         for c in range(source - 1, low - 1, -1):
-            x = contact[c + 1].rate * ball[c + 1].ratio
-            contact[c].rate = x if x > smallest else 0.0
+            contact[c].rate = passed_on(contact[c + 1].rate, ball[c + 1].ratio, smallest)
 
 
-@once
-def pulls(low, high, ball, contact):
-    """Eqs. 47-48: m dv = dP on the left - dP on the right, for the balls of contacts low..high."""
-    ball[low].pull = -contact[low].rate / ball[low].m
-    ball[high + 1].pull = contact[high].rate / ball[high + 1].m
-    for i in range(low + 1, high + 1):
-        b = ball[i]
-        # The difference of the rates leaves the sum of the momenta alone; where they are nearly
-        # equal, what the driver keeps for the ball has more digits.
-        if b.rest > 0.5:
-            b.pull = (contact[i - 1].rate - contact[i].rate) / b.m
-        elif b.turn == 1:
-            b.pull = contact[i - 1].rate * b.rest / b.m
-        else:
-            b.pull = -contact[i].rate * b.rest / b.m
-    # The balls of a contact that is held move as one, to the last bit.
-    for c in range(low + 1, high + 1):
-        if contact[c].fixed > 0 and ball[c].turn == 1:
-            ball[c + 1].pull = ball[c].pull
-    for j in range(low, high):
-        c = low + high - 1 - j
-        if contact[c].fixed > 0 and ball[c + 1].turn == -1:
-            ball[c].pull = ball[c + 1].pull
+@jit
+def opens_at_zero(c, ball, contact):
+    """R3: tell whether contact c, at u = 0 with nothing to release, is about to open.
+
+    One that nobody drives opens by its own push, be it a vanishing number (R6).
+    """
+    k = contact[c]
+    if k.u.real != 0.0 or k.q.real > 0.0:
+        return False
+    source = ball[c].turn != 1 and ball[c + 1].turn != -1
+    return k.slope.real < 0.0 or (source and k.rate.real == 0.0)
 
 
 @jit
 def rates(first, run, ball, contact, tally):
-    """R1, R6, R7: impulse rates, pulls and slopes of a run.
+    """R1, R6, R7: impulse rates, pulls (Eqs. 47-48: m dv = dP left - dP right) and slopes of a run.
 
     Returns whether a contact at u = 0 with nothing to release is about to open.
     """
     reached(first, run, tally.cut_off, ball, contact)
     low, high = run[first].low, run[first].high
-    ratios_in_force(low, high, ball, contact)
+    ratios_in_force(low, high, ball, contact, tally)
     impulse_rates(low, high, run[first].source, tally.cut_off, ball, contact)
-    pulls(low, high, ball, contact)
+    ball[low].pull = negative(times(contact[low].rate, ball[low].inverse))
     opens = False
     for c in range(low, high + 1):
-        contact[c].slope = ball[c].pull - ball[c + 1].pull
-        opens = opens or opens_at_zero(c, contact)
+        onward = contact[c + 1].rate if c < high else ZERO
+        ball[c + 1].pull = times(minus(contact[c].rate, onward), ball[c + 1].inverse)
+        held = contact[c].fixed > 0
+        contact[c].slope = ZERO if held else minus(ball[c].pull, ball[c + 1].pull)
+        opens = opens or opens_at_zero(c, ball, contact)
     return opens
 
 
 @jit
-def opens_at_zero(c, contact):
-    """R3: tell whether contact c, at u = 0 with nothing to release, is about to open."""
-    k = contact[c]
-    return k.u == 0.0 and k.q <= 0.0 and k.slope < 0.0
+def is_clear(difference, size, tally):
+    """Tell whether a difference of two numbers of this size is none of rounding; note how large."""
+    part = abs(difference) / size if size > 0.0 else 0.0
+    if part <= LIMITS.tie:
+        return False
+    tally.margin = min(tally.margin, part)
+    return True
 
 
 @once
 def has_ended(c, contact):
     """R3: tell whether contact c has ended: it opens, or has e = 0 and no longer closes."""
     k = contact[c]
-    if k.q > 0.0:
+    if k.q.real > 0.0:
         return False
-    return k.u < 0.0 or (k.u == 0.0 and k.e == 0.0 and k.w > 0.0)
+    return k.u.real < 0.0 or (k.u.real == 0.0 and k.e.real == 0.0 and k.w > 0.0)
 
 
 @once
-def end_progress(u, q, slope, rate, e):
-    """R3: progress to the end of a contact, where all that it can release is released.
+def way_to_end(k, tally):
+    """R3: progress until contact k has released all, and its closing speed then; or NEVER.
 
-    While u < 0, Q(s) = Q + rate (u s + slope s^2 / 2); the root is written without cancellation.
-    Returns the progress and the closing speed there.
+    While it opens, Q(s) = Q + rate (u s + slope s^2 / 2), which is zero where u^2 has become
+    u^2 - 2 slope Q / rate.  Where it closes first, Q gains e^2 of the work until then,
+    rate u^2 / (2 |slope|), so that it ends at u^2 = e^2 u^2 - 2 slope Q / rate.
     """
-    s = 0.0
-    if u > 0.0:
-        if slope >= 0.0:
-            return math.inf, 0.0
-        s = -u / slope
-        q += 0.5 * e * e * rate * u * s
-        u = 0.0
-        if q <= 0.0:
-            return s, 0.0
-    if q <= 0.0 or rate == 0.0:
-        return math.inf, 0.0
-    square = u * u - 2.0 * slope * q / rate
-    if square < 0.0:
-        return math.inf, 0.0  # recompression comes first
-    root = math.sqrt(square)
-    speed = root - u
-    if speed <= 0.0:
-        return math.inf, 0.0
-    return s + 2.0 * q / (rate * speed), -root
+    closes = k.u.real > 0.0
+    if k.rate.real == 0.0 or (k.slope.real >= 0.0 and k.u.real >= 0.0):
+        return NEVER, ZERO
+    if k.q.real <= 0.0:
+        if not closes:
+            return NEVER, ZERO
+        speed = times(k.e, k.u)
+    else:
+        now = times(k.u, k.u)
+        part = over(times(k.slope, k.q), k.rate)
+        square = minus(times(k.square, now) if closes else now, plus(part, part))
+        again = not closes and k.slope.real > 0.0
+        if again and not (is_clear(square.real, now.real, tally) and square.real > 0.0):
+            return NEVER, ZERO  # it is compressed again before that
+        speed = root(square)
+    # Each of these two roots is a sum of positive terms.
+    if closes:
+        return over(plus(k.u, speed), negative(k.slope)), negative(speed)
+    return over(plus(k.q, k.q), times(k.rate, minus(speed, k.u))), negative(speed)
 
 
 @jit
@@ -244,61 +251,46 @@ def is_gap(c, n, contact):
     return 0 < c < n - 2 and contact[c - 1].active == 1 and contact[c + 1].active == 1
 
 
-@once
-def rounding_after(k, s):
-    """Return how much of the closing speed of contact k may be rounding after a progress s."""
-    return LIMITS.roundings * (k.blur + 2.0**-53 * abs(k.slope) * s)
-
-
-@once
-def comes_at(s, k):
-    """Tell whether the next event of contact k comes at progress s, as far as rounding can tell.
-
-    It closes, or ends at u = 0, when u gets there.  It ends otherwise when Q = 0: of rounding in
-    what it has absorbed Q has e^2, and once u < 0 it changes by rate * u.  An end that is further
-    off than the whole segment comes later: runs that meet again and again come nearer to it by a
-    part of the rest each time, to all digits.
-    """
-    if not k.until < math.inf:
-        return False
-    late = k.until - s
-    blur = rounding_after(k, s)
-    if k.active == 1 and k.final < 0.0:
-        at_zero = min(s, -k.u / k.slope) if k.u > 0.0 else 0.0
-        unsure_work = blur * at_zero + LIMITS.roundings * 2.0**-53 * k.w / k.rate
-        unsure_store = k.e * k.e * unsure_work + blur * (s - at_zero)
-        slow = late * abs(k.slope) <= max(-k.final, blur)
-        return late <= s and slow and late * -k.final <= unsure_store
-    return late * abs(k.slope) <= blur
+@jit
+def pulls_at(c, ball):
+    """Return how fast the two balls of contact c change their velocities, both together."""
+    return abs(ball[c].pull.real) + abs(ball[c + 1].pull.real)
 
 
 @jit
-def segment(first, n, run, ball, contact):
-    """R8.2: progress of a run to its own next rate-changing event.
+def segment(first, n, run, ball, contact, tally):
+    """R8.2: progress of a run to its own next rate-changing event, and which contacts have it then.
 
-    Returns how much later the next one is that does not come at the very same time, relative to
-    itself.
+    Two events are one if they are closer than what their closing speeds are known to.
     """
     low, high = run[first].low, run[first].high
-    s = second = math.inf
-    for c in range(low, high + 1):
+    reach = NEVER
+    sure = 0.0  # how old the closing speed of the first is
+    for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
         k = contact[c]
-        k.until, k.final = end_progress(k.u, k.q, k.slope, k.rate, k.e)
-        s = min(s, k.until)
-    # Idle neighbours close; a gap, shared with another run, is no event of this run's own.
-    for c in (low - 1, high + 1):
-        if 0 <= c < n - 1 and contact[c].active == 0:
-            contact[c].before = -contact[c].u
-            contact[c].until = math.inf
-            contact[c].slope = -ball[low].pull if c < low else ball[c].pull
-            if contact[c].slope > 0.0 and not is_gap(c, n, contact):
-                contact[c].until = -contact[c].u / contact[c].slope
-                s = min(s, contact[c].until)
-    run[first].reach = s
+        k.until = NEVER
+        if low <= c <= high:
+            k.until, k.final = way_to_end(k, tally)
+        elif k.active == 0:
+            # Idle neighbours close; a gap, shared with another run, is no event of this run's own.
+            k.slope = negative(ball[low].pull) if c < low else ball[c].pull
+            if k.slope.real > 0.0 and not is_gap(c, n, contact):
+                k.until = over(negative(k.u), k.slope)
+        else:
+            continue
+        pulls = abs(k.slope.real) if k.active == 0 else pulls_at(c, ball)
+        k.age = k.made / pulls if pulls > 0.0 else 0.0
+        if less(k.until, reach):
+            reach = k.until
+            sure = k.age
+    run[first].reach = reach
+    second = NEVER
     for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
         k = contact[c]
         if low <= c <= high or k.active == 0:
-            k.due = 1 if comes_at(s, k) else 0
-            if k.until > s and k.until < second:
-                second = k.until
-    return 1.0 - s / second if second < math.inf else 1.0
+            late = minus(k.until, reach).real if k.until.real < math.inf else math.inf
+            k.due = 1 if late <= LIMITS.tie * max(k.age, sure) else 0
+            if k.due == 0:
+                second = least(second, k.until)
+    if reach.real < second.real < math.inf:
+        tally.margin = min(tally.margin, minus(second, reach).real / second.real)

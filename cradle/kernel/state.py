@@ -1,8 +1,9 @@
-"""What the event loop knows: groups of arrays, each field explained; and the limits of rounding.
+"""What the event loop knows: groups of arrays, each field explained; and its limits.
 
 The comments of the fields are the notation of this package.  There are n balls; ball i lies between
 contacts i - 1 and i, contact c between balls c and c + 1.  Masses and velocities are counted in the
 chain's own units, powers of two, in which the largest are near 1 (`scales`): that changes no digit.
+A field that is `complex` holds a number of 32 digits (`cradle.kernel.numbers`).
 """
 
 from typing import Any, NamedTuple
@@ -22,7 +23,7 @@ if "jit" not in globals():
         return function
 
     def bare(things: Any) -> Any:
-        """Hand on a sequence; compiled code then passes its address alone (`cradle.addresses`)."""
+        """Hand on a sequence; compiled code passes its address (`cradle.runtime.addresses`)."""
         return things
 
     def door(function: Any) -> Any:
@@ -36,26 +37,28 @@ FINISHED, UNFINISHED, REFUSED, PAUSED, UNSOUND = 0, 1, 2, 3, 4
 MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE, REPETITION = 0, 1, 2, 3, 4
 # R8.1: ends that are known without the slopes, and those that need them.
 CERTAIN, SLOPED = 0, 1
-# R9: the two levels on which cycles are looked for.
+# R9: the two levels on which cycles are looked for, ends of contacts and collapses.
 LOWER, UPPER = 0, 1
 # What an answer can break; 0 is none.
 NO_EVENT, PASSED, MOMENTUM, PULL, ORDER, ENERGY, LEDGER = 1, 2, 3, 4, 5, 6, 7
 
 
 class Limits(NamedTuple):
-    """What rounding and infinity are measured by.
+    """What rounding and infinity are measured by."""
 
-    Where a chain is known that goes wrong without a limit, `tests/test_safeguards.py` switches it
-    off: `exhausted`, `dust`, `faint`, `repeats`, `self_similar`, `bend`, `doubt`, `one_digit`,
-    `tie`, `simultaneous`, `roundings`, `same`, `rounded`, `vanishing`.  `many` and `cut` only save
-    work (`tests/test_speed.py`).  No such chain is known for a larger `faint` or `doubt`, or a
-    smaller `same`: these stay as what rounding says.  The others bound the input, the closed form
-    and the certificate.
-    """
-
+    #: R8: a closing speed, or a difference of two, below this part of what it was made of is zero;
+    #: the other seven of the 32 digits are left to the roundings of the way there.
+    tie: float
+    #: R7: a ratio that this factor brings to its bound is meant to be the bound.
+    rounded: float
+    #: R1: a rate below this part of its run's largest, times the lightest ball's part of the
+    #: heaviest, is zero: no ball could notice it.
+    cut: float
+    #: R6: one vanishing ratio, as a binary exponent far below that of any number.
+    vanishing: int
     #: R9: an exhausted contact's speed, relative to the largest initial closing speed.
     exhausted: float
-    #: Closing speed below the last digit of velocities kept as sums of two numbers.
+    #: R9: a speed so low that sequences of impacts go on for ever, relative to the same.
     dust: float
     #: R9: kinetic energy that a collapse may cost, relative to that of the initial closing.
     faint: float
@@ -67,44 +70,26 @@ class Limits(NamedTuple):
     self_similar: float
     #: R9: how far a cycle may turn before it is exhausted, relative to its own scale.
     bend: float
-    #: R9: what a jump beside a steady neighbour may leave in doubt, in exhausted speeds.
+    #: R9: what a jump beside a steady neighbour may leave in doubt, relative to the largest
+    #: initial closing speed.
     doubt: float
-    #: R9: doubt of a cycle's sum, relative to itself, from which not one digit of it is known.
-    one_digit: float
-    #: Relative accuracy of an impulse.
-    digits: float
-    #: R8: parts of segments, and distances, closer than this are equal; part of a run's largest
-    #: closing speed that a correction of rounding may change a velocity by.
-    tie: float
-    #: R8: a part of a segment that this factor brings to 1 is whole.
-    simultaneous: float
-    #: R8: closing speeds closer than this many of their roundings are equal.
-    roundings: float
-    #: R3: an end speed this close to -e times the speed at the start of compression is meant so.
-    same: float
-    #: R7: a ratio that this factor brings to its bound is meant to be the bound.
-    rounded: float
-    #: R1: a rate below this part of its run's largest, times the lightest ball's part of the
-    #: heaviest, is zero: no ball could notice it.
-    cut: float
-    #: R6: one vanishing ratio, as a binary exponent far below that of any number.
-    vanishing: int
-    #: The closed form is used for numbers between these, where no square over- or underflows ...
-    tiny: float
-    huge: float
-    #: ... and for conditions that are met by this part of their largest term.
-    clear: float
-    #: Mass of the lightest ball allowed, as a part of the heaviest: below 2**-53 the last digit of
-    #: a progress moves it by as much as its next event takes.
+    #: R9: the least part of an impulse that a ball beside a steady neighbour is taken to keep.
+    kept: float
+    #: R9: how many contacts to each side a snapshot holds.
+    window: int
+    #: Mass of the lightest ball allowed, as a part of the heaviest.
     lightest: float
-    #: Least coefficient of restitution allowed, but zero: a slower end is below the last digit.
+    #: Least coefficient of restitution allowed, but zero.
     least_restitution: float
-    #: The certificate: what each sum may be off, relative to its terms; and the speed at which two
-    #: balls that should touch have passed.
+    #: The certificate: what each sum may be off, relative to its terms.
     sound: float
 
 
 LIMITS = Limits(
+    tie=2.0**-84,
+    rounded=1.0 + 4 * 2.0**-52,
+    cut=2.0**-120,
+    vanishing=1 << 40,
     exhausted=1e-18,
     dust=2.0**-100,
     faint=1e-20,
@@ -112,19 +97,9 @@ LIMITS = Limits(
     many=64,
     self_similar=1e-13,
     bend=1e-2,
-    doubt=1e5,
-    one_digit=0.1,
-    digits=4 * 2.0**-52,
-    tie=1e-9,
-    simultaneous=1.0 + 64 * 2.0**-52,
-    roundings=16.0,
-    same=16 * 2.0**-52,
-    rounded=1.0 + 4 * 2.0**-52,
-    cut=2.0**-120,
-    vanishing=1 << 40,
-    tiny=1e-60,
-    huge=1e60,
-    clear=1e-12,
+    doubt=1e-13,
+    kept=1e-30,
+    window=64,
     lightest=1e-15,
     least_restitution=1e-30,
     sound=64 * 2.0**-52,
@@ -134,45 +109,41 @@ LIMITS = Limits(
 class Ball:
     """One ball."""
 
-    v: float  # velocity before the impact, in the caller's units
-    m: float  # mass
-    hi: float  # velocity as a sum of two numbers, hi + lo, with twice the digits
-    lo: float
-    pull: float  # velocity per unit of progress of the ball's run, dv/ds
-    ratio: float  # ratio in force at the ball
-    rest: float  # 1 - ratio, to all its digits
+    v: float  # velocity before the impact, in the caller's units,
+    start: complex  # and in the chain's own
+    m: complex  # mass
+    inverse: complex  # 1 / mass
+    after: float  # velocity after the impact, in the caller's units
+    pull: complex  # velocity per unit of progress of the ball's run, dv/ds
+    ratio: complex  # ratio in force at the ball
     turn: int  # direction: 1 forward, -1 backward, 0 none
-    x: float  # room for what a function works out in passing
-    y: float
+    x: complex  # room for what a function works out in passing
 
 
 class Contact:
     """One contact; it joins the ball of its own number and the next.
 
-    `u` is zero exactly if the two balls have the same velocity to the last bit of both its parts.
+    `u` is zero exactly if the contact is at zero by construction, or by a tie.
     """
 
-    e: float  # restitution
-    forward: float  # ratios at its right ball
-    backward: float
-    u: float  # closing speed, > 0 in compression
-    u0: float  # closing speed before its run moved last
-    q: float  # work that it can still release, e^2 W+ - W-, since it became active,
-    q_lo: float  # as a sum of two numbers
+    e: complex  # restitution
+    square: complex  # e^2
+    forward: complex  # ratios at its right ball
+    backward: complex
+    u: complex  # closing speed, > 0 in compression
+    q: complex  # work that it can still release, e^2 W+ - W-, since it became active
     w: float  # work absorbed since it became active, W+
-    top: float  # closing speed at which its compression began, as a sum of two numbers
-    tip: float
-    rate: float  # impulse per unit of progress; the largest of a run is about 1
-    slope: float  # closing speed per unit of progress, du/ds
-    until: float  # progress to its own next event, and
-    final: float  # its closing speed there, if it ends
-    due: int  # 1 if that comes at the end of the run's segment, but for rounding
-    blur: float  # how much of u may be rounding: it grows with every change of u
-    before: float  # -u of an idle contact before its run moved last, or when it ended
-    p: float  # impulse since the start, as a sum of two numbers
-    p_lo: float
-    a: float  # work absorbed since the start, as a sum of two numbers
-    a_lo: float
+    rate: complex  # impulse per unit of progress; the largest of a run is about 1
+    slope: complex  # closing speed per unit of progress, du/ds
+    until: complex  # progress to its own next event, and
+    final: complex  # its closing speed there, if it ends
+    age: float  # progress at the present pulls that would have made all that u was made of
+    due: int  # 1 if its event comes at the end of the run's segment
+    made: float  # sum of all changes of u's two balls since u was last zero by construction
+    before: complex  # -u of an idle contact before progress number `stamp`, or when it ended
+    stamp: int
+    p: complex  # impulse since the start
+    a: complex  # work absorbed since the start
     active: int  # 1 while it is active
     fixed: int  # > 0 while it is held at u = 0; 2 if its ratio is just the bound
     held: int  # 1 if it had an impulse while held by a ratio above the bound
@@ -180,8 +151,8 @@ class Contact:
     tiny: int  # how many exhausted collisions in a row
     power: int  # binary exponent of the rate
     passes: int  # 1 while its maximum of compression is still to be recorded
-    x: float  # room for what a function works out in passing
-    y: float
+    x: complex  # room for what a function works out in passing
+    y: complex
 
 
 class Run:
@@ -195,38 +166,42 @@ class Run:
     onward: int  # first contact of the next run, or n
     back: int  # first contact of the run before, or -1
     stirred: int  # 1 if it has changed since its rates and its segment were worked out
-    reach: float  # progress to the run's own next event
-    part: float  # how much of its segment the run goes in this round; negative if it stays
-    left: float  # of the gap after the run: parts of the two segments at which it is reached,
-    right: float  # left run's and right run's; `left` is negative if it must not meet
+    reach: complex  # progress to the run's own next event: its segment
+    way: complex  # how far it goes in this round
+    goes: int  # 0 if it stays, 1 if it goes a part of its segment, 2 if all of it
+    meets: int  # 1 if it must meet the next run, after these parts
+    left: complex  # of their two segments
+    right: complex
 
 
 class Level:
-    """R9: one of two levels on which cycles are looked for, ends of contacts and collapses."""
+    """R9: one of two levels on which cycles are looked for."""
 
     mark: int  # contact at whose end, or collapse, the snapshot was taken; -1 for none
-    seen: int  # how many ends, or collapses, had been counted then; the next one is taken at twice
-    count: int  # how many have been counted so far
+    count: int  # ends, or collapses, so far
+    due: int  # at this count the next snapshot is taken
+    taken: int  # snapshots so far
+    low: int  # the contacts that it holds
+    high: int
 
 
 class Memory:
-    """R9: what is remembered of one contact on one level."""
+    """R9: a snapshot of one contact."""
 
-    u: float  # the snapshot: closing speed, work, collisions, and who drives whom
-    q: float
-    q_lo: float
+    u: complex
+    q: complex
+    p: complex
+    a: complex
     hits: int
-    code: int
-    p: float  # impulse and work absorbed since then, without corrections of rounding; on the upper
-    # level without the lower one's
-    a: float
+    code: int  # whether it is active, and who drives whom at its balls
 
 
 class Tally:
     """The impact as a whole."""
 
-    events: int  # how many events, and rounds, so far
+    events: int  # how many events, rounds, and rounds of progress, so far
     rounds: int
+    stamp: int
     collapsed: int  # 1 if contacts have collapsed
     effort: int  # contacts that may still be touched, and events written, before a pause
     room: int
@@ -237,10 +212,10 @@ class Tally:
     unit: float  # what velocities are multiplied by, 2**-shift
     defect: int  # what the answer breaks
     cut_off: float  # rates below this are zero
-    threshold: float  # R9: closing speed below which a contact is exhausted
+    fastest: float  # the largest closing speed at the start
     energy: float  # R9: the largest m u^2 of a contact at the start, m its reduced mass
-    meeting: float  # R8: where two runs meet, as a part of the overlap
-    margin: float  # least distance of two events of a run, relative to their progress
+    meeting: complex  # R8: where two runs meet, as a part of the overlap
+    margin: float  # how far the nearest decision was from a tie, relative to what it compares
 
 
 class Cluster(NamedTuple):

@@ -54,8 +54,7 @@ def post_impact_velocities(
 ) -> Vector:
     """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
 
-    The same event loop as `collide` with `ImpulseCorrelation`, without the record; two balls, and
-    three that collide once each, take the closed form instead.  Compiled, some
+    The same event loop as `collide` with `ImpulseCorrelation`, without the record.  Compiled, some
     thousands of chains and more are shared out to all processors.
 
     Parameters
@@ -242,7 +241,7 @@ def outcomes(
     out = np.empty((count, n))
     hits = np.empty((count, n - 1), dtype=np.int64)
     collapsed = np.empty(count, dtype=np.int64)
-    options = Options(float(meeting), int(max_events), excess == "raise", False)
+    options = Options(float(meeting), int(max_events), excess == "raise")
     large = count * n >= LARGE
 
     def solve(begin: int, stop: threading.Event) -> tuple[int, int]:

@@ -151,7 +151,7 @@ class ImpulseCorrelation:
             *(part[None] for part in ratios),
         )
         room = _most_events(n) if record is None else _EVERY if record else 0
-        options = Options(self.meeting, self.max_events, self.excess == "raise", True)
+        options = Options(self.meeting, self.max_events, self.excess == "raise")
         job = Job(inputs, 1, options, room)
         if progress:
             with progress_bar(unit=" events") as bar:

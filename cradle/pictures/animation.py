@@ -59,7 +59,7 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
         # At 72 dots an inch, points of the figure are units of the file.
         figure = Figure(figsize=(6.4, 5.4), dpi=72, layout="constrained", facecolor="white")
         row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.6])
-        _draw_balls(trace, row)
+        centres = _draw_balls(trace, row)
         impulses, _ = trace.curve()
         if contact is None:
             velocities(trace, diagram)
@@ -78,26 +78,15 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
             )  # fmt: skip
             dot.set_gid(f"{KEY}dot{ball}")
         diagram.set(xlim=x, ylim=y)
-        file = io.StringIO()
-        figure.savefig(
-            file, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type"))
-        )
-    style = _impact_style(trace, row, diagram, along, list(shown))
+        file, nothing = io.StringIO(), dict.fromkeys(("Creator", "Date", "Format", "Type"))
+        figure.savefig(file, format="svg", metadata=nothing)
+    style = _impact_style(trace, centres, (row, diagram), along, shown)
     return Animation(with_style(file.getvalue(), style, alt))
 
 
-def _radii(masses: Vector) -> Vector:
-    return np.asarray(0.5 * np.cbrt(masses / masses.max()))
-
-
-def _bar_length(trace: Trace) -> float:
-    """Return the length of a bar for 1 m/s, in diameters of the largest ball."""
-    return 0.95 / (float(np.abs(trace.curve()[1]).max()) or 1.0)
-
-
-def _draw_balls(trace: Trace, ax: Axes) -> None:
+def _draw_balls(trace: Trace, ax: Axes) -> Vector:
     """Draw the balls as they touch, a star on each contact, and a bar of unit length on each."""
-    radii = _radii(trace.chain.masses)
+    radii = 0.5 * np.cbrt(trace.chain.masses / trace.chain.masses.max())
     centres = np.cumsum(2 * radii) - radii
     for ball, (x, radius) in enumerate(zip(centres.tolist(), radii.tolist(), strict=True)):
         colour = PALETTE[ball % len(PALETTE)]
@@ -115,13 +104,14 @@ def _draw_balls(trace: Trace, ax: Axes) -> None:
     reach = 2.6
     ax.set(xlim=(-reach, centres[-1] + radii[-1] + reach), ylim=(-0.6, 0.95), aspect="equal")
     ax.set_axis_off()
+    return np.asarray(centres)
 
 
 def _impact_style(
-    trace: Trace, row: Axes, diagram: Axes, along: Vector, shown: Sequence[int]
+    trace: Trace, centres: Vector, axes: tuple[Axes, Axes], along: Vector, shown: Sequence[int]
 ) -> str:
     """Return the keyframes: one at each point of the curves, and at the ends of the flights."""
-    height = row.get_figure().bbox.height  # type: ignore[union-attr]
+    row, diagram = axes
     before, slow, after, rest = _ACTS
     impulses, path = trace.curve()
     points, done = len(path), impulses.sum(axis=1)
@@ -139,39 +129,31 @@ def _impact_style(
     shift[0] = come * unit * trace.path[0]
     shift[-2:] = per_speed * unit * trace.velocities
     shift[-1] = shift[-2]
-    radii = _radii(trace.chain.masses)
-    centres = row.transData.transform(
-        np.column_stack([np.cumsum(2 * radii) - radii, np.full(len(radii), 0.73)])
-    )
-    bar = _bar_length(trace)
+    bar = 0.95 / (float(np.abs(path).max()) or 1.0)  # diameters of the largest ball, for 1 m/s
     style: list[str] = []
-    for ball, centre in enumerate(centres[:, 0].tolist()):
+
+    def moved(part: str, values: Vector, form: str, off: float = 0.03, at: int = still) -> None:
+        style.append(keyframes(KEY + part, times, values, f"transform:{form}", off, at))
+
+    places = row.transData.transform(np.column_stack([centres, np.full(len(centres), 0.73)]))
+    for ball, centre in enumerate(places[:, 0].tolist()):
         x, v = shift[:, ball], path[index, ball] * bar
-        move = "transform:translateX({}px)"
         for name, values in (("ball", x), ("ballname", x), ("tip", x + unit * v)):
-            part = f"{KEY}{name}{ball}"
-            style.append(keyframes(part, times, values[:, None], move, 0.03, still))
+            moved(f"{name}{ball}", values[:, None], "translateX({}px)")
         style.append(f"#{KEY}bar{ball}{{transform-origin:{number(centre)}px 0}}\n")
-        form = "transform:translateX({}px) scaleX({})"
-        style.append(
-            keyframes(f"{KEY}bar{ball}", times, np.column_stack([x, v]), form, 0.001, still)
-        )
+        moved(f"bar{ball}", np.column_stack([x, v]), "translateX({}px) scaleX({})", 0.001)
     # The diagram: dots on the curves, and a cover that draws back to the right.
-    places = np.dstack(np.broadcast_arrays(along[:, None], path))
-    drawn = diagram.transData.transform(places.reshape(-1, 2)).reshape(places.shape)
+    curves = np.dstack(np.broadcast_arrays(along[:, None], path))
+    drawn = diagram.transData.transform(curves.reshape(-1, 2)).reshape(curves.shape)
     for ball in shown:
-        moved = (drawn[:, ball] - drawn[-1, ball]) * [1, -1]
-        part, move = f"{KEY}dot{ball}", "transform:translate({}px,{}px)"
-        style.append(keyframes(part, times, moved[index], move, 0.03, still))
-    box = diagram.bbox
+        way = (drawn[:, ball] - drawn[-1, ball]) * [1, -1]
+        moved(f"dot{ball}", way[index], "translate({}px,{}px)")
+    box, height = diagram.bbox, row.get_figure().bbox.height  # type: ignore[union-attr]
     hidden = (box.x1 - drawn[index, 0, 0]) / box.width
     hidden[still + 1 :] = 0.0  # beyond the last point too
     style.append(f"#{KEY}cover{{transform-origin:{number(box.x1)}px {number(height)}px}}\n")
-    style.append(
-        keyframes(f"{KEY}cover", times, hidden[:, None], "transform:scaleX({})", 0.0005, still + 1)
-    )
-    style += _stars(impulses, times)
-    return "".join(style)
+    moved("cover", hidden[:, None], "scaleX({})", 0.0005, still + 1)
+    return "".join(style + _stars(impulses, times))
 
 
 def _stars(impulses: Vector, times: Vector) -> list[str]:
@@ -257,19 +239,15 @@ def animate_swing(
     # letters are larger, for a page shows the whole smaller.
     cell = 480.0 if beside == 1 else max(300.0, *(2 * one.half_width for one in swings))
     edge, letters = 240.0 - cell / 2, 15 if beside == 1 else 20
-    rows, top = [], 0.0
+    rows, top, lines = [], 0.0, lines or [""] * len(several)
     for first in range(0, len(several), beside):
         heights = []
-        for k, one in enumerate(swings[first : first + beside], start=first):
-            label = lines[k] if lines else ""
-            text = (
-                f'<text x="{number(edge + 12)}" y="20" font-size="{letters}">{escape(label)}</text>'
-                if label
-                else ""
-            )
-            place = f"{number((k - first) * cell - edge)} {number(top)}"
+        for k, one in enumerate(swings[first : first + beside]):
+            text, place = escape(lines[first + k]), f"{number(k * cell - edge)} {number(top)}"
+            if text:
+                text = f'<text x="{number(edge + 12)}" y="20" font-size="{letters}">{text}</text>'
             rows.append(f'<g transform="translate({place})">{text}{one.svg}</g>')
-            heights.append(one.height + (14 if label else 0))
+            heights.append(one.height + (14 if text else 0))
         top += max(heights)
     size = f'width="{number(cell * beside)}" height="{number(top)}"'
     svg = (

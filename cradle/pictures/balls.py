@@ -64,21 +64,12 @@ def outcome_by_ball(
     # Nested open markers: equal outcomes are seen as such, none hides another.
     for k, trace in enumerate(several):
         speed = trace.chain.velocities[0]
-        ax.plot(
-            number,
-            trace.velocities / speed,
-            "osDhXP*"[k % 7],
-            ms=5 + 4 * k,
-            mfc="none",
-            mew=1.5,
-            color=PALETTE[k % len(PALETTE)],
-            label=rf"$v_1^-$ = {speed:g} m/s",
-        )
+        ax.plot(number, trace.velocities / speed, "osDhXP*"[k % 7], ms=5 + 4 * k, mfc="none",
+                mew=1.5, color=PALETTE[k % len(PALETTE)],
+                label=rf"$v_1^-$ = {speed:g} m/s")  # fmt: skip
     ax.plot(number, several[0].velocities / several[0].chain.velocities[0], "0.6", lw=1, zorder=1)
-    names = (
-        [f"{n}\n{letter}" for n, letter in zip(number, letters, strict=True)] if letters else None
-    )
-    ax.set_xticks(number, names)
+    names = [f"{n}\n{letter}" for n, letter in zip(number, letters, strict=False)]
+    ax.set_xticks(number, names or None)
     ax.margins(y=0.12)  # room for the large markers
     ax.set(xlabel="ball number", ylabel=r"$v^+ / v_1^-$", xlim=(0, number[-1] + 1))
     ax.grid(alpha=0.3)

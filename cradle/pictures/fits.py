@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
 from cradle.fit.answers import Estimate
-from cradle.fit.parameters import Points, pair_keys, ratio_keys
-from cradle.fit.result import Fit, predicted_points
+from cradle.fit.parameters import Points, label, pair_keys, parameter_key, ratio_keys
+from cradle.fit.result import Fit
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
 from cradle.input.values import Vector
@@ -18,6 +19,7 @@ from cradle.pictures.impacts import PALETTE, ball_style
 
 # Beyond this a value of chi-square is of no interest.
 _TOP = 25.0
+_LEGEND: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.08), "frameon": False}
 
 
 def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequence[Axes]:
@@ -48,16 +50,14 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
     if not fit.estimates:
         raise ValueError("nothing was fitted; there is nothing to draw")
     if name is None:
-        name = next(
-            (n for n, e in fit.estimates.items() if e.identified), next(iter(fit.estimates))
-        )
+        identified = (n for n, one in fit.estimates.items() if one.identified)
+        name = next(identified, next(iter(fit.estimates)))
     estimate = fit[name]
     if axes is None:
         _, axes = plt.subplots(2, 1, figsize=(5.6, 7), layout="constrained")
     draw_likelihood(estimate, axes[0])
     for one in fit.shots.sets:
-        keys = pair_keys(one.types) if len(one.types) == 2 else ratio_keys(one.types)
-        if estimate.key in keys:
+        if estimate.key in (pair_keys(one.types) if len(one.types) == 2 else ratio_keys(one.types)):
             _draw_data(fit, estimate, one, axes[1])
             break
     else:
@@ -80,10 +80,8 @@ def draw_likelihood(estimate: Estimate, ax: Axes) -> Axes:
     Axes
     """
     x, y = estimate.grid, estimate.excess
-    if estimate.excess.size > 2 and (np.diff(x) <= 0).any():  # of several parameters: a cloud
-        ax.plot(x, y, ".", ms=2, color=PALETTE[0])
-    else:
-        ax.plot(x, y, color=PALETTE[0], lw=2)
+    cloud = x.size > 2 and bool((np.diff(x) <= 0).any())  # of several parameters
+    ax.plot(x, y, "." if cloud else "-", ms=2, lw=2, color=PALETTE[0])
     if estimate.identified:
         for k, (low, high) in enumerate(estimate.intervals):
             ax.axvspan(low, high, color=PALETTE[4], alpha=0.3,
@@ -92,16 +90,14 @@ def draw_likelihood(estimate: Estimate, ax: Axes) -> Axes:
     modes = [mode for mode in estimate.modes if mode.excess < _TOP]
     ax.plot([m.value for m in modes], [m.excess for m in modes], "v", color=PALETTE[1], ms=8,
             clip_on=False, zorder=5, ls="none", label="minima")  # fmt: skip
-    ax.set(xlim=(0, estimate.bound), ylim=(0, _TOP), xlabel=f"{estimate.kind} {estimate.name}",
-           ylabel="chi-square above its lowest",
-           title=f"likelihood of {estimate.kind} {estimate.name}")  # fmt: skip
-    ax.legend(
-        loc="lower center", bbox_to_anchor=(0.5, 1.08), ncols=3, frameon=False, fontsize="small"
-    )
+    what = f"{estimate.kind} {estimate.name}"
+    ax.set(xlim=(0, estimate.bound), ylim=(0, _TOP), xlabel=what,
+           ylabel="chi-square above its lowest", title=f"likelihood of {what}")  # fmt: skip
+    ax.legend(ncols=3, fontsize="small", **_LEGEND)
     return ax
 
 
-def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> Axes:
+def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> None:
     """Draw measured velocities over the striker's against the striker's, and what is predicted.
 
     Shots that begin alike are predicted by lines, others by a dash each.
@@ -121,19 +117,22 @@ def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> Axes:
                     color=style["color"])  # fmt: skip
     ax.set(xlabel="speed of the striker (m/s)", ylabel="velocity after / striker's speed",
            title=f"data of set {shots.name}")  # fmt: skip
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.08), ncols=len(shots.types),
-              frameon=False, fontsize="small")  # fmt: skip
-    return ax
+    ax.legend(ncols=len(shots.types), fontsize="small", **_LEGEND)
 
 
 def _prediction(fit: Fit, estimate: Estimate, shots: ShotSet, begins: Vector) -> Vector | None:
     """Return the velocities that the best parameters give after shots that begin so, (K, N)."""
+    restitution = {tuple(sorted(parameter_key(name))): e for name, (e, _) in fit.given.items()}
+    ratios = {}
     if estimate.kind == "restitution":
         if estimate.value is None:
             return None
-        points: Points | None = Points({estimate.key: estimate.value}, {})
-    else:
-        points = predicted_points(fit, shots.types)
-    if points is None:
-        return None
+        restitution = {estimate.key: estimate.value}
+    for key in ratio_keys(shots.types):
+        name = label(key)
+        value = fit.known[name] if name in fit.known else fit.estimates[name].value
+        if value is None and any(key in group.keys for group in fit.groups):
+            return None
+        ratios[key] = np.array([value or 0.0])  # one without effect may have any value
+    points = Points(restitution, ratios)
     return points.outcomes(shots.types, shots.masses, begins[:, np.newaxis])[:, 0]

@@ -21,14 +21,9 @@ from cradle.input.values import Vector, must_be, place_in
 from cradle.trace import Trace
 
 __all__ = [
-    "EVENT_STYLES",
-    "PALETTE",
-    "ball_style",
-    "impulse_axis",
-    "progress",
-    "velocities",
+    "EVENT_STYLES", "PALETTE", "ball_style", "impulse_axis", "progress", "velocities",
     "velocity_impulse",
-]
+]  # fmt: skip
 
 #: Colours of Okabe and Ito, told apart by colour-blind readers; in an order of changing lightness.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
@@ -238,18 +233,14 @@ def _mark_events(trace: Trace, contact: int, ax: Axes) -> None:
                 textcoords="offset points", fontsize=9,
             )  # fmt: skip
             taken = x + 0.035 * len(letters) * float(impulse[-1])
-    marks = [
-        Line2D(
-            [], [], marker=marker, ls="none", mfc="white", mec="black", label=f"{letter}: {name}"
-        )
-        for kind, (marker, letter, name) in EVENT_STYLES.items()
-        if kind in kinds
-    ]
-    handles = [*ax.get_lines()[:2], *marks]
+    handles = ax.get_lines()[:2]
+    for kind, (marker, letter, name) in EVENT_STYLES.items():
+        if kind in kinds:
+            handles.append(Line2D([], [], marker=marker, ls="none", mfc="white", mec="black",
+                                  label=f"{letter}: {name}"))  # fmt: skip
     # Below the axes, where it hides no line.
-    ax.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False
-    )
+    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3,
+              frameon=False)  # fmt: skip
 
 
 def impulse_axis(

@@ -50,7 +50,7 @@ class Stopped(Exception):
 
 def _type(record: type) -> np.dtype[Any]:
     """Return the NumPy type of one of the kernel's records."""
-    kinds = {int: "i8", float: "f8"}
+    kinds = {int: "i8", float: "f8", complex: "c16"}
     return np.dtype([(name, kinds[kind]) for name, kind in get_type_hints(record).items()])
 
 
@@ -216,7 +216,7 @@ class Job:
     def stored(self) -> float:
         """Return the work that contacts can still release, in the kernel's own units."""
         contacts = self.state.contact
-        return float(contacts["q"].sum() if self.compiled else sum(k.q for k in contacts))
+        return float(sum(k["q"].real if self.compiled else k.q.real for k in contacts))
 
     def _set_room(self, room: int) -> None:
         """Let the event loop write so many events."""
@@ -265,4 +265,4 @@ def warm_up() -> None:
     """
     one = np.ones((1, 2))
     inputs = plain.Inputs(one, np.array([[1.0, 0.0]]), np.ones((1, 1)), *[np.ones((1, 0))] * 2)
-    Job(inputs, 1, plain.Options(0.5, 1000, True, True), large=True).run()
+    Job(inputs, 1, plain.Options(0.5, 1000, True), large=True).run()

@@ -1,0 +1,205 @@
+"""Gaps and leans: what a row of spheres does when its balls do not just touch.
+
+Usage::
+
+    python benchmarks/gaps.py            # writes data/gaps_five.csv and data/gaps_triplets.csv
+
+Spheres push with F = k s^1.5.  The state s of a contact changes with its closing speed u as
+ds = u dt, and while it gives back as ds = u dt / e^2: the energy law of Liu, Zhao and Brogliato, in
+time.  A gap starts at s = -gap, a lean at s > 0, balanced by constant forces, as inclined strings
+hold it.
+Lengths are in Hertz units, (m v^2 / k)^(2/5), with the mass of ball A, or of each ball of an equal
+row, and v the striker's speed.
+"""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    FusedChain,
+    QuadraticDissipation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    paper_chain,
+    post_impact_velocities,
+    ratio_table,
+)
+from cradle.measures import effective_ratio
+from cradle.tables import ball_masses
+
+DATA = Path(__file__).parents[1] / "data"
+# Row of five: gaps of all three contacts at rest.
+GAPS = (0.0, *(float(f"{10 ** (k / 8):.4g}") for k in range(-24, 5)))
+# Triplets: the contact that the striker does not touch; negative for a lean.
+SHIFTS = np.round(
+    [*-np.arange(1, 0.1, -0.05), *np.arange(-10, 10) / 100, *np.arange(2, 20) / 20,
+     *np.arange(4, 17) / 4], 3
+) + 0.0  # fmt: skip
+ONE = np.linspace(0, 0.5, 101)  # ratios
+QUOTIENTS = np.array([float(f"{10 ** (k / 4):.4g}") for k in range(-16, 17)])  # stiffness
+LAWS = {
+    "sequential": SequentialCollisions(),
+    "energy_hertz": EnergyDistribution(1.0),
+    "energy_linear": EnergyDistribution(1.0, 1),
+    "convex": QuadraticDissipation(),
+    "fused": FusedChain(),
+}
+
+
+def strike(masses, velocities, restitution, gaps, stiffness=1.0, step=0.02, longest=60.0):
+    """Return velocities (..., N) after the impact of spheres at `gaps` (..., N - 1).
+
+    Runge-Kutta of order four.  What is still closing after the time `longest`, or is closed when
+    nothing pushes any more, goes on as pairs, one after the other.
+    """
+    m, v, e, s = (np.asarray(x, float) for x in (masses, velocities, restitution, gaps))
+    balls = m.shape[-1]
+    row = np.broadcast_shapes(m.shape, v.shape, *((*x.shape[:-1], balls) for x in (e, s)))
+    m, v = np.broadcast_to(m, row), np.array(np.broadcast_to(v, row))
+    s = -np.array(np.broadcast_to(s, (*row[:-1], row[-1] - 1)))
+    e = np.broadcast_to(e, s.shape)
+    held = stiffness * np.maximum(s, 0.0) ** 1.5
+    none = np.zeros((*row[:-1], 1))
+
+    def rate(s, v):
+        closing = v[..., :-1] - v[..., 1:]
+        push = stiffness * np.maximum(s, 0.0) ** 1.5 - held
+        force = np.concatenate([none, push], -1) - np.concatenate([push, none], -1)
+        slow = np.where((closing < 0) & (s > 0), closing / np.maximum(e, 1e-3) ** 2, closing)
+        return slow, force / m
+
+    left, time, out = np.ones(row[:-1], bool), 0.0, np.empty(row)
+    while time < longest:
+        a = rate(s, v)
+        b = rate(s + step / 2 * a[0], v + step / 2 * a[1])
+        c = rate(s + step / 2 * b[0], v + step / 2 * b[1])
+        d = rate(s + step * c[0], v + step * c[1])
+        s = s + step / 6 * (a[0] + 2 * b[0] + 2 * c[0] + d[0])
+        v = v + step / 6 * (a[1] + 2 * b[1] + 2 * c[1] + d[1])
+        time += step
+        done = left & (s <= 0).all(-1)
+        done &= (v[..., :-1] <= v[..., 1:]).all(-1) | (held > 0).any(-1)
+        out[done] = v[done]
+        left &= ~done
+        if not left.any():
+            return out
+    out[left] = v[left]
+    return post_impact_velocities(m, out, e, np.zeros(row[-1] - 2))
+
+
+def five():
+    """Return rows of gap and velocities: five equal elastic balls, the first striking."""
+    gaps = np.outer(GAPS, [0.0, 1.0, 1.0, 1.0])
+    return [[g, *v] for g, v in zip(GAPS, strike([1] * 5, np.eye(5)[0], 1.0, gaps), strict=True)]
+
+
+def of_triplets(names):
+    """Return masses over that of A, restitution, and the outcomes that Table 2 encodes."""
+    pairs = [paper_chain(t, excess="saturate") for t in names]
+    masses = np.array([chain.masses for chain, _ in pairs]) / ball_masses()["A"]
+    listed = np.array([collide(chain, model).velocities for chain, model in pairs])
+    return masses, np.array([chain.restitution for chain, _ in pairs]), listed
+
+
+def off(after, listed):
+    """Return the largest difference of a velocity, over the striker's speed."""
+    return np.abs(after - listed).max(-1)
+
+
+def shared(errors, keys):
+    """Return the choice (last axis) that each group of equal keys has the least rms error with."""
+    best = np.empty(len(keys), int)
+    for key in set(keys):
+        group = np.array([k == key for k in keys])
+        best[group] = (errors[group] ** 2).mean(0).argmin()
+    return best
+
+
+def by_pair(names, masses, e, listed):
+    """Return outcomes with one stiffness a pair of kinds, fitted to all triplets."""
+    first, second = ([ordered(t[k : k + 2]) for t in names] for k in (0, 1))
+    kinds = sorted({*first, *second})
+    place = np.array([[kinds.index(a), kinds.index(b)] for a, b in zip(first, second, strict=True)])
+
+    def after(p):
+        k = np.exp(np.append(p, 0.0)[place])
+        k /= k.max(1, keepdims=True)
+        return strike(masses, [1, 0, 0], e, np.zeros((len(names), 2)), k, 0.04, 100.0)
+
+    fits = [
+        least_squares(lambda p: (after(p) - listed).ravel(), start, diff_step=0.02, max_nfev=25)
+        for start in np.random.default_rng(0).normal(0, 1, (3, len(kinds) - 1))
+    ]
+    return after(min(fits, key=lambda fit: fit.cost).x)
+
+
+def ordered(pair):
+    """Return the pair of kinds without its order."""
+    return "".join(sorted(pair))
+
+
+def triplets():
+    """Return columns: how far each law is from the outcome that Table 2 encodes."""
+    names = list(ratio_table()["triplet"])
+    masses, e, listed = of_triplets(names)
+    columns = {"triplet": names}
+    for name, model in LAWS.items():
+        chains = [Chain(m, [1, 0, 0], r) for m, r in zip(masses, e, strict=True)]
+        columns[name] = off(np.array([collide(c, model).velocities for c in chains]), listed)
+    columns["implied"] = [
+        effective_ratio(collide(Chain(m, [1, 0, 0], 1), SpringChain(rtol=1e-10))) for m in masses
+    ]
+    every, m, r = np.arange(len(names)), masses[:, None], e[:, None]
+    one = off(post_impact_velocities(m, [1, 0, 0], r, ONE[:, None], excess="saturate"),
+              listed[:, None])  # fmt: skip
+    columns["one_ratio"] = one[every, shared(one, [""] * len(names))]
+
+    shift = np.zeros((len(names), len(SHIFTS), 2))
+    shift[..., 1] = SHIFTS
+    errors = off(strike(m, [1, 0, 0], r, shift), listed[:, None])
+    gaps = np.where(SHIFTS >= 0, errors, 9.0)
+    last = [ordered(t[1:]) for t in names]
+    for name, found in (("gap", gaps), ("shift", errors)):
+        columns[f"one_{name}"] = found[every, shared(found, [""] * len(names))]
+        columns[f"{name}_of_pair"] = found[every, shared(found, last)]
+        own = shared(found, names)
+        columns[f"own_{name}"] = SHIFTS[own]
+        columns[f"with_own_{name}"] = found[every, own]
+
+    k = np.stack([np.minimum(1, 1 / QUOTIENTS), np.minimum(1, QUOTIENTS)], -1)
+    zero = np.zeros((len(names), len(QUOTIENTS), 2))
+    errors = off(strike(m, [1, 0, 0], r, zero, k, longest=150.0), listed[:, None])
+    own = shared(errors, names)
+    columns["own_quotient"], columns["with_own_quotient"] = QUOTIENTS[own], errors[every, own]
+    columns["stiffness_of_pair"] = off(by_pair(names, masses, e, listed), listed)
+    return columns
+
+
+def written(x):
+    """Return a number to four decimals, or four digits."""
+    return f"{round(x, 4) + 0.0:.4f}" if abs(x) < 100 else f"{x:g}"
+
+
+def main():
+    """Write both files."""
+    columns = triplets()
+    rows = zip(*columns.values(), strict=True)
+    for name, header, lines in (
+        ("gaps_five.csv", ["gap", *(f"v{k}" for k in range(1, 6))], five()),
+        ("gaps_triplets.csv", list(columns), rows),
+    ):
+        with (DATA / name).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(header)
+            for line in lines:
+                writer.writerow([x if isinstance(x, str) else written(x) for x in line])
+
+
+if __name__ == "__main__":
+    main()

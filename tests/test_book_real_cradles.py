@@ -1,0 +1,211 @@
+"""Chapter "Two real cradles": what it prints, says and draws, by second routes."""
+
+import csv
+
+import numpy as np
+import pytest
+import real_cradles
+import real_swing
+from chapters import Chapter
+from real_cradles import first_strikes, spheres, table
+from scipy.optimize import brentq
+
+from cradle import Chain, ImpulseCorrelation, collide, ratio_table
+
+CHAPTER = Chapter("real_cradles")
+GLUED = CHAPTER.glued
+with (real_cradles.DATA / "film_fits.csv").open(encoding="utf-8", newline="") as file:
+    FITS = {
+        (row["law"], row["strikers"], row["fitted"], row["reading"]): row
+        for row in csv.DictReader(file)
+    }
+
+
+def parameters(law, strikers, fitted, reading="4"):
+    return [float(x) for x in FITS[law, strikers, fitted, reading]["parameters"].split()]
+
+
+def rows(cell):
+    """Numbers at the end of each line of a printed table, by the words before them."""
+    found = {}
+    for line in CHAPTER.printed(cell).splitlines()[1:]:
+        words = line.split()
+        numbers = [word for word in words if word.lstrip("-").replace(".", "", 1).isdigit()]
+        if numbers:
+            found[" ".join(words[: len(words) - len(numbers)])] = [float(x) for x in numbers]
+    return found
+
+
+def points(ax, marker):
+    """Points drawn with one marker, in the order of x."""
+    found = [
+        xy for line in ax.get_lines() if line.get_marker() == marker for xy in line.get_xydata()
+    ]
+    return np.array(sorted(map(tuple, found)))
+
+
+def test_the_table_of_readings():
+    shown = CHAPTER.printed("first")
+    for reading in (4, 2):
+        for release in (1, 2):
+            for v, sigma in zip(*first_strikes(reading)[release]):
+                assert f"{v:+.3f} ± {sigma:.3f}" in shown
+
+
+def test_velocities_of_the_models_by_the_fitting_script():
+    gapped = parameters("spheres, four gaps, A", "own gap", "one")
+    three = parameters("three ratios, e", "apart", "one")
+    assert three == parameters("three ratios, e", "together", "one")
+    expected = {
+        "spheres, touching": real_cradles.by_spheres([0] * 5, 2),
+        "three ratios, strikers together": real_cradles.ratios(three[:3], three[3], 2, False),
+        "three ratios, one by one": real_cradles.ratios(three[:3], three[3], 2, True),
+        "spheres, gaps, strikers' own gap": real_cradles.by_spheres(gapped, 2),
+    }
+    shown = rows("spheres")
+    assert shown.keys() == expected.keys()
+    for name, v in expected.items():
+        assert shown[name][:5] == pytest.approx(v, abs=6e-4)
+    # Strikers at their own gap were fitted to two balls, all else to one.
+    assert shown["three ratios, one by one"][5] < 10 < shown["three ratios, strikers together"][5]
+
+
+def test_the_table_of_laws_is_that_of_the_stored_fits():
+    lines = CHAPTER.printed("table").splitlines()[1:]
+    words = {"together": "touch", "apart": "one by one", "own gap": "own gap"}
+    kept = [key for key in FITS if key[2:] == ("both", "4")]
+    assert len(lines) == len(kept)
+    for law, strikers, *_ in kept:
+        how = f" {words[strikers]} "
+        (numbers,) = [x.split(how)[1] for x in lines if x.split(how)[0].strip() == law]
+        both = FITS[law, strikers, "both", "4"]
+        total = float(both["chi_one"]) + float(both["chi_two"])
+        predicted = FITS[law, strikers, "one", "4"]
+        expected = [total, float(both["freedom"])]
+        expected += [float(predicted["chi_two"]), float(predicted["freedom"])]
+        numbers = [float(x) for x in numbers.replace("/", " ").split()]
+        assert numbers == pytest.approx(expected, rel=1e-3, abs=0.51)
+
+
+def test_what_is_said_to_be_refuted_is_and_what_is_not_is_not():
+    for reading in ("4", "2"):
+        chi = {
+            key[:2]: (float(row["chi_one"]) + float(row["chi_two"])) / int(row["freedom"])
+            for key, row in FITS.items()
+            if key[2:] == ("both", reading)
+        }
+        fits = {key for key, value in chi.items() if value < 1}
+        assert fits == {("three ratios, e", "apart"), ("spheres, four gaps, A", "own gap")}
+        assert min(value for key, value in chi.items() if key not in fits) > 4
+
+
+def test_the_third_release_lies_between_two_predictions():
+    t = table("film_strikes.csv")
+    use = (t["reading"] == 4) & (t["release"] == 3) & (t["strike"] == 1)
+    after, before = t["after"][use][::-1], t["before"][use][::-1]
+    row = before[3:].mean()
+    shown = rows("third-code")
+    assert shown["measured"] == pytest.approx((after - row) / (1 - row), abs=6e-4)
+    p = parameters("spheres, four gaps, A", "own gap", "both")
+    assert shown["spheres, gaps, one by one"] == pytest.approx(
+        real_cradles.by_spheres(p, 3, apart=True), abs=6e-4
+    )
+    striker = [
+        shown[k][0] for k in ("three ratios, one by one", "measured", "spheres, gaps, one by one")
+    ]
+    assert striker == sorted(striker)
+
+
+def implied(gap):
+    """The ratio that a gap implies, by the fitting script's spheres."""
+    second = spheres([1, 0, 0], [0, gap], 0.0)[1]
+
+    def miss(ratio):
+        return collide(Chain([1] * 3, [1, 0, 0]), ImpulseCorrelation(ratio)).velocities[1] - second
+
+    return brentq(miss, 0, 0.3)
+
+
+def test_fig_gaps():
+    ax = CHAPTER.figures["fig-real-gaps"].axes[0]
+    line = max(ax.get_lines(), key=lambda line: len(line.get_xdata())).get_xydata()
+    for gap, ratio in line[::3]:
+        assert ratio == pytest.approx(implied(gap), abs=2e-5)
+    assert line[0, 1] == pytest.approx(0.1325, abs=1e-4)
+    dots = points(ax, "o")
+    gaps = parameters("spheres, four gaps, A", "own gap", "both")[:3]
+    ratios = parameters("three ratios, e", "apart", "both")[:3]
+    assert dots == pytest.approx(np.array(sorted(zip(gaps, ratios))))
+    listed = ratio_table().set_index("triplet").ratio
+    above = sum(listed[3 * ball] > line[0, 1] for ball in "ABCD")
+    assert GLUED["above"] == {3: "three"}[above]
+
+
+def test_figures_of_the_strikes_show_what_was_read():
+    for name, release in (("fig-real-one", 1), ("fig-real-two", 2)):
+        v, _ = first_strikes(4)[release]
+        axes = CHAPTER.figures[name].axes
+        dots = np.concatenate([points(ax, "o") for ax in axes])
+        assert dots == pytest.approx(np.column_stack([range(1, 6), v]))
+
+
+def test_later_strikes():
+    shown = {
+        line[:40].strip(): float(line[40:]) for line in CHAPTER.printed("later-code").splitlines()
+    }
+    assert len(shown) == 6
+    wrong = {name for name, value in shown.items() if value > 0.03}
+    assert wrong == {"three ratios; all five meet at once", "spheres, touching, with loss"}
+    assert max(value for name, value in shown.items() if name not in wrong) < 0.01
+
+
+def test_swing_of_the_mean():
+    size, damping, period, _ = real_swing.common()
+    assert (
+        f"{1000 * size:.2f} mm, period {period:.4f} s, falls by {damping:.4f}"
+        in CHAPTER.printed("mean")
+    )
+    # Air alone: the drag of Stokes for slow oscillations, over twice the mass.
+    layer = np.sqrt(2 * 1.8e-5 / 1.2 * period / (2 * np.pi))
+    air = 3 * np.pi * 1.8e-5 * 0.01109 * (1 + 0.01109 / layer) / 0.044756
+    assert float(GLUED["air"]) == pytest.approx(damping / air, rel=0.06)
+
+
+def test_fig_half():
+    top, low = CHAPTER.figures["fig-real-half"].axes
+    ball, time, place, *_ = real_swing.peaks()
+    for k, marker in ((0, "o"), (4, "s")):
+        own = ball == k
+        assert points(top, marker) == pytest.approx(
+            np.column_stack([time[own], 1000 * np.abs(place[own])])
+        )
+    with (real_cradles.DATA / "cradle_fits.csv").open(encoding="utf-8", newline="") as file:
+        stored = {row["law"]: row for row in csv.DictReader(file)}
+    for law, marker in (("constant loss", "o"), ("constant restitution", "^")):
+        drawn = points(low, marker)
+        assert (drawn[:, 1] ** 2).sum() == pytest.approx(float(stored[law]["chi_places"]), rel=0.02)
+    assert len(time) == int(GLUED["turns"])
+
+
+def test_a_line_and_not_an_exponential():
+    shown = [line for line in CHAPTER.printed("decay").splitlines() if "chi-square" in line]
+    chi = [float(line.split("chi-square")[1].split("/")[0]) for line in shown]
+    t = table("cradle_peaks.csv")
+    for k, ball in enumerate((1, 5)):
+        use = (t["ball"] == ball) & (t["kind"] == "flight") & (t["t_s"] < 20)
+        x, size, error = t["t_s"][use], np.abs(t["x_m"][use]), t["u_x"][use]
+        line = np.polyfit(x, size, 1, w=1 / error)
+        least = (((size - np.polyval(line, x)) / error) ** 2).sum()
+        assert chi[2 * k] == pytest.approx(least, abs=0.51)
+        assert chi[2 * k + 1] > 5 * least
+
+
+def test_a_ratio_changes_nothing_over_half_a_minute():
+    assert "a change of < 10⁻¹² m" in CHAPTER.printed("decay")
+
+
+def test_another_height():
+    p = parameters("spheres, four gaps, A", "own gap", "both")
+    shown = CHAPTER.printed("ex-speed").splitlines()
+    for part, line in zip((1, 0.5, 0.25), shown, strict=True):
+        assert float(line.split()[-1]) == pytest.approx(implied(p[0] / part**0.8), abs=6e-4)

@@ -1,0 +1,93 @@
+"""The page of observations: its verdicts by other routes, and its sources."""
+
+import re
+from pathlib import Path
+
+import gaps
+import numpy as np
+import pytest
+from chapters import Chapter
+
+PAGE = Chapter("observations")
+BOOK = Path(__file__).parents[1] / "book"
+
+
+def verdicts():
+    """Rows of the first table: label to words by law."""
+    lines = PAGE.printed("seen").splitlines()
+    laws = ("pairs", "one body", "convex", "ratio", "spheres")
+    rows = {}
+    for line in lines[1:]:
+        label, *words = re.split(r"\s{2,}", line.strip())
+        rows[label] = dict(zip(laws, words, strict=True))
+    return rows
+
+
+E = np.round(np.arange(0.71, 1, 0.02), 2)
+
+
+def from_where(agrees):
+    """The least e of the page's grid from which on all agree."""
+    first = int(np.argmax(agrees))
+    assert agrees[first:].all()
+    return f"e ≥ {E[first]:.2f}"
+
+
+def test_who_goes_back():
+    """Pairs: v1 = (1 - e) / 2 before a later push, never below 0. Ratio a: e > 1 - a, Eq. 24."""
+    row = verdicts()["1 striker goes back"]
+    assert row["pairs"] == "no"
+    assert row["one body"] == row["convex"] == "yes"
+    assert row["ratio"] == from_where(E > 1 - 0.15)
+    spheres = gaps.strike([1] * 3, [1, 0, 0], E[:, None], [0, 0])
+    assert row["spheres"] == from_where(spheres[:, 0] < 0)
+
+
+def test_who_follows():
+    *behind, fourth, last = gaps.strike([1] * 5, np.eye(5)[0], E[:, None], [0] * 4).T
+    row = verdicts()["5 last but one follows"]
+    agrees = (last > fourth) & (fourth > 1.5 * np.abs(behind).max(axis=0))
+    assert row["spheres"] == from_where(agrees)
+    assert row["pairs"] == row["one body"] == "no"
+
+
+def test_a_gap_decides():
+    """Rows 1 and 4 are one experiment: elastic spheres that touch, and with a gap of a unit."""
+    assert gaps.strike([1] * 3, [1, 0, 0], 0.95, [0, 0])[0] < 0
+    wide = gaps.strike([1] * 3, [1, 0, 0], 0.95, [0, 1.5])
+    assert 0 < wide[0] < wide[1]
+    assert [r for r, row in verdicts().items() if row["pairs"] == "yes"] == [
+        "2 and leaves the middle ball", "4 with a gap it goes on",
+    ]  # fmt: skip
+
+
+def test_common_motion_of_spheres():
+    v = np.eye(5)[0]
+    for _ in range(5):
+        v = -gaps.strike([1] * 5, v, 0.9, [0] * 4)
+    share = 5 * v.mean() ** 2 / (v @ v)
+    (line,) = (x for x in PAGE.printed("many").splitlines() if "stroke 5" in x)
+    assert float(line.split()[-1]) == pytest.approx(share, abs=0.02)
+
+
+def test_numbers_of_others():
+    told = PAGE.printed("again")
+    m, n = 0.6, 0.06
+    assert f"pairs {(3 * m - n) / (m + n):.2f}," in told
+    # Floor, heavy and light ball as three spheres, by another program.
+    after = gaps.strike([1e9, m, n], [0, -1, -1], 1.0, [0, 0], step=0.01)
+    assert f"spheres {after[2]:.2f}" in told
+    power = float(re.search(r"power ([\d.]+) ", told)[1])
+    assert power == pytest.approx(1 / 5, abs=2e-3)
+    assert "below True, 1 % above False" in told
+
+
+def test_every_reference_is_cited():
+    keys = set(re.findall(r"^@\w+\{(\w+),", (BOOK / "references.bib").read_text(), re.MULTILINE))
+    text = "".join(
+        p.read_text(encoding="utf-8") for ext in ("md", "ipynb") for p in BOOK.glob(f"*.{ext}")
+    )
+    cited = set(",".join(re.findall(r"\{cite:\w\}`([\w,]+)`", text)).split(","))
+    assert cited == keys
+    related = (BOOK / "related.md").read_text(encoding="utf-8")
+    assert len(set(re.findall(r"\{cite:t\}`(\w+)`", related))) >= 30
