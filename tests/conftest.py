@@ -58,7 +58,7 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 LONG = (
     "tests/test_book_parameters.py", "tests/test_defects.py", "tests/test_extremes.py",
     "tests/test_explorer_reading.py", "tests/test_layout.py", "book/toy.ipynb",
-    "tests/test_book_figures_use.py", "book/patterns.ipynb", "book/three_balls.ipynb",
+    "tests/test_book_figures_use.py", "book/reading.ipynb", "book/patterns.ipynb",
     "tests/test_textbook.py", "tests/test_speed.py", "tests/test_book_figures.py",
     "tests/test_explorer_page.py", "tests/test_explorer_engine.py", "tests/test_examples.py",
 )  # fmt: skip

@@ -18,7 +18,7 @@ from cradle import Chain, ImpulseCorrelation, collide, ratio_table
 
 GAMMAS = (0.05, 0.5, 1.0, 2.0, 7.0, 60.0)
 THREE = Chain([1, 1, 1], [1, 0, 0], 1)
-CHAPTER = Chapter("compliance")
+CHAPTER, READING = Chapter("compliance"), Chapter("reading")
 
 
 def springs(*stiffness, pull=False, until=None):
@@ -150,7 +150,7 @@ def test_eq_13_has_no_constant_ratio():
     for gamma in GAMMAS:
         first, second = (gamma * lam / (2 * lam - 3 * gamma) for lam in eigenvalues(gamma))
         assert first - second == pytest.approx(2 * math.sqrt(1 - gamma + gamma**2), rel=1e-12)
-    assert "2*sqrt(gamma**2 - gamma + 1)" in CHAPTER.printed("sympy-delta")
+    assert "2*sqrt(gamma**2 - gamma + 1)" in READING.printed("compliance-sympy-delta")
 
 
 def test_eq_14_is_not_the_limit():
@@ -172,7 +172,7 @@ def test_eq_14_is_not_the_limit():
         tau_2, tau_3 = path.sol(first_loss(gamma)[0])[6:]
         assert tau_3 / tau_2 / gamma == pytest.approx(factor, rel=gamma)
         assert path.y[7, -1] / path.y[6, -1] == pytest.approx(1, abs=gamma)
-    assert CHAPTER.glued["loss-factor"] == f"{factor:.3f}"
+    assert READING.glued["compliance-loss-factor"] == f"{factor:.3f}"
 
 
 def test_eq_15_is_a_clean_limit():
@@ -227,7 +227,7 @@ def test_fig_own_compliance_ratio():
 
 
 def test_table_of_limits():
-    lines = CHAPTER.printed("table-limits").splitlines()
+    lines = READING.printed("compliance-table-limits").splitlines()
     heads = ["γ", "opens first", "τ₃/τ₂ then", "off Eq. 14", "off Eq. 15"]
     assert lines[0].split() == " ".join(heads).split()
     assert len(lines) == 8
@@ -304,7 +304,7 @@ def test_fig_own_compliance_effective():
         ratio = constant_ratio(outcome(1, gamma))
         assert ratio / gamma == pytest.approx(math.pi**2 / 8 - 1, rel=0.03 * gamma + 1e-7)
         stored = f"gamma = {gamma}: effective ratio / gamma = {ratio / gamma:.6f}"
-        assert stored in CHAPTER.printed("sympy-effective")
+        assert stored in READING.printed("compliance-sympy-effective")
     # Towards 1/2 for a stiff second spring; all outcomes stay on the arc of the first chapter.
     for gamma, low in ((2, 0.394), (10, 0.497), (100, 0.4999)):
         velocities = outcome(1, gamma)
@@ -313,16 +313,21 @@ def test_fig_own_compliance_effective():
 
 
 def test_exercises():
-    gamma = float(CHAPTER.printed("solution-1").split("=")[1])
+    gamma = float(READING.printed("compliance-which-code").split("=")[1])
     assert constant_ratio(outcome(1, gamma)) == pytest.approx(0.167, abs=2e-5)
 
     loss, _ = first_loss(1)
     q = printed_7_to_9(1, 1, loss)
-    assert CHAPTER.printed("solution-2").startswith(f"{(q[1] - q[2]) ** 2:.1%} ")
+    assert CHAPTER.glued["ex-stored"] == f"{(q[1] - q[2]) ** 2:.1%}".replace("%", " %")
+    v = springs(1, 1, until=loss).y[3:6, -1]
+    assert CHAPTER.glued["ex-kinetic"] == f"{v @ v:.3f}"
+    tau_2, tau_3 = -printed_10_and_11(1, 1, loss)
+    for name, value in (("tau2", tau_2), ("tau3", tau_3), ("ratio", tau_3 / tau_2), ("loss", loss)):
+        assert CHAPTER.glued[f"ex-{name}"] == f"{value:.3f}"
 
     rows = [
         [float(x) for x in re.findall(r"-?\d\.\d{4}", line)[:4]]
-        for line in CHAPTER.printed("solution-3").splitlines()
+        for line in READING.printed("compliance-four-code").splitlines()
     ]
     ratio = constant_ratio(outcome(1, 1))
     np.testing.assert_allclose(rows[0], outcome(1, 1, 1), rtol=0, atol=6e-5)
@@ -335,3 +340,14 @@ def test_exercises():
     assert rows[0][1] < -0.05
     for a in np.linspace(0, 0.5, 26):
         assert abs(float(solve([1] * 4, [1, 0, 0, 0], 1, a).velocities[1])) < 1e-14
+
+
+@pytest.mark.parametrize("gamma", GAMMAS)
+def test_each_mode_alone_has_a_constant_quotient_of_impulses(gamma: float):
+    """The eigenvectors by NumPy: a mode's share of the speeds of balls 3 and 1."""
+    stiffness = np.array([[1, -1, 0], [-1, 1 + gamma, -gamma], [0, -gamma, gamma]])
+    squares, modes = np.linalg.eigh(stiffness)
+    assert squares[1:] == pytest.approx(eigenvalues(gamma)[::-1], rel=1e-12)
+    for lam, (first, _, third) in zip(squares[1:], modes.T[1:]):
+        # tau_2 = 1 - v1 and tau_3 = v3: a mode that takes from ball 1 gives to tau_2.
+        assert third / -first == pytest.approx(gamma / (2 * gamma - lam), rel=1e-9)

@@ -74,7 +74,7 @@ def test_fig_6_drawn():
 
 
 def test_fig_patterns_turns():
-    for name, line in panel("patterns", "fig-patterns-turns").items():
+    for name, line in panel("reading", "fig-patterns-turns").items():
         r = float(re.search(r"r = ([\d.]+)", name)[1])
         if "border" in name:
             r = edge_on_diagonal()
@@ -92,7 +92,7 @@ def edge_on_diagonal():
 
 
 def test_fig_patterns_corner():
-    left, right = drawn("patterns")["fig-patterns-corner"].axes[:2]
+    left, right = drawn("reading")["fig-patterns-corner"].axes[:2]
     log = np.geomspace(0.005, 3, 241)
     log = np.sqrt(log[1:] * log[:-1])
     (mesh,) = [x for x in left.collections if hasattr(x, "get_coordinates")]
@@ -115,7 +115,7 @@ def test_fig_patterns_corner():
 def test_fig_patterns_parameters():
     cases = [(0.0, 0.15), (0.1, 0.15), (1.0, 0.15), (0.5, 0.0), (0.4, 0.5), (1.0, 0.5)]
     coarse = np.linspace(0, 3, 151)[1:] - 0.01
-    for ax, (e, a) in zip(drawn("patterns")["fig-patterns-parameters"].axes, cases):
+    for ax, (e, a) in zip(drawn("reading")["fig-patterns-parameters"].axes, cases):
         some = coarse[coarse <= (1 / a - 1 if a else np.inf)]
         mesh = ax.collections[0]
         field = np.ma.getdata(mesh.get_array()).reshape(some.size, some.size)

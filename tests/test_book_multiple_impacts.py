@@ -14,7 +14,7 @@ from cradle import Chain, ImpulseCorrelation, collide
 
 SEQUENCE = [("end", 0), ("close", 0), ("end", 1), ("close", 1), ("end", 0), ("end", 1)]
 VELOCITIES = (1, "0.8", 0)
-CHAPTER = Chapter("multiple_impacts")
+CHAPTER, READING = Chapter("multiple_impacts"), Chapter("reading")
 # The chapter's example and others with the same sequence: masses, e2, e3, forward, backward.
 EXAMPLES = [
     ((1, 1, 1), "0.3", "0.3", "0.05", "0.05"),
@@ -84,7 +84,9 @@ def test_eq_36_fourth_line_needs_its_factor():
         assert too_fast == pytest.approx(a * (end[3] - start[3]) / m2, rel=1e-9)
         assert too_fast > 1e-3
         if example is EXAMPLES[0]:
-            stored = re.search(r"momentum missing .*: ([\d.]+)", CHAPTER.printed("functions"))
+            stored = re.search(
+                r"momentum missing .*: ([\d.]+)", READING.printed("multiple-functions")
+            )
             assert float(stored[1]) == pytest.approx(m2 * too_fast, abs=6e-6)
 
 
@@ -125,7 +127,8 @@ def test_fig_5_marked_values_as_printed_in_the_chapter():
     for name, key in velocities.items():
         expected[f"v_{name}+"] = exact.path[rows[key]][int(name[0]) - 1]
     stored = {
-        line.split()[0]: line.split()[1:3] for line in CHAPTER.printed("compare").splitlines()[1:]
+        line.split()[0]: line.split()[1:3]
+        for line in READING.printed("multiple-compare").splitlines()[1:]
     }
     assert stored.keys() == expected.keys()
     for name, (by_equations, by_solver) in stored.items():
@@ -177,3 +180,23 @@ def test_fig_5_middle_ball_turns_round():
     assert change["C"] < 0 < change["D"]
     v1, v2, v3 = path["F"][1][:3]
     assert v1 < v2 < v3
+
+
+def test_exercises():
+    """The lead of ball 2, the energy lost, and its four parts, from the reference solver's path."""
+    exact, _ = solved(*EXAMPLES[0])
+    path, impulses = np.array(exact.path, float), np.array(exact.path_impulses, float)
+    rows = [k for k, event in enumerate(exact.events, 1) if event[0] != "maximum_compression"]
+    assert float(CHAPTER.glued["multiple-lead"]) == pytest.approx(
+        impulses[rows[1], 1] - impulses[rows[0], 1]
+    )
+    for number in (1, 2):
+        stated = float(CHAPTER.glued[f"multiple-tau3-{number}"])
+        assert stated == pytest.approx(impulses[rows[number - 1], 1], abs=6e-5)
+    lost = (path[0] @ path[0] - path[-1] @ path[-1]) / 2
+    works = [float(x) for x in re.findall(r"[\d.]+", CHAPTER.glued["multiple-works"])]
+    assert float(CHAPTER.glued["multiple-loss"]) == pytest.approx(lost, abs=6e-5)
+    assert (1 - 0.3**2) * sum(works) == pytest.approx(lost, abs=2e-4)
+    assert 0.7 < works[1] / sum(works) < 0.75  # "almost three quarters"
+    # Two balls alone and a straight line: contact 1-2 absorbs half of 0.2 m/s times its impulse.
+    assert works[0] == pytest.approx(0.1 * impulses[1, 0], abs=6e-5)

@@ -16,7 +16,7 @@ from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequen
 from cradle.closed_form import largest_ratios
 
 FIG_8 = Chain([1] * 4, [1, 0.5, 0, 0], 1)
-CHAPTER = Chapter("n_balls")
+CHAPTER, READING = Chapter("n_balls"), Chapter("reading")
 
 
 def random_chain(seed, n):
@@ -105,7 +105,7 @@ def test_eq_53_at_the_bound_the_rest_is_one_body(n):
 
 
 def test_end_progress_is_as_exact_as_its_arguments():
-    rows = CHAPTER.printed("root-errors").splitlines()[2:]
+    rows = READING.printed("root-errors").splitlines()[2:]
     errors = {number(row.split()[0]): [number(x) for x in row.split()[1:]] for row in rows}
     assert all(ours < 3e-16 for _, ours in errors.values())
     # The school formula loses as many digits as Q is small.
@@ -223,13 +223,13 @@ def test_fig_8_three_readings():
         assert table.loc[reading, "collisions"] == sum(kind == "end" for kind, _ in exact.events)
 
 
-def test_exercise_3_the_march_stops_less_than_two_steps_late():
+def test_the_march_stops_less_than_two_steps_late():
     """Velocities are exact at each step; the work, with the first closing speed, is too large."""
     exact = truth.solve([1] * 4, [1, "0.5", 0, 0], 1, "0.1")
     row = exact.events.index(("end", 0)) + 1
     end, at_end = float(exact.path_impulses[row][0]), float(exact.path[row][1])
     rate = (at_end - 0.5) / end  # of v2 over the first impulse: one straight line up to there
-    for line in CHAPTER.printed("exercise-3").splitlines():
+    for line in READING.printed("n-balls-march-code").splitlines():
         step, error = (number(text) for text in re.findall(r"(?:step|error) ([^\s:]+)", line))
         assert 0 < error / abs(rate) / step < 2
 

@@ -367,3 +367,17 @@ def test_light_ball_has_no_limit():
         assert abs(v3 - 1).max() < 2 * r
         assert v2.min() < 0.05
         assert v2.max() > 0.95
+
+
+def test_exercises():
+    """Where ball 1 turns, where a third collision sets in, and ball 3 with all that is left."""
+    assert GLUED["ex-1"] == f"{1 - ALPHA:.2f}"
+    assert GLUED["ex-border"] == f"{brentq(lambda e: count(1, 1, e) - 2.5, 0.2, 0.9):.3f}"
+    for e in (0.3, 0.6, 1.0):
+        assert reference(1, 1, e).velocities[1] > 0  # ball 2 never goes back
+    assert reference(1, 1, 0.3).velocities[0] > 0
+    r1, r2 = (float(GLUED[f"ex-{name}"]) for name in ("r1", "r2"))
+    v = solve([1 / r1, 1, 1 / r2], [1, 0, 0], ["0.9", "0.3"], "0.15").velocities
+    assert [float(x) for x in v[:2]] == pytest.approx([0, 0], abs=1e-3)
+    left = float(v[2]) ** 2 * r1 / r2
+    assert float(GLUED["ex-part"]) == pytest.approx(left, abs=2e-3)

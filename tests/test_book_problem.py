@@ -5,14 +5,15 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from chains import uniform
-from chapters import Chapter
+from chapters import Chapter, number
 from scipy.optimize import brentq
+from test_book_n_balls import outcome
 from truth import solve
 
-from cradle import Chain, ImpulseCorrelation, collide
+from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequences
 
 EQUAL = Chain([1, 1, 1], [1, 0, 0], 1)
-CHAPTER = Chapter("problem")
+CHAPTER, READING = Chapter("problem"), Chapter("reading")
 
 
 def elastic(m1, v1, m2, v2):
@@ -171,15 +172,50 @@ def test_fig_own_problem_definitions():
         assert energy(2 * compressed) == pytest.approx((4 + a**2) / (2 - a) ** 2, rel=1e-13)
         assert energy(left / 2) == pytest.approx((2 + a**2) / (2 - a) ** 2, rel=1e-13)
         assert energy(right) == pytest.approx(1, rel=1e-13)
-    assert CHAPTER.glued["poisson-most"] == f"{(4 + 0.499**2) / (2 - 0.499) ** 2:.3f}"
-    assert CHAPTER.glued["newton-least"] == f"{2 / 4:.3f}"
+    assert READING.glued["problem-poisson-most"] == f"{(4 + 0.499**2) / (2 - 0.499) ** 2:.3f}"
+    assert READING.glued["problem-newton-least"] == f"{2 / 4:.3f}"
 
 
 def test_exercise_2_heavy_middle():
     rows = {
         line.split()[0]: [float(x) for x in line.split()[1:]]
-        for line in CHAPTER.cells["solution-2"].outputs[0].data["text/plain"].splitlines()[1:3]
+        for line in READING.printed("problem-heavy").splitlines()[1:3]
     }
     for name, ratio in (("sequential", 0), ("between", 1 / 6)):
         v = [float(x) for x in solve([1, 2, 1], [1, 0, 0], 1, ratio).velocities]
         np.testing.assert_allclose(rows[name][1:4], v, rtol=0, atol=5e-5)
+
+
+def test_what_the_rules_matter():
+    """The table of the model's parts, by the reference solver and the textbook solver."""
+    fig_8 = [1] * 4, [1, "0.5", 0, 0], 1, "0.1"
+
+    def after(velocities=fig_8[1], **options):
+        found = solve([1] * 4, velocities, 1, "0.1", number=float, **options)
+        return np.array([float(v) for v in found.velocities])
+
+    image = -after([0, 0, "-0.5", -1])[::-1]
+    assert CHAPTER.glued["mirror"] == f"{abs(image - after()).max():.2f}"
+    places = [after(meeting=x) for x in np.linspace(0, 1, 11).tolist()]
+    assert number(CHAPTER.glued["meeting"]) == pytest.approx(np.ptp(places, 0).max(), abs=6e-4)
+    read = [outcome(way).velocities for way in DRIVES]
+    spread = np.ptp([[float(v) for v in velocities] for velocities in read], 0).max()
+    assert CHAPTER.glued["readings"] == f"{spread:.2f}"
+    ten = {}
+    for name in paper_sequences():
+        chain, model = paper_chain(name, excess="saturate")
+        balls = list(chain.masses), list(chain.velocities), list(chain.restitution)
+        found = [
+            solve(*balls, model.forward, model.backward, meeting=x, excess="saturate", number=float)
+            for x in (0.0, 0.5, 1.0)
+        ]
+        moved = np.ptp([[float(v) for v in one.velocities] for one in found], 0).max()
+        ten[name] = moved, found[1].held
+    assert number(CHAPTER.glued["meeting-ten"]) == pytest.approx(
+        max(moved for moved, _ in ten.values()), rel=0.02
+    )
+    held = sum(bool(contacts) for _, contacts in ten.values())
+    assert CHAPTER.glued["held"] == ["none", "one", "two", "three"][held]
+
+
+DRIVES = ("forward", "backward"), ("forward", "forward"), ("backward", "backward")

@@ -4,19 +4,23 @@ The second routes are the independent solver in truth.py, the path of the packag
 (whose loop knows no formula of this chapter), and integrals worked out at fifty digits.
 """
 
+import contextlib
+import functools
+import io
 import math
 
 import mpmath
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
-from chapters import Chapter, number
+from chapters import Chapter, code, number
+from chapters import run as run_cells
 from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 from cradle.closed_form import final_impulses, one_collision_each, three_balls
 
-CHAPTER = Chapter("three_balls")
+CHAPTER, READING = Chapter("three_balls"), Chapter("reading")
 # The chapter's example.
 EXAMPLE = ([1.0, 1.5, 1.0], [1.0, 0.2, 0.0], [0.8, 0.7], 0.25)
 CLOSE = {"rtol": 1e-12, "atol": 1e-13}
@@ -198,7 +202,7 @@ def test_eqs_24_to_33_on_the_grid():
     at_zero = ((part == 1) & (w == 0))[one]
     assert difference[~at_zero].max() < 1e-12
     assert difference[at_zero].max() < 1e-7
-    assert number(CHAPTER.glued["three-balls-grid-zero"]) == at_zero.sum()
+    assert number(READING.glued["three-balls-grid-zero"]) == at_zero.sum()
 
 
 @pytest.mark.parametrize("e3", [0.2, 0.5, 1.0])
@@ -411,3 +415,59 @@ def test_one_outcome_belongs_to_many_parameters():
     assert [sum(x.collisions) for x in twice] == [3, 2]
     outcomes = [[float(v) for v in x.velocities] for x in twice]
     np.testing.assert_allclose(*outcomes, rtol=0, atol=1e-7)  # seven digits of the ratio
+
+
+@functools.cache
+def typed_in():
+    """Run what a reader sees, and nothing else; return the names."""
+    shown = [
+        c
+        for c in code("three_balls")
+        if not {"hide-input", "hide-cell", "remove-cell"} & set(c.metadata.get("tags", ()))
+    ]
+    with contextlib.redirect_stdout(io.StringIO()):
+        return run_cells(shown, {})
+
+
+def test_shown_cells_use_no_hidden_name():
+    """What a reader sees can be typed in: it runs, and ends with the chapter's numbers."""
+    names = typed_in()
+    assert len(names["fits"]) == 3
+    *_, (_, _, velocities, _) = names["path"]
+    np.testing.assert_allclose(velocities, run(*EXAMPLE).velocities, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(names["outcome"][0], [0, 0, 1], atol=1e-14)
+
+
+def test_the_readers_solver_against_the_reference_solver():
+    """Its path is that of the rules; its functions have some thirty lines in all."""
+    names = typed_in()
+    rng = np.random.default_rng(77)
+    repeated = 0
+    for _ in range(60):
+        m, e = uniform(rng, 0.3, 3, 3), uniform(rng, 0.3, 1, 2)
+        v = [1, uniform(rng, 0, 0.8), 0]
+        ratio = uniform(rng, 0, 1) * min(m[2] / (m[1] + m[2]), m[0] / (m[0] + m[1]))
+        *_, (_, _, found, impulses) = names["three_balls"](m, v, e, ratio)
+        exact = solve(list(m), v, list(e), ratio)
+        np.testing.assert_allclose(found, [float(x) for x in exact.velocities], atol=1e-10)
+        np.testing.assert_allclose(impulses, [float(x) for x in exact.impulses], atol=1e-10)
+        repeated += sum(exact.collisions) > 2
+    assert repeated > 5
+    lines = sum(
+        len(cell.source.splitlines())
+        for cell in code("three_balls")
+        if cell.id in ("rates", "ways", "loop")
+    )
+    assert lines < 65
+
+
+def test_exercises_1_and_2():
+    for name, v2 in (("ratio", 0.1), ("low", 0.09), ("high", 0.11)):
+        stated = CHAPTER.glued[f"three-balls-ex-{name}"]
+        after = solve([1, 1, 1], [1, 0, 0], 1, stated).velocities
+        assert float(after[1]) == pytest.approx(v2, abs=4e-4)
+    a = 0.25
+    gain = 2 / (2 - a)
+    newton = (1 - gain) ** 2 + 2 * (gain / 2) ** 2
+    assert CHAPTER.glued["three-balls-ex-newton"] == f"{newton:.3f}"
+    assert CHAPTER.glued["three-balls-ex-poisson"] == f"{(4 + a**2) / (2 - a) ** 2:.3f}"

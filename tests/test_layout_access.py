@@ -169,7 +169,7 @@ def test_equations_wait_until_they_are_seen(browser, html: Path):  # noqa: F811
     """At first those in sight are set, and a voice can read all of them; on paper all are set."""
     tab = browser.new_page(viewport={"width": 390, "height": 800})
     tab.set_default_timeout(PATIENCE)
-    tab.goto((html / "book" / "three_balls.html").as_uri())
+    tab.goto((html / "book" / "reading.html").as_uri())
     tab.wait_for_function("document.querySelector('mjx-container svg')")
     tab.evaluate("MathJax.startup.promise")
     count = "document.querySelectorAll('mjx-container{}').length"

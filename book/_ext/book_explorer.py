@@ -86,12 +86,14 @@ def story() -> list[dict[str, Any]]:
     meeting["speeds"] = [1.0, 0.5, 0.0, 0.0]
     told = [
         ("one", "Pull back one ball", equal(5, 0.0), "inside",
-         "One comes, one goes. This is the toy of the textbooks: the balls collide one pair after "
-         "the other. In the paper's terms, the ratio is 0. Steel balls that touch do not do this: "
+         "One ball strikes, and one leaves at the other end. This is the toy of the textbooks: "
+         "the balls collide one pair after the other. In the paper's terms, the ratio is 0. "
+         "Steel balls that touch do not do this: "
          "if contacts push by Hertz's law and lose no energy, balls 1 to 5 leave with "
          f"{steel_balls()} of the striker's speed."),
         ("two", "Pull back two balls", equal(5, 0.0, 2), "inside",
-         "Two come, two go. Still the ratio 0. Pull back three, and one of them never stops."),
+         "Two balls strike, and two leave. The ratio is still 0. Pull back three, and one of them "
+         "never stops."),
         ("small", "A small ratio", equal(5, 0.15), "inside",
          "Now each inner ball passes some of a push on while it is still being pushed. That share "
          "is the ratio. The last ball still takes most of the motion, but the first one comes back "

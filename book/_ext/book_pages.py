@@ -237,19 +237,20 @@ def break_code_in_tables(
 
 
 def letter_figures(app: Sphinx, env: BuildEnvironment) -> list[str]:
-    """Give the figures of the appendices the numbers A.1, A.2, ..., through all pages."""
+    """Give figures and equations of the appendices the numbers A.1, A.2, ..., through all pages."""
     appendices = [
         page
         for page in env.toc_fignumbers
         if page != app.config.root_doc and not env.toc_secnumbers.get(page)
     ]
-    names = [
-        (page, name)
-        for page in appendices
-        for name in env.toc_fignumbers[page].get("figure", ())
-    ]
-    for number, (page, name) in enumerate(names, start=1):
-        env.toc_fignumbers[page]["figure"][name] = ("A", number)
+    for kind in ("figure", "displaymath"):
+        names = [
+            (page, name)
+            for page in appendices
+            for name in env.toc_fignumbers[page].get(kind, ())
+        ]
+        for number, (page, name) in enumerate(names, start=1):
+            env.toc_fignumbers[page][kind][name] = ("A", number)
     return appendices
 
 
