@@ -623,7 +623,7 @@ def late(problem, steps, room=20_000, **limits):
     limit = max(steps - 2 * room, 0)
     inputs = kernel.Inputs(*(np.array([part], float) for part in problem[:5]))
     options = kernel.Options(problem.meeting, max(limit, 1), False)
-    job = drive.Job(inputs, 1, options, large=limit > 100_000).run()
+    job = drive.Job(inputs, drive.outputs(1, n), options, large=limit > 100_000).run()
     assert job.status == drive.UNFINISHED
     last = collections.deque(maxlen=room)
 

@@ -401,7 +401,7 @@ def outcome_rows(clock, _):
 def door_rows(clock, _):
     """Yield what surrounds an impact: a chain that is made, a strike of a swing to its end."""
     scene = SCENES["five equal"]
-    m, v, e = (part.tolist() for part in (scene.masses, scene.velocities, scene.restitution))
+    m, v, e = (list(part) for part in (scene.masses, scene.velocities, scene.restitution))
     still, times = Chain(m, [0.0] * len(m), e), [0.0, 10.0]
 
     def swings():
