@@ -141,8 +141,6 @@ def call(function: ast.expr, given: list[str]) -> str:
     name = called(function)
     if name == "len":
         return f"{given[0]}.length"
-    if name == "bare":
-        return given[0]
     if name in ("max", "min"):
         while len(given) > 2:
             given[:2] = [f"{name}({given[0]}, {given[1]})"]

@@ -11,12 +11,8 @@ from cradle.kernel.state import (
     LIMITS,
     REFUSED,
     UNSOUND,
-    Record,
-    State,
     apart,
-    bare,
     door,
-    once,
 )
 
 
@@ -102,22 +98,8 @@ def hand_out(k, n, out, ball, contact, tally):
         out.held[c] = contact[c].held
 
 
-@once
-def bare_state(area):
-    """Return the work area as the event loop hands it on."""
-    record = area.record
-    return State(
-        bare(area.ball), bare(area.contact), bare(area.run), bare(area.level), bare(area.memory),
-        bare(area.tally),
-        Record(
-            bare(record.kinds), bare(record.contacts), bare(record.velocities),
-            bare(record.impulses),
-        ),
-    )  # fmt: skip
-
-
 @door
-def batch(begin, resumed, n, inputs, options, out, area, effort):
+def batch(begin, resumed, n, inputs, options, out, state, effort):
     """Solve the chains of `out` from number `begin` on; return the next one's number, and status.
 
     It stops at the first chain whose status is not FINISHED: PAUSED, when `effort` (contacts
@@ -128,8 +110,7 @@ def batch(begin, resumed, n, inputs, options, out, area, effort):
     by_m, by_v = min(len(inputs.m), 2) - 1, min(len(inputs.v), 2) - 1
     by_e = min(len(inputs.e), 2) - 1
     by_f, by_b = min(len(inputs.forward), 2) - 1, min(len(inputs.backward), 2) - 1
-    state = bare_state(area)
-    state.tally[0].effort, state.tally[0].capacity = effort, len(area.record.kinds)
+    state.tally[0].effort, state.tally[0].capacity = effort, len(state.record.kinds)
     for k in range(begin, rows):
         chain = Inputs(
             inputs.m[k * by_m], inputs.v[k * by_v], inputs.e[k * by_e],

@@ -22,10 +22,6 @@ if "jit" not in globals():
         """Mark a function that is called from one place: a part of its caller."""
         return function
 
-    def bare(things: Any) -> Any:
-        """Hand on a sequence; compiled code passes its address (`cradle.runtime.addresses`)."""
-        return things
-
     def door(function: Any) -> Any:
         """Mark the function that is called from outside, whose compiled code is kept on disk."""
         return function

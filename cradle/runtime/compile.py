@@ -175,7 +175,7 @@ def compiled() -> Any | None:
     module.__file__ = str(path or name)
     kept = {"door"} if path is not None else set()
     marks = {mark: numba.njit(**options, cache=mark in kept) for mark, options in _MEANINGS.items()}
-    vars(module).update(marks, unsigned=np.uint64, bare=marks["once"](lambda things: things))
+    vars(module).update(marks, unsigned=np.uint64)
     sys.modules[name] = module
     exec(compile(_compilable(), module.__file__, "exec"), vars(module))
     # numba compiles a function anew for each whole number that is written down in a call; not so
