@@ -197,6 +197,8 @@ def test_a_fit_and_a_film(tmp_path, monkeypatch):
         assert printed(code) == told
     run(last)
     table = Path("shots.csv").read_text(encoding="utf-8").splitlines()
+    with pytest.raises(ValueError, match="restitution has no 'AC', which set BAC needs"):
+        printed(PAIRS[FIT][0][0])
     lines = [line for line in table if line[0] != "#"]
     rows = [row for row in csv.DictReader(lines) if row["set"] == "BAC"]
     before, after, error = map(numbers, PAIRS[FIT][1][1].splitlines())
