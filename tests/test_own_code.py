@@ -1,0 +1,207 @@
+"""The page "Use it from your own code": its blocks are copied, run, and print what it shows."""
+
+import contextlib
+import csv
+import io
+import json
+import re
+import shlex
+import subprocess
+import sys
+import types
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from script import Script
+
+from cradle import Chain, ImpulseCorrelation, collide, textbook
+from cradle.tables import data_folder
+
+ROOT = Path(__file__).parents[1]
+SECTIONS = re.split(r"(?m)^## ", (ROOT / "book" / "own_code.md").read_text(encoding="utf-8"))[1:]
+#: Title of the section -> its blocks, each one its language and its text.
+BLOCKS = {
+    section.partition("\n")[0]: re.findall(r"```(\w+)\n(.*?)```", section, re.DOTALL)
+    for section in SECTIONS
+}
+ONE, MANY, ENGINE, WEB, FIT = BLOCKS
+#: Python that prints, and what the page shows of it.
+PAIRS = {
+    title: [(code, told) for (kind, code), (_, told) in zip(parts, parts[1:]) if kind == "python"]
+    for title, parts in BLOCKS.items()
+}
+
+
+def printed(code):
+    """What a block prints, run alone."""
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        exec(compile(code, "own_code.md", "exec"), {"__name__": "__main__"})
+    return said.getvalue()
+
+
+def numbers(text):
+    return [float(one) for one in re.findall(r"-?\d+\.\d*", text)]
+
+
+def test_every_block_is_run_here():
+    kinds = {title: " ".join(kind for kind, _ in parts) for title, parts in BLOCKS.items()}
+    assert kinds == {
+        ONE: "python text",
+        MANY: "python text",
+        ENGINE: "python text",
+        WEB: "sh html text",
+        FIT: "sh python text python text sh",
+    }
+
+
+@pytest.mark.parametrize("title", [ONE, MANY])
+def test_plain_blocks(title):
+    ((code, told),) = PAIRS[title]
+    assert printed(code) == told
+
+
+def test_three_balls_by_the_textbook():
+    found = textbook.solve([1, 1, 1], [1, 0, 0], [0.95, 0.95], [0.15]).path[-1]
+    assert numbers(BLOCKS[ONE][1][1]) == np.round(found, 3).tolist()
+
+
+def test_the_best_ball_between_two_others():
+    """At ratio zero it is the geometric mean; each speed by the textbook."""
+    rows = [numbers(line) for line in BLOCKS[MANY][1][1].splitlines()]
+    assert rows[0] == [0, 0.5, round((2 / 1.5) * (1 / 0.75), 3)]
+    assert [row[0] for row in rows] == [0, 0.05, 0.1, 0.15]
+    for ratio, middle, speed in rows:
+        found = [
+            float(textbook.solve([1, m, 0.25], [1, 0, 0], [1, 1], [ratio]).path[-1][2])
+            for m in (middle / 1.05, middle, middle * 1.05)
+        ]
+        assert found[1] == pytest.approx(speed, abs=6e-4)
+        assert found[1] > max(found[0], found[2])
+
+
+class Vec(NamedTuple):
+    """Two coordinates, as pymunk gives them."""
+
+    x: float
+    y: float
+
+
+class Body:
+    """A ball on which no force acts: as much of pymunk's as the page asks for."""
+
+    def __init__(self, mass, moment):
+        self.mass, self.position, self.velocity = mass, (0.0, 0.0), (0.0, 0.0)
+
+    def __setattr__(self, name, value):
+        super().__setattr__(name, Vec(*value) if isinstance(value, tuple) else value)
+
+    def apply_impulse_at_world_point(self, impulse, point):
+        assert point == self.position
+        x, y = self.velocity
+        self.velocity = x + impulse[0] / self.mass, y + impulse[1] / self.mass
+
+
+class Space:
+    """A world without contacts."""
+
+    def __init__(self):
+        self.bodies = []
+
+    def add(self, *parts):
+        self.bodies += [part for part in parts if isinstance(part, Body)]
+
+    def step(self, duration):
+        for body in self.bodies:
+            (x, y), (u, v) = body.position, body.velocity
+            body.position = x + duration * u, y + duration * v
+
+
+class Circle:
+    """A shape; in a world without contacts it does nothing."""
+
+    def __init__(self, body, radius):
+        self.body, self.radius = body, radius
+
+
+PLAIN = types.SimpleNamespace(
+    Body=Body, Space=Space, Circle=Circle, ShapeFilter=types.SimpleNamespace
+)
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "plain"])
+def test_a_row_in_an_engine(engine, monkeypatch):
+    """The block as it stands, in pymunk where it is installed, and in an engine of our own."""
+    if engine == "plain":
+        monkeypatch.setitem(sys.modules, "pymunk", PLAIN)
+    else:
+        pytest.importorskip("pymunk", reason='not installed; pip install -e ".[engines]"')
+    ((code, told),) = PAIRS[ENGINE]
+    assert printed(code) == told
+
+
+def test_the_row_does_what_collide_does():
+    hit, velocities = BLOCKS[ENGINE][1][1].splitlines()
+    trace = collide(Chain([1] * 4, [2.5, 0, 0, 0], 0.95), ImpulseCorrelation(0.13))
+    assert numbers(velocities) == trace.velocities.round(3).tolist()
+    assert numbers(hit) == [0.3 / 2.5, round(float(trace.impulses.max()), 2)]
+
+
+def test_a_web_page(tmp_path):
+    """The folder that the page's command makes, and its script, in V8; a document stands in."""
+    (_, command), (_, html), (_, told) = BLOCKS[WEB]
+    program, *given, folder = shlex.split(command)
+    assert (program, folder) == ("python", "my-page")
+    subprocess.run([sys.executable, *given, str(tmp_path)], cwd=ROOT, check=True)
+    assert {"index.js", "README.md", "example.html"} <= {path.name for path in tmp_path.iterdir()}
+    start, name, end = re.search(r'<p>(.*?)<output id="(\w+)"></output>(.*?)</p>', html).groups()
+    script = re.search(r'<script type="module">(.*?)</script>', html, re.DOTALL)[1]
+    names, address, body = re.search(
+        r'import (\{.*?\}) from "\./(.*?)";(.*)', script, re.S
+    ).groups()
+    module, count = re.subn(
+        r"(?m)^export const ", "const ", (tmp_path / address).read_text(encoding="utf-8")
+    )
+    assert count == 1
+    page = Script(f"""const parts = {json.dumps({name: {}})}; let hit = null;
+        (() => {{ {module}
+          const document = {{ getElementById: (id) => parts[id] }};
+          (({names}) => {{ {body.replace("const hit", "hit")} }})({names}); }})();""")
+    shown, velocities = page("() => [parts, hit.velocities]")
+    page.context.close()
+    assert f"{start}{shown[name]['textContent']}{end}\n" == told
+    # "those of the first block above, to the last bit"
+    trace = collide(Chain([1, 1, 1], [1, 0, 0], 0.95), ImpulseCorrelation(0.15))
+    assert velocities == trace.velocities.tolist()
+    assert numbers(told.replace("m/s.", "")) == numbers(BLOCKS[ONE][1][1])
+
+
+def test_a_fit_and_a_film(tmp_path, monkeypatch):
+    """From the template to a ratio, and from a film to velocities: by Python and by command."""
+    monkeypatch.chdir(tmp_path)
+    film = (data_folder() / "video_synthetic.txt").read_text(encoding="utf-8")
+    Path("film.txt").write_text(film, encoding="utf-8")
+
+    def run(command):
+        program, *given = shlex.split(command)
+        assert program == "cradle"
+        *given, arrow, file = given
+        with Path(file).open({">": "w", ">>": "a"}[arrow], encoding="utf-8") as out:
+            subprocess.run([sys.executable, "-m", "cradle", *given], stdout=out, check=True)
+
+    first, last = [code for kind, code in BLOCKS[FIT] if kind == "sh"]
+    run(first)
+    for code, told in PAIRS[FIT]:
+        assert printed(code) == told
+    run(last)
+    table = Path("shots.csv").read_text(encoding="utf-8").splitlines()
+    with pytest.raises(ValueError, match="restitution has no 'AC', which set BAC needs"):
+        printed(PAIRS[FIT][0][0])
+    lines = [line for line in table if line[0] != "#"]
+    rows = [row for row in csv.DictReader(lines) if row["set"] == "BAC"]
+    before, after, error = map(numbers, PAIRS[FIT][1][1].splitlines())
+    assert [round(float(row["before"]), 2) for row in rows] == before
+    assert [round(float(row["after"]), 2) for row in rows] == after
+    assert [round(float(row["sigma"]), 2) for row in rows] == error
