@@ -23,7 +23,7 @@ TIE = 1e-9
 
 @dataclass(frozen=True, eq=False, init=False)
 class Pendulums:
-    """How the balls hang: strings, gravity, gaps, and the damping of the air.
+    """How the balls hang: strings, gravity, gaps, and the damping of the swing.
 
     Parameters
     ----------
