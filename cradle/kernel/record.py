@@ -10,16 +10,12 @@ from cradle.kernel.state import LIMITS, MAXIMUM_COMPRESSION, apart, jit
 
 
 @jit
-def velocity(i, before, after, ball, unit):
-    """Return the velocity of ball i in the caller's units, from the impulses of its contacts.
+def velocity(b, change, unit):
+    """Return the velocity of a ball in the caller's units, from what impulses have changed it by.
 
     One that has not been touched is as given.
     """
-    b = ball[i]
-    impulse = minus(before, after)
-    if impulse.real == 0.0:
-        return b.v
-    return plus(b.start, times(impulse, b.inverse)).real / unit
+    return b.v if change.real == 0.0 else plus(b.start, change).real / unit
 
 
 @apart
@@ -32,8 +28,8 @@ def settle(n, ball, contact, unit):
     before = ZERO
     for i in range(n):
         after = contact[i].p if i < n - 1 else ZERO
-        ball[i].after = velocity(i, before, after, ball, unit)
         ball[i].x = times(minus(before, after), ball[i].inverse)
+        ball[i].after = velocity(ball[i], ball[i].x, unit)
         before = after
     first = 0
     while first < n:
@@ -62,7 +58,8 @@ def write(k, kind, c, n, state):
     before = ZERO
     for i in range(n):
         after = contact[i].x if i < n - 1 else ZERO
-        velocities[i] = velocity(i, before, after, ball, tally.unit)
+        change = times(minus(before, after), ball[i].inverse)
+        velocities[i] = velocity(ball[i], change, tally.unit)
         if i < n - 1:
             impulses[i] = math.ldexp(after.real, tally.shift + tally.mass_shift)
         before = after
