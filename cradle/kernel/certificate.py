@@ -2,37 +2,36 @@
 
 import math
 
-from cradle.kernel.numbers import ZERO, minus, plus, times
+from cradle.kernel.numbers import minus, plus
 from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, PULL, apart
 
 
 @apart
 def certify(n, ball, contact, tally):
-    """Return what the outcome breaks, or 0; each sum within the rounding of its terms.
+    """Return what a settled outcome breaks, or 0; each sum within the rounding of its terms.
 
     The loop follows closing speeds and works; velocities come from impulses alone.  So it is a
     check of all of these that the velocities part as the closing speeds say, and that the energy
     lost, the sum of impulse times mean closing speed, is what the contacts keep back, (1 - e^2) of
-    the work that each absorbed.  Momentum and order are those of
-    the velocities as they are handed out.
+    the work that each absorbed.  Momentum and order are those of the
+    velocities as they are handed out.
     """
     unit = tally.unit
     momentum = terms = grain = 0.0
     lost = kept = absorbed = energy = 0.0
     strongest = weakest = least = 0.0
-    speed = plus(ball[0].start, times(minus(ZERO, contact[0].p), ball[0].inverse))
+    speed = plus(ball[0].start, ball[0].x)
     for i in range(n):
         b = ball[i]
-        after = contact[i].p if i < n - 1 else ZERO
+        push = contact[i].p.real if i < n - 1 else 0.0
         change = b.after * unit - b.v * unit
         momentum += b.m.real * change
-        terms += b.m.real * (abs(change) + abs(b.start.real)) + abs(after.real)
+        terms += b.m.real * (abs(change) + abs(b.start.real)) + abs(push)
         grain += b.m.real * 5e-324 * unit  # no finer velocity is a float
         if i == n - 1:
             break
         k, right = contact[i], ball[i + 1]
-        onward = contact[i + 1].p if i < n - 2 else ZERO
-        next_speed = plus(right.start, times(minus(k.p, onward), right.inverse))
+        next_speed = plus(right.start, right.x)
         closing = minus(speed, next_speed).real
         spread = abs(speed.real) + abs(next_speed.real) + tally.fastest
         slack = LIMITS.sound * spread
@@ -41,9 +40,9 @@ def certify(n, ball, contact, tally):
         if (b.after - right.after) * unit > LIMITS.tie * spread:
             return ORDER
         speed = next_speed
-        work = 0.5 * k.p.real * (minus(b.start, right.start).real + closing)
-        lost += work
-        energy += abs(k.p.real) * (abs(minus(b.start, right.start).real) + abs(closing))
+        first = minus(b.start, right.start).real
+        lost += 0.5 * k.p.real * (first + closing)
+        energy += abs(k.p.real) * (abs(first) + abs(closing))
         kept += (1.0 - k.square.real) * k.a.real
         absorbed += k.a.real
         strongest, weakest, least = (

@@ -20,7 +20,7 @@ def velocity(b, change, unit):
 
 @apart
 def settle(n, ball, contact, unit):
-    """Leave the velocities in `after`, in the caller's units.
+    """Leave changes of velocity in `x`, velocities in `after`, these in the caller's units.
 
     Balls that move as one, or whose order is lost in the last of 32 digits, have one velocity:
     that of the ball which impulses have changed least.
