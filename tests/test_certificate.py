@@ -1,6 +1,8 @@
 """An answer with one thing wrong is refused, and told what: the kernel's `certify`, by itself."""
 
 import math
+from fractions import Fraction
+from itertools import pairwise
 
 import plain
 import pytest
@@ -59,6 +61,27 @@ def test_what_the_event_loop_leaves_is_right(name):
         found = plain.solve(*chain, meeting=meeting, max_events=2000, kernel=KERNEL)
         if found.status == 0:
             assert verdict(found.state) == 0
+
+
+def exactly(number):
+    """A number of 32 digits."""
+    return Fraction(number.real) + Fraction(number.imag)
+
+
+def test_a_cycle_taken_in_part_moves_impulses_and_closing_speeds_alike():
+    """Its rest is what the part leaves, to 32 digits; as a float it left balls apart by 1e-16."""
+    found = plain.solve(
+        [901.5989808350828, 0.002949248338543602, 21.140413781476184, 49.50695790764679],
+        [0.6843239851596099, 0.05682501887918989, 0.5139387761330143, -0.7095331836093497],
+        [0.7579733156338904, 0.0, 0.8588236056820905],
+        [0.3261405056846192, 0.19244200679674547],
+        [0.799189580825052, 0.0004010096605456601],
+        kernel=KERNEL,
+    )
+    assert max(found.collisions) > 800
+    after = [exactly(ball.start) + exactly(ball.x) for ball in found.state.ball]
+    for c, (one, other) in enumerate(pairwise(after)):
+        assert abs(one - other - exactly(found.state.contact[c].u)) < 1e-25
 
 
 @balls
