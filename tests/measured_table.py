@@ -1,0 +1,68 @@
+"""The stored table of times and errors (benchmarks/run.py), and textbook answers beside it."""
+
+import csv
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from chains import ELASTIC
+from chapters import points
+from truth import solve
+
+from cradle import paper_chain
+
+DATA = Path(__file__).parents[1] / "data"
+NUMBERS = (
+    "parameter", "numerical_error", "model_error", "momentum_error", "energy_change",
+    "microseconds", "time_ratio", "repeats", "evaluations",
+)  # fmt: skip
+
+
+@cache
+def table():
+    with (DATA / "benchmarks.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        for name in NUMBERS:
+            row[name] = float(row[name]) if row[name] else None
+        row["velocities"] = np.array([float(v) for v in row["velocities"].split()])
+    return rows
+
+
+def find(group, text="", **equal):
+    """Rows of a group whose setting contains a text and whose columns have given values."""
+    return [
+        row
+        for row in table()
+        if row["group"] == group
+        and text in row["setting"]
+        and all(row[name] == value for name, value in equal.items())
+    ]
+
+
+def masses_and_restitution(scene):
+    if scene in ELASTIC:
+        return np.array(ELASTIC[scene], float), np.ones(len(ELASTIC[scene]) - 1)
+    chain, _ = paper_chain(scene, excess="saturate")
+    return chain.masses, chain.restitution
+
+
+@cache
+def sequential(scene):
+    m, e = masses_and_restitution(scene)
+    start = [1] + [0] * (len(m) - 1)
+    solved = solve(m.tolist(), start, e.tolist(), 0.0)
+    return np.array([float(v) for v in solved.velocities])
+
+
+def fused(scene):
+    """The first ball strikes one body of all the others."""
+    m, e = masses_and_restitution(scene)
+    rest = m[1:].sum()
+    first = (m[0] - e[0] * rest) / (m[0] + rest)
+    return np.array([first] + [(1 + e[0]) * m[0] / (m[0] + rest)] * (len(m) - 1))
+
+
+def marks(ax):
+    """Points drawn one at a time."""
+    return np.array([line[0] for line in points(ax, 1)])
