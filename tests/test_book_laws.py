@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from chains import ELASTIC, HERTZ, LINEAR
 from chapters import Chapter, number, points
+from energy_law import strike
 from measured_table import DATA, find, fused, marks, sequential
 from scipy.optimize import minimize
 from truth import solve
@@ -122,26 +123,6 @@ def test_fig_laws_map():
     assert max(ratios) > 30 * min(ratios)
 
 
-def strike(e, steps):
-    """Velocities and impulses of three equal balls on springs that are stiffer in release.
-
-    The energy law in time: a spring pushes with x^1.5; x follows the closing speed u in
-    compression and u / e^2 in release. A contact that has ended leaves a gap.
-    """
-    v, x, gap, impulse = np.array([1.0, 0, 0]), np.zeros(2), np.zeros(2), np.zeros(2)
-    closed, h, rows = np.full(2, True), 1 / steps, []
-    while closed.any() or (v[:-1] > v[1:]).any():
-        u = v[:-1] - v[1:]
-        x = np.where(closed, x + h * np.where(u > 0, u, u / e**2), 0.0)
-        gap = np.where(closed, 0.0, gap - h * u)
-        closed = np.where(closed, x > 0, gap < 0)
-        push = h * np.where(closed, np.maximum(x, 0.0), 0.0) ** 1.5
-        v = v - np.diff(push, prepend=0, append=0)
-        impulse = impulse + push
-        rows.append(impulse)
-    return v, np.array(rows)
-
-
 def paths_drawn():
     """The arc, and for each law its paths without and with losses."""
     ax = CHAPTER.figures["fig-laws-paths"].axes[0]
@@ -158,7 +139,7 @@ def test_fig_laws_paths_of_the_energy_law_and_of_the_ratio():
     np.testing.assert_allclose(arc[[0, -1]], [[1, 1], [4 / 3, 2 / 3]], rtol=0, atol=1e-7)
     outcomes = {}
     for path, e in ((hertz, 1.0), (lossy, 0.5)):
-        v, by_time = strike(e, 3000)
+        v, by_time = strike([1] * 3, [1, 0, 0], e, 3000)
         outcomes[e] = v
         # Each point drawn is near one of the small steps.
         apart = np.linalg.norm(path[:, None] - by_time[None, ::7], axis=-1).min(axis=1)

@@ -164,7 +164,7 @@ def test_conserving_outcomes_conserve(seed):
         FusedChain(),
         SpringChain(1.0, 1, rtol=1e-12),
         SpringChain([1, 3], 1.5, rtol=1e-12),
-        EnergyDistribution([1, 3], step=0.01),
+        EnergyDistribution([1, 3], rtol=1e-12),
     ],
     ids=lambda model: type(model).__name__,
 )

@@ -18,7 +18,7 @@ from cradle import (
 )
 from cradle.measures import condition_number, effective_ratio
 
-SPRINGS = [SpringChain(), EnergyDistribution(), EnergyDistribution(step=0.1)]
+SPRINGS = [SpringChain(), EnergyDistribution()]
 
 
 # --- types ---------------------------------------------------------------------------------

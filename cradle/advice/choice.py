@@ -185,8 +185,6 @@ class _Wish(NamedTuple):
             method = row.setting.split(",")[0]
             return SpringChain(stiffness, rtol=row.parameter, method=method)
         if row.group == "energy":
-            if row.setting.startswith("step"):
-                return EnergyDistribution(stiffness, step=row.parameter)
             return EnergyDistribution(stiffness, rtol=row.parameter)
         return SequentialCollisions()
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from cradle.chain import Chain
-from cradle.input.values import one_number, refuse_where
+from cradle.input.values import refuse_where
 from cradle.models.compliant import SpringChain
 from cradle.models.motion import CurvedTrace, own_units
 from cradle.models.release import Process
@@ -30,7 +30,7 @@ class EnergyTrace(CurvedTrace):
     step_impulses : ndarray, shape (S, N - 1)
         Impulses so far at each step, N s.
     evaluations : int
-        How often the ratios were evaluated; with a fixed step, the number of steps.
+        How often the ratios were evaluated.
 
     References
     ----------
@@ -39,9 +39,9 @@ class EnergyTrace(CurvedTrace):
     Examples
     --------
     >>> from cradle import Chain, collide
-    >>> trace = collide(Chain([1, 1], [1, 0], 0.5), EnergyDistribution(1.0, step=0.03))
-    >>> trace.evaluations, trace.step_impulses[-1].round(6)
-    (51, array([0.75]))
+    >>> trace = collide(Chain([1, 1], [1, 0], 0.5), EnergyDistribution(1.0))
+    >>> trace.step_impulses[-1].round(6)
+    array([0.75])
     """
 
 
@@ -79,21 +79,14 @@ class EnergyDistribution:
         k of each contact; only ratios count, so they are all 1 if left out.
     exponent : float
         p, at least 1: 1 a linear spring, 3/2 the contact of two elastic spheres (Hertz).
-    step : float, optional
-        Without it the error is controlled (`rtol`).  With it, explicit steps of this impulse at the
-        contact whose impulse grows fastest, in units of reduced mass times closing speed of the
-        fastest closing.  The shares within a step follow from the law with the closing speeds of
-        its start; ends and zeros of u cut a step short.  The energies add up to rounding, but for
-        what a plastic end takes (see `rtol`): up to the part 1e-4 step^2.
     gaps : bool
         Whether a gap must close before an open contact acts.
     rtol : float
         Relative tolerance of the integration.  An impact that goes on with speeds alone below rtol
-        (or 0.01 step) times that of the fastest closing is ended plastically: `Trace.collapsed`, if
-        contacts that have acted would act on.
+        times that of the fastest closing is ended plastically: `Trace.collapsed`, if contacts that
+        have acted would act on.
     max_evaluations : int
-        How often the ratios may be evaluated before the impact is given up; with `step` at least
-        1 / step.
+        How often the ratios may be evaluated before the impact is given up.
 
     Raises
     ------
@@ -117,7 +110,6 @@ class EnergyDistribution:
 
     stiffness: float | Sequence[float] = 1.0
     exponent: float = 1.5
-    step: float | None = None
     gaps: bool = field(default=True, kw_only=True)
     rtol: float = field(default=1e-9, kw_only=True)
     max_evaluations: int = field(default=1_000_000, kw_only=True)
@@ -128,15 +120,6 @@ class EnergyDistribution:
         )
         for name in ("stiffness", "exponent", "rtol"):
             object.__setattr__(self, name, getattr(springs, name))
-        if self.step is not None:
-            step = one_number("step", self.step, "must lie in (0, 1]", 0.0, 1.0, open_low=True)
-            object.__setattr__(self, "step", step)
-            # The fastest closing ends after an impulse of 1 in these units, or more.
-            if self.max_evaluations < 1.0 / step:
-                raise ValueError(
-                    f"step = {step!r}; with max_evaluations = {self.max_evaluations} it must be at "
-                    f"least {1.0 / self.max_evaluations:g}, to reach the end of a compression"
-                )
         if not isinstance(self.gaps, bool):
             raise ValueError(f"gaps = {self.gaps!r}; must be True or False")
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import itertools
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cradle.input.values import Vector
-from cradle.models.motion import Motion, TooManyEvaluations
+from cradle.models.motion import Motion
 
 if TYPE_CHECKING:
     from cradle.models.energy import EnergyDistribution
@@ -25,14 +24,12 @@ class Process(Motion):
 
     def __init__(self, m: Vector, u: Vector, k: Vector, e: Vector, model: EnergyDistribution):
         super().__init__(m, u, k, model.exponent, model.rtol)
-        self.e, self.q, self.step, self.gaps = e, self.p + 1.0, model.step, model.gaps
+        self.e, self.gaps = e, model.gaps
         self.reduced = m[:-1] / (m[:-1] + m[1:]) * m[1:]
         self.weights = np.zeros_like(e)  # dx / (u dt) of each contact, up to the next event
         self.collapsed = False
         #: Largest change of each velocity at an event so far: what rounding was left by.
         self.largest = np.zeros(len(m))
-        #: Speeds that are no more than errors of the integration.
-        self.tiny = self.rtol if self.step is None else 0.01 * self.step
 
     def speeds(self, y: Vector) -> Vector:
         """Return the closing speeds; what is no more than rounding is zero."""
@@ -78,78 +75,11 @@ class Process(Motion):
         """Integrate to the next event; return why it failed, or nothing."""
         released = np.divide(1.0, self.e**2, out=np.ones_like(self.e), where=self.e > 0.0)
         self.weights = np.where(self.closed & ~self.loading, released, self.closed | self.gaps)
-        return super().integrate(method, limit) if self.step is None else self.march(self.step)
-
-    def advice(self) -> str:
-        """Return what makes the steps short: the one that is given, or the integration."""
-        return super().advice() if self.step is None else f" by step = {self.step!r}"
-
-    def march(self, step: float) -> str:
-        """Make one explicit step of the fastest growing impulse, to the next event at most."""
-        if self.evaluations == self.most:
-            raise TooManyEvaluations
-        self.evaluations += 1
-        closed, loading = self.closed, self.loading
-        self.y = self.y.copy()
-        change, d, impulses = self.parts(self.y)
-        u, energy = self.speeds(self.y), self.stored(self.y)
-        time, growth = self.shares(d, u, step)
-        pace = time / step if self.gaps else 0.0
-        # At the part h of the step: speeds u + a h, works (u + a h / 2) h growth.
-        passed = np.concatenate([[0.0], growth, [0.0]])
-        pushes = (passed[:-1] - passed[1:]) / self.m
-        a = pushes[:-1] - pushes[1:]
-        side = np.where(loading, 1.0, -1.0)
-        limits = np.where(closed, _zero(side * u, side * a, 0.0 * a), math.inf)
-        ends = _zero(self.e**2 * energy, growth * u, growth * a)
-        ends = np.where(closed & ~loading, ends, math.inf)
-        closings = _zero(-d, -pace * u, -pace * a) if self.gaps else _zero(-u, -a, 0.0 * a)
-        closings = np.where(closed, math.inf, closings)
-        h = min(step, limits.min(), ends.min(), closings.min())
-
-        mean, before = u + 0.5 * a * h, energy.copy()
-        energy += self.weights * growth * mean * h
-        # What rounding leaves of an energy takes steps too short to be counted.
-        ends[closed & ~loading & (energy <= 4.0 * _EPSILON * before)] = 0.0
-        change += pushes * h
-        impulses += growth * h
-        compression = (self.q * np.maximum(energy, 0.0) / self.k) ** (1.0 / self.q)
-        d[:] = np.where(closed, compression, d + pace * mean * h)
-        self.t += time * h / step
-        self.steps.append((np.array([self.t]), self.y[:, None]))
-        for c in np.flatnonzero(limits <= h).tolist():
-            self.absorbed[c] += energy[c] if loading[c] else -energy[c]
-            if loading[c]:
-                self.record.append((self.t, "maximum_compression", c, self.y))
-            loading[c] = not loading[c]
-        self.settle(np.flatnonzero((ends <= h) | (closings <= h)).tolist())
-        return ""
-
-    def shares(self, d: Vector, u: Vector, step: float) -> tuple[float, Vector]:
-        """Return the time of a step, and the impulses by the law, u frozen, as parts of the step.
-
-        With x = d + s and s = w u t, w = dx / (u dt), the integral of k x^p over the time is
-        P = k (x^q - d^q) / (q w u), q = p + 1.  At d = 0 this is the limit in which the law is 0/0.
-        """
-        k, q, pushed, growing = self.k, self.q, self.closed & (d > 0.0), self.closed & (u > 0.0)
-        d, rate = np.where(pushed, d, 0.0), self.weights * u
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            part = q * rate * step / (k * d**q)
-            times = np.where(
-                rate == 0.0, step / (k * d**self.p), np.expm1(np.log1p(part) / q) * d / rate
-            )
-            times = np.where(pushed, times, (q * step / (k * rate**self.p)) ** (1.0 / q))
-            times = np.where(pushed & (part <= -1.0), -d / rate, times)  # it ends before
-            time = float(times[pushed | growing].min())
-            s = rate * time / d
-            mean = np.where(s == 0.0, 1.0, np.expm1(q * np.log1p(np.maximum(s, -1.0))) / (q * s))
-            passed = np.where(pushed, k * d**self.p * time * mean, 0.0)
-            started = k * rate**self.p * time**q / q
-        return time, np.where(growing & ~pushed, started, passed) / step
+        return super().integrate(method, limit)
 
     def fly(self) -> bool:
         """Fly with all contacts open to the next closing; False if there is none."""
-        return bool(self.gaps and (self.speeds(self.y) > self.tiny).any() and super().fly())
+        return bool(self.gaps and (self.speeds(self.y) > self.rtol).any() and super().fly())
 
     def settle(self, crossed: list[int]) -> None:
         """Open the contacts that have ended, close those that approach, and record both."""
@@ -174,7 +104,7 @@ class Process(Motion):
         self.record += [(self.t, "end", c, self.y) for c in np.flatnonzero(opens).tolist()]
         # What goes on with speeds below the errors of the integration alone may go on for ever.
         speeds = np.maximum(u, np.sqrt(2.0 * self.stored(self.y) / self.reduced))
-        if (speeds <= self.tiny).all():
+        if (speeds <= self.rtol).all():
             self.collapsed = bool(stay.any() or (closes & (self.collisions > 0)).any())
             self.record += [(self.t, "collapse", c, self.y) for c in np.flatnonzero(stay).tolist()]
             self.closed = np.zeros_like(closed)
@@ -203,16 +133,3 @@ class Process(Motion):
             change[first:last] += jump
             impulses[first : last - 1] -= np.cumsum(m * jump)[:-1]
         self.record[-1] = (*self.record[-1][:3], self.y)
-
-
-def _zero(value: Vector, slope: Vector, curvature: Vector) -> Vector:
-    """Return the first h >= 0 at which value + slope h + curvature h^2 / 2 falls through zero.
-
-    A value below zero is rounding, and counts as zero; infinity where there is no such h.
-    """
-    value = np.maximum(value, 0.0)
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        root = np.sqrt(slope**2 - 2.0 * curvature * value)
-        h = np.where(slope < 0.0, 2.0 * value / (root - slope), -(root + slope) / curvature)
-    falls = (slope < 0.0) | (curvature < 0.0)
-    return np.where(falls & ~np.isnan(h), h, math.inf)
