@@ -89,6 +89,23 @@ MISFITS = """() => {
     const letters = node.textContent.trim().length;
     if (lines > 6.5 && letters / lines < 8) say("squeezed column", node, letters / lines, 8);
   }
+  // Words in tables: whole, where the table does not say otherwise.
+  for (const node of document.querySelectorAll(".bd-content :is(td, th)")) {
+    if (!node.checkVisibility() || getComputedStyle(node).overflowWrap === "anywhere") continue;
+    const texts = document.createTreeWalker(node, NodeFilter.SHOW_TEXT);
+    for (let text; (text = texts.nextNode());) {
+      if (!text.parentElement.checkVisibility() || text.parentElement.closest("mjx-container"))
+        continue;
+      for (const { 0: word, index } of text.data.matchAll(/[\\p{L}\\p{N}_]+/gu)) {
+        const range = document.createRange();
+        range.setStart(text, index);
+        range.setEnd(text, index + word.length);
+        const boxes = [...range.getClientRects()].filter(({ width }) => width > 0);
+        const lines = new Set(boxes.map(({ top }) => Math.round(top / 4)));
+        if (lines.size > 1) say("broken word", text, word, lines.size);
+      }
+    }
+  }
   return found;
 }"""
 
@@ -220,6 +237,10 @@ def test_numbers_of_equations_on_a_phone(looked_at: dict):
             "turned map",
         ),
         ("<table><td style='width: 2em'>" + 40 * "word " + "</td></table>", "squeezed column"),
+        (
+            "<table style='width: 1px'><td><p style='overflow-wrap: anywhere'>R1</table>",
+            "broken word",
+        ),
         (
             "<table style='table-layout: fixed; width: 4em'><td><mjx-container display='true'>"
             "<svg style='width: 20em'></svg></mjx-container></td></table>",
