@@ -1,0 +1,171 @@
+"""Sphinx extension: the reader's own solver of three balls, run in the page.
+
+A page asks for it by `<div class="reader-solver"></div>`. The editor holds the lines of the
+chapter's shown cells, read from its notebook, so there is no second copy of them. What comes out is
+compared with `cradle`, asked here.
+
+Python runs in the browser by Brython, which comes from PyPI. Interpreter, `math` and the little of
+numpy that the lines use are one script, loaded when the reader first presses Run. It holds a text
+from which a worker is made: pages from a disk may start workers in no other way, and a worker can
+be stopped.
+"""
+
+import ast
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+
+HERE = Path(__file__).parent
+PLACE = '<div class="reader-solver"'
+#: The functions that the chapter builds up.
+PIECES = ("rates", "way_to_event", "three_balls")
+#: Title; masses, velocities, restitution, ratio. The chapter's own example is put in front.
+CASES = (
+    ("Equal balls, ratio 0: one leaves", ([1, 1, 1], [1, 0, 0], [1, 1], 0)),
+    ("Both contacts lose energy", ([1, 2, 0.5], [1, 0.3, 0.1], [0.6, 0.9], 0.1)),
+    ("A light ball rattles in the middle", ([1, 0.05, 1], [1, 0, 0], [1, 1], 0.2)),
+    ("A ratio above its bound", ([1, 3, 1], [1, 0, 0], [0.9, 0.8], 0.5)),
+)  # fmt: skip
+
+
+def cells() -> list[str]:
+    """Return the code of the chapter's cells."""
+    path = HERE.parent / "three_balls.ipynb"
+    found = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    return [
+        "".join(cell["source"])
+        for cell in found
+        if cell["cell_type"] == "code"
+    ]
+
+
+def lines(codes: list[str]) -> str:
+    """Return the chapter's solver: the cells that define its pieces."""
+    wanted = re.compile(rf"^def ({'|'.join(PIECES)})\(", re.MULTILINE)
+    parts = [code.strip() for code in codes if wanted.search(code)]
+    solver = "\n\n\n".join(["import numpy as np", *parts]) + "\n"
+    if sorted(wanted.findall(solver)) != sorted(PIECES):
+        raise ValueError(
+            f"book/three_balls.ipynb defines not each of {PIECES} once"
+        )
+    return solver
+
+
+def without(solver: str, piece: str) -> str:
+    """Return the solver with the body of one function left to the reader."""
+    (function,) = (
+        node
+        for node in ast.parse(solver).body
+        if isinstance(node, ast.FunctionDef) and node.name == piece
+    )
+    told = ast.get_docstring(function) is not None
+    first = function.body[told]
+    rows = solver.splitlines()
+    rows[first.lineno - 1 : function.end_lineno] = ["    ...  # your lines"]
+    return "\n".join(rows) + "\n"
+
+
+def example(codes: list[str]) -> tuple[list[float], list[float], list[float], float]:  # fmt: skip
+    """Return the numbers of the chapter's example."""
+    (parameters,) = (code for code in codes if code.startswith("masses = "))
+    values: dict[str, Any] = {}
+    exec(parameters, values)
+    return tuple(
+        values[name]
+        for name in ("masses", "velocities", "restitution", "ratio")
+    )
+
+
+def checks(codes: list[str]) -> list[dict[str, Any]]:
+    """Return what is asked of the reader's solver, and the answers of `cradle`."""
+    from cradle import Chain, ImpulseCorrelation, collide
+
+    asked = []
+    for title, (masses, velocities, restitution, ratio) in (
+        ("The chapter's example", example(codes)),
+        *CASES,
+    ):
+        trace = collide(
+            Chain(masses, velocities, restitution),
+            ImpulseCorrelation(ratio, excess="saturate"),
+        )
+        asked.append(
+            {
+                "title": title,
+                "given": [masses, velocities, restitution, ratio],
+                "expected": trace.velocities.tolist(),
+            }
+        )
+    return asked
+
+
+def data() -> dict[str, Any]:
+    """Return what the page shows: the texts to begin with, and the checks."""
+    codes = cells()
+    solver = lines(codes)
+    texts = {piece: without(solver, piece) for piece in PIECES}
+    return {"texts": {**texts, "": solver}, "checks": checks(codes)}
+
+
+def interpreter() -> str:
+    """Return the script of the worker: Brython, the modules it may import, and what it answers."""
+    import brython
+
+    folder = Path(brython.__file__).parent / "data"
+    core, library = (
+        (folder / f"{name}.js").read_text(encoding="utf-8")
+        for name in ("brython", "brython_stdlib")
+    )
+    start = library.index("{", library.index("var scripts"))
+    modules, _ = json.JSONDecoder().raw_decode(library[start:])
+    kept = {name: modules[name] for name in ("$timestamp", "math")}
+    numpy = (HERE / "solver_numpy.py").read_text(encoding="utf-8")
+    kept["numpy"] = [".py", numpy, ["math"]]
+    worker = (HERE / "solver_worker.js").read_text(encoding="utf-8")
+    return (
+        # A worker made from a text has no address, for which Brython asks.
+        'globalThis.__BRYTHON__ = {brython_path: "file:///"};\n'
+        f"{core}\n;globalThis.modules = {json.dumps(kept)};\n{worker}"
+    )
+
+
+def add_scripts(
+    app: Sphinx,
+    page: str,
+    template: str,
+    context: dict[str, Any],
+    doctree: nodes.document | None,
+) -> None:
+    """Give a page with an editor its script and style."""
+    if PLACE in context.get("body", ""):
+        app.add_css_file("solver.css")
+        for script in ("solver_data.js", "solver.js"):
+            app.add_js_file(script, loading_method="defer")
+
+
+def write_data(app: Sphinx, exception: Exception | None) -> None:
+    """Write the data of the page, and the interpreter as a text."""
+    if exception is not None or app.builder.format != "html":
+        return
+    for name, key, value in (
+        ("data", "cradleSolver", data()),
+        ("python", "cradlePython", interpreter()),
+    ):
+        Path(app.outdir, "_static", f"solver_{name}.js").write_text(
+            f"globalThis.{key} = {json.dumps(value)};\n", encoding="utf-8"
+        )
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the callbacks."""
+    app.connect("html-page-context", add_scripts)
+    app.connect("build-finished", write_data)
+    return {
+        "version": "1",
+        "parallel_read_safe": True,
+        "parallel_write_safe": True,
+    }

@@ -1,0 +1,53 @@
+// The worker: runs the reader's lines, then each check, and posts what comes out.
+{
+  const $B = __BRYTHON__;
+  const MOST = 20000; // letters that are shown of what the lines print
+  const FILE = "lines";
+  let said = 0;
+
+  const say = (text) => {
+    if (said < MOST) postMessage({ printed: String(text).slice(0, MOST - said) });
+    said += String(text).length;
+  };
+  // What Brython itself has to say is for its authors; errors are told below.
+  for (const kind of ["log", "error", "info", "warn", "debug"]) console[kind] = () => {};
+
+  // The parts of a traceback that lie in the reader's lines.
+  function told(error) {
+    const trace = $B.error_trace($B.exception(error)).split("\n");
+    const place = /^ {2}File "([^"]*)", line (\d+)/;
+    let own = true;
+    let line = null;
+    const kept = trace.filter((row) => {
+      const [, file, number] = place.exec(row) ?? [];
+      if (file) own = file.endsWith(`#${FILE}`) || file === FILE;
+      if (file && own) line = +number;
+      return own || /^\S/.test(row);
+    });
+    return { error: kept.join("\n").replace(/File "[^"]*", line/g, "Line"), line };
+  }
+
+  const run = (code, name) => $B.runPythonSource(code, name);
+
+  onmessage = ({ data: { code, checks } }) => {
+    $B.use_VFS = true;
+    $B.update_VFS(modules);
+    const only = $B.finders.VFS; // modules come from nowhere else, so nothing is asked of a network
+    Object.assign($B.finders, { path: only, stdlib_static: only });
+    $B.brython({ debug: 1, indexedDB: false });
+    try {
+      $B.pythonToAST(code, FILE); // is it Python at all?
+      console.log = say; // where `print` writes
+      run(code, FILE);
+      checks.forEach(({ given }, number) => {
+        const asked = given.map((value) => JSON.stringify(value)).join(", ");
+        const ask = `import ${FILE}\nfound = repr([float(v) for v in ${FILE}.three_balls(${asked})[-1][2]])`;
+        const check = run(ask, `check_${number}`);
+        postMessage({ number, found: String($B.module_getattr(check, "found")) });
+      });
+      postMessage({ done: true });
+    } catch (error) {
+      postMessage({ ...told(error), done: true });
+    }
+  };
+}

@@ -1,0 +1,179 @@
+// The reader's own solver of three balls: an editor, a button, five checks. The lines run in a worker
+// with Brython, which is loaded at the first press (book/_ext/reader_solver.py writes it), so an
+// endless loop holds up nothing and can be stopped.
+(function (data) {
+  "use strict";
+  const { texts, checks } = data;
+  const PYTHON = document.currentScript.src.replace(/solver\.js.*/, "solver_python.js");
+  const SAME = 1e-9; // m/s
+  const LONG = 4000; // milliseconds after which a run may be endless
+
+  function make(kind, attributes = {}, ...children) {
+    const node = document.createElement(kind);
+    for (const [name, value] of Object.entries(attributes)) {
+      if (name.startsWith("on")) node.addEventListener(name.slice(2), value);
+      else node.setAttribute(name, value);
+    }
+    node.append(...children);
+    return node;
+  }
+
+  let loading = null;
+  const python = () =>
+    (loading ??= new Promise((done, refuse) => {
+      const script = make("script", { src: PYTHON, onload: done, onerror: refuse });
+      document.head.append(script);
+    }));
+
+  const shown = (v) => (v === null ? "no number" : String(+v.toPrecision(6) + 0));
+  const row = (values) => values.map(shown).join(", ").replaceAll("-", "\u2212");
+  const numbers = (text) => JSON.parse(text.replace(/-?(nan|inf)/g, "null"));
+  const agrees = (found, expected) =>
+    found.length === expected.length &&
+    expected.every((v, ball) => found[ball] !== null && Math.abs(found[ball] - v) <= SAME);
+
+  function solver(host) {
+    const drafts = { ...texts };
+    let piece = Object.keys(texts)[0];
+    let worker = null;
+    let slow = 0;
+
+    // --- the editor -----------------------------------------------------------------------------
+    const count = make("pre", { class: "count", "aria-hidden": true });
+    const editor = make("textarea", {
+      spellcheck: false,
+      autocapitalize: "off",
+      autocomplete: "off",
+      wrap: "off",
+      "aria-label": "your solver, in Python",
+      oninput: () => number(),
+      onkeydown: (event) => key(event),
+    });
+    function number() {
+      drafts[piece] = editor.value;
+      const rows = editor.value.split("\n").length;
+      editor.rows = rows;
+      count.textContent = Array.from({ length: rows }, (_, k) => k + 1).join("\n");
+    }
+    function key(event) {
+      if (event.key !== "Enter") return;
+      if (event.ctrlKey || event.metaKey) run();
+      else {
+        // A new line begins below the one before; after a colon, further in.
+        const [above] = editor.value.slice(0, editor.selectionStart).split("\n").slice(-1);
+        const inset = /^ */.exec(above)[0] + (/:\s*$/.test(above) ? "    " : "");
+        document.execCommand("insertText", false, `\n${inset}`);
+      }
+      event.preventDefault();
+    }
+    function take(name) {
+      piece = name;
+      editor.value = drafts[name];
+      number();
+    }
+    const choices = Object.keys(texts).map((name) =>
+      make(
+        "label",
+        {},
+        make("input", { type: "radio", name: "solver-piece", value: name, onchange: () => take(name) }),
+        name ? make("code", {}, name) : "nothing: the chapter's lines, to be changed",
+      ),
+    );
+    choices[0].firstChild.checked = true;
+
+    // --- what comes out -------------------------------------------------------------------------
+    const start = make("button", { type: "button", class: "main", onclick: () => run() }, "Run");
+    const halt = make("button", { type: "button", onclick: () => stop("Stopped.") }, "Stop");
+    const told = make("span", { class: "told", role: "status" });
+    const printed = make("pre", { class: "printed", "aria-label": "what your lines print" });
+    const wrong = make("pre", { class: "wrong", role: "alert" });
+    const results = checks.map(() => make("p", {}));
+    const list = make(
+      "ol",
+      {},
+      ...checks.map(({ title, given: [masses, velocities, restitution, ratio] }, k) => {
+        const asked =
+          `masses ${row(masses)} kg; velocities ${row(velocities)} m/s; ` +
+          `restitution ${row(restitution)}; ratio ${ratio}`;
+        return make("li", {}, make("b", {}, `${title}. `), asked, results[k]);
+      }),
+    );
+
+    function show(check, text) {
+      const { expected } = checks[check];
+      const found = numbers(text);
+      const passed = agrees(found, expected);
+      results[check].className = passed ? "passed" : "missed";
+      results[check].textContent = passed
+        ? `\u2713 passed: ${row(expected)} m/s`
+        : `not yet: ${row(found)} m/s came out; cradle has ${row(expected)} m/s`;
+    }
+    function stop(words) {
+      worker?.terminate();
+      worker = null;
+      clearTimeout(slow);
+      halt.disabled = true;
+      start.disabled = false;
+      told.textContent = words;
+    }
+    function hear({ printed: text, number: check, found, error, line, done }) {
+      if (text) printed.textContent += text;
+      if (found) show(check, found);
+      if (error) {
+        wrong.textContent = error.trim();
+        if (line) mark(line);
+      }
+      if (!done) return;
+      const passed = list.querySelectorAll(".passed").length;
+      stop(error ? `An error${line ? ` in line ${line}` : ""}.` : `${passed} of ${checks.length} checks passed.`);
+    }
+    // The line of an error is selected, so that it is seen.
+    function mark(line) {
+      const rows = editor.value.split("\n");
+      const from = rows.slice(0, line - 1).reduce((sum, text) => sum + text.length + 1, 0);
+      editor.setSelectionRange(from, from + (rows[line - 1] ?? "").length);
+      editor.focus({ preventScroll: true });
+    }
+    async function run() {
+      if (start.disabled) return;
+      start.disabled = true;
+      told.textContent = "Python is being loaded \u2026";
+      printed.textContent = wrong.textContent = "";
+      results.forEach((result) => Object.assign(result, { className: "", textContent: "" }));
+      try {
+        await python();
+      } catch {
+        loading = null;
+        stop("Python could not be loaded.");
+        return;
+      }
+      const code = new Blob([globalThis.cradlePython], { type: "text/javascript" });
+      const address = URL.createObjectURL(code);
+      worker = new Worker(address);
+      URL.revokeObjectURL(address);
+      worker.onmessage = ({ data }) => hear(data);
+      worker.onerror = ({ message }) => hear({ error: message, done: true });
+      worker.postMessage({ code: editor.value, checks });
+      halt.disabled = false;
+      told.textContent = "running \u2026";
+      slow = setTimeout(() => {
+        told.textContent = "Still running. If a loop has no end, press Stop.";
+      }, LONG);
+    }
+
+    host.replaceChildren(
+      make("div", { role: "radiogroup", "aria-label": "Which piece do you write?" },
+        "Which piece do you write? ", ...choices),
+      make("div", { class: "editor" }, count, editor),
+      make("div", { class: "run" }, start, halt, told),
+      wrong,
+      printed,
+      list,
+    ); // prettier-ignore
+    host.classList.add("live");
+    halt.disabled = true;
+    take(piece);
+  }
+
+  document.querySelectorAll(".reader-solver").forEach(solver);
+})(globalThis.cradleSolver);
