@@ -138,3 +138,34 @@ def _narrow(line: str, width: int) -> list[str]:
     if '"""' in line:
         return textwrap.wrap(line, width, subsequent_indent=indent)
     return [line]
+
+
+def name_lines(
+    ax: object, *, side: str = "right", apart: float = 11
+) -> None:
+    """Write the name of each line at its last point that is seen (or its first), in its colour.
+
+    Names that would lie on one another are lifted, `apart` points each.
+    """
+    end, sign = (-1, 1) if side == "right" else (0, -1)
+    ax.figure.canvas.draw()
+    point, box, placed = ax.figure.dpi / 72, ax.bbox.padded(1), []
+    for line in sorted(
+        ax.get_lines(), key=lambda one: one.get_ydata()[end]
+    ):
+        if line.get_label()[0] == "_":
+            continue
+        places = line.get_xydata()
+        seen = ax.transData.transform(places)
+        inside = [box.contains(*xy) for xy in seen]
+        x, y = seen[inside][end]
+        lifted = y
+        for other_x, other_y in placed:
+            if abs(x - other_x) < 60 * point:
+                lifted = max(lifted, other_y + apart * point)
+        placed.append((x, lifted))
+        ax.annotate(
+            line.get_label(), places[inside][end], (5 * sign, (lifted - y) / point),
+            textcoords="offset points", color=line.get_color(), fontsize=9.5,
+            ha="left" if sign > 0 else "right", va="center",
+        )  # fmt: skip

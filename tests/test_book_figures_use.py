@@ -77,9 +77,9 @@ def test_fig_toy_drift():
         assert five[:3, 0].tolist() == two[:3, 0].tolist() == [1, 2, 3]
 
 
-def test_fig_toy_resting():
+def test_fig_inventory_resting():
     """Up to the first impact both balls are free."""
-    ax = drawn("toy")["fig-toy-resting"].axes[0]
+    ax = drawn("extremes_inventory")["fig-inventory-resting"].axes[0]
     distance, hits = (line.get_xydata() for line in ax.get_lines()[:2])
     assert (distance[:, 1] > -1e-9).all()
     first = hits[0, 0]

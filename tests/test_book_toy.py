@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from truth import solve
 
 CHAPTER = Chapter("toy")
+INVENTORY = Chapter("extremes_inventory").glued
 LENGTH, BACK, G, RATIO = 0.12, 0.04, 9.81, 0.15
 PERIOD = 2 * math.pi * math.sqrt(LENGTH / G)
 
@@ -113,7 +114,7 @@ def test_fig_toy_drift(name, e):
     assert glued("left") == 20
 
 
-def test_fig_toy_resting():
+def test_fig_inventory_resting():
     """Bounce after bounce by root finding, then one oscillator of the joint frequency."""
     w = np.sqrt(G / np.array([0.10, 0.14]))
     x, v, t, e = np.array([-0.04, -0.0392]), np.zeros(2), 0.0, 0.5
@@ -137,11 +138,11 @@ def test_fig_toy_resting():
         x = np.full(2, (left + right) / 2)
         v = (v1 + v2) / 2 + np.array([-1, 1]) * e * (v1 - v2) / 2
     end = t + flight * e / (1 - e)  # the flights shrink by e
-    assert glued("crowd-end") == pytest.approx(end, abs=6e-5)
+    assert float(INVENTORY["crowd-end"]) == pytest.approx(end, abs=6e-5)
     joint = math.sqrt(np.mean(w**2))
     common = v.mean()
     falls = math.atan(-x[0] * joint / common) / joint
-    assert glued("opens") == pytest.approx(t + falls, abs=1.5e-3)
+    assert float(INVENTORY["opens"]) == pytest.approx(t + falls, abs=1.5e-3)
 
 
 def test_second_stroke_of_springs_by_another_integrator():
@@ -201,12 +202,13 @@ def test_spread_of_the_second_stroke_at_any_angle():
     assert glued("spread") == pytest.approx(1e3 * late, rel=0.1)
 
 
-def test_exercises():
+def test_one_percent_and_the_ball_that_never_hangs_still():
     k = math.ceil(math.log(100) / (2 * math.log(1 / 0.95)))
     five = strokes(25, [1, 0, 0, 0, 0], 0.95)
     counted = 1 + int(np.argmax(5 * five.var(axis=1) / 0.8 < 0.01))
-    assert CHAPTER.printed("exercise-drift") == f"two balls {k} strokes, five balls {counted}\n"
-    assert CHAPTER.printed("exercise-middle") == "always moving: ball 3\n"
+    assert (glued("two-percent"), glued("five-percent")) == (k, counted)
+    always = np.abs(strokes(6, [1, 1, 1, 0, 0], ratio=0.0)) > 1e-9
+    assert np.flatnonzero(always.all(axis=0)).tolist() == [glued("always") - 1]
 
 
 def test_fig_toy_inside_and_film():
