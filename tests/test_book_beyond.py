@@ -227,9 +227,9 @@ def test_fig_beyond_front():
     np.testing.assert_allclose(parts, parts[-1], rtol=1e-4)
 
 
-def test_fig_beyond_time():
+def test_fig_inventory_time():
     """Time in proportion to the length, from a thousand balls on."""
-    (ax,) = CHAPTER.figures["fig-beyond-time"].axes
+    (ax,) = Chapter("extremes_inventory").figures["fig-inventory-time"].axes
     for line, ratio in zip(points(ax), (0.0, 0.1, 0.3, 0.5)):
         rows = find("elastic", ratio=ratio)
         np.testing.assert_array_equal(line, column(rows, "balls", "cpu_seconds"))
@@ -319,19 +319,37 @@ def test_fig_beyond_springs():
 
 
 def test_ratios_that_differ_from_ball_to_ball_give_the_springs():
-    """Exercise 3, with the velocities of another program."""
-    after = post_impact_velocities(*struck(5), 1.0, [0.13274, 0.15339, 0.20183], excess="saturate")
+    """The ratios that the text quotes, with the velocities of another program."""
+    ratios = [float(a) for a in CHAPTER.glued["along-five"].split(", ")]
+    after = post_impact_velocities(*struck(5), 1.0, ratios, excess="saturate")
     np.testing.assert_allclose(after, HERTZ["five equal"], rtol=0, atol=2e-4)
 
 
 def test_two_strikers_have_no_closed_form():
-    """Exercise 1: four balls fly off at the stored ratio, and lengths differ."""
+    """Four balls fly off at the stored ratio, and the leader is faster in a longer row."""
     leaders = []
     for balls in (20, 50, 200):
         after = outcomes(*struck(balls, 2), 1.0, 0.3).velocities
         assert (after > 0.01).sum() == 4
         leaders.append(after[-1])
     assert leaders[0] < leaders[1] - 0.02 < leaders[2] - 0.04
+    for name, balls in (("short", 20), ("long", 100)):
+        after = solve([1.0] * balls, [1.0, 1.0] + [0.0] * (balls - 2), [1.0] * (balls - 1), 0.3)
+        assert float(CHAPTER.glued[f"two-{name}"]) == pytest.approx(after.velocities[-1], abs=6e-3)
+
+
+def test_a_leader_predicted_from_shorter_rows():
+    """Exercise 2: what 20 and 40 balls say of 160."""
+    few, more, kept, guess, solved = (
+        float(CHAPTER.glued[name]) for name in ("leader-20", "leader-40", "kept", "guess", "solved")
+    )
+    after = solve([1.0] * 20, [1.0] + [0.0] * 19, [0.99] * 19, 0.3).velocities
+    assert few == pytest.approx(after[-1], abs=6e-5)
+    assert kept == pytest.approx((more / few) ** (1 / 20), abs=1e-4)
+    assert guess == pytest.approx(more * kept**120, abs=5e-3)
+    found = outcomes(*struck(160), 0.99, 0.3).velocities[-1]
+    assert solved == pytest.approx(found, abs=6e-4)
+    assert solved == pytest.approx(guess, abs=2e-3)
 
 
 # Sweeps in pieces
