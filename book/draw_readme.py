@@ -17,7 +17,7 @@ def draw() -> Figure:
     fig = Figure(figsize=(8, 4.2), layout="constrained")
     ax = figures.velocities(trace, fig.subplots())
     ax.get_legend().remove()
-    total = figures.progress(trace)
+    total = trace.path_impulses.sum(axis=1)
     ax.set_xlim(0, 1.28 * total[-1])
     for ball, velocity in enumerate(trace.velocities):
         text = f"  ball {ball + 1}: {velocity:.2f} m/s".replace("-", "−")

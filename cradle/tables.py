@@ -5,10 +5,10 @@ Impulse Correlation Ratios to triplets. The numbers are read from the CSV files 
 whose README gives their origin, units and doubtful readings.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
@@ -21,8 +21,9 @@ from cradle.input.values import a, one_number, shown
 from cradle.models.correlation import ImpulseCorrelation
 
 if TYPE_CHECKING:
-    # At run time pandas is imported by the two functions that return a DataFrame, and only there:
-    # `import cradle` and `paper_chain` stay light.
+    # At run time imported where they are used, so that `import cradle` stays light.
+    from importlib.resources.abc import Traversable
+
     import pandas as pd
 
 __all__ = [
@@ -44,6 +45,8 @@ def data_folder() -> Traversable:
     >>> (data_folder() / "ratios.csv").is_file()
     True
     """
+    from importlib.resources import files
+
     installed = files("cradle") / "data"
     return installed if installed.is_dir() else Path(__file__).parents[1] / "data"
 
@@ -120,7 +123,7 @@ def _ratios() -> Mapping[str, float]:
     )
 
 
-def restitution_table() -> "pd.DataFrame":
+def restitution_table() -> pd.DataFrame:
     """Return Table 1, the coefficients of restitution of all pairs of ball types.
 
     Returns
@@ -145,7 +148,7 @@ def restitution_table() -> "pd.DataFrame":
     return pd.DataFrame(values, index=pd.Index(balls, name="ball"), columns=balls)
 
 
-def ratio_table() -> "pd.DataFrame":
+def ratio_table() -> pd.DataFrame:
     """Return Table 2, the Impulse Correlation Ratios of all triplets, with the bound of Eq. 34.
 
     Returns

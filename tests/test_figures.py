@@ -47,6 +47,8 @@ def test_velocities_draws_the_whole_path(ax, trace):
     for ball, line in enumerate(lines):
         np.testing.assert_array_equal(line.get_xdata(), trace.path_impulses.sum(axis=1))
         np.testing.assert_array_equal(line.get_ydata(), trace.path[:, ball])
+    assert np.all(np.diff(line.get_xdata()) >= 0)
+    assert line.get_xdata()[-1] == pytest.approx(trace.impulses.sum())
 
 
 @pytest.mark.parametrize(
@@ -70,11 +72,6 @@ def test_springs_are_drawn_as_curves(ax, model):
         for ball, line in enumerate(lines, start=contact):
             np.testing.assert_array_equal(line.get_ydata()[:-1], trace.step_velocities[:, ball])
             np.testing.assert_array_equal(line.get_xdata()[:-1], trace.step_impulses[:, contact])
-
-
-def test_progress_grows_at_every_event(trace):
-    assert np.all(np.diff(figures.progress(trace)) >= 0)
-    assert figures.progress(trace)[-1] == pytest.approx(trace.impulses.sum())
 
 
 @pytest.mark.parametrize("contact", [0, 1])

@@ -6,11 +6,13 @@ import csv
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
-from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from cradle.input.values import one_number
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
 
 
 class Line(NamedTuple):

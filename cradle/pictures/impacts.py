@@ -21,8 +21,7 @@ from cradle.input.values import Vector, must_be, place_in
 from cradle.trace import Trace
 
 __all__ = [
-    "EVENT_STYLES", "PALETTE", "ball_style", "impulse_axis", "progress", "velocities",
-    "velocity_impulse",
+    "EVENT_STYLES", "PALETTE", "ball_style", "impulse_axis", "velocities", "velocity_impulse",
 ]  # fmt: skip
 
 #: Colours of Okabe and Ito, told apart by colour-blind readers; in an order of changing lightness.
@@ -73,29 +72,6 @@ def ball_style(ball: int) -> dict[str, Any]:
     {'color': '#0072B2', 'linestyle': 'solid'}
     """
     return {"color": PALETTE[ball % len(PALETTE)], "linestyle": _DASHES[ball % len(_DASHES)]}
-
-
-def progress(trace: Trace) -> Vector:
-    """Return how far an impact has come at each row of its path.
-
-    Parameters
-    ----------
-    trace : Trace
-        K events.
-
-    Returns
-    -------
-    ndarray, shape (K + 1,)
-        Sum of the impulses of all contacts, N s. It grows wherever anything happens, and all
-        velocities are linear in it between two rows.
-
-    Examples
-    --------
-    >>> from cradle import Chain, ImpulseCorrelation, collide
-    >>> progress(collide(Chain([1, 1], [1, 0], 1), ImpulseCorrelation(0))).tolist()
-    [0.0, 0.5, 1.0]
-    """
-    return np.asarray(trace.path_impulses.sum(axis=1))
 
 
 def indexed(symbol: str, number: int) -> str:
