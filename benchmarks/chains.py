@@ -56,24 +56,24 @@ def power_of_ten(quarters):
     return float(f"1e{whole}") * (1, root, math.sqrt(10), root * math.sqrt(10))[rest]
 
 
+def one_way(masses, parts):
+    """Forward ratios as parts of their bounds, Eq. 53."""
+    ratios, onward = np.zeros(parts.shape), 0.0
+    for i in reversed(range(parts.shape[-1])):
+        here, beyond = masses[..., i + 1], masses[..., i + 2]
+        onward = parts[..., i] * np.minimum(beyond / (beyond + here * (1 - onward)), 1)
+        ratios[..., i] = onward
+    return ratios
+
+
 def within_bounds(masses, part):
     """Forward and backward ratios as parts of their bounds, Eq. 53 and its mirror image.
 
     `masses` (..., N); `part(shape)` gives numbers in [0, 1].
     """
-
-    def one_way(m):
-        ratios = np.zeros((*m.shape[:-1], m.shape[-1] - 2))
-        parts = part(ratios.shape)
-        onward = np.zeros(m.shape[:-1])
-        for i in reversed(range(m.shape[-1] - 2)):
-            here, beyond = m[..., i + 1], m[..., i + 2]
-            onward = parts[..., i] * np.minimum(beyond / (beyond + here * (1 - onward)), 1)
-            ratios[..., i] = onward
-        return ratios
-
     masses = np.asarray(masses, float)
-    return one_way(masses), one_way(masses[..., ::-1])[..., ::-1]
+    shape = (*masses.shape[:-1], masses.shape[-1] - 2)
+    return one_way(masses, part(shape)), one_way(masses[..., ::-1], part(shape))[..., ::-1]
 
 
 def with_ends(rng, share=0.15):

@@ -10,25 +10,22 @@ springs are integrated here, independently of the package, and judge the others.
 beside that of `swing` or of the engine alone, measured in turn: read the ratios.
 """
 
-import argparse
-import csv
 import importlib
 import math
 import statistics
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
 import numba
 import numpy as np
 from measure import absent, versions
+from stored import DATA, options, write
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
 from cradle.runtime.job import warm_up
 
-ROOT = Path(__file__).parents[1]
-sys.path.append(str(ROOT / "examples"))
+sys.path.append(str(DATA.parent / "examples"))
 
 BALLS, RADIUS, LENGTH, GRAVITY = 5, 0.1, 1.0, 9.81
 ANGLE = math.radians(30)
@@ -244,8 +241,8 @@ def strokes(angles, rates):
 def runs(missing):
     """Yield who moves the balls and how, gap, how many balls were pulled back, and the run."""
     for pulled in (1, 2):
-        for setting, options in SPRINGS.items():
-            yield "Hertz springs", "alone", setting, 0.0, pulled, on_springs(pulled, **options)
+        for setting, given in SPRINGS.items():
+            yield "Hertz springs", "alone", setting, 0.0, pulled, on_springs(pulled, **given)
         for setting, model in MODELS.items():
             yield "swing", "alone", setting, 0.0, pulled, by_swing(pulled, model=model)
     for engine in ENGINES:
@@ -322,14 +319,6 @@ def _ratio(these, those):
     return statistics.median(a / b for a, b in zip(these, those, strict=True))
 
 
-def write(path, columns, rows):
-    """Write rows as CSV."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(rows)
-
-
 def strokes_and_film(folder, missing):
     """Run all scenes and write two tables."""
     table, film = [], []
@@ -347,29 +336,28 @@ def strokes_and_film(folder, missing):
             *row, f"{len(found)} strokes", found[-1].sum().round(4), found[-1].round(3), flush=True
         )
     columns = ("run", "how", "setting", "gap", "pulled", "stroke", *balls)
-    write(folder / "scene_strokes.csv", columns, table)
-    write(folder / "scene_film.csv", ("run", "how", "time", *balls), film)
+    write("scene_strokes.csv", columns, table, folder)
+    write("scene_film.csv", ("run", "how", "time", *balls), film, folder)
 
 
 def main(arguments=None):
     """Run all and write three tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=ROOT / "data", help="a folder")
+    parser = options(__doc__)
     parser.add_argument("--costs", action="store_true", help="measure the costs alone")
-    options = parser.parse_args(arguments)
+    given = parser.parse_args(arguments)
     missing = absent(ENGINES)
     for name, reason in missing.items():
         print(f"skipped {name}: {reason}")
     warm_up()
     begin = time.perf_counter()
-    if not options.costs:
-        strokes_and_film(options.output, missing)
+    if not given.costs:
+        strokes_and_film(given.output, missing)
     measured = []
     for row in costs(missing):
         print(*row.values(), flush=True)
         measured.append([f"{x:.4g}" if isinstance(x, float) else x for x in row.values()])
         columns = tuple(row)
-    write(options.output / "scene_costs.csv", columns, measured)
+    write("scene_costs.csv", columns, measured, given.output)
     print(f"{time.perf_counter() - begin:.0f} s", file=sys.stderr)
 
 

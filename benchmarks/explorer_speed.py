@@ -3,7 +3,6 @@
 Usage::
 
     python benchmarks/explorer_speed.py             # some minutes; writes data/explorer_speed.csv
-    python benchmarks/explorer_speed.py --output speed.csv
 
 The task is the page's own: the outcome of the first hit for every ratio from 0 to 1, of five equal
 balls with e = 0.9. Times are processor times. Each is the least of several, taken in turn, and
@@ -11,7 +10,6 @@ divided by that of the compiled package with its path.
 """
 
 import argparse
-import csv
 import json
 import os
 import platform
@@ -23,9 +21,9 @@ import time
 from importlib import metadata
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "book" / "_ext"))
-OUTPUT = ROOT / "data" / "explorer_speed.csv"
+from stored import DATA, options, write
+
+sys.path.insert(0, str(DATA.parent / "book" / "_ext"))
 COLUMNS = ("runtime", "record", "microseconds", "time_ratio", "repeats", "versions")
 
 BALLS, RESTITUTION = 5, 0.9
@@ -129,12 +127,11 @@ def tasks():
 
 def main():
     """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=OUTPUT)
+    parser = options(__doc__)
     parser.add_argument("--package", help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.package is not None:
-        print(in_package(options.package))
+    given = parser.parse_args()
+    if given.package is not None:
+        print(in_package(given.package))
         return
     every = list(tasks())
     spent = [[] for _ in every]
@@ -142,14 +139,11 @@ def main():
         for seconds, task in zip(spent, every, strict=True):
             seconds.append(task[3]())
     least = [min(seconds) / len(RATIOS) * 1e6 for seconds in spent]
-    with options.output.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for (name, record, versions, _), time_each in zip(every, least, strict=True):
-            ratio = f"{time_each / least[0]:.3g}"
-            row = (name, int(record), f"{time_each:.3g}", ratio, REPEATS, versions)
-            writer.writerow(row)
-            print(*row)
+    rows = [
+        (name, int(record), f"{each:.3g}", f"{each / least[0]:.3g}", REPEATS, versions)
+        for (name, record, versions, _), each in zip(every, least, strict=True)
+    ]
+    write("explorer_speed.csv", COLUMNS, rows, given.output)
 
 
 if __name__ == "__main__":

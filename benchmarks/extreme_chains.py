@@ -30,6 +30,7 @@ from cradle import (
     post_impact_velocities,
 )
 from cradle.kernel.state import COLLAPSE, LIMITS, REPETITION
+from cradle.measures import _events_at_balls as events_at_balls
 from cradle.models.correlation import MAX_EVENTS
 from cradle.runtime import job as drive
 
@@ -173,40 +174,32 @@ class Measured(NamedTuple):
     error: largest error of a velocity, in units of eps times the largest speed.
     condition: unavoidable change, in the same units.
     own: largest error of a velocity in units of its own rounding plus its own unavoidable change.
-    events: the exact solver's number of events, or -1 if it was not asked.
-    same: whether the number of collisions of every contact is the exact one.
     """
 
     error: float
     condition: float
     own: float
-    events: int
-    same: bool
 
 
-def measure(problem, trace=None, max_events=20_000, digits=50, conditioning=True):
-    """Compare the package with fifty digits; raises `EventLimit` where these take too long."""
-    if trace is None:
-        trace, finished = problem.attempt()
-        assert finished
-    with mpmath.workdps(digits):
-        exact = problem.exact(max_events)
-        after = [mpmath.mpf(x) for x in trace.velocities.tolist()]
-        off = [abs(a - b) for a, b in zip(after, exact.velocities)]
-        largest = max(abs(x) for x in exact.velocities) or mpmath.mpf(1)
-        change = [mpmath.mpf(0)] * len(off)
-        if conditioning:
-            change = unavoidable(problem, exact, max_events)
-        own = max(
-            a / (EPS * abs(b) + c + TINIEST) for a, b, c in zip(off, exact.velocities, change)
-        )
-        return Measured(
-            float(max(off) / largest / EPS),
-            float(max(change) / largest / EPS),
-            float(own),
-            len(exact.events),
-            trace.collisions.tolist() == exact.collisions or exact.collapsed,
-        )
+def compare(trace, known):
+    """Measure an outcome against exact velocities and their unavoidable change, None if unknown."""
+    velocities, change = known
+    with mpmath.workdps(50):
+        off = [abs(mpmath.mpf(a) - b) for a, b in zip(trace.velocities.tolist(), velocities)]
+        largest = max(abs(x) for x in velocities) or mpmath.mpf(1)
+        if change is None:  # a limit at rest is at rest to half of the fifty digits
+            largest = largest if largest > mpmath.mpf(10) ** -25 else mpmath.mpf(1)
+            return Measured(float(max(off) / largest / EPS), math.nan, math.nan)
+        error = float(max(off) / largest / EPS)
+        own = max(a / (EPS * abs(b) + c + TINIEST) for a, b, c in zip(off, velocities, change))
+        return Measured(error, float(max(change) / largest / EPS), float(own))
+
+
+def measure(problem, trace):
+    """Compare a trace with fifty digits; raises `EventLimit` where these take too long."""
+    with mpmath.workdps(50):
+        exact = problem.exact()
+        return compare(trace, (exact.velocities, unavoidable(problem, exact)))
 
 
 # --- the map of the error ----------------------------------------------------------------------
@@ -262,20 +255,6 @@ def truth(problem, trace, longest=400, conditioned=80):
             parts = (part(problem, exact, longest) for part in (unavoidable, slack_of_bound))
             change = [a + b for a, b in zip(*parts)]
         return exact.velocities, change
-
-
-def compare(trace, known):
-    """Error and condition as in `Measured`, from what `truth` returned."""
-    velocities, change = known
-    with mpmath.workdps(50):
-        off = [abs(mpmath.mpf(a) - b) for a, b in zip(trace.velocities.tolist(), velocities)]
-        largest = max(abs(x) for x in velocities) or mpmath.mpf(1)
-        if change is None:  # a limit at rest is at rest to half of the fifty digits
-            largest = largest if largest > mpmath.mpf(10) ** -25 else mpmath.mpf(1)
-            return float(max(off) / largest / EPS), math.nan, math.nan
-        error = float(max(off) / largest / EPS)
-        own = max(a / (EPS * abs(b) + c + TINIEST) for a, b, c in zip(off, velocities, change))
-        return error, float(max(change) / largest / EPS), float(own)
 
 
 # --- long chains -------------------------------------------------------------------------------
@@ -431,14 +410,6 @@ def edge(e, ratio, low=1e-7, high=2.0):
 
 
 # --- distance to another sequence of events ----------------------------------------------------
-
-
-def events_at_balls(trace):
-    """Ends, closings and collapses as each ball sees them."""
-    return [
-        [e for e in trace.events if e.kind != "maximum_compression" and i - 1 <= e.contact <= i]
-        for i in range(len(trace.chain))
-    ]
 
 
 def inputs(problem):

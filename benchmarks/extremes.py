@@ -10,8 +10,6 @@ Every part writes one small file `data/extremes_<part>.csv`.  The measuring func
 `benchmarks/extreme_chains.py`, and the tests compute a sample of the rows anew.
 """
 
-import argparse
-import csv
 import itertools
 import math
 import multiprocessing
@@ -24,30 +22,20 @@ import extreme_chains as x
 import mpmath
 import numpy as np
 from chains import power_of_ten
+from stored import options, write
 
-from cradle import (
-    outcomes,
-    paper_chain,
-)
+from cradle import outcomes, paper_chain
 from cradle.tables import paper_sequences
 
-ROOT = Path(__file__).parents[1]
+
+def written(row):
+    """Return a row as it is stored: four digits."""
+    return [f"{v:.4g}" if isinstance(v, float) else v for v in row]
 
 
-def write(part, header, rows):
-    with (ROOT / "data" / f"extremes_{part}.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        count = 0
-        for row in rows:
-            writer.writerow(f"{v:.4g}" if isinstance(v, float) else v for v in row)
-            count += 1
-    print(f"{part}: {count} rows", flush=True)
-
-
-def the_map(keep):
+def the_map(given):
     """Worst of the velocities of each (shape, mass ratio, restitution, ratio)."""
-    known = {}
+    known, keep = {}, given.keep
     if keep and keep.exists():
         with keep.open("rb") as file:
             known = pickle.load(file)
@@ -193,7 +181,7 @@ def long_or_not(family, decades, index):
     return n, (*row, stopped is not None), unfinished
 
 
-def finish(_):
+def finish(given):
     """Count by family and number of balls: finished, collapsed, long; unfinished ones by name."""
     unfinished = []
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
@@ -209,7 +197,7 @@ def finish(_):
     header = ["family", "decades", "index", "balls", "period", "energy_half", "energy"]
     header += ["collisions", "finished", "open"]
     header += [f"late_{name}" for name in x.Explanation._fields]
-    write("unfinished", header, unfinished)
+    write("extremes_unfinished.csv", header, map(written, unfinished), given.output)
 
 
 def cost(_):
@@ -239,13 +227,14 @@ PARTS = {
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser = options(__doc__)
     parser.add_argument("parts", nargs="*", default=list(PARTS), choices=[*PARTS, []])
     parser.add_argument("--keep", type=Path)
-    options = parser.parse_args()
-    for part in options.parts or PARTS:
+    given = parser.parse_args()
+    for part in given.parts or PARTS:
         rows, header = PARTS[part]
-        write(part, header.split(), rows(options.keep))
+        lines = map(written, rows(given))
+        write(f"extremes_{part}.csv", header.split(), lines, given.output)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,8 @@ round alike everywhere; printed, it is short.  Draws come from `random.Random`, 
 
 import random
 
+import numpy as np
+from chains import one_way
 from problem import Problem
 
 PAPER_MASSES = [0.045, 0.053, 0.053, 0.166]
@@ -36,11 +38,7 @@ class Draw:
 
 def within_bounds(masses, parts):
     """One way's ratios as parts of Eq. 53, for a chain driven to the right."""
-    ratios, onward = [], 0.0
-    for here, beyond, part in reversed(list(zip(masses[1:], masses[2:], parts))):
-        onward = part * (beyond / (beyond + here * (1 - onward)))
-        ratios.insert(0, onward)
-    return ratios
+    return one_way(np.array(masses), np.array(parts)).tolist()
 
 
 def ties(draw, n):

@@ -2,7 +2,7 @@
 
 Usage, in an environment with OpenCV (not a dependency of the package)::
 
-    python benchmarks/film_reading.py newtons_cradle.mp4 --output strikes.csv     # minutes
+    python benchmarks/film_reading.py newtons_cradle.mp4 --output .     # minutes; film_reading.csv
 
 The film is not stored here; `data/README.md` says where it was found.  Steps: drift of the camera
 off (phase correlation of the frame's posts and base); where a ball may be (normalised correlation
@@ -12,8 +12,6 @@ weights); an arc of a pendulum of any angle through each ball's places between t
 more from the places and the blur that the arcs predict.  Times in frames, lengths in pixels.
 """
 
-import argparse
-import csv
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -21,6 +19,7 @@ import cv2
 import numpy as np
 from film_arcs import LENGTH, RELEASES, REST, crossing, predict, strikes, summary
 from scipy.ndimage import median_filter
+from stored import options, write
 
 RADIUS, EDGE = 25.75, 0.7  # of a ball; its softness
 X0, X1, Y0, Y1 = 330, 1120, 400, 600  # the strip where balls move
@@ -225,11 +224,10 @@ def seen_at(i, guess):
 
 def main(arguments=None):
     """Read the film, write a row per release, strike and ball."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser, rows = options(__doc__), []
     parser.add_argument("film", type=Path)
-    parser.add_argument("--output", type=Path, default=Path("film_strikes.csv"))
-    options, rows = parser.parse_args(arguments), []
-    read(options.film)
+    given = parser.parse_args(arguments)
+    read(given.film)
     for release, (start, half, first, last) in RELEASES.items():
         times, frames = np.arange(start, last, half)[:-1], range(first, last + 1)
         with ProcessPoolExecutor() as pool:
@@ -245,10 +243,7 @@ def main(arguments=None):
         ways = ({}, {"window": 8}, {"slope": 0.02}, {"late": 0.04}, {"late": -0.04})
         reads = [LENGTH * strikes(table, release, times, **way)[..., 1:] for way in ways]
         rows += summary(release, np.array(reads))
-    with options.output.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows(rows)
+    write("film_reading.csv", COLUMNS, rows, given.output)
 
 
 if __name__ == "__main__":

@@ -11,17 +11,13 @@ with the values of Tables 1 and 2.  A phone takes 240 frames a second; each mark
 amount.  The velocities of the table are found from the marks as a reader would find them.
 """
 
-import argparse
-import csv
-from pathlib import Path
-
 import numpy as np
+from stored import options, write
 
 from cradle import collide, paper_chain
 from cradle.fit import Tracks, velocities_from_tracks
 from cradle.fit.shots import Track
 
-DATA = Path(__file__).parents[1] / "data"
 LENGTH, GRAVITY = 0.3, 9.81
 FRAMES_PER_SECOND, FRAMES = 240.0, 24  # frames on either side of the impact
 SCATTER = 0.0004  # of a mark, m
@@ -103,16 +99,11 @@ def experiment():
 
 def main(arguments=None):
     """Write the files."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--folder", type=Path, default=DATA)
-    folder = parser.parse_args(arguments).folder
+    folder = options(__doc__).parse_args(arguments).output
     rows, text = experiment()
     (folder / "video_synthetic.txt").write_text(text, encoding="utf-8")
-    with (folder / "shots_synthetic.csv").open("w", newline="", encoding="utf-8") as file:
-        file.write("# SYNTHETIC: made by benchmarks/fit_example.py, not measured\n")
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(HEADER)
-        writer.writerows(rows)
+    comment = "# SYNTHETIC: made by benchmarks/fit_example.py, not measured\n"
+    write("shots_synthetic.csv", HEADER, rows, folder, comment)
 
 
 if __name__ == "__main__":

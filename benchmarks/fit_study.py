@@ -10,18 +10,14 @@ bound are taken at it); the balls have the paper's masses, the first strikes at 
 2 m/s, and every velocity is off by a random amount, `noise` times the striker's speed.
 """
 
-import argparse
-import csv
-from pathlib import Path
-
 import numpy as np
 from scipy.optimize import least_squares, minimize_scalar
+from stored import options, write
 
 from cradle import paper_chain, post_impact_velocities, ratio_table
 from cradle.fit import ratio, read_shots
 from cradle.fit.parameters import pair_keys
 
-DATA = Path(__file__).parents[1] / "data"
 SPEEDS = (0.5, 1.0, 1.5, 2.0)
 NOISES = (0.003, 0.01, 0.03)
 REPEATS, DATASETS = 3, 25  # shots at each speed; experiments of each triplet and noise
@@ -174,25 +170,11 @@ def _minima(values):
 
 def main(arguments=None):
     """Write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--folder", type=Path, default=DATA)
-    parser.add_argument("--only", choices=["study", "precision"])
-    options = parser.parse_args(arguments)
+    folder = options(__doc__).parse_args(arguments).output
     triplets = list(ratio_table().triplet)
-    if options.only != "study":
-        _write(options.folder / "fit_precision.csv", PRECISION, map(precision, triplets))
-    if options.only != "precision":
-        rows = (study(triplet, noise) for noise in NOISES for triplet in triplets)
-        _write(options.folder / "fit_study.csv", STUDY, rows)
-
-
-def _write(path, header, rows):
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        for row in rows:
-            writer.writerow(row)
-            file.flush()
+    write("fit_precision.csv", PRECISION, map(precision, triplets), folder)
+    rows = (study(triplet, noise) for noise in NOISES for triplet in triplets)
+    write("fit_study.csv", STUDY, rows, folder)
 
 
 if __name__ == "__main__":

@@ -1,23 +1,23 @@
-"""Coverage-guided search for chains that break a public entry point.
+"""Strings of bytes that become calls of a public entry point, and what must hold of each call.
 
-Usage, with atheris from PyPI (not a dependency of the project)::
-
-    python benchmarks/fuzz.py -max_total_time=3600 corpus/
-
-Every input is a string of bytes that becomes a call: numbers from the ends of their ranges, their
-neighbours, and any pattern of 64 bits. Single impacts run as plain Python, so that the search sees
-which lines of the event loop a chain reaches; the batch runs compiled. Allowed are the documented
-errors alone; every outcome must keep `extreme_chains.faults` empty. What was found became named
-cases in `test_extremes.py`.
+The bytes give numbers from the ends of their ranges, their neighbours, and any pattern of 64 bits:
+made for a search guided by coverage (atheris, AFL) as for hypothesis.  Allowed are the documented
+errors alone; every outcome must keep `extreme_chains.faults` empty.  What a search of some hours
+found became named cases in `test_extremes.py`.
 """
 
 import math
-import os
 import struct
-import sys
-import warnings
-from pathlib import Path
-from unittest import mock
+
+from extreme_chains import faults
+
+from cradle import (
+    Chain,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    collide,
+    post_impact_velocities,
+)
 
 ENDS = {
     "unit": [0.0, 1.0, 1.0 - 2.0**-53, 0.5, 1e-16, 1e-300, 5e-324, 1 / 3, 0.15],
@@ -100,28 +100,13 @@ def quotient(x, y):
     return x / y if 0.0 < y < math.inf and 0.0 < x < math.inf else 0.5
 
 
-def attempt(data, max_events=400, kernel=""):
-    """Run one call; raises what must not happen. Returns the trace, or None if refused.
-
-    `kernel` names the kernel of the single impact ("plain"); the batch takes the fastest.
-    """
-    from extreme_chains import faults
-
-    from cradle import (
-        Chain,
-        ImpactNotFinished,
-        ImpulseCorrelation,
-        collide,
-        post_impact_velocities,
-    )
-    from cradle.runtime import compile as runtime
-
+def attempt(data, max_events=400):
+    """Run one call; raises what must not happen. Returns the trace, or None if refused."""
     m, v, e, f, b, options = problem(data)
     refused = None
     try:
-        with mock.patch.dict(os.environ, {runtime.VARIABLE: kernel} if kernel else {}):
-            model = ImpulseCorrelation(f, b, max_events=max_events, **options)
-            trace = collide(Chain(m, v, e), model)
+        model = ImpulseCorrelation(f, b, max_events=max_events, **options)
+        trace = collide(Chain(m, v, e), model)
         finished = True
     except ValueError as error:
         refused = str(error)
@@ -144,33 +129,3 @@ def attempt(data, max_events=400, kernel=""):
     wrong = faults(trace, finished)
     assert not wrong, f"{wrong}: {trace.chain!r}, {trace.model!r}"
     return trace
-
-
-def main():
-    import atheris
-
-    warnings.simplefilter("error")
-    with atheris.instrument_imports(include=["cradle"]):
-        import cradle.models.correlation  # noqa: F401
-
-    found = Path(os.environ.get("FUZZ_FOUND", "found"))
-    found.mkdir(exist_ok=True)
-    seen = set()
-
-    def target(data):
-        try:
-            attempt(data, kernel="plain")
-        except Exception as error:
-            # Keep going: one file a kind of failure and number of balls, not one a run.
-            key = (type(error).__name__, str(error)[:24], 2 + (data[0] % 7 if data else 0))
-            if key not in seen:
-                seen.add(key)
-                (found / f"{len(seen):03d}-{os.getpid()}.bin").write_bytes(data)
-                print("FOUND", key, str(error)[:600], flush=True)
-
-    atheris.Setup([*sys.argv], target)
-    atheris.Fuzz()
-
-
-if __name__ == "__main__":
-    main()

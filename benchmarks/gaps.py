@@ -12,11 +12,9 @@ Lengths are in Hertz units, (m v^2 / k)^(2/5), with the mass of ball A, or of ea
 row, and v the striker's speed.
 """
 
-import csv
-from pathlib import Path
-
 import numpy as np
 from scipy.optimize import least_squares
+from stored import options, write
 
 from cradle import (
     Chain,
@@ -33,7 +31,6 @@ from cradle import (
 from cradle.measures import effective_ratio
 from cradle.tables import ball_masses
 
-DATA = Path(__file__).parents[1] / "data"
 # Row of five: gaps of all three contacts at rest.
 GAPS = (0.0, *(float(f"{10 ** (k / 8):.4g}") for k in range(-24, 5)))
 # Triplets: the contact that the striker does not touch; negative for a lean.
@@ -181,24 +178,19 @@ def triplets():
     return columns
 
 
-def written(x):
-    """Return a number to four decimals, or four digits."""
-    return f"{round(x, 4) + 0.0:.4f}" if abs(x) < 100 else f"{x:g}"
+def written(line):
+    """Return numbers to four decimals, or four digits."""
+    return [x if isinstance(x, str) else f"{round(x, 4) + 0.0:.4f}" if abs(x) < 100 else f"{x:g}"
+            for x in line]  # fmt: skip
 
 
-def main():
+def main(arguments=None):
     """Write both files."""
+    folder = options(__doc__).parse_args(arguments).output
+    write("gaps_five.csv", ["gap", *(f"v{k}" for k in range(1, 6))], map(written, five()), folder)
     columns = triplets()
-    rows = zip(*columns.values(), strict=True)
-    for name, header, lines in (
-        ("gaps_five.csv", ["gap", *(f"v{k}" for k in range(1, 6))], five()),
-        ("gaps_triplets.csv", list(columns), rows),
-    ):
-        with (DATA / name).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(header)
-            for line in lines:
-                writer.writerow([x if isinstance(x, str) else written(x) for x in line])
+    rows = map(written, zip(*columns.values(), strict=True))
+    write("gaps_triplets.csv", list(columns), rows, folder)
 
 
 if __name__ == "__main__":

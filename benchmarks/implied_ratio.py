@@ -3,7 +3,6 @@
 Usage::
 
     python benchmarks/implied_ratio.py            # writes data/implied_ratio.csv, minutes
-    python benchmarks/implied_ratio.py --output map.csv
 
 For each row a spring chain (m1 = 1, ball 1 at speed 1, the others at rest) is integrated, and the
 constant ratio with the same outcome is looked for between 0 and its bound (Eq. 34).  Where there is
@@ -11,12 +10,10 @@ none, the ratio is empty and the note has the one that comes nearest.  Near the 
 like the square root of what is left to it, so all digits of the ratio count.
 """
 
-import argparse
-import csv
 import itertools
-from pathlib import Path
 
 import numpy as np
+from stored import options, write
 
 from cradle import Chain, SpringChain, collide
 from cradle.measures import effective_ratio
@@ -27,7 +24,6 @@ MASS_RATIOS = (0.1, 0.3, 1.0, 3.0, 10.0)
 STIFFNESS_RATIOS = tuple(float(f"{10.0 ** (k / 4):.6g}") for k in range(-12, 13))
 CASE = ["exponent", "m2_over_m1", "m3_over_m2", "k2_over_k1"]
 COLUMNS = [*CASE, "v1", "v2", "v3", "bound", "ratio", "note"]
-OUTPUT = Path(__file__).parents[1] / "data" / "implied_ratio.csv"
 
 
 def outcome(exponent, m2_over_m1, m3_over_m2, k2_over_k1):
@@ -53,14 +49,9 @@ def row(exponent, m2_over_m1, m3_over_m2, k2_over_k1):
 
 def main(arguments=None):
     """Write the map."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=OUTPUT)
-    output = parser.parse_args(arguments).output
+    folder = options(__doc__).parse_args(arguments).output
     cases = itertools.product(EXPONENTS, MASS_RATIOS, MASS_RATIOS, STIFFNESS_RATIOS)
-    with output.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows(row(*case) for case in cases)
+    write("implied_ratio.csv", COLUMNS, (row(*case) for case in cases), folder)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ Usage::
 
     python benchmarks/judge.py                             # a hundred chains of every family
     python benchmarks/judge.py --family losses --count 10000 --seed 7
-    python benchmarks/judge.py --count 1000 --seed 2026 --output data/judge.csv     # ten minutes
+    python benchmarks/judge.py --count 1000 --seed 2026 --write     # data/judge.csv, ten minutes
 
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
 within 600 events.  A float means what it prints as if that is short, see `meaning`: ties of an
@@ -14,19 +14,17 @@ they can be pasted.  Where the exact run has no end, see `second_opinion`.
 Every chain counted as right or wrong was judged by the exact run, at some hundred chains a second.
 """
 
-import argparse
-import csv
 import decimal
 import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from decimal import Decimal
-from pathlib import Path
 from typing import NamedTuple
 
 import truth
 from families import JUDGED, family
 from problem import Problem
+from stored import options, write
 from truth import meaning
 
 from cradle import ImpactNotFinished, post_impact_velocities, textbook
@@ -317,23 +315,20 @@ def run(names, count, seed, workers=2):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options(__doc__)
     parser.add_argument("--family", choices=JUDGED, action="append")
     parser.add_argument("--count", type=int, default=100, help="chains of each family")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--shrink", type=int, default=5, help="how many wrong chains to shrink")
-    parser.add_argument("--output", type=Path, help="write the counts as CSV")
+    parser.add_argument("--write", action="store_true", help="write the counts as judge.csv")
     given = parser.parse_args()
     counts, found = run(given.family or list(JUDGED), given.count, given.seed)
     print(f"{'':18}" + "".join(f"{word:>14}" for word in WORDS))
     for name, count in counts.items():
         print(f"{name:18}" + "".join(f"{count[word]:14}" for word in WORDS))
-    if given.output:
-        with given.output.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(["family", *WORDS])
-            for name, count in counts.items():
-                writer.writerow([name, *(count[word] for word in WORDS)])
+    if given.write:
+        lines = ([name, *(count[word] for word in WORDS)] for name, count in counts.items())
+        write("judge.csv", ["family", *WORDS], lines, given.output)
     for name, verdict, problem in found:
         print(f"\n{name}: {verdict.word}, off by {verdict.off:.1e}\n{problem!r}")
     for _, _, problem in [each for each in found if each[1].word == "wrong"][: given.shrink]:

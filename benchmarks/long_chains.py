@@ -3,7 +3,6 @@
 Usage::
 
     python benchmarks/long_chains.py            # three minutes; writes data/long_chains.csv
-    python benchmarks/long_chains.py --output chains.csv
 
 All balls are equal and touch, and the first one strikes the others at speed 1.  Times are
 processor times, and each is divided by the time of one impact of three equal balls on Hertz
@@ -11,17 +10,14 @@ springs, integrated beside it, so that a busy machine slows down both.  Seconds 
 times the median of all those times, so that they too are of one machine at one speed.
 """
 
-import argparse
-import csv
 import statistics
 import time
-from pathlib import Path
 
 import numpy as np
+from stored import options, write
 
 from cradle import Chain, SpringChain, collide, outcomes
 
-OUTPUT = Path(__file__).parents[1] / "data" / "long_chains.csv"
 COLUMNS = [
     "group", "restitution", "ratio", "exponent", "balls", "chains", "collisions", "collapsed",
     "orders", "kept", "spread", "fast", "fast_least", "fast_most", "back", "first", "third_last",
@@ -220,15 +216,11 @@ def text(value):
 
 def main(arguments=None):
     """Write the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=OUTPUT)
-    output = parser.parse_args(arguments).output
+    folder = options(__doc__).parse_args(arguments).output
     found = list(rows())
     add_seconds(found)
-    with output.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({name: text(value) for name, value in row.items()} for row in found)
+    lines = ([text(row.get(name, "")) for name in COLUMNS] for row in found)
+    write("long_chains.csv", COLUMNS, lines, folder)
 
 
 if __name__ == "__main__":

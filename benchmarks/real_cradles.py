@@ -1,24 +1,21 @@
-"""Two real cradles against the models: first strikes of a film, half a minute of swinging, gaps.
+"""The first strikes of a filmed cradle against the models.
 
 Usage::
 
-    python benchmarks/real_cradles.py            # prints tables, some minutes
-    python benchmarks/real_cradles.py strikes    # or half_minute, or gaps
+    python benchmarks/real_cradles.py            # some minutes; writes data/film_fits.csv
 
-Strikes: velocities relative to the row, over the striker's, the striking side first.  Lengths in
+Velocities relative to the row, over the striker's, the striking side first.  Lengths in
 Hertz units of the first release, (m v^2 / k)^(2/5); v its striker's speed.  The striker's speed was
 read in part from the sum of momentum: of the five numbers of a release one may not be free, so the
-degrees of freedom are too many by up to one a release.  `strikes` writes data/film_fits.csv.
+degrees of freedom are too many by up to one a release.
 """
 
-import csv
 import itertools
-import sys
-from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq, least_squares, minimize_scalar
+from scipy.optimize import least_squares, minimize_scalar
+from stored import read, write
 
 from cradle import (
     Chain,
@@ -26,10 +23,8 @@ from cradle import (
     ImpulseCorrelation,
     SequentialCollisions,
     collide,
-    ratio_table,
 )
 
-DATA = Path(__file__).parents[1] / "data"
 READINGS = (1, 2, 3, 4)
 EQUAL = (1, 1, 1, 1, 1)
 SLOWER = 0.766  # strikers of the second release over the one of the first, relative to the row
@@ -37,8 +32,7 @@ SLOWER = 0.766  # strikers of the second release over the one of the first, rela
 
 def table(name):
     """Return the columns of a file as arrays, empty fields as nan."""
-    with (DATA / name).open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read(name)
     return {
         key: np.array([float(r[key] or "nan") if key != "kind" else r[key] for r in rows])
         for key in rows[0]
@@ -262,8 +256,8 @@ def fits_of(reading, law, apart):
     return rows
 
 
-def strikes():
-    """Fit every law to readings 4 and 2; write film_fits.csv."""
+def main():
+    """Fit every law to readings 4 and 2."""
     rows = [
         row
         for reading in (4, 2)
@@ -271,87 +265,8 @@ def strikes():
         for law in laws
         for row in fits_of(reading, law, apart)
     ]
-    with (DATA / "film_fits.csv").open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
-
-
-def half_minute():
-    """Print what the swing of five balls says: the mean, the end, the outer amplitudes."""
-    t = table("cradle_trace.csv")
-    time, x = t["t_s"], np.stack([t[f"x{k}_m"] for k in range(1, 6)])
-    use = np.isfinite(x).all(0) & (time > 0.8)
-    time, mean = time[use], x[:, use].mean(0)
-
-    def swing(p):
-        return p[4] + p[0] * np.exp(-p[1] * time) * np.cos(p[2] * time + p[3])
-
-    fits = [
-        least_squares(lambda p: (swing(p) - mean) / 1e-4, [0.006, 0.03, 8.585, phase, 0.0],
-                      x_scale=[1e-3, 0.01, 0.01, 1, 1e-4])
-        for phase in np.arange(0, 6.3, 0.8)
-    ]  # fmt: skip
-    p = min(fits, key=lambda fit: fit.cost).x
-    print(f"\nMean of five: {abs(p[0]) * 1e3:.3f} mm exp(-{p[1]:.4f} t) cos, period", end=" ")
-    print(f"{2 * np.pi / p[2]:.4f} s; residual rms {np.std(swing(p) - mean) * 1e6:.0f} um")
-    peaks, common = table("cradle_peaks.csv"), table("cradle_common.csv")
-    flights = peaks["kind"] == "flight"
-    first = np.abs(peaks["x_m"][flights & (peaks["t_s"] < 2)])
-    print(f"A fifth of the first flights ({1e3 * first.mean():.2f} mm), decayed, against seen:")
-    for at in (15.0, 20.0, 25.0, 28.0):
-        near = np.abs(common["t_mid_s"] - at) < 1.5
-        outer = np.abs(peaks["x_m"][np.abs(peaks["t_s"] - at) < 1.5])
-        predicted = first.mean() / 5 * np.exp(-p[1] * (at - 1.3))
-        print(f"  {at:4.0f} s: predicted {1e3 * predicted:.2f} mm, mean of five", end=" ")
-        print(f"{1e3 * abs(p[0]) * np.exp(-p[1] * at):.2f}; inner", end=" ")
-        print(
-            f"{1e3 * np.nanmean(common['amplitude_m'][near]):.2f}, outer {1e3 * outer.mean():.2f}"
-        )
-    for ball in (1, 5):
-        use = (peaks["ball"] == ball) & flights & (peaks["t_s"] < 20)
-        at, size = peaks["t_s"][use], np.abs(peaks["x_m"][use])
-        error = peaks["u_x"][use]
-        for name, shape in (("line", lambda z: 1 - z), ("exponential", lambda z: np.exp(-z))):
-
-            def curve(q, shape=shape, data=(at, size, error)):
-                return (q[0] * shape(q[1] * data[0]) - data[1]) / data[2]
-
-            fit = least_squares(curve, [0.028, 0.03])
-            print(f"Ball {ball}, {name}: {1e3 * fit.x[0]:.2f} mm, {fit.x[1]:.4f} per s;", end=" ")
-            print(f"chi-square {2 * fit.cost:.1f} / {len(at) - 2}")
-
-
-def gaps():
-    """Print the ratio that a gap behind the struck ball implies: three equal elastic spheres."""
-    listed = ratio_table()
-    print("\nTable 2, ratios:", np.round(np.percentile(listed["ratio"], (0, 25, 50, 75, 100)), 3))
-    for ball in "ABCD":
-        print(ball * 3, float(listed.set_index("triplet")["ratio"][ball * 3]), end="  ")
-    bulk = 2.1e11 / (2 * (1 - 0.3**2))  # 1 / ((1 - nu^2) / E + ...), steel on steel
-    radius, mass = 0.01109, 0.0448
-    stiff = 4 / 3 * bulk * np.sqrt(radius / 2)
-
-    def implied(units):
-        v = spheres([1.0, 0.0, 0.0], [0.0, units], 0.0)
-        chain = Chain([1, 1, 1], [1, 0, 0], 1.0)
-
-        def misfit(ratio):
-            return collide(chain, ImpulseCorrelation(ratio)).velocities[1] - v[1]
-
-        return v, brentq(misfit, 0, 0.35) if misfit(0) < 0 else 0.0
-
-    for units in (0, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2):
-        v, ratio = implied(units)
-        print(
-            f"\ngap {units:5.2f} Hertz units: velocities {np.round(v, 4)}, ratio {ratio:.4f}",
-            end="",
-        )
-    print()
-    for speed in (0.36, 0.5, 1.0, 2.0):
-        unit = (mass * speed**2 / stiff) ** 0.4
-        row = [implied(gap * 1e-6 / unit)[1] for gap in (0, 0.1, 0.3, 1, 2, 5)]
-        print(f"{speed} m/s, unit {unit * 1e6:.1f} um; gaps 0 .1 .3 1 2 5 um:", np.round(row, 3))
+    write("film_fits.csv", COLUMNS, rows)
 
 
 if __name__ == "__main__":
-    for name in sys.argv[1:] or ("gaps", "half_minute", "strikes"):
-        {"gaps": gaps, "half_minute": half_minute, "strikes": strikes}[name]()
+    main()

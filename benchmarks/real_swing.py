@@ -10,12 +10,12 @@ times; where each of the two hangs at rest is subtracted.  Small angles: gaps ar
 others.  Angles of 12 degrees lengthen a half swing by 1 ms.
 """
 
-import csv
 from dataclasses import dataclass
 
 import numpy as np
-from real_cradles import DATA, table
+from real_cradles import table
 from scipy.optimize import least_squares
+from stored import write
 
 from cradle import Chain, Pendulums, SequentialCollisions, swing
 
@@ -130,8 +130,7 @@ def main():
             print(law, p, chi, flush=True)
             best = (chi, p) if best is None or chi.sum() < best[0].sum() else best
         rows.append([law, *(f"{x:.6g}" for x in best[1]), *(f"{x:.4g}" for x in best[0])])
-    with (DATA / "cradle_fits.csv").open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
+    write("cradle_fits.csv", COLUMNS, rows)
 
 
 if __name__ == "__main__":

@@ -10,26 +10,14 @@ Numerical errors and errors of a model are separate columns. Engines that are no
 (``pip install -e ".[engines]"``) are skipped and named; their old rows are not kept.
 """
 
-import argparse
-import csv
 import sys
 import time
-from pathlib import Path
 
 import engines
 import savings
 import solvers
 from measure import COLUMNS, REFERENCE, Clock, absent
-
-DATA = Path(__file__).parents[1] / "data" / "benchmarks.csv"
-
-
-def write(rows, path):
-    """Write rows as CSV."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows(row.as_text() for row in rows)
+from stored import DATA, options, write
 
 
 def show(row):
@@ -43,19 +31,17 @@ def show(row):
 
 def main(arguments=None):
     """Run the suite."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options(__doc__)
+    parser.set_defaults(output=None)
     parser.add_argument("--quick", action="store_true", help="fewer settings and repetitions")
-    parser.add_argument(
-        "--output", type=Path, help="where to write; data/benchmarks.csv unless quick"
-    )
-    options = parser.parse_args(arguments)
-    clock = Clock(repeats=3 if options.quick else 9)
-    output = options.output or (None if options.quick else DATA)
+    given = parser.parse_args(arguments)
+    clock = Clock(repeats=3 if given.quick else 9)
+    folder = given.output or (None if given.quick else DATA)
     begin = time.perf_counter()
     print(f"times over: {REFERENCE}")
     rows = []
     for part in (solvers.rows, savings.rows, engines.rows):
-        for row in part(clock, options.quick):
+        for row in part(clock, given.quick):
             show(row)
             rows.append(row)
     unit = 1e6 * clock.unit()
@@ -64,9 +50,8 @@ def main(arguments=None):
             row.microseconds = unit * row.time_ratio
     for name, reason in absent(engines.ENGINES).items():
         print(f"skipped {name}: {reason}")
-    if output:
-        write(rows, output)
-        print(f"{len(rows)} rows in {output}")
+    if folder:
+        write("benchmarks.csv", COLUMNS, (row.as_text() for row in rows), folder)
     print(f"{time.perf_counter() - begin:.0f} s", file=sys.stderr)
     return rows
 

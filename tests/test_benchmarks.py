@@ -120,8 +120,8 @@ def test_quick_form_writes_its_table(tmp_path, monkeypatch, rows, capsys):
     monkeypatch.setattr(run.solvers, "rows", lambda *_: iter(rows))
     monkeypatch.setattr(run.savings, "rows", lambda *_: iter(()))
     monkeypatch.setattr(engines, "ENGINES", ())
-    run.main(["--quick", "--output", str(tmp_path / "table.csv")])
-    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
+    run.main(["--quick", "--output", str(tmp_path)])
+    with (tmp_path / "benchmarks.csv").open(encoding="utf-8") as file:
         table = list(csv.DictReader(file))
     assert list(table[0]) == measure.COLUMNS
     assert len(table) == len(rows)

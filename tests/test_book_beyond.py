@@ -4,7 +4,6 @@ The table is measured (benchmarks/long_chains.py); its outcomes are computed aga
 forms, by the independent solver in truth.py, and by another integrator.
 """
 
-import csv
 from functools import cache
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import pytest
 import xarray as xr
 from chains import HERTZ, uniform
 from chapters import Chapter, number, points
+from stored import read
 from truth import solve
 
 from cradle import Chain, SpringChain, collide, outcomes, post_impact_velocities
@@ -32,8 +32,7 @@ needs_numba = pytest.mark.skipif(runtime.compiled() is None, reason="too long wi
 
 @cache
 def table():
-    with long_chains.OUTPUT.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read("long_chains.csv")
     for row in rows:
         for name, value in row.items():
             if name != "group":

@@ -1,7 +1,5 @@
 """Chapter "Two real cradles": what it prints, says and draws, by second routes."""
 
-import csv
-
 import numpy as np
 import pytest
 import real_cradles
@@ -9,16 +7,16 @@ import real_swing
 from chapters import Chapter
 from real_cradles import first_strikes, spheres, table
 from scipy.optimize import brentq
+from stored import read
 
 from cradle import Chain, ImpulseCorrelation, collide, ratio_table
 
 CHAPTER = Chapter("real_cradles")
 GLUED = CHAPTER.glued
-with (real_cradles.DATA / "film_fits.csv").open(encoding="utf-8", newline="") as file:
-    FITS = {
-        (row["law"], row["strikers"], row["fitted"], row["reading"]): row
-        for row in csv.DictReader(file)
-    }
+FITS = {
+    (row["law"], row["strikers"], row["fitted"], row["reading"]): row
+    for row in read("film_fits.csv")
+}
 
 
 def parameters(law, strikers, fitted, reading="4"):
@@ -179,8 +177,7 @@ def test_fig_half():
         assert points(top, marker) == pytest.approx(
             np.column_stack([time[own], 1000 * np.abs(place[own])])
         )
-    with (real_cradles.DATA / "cradle_fits.csv").open(encoding="utf-8", newline="") as file:
-        stored = {row["law"]: row for row in csv.DictReader(file)}
+    stored = {row["law"]: row for row in read("cradle_fits.csv")}
     for law, marker in (("constant loss", "o"), ("constant restitution", "^")):
         drawn = points(low, marker)
         assert (drawn[:, 1] ** 2).sum() == pytest.approx(float(stored[law]["chi_places"]), rel=0.02)

@@ -761,7 +761,7 @@ def test_anything_at_all(masses, velocities, number):
 @settings(max_examples=300)
 @given(st.binary(max_size=160))
 def test_fuzzing_target(data):
-    """What `fuzz.py` runs for an hour, on a few random strings of bytes."""
+    """What `fuzz.py` asks of a call, on a few random strings of bytes."""
     attempt(data)
 
 

@@ -1,19 +1,15 @@
 """The measured cradles: readings agree, spheres are spheres, stored fits fit as they state."""
 
-import csv
-
 import numpy as np
 import pytest
 import real_cradles
 import real_swing
 from real_cradles import by_spheres, chi_square, first_strikes, ratios, spheres, table
+from stored import read
 
 from cradle import Chain, SequentialCollisions, SpringChain, collide
 
-with (real_cradles.DATA / "film_fits.csv").open(encoding="utf-8", newline="") as file:
-    FITS = list(csv.DictReader(file))
-with (real_cradles.DATA / "cradle_fits.csv").open(encoding="utf-8", newline="") as file:
-    SWINGS = list(csv.DictReader(file))
+FITS, SWINGS = read("film_fits.csv"), read("cradle_fits.csv")
 MEAN = real_swing.common()
 
 

@@ -1,0 +1,35 @@
+"""The tables of data/: read and written in one way, by scripts that are called in one way."""
+
+import argparse
+import csv
+from pathlib import Path
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+def options(document):
+    """Return the options that every script has."""
+    parser = argparse.ArgumentParser(description=document.splitlines()[0])
+    parser.add_argument("--output", type=Path, default=DATA, help="folder of the tables")
+    return parser
+
+
+def read(name, **equal):
+    """Return the rows of a table as texts by column: all, or those that have these texts."""
+    with (DATA / name).open(encoding="utf-8", newline="") as file:
+        rows = csv.DictReader(line for line in file if not line.startswith("#"))
+        return [row for row in rows if all(row[key] == text for key, text in equal.items())]
+
+
+def write(name, columns, rows, folder=DATA, comment=""):
+    """Write rows as they come, and say how many there were."""
+    count = 0
+    with (folder / name).open("w", encoding="utf-8", newline="") as file:
+        file.write(comment)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        for row in rows:
+            count += 1
+            writer.writerow(row)
+            file.flush()
+    print(f"{name}: {count} rows", flush=True)
