@@ -1,5 +1,6 @@
 """Rows of the package's models, and of two schemes that have a step."""
 
+import itertools
 import math
 
 import numpy as np
@@ -35,6 +36,24 @@ def model_error(scene, velocities):
     """Return the distance from Hertz where that applies, else from the paper's model."""
     reference, name = (scene.springs(), HERTZ) if scene.elastic else (scene.truth(), TABLES)
     return {"model_error": distance(velocities, reference), "model_reference": name}
+
+
+def row(clock, about, scene, setting, run, exact=None, impacts=1, **more):
+    """Return a row: what `run` gives, how far that is from `exact` (velocities, which), how long.
+
+    `about` is what all rows of a family share.  `run` gives velocities, or a trace, or velocities
+    and how many steps they took.
+    """
+    given = run()
+    after, steps = given if isinstance(given, tuple) else (getattr(given, "velocities", given), "")
+    after = np.atleast_2d(after)[0]
+    fields = {"versions": ours(), "evaluations": steps} | about
+    fields |= outcome(scene.masses, scene.velocities, after)
+    if exact is None:
+        fields |= model_error(scene, after)
+    else:
+        fields |= {"numerical_error": distance(after, exact[0]), "numerical_reference": exact[1]}
+    return Row(setting=setting, chain=scene.name, **(fields | more), **clock(run, impacts))
 
 
 def event_rows(clock, quick):
@@ -116,115 +135,73 @@ def event_rows(clock, quick):
 
 def march_rows(clock, quick):
     """Yield the same rules in small fixed steps of impulse."""
-    for name in ("three equal", "ABCCA"):
-        scene = SCENES[name]
-        arguments = (
-            scene.masses, scene.velocities, scene.restitution, scene.forward, scene.backward
-        )  # fmt: skip
+    about = {
+        "group": "march", "model": "ImpulseCorrelation", "needs": "e, ratios, step",
+        "gives": "velocities, impulses",
+        "note": "brute force, its steps compiled, no code in common with the event solver",
+    }  # fmt: skip
+    for scene in (SCENES["three equal"], SCENES["ABCCA"]):
+        chain = scene.masses, scene.velocities, scene.restitution, scene.forward, scene.backward
         for steps in (10, 100, 1000) if quick else (10, 30, 100, 300, 1000, 3000, 10_000):
 
-            def run(arguments=arguments, steps=steps):
-                return march(*arguments, steps=steps)
+            def run(chain=chain, steps=steps):
+                done = march(*chain, steps=steps)
+                return done.velocities, done.steps
 
-            result = run()
-            yield Row(
-                "march",
-                "ImpulseCorrelation",
-                f"fixed step, 1/{steps} of the first closing speed",
-                name,
-                parameter=1 / steps,
-                **outcome(scene.masses, scene.velocities, result.velocities),
-                numerical_error=distance(result.velocities, scene.truth()),
-                numerical_reference=FIFTY,
-                evaluations=result.steps,
-                needs="e, ratios, step",
-                gives="velocities, impulses",
-                versions=ours(),
-                note="brute force, its steps compiled, no code in common with the event solver",
-                **clock(run),
+            setting = f"fixed step, 1/{steps} of the first closing speed"
+            yield row(
+                clock, about, scene, setting, run, (scene.truth(), FIFTY), parameter=1 / steps
             )
 
 
 def closed_form_rows(clock, _):
     """Yield Eqs. 22 to 33, for three balls that collide once per contact."""
+    about = {
+        "group": "closed form", "model": "three_balls", "evaluations": 1, "needs": "e, ratio",
+        "gives": "velocities, impulses", "note": "three balls, one collision per contact",
+    }  # fmt: skip
     scene = SCENES["three equal"]
-    arguments = scene.masses, scene.velocities, scene.restitution, scene.forward[0]
-    many = [np.tile(part, (2000, 1)) for part in arguments[:3]] + [np.full(2000, RATIO)]
-    for setting, given, impacts in (
-        ("one call", arguments, 1),
-        ("2000 chains in one call", many, 2000),
-    ):
+    one = scene.masses, scene.velocities, scene.restitution, scene.forward[0]
+    many = [np.tile(part, (2000, 1)) for part in one[:3]] + [np.full(2000, RATIO)]
+    for setting, given, impacts in (("one call", one, 1), ("2000 chains in one call", many, 2000)):
 
         def run(given=given):
             return three_balls(*given)
 
-        after = np.atleast_2d(run())[0]
-        yield Row(
-            "closed form",
-            "three_balls",
-            setting,
-            scene.name,
-            **outcome(scene.masses, scene.velocities, after),
-            numerical_error=distance(after, scene.truth()),
-            numerical_reference=FIFTY,
-            **model_error(scene, after),
-            evaluations=1,
-            needs="e, ratio",
-            gives="velocities, impulses",
-            versions=ours(),
-            note="three balls, one collision per contact",
-            **clock(run, impacts),
-        )
+        errors = model_error(scene, np.atleast_2d(run())[0])
+        exact = scene.truth(), FIFTY
+        yield row(clock, about, scene, setting, run, exact, impacts, **errors)
 
 
 def spring_rows(clock, quick):
     """Yield springs integrated in time with error control."""
+    about = {
+        "group": "springs", "model": "SpringChain, Hertz", "needs": "stiffness, e = 1",
+        "gives": TIMED, "versions": ours("scipy"),
+    }  # fmt: skip
     tolerances = (1e-3, 1e-6, 1e-9) if quick else [10.0**-k for k in range(3, 13)]
     cases = [("three equal", method) for method in ("RK45", "DOP853", "LSODA")]
     cases += [("five equal", "DOP853"), ("light middle", "DOP853")]
-    for name, method in cases[:3] if quick else cases:
-        scene = SCENES[name]
-        for rtol in tolerances:
-            model = SpringChain(1.0, rtol=rtol, method=method)
+    for (name, method), rtol in itertools.product(cases[:3] if quick else cases, tolerances):
+        scene, model = SCENES[name], SpringChain(1.0, rtol=rtol, method=method)
 
-            def run(scene=scene, model=model):
-                return collide(scene.chain, model)
+        def run(scene=scene, model=model):
+            return collide(scene.chain, model)
 
-            trace = run()
-            yield Row(
-                "springs",
-                "SpringChain, Hertz",
-                f"{method}, rtol {rtol:.0e}",
-                name,
-                parameter=rtol,
-                **outcome(scene.masses, scene.velocities, trace.velocities),
-                numerical_error=distance(trace.velocities, scene.springs()),
-                numerical_reference=CONVERGED,
-                evaluations=trace.evaluations,
-                needs="stiffness, e = 1",
-                gives=TIMED,
-                versions=ours("scipy"),
-                note="SciPy's integrators, called from Python",
-                **clock(run),
-            )
-    scene = SCENES["three equal"]
-    linear = SpringChain(1.0, 1, rtol=1e-9)
-    after = collide(scene.chain, linear).velocities
-    yield Row(
-        "springs",
-        "SpringChain, linear",
-        "DOP853, rtol 1e-09",
-        scene.name,
-        parameter=1e-9,
-        **outcome(scene.masses, scene.velocities, after),
-        numerical_error=distance(after, scene.springs(1)),
-        numerical_reference=CONVERGED,
-        **model_error(scene, after),
-        needs="stiffness, e = 1",
-        gives=TIMED,
-        versions=ours("scipy"),
-        **clock(lambda: collide(scene.chain, linear)),
-    )
+        yield row(
+            clock, about, scene, f"{method}, rtol {rtol:.0e}", run, (scene.springs(), CONVERGED),
+            parameter=rtol, evaluations=run().evaluations,
+            note="SciPy's integrators, called from Python",
+        )  # fmt: skip
+    scene, linear = SCENES["three equal"], SpringChain(1.0, 1, rtol=1e-9)
+
+    def run():
+        return collide(scene.chain, linear)
+
+    yield row(
+        clock, about, scene, "DOP853, rtol 1e-09", run, (scene.springs(1), CONVERGED),
+        parameter=1e-9, model="SpringChain, linear", **model_error(scene, run().velocities),
+    )  # fmt: skip
 
 
 def _penalty(masses, velocities, stiffness, exponent, step, kick_first, most):
@@ -279,36 +256,26 @@ def penalty_rows(clock, quick):
     scene = SCENES["three equal"]
     masses, velocities = (np.array(x) for x in (scene.masses, scene.velocities))
     schemes = {"semi-implicit Euler": 1.0, "velocity Verlet": 0.5}
-    note = "compiled by numba" if runtime.compiled() is not None else "plain Python"
+    about = {
+        "needs": "stiffness, step, e = 1", "gives": TIMED,
+        "note": "plain Python" if runtime.compiled() is None else "compiled by numba",
+    }  # fmt: skip
 
-    def row(group, law, scheme, setting, parameter, stiffness, exponent, step):
+    def stepped(group, law, scheme, setting, parameter, stiffness, exponent, step):
         def run():
             kick = schemes[scheme]
             return penalty(masses, velocities, stiffness, exponent, step, kick, 10_000_000)
 
-        after, steps = run()
-        return Row(
-            group,
-            f"penalty, {law}",
-            setting,
-            scene.name,
-            parameter=parameter,
-            **outcome(masses, velocities, after),
-            numerical_error=distance(after, scene.springs(exponent)),
-            numerical_reference=CONVERGED,
-            evaluations=steps,
-            needs="stiffness, step, e = 1",
-            gives=TIMED,
-            versions=ours(),
-            note=note,
-            **clock(run),
+        exact, model = (scene.springs(exponent), CONVERGED), f"penalty, {law}"
+        return row(
+            clock, about, scene, setting, run, exact, group=group, model=model, parameter=parameter
         )
 
     for law, exponent in (("Hertz", 1.5), ("linear", 1.0)):
         lasts = contact_time(exponent)
         for scheme in schemes:
             for count in (10, 100, 1000) if quick else (5, 10, 30, 100, 300, 1000, 3000, 10_000):
-                yield row(
+                yield stepped(
                     "penalty", law, scheme, f"{scheme}, {count} steps a contact",
                     1 / count, 1.0, exponent, lasts / count,
                 )  # fmt: skip
@@ -317,7 +284,7 @@ def penalty_rows(clock, quick):
     for scheme in schemes:
         for phase in (0.01, 0.1, 1.0) if quick else (0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0, 1.5):
             stiffness = 0.5 * (phase / step) ** 2
-            yield row(
+            yield stepped(
                 "stiffness", "linear", scheme,
                 f"{scheme}, step 1 ms, stiffness {stiffness:.3g} N/m",
                 phase, stiffness, 1.0, step,
@@ -326,13 +293,18 @@ def penalty_rows(clock, quick):
 
 def energy_rows(clock, quick):
     """Yield the law of Liu, Zhao and Brogliato, over its tolerance."""
+    about = {
+        "group": "energy", "model": "EnergyDistribution, Hertz", "note": "plain Python",
+        "needs": "e, stiffness ratios, exponent", "gives": f"{PATH}, stored energies",
+        "versions": ours("scipy"),
+    }  # fmt: skip
     for name in ("three equal",) if quick else ("three equal", "ABCCA"):
         scene = SCENES[name]
         if scene.elastic:
-            reference, against = scene.springs(), "Hertz springs, converged: its limit at e = 1"
+            exact = scene.springs(), "Hertz springs, converged: its limit at e = 1"
         else:
-            reference = collide(scene.chain, EnergyDistribution(1.0, rtol=3e-13)).velocities
-            against = "same law, rtol 3e-13"
+            finest = collide(scene.chain, EnergyDistribution(1.0, rtol=3e-13))
+            exact = finest.velocities, "same law, rtol 3e-13"
         for rtol in (1e-6,) if quick else (1e-3, 1e-5, 1e-7, 1e-9, 1e-11):
             model = EnergyDistribution(1.0, rtol=rtol)
 
@@ -340,23 +312,11 @@ def energy_rows(clock, quick):
                 return collide(scene.chain, model)
 
             trace = run()
-            yield Row(
-                "energy",
-                "EnergyDistribution, Hertz",
-                f"rtol {rtol:.0e}",
-                name,
-                parameter=rtol,
-                **outcome(scene.masses, scene.velocities, trace.velocities),
-                numerical_error=distance(trace.velocities, reference),
-                numerical_reference=against,
-                **({} if scene.elastic else model_error(scene, trace.velocities)),
-                evaluations=trace.evaluations,
-                needs="e, stiffness ratios, exponent",
-                gives=f"{PATH}, stored energies",
-                versions=ours("scipy"),
-                note="plain Python",
-                **clock(run),
-            )
+            errors = {} if scene.elastic else model_error(scene, trace.velocities)
+            yield row(
+                clock, about, scene, f"rtol {rtol:.0e}", run, exact,
+                parameter=rtol, evaluations=trace.evaluations, **errors,
+            )  # fmt: skip
 
 
 def outcome_rows(clock, _):
@@ -373,24 +333,13 @@ def outcome_rows(clock, _):
             one = ImpulseCorrelation(RATIO, excess="saturate")
             models.append((one, "e, ratio", PATH, "one ratio, .167, everywhere"))
         for model, needs, gives, note in models:
+            about = {"group": "outcome", "model": type(model).__name__, "note": note}
+            about |= {"needs": needs, "gives": gives}
 
             def run(chain=scene.chain, model=model):
                 return collide(chain, model)
 
-            after = run().velocities
-            yield Row(
-                "outcome",
-                type(model).__name__,
-                "one call",
-                scene.name,
-                **outcome(scene.masses, scene.velocities, after),
-                **model_error(scene, after),
-                needs=needs,
-                gives=gives,
-                versions=ours(),
-                note=note,
-                **clock(run),
-            )
+            yield row(clock, about, scene, "one call", run)
 
 
 def door_rows(clock, _):
