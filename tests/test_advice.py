@@ -359,49 +359,6 @@ def test_the_other_kernel_has_rows_of_its_own(monkeypatch):
 
 # --- refusals -----------------------------------------------------------------------------------
 
-REFUSED = [
-    (THREE, {}, "wanted = 'velocities'; needs ratios or stiffness: restitution alone does not det"),
-    (LOSSY, {}, "wanted = 'velocities'; needs ratios or stiffness: restitution alone does not det"),
-    (THREE, {"wanted": "forces"}, "wanted = 'forces'; needs stiffness"),
-    (THREE, {"wanted": ("path", "times"), "ratios": 0.1}, "wanted = 'times'; needs stiffness"),
-    (LOSSY, {"wanted": "forces", "stiffness": 1}, "wanted = 'forces', restitution[0] = 0.9; must"),
-    (LOSSY, {"model_error": 0.1}, "model_error = 0.1, restitution[0] = 0.9; must be left out"),
-    (THREE, {"accuracy": 2e-15, "stiffness": 1}, "accuracy = 2e-15; the least numerical error of"),
-    (THREE, {"accuracy": 1e-17, "ratios": 0.1}, "accuracy = 1e-17; must lie in [1e-15, 1]"),
-    (LOSSY, {"accuracy": 1e-15, "stiffness": 1}, "accuracy = 1e-15; the least numerical error of"),
-    (THREE, {"model_error": 1e-6}, "model_error = 1e-06; that of SequentialCollisions is 0."),
-    (striking([1, 2, 1]), {"model_error": 0.5}, "model_error = 0.5; that of SequentialCollisions "),
-    (
-        THREE,
-        {"model_error": 1e-6, "ratios": 0.2, "accuracy": 1e-15},
-        "model_error = 1e-06; that of",
-    ),
-    (THREE, {"model_error": 0.5, "ratios": 0.2, "wanted": "forces"}, "wanted = 'forces'; needs st"),
-    (THREE, {"model_error": -1}, "model_error = -1.0; must lie in [0, 1]"),
-    (THREE, {"wanted": "speed"}, "wanted = 'speed'; must be one or several of velocities, imp"),
-    (THREE, {"wanted": []}, "wanted = []; must be one or several of"),
-    (THREE, {"wanted": 3}, "wanted = 3; must be one or several of"),
-    (THREE, {"wanted": ["path", 3]}, "wanted = 3; must be one or several of"),
-    (THREE, {"impacts": 0, "ratios": 0.1}, "impacts = 0; must be a whole number, at least 1"),
-    (THREE, {"ratios": 0.6}, "forward[0] = 0.6; at ball 1, counted from 0, it must not exceed 0.5"),
-    (THREE, {"ratios": [0.1, 0.1]}, "forward has 2 values; 3 balls need 1, or one number"),
-    (THREE, {"stiffness": [1, 2, 3]}, "stiffness has 3 values; 3 balls need 2"),
-    (THREE, {"stiffness": 0}, "stiffness = 0.0; must be above 0"),
-    (Chain([1, 1, 1], [0, 0, 1]), {}, "velocities = [0.0, 0.0, 1.0]; no balls approach"),
-    (striking([1, 1, 1], 1e-9), {"stiffness": 1}, "restitution[0] = 1e-09; must be 0 or at least"),
-]
-
-
-@pytest.mark.parametrize(("chain", "asked", "words"), REFUSED, ids=lambda part: str(part)[:40])
-def test_refusals(chain, asked, words):
-    with pytest.raises(ValueError, match="^" + re.escape(words)):
-        recommend(chain, **asked)
-
-
-def test_what_is_no_chain():
-    with pytest.raises(TypeError, match=r"^chain is a list; must be a Chain$"):
-        recommend([1, 1, 1], ratios=0.1)
-
 
 def test_what_the_refusal_says_of_sequential_collisions_is_measured():
     with pytest.raises(ValueError, match="needs ratios or stiffness") as refused:

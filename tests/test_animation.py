@@ -182,14 +182,10 @@ def test_light_enough_for_a_page():
     assert len(animate_swing(run).svg) < 80_000
 
 
-def test_no_impact_and_no_duration():
+def test_no_impact():
     still = collide(Chain([1, 1], [0, 1], 1), ImpulseCorrelation(0))
     assert "NaN" not in animate(still).svg
     assert "nan" not in re.sub(r"<path[^>]*>", "", animate(still).svg)
-    with pytest.raises(ValueError, match="duration"):
-        animate_swing([])
-    with pytest.raises(ValueError, match="labels has 2 lines; 1 swings"):
-        animate_swing(RUN, ["a", "b"])
 
 
 def test_thinning_stays_within_its_tolerance():
@@ -224,9 +220,3 @@ def test_swings_side_by_side_are_the_same_swings():
     # The middle of every picture, at 240, is the middle of its cell.
     np.testing.assert_allclose(left + 240, [cell / 2, 1.5 * cell, cell / 2], atol=1e-3)
     assert cell == 300  # the swings are small
-
-
-@pytest.mark.parametrize("columns", [0, -1, 1.5])
-def test_columns_are_a_whole_number(columns):
-    with pytest.raises(ValueError, match=r"columns = .*; must be a whole number, at least 1"):
-        animate_swing(RUN, columns=columns)

@@ -1,7 +1,5 @@
 """Eqs. 17-34 and 43-46 against the event solver, which knows none of them."""
 
-import re
-
 import mpmath
 import numpy as np
 import pytest
@@ -193,31 +191,6 @@ def test_closed_form_in_fifty_digits():
 
 # --- input that has no meaning -------------------------------------------------------------
 
-ONES = np.ones(3)
-
-
-@pytest.mark.parametrize("function", [three_balls, final_impulses, one_collision_each])
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (([1, 1], [1, 0, 0], [1, 1], 0), "masses has shape (2,); must be (..., 3)"),
-        ((1, [1, 0, 0], [1, 1], 0), "masses has shape (); must be (..., 3)"),
-        ((ONES, np.ones((3, 4)), [1, 1], 0), "velocities has shape (3, 4); must be (..., 3)"),
-        ((ONES, [1, 0, 0], 1, 0), "restitution has shape (); must be (..., 2)"),
-        ((ONES, [1, 0, 0], ONES, 0), "restitution has shape (3,); must be (..., 2)"),
-        ((ONES, [1, 0, 0], [1, 1], "a"), "ratio = 'a'; must be real numbers"),
-        ((ONES, [1, None, 0], [1, 1], 0), "velocities[1] = None; must be a real number"),
-        (
-            (np.ones((4, 3)), [1, 0, 0], [1, 1], [0, 0.1]),
-            "leading axes do not broadcast: masses (4, 3), velocities (3,), restitution (2,), "
-            "ratio (2,)",
-        ),
-    ],
-)
-def test_three_balls_refuse_other_shapes(function, arguments, message):
-    with pytest.raises(ValueError, match=re.escape(message)):
-        function(*arguments)
-
 
 def test_three_balls_pass_on_nan():
     """An input that is NaN spoils its own chain, without a warning; none approach: 0/0."""
@@ -229,51 +202,11 @@ def test_three_balls_pass_on_nan():
     assert once.tolist() == [True, False, False]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((1, 0.5, 0.5), "masses has shape (); must be (..., N) with N >= 2"),
-        (([1], [], []), "masses has shape (1,); must be (..., N) with N >= 2"),
-        ((ONES, 0.5, [0.5]), "forward has shape (); must be (..., 1) for 3 balls"),
-        ((ONES, [0.5], [0.5, 0.5]), "backward has shape (2,); must be (..., 1) for 3 balls"),
-        (([1, 0, 1], [0.5], [0.5]), "masses[1] = 0.0; must be above 0"),
-        (([1, 1, np.inf], [0.5], [0.5]), "masses[2] = inf; must be finite"),
-        (([1, 1, np.nan], [0.5], [0.5]), "masses[2] = nan; must be finite"),
-        ((ONES, [-0.1], [0.5]), "forward[0] = -0.1; must lie in [0, 1]"),
-        ((ONES, [0.1], [[0.5], [1.5]]), "backward[1, 0] = 1.5; must lie in [0, 1]"),
-        ((ONES, [np.nan], [0.5]), "forward[0] = nan; must be finite"),
-        ((ONES, None, [0.5]), "forward = None; must be real numbers"),
-    ],
-)
-def test_largest_ratios_refuse(arguments, message):
-    with pytest.raises(ValueError, match=re.escape(message)):
-        largest_ratios(*arguments)
-
-
 def test_largest_ratios_of_none():
     """Two balls have no ball in between, and no chains no bounds."""
     assert [bound.shape for bound in largest_ratios([1, 2], [], [])] == [(0,), (0,)]
     shapes = [bound.shape for bound in largest_ratios(np.ones((0, 4)), *np.ones((2, 0, 2)))]
     assert shapes == [(0, 2), (0, 2)]
-
-
-@pytest.mark.parametrize(
-    ("function", "arguments", "message"),
-    [
-        (back_impact_line, (1, 0, 0.5, 0.1), "e2 = 0.0; must lie in [1e-30, 1]"),
-        (back_impact_line, ([1, -1], 0.5, 0.5, 0.1), "r2[1] = -1.0; must be at least 0"),
-        (back_impact_line, (1, 0.5, 1.5, 0.1), "e3 = 1.5; must lie in [0, 1]"),
-        (back_impact_line, (1, 0.5, 0.5, np.nan), "ratio = nan; must be finite"),
-        (first_ball_stops, (0, 0.1), "e2 = 0.0; must lie in [1e-30, 1]"),
-        (first_ball_stops, (0.5, 1.1), "ratio = 1.1; must lie in [0, 1]"),
-        (first_ball_stops, ([0.5, 0.6], 0.1), "e2 = [0.5, 0.6]; must be one number"),
-        (middle_ball_stops, (-0.5, 0.1), "e3 = -0.5; must lie in [0, 1]"),
-        (middle_ball_stops, (0.5, "x"), "ratio = 'x'; must be real numbers"),
-    ],
-)
-def test_eqs_44_to_46_refuse(function, arguments, message):
-    with pytest.raises(ValueError, match=re.escape(message)):
-        function(*arguments)
 
 
 def test_eq_44_beyond_the_bound_is_nan():

@@ -207,18 +207,3 @@ def test_a_long_chain_leaves_room_for_its_curves():
     trace = collide(Chain([1] * 40, np.eye(40)[0]), ImpulseCorrelation(0.1))
     assert animate(trace).svg.count("@keyframes") > 40
     drawn(lambda ax: figures.velocities(trace, ax))
-
-
-@pytest.mark.parametrize(
-    ("chains", "letters", "message"),
-    [
-        ([], "", r"traces has chains of \[\] balls; must be of one length"),
-        ([[1, 0], [1, 0, 0]], "", r"traces has chains of \[2, 3\] balls"),
-        ([[1, 0], [0, -1]], "", "traces has a first ball at rest"),
-        ([[1, 0]], "ABC", "letters = 'ABC'; 2 balls need as many"),
-    ],
-)
-def test_outcome_by_ball_refuses(chains, letters, message):
-    traces = [collide(Chain(np.ones(len(v)), v), ImpulseCorrelation(0.0)) for v in chains]
-    with pytest.raises(ValueError, match=message):
-        outcome_by_ball(traces, Figure().subplots(), letters=letters)

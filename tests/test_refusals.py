@@ -1,0 +1,274 @@
+"""What is refused, in which words: chains, closed forms, measures, tables, pictures, advice.
+
+A row is a call and the beginning of what it says.  `test_entries.py` asks every argument of every
+entry point for whatever is no such value at all.
+"""
+
+import re
+
+import numpy as np
+import pytest
+from chains import striking
+from matplotlib.figure import Figure
+
+from cradle import (
+    Chain,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    collide,
+    paper_chain,
+    post_impact_velocities,
+    recommend,
+    swing,
+)
+from cradle.closed_form import (
+    back_impact_line,
+    final_impulses,
+    first_ball_stops,
+    largest_ratios,
+    middle_ball_stops,
+    one_collision_each,
+    three_balls,
+)
+from cradle.measures import (
+    bouncing_pattern,
+    condition_number,
+    conserving_outcomes,
+    effective_ratio,
+)
+from cradle.pictures.animation import animate_swing
+from cradle.pictures.balls import outcome_by_ball
+
+NAN, INF, ONES = np.nan, np.inf, np.ones(3)
+THREE, LOSSY = striking(), striking(e=0.9)
+TRACE = collide(THREE, ImpulseCorrelation(0.1))
+RUN = swing(Chain([1, 1], [0, 0]), SequentialCollisions(), [-0.03, 0], [0.0, 0.1])
+
+
+def chain(**change):
+    return Chain(**({"masses": [1, 2, 3], "velocities": [1, 0, -1], "restitution": 1} | change))
+
+
+def drawn(velocities, letters=""):
+    """Outcomes of several chains of equal balls, one picture."""
+    traces = [collide(Chain(np.ones(len(v)), v), ImpulseCorrelation(0.0)) for v in velocities]
+    return outcome_by_ball(traces, Figure().subplots(), letters=letters)
+
+
+def ratio_of(velocities):
+    return effective_ratio(collide(Chain(np.ones(len(velocities)), velocities),
+                                   SequentialCollisions()))  # fmt: skip
+
+
+def light(masses, door):
+    """A ball too light for the event loop, at every door: two or three balls take short cuts."""
+    velocities = [1.0] + [0.0] * (len(masses) - 1)
+    if door == "batch":
+        return post_impact_velocities(masses, velocities, 1, 0)
+    return collide(Chain(masses, velocities), ImpulseCorrelation(0))
+
+
+LIGHT = "must be at least 1e-150 of the heaviest ball of its chain"
+MASKED = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
+
+CHAINS = [
+    ({"masses": [1, 0, 1]}, "masses[1] = 0.0; must be above 0"),
+    ({"masses": [1, 1, -2]}, "masses[2] = -2.0; must be above 0"),
+    ({"masses": [1, NAN, 1]}, "masses[1] = nan; must be finite"),
+    ({"masses": [INF, 1, 1]}, "masses[0] = inf; must be finite"),
+    ({"masses": [1, 1, -INF]}, "masses[2] = -inf; must be finite"),
+    ({"masses": [1, 1e-151, 1]}, f"masses[1] = 1e-151; {LIGHT}"),
+    ({"masses": [1e70, 1e71, 1e-81]}, f"masses[2] = 1e-81; {LIGHT}"),
+    ({"masses": [2.0, 1e-150, 2.0]}, f"masses[1] = 1e-150; {LIGHT}"),
+    ({"masses": [2e-150, 1e-300, 1e-150]}, f"masses[1] = 1e-300; {LIGHT}"),
+    ({"masses": 1.0}, "masses has shape (); a chain needs (N,) with N >= 2"),
+    ({"masses": [1.0]}, "masses has shape (1,); a chain needs (N,) with N >= 2: one row of two or"),
+    ({"masses": []}, "masses has shape (0,); a chain needs (N,) with N >= 2"),
+    ({"masses": [[1, 1, 1]]}, "masses has shape (1, 3); a chain needs (N,) with N >= 2"),
+    ({"masses": [1, 1]}, "velocities has shape (3,); 2 masses need (2,)"),
+    (
+        {"velocities": [1, 0]},
+        "velocities has shape (2,); 3 masses need (3,): one velocity for each",
+    ),
+    ({"velocities": 1.0}, "velocities has shape (); 3 masses need (3,)"),
+    ({"velocities": [[1], [0], [0]]}, "velocities has shape (3, 1); 3 masses need (3,)"),
+    ({"velocities": [1, NAN, 0]}, "velocities[1] = nan; must be finite"),
+    ({"velocities": [1, 0, -INF]}, "velocities[2] = -inf; must be finite"),
+    ({"velocities": [0, 1e200, 0]}, "velocities[1] = 1e+200; kinetic energy overflows: choose lar"),
+    ({"velocities": [1, 0, -1e160]}, "velocities[2] = -1e+160; kinetic energy overflows"),
+    (
+        {"masses": [1e200] * 3, "velocities": [1e70, 0, 0]},
+        "velocities[0] = 1e+70; kinetic energy overflows",
+    ),
+    ({"restitution": [0.5, 1.2]}, "restitution[1] = 1.2; must lie in [0, 1]"),
+    ({"restitution": [-0.1, 1]}, "restitution[0] = -0.1; must lie in [0, 1]"),
+    ({"restitution": 1 + 2**-52}, "restitution = 1.0000000000000002; must lie in [0, 1]"),
+    ({"restitution": [1, 1e-31]}, "restitution[1] = 1e-31; must be 0 or at least 1e-30"),
+    ({"restitution": [NAN, 1]}, "restitution[0] = nan; must be finite"),
+    (
+        {"restitution": [1, 1, 1]},
+        "restitution has shape (3,); 3 balls need () or (2,): 3 balls have 2 contacts, restitution "
+        "needs one number or 2",
+    ),
+    (
+        {"masses": [1, 1], "velocities": [1, 0], "restitution": [1, 1]},
+        "restitution has shape (2,); 2 balls need () or (1,): 2 balls have 1 contact, restitution "
+        "needs one number or 1",
+    ),
+    ({"restitution": [1]}, "restitution has shape (1,); 3 balls need () or (2,)"),
+    ({"restitution": [[1, 1]]}, "restitution has shape (1, 2); 3 balls need () or (2,)"),
+    ({"masses": "heavy"}, "masses = 'heavy'; must be real numbers, one shape"),
+    ({"masses": ["1", "2", "3"]}, "masses[0] = '1'; must be a real number"),
+    ({"masses": [1, [2, 3], 4]}, "masses[1] has shape (2,), masses[0] has (); must have one shape"),
+    ({"masses": [1, None, 1]}, "masses[1] = None; must be a real number"),
+    ({"masses": MASKED}, "masses[1] = masked; must be a real number"),
+    ({"masses": [1.0, np.ma.masked, 3.0]}, "masses[1] = masked; must be a real number"),
+    ({"velocities": [1, [0, 0], 0]}, "velocities[1] has shape (2,), velocities[0] has ()"),
+    ({"velocities": [1j, 0, 0]}, "velocities[0] = 1j; must be a real number"),
+    ({"velocities": None}, "velocities = None"),
+    ({"restitution": "1"}, "restitution = '1'; must be real numbers, one shape"),
+    ({"restitution": None}, "restitution = None; must be real numbers, one shape"),
+]
+
+SHAPES = [
+    (([1, 1], [1, 0, 0], [1, 1], 0), "masses has shape (2,); must be (..., 3)"),
+    ((1, [1, 0, 0], [1, 1], 0), "masses has shape (); must be (..., 3)"),
+    ((ONES, np.ones((3, 4)), [1, 1], 0), "velocities has shape (3, 4); must be (..., 3)"),
+    ((ONES, [1, 0, 0], 1, 0), "restitution has shape (); must be (..., 2)"),
+    ((ONES, [1, 0, 0], ONES, 0), "restitution has shape (3,); must be (..., 2)"),
+    ((ONES, [1, 0, 0], [1, 1], "a"), "ratio = 'a'; must be real numbers"),
+    ((ONES, [1, None, 0], [1, 1], 0), "velocities[1] = None; must be a real number"),
+    (
+        (np.ones((4, 3)), [1, 0, 0], [1, 1], [0, 0.1]),
+        "leading axes do not broadcast: masses (4, 3), velocities (3,), restitution (2,), ratio (2",
+    ),
+]
+
+BOUNDS = [
+    ((1, 0.5, 0.5), "masses has shape (); must be (..., N) with N >= 2"),
+    (([1], [], []), "masses has shape (1,); must be (..., N) with N >= 2"),
+    ((ONES, 0.5, [0.5]), "forward has shape (); must be (..., 1) for 3 balls"),
+    ((ONES, [0.5], [0.5, 0.5]), "backward has shape (2,); must be (..., 1) for 3 balls"),
+    (([1, 0, 1], [0.5], [0.5]), "masses[1] = 0.0; must be above 0"),
+    (([1, 1, INF], [0.5], [0.5]), "masses[2] = inf; must be finite"),
+    (([1, 1, NAN], [0.5], [0.5]), "masses[2] = nan; must be finite"),
+    ((ONES, [-0.1], [0.5]), "forward[0] = -0.1; must lie in [0, 1]"),
+    ((ONES, [0.1], [[0.5], [1.5]]), "backward[1, 0] = 1.5; must lie in [0, 1]"),
+    ((ONES, [NAN], [0.5]), "forward[0] = nan; must be finite"),
+    ((ONES, None, [0.5]), "forward = None; must be real numbers"),
+]
+
+LETTERS = [
+    ("ABXA", "sequence[2] = 'X'; must be one of A, B, C, D"),
+    ("abc", "sequence[0] = 'a'; must be one of A, B, C, D: a capital letter, 'A'"),
+    (["A", "e"], "sequence[1] = 'e'; must be one of A, B, C, D"),
+    (["A", "BC"], "sequence[1] = 'BC'; must be one of A, B, C, D"),
+    ([1, 2], "sequence[0] = 1; must be one of A, B, C, D"),
+    ("AB C", "sequence[2] = ' '; must be one of A, B, C, D"),
+    ("A", "sequence = 'A'; must name at least 2 balls"),
+    ("", "sequence = ''; must name at least 2 balls"),
+    ("ABC" * 99 + "ABx", "sequence[299] = 'x'; must be one of A, B, C, D"),
+]
+
+TOLERANCES = [
+    (-1e-9, "tolerance = -1e-09; must be at least 0"),
+    (NAN, "tolerance = nan; must be finite"),
+    ([1e-6], "tolerance = [1e-06]; must be one number"),
+    ("1e-6", "tolerance = '1e-6'; must be real numbers"),
+    ([[1e-6], []], "tolerance[1] has shape (0,), tolerance[0] has (1,)"),
+]
+
+ADVICE = [
+    (THREE, {}, "wanted = 'velocities'; needs ratios or stiffness: restitution alone does not det"),
+    (LOSSY, {}, "wanted = 'velocities'; needs ratios or stiffness: restitution alone does not det"),
+    (THREE, {"wanted": "forces"}, "wanted = 'forces'; needs stiffness"),
+    (THREE, {"wanted": ("path", "times"), "ratios": 0.1}, "wanted = 'times'; needs stiffness"),
+    (LOSSY, {"wanted": "forces", "stiffness": 1}, "wanted = 'forces', restitution[0] = 0.9; must"),
+    (LOSSY, {"model_error": 0.1}, "model_error = 0.1, restitution[0] = 0.9; must be left out"),
+    (THREE, {"accuracy": 2e-15, "stiffness": 1}, "accuracy = 2e-15; the least numerical error of"),
+    (THREE, {"accuracy": 1e-17, "ratios": 0.1}, "accuracy = 1e-17; must lie in [1e-15, 1]"),
+    (LOSSY, {"accuracy": 1e-15, "stiffness": 1}, "accuracy = 1e-15; the least numerical error of"),
+    (THREE, {"model_error": 1e-6}, "model_error = 1e-06; that of SequentialCollisions is 0."),
+    (striking([1, 2, 1]), {"model_error": 0.5}, "model_error = 0.5; that of SequentialCollisions "),
+    (
+        THREE,
+        {"model_error": 1e-6, "ratios": 0.2, "accuracy": 1e-15},
+        "model_error = 1e-06; that of",
+    ),
+    (THREE, {"model_error": 0.5, "ratios": 0.2, "wanted": "forces"}, "wanted = 'forces'; needs st"),
+    (THREE, {"model_error": -1}, "model_error = -1.0; must lie in [0, 1]"),
+    (THREE, {"wanted": "speed"}, "wanted = 'speed'; must be one or several of velocities, imp"),
+    (THREE, {"wanted": []}, "wanted = []; must be one or several of"),
+    (THREE, {"wanted": 3}, "wanted = 3; must be one or several of"),
+    (THREE, {"wanted": ["path", 3]}, "wanted = 3; must be one or several of"),
+    (THREE, {"impacts": 0, "ratios": 0.1}, "impacts = 0; must be a whole number, at least 1"),
+    (THREE, {"ratios": 0.6}, "forward[0] = 0.6; at ball 1, counted from 0, it must not exceed 0.5"),
+    (THREE, {"ratios": [0.1, 0.1]}, "forward has 2 values; 3 balls need 1, or one number"),
+    (THREE, {"stiffness": [1, 2, 3]}, "stiffness has 3 values; 3 balls need 2"),
+    (THREE, {"stiffness": 0}, "stiffness = 0.0; must be above 0"),
+    (Chain([1, 1, 1], [0, 0, 1]), {}, "velocities = [0.0, 0.0, 1.0]; no balls approach"),
+    (striking(e=1e-9), {"stiffness": 1}, "restitution[0] = 1e-09; must be 0 or at least"),
+]
+
+OTHERS = [
+    (back_impact_line, (1, 0, 0.5, 0.1), "e2 = 0.0; must lie in [1e-30, 1]"),
+    (back_impact_line, ([1, -1], 0.5, 0.5, 0.1), "r2[1] = -1.0; must be at least 0"),
+    (back_impact_line, (1, 0.5, 1.5, 0.1), "e3 = 1.5; must lie in [0, 1]"),
+    (back_impact_line, (1, 0.5, 0.5, NAN), "ratio = nan; must be finite"),
+    (first_ball_stops, (0, 0.1), "e2 = 0.0; must lie in [1e-30, 1]"),
+    (first_ball_stops, (0.5, 1.1), "ratio = 1.1; must lie in [0, 1]"),
+    (first_ball_stops, ([0.5, 0.6], 0.1), "e2 = [0.5, 0.6]; must be one number"),
+    (middle_ball_stops, (-0.5, 0.1), "e3 = -0.5; must lie in [0, 1]"),
+    (middle_ball_stops, (0.5, "x"), "ratio = 'x'; must be real numbers"),
+    (bouncing_pattern, ([1.0, 2.0],), "velocities has shape (2,); must be (..., 3)"),
+    (bouncing_pattern, (1.0,), "velocities has shape (); must be (..., 3)"),
+    (bouncing_pattern, ([0.0, NAN, 1.0],), "velocities[1] = nan; must be finite"),
+    (bouncing_pattern, ([-3.0, -2.0, -1.0],), "velocities of ball 3 = -1.0; must be at least 0"),
+    (bouncing_pattern, ([[0, 0, 1], [-2, -2, -1]],), "velocities of ball 3[1] = -1.0"),
+    (conserving_outcomes, ([1, 1], [1, 0]), "masses has shape (2,); must be (3,)"),
+    (
+        conserving_outcomes, ([1, 1, 1], [1, 0, 0], [0.1, 1.5]),
+        "angles[1] = 1.5; must lie in [0, 1.0472]",
+    ),
+    (condition_number, (THREE, ImpulseCorrelation([0.1] * 3)), "forward has 3 values"),
+    (ratio_of, ([1, 0, 0, 0],), "trace has 4 balls; an effective ratio is that of three"),
+    (ratio_of, ([0, 0, 1],), "closing_speeds = [0.0, -1.0]; any ratio fits"),
+    (paper_chain, ("ABC", [1, 2]), "speed = [1, 2]; must be one number"),
+    (paper_chain, (3,), "sequence is an int; must be letters, as in 'ABC'"),
+    (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
+    (TRACE.plot, {"contact": 4}, "contact = 4; must be one of 0 to 1"),
+    (drawn, ([],), "traces has chains of [] balls; must be of one length"),
+    (drawn, ([[1, 0], [1, 0, 0]],), "traces has chains of [2, 3] balls"),
+    (drawn, ([[1, 0], [0, -1]],), "traces has a first ball at rest"),
+    (drawn, ([[1, 0]], "ABC"), "letters = 'ABC'; 2 balls need as many"),
+    (animate_swing, ([],), "runs has no swing, or one without a duration"),
+    (animate_swing, (RUN, ["a", "b"]), "labels has 2 lines; 1 swings need as many"),
+]  # fmt: skip
+
+
+def rows():
+    """Every call that is refused: what is called, with what, and the words."""
+    yield from ((chain, given, words) for given, words in CHAINS)
+    for function in (three_balls, final_impulses, one_collision_each):
+        yield from ((function, given, words) for given, words in SHAPES)
+    yield from ((largest_ratios, given, words) for given, words in BOUNDS)
+    yield from ((paper_chain, (given,), words) for given, words in LETTERS)
+    yield from ((effective_ratio, {"trace": TRACE, "tolerance": x}, say) for x, say in TOLERANCES)
+    yield from ((recommend, {"chain": one, **asked}, words) for one, asked, words in ADVICE)
+    for masses in ([1, 1e-20], [1e-20, 1], [1, 1, 1e-20], [1, 1e-16, 1]):
+        words = f"masses[{masses.index(min(masses))}] = {min(masses)}; for this model it must be at"
+        yield from ((light, (masses, door), words) for door in ("collide", "batch"))
+    for number in (0, -1, 1.5):
+        given = {"runs": RUN, "columns": number}
+        yield animate_swing, given, f"columns = {number}; must be a whole number, at least 1"
+    yield from OTHERS
+
+
+@pytest.mark.parametrize(
+    ("function", "given", "words"),
+    [pytest.param(*row, id=f"{row[0].__name__}: {row[2]}") for row in rows()],
+)
+def test_refused_in_these_words(function, given, words):
+    named, kind = isinstance(given, dict), TypeError if " is a" in words else ValueError
+    with pytest.raises(kind, match="^" + re.escape(words)):
+        function(**given) if named else function(*given)
