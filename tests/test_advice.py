@@ -3,16 +3,15 @@
 No number of the measured table stands here, because it is measured anew from time to time.
 """
 
-import csv
 import re
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
 
 import mpmath
 import numpy as np
 import pytest
-from chains import ELASTIC, HERTZ, magnitudes, uniform, within_bounds
+from chains import ELASTIC, HERTZ, elastic_spheres, magnitudes, striking, uniform, within_bounds
 from energy_law import strike
+from stored import read
 from truth import solve
 
 import cradle.advice.choice
@@ -30,45 +29,19 @@ from cradle import (
 )
 from cradle.advice.measured import evidence, lasting, measured_chain, rows
 
-ROOT = Path(__file__).parents[1]
 #: Numbers of the table may come from another version of SciPy, and errors near rounding vary.
 SLACK, ROUNDING = 2.0, 2.0**-50
 LOSSY = Chain([1, 1, 1], [1, 0, 0], 0.9)
-
-
-def striking(masses, e=1.0):
-    return Chain(masses, np.eye(len(masses))[0], e)
 
 
 THREE, FIVE, LIGHT = (striking(ELASTIC[name]) for name in ELASTIC)
 ABCCA, TABLES = paper_chain("ABCCA", excess="saturate")
 
 
-def table(**equal):
-    """Rows of the table by a reader of our own."""
-    with (ROOT / "data" / "benchmarks.csv").open(encoding="utf-8") as file:
-        return [row for row in csv.DictReader(file)
-                if all(row[name] == value for name, value in equal.items())]  # fmt: skip
-
-
 def off(chain, advice, answer):
     """Error of the recommended model, over the closing speed."""
     u = np.abs(chain.closing_speeds).max()
     return np.abs(collide(chain, advice.model).velocities - answer).max() / u
-
-
-def elastic_spheres(masses, step):
-    """Velocities after the strike by a second route: Hertz's force, fixed steps, plain Verlet."""
-    m = np.asarray(masses, float)
-    place, speed = np.zeros(len(m)), np.eye(len(m))[0]
-    force = np.zeros(len(m) + 1)  # from the left of each ball, then from its right
-    while True:
-        speed = speed + 0.5 * step * (force[:-1] - force[1:]) / m
-        place = place + step * speed
-        force[1:-1] = np.maximum(place[:-1] - place[1:], 0.0) ** 1.5
-        speed = speed + 0.5 * step * (force[:-1] - force[1:]) / m
-        if not force.any() and (np.diff(speed) >= 0.0).all():
-            return speed
 
 
 def between(number, balls, spread, seed=7):
@@ -181,7 +154,7 @@ def test_model_errors(name):
 
 def test_sequential_is_the_nearest_that_needs_restitution_alone():
     worst = {}
-    for row in table(group="outcome", needs="e"):
+    for row in read("benchmarks.csv", group="outcome", needs="e"):
         if row["model_reference"].startswith("Hertz"):
             error = float(row["model_error"])
             worst[row["model"]] = max(error, worst.get(row["model"], 0.0))
@@ -265,7 +238,7 @@ def test_the_cheapest_setting_of_the_table(name, accuracy):
     chain = ABCCA if name == "ABCCA" else striking(ELASTIC[name])
     advice = recommend(chain, accuracy=accuracy, stiffness=1.0)
     model = "EnergyDistribution, Hertz" if name == "ABCCA" else "SpringChain, Hertz"
-    fit = [row for row in table(group=group, model=model, chain=name)
+    fit = [row for row in read("benchmarks.csv", group=group, model=model, chain=name)
            if float(row["numerical_error"]) <= accuracy]  # fmt: skip
     row = min(fit, key=lambda row: float(row["time_ratio"]))
     assert advice.setting == row["setting"]
@@ -392,7 +365,7 @@ def test_the_time_of_plain_python_is_told_where_the_loop_is_compiled():
     """Small work is not compiled: both times, from the table, and the slower one is slower."""
     for impacts in (1, 1000):
         advice = recommend(FIVE, ratios=0.167, impacts=impacts)
-        (row,) = table(setting="plain, one call with its path", chain="five equal")
+        (row,) = read("benchmarks.csv", setting="plain, one call with its path", chain="five equal")
         assert advice.plain_seconds == pytest.approx(1e-6 * float(row["microseconds"]), rel=0.5)
         assert advice.plain_seconds > advice.seconds
         words = f"{lasting(advice.seconds)} compiled; {lasting(advice.plain_seconds)} in plain"

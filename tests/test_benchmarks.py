@@ -2,7 +2,6 @@
 
 import csv
 import importlib.util
-from pathlib import Path
 
 import engines
 import measure
@@ -13,10 +12,9 @@ import savings
 import scenes
 import solvers
 from chains import HERTZ, LINEAR
+from stored import read
 
 from cradle.closed_form import three_balls
-
-ROOT = Path(__file__).parents[1]
 
 CLOCK = measure.Clock(repeats=1)
 
@@ -151,11 +149,6 @@ def engine(request):
     return request.param
 
 
-def stored():
-    with (ROOT / "data" / "benchmarks.csv").open(encoding="utf-8") as file:
-        return [row for row in csv.DictReader(file) if row["group"] == "engine"]
-
-
 # Box2D's bindings, made by SWIG, warn when they are imported.
 @pytest.mark.filterwarnings("ignore:builtin type:DeprecationWarning")
 def test_engine_exchanges_the_velocities_of_two_balls(engine):
@@ -174,12 +167,8 @@ def test_engine_repeats_what_is_stored(engine, setting):
         scene = scenes.SCENES[name]
         _, after = engines.solve(engine, scene, "touching", setting)
         assert abs(np.dot(scene.masses, after) / scene.masses[0] - 1) < 1e-5
-        (row,) = [
-            row
-            for row in stored()
-            if (row["model"], row["setting"], row["chain"])
-            == (engine.name, f"{setting}, touching", name)
-        ]
+        same = {"model": engine.name, "setting": f"{setting}, touching", "chain": name}
+        (row,) = read("benchmarks.csv", group="engine", **same)
         if row["versions"].startswith(same_version):
             expected = [float(v) for v in row["velocities"].split()]
             np.testing.assert_allclose(after, expected, rtol=0, atol=1e-4)

@@ -1,15 +1,12 @@
 """data/gaps_*.csv: spheres with gaps and leans, computed again by other means."""
 
-import csv
-from functools import cache
-from pathlib import Path
-
 import gaps
 import numpy as np
 import pytest
 import real_cradles
 from chains import HERTZ
 from chapters import Chapter
+from stored import read
 
 from cradle import (
     Chain,
@@ -22,13 +19,6 @@ from cradle import (
 )
 
 CHAPTER = Chapter("experiments")
-DATA = Path(__file__).parents[1] / "data"
-
-
-@cache
-def table(name):
-    with (DATA / name).open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def test_touching_spheres_are_the_energy_law_and_wide_gaps_are_pairs():
@@ -45,7 +35,7 @@ def test_touching_spheres_are_the_energy_law_and_wide_gaps_are_pairs():
 
 @pytest.mark.parametrize("number", [9, 17, 21])
 def test_rows_of_five_by_another_integration(number):
-    row = table("gaps_five.csv")[number]
+    row = read("gaps_five.csv")[number]
     gap = float(row["gap"])
     after = real_cradles.spheres(np.eye(5)[0], [0, gap, gap, gap], 0.0)
     assert [float(row[f"v{k}"]) for k in range(1, 6)] == pytest.approx(after, abs=3e-4)
@@ -72,7 +62,7 @@ def test_lean_between_two_balls_at_rest_by_scipy():
 
 @pytest.mark.parametrize("triplet", ["AAA", "ADD", "BCB", "DAC", "CDB"])
 def test_rows_of_triplets(triplet):
-    row = next(r for r in table("gaps_triplets.csv") if r["triplet"] == triplet)
+    row = next(r for r in read("gaps_triplets.csv") if r["triplet"] == triplet)
     chain, model = paper_chain(triplet, excess="saturate")
     listed = collide(chain, model).velocities
     for name in ("sequential", "energy_hertz", "fused"):
@@ -89,7 +79,7 @@ def test_rows_of_triplets(triplet):
 
 def test_what_the_chapter_says():
     """Medians; one number each beats a shared one; the quotients are no property of the pairs."""
-    rows = table("gaps_triplets.csv")
+    rows = read("gaps_triplets.csv")
     assert len(rows) == 64
     column = {name: np.array([float(r[name]) for r in rows]) for name in list(rows[0])[1:]}
     rms = {name: np.sqrt((column[name] ** 2).mean()) for name in column}
@@ -115,7 +105,7 @@ def test_what_the_chapter_says():
 
 def test_ratio_of_touching_spheres():
     """ADD by another integration: 51 entries of Table 2 lie above what elastic spheres imply."""
-    rows = {r["triplet"]: float(r["implied"]) for r in table("gaps_triplets.csv")}
+    rows = {r["triplet"]: float(r["implied"]) for r in read("gaps_triplets.csv")}
     listed = ratio_table().set_index("triplet")["ratio"]
     above = sum(listed[t] > ratio for t, ratio in rows.items())
     assert int(CHAPTER.glued["scored-above-spheres"]) == above

@@ -1,23 +1,19 @@
 """data/implied_ratio.csv: the ratio that springs imply, computed again by other means."""
 
-import csv
 from functools import cache
-from pathlib import Path
 
 import implied_ratio
 import numpy as np
 import pytest
+from stored import read
 
 from cradle import post_impact_velocities
 from cradle.closed_form import one_collision_each, three_balls
 
-ROOT = Path(__file__).parents[1]
-
 
 @cache
 def table():
-    with (ROOT / "data" / "implied_ratio.csv").open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    return read("implied_ratio.csv")
 
 
 def numbers(row, names):

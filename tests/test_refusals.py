@@ -235,6 +235,7 @@ OTHERS = [
     (ratio_of, ([0, 0, 1],), "closing_speeds = [0.0, -1.0]; any ratio fits"),
     (paper_chain, ("ABC", [1, 2]), "speed = [1, 2]; must be one number"),
     (paper_chain, (3,), "sequence is an int; must be letters, as in 'ABC'"),
+    (post_impact_velocities, (MASKED, [1, 0, 0], 1, 0.1), "masses[1] = masked; must be a real"),
     (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
     (TRACE.plot, {"contact": 4}, "contact = 4; must be one of 0 to 1"),
     (drawn, ([],), "traces has chains of [] balls; must be of one length"),

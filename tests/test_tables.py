@@ -3,8 +3,6 @@
 import csv
 import re
 import shutil
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -197,15 +195,6 @@ def test_a_table_changed_rightly_is_read(edited):
     """The fixture itself reads the copy: else the refusals above would prove nothing."""
     edited("masses.csv", b"A,0.045", b"A,0.5")
     assert paper_chain("AB")[0].masses.tolist() == [0.5, 0.053]
-
-
-def test_import_loads_neither_pandas_nor_matplotlib():
-    code = (
-        "import sys, cradle; cradle.paper_chain('ABACA');"
-        "print(sorted({'pandas', 'matplotlib'} & sys.modules.keys()))"
-    )
-    loaded = subprocess.check_output([sys.executable, "-c", code], text=True)
-    assert loaded.strip() == "[]"
 
 
 def test_data_readme_names_every_file_and_column(root: Path):
