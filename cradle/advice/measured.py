@@ -5,7 +5,6 @@ The table is `benchmarks.csv`, the one that the book shows ("Which model does yo
 
 from __future__ import annotations
 
-import csv
 from functools import cache
 from typing import NamedTuple
 
@@ -14,7 +13,7 @@ import numpy as np
 from cradle.chain import Chain
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.runtime import compile as runtime
-from cradle.tables import data_folder, paper_chain
+from cradle.tables import paper_chain, table_rows
 
 __all__ = ["Evidence", "Measured", "evidence", "lasting", "measured_chain", "rows", "unit_time"]
 
@@ -65,15 +64,9 @@ class Evidence(NamedTuple):
 
 
 @cache
-def _lines() -> tuple[dict[str, str], ...]:
-    with (data_folder() / "benchmarks.csv").open(encoding="utf-8") as file:
-        return tuple(csv.DictReader(file))
-
-
-@cache
 def unit_time() -> float:
     """Return the unit of times, s: one impact of three balls in a batch, where it was measured."""
-    timed = [line for line in _lines() if line["time_ratio"]]
+    timed = [line for line in table_rows("benchmarks.csv") if line["time_ratio"]]
     times = [float(line["microseconds"]) / float(line["time_ratio"]) for line in timed]
     return 1e-6 * float(np.median(times))
 
@@ -92,7 +85,7 @@ def rows(group: str, kernel: str = "") -> tuple[Measured, ...]:
     kernel = kernel or ("compiled" if runtime.available() else "plain")
     path, batch = f"{kernel}, one call with its path", f"{kernel}, batch"
     found = []
-    for line in _lines():
+    for line in table_rows("benchmarks.csv"):
         if line["model"] == "two balls" and line["setting"].startswith("all: "):
             # A batch of two balls, by `post_impact_velocities`.
             line = line | {"group": "event", "model": "ImpulseCorrelation", "setting": batch}
