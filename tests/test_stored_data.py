@@ -12,7 +12,7 @@ from pathlib import Path
 DATA = Path(__file__).parents[1] / "data"
 CHECKSUMS = DATA / "checksums.csv"
 MEASURED = (
-    "benchmarks.csv", "cradle_*.csv", "explorer_speed.csv", "extremes_*.csv", "film_*.csv",
+    "benchmarks.csv", "cradle_*.csv", "extremes_*.csv", "film_*.csv",
     "gaps_*.csv", "implied_ratio.csv", "long_chains.csv", "scene_*.csv",
 )  # fmt: skip
 
