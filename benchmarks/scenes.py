@@ -3,15 +3,14 @@
 from dataclasses import dataclass
 from functools import cache
 
-import mpmath
 import numpy as np
 from chains import magnitudes, uniform
 from march import march
-from truth import solve
+from truth import in_fifty_digits
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide, paper_chain
 
-__all__ = ["SCENES", "Scene", "march", "random_chains", "random_truth", "solve"]
+__all__ = ["SCENES", "Scene", "march", "random_chains", "random_truth"]
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class Scene:
     def truth(self):
         """Return the outcome of the paper's model from another solver, in fifty digits."""
         parts = (self.masses, self.velocities, self.restitution, self.forward, self.backward)
-        return _in_fifty_digits(parts)
+        return in_fifty_digits(*parts, excess="saturate")[0]
 
     @cache  # noqa: B019
     def springs(self, exponent=1.5):
@@ -99,10 +98,4 @@ def random_chains(balls, count):
 def random_truth(chains, count):
     """Return the outcomes of the first of these chains from another solver, in fifty digits."""
     rows = zip(*(part[:count].tolist() for part in chains), strict=True)
-    return np.array([_in_fifty_digits(row) for row in rows])
-
-
-def _in_fifty_digits(parts):
-    with mpmath.workdps(50):
-        solved = solve(*(list(part) for part in parts), excess="saturate")
-        return np.array([float(v) for v in solved.velocities])
+    return np.array([in_fifty_digits(*row, excess="saturate")[0] for row in rows])

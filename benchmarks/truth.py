@@ -9,11 +9,12 @@ import decimal
 from itertools import groupby
 
 import mpmath
+import numpy as np
 
 from cradle import textbook
 from cradle.textbook import EventLimit
 
-__all__ = ["EventLimit", "Impact", "as_meant", "meaning", "solve"]
+__all__ = ["EventLimit", "Impact", "as_meant", "in_fifty_digits", "meaning", "solve"]
 
 
 def meaning(x):
@@ -171,3 +172,12 @@ def solve(
         masses, velocities, restitution, forward, backward,
         number=number, max_events=max_events, impact=Chosen, **options,
     )  # fmt: skip
+
+
+def in_fifty_digits(masses, velocities, restitution, forward, backward=None, **options):
+    """Velocities as floats, and the whole state, of a chain given in arrays, numbers or texts."""
+    given = (masses, velocities, restitution, forward, backward)
+    parts = [part.tolist() if isinstance(part, np.ndarray) else part for part in given]
+    with mpmath.workdps(50):
+        state = solve(*parts, **options)
+        return np.array([float(v) for v in state.velocities]), state

@@ -6,13 +6,12 @@ No number of the measured table stands here, because it is measured anew from ti
 import re
 import xml.etree.ElementTree as ElementTree
 
-import mpmath
 import numpy as np
 import pytest
 from chains import ELASTIC, HERTZ, elastic_spheres, magnitudes, striking, uniform, within_bounds
 from energy_law import strike
 from stored import read
-from truth import solve
+from truth import in_fifty_digits
 
 import cradle.advice.choice
 import cradle.advice.measured
@@ -111,10 +110,8 @@ def test_events_against_fifty_digits():
         n = len(chain)
         ways = [ratios.forward, ratios.forward if ratios.backward is None else ratios.backward]
         forward, backward = (np.broadcast_to(part, n - 2).tolist() for part in ways)
-        with mpmath.workdps(50):
-            parts = (part.tolist() for part in (chain.masses, chain.velocities, chain.restitution))
-            done = solve(*parts, forward, backward, excess="saturate")
-            answer = np.array([float(v) for v in done.velocities])
+        own = chain.masses, chain.velocities, chain.restitution
+        answer, _ = in_fifty_digits(*own, forward, backward, excess="saturate")
         assert advice.numerical_error * (1 if len(advice.measured_on) == 1 else 10) <= 1e-12
         assert off(chain, advice, answer) <= 10 * advice.numerical_error + ROUNDING
 

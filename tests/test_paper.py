@@ -1,10 +1,9 @@
 """What the paper shows: the ends of Fig. 4, Figs. 5, 7 and 8, the ten chains of Figs. 10 to 12."""
 
-import mpmath
 import numpy as np
 import pytest
 from chains import FIG_8, changes
-from truth import solve
+from truth import in_fifty_digits
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain
 from cradle.tables import paper_sequences
@@ -33,9 +32,8 @@ def test_figure_5_sequence():
     trace = collide(Chain([1, 1, 1], [1, 0.8, 0], 0.2), ImpulseCorrelation(0.1))
     expected = [("end", 0), ("close", 0), ("end", 1), ("close", 1), ("end", 0), ("end", 1)]
     assert changes(trace.events) == expected
-    with mpmath.workdps(50):
-        exact = solve([1, 1, 1], [1, "0.8", 0], "0.2", "0.1")
-    np.testing.assert_allclose(trace.velocities, [float(v) for v in exact.velocities], atol=1e-15)
+    exact, _ = in_fifty_digits([1, 1, 1], [1, "0.8", 0], "0.2", "0.1")
+    np.testing.assert_allclose(trace.velocities, exact, atol=1e-15)
 
 
 def test_figure_7_digits():
@@ -45,9 +43,8 @@ def test_figure_7_digits():
     assert [f"{v:.3f}" for v in after] == ["-0.003", "0.347", "0.999"]
     nudged = collide(chain, ImpulseCorrelation(0.15006)).velocities
     assert [f"{v:.3f}" for v in nudged] == ["-0.003", "0.348", "0.999"]
-    with mpmath.workdps(50):
-        exact = solve([1, 0.01, 1], [1, 0, 0], 1, 0.15).velocities
-    np.testing.assert_allclose(after, [float(v) for v in exact], rtol=0, atol=1e-13)
+    exact, _ = in_fifty_digits([1, 0.01, 1], [1, 0, 0], 1, 0.15)
+    np.testing.assert_allclose(after, exact, rtol=0, atol=1e-13)
 
 
 def test_figure_8_sequence():
@@ -60,17 +57,12 @@ def test_figure_8_sequence():
 
 def test_figure_8_meeting_rule():
     """The ends of the overlap and its midpoint (section 3.2) give three outcomes."""
-    after = [
-        collide(
-            Chain([1] * 4, [1, 0.5, 0, 0], 1), ImpulseCorrelation(0.1, meeting=meeting)
-        ).velocities
-        for meeting in (0.0, 0.5, 1.0)
-    ]
-    assert np.abs(after[0] - after[2]).max() > 0.01
-    with mpmath.workdps(50):
-        for meeting, found in zip((0, 0.5, 1), after):
-            exact = solve([1] * 4, [1, 0.5, 0, 0], 1, 0.1, meeting=meeting).velocities
-            np.testing.assert_allclose(found, [float(v) for v in exact], rtol=0, atol=1e-14)
+    chain, found = Chain([1] * 4, [1, 0.5, 0, 0], 1), []
+    for meeting in (0.0, 0.5, 1.0):
+        found.append(collide(chain, ImpulseCorrelation(0.1, meeting=meeting)).velocities)
+        exact, _ = in_fifty_digits([1] * 4, [1, 0.5, 0, 0], 1, 0.1, meeting=meeting)
+        np.testing.assert_allclose(found[-1], exact, rtol=0, atol=1e-14)
+    assert np.abs(found[0] - found[2]).max() > 0.01
 
 
 @pytest.mark.parametrize("sequence", list(paper_sequences()))
@@ -79,16 +71,8 @@ def test_figures_10_to_12(sequence, speed):
     """The ten chains at the four speeds, against the reference solver in fifty digits."""
     chain, model = paper_chain(sequence, speed, excess="saturate")
     trace = collide(chain, model)
-    with mpmath.workdps(50):
-        exact = solve(
-            chain.masses.tolist(),
-            chain.velocities.tolist(),
-            chain.restitution.tolist(),
-            model.forward,
-            model.backward,
-            excess="saturate",
-        )
-        after = [float(v) for v in exact.velocities]
+    own = chain.masses, chain.velocities, chain.restitution
+    after, exact = in_fifty_digits(*own, model.forward, model.backward, excess="saturate")
     assert changes(trace.events) == changes(exact.events)
     np.testing.assert_allclose(trace.velocities, after, rtol=0, atol=1e-13 * speed)
     assert set(trace.saturated) == exact.held
