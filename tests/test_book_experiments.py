@@ -9,6 +9,7 @@ from functools import cache
 import mpmath
 import numpy as np
 import pytest
+from chains import changes
 from chapters import Chapter, points
 from truth import solve
 
@@ -109,6 +110,8 @@ def check_prediction(sequence):
         trace = collide(*paper_chain(sequence, speed=speed, excess="saturate"))
         np.testing.assert_allclose(trace.velocities / speed, expected, rtol=1e-12, atol=1e-14)
         assert trace.collisions.tolist() == predicted(sequence).collisions
+        assert changes(trace.events) == changes(predicted(sequence).events)
+        assert set(trace.saturated) == predicted(sequence).held
 
 
 @pytest.mark.parametrize("sequence", [s for s, n in paper_sequences().items() if n == 10])
