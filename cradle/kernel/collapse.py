@@ -21,8 +21,6 @@ def end_plastically(first, last, n, state):
     for c in (first - 1, last + 1):
         if 0 <= c < n - 1:
             stir(c, n, run, contact)
-            if contact[c].active == 1:
-                run[run_of(c, contact)].stirred = 1
 
 
 @jit
@@ -63,13 +61,11 @@ def common_velocity(first, last, left_part, right_part, ball, contact):
 
 
 @jit
-def chatters(c, n, state):
-    """Tell whether contact c exists and is in an exhausted collision, or has just been.
+def chatters(c, state):
+    """Tell whether contact c is in an exhausted collision, or has just been.
 
     Or if it has collided lately at a speed that is as far below an exhausted one: dust.
     """
-    if not 0 <= c < n - 1:
-        return False
     k = state.contact[c]
     work = k.w if k.active == 1 and k.w > 0.0 else k.q.real
     if not exhausted(c, work, state.ball, state.contact, state.tally[0]):
@@ -79,12 +75,16 @@ def chatters(c, n, state):
 
 
 @jit
-def next_chatter(c, step, n, state):
-    """Return the next contact after c that chatters too, with nothing but zeros between; or c."""
-    k = c + step
-    while 0 <= k < n - 1 and state.contact[k].u.real == 0.0 and not chatters(k, n, state):
+def last_chatter(c, step, n, state):
+    """Return the last contact from c on that chatters too, with nothing but zeros between."""
+    last, k = c, c + step
+    while 0 <= k < n - 1:
+        if chatters(k, state):
+            last = k
+        elif state.contact[k].u.real != 0.0:
+            break
         k += step
-    return k if chatters(k, n, state) else c
+    return last
 
 
 @apart
@@ -96,11 +96,7 @@ def exhausted_stretch(c, n, state):
     a light ball that struck them.
     """
     ball, contact = state.ball, state.contact
-    first = last = c
-    while next_chatter(first, -1, n, state) < first:
-        first = next_chatter(first, -1, n, state)
-    while next_chatter(last, 1, n, state) > last:
-        last = next_chatter(last, 1, n, state)
+    first, last = last_chatter(c, -1, n, state), last_chatter(c, 1, n, state)
     loses = False
     common_velocity(first, last, ONE, ONE, ball, contact)
     energy = fastest = 0.0

@@ -306,16 +306,17 @@ def look_above(first, last, n, state):
 
 
 @once
-def take_limits(ends, ended, worn, n, state):
-    """R9, after `ends` contacts have ended, `ended` the last; tell whether contacts collapsed."""
-    state.level[LOWER].count += ends
-    first, last = ended, ended - 1
-    if worn >= 0:
-        first, last = exhausted_stretch(worn, n, state)
+def take_limits(n, state):
+    """R9, after contacts have ended; tell whether some have collapsed."""
+    tally = state.tally[0]
+    state.level[LOWER].count += tally.ends
+    first, last = tally.ended, tally.ended - 1
+    if tally.worn >= 0:
+        first, last = exhausted_stretch(tally.worn, n, state)
         if first <= last:
             first, last = merge(first, last, n, state)
     if last < first:
-        first, last = look(LOWER, ended, n, state)
+        first, last = look(LOWER, tally.ended, n, state)
     if last < first:
         return False
     look_above(first, last, n, state)

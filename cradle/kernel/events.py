@@ -28,28 +28,22 @@ def run_of(c, contact):
 @jit
 def stir(c, n, run, contact):
     """Note that the runs at contact c and across an idle contact beside it have changed."""
-    k = c
-    if contact[c].active == 0:
-        k = c - 1
-        if k >= 0 and contact[k].active == 1:
-            run[run[k].first].stirred = 1
-        k = c + 1
-        if k < n - 1 and contact[k].active == 1:
-            run[k].stirred = 1
-    if c > 1 and contact[c - 1].active == 0 and contact[c - 2].active == 1:
-        run[run[c - 2].first].stirred = 1
-    if c < n - 3 and contact[c + 1].active == 0 and contact[c + 2].active == 1:
-        run[c + 2].stirred = 1
+    for k in range(max(c - 2, 0), min(c + 2, n - 2) + 1):
+        if contact[k].active == 1:
+            if k == 0 or contact[k - 1].active == 0:
+                run[k].stirred = 1
+            elif k == n - 2 or contact[k + 1].active == 0:
+                run[run[k].first].stirred = 1
 
 
 @jit
 def make_run(first, last, source, low, high, run):
-    """Write a run down."""
+    """Write a run down; source, low and high are those of a longer one, or of this."""
     run[first].last = last
     run[last].first = first
-    run[first].source = source
-    run[first].low = low
-    run[first].high = high
+    run[first].source = min(max(source, first), last) if source >= 0 else -1
+    run[first].low = min(max(low, first), last)
+    run[first].high = min(max(high, first), last)
     run[first].stirred = 1
 
 
@@ -82,40 +76,36 @@ def start(n, state):
             before = first
 
 
-@once
-def activate(c, from_left, from_right, ball, contact):
-    """R4, R5: contact c becomes active, driven from the side or sides already active."""
-    contact[c].q = ZERO
-    contact[c].w = 0.0
-    contact[c].rate = ZERO  # it drives nobody in this round
-    contact[c].active = 1
-    contact[c].hits += 1
-    if from_left:
-        ball[c].turn = 1
-    if from_right:
-        ball[c + 1].turn = -1
+@jit
+def join(one, other, source, n, run, tally):
+    """Make one run of two that touch."""
+    make_run(one, run[other].last, source, run[one].low, run[other].high, run)
+    link(one, run[other].onward, n, run, tally)
 
 
 @apart
 def grow(c, n, ball, contact, run, tally):
-    """R5: take the contact c that has just closed into the run, or the two runs, beside it."""
+    """R4, R5: contact c closes: a run of its own, joined to those beside it, which drive it."""
+    k = contact[c]
+    k.q = k.rate = ZERO  # it drives nobody in this round
+    k.w = 0.0
+    k.active = 1
+    k.hits += 1
     from_left = c > 0 and contact[c - 1].active == 1
     from_right = c < n - 2 and contact[c + 1].active == 1
-    activate(c, from_left, from_right, ball, contact)
-    if from_left and from_right:  # R8.5: several sources
-        first, right = run[c - 1].first, c + 1
-        last, after = run[right].last, run[right].onward
-        make_run(first, last, -1, first, last, run)
-        link(first, after, n, run, tally)
-    elif from_left:
-        first = run[c - 1].first
-        make_run(first, c, run[first].source, run[first].low, c, run)
-    else:
-        right = c + 1
-        before, after, source = run[right].back, run[right].onward, run[right].source
-        make_run(c, run[right].last, source, c, run[right].high, run)
-        link(before, c, n, run, tally)
-        link(c, after, n, run, tally)
+    first = run[c - 1].first if from_left else c
+    before = first if from_left else run[c + 1].back
+    after = c + 1 if from_right else run[first].onward
+    make_run(c, c, c, c, c, run)
+    link(before, c, n, run, tally)
+    link(c, after, n, run, tally)
+    if from_left:
+        ball[c].turn = 1
+        join(first, c, run[first].source, n, run, tally)
+    if from_right:
+        ball[c + 1].turn = -1
+        source = -1 if from_left else run[c + 1].source  # R8.5: several sources
+        join(first, c + 1, source, n, run, tally)
     stir(c, n, run, contact)
 
 
@@ -129,23 +119,12 @@ def deactivate(c, first, n, ball, contact, run, tally):
     ball[c + 1].turn = 0
     last, source, low, high = run[first].last, run[first].source, run[first].low, run[first].high
     before, after = run[first].back, run[first].onward
-    if c > first:
-        one = source
-        if source < 0:
-            one = source_of(first, c - 1, ball)
-        elif c <= source:
-            one = c - 1
-        make_run(first, c - 1, one, min(low, c - 1), min(high, c - 1), run)
-        before = first
-    if c < last:
-        other = source
-        if source < 0:
-            other = source_of(c + 1, last, ball)
-        elif c >= source:
-            other = c + 1
-        make_run(c + 1, last, other, max(low, c + 1), max(high, c + 1), run)
-        link(before, c + 1, n, run, tally)
-        before = c + 1
+    for one, other in ((first, c - 1), (c + 1, last)):
+        if one <= other:
+            own = source if source >= 0 else source_of(one, other, ball)
+            make_run(one, other, own, low, high, run)
+            link(before, one, n, run, tally)
+            before = one
     link(before, after, n, run, tally)
     stir(c, n, run, contact)
 
@@ -186,12 +165,8 @@ def end_contacts(which, n, state):
     """R3, R8.1: end every contact that needs no progress to end; left to right.
 
     SLOPED are those that open from u = 0, once the slopes are known; CERTAIN all others, before.
-    Returns the number of ends, the last contact ended, and one that is worn out (R9) or -1.
     """
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
-    ends = 0
-    ended = -1
-    worn = -1
     first = tally.first
     while first < n:
         after = run[first].onward
@@ -201,17 +176,16 @@ def end_contacts(which, n, state):
                 sloped = which == SLOPED and opens_at_zero(c, ball, contact)
                 if not (sloped or (which == CERTAIN and has_ended(c, contact))):
                     continue
+                tally.ends += 1
+                tally.ended = c
                 if count_exhausted(c, n, ball, contact, tally):
-                    worn = c
+                    tally.worn = max(tally.worn, c)
                 last = run[first].last
                 deactivate(c, first, n, ball, contact, run, tally)
                 if c < last:
                     first = c + 1
-                ends += 1
-                ended = c
                 record(END, c, n, state)
         first = after
-    return ends, ended, worn
 
 
 @jit
@@ -233,39 +207,31 @@ def distance(c, contact, tally):
     return k.before if k.stamp == tally.stamp else ZERO
 
 
-@once
-def goes_first(c, left, contact, tally):
-    """R8.6: tell whether contact c closes before the one on the left of the same free ball.
-
-    The nearer one does; of equals the left one.
-    """
-    one = distance(left, contact, tally)
-    nearer = minus(one, distance(c, contact, tally)).real
-    return is_clear(nearer, one.real, tally) and nearer > 0.0
+@jit
+def closes_now(c, n, contact, tally):
+    """R5, R8.6: tell whether contact c closes; of two on one free ball the nearer, or left one."""
+    if not about_to_close(c, n, contact):
+        return False
+    if not about_to_close(c + 1, n, contact):
+        return True
+    one = distance(c, contact, tally)
+    farther = minus(one, distance(c + 1, contact, tally)).real
+    return not (is_clear(farther, one.real, tally) and farther > 0.0)
 
 
 @jit
 def close_contacts(n, state):
-    """R5, R8.1: activate every idle contact that is about to close; left to right.
-
-    Of two that close on one ball between two runs, the one that was nearer goes first (R8.6).
-    """
-    ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
-    closes = 0
+    """R5, R8.1: activate every idle contact that is about to close, left to right; tell if any."""
+    contact, run, tally = state.contact, state.run, state.tally[0]
+    closed = False
     first = tally.first
     while first < n:
         after = run[first].onward
         if run[first].stirred == 1:
-            left, right = first - 1, run[first].last + 1
-            if about_to_close(left, n, contact):
-                grow(left, n, ball, contact, run, tally)
-                record(CLOSE, left, n, state)
-                closes += 1
-            if about_to_close(right, n, contact):
-                both = about_to_close(right + 1, n, contact)
-                if not (both and goes_first(right + 1, right, contact, tally)):
-                    grow(right, n, ball, contact, run, tally)
-                    record(CLOSE, right, n, state)
-                    closes += 1
+            for c in (first - 1, run[first].last + 1):
+                if closes_now(c, n, contact, tally):
+                    grow(c, n, state.ball, contact, run, tally)
+                    record(CLOSE, c, n, state)
+                    closed = True
         first = after
-    return closes
+    return closed

@@ -7,7 +7,7 @@ from cradle.kernel.events import close_contacts, end_contacts, grow, reduced_mas
 from cradle.kernel.meeting import first_meeting, who_goes
 from cradle.kernel.numbers import ONE, ZERO, minus, negative, over, plus, read, scaled, times
 from cradle.kernel.record import record, record_compressions
-from cradle.kernel.rules import pulls_at, rates, segment
+from cradle.kernel.rules import pull_beside, pulls_at, rates, segment
 from cradle.kernel.snapshot import forget
 from cradle.kernel.state import (
     CERTAIN,
@@ -77,32 +77,29 @@ def advance(first, n, state):
     """Take a run straight on its way: velocities are linear in the impulses, works quadratic."""
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
     low, high, s = run[first].low, run[first].high, run[first].way
-    whole = run[first].goes == 2
-    for c in range(low, high + 1):
+    for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
         k = contact[c]
-        impulse = times(k.rate, s)
-        k.p = plus(k.p, impulse)
-        if k.fixed == 1 and impulse.real > 0.0:
-            k.held = 1
-        ends = whole and k.due == 1
-        now = k.final if ends else plus(k.u, times(k.slope, s))
-        if k.fixed == 0:
-            book_work(k, impulse, now)
+        own = low <= c <= high
+        if not own and k.active == 1:
+            continue  # it waits
+        slope = k.slope if own else pull_beside(c, low, ball)
+        pulls = pulls_at(c, ball) if own else abs(slope.real)
+        ends = run[first].goes == 2 and k.due == 1
+        now = k.final if ends else plus(k.u, times(slope, s))
+        if own:
+            impulse = times(k.rate, s)
+            k.p = plus(k.p, impulse)
+            if k.fixed == 1 and impulse.real > 0.0:
+                k.held = 1
+            if k.fixed == 0:
+                book_work(k, impulse, now)
+        elif k.stamp < tally.stamp:
+            k.before, k.stamp = negative(k.u), tally.stamp
         if ends:
-            set_exactly(k, now)
             k.q = ZERO
+            set_exactly(k, now)
         else:
-            set_speed(k, now, pulls_at(c, ball) * s.real, tally)
-    for c in (low - 1, high + 1):
-        if 0 <= c < n - 1 and contact[c].active == 0:
-            k = contact[c]
-            if k.stamp < tally.stamp:
-                k.before, k.stamp = negative(k.u), tally.stamp
-            pull = negative(ball[low].pull) if c < low else ball[c].pull
-            if whole and k.due == 1:
-                set_exactly(k, ZERO)
-            else:
-                set_speed(k, plus(k.u, times(pull, s)), abs(pull.real) * s.real, tally)
+            set_speed(k, now, pulls * s.real, tally)
     run[first].stirred = 1
 
 
@@ -112,10 +109,6 @@ def go(n, state):
     run, contact, tally = state.run, state.contact, state.tally[0]
     tally.stamp += 1
     gap = who_goes(first_meeting(n, state), n, state)
-    first = tally.first
-    while first < n:
-        run[first].stirred = 0
-        first = run[first].onward
     first = tally.first
     while first < n:
         if run[first].goes > 0:
@@ -134,9 +127,10 @@ def go(n, state):
         record(CLOSE, gap, n, state)
 
 
-@once
-def set_units(n, chain, meeting, tally):
-    """Choose units of velocity and mass, powers of two."""
+@apart
+def prepare(n, chain, meeting, state):
+    """Write the chain into the state, in units of its own, powers of two; R2."""
+    ball, contact, tally = state.ball, state.contact, state.tally[0]
     largest = heaviest = 0.0
     for i in range(n):
         largest = max(largest, abs(chain.v[i]))
@@ -144,16 +138,8 @@ def set_units(n, chain, meeting, tally):
     # The units themselves and their inverses are numbers too.
     tally.shift = min(max(math.frexp(largest)[1], -1000), 1023)
     tally.mass_shift = min(max(math.frexp(heaviest)[1], -1000), 1023)
-    tally.unit = math.ldexp(1.0, -tally.shift)
+    tally.unit, mass_unit = math.ldexp(1.0, -tally.shift), math.ldexp(1.0, -tally.mass_shift)
     tally.meeting = read(meeting)
-
-
-@apart
-def prepare(n, chain, meeting, state):
-    """Write the chain into the state, in its own units; R2."""
-    ball, contact, tally = state.ball, state.contact, state.tally[0]
-    set_units(n, chain, meeting, tally)
-    mass_unit = math.ldexp(1.0, -tally.mass_shift)
     tally.events = tally.rounds = tally.stamp = tally.collapsed = tally.defect = 0
     tally.cut_off, tally.fastest, tally.energy, tally.margin = LIMITS.cut, 0.0, 0.0, 1.0
     for i in range(n):
@@ -224,21 +210,19 @@ def impact(n, chain, meeting, max_rounds, resumed, state):
         if tally.effort < 0 or tally.events > tally.room:
             return PAUSED
         # R8.1: ends first, those that are known without the slopes before the others; then R9.
-        ends, ended, worn = end_contacts(CERTAIN, n, state)
-        more = 0
+        tally.ends, tally.worn = 0, -1
+        end_contacts(CERTAIN, n, state)
+        certain = tally.ends
         if new_rates(n, state):
-            more, last, last_worn = end_contacts(SLOPED, n, state)
-            ends += more
-            ended = last if more > 0 else ended
-            worn = max(worn, last_worn)
-        collapsed = ends > 0 and take_limits(ends, ended, worn, n, state)
+            end_contacts(SLOPED, n, state)
+        collapsed = tally.ends > 0 and take_limits(n, state)
         if tally.first >= n:
             break
         tally.rounds += 1
         if tally.rounds > max_rounds:
             return UNFINISHED
         # R8.1: then closings; both need no progress, so the next round looks again.
-        if more > 0 or collapsed or close_contacts(n, state) > 0:
+        if tally.ends > certain or collapsed or close_contacts(n, state):
             continue
         # R8.2 to R8.6: progress.
         new_segments(n, state)

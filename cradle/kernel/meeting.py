@@ -2,7 +2,19 @@
 
 import math
 
-from cradle.kernel.numbers import NEVER, ONE, ZERO, least, less, minus, negative, over, plus, times
+from cradle.kernel.numbers import (
+    NEVER,
+    ONE,
+    ZERO,
+    least,
+    less,
+    minus,
+    most,
+    negative,
+    over,
+    plus,
+    times,
+)
 from cradle.kernel.rules import is_clear, is_gap
 from cradle.kernel.state import LIMITS, jit, once
 
@@ -76,23 +88,11 @@ def first_meeting(n, state):
 @jit
 def is_reached_sooner(one, other, tally):
     """R8.4: tell whether the gap after run `one` is reached sooner than that after `other`."""
-    larger = minus(larger_part(one), larger_part(other)).real
+    larger = minus(most(one.left, one.right), most(other.left, other.right)).real
     if is_clear(larger, 1.0, tally):
         return larger < 0.0
-    smaller = minus(smaller_part(one), smaller_part(other)).real
+    smaller = minus(least(one.left, one.right), least(other.left, other.right)).real
     return is_clear(smaller, 1.0, tally) and smaller < 0.0
-
-
-@jit
-def larger_part(one):
-    """Return the larger part of the two segments before the gap after a run."""
-    return one.right if less(one.left, one.right) else one.left
-
-
-@jit
-def smaller_part(one):
-    """Return the smaller part of the two."""
-    return one.left if less(one.left, one.right) else one.right
 
 
 @jit
@@ -125,6 +125,7 @@ def who_goes(one, n, state):
     while first < n:
         run[first].goes = 2 if one < 0 else 0
         run[first].way = run[first].reach
+        run[first].stirred = 0
         first = run[first].onward
     if one < 0:
         return -1

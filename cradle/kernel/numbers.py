@@ -113,6 +113,12 @@ def least(a, b):
 
 
 @jit
+def most(a, b):
+    """Return the larger one, the first of equals."""
+    return b if less(a, b) else a
+
+
+@jit
 def read(x):
     """Return what a float means: the decimal of up to 15 digits that it prints as, or its bits.
 

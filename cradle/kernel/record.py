@@ -48,16 +48,18 @@ def settle(n, ball, contact, unit):
 
 
 @apart
-def write(k, kind, c, n, state):
-    """Write event number k, with impulses x of the contacts and the velocities that these give."""
+def write(kind, c, low, high, way, n, state):
+    """Write an event and the state when contacts low..high have gone so far on at their rates."""
     record, tally = state.record, state.tally[0]
-    ball, contact = state.ball, state.contact
+    ball, contact, k = state.ball, state.contact, tally.events
     record.kinds[k] = kind
     record.contacts[k] = c
     velocities, impulses = record.velocities[k + 1], record.impulses[k + 1]
     before = ZERO
     for i in range(n):
-        after = contact[i].x if i < n - 1 else ZERO
+        after = contact[i].p if i < n - 1 else ZERO
+        if low <= i <= high:
+            after = plus(after, times(contact[i].rate, way))
         change = times(minus(before, after), ball[i].inverse)
         velocities[i] = velocity(ball[i], change, tally.unit)
         if i < n - 1:
@@ -65,20 +67,11 @@ def write(k, kind, c, n, state):
         before = after
 
 
-@apart
-def write_present(kind, c, n, state):
-    """Write an event and the state after it."""
-    contact = state.contact
-    for j in range(n - 1):
-        contact[j].x = contact[j].p
-    write(state.tally[0].events, kind, c, n, state)
-
-
 @jit
 def record(kind, c, n, state):
     """Count an event; write it and the state after it, if there is room."""
     if state.tally[0].events < state.tally[0].capacity:
-        write_present(kind, c, n, state)
+        write(kind, c, 0, -1, ZERO, n, state)
     state.tally[0].events += 1
 
 
@@ -92,24 +85,22 @@ def record_compressions(first, way, n, state):
     low, high = run[first].low, run[first].high
     for c in range(low, high + 1):
         k = contact[c]
-        passes = k.u.real > 0.0 and k.slope.real < 0.0
-        k.y = over(k.u, negative(k.slope)) if passes else NEVER
-        ends = run[first].goes == 2 and k.due == 1
-        # One that comes at the end of the way is one of it, whatever its last digits say.
-        late = minus(k.y, way).real if passes else math.inf
-        k.passes = 1 if (ends and passes) or late <= LIMITS.tie * k.age else 0
+        k.x = NEVER
+        if k.u.real > 0.0 and k.slope.real < 0.0:
+            at = over(k.u, negative(k.slope))
+            ends = run[first].goes == 2 and k.due == 1
+            # One that comes at the end of the way is one of it, whatever its last digits say.
+            if ends or minus(at, way).real <= LIMITS.tie * k.age:
+                k.x = at
     while True:
-        found = -1
+        found = low
         for c in range(low, high + 1):
-            if contact[c].passes == 1 and (found < 0 or less(contact[c].y, contact[found].y)):
+            if less(contact[c].x, contact[found].x):
                 found = c
-        if found < 0:
+        at = contact[found].x
+        if at.real == math.inf:
             return
-        contact[found].passes = 0
+        contact[found].x = NEVER
         if tally.events < tally.capacity:
-            at = least(contact[found].y, way)
-            for j in range(n - 1):
-                k = contact[j]
-                k.x = plus(k.p, times(k.rate, at)) if low <= j <= high else k.p
-            write(tally.events, MAXIMUM_COMPRESSION, found, n, state)
+            write(MAXIMUM_COMPRESSION, found, low, high, least(at, way), n, state)
         tally.events += 1

@@ -258,39 +258,44 @@ def pulls_at(c, ball):
 
 
 @jit
+def pull_beside(c, low, ball):
+    """Return the closing speed per unit of progress that a run gives an idle contact beside it."""
+    return negative(ball[low].pull) if c < low else ball[c].pull
+
+
+@jit
 def segment(first, n, run, ball, contact, tally):
     """R8.2: progress of a run to its own next rate-changing event, and which contacts have it then.
 
     Two events are one if they are closer than what their closing speeds are known to.
     """
     low, high = run[first].low, run[first].high
+    left = low - 1 if low > 0 and contact[low - 1].active == 0 else low
+    right = high + 1 if high < n - 2 and contact[high + 1].active == 0 else high
     reach = NEVER
     sure = 0.0  # how old the closing speed of the first is
-    for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
+    for c in range(left, right + 1):
         k = contact[c]
-        k.until = NEVER
         if low <= c <= high:
             k.until, k.final = way_to_end(k, tally)
-        elif k.active == 0:
+            pulls = pulls_at(c, ball)
+        else:
             # Idle neighbours close; a gap, shared with another run, is no event of this run's own.
-            k.slope = negative(ball[low].pull) if c < low else ball[c].pull
+            k.until, k.final, k.slope = NEVER, ZERO, pull_beside(c, low, ball)
             if k.slope.real > 0.0 and not is_gap(c, n, contact):
                 k.until = over(negative(k.u), k.slope)
-        else:
-            continue
-        pulls = abs(k.slope.real) if k.active == 0 else pulls_at(c, ball)
+            pulls = abs(k.slope.real)
         k.age = k.made / pulls if pulls > 0.0 else 0.0
         if less(k.until, reach):
             reach = k.until
             sure = k.age
     run[first].reach = reach
     second = NEVER
-    for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
+    for c in range(left, right + 1):
         k = contact[c]
-        if low <= c <= high or k.active == 0:
-            late = minus(k.until, reach).real if k.until.real < math.inf else math.inf
-            k.due = 1 if late <= LIMITS.tie * max(k.age, sure) else 0
-            if k.due == 0:
-                second = least(second, k.until)
+        late = minus(k.until, reach).real if k.until.real < math.inf else math.inf
+        k.due = 1 if late <= LIMITS.tie * max(k.age, sure) else 0
+        if k.due == 0:
+            second = least(second, k.until)
     if reach.real < second.real < math.inf:
         tally.margin = min(tally.margin, minus(second, reach).real / second.real)

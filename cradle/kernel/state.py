@@ -132,7 +132,7 @@ class Contact:
     rate: complex  # impulse per unit of progress; the largest of a run is about 1
     slope: complex  # closing speed per unit of progress, du/ds
     until: complex  # progress to its own next event, and
-    final: complex  # its closing speed there, if it ends
+    final: complex  # its closing speed there
     age: float  # progress at the present pulls that would have made all that u was made of
     due: int  # 1 if its event comes at the end of the run's segment
     made: float  # sum of all changes of u's two balls since u was last zero by construction
@@ -146,7 +146,6 @@ class Contact:
     hits: int  # how often it became active
     tiny: int  # how many exhausted collisions in a row
     power: int  # binary exponent of the rate
-    passes: int  # 1 while its maximum of compression is still to be recorded
     x: complex  # room for what a function works out in passing
     y: complex
 
@@ -198,6 +197,9 @@ class Tally:
     events: int  # how many events, rounds, and rounds of progress, so far
     rounds: int
     stamp: int
+    ends: int  # contacts that have ended in this round, and the last of them
+    ended: int
+    worn: int  # R9: the last of them that is worn out, or -1
     collapsed: int  # 1 if contacts have collapsed
     effort: int  # contacts that may still be touched, and events written, before a pause
     room: int
