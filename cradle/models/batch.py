@@ -15,11 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from cradle.chain import Chain
 from cradle.input.values import (
     Vector,
-    checked,
-    checked_masses,
-    checked_restitution,
     numbers,
-    refuse_overflow,
     shown,
 )
 from cradle.kernel import Inputs, Options, Outputs
@@ -27,9 +23,8 @@ from cradle.models.correlation import (
     MAX_EVENTS,
     ImpulseCorrelation,
     check_options,
-    checked_ratios,
-    refuse_excess,
-    refuse_light,
+    check_values,
+    raise_refused,
 )
 from cradle.progress import progress_bar
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
@@ -237,7 +232,7 @@ def outcomes(
 
     count, chunk = math.prod(lead), _chunk(n)
     if count == 0:
-        _check(given, excess)
+        check_values(excess == "raise", *given.values())
     whole = outputs(count, n)
     options = Options(float(meeting), int(max_events), excess == "raise")
     large = count * n >= LARGE
@@ -256,8 +251,7 @@ def outcomes(
     # At the first failure in the order of the chains; none has been returned before.
     for status, failed in _in_order(solve, starts, progress):
         if status == REFUSED:
-            _check(given, excess)
-            raise AssertionError("the kernel refused chains that the checks admit")
+            raise_refused(options.bounded, *given.values())
         if status != FINISHED:
             # Alone, with its record; it stops where it stopped here, and raises.
             m, v, e, f, b = (_rows(array, lead, slice(failed, failed + 1))[0] for array in arrays)
@@ -300,21 +294,6 @@ def _chunk(n: int) -> int:
     So much memory is needed beyond inputs and outputs.
     """
     return 16_384 if n <= 3 else 4096
-
-
-def _check(given: dict[str, ArrayLike], excess: str) -> None:
-    """Raise if a value is outside its limits: what the kernel checks, and in words."""
-    m = checked_masses(given["masses"])
-    v = checked("velocities", given["velocities"])
-    checked_restitution(given["restitution"])
-    f, b = (checked_ratios(name, given[name]) for name in ("forward", "backward"))
-    refuse_overflow(v, m)
-    if m.size:
-        refuse_light(m)
-    if excess == "raise":
-        ends = m.shape[-1] - 2
-        f, b = (np.broadcast_to(x, (ends,)) if x.ndim == 0 else x for x in (f, b))
-        refuse_excess(m, f, b)
 
 
 def _rows(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:

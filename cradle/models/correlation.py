@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,14 +12,16 @@ from numpy.typing import ArrayLike
 from cradle.chain import Chain
 from cradle.closed_form import largest_ratios
 from cradle.input.values import (
-    Vector,
     checked,
+    checked_masses,
+    checked_restitution,
     first,
     is_whole,
     must_be,
     number_or_row,
     one_number,
     one_of,
+    refuse_overflow,
     refuse_where,
     row_of,
     whole_rule,
@@ -159,10 +162,7 @@ class ImpulseCorrelation:
         else:
             job.run()
         if job.status == REFUSED:
-            Chain(chain.masses, chain.velocities, chain.restitution)  # a part that nobody asked
-            refuse_light(chain.masses)
-            refuse_excess(chain.masses, forward, backward)
-            raise AssertionError("the kernel refused a chain that the checks admit")
+            raise_refused(options.bounded, *own)
         trace = self._trace(chain, job)
         if job.status == UNFINISHED:
             raise ImpactNotFinished(
@@ -208,11 +208,6 @@ def _over_largest(job: Job, chain: Chain) -> float:
     return float(job.stored() / (heaviest * fastest * fastest))
 
 
-def checked_ratios(name: str, ratios: ArrayLike | None) -> Vector:
-    """Return ratios as floats, all in [0, 1]."""
-    return checked(name, ratios, *_RANGE)
-
-
 def check_options(meeting: float, excess: str, max_events: int) -> None:
     """Raise if an option is outside its range."""
     # The usual options first: they cost a call for one chain less than the checks in full.
@@ -225,18 +220,26 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
         raise ValueError(f"max_events = {max_events!r}; must be at least 1 and below 2**63")
 
 
-def refuse_light(masses: Vector) -> None:
-    """Raise if a ball is too light: how it parts the heavy ones is below rounding."""
-    small = masses < LIMITS.lightest * masses.max(axis=-1, keepdims=True)
-    rule = f"for this model it must be at least {LIMITS.lightest} of the heaviest ball of its chain"
-    refuse_where("masses", masses, small, rule)
-
-
-def refuse_excess(masses: Vector, forward: Vector, backward: Vector) -> None:
-    """Raise if a ratio is above Eq. 53 or its mirror image, by more than a rounding error."""
-    bounds = largest_ratios(masses, forward, backward)
-    for name, ratios, bound in (("forward", forward, bounds[0]), ("backward", backward, bounds[1])):
-        above = ratios > bound * LIMITS.rounded
+def check_values(
+    bounded: bool, masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike,
+    forward: ArrayLike, backward: ArrayLike,
+) -> None:  # fmt: skip
+    """Raise if a value is outside its limits: what the kernel refuses, in words."""
+    m, v = checked_masses(masses), checked("velocities", velocities)
+    checked_restitution(restitution)
+    ratios = {"forward": checked("forward", forward, *_RANGE)}
+    ratios["backward"] = checked("backward", backward, *_RANGE)
+    refuse_overflow(v, m)
+    if m.size:
+        # How a ball as light as that parts the heavy ones is below rounding.
+        small = m < LIMITS.lightest * m.max(axis=-1, keepdims=True)
+        least = f"at least {LIMITS.lightest} of the heaviest ball of its chain"
+        refuse_where("masses", m, small, f"for this model it must be {least}")
+    if not bounded:
+        return
+    f, b = (np.broadcast_to(x, (m.shape[-1] - 2,)) if x.ndim == 0 else x for x in ratios.values())
+    for name, given, bound in zip(ratios, (f, b), largest_ratios(m, f, b), strict=True):
+        above = given > bound * LIMITS.rounded
         if above.any():
             at = first(above)
             mirrored = "" if name == "forward" else ", mirrored"
@@ -245,4 +248,10 @@ def refuse_excess(masses: Vector, forward: Vector, backward: Vector) -> None:
                 f"(Eq. 53{mirrored}): a larger ratio would make a contact pull; excess='saturate' "
                 "holds the contact closed instead"
             )
-            refuse_where(name, ratios, above, rule)
+            refuse_where(name, given, above, rule)
+
+
+def raise_refused(bounded: bool, *values: ArrayLike) -> NoReturn:
+    """Say in words what the kernel has refused."""
+    check_values(bounded, *values)
+    raise AssertionError("the kernel refused a chain that the checks admit")
