@@ -27,12 +27,14 @@ from numpy.typing import ArrayLike
 from cradle.chain import Chain
 from cradle.input.values import a, one_number
 from cradle.models import Model
-from cradle.swinging.stride import Alone, Flight, Hit, Pairs, Plane, plane
+from cradle.swinging.stride import Alone, Flight, Hit, Plane
 
 __all__ = ["Bodies", "Hit", "Row", "step_rows"]
 
 # From so many looks at moving balls the row learns how the engine steps.
 _LESSONS = 200
+
+Pairs = Sequence[Sequence[float]]
 
 
 class Bodies(Protocol):
@@ -156,8 +158,7 @@ class Row(Alone):
         super().__init__(x, chain, model, radii, pivots, touching, resting, acceleration)
         self.bodies = bodies
         self.on_hit: Callable[[Hit], object] | None = None
-        self.impacts, self.settled = 0, 0
-        self.time = 0.0
+        self.impacts, self.settled, self.time = 0, 0, 0.0
         #: Where the speed of a step lies: 0 is the velocity before it, 1 the one after it.
         self.lag = 0.5
         self._samples: list[float] = []
@@ -186,6 +187,10 @@ class Row(Alone):
         """Look at the balls at the next step: call it after moving or kicking one of them."""
         self.quiet, self._last = 0.0, None
 
+    def _motion(self) -> tuple[list[complex], list[complex]]:
+        x, v = self.bodies.motion()
+        return [complex(*place) for place in x], [complex(*speed) for speed in v]
+
     def _push(self, own: Plane, x: Plane) -> None:
         impulses = self.chain.masses * own * self.ways(x)
         for ball, impulse in enumerate(impulses.tolist()):
@@ -197,17 +202,15 @@ class Row(Alone):
         self.quiet -= duration
         if self.quiet >= 0.0:
             return None
-        told = self.bodies.motion()
+        told = self._motion()
         touches, arrival, self.quiet = self.look(*told)
         self.quiet -= duration
         near = touches or arrival < 1.5 * duration  # the step itself makes them faster or slower
-        learning = self._lessons < _LESSONS and any(
-            abs(s[0]) > self.resting or abs(s[1]) > self.resting for s in told[1]
-        )
+        learning = self._lessons < _LESSONS and max(map(abs, told[1])) > self.resting
         if not (near or learning):
             self._last = None
             return None
-        x, v = map(plane, told)
+        x, v = map(np.array, told)
         own = self.own(v, x)
         if learning:
             self._learn(x, own, duration)
@@ -225,7 +228,7 @@ class Row(Alone):
         if begun is None:
             return
         x, own, (_, early, _, _) = begun
-        now, v = map(plane, self.bodies.motion())
+        now, v = map(np.array, self._motion())
         # The speed of the step, whether its kick comes first, last, or half and half.
         speeds = own + self.lag * (self.own(v, now) - early - own)
         bent = self._pull(x) - self._pull(now)

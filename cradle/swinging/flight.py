@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cradle.input.values import Vector
-from cradle.swinging.pendulums import TIE, Hanging
+from cradle.swinging.pendulums import TIE, Hanging, mean
 
 # Below this part of its largest value a derivative is a rounding error.
 _ROUNDING = 1e-11
@@ -180,14 +180,9 @@ def _bodies(hanging: Hanging, together: tuple[bool, ...]) -> _Bodies:
     each, forces = [], {}
     for a, b in pairwise([*first, n]):
         m, w2, d = (row[a:b] for row in (hanging.masses, square, hanging.damping))
-        offset = -np.concatenate([[0.0], np.cumsum(hanging.gaps[a : b - 1])])
-
-        def mean(values: Vector, m: Vector = m) -> float:
-            # Equal values stay what they are, to the bit.
-            return float(values[0] if (values == values[0]).all() else m @ values / m.sum())
-
-        lowest = -mean(w2 * offset) / mean(w2)
-        rate = complex(-mean(d), math.sqrt(mean(w2) - mean(d) * mean(d)))
+        offset, pull, damping = -hanging.offsets(a, b), mean(w2, m), mean(d, m)
+        lowest = -mean(w2 * offset, m) / pull
+        rate = complex(-damping, math.sqrt(pull - damping * damping))
         centre[a:b], rates[a:b] = lowest + offset, rate
         each.append((a, b - a, lowest, rate))
         for k in range(1, b - a):  # what stops the balls before k from moving as they would alone

@@ -117,22 +117,31 @@ class Pendulums:
         return frequency
 
 
+def mean(values: Vector, masses: Vector) -> float:
+    """Return the mean over the mass; equal values stay what they are, to the bit."""
+    return float(values[0] if (values == values[0]).all() else masses @ values / masses.sum())
+
+
 class Hanging:
     """The pendulums of one chain: a row of each kind, and what follows from them alone."""
 
     def __init__(self, pendulums: Pendulums, masses: Vector) -> None:
         n = len(masses)
-        self.masses, self.gravity, self.small = (
-            masses,
-            pendulums.gravity,
-            pendulums.angle == "small",
-        )
+        self.masses, self.gravity = masses, pendulums.gravity
+        self.small = pendulums.angle == "small"
         self.gaps = pendulums.row("gaps", n - 1)
         self.frequency = pendulums.natural_frequency(n)
         self.length, self.damping = pendulums.row("length", n), pendulums.row("damping", n)
         self.fastest = float(self.frequency.max())
         self.tie = TIE / self.fastest  # events nearer than this are one, s
-        self._weight = 2.0 * masses * self.gravity * self.length
+        self._half_masses, self._half_pulls = (
+            0.5 * masses,
+            0.5 * masses * self.gravity / self.length,
+        )
+
+    def offsets(self, first: int, last: int) -> Vector:
+        """Return how far the balls of a body hang from its first one, where they touch, m."""
+        return np.concatenate([[0.0], np.cumsum(self.gaps[first : last - 1])])
 
     def accelerations(self, positions: Vector, velocities: Vector) -> Vector:
         """Return the acceleration of each ball if it swung alone, m/s^2."""
@@ -142,8 +151,8 @@ class Hanging:
 
     def energy(self, positions: Vector, velocities: Vector) -> Vector:
         """Return kinetic and potential energy, J; the last axis is summed."""
-        half = 0.5 * positions / self.length
-        sine = half if self.small else np.sin(half)
-        kinetic = 0.5 * (self.masses * velocities**2).sum(axis=-1)
-        # 1 - cos a = 2 sin^2(a/2), without cancellation.
-        return np.asarray(kinetic + (self._weight * sine**2).sum(axis=-1))
+        away = positions
+        if not self.small:  # 1 - cos a = 2 sin^2(a/2), without cancellation
+            away = 2.0 * self.length * np.sin(0.5 * positions / self.length)
+        each = self._half_masses * velocities**2 + self._half_pulls * away**2
+        return np.asarray(each.sum(axis=-1))

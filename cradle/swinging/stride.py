@@ -8,7 +8,7 @@ along its arc, a real number, where it hangs; where it is free, all of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,19 +29,6 @@ _LONGEST = 0.01
 _MOST_IMPACTS = 10_000
 
 Plane = NDArray[np.complexfloating[Any, Any]]
-Pairs = Sequence[Sequence[float]]
-
-
-def plane(told: Pairs) -> Plane:
-    """Return pairs of coordinates as complex numbers."""
-    x = np.array(told, dtype=np.float64)
-    return x[:, 0] + 1j * x[:, 1]
-
-
-def pairs(x: Plane) -> list[list[float]]:
-    """Return complex numbers as pairs of coordinates."""
-    told: list[list[float]] = np.column_stack([x.real, x.imag]).tolist()
-    return told
 
 
 class Hit(NamedTuple):
@@ -86,14 +73,16 @@ class Alone:
             raise ValueError(f"radii has shape {size.shape}; {n} balls need () or ({n},)")
         self.chain, self.model = chain, model
         self.radii: list[float] = np.broadcast_to(size, (n,)).tolist()
-        self.reach = [a + b for a, b in zip(self.radii, self.radii[1:], strict=False)]
-        self.acceleration = one_number(
-            "acceleration", acceleration, "must be above 0", 0.0, open_low=True
-        )
-        near = 1e-3 * min(self.radii) if touching is None else touching
-        self.touching = one_number("touching", near, "must be above 0", 0.0, open_low=True)
-        slow = 0.01 * math.sqrt(self.acceleration * min(self.radii)) if resting is None else resting
-        self.resting = one_number("resting", slow, "must be above 0", 0.0, open_low=True)
+        self.reach = [a + b for a, b in pairwise(self.radii)]
+
+        def above_zero(name: str, value: float) -> float:
+            return one_number(name, value, "must be above 0", 0.0, open_low=True)
+
+        self.acceleration = above_zero("acceleration", acceleration)
+        least = min(self.radii)
+        self.touching = above_zero("touching", 1e-3 * least if touching is None else touching)
+        slow = 0.01 * math.sqrt(self.acceleration * least) if resting is None else resting
+        self.resting = above_zero("resting", slow)
         at = self._plane("motion: positions", x)
         self._refuse_a_pack(at)
         overlaps = self.reach - np.abs(np.diff(at))
@@ -101,9 +90,9 @@ class Alone:
             c = int(np.argmax(overlaps))
             rule = f"must be at most `touching` = {self.touching:g} at the start"
             raise ValueError(f"balls {c} and {c + 1} overlap by {overlaps[c]:g} m; {rule}")
-        # Balls on equal strings that nearly touch are accelerated alike, others not.
         self.pivots: Plane | None = None
-        self.hang_alike = False
+        #: How fast neighbours may come to close; 0 on equal strings: these are accelerated alike.
+        self.speeding = self.acceleration
         if pivots is not None:
             self.pivots = self._plane("pivots", pivots)
             way = self.pivots[-1] - self.pivots[0]
@@ -117,8 +106,8 @@ class Alone:
             if ((at[-1] - at[0]) / way).real <= 0.0:
                 raise ValueError("pivots lead the other way than the balls; must be in their order")
             lengths = np.abs(at - self.pivots)
-            self.hang_alike = bool(np.ptp(lengths) <= 1e-3 * lengths.min())
-        self.speeding = 0.0 if self.hang_alike else self.acceleration
+            if np.ptp(lengths) <= 1e-3 * lengths.min():
+                self.speeding = 0.0
         #: For how long nothing can happen, s.
         self.quiet = 0.0
 
@@ -153,7 +142,7 @@ class Alone:
         hits: list[Hit] = []
         left, settled, touched = duration, 0, False
         for _ in range(_MOST_IMPACTS):
-            touches, arrival, self.quiet = self.look(pairs(x), pairs(own * self.ways(x)))
+            touches, arrival, self.quiet = self.look(x.tolist(), (own * self.ways(x)).tolist())
             if touches:
                 gained, rests = self._solve(x, own, duration - left, hits)
                 own = own + gained
@@ -169,7 +158,7 @@ class Alone:
             f"squeezed between others, or `resting` = {self.resting!r} is too low"
         )
 
-    def look(self, x: Pairs, v: Pairs) -> tuple[bool, float, float]:
+    def look(self, x: list[complex], v: list[complex]) -> tuple[bool, float, float]:
         """Tell whether something touches now, when the next contact arrives, how long is quiet.
 
         The second goes by the present velocities, and is 0 with an impact: look again.  For the
@@ -178,14 +167,13 @@ class Alone:
         arrival, quiet = math.inf, _LONGEST
         strike = rest = False
         for c, reach in enumerate(self.reach):
-            (xa, ya), (xb, yb) = x[c], x[c + 1]
-            dx, dy = xb - xa, yb - ya
-            distance = math.hypot(dx, dy)
+            line = x[c + 1] - x[c]
+            distance = math.hypot(line.real, line.imag)
             gap = distance - reach
-            closing = (v[c][0] - v[c + 1][0]) * dx + (v[c][1] - v[c + 1][1]) * dy
+            closing = ((v[c] - v[c + 1]) * line.conjugate()).real
             if not math.isfinite(gap + closing):
-                checked("motion: positions", x)
-                checked("motion: velocities", v)
+                for name, told in (("positions", x), ("velocities", v)):
+                    checked(f"motion: {name}", [(one.real, one.imag) for one in told])
             if not gap > -0.5 * reach:
                 raise RuntimeError(
                     f"balls {c} and {c + 1} overlap by {-gap:g} m; the step is too long, or "
@@ -202,8 +190,8 @@ class Alone:
             root = math.sqrt(closing * closing + 2.0 * self.speeding * room)
             if closing + root > 0.0:
                 quiet = min(quiet, 2.0 * room / (closing + root))
-        if not self.hang_alike:  # nothing else keeps the balls in order
-            self._refuse_a_pack(plane(x))
+        if self.speeding:  # nothing else keeps the balls in order
+            self._refuse_a_pack(np.array(x))
         return strike or rest, 0.0 if strike else arrival, quiet
 
     def _solve(self, x: Plane, own: Plane, time: float, hits: list[Hit]) -> tuple[Plane, int]:
@@ -217,9 +205,8 @@ class Alone:
             axis /= abs(axis)
             self._refuse_a_bend(lines[first : last - 1], axis, first)
             # How a ball's own way lies to the axis; a free ball's is the axis.
-            along = np.ones(last - first)
-            if self.pivots is not None:
-                along = (ways[balls] / axis).real
+            free = self.pivots is None
+            along = np.ones(last - first) if free else (ways[balls] / axis).real
             if (np.abs(along) < 0.1).any():
                 ball = first + int(np.argmin(np.abs(along)))
                 raise ValueError(f"ball {ball} is struck along its string; its arc leads elsewhere")
@@ -231,11 +218,11 @@ class Alone:
                     after = collide(chain, part(self.model, len(x), first, last)).velocities
                 impulses = np.cumsum(masses * (before - after))[:-1]
                 c = int(np.argmax(impulses))
-                hit = Hit(time, range(first, last), before, after, first + c, float(impulses[c]))
-                hits.append(hit)
+                told = time, range(first, last), before, after, first + c, float(impulses[c])
+                hits.append(Hit(*told))
             after, rests = self._rested(masses, after, gaps[first : last - 1])
             settled += rests
-            gained[balls] = (after - before) * (axis if self.pivots is None else 1.0 / along)
+            gained[balls] = (after - before) * (axis if free else 1.0 / along)
         return gained, settled
 
     def _rested(self, masses: Vector, v: Vector, gaps: Vector) -> tuple[Vector, bool]:
@@ -255,7 +242,7 @@ class Alone:
         x, n = checked(name, places), len(self.chain)
         if x.shape != (n, 2):
             raise ValueError(f"{name} has shape {x.shape}; {n} balls need ({n}, 2)")
-        return plane(x.tolist())
+        return x[:, 0] + 1j * x[:, 1]
 
     def _refuse_a_bend(self, lines: Plane, axis: complex, first: int) -> None:
         off = np.abs(np.angle(lines / axis)).max()
