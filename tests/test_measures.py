@@ -43,15 +43,6 @@ def test_pattern_keeps_leading_axes():
 # --- effective ratio -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("exponent", "ratio"), [(1.5, 0.132503287), (1, 0.230498292)])
-def test_effective_ratio_of_springs(exponent, ratio):
-    trace = collide(striking(), SpringChain(1.0, exponent, rtol=1e-12))
-    assert effective_ratio(trace) == pytest.approx(ratio, abs=1e-9)
-    # Eqs. 24 and 31 for equal elastic balls: v1 = -ratio / (2 - ratio).
-    v1 = trace.velocities[0]
-    assert effective_ratio(trace) == pytest.approx(-2 * v1 / (1 - v1), abs=1e-10)
-
-
 @pytest.mark.parametrize("part", [0, 0.01, 0.3, 0.7, 1])
 @pytest.mark.parametrize("e", [1.0, 0.7])
 @pytest.mark.parametrize("masses", [(1, 1, 1), (1, 2, 0.5), (2, 1, 2.5)])
