@@ -10,6 +10,7 @@ springs are integrated here, independently of the package, and judge the others.
 beside that of `swing` or of the engine alone, measured in turn: read the ratios.
 """
 
+import functools
 import importlib
 import math
 import statistics
@@ -17,9 +18,10 @@ import sys
 import time
 from dataclasses import dataclass
 
+import measure
 import numba
 import numpy as np
-from measure import absent, versions
+from measure import absent, quotient, versions
 from stored import DATA, options, write
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
@@ -43,6 +45,7 @@ SPRINGS = {
     "half the step": {"steps_a_contact": 200},
     "ten times softer": {"contact": 10**0.4 * STEEL},
 }
+cpu = functools.partial(measure.seconds, clock=time.process_time)
 MODELS = {"ratio": ImpulseCorrelation(RATIO), "springs": SpringChain(1.0)}
 
 
@@ -274,10 +277,10 @@ def costs(missing, repeats=5, seconds=5.0):
         kinds = {"alone": None} if choice is None else {"as it is": False, "mended": True}
         reference, taken = [], {how: [] for how in kinds}
         for _ in range(repeats):
-            reference.append(_timed(lambda: by_swing(1, seconds)) / seconds)
+            reference.append(cpu(lambda: by_swing(1, seconds)) / seconds)
             for how, mend in kinds.items():
                 if choice is None:
-                    taken[how].append(_timed(lambda: on_springs(1, seconds)) / seconds)
+                    taken[how].append(cpu(lambda: on_springs(1, seconds)) / seconds)
                 else:
                     taken[how].append(_cost(*choice, mend, seconds))
         for how, times in taken.items():
@@ -288,17 +291,11 @@ def costs(missing, repeats=5, seconds=5.0):
                 "setting": "steel" if choice is None else choice[1],
                 "pulled": 1 if choice is None else choice[2],
                 "seconds": statistics.median(times),
-                "over_swing": _ratio(times, reference),
-                "over_as_it_is": _ratio(times, first),
+                "over_swing": quotient(times, reference),
+                "over_as_it_is": quotient(times, first),
                 "repeats": repeats,
                 "version": versions("numba" if choice is None else choice[0].distribution),
             }
-
-
-def _timed(function):
-    begin = time.process_time()
-    function()
-    return time.process_time() - begin
 
 
 def _cost(engine, setting, pulled, mend, seconds):
@@ -310,13 +307,9 @@ def _cost(engine, setting, pulled, mend, seconds):
         for _ in range(count):
             advance(step)
 
-    taken = _timed(all_steps)
+    taken = cpu(all_steps)
     close(bodies)
     return taken / (count * step)
-
-
-def _ratio(these, those):
-    return statistics.median(a / b for a, b in zip(these, those, strict=True))
 
 
 def strokes_and_film(folder, missing):

@@ -10,10 +10,12 @@ springs, integrated beside it, so that a busy machine slows down both.  Seconds 
 times the median of all those times, so that they too are of one machine at one speed.
 """
 
+import functools
 import statistics
 import time
 
 import numpy as np
+from measure import quotient, seconds
 from stored import options, write
 
 from cradle import Chain, SpringChain, collide, outcomes
@@ -61,19 +63,13 @@ def three_on_springs():
 
 def cost(function, repeats):
     """Return the fields of a row that tell the processor time of `function`, and of the unit."""
-
-    def seconds(solve, calls=1):
-        begin = time.process_time()
-        for _ in range(calls):
-            solve()
-        return (time.process_time() - begin) / calls
-
+    cpu = functools.partial(seconds, clock=time.process_time)
     function()
-    calls = max(1, round(0.02 / max(seconds(function), 1e-6)))
-    pairs = [(seconds(function, calls), seconds(three_on_springs, 3)) for _ in range(repeats)]
+    calls = max(1, round(0.02 / max(cpu(function), 1e-6)))
+    pairs = [(cpu(function, calls), cpu(three_on_springs, 3)) for _ in range(repeats)]
     return {
         "units": [unit for _, unit in pairs],  # for `add_seconds`
-        "time_ratio": statistics.median(taken / unit for taken, unit in pairs),
+        "time_ratio": quotient(*zip(*pairs, strict=True)),
         "repeats": repeats,
     }
 

@@ -91,6 +91,19 @@ def outcome(masses, before, after):
     }
 
 
+def seconds(function, calls=1, clock=time.perf_counter):
+    """Return the time of one call."""
+    begin = clock()
+    for _ in range(calls):
+        function()
+    return (clock() - begin) / calls
+
+
+def quotient(these, those):
+    """Return the median quotient of times that were taken in turn."""
+    return statistics.median(a / b for a, b in zip(these, those, strict=True))
+
+
 class Clock:
     """Takes times beside those of the reference, so that a busy machine slows down both.
 
@@ -106,13 +119,6 @@ class Clock:
         """Return the median time of the reference so far, in seconds."""
         return statistics.median(self.units)
 
-    def seconds(self, function, calls=1):
-        """Return the time of one call."""
-        begin = time.perf_counter()
-        for _ in range(calls):
-            function()
-        return (time.perf_counter() - begin) / calls
-
     def __call__(self, function, impacts=1, prepare=None, kernel=None):
         """Return the fields of a row that tell the time of `function`, which solves `impacts`.
 
@@ -125,7 +131,7 @@ class Clock:
 
         def measured():
             given = [prepare()] if prepare else []
-            return self.seconds(lambda: function(*given), calls)
+            return seconds(lambda: function(*given), calls)
 
         warm_up()  # else the reference, as small work, would run plain at first
         calls = 1
@@ -136,15 +142,14 @@ class Clock:
             calls = max(1, math.ceil(1e-3 / once))  # a millisecond at least
         reference()
         # As long as the row itself, within limits: what interrupts one interrupts the other.
-        units = min(20, max(2, math.ceil(once * calls / self.seconds(reference))))
-        ratios = []
+        units = min(20, max(2, math.ceil(once * calls / seconds(reference))))
+        taken, beside = [], []
         for _ in range(self.repeats):
-            unit = self.seconds(reference, units) / len(_BATCH[0])
+            beside.append(seconds(reference, units) / len(_BATCH[0]))
             with running(kernel):
-                taken = measured() / impacts
-            self.units.append(unit)
-            ratios.append(taken / unit)
-        return {"time_ratio": statistics.median(ratios), "repeats": self.repeats}
+                taken.append(measured() / impacts)
+        self.units += beside
+        return {"time_ratio": quotient(taken, beside), "repeats": self.repeats}
 
 
 @contextlib.contextmanager
