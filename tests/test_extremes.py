@@ -778,6 +778,9 @@ FOUND = {
         [3, 5.6e-27, 0.02, 0.26, 0.25], [1, 0, 0, 0, 0], 1, [1, 0.9178, 0.4875],
         [1, 2.4e-25, 0.082],
     ),
+    "speeds so small that the grain of floats was rounded away from what is allowed": (
+        [1, 1, 1], [1e-323, 0, 0], 0, 0.5,
+    ),
     "an impact within one at a speed of 1e-15": (
         [1, 1e15, 1, 0.01, 1], [1, 0, 0, 0, 0], [0.9, 0.3, 0.95, 0.95], 0.1,
     ),

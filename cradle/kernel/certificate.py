@@ -27,7 +27,7 @@ def certify(n, ball, contact, tally):
         change = b.after * unit - b.v * unit
         momentum += b.m.real * change
         terms += b.m.real * (abs(change) + abs(b.start.real)) + abs(push)
-        grain += b.m.real * 5e-324 * unit  # no finer velocity is a float
+        grain += b.m.real * (5e-324 * unit)  # no finer velocity is a float
         if i == n - 1:
             break
         k, right = contact[i], ball[i + 1]
