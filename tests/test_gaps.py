@@ -3,7 +3,6 @@
 import gaps
 import numpy as np
 import pytest
-import real_cradles
 from chains import HERTZ
 from chapters import Chapter
 from stored import read
@@ -31,14 +30,6 @@ def test_touching_spheres_are_the_energy_law_and_wide_gaps_are_pairs():
         for gap, law in ((0, EnergyDistribution(1.0)), (6, SequentialCollisions())):
             after = collide(Chain(m, [1, 0, 0], r), law).velocities
             np.testing.assert_allclose(found[gap][k], after, atol=1e-3)
-
-
-@pytest.mark.parametrize("number", [9, 17, 21])
-def test_rows_of_five_by_another_integration(number):
-    row = read("gaps_five.csv")[number]
-    gap = float(row["gap"])
-    after = real_cradles.spheres(np.eye(5)[0], [0, gap, gap, gap], 0.0)
-    assert [float(row[f"v{k}"]) for k in range(1, 6)] == pytest.approx(after, abs=3e-4)
 
 
 def test_lean_between_two_balls_at_rest_by_scipy():

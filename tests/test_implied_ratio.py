@@ -81,20 +81,6 @@ def test_ratios_give_the_outcomes():
     np.testing.assert_allclose(closed, after[once], rtol=0, atol=1e-6)
 
 
-def test_limits_of_equal_balls():
-    """Soft second spring: (pi^2/8 - 1) k2/k1 for linear ones, not Eq. 14; stiff: Eq. 15, 1/2."""
-    equal = [r for r in table() if r["m2_over_m1"] == r["m3_over_m2"] == "1"]
-    for exponent, same in (("1", 0.230498292), ("1.5", 0.132503287)):
-        rows = {
-            float(r["k2_over_k1"]): float(r["ratio"]) for r in equal if r["exponent"] == exponent
-        }
-        assert rows[1.0] == pytest.approx(same, abs=2e-9)
-        assert rows[1000.0] == pytest.approx(0.5, abs=1e-5)
-        if exponent == "1":
-            assert rows[0.001] / 0.001 == pytest.approx(np.pi**2 / 8 - 1, rel=1e-3)
-        assert rows[0.001] < 0.25 * 0.001
-
-
 @pytest.mark.parametrize("number", [312, 937])
 def test_script_makes_the_rows(number):
     row = table()[number]

@@ -167,21 +167,13 @@ def test_one_bot_renews_the_lock():
     (command,) = re.findall(r"uv pip compile .*", script)
     explained = " ".join(text("environment-notes.md").split())
     assert command.removesuffix(" --upgrade") in explained
-    assert workflow["jobs"]["renew"]["permissions"] == {
-        "contents": "write",
-        "pull-requests": "write",
-    }
-    ecosystems = [
-        one["package-ecosystem"]
-        for one in yaml.safe_load(text(".github/dependabot.yml"))["updates"]
-    ]
-    assert ecosystems == ["github-actions"]
-    others = [
-        path.name
-        for path in (ROOT / ".github/workflows").glob("*.yml")
-        if "pip compile" in path.read_text(encoding="utf-8")
-    ]
-    assert others == ["lock.yml"]
+    may = workflow["jobs"]["renew"]["permissions"]
+    assert may == dict.fromkeys(("contents", "pull-requests"), "write")
+    updates = yaml.safe_load(text(".github/dependabot.yml"))["updates"]
+    assert [one["package-ecosystem"] for one in updates] == ["github-actions"]
+    workflows = (ROOT / ".github/workflows").glob("*.yml")
+    compiling = [one.name for one in workflows if "pip compile" in one.read_text(encoding="utf-8")]
+    assert compiling == ["lock.yml"]
 
 
 def test_readme_on_pypi_has_no_relative_link():
@@ -218,20 +210,14 @@ def test_actions_are_pinned():
         assert "permissions:\n  contents: read\n" in path.read_text(encoding="utf-8"), path.name
 
 
-def test_the_lock_has_hashes_and_no_address():
+def test_the_lock_has_every_dependency_with_hashes_and_no_address(project):
     lock = text("requirements-lock.txt")
     assert "://" not in lock
     entries = re.split(r"^(?=[\w.-]+==)", lock, flags=re.MULTILINE)[1:]
     assert len(entries) > 100
     for entry in entries:
         assert "--hash=sha256:" in entry, entry
-
-
-def test_the_lock_has_every_dependency(project):
-    locked = {
-        name.lower().replace("_", "-")
-        for name in re.findall(r"^([\w.-]+)==", text("requirements-lock.txt"), re.MULTILINE)
-    }
+    locked = {entry.partition("==")[0].lower().replace("_", "-") for entry in entries}
     extras = project["optional-dependencies"]
     asked = [*project["dependencies"], *extras["book"], *extras["test"], *extras["dev"]]
     names = {re.match(r"[\w.-]+", one)[0].lower() for one in asked} - {project["name"]}
