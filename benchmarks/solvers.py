@@ -38,7 +38,7 @@ def model_error(scene, velocities):
     return {"model_error": distance(velocities, reference), "model_reference": name}
 
 
-def row(clock, about, scene, setting, run, exact=None, impacts=1, **more):
+def row(clock, about, scene, setting, run, exact=None, impacts=1, kernel=None, **more):
     """Return a row: what `run` gives, how far that is from `exact` (velocities, which), how long.
 
     `about` is what all rows of a family share.  `run` gives velocities, or a trace, or velocities
@@ -53,7 +53,8 @@ def row(clock, about, scene, setting, run, exact=None, impacts=1, **more):
         fields |= model_error(scene, after)
     else:
         fields |= {"numerical_error": distance(after, exact[0]), "numerical_reference": exact[1]}
-    return Row(setting=setting, chain=scene.name, **(fields | more), **clock(run, impacts))
+    time = clock(run, impacts, kernel=kernel)
+    return Row(setting=setting, chain=scene.name, **(fields | more), **time)
 
 
 def event_rows(clock, quick):
@@ -62,42 +63,33 @@ def event_rows(clock, quick):
     kernels = ["plain"] if runtime.compiled() is None else [None, "plain"]
     usual = "plain" if runtime.compiled() is None else "compiled"
     for scene in SCENES.values():
-        m, v, e = scene.masses, scene.velocities, scene.restitution
-        ratios = scene.forward, scene.backward
+        given = scene.masses, scene.velocities, scene.restitution, scene.forward, scene.backward
+        many = [np.tile(part, (2000, 1)) for part in given]
 
-        def one(chain=scene.chain, model=scene.model):
-            return collide(chain, model)
+        def path(scene=scene):
+            return collide(scene.chain, scene.model)
 
-        def alone(m=m, v=v, e=e, ratios=ratios):
-            return post_impact_velocities(m, v, e, *ratios, excess="saturate")
-
-        trace = one()
-        common = about | outcome(m, v, trace.velocities)
-        common |= model_error(scene, trace.velocities) if scene.elastic else {}
-        common |= {
-            "chain": scene.name,
-            "numerical_error": distance(trace.velocities, scene.truth()),
-            "numerical_reference": FIFTY,
-            "evaluations": len(trace.events),
-            "versions": ours(),
-            "note": f"ratios: {scene.source}",
-        }
-        for kernel in kernels:
-            how = "plain" if kernel else "compiled"
-            for setting, function, gives in (
-                ("one call with its path", one, PATH),
-                ("one call, outcome alone", alone, "velocities"),
-            ):
-                time = clock(function, kernel=kernel)
-                yield Row(setting=f"{how}, {setting}", gives=gives, **common, **time)
-
-        many = [np.tile(part, (2000, 1)) for part in (m, v, e, *ratios)]
+        def alone(given=given):
+            return post_impact_velocities(*given, excess="saturate")
 
         def batch(many=many):
             return post_impact_velocities(*many, excess="saturate")
 
-        time = clock(batch, 2000)
-        yield Row(setting=f"{usual}, batch", gives="velocities", **common, **time)
+        trace, exact = path(), (scene.truth(), FIFTY)
+        common = {"evaluations": len(trace.events), "note": f"ratios: {scene.source}"}
+        common |= model_error(scene, trace.velocities) if scene.elastic else {}
+        ways = (
+            ("one call with its path", path, PATH),
+            ("one call, outcome alone", alone, "velocities"),
+        )
+        for kernel, (words, run, gives) in itertools.product(kernels, ways):
+            setting = f"{'plain' if kernel else 'compiled'}, {words}"
+            yield row(
+                clock, about, scene, setting, run, exact, kernel=kernel, gives=gives, **common
+            )
+        yield row(
+            clock, about, scene, f"{usual}, batch", batch, exact, 2000, gives="velocities", **common
+        )
 
     count = 500 if quick else 2000
     for balls in (3, 6):
