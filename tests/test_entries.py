@@ -82,7 +82,7 @@ ENTRIES = {
     SequentialCollisions: {"order": "left", "max_events": 100},
     FusedChain: {},
     SpringChain: SPRINGS | {"method": "RK45", "max_time": 10.0},
-    EnergyDistribution: SPRINGS | {"step": 0.1, "gaps": True},
+    EnergyDistribution: SPRINGS | {"gaps": True},
     QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
     cradle.post_impact_velocities: SEVEN | {"max_events": 100},
     cradle.outcomes: SEVEN | {"max_events": 100},
