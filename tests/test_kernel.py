@@ -448,30 +448,13 @@ def test_no_function_is_inlined_that_is_meant_to_stand_apart():
     Then all of the event loop would be one function, which takes minutes to compile.
     """
     module = runtime.compiled()
-    inlined = {"jit": True, "once": False, "apart": False, "door": False}
+    inlined = {"jit": True, "apart": False, "door": False}
     for node in ast.parse(runtime.unit()).body:
         if isinstance(node, ast.FunctionDef) and hasattr(getattr(module, node.name), "py_func"):
             (mark,) = (ast.unparse(part) for part in node.decorator_list)
             options = getattr(module, node.name).targetoptions
             assert options["forceinline"] is inlined[mark], node.name
-            assert options.get("inline", "never") == ("always" if mark == "once" else "never")
             assert mark == "door" or options["no_cpython_wrapper"], node.name
-
-
-def test_what_is_a_part_of_its_caller_is_called_from_one_place():
-    """A copy for each call would cost more than a function of its own."""
-    functions = [
-        node for node in ast.parse(runtime.unit()).body if isinstance(node, ast.FunctionDef)
-    ]
-    calls = [
-        node.func.id
-        for function in functions
-        for node in ast.walk(function)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-    ]
-    once = [f.name for f in functions if [ast.unparse(d) for d in f.decorator_list] == ["once"]]
-    assert "impact" in once
-    assert {name: calls.count(name) for name in once} == dict.fromkeys(once, 1)
 
 
 # --- pauses -------------------------------------------------------------------------------------

@@ -27,7 +27,6 @@ from cradle.kernel.state import (
     UPPER,
     apart,
     jit,
-    once,
 )
 
 
@@ -264,7 +263,7 @@ def cycle(number, c, n, state):
     return c, c - 1
 
 
-@once
+@jit
 def is_in_doubt(cluster, bent, state):
     """Tell whether steady neighbours leave open where a bent cycle's limit is."""
     if cluster.left == cluster.first and cluster.last == cluster.right:
@@ -305,7 +304,7 @@ def look_above(first, last, n, state):
     state.tally[0].collapsed = 1
 
 
-@once
+@jit
 def take_limits(n, state):
     """R9, after contacts have ended; tell whether some have collapsed."""
     tally = state.tally[0]

@@ -3,7 +3,7 @@
 from cradle.kernel.numbers import ZERO, minus, negative
 from cradle.kernel.record import record
 from cradle.kernel.rules import has_ended, is_clear, opens_at_zero, source_of
-from cradle.kernel.state import CERTAIN, CLOSE, END, LIMITS, SLOPED, apart, jit, once
+from cradle.kernel.state import CERTAIN, CLOSE, END, LIMITS, SLOPED, apart, jit
 
 
 @jit
@@ -47,7 +47,7 @@ def make_run(first, last, source, low, high, run):
     run[first].stirred = 1
 
 
-@once
+@jit
 def start(n, state):
     """R2: in each touching stretch the leftmost approaching contact is the source."""
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
@@ -145,7 +145,7 @@ def exhausted(c, work, ball, contact, tally):
     return 2.0 * work < reduced_mass(c, ball) * threshold * threshold
 
 
-@once
+@jit
 def count_exhausted(c, n, ball, contact, tally):
     """R9: count a collision as exhausted if all of it was; a genuine one clears its neighbours.
 
@@ -164,7 +164,7 @@ def count_exhausted(c, n, ball, contact, tally):
 def end_contacts(which, n, state):
     """R3, R8.1: end every contact that needs no progress to end; left to right.
 
-    SLOPED are those that open from u = 0, once the slopes are known; CERTAIN all others, before.
+    SLOPED are those that open from u = 0 the slopes are known; CERTAIN all others, before.
     """
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
     first = tally.first

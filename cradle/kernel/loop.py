@@ -24,7 +24,6 @@ from cradle.kernel.state import (
     UPPER,
     apart,
     jit,
-    once,
 )
 
 
@@ -72,7 +71,7 @@ def set_exactly(k, u):
     k.made = abs(u.real)
 
 
-@once
+@jit
 def advance(first, n, state):
     """Take a run straight on its way: velocities are linear in the impulses, works quadratic."""
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
@@ -103,7 +102,7 @@ def advance(first, n, state):
     run[first].stirred = 1
 
 
-@once
+@jit
 def go(n, state):
     """R8.3 to R8.6: take every run on; close the gap at which two of them meet."""
     run, contact, tally = state.run, state.contact, state.tally[0]
@@ -171,7 +170,7 @@ def prepare(n, chain, meeting, state):
     start(n, state)
 
 
-@once
+@jit
 def new_rates(n, state):
     """Work out the rates of the runs that have changed; tell whether a contact is about to open."""
     run, tally = state.run, state.tally[0]
@@ -186,7 +185,7 @@ def new_rates(n, state):
     return opening
 
 
-@once
+@jit
 def new_segments(n, state):
     """R8.2: work out the segments of the runs that have changed."""
     run, tally = state.run, state.tally[0]
@@ -197,7 +196,7 @@ def new_segments(n, state):
         first = run[first].onward
 
 
-@once
+@jit
 def impact(n, chain, meeting, max_rounds, resumed, state):
     """Solve one impact: run rounds until no contact is active; return the status.
 

@@ -16,10 +16,10 @@ from cradle.kernel.numbers import (
     times,
 )
 from cradle.kernel.rules import is_clear, is_gap
-from cradle.kernel.state import LIMITS, jit, once
+from cradle.kernel.state import LIMITS, jit
 
 
-@once
+@jit
 def parts_to_meeting(first, after, run, ball, contact, tally):
     """R8.3: work out whether runs `first` and `after` must meet, at what parts of their segments.
 
@@ -112,7 +112,7 @@ def part_beyond(first, part, outward, c, n, state):
     return NEVER
 
 
-@once
+@jit
 def who_goes(one, n, state):
     """R8.4 to R8.6: say how far each run goes; return the gap that then closes, or -1.
 

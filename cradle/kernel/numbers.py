@@ -125,7 +125,7 @@ def read(x):
     So .9 is nine tenths.  From 1e-7 to 1e15 the powers of ten in the way are floats themselves.
     """
     size = abs(x)
-    if not 1e-7 <= size < 1e15:
+    if not 1e-7 <= size < 1e15 or (x + ROUND) - ROUND == x:
         return complex(x, 0.0)
     # 15 digits: x 10**k lies between 1e14 and 1e15, as far as the binary exponent can tell.
     k = 15 - (math.frexp(size)[1] * 1233 + 4095) // 4096

@@ -20,7 +20,7 @@ from cradle.kernel.numbers import (
     scaled,
     times,
 )
-from cradle.kernel.state import LIMITS, apart, jit, once
+from cradle.kernel.state import LIMITS, apart, jit
 
 
 @jit
@@ -45,7 +45,7 @@ def wait(low, high, ball, contact, outer):
         contact[c].rate = contact[c].slope = ball[c + outer].pull = ZERO
 
 
-@once
+@jit
 def reached(first, run, smallest, ball, contact):
     """R1: set low..high of a run: as far as impulses reach at the nominal ratios, or beyond.
 
@@ -93,7 +93,7 @@ def keep_closed(i, driven, far, onward, ball, contact, tally):
             tally.margin = min(tally.margin, abs(nominal - bound) / bound)
 
 
-@once
+@jit
 def ratios_in_force(low, high, ball, contact, tally):
     """R7: the ratios in force in a run, each chain of drives from its far end to its driver.
 
@@ -150,7 +150,7 @@ def passed_on(rate, ratio, smallest):
     return x if x.real > smallest else ZERO
 
 
-@once
+@jit
 def impulse_rates(low, high, source, smallest, ball, contact):
     """R1, R6: impulse rates of contacts low..high of a run."""
     if source < 0:
@@ -207,7 +207,7 @@ def is_clear(difference, size, tally):
     return True
 
 
-@once
+@jit
 def has_ended(c, contact):
     """R3: tell whether contact c has ended: it opens, or has e = 0 and no longer closes."""
     k = contact[c]
@@ -216,7 +216,7 @@ def has_ended(c, contact):
     return k.u.real < 0.0 or (k.u.real == 0.0 and k.e.real == 0.0 and k.w > 0.0)
 
 
-@once
+@jit
 def way_to_end(k, tally):
     """R3: progress until contact k has released all, and its closing speed then; or NEVER.
 

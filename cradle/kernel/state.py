@@ -18,10 +18,6 @@ if "jit" not in globals():
         """Mark a function that is called seldom: compiled once, not into each caller."""
         return function
 
-    def once(function: Any) -> Any:
-        """Mark a function that is called from one place: a part of its caller."""
-        return function
-
     def door(function: Any) -> Any:
         """Mark the function that is called from outside, whose compiled code is kept on disk."""
         return function

@@ -45,7 +45,6 @@ _APART = {**_DOOR, "no_cpython_wrapper": True}
 #: What numba is told about the marks of the kernel's functions.
 _MEANINGS: dict[str, dict[str, Any]] = {
     "jit": {**_APART, "forceinline": True},
-    "once": {**_APART, "inline": "always"},
     "apart": _APART,
     "door": _DOOR,
 }
