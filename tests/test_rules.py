@@ -4,6 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import local_orders
+from delicate import CHAINS, chains_of, seen
 from truth import as_meant, solve
 
 from cradle import Chain, ImpulseCorrelation, collide
@@ -483,113 +484,12 @@ def test_default_limit_is_far_above_what_these_cases_need():
 
 # --- one chain for one line ---------------------------------------------------------------
 
-#: Chains whose outcome changes when a single line of the solver is taken away.
-DELICATE = {
-    "a compressed contact at u = 0 is not held": (
-        [1.0, 1.0, 4.0, 0.25, 0.5],
-        [1.0, -0.5, 0.0, -0.5, -1.0],
-        [1.0, 1.0, 0.6387339605253677, 1.0],
-        [0, 0.5, 1],
-        [0.25, 0, 0],
-    ),
-    "a compressed contact at u = 0 is not held, plastic beside": (
-        [1.0, 1.0, 0.25, 1.0, 1.0],
-        [1.0, 0.0, -0.5, -1.0, 0.0],
-        [0.25, 0.25, 1.0, 1.0],
-        [1, 1, 0],
-        [0.7377208665370546, 0, 0.25],
-    ),
-    "the same, driven backward": (
-        [2.0, 1.0, 1.0, 1.0, 0.25, 2.0],
-        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [0.5, 0.5, 1.0, 1.0, 1.0],
-        [0, 0.1125603495314772, 0, 0.5],
-        [0, 1, 0.25, 1],
-    ),
-    "plastic end beside a closing": (
-        [2.0, 0.5, 4.0, 4.0, 4.0],
-        [
-            -0.6638872105220346,
-            0.2475822924080393,
-            -0.5724379552871353,
-            -0.9883483374565267,
-            -0.9463541170473972,
-        ],
-        [1.0, 0.0, 0.0, 0.25],
-        [1, 1, 0.25],
-        [0, 0.25, 0.25],
-    ),
-    "cycles of different drives": (
-        [1.0, 1.0, 2.0, 1.0, 1.0, 1.0],
-        [
-            0.4726922294304865,
-            0.6690417164580855,
-            -0.6769893980987352,
-            -0.5724305952354507,
-            -0.5428483247261646,
-            -0.378057762842982,
-        ],
-        [1.0, 0.0, 0.0, 0.5, 1.0],
-        [0, 0.3333333333333333, 0.3333333333333333, 0.9409351398616886],
-        [0, 0, 0.25, 0.3333333333333333],
-    ),
-    "a neighbour releases on the way to the limit": (
-        [1.0, 1.0, 0.25, 1.0, 0.5, 1.0],
-        [0.25, 0.0, 0.0, 0.25, -0.5, 0.25],
-        [1.0, 0.25, 0.25, 1.0, 0.13472129442337089],
-        [0.3333333333333333, 0.5, 0.25, 1],
-        [0, 0.25, 1, 1],
-    ),
-    "two neighbours release on the way to the limit": (
-        [0.25, 1.0, 1.0, 2.0, 1.0, 1.0],
-        [1.0, 0.25, 0.25, 0.0, 0.5, -0.5],
-        [0.6856261727376172, 1.0, 0.5, 1.0, 0.0],
-        [0.5, 0.5, 1, 0],
-        [0.11451867707494123, 0.5, 1, 0.4912],
-    ),
-    "a neighbour ends on the way to the limit": (
-        [
-            0.4781842402081074,
-            9.809478007327609,
-            0.6643545113802615,
-            0.20902186612237525,
-            0.5509621635736639,
-            0.2817576328564286,
-        ],
-        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [0.25, 1.0, 0.5317149066567626, 0.0, 0.25],
-        [0.5613587893456714, 1, 0, 0.7792083440195937],
-        [0.20860373767079354, 0.15896081848452137, 0, 0.5],
-    ),
-    "a neighbour takes a share of the limit": (
-        [
-            0.15587536664412452,
-            1.0628975784598622,
-            3.1757963159719362,
-            0.10814514567524718,
-            0.9177706951898378,
-            5.398693201773757,
-        ],
-        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [0.0, 0.0, 1.0, 0.0, 1.0],
-        [1, 1, 0.3333333333333333, 0.5],
-        [0, 0, 1, 0.8874856935073941],
-    ),
-}
 
-
-@pytest.mark.parametrize("mirrored", [False, True])
-@pytest.mark.parametrize("name", DELICATE)
-def test_delicate_chains(name, mirrored):
+@pytest.mark.parametrize(("name", "problem"), seen(chains_of("one line of the solver")))
+def test_delicate_chains(name, problem):
     """Collapsed ones against the sum of a great many impacts: the reference knows no cycles."""
-    masses, velocities, restitution, forward, backward = DELICATE[name]
-    if mirrored:
-        velocities = [-v for v in velocities]
-        forward, backward = backward, forward
-        parts = masses, velocities, restitution, forward, backward
-        masses, velocities, restitution, forward, backward = (part[::-1] for part in parts)
-    trace = solved(masses, velocities, restitution, forward, backward)
-    agrees(trace, atol=1e-12)
+    trace = problem.collide()
+    agrees(trace, atol=CHAINS[name.removesuffix(", mirrored")].velocities)
     # Bounded work.  The order of simultaneous events has no mirror image, and with it the cycles.
     assert len(trace.events) < 5000
 

@@ -13,8 +13,8 @@ import mpmath
 import numpy as np
 import pytest
 import truth
+from delicate import CHAINS
 from plain import rooms, solve
-from test_defects import LAST_DIGITS
 
 from cradle.kernel import cycles
 from cradle.kernel.numbers import NEVER
@@ -80,7 +80,7 @@ AT_ONCE = (
     [0.37, 0.4, 0, 0, 0.1, 0.08, 0.1], [0.32, 0.21, 0.06, 0.2, 0, 0.41, 0.52], 0.5,
 )  # fmt: skip
 
-HELD_FAST = LAST_DIGITS["two balls that chatter between balls held fast"]
+HELD_FAST = CHAINS["two balls that chatter between balls held fast"].problem
 
 #: What is exchanged; the chain with its ratios and `meeting`; what becomes of it.
 NEEDED = {
@@ -100,7 +100,7 @@ NEEDED = {
     "one exhausted collision, which is no row": ({"repeats": 1}, HELD_FAST, WRONG),
     "a collapse that costs next to no energy": (
         {"faint": 0.0},
-        LAST_DIGITS["contacts that have just closed at the last digit"],
+        CHAINS["contacts that have just closed at the last digit"].problem,
         UNFINISHED,
     ),
     "a cycle repeated up to its neighbour's event": (
@@ -185,7 +185,7 @@ SHORT = [
     if min(chain[0]) > 0.01
     and name != "cycles that contain collapses"
     and chain != HELD_FAST
-    and chain != LAST_DIGITS["contacts that have just closed at the last digit"]
+    and chain != CHAINS["contacts that have just closed at the last digit"].problem
 ]
 
 
