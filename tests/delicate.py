@@ -29,7 +29,7 @@ def _row(cells):
     return Row(
         cells["law"],
         Problem(*parts, float(cells["meeting"])),
-        float(cells["velocities_within"]),
+        float(cells["velocities_within"] or math.inf),
         float(cells["impulses_within"] or math.inf),
         int(cells["events"] or 5_000_000),
         cells["mirrored"] == "1",

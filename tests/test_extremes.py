@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import power_of_ten, uniform
+from delicate import CHAINS, chains_of
 from fuzz import attempt
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -765,82 +766,12 @@ def test_fuzzing_target(data):
     attempt(data)
 
 
-#: What the search found in earlier versions of the event loop, made as short as it goes.
-FOUND = {
-    "a rate too small to matter to its neighbour, but not to a very light ball": (
-        [1e-142, 1e-42, 1], [10, 1e27, 1], 1, 0.5,
-    ),
-    "the same beside a very heavy ball": ([3, 1e150, 2, 1], [1, 0, 0, 0], 0.9, 0.5),
-    "a light ball held where its bound rounds to 1": ([3, 5.6e-27, 0.02], [1, 0, 0], 1, 1),
-    "the same, four digits lighter": ([3, 5.6e-12, 0.02], [1, 0, 0], 1, 1),
-    "the same, plastic": ([1e12, 1e-40, 0.3], [0.3, 0, 0], 0, 1),
-    "energy out of nothing at a light ball": (
-        [3, 5.6e-27, 0.02, 0.26, 0.25], [1, 0, 0, 0, 0], 1, [1, 0.9178, 0.4875],
-        [1, 2.4e-25, 0.082],
-    ),
-    "speeds so small that the grain of floats was rounded away from what is allowed": (
-        [1, 1, 1], [1e-323, 0, 0], 0, 0.5,
-    ),
-    "an impact within one at a speed of 1e-15": (
-        [1, 1e15, 1, 0.01, 1], [1, 0, 0, 0, 0], [0.9, 0.3, 0.95, 0.95], 0.1,
-    ),
-    "an ulp below the bound means the bound": (
-        [1, 1e-3, 1], [1, 0, 0], 0.3, 0.999000999000999,
-    ),
-    "a limit beside a light ball": (
-        [2e-3, 2e3, 1e-20, 0.03, 3], [1, 0, 0, 0, 0], 0.1, 1e-16,
-    ),
-    "a slope that vanishes": (
-        [2.9999999999999987, 1e-16, 0.2500000000000001, 5.623413251903491e26,
-         0.9137254901960784, 0.8352941176470589, 4.050984908489599e83, 1],
-        [1.0000000000000002, 0.5, 5e-324, -1, 0, -1, 0, 0.803921568627451],
-        [0.5568627450980392, 0.7333333333333333, 0, 0, 0, 0, 0],
-        [0.9999999999999996, 1, 1.624859225643408e-27, 0.47757847533632286, 1,
-         2.4685354860352906e-84],
-        [1, 3.9999999999999965e-16, 4.445698525097309e-28, 1, 0.5224215246636771,
-         2.0619531706883015e-84],
-    ),
-    "a light ball arrives as its own contact ends": (
-        [1, 1e-50, 1, 1e-50], [0, 1, 0, -1e20], [0, 1e-16, 0], 0.5,
-    ),
-    "collisions so weak that their works underflow": (
-        [0.4, 1e-150, 0.25, 1e-150, 1e-150], [0, 2e11, 0, -9e30, 0.9], [0, 1e-16, 0, 0],
-        [0.3, 0.5, 0],
-    ),
-    "a light ball arrives just before its plastic contact ends": (
-        [0.25, 1, 1e-150, 1, 1e-150, 0.0075, 0.8, 1e-19],
-        [0, 0, 0.5, 0.8, 7.5e125, 1e-16, 1e-16, 0],
-        [0.9, 1e-16, 0.8, 0, 0, 0, 0],
-        [4e-150, 1, 1e-150, 1, 0.99, 1.2e-19],
-        [0.2, 1, 1e-150, 1, 1.33e-148, 0.009],
-    ),
-    "the same across a gap between two collisions": (
-        [1, 1e-150, 0.0075, 0.8], [0.8, 7.5e125, 1e-16, 1e-16], [0, 0.74, 0.5], 0,
-    ),
-    "a closing speed so small that nothing smaller is a number": (
-        [1] * 8, [0, 5e-324, 0, 0, 0, 0, 0, 3e-18], 0, 0.5,
-    ),
-    "a light ball meets a heavy one that another collision drives": (
-        [1e-29, 0.10588235294117647, 3.16e-16, 3e4],
-        [0.87, 0.0001333521432163324, 0.2784313725490196, 1e-16], 0, [3e-15, 1],
-        [9e-29, 0.999999999999997],
-    ),
-    "a ball falls behind two that have one velocity, the lightest in the middle": (
-        [254.8, 5.6e-24, 1e-12, 0.79], [1e-150, 1, 4.2, 1e-25], [0, 1e-21, 0.9999999999999999],
-        [0.9999999999943765, 0.9999999999987313], [1, 5.6e-12],
-    ),
-    "heavy balls, slower than the light one that struck them by twenty digits": (
-        [1, 1e-30, 1], [1, 1e20, 0], [1, 0], 0.5,
-    ),
-}  # fmt: skip
-
-
 @pytest.mark.parametrize("plain", [False, True])
-@pytest.mark.parametrize("name", FOUND)
+@pytest.mark.parametrize("name", chains_of("found by fuzzing"))
 def test_found_by_fuzzing(name, plain, monkeypatch):
     if plain:
         monkeypatch.setenv(runtime.VARIABLE, "plain")
-    problem = x.case(*FOUND[name])
+    problem = CHAINS[name].problem
     least = min(problem.masses) / max(problem.masses)
     if least < LIMITS.lightest or any(
         0 < e < LIMITS.least_restitution for e in problem.restitution
