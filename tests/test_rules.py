@@ -218,45 +218,22 @@ def test_generic_tie_of_two_gaps_takes_the_left():
     agrees(trace)
 
 
-@pytest.mark.parametrize(
-    ("chain", "first"),
-    [
-        (
-            ([0.5, 1, 0.5, 1, 1, 1], [0.9, -0.4, 0, -0.4, -0.2, -0.8], 0.5, [0.2, 0.1, 0.2, 0.1]),
-            3,
-        ),
-        (
-            (
-                [0.5, 1, 2, 2, 1, 1],
-                [0.7, 0.4, 0.8, -0.3, 0.3, -0.2],
-                [0.3, 0.3, 1, 0.5, 0.3],
-                [0.2, 0.2, 0.2, 0.1],
-            ),
-            1,
-        ),
-        (
-            (
-                [1, 1, 1, 1, 2, 1],
-                [0.7, 0.4, 0.9, -0.4, 0.1, -0.7],
-                [1, 0.3, 0.7, 0.3, 0.7],
-                [0, 0.1, 0, 0],
-            ),
-            3,
-        ),
-        (
-            (
-                [2, 0.5, 2, 0.5, 1, 1],
-                [1.0, 0.3, 0.8, -0.4, 0.5, 0.3],
-                [0.5, 0.5, 0.7, 0.7, 1],
-                [0, 0.2, 0.2, 0.1],
-            ),
-            1,
-        ),
-    ],
-)
-def test_generic_ties_of_the_key_are_broken_by_the_smaller_fraction(chain, first):
+#: Chains whose gaps tie in the larger part, and the contact that closes first.
+TIED = [
+    (3, [0.5, 1, 0.5, 1, 1, 1], [0.9, -0.4, 0, -0.4, -0.2, -0.8], 0.5, [0.2, 0.1, 0.2, 0.1]),
+    (1, [0.5, 1, 2, 2, 1, 1], [0.7, 0.4, 0.8, -0.3, 0.3, -0.2], [0.3, 0.3, 1, 0.5, 0.3],
+     [0.2, 0.2, 0.2, 0.1]),
+    (3, [1, 1, 1, 1, 2, 1], [0.7, 0.4, 0.9, -0.4, 0.1, -0.7], [1, 0.3, 0.7, 0.3, 0.7],
+     [0, 0.1, 0, 0]),
+    (1, [2, 0.5, 2, 0.5, 1, 1], [1, 0.3, 0.8, -0.4, 0.5, 0.3], [0.5, 0.5, 0.7, 0.7, 1],
+     [0, 0.2, 0.2, 0.1]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("first", *"mvef"), TIED)
+def test_generic_ties_of_the_key_are_broken_by_the_smaller_fraction(first, m, v, e, f):
     """A sweep wholly inside the overlap uses one half, give or take an ulp: not the ulp decides."""
-    trace = solved(*chain)
+    trace = solved(m, v, e, f)
     assert closings(trace)[0] == first
     agrees(trace)
 
@@ -282,18 +259,11 @@ def test_simultaneous_events_of_one_run():
     """Ends and closings that fall together happen together, ends first, left to right."""
     trace = solved(
         [1] * 6,
-        [
-            0.3368969063278493,
-            0.2984461343315177,
-            -0.1368896946451319,
-            -0.4885487538060256,
-            -0.7535367500934445,
-            -0.8269642864891671,
-        ],
+        [0.3368969063278493, 0.2984461343315177, -0.1368896946451319, -0.4885487538060256,
+         -0.7535367500934445, -0.8269642864891671],
         [0, 0.2097089174928406, 0.6868527351583686, 1, 0.17931666669551816],
-        [0.25, 0, 0, 0],
-        [0.25, 4 / 7, 0.35, 0],
-    )
+        [0.25, 0, 0, 0], [0.25, 4 / 7, 0.35, 0],
+    )  # fmt: skip
     exact = agrees(trace)
     assert trace.collisions.tolist() == exact.collisions
 
