@@ -1,6 +1,7 @@
 """What the models and measures ask of chains, masses and types, in sentences."""
 
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from cradle import (
     Chain,
     EnergyDistribution,
     FusedChain,
+    ImpactNotFinished,
     ImpulseCorrelation,
     QuadraticDissipation,
     SequentialCollisions,
@@ -19,6 +21,11 @@ from cradle import (
 from cradle.measures import condition_number, effective_ratio
 
 SPRINGS = [SpringChain(), EnergyDistribution()]
+DISSIPATION = QuadraticDissipation
+LAWS = [
+    *SPRINGS, DISSIPATION(3), SequentialCollisions("left"), SequentialCollisions("right"),
+    FusedChain(), ImpulseCorrelation(0.1),
+]  # fmt: skip
 
 
 # --- types ---------------------------------------------------------------------------------
@@ -40,11 +47,7 @@ def test_what_is_no_model(model, sentence):
             call(chain, model)
 
 
-@pytest.mark.parametrize(
-    "model",
-    [*SPRINGS, FusedChain(), SequentialCollisions(), QuadraticDissipation()],
-    ids=lambda model: type(model).__name__,
-)
+@pytest.mark.parametrize("model", LAWS, ids=repr)
 def test_what_is_no_chain(model):
     for thing, words in (([1, 0, 0], "a list"), (Chain, "the class Chain"), (None, "a NoneType")):
         for call in (lambda chain: collide(chain, model), model.solve):
@@ -59,15 +62,116 @@ def test_what_is_no_trace():
             effective_ratio(thing)
 
 
-# --- masses --------------------------------------------------------------------------------
+# --- values --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("model", SPRINGS, ids=repr)
-@pytest.mark.parametrize("mass", [5e-324, 1e-309, 1.2e308])
-def test_springs_refuse_masses_whose_reduced_mass_is_no_float(model, mass):
-    words = f"masses[0] = {mass!r}; its reduced mass with masses[1] = {mass!r} is beyond the range"
+def impact(model, masses=(1, 1, 1), velocities=(1, 0, 0), e=1.0):
+    return lambda: collide(Chain(masses, velocities, e), model)
+
+
+ENERGY = partial(EnergyDistribution, 1.0)
+UNDEFINED = "velocities leave it undefined which balls move as one body: contacts "
+#: Calls, and the words in which they are refused.
+REFUSED = [
+    (partial(SequentialCollisions, "first"), "order = 'first'; must be 'left' or 'right'"),
+    (partial(SequentialCollisions, None), "order = None; must be 'left' or 'right'"),
+    (partial(SequentialCollisions, max_events=0), "max_events = 0; must be at least 1"),
+    (partial(SequentialCollisions, max_events=1.5), "max_events = 1.5; must be a whole number"),
+    *(
+        (impact(FusedChain(), [1] * 4, v), f"{UNDEFINED}{what} FusedChain needs")
+        for v, what in (
+            ([2, 1, 0, 0], "[0, 1] approach;"),
+            ([1, 0, 0, 0.5], "[0] approach and [2] open;"),
+            ([0, 1, 0, 0], "[1] approach and [0] open;"),
+        )
+    ),
+    (partial(EnergyDistribution, -1), "stiffness = -1.0; must be above 0"),
+    (partial(ENERGY, 0.5), "exponent = 0.5; must be at least 1"),
+    (partial(ENERGY, gaps=1), "gaps = 1; must be True or False"),
+    (partial(ENERGY, rtol=0), "rtol = 0.0; must lie in"),
+    (partial(ENERGY, max_evaluations=0), "max_evaluations = 0; must be a whole number, at least 1"),
+    (impact(EnergyDistribution([1, 2, 3])), "stiffness has 3 values; 3 balls need 2"),
+    (impact(ENERGY(), e=[0.5, 1e-12]),
+     "restitution[1] = 1e-12; must be 0 or at least 1e-06 for EnergyDistribution"),
+    *(
+        (impact(model, [mass] * 3, [1e-10, 0, 0]), f"masses[0] = {mass!r}; its reduced mass with "
+         f"masses[1] = {mass!r} is beyond the range")
+        for model in SPRINGS for mass in (5e-324, 1e-309, 1.2e308)
+    ),
+    (partial(DISSIPATION, -1), "coefficients = -1.0; must lie in [0, 1e+09]"),
+    (partial(DISSIPATION, [1, np.inf]), "coefficients[1] = inf; must be finite"),
+    (partial(DISSIPATION, [[1]]), "coefficients has shape (1, 1); must be () or (N - 1,)"),
+    (partial(DISSIPATION, distance=-1), "distance = -1.0; must lie in [0, 1e+09]"),
+    (partial(DISSIPATION, distance=[1]), "distance = [1]; must be one number"),
+    (partial(DISSIPATION, max_problems=0), "max_problems = 0; must be a whole number, at least 1"),
+    (impact(DISSIPATION(), e=[0.5, 1]),
+     "restitution[1] = 1.0; must be below 1 - 2e-09 for QuadraticDissipation: e = 1 is"),
+    (impact(DISSIPATION([1, 2, 3])), "coefficients has 3 values; 3 balls need 2, or one"),
+    (impact(DISSIPATION(1, distance=1), [1, 1], [1, 0]),
+     "distance = 1.0; needs three balls, the chain has 2"),
+    (impact(DISSIPATION(), [1, 1e-100, 1], e=0.5),
+     "masses[1] = 1e-100; must be at least 1e-06 of the he"),
+    # A group: each is near a neighbour, but the group is far from both its sides.
+    (impact(DISSIPATION(), [1e4, 1e-15, 2e-15, 1e13, 1e4], [1, 0, 0, 0, 0], 0.5),
+     "masses[1] = 1e-15; must be at least 1e-06 of the he"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("call", "words"), REFUSED, ids=[words for _, words in REFUSED])
+def test_refusals_name_value_and_rule(call, words):
     with pytest.raises(ValueError, match="^" + re.escape(words)):
-        collide(Chain([mass] * 3, [1e-10, 0, 0]), model)
+        call()
+
+
+@pytest.mark.parametrize(
+    "caption",
+    [
+        "SequentialCollisions(order='right', max_events=5000000)",
+        "FusedChain()",
+        "EnergyDistribution(stiffness=(1.0, 2.0), exponent=1.0, gaps=True, "
+        "rtol=1e-09, max_evaluations=1000000)",
+        "QuadraticDissipation(coefficients=(1.0, 2.0), distance=3.0, max_problems=10000)",
+    ],
+)
+def test_the_repr_is_the_call(caption):
+    assert repr(eval(caption, vars(cradle))) == caption
+
+
+@pytest.mark.parametrize("model", LAWS, ids=repr)
+def test_balls_that_do_not_approach(model):
+    trace = collide(Chain([1, 2, 3], [-1, 0, 0], 1), model)
+    assert trace.velocities.tolist() == [-1, 0, 0]
+    assert trace.path.tolist() == [[-1, 0, 0]]
+    assert not trace.events
+    assert not trace.collisions.any()
+    assert getattr(trace, "evaluations", 0) == 0
+
+
+@pytest.mark.parametrize(
+    ("model", "masses", "velocities", "words", "reached"),
+    [
+        (SequentialCollisions("left", max_events=3), [100, 1, 100], [1, 0, -1], "3 steps",
+         lambda trace: np.argmax(trace.collisions) == 0),
+        (SequentialCollisions("right", max_events=3), [100, 1, 100], [1, 0, -1], "3 steps",
+         lambda trace: np.argmax(trace.collisions) == 1),
+        (ENERGY(max_evaluations=50), [1, 1, 1], [1, 0, 0], "50 reached",
+         lambda trace: trace.evaluations == 50 and trace.step_impulses[-1, 0] >= 0),
+        (DISSIPATION(9.0, max_problems=2), [10, 0.1, 10], [0, 1, 0], "2;",
+         lambda trace: trace.collisions.tolist() == [1, 1]),
+    ],
+)  # fmt: skip
+def test_unfinished_impacts_show_what_was_reached(model, masses, velocities, words, reached):
+    chain = Chain(masses, velocities, 1)
+    with pytest.raises(ImpactNotFinished, match=f"max_[a-z]+ = {words}") as stopped:
+        collide(chain, model)
+    trace = stopped.value.trace
+    assert trace.chain is chain
+    assert trace.model is model
+    assert chain.masses @ trace.velocities == pytest.approx(chain.momentum, abs=1e-13)
+    assert reached(trace)
+
+
+# --- masses --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("model", [*SPRINGS, QuadraticDissipation(3)], ids=repr)
@@ -82,12 +186,6 @@ def test_outcomes_have_no_unit_of_mass(model, power):
     np.testing.assert_allclose(
         same.absorbed[one.absorbed > 0], np.ldexp(one.absorbed, power)[one.absorbed > 0], rtol=1e-12
     )
-
-
-LAWS = [
-    *SPRINGS, QuadraticDissipation(3), SequentialCollisions("right"), FusedChain(),
-    ImpulseCorrelation(0.1),
-]  # fmt: skip
 
 
 @pytest.mark.parametrize("model", LAWS, ids=repr)
@@ -114,13 +212,13 @@ def test_dissipation_has_no_unit_of_mass(power):
     assert collide(same, QuadraticDissipation()).velocities.tolist() == velocities.tolist()
 
 
-def test_dissipation_refuses_light_balls_between_heavy_ones():
-    """A group of them too: each is near a neighbour, but the group is far from both its sides."""
-    with pytest.raises(ValueError, match=r"^masses\[1\] = 1e-15; must be at least 1e-06 of the he"):
-        collide(Chain([1e4, 1e-15, 2e-15, 1e13, 1e4], [1, 0, 0, 0, 0], 0.5), QuadraticDissipation())
-    # Balls that grow lighter towards an end are none between heavy ones.
-    light = collide(Chain([1, 1e-7, 1e-14], [1, 0, 0], 0.5), QuadraticDissipation())
-    assert np.isfinite(light.velocities).all()
+@pytest.mark.parametrize("masses", [[1, 1e-6, 1], [1, 1e-7, 1e-14], [1e-12, 1, 1e12]])
+def test_dissipation_takes_balls_that_grow_lighter_towards_an_end_and_just_heavy_ones(masses):
+    after = collide(Chain(masses, [1, 0, 0], 0.5), DISSIPATION()).velocities
+    if masses[2] == 1:
+        np.testing.assert_allclose(after, 1 / (2 + 1e-6), rtol=1e-9)
+    else:
+        assert (np.diff(after) > -1e-14).all()
 
 
 # --- defaults ------------------------------------------------------------------------------

@@ -1,12 +1,10 @@
 """One collision after another, and one solid body: the two ends that the ratio bridges."""
 
-import re
-
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
 
-from cradle import Chain, ImpactNotFinished, collide
+from cradle import Chain, collide
 from cradle.models.sequential import FusedChain, SequentialCollisions
 
 ARRAYS = ("velocities", "impulses", "absorbed", "collisions", "path", "path_impulses")
@@ -123,29 +121,6 @@ def test_endless_sequences_reach_their_limit(order):
     np.testing.assert_allclose(trace.velocities, 1, rtol=1e-12)
 
 
-@pytest.mark.parametrize("order", ["left", "right"])
-def test_unfinished_impact_shows_what_was_reached(order):
-    chain = Chain([100, 1, 100], [1, 0, -1], 1)
-    model = SequentialCollisions(order, max_events=3)
-    with pytest.raises(ImpactNotFinished, match="max_events = 3 steps") as stopped:
-        collide(chain, model)
-    trace = stopped.value.trace
-    assert trace.chain is chain
-    assert trace.model is model
-    assert chain.masses @ trace.velocities == pytest.approx(chain.momentum, abs=1e-13)
-    assert np.argmax(trace.collisions) == (0 if order == "left" else 1)
-
-
-def test_balls_that_do_not_approach_keep_their_velocities():
-    chain = Chain([1, 2, 3], [-1, 0, 0], 0.5)
-    for model in (SequentialCollisions("left"), SequentialCollisions("right"), FusedChain()):
-        trace = collide(chain, model)
-        assert trace.velocities.tolist() == [-1, 0, 0]
-        assert trace.path.tolist() == [[-1, 0, 0]]
-        assert not trace.events
-        assert not trace.collisions.any()
-
-
 # --- one solid body ------------------------------------------------------------------------
 
 
@@ -179,38 +154,3 @@ def test_fused_masses_whose_sum_overflows():
 
 
 # --- input ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("velocities", "what"),
-    [
-        ([2, 1, 0, 0], "contacts [0, 1] approach;"),
-        ([1, 0, 0, 0.5], "contacts [0] approach and [2] open;"),
-        ([0, 1, 0, 0], "contacts [1] approach and [0] open;"),
-    ],
-)
-def test_fused_refuses_where_bodies_are_undefined(velocities, what):
-    message = f"velocities leave it undefined which balls move as one body: {what} FusedChain needs"
-    with pytest.raises(ValueError, match="^" + re.escape(message)):
-        collide(Chain([1, 1, 1, 1], velocities, 1), FusedChain())
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"order": "first"}, "order = 'first'; must be 'left' or 'right'"),
-        ({"order": None}, "order = None; must be 'left' or 'right'"),
-        ({"max_events": 0}, "max_events = 0; must be at least 1"),
-        ({"max_events": 1.5}, "max_events = 1.5; must be a whole number"),
-    ],
-)
-def test_bad_options_name_value_and_rule(options, message):
-    with pytest.raises(ValueError, match="^" + re.escape(message)):
-        SequentialCollisions(**options)
-
-
-def test_repr_is_the_caption():
-    assert repr(SequentialCollisions("right")) == (
-        "SequentialCollisions(order='right', max_events=5000000)"
-    )
-    assert repr(FusedChain()) == "FusedChain()"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,7 @@ class DissipationTrace(Trace):
         return float(np.sum(self.absorbed))
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True)
 class QuadraticDissipation:
     """Velocities after the impact from one convex problem (Moreau; Frémond; Cholet).
 
@@ -105,24 +105,19 @@ class QuadraticDissipation:
     [0. 0. 1.]
     """
 
-    coefficients: float | tuple[float, ...] | None
-    distance: float
-    max_problems: int
+    coefficients: float | Sequence[float] | None = None
+    distance: float = field(default=0.0, kw_only=True)
+    max_problems: int = field(default=10_000, kw_only=True)
 
-    def __init__(
-        self,
-        coefficients: float | Sequence[float] | None = None,
-        *,
-        distance: float = 0.0,
-        max_problems: int = 10_000,
-    ) -> None:
-        rule = f"must lie in [0, {_LARGEST:g}]"
-        value: float | tuple[float, ...] | None = None
-        if coefficients is not None:
-            value = number_or_row("coefficients", coefficients, "N - 1", rule, 0.0, _LARGEST)
-        object.__setattr__(self, "max_problems", whole_number("max_problems", max_problems))
-        object.__setattr__(self, "coefficients", value)
-        object.__setattr__(self, "distance", one_number("distance", distance, rule, 0.0, _LARGEST))
+    def __post_init__(self) -> None:
+        rule, given = f"must lie in [0, {_LARGEST:g}]", self.coefficients
+        if given is not None:
+            given = number_or_row("coefficients", given, "N - 1", rule, 0.0, _LARGEST)
+        vars(self).update(
+            coefficients=given,
+            distance=one_number("distance", self.distance, rule, 0.0, _LARGEST),
+            max_problems=whole_number("max_problems", self.max_problems),
+        )
 
     def solve(self, chain: Chain) -> DissipationTrace:
         """Solve the impact of `chain`; see `collide`."""

@@ -145,7 +145,8 @@ class _Run:
             rule = f"must be within {far:.4g} m: pendulums of this length reach {most}"
             refuse_where("positions", x, beyond, rule)
         self.chain, self.hanging = chain, (hanging := Hanging(pendulums, chain.masses))
-        self.model = functools.lru_cache(None)(functools.partial(part, model, n))
+        self.model = functools.cache(functools.partial(part, model, n))
+        self.offsets = functools.cache(hanging.offsets)
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
         self.released = float(hanging.energy(self.x, self.v))
         self.speed = float(np.sqrt(2.0 * self.released / chain.masses.sum()))
@@ -237,7 +238,7 @@ class _Run:
 
     def align(self, first: int, last: int) -> None:
         """Move balls that touch, but for rounding, to where they touch; keep their centre."""
-        m, offset = self.hanging.masses[first:last], self.hanging.offsets(first, last)
+        m, offset = self.hanging.masses[first:last], self.offsets(first, last)
         x = self.x[first:last] + offset
         self.x[first:last] = mean(x, m) - offset
 
