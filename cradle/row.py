@@ -13,6 +13,10 @@ w becomes w + u.  Where the balls hang alike and touch, that changes the energy 
 sum of m ((w + u)^2 - w^2), up to terms whose mean is zero; and that sum is what `collide` keeps.
 Two pushes do it: m u t / h before the engine's step, the rest after it, when w is known.  It lies
 between the velocities before and after the step; where, the row learns from steps without contact.
+
+A solver that puts balls back onto their strings takes a part of each velocity that it turns: of w
+the part q (h w / l)^2, with q up to 1/2.  The row learns q too, and lets each part of a side that a
+contact divides lose what it would lose alone, in the place of what the engine took.
 """
 
 from __future__ import annotations
@@ -161,7 +165,7 @@ class Row(Alone):
         self.impacts, self.settled, self.time = 0, 0, 0.0
         #: Where the speed of a step lies: 0 is the velocity before it, 1 the one after it.
         self.lag = 0.5
-        self._samples: list[float] = []
+        self._samples, self._losses = list[float](), list[float]()
         self._last: tuple[Plane, Plane, float, float] | None = None
         self._lessons = self._doubts = 0
 
@@ -230,11 +234,12 @@ class Row(Alone):
         x, own, (_, early, _, _) = begun
         now, v = map(np.array, self._motion())
         # The speed of the step, whether its kick comes first, last, or half and half.
-        speeds = own + self.lag * (self.own(v, now) - early - own)
+        taken = self.taken(x, own + early, duration)
+        speeds = own + self.lag * (self.own(v, now) + taken - early - own)
         bent = self._pull(x) - self._pull(now)
         speeds += self.lag * (1.0 - self.lag) * duration * bent
-        change, _, hits, settled = self.fly(x, speeds, duration) or Flight(0.0 * own, early, [], 0)
-        self._push(change - early, now)
+        change, _, hits, settled = self.fly(x, speeds, duration) or Flight(-taken, early, [], 0)
+        self._push(change - early + taken, now)
         self.impacts += len(hits)
         self.settled += settled
         for hit in hits:
@@ -252,6 +257,7 @@ class Row(Alone):
             return
         was, before, then, step = last
         passed = self.time - then
+        steady = math.isclose(passed, step, rel_tol=1e-6)
         mean, gain = self.travelled(was, x) / passed, own - before
         speed, gained = np.abs(0.5 * (own + before)), np.abs(gain)
         fast = speed > np.maximum(4.0 * gained, self.resting)
@@ -267,11 +273,19 @@ class Row(Alone):
         # Near the turning points the lag is seen: the kicks are in proportion to the pulls.
         first, second = self._pull(was).real, self._pull(x).real
         seen = (gained > 0.05 * speed) & (np.abs(first) > 0.05 * self.acceleration)
-        if seen.any() and math.isclose(passed, step, rel_tol=1e-6):
+        if seen.any() and steady:
             share = ((mean - before)[seen] / gain[seen]).real
             late = share * second[seen]
             self._samples += (late / (late + (1.0 - share) * first[seen])).tolist()
             self.lag = float(np.clip(np.median(self._samples), 0.0, 1.0))
+        # Near the lowest point one sees what a solver takes of a velocity that it turns.
+        turn = self.travelled(was, x).real / self.arms(was)
+        seen = fast & (np.abs(turn) > 0.01)
+        if seen.any() and steady and self._samples:
+            kick = step * (self.lag * first + (1.0 - self.lag) * second)
+            less = (kick - gain.real)[seen] / (0.5 * (own + before)).real[seen]
+            self._losses += (less / turn[seen] ** 2).tolist()
+            self.loss = float(np.clip(np.median(self._losses), 0.0, 0.5))
 
 
 def step_rows(rows: Sequence[Row], duration: float) -> None:

@@ -135,24 +135,55 @@ SHORT = 0.2
 FIVE, MIXED, LIGHT = [1.0] * 5, [0.5, 1.0, 2.0], [1.0, 0.2, 1.0]
 
 
+class Strings(Free):
+    """Balls that a solver puts back onto their strings at each step: what they turn costs speed."""
+
+    def __init__(self, masses, sub):
+        n, self.sub = len(masses), sub
+        self.pivots = np.column_stack([0.04 * np.arange(n), np.zeros(n)])
+        arms = np.array([[math.sin(a), -math.cos(a)] for a in (-0.5, *[0.0] * (n - 1))])
+        super().__init__(self.pivots + SHORT * arms, np.zeros((n, 2)), masses)
+
+    def arms(self):
+        arms = self.x - self.pivots
+        return arms / np.hypot(*arms.T)[:, None]
+
+    def advance(self, step):
+        for _ in range(self.sub):
+            self.v[:, 1] -= step / self.sub * GRAVITY
+            self.v -= (self.v * self.arms()).sum(axis=1)[:, None] * self.arms()
+            self.x += step / self.sub * self.v
+            self.x = self.pivots + SHORT * self.arms()
+
+    def energy(self):
+        height = SHORT + self.x[:, 1] - self.pivots[:, 1]
+        return self.masses * (0.5 * (self.v**2).sum(axis=1) + GRAVITY * height)
+
+
+# Kicks first: the speed of a step is that after it; four kicks: the mean of 1/4, 2/4, 3/4 and 1.
+# Strings that are put back keep of a velocity the cosine of its turn; four times of a quarter of
+# it, a quarter of that loss.
 @pytest.mark.parametrize(
-    ("kind", "kicks", "masses"),
+    ("engine", "kind", "masses", "lag", "loss"),
     [
-        ("first", 1, FIVE),
-        ("first", 1, MIXED),
-        ("first", 1, LIGHT),
-        ("last", 1, FIVE),
-        ("last", 1, MIXED),
-        ("half", 1, FIVE),
-        ("half", 1, MIXED),
-        ("first", 4, FIVE),
+        *((Plain, ("first",), masses, 1.0, 0.0) for masses in (FIVE, MIXED, LIGHT)),
+        *((Plain, ("last",), masses, 0.0, 0.0) for masses in (FIVE, MIXED)),
+        *((Plain, ("half",), masses, 0.5, 0.0) for masses in (FIVE, MIXED)),
+        (Plain, ("first", 4), FIVE, 0.625, 0.0),
+        *((Strings, (1,), masses, 1.0, 0.5) for masses in (FIVE, LIGHT)),
+        *((Strings, (4,), masses, 0.625, 0.125) for masses in (FIVE, LIGHT)),
     ],
 )
-def test_half_a_minute_at_60_hz_leaves_the_energy_that_one_pendulum_keeps(kind, kicks, masses):
-    """The mean over the last ten seconds: energy swings with the phase of each ball."""
+def test_half_a_minute_at_60_hz_leaves_the_energy_that_one_pendulum_keeps(
+    engine, kind, masses, lag, loss
+):
+    """The mean over the last ten seconds: energy swings with the phase of each ball.
+
+    Where swings lose by their height, a row loses somewhat less: its balls share the energy.
+    """
     means = []
     for alone in (True, False):
-        bodies = Plain(masses, kind, kicks)
+        bodies = engine(masses, *kind)
         row = Row(bodies, Chain(masses, [0] * len(masses)), MODEL, 0.02, bodies.pivots)
         start, total = bodies.energy().sum(), 0.0
         for k in range(1800):
@@ -160,12 +191,9 @@ def test_half_a_minute_at_60_hz_leaves_the_energy_that_one_pendulum_keeps(kind, 
             total += bodies.energy().sum() / start if k >= 1200 else 0.0
         means.append(total / 600)
     assert row.impacts > 100
-    assert row.lag == pytest.approx(LAGS[kind, kicks], abs=2e-3)
-    assert means[1] == pytest.approx(means[0], abs=5e-3)
-
-
-#: Kicks first: the speed of a step is that after it; four kicks: the mean of 1/4, 2/4, 3/4 and 1.
-LAGS = {("first", 1): 1.0, ("last", 1): 0.0, ("half", 1): 0.5, ("first", 4): 0.625}
+    assert row.lag == pytest.approx(lag, abs=2e-3)
+    assert row.loss == pytest.approx(loss, abs=0.02)
+    assert means[1] == pytest.approx(means[0], abs=0.014 if loss else 5e-3)
 
 
 def test_the_engine_makes_whole_steps():

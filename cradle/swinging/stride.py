@@ -108,6 +108,8 @@ class Alone:
             lengths = np.abs(at - self.pivots)
             if np.ptp(lengths) <= 1e-3 * lengths.min():
                 self.speeding = 0.0
+        #: Part of a velocity that a step takes, over the square of the angle by which it turns.
+        self.loss = 0.0
         #: For how long nothing can happen, s.
         self.quiet = 0.0
 
@@ -136,6 +138,14 @@ class Alone:
         arms = x - self.pivots
         return self.pivots + arms * np.exp(1j * ways.real / np.abs(arms))
 
+    def arms(self, x: Plane) -> Vector:
+        """Return how far balls are from their pivots; infinity if they are free."""
+        return np.full(len(x), np.inf) if self.pivots is None else np.abs(x - self.pivots)
+
+    def taken(self, x: Plane, own: Plane, duration: float) -> Plane:
+        """Return what a step takes of own velocities that it turns."""
+        return self.loss * (own * duration / self.arms(x)) ** 2 * own
+
     def fly(self, x: Plane, own: Plane, duration: float) -> Flight | None:
         """Make a step with these own velocities; None if nothing touches."""
         change, early = np.zeros((2, len(x)), complex)
@@ -149,10 +159,13 @@ class Alone:
                 change += gained
                 early += left / duration * gained
                 settled, touched = settled + rests, True
-            if arrival >= left:
+            passed = min(arrival, left)
+            taken = passed / duration * self.taken(x, own, duration)
+            own, change = own - taken, change - taken
+            if passed == left:
                 self.quiet -= left
                 return Flight(change, early, hits, settled) if touched else None
-            x, left = self.moved(x, arrival * own), left - arrival
+            x, left = self.moved(x, passed * own), left - passed
         raise RuntimeError(
             f"more than {_MOST_IMPACTS} impacts in a step of {duration!r} s; the balls are "
             f"squeezed between others, or `resting` = {self.resting!r} is too low"
