@@ -230,7 +230,7 @@ def strokes(angles, rates):
     those at the turning point that follows.
     """
     mean = angles.mean(axis=1)
-    passed = np.flatnonzero(np.sign(mean[1:]) != np.sign(mean[:-1])) + 1
+    passed = np.flatnonzero(np.diff(mean > 0.0)) + 1
     each = energies(angles, rates)
     ends = np.append(passed[1:], len(mean))
     turning = [a + int(np.argmax(np.abs(mean[a:b]))) for a, b in zip(passed, ends, strict=True)]
