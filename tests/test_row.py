@@ -277,12 +277,10 @@ def test_one_impact_of_free_balls_is_that_of_collide():
     places = np.array([-0.3, 0.0, 0.2, 0.4])[:, None] * axis
     across = np.array([-axis[1], axis[0]])
     v = np.array([2.0, 0.0, 0.0, 0.0])[:, None] * axis
-    v[2] += 0.0 * across
     bodies = Free(places, v, masses)
     model = ImpulseCorrelation(0.2)
     row = Row(bodies, Chain(masses, [0] * 4, e), model, RADIUS)
-    for _ in range(4):
-        row.step(0.02)
+    steps(row, 4, 0.02)
     chain = Chain(masses, [2.0, 0, 0, 0], e)
     np.testing.assert_allclose(bodies.v @ axis, collide(chain, model).velocities, atol=1e-12)
     np.testing.assert_allclose(bodies.v @ across, 0, atol=1e-12)
@@ -332,8 +330,7 @@ def test_balls_at_rest_cost_no_impact():
     looks = count(bodies)
     row = hung(bodies)
     looks.clear()
-    for _ in range(2000):
-        row.step(1e-3)
+    steps(row, 2000, 1e-3)
     assert row.impacts == row.settled == 0
     np.testing.assert_array_equal(bodies.angles, 0)
     assert len(looks) <= 220  # every hundredth of a second
@@ -367,8 +364,7 @@ def test_balls_that_press_each_other_rest(e: float, step: float):
 def test_lossy_balls_come_to_rest_together():
     bodies = Hanging([-0.5, 0, 0, 0, 0])
     row = hung(bodies, 0.5)
-    for _ in range(30_000):
-        row.step(1e-3)
+    steps(row, 30_000, 1e-3)
     assert row.impacts < 500
     # At last all swing as one pendulum: with the momentum, a fifth of the velocity.
     assert np.ptp(bodies.rates) < 0.02
@@ -440,17 +436,33 @@ def test_what_is_no_row_is_refused(change: dict, message: str):
         Row(bodies, Chain([1] * 3, [0] * 3), given.pop("model"), given.pop("radii"), **given)
 
 
-def test_a_bend_is_refused_when_it_is_struck():
-    bodies = Free([[-0.3, 0], [0, 0], [0.2 * 0.8, 0.2 * 0.6]], [[1, 0], [0, 0], [0, 0]], [1] * 3)
-    row = Row(bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS)
-    with pytest.raises(ValueError, match=r"balls 0 to 2 touch, but not in a straight row"):
-        row.step(0.2)
+STILL = [0, 0]
+#: Places, velocities, pivots, the step, and the words in which a step of a hundred is refused.
+REFUSED = [
+    ([[-0.3, 0], [0, 0], [0.2 * 0.8, 0.2 * 0.6]], [[1, 0], STILL, STILL], None, 0.2,
+     "balls 0 to 2 touch, but not in a straight row"),
+    ([[0, 0], [0.3, 0], [0.6, 0]], [[0.3, 1], STILL, [-0.3, 1]], None, 0.01,
+     "balls 0 and 2 touch and are no neighbours"),
+    ([[-0.2, 0], [0, 0]], [[1, 0], STILL], [[-0.2, 1], [1, 0]], 0.01,
+     "ball 1 is struck along its string"),
+]  # fmt: skip
 
 
-def test_a_row_that_folds_is_refused():
-    bodies = Free([[0, 0], [0.3, 0], [0.6, 0]], [[0.3, 1], [0, 0], [-0.3, 1]], [1] * 3)
-    row = Row(bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS)
-    with pytest.raises(ValueError, match=r"balls 0 and 2 touch and are no neighbours"):
+@pytest.mark.parametrize(("x", "v", "pivots", "step", "words"), REFUSED)
+def test_what_is_seen_to_be_no_row_in_a_step_is_refused(x, v, pivots, step, words):
+    row = Row(Free(x, v, [1] * len(x)), Chain([1] * len(x), [0] * len(x)), MODEL, RADIUS, pivots)
+    with pytest.raises(ValueError, match=words):
+        steps(row, 100, step)
+
+
+@pytest.mark.parametrize(("first", "words"), [(0.45, "0.15 m"), (0.2, "0.1")])
+def test_balls_that_pass_each_other_are_an_error(first, words):
+    """Moved by somebody, or in an engine that ignores impulses."""
+    bodies = Free([[0, 0], [0.5, 0]], [[1, 0], STILL], [1, 1])
+    bodies.push = lambda *_: None
+    row = Row(bodies, Chain([1, 1], STILL), MODEL, RADIUS)
+    bodies.x[0, 0] = first
+    with pytest.raises(RuntimeError, match=f"balls 0 and 1 overlap by {words}"):
         steps(row, 100, 0.01)
 
 
@@ -463,34 +475,10 @@ def test_units_are_free():
         row = Row(
             bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS * unit, acceleration=GRAVITY * unit
         )
-        for _ in range(30):
-            row.step(0.01)
+        steps(row, 30, 0.01)
         found.append((bodies.v / unit, row.touching / unit, row.resting / unit, row.impacts))
     for one, other in zip(*found):
         np.testing.assert_array_equal(one, other)
-
-
-def test_a_ball_struck_along_its_string_is_refused():
-    bodies = Free([[-0.2, 0], [0, 0]], [[1, 0], [0, 0]], [1, 1])
-    row = Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS, [[-0.2, 1], [1, 0]])
-    with pytest.raises(ValueError, match=r"ball 1 is struck along its string"):
-        row.step(0.01)
-
-
-def test_balls_that_passed_each_other_are_an_error():
-    bodies = Free([[0, 0], [0.5, 0]], [[0, 0], [0, 0]], [1, 1])
-    row = Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS)
-    bodies.x[0, 0] = 0.45
-    with pytest.raises(RuntimeError, match=r"balls 0 and 1 overlap by 0.15 m"):
-        row.step(1e-3)
-
-
-def test_an_engine_that_ignores_impulses_is_an_error():
-    bodies = Free([[0, 0], [0.2, 0]], [[1, 0], [0, 0]], [1, 1])
-    bodies.push = lambda *_: None
-    row = Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS)
-    with pytest.raises(RuntimeError, match=r"balls 0 and 1 overlap by 0\.1"):
-        steps(row, 100, 0.01)
 
 
 def test_a_step_with_too_many_impacts_is_an_error(monkeypatch):
