@@ -113,17 +113,8 @@ class Swing:
         0   0.0     0     -0.02       0.0
         1   0.0     1      0.00       0.0
         """
-        import pandas as pd
-
-        count, n = self.positions.shape
-        return pd.DataFrame(
-            {
-                "time": np.repeat(self.times, n),
-                "ball": np.tile(np.arange(n), count),
-                "position": self.positions.ravel(),
-                "velocity": self.velocities.ravel(),
-            }
-        )
+        parts = {"position": self.positions, "velocity": self.velocities}
+        return self._by_ball({"time": self.times}, parts)
 
     def impacts_to_frame(self) -> pd.DataFrame:
         """Return a row for each impact and ball: impact, time, ball, before, after.
@@ -137,18 +128,19 @@ class Swing:
         0       0  0.317     0     1.0    0.0
         1       0  0.317     1     0.0    1.0
         """
+        times = np.array([impact.time for impact in self.impacts])
+        names = ("before", "after")
+        parts = {name: np.array([getattr(one, name) for one in self.impacts]) for name in names}
+        return self._by_ball({"impact": np.arange(len(times)), "time": times}, parts)
+
+    def _by_ball(self, rows: dict[str, Any], parts: dict[str, Vector]) -> pd.DataFrame:
+        """Return a row for each of these rows and each ball."""
         import pandas as pd
 
-        n, count = len(self.chain), len(self.impacts)
-        return pd.DataFrame(
-            {
-                "impact": np.repeat(np.arange(count), n),
-                "time": np.repeat([impact.time for impact in self.impacts], n),
-                "ball": np.tile(np.arange(n), count),
-                "before": np.array([impact.before for impact in self.impacts]).ravel(),
-                "after": np.array([impact.after for impact in self.impacts]).ravel(),
-            }
-        )
+        n, count = len(self.chain), len(next(iter(rows.values())))
+        columns = {name: np.repeat(values, n) for name, values in rows.items()}
+        columns["ball"] = np.tile(np.arange(n), count)
+        return pd.DataFrame(columns | {name: part.ravel() for name, part in parts.items()})
 
     def __repr__(self) -> str:
         """Return a short account."""

@@ -305,11 +305,11 @@ class Account:
         """Demand of a flight that no ball passes another, and that energy is only damped."""
         overlaps = x[:, :-1] - x[:, 1:] - self.hanging.gaps
         worst = overlaps.max(axis=-1)
-        _demand(worst, self.overlap, begin + times, "balls overlap by {:g} m")
+        _demand(worst, self.overlap, (begin, times), "balls overlap by {:g} m")
         gain = self.hanging.energy(x, v) - self.energy
         most = RADIAN * (1.0 + times * self.hanging.fastest) * self.energy
-        least = -np.inf if self.damped else -most
-        _demand(gain, most, begin + times, "a flight has made or lost {:g} J", least)
+        least = None if self.damped else -most
+        _demand(gain, most, (begin, times), "a flight has made or lost {:g} J", least)
 
     def settle(
         self, time: float, x: Vector, placed: Vector, v: Vector, struck: Vector, left: Vector
@@ -321,17 +321,19 @@ class Account:
         """
         m = self.hanging.masses
         gain, most = abs(m @ (left - v)), INSTANT * (m @ (np.abs(left) + np.abs(v)))
-        _demand(gain, most, time, "impacts have made or lost {:g} kg m/s")
+        _demand(gain, most, (time, 0.0), "impacts have made or lost {:g} kg m/s")
         energies = self.hanging.energy(np.array([x, placed]), np.array([struck, left])).tolist()
         gain, self.energy = abs(energies[1] - energies[0]), energies[1]
         most = INSTANT * max(energies)
-        _demand(gain, most, time, "{:g} J are made or lost beside the impacts")
+        _demand(gain, most, (time, 0.0), "{:g} J are made or lost beside the impacts")
 
 
-def _demand(defect: Any, most: Any, times: Any, what: str, least: Any = -np.inf) -> None:
-    """Raise for the first of some times at which a defect is too large, or no number."""
-    sound = np.asarray((defect <= most) & (defect >= least))
-    if not sound.all():
+def _demand(defect: Any, most: Any, when: tuple[float, Any], what: str, least: Any = None) -> None:
+    """Raise for the first of some times since another at which a defect is beyond, or no number."""
+    sound = defect <= most
+    if least is not None:
+        sound = sound & (defect >= least)
+    if not np.asarray(sound).all():
         k = int(np.argmin(sound))
-        time, size = np.ravel(times)[k], np.ravel(defect)[k]
+        time, size = np.ravel(when[0] + when[1])[k], np.ravel(defect)[k]
         raise RuntimeError(f"the swing is not certified: at t = {time} s {what.format(size)}")
