@@ -309,6 +309,3 @@ class FullFlight:
             found.append(y)
         x, v = np.split(np.array(found).reshape(len(times), len(self.start)), 2, axis=1)
         return x[:, self.body], v[:, self.body]
-
-
-Flight = SmallAngleFlight | FullFlight

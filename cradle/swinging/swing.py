@@ -26,7 +26,7 @@ from cradle.input.values import (
     whole_number,
 )
 from cradle.models import Model, collide
-from cradle.swinging.flight import Flight, FullFlight, Meeting, SmallAngleFlight, Start
+from cradle.swinging.flight import FullFlight, Meeting, SmallAngleFlight, Start
 from cradle.swinging.pendulums import TIE, Hanging, Pendulums, mean
 from cradle.swinging.record import Impact, Swing
 from cradle.swinging.resting import NEAR, RESTING, common_velocities, pressed, stretches
@@ -114,6 +114,7 @@ def swing(
     run = _Run(chain, model, hanging, checked("positions", positions))
     ended = run.to_the_end(at, most, least)
     found = at[: sum(len(x) for x, _ in run.series)]
+    certify(run, found)
     return Swing(
         chain=chain,
         model=model,
@@ -153,7 +154,8 @@ class _Run:
         self.impacts: list[Impact] = []
         self.series: list[tuple[Vector, Vector]] = []
         self.size = max(float(np.abs(x).max()), self.speed / float(hanging.frequency.min()))
-        self.account = Account(hanging, self.size)
+        #: When, where balls came to be and were put, their velocities before, struck, and at last.
+        self.instants: list[tuple[float, Vector, Vector, Vector, Vector, Vector]] = []
         distance = hanging.gaps + np.diff(x)
         if (distance < -TIE * self.size).any():
             c = int(np.argmin(distance))
@@ -173,7 +175,7 @@ class _Run:
             if len(self.impacts) >= most:
                 ended = "impacts"
                 break
-            if self.account.energy < least * self.released:
+            if least and self.hanging.energy(self.x, self.v) < least * self.released:
                 ended = "energy"
                 break
             flight = kind(self.hanging, Start(self.x, self.v, self.together, self.parting))
@@ -181,12 +183,12 @@ class _Run:
             later = self.t + meeting.time
             here = int(times.searchsorted(later, side="left"))
             if here > done or later > end:
-                self.series.append(self.fly(flight, times[done:here] - self.t))
+                self.series.append(flight.at(times[done:here] - self.t))
             done = here
             if later > end:
                 self.t = end
                 return "times"
-            x, v = self.fly(flight, np.array([meeting.time]))
+            x, v = flight.at(np.array([meeting.time]))
             known = len(self.impacts)
             self.t, self.x, self.v = later, x[0], v[0]
             self.settle(meeting)
@@ -203,11 +205,6 @@ class _Run:
         self.series.append((np.tile(self.x, (count, 1)), np.tile(self.v, (count, 1))))
         return ended
 
-    def fly(self, flight: Flight, times: Vector) -> tuple[Vector, Vector]:
-        x, v = flight.at(times)
-        self.account.fly(self.t, times, x, v)
-        return x, v
-
     def settle(self, meeting: Meeting) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
         hanging, x, v = self.hanging, self.x, self.v
@@ -218,7 +215,7 @@ class _Run:
         groups = stretches(touching)
         for group in groups:
             self.align(*group)
-        self.collide(groups)
+        self.collide(groups, v)
         struck = self.v
         # What opens at this instant rests no more in it, whatever else happens.
         for c in meeting.releasing:
@@ -228,7 +225,7 @@ class _Run:
             for t, freed in zip(touching, self.freed, strict=True)
         ]
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
-        self.account.settle(self.t, x, self.x, v, struck, self.v)
+        self.instants.append((self.t, x, self.x, v, struck, self.v))
         if any(resting):
             alone = hanging.accelerations(self.x, self.v)
             least = 1e-12 * self.speed * hanging.fastest
@@ -242,9 +239,9 @@ class _Run:
         x = self.x[first:last] + offset
         self.x[first:last] = mean(x, m) - offset
 
-    def collide(self, groups: list[tuple[int, int]]) -> None:
+    def collide(self, groups: list[tuple[int, int]], before: Vector) -> None:
         """Solve the impacts of this instant and record them as one."""
-        before, contacts, traces = self.v.copy(), list[int](), list[Trace]()
+        contacts, traces = list[int](), list[Trace]()
         speeds, slow = before.tolist(), RESTING * self.speed
         for first, last in groups:
             if all(a - b <= slow for a, b in pairwise(speeds[first:last])):
@@ -293,47 +290,40 @@ INSTANT = 1e-10
 RADIAN = 1e-11
 
 
-class Account:
-    """What the balls of a swing have, and what an unsound flight or instant would change."""
+def certify(run: _Run, times: Vector) -> None:
+    """Demand order, momentum and energy of every flight and of every instant.
 
-    def __init__(self, hanging: Hanging, size: float) -> None:
-        self.hanging, self.damped = hanging, bool(hanging.damping.any())
-        self.overlap = TIE * size
-        self.energy = 0.0  # where the present flight began, J
-
-    def fly(self, begin: float, times: Vector, x: Vector, v: Vector) -> None:
-        """Demand of a flight that no ball passes another, and that energy is only damped."""
-        overlaps = x[:, :-1] - x[:, 1:] - self.hanging.gaps
-        worst = overlaps.max(axis=-1)
-        _demand(worst, self.overlap, (begin, times), "balls overlap by {:g} m")
-        gain = self.hanging.energy(x, v) - self.energy
-        most = RADIAN * (1.0 + times * self.hanging.fastest) * self.energy
-        least = None if self.damped else -most
-        _demand(gain, most, (begin, times), "a flight has made or lost {:g} J", least)
-
-    def settle(
-        self, time: float, x: Vector, placed: Vector, v: Vector, struck: Vector, left: Vector
-    ) -> None:
-        """Demand of an instant that all but its impacts keeps the energy, and all the momentum.
-
-        How much energy an impact keeps is told by its own trace.  Places are those to which balls
-        came, and where they were put; velocities as they came, after the impacts, and at last.
-        """
-        m = self.hanging.masses
-        gain, most = abs(m @ (left - v)), INSTANT * (m @ (np.abs(left) + np.abs(v)))
-        _demand(gain, most, (time, 0.0), "impacts have made or lost {:g} kg m/s")
-        energies = self.hanging.energy(np.array([x, placed]), np.array([struck, left])).tolist()
-        gain, self.energy = abs(energies[1] - energies[0]), energies[1]
-        most = INSTANT * max(energies)
-        _demand(gain, most, (time, 0.0), "{:g} J are made or lost beside the impacts")
+    How much energy an impact keeps is told by its own trace.
+    """
+    hanging, m = run.hanging, run.hanging.masses
+    instants, *states = map(np.array, zip(*run.instants, strict=True))
+    came, placed, v, struck, left = states
+    momenta = np.abs((left - v) @ m), INSTANT * ((np.abs(left) + np.abs(v)) @ m)
+    _demand(*momenta, instants, "impacts have made or lost {:g} kg m/s")
+    before, kept = hanging.energy(placed, struck), hanging.energy(placed, left)
+    most = INSTANT * np.maximum(before, kept)
+    what = "{:g} J are made or lost beside the impacts"
+    _demand(np.abs(kept - before), most, instants, what)
+    # Flights: to where they end, and to where they are looked at.
+    begun = instants.searchsorted(times, side="right") - 1
+    begun = np.concatenate([np.arange(len(instants) - 1), begun])
+    until = np.concatenate([instants[1:], times])
+    x, v = (
+        np.concatenate([events[1:], *seen])
+        for events, seen in zip((came, v), zip(*run.series, strict=True), strict=True)
+    )
+    worst = (x[:, :-1] - x[:, 1:] - hanging.gaps).max(axis=-1)
+    _demand(worst, TIE * run.size, until, "balls overlap by {:g} m")
+    gain = hanging.energy(x, v) - kept[begun]
+    most = RADIAN * (1.0 + (until - instants[begun]) * hanging.fastest) * kept[begun]
+    wrong = gain if hanging.damping.any() else np.abs(gain)
+    _demand(wrong, most, until, "a flight has made or lost {:g} J", gain)
 
 
-def _demand(defect: Any, most: Any, when: tuple[float, Any], what: str, least: Any = None) -> None:
-    """Raise for the first of some times since another at which a defect is beyond, or no number."""
+def _demand(defect: Vector, most: Any, times: Vector, what: str, told: Any = None) -> None:
+    """Raise for the first of some times at which a defect is too large, or no number."""
     sound = defect <= most
-    if least is not None:
-        sound = sound & (defect >= least)
-    if not np.asarray(sound).all():
-        k = int(np.argmin(sound))
-        time, size = np.ravel(when[0] + when[1])[k], np.ravel(defect)[k]
-        raise RuntimeError(f"the swing is not certified: at t = {time} s {what.format(size)}")
+    if not sound.all():
+        k = np.flatnonzero(~sound)[np.argmin(times[~sound])]
+        size = (defect if told is None else told)[k]
+        raise RuntimeError(f"the swing is not certified: at t = {times[k]} s {what.format(size)}")
