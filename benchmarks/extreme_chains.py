@@ -336,7 +336,7 @@ UNEQUAL = {
 def unequal_jumps(family, n, ratio, chains=24, size=1e-12, e=0.9):
     """Change of a velocity, one a chain, if every input of unequal rows changes by the part `size`.
 
-    The first ball strikes; ratios above their bounds are held.
+    The first ball strikes; ratios above their bounds are held.  NaN: not done in a million steps.
     """
     masses, spread = UNEQUAL[family]
     rng = np.random.default_rng([2001, n, round(1000 * ratio)])
@@ -344,8 +344,18 @@ def unequal_jumps(family, n, ratio, chains=24, size=1e-12, e=0.9):
     velocities = np.tile(np.eye(n)[0], (chains, 1))
     parts = [masses, velocities, np.full((chains, n - 1), e), np.full((chains, n - 2), ratio)]
     changed = [part * (1 + size * rng.choice([-1, 1], part.shape)) for part in parts]
-    one, other = (post_impact_velocities(*p, excess="saturate") for p in (parts, changed))
-    return np.abs(other - one).max(axis=-1)
+    return np.array([_moved(here, there) for here, there in zip(zip(*parts), zip(*changed))])
+
+
+def _moved(*chains):
+    try:
+        one, other = (
+            post_impact_velocities(*chain, excess="saturate", max_events=1_000_000)
+            for chain in chains
+        )
+    except ImpactNotFinished:
+        return math.nan
+    return np.abs(other - one).max()
 
 
 # --- a light ball between two heavy ones -------------------------------------------------------

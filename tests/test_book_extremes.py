@@ -230,8 +230,8 @@ def test_fig_extremes_unequal(glued, figures):
     families = list(dict.fromkeys(r["family"] for r in rows))
     for name, family, balls, ratio in (
         ("ten", families[1], "80", "0.3"),
-        ("most", families[1], "80", "0.45"),
         ("turn", families[2], "40", "0.45"),
+        ("taper", families[3], "80", "0.3"),
     ):
         (row,) = (
             r for r in rows if (r["family"], r["balls"], r["ratio"]) == (family, balls, ratio)
@@ -289,11 +289,14 @@ def test_table_of_unfinished_chains(inventory):
     assert number(inventory["default-most"]) == pytest.approx(max(done), rel=0.05)
 
 
-def test_exercise_of_the_wedge():
-    """Masses 1, 1/4, 1: tan of the angle is 3/4, and 180 / 36.87 is 4.88."""
+def test_exercises(glued):
+    """Masses 1, 1/4, 1: tan of the angle is 3/4, and 180 / 36.87 is 4.88; a border by trace."""
     assert math.sqrt(0.25 * 2.25) == 0.75
-    printed = Chapter("extremes").printed("extremes-34")
-    assert printed.split()[0] == str(math.ceil(math.pi / math.atan(0.75)) - 1) == "4"
+    assert number(glued["quarter"]) == math.ceil(math.pi / math.atan(0.75)) - 1 == 4
+    e1, e2, r = 0.3, 0.8, float(glued["two-border"])
+    a = 1 / (1 + r)
+    assert (1 + e1) * (1 + e2) * a * a == pytest.approx((math.sqrt(e1) + math.sqrt(e2)) ** 2, 2e-3)
+    assert (glued["two-below"], glued["two-above"]) == ("infinite", "finite")
 
 
 def test_cells_show_what_they_claim():
