@@ -12,6 +12,7 @@ beside that of `swing` or of the engine alone, measured in turn: read the ratios
 
 import functools
 import importlib
+import itertools
 import math
 import statistics
 import sys
@@ -37,6 +38,7 @@ MINUTE, FILM = 60, 11  # s
 WILD = 10.0  # times the energy at the release
 FILMED = ("default", "ratio", "steel")
 GAP = 1e-2  # over a diameter
+GAPS = (0.0, 5e-5, 1e-3, 1e-2)  # of the first strokes
 FREQUENCY = math.sqrt(GRAVITY / LENGTH)
 #: Contact of two balls at the first stroke, s: steel, if the cradle were ten times smaller.
 STEEL = 6.9e-4 / FREQUENCY
@@ -333,16 +335,34 @@ def strokes_and_film(folder, missing):
     write("scene_film.csv", ("run", "how", "time", *balls), film, folder)
 
 
+def first_strokes_with_gaps(folder, missing):
+    """Write the energies after the first stroke of engines as they are, with gaps."""
+    table = []
+    cases = itertools.product(ENGINES, ("default", "refined"), GAPS, (1, 2))
+    for engine, setting, gap, pulled in cases:
+        if engine.name not in missing:
+            _, angles, rates = in_engine(engine, setting, pulled, mend=False, gap=gap, duration=1.3)
+            first = strokes(angles, rates)[0]
+            table.append((engine.name, setting, f"{gap:g}", pulled, *(f"{e:.4f}" for e in first)))
+    balls = [f"ball{i}" for i in range(1, BALLS + 1)]
+    write("scene_gaps.csv", ("run", "setting", "gap", "pulled", *balls), table, folder)
+
+
 def main(arguments=None):
-    """Run all and write three tables."""
+    """Run all and write four tables."""
     parser = options(__doc__)
     parser.add_argument("--costs", action="store_true", help="measure the costs alone")
+    parser.add_argument("--gaps", action="store_true", help="first strokes with gaps alone")
     given = parser.parse_args(arguments)
     missing = absent(ENGINES)
     for name, reason in missing.items():
         print(f"skipped {name}: {reason}")
     warm_up()
     begin = time.perf_counter()
+    if not given.costs:
+        first_strokes_with_gaps(given.output, missing)
+    if given.gaps:
+        return
     if not given.costs:
         strokes_and_film(given.output, missing)
     measured = []
