@@ -52,19 +52,20 @@ def first_strikes(reading):
     return found
 
 
-def spheres(speeds, gaps, loss, limit=400.0):
-    """Return velocities of equal spheres after F = k (d^1.5 + A d(d^1.5)/dt), never pulling.
+def spheres(speeds, gaps, loss, limit=400.0, masses=EQUAL):
+    """Return velocities of spheres after F = k (d^1.5 + A d(d^1.5)/dt), never pulling.
 
-    The balls rest at `gaps` in front of one another; mass and k are 1.
+    The balls rest at `gaps` in front of one another; k is 1 at all contacts.
     """
     n, room = len(speeds), np.asarray(gaps, float)
+    mass = np.asarray(masses[:n], float)
 
     def rate(_, state):
         x, v = state[:n], state[n:]
         deep = np.maximum(x[:-1] - x[1:] - room, 0.0)
         push = deep**1.5 + loss * 1.5 * np.sqrt(deep) * (v[:-1] - v[1:])
         push = np.maximum(push, 0.0)
-        return np.concatenate([v, np.append(0, push) - np.append(push, 0)])
+        return np.concatenate([v, (np.append(0, push) - np.append(push, 0)) / mass])
 
     state, time = np.concatenate([np.zeros(n), speeds]), 0.0
     while time < limit:
@@ -106,12 +107,13 @@ def ratios(p, e, release, apart, backward=None, masses=EQUAL):
     return by_law(model, e, release, apart, masses)
 
 
-def by_spheres(p, release, apart=False):
+def by_spheres(p, release, apart=False, masses=EQUAL):
     """Return velocities: p = gaps of contacts 2, 3, 4, A, and the gap of the strikers."""
     unit = 1.0 if release == 1 else SLOWER
     between = APART if apart else p[4]
     gaps = [between] * (release - 1) + [0.0] + list(p[release - 1 : 3])
-    return spheres([unit] * release + [0.0] * (5 - release), np.abs(gaps), abs(p[3])) / unit
+    speeds = [unit] * release + [0.0] * (5 - release)
+    return spheres(speeds, np.abs(gaps), abs(p[3]), masses=masses) / unit
 
 
 # Name: velocities from parameters, release and whether strikers are apart; starts; bounds; for
@@ -158,6 +160,11 @@ LAWS = {
         lambda p, r, a: by_spheres([0, 0, 0, p[0], 0], r, a),
         [[0.003], [0.02]],
         [LOSS],
+    ),
+    "touching spheres, A, four masses": (
+        lambda p, r, a: by_spheres([0, 0, 0, p[0], 0], r, a, [1, *p[1:]]),
+        [[0.005, 1, 1, 1, 1]],
+        [LOSS] + [(0.95, 1.05)] * 4,
     ),
     "spheres, one gap, A": (
         lambda p, r, a: by_spheres([*p[:1]] * 3 + [p[1], p[0]], r, a),

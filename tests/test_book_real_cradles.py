@@ -139,12 +139,19 @@ def test_fig_gaps():
     assert GLUED["above"] == {3: "three"}[above]
 
 
-def test_figures_of_the_strikes_show_what_was_read():
-    for name, release in (("fig-real-one", 1), ("fig-real-two", 2)):
-        v, _ = first_strikes(4)[release]
-        axes = CHAPTER.figures[name].axes
-        dots = np.concatenate([points(ax, "o") for ax in axes])
-        assert dots == pytest.approx(np.column_stack([range(1, 6), v]))
+def test_figures_of_the_strikes_show_how_far_laws_are_from_what_was_read():
+    """Ball by ball, in the order of the laws: computed less measured, and its standard error."""
+    for name, release, cell in (("fig-real-one", 1, "laws"), ("fig-real-two", 2, "spheres")):
+        v, sigma = first_strikes(4)[release]
+        (ax,) = CHAPTER.figures[name].axes
+        laws = [row[:5] for row in rows(cell).values()]
+        bars = list(ax.containers)
+        assert len(bars) == 5 * len(laws)
+        for k, bar in enumerate(bars):
+            law, ball = divmod(k, 5)
+            assert bar.lines[0].get_xdata()[0] == pytest.approx(laws[law][ball] - v[ball], abs=6e-4)
+            (ends,) = bar.lines[2][0].get_segments()
+            assert np.ptp(ends[:, 0]) == pytest.approx(2 * sigma[ball])
 
 
 def test_later_strikes():
@@ -203,6 +210,21 @@ def test_a_ratio_changes_nothing_over_half_a_minute():
 
 def test_another_height():
     p = parameters("spheres, four gaps, A", "own gap", "both")
-    shown = CHAPTER.printed("ex-speed").splitlines()
-    for part, line in zip((1, 0.5, 0.25), shown, strict=True):
-        assert float(line.split()[-1]) == pytest.approx(implied(p[0] / part**0.8), abs=6e-4)
+    for part, name in ((1, "full"), (0.5, "half"), (0.25, "quarter")):
+        expected = pytest.approx(implied(p[0] / part**0.8), abs=6e-4)
+        assert float(GLUED[f"{name}-speed"]) == expected
+
+
+def test_touching_spheres_of_free_masses():
+    """Equal masses are among them, and they do not help."""
+    law, equal = "touching spheres, A, four masses", "touching spheres, A"
+    for reading in ("4", "2"):
+        row, plain = FITS[law, "apart", "both", reading], FITS[equal, "apart", "both", reading]
+        total = float(row["chi_one"]) + float(row["chi_two"])
+        assert total < float(plain["chi_one"]) + float(plain["chi_two"])
+        assert total > 30 * int(row["freedom"])
+        p = parameters(law, "apart", "both", reading)
+        data = first_strikes(int(reading))
+        for release, name in ((1, "chi_one"), (2, "chi_two")):
+            again = real_cradles.chi_square(law, p, True, data, (release,))
+            assert again == pytest.approx(float(row[name]), rel=0.02)

@@ -333,6 +333,12 @@ def test_the_figures_draw_the_tables():
     np.testing.assert_allclose(image**2, run("Chipmunk", "mended", "default").T, atol=1e-12)
 
 
+def speeds_of(row):
+    """Speeds over the strikers', from energies over that of all."""
+    energies = np.array([float(row[f"ball{k}"]) for k in range(1, 6)])
+    return np.sqrt(float(row["pulled"]) * energies)
+
+
 def test_judged_by_the_film():
     """Speeds after the first strike: the film, the row, and engines with tiny gaps."""
     glued = Chapter("scene").glued
@@ -343,11 +349,11 @@ def test_judged_by_the_film():
         off = np.abs(row[back] - seen[back]).max()
         assert float(glued[f"film-row-{name}"]) == pytest.approx(off, abs=0.012)
         small = [
-            np.abs(np.sqrt(back * np.array([float(r[f"ball{k}"]) for k in range(1, 6)])) - seen[back])
-            for r in stored("gaps")
-            if (r["run"] in ("Chipmunk", "Box2D", "Bullet"), r["gap"], r["pulled"])
-            == (True, "5e-05", str(back))
-        ]  # fmt: skip
+            np.abs(speeds_of(row) - seen[back])
+            for row in stored("gaps")
+            if row["run"] in ("Chipmunk", "Box2D", "Bullet")
+            and (row["gap"], row["pulled"]) == ("5e-05", str(back))
+        ]
         assert len(small) == 6
         least, most = (float(x) for x in glued[f"film-gaps-{name}"].split(" to "))
         assert least == pytest.approx(min(x.max() for x in small), abs=0.006)
