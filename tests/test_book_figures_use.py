@@ -128,7 +128,7 @@ def test_fig_measure_tracks():
     ],
 )
 def test_likelihoods_cross_their_limit_at_the_printed_ends(figure, printed):
-    ax = drawn("measure")[figure].axes[0]
+    ax = (drawn("measure") | drawn("table_2"))[figure].axes[0]
     x, y = ax.get_lines()[0].get_xydata().T
     assert y.min() == pytest.approx(0, abs=1e-3)
     above = y > 3.84
@@ -147,7 +147,7 @@ def test_fig_measure_fit_shots():
 
 
 def test_fig_measure_fold():
-    upper, lower = drawn("measure")["fig-measure-fold"].axes
+    upper, lower = drawn("table_2")["fig-measure-fold"].axes
     chain, model = paper_chain("CBD")
     back = float(model.backward[0])
     balls = chain.masses, chain.velocities, chain.restitution
