@@ -48,18 +48,17 @@ def test_every_number_is_shown_and_every_test_exists():
     assert named <= defined
 
 
-def test_entries_are_numbered_and_complete():
-    """Six in full, the others in tables, each number once; every entry has all its parts."""
-    full = re.findall(r"^\*\*(\d+)\*\* · \*(\w+)\* · ", TEXT, flags=re.MULTILINE)
-    listed = re.findall(r"^\| \*\*(\d+)\*\* · \*(\w+)\* · .*? \|", TEXT, flags=re.MULTILINE)
-    assert len(full) == 6
-    numbers = sorted(int(n) for n, _ in full + listed)
+def test_entries_are_numbered_and_short():
+    """Each number once, six of them first; no entry is a table's cell or a page."""
+    entries = re.findall(r"^\*\*(\d+)\*\* · \*(\w+)\* · (.+)$", TEXT, flags=re.MULTILINE)
+    numbers = sorted(int(number) for number, *_ in entries)
     assert numbers == list(range(1, len(numbers) + 1))
-    assert {kind for _, kind in full + listed} == {"slip", "error", "gap", "open"}
-    for part in ("Where", "In the paper", "Evidence", "Effect", "Our choice"):
-        assert TEXT.count(f"\n- *{part}:* ") == len(full)
-    for part in ("*Evidence:* ", "*Our choice:* "):
-        assert sum(part in line for line in TEXT.splitlines() if line[:4] == "| **") == len(listed)
+    assert {kind for _, kind, _ in entries} == {"slip", "error", "unsaid", "open"}
+    assert TEXT.index("## Part 1") < TEXT.index("**1** ·")
+    first = TEXT[TEXT.index("## The six that matter") : TEXT.index("## Part 1")]
+    assert len(re.findall(r"^\*\*\d+\*\* · ", first, flags=re.MULTILINE)) == 6
+    assert "| **" not in TEXT
+    assert max(len(words.split()) for *_, words in entries) < 140
 
 
 def test_different_parameters_with_one_outcome():
