@@ -121,7 +121,7 @@ def test_eq_34_error_beyond_its_range():
 
 def test_r2_source_on_the_other_side():
     for name, v, e, a in (
-        ("fig-5", [1, "0.8", 0], "0.3", "0.05"),
+        ("fig-5", [1, "0.8", 0], "0.25", "0.15"),
         ("fig-8", [1, "0.5", 0, 0], 1, "0.1"),
     ):
         image = ["-" + x if isinstance(x, str) else -x for x in v[::-1]]

@@ -22,7 +22,7 @@ CHANGES = {
     "compliance": [{"stiffness_ratio": 0.2}, {"stiffness_ratio": 30}],
     "three_balls": [
         {"ratio": 0, "restitution": [0, 1]},
-        {"ratio": 0.4, "masses": [3, 1, 2], "velocities": [1, 0, 0]},
+        {"ratio": 0.4, "masses": [3, 1, 2], "velocities": [1, 0.2, 0]},
         {"ratio": 0.9, "restitution": [0.5, 0.3]},  # above the bound
     ],
     "multiple_impacts": [
