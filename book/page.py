@@ -1,18 +1,39 @@
-"""What the notebooks of the book share and a reader need not see: numbers as people write them."""
+"""What the notebooks of the book share and a reader need not see: numbers and drawings."""
 
 import inspect
 import textwrap
+from collections.abc import Iterable
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from IPython.display import Markdown, display
+from matplotlib.axes import Axes
 from myst_nb import glue
+
+from cradle.pictures.impacts import PALETTE, velocities
+from cradle.trace import Trace
 
 #: Whole numbers as words.
 WORDS = [
     "no", "one", "two", "three", "four", "five", "six", "seven", "eight",
     "nine", "ten", "eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen",
 ]  # fmt: skip
+#: Areas under a closing speed: work that a contact absorbs, and work that it gives back.
+ABSORBED = {
+    "facecolor": PALETTE[4],
+    "edgecolor": PALETTE[0],
+    "hatch": "//",
+    "alpha": 0.55,
+    "lw": 0,
+}
+GIVEN_BACK = {
+    "facecolor": PALETTE[5],
+    "edgecolor": PALETTE[1],
+    "hatch": "..",
+    "alpha": 0.55,
+    "lw": 0,
+}
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -140,13 +161,14 @@ def _narrow(line: str, width: int) -> list[str]:
     return [line]
 
 
-def name_lines(
-    ax: object, *, side: str = "right", apart: float = 11
-) -> None:
+def name_lines(ax: Axes, *, side: str = "right", apart: float = 11) -> None:
     """Write the name of each line at its last point that is seen (or its first), in its colour.
 
+    They take the place of a legend.
     Names that would lie on one another are lifted, `apart` points each.
     """
+    if ax.get_legend():
+        ax.get_legend().remove()
     end, sign = (-1, 1) if side == "right" else (0, -1)
     ax.figure.canvas.draw()
     point, box, placed = ax.figure.dpi / 72, ax.bbox.padded(1), []
@@ -169,3 +191,96 @@ def name_lines(
             textcoords="offset points", color=line.get_color(), fontsize=9.5,
             ha="left" if sign > 0 else "right", va="center",
         )  # fmt: skip
+
+
+def turns(trace: Trace) -> list[int]:
+    """Rows of the path at which a contact ends or closes: the events that the book numbers."""
+    return [
+        row
+        for row, event in enumerate(trace.events, start=1)
+        if event.kind != "maximum_compression"
+    ]
+
+
+def number_events(
+    ax: Axes,
+    places: Iterable[float],
+    numbers: Iterable[int],
+    most: int = 12,
+) -> None:
+    """Write the numbers of events above the axes, at most `most`, with a dotted line down."""
+    left, right = ax.get_xlim()
+    names: dict[float, list[str]] = {}  # events at one place share a line
+    for at, number in list(zip(places, numbers, strict=True))[:most]:
+        names.setdefault(float(at), []).append(f"{number}")
+    last = left - right
+    for at, together in names.items():
+        ax.axvline(at, color="0.7", lw=0.8, ls=":", zorder=0)
+        last = max(at, last + 0.035 * (right - left))
+        ax.annotate(
+            ", ".join(together),
+            (last, 1),
+            (0, 3),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            ha="center",
+            fontsize=9,
+        )
+        last += 0.03 * (right - left) * (len(together) - 1)
+
+
+def inside(trace: Trace) -> None:
+    """Draw an impact from the inside: velocities, numbered events, and when each contact acts."""
+    contacts = len(trace.impulses)
+    _, (ax, below) = plt.subplots(
+        2,
+        1,
+        figsize=(5.6, 3.9 + 0.22 * contacts),
+        sharex=True,
+        layout="constrained",
+        height_ratios=(10, 1 + 0.6 * contacts),
+    )
+    velocities(trace, ax)
+    ax.set(xlabel="")
+    rows = turns(trace)
+    along = trace.path_impulses.sum(axis=1)
+    number_events(ax, along[rows], range(1, len(rows) + 1))
+    grows = np.diff(trace.path_impulses, axis=0) > 0
+    for contact in range(contacts):
+        spans = [
+            (start, end - start)
+            for start, end, acts in zip(
+                along, along[1:], grows[:, contact], strict=False
+            )
+            if acts
+        ]
+        below.broken_barh(spans, (contact - 0.35, 0.7), color="0.35")
+    below.set_yticks(
+        range(contacts), [rf"$\tau_{c + 2}$ acts" for c in range(contacts)]
+    )
+    below.invert_yaxis()
+    below.set(xlabel="sum of all impulses (N s)", xlim=along[[0, -1]])
+    name_lines(ax)
+    for side in ("top", "right", "left"):
+        below.spines[side].set_visible(False)
+    below.tick_params(axis="y", length=0)
+
+
+def works(
+    trace: Trace, contact: int, ax: Axes, *, numbered: bool = True
+) -> None:
+    """Draw work as areas: the closing speed of a contact over its impulse, events numbered."""
+    tau = trace.path_impulses[:, contact]
+    u = trace.path[:, contact] - trace.path[:, contact + 1]
+    ax.axhline(0, color="0.3", lw=0.8)
+    ax.fill_between(tau, u, where=u >= 0, interpolate=True, **ABSORBED)
+    ax.fill_between(tau, u, where=u <= 0, interpolate=True, **GIVEN_BACK)
+    ax.plot(tau, u, color="black", lw=1.6, label=f"$u_{contact + 2}$")
+    ax.set(
+        xlabel=rf"impulse $\tau_{contact + 2}$ (N s)",
+        ylabel=rf"closing speed $u_{contact + 2}$ (m/s)",
+    )
+    ax.margins(x=0.02)
+    rows = turns(trace) if numbered else []
+    shown = [(tau[row], k) for k, row in enumerate(rows, 1) if tau[row] > 0]
+    number_events(ax, [at for at, _ in shown], [k for _, k in shown])

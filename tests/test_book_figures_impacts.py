@@ -5,11 +5,11 @@ import re
 
 import numpy as np
 import pytest
-from chapters import after, drawn, lines, panel
+from chapters import after, drawn, lines, panel, solved
 from test_book_n_balls import FIG_8, contact_work
 from test_book_patterns import by_turns, edge, turn
 
-from cradle import ImpulseCorrelation, collide, paper_chain, textbook
+from cradle import ImpulseCorrelation, collide, textbook
 from cradle.measures import bouncing_pattern
 
 CLOSE = {"rtol": 0, "atol": 1e-12}
@@ -37,7 +37,7 @@ def in_ratios(r1, r2):
 
 
 def test_fig_patterns_three():
-    for number, (r1, r2) in enumerate(((2.5, 1.5), (1.0, 1.5), (2.5, 0.2))):
+    for number, (r1, r2) in enumerate(((2.5, 1.0), (1.0, 1.0), (2.5, 0.2))):
         v = after((*in_ratios(r1, r2), 0.5), 0.15)
         for ball, line in enumerate(panel("patterns", "fig-patterns-three", number).values()):
             places = 0.6 * ball + np.array([-1.0 * (ball == 0), 0, 2 * v[ball]])
@@ -158,7 +158,7 @@ def test_fig_8_drawn():
     right = math.hypot(v[2] - v[3], math.sqrt(4 * contact_work(trace, 2, start)))
     ends = [v[0] + v[1] - left, v[0] + v[1] + left, v[2] + v[3] - right, v[2] + v[3] + right]
     for contact in range(3):
-        both, apart = (panel("n_balls", "fig-p8", 2 * contact + row) for row in (1, 0))
+        both, apart = (panel("reading", "fig-p8", 2 * contact + row) for row in (1, 0))
         for ball in (contact, contact + 1):
             name = f"$v_{ball + 1}$"
             expected = np.column_stack([impulses[:, contact], path[:, ball]])
@@ -167,24 +167,41 @@ def test_fig_8_drawn():
             np.testing.assert_allclose(apart[name][met:, 1], ends[ball] / 2, **CLOSE)
 
 
-def test_fig_meeting():
-    left, right = (panel("n_balls", "fig-own-meeting", k) for k in (0, 1))
-    chain = [1] * 4, [1, 0.5, 0, 0], 1
-    middle = after(chain, 0.1)
-    for k in (0, 13, 40):
-        moved = after(chain, 0.1, meeting=left["$v_1$"][k, 0]) - middle
-        assert [left[f"$v_{i}$"][k, 1] for i in (1, 2, 3, 4)] == pytest.approx(moved, abs=1e-12)
-    assert list(right) == ["ABCCAB", "BCACBA"]
-    for name, line in right.items():
-        balls, model = paper_chain(name, excess="saturate")
-        chain = list(balls.masses), list(balls.velocities), list(balls.restitution)
-        forward, backward = list(model.forward), list(model.backward)
-        ends = [
-            after(chain, forward, backward=backward, meeting=x)
-            for x in (0.5, *line[[0, 13, 40], 0])
-        ]
-        moved = [abs(end - ends[0]).max() for end in ends[1:]]
-        assert line[[0, 13, 40], 1] == pytest.approx(moved, abs=1e-12)
+@pytest.mark.parametrize(
+    ("chapter", "figure", "chain", "ratio"),
+    [
+        ("multiple_impacts", "fig-own-multiple-work", ([1] * 3, [1, 0.8, 0], 0.25), 0.15),
+        ("n_balls", "fig-own-n-balls-work", ([1] * 4, [1, 0.5, 0, 0], 1), 0.1),
+    ],
+)
+def test_works_are_areas(chapter, figure, chain, ratio):
+    """The lines are the closing speeds; in each collision orange is e^2 times blue."""
+    path, impulses = solved(chain, ratio)
+    for contact in range(len(chain[0]) - 1):
+        (line,) = panel(chapter, figure, contact).values()
+        u = path[:, contact] - path[:, contact + 1]
+        np.testing.assert_allclose(line, np.column_stack([impulses[:, contact], u]), **CLOSE)
+        step = (u[1:] + u[:-1]) / 2 * np.diff(impulses[:, contact])
+        blue, orange = step[step > 0].sum(), -step[step < 0].sum()
+        assert orange == pytest.approx(chain[2] ** 2 * blue, rel=1e-9)
+
+
+def test_fig_overlap():
+    """Each bar ends where its run, left alone, would: by the works of the two pairs (Fig. 8)."""
+    trace = collide(FIG_8, ImpulseCorrelation(0.1))
+    apart = panel("reading", "fig-p8", 2)  # part (a), contact 2-3
+    start = trace.path[trace.events.index(("end", 1)) + 1]
+    for ball in (2, 3):
+        bar = panel("n_balls", "fig-own-overlap")[f"ball {ball}"][:, 0]
+        assert bar == pytest.approx([start[ball - 1], apart[f"$v_{ball}$"][-1, 1]], abs=1e-12)
+    ((low, high),) = [
+        sorted({x for x, _ in patch.get_path().vertices})
+        if not hasattr(patch, "get_width")
+        else (patch.get_x(), patch.get_x() + patch.get_width())
+        for patch in drawn("n_balls")["fig-own-overlap"].axes[0].patches[:1]
+    ]
+    met = trace.path[trace.events.index(("close", 1)) + 1, 1]
+    assert (low + high) / 2 == pytest.approx(met, abs=1e-12)
 
 
 def test_fig_notation_contact():
