@@ -331,7 +331,7 @@ def test_fig_experiments_structure_as_drawn():
 
 def test_fig_experiments_swap_as_drawn():
     table = ratio_table().set_index("triplet").ratio
-    (ax,) = FIGURES.figures["fig-experiments-swap"].axes
+    (ax,) = Chapter("reading").figures["fig-experiments-swap"].axes
     drawn = {tuple(np.round(line[0], 9)) for line in points(ax, 1)}
     printed = {(table[x + "C" + z], table[x + "B" + z]) for x in "ABCD" for z in "ABCD"}
     put_back = {(table[t[0] + "C" + t[2]], table[t[::-1]]) for t in ("DBB", "BBD", "DBC", "CBD")}
