@@ -16,10 +16,11 @@ from stored import options, write
 
 from cradle import collide, paper_chain
 from cradle.fit import Tracks, velocities_from_tracks
-from cradle.fit.shots import Track
+from cradle.fit.tracks import Track
 
 LENGTH, GRAVITY = 0.3, 9.81
 FRAMES_PER_SECOND, FRAMES = 240.0, 24  # frames on either side of the impact
+WINDOW = 0.05  # used of it, s
 SCATTER = 0.0004  # of a mark, m
 DIAMETER = 0.035
 SPEEDS = (0.6, 1.0, 1.4)
@@ -84,11 +85,13 @@ def experiment():
             tracks, masses = film(name, true_speed, random)
             films.append((name, shot, tracks, masses))
     # The marks of all films have one scatter: pooled, it is known well.
-    alone = [velocities_from_tracks(tracks, length=LENGTH) for _, _, tracks, _ in films]
+    alone = [
+        velocities_from_tracks(tracks, length=LENGTH, window=WINDOW) for _, _, tracks, _ in films
+    ]
     scatter = float(np.sqrt(np.mean([found.scatter**2 for found in alone])))
     rows = []
     for name, shot, tracks, masses in films:
-        found = velocities_from_tracks(tracks, length=LENGTH, scatter=scatter)
+        found = velocities_from_tracks(tracks, length=LENGTH, window=WINDOW, scatter=scatter)
         for k, letter in enumerate(name):
             numbers = (found.before[k], found.after[k], found.sigma[k], found.sigma_before[k])
             rows.append([name, shot, k + 1, letter, f"{masses[k]:.3f}",

@@ -1,6 +1,7 @@
 """Fits to measured shots: data read and refused, searches, confidence sets, predictions."""
 
 import csv
+import re
 from functools import cache
 from itertools import permutations
 from pathlib import Path
@@ -28,7 +29,8 @@ from cradle.fit import (
 from cradle.fit.likelihood import chi_squares
 from cradle.fit.parameters import Points
 from cradle.fit.search import RISE, refine, scan
-from cradle.fit.shots import Track
+from cradle.fit.tracks import Track
+from cradle.tables import data_folder
 
 ROOT = Path(__file__).parents[1]
 MASS = {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}
@@ -499,36 +501,83 @@ def test_missing_knowledge_is_named():
 
 # --- tracks ------------------------------------------------------------------------------------
 
-OLD = "mass_A\nt\tx\ty\n0.00\t0.10\t0.5\n0.01\t0.12\t0.5\n"
-NEW = (
-    "\tmass A\t\t\t\nt\tx\ty\tv\t\n0.00\t1.0E-1\t0.5\t\t\n0.01\t1.2E-1\t0.5\t2.0\t\n0.02\t\t\t\t\n"
-)
-MULTI = "#multi:\n,A,,B,,\nt,x,y,x,y,\n0.00,0.10,0.5,0.20,0.5,\n0.01,0.12,0.5,,,\n"
+MINUS = "\N{MINUS SIGN}"
+#: What programs export, and what it holds: positions in m at 0 and 0.03 s, by the balls' names.
+EXPORTS = {
+    "Tracker 4": ("mass_A\nt\tx\ty\n0.00\t0.10\t0.5\n0.03\t-0.12\t0.5\n", {"mass A": [0.1, -0.12]}),
+    "Tracker 6": (
+        "\tmass A\t\t\t\nt\tx\ty\tv\t\n0\t1.0E-1\t0.5\t\t\n0.03\t-1.2E-1\t0\t2\t\n0.06\t\t\t\t\n",
+        {"mass A": [0.1, -0.12]},
+    ),
+    "Tracker, several": (
+        "#multi:\n,A,,B,,\nt,x,y,x,y,\n0.00,0.10,0.5,0.20,0.5,\n0.03,0.12,0.5,,,\n",
+        {"A": [0.1, 0.12], "B": [0.2]},
+    ),
+    "Kinovea, text": (
+        "#Kinovea Trajectory data export\n#T X Y\n\n# left ball\n0 0.1 2\n0.03 0.2 2\n\n"
+        "# B\n0 0.5 2\n0.03 0.6 2\n\n",
+        {"left ball": [0.1, 0.2], "B": [0.5, 0.6]},
+    ),
+    "Kinovea, decimal commas": (
+        f"Time;A/0/X;A/0/Y;B/0/X;B/0/Y\n0;1,5;2;5;2\n0,03;{MINUS}2,5;2;;\n",
+        {"A": [1.5, -2.5], "B": [5]},
+    ),
+    "Kinovea, one ball": (
+        '"Time (ms)","X (cm)","Y (cm)"\n0,1.0,2\n30,2.0,2\n',
+        {"track": [0.01, 0.02]},
+    ),
+    "Logger Pro": (
+        '"Latest: Time (s)","Latest: X (mm)","Latest: Y (mm)","Latest: X 2 (mm)",'
+        '"Latest: X Velocity (m/s)"\n0,1,2,5,2\n0.03,2,2,6,3\n',
+        {"X": [0.001, 0.002], "X 2": [0.005, 0.006]},
+    ),
+    "Logger Pro, text": (
+        "Vernier Format 2\nUntitled.cmbl 3/18/2011 10:29:33 .\nRun 1\nTime\tX\tY\nt\tx\ty\n"
+        "s\tcm\tcm\n\n0\t1\t2\n0.03\t2\t2\n",
+        {"Run 1": [0.01, 0.02]},
+    ),
+    "Capstone, byte-order mark": (
+        "\ufeffTime (s) Run #1;Position (m) Run #1;Position, Ch 2 (m) Run #1;Velocity (m/s) Run #1"
+        "\n0;0,1;0,5;0\n0,03;0,2;0,6;0\n",
+        {"Position": [0.1, 0.2], "Position, Ch 2": [0.5, 0.6]},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("program", EXPORTS)
+def test_exports_of_video_programs(tmp_path, program):
+    """A unit that the file names counts, else the one that is told."""
+    text, held = EXPORTS[program]
+    (tmp_path / "export.txt").write_text(text, encoding="utf-8")
+    tracks = read_tracker(tmp_path / "export.txt")
+    assert {name: track.positions.tolist() for name, track in tracks.items()} == held
+    slow = read_tracker(tmp_path / "export.txt", time_scale=0.125, unit=0.1)
+    scale = 1.0 if "(" in text or "\tcm" in text else 0.1
+    for name, places in held.items():
+        np.testing.assert_allclose(tracks[name].times, [0, 0.03][: len(places)], rtol=1e-14)
+        np.testing.assert_allclose(slow[name].times, 0.125 * tracks[name].times, rtol=1e-14)
+        np.testing.assert_allclose(slow[name].positions, np.multiply(scale, places), rtol=1e-14)
 
 
 @pytest.mark.parametrize(
-    ("text", "names"), [(OLD, ["mass A"]), (NEW, ["mass A"]), (MULTI, ["A", "B"])]
+    ("text", "message"),
+    [
+        ("a,b\n1,2\n3,4\n", "export.txt has no column of positions: a line of titles must begin"),
+        ("", "export.txt has no column of positions"),
+        ("t,y\n0,1\n", "export.txt has no column of positions"),
+        ("A\nt\tx\n0\t1\n1\there\n", "export.txt, line 4, column x: 'here'; must be a number"),
+        ("#T X Y\n0:00:00:03 1.0 2.0\n", "line 2, column T: '0:00:00:03'; must be a number"),
+        ("t,x\n0,1\n0,2\n", "the times of track do not rise; where one ball follows the other"),
+        ("t,x (px)\n0,1\n", "line 2, column x: px; say how large a pixel is, in m: unit"),
+        ("t (frames),x\n0,1\n", "column t: unit 'frames'; must be in s, ms, m, cm, mm or px"),
+        ("t,x\n0,1\n33,1\n", "marks 33 s apart; if the times are in ms, divide time_scale by"),
+        ("t;x\n0;1,5\n0,1;2.5\n", "decimals with a comma in line 2 and with a point in line 3"),
+    ],
 )
-def test_layouts_of_tracker(tmp_path, text, names):
-    path = tmp_path / "export.txt"
-    path.write_text(text, encoding="utf-8")
-    tracks = read_tracker(path, time_scale=0.125, unit=0.01)
-    assert list(tracks) == names
-    first = tracks[names[0]]
-    np.testing.assert_allclose(first.times, [0, 0.00125], rtol=1e-14)
-    np.testing.assert_allclose(first.positions, [0.001, 0.0012], rtol=1e-14)
-    if len(names) > 1:
-        assert tracks["B"].positions.tolist() == [0.002]
-
-
-def test_other_files_are_not_taken_for_exports(tmp_path):
-    path = tmp_path / "export.txt"
-    path.write_text("a,b\n1,2\n3,4\n", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"export.txt, line 2: '1,2'; an export of Tracker"):
-        read_tracker(path)
-    path.write_text(OLD.replace("0.12", "here"), encoding="utf-8")
-    with pytest.raises(ValueError, match="line 4, column x: 'here'; must be a number"):
-        read_tracker(path)
+def test_exports_that_are_refused(tmp_path, text, message):
+    (tmp_path / "export.txt").write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=re.escape(message)):
+        read_tracker(tmp_path / "export.txt")
 
 
 @pytest.mark.parametrize("length", [None, 0.3])
@@ -553,18 +602,59 @@ def test_velocities_from_exact_tracks(length):
         velocities_from_tracks({"C": tracks["C"], "A": tracks["A"]}, length=length, striker=1)
 
 
-def test_errors_of_velocities_are_those_of_the_marks():
+@pytest.mark.parametrize(("rate", "count"), [(30, 20), (60, 20), (240, 40)])
+def test_errors_of_velocities_are_those_of_the_marks(monkeypatch, rate, count):
     """The squares of errors over their standard errors average to 1, within four of its errors."""
+    monkeypatch.setattr(fit_example, "FRAMES_PER_SECOND", rate)
+    monkeypatch.setattr(fit_example, "FRAMES", max(24, rate // 4))
     random = np.random.default_rng(8)
     squares = []
-    for _ in range(40):
+    for _ in range(count):
         tracks, _ = fit_example.film("AB", 1.0, random)
         found = velocities_from_tracks(
             tracks, length=fit_example.LENGTH, scatter=fit_example.SCATTER
         )
+        assert found.window <= np.pi / 2 * np.sqrt(fit_example.LENGTH / 9.81)
         squares += [((found.before[0] - 1) / found.sigma_before[0]) ** 2,
                     *((found.after - outcome("AB")) / found.sigma) ** 2]  # fmt: skip
     assert np.mean(squares) == pytest.approx(1, abs=4 * np.sqrt(2 / len(squares)))
+
+
+def test_a_window_that_does_not_fit(monkeypatch):
+    """Balls that hang, taken for a level track, or of another length: refused, or cut short."""
+    monkeypatch.setattr(fit_example, "FRAMES", 60)
+    random = np.random.default_rng(8)
+    for _ in range(5):
+        tracks, _ = fit_example.film("AB", 1.0, random)
+        with pytest.raises(ValueError, match=r"window = .* s; .* if the balls hang, give their le"):
+            velocities_from_tracks(tracks)
+        with pytest.raises(
+            ValueError, match=r"window = 0.2 s; .* is it the right length, and one impact"
+        ):
+            velocities_from_tracks(tracks, length=0.2, window=0.2)
+        # A wall at 0.15 s: what is after it is not used.
+        track = tracks["B"]
+        late = track.times > track.times[60] + 0.15
+        there = np.where(late, track.positions[~late][-1], track.positions)
+        found = velocities_from_tracks(tracks | {"B": Track(track.times, there)}, length=0.3)
+        assert found.window < 0.15
+        np.testing.assert_allclose(found.after, outcome("AB"), atol=4 * found.sigma.max())
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_a_ball_at_rest_before_and_after(noise):
+    """Its velocity is zero, with an error of its own, whether its marks scatter or not."""
+    times, random = (np.arange(49) - 24.3) / 240, np.random.default_rng(1)
+    marks = noise * random.standard_normal((3, 49))
+    moving = fit_example.swing(1.0, times)
+    marks[0] += np.where(times < 0, moving, 0.0)
+    marks[1] += 0.035
+    marks[2] += 0.07 + np.where(times < 0, 0.0, moving)
+    tracks = {name: Track(times, row) for name, row in zip("ABC", marks)}
+    found = velocities_from_tracks(tracks, length=0.3)
+    np.testing.assert_allclose(found.before, [1, 0, 0], atol=1e-5 + 40 * noise)
+    np.testing.assert_allclose(found.after, [0, 0, 1], atol=1e-5 + 40 * noise)
+    assert (found.sigma > 0).all()
 
 
 def test_speeds_from_heights():
@@ -673,12 +763,11 @@ def test_files_that_are_no_table_of_ours(tmp_path):
     """As spreadsheets save them: each says what to do."""
     lines = (ROOT / "data" / "shots_template.csv").read_text(encoding="utf-8").splitlines()
     cases = {
-        "semicolons; put commas": [line.replace(",", ";") for line in lines],
-        "has tabs; put commas": [line.replace(",", "\t") for line in lines[2:]],
-        "semicolons between the columns and commas in the decimals; first turn every comma into": [
-            line.replace(",", ";").replace(".", ",") for line in lines
+        "decimals with a comma in line 4 and with a point in line 5": [
+            line.replace(",", ";").replace(".", "," if n == 3 else ".")
+            for n, line in enumerate(lines)
         ],
-        r"13 values; the header has 9 columns \(decimals need a point": [
+        r"13 values; the header has 9 columns \(between commas, decimals need a point": [
             line.replace("0.", "0,") for line in lines
         ],
         "set ABA has the balls AB alone; is the row of ball 3 missing": lines[:-1],
@@ -688,8 +777,13 @@ def test_files_that_are_no_table_of_ours(tmp_path):
         path.write_text("\n".join(table) + "\n", encoding="utf-8")
         with pytest.raises(ValueError, match=words):
             read_shots(path)
+    same = repr(read_shots(data_folder() / "shots_template.csv").sets[1].after)
+    for marks in (",.", ";.", ";,", "\t.", "\t,"):
+        text = "\n".join(lines).translate(str.maketrans(",.-", f"{marks}{MINUS}"))
+        path.write_text(text, encoding="utf-8-sig")
+        assert repr(read_shots(path).sets[1].after) == same
     path.write_text("\n".join(lines), encoding="utf-16")
-    with pytest.raises(ValueError, match=r"4.csv is no UTF-8 text \(byte 0\); save it as CSV in"):
+    with pytest.raises(ValueError, match=r"2.csv is no UTF-8 text \(byte 0\); save it as CSV in"):
         read_shots(path)
     # Rows without a cell filled say nothing.
     path.write_text("\n".join([*lines, ",,,,,,,,", "", " , "]), encoding="utf-8")

@@ -202,6 +202,6 @@ def test_a_fit_and_a_film(tmp_path, monkeypatch):
     lines = [line for line in table if line[0] != "#"]
     rows = [row for row in csv.DictReader(lines) if row["set"] == "BAC"]
     before, after, error = map(numbers, PAIRS[FIT][1][1].splitlines())
-    assert [round(float(row["before"]), 2) for row in rows] == before
-    assert [round(float(row["after"]), 2) for row in rows] == after
-    assert [round(float(row["sigma"]), 2) for row in rows] == error
+    assert [round(float(row["before"]), 3) for row in rows] == before
+    assert [round(float(row["after"]), 3) for row in rows] == after
+    assert [round(float(row["sigma"]), 3) for row in rows] == error

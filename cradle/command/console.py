@@ -6,7 +6,9 @@ import csv
 import io
 import json
 import math
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +100,30 @@ def picture(_: click.Context, __: click.Parameter, path: str | None) -> str | No
 def image_format(path: str) -> str:
     """Return the format of a picture by the ending of its file; without one matplotlib adds one."""
     return Path(path).suffix[1:] or "png"
+
+
+@contextmanager
+def waiting(hint: str, after: float = 2.0) -> Iterator[None]:
+    """Say after some seconds that work goes on, and what would be faster; count the time."""
+    done = threading.Event()
+
+    def tell() -> None:
+        if done.wait(after):
+            return
+        from cradle.progress import progress_bar
+
+        click.echo(f"cradle: still working; {hint}", err=True)
+        with progress_bar(bar_format="{elapsed}", disable=None) as bar:
+            while not done.wait(0.5):
+                bar.refresh()
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        done.set()
+        teller.join()
 
 
 def plot_fits(fits: Sequence[Any], path: str) -> None:

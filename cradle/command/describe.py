@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import click
+
+from cradle.command.console import waiting
 
 if TYPE_CHECKING:
     from cradle.chain import Chain
@@ -18,9 +22,10 @@ _MODELS = ("ratio", "spheres", "sequential")
 
 
 def numbers_of(_: click.Context, __: click.Parameter, value: str | None) -> list[float] | None:
-    """Read numbers with commas between them."""
+    """Read numbers with commas between them; a minus sign may be the typographic one."""
     try:
-        return None if value is None else [float(part) for part in value.split(",")]
+        given = (value or "").replace("\N{MINUS SIGN}", "-").split(",")
+        return None if value is None else [float(part) for part in given]
     except ValueError:
         raise click.BadParameter(f"{value!r}; write numbers with commas between") from None
 
@@ -46,6 +51,25 @@ def chain_options(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
+def swing_options(otherwise: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add what describes the pendulums; see `pendulum_length`."""
+    length = click.option("--length", type=float, help=f"Of the pendulums, m [{otherwise}].")
+    period = click.option("--period", type=float, help="Instead: of a small swing to and fro, s.")
+    return lambda command: length(period(command))
+
+
+def pendulum_length(length: float | None, period: float | None) -> float | None:
+    """Return the length of pendulums that have this length, or this period of small swings."""
+    from cradle.input.values import one_number
+
+    if length is not None and period is not None:
+        raise click.UsageError("give one of --length and --period")
+    if period is None:
+        return length
+    one_number("--period", period, "must be above 0", 0.0, open_low=True)
+    return 9.81 * (0.5 * period / math.pi) ** 2
+
+
 class Described(NamedTuple):
     """A chain and how it collides."""
 
@@ -53,6 +77,16 @@ class Described(NamedTuple):
     model: Model
     #: What was not given and stands for it, in words.
     assumed: tuple[str, ...]
+    #: Types of the balls, where they are the paper's.
+    letters: str = ""
+
+    def waiting(self) -> AbstractContextManager[None]:
+        """Return what says that long work goes on, and what would be faster."""
+        return waiting(
+            "--ratio 0.1 or --model sequential would take seconds"
+            if type(self.model).__name__ in ("SpringChain", "EnergyDistribution")
+            else "fewer balls would be faster"
+        )
 
     @property
     def note(self) -> str:
@@ -76,8 +110,15 @@ def described(
     from cradle.models.correlation import ImpulseCorrelation
     from cradle.tables import paper_chain
 
+    assumed = []
+    if sequence is not None and sequence.isdecimal() and masses is None:
+        masses, sequence = [1.0] * int(sequence), None
+        assumed.append("equal balls of 1 kg" if unit is None else f"equal balls of 1 {unit}")
     if (sequence is None) == (masses is None):
-        raise click.UsageError("give either a sequence of ball types, such as ABCCA, or --masses")
+        raise click.UsageError(
+            "give how many equal balls, such as 5, or a sequence of the paper's balls, such as "
+            "ABCCA, or --masses"
+        )
     if model not in (None, "ratio") and (ratio or backward or saturate):
         raise click.UsageError(f"--model {model} has no ratios; leave them out, and --saturate")
     if not (speed is None or velocities is None):
@@ -90,14 +131,14 @@ def described(
         for name, value in given.items():
             if value is not None:
                 raise click.UsageError(f"{name} goes with --masses; {sequence} has its own values")
-        chain, ratios = paper_chain(sequence, striker, excess=excess)
+        chain, ratios = paper_chain(sequence.upper(), striker, excess=excess)
         law = ratios if model in (None, "ratio") else _without_ratios(chain, model)
-        return Described(chain, law, ())
+        return Described(chain, law, (), sequence.upper())
     assert masses is not None
     before = [striker] + [0.0] * (len(masses) - 1) if velocities is None else velocities
     balls = [UNITS[unit or "kg"] * m for m in masses]
     chain = Chain(balls, before, one_or_all(restitution or [1.0]))
-    assumed = [] if velocities else [f"the first ball strikes at {striker:g} m/s"]
+    assumed += [] if velocities else [f"the first ball strikes at {striker:g} m/s"]
     assumed += [] if restitution else ["no energy is lost (--restitution)"]
     if ratio is not None:
         law = ImpulseCorrelation(one_or_all(ratio), one_or_all(backward), excess=excess)

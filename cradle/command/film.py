@@ -1,50 +1,95 @@
-"""`cradle film`: from an export of the video tool Tracker to rows of the table of shots."""
+"""`cradle film`: from marks in films to rows of the table of shots."""
 
 from __future__ import annotations
 
 import csv
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from cradle.command.describe import UNITS, numbers_of
+from cradle.command.describe import UNITS, numbers_of, pendulum_length, swing_options
+
+if TYPE_CHECKING:
+    from cradle.fit import Velocities
+
+_SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
 
 @click.command()
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("files", nargs=-1, required=True,
+                type=click.Path(exists=True, dir_okay=False, path_type=Path))  # fmt: skip
 @click.option("--set", "name", required=True, help="Types of the balls, left to right: BAC.")
-@click.option("--shot", default="1", help="Name of the shot [1].")
+@click.option("--shot", help="Name of the shot [that of the file].")
 @click.option("--masses", required=True, callback=numbers_of,
               help="Masses, left to right: 53,45,53.")  # fmt: skip
 @click.option("--unit", type=click.Choice(list(UNITS)), default="kg", help="Of masses.")
-@click.option("--length", type=float, help="Of the pendulums, m; left out: a level track.")
-@click.option("--window", default=0.05, help="Time used before and after, s [0.05].")
+@swing_options("or --period, or --level")
+@click.option("--level", is_flag=True, help="The balls do not hang: they roll on a level track.")
+@click.option("--position-unit", type=click.Choice([*_SIZES, "px"]),
+              help="Of positions, where the file does not say it [m].")  # fmt: skip
+@click.option("--scale", type=float, help="Pixels in a metre.")
+@click.option("--window", type=float,
+              help="Time used before and after, s [the longest that fits].")  # fmt: skip
 @click.option("--slower", default=1.0, help="8 if 240 pictures a second play at 30 [1].")
 @click.option("--header", is_flag=True, help="Print the names of the columns too.")
 def film(
-    file: Path, name: str, shot: str, masses: list[float], unit: str, length: float | None,
-    window: float, slower: float, header: bool,
+    files: tuple[Path, ...], name: str, shot: str | None, masses: list[float], unit: str,
+    header: bool, **options: Any,
 ) -> None:  # fmt: skip
-    """Velocities from the marks in a film.
+    """Velocities from the marks in films, a film a shot.
 
-    FILE is exported by the video tool Tracker, one track a ball, left to right; tracks named by
-    types are in the order of --set.  The first ball strikes the others at rest.  Prints the rows of
-    one shot for the table that `cradle fit` reads.
+    FILES are exported by Tracker, Kinovea, Logger Pro or Capstone, one track a ball, left to right;
+    tracks named by types are in the order of --set.  The first ball strikes the others at rest.
+    Prints rows for the table that `cradle fit` reads; what was used of each film goes to standard
+    error.
 
     \b
     Examples:
       cradle film film.txt --set BAC --masses 53,45,53 --unit g --length 0.3 --header
-      cradle film film.txt --set BAC --masses 0.053,0.045,0.053 --shot 2 --slower 2
+      cradle film film.txt --set BAC --masses 0.053,0.045,0.053 --period 2.2 --slower 2
     """
-    from cradle.fit import read_tracker, velocities_from_tracks
     from cradle.fit.parameters import parameter_key
     from cradle.fit.reading import COLUMNS, OPTIONAL
+
+    if shot is not None and len(files) > 1:
+        raise click.UsageError("--shot names one film; several have the names of their files")
+    types = parameter_key(name)
+    found = [_velocities(file, types, masses, **options) for file in files]
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    if header:
+        writer.writerow([*COLUMNS, *OPTIONAL])
+    for file, one in zip(files, found, strict=True):
+        for k, kind in enumerate(types):
+            mass = UNITS[unit] * masses[k]
+            numbers = (mass, one.before[k], one.after[k], one.sigma[k], one.sigma_before[k])
+            row = [name, shot or file.stem, k + 1, kind, *(f"{x:.6g}" for x in numbers)]
+            writer.writerow(row)
+        click.echo(
+            f"{file.name}: impact at {one.time:.4g} s, window {one.window:.3g} s, marks scatter by "
+            f"{one.scatter:.2g} m; chance of such a fit {one.probability:.2g}", err=True,
+        )  # fmt: skip
+
+
+def _velocities(
+    file: Path, types: tuple[str, ...], masses: list[float], length: float | None,
+    period: float | None, level: bool, position_unit: str | None, scale: float | None,
+    window: float | None, slower: float,
+) -> Velocities:  # fmt: skip
+    """Return the velocities in one film, of balls of these types."""
+    from cradle.fit import read_tracker, velocities_from_tracks
     from cradle.input.values import one_number
 
     one_number("--slower", slower, "must be above 0", 0.0, open_low=True)
-    tracks = read_tracker(file, time_scale=1.0 / slower)
-    types = parameter_key(name)
+    length = pendulum_length(length, period)
+    if (length is None) != level:
+        raise click.UsageError("give --length or --period of the pendulums, or --level: one")
+    if (position_unit == "px") != (scale is not None):
+        raise click.UsageError("--position-unit px and --scale, pixels in a metre, go together")
+    size = 1.0 / one_number("--scale", scale or 1.0, "must be above 0", 0.0, open_low=True)
+    unit = _SIZES.get(position_unit or "m", size)
+    tracks = read_tracker(file, time_scale=1.0 / slower, unit=unit)
     if not len(types) == len(masses) == len(tracks):
         raise ValueError(
             f"{file.name} has {len(tracks)} tracks, --set {len(types)} types and --masses "
@@ -53,14 +98,12 @@ def film(
     for place, (kind, track) in enumerate(zip(types, tracks, strict=True), 1):
         if track in types and track != kind:
             raise ValueError(
-                f"{file.name}: track {place} is named {track}, --set {name} has {kind} there; both "
-                "go from left to right"
+                f"{file.name}: track {place} is named {track}, --set {''.join(types)} has {kind} "
+                "there; both go from left to right"
             )
     found = velocities_from_tracks(tracks, length=length, window=window)
-    writer = csv.writer(sys.stdout, lineterminator="\n")
-    if header:
-        writer.writerow([*COLUMNS, *OPTIONAL])
-    weights = [UNITS[unit] * mass for mass in masses]
-    for k, (kind, mass) in enumerate(zip(types, weights, strict=True)):
-        numbers = (mass, found.before[k], found.after[k], found.sigma[k], found.sigma_before[k])
-        writer.writerow([name, shot, k + 1, kind, *(f"{x:.6g}" for x in numbers)])
+    if (fastest := float(abs(found.after).max())) > 20.0:
+        raise ValueError(
+            f"{file.name}: {fastest:.3g} m/s is unlikely; say --position-unit cm, mm or px"
+        )
+    return found

@@ -47,3 +47,5 @@ def recommend(
         stiffness=one_or_all(stiffness),
     )  # fmt: skip
     click.echo(repr(advice))
+    if assumed := [words for words in given.assumed if "--model" not in words]:
+        click.echo(f"  {'assumed:':<17}{'; '.join(assumed)}")

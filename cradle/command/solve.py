@@ -19,11 +19,12 @@ from cradle.command.describe import chain_options, described
 from cradle.command.film import film
 from cradle.command.fit import fit, template
 from cradle.command.recommend import recommend
+from cradle.command.swing import swing
 
 # What a command needs is imported in the command: the first answer comes within a second.
 
 # What errors say of arguments, as options; a row of values counts from 1, like the tables.
-_ROW = r"\b(masses|velocities|restitution|ratio|backward|stiffness)"
+_ROW = r"\b(masses|velocities|restitution|ratio|backward|stiffness|gaps|damping)"
 _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"excess='saturate'": "--saturate",
     r"(mass|velocity)_unit='(\S+)'": r"--\1-unit \2",
@@ -50,10 +51,19 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
 }
 
 
-@click.group()
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="cradle-companion", prog_name="cradle")
-def main() -> None:
-    """Impacts in chains of balls: Newton's cradle by the Impulse Correlation Ratio."""
+@click.pass_context
+def main(context: click.Context) -> None:
+    """Impacts in chains of balls: Newton's cradle by the Impulse Correlation Ratio.
+
+    \b
+    For a start:
+      cradle solve 5
+      cradle swing 5 -o toy.gif
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 @main.command()
@@ -62,11 +72,12 @@ def main() -> None:
 def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
     """Velocities after an impact; balls and contacts count from 1, the left.
 
-    SEQUENCE names the paper's balls, first ball first, such as ABACA; or give --masses.
+    SEQUENCE names the paper's balls, first ball first, such as ABACA, or says how many equal balls
+    there are, such as 5; or give --masses.
 
     \b
     Examples:
-      cradle solve --masses 1,1,1,1,1
+      cradle solve 5
       cradle solve ABACA --speed 1
       cradle solve ABCCA --saturate --json
       cradle solve --masses 45,53,53 --unit g --restitution 0.53,0.36 --ratio 0.104
@@ -78,8 +89,9 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
     # One chain: faster as it stands than the compiler takes to load.
     given = described(**options)
     chain = given.chain
-    trace = collide(chain, given.model)
-    letters = options["sequence"] or ["-"] * len(chain)
+    with given.waiting():
+        trace = collide(chain, given.model)
+    letters = given.letters or "-" * len(chain)
     rows = [
         {"ball": k + 1, "type": letters[k], "mass": float(chain.masses[k]),
          "before": float(chain.velocities[k]), "after": float(trace.velocities[k]) + 0.0}
@@ -123,73 +135,14 @@ def plot(output: str, **options: Any) -> None:
     from cradle.pictures.impacts import velocities
 
     given, figure = described(**options), Figure((7, 4.3), layout="constrained")
-    velocities(collide(given.chain, given.model), figure.subplots())
+    with given.waiting():
+        trace = collide(given.chain, given.model)
+    velocities(trace, figure.subplots())
     figure.savefig(output, format=image_format(output))
     click.echo(f"drawn to {output}\n{given.note}")
 
 
-@main.command()
-@chain_options
-@click.option("--pull", default=0.05, help="How far the first ball is pulled aside, m along its "
-              "arc, at most a quarter of a circle [0.05].")  # fmt: skip
-@click.option("--length", default=0.3, help="Of the pendulums, m [0.3].")
-@click.option("--seconds", default=2.0, help="How long it swings [2].")
-@click.option("--steps", default=20, help="How many rows to print [20].")
-@format_options
-def swing(
-    pull: float, length: float, seconds: float, steps: int, as_json: bool, as_csv: bool,
-    **options: Any,
-) -> None:  # fmt: skip
-    """Positions of a swinging cradle, impact after impact.
-
-    The first ball is pulled aside and let go: --speed and --velocities are refused.
-
-    \b
-    Examples:
-      cradle swing ABACA --pull 0.05 --seconds 1
-      cradle swing --masses 1,1,1,1,1 --csv
-    """
-    from cradle.advice.recommendation import made
-    from cradle.chain import Chain
-    from cradle.input.values import one_number, whole_number
-    from cradle.swinging.pendulums import Pendulums
-    from cradle.swinging.swing import swing as swing_freely
-
-    if (options["speed"], options["velocities"]) != (None, None):
-        raise click.UsageError("leave --speed and --velocities out: the first ball is pulled aside "
-                               "(--pull) and let go")  # fmt: skip
-    given = described(**options)
-    chain, hanging = given.chain, Pendulums(length=length)
-    far = float(hanging.reach(1)[0])
-    rule = f"must be above 0 and at most a quarter of a circle of that --length, {far:.4g} m"
-    one_number("--pull", pull, rule, 0.0, far, open_low=True)
-    one_number("--seconds", seconds, "must be above 0", 0.0, open_low=True)
-    whole_number("--steps", steps)
-    still = [0.0] * len(chain)
-    run = swing_freely(
-        Chain(chain.masses, still, chain.restitution), given.model, [-pull, *still[1:]],
-        [seconds * k / steps for k in range(steps + 1)],
-        pendulums=hanging,
-    )  # fmt: skip
-    rows = [
-        {"time": float(time), **{f"ball {k + 1}": float(x) + 0.0 for k, x in enumerate(places)}}
-        for time, places in zip(run.times, run.positions, strict=True)
-    ]
-    impacts = [
-        {"time": float(one.time), "before": one.before.tolist(), "after": one.after.tolist()}
-        for one in run.impacts
-    ]
-    # How fast the first ball strikes follows from the pull.
-    told = given._replace(assumed=tuple(one for one in given.assumed if "strikes" not in one))
-    extra = {"model": made(given.model), "assumed": told.assumed, "impacts": impacts}
-    note = f"impacts: {len(impacts)}; positions in m, times in s\n{told.note}"
-    show(rows, extra, note, as_json, as_csv)
-    if run.ended != "times":
-        # Also where the table goes to a file.
-        click.echo(f"cradle: ended at {run.end:g} s, after {len(impacts)} impacts", err=True)
-
-
-for verb in (film, fit, recommend, template):
+for verb in (film, fit, recommend, swing, template):
     main.add_command(verb)
 
 

@@ -8,10 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.fit.shots import Track
+from cradle.fit.tracks import Track
 from cradle.input.values import Vector, checked, one_number
 
 _GRAVITY = 9.81
+# Marks that each side of the impact needs; the longest window on a level track, s.
+_LEAST, _LONGEST = 5, 0.25
 
 
 class Velocities(NamedTuple):
@@ -25,6 +27,10 @@ class Velocities(NamedTuple):
         m/s; ball by ball, with standard errors.
     scatter : float
         Standard deviation of the marks about the motion fitted, m.
+    window : float
+        How much time on either side was used, s.
+    probability : float
+        Chance that marks bend at least as much about the motion fitted if it is the true one.
     """
 
     time: float
@@ -33,6 +39,8 @@ class Velocities(NamedTuple):
     sigma: Vector
     sigma_before: Vector
     scatter: float
+    window: float
+    probability: float
 
 
 def speeds_from_heights(
@@ -75,7 +83,7 @@ def velocities_from_tracks(
     tracks: Mapping[str, Track],
     *,
     length: float | None = None,
-    window: float = 0.05,
+    window: float | None = None,
     striker: int = 0,
     scatter: float | None = None,
 ) -> Velocities:
@@ -91,8 +99,9 @@ def velocities_from_tracks(
         One track a ball, left to right.
     length : float, optional
         Length of the pendulums, m; left out, the balls roll on a level track.
-    window : float
-        How much time before and after the impact is used, s.
+    window : float, optional
+        How much time before and after the impact is used, s.  Left out, it is the longest one that
+        the marks agree with: at most a quarter of a swing, or a quarter of a second on a track.
     striker : int
         Index of the ball that moves before.
     scatter : float, optional
@@ -105,28 +114,65 @@ def velocities_from_tracks(
     Raises
     ------
     ValueError
-        If there are fewer than two balls, or too few marks on either side.
+        If there are fewer than two balls, too few marks on either side, or the marks do not lie on
+        such a motion (see `Velocities.probability`; below 0.001).
 
     Notes
     -----
-    A pendulum that passes its lowest point with velocity v is then, with w = g/l, u = (v/l)^2, at
-    v t (1 - (w + u) t^2/6 + (w^2 + 11 w u + u^2) t^4/120) up to terms in t^7.
+    A pendulum that passes its lowest point with velocity v is then, with w^2 = g/l, k = v/(2 w l)
+    and Jacobi's functions of modulus k, at (v/w) sn(w t) dn(w t), measured along the row.
 
     Examples
     --------
     >>> from cradle.fit import read_tracker
     >>> from cradle.tables import data_folder
     >>> tracks = read_tracker(data_folder() / "video_synthetic.txt")
-    >>> velocities_from_tracks(tracks, length=0.3).sigma.round(3).tolist()
+    >>> velocities_from_tracks(tracks, length=0.3, window=0.05).sigma.round(3).tolist()
     [0.009, 0.009, 0.009]
     """
     balls = list(tracks.values())
     if len(balls) < 2 or not 0 <= striker < len(balls):
         raise ValueError(f"{len(balls)} tracks, striker = {striker}; needs two balls and a striker")
-    window = one_number("window", window, "must be above 0", 0.0, open_low=True)
     if length is not None:
         length = one_number("length", length, "must be above 0", 0.0, open_low=True)
-    time = _coarse_time(balls, striker, window)
+    if window is not None:
+        window = one_number("window", window, "must be above 0", 0.0, open_low=True)
+    if scatter is not None:
+        one_number("scatter", scatter, "must be above 0", 0.0, open_low=True)
+    frame = max(float(np.median(np.diff(ball.times))) for ball in balls if ball.times.size > 1)
+    least = window or max(0.05, (_LEAST + 0.5) * frame)
+    coarse = _coarse_time(balls, striker, least)
+    longest = _LONGEST if length is None else 0.5 * np.pi * float(np.sqrt(length / _GRAVITY))
+    tried = [window] if window else _shrinking(longest, least)
+    for k, wide in enumerate(tried):
+        found = _around(tracks, coarse, wide, length, striker)
+        if found.probability > (0.2 if k else 0.01):
+            break
+    if k and k + 3 < len(tried):
+        # What bends the marks is not yet seen there; a bias falls as the window to the power 3.5.
+        found = _around(tracks, coarse, tried[k + 3], length, striker)
+    elif k or found.probability < 1e-3:
+        rather = "is it the right length, and one impact" if length else "give their length"
+        raise ValueError(
+            f"window = {found.window:.3g} s; the marks bend otherwise than by such a motion: if "
+            f"the balls hang, {rather}; else give a shorter window"
+        )
+    if scatter is None:
+        return found
+    ratio = scatter / found.scatter
+    return found._replace(sigma=ratio * found.sigma, sigma_before=ratio * found.sigma_before)
+
+
+def _shrinking(longest: float, least: float) -> list[float]:
+    """Return windows from the longest one on, each four fifths of the last."""
+    steps = int(np.log(max(longest / least, 1.0)) / np.log(1.25))
+    return [longest * 0.8**k for k in range(steps + 1)] if longest > least else [least]
+
+
+def _around(
+    tracks: Mapping[str, Track], time: float, window: float, length: float | None, striker: int
+) -> Velocities:
+    """Fit the moment in a window, then every ball on its own on either side of it."""
     for _ in range(3):  # the window moves with the moment that is found in it
         used = _window(tracks, time, window)
         time, places = _moment(used, time, length, striker)
@@ -135,11 +181,7 @@ def velocities_from_tracks(
             f"the balls meet at {places.round(4).tolist()} m; the tracks must be in the order of "
             "the balls, left to right"
         )
-    found = _velocities(used, time, length, striker)
-    if scatter is None:
-        return found
-    ratio = one_number("scatter", scatter, "must be above 0", 0.0, open_low=True) / found.scatter
-    return found._replace(sigma=ratio * found.sigma, sigma_before=ratio * found.sigma_before)
+    return _velocities(used, time, length, striker, window)
 
 
 def _window(tracks: Mapping[str, Track], time: float, window: float) -> list[Track]:
@@ -149,10 +191,10 @@ def _window(tracks: Mapping[str, Track], time: float, window: float) -> list[Tra
         near = np.abs(track.times - time) <= window
         times = track.times[near]
         sides = [int((times < time).sum()), int((times >= time).sum())]
-        if min(sides) < 5:
+        if min(sides) < _LEAST:
             raise ValueError(
                 f"track {name!r} has {sides[0]} marks before and {sides[1]} after the impact at "
-                f"{time:.4g} s within window = {window:g} s; needs 5 on each side"
+                f"{time:.4g} s within window = {window:g} s; needs {_LEAST} on each side"
             )
         used.append(Track(times, track.positions[near]))
     return used
@@ -187,13 +229,15 @@ def _rest(columns: list[Vector], x: Vector) -> float:
     return float(left @ left)
 
 
-def _motion(t: Vector, velocity: float, length: float | None) -> Vector:
-    """Return the way from the place of the impact."""
+def _way(t: Vector, velocity: float, length: float | None) -> Vector:
+    """Return the way from the place of the impact, for each m/s of the velocity there."""
     if length is None:
-        return velocity * t
-    w, u = _GRAVITY / length, (velocity / length) ** 2
-    bend = -(w + u) * t**2 / 6 + (w * w + 11 * w * u + u * u) * t**4 / 120
-    return np.asarray(velocity * t * (1 + bend))
+        return t
+    from scipy.special import ellipj
+
+    w = np.sqrt(_GRAVITY / length)
+    sn, _, dn, _ = ellipj(w * t, min(1.0, (0.5 * velocity / (w * length)) ** 2))
+    return np.asarray(sn * dn / w)
 
 
 def _moment(
@@ -208,9 +252,9 @@ def _moment(
         parts = []
         for k, ball in enumerate(balls):
             t = ball.times - p[0]
-            way = _motion(np.maximum(t, 0.0), p[2 + count + k], length)
+            way = p[2 + count + k] * _way(np.maximum(t, 0.0), p[2 + count + k], length)
             if k == striker:
-                way = way + _motion(np.minimum(t, 0.0), p[1], length)
+                way = way + p[1] * _way(np.minimum(t, 0.0), p[1], length)
             parts.append(ball.positions - p[2 + k] - way)
         return np.concatenate(parts)
 
@@ -224,25 +268,29 @@ def _moment(
     return float(found[0]), found[2 : 2 + count]
 
 
-def _slope(t: Vector, x: Vector, length: float | None) -> tuple[float, float, float]:
+def _slope(t: Vector, x: Vector, length: float | None) -> tuple[float, float, float, float]:
     """Return velocity at time 0, its variance over that of a mark, and the squares left over.
 
-    The place is free: the velocities of different balls and sides have independent errors.
+    The place is free: the velocities of different balls and sides have independent errors.  The
+    last number is the squares that would be left if the way could bend otherwise too.
     """
-    velocity = float(np.polyfit(t, x, 1)[0])
+    velocity = 0.0
     for _ in range(4):  # the way depends a little on the velocity itself
-        way = t if length is None else _motion(t, velocity, length) / velocity
+        way = _way(t, velocity, length)
         matrix = np.stack([np.ones(t.size), way], axis=-1)
-        solution = np.linalg.lstsq(matrix, x, rcond=None)[0]
-        velocity = float(solution[1]) or np.finfo(float).tiny
-    left = x - matrix @ solution
-    return velocity, float(np.linalg.inv(matrix.T @ matrix)[1, 1]), float(left @ left)
+        velocity = float(np.linalg.lstsq(matrix, x, rcond=None)[0][1])
+    variance = float(np.linalg.inv(matrix.T @ matrix)[1, 1])
+    return velocity, variance, _rest([way], x), _rest([way, t**2, t**3], x)
 
 
-def _velocities(balls: list[Track], time: float, length: float | None, striker: int) -> Velocities:
+def _velocities(
+    balls: list[Track], time: float, length: float | None, striker: int, window: float
+) -> Velocities:
     """Fit the velocity of every ball on its own, on either side of the impact."""
+    from scipy.special import fdtrc
+
     velocities, variances = np.zeros((2, 2, len(balls)))
-    squares, freedom = 0.0, 0
+    squares, freedom, bent, bends = 0.0, 0, 0.0, 0
     for k, ball in enumerate(balls):
         t = ball.times - time
         # The moment is known to a part of a frame: a mark nearer than half a frame may be of
@@ -250,10 +298,15 @@ def _velocities(balls: list[Track], time: float, length: float | None, striker: 
         near = 0.5 * float(np.median(np.diff(t)))
         sides = {1: t > near, 0: t < -near} if k == striker else {1: t > near}
         for side, some in sides.items():
-            velocities[side, k], variances[side, k], left = _slope(
+            velocities[side, k], variances[side, k], left, more = _slope(
                 t[some], ball.positions[some], length
             )
             squares, freedom = squares + left, freedom + int(some.sum()) - 2
+            bent, bends = bent + more, bends + 2
     scatter = float(np.sqrt(squares / freedom))
+    gain, spare = (squares - bent) / bends, bent / (freedom - bends) if freedom > bends else 0.0
+    # Marks without scatter, as of a computed motion, leave rounding alone, and no question.
+    exact = scatter < 1e-5 * max(float(np.ptp(ball.positions)) for ball in balls)
+    chance = 1.0 if exact or not spare else float(fdtrc(bends, freedom - bends, gain / spare))
     (before, after), (sigma_before, sigma) = velocities, scatter * np.sqrt(variances)
-    return Velocities(time, before, after, sigma, sigma_before, scatter)
+    return Velocities(time, before, after, sigma, sigma_before, scatter, window, chance)

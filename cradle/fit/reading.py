@@ -1,4 +1,4 @@
-"""Files of measurements: tables of shots, one row per ball of each shot, and Tracker's exports."""
+"""Tables of shots: one row per ball of each shot, read and checked."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from cradle.fit.shots import Shots, ShotSet, Track, Tracks
+from cradle.fit.shots import Shots, ShotSet
 from cradle.input.csv import table_lines
-from cradle.input.values import Vector, one_number
+from cradle.input.values import one_number
 
 #: Columns that every table of shots has, and what they hold.
 COLUMNS = {
@@ -220,96 +220,3 @@ def _check_physics(what: str, rows: list[_Row]) -> None:
             f"{rows[0].where}, columns before and after: {what} gains {100 * share:.3g} % of its "
             f"energy, {gain / error:.3g} standard errors; check units, signs and sigma"
         )
-
-
-# Tracker's text exports, by files that people published and by the program's source
-# (github.com/OpenSourcePhysics/tracker, `ExportDataDialog.java`).  One track: its name, spaces as
-# underscores (``mass_A``), a line of columns (``t  x  y``), the numbers; version 6 puts a delimiter
-# before the name and at the ends of lines.  Several tracks: ``#multi:``, the names above their
-# columns, then ``t`` once and the columns of each.  Tabs, commas and semicolons delimit; a cell is
-# empty where a ball was not marked.
-
-
-def read_tracker(
-    path: str | Path, *, column: str = "x", time_scale: float = 1.0, unit: float = 1.0
-) -> Tracks:
-    """Read a text file exported by Tracker.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    column : str
-        Which column holds the position along the row.
-    time_scale : float
-        True time over the time of the video: 30 / 240 for a video that shows 240 frames a second
-        slowed down to 30.
-    unit : float
-        Length of Tracker's unit in m: 0.01 if the calibration stick was given in cm.
-
-    Returns
-    -------
-    Tracks
-        By name; frames where a ball was not marked are left out.
-
-    Raises
-    ------
-    ValueError
-        If the file has another layout, or a cell is no number; the message names line and column.
-
-    Examples
-    --------
-    >>> from cradle.tables import data_folder
-    >>> tracks = read_tracker(data_folder() / "video_synthetic.txt")
-    >>> {name: track.times.size for name, track in tracks.items()}
-    {'B': 49, 'A': 49, 'C': 49}
-    """
-    one_number("time_scale", time_scale, "must be above 0", 0.0, open_low=True)
-    one_number("unit", unit, "must be above 0", 0.0, open_low=True)
-    file = Path(path) if isinstance(path, str) else path
-    try:
-        lines = file.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError as error:
-        raise ValueError(
-            f"{file.name} is no UTF-8 text (byte {error.start}); export it from Tracker, or save "
-            "it as text in UTF-8"
-        ) from None
-    first = 1 if lines and lines[0].strip().rstrip(",;").strip() == "#multi:" else 0
-    if len(lines) < first + 3:
-        raise ValueError(f"{file.name}: too short for an export of Tracker")
-    header = lines[first + 1]
-    delimiter = next((mark for mark in "\t;," if mark in header), "\t")
-    columns = [name.strip() for name in header.split(delimiter)]
-    if len(columns) < 2 or columns[0] != "t" or column not in columns:
-        raise ValueError(
-            f"{file.name}, line {first + 2}: {header!r}; an export of Tracker has its columns "
-            f"there, t first, and {column} among them"
-        )
-    names = [name.strip() for name in lines[first].split(delimiter)]
-    if first:  # of several tracks, the name stands above the first of its columns
-        owners = [""]
-        for name in [*names[1:], *[""] * len(columns)]:
-            owners.append(name or owners[-1])
-    else:
-        owners = [next(filter(None, names), "track").replace("_", " ")] * len(columns)
-    tracks: Tracks = {}
-    for place, title in enumerate(columns):
-        if title == column:
-            times, positions = _marks(file.name, lines, first + 2, (delimiter, place, column))
-            tracks[owners[place]] = Track(times * time_scale, positions * unit)
-    return tracks
-
-
-def _marks(name: str, lines: list[str], begin: int, where: tuple[str, int, str]) -> Vector:
-    """Return times and positions of a track's marks, shape (2, T)."""
-    delimiter, place, column = where
-    marks: list[float] = []
-    for number, line in enumerate(lines[begin:], begin + 1):
-        cells = [cell.strip() for cell in line.split(delimiter)]
-        for title, at in (("t", 0), (column, place)) if any(cells[place:][:1]) else ():
-            # Tracker can be told to write decimal commas, with another delimiter then.
-            try:
-                marks.append(float(cells[at] if delimiter == "," else cells[at].replace(",", ".")))
-            except ValueError:
-                _refuse(f"{name}, line {number}", title, f"{cells[at]!r}; must be a number")
-    return np.array(marks).reshape(-1, 2).T

@@ -1,9 +1,8 @@
-"""What is measured: shots, velocities before and after impacts, with their tables; tracks."""
+"""What is measured: shots, velocities before and after impacts, in sets."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -182,17 +181,6 @@ class Shots:
         """
         residuals = np.concatenate([s.momentum_residuals for s in self.sets])
         return float(residuals @ residuals), residuals.size
-
-
-class Track(NamedTuple):
-    """Marks of one ball: times in s and positions along the row in m, both of shape (T,)."""
-
-    times: Vector
-    positions: Vector
-
-
-#: Marks of every ball, by the names of the tracks, in the order of the file.
-Tracks = dict[str, Track]
 
 
 def chance(chi_square: float, degrees_of_freedom: int) -> float:

@@ -28,39 +28,47 @@ def table_lines(source: Any) -> list[tuple[str, dict[str, Any]]]:
     return [(f"row {k}", dict(zip(names, row, strict=True))) for k, row in enumerate(rows, 1)]
 
 
-def _file_lines(name: str, content: bytes) -> list[tuple[str, dict[str, Any]]]:
-    """Return the rows of a CSV file; comments and rows without any cell filled are left out."""
+def text_rows(name: str, content: bytes, comments: bool = False) -> dict[int, list[str]]:
+    """Return the cells of each filled line of a text file by its number, as points and ASCII.
+
+    Tabs, semicolons or commas stand between the columns, else spaces; decimals may have commas
+    where columns have none.
+    """
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode("utf-8-sig").replace("\N{MINUS SIGN}", "-")
     except UnicodeDecodeError as error:
         raise ValueError(
             f"{name} is no UTF-8 text (byte {error.start}); save it as CSV in UTF-8"
         ) from None
-    kept = {
+    lines = {
         number: line for number, line in enumerate(re.split("\r\n|\n|\r", text), 1)
-        if line.strip(", \t") and not line.lstrip().startswith("#")
+        if line.strip(",; \t") and (comments or not line.lstrip().startswith("#"))
     }  # fmt: skip
-    first = next(iter(kept.values()), "")
-    for mark, word in ((";", "semicolon"), ("\t", "tab")):
-        if mark in first and "," not in first:
-            if any(re.search(r"\d,\d", line) for line in kept.values()):
-                raise ValueError(
-                    f"{name} has {word}s between the columns and commas in the decimals; "
-                    f"first turn every comma into a point, then every {word} into a comma"
-                )
-            raise ValueError(f"{name} has {word}s; put commas between the columns")
-    header, *rows = list(csv.reader(kept.values())) or [[]]
-    header = [name.strip() for name in header]
+    mark = next((one for one in "\t;," if any(one in line for line in lines.values())), " ")
+    if mark != ",":
+        comma = next((n for n, line in lines.items() if re.search(r",\d", line)), None)
+        point = next((n for n, line in lines.items() if re.search(r"\d\.\d", line)), None)
+        if comma and point:
+            raise ValueError(
+                f"{name} has decimals with a comma in line {comma} and with a point in line "
+                f"{point}; write all with a point"
+            )
+        lines = {number: re.sub(r",(?=\d)", ".", line) for number, line in lines.items()}
+    rows = csv.reader(lines.values(), delimiter=mark, skipinitialspace=True)
+    return dict(zip(lines, ([cell.strip() for cell in row] for row in rows), strict=True))
+
+
+def _file_lines(name: str, content: bytes) -> list[tuple[str, dict[str, Any]]]:
+    """Return the rows of a table by the names of its columns."""
+    (_, header), *rows = [*text_rows(name, content).items()] or [(1, list[str]())]
     _refuse_repeated(header)
-    lines = []
-    for number, cells in zip(list(kept)[1:], rows, strict=True):
+    for number, cells in rows:
         if len(cells) != len(header):
             raise ValueError(
                 f"line {number}: {len(cells)} values; the header has {len(header)} columns "
-                "(decimals need a point)"
+                "(between commas, decimals need a point)"
             )
-        lines.append((f"line {number}", dict(zip(header, cells, strict=True))))
-    return lines
+    return [(f"line {n}", dict(zip(header, cells, strict=True))) for n, cells in rows]
 
 
 def _refuse_repeated(names: Sequence[str]) -> None:

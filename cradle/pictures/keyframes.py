@@ -61,13 +61,33 @@ class Animation:
         return f"Animation({len(self.svg.encode()) / 1000:.0f} kB)"
 
     def save(self, path: str | Path) -> None:
-        """Write the picture to an SVG file.
+        """Write the picture to a file; its ending says of what kind.
+
+        Parameters
+        ----------
+        path : str or Path
+            ``.svg``, ``.html``, a film ``.gif`` or ``.mp4``, or the still as ``.png``.
+
+        Raises
+        ------
+        ValueError
+            If the ending is another one, or a film needs a program that is missing.
 
         Examples
         --------
         >>> Animation("<svg/>").save("/dev/null")
         """
-        Path(path).write_text(self.svg, encoding="utf-8")
+        file = Path(path)
+        kind = file.suffix.lower()
+        if kind in (".png", ".gif", ".mp4"):
+            from cradle.pictures.frames import save_pixels
+
+            save_pixels(self.svg, file)
+        elif kind in (".svg", ".html", ""):
+            page = f"<!doctype html>\n<meta charset='utf-8'>\n{self._repr_html_()}\n"
+            file.write_text(page if kind == ".html" else self.svg, encoding="utf-8")
+        else:
+            raise ValueError(f"path = {str(path)!r}; must end in .svg, .html, .gif, .mp4 or .png")
 
 
 def thin(times: Vector, values: Vector, tolerance: float) -> NDArray[np.int64]:

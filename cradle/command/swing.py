@@ -1,0 +1,110 @@
+"""`cradle swing`: a swinging cradle, as a table or a film."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import click
+
+from cradle.command.console import format_options, picture, show
+from cradle.command.describe import (
+    chain_options,
+    described,
+    numbers_of,
+    one_or_all,
+    pendulum_length,
+    swing_options,
+)
+
+
+@click.command()
+@chain_options
+@click.option("--pull", callback=numbers_of, help="How many balls are pulled aside: 2 at the left "
+              "end; 0,1 one at the right; 1,1 one at each [1].")  # fmt: skip
+@click.option("--by", default=0.05, help="How far, m along the arc, at most a quarter of a "
+              "circle [0.05].")  # fmt: skip
+@swing_options("0.3")
+@click.option("--gaps", callback=numbers_of, help="Between the balls at rest, m [0].")
+@click.option("--damping", callback=numbers_of, help="Of each swing's amplitude, 1/s [0].")
+@click.option("--seconds", default=2.0, help="How long it swings [2].")
+@click.option("--steps", default=20, help="How many rows to print [20].")
+@click.option("--output", "-o", type=click.Path(dir_okay=False), callback=picture,
+              help="Draw a film to a file: .gif, .mp4, .html, .svg; .png is a picture of the "
+              "start.")  # fmt: skip
+@format_options
+def swing(
+    pull: list[float] | None, by: float, gaps: list[float] | None, damping: list[float] | None,
+    seconds: float, steps: int, output: str | None, as_json: bool, as_csv: bool, **options: Any,
+) -> None:  # fmt: skip
+    """Positions of a swinging cradle, impact after impact.
+
+    The balls that are pulled aside are let go: --speed and --velocities are refused.
+
+    \b
+    Examples:
+      cradle swing 5 --pull 2 -o toy.gif
+      cradle swing 5 --gaps 0.001 --damping 0.05 --period 1.1 --seconds 10
+      cradle swing ABACA --by 0.03 --seconds 1
+      cradle swing --masses 1,1,1,1,1 --csv
+    """
+    from cradle.advice.recommendation import made
+    from cradle.chain import Chain
+    from cradle.input.values import one_number, whole_number
+    from cradle.swinging.pendulums import Pendulums
+    from cradle.swinging.swing import swing as swing_freely
+
+    if (options["speed"], options["velocities"]) != (None, None):
+        raise click.UsageError("leave --speed and --velocities out: the first ball is pulled aside "
+                               "(--pull) and let go")  # fmt: skip
+    length = pendulum_length(options.pop("length"), options.pop("period"))
+    given = described(**options)
+    chain = given.chain
+    hanging = Pendulums(0.3 if length is None else length, gaps=one_or_all(gaps or [0.0]),
+                        damping=one_or_all(damping or [0.0]))  # fmt: skip
+    far = float(hanging.reach(len(chain))[0])
+    rule = f"must be above 0 and at most a quarter of a circle of that --length, {far:.4g} m"
+    one_number("--by", by, rule, 0.0, far, open_low=True)
+    one_number("--seconds", seconds, "must be above 0", 0.0, open_low=True)
+    whole_number("--steps", steps)
+    if output:  # twenty keyframes a swing
+        steps = math.ceil(20 * seconds * hanging.natural_frequency(len(chain))[0] / math.tau)
+    still = [0.0] * len(chain)
+    places = _released(pull or [1.0], by, len(chain))
+    balls = Chain(chain.masses, still, chain.restitution)
+    times = [seconds * k / steps for k in range(steps + 1)]
+    with given.waiting():
+        run = swing_freely(balls, given.model, places, times, pendulums=hanging)
+    rows = [
+        {"time": float(time), **{f"ball {k + 1}": float(x) + 0.0 for k, x in enumerate(places)}}
+        for time, places in zip(run.times, run.positions, strict=True)
+    ]
+    impacts = [
+        {"time": float(one.time), "before": one.before.tolist(), "after": one.after.tolist()}
+        for one in run.impacts
+    ]
+    # How fast the first ball strikes follows from the pull.
+    told = given._replace(assumed=tuple(one for one in given.assumed if "strikes" not in one))
+    extra = {"model": made(given.model), "assumed": told.assumed, "impacts": impacts}
+    if output:
+        from cradle.pictures.animation import animate_swing
+
+        animate_swing(run).save(output)
+        click.echo(f"drawn to {output}; impacts: {len(impacts)}\n{told.note}")
+    else:
+        note = f"impacts: {len(impacts)}; positions in m, times in s\n{told.note}"
+        show(rows, extra, note, as_json, as_csv)
+    if run.ended != "times":
+        # Also where the table goes to a file.
+        click.echo(f"cradle: ended at {run.end:g} s, after {len(impacts)} impacts", err=True)
+
+
+def _released(pull: list[float], by: float, size: int) -> list[float]:
+    """Return where the balls are let go, so many pulled from the left end and from the right."""
+    left, right = [*pull, 0.0][:2]
+    wrong = len(pull) > 2 or any(one < 0.0 or not one.is_integer() for one in pull)
+    if wrong or not 0 < left + right <= size:
+        raise click.UsageError(
+            f"--pull says how many of the {size} balls are pulled, 2 or 1,1; how far is --by"
+        )
+    return [-by] * int(left) + [0.0] * int(size - left - right) + [by] * int(right)

@@ -1,0 +1,163 @@
+"""Positions of balls in a film: text exported by Tracker, Kinovea, Logger Pro or Capstone."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from cradle.input.csv import text_rows
+from cradle.input.values import Vector, one_number
+
+
+class Track(NamedTuple):
+    """Marks of one ball: times in s and positions along the row in m, both of shape (T,)."""
+
+    times: Vector
+    positions: Vector
+
+
+#: Marks of every ball, by the names of the tracks, in the order of the file.
+Tracks = dict[str, Track]
+
+# What programs write, by files that people published and by the source of Tracker
+# (`ExportDataDialog.java`) and Kinovea (`ExporterTXTTrajectory.cs`, `ExporterCSVTrajectory.cs`):
+# Tracker        a name, spaces as underscores (``mass_A``); ``t  x  y``; numbers.  Several tracks:
+#                ``#multi:``, the names above their columns, ``t`` once and the columns of each
+# Kinovea        ``#T X Y``, then of each ball ``# name`` and numbers; or ``Time``, ``name/0/X``
+# Logger Pro     ``Latest: Time (s)``, ``Latest: X (m)``, ``Latest: X 2 (m)``; as text ``Time  X``,
+#                ``t  x``, and a line of units
+# Capstone       ``Time (s) Run #1``, ``Position (m) Run #1``
+_TITLE = re.compile(r"(?:.*:)?\s*(.*?)\s*(?:\(([^)]*)\))?\s*(?:Run.*)?", re.IGNORECASE)
+_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "s": 1.0, "ms": 1e-3}
+
+
+def read_tracker(
+    path: str | Path, *, column: str = "x", time_scale: float = 1.0, unit: float = 1.0
+) -> Tracks:
+    """Read a text file exported by Tracker, Kinovea, Logger Pro or Capstone.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; tabs, semicolons or commas between the columns, decimals with a point or a comma.
+    column : str
+        Which column holds the position along the row.
+    time_scale : float
+        True time over the time of the video: 30 / 240 for a video that shows 240 frames a second
+        slowed down to 30.
+    unit : float
+        Length of the file's unit in m: 0.01 if the calibration stick was given in cm, or the size
+        of a pixel.  Columns that name their unit, such as ``X (cm)``, need none.
+
+    Returns
+    -------
+    Tracks
+        By name; frames where a ball was not marked are left out.
+
+    Raises
+    ------
+    ValueError
+        If the file has another layout, or a cell is no number; the message names line and column.
+
+    Examples
+    --------
+    >>> from cradle.tables import data_folder
+    >>> tracks = read_tracker(data_folder() / "video_synthetic.txt")
+    >>> {name: track.times.size for name, track in tracks.items()}
+    {'B': 49, 'A': 49, 'C': 49}
+    """
+    one_number("time_scale", time_scale, "must be above 0", 0.0, open_low=True)
+    one_number("unit", unit, "must be above 0", 0.0, open_low=True)
+    file = Path(path) if isinstance(path, str) else path
+    rows = text_rows(file.name, file.read_bytes(), comments=True)
+    titles, above, block = list[_Title](), list[str](), ""
+    marks: dict[str, list[tuple[float, float]]] = {}
+    for number, (first, *others) in rows.items():
+        cells = [first.lstrip("# "), *others]
+        if cells[0] and _title(cells[0]).name in ("t", "time"):
+            titles = [_title(cell) for cell in cells]
+        elif titles and {*map(str.strip, cells)} <= {*_UNITS, "px", ""} and any(cells):
+            titles = [one._replace(unit=cell) for one, cell in zip(titles, cells, strict=False)]
+        elif titles and not first.startswith("#"):
+            where = f"{file.name}, line {number}"
+            owners = _owners(titles, column, above, block)
+            for at, name in owners.items():
+                if at < len(cells) and cells[at]:
+                    time = _mark(where, cells[0], titles[0], time_scale)
+                    place = _mark(where, cells[at], titles[at], unit)
+                    marks.setdefault(name, []).append((time, place))
+        else:
+            above, block = cells, " ".join(cells).strip()
+    if not marks:
+        raise ValueError(
+            f"{file.name} has no column of positions: a line of titles must begin with t or Time "
+            f"and name {column} too, as in the exports of Tracker, Kinovea, Logger Pro or Capstone"
+        )
+    tracks = {name: Track(*np.array(found).T) for name, found in marks.items()}
+    for name, (times, _) in tracks.items():
+        if (np.diff(times) <= 0.0).any():
+            raise ValueError(
+                f"{file.name}: the times of {name} do not rise; where one ball follows the other, "
+                "each needs a line with its name, '# A', above"
+            )
+    apart = max(float(np.median(np.diff(t))) if t.size > 1 else 0.0 for t, _ in tracks.values())
+    if apart > 0.5:
+        raise ValueError(
+            f"{file.name} has marks {apart:g} s apart; if the times are in ms, divide time_scale "
+            "by 1000"
+        )
+    return tracks
+
+
+class _Title(NamedTuple):
+    text: str
+    name: str
+    unit: str
+
+
+def _title(cell: str) -> _Title:
+    """Return the title of a column without run and unit, in small letters, and its unit."""
+    found = _TITLE.fullmatch(cell)
+    name, unit = found.groups() if found else (cell, None)
+    return _Title(name, name.casefold(), unit or "")
+
+
+def _owners(titles: list[_Title], column: str, above: list[str], block: str) -> dict[int, str]:
+    """Return the ball of each column of positions."""
+    form = re.compile(rf"(?:(.+?)/.*)?(?:{re.escape(column)}|position)(?:\W*(?:ch )?\d+)?", re.I)
+    found = {at: match for at, one in enumerate(titles) if (match := form.fullmatch(one.text))}
+    names = {titles[at].name for at in found}
+    owners, name = {}, ""
+    over = [*above, *[""] * len(titles)]
+    for at, match in found.items():
+        if match[1]:  # Kinovea: the ball's name, and that of its point
+            name = match[1]
+        elif len(names) == len(found) > 1:
+            name = titles[at].text
+        elif len(found) > 1:  # the name stands above the first of its columns
+            name = next(filter(None, over[at : at + 1] + over[at - 1 : 0 : -1]), name)
+        else:
+            name = block.replace("_", " ") or "track"
+        owners[at] = name
+    return owners
+
+
+def _mark(where: str, cell: str, title: _Title, scale: float) -> float:
+    """Return a time in s or a position in m."""
+    if title.unit not in {*_UNITS, "px", ""}:
+        rule = "must be in s, ms, m, cm, mm or px"
+        raise ValueError(f"{where}, column {title.text}: unit {title.unit!r}; {rule}")
+    if title.unit == "px" and scale == 1.0:
+        raise ValueError(f"{where}, column {title.text}: px; say how large a pixel is, in m: unit")
+    try:
+        value = float(cell)
+    except ValueError:
+        raise ValueError(f"{where}, column {title.text}: {cell!r}; must be a number") from None
+    return (
+        value
+        * (_UNITS.get(title.unit, 1.0) if title.name in ("t", "time") else 1.0)
+        * (scale if title.name in ("t", "time") or title.unit in ("", "px") else _UNITS[title.unit])
+    )
