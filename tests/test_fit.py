@@ -12,11 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.optimize import brentq, least_squares, minimize
-from scipy.stats import binom
+from scipy.stats import binom, chi2
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain, ratio_table
 from cradle.closed_form import three_balls
 from cradle.fit import (
+    Fit,
     Shots,
     ratio,
     read_shots,
@@ -26,6 +27,7 @@ from cradle.fit import (
     speeds_from_heights,
     velocities_from_tracks,
 )
+from cradle.fit.answers import FOLDED, Group
 from cradle.fit.likelihood import chi_squares
 from cradle.fit.parameters import Points
 from cradle.fit.search import RISE, refine, scan
@@ -661,6 +663,50 @@ def test_speeds_from_heights():
     speed, sigma = speeds_from_heights([0.05, -0.05, 0.0], 0.001, 10.0)
     np.testing.assert_allclose(speed, [1, -1, 0])
     np.testing.assert_allclose(sigma, [np.sqrt(1.02) - 1] * 2 + [np.sqrt(0.02)])
+
+
+def test_correlations_are_those_of_the_ellipse():
+    """A likelihood on a grid against the inverse of its matrix."""
+    matrix = 1e4 * np.array([[2.0, 1.2], [1.2, 3.0]])
+    axis = np.linspace(0.0, 0.1, 101)
+    points = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1).reshape(-1, 2)
+    excess = np.einsum("pi,ij,pj->p", points - 0.05, matrix, points - 0.05)
+    group = Group((tuple("ABC"), tuple("CBA")), points, excess, np.ones(len(points)))
+    found = Fit(Shots(()), {}, {}, (group,), 0.0, 1).correlations()
+    spread = np.linalg.inv(matrix)
+    assert found == {
+        ("ABC", "CBA"): pytest.approx(spread[0, 1] / np.sqrt(spread[0, 0] * spread[1, 1]), abs=1e-4)
+    }
+
+
+def test_summary_names_what_is_off():
+    """Twelve shots without errors but one, four of its errors off; a ratio beside its pair."""
+    errors = np.zeros((12, 3))
+    errors[7, 1] = 0.04
+    shots = read_shots(columns("ABA", [1.0] * 12, outcome("ABA"), 0.01, errors))
+    found = ratio(shots, pairs_of("ABA", 0.0))
+    text = found.summary().splitlines()
+    assert text[0] == f"{found['ABA']}, standard error {found['ABA'].standard_error:.2g}"
+    chance = chi2.sf(found.chi_square, 35)
+    assert text[1].endswith(f"degrees of freedom 35, chance {chance:.2g}")
+    words, size, largest = re.fullmatch(
+        r"(residuals of ABA: )(\S+) standard errors, the largest (\S+) \(shot 7, ball 2\)", text[2]
+    ).groups()
+    assert words
+    # Its own error, and that of the striker's speed with which it goes.
+    alone = 0.04 / (0.01 * np.hypot(1, outcome("ABA")[1]))
+    assert float(largest) == pytest.approx(alone, abs=0.4)
+    assert float(size) == pytest.approx(alone / 6, abs=0.1)
+
+
+def test_a_set_that_is_no_bell_curve_is_said():
+    """CBD has a fold at its ratio; ABA has none."""
+    for name, folded in (("CBD", True), ("ABA", False)):
+        shots = read_shots(columns(name, [0.5, 1.0, 1.5, 2.0], outcome(name), 0.01))
+        known = {} if name == "ABA" else {"DBC": 0.5}
+        found = ratio(shots, pairs_of(name, 0.0), known=known)
+        assert found[name].folded == folded
+        assert (FOLDED in found.summary()) == folded
 
 
 def test_predictions_cover():

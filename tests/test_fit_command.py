@@ -7,7 +7,7 @@ from click.testing import CliRunner
 from test_command import call
 
 from cradle.command.solve import main
-from cradle.fit import ratio, read_shots
+from cradle.fit import ratio, read_shots, restitution
 from cradle.runtime import compile as runtime
 from cradle.tables import data_folder
 
@@ -87,6 +87,16 @@ def test_a_table_comes_from_standard_input(shots):
     text = (shots / "shots.csv").read_text()
     piped = CliRunner().invoke(main, ["fit", "-"], input=text, catch_exceptions=False)
     assert piped.output == call("fit shots.csv")
+
+
+@pytest.mark.usefixtures("shots")
+def test_a_summary_is_that_of_python():
+    text = call("fit shots.csv --summary")
+    pairs = restitution(table := read_shots("shots.csv"))
+    both = [pairs.summary(), ratio(table, pairs).summary()]
+    assert text.startswith("\n".join(both))
+    assert "residuals of AB: " in text
+    assert text.splitlines()[-1].startswith("momentum: chi-square ")
 
 
 def test_momentum_that_is_lost_is_marked(shots):

@@ -36,10 +36,11 @@ if TYPE_CHECKING:
 @click.option("--speed", type=float, help="Of its first ball, with --predict, m/s [1].")
 @click.option("--plot", type=click.Path(dir_okay=False), callback=picture,
               help="Draw the likelihoods to a file.")  # fmt: skip
+@click.option("--summary", is_flag=True, help="Print errors, correlations and residuals instead.")
 @format_options
 def fit(
     file: Path, without: Sequence[str], predict: str | None, speed: float | None, plot: str | None,
-    as_json: bool, as_csv: bool, **options: Any,
+    summary: bool, as_json: bool, as_csv: bool, **options: Any,
 ) -> None:  # fmt: skip
     """Fit coefficients of restitution and ratios to measured velocities.
 
@@ -58,9 +59,11 @@ def fit(
       cradle fit shots.csv --mass-unit g --without AC --restitution AC=0.31:0.01
       cradle fit shots.csv --predict ABACA --speed 1.2
       cradle fit long.csv --without ABACA --predict ABACA
+      cradle fit shots.csv --summary
       cradle fit shots.csv --json --plot fit.png
     """
     from cradle.fit import read_shots
+    from cradle.fit.answers import FOLDED
     from cradle.fit.parameters import types_in_a_row
     from cradle.fit.result import RESULT_COLUMNS
     from cradle.fit.shots import chance
@@ -109,7 +112,13 @@ def fit(
         notes += lines
     if plot is not None:
         plot_fits(fits, plot)
-    show(rows, extra, "\n".join(notes), as_json, as_csv, RESULT_COLUMNS)
+    if summary:
+        click.echo("\n".join([*(one.summary() for one in fits), *notes[1 + len(fits) :]]))
+    else:
+        notes[1:1] = [
+            f"{e.name}{FOLDED}" for one in fits for e in one.estimates.values() if e.folded
+        ]
+        show(rows, extra, "\n".join(notes), as_json, as_csv, RESULT_COLUMNS)
 
 
 def _named(given: str) -> tuple[str, tuple[float, float]]:

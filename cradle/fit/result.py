@@ -4,14 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cradle.fit.answers import Estimate, Group, Prediction
-from cradle.fit.parameters import Key, Points, label, pair_keys, triplet_keys, types_in_a_row
+from cradle.fit.answers import FOLDED, Estimate, Group, Prediction
+from cradle.fit.parameters import (
+    Key,
+    Points,
+    label,
+    pair_keys,
+    ratio_keys,
+    triplet_keys,
+    types_in_a_row,
+)
 from cradle.fit.search import LEVEL
-from cradle.fit.shots import Shots, chance
+from cradle.fit.shots import Shots, ShotSet, chance
 from cradle.input.values import Vector, one_number
 
 if TYPE_CHECKING:
@@ -82,6 +91,95 @@ class Fit:
             f"Fit({', '.join(shown)}; "
             f"chi-square {self.chi_square:.1f} of {self.degrees_of_freedom}{poor})"
         )
+
+    def expected(self, shots: ShotSet) -> Vector | None:
+        """Return the velocities after the shots of a set by the best parameters, shape (K, N)."""
+        values = {one.key: one.value for one in self.estimates.values()}
+        e = {key: values.get(key, self.given.get(label(key), (None,))[0])
+             for key in pair_keys(shots.types)}  # fmt: skip
+        acting = {key for group in self.groups for key in group.keys}
+        ratios = {}
+        for key in ratio_keys(shots.types):
+            value = self.known.get(label(key), values.get(key))
+            if value is None and (key in acting or key not in values):
+                return None
+            ratios[key] = np.array([value or 0.0])  # one without effect may have any value
+        known = {key: value for key, value in e.items() if value is not None}
+        if len(known) < len(e):
+            return None
+        return Points(known, ratios).outcomes(shots.types, shots.masses, shots.before[:, None])[
+            :, 0
+        ]
+
+    def correlations(self) -> dict[tuple[str, str], float]:
+        """Return how the errors of ratios that were fitted together go with one another.
+
+        Returns
+        -------
+        dict of (str, str) to float
+            In [-1, 1], by the names of two estimates; of parameters fitted apart there is none.
+
+        Examples
+        --------
+        >>> from cradle.fit import ratio, read_shots
+        >>> from cradle.tables import data_folder
+        >>> shots = read_shots(data_folder() / "shots_template.csv")
+        >>> ratio(shots, {"AB": (0.53, 0.01)}).correlations()
+        {}
+        """
+        found = {}
+        for group in self.groups:
+            weights = group.weights * np.exp(-0.5 * group.excess)
+            spread = np.atleast_2d(np.cov(group.points.T, aweights=weights))
+            matrix = spread / np.sqrt(np.outer(np.diag(spread), np.diag(spread)))
+            for i, j in combinations(range(len(group.keys)), 2):
+                found[label(group.keys[i]), label(group.keys[j])] = float(matrix[i, j])
+        return found
+
+    def summary(self) -> str:
+        """Return all that the fit says, as text: values and errors, how well they fit, residuals.
+
+        Returns
+        -------
+        str
+            A line for each estimate, with its standard error and 95 % confidence set; chi-square,
+            degrees of freedom and chance; correlations; for each set the residuals over their
+            standard errors: root of the mean square (about 1 for a good fit) and the largest one.
+
+        Examples
+        --------
+        >>> from cradle.fit import read_shots, restitution
+        >>> from cradle.tables import data_folder
+        >>> print(restitution(read_shots(data_folder() / "shots_template.csv")).summary())
+        restitution AB = 0.5270 [0.5113, 0.5429], standard error 0.0081
+        chi-square 0.8, degrees of freedom 3, chance 0.85
+        residuals of AB: 0.4 standard errors, the largest 0.6 (shot 1, ball 1)
+        """
+        lines = []
+        for one in self.estimates.values():
+            error = "" if one.value is None else f", standard error {one.standard_error:.2g}"
+            lines.append(f"{one}{error}{FOLDED if one.folded else ''}")
+        lines.append(
+            f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}, "
+            f"chance {self.probability:.2g}"
+        )
+        for (a, b), value in self.correlations().items():
+            lines.append(f"correlation of {a} and {b}: {value:.2f}")
+        fitted = {one.key for one in self.estimates.values()}
+        for shots in self.shots.sets:
+            own = pair_keys(shots.types) if len(shots.types) == 2 else ratio_keys(shots.types)
+            expected = self.expected(shots) if fitted & set(own) else None
+            if expected is None:
+                continue
+            share = shots.sigma_before / np.where(shots.before, np.abs(shots.before), 1.0)
+            error = np.hypot(shots.sigma, np.abs(expected) * share.max(axis=1, keepdims=True))
+            left = (shots.after - expected) / error
+            shot, ball = np.unravel_index(np.argmax(np.abs(left)), left.shape)
+            lines.append(
+                f"residuals of {shots.name}: {np.sqrt((left**2).mean()):.1f} standard errors, the "
+                f"largest {left[shot, ball]:.1f} (shot {shots.shots[shot]}, ball {ball + 1})"
+            )
+        return "\n".join(lines)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one row per estimate.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -10,11 +11,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cradle.fit.answers import Estimate
-from cradle.fit.parameters import Points, label, pair_keys, parameter_key, ratio_keys
+from cradle.fit.parameters import pair_keys, ratio_keys
 from cradle.fit.result import Fit
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
-from cradle.input.values import Vector
 from cradle.pictures.impacts import PALETTE, ball_style
 
 # Beyond this a value of chi-square is of no interest.
@@ -58,7 +58,7 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
     draw_likelihood(estimate, axes[0])
     for one in fit.shots.sets:
         if estimate.key in (pair_keys(one.types) if len(one.types) == 2 else ratio_keys(one.types)):
-            _draw_data(fit, estimate, one, axes[1])
+            _draw_data(fit, one, axes[1])
             break
     else:
         axes[1].set_axis_off()
@@ -97,14 +97,14 @@ def draw_likelihood(estimate: Estimate, ax: Axes) -> Axes:
     return ax
 
 
-def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> None:
+def _draw_data(fit: Fit, shots: ShotSet, ax: Axes) -> None:
     """Draw measured velocities over the striker's against the striker's, and what is predicted.
 
     Shots that begin alike are predicted by lines, others by a dash each.
     """
     speed = np.abs(shots.before).max(axis=1)
     begins = shots.before / speed[:, np.newaxis]
-    predicted = _prediction(fit, estimate, shots, begins)
+    predicted = fit.expected(replace(shots, before=begins))
     alike = np.ptp(begins, axis=0).max() < 1e-9
     for k, kind in enumerate(shots.types):
         style = ball_style(k)
@@ -118,21 +118,3 @@ def _draw_data(fit: Fit, estimate: Estimate, shots: ShotSet, ax: Axes) -> None:
     ax.set(xlabel="speed of the striker (m/s)", ylabel="velocity after / striker's speed",
            title=f"data of set {shots.name}")  # fmt: skip
     ax.legend(ncols=len(shots.types), fontsize="small", **_LEGEND)
-
-
-def _prediction(fit: Fit, estimate: Estimate, shots: ShotSet, begins: Vector) -> Vector | None:
-    """Return the velocities that the best parameters give after shots that begin so, (K, N)."""
-    restitution = {tuple(sorted(parameter_key(name))): e for name, (e, _) in fit.given.items()}
-    ratios = {}
-    if estimate.kind == "restitution":
-        if estimate.value is None:
-            return None
-        restitution = {estimate.key: estimate.value}
-    for key in ratio_keys(shots.types):
-        name = label(key)
-        value = fit.known[name] if name in fit.known else fit.estimates[name].value
-        if value is None and any(key in group.keys for group in fit.groups):
-            return None
-        ratios[key] = np.array([value or 0.0])  # one without effect may have any value
-    points = Points(restitution, ratios)
-    return points.outcomes(shots.types, shots.masses, begins[:, np.newaxis])[:, 0]
