@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 # A set that is so much longer on one side than on the other is no bell curve's; what is said then.
 SKEW = 1.3
 FOLDED = (
-    " (no bell curve, as near a fold: such sets held the true value in 92 of 100 trials, not 95)"
+    " (no bell curve, as near a fold: such sets held the true value in 90 of 100 trials, not 95)"
 )
 # A confidence set that covers more than this part of the range says nothing.
 _ALL = 0.999
@@ -86,7 +86,7 @@ class Estimate:
 
     @property
     def folded(self) -> bool:
-        """Whether chi-square is no parabola over the confidence set: it may cover but 92 %.
+        """Whether chi-square is no parabola over the confidence set: it may cover but 90 %.
 
         So it is near a fold, a ratio at which the order of the impact's events changes.
         """

@@ -10,7 +10,7 @@ import numpy as np
 
 from cradle.fit.shots import Shots, ShotSet
 from cradle.input.csv import table_lines
-from cradle.input.values import one_number
+from cradle.input.values import one_number, one_of
 
 #: Columns that every table of shots has, and what they hold.
 COLUMNS = {
@@ -36,6 +36,7 @@ _LIKELY = {
     "before": (20.0, "m/s", "cm/s: say velocity_unit='cm/s'", "velocity_unit='m/s'"),
 }
 _LIKELY["after"] = _LIKELY["before"]
+_ABOVE = "must be above 0"
 # A defect of a measurement counts from so many standard errors on.
 _BEYOND = 5.0
 
@@ -110,12 +111,13 @@ def read_shots(
                 f"there are {', '.join(there)}{hint}"
             )
     if sigma is not None:
-        one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
+        one_number("sigma", sigma, _ABOVE, 0.0, open_low=True)
         if "sigma" in there:
             raise ValueError(f"sigma = {sigma!r}; the table has a column sigma: leave out one of "
                              "them")  # fmt: skip
-    scale = (_unit("mass_unit", mass_unit, _MASS_UNITS, "kg"),
-             _unit("velocity_unit", velocity_unit, _VELOCITY_UNITS, "m/s"))  # fmt: skip
+    scale = (_MASS_UNITS[one_of("mass_unit", mass_unit or "kg", list(_MASS_UNITS))],
+             _VELOCITY_UNITS[one_of("velocity_unit", velocity_unit or "m/s",
+                                    list(_VELOCITY_UNITS))])  # fmt: skip
     rows = [_row(where, line, scale, sigma) for where, line in lines]
     for name, (limit, unit, other, same) in _LIKELY.items():
         given = mass_unit if name == "mass" else velocity_unit
@@ -129,43 +131,29 @@ def read_shots(
     return Shots(tuple(_shot_set(name, shots) for name, shots in groups.items()))
 
 
-def _unit(name: str, given: str | None, known: dict[str, float], default: str) -> float:
-    if given is not None and given not in known:
-        raise ValueError(f"{name} = {given!r}; must be one of {', '.join(known)}")
-    return known[given or default]
-
-
 def _refuse(where: str, column: str, words: str) -> NoReturn:
     raise ValueError(f"{where}, column {column}: {words}") from None
 
 
-def _number(where: str, line: dict[str, Any], name: str) -> float:
-    try:
-        value = float(line[name])
-    except (TypeError, ValueError):
-        value = np.nan
-    if not np.isfinite(value):
-        _refuse(where, name, f"{line[name]!r}; must be a number")
-    return value
-
-
 def _row(where: str, line: dict[str, Any], scale: tuple[float, float], sigma: float | None) -> _Row:
     """Return one row in kg and m/s."""
-    ball, mass = _number(where, line, "ball"), _number(where, line, "mass") * scale[0]
-    before, after = (_number(where, line, name) * scale[1] for name in ("before", "after"))
-    error = _number(where, line, "sigma") if sigma is None else float(sigma)
+
+    def number(name: str, rule: str = "must be finite", low: float = -np.inf) -> float:
+        place = f"{where}, column {name}"
+        try:
+            value = float(line[name])
+        except (TypeError, ValueError):
+            raise ValueError(f"{place} = {line[name]!r}; must be a number") from None
+        return one_number(place, value, rule, low, open_low=rule == _ABOVE)
+
+    ball, mass = number("ball"), number("mass", _ABOVE, 0.0) * scale[0]
     if ball < 1 or ball != int(ball):
         _refuse(where, "ball", f"{line['ball']!r}; must be 1, 2, ... from the left")
-    if not mass > 0:
-        _refuse(where, "mass", f"{line['mass']!r}; must be above 0")
-    if not error > 0:
-        _refuse(where, "sigma", f"{error!r}; must be above 0")
-    error *= scale[1]
+    before, after = number("before") * scale[1], number("after") * scale[1]
+    error = scale[1] * (number("sigma", _ABOVE, 0.0) if sigma is None else float(sigma))
     earlier = error if before else 0.0
     if line.get("sigma_before") not in (None, ""):
-        earlier = _number(where, line, "sigma_before") * scale[1]
-        if earlier < 0:
-            _refuse(where, "sigma_before", f"{earlier!r}; must be at least 0")
+        earlier = scale[1] * number("sigma_before", "must be at least 0", 0.0)
     group, shot, kind = (str(line[name]).strip() for name in ("set", "shot", "type"))
     return _Row(group, shot, int(ball), kind, mass, before, after, error, earlier, where)
 
