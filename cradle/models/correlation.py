@@ -118,14 +118,10 @@ class ImpulseCorrelation:
         max_events: int = MAX_EVENTS,
     ) -> None:
         check_options(meeting, excess, max_events)
-        for name, ratios in (("forward", forward), ("backward", backward)):
-            value = None
-            if ratios is not None or name == "forward":
-                value = number_or_row(name, ratios, "N - 2", *_RANGE)
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "meeting", float(meeting))
-        object.__setattr__(self, "excess", excess)
-        object.__setattr__(self, "max_events", int(max_events))
+        ratios = {"forward": forward} | ({} if backward is None else {"backward": backward})
+        kept = {name: number_or_row(name, x, "N - 2", *_RANGE) for name, x in ratios.items()}
+        options = {"meeting": float(meeting), "excess": excess, "max_events": int(max_events)}
+        vars(self).update({"backward": None} | kept | options)
 
     def solve(self, chain: Chain, *, record: bool | None = None, progress: bool = False) -> Trace:
         """Solve the impact of `chain`; see `collide`.

@@ -74,16 +74,13 @@ class Pendulums:
             "gaps": number_or_row("gaps", gaps, "N - 1", least, 0.0),
             "damping": number_or_row("damping", damping, "N", least, 0.0),
         }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
         one_of("angle", angle, ("small", "full"))
         if angle == "full":
             for name, value in values.items():
                 if len(set(np.ravel(value))) > 1 or (name == "gaps" and np.any(value)):
                     rule = "must be 0" if name == "gaps" else "must be equal"
                     raise ValueError(f"{name} = {value!r}; {rule} with angle='full'")
-        object.__setattr__(self, "gravity", g)
-        object.__setattr__(self, "angle", angle)
+        vars(self).update(values, gravity=g, angle=angle)
 
     def row(self, name: str, size: int) -> Vector:
         """Return `length`, `gaps` or `damping` for each of `size` balls or contacts."""
