@@ -463,6 +463,42 @@ def test_film_gives_the_rows_of_the_table(folder):
     np.testing.assert_allclose(2 * two.after[0], one.after[0], atol=1e-3)
 
 
+def test_several_films_in_any_unit(folder, capsys):
+    """A film a shot, named by its file; positions in pixels, mm, or as the file says itself."""
+    text = (folder / "film.txt").read_text(encoding="utf-8")
+    (folder / "px.txt").write_text(scaled(text, 2000), encoding="utf-8")
+    (folder / "mm.txt").write_text(scaled(text, 1000), encoding="utf-8")
+    (folder / "cm.txt").write_text(scaled(text, 100).replace("x", "x (cm)"), encoding="utf-8")
+    named = [row.split(",") for row in call(f"{BAC} film.txt cm.txt").splitlines()]
+    assert [row[1] for row in named] == ["film"] * 6 + ["cm"] * 3
+    assert named[:3] == named[3:6]
+    metres = np.array([row[5:] for row in named[:3]], float)
+    others = [
+        [row[5:] for row in named[6:]],
+        *(
+            [row.split(",")[5:] for row in call(line).splitlines()]
+            for line in (
+                f"{BAC} --position-unit px --scale 2000".replace("film.txt", "px.txt"),
+                f"{BAC} --position-unit mm".replace("film.txt", "mm.txt"),
+            )
+        ),
+    ]
+    for rows in others:
+        np.testing.assert_allclose(np.array(rows, float), metres, rtol=1e-4, atol=1e-5)
+    for how, words in (("--length 0.3", "than a pendulum of 0.3 m"), ("--level", "is unlikely")):
+        with pytest.raises(SystemExit):
+            run(shlex.split(BAC.replace("film.txt", "px.txt").replace("--length 0.3", how)))
+        assert re.search(rf"{words}; say --position-unit", capsys.readouterr().err)
+
+
+def scaled(text, size):
+    """An export with its positions in another unit."""
+    *head, first = text.split("\n", 3)
+    lines = [line.split("\t") for line in first.strip().split("\n")]
+    rows = [[t, *(str(size * float(x)) if x else "" for x in cells)] for t, *cells in lines]
+    return "\n".join([*head, *("\t".join(row) for row in rows)]) + "\n"
+
+
 @pytest.mark.usefixtures("folder")
 def test_a_name_with_a_comma_stays_one_cell():
     line = f"{BAC} --shot 'a,b'"

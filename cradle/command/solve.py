@@ -29,6 +29,7 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"excess='saturate'": "--saturate",
     r"(mass|velocity)_unit='(\S+)'": r"--\1-unit \2",
     r"\bstiffness=": "--stiffness ",
+    r"say the unit of the positions": "say --position-unit",
     r"\b(sigma|known)=": r"--\1",
     r"\b(wanted|accuracy|impacts|length|sigma|speed|window) = ": r"--\1 ",
     r"\bmodel_error = ": "--model-error ",

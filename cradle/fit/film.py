@@ -135,6 +135,12 @@ def velocities_from_tracks(
         raise ValueError(f"{len(balls)} tracks, striker = {striker}; needs two balls and a striker")
     if length is not None:
         length = one_number("length", length, "must be above 0", 0.0, open_low=True)
+        for name, ball in tracks.items():
+            if (span := float(np.ptp(ball.positions))) > 2.0 * length:
+                raise ValueError(
+                    f"track {name!r} spans {span:.3g} m, more than a pendulum of {length:g} m; say "
+                    "the unit of the positions"
+                )
     if window is not None:
         window = one_number("window", window, "must be above 0", 0.0, open_low=True)
     if scatter is not None:
