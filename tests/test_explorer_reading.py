@@ -830,6 +830,7 @@ def test_what_rests_is_said_to_rest(visit):
         ("problem", {"ratio"}),
         ("three_balls", {"mass", "restitution", "ratio"}),
         ("patterns", {"restitution", "ratio"}),
+        ("multiple_impacts", {"restitution", "ratio"}),
         ("n_balls", {"ratio"}),
     ],
 )
@@ -854,11 +855,12 @@ def test_small_ones_in_chapters(visit, page, chapter: str, parts: set[str]):
 
 
 def test_the_first_page_does_what_it_says(visit, page):
-    """Let go, pull back, drag ball 2: ball 1 comes along, and both swing when they are released."""
+    """Let go, ratio 0, drag ball 2: ball 1 comes along, and both swing when they are released."""
     tab = visit(address=page.replace("explorer.html", "intro.html"), stopped=True)
     tab.clock.run_for(1000)
     press(tab, "Let go")
     assert later(tab, 50)["speeds"] == [1, 0, 0, 0, 0]
+    tab.get_by_label("ratio", exact=True).press("Home")
     press(tab, "Pull back")
     x, y = middle(tab, ".ball[data-ball='1'] .disc")
     tab.mouse.move(x, y)

@@ -29,6 +29,8 @@ SCRIPTS = (
     "explorer_controls.js",
     "explorer_panels.js",
     "explorer_pictures.js",
+    "explorer_guess.js",
+    "explorer_tasks.js",
     "explorer_state.js",
     "explorer.js",
 )
@@ -165,6 +167,15 @@ def measured() -> list[dict[str, Any]]:
     return scenes
 
 
+def chapters() -> list[dict[str, Any]]:
+    """Return scenes of single chapters, which are not walked through."""
+    meets = equal(3, 0.15, e=0.25)
+    meets["speeds"] = [1.0, 0.8, 0.0]
+    told = [("meets", "Balls that meet again", meets, "inside")]
+    keys = ("key", "title", "setting", "picture")
+    return [dict(zip(keys, scene, strict=True), text="") for scene in told]
+
+
 def data() -> dict[str, Any]:
     """Return all that the page does not compute itself."""
     from cradle.pictures.impacts import EVENT_STYLES, PALETTE, ball_style
@@ -175,6 +186,7 @@ def data() -> dict[str, Any]:
     dashes = [ball_style(ball)["linestyle"] for ball in range(len(PALETTE))]
     return {
         "scenes": [*story(), *measured()],
+        "chapters": chapters(),
         "masses": dict(ball_masses()),
         "restitution": {x + y: float(e) for (x, y), e in pairs.items()},
         "ratios": dict(
@@ -227,7 +239,11 @@ def add_scripts(
     if not PLACE.search(body):
         return
     root = context["pathto"]("_static", resource=True)
-    scenes = {scene["key"]: scene for scene in data()["scenes"]}
+    content = data()
+    scenes = {
+        scene["key"]: scene
+        for scene in content["scenes"] + content["chapters"]
+    }
 
     def with_picture(match: re.Match[str]) -> str:
         scene = scenes[match["scene"]]
@@ -258,7 +274,10 @@ def write_data(app: Sphinx, exception: Exception | None) -> None:
         f"globalThis.cradleExplorer = {{ data: {text} }};\n",
         encoding="utf-8",
     )
-    scenes = {scene["key"]: scene for scene in content["scenes"]}
+    scenes = {
+        scene["key"]: scene
+        for scene in content["scenes"] + content["chapters"]
+    }
     pages = Path(app.outdir).glob("**/*.html")
     shown = {
         key

@@ -6,12 +6,14 @@
 //   explorer_words.js     a hit in words
 //   explorer_plots.js     pictures of one hit       explorer_fields.js     of many hits
 //   explorer_stage.js     the balls, to be pulled   explorer_controls.js   buttons and sliders
-//   explorer_panels.js, explorer_pictures.js        the parts of an explorer
+//   explorer_panels.js, explorer_pictures.js, explorer_guess.js, explorer_tasks.js
+//                         the parts of an explorer
 //   explorer_state.js     the state and its changes
 (function (explorer) {
   "use strict";
   const { Stage, State, controls, panels } = explorer;
-  const ALL_PARTS = "scenes count scope material mass restitution ratio inside sweep map share";
+  const ALL_PARTS =
+    "scenes tasks count scope material speed mass restitution ratio beside inside sweep map share";
   const LONGEST_FRAME = 0.1; // s; a page that was hidden must not jump
 
   const less = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -22,17 +24,30 @@
     (key === " " && node.matches("button")) ||
     (key.startsWith("Arrow") && node.matches(".ball, .point"));
 
+  // A click, the louder the harder the balls meet; `strength` from 0 to 1.
+  function click(audio, strength) {
+    const [tone, volume] = [audio.createOscillator(), audio.createGain()];
+    tone.frequency.value = 2400;
+    volume.gain.setValueAtTime(0.5 * strength, audio.currentTime);
+    volume.gain.exponentialRampToValueAtTime(1e-4, audio.currentTime + 0.06);
+    tone.connect(volume).connect(audio.destination);
+    tone.start();
+    tone.stop(audio.currentTime + 0.07);
+  }
+
   class Explorer {
     // A host without `data-parts` has a page of its own: all parts, the address, the wall.
     constructor(host) {
       this.host = host;
-      const { scene, parts, picture } = host.dataset;
+      const { scene, parts, picture, guess } = host.dataset;
       this.page = parts === undefined;
       this.parts = new Set((parts ?? ALL_PARTS).split(" "));
-      this.state = new State({ scene, picture, playing: this.page && !less() });
+      const guessing = guess === undefined ? "" : guess || "once";
+      this.state = new State({ scene, picture, guessing, playing: this.page && !less() });
       this.visible = true;
       this.pointed = false; // whether a pointer has chosen what has the focus
       this.box = this.box.bind(this);
+      this.stageBox = this.stageBox.bind(this);
       this.build();
       if (this.page) this.readAddress();
       this.watch();
@@ -44,22 +59,32 @@
     build() {
       const act = this.actions();
       const { make } = controls;
+      const beside = this.parts.has("beside") ? panels.besidePanel(act) : null;
       this.panels = {
-        scenes: this.parts.has("scenes") ? panels.scenesPanel(act) : null,
-        run: panels.runPanel(act),
+        scenes: ["scenes", "chains"].some((name) => this.parts.has(name))
+          ? panels.scenesPanel(act, this.parts)
+          : null,
+        question: panels.questionPanel(act, this.host.dataset),
+        run: panels.runPanel(act, this.parts),
         words: panels.wordsPanel(),
-        outcome: panels.outcomePanel(this.host),
+        outcome: panels.outcomePanel(this.host, act, beside?.bars),
+        beside,
+        tasks: this.parts.has("tasks") ? panels.tasksPanel() : null,
         settings: panels.settingsPanel(act, this.parts),
         pictures: panels.picturesPanel(act, this.parts),
         share: this.parts.has("share") ? panels.sharePanel(act) : null,
       };
       const node = (name) => this.panels[name]?.node ?? "";
       const cradle = make("div", { class: "cradle" });
-      const left = make("div", { class: "left" }, cradle, node("run"), node("words"));
+      const stages = make("div", { class: "stages" }, cradle, beside?.place ?? "");
+      const left = make("div", { class: "left" }, stages, node("run"), node("words"));
+      this.panels.settings.node.append(node("beside"));
       const right = make("div", { class: "right" }, node("outcome"), node("pictures"));
       this.link = make("a", { href: "explorer.html" }, "Open in the full explorer");
       this.host.replaceChildren(
+        node("question"),
         node("scenes"),
+        node("tasks"),
         make("div", { class: "desk" }, left, node("settings"), right),
         node("share"),
         this.page ? "" : make("p", { class: "more" }, this.link),
@@ -120,6 +145,16 @@
         step: on(() => state.step()),
         back: on(() => state.restart(false)),
         slow: on(() => Object.assign(clock, { slow: !clock.slow, inside: null })),
+        guess: on((ball, value) => state.guess(ball, value)),
+        answer: on((answer) => (view.guess.answer = answer)),
+        guessing: on(() => {
+          state.guessing = state.guessing ? "" : "always";
+          state.set(state.setting);
+          if (state.guessing) state.restart(false);
+        }),
+        sound: on(() => (this.audio = this.audio ? null : new AudioContext())),
+        beside: on((chosen) => state.beside(chosen)),
+        speed: setting((old, speed) => explorer.pulled(old, concerned().balls[0], speed)),
         scope: on((scope) => (view.scope = scope)),
         picture: on((picture) => (view.picture = picture)),
         contact: on((contact) => (view.contact = contact === "all" ? "all" : +contact)),
@@ -206,7 +241,7 @@
         " ": () => state.play(),
         ".": () => state.step(),
       }[key];
-      if (!act || !this.panels.scenes) return;
+      if (!act || !this.page) return;
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       if (!this.full && !this.host.contains(target)) return;
       if (!this.full && key.startsWith("Page")) return; // they scroll
@@ -278,22 +313,41 @@
       this.last = now;
       const { clock, moves } = this.state;
       const running = clock.playing && moves && this.visible && !this.stage.drags.size;
-      if (running && this.state.advance(seconds)) this.stale = true;
+      if (running && this.state.advance(seconds)) {
+        this.stale = true;
+        this.sound();
+      }
       const scenery = this.state.scenery();
       if (this.stale) this.draw(scenery);
       this.move(scenery);
-      const working = this.visible && this.panels.pictures?.resume(scenery, this.box);
+      const working = this.visible && this.resume(scenery);
       if (running || working) this.wake();
       else this.last = undefined;
+    }
+
+    // After a hit: as loud as the balls meet fast.
+    sound() {
+      const { before, happened } = this.state.swing.hit(this.state.view.number);
+      if (!this.audio || !happened || this.state.clock.inside > 0) return;
+      click(this.audio, Math.min(1, Math.max(...before.slice(1).map((v, c) => before[c] - v))));
     }
 
     // Bring everything up to date with the state.
     draw(scenery) {
       this.stale = false;
-      for (const panel of Object.values(this.panels)) panel?.show(scenery, this.box);
+      const { pictures, outcome } = this.panels;
+      if (pictures) pictures.node.hidden = scenery.covered;
+      // Who chooses an answer draws no bars.
+      outcome.node.hidden = scenery.covered && "answers" in this.host.dataset;
+      for (const panel of Object.values(this.panels))
+        if (!panel?.node.hidden) panel?.show({ ...scenery, loud: this.audio }, this.box, this.stageBox);
       this.stage.lay(scenery.setting, this.stageBox());
       this.link.href = `explorer.html#${this.state.fragment()}`;
       this.writeAddress();
+    }
+
+    resume(scenery) {
+      return !scenery.covered && this.panels.pictures?.resume(scenery, this.box);
     }
 
     // What is printed is finished, seen or not.
@@ -301,7 +355,7 @@
       const scenery = this.state.scenery();
       this.draw(scenery);
       this.move(scenery);
-      while (this.panels.pictures?.resume(scenery, this.box));
+      while (this.resume(scenery));
     }
 
     // Move what moves between two changes: balls, and what travels through a hit.
@@ -314,7 +368,8 @@
       const pressed = inside ? explorer.during(record, part).pressed : [];
       this.stage.show(positions, { held: clock.time <= 0, speeds: setting.speeds, pressed });
       if (clock.inside !== null) this.panels.outcome.show(scenery, this.box);
-      this.panels.pictures?.move(scenery, this.box);
+      this.panels.beside?.move(scenery, this.stage.size);
+      if (!scenery.covered) this.panels.pictures?.move(scenery, this.box);
     }
 
     // The size of a plot. On the wall it takes what is left of the height; `under`: its slider and
@@ -327,8 +382,7 @@
     }
 
     // The cradle's box; on the wall, what the rest of its column leaves.
-    stageBox() {
-      const host = this.stage.svg.parentElement;
+    stageBox(host = this.stage.svg.parentElement) {
       const { width, em } = this.box(host);
       const others = this.panels.run.node.offsetHeight + this.panels.words.node.offsetHeight;
       const wall = Math.max(this.below(host) - others - 2 * em, 12 * em);

@@ -4,29 +4,41 @@
   "use strict";
   const { LIMITS, NONE, all, controls } = explorer;
   const { button, choice, make, select, slider } = controls;
+  const panels = (explorer.panels = {});
 
   // --- scenes: choose one, or walk through them -------------------------------------------------
 
-  function scenesPanel(act) {
+  // In a chapter of them: the paper's chains alone.
+  function scenesPanel(act, parts) {
     const { scenes } = explorer.data;
+    const chains = parts.has("chains");
     const entries = (list) => list.map(({ key, title }) => ({ value: key, text: title }));
     const options = [
       { entries: [{ value: "", text: "a setting of your own" }] },
       { group: "The story", entries: entries(scenes.filter((scene) => !scene.paper)) },
       { group: "The paper's ten chains", entries: entries(scenes.filter((scene) => scene.paper)) },
     ];
-    const list = select({ words: "Scene", options, choose: act.scene, hidden: true });
+    const list = select({
+      words: chains ? "Chain" : "Scene",
+      options: chains ? options.slice(2) : options,
+      choose: act.scene,
+      hidden: true,
+    });
     const place = make("span", { class: "place" });
     const full = button("Full screen", act.fullScreen, { class: "full" });
     const text = make("p", { class: "scene-text" });
     const walk = make(
       "div",
       { class: "walk" },
-      button("←", () => act.walk(-1), { "aria-label": "previous scene" }),
-      list.node,
-      button("→", () => act.walk(1), { "aria-label": "next scene" }),
-      place,
-      full,
+      ...(chains
+        ? [list.node]
+        : [
+            button("←", () => act.walk(-1), { "aria-label": "previous scene" }),
+            list.node,
+            button("→", () => act.walk(1), { "aria-label": "next scene" }),
+            place,
+            full,
+          ]),
     );
     function show({ scene }) {
       full.textContent = document.fullscreenElement ? "Leave full screen" : "Full screen";
@@ -37,23 +49,30 @@
       const more = link ? [" ", make("a", { href: link.address }, link.words)] : [];
       text.replaceChildren(said, ...more);
     }
-    return { node: make("div", { class: "scenes" }, walk, text), show };
+    return { node: make("div", { class: "scenes" }, walk, chains ? "" : text), show };
   }
 
   // --- running: let go, step, slow motion ---------------------------------------------------------
 
-  function runPanel(act) {
+  function runPanel(act, parts) {
     const play = button("", act.play, { class: "main" });
     const step = button("Next hit", act.step);
     const back = button("Pull back", act.back);
     const slow = button("Slow motion", act.slow);
-    function show({ clock }) {
+    const more = parts.has("share")
+      ? [
+          button("Guess first", act.guessing, { title: "cover what comes out until the balls have moved" }),
+          button("Sound", act.sound, { title: "a click at each hit, as loud as it is hard" }),
+        ]
+      : [];
+    function show({ clock, guessing, loud }) {
       const words = clock.playing ? "Pause" : clock.time > 0 ? "Go on" : "Let go";
       if (play.textContent !== words) play.textContent = words;
       back.disabled = clock.time <= 0 && !clock.playing;
       slow.setAttribute("aria-pressed", clock.slow);
+      [Boolean(guessing), Boolean(loud)].forEach((on, k) => more[k]?.setAttribute("aria-pressed", on));
     }
-    return { node: make("div", { class: "run" }, play, step, back, slow), show };
+    return { node: make("div", { class: "run" }, play, step, back, slow, ...more), show };
   }
 
   // --- settings -----------------------------------------------------------------------------------
@@ -81,7 +100,16 @@
         step: 0.01,
         input: (value) => act.ratio(value, directions),
       });
+    const [slowest, fastest] = LIMITS.speeds;
     return {
+      speed: slider({
+        words: "comes in with",
+        low: slowest,
+        high: fastest,
+        step: 0.05,
+        unit: "m/s",
+        input: act.speed,
+      }),
       mass: slider({
         words: "mass",
         low: lightest,
@@ -158,6 +186,7 @@
       material.show(worn.size === 1 ? [...worn][0] : null);
       const one = chosen !== "all";
       const rows = {
+        speed: one ? [setting.speeds[balls[0]]] : [],
         mass: balls.map((ball) => setting.masses[ball]),
         restitution: contacts.map((c) => setting.restitution[c]),
         ratio: one ? [] : inner.flatMap((k) => [setting.forward[k], setting.backward[k]]),
@@ -184,32 +213,86 @@
     return `h${+(before.pop()?.tagName[1] ?? 1) + 1}`;
   }
 
-  function outcomePanel(host) {
+  // `other`: the bars of the cradle at its side.
+  function outcomePanel(host, act, other) {
     const level = headingBelow(host);
     const title = make(level, {});
-    const bars = make("div", { class: "plot" });
-    const energy = make("div", { class: "plot" });
+    const [bars, momentum, energy] = [1, 2, 3].map(() => make("div", { class: "plot" }));
+    const handles = panels.handles(act);
+    const told = make("p", { class: "note" });
     const caption = make(
       "p",
       { class: "note" },
-      "The kinetic energy before the hit is 100\u00a0%. Grey: lost, or stored in the contacts.",
+      "Momentum: ball by ball, up to the dashed line; balls that go back take some off. " +
+        "Energy: 100\u00a0% is what there was before the hit; grey is lost, or stored in the contacts.",
     );
     const node = make(
       "div",
       { class: "outcome" },
       title,
-      bars,
-      make(level, {}, "Energy"),
+      make("div", { class: "drawn" }, bars, handles.node),
+      told,
+      other ?? "",
+      make(level, {}, "Momentum and energy"),
+      momentum,
       energy,
       caption,
     );
-    function show({ setting, hit, number, now, part }, box) {
+    function show(state, box) {
+      const { setting, hit, number, now, part, guess, covered } = state;
       const name = explorer.hitName(number);
-      title.textContent = `${part < 1 ? "During" : "After"} ${name} (m/s)`;
-      bars.innerHTML = now ? explorer.bars(box(bars), setting, hit.before, now) : "";
+      title.textContent = covered
+        ? `Your guess: after ${name} (m/s)`
+        : `${part < 1 ? "During" : "After"} ${name} (m/s)`;
+      const ghost = guess?.open && guess.touched && number === 0 ? { guess: guess.values } : {};
+      const drawn = covered ? { span: explorer.guessReach(setting).span, gap: 0.9 } : ghost;
+      bars.innerHTML = now ? explorer.bars(box(bars), setting, hit.before, now, drawn) : "";
+      momentum.innerHTML = now ? explorer.momentum(box(momentum), setting, hit.before, now) : "";
       energy.innerHTML = now ? explorer.energy(box(energy), setting, hit.before, now) : "";
+      handles.show(state, box(bars));
+      told.textContent = guess && number === 0 ? explorer.guessInWords(state) : "";
     }
     return { node, show };
+  }
+
+  // --- a second cradle ------------------------------------------------------------------------------
+
+  // At the side of the first one, with the same clock: another ratio, or a setting that was kept.
+  function besidePanel(act) {
+    const options = [["", "nothing"], ["0", "ratio 0"], ["0.15", "ratio 0.15"], ["kept", "this setting, kept as it is"]]; // prettier-ignore
+    const chosen = choice({
+      words: "beside it",
+      choose: act.beside,
+      options: options.map(([value, text]) => ({ value, text })),
+    });
+    chosen.node.classList.add("beside");
+    const place = make("div", { class: "cradle other" });
+    const plot = make("div", { class: "plot" });
+    const name = make("p", { class: "note" });
+    const bars = make("div", {}, name, plot);
+    const idle = () => {};
+    const stage = new explorer.Stage(place, { giveUp: idle });
+    stage.svg.setAttribute("aria-label", "the other cradle");
+    function show({ other, number, beside, covered }, box, stageBox) {
+      chosen.show(typeof beside === "object" ? "kept" : beside);
+      place.hidden = !other;
+      bars.hidden = !other || covered;
+      if (!other) return;
+      name.textContent = `The cradle at its side, ${typeof beside === "object" ? "as it was kept" : `ratio ${beside}`}:`;
+      const { setting } = other;
+      stage.lay(setting, stageBox(place));
+      stage.balls.forEach(({ group }) => group.removeAttribute("tabindex"));
+      const hit = other.hit(number);
+      plot.innerHTML = hit.after ? explorer.bars(box(plot), setting, hit.before, hit.after) : "";
+    }
+    function move({ other, clock }, size) {
+      if (!other) return;
+      const { setting } = other;
+      const positions = other.positions(Math.max(clock.time, 0)) ?? setting.speeds.map(() => 0);
+      stage.size = size;
+      stage.show(positions, { held: clock.time <= 0, speeds: setting.speeds });
+    }
+    return { node: chosen.node, place, bars, show, move };
   }
 
   // --- what the page says and gives away ------------------------------------------------------------
@@ -251,7 +334,8 @@
     return { node, show: ({ setting }) => (code.textContent = explorer.python(setting)) };
   }
 
-  explorer.panels = {
+  Object.assign(panels, {
+    besidePanel,
     concerned,
     outcomePanel,
     runPanel,
@@ -259,5 +343,5 @@
     settingsPanel,
     sharePanel,
     wordsPanel,
-  };
+  });
 })(globalThis.cradleExplorer);

@@ -6,10 +6,37 @@
   const TITLES = { inside: "Inside the hit", sweep: "All ratios", map: "Mass ratios" };
   // Milliseconds of each frame for sweeps and maps.
   const BUDGET = 7;
+  const LISTED = 12; // events as buttons
 
   // --- a hit from the inside ------------------------------------------------------------------------
 
-  function insidePicture(act) {
+  // The events of a hit as buttons, numbered as in chapter 4: contacts that end, and that begin anew.
+  function eventList(act) {
+    const node = make("ol", { class: "events" });
+    let listed = null;
+    const words = ({ kind, contact }) =>
+      `balls ${contact + 1} and ${contact + 2} ${kind === "close" ? "meet again" : "part"}`;
+    function show({ record, part }) {
+      const total = record ? explorer.progress(record) : [0];
+      const end = total[total.length - 1];
+      const events = (record?.events ?? []).flatMap((event, k) =>
+        event.kind === "maximum_compression" ? [] : [{ ...event, at: total[k + 1] / end }],
+      );
+      if (record !== listed)
+        node.replaceChildren(
+          ...events.slice(0, LISTED).map((event) => make("li", {}, button(words(event), () => act.part(event.at)))),
+        );
+      listed = record;
+      [...node.children].forEach(({ firstChild }, k) => {
+        const now = part >= events[k].at - 1e-9 && !(part >= (events[k + 1]?.at ?? 2) - 1e-9);
+        firstChild.setAttribute("aria-pressed", now);
+      });
+    }
+    return { node, show };
+  }
+
+  function insidePicture(act, parts) {
+    const events = parts.has("events") ? eventList(act) : null;
     const contact = select({ words: "velocities of", options: [], choose: act.contact });
     const plot = make("div", { class: "plot" });
     const part = make("input", {
@@ -58,8 +85,10 @@
           ? "There is no answer to draw."
           : "There is no hit to draw.";
     }
-    function move({ record, contact: chosen, part: now }, box) {
+    function move(state, box) {
+      const { record, contact: chosen, part: now } = state;
       if (!drawn || !record) return;
+      events?.show(state);
       if (document.activeElement !== part || +part.value !== now) part.value = now;
       if (drawn.now === now) return;
       drawn.now = now;
@@ -68,7 +97,7 @@
       plot.querySelector(".now").innerHTML = explorer.dots(drawn.plot, record, chosen, now, em);
     }
     return {
-      node: make("div", {}, contact.node, plot, scrub, note),
+      node: make("div", {}, contact.node, plot, scrub, events?.node ?? "", note),
       show,
       move,
       resume: () => false,
@@ -262,7 +291,7 @@
     const makers = { inside: insidePicture, sweep: sweepPicture, map: mapPicture };
     const names = Object.keys(makers).filter((name) => parts.has(name));
     if (!names.length) return null;
-    const pictures = Object.fromEntries(names.map((name) => [name, makers[name](act)]));
+    const pictures = Object.fromEntries(names.map((name) => [name, makers[name](act, parts)]));
     const options = names.map((value) => ({ value, text: TITLES[value] }));
     const tabs = choice({ words: "picture", options, choose: act.picture, hidden: true });
     tabs.node.classList.add("tabs");

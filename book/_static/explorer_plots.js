@@ -115,21 +115,26 @@
   const polyline = (points, how) =>
     `<polyline fill="none" ${how} points="${points.map(([x, y]) => `${x},${y}`).join(" ")}"/>`;
 
-  // Velocities as bars, a row for each ball, to the left and to the right as the balls move. Thin
-  // outlines show the velocities before.
-  function bars(box, setting, before, now) {
-    const { width, em } = box;
-    const count = now.length;
-    const row = 1.75 * em;
+  // Where bars of velocities stand: a row for each ball, and room for its name and its number.
+  // `span`: the velocities that must have room.
+  function barPlaces({ width, em }, span) {
     const name = 3.2 * em;
     const number = 3.4 * em;
-    const largest = Math.max(...before.map(Math.abs), ...now.map(Math.abs), 1e-9);
-    const low = Math.min(0, ...before, ...now) / largest;
-    const high = Math.max(0, ...before, ...now) / largest;
+    const largest = Math.max(...span.map(Math.abs), 1e-9);
+    const low = Math.min(0, ...span) / largest;
+    const high = Math.max(0, ...span) / largest;
     // Room for a number beyond a bar that goes to the left.
     const left = name + (low < 0 ? number : 0);
     const scale = (width - number - left) / Math.max(high - low, 1e-9);
-    const x = (value) => px(left + (value / largest - low) * scale);
+    return { row: 1.75 * em, x: (value) => px(left + (value / largest - low) * scale) };
+  }
+
+  // Velocities as bars, to the left and to the right as the balls move. Thin outlines show the
+  // velocities before, `guess` what the reader has drawn.
+  function bars(box, setting, before, now, { guess = [], span, gap = 0.35 } = {}) {
+    const { width, em } = box;
+    const count = now.length;
+    const { row, x } = barPlaces(box, span ?? [...before, ...now, ...guess]);
     const parts = [];
     for (let ball = 0; ball < count; ball += 1) {
       const top = px(ball * row + 0.25 * em);
@@ -142,8 +147,9 @@
       );
       parts.push(text(1.3 * em, top + em, `${ball + 1}${letter}`));
       parts.push(bar(before[ball], 'class="before"'), bar(now[ball], `fill="${colour(ball)}"`));
+      if (guess.length) parts.push(bar(guess[ball], 'class="guess"'));
       const leftwards = +now[ball].toFixed(2) < 0;
-      const at = x(now[ball]) + (leftwards ? -0.35 : 0.35) * em;
+      const at = x(now[ball]) + (leftwards ? -gap : gap) * em;
       const end = leftwards ? 'text-anchor="end" class="number"' : 'class="number"';
       parts.push(text(at, top + em, fixed(now[ball]), end));
     }
@@ -152,16 +158,47 @@
     return picture({ width, height: count * row + 0.2 * em }, words, parts.join(""));
   }
 
-  // Where the kinetic energy is: one share for each ball, and what is stored or lost.
+  // Momentum, ball by ball, each from where the one before has ended: to the right, or back. The
+  // mark is the momentum before the hit, where the last one has to end.
+  function momentum(box, setting, before, now) {
+    const { width, em } = box;
+    const of = (row) => row.map((v, ball) => setting.masses[ball] * v);
+    const ends = of(now).reduce((all, p) => [...all, all[all.length - 1] + p], [0]);
+    const total = sum(of(before));
+    const [low, high] = [Math.min(0, total, ...ends), Math.max(0, total, ...ends)];
+    const x = (p) => px(em + ((p - low) / Math.max(high - low, 1e-9)) * (width - 2 * em));
+    const thick = 0.55 * em;
+    const pieces = ends.slice(1).map((end, ball) => {
+      const [from, to] = [x(ends[ball]), x(end)];
+      const back = to < from;
+      const y = px(back ? 0.5 * em + thick : 0.5 * em);
+      return (
+        `<rect x="${Math.min(from, to)}" y="${y}" width="${px(Math.abs(to - from))}" ` +
+        `height="${px(thick)}" fill="${colour(ball)}"/>`
+      );
+    });
+    const height = em + 2 * thick;
+    const tick = (p, how) => `<path class="${how}" d="M${x(p)} 0V${px(height)}"/>`;
+    const last = ends[ends.length - 1];
+    return picture(
+      { width, height },
+      `Momentum: ${fixed(last)}, before the hit ${fixed(total)} kg m/s`,
+      tick(0, "zero") + pieces.join("") + tick(total, "cursor"),
+    );
+  }
+
+  // Where the kinetic energy is: one share for each ball, and what is stored or lost. A guess may
+  // have more than there was: then a line marks the energy before.
   function energy(box, setting, before, now) {
     const { width, em } = box;
     const total = sum(kinetic(setting.masses, before));
     const shares = kinetic(setting.masses, now).map((share) => (total > 0 ? share / total : 0));
     const gone = total > 0 ? Math.max(0, 1 - sum(shares)) : 0;
     const height = 1.5 * em;
+    const whole = Math.max(1, sum(shares) - 1e-9);
     let x = 0;
     const piece = (share, how, label, fill) => {
-      const wide = share * width;
+      const wide = (share / whole) * width;
       const part =
         `<rect x="${px(x)}" y="0" width="${px(wide)}" height="${px(height)}" ${how}/>` +
         (wide > 2.6 * em
@@ -175,6 +212,10 @@
       piece(share, `fill="${colour(ball)}" class="part"`, percent(share), `fill="${letters(ball)}"`),
     );
     parts.push(piece(gone, 'class="gone"', percent(gone), ""));
+    if (whole > 1.0005) {
+      const at = px(width / whole);
+      parts.push(`<path class="limit" d="M${at} ${px(-0.3 * em)}V${px(height + 0.3 * em)}"/>`);
+    }
     const words = shares.map((share, ball) => `ball ${ball + 1} ${percent(share)}`).join(", ");
     return picture(
       { width, height },
@@ -303,15 +344,18 @@
 
   Object.assign(explorer, {
     axes,
+    barPlaces,
     bars,
     colour,
     diagram,
     dots,
     during,
     energy,
+    momentum,
     names,
     picture,
     polyline,
+    progress,
     px,
     span,
     stroke,

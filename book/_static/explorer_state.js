@@ -6,14 +6,17 @@
   const SLOW = 0.25; // of the true speed
   const INSIDE = 3.5; // seconds that a hit takes in slow motion
   const REST = 0.5; // seconds before the balls are let go again
+  const GUESS = "Nothing is shown before the hit. Guess, then let the balls go.";
 
-  const { scenes } = explorer.data;
-  const named = (key) => scenes.find((scene) => scene.key === key);
+  const { chapters, scenes } = explorer.data;
+  const named = (key) => [...scenes, ...chapters].find((scene) => scene.key === key);
 
   class State {
-    // `picture`: which one to show instead of that of a scene.
-    constructor({ scene, playing, picture }) {
+    // `picture`: which one to show instead of that of a scene; `guessing`: whether the outcome is
+    // covered until the reader has seen the balls move, this "once", "always", or not at all ("").
+    constructor({ scene, playing, picture, guessing = "" }) {
       this.picture = picture;
+      this.guessing = guessing;
       this.clock = { time: 0, playing, slow: false, inside: null };
       this.view = {
         scene: "", // a key, or none for a setting of the reader's own
@@ -23,12 +26,15 @@
         number: 0, // of the hit that is shown
         part: 1, // how far that hit has come
         notice: "",
+        guess: null, // {values, answer, touched, open}
+        beside: "", // what swings below: a ratio, or a setting that was kept
       };
       this.take(scene);
     }
 
     set(setting) {
       this.setting = setting;
+      this.own = true; // the reader's, unless it comes from the list of scenes
       this.swing = new Swing(setting);
       const { view } = this;
       const count = setting.masses.length;
@@ -37,7 +43,41 @@
       view.scene = scenes.find((scene) => explorer.equal(scene.setting, setting))?.key ?? "";
       this.lastScene = view.scene || this.lastScene;
       view.notice = "";
+      const old = view.guess;
+      const same = old && !old.open && old.values.length === count;
+      const fresh = { values: setting.speeds.map(() => 0), answer: "", touched: false, open: false };
+      view.guess = this.guessing ? (same ? old : fresh) : null;
+      this.lay();
       this.restart(this.clock.playing);
+    }
+
+    // What swings below: the same setting with another ratio, or one that was kept.
+    lay() {
+      const { setting } = this;
+      const { beside } = this.view;
+      const other = typeof beside === "object" ? beside : explorer.withRatio(setting, explorer.all(setting.forward), +beside);
+      this.other = beside === "" ? null : new Swing(other);
+    }
+
+    beside(chosen) {
+      this.view.beside = chosen === "kept" ? this.setting : chosen;
+      this.lay();
+    }
+
+    // --- the reader's guess -----------------------------------------------------------------------
+
+    guess(ball, value) {
+      const { guess } = this.view;
+      guess.values = guess.values.map((old, k) => (k === ball ? value : old));
+      guess.touched = true;
+    }
+
+    // The balls have moved.
+    open() {
+      const { guess } = this.view;
+      if (!guess || guess.open) return;
+      guess.open = true;
+      if (this.guessing === "once") this.guessing = "";
     }
 
     // Return what brings everything back to where it is now.
@@ -60,6 +100,7 @@
         contact: "all",
       });
       this.set(scene.setting);
+      this.own = false;
     }
 
     // To the next scene or back, from the last one that was shown.
@@ -108,6 +149,7 @@
     step() {
       const number = this.swing.latest(Math.max(this.clock.time, 0)) + 1;
       Object.assign(this.clock, { time: Swing.time(number), playing: false, inside: null });
+      this.open();
       this.show(number);
     }
 
@@ -125,6 +167,7 @@
       const next = swing.latest(clock.time) + 1;
       clock.time += seconds * (clock.slow ? SLOW : 1);
       if (clock.time < Swing.time(next)) return false;
+      this.open();
       const { status, happened } = swing.hit(next);
       if (status !== "finished") {
         Object.assign(clock, { time: Swing.time(next), playing: false });
@@ -146,6 +189,8 @@
 
     // Velocities of all balls at the part of the hit that is shown; null if it has no answer.
     now(hit) {
+      const { guess } = this.view;
+      if (guess && !guess.open) return guess.values;
       if (hit.status !== "finished") return null;
       return this.record ? explorer.during(this.record, this.view.part).velocities : hit.after;
     }
@@ -154,8 +199,13 @@
       const { setting, clock, view, swing, record } = this;
       const hit = swing.hit(view.number);
       const firstAfter = swing.hit(0).after;
-      const words = view.notice || explorer.outcomeInWords(setting, hit, view.number, record);
-      return { ...view, setting, clock, hit, record, firstAfter, now: this.now(hit), words };
+      const covered = Boolean(view.guess && !view.guess.open);
+      const words =
+        view.notice ||
+        (covered ? GUESS : explorer.outcomeInWords(setting, hit, view.number, record));
+      const { guessing, other, own } = this;
+      const seen = { guessing, covered, other, own, words, now: this.now(hit) };
+      return { ...view, setting, clock, hit, record, firstAfter, ...seen };
     }
   }
 

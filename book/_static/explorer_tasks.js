@@ -1,0 +1,60 @@
+// Tasks on the live cradle, from easy to hard. Whether one is done, the solver says: each asks what
+// was set, the velocities after the first hit, and the record of it.
+(function (explorer) {
+  "use strict";
+  const { controls, kinetic, panels, sum } = explorer;
+  const { make } = controls;
+  const STILL = 0.005; // of the fastest ball's speed
+
+  const back = (v) => v.filter((speed) => speed < -STILL).length;
+  const kept = (masses, before, after) => sum(kinetic(masses, after)) / sum(kinetic(masses, before));
+  const TASKS = [
+    [1, "Make the last two balls leave alike.", ({ v, last }) => last > 0.1 && Math.abs(v.at(-2) - last) < STILL],
+    [1, "Send the last ball off faster than the striker came.", ({ last }) => last > 1.2],
+    [2, "Lose more than half of the energy, and let the last ball leave with more than half of the striker's speed.",
+      ({ masses, before, v, last }) => kept(masses, before, v) < 0.5 && last > 0.5],
+    [3, "Stop the striker dead, with every ratio at least 0.1.",
+      ({ v, setting }) => Math.abs(v[0]) < STILL && Math.min(...setting.forward, ...setting.backward) >= 0.1],
+    [3, "Lose no energy, and make two balls come back.",
+      ({ masses, before, v }) => kept(masses, before, v) > 1 - 1e-9 && back(v) === 2],
+    [3, "Make balls 1 and 2 collide ten times in one hit.", ({ record }) => record.collisions[0] >= 10],
+  ]; // prettier-ignore
+
+  // Whether each task is done by the first hit: one ball, the first, strikes others at rest.
+  function done(setting, { before, after, happened }, record) {
+    const alone = before[0] > 0 && before.slice(1).every((v) => v === 0) && before.length > 2;
+    if (!alone || !happened || !after || !record) return TASKS.map(() => false);
+    const [unit, v] = [before, after].map((row) => row.map((speed) => speed / before[0]));
+    const asked = { setting, masses: setting.masses, before: unit, v, last: v.at(-1), record };
+    return TASKS.map(([, , met]) => met(asked));
+  }
+
+  function tasksPanel() {
+    const met = TASKS.map(() => false);
+    const items = TASKS.map(([stars, words]) =>
+      make("li", {}, make("span", { "aria-label": `grade ${stars} of 3` }, "★".repeat(stars)), ` ${words} `, make("b", {})),
+    );
+    const count = make("span", { role: "status" });
+    const node = make(
+      "details",
+      { class: "tasks" },
+      make("summary", {}, "Tasks ", count),
+      make("p", {}, "Of three balls or more pull back the first, and set whatever else you like. The first hit counts."),
+      make("ol", {}, ...items),
+    );
+    function show({ setting, hit, number, record, covered, own }) {
+      if (own && !covered && number === 0)
+        done(setting, hit, record).forEach((now, k) => {
+          met[k] ||= now;
+          items[k].lastChild.textContent = met[k] ? "\u2713 done" : "";
+          items[k].classList.toggle("done", met[k]);
+        });
+      const words = `(${met.filter(Boolean).length} of ${TASKS.length} done)`;
+      if (count.textContent !== words) count.textContent = words;
+    }
+    return { node, show };
+  }
+
+  explorer.tasksDone = done;
+  panels.tasksPanel = tasksPanel;
+})(globalThis.cradleExplorer);

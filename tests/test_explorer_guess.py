@@ -1,0 +1,202 @@
+"""Guesses, questions and tasks on the live cradles: what is covered, and what the solver says."""
+
+import re
+
+import numpy as np
+import pytest
+from chapters import Chapter
+from explorer import (
+    EXPLORER,
+    address_of_page,  # noqa: F401
+    chain_of,
+    drawn,
+    later,
+    press,
+    still,
+    visits,  # noqa: F401
+)
+from test_layout import browser  # noqa: F401
+
+from cradle import Chain, ImpulseCorrelation, collide
+
+NUMBERS = """(node) => [...node.querySelectorAll('text.number')]
+  .map((text) => +text.textContent.replace('\\u2212', '-'))"""
+
+
+def guess(tab, ball: int, keys: str, times: int):
+    for _ in range(times):
+        tab.get_by_label(f"your guess for ball {ball}, m/s").press(keys)
+
+
+def chapter(visit, page, name: str):
+    return still(visit, address=page.replace("explorer.html", f"{name}.html"))
+
+
+def test_the_first_page_is_guessed(visit, page):
+    """Nothing tells the outcome before the balls have moved; then the guess stays as an outline."""
+    tab = chapter(visit, page, "intro")
+    shown = drawn(tab)
+    expected = collide(*chain_of(shown)).velocities
+    host = tab.locator(".cradle-explorer")
+    for value in expected[np.abs(expected) > 0.05]:
+        assert f"{abs(value):.2f}" not in host.inner_text()
+    assert tab.locator(".question p").last.is_hidden()
+    guess(tab, 5, "ArrowRight", 18)
+    guess(tab, 1, "ArrowLeft", 2)
+    drawn(tab)
+    assert tab.evaluate(f"{EXPLORER}.state.view.guess.values") == pytest.approx(
+        [-0.1, 0, 0, 0, 0.9]
+    )
+    assert "80\u00a0% of the momentum and 82\u00a0% of the energy" in host.inner_text()
+    press(tab, "Next hit")
+    drawn(tab)
+    bars = tab.locator(".outcome .drawn")
+    assert bars.evaluate(NUMBERS) == expected.round(2).tolist()
+    assert bars.locator(".guess").count() == 5
+    off = np.abs(expected - [-0.1, 0, 0, 0, 0.9])
+    words = f"off by at most {off.max():.2f} m/s, at ball {off.argmax() + 1}"
+    assert words in host.inner_text()
+    assert tab.locator(".question p").last.is_visible()
+    # From here on nothing is covered any more.
+    tab.get_by_label("ratio", exact=True).press("ArrowLeft")
+    after = drawn(tab)["after"]
+    assert bars.evaluate(NUMBERS) == np.round(after, 2).tolist()
+
+
+@pytest.mark.parametrize(
+    ("name", "said", "words"),
+    [
+        ("multiple_impacts", "3", "You said 3; it is 4."),
+        ("multiple_impacts", "4", "Yes: 4."),
+        ("patterns", "ball 1", "You said ball 1; it is none."),
+        ("patterns", "none", "Yes: none."),
+    ],
+)
+def test_a_question_of_a_chapter(visit, page, name, said, words):
+    """The answer is the solver's; pictures are seen after the balls have moved."""
+    tab = chapter(visit, page, name)
+    trace = collide(*chain_of(drawn(tab)))
+    right = str(trace.collisions.sum()) if name == "multiple_impacts" else "none"
+    assert right in words
+    assert right != "none" or min(trace.velocities) > 0
+    assert tab.locator(".pictures").is_hidden()
+    assert tab.locator(".outcome").is_hidden()
+    tab.get_by_label(said, exact=True).check(force=True)
+    press(tab, "Next hit")
+    drawn(tab)
+    assert tab.inner_text(".question .told") == words
+    assert tab.locator(".pictures").is_visible()
+
+
+def test_events_are_those_of_the_chapter(visit, page):
+    """Numbered as in its table; a press goes there."""
+    tab = chapter(visit, page, "multiple_impacts")
+    trace = collide(*chain_of(drawn(tab)))
+    told = re.search(r"impact:(.*)m/s", Chapter("multiple_impacts").printed("example-code"))[1]
+    assert [float(v) for v in told.split()] == trace.velocities.round(4).tolist()
+    press(tab, "Next hit")
+    drawn(tab)
+    rows = [
+        (row, f"balls {c + 1} and {c + 2} {'meet again' if kind == 'close' else 'part'}")
+        for row, (kind, c) in enumerate(trace.events, start=1)
+        if kind != "maximum_compression"
+    ]
+    assert tab.locator(".events button").all_inner_texts() == [words for _, words in rows]
+    for number, (row, _) in enumerate(rows):
+        tab.locator(".events button").nth(number).click()
+        drawn(tab)
+        shown = tab.locator(".outcome .drawn").evaluate(NUMBERS)
+        assert shown == trace.path[row].round(2).tolist()
+
+
+def test_each_chain_of_chapter_7_is_guessed(visit, page):
+    tab = chapter(visit, page, "experiments")
+    drawn(tab)
+    options = tab.locator(".walk option").all_inner_texts()
+    assert len(options) == 10
+    for chain in options[:3]:
+        tab.locator(".walk select").select_option(chain)
+        drawn(tab)
+        assert tab.locator(".pictures").is_hidden()
+        press(tab, "Next hit")
+        after = drawn(tab)["after"]
+        assert tab.locator(".outcome .drawn").evaluate(NUMBERS) == np.round(after, 2).tolist()
+
+
+# A setting that does each task, in the order of the page.
+TASKS = (
+    "speeds=1,0,0&forward=0.5",
+    "speeds=1,0,0&masses=4,2,1&forward=0",
+    "speeds=1,0,0,0,0&restitution=0.7&forward=0",
+    "speeds=1,0,0&masses=1.12,1,1&forward=0.1",
+    "speeds=1,0,0&masses=1,0.05,2&forward=0.15",
+    "speeds=1,0,0&masses=1,0.02,10&forward=0.15",
+)
+
+
+def test_tasks_are_judged_by_the_solver(visit):
+    tab = still(visit)
+    drawn(tab)
+    count = tab.locator(".tasks li")
+    assert count.count() == len(TASKS)
+    done = "(node) => node.classList.contains('done')"
+    assert not any(count.nth(k).evaluate(done) for k in range(len(TASKS)))
+    for k, setting in enumerate(TASKS):
+        assert not count.nth(k).evaluate(done), setting
+        tab.evaluate(f"{EXPLORER}.state.read('{setting}'), {EXPLORER}.changed()")
+        drawn(tab)
+        assert count.nth(k).evaluate(done), setting
+    assert f"{len(TASKS)} of {len(TASKS)} done" in tab.inner_text(".tasks summary")
+    # Two balls that are pulled do none of them.
+    nothing = (
+        "(({setting, swing, record}) => cradleExplorer.tasksDone(setting, swing.hit(0), record))"
+    )
+    tab.evaluate(f"{EXPLORER}.state.read('speeds=1,1,0&forward=0.5'), {EXPLORER}.changed()")
+    assert not any(tab.evaluate(f"{nothing}({EXPLORER}.state)"))
+
+
+def test_two_cradles_side_by_side(visit):
+    """The other one has its own ratio, or what was kept; both are the solver's."""
+    tab = still(visit, "#speeds=1,0,0&forward=0.3")
+    kept = drawn(tab)["after"]
+    other = tab.locator(".outcome > div:not(.drawn) .plot")
+    for label, expected in (
+        ("ratio 0.15", collide(Chain([1] * 3, [1, 0, 0]), ImpulseCorrelation(0.15)).velocities),
+        ("this setting, kept as it is", kept),
+    ):
+        tab.get_by_label(label, exact=True).check(force=True)
+        drawn(tab)
+        assert other.first.evaluate(NUMBERS) == np.round(expected, 2).tolist()
+    tab.get_by_label("ratio", exact=True).press("Home")
+    drawn(tab)
+    assert other.first.evaluate(NUMBERS) == np.round(kept, 2).tolist()
+    assert tab.locator(".outcome .drawn").evaluate(NUMBERS) == [0, 0, 1]
+    tab.get_by_label("nothing", exact=True).check(force=True)
+    drawn(tab)
+    assert tab.locator(".other").is_hidden()
+
+
+def test_a_speed_is_typed_and_a_hit_is_heard(visit):
+    tab = still(visit, stopped=True)
+    later(tab, 50)
+    tab.evaluate(
+        """() => {
+          globalThis.clicks = [];
+          const node = () => ({ connect: (next) => next, start() {}, stop() {}, frequency: {},
+            gain: { setValueAtTime: (x) => clicks.push(x), exponentialRampToValueAtTime() {} } });
+          globalThis.AudioContext = class { createOscillator = node; createGain = node; };
+        }"""
+    )
+    tab.get_by_title("ball 1", exact=True).click()
+    later(tab, 50)
+    box = tab.get_by_label("comes in with, as a number")
+    box.fill("0.5")
+    box.press("Enter")
+    assert later(tab, 50)["speeds"] == [0.5, 0, 0, 0, 0]
+    press(tab, "Let go")
+    later(tab, 2000)
+    assert tab.evaluate("clicks") == []  # off by default
+    press(tab, "Sound")
+    later(tab, 4000)
+    assert tab.evaluate("clicks")
+    assert set(tab.evaluate("clicks")) == {0.25}  # half of the loudest, as the speed is
