@@ -329,15 +329,6 @@ def test_fig_experiments_structure_as_drawn():
         np.testing.assert_allclose(drawn, sorted(expected), rtol=1e-12)
 
 
-def test_fig_experiments_swap_as_drawn():
-    table = ratio_table().set_index("triplet").ratio
-    (ax,) = Chapter("reading").figures["fig-experiments-swap"].axes
-    drawn = {tuple(np.round(line[0], 9)) for line in points(ax, 1)}
-    printed = {(table[x + "C" + z], table[x + "B" + z]) for x in "ABCD" for z in "ABCD"}
-    put_back = {(table[t[0] + "C" + t[2]], table[t[::-1]]) for t in ("DBB", "BBD", "DBC", "CBD")}
-    assert drawn == printed | put_back
-
-
 def test_fig_experiments_identify_as_drawn():
     """Bars of four triplets: their ends agree within the error, and a step beyond they do not."""
     table = ratio_table().set_index("triplet")

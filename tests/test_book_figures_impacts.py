@@ -5,11 +5,11 @@ import re
 
 import numpy as np
 import pytest
-from chapters import after, drawn, lines, panel, solved
+from chapters import after, drawn, lines, panel, points, solved
 from test_book_n_balls import FIG_8, contact_work
 from test_book_patterns import by_turns, edge, turn
 
-from cradle import ImpulseCorrelation, collide, textbook
+from cradle import ImpulseCorrelation, collide, ratio_table, textbook
 from cradle.measures import bouncing_pattern
 
 CLOSE = {"rtol": 0, "atol": 1e-12}
@@ -202,6 +202,15 @@ def test_fig_overlap():
     ]
     met = trace.path[trace.events.index(("close", 1)) + 1, 1]
     assert (low + high) / 2 == pytest.approx(met, abs=1e-12)
+
+
+def test_fig_experiments_swap_as_drawn():
+    table = ratio_table().set_index("triplet").ratio
+    (ax,) = drawn("reading")["fig-experiments-swap"].axes
+    shown = {tuple(np.round(line[0], 9)) for line in points(ax, 1)}
+    printed = {(table[x + "C" + z], table[x + "B" + z]) for x in "ABCD" for z in "ABCD"}
+    put_back = {(table[t[0] + "C" + t[2]], table[t[::-1]]) for t in ("DBB", "BBD", "DBC", "CBD")}
+    assert shown == printed | put_back
 
 
 def test_fig_notation_contact():
