@@ -710,8 +710,8 @@ def costs(point):
             break
         yield "march", float(steps), end.steps, float(np.abs(end.velocities - exact).max())
     if e == 1:
-        best = collide(chain, SpringChain(1.0, rtol=1e-13))
+        best = collide(chain, SpringChain(1.0, accuracy=1e-12))
         for power in (4, 6, 8, 10, 12):
-            end = collide(chain, SpringChain(1.0, rtol=10.0**-power))
+            end = collide(chain, SpringChain(1.0, accuracy=10.0**-power))
             off = float(np.abs(end.velocities - best.velocities).max())
             yield "springs", 10.0**-power, end.evaluations, off

@@ -150,7 +150,8 @@ def triplets():
         chains = [Chain(m, [1, 0, 0], r) for m, r in zip(masses, e, strict=True)]
         columns[name] = off(np.array([collide(c, model).velocities for c in chains]), listed)
     columns["implied"] = [
-        effective_ratio(collide(Chain(m, [1, 0, 0], 1), SpringChain(rtol=1e-10))) for m in masses
+        effective_ratio(collide(Chain(m, [1, 0, 0], 1), SpringChain(accuracy=1e-10)))
+        for m in masses
     ]
     every, m, r = np.arange(len(names)), masses[:, None], e[:, None]
     one = off(post_impact_velocities(m, [1, 0, 0], r, ONE[:, None], excess="saturate"),

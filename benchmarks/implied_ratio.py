@@ -29,7 +29,7 @@ COLUMNS = [*CASE, "v1", "v2", "v3", "bound", "ratio", "note"]
 def outcome(exponent, m2_over_m1, m3_over_m2, k2_over_k1):
     """Return the impact of three balls on springs."""
     masses = np.cumprod([1.0, m2_over_m1, m3_over_m2])
-    model = SpringChain([1.0, k2_over_k1], exponent, rtol=1e-11)
+    model = SpringChain([1.0, k2_over_k1], exponent, accuracy=1e-11)
     return collide(Chain(masses, [1.0, 0.0, 0.0], 1.0), model)
 
 

@@ -146,7 +146,7 @@ def losses(restitution, ratio, balls):
 
 def springs(exponent, balls):
     """Return a row: the same chain on springs, without losses."""
-    found = collide(Chain(*still_chain(balls), 1.0), SpringChain(1.0, exponent, rtol=1e-10))
+    found = collide(Chain(*still_chain(balls), 1.0), SpringChain(1.0, exponent, accuracy=1e-10))
     return {
         "group": "springs",
         "restitution": 1.0,

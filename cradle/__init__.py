@@ -31,6 +31,7 @@ from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
+from cradle.models.springs import spring_velocities
 from cradle.runtime.job import warm_up
 from cradle.swinging.pendulums import Pendulums
 from cradle.swinging.record import Impact, Swing
@@ -67,6 +68,7 @@ __all__ = [
     "ratio_table",
     "recommend",
     "restitution_table",
+    "spring_velocities",
     "swing",
     "warm_up",
 ]

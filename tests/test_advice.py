@@ -80,7 +80,7 @@ def test_springs_among_the_measured_chains():
             assert off(striking(m), advice, finer) <= accuracy + own
             assert advice.numerical_error * 10 <= accuracy
     for m, _ in between(6, (3, 4, 5), 60.0, seed=8):
-        other = collide(striking(m), SpringChain(1.0, rtol=1e-12, method="RK45")).velocities
+        other = collide(striking(m), SpringChain(1.0, accuracy=1e-12)).velocities
         for accuracy in (1e-3, 1e-5, 1e-7):
             advice = recommend(striking(m), accuracy=accuracy, stiffness=1.0)
             assert off(striking(m), advice, other) <= accuracy
@@ -88,7 +88,7 @@ def test_springs_among_the_measured_chains():
 
 def test_forces_and_times_are_no_worse_than_said():
     """Their errors were not measured; the notes say so.  Of three balls they can be looked at."""
-    best = collide(THREE, SpringChain(1.0, rtol=1e-13))
+    best = collide(THREE, SpringChain(1.0, accuracy=1e-12))
     for accuracy in (1e-3, 1e-6):
         model = recommend(THREE, ("forces", "times"), accuracy=accuracy, stiffness=1.0).model
         trace = collide(THREE, model)
@@ -246,7 +246,7 @@ def test_the_cheapest_setting_of_the_table(name, accuracy):
     if words[0] == "rtol":
         assert model == EnergyDistribution(1.0, rtol=float(words[1]))
     else:
-        assert model == SpringChain(1.0, method=words[0], rtol=float(words[2]))
+        assert model == SpringChain(1.0, accuracy=float(words[1]))
 
 
 @pytest.mark.parametrize(
@@ -347,7 +347,7 @@ def test_what_the_refusal_says_of_sequential_collisions_is_measured():
 def test_what_is_shown():
     advice = recommend(THREE, "forces", accuracy=1e-3, stiffness=1e10)
     text = repr(advice)
-    assert text.startswith("Recommendation: SpringChain(stiffness=10000000000.0, rtol=")
+    assert text.startswith("Recommendation: SpringChain(stiffness=10000000000.0, accuracy=")
     assert f"{advice.numerical_error:.1e}" in text
     assert lasting(advice.seconds) in text
     assert advice.reason in text

@@ -41,7 +41,7 @@ def test_bars_are_the_velocities_at_every_event():
 
 def test_bars_of_springs_follow_their_curves():
     """Three equal balls on linear springs, by their two modes, until the first contact opens."""
-    trace = collide(Chain([1, 1, 1], [1, 0, 0]), SpringChain(1.0, 1, rtol=1e-12))
+    trace = collide(Chain([1, 1, 1], [1, 0, 0]), SpringChain(1.0, 1, accuracy=1e-12))
     svg = animate(trace).svg
     t = np.linspace(0, 2.4, 13)[:, None]
     slow, fast = np.cos(t) * [1 / 2, 0, -1 / 2], np.cos(np.sqrt(3) * t) * [1 / 6, -1 / 3, 1 / 6]

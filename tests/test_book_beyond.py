@@ -156,7 +156,7 @@ def test_stored_springs_by_another_integrator(exponent):
         balls = int(row["balls"])
         if balls > 15:
             continue
-        model = SpringChain(1.0, exponent, rtol=1e-9, method="RK45")
+        model = SpringChain(1.0, exponent, accuracy=1e-9)
         after = collide(Chain(*struck(balls), 1.0), model).velocities
         stored = [row[name] for name in ("first", "third_last", "second_last", "last")]
         np.testing.assert_allclose(after[[0, -3, -2, -1]], stored, rtol=0, atol=2e-6)

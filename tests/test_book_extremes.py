@@ -255,7 +255,7 @@ def test_table_of_cost():
     spring = next(
         r for r in rows if (r["point"], r["method"], r["effort"]) == ("equal", "springs", "1e-08")
     )
-    again = collide(Chain([1, 1, 1], [1, 0, 0], 1), SpringChain(1.0, rtol=1e-8))
+    again = collide(Chain([1, 1, 1], [1, 0, 0], 1), SpringChain(1.0, accuracy=1e-8))
     assert again.evaluations == pytest.approx(int(spring["evaluations"]), rel=0.1)
     # A cell of the table is the best of its row: the event solver needs least, nearly everywhere.
     table = Chapter("extremes_inventory").cells["inventory-11"].outputs[0].data["text/plain"]

@@ -302,7 +302,7 @@ def test_recommend_says_what_python_says():
 def test_warm_up_says_what_was_done(monkeypatch, loaded, before, after, words):
     found = iter([before, after])
     monkeypatch.setattr(drive, "warm_up", lambda: None)
-    monkeypatch.setattr(runtime, "on_disk", lambda: next(found))
+    monkeypatch.setattr(runtime, "on_disk", lambda *_: next(found))
     monkeypatch.setattr(runtime, "loaded", lambda: loaded)
     assert re.match(words, call("warm-up"))
 

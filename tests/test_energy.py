@@ -154,7 +154,7 @@ def test_spring_chain_at_e_1(case):
     """Gaps count as for the springs: equal whatever closes again."""
     chain, stiffness, exponent = case
     chain = Chain(chain.masses, chain.velocities, 1)
-    springs = collide(chain, SpringChain(stiffness, exponent, rtol=1e-10))
+    springs = collide(chain, SpringChain(stiffness, exponent, accuracy=1e-10))
     trace = collide(chain, EnergyDistribution(stiffness, exponent, rtol=1e-10))
     np.testing.assert_allclose(trace.velocities, springs.velocities, rtol=0, atol=1e-8)
     np.testing.assert_allclose(trace.absorbed, springs.absorbed, rtol=1e-6, atol=1e-8)
@@ -164,7 +164,7 @@ def test_works_are_those_of_springs_at_e_1():
     """Contacts that are compressed again before they end count each compression."""
     again = False
     for masses, exponent in (([1, 1, 1], 1.5), ([2, 1, 1], 1), ([1, 2, 1, 3], 2)):
-        springs = collide(striking(masses), SpringChain(1.0, exponent, rtol=1e-10))
+        springs = collide(striking(masses), SpringChain(1.0, exponent, accuracy=1e-10))
         trace = collide(striking(masses), EnergyDistribution(1.0, exponent, rtol=1e-10))
         maxima = [event.kind for event in trace.events].count("maximum_compression")
         again = again or maxima > trace.collisions.sum()

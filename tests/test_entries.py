@@ -68,7 +68,8 @@ def one_block(masses, velocities, restitution, forward, backward, **options):
 
 BALLS = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "restitution": 1}
 SEVEN = BALLS | {"forward": 0.1, "backward": 0.1, "meeting": 0.5, "excess": "raise"}
-SPRINGS = {"stiffness": 1, "exponent": 1.5, "rtol": 1e-6, "max_evaluations": 10_000}
+SPRINGS = {"stiffness": 1, "exponent": 1.5}
+FORCES = SPRINGS | {"viscosity": 0.01, "gaps": 0.1, "accuracy": 1e-3}
 PENDULUMS = {"length": 0.1, "gravity": 9.81, "gaps": 0.0, "damping": 0.0, "angle": "small"}
 SHOTS = fit.read_shots(DATA / "shots_synthetic.csv", velocity_unit="m/s")
 
@@ -81,8 +82,9 @@ ENTRIES = {
     },
     SequentialCollisions: {"order": "left", "max_events": 100},
     FusedChain: {},
-    SpringChain: SPRINGS | {"method": "RK45", "max_time": 10.0},
-    EnergyDistribution: SPRINGS | {"gaps": True},
+    SpringChain: FORCES | {"max_steps": 10_000},
+    EnergyDistribution: SPRINGS | {"rtol": 1e-6, "max_evaluations": 10_000, "gaps": True},
+    cradle.spring_velocities: {"masses": [1, 1, 1], "velocities": [1, 0, 0]} | FORCES,
     QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
     cradle.post_impact_velocities: SEVEN | {"max_events": 100},
     cradle.outcomes: SEVEN | {"max_events": 100},

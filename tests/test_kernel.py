@@ -171,8 +171,8 @@ def test_without_numba_everything_works(cause, monkeypatch):
 def test_small_work_runs_plain_and_more_work_compiled(monkeypatch):
     """Nothing is loaded before plain work has taken as long as loading, nor compiled before."""
     ready = []
-    monkeypatch.setattr(runtime, "loaded", lambda: False)
-    monkeypatch.setattr(runtime, "on_disk", lambda: bool(ready))
+    monkeypatch.setattr(runtime, "loaded", lambda *_: False)
+    monkeypatch.setattr(runtime, "on_disk", lambda *_: bool(ready))
     monkeypatch.setattr(runtime, "compiled", lambda: "compiled")
     for on_disk, spent, large, expected in (
         ([], 0.0, False, kernel),
@@ -207,8 +207,8 @@ def test_plain_work_is_counted(plain, monkeypatch):
 def test_a_compilation_says_so_once(monkeypatch, caplog, folder, when):
     monkeypatch.setenv(runtime.VARIABLE, "compiled")
     monkeypatch.setattr(runtime, "compiled", lambda: "compiled")
-    monkeypatch.setattr(runtime, "on_disk", lambda: False)
-    monkeypatch.setattr(runtime, "loaded", lambda: False)
+    monkeypatch.setattr(runtime, "on_disk", lambda *_: False)
+    monkeypatch.setattr(runtime, "loaded", lambda *_: False)
     monkeypatch.setattr(runtime, "_stored", lambda: folder)
     with caplog.at_level(logging.WARNING, "cradle"):
         runtime.chosen()
@@ -223,7 +223,7 @@ def test_a_compilation_says_so_once(monkeypatch, caplog, folder, when):
 def test_ready_code_is_loaded_without_a_word(monkeypatch, caplog):
     monkeypatch.setenv(runtime.VARIABLE, "compiled")
     monkeypatch.setattr(runtime, "compiled", lambda: "compiled")
-    monkeypatch.setattr(runtime, "loaded", lambda: True)
+    monkeypatch.setattr(runtime, "loaded", lambda *_: True)
     with caplog.at_level(logging.WARNING, "cradle"):
         runtime.chosen()
     assert not caplog.records
@@ -234,8 +234,8 @@ def test_ready_code_is_loaded_without_a_word(monkeypatch, caplog):
 def test_compiled_code_is_looked_for_seldom(monkeypatch):
     """Not before each of many small impacts, which take less time than a look."""
     looks = []
-    monkeypatch.setattr(runtime, "loaded", lambda: False)
-    monkeypatch.setattr(runtime, "on_disk", lambda: bool(looks.append(runtime._spent)))
+    monkeypatch.setattr(runtime, "loaded", lambda *_: False)
+    monkeypatch.setattr(runtime, "on_disk", lambda *_: bool(looks.append(runtime._spent)))
     for _ in range(1000):
         assert runtime.chosen() is kernel
         runtime.spend(4 * runtime.LOADS_AFTER / 1000)
@@ -327,7 +327,7 @@ def kept_files(folder):
 def test_code_on_disk_that_cannot_be_read_is_removed_once(monkeypatch, tmp_path, caplog, again):
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(runtime, "_folder", lambda: tmp_path)
-    monkeypatch.setattr(runtime, "loaded", lambda: False)
+    monkeypatch.setattr(runtime, "loaded", lambda *_: False)
     files = kept_files(tmp_path)
     other = files[0].with_name("another_unit.batch-1.py311.nbi")
     other.write_bytes(b"")

@@ -25,6 +25,7 @@ from typing import Any, NoReturn
 from explorer_pairs import equal_pairs
 from sphinx.application import Sphinx
 
+from cradle import kernel
 from cradle.runtime import compile as runtime
 from cradle.runtime import job as drive
 
@@ -308,7 +309,7 @@ def engine() -> str:
     )
     loop = (
         "// The event loop of the package cradle, translated.\n"
-        + translate(runtime.unit())
+        + translate(runtime.unit(kernel.EVENT_LOOP))
         + f"\nconst DEFECTS = {json.dumps(drive.DEFECTS)};\n"
     )
     inside = "\n".join([before, loop, after])

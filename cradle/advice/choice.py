@@ -182,8 +182,7 @@ class _Wish(NamedTuple):
         if row.group == "event":
             return self.ratios or ImpulseCorrelation(0.0)
         if row.group == "springs":
-            method = row.setting.split(",")[0]
-            return SpringChain(stiffness, rtol=row.parameter, method=method)
+            return SpringChain(stiffness, accuracy=row.parameter)
         if row.group == "energy":
             return EnergyDistribution(stiffness, rtol=row.parameter)
         return SequentialCollisions()

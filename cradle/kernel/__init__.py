@@ -13,16 +13,23 @@
     loop         the rounds                                                   R8
     batch        many chains; the door
 
+and contact forces in time, with a door of their own:
+
+    kinks        the law of force; what a contact that closes or opens owes
+    forces       steps, runs; the door
+
 The rooms are plain: numbers, loops, sequences, tuples of arrays and `math`.  They run as they
 stand, and compiled as one unit (`cradle.runtime`), with the same bits.
 """
 
 from cradle.kernel.batch import Inputs, Options, Outputs, batch
+from cradle.kernel.forces import springs
 
-#: The rooms in an order in which each uses only those before it.
-ROOMS = (
+#: The rooms of the event loop, and all, in an order in which each uses only those before it.
+EVENT_LOOP = (
     "state", "numbers", "rules", "record", "events", "meeting", "collapse", "snapshot",
     "cycles", "certificate", "loop", "batch",
 )  # fmt: skip
+ROOMS = (*EVENT_LOOP, "kinks", "forces")
 
-__all__ = ["ROOMS", "Inputs", "Options", "Outputs", "batch"]
+__all__ = ["EVENT_LOOP", "ROOMS", "Inputs", "Options", "Outputs", "batch", "springs"]

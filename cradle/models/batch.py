@@ -209,28 +209,9 @@ def outcomes(
         "backward": forward if backward is None else backward,
     }
     # Whether these are in range is checked by the kernel.
-    arrays = [numbers(name, values) for name, values in given.items()]
-    n = arrays[0].shape[-1] if arrays[0].ndim else 0
-    if n < 2:
-        raise ValueError(f"masses has shape {arrays[0].shape}; must be (..., N) with N >= 2")
-    if arrays[1].shape[-1:] != (n,):
-        raise ValueError(f"velocities has shape {arrays[1].shape}; must be (..., {n}), as masses")
-    for k, size in ((2, n - 1), (3, n - 2), (4, n - 2)):
-        if arrays[k].ndim == 0:
-            arrays[k] = np.full(size, arrays[k])
-        elif arrays[k].shape[-1] != size:
-            raise ValueError(
-                f"{list(given)[k]} has shape {arrays[k].shape}; "
-                f"must be () or (..., {size}) for {n} balls"
-            )
-    leads = {array.shape[:-1] for array in arrays}
-    try:
-        lead = leads.pop() if len(leads) == 1 else np.broadcast_shapes(*leads)
-    except ValueError:
-        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
-        raise ValueError(f"leading axes do not broadcast: {shapes}") from None
-
-    count, chunk = math.prod(lead), _chunk(n)
+    arrays, lead = shaped(given, (0, 0, 1, 2, 2))
+    n, count = arrays[0].shape[-1], math.prod(lead)
+    chunk = _chunk(n)
     if count == 0:
         check_values(excess == "raise", *given.values())
     whole = outputs(count, n)
@@ -263,6 +244,35 @@ def outcomes(
             raise ImpactNotCertified(chain, model, "among others it stops, alone it does not")
     v, hits, collapsed, *_ = whole
     return Outcomes(v.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.reshape(lead) != 0)
+
+
+def shaped(
+    given: dict[str, ArrayLike], missing: tuple[int, ...]
+) -> tuple[list[Vector], tuple[int, ...]]:
+    """Return inputs as arrays, numbers as rows, and the shape of their leading axes.
+
+    Rows are shorter than the number of balls, that of the first one, by what is `missing`.
+    """
+    arrays = [numbers(name, values) for name, values in given.items()]
+    n = arrays[0].shape[-1] if arrays[0].ndim else 0
+    if n < 2:
+        raise ValueError(f"masses has shape {arrays[0].shape}; must be (..., N) with N >= 2")
+    if arrays[1].shape[-1:] != (n,):
+        raise ValueError(f"velocities has shape {arrays[1].shape}; must be (..., {n}), as masses")
+    for k, name in enumerate(given):
+        size = n - missing[k]
+        if arrays[k].ndim == 0:
+            arrays[k] = np.full(size, arrays[k])
+        elif arrays[k].shape[-1] != size:
+            raise ValueError(
+                f"{name} has shape {arrays[k].shape}; must be () or (..., {size}) for {n} balls"
+            )
+    leads = {array.shape[:-1] for array in arrays}
+    try:
+        return arrays, leads.pop() if len(leads) == 1 else np.broadcast_shapes(*leads)
+    except ValueError:
+        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
+        raise ValueError(f"leading axes do not broadcast: {shapes}") from None
 
 
 def _in_order(

@@ -6,15 +6,25 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from cradle.chain import Chain
-from cradle.input.values import refuse_where
-from cradle.models.compliant import SpringChain
+from cradle.input.values import (
+    LIGHTEST,
+    number_or_row,
+    one_number,
+    refuse_where,
+    whole_number,
+)
 from cradle.models.motion import CurvedTrace, own_units
 from cradle.models.release import Process
 from cradle.trace import ImpactNotFinished
 
 # Smallest restitution above 0.
 _SMALLEST = 1e-6
+# SciPy takes no smaller relative tolerance.
+_SMALLEST_RTOL = 100 * float(np.finfo(np.float64).eps)
+_RTOL_RULE = f"must lie in [{_SMALLEST_RTOL:.3g}, 0.1]"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -115,11 +125,19 @@ class EnergyDistribution:
     max_evaluations: int = field(default=1_000_000, kw_only=True)
 
     def __post_init__(self) -> None:
-        springs = SpringChain(  # the same checks
-            self.stiffness, self.exponent, rtol=self.rtol, max_evaluations=self.max_evaluations
-        )
-        for name in ("stiffness", "exponent", "rtol"):
-            object.__setattr__(self, name, getattr(springs, name))
+        above = "must be above 0"
+        k = number_or_row("stiffness", self.stiffness, "N - 1", above, 0.0, open_low=True)
+        soft = np.asarray(k) < LIGHTEST * np.max(k, initial=0.0)
+        rule = f"must be at least {LIGHTEST} of the stiffest contact"
+        refuse_where("stiffness", np.asarray(k), soft, rule)
+        kept = {
+            "stiffness": k,
+            "exponent": one_number("exponent", self.exponent, "must be at least 1", 1.0),
+            "rtol": one_number("rtol", self.rtol, _RTOL_RULE, _SMALLEST_RTOL, 0.1),
+        }
+        for name, value in kept.items():
+            object.__setattr__(self, name, value)
+        whole_number("max_evaluations", self.max_evaluations)
         if not isinstance(self.gaps, bool):
             raise ValueError(f"gaps = {self.gaps!r}; must be True or False")
 

@@ -57,10 +57,10 @@ _deciding = threading.Lock()
 
 
 @functools.cache
-def unit() -> str:
-    """Return the rooms of the kernel as one source, without comments and docstrings."""
+def unit(rooms: tuple[str, ...] = plain.ROOMS) -> str:
+    """Return rooms of the kernel as one source, without comments and docstrings."""
     body: list[ast.stmt] = []
-    for room in plain.ROOMS:
+    for room in rooms:
         tree = ast.parse(Path(plain.__file__).with_name(f"{room}.py").read_text(encoding="utf-8"))
         for node in ast.walk(tree):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
@@ -193,15 +193,15 @@ def _files(pattern: str) -> Iterator[Path]:
         yield from folder.rglob(f"{_name()}.{pattern}")
 
 
-def on_disk() -> bool:
-    """Tell whether compiled code of this very kernel is on disk."""
-    return any(_files("batch-*.nbi"))
+def on_disk(door: str = "batch") -> bool:
+    """Tell whether compiled code of this very kernel is on disk, from a door on."""
+    return any(_files(f"{door}-*.nbi"))
 
 
-def loaded() -> bool:
-    """Tell whether compiled code has run in this process."""
+def loaded(door: str = "batch") -> bool:
+    """Tell whether compiled code has run in this process, from a door on."""
     module = compiled() if compiled.cache_info().currsize else None
-    return module is not None and bool(module.batch.overloads)
+    return module is not None and bool(vars(module)[door].overloads)
 
 
 def first_call(door: Callable[..., Any], *arguments: Any) -> Any:
@@ -213,7 +213,7 @@ def first_call(door: Callable[..., Any], *arguments: Any) -> Any:
     try:
         return door(*arguments)
     except Exception as error:  # half a file can raise anything; the kernel itself nothing
-        broken = [] if loaded() else [*_files("*.nb[ci]")]
+        broken = [] if loaded(door.__name__) else [*_files("*.nb[ci]")]
         if not broken:
             raise
         for file in broken:
@@ -241,13 +241,13 @@ def without_waiting() -> Iterator[None]:
         _hurry.reset(before)
 
 
-def chosen(large: bool = False) -> Any:
-    """Return the kernel in force; `large` work is surely worth compiling for."""
+def chosen(large: bool = False, door: str = "batch") -> Any:
+    """Return the kernel in force behind a door; `large` work is surely worth compiling for."""
     global _look
     wish = os.environ.get(VARIABLE)
     if wish:
         one_of(VARIABLE, wish, ("plain", "compiled"))
-    if wish != "plain" and loaded():
+    if wish != "plain" and loaded(door):
         return compiled()
     if wish == "plain" or not available() or _hurry.get():
         return plain
@@ -256,12 +256,12 @@ def chosen(large: bool = False) -> Any:
             return plain
         # To look costs more than a small impact, so not at each of them.
         _look = _spent + LOADS_AFTER
-        if not on_disk():
+        if not on_disk(door):
             return plain
     # Threads that come here together share one module, which numba compiles once.
     with _deciding:
         module = compiled()
-        if module is not None and not on_disk():
+        if module is not None and not on_disk(door):
             _announce()
     return plain if module is None else module
 

@@ -1,0 +1,134 @@
+"""What two balls on a spring push each other with, and what a kink owes to a sum over steps.
+
+A contact pushes with f = k d^p while its compression d is above zero; with losses with f + A df/dt
+while that is above zero.  A sum over nodes differs from the integral of tau^p by
+h^(p + 1) zeta(-p, theta), theta the part of a step between the kink and its first node.
+
+Kuwabara and Kono, Jpn. J. Appl. Phys. 26 (1987) 1230; Navot, J. Math. and Phys. 40 (1961) 271.
+"""
+
+import math
+
+from cradle.kernel.state import apart, jit
+
+
+class Link:
+    """One ball and the contact on its right, in the chain's own units."""
+
+    w: float  # 1 / mass
+    v: float  # velocity between two nodes; with losses, less that of the impulses A f
+    k: float  # stiffness
+    loss: float  # A
+    pull: float  # force that presses the contact together at rest, all the time
+    d: float  # compression at a node, as the drifts have it; below zero a gap
+    f: float  # force at the node,
+    g: float  # its slope df/dd,
+    move: float  # and how much the compression has grown in the step before it
+    y: float  # with losses: compression at the node, as it is,
+    lag: float  # what it is more than `d`,
+    trend: float  # and was a step before,
+    push: float  # force less the pull, corrected; before, see `resumed`
+    dv: float  # acceleration
+    b: float  # velocity of the impulses A f, and its rate of change
+    db: float
+    seen: float  # time at which the contact was last looked at
+    kink: int  # a contact that has closed or opened in this step,
+    rise: float  # and how much its compression has grown in it
+
+
+@jit
+def grade(p, x):
+    """Return x^(p - 1); with the same bits everywhere for spheres and linear springs."""
+    if p == 1.5:
+        return math.sqrt(x)
+    return 1.0 if p == 1.0 else x ** (p - 1.0)
+
+
+@jit
+def tail(q, x):
+    """Return zeta(-q, x) / x^q for x not small, by the sum of Euler and Maclaurin."""
+    s = 1.0 / (x * x)
+    series = 1.0 - (q - 5.0) * (q - 6.0) / 40.0 * s
+    series = 1.0 - (q - 3.0) * (q - 4.0) / 42.0 * s * series
+    series = 1.0 - (q - 1.0) * (q - 2.0) / 60.0 * s * series
+    return 0.5 - x / (q + 1.0) - q / 12.0 / x * series
+
+
+@apart
+def zetas(p, theta):
+    """Return Hurwitz's zeta(-p, theta) and zeta(-p - 1, theta)."""
+    one = two = 0.0
+    x = theta
+    while x < 2.0 or x < p:
+        term = x * grade(p, x)
+        one += term
+        two += x * term
+        x += 1.0
+    term = x * grade(p, x)
+    return one + term * tail(p, x), two + x * term * tail(p + 1.0, x)
+
+
+@apart
+def crossing(p, h, k, loss, closes, theta, move):
+    """Return the kick and the shift that a kink owes a contact: an impulse, and that times a time.
+
+    At the first node after it closes, theta steps later, or the first after it opens, when the last
+    before was theta steps from d = 0; it grows or shrinks by `move` in a step.  With losses the
+    force ends at d = `early` moves, and what A f still has to give back comes at once.
+    """
+    early = loss * p / h
+    unit = h * k * move * grade(p, move)
+    one, two = zetas(p, theta)
+    if closes:
+        return -unit * one, h * unit * (two - (theta + early / p) * one)
+    cut = 0.0
+    if early > 0.0:
+        cut = early * early * grade(p, early) / (p + 1.0)
+    spent = one + cut
+    kick = cut * (p + 1.0) / p - spent
+    moment = two - early * one - early * cut / (p + 2.0)
+    return unit * kick, h * unit * ((1.0 - theta + early) * kick - moment - early / p * spent)
+
+
+@apart
+def resumed(h, a, early):
+    """Return the same for a contact that its losses had opened and that pushes again before d = 0.
+
+    What its force is in proportion to, d plus `early` moves, was `push` at the node before.
+    """
+    now = a.y + early * a.move
+    theta = min(max(now / (now - a.push), 0.0), 1.0) if now > a.push else 0.5
+    rate = a.g * a.move
+    first = a.f - theta * rate
+    half, third = 0.5 - theta, 0.5 * (theta * (1.0 - theta) - 1.0 / 6.0)
+    owed = h * (first * half + rate * third)
+    kick = -owed - a.loss * first
+    return kick, h * h * first * third - a.loss * owed + theta * h * kick
+
+
+@apart
+def pay(n, p, h, kinks, slow, lossy, s):
+    """Give back what the kinks of this step owe, where it can be noticed: kick and shift apart."""
+    for i in range(kinks):
+        c, move = s[i].kink, s[i].rise
+        a = s[c]
+        d, loss = a.d, 0.0
+        if lossy:
+            d, loss = a.y, a.loss
+        j = x = 0.0
+        left, right = a.w, s[c + 1].w
+        if a.f > 0.0 and d > move and loss > 0.0:
+            j, x = resumed(h, a, loss * p / h)
+        elif loss == 0.0 and h * a.k * abs(move) * grade(p, abs(move)) * (left + right) <= slow:
+            continue
+        elif a.f == 0.0 and move < 0.0:
+            j, x = crossing(p, h, a.k, loss, False, max(1.0 - d / move, 0.0), -move)
+        elif a.f > 0.0 and move > 0.0:
+            j, x = crossing(p, h, a.k, loss, True, min(d / move, 1.0), move)
+        a.v -= j * left
+        s[c + 1].v += j * right
+        a.d -= x * (left + right)
+        if c > 0:
+            s[c - 1].d += x * left
+        if c < n - 2:
+            s[c + 1].d += x * right

@@ -1,0 +1,89 @@
+"""From arrays to the loop of the contact forces and back: work area, pauses, plain or compiled."""
+
+from __future__ import annotations
+
+import functools
+import threading
+import time
+from typing import Any, get_type_hints
+
+import numpy as np
+
+from cradle import kernel as plain
+from cradle.kernel.forces import Clock, Forces, Law, Motions
+from cradle.kernel.kinks import Link
+from cradle.kernel.state import PAUSED
+from cradle.runtime import compile as runtime
+from cradle.runtime.job import FINISHED, Stopped
+
+# Contacts times steps between two pauses, plain and compiled: some hundredths of a second.
+_EFFORT = {False: 5_000, True: 5_000_000}
+# The same with a record, of which each step is a page.
+_PAGES = 1024
+
+
+def _blank(kind: type, size: int, compiled: bool) -> Any:
+    """Return records, all zero: NumPy's for compiled code, Python objects for plain."""
+    fields = {field: number() for field, number in get_type_hints(kind).items()}
+    if compiled:
+        return np.zeros(size, [(field, np.array(zero).dtype) for field, zero in fields.items()])
+    things = [kind() for _ in range(size)]
+    for thing in things:
+        vars(thing).update(fields)
+    return things
+
+
+def room(rows: int, n: int) -> Motions:
+    """Return room for what so many chains come to."""
+    counts = np.zeros((2, rows), np.int64)
+    return Motions(np.empty((rows, n)), np.zeros(rows), *counts)
+
+
+_kept = threading.local()
+
+
+def solve(
+    chains: Forces,
+    law: Law,
+    out: Motions,
+    large: bool = False,
+    stop: threading.Event | None = None,
+    record: list[Any] | None = None,
+) -> tuple[int, int]:
+    """Run the chains; return the number of the next one, and how the one before it ended.
+
+    It ends when `stop` is set.  The steps of one chain are written to a `record`.
+    """
+    rows, n = out.v.shape
+    k, status, resumed = 0, FINISHED, False
+    compiled: bool | None = None
+    kept: Any = None
+    pages = np.empty((0 if record is None else _PAGES, 6, max(n, 3)))
+    while k < rows:
+        if stop is not None and stop.is_set():
+            raise Stopped
+        kernel = runtime.chosen(large, "springs")
+        if compiled is None or (compiled is not (kernel is not plain) and record is None):
+            # A chain that has begun plain begins anew.
+            compiled, resumed = kernel is not plain, False
+            kept = vars(_kept).get(str(compiled))
+            if kept is None or len(kept[0]) != n:
+                kept = _blank(Link, n, compiled), _blank(Clock, 1, compiled)
+                vars(_kept)[str(compiled)] = kept
+            given = chains if compiled else Forces(*(part.tolist() for part in chains))
+        call = kernel.springs if compiled else plain.springs
+        if compiled and not runtime.loaded("springs"):
+            call = functools.partial(runtime.first_call, call)
+        begun = time.perf_counter()
+        effort = _EFFORT[compiled] if record is None else _PAGES
+        k, status = call(k, resumed, n, given, law, out, *kept, pages, effort)
+        if not compiled:
+            runtime.spend(time.perf_counter() - begun)
+        if record is not None:
+            clock = kept[1][0] if compiled else vars(kept[1][0])
+            record.append(pages[: clock["row"]].copy())
+            clock["row"] = 0
+        resumed = status == PAUSED
+        if not (resumed or status == FINISHED):
+            break
+    return k, status
