@@ -172,7 +172,9 @@ def spring_rows(clock, quick):
         "gives": TIMED, "note": "velocity Verlet with two corrections, compiled",
     }  # fmt: skip
     accuracies = (1e-3, 1e-6, 1e-9) if quick else [1e-2, *(10.0**-k for k in range(3, 13))]
-    for name, accuracy in itertools.product(("three equal", "five equal", "light middle"), accuracies):
+    for name, accuracy in itertools.product(
+        ("three equal", "five equal", "light middle"), accuracies
+    ):
         scene, model = SCENES[name], SpringChain(1.0, accuracy=accuracy)
 
         def run(scene=scene, model=model):

@@ -106,7 +106,8 @@ def test_fig_trade_cost_springs():
         min(row["evaluations"] for row in springs if row["numerical_error"] <= error)
         for error in (2e-3, 2e-9)
     ]
-    assert work[1] < 10 * work[0]
+    # Of fourth order: six digits for ten times the steps to the power 6/4, and the runs before.
+    assert work[1] < 100 * work[0]
     # The right panel: error control spends fewer evaluations than fixed steps on many digits.
     few = min(row["evaluations"] for row in springs if row["numerical_error"] < 1e-8)
     many = min(row["evaluations"] for row in verlet if row["numerical_error"] < 1e-8)
@@ -275,7 +276,7 @@ def test_fig_trade_cost_drawn():
     chosen = [
         find("march", chain="three equal"),
         find("penalty", "Verlet", model="penalty, Hertz"),
-        find("springs", "DOP853", chain="three equal", model="SpringChain, Hertz"),
+        find("springs", "accuracy", chain="three equal", model="SpringChain, Hertz"),
         find("energy", "rtol", chain="three equal"),
     ]
     drawn = [line for line in points(ax) if len(line) > 1]

@@ -196,7 +196,7 @@ def kick_lossy(h, low, high, s):
 
 
 @jit
-def join(c, time, u, s):
+def bring(c, time, u, s):
     """Bring contact c, whose balls have flown freely at closing speed u, to this time."""
     a = s[c]
     a.d += (time - a.seen) * u
@@ -330,11 +330,11 @@ def run(n, h, law, effort, s, clock, record):
         clock.top, clock.closed = max(clock.top, stiff), closed
         first, last = low, high - 1
         if high < n - 1 and s[last].f > 0.0 and s[last].d > slow:
-            join(high, time, right - s[high + 1].v, s)
+            bring(high, time, right - s[high + 1].v, s)
             high += 1
         if low > 0 and s[first].f > 0.0 and s[first].d > slow:
             low -= 1
-            join(low, time, s[low].v - left, s)
+            bring(low, time, s[low].v - left, s)
         if lossy:
             kick_lossy(h, low, high, s)
             # What was before a kink tells nothing of what follows.
