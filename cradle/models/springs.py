@@ -138,7 +138,7 @@ def run(chains: Forces, law: Law, large: bool = False, stop: Any = None) -> Solv
             break
         off = h * np.sqrt(moved.top) / eta
         fine = off <= 1.0
-        # The run before may have been near by luck, so how far it went counts too.
+        # The run before may have been near by luck: its own change counts too, with losses always.
         change = (2.0 if lossy else 0.5) * abs(moved.v - before[todo]).max(axis=-1) / accuracy
         told = np.maximum(change, 0.25 * changes[todo])
         changes[todo] = np.where(np.isfinite(change) | lossy, change, 0.0)
