@@ -211,8 +211,8 @@ def test_a_step_never_compiles(monkeypatch):
     asked = []
     monkeypatch.setattr(runtime, "_spent", 1e9)
     monkeypatch.setattr(runtime, "available", lambda: True)
-    monkeypatch.setattr(runtime, "loaded", lambda: False)
-    monkeypatch.setattr(runtime, "compiled", lambda: asked.append("compiled"))
+    monkeypatch.setattr(runtime, "loaded", lambda *_: False)
+    monkeypatch.setattr(runtime, "compiled", lambda *_: asked.append("compiled"))
     bodies = Hanging([-0.5, 0.0, 0.0])
     row = hung(bodies)
     steps(row, 60, 1 / 60)

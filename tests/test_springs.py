@@ -16,6 +16,7 @@ from scipy.special import gamma
 
 from cradle import (
     Chain,
+    EnergyDistribution,
     ImpactNotCertified,
     ImpactNotFinished,
     Pendulums,
@@ -250,6 +251,15 @@ def test_accuracy_is_kept_on_random_chains(monkeypatch, p, loss, n):
         assert (abs(found - finer).max(axis=1) / speed).max() <= accuracy
         np.testing.assert_allclose((m * (found - v)).sum(axis=1), 0, atol=1e-12)
         assert (np.diff(found, axis=1) >= -0.01 * accuracy * speed[:, None]).all()
+
+
+@pytest.mark.parametrize("light", [1e-3, 1e-4])
+def test_a_light_ball_that_swings_often_amplifies_no_error(light):
+    """Each swing adds to the error: from some on two runs are compared."""
+    chain = striking([1, light, 1])
+    exact = collide(chain, EnergyDistribution(rtol=1e-13)).velocities
+    found = collide(chain, SpringChain(accuracy=1e-4)).velocities
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-4)
 
 
 def test_units_a_boost_and_a_mirror_change_nothing_else():

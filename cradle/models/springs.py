@@ -34,8 +34,9 @@ _FAINT = 0.01
 # A step times the largest frequency from which on a run shows whether it was short enough; a
 # coarser one that only measures the frequency; and what it may measure too little.
 _ENOUGH, _COARSE, _SPARE = 0.25, 0.5, 1.05
-# Kinks of a contact, on average, from which on two runs are compared: 1.2 collisions.
-_OFTEN = 2.4
+# Kinks of a contact, on average, from which on two runs are compared: 1.2 collisions; and radians
+# of the quickest ball's swing, of which each adds to the error.
+_OFTEN, _LONG = 2.4, 30.0
 # Runs of a chain, each finer than the one before.
 _TRIALS = 16
 # Step times A times the square of a frequency, at most.
@@ -136,14 +137,16 @@ def run(chains: Forces, law: Law, large: bool = False, stop: Any = None) -> Solv
         if status != FINISHED:
             todo = todo[at:]
             break
-        off = h * np.sqrt(moved.top) / eta
+        phase = h * np.sqrt(moved.top)
+        off = phase / eta
         fine = off <= 1.0
         # The run before may have been near by luck: its own change counts too, with losses always.
         change = (2.0 if lossy else 0.5) * abs(moved.v - before[todo]).max(axis=-1) / accuracy
         told = np.maximum(change, 0.25 * changes[todo])
         changes[todo] = np.where(np.isfinite(change) | lossy, change, 0.0)
         before[todo] = np.where(fine[:, None], moved.v, np.inf)
-        compare = fine & (lossy | (moved.kinks > _OFTEN * (n - 1)))
+        many = (moved.kinks > _OFTEN * (n - 1)) | (moved.steps * phase > _LONG * (n - 1))
+        compare = fine & (lossy | many)
         error = np.where(compare, np.maximum(off**4, told), off**4)
         out.error[todo] = accuracy * error
         h = np.where(fine, 0.5 * h, h / (off * _SPARE))
