@@ -66,8 +66,8 @@ def event_rows(clock, quick):
         given = scene.masses, scene.velocities, scene.restitution, scene.forward, scene.backward
         many = [np.tile(part, (2000, 1)) for part in given]
 
-        def path(scene=scene):
-            return collide(scene.chain, scene.model)
+        def path(chain=scene.chain, model=scene.model):
+            return collide(chain, model)
 
         def alone(given=given):
             return post_impact_velocities(*given, excess="saturate")
