@@ -14,6 +14,8 @@ from chains import ELASTIC, HERTZ
 from chapters import Chapter, number, points
 from measured_table import find, fused, marks, masses_and_restitution, sequential, table
 from page import people
+from stored import read
+from truth import solve
 
 from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, paper_chain
 
@@ -464,3 +466,22 @@ def shown(cell):
         [unescape(cell) for cell in re.findall(r"<t[hd]>(.*?)</t[hd]>", row, flags=re.DOTALL)]
         for row in body.split("</tr>")[:-1]
     ]
+
+
+def test_fig_trade_total_drawn():
+    """Each panel is the stored table; the rule's error by another program, no error above asked."""
+    rows = read("forces.csv")
+    names = ("5 equal", "20 equal", "1 1 .1 1 1")
+    for ax, name in zip(CHAPTER.figures["fig-trade-total"].axes, names, strict=True):
+        for line, method in zip(
+            points(ax), ("this package", "velocity Verlet", "the paper's rule"), strict=True
+        ):
+            found = [r for r in rows if (r["chain"], r["method"]) == (name, method)]
+            expected = [(float(r["microseconds"]), float(r["error"])) for r in found]
+            np.testing.assert_allclose(line, expected)
+            assert all(float(r["error"]) <= float(r["asked"] or 1) for r in found)
+    rule = next(r for r in rows if r["chain"] == "5 equal" and r["method"].startswith("the"))
+    exact = [float(v) for v in solve([1] * 5, [1, 0, 0, 0, 0], [1] * 4, 0.132503287).velocities]
+    assert float(rule["error"]) == pytest.approx(
+        np.abs(np.subtract(exact, HERTZ["five equal"])).max(), rel=1e-2
+    )
