@@ -211,11 +211,12 @@ class Motion:
         self.durations[self.closed] += found.t[-1] - self.t
         self.steps.append((found.t, found.y))
         self.t, self.y = float(found.t[-1]), found.y[:, -1].copy()
-        # An extreme may fall on the end, where rounding can hide it.
-        ahead = self.closed & (self.loading == (self.speeds(self.y) < 0.0))
-        turns += [(self.t, c, self.y) for c in np.flatnonzero(ahead).tolist()]
         for turn in turns:
             self.turn(*turn)
+        # An extreme may fall on the end, where rounding can hide it.
+        ahead = self.closed & (self.loading == (self.speeds(self.y) < 0.0))
+        for c in np.flatnonzero(ahead).tolist():
+            self.turn(self.t, c, self.y)
         self.y = self.y.copy()
         self.settle(crossed)
         return ""
