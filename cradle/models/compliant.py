@@ -20,7 +20,7 @@ from cradle.input.values import (
 )
 from cradle.kernel.forces import Forces, Law
 from cradle.models import springs
-from cradle.models.motion import CurvedTrace, own_units
+from cradle.models.energy import CurvedTrace, fastest
 from cradle.runtime.springs import room, solve
 from cradle.trace import Event
 
@@ -175,8 +175,11 @@ class SpringChain:
         n = len(must_be(Chain, "chain", chain))
         rule = "must be 1 for SpringChain, whose losses are its viscosity"
         refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
-        k = own_units(chain, self.stiffness)[0]
-        loss, gap = (row_of(name, getattr(self, name), n - 1, n) for name in ("viscosity", "gaps"))
+        fastest(chain)  # is within the range of floats
+        k, loss, gap = (
+            row_of(name, getattr(self, name), n - 1, n)
+            for name in ("stiffness", "viscosity", "gaps")
+        )
         rows = chain.masses, chain.velocities, k, loss, gap
         springs.admit(springs.Problem(*rows, self.exponent, self.accuracy))
         m, v, k, loss, gap = (row[None] for row in rows)

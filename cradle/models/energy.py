@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -11,20 +10,52 @@ import numpy as np
 from cradle.chain import Chain
 from cradle.input.values import (
     LIGHTEST,
+    Vector,
+    must_be,
     number_or_row,
     one_number,
     refuse_where,
+    row_of,
     whole_number,
 )
-from cradle.models.motion import CurvedTrace, own_units
 from cradle.models.release import Process
-from cradle.trace import ImpactNotFinished
+from cradle.trace import ImpactNotFinished, Trace
 
 # Smallest restitution above 0.
 _SMALLEST = 1e-6
 # SciPy takes no smaller relative tolerance.
 _SMALLEST_RTOL = 100 * float(np.finfo(np.float64).eps)
 _RTOL_RULE = f"must lie in [{_SMALLEST_RTOL:.3g}, 0.1]"
+
+
+def fastest(chain: Chain) -> tuple[int, float, float]:
+    """Return the contact that closes fastest, its reduced mass and its speed, 1 if none moves."""
+    m, u = chain.masses, chain.closing_speeds
+    c = int(np.argmax(u))
+    with np.errstate(over="ignore"):
+        mass = float(m[c] / (m[c] + m[c + 1]) * m[c + 1])
+    if not np.finfo(np.float64).tiny <= mass:
+        raise ValueError(
+            f"masses[{c}] = {float(m[c])!r}; its reduced mass with masses[{c + 1}] = "
+            f"{float(m[c + 1])!r} is beyond the range of floats: choose other units"
+        )
+    return c, mass, abs(float(u[c])) or 1.0
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class CurvedTrace(Trace):
+    """The path of an impact whose events are joined by smooth curves; N balls, S steps."""
+
+    step_velocities: Vector
+    step_impulses: Vector
+    evaluations: int
+
+    def curve(self) -> tuple[Vector, Vector]:
+        """Return impulses and velocities at the steps of the integration, and at the end."""
+        return (
+            np.vstack([self.step_impulses, self.impulses]),
+            np.vstack([self.step_velocities, self.velocities]),
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -143,24 +174,22 @@ class EnergyDistribution:
 
     def solve(self, chain: Chain) -> EnergyTrace:
         """Solve the impact of `chain`; see `collide`."""
-        k, unit, mass, speed = own_units(chain, self.stiffness)
+        n = len(must_be(Chain, "chain", chain))
+        k = row_of("stiffness", self.stiffness, n - 1, n)
         small = (chain.restitution > 0.0) & (chain.restitution < _SMALLEST)
         rule = (
             f"must be 0 or at least {_SMALLEST} for EnergyDistribution: such a release is too "
             "short to follow"
         )
         refuse_where("restitution", chain.restitution, small, rule)
-        scaled = (chain.masses / mass, chain.closing_speeds / speed, k / unit)
+        c, mass, speed = fastest(chain)
+        scaled = chain.masses / mass, chain.closing_speeds / speed, k / k[c]
         process = Process(*scaled, chain.restitution, self)
-        reason = process.run("DOP853", math.inf, self.max_evaluations)
-        if not reason:
-            process.part()
-        trace = EnergyTrace(
-            **process.account(chain, mass, speed), model=self, collapsed=process.collapsed
-        )
+        reason = process.run()
+        account = process.account(chain.velocities, mass, speed)
+        trace = EnergyTrace(chain=chain, model=self, **account)
         if reason:
             raise ImpactNotFinished(
-                f"the impact was not finished after {len(trace.events)} events: {reason}",
-                trace,
+                f"the impact was not finished after {len(trace.events)} events: {reason}", trace
             )
         return trace
