@@ -15,7 +15,7 @@
 
 and contact forces in time, with a door of their own:
 
-    kinks        the law of force; what a contact that closes or opens owes
+    kinks        the records, the law of force; what a contact that closes or opens owes
     forces       steps, runs; the door
 
 The rooms are plain: numbers, loops, sequences, tuples of arrays and `math`.  They run as they

@@ -12,54 +12,8 @@ after the impact exact to h^4:
 Takahashi and Imada, J. Phys. Soc. Jpn. 53 (1984) 3765; Rowlands, J. Comput. Phys. 97 (1991) 235.
 """
 
-from typing import Any, NamedTuple
-
-from cradle.kernel.kinks import grade, pay
+from cradle.kernel.kinks import Forces, grade, pay
 from cradle.kernel.state import FINISHED, PAUSED, UNFINISHED, apart, door, jit
-
-
-class Forces(NamedTuple):
-    """Chains on springs, a row for each, in their own units: what `Link` says of n and of n - 1."""
-
-    w: Any
-    v: Any
-    k: Any
-    loss: Any
-    d: Any
-    h: Any  # step, one for each chain
-
-
-class Motions(NamedTuple):
-    """What the chains come to, a row for each."""
-
-    v: Any
-    top: Any  # as in `Clock`
-    steps: Any
-    kinks: Any
-
-
-class Law(NamedTuple):
-    """The law of force, and when to stop."""
-
-    p: float
-    slow: float  # a closing speed that is too little to matter
-    most: int  # steps
-    lossy: bool
-    leans: bool  # contacts are pressed together at rest: all are watched, all the time
-
-
-class Clock:
-    """Where a run is: contacts low..high - 1 are watched, the others fly or rest."""
-
-    low: int
-    high: int
-    closed: int  # how many contacts were closed at the last node
-    steps: int
-    kinks: int  # how often contacts closed and opened so far
-    time: float
-    top: float  # the largest square of a frequency so far
-    ended: float  # when the last contact opened
-    row: int  # of the record, to be written next
 
 
 @jit

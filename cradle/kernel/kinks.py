@@ -1,4 +1,4 @@
-"""What two balls on a spring push each other with, and what a kink owes to a sum over steps.
+"""Balls on springs: their records, what they push with, what a kink owes to a sum over steps.
 
 A contact pushes with f = k d^p while its compression d is above zero; with losses with f + A df/dt
 while that is above zero.  A sum over nodes differs from the integral of tau^p by
@@ -8,6 +8,7 @@ Kuwabara and Kono, Jpn. J. Appl. Phys. 26 (1987) 1230; Navot, J. Math. and Phys.
 """
 
 import math
+from typing import Any, NamedTuple
 
 from cradle.kernel.state import apart, jit
 
@@ -34,6 +35,50 @@ class Link:
     seen: float  # time at which the contact was last looked at
     kink: int  # a contact that has closed or opened in this step,
     rise: float  # and how much its compression has grown in it
+
+
+class Forces(NamedTuple):
+    """Chains on springs, a row for each, in their own units: what `Link` says of n and of n - 1."""
+
+    w: Any
+    v: Any
+    k: Any
+    loss: Any
+    d: Any
+    h: Any  # step, one for each chain
+
+
+class Motions(NamedTuple):
+    """What the chains come to, a row for each."""
+
+    v: Any
+    top: Any  # as in `Clock`
+    steps: Any
+    kinks: Any
+
+
+class Law(NamedTuple):
+    """The law of force, and when to stop."""
+
+    p: float
+    slow: float  # a closing speed that is too little to matter
+    most: int  # steps
+    lossy: bool
+    leans: bool  # contacts are pressed together at rest: all are watched, all the time
+
+
+class Clock:
+    """Where a run is: contacts low..high - 1 are watched, the others fly or rest."""
+
+    low: int
+    high: int
+    closed: int  # how many contacts were closed at the last node
+    steps: int
+    kinks: int  # how often contacts closed and opened so far
+    time: float
+    top: float  # the largest square of a frequency so far
+    ended: float  # when the last contact opened
+    row: int  # of the record, to be written next
 
 
 @jit

@@ -18,7 +18,7 @@ from cradle.input.values import (
     row_of,
     whole_number,
 )
-from cradle.kernel.forces import Forces, Law
+from cradle.kernel.kinks import Forces, Law
 from cradle.models import springs
 from cradle.models.energy import CurvedTrace, fastest
 from cradle.runtime.springs import room, solve

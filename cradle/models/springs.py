@@ -19,7 +19,7 @@ from cradle.input.values import (
     refuse_overflow,
     refuse_where,
 )
-from cradle.kernel.forces import Forces, Law
+from cradle.kernel.kinks import Forces, Law
 from cradle.kernel.state import ENERGY, FINISHED, LEDGER, MOMENTUM, ORDER, REFUSED, UNFINISHED
 from cradle.models.batch import _in_order, _rows, shaped
 from cradle.runtime.job import DEFECTS, LARGE
@@ -83,12 +83,8 @@ class Problem(NamedTuple):
                 energy = np.log(mass) + 2.0 * np.log(speed) - np.log(unit)
                 length = np.exp(energy / (self.p + 1.0))
         w, v, k = mass / m, (v - ball) / speed, k / unit
-        return (
-            Forces(w, v, k, loss * (speed / length), -gap / length, speed[:, 0]),
-            mass,
-            speed,
-            length,
-        )
+        own = Forces(w, v, k, loss * (speed / length), -gap / length, speed[:, 0])
+        return own, mass, speed, length
 
 
 class Solved(NamedTuple):
@@ -201,14 +197,11 @@ def admit(problem: Problem) -> None:
     checked("gaps", problem.gap)
     if m.size and v.size:
         refuse_overflow(v, m)
-        for name, array, of in (
-            ("masses", m, "heaviest ball"),
-            ("stiffness", k, "stiffest contact"),
-        ):
+        largest = ("masses", m, "heaviest ball"), ("stiffness", k, "stiffest contact")
+        for name, array, of in largest:
             small = array < _SMALLEST * array.max(axis=-1, keepdims=True)
-            refuse_where(
-                name, array, small, f"must be at least {_SMALLEST} of the {of} of its chain"
-            )
+            rule = f"must be at least {_SMALLEST} of the {of} of its chain"
+            refuse_where(name, array, small, rule)
 
 
 def beyond(problem: Problem, own: tuple[Forces, Vector, Vector, Vector]) -> list[Any]:

@@ -10,8 +10,7 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from cradle import kernel as plain
-from cradle.kernel.forces import Clock, Forces, Law, Motions
-from cradle.kernel.kinks import Link
+from cradle.kernel.kinks import Clock, Forces, Law, Link, Motions
 from cradle.kernel.state import PAUSED
 from cradle.runtime import compile as runtime
 from cradle.runtime.job import FINISHED, Stopped
