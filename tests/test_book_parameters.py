@@ -34,6 +34,7 @@ CHANGES = {
     "n_balls": [{"ratio": 0}, {"ratio": 0.05}, {"ratio": 0.33}, {"ratio": 0.5}],
     "toy": [{"ratio": 0.05, "pulled_back": 0.02}, {"ratio": 0.3}],
     "trade": [{"ratio": 0, "step": 1 / 240}, {"ratio": 0.4, "step": 1e-4}],
+    "forces": [{"masses": [1, 2, 1]}],
     "laws": [{"ratio": 0}, {"ratio": 0.4}],
     "extremes": [{"ratio": 0}, {"ratio": 0.3}],
     "beyond": [{"ratio": 0, "restitution": 0.9}, {"ratio": 0.5, "restitution": 1}],

@@ -1,0 +1,64 @@
+"""Numbers and curves of the chapter on contact forces, by other routes than the chapter's."""
+
+import mpmath
+import numpy as np
+import pytest
+from chapters import Chapter, number, panel, stored_run
+from scipy.integrate import solve_ivp
+from truth import solve
+
+CHAPTER = Chapter("forces")
+
+
+def spheres(n):
+    """Velocities after the first of n equal elastic spheres strikes, by SciPy at 1e-12."""
+
+    def rate(_, y):
+        push = np.maximum(y[: n - 1] - y[1:n], 0) ** 1.5
+        return np.concatenate([y[n:], np.append(0, push) - np.append(push, 0)])
+
+    start = np.append(np.zeros(n), np.eye(n)[0])
+    return solve_ivp(rate, (0, 30), start, "DOP853", rtol=1e-12, atol=1e-14).y[n:, -1]
+
+
+def test_zeta_is_hurwitzs():
+    zeta = next(given["zeta"] for given in stored_run("forces")[1] if "zeta" in given)
+    for q in (1, 1.5):
+        for x in (1e-6, 0.3, 0.5, 1):
+            assert zeta(q, x) == pytest.approx(float(mpmath.zeta(-q, x)), abs=1e-7)
+
+
+def test_the_curves_have_their_orders():
+    shown = panel("forces", "fig-own-forces")
+    for label, order, name in zip(shown, (2, 2.5, 3.5), ("verlet", "better", "paid"), strict=True):
+        work, error = np.log(shown[label]).T
+        assert -np.polyfit(work, error, 1)[0] == pytest.approx(order, abs=0.25)
+        assert label.endswith(f": {CHAPTER.glued[name]}")
+        assert float(CHAPTER.glued[name]) == pytest.approx(order, abs=0.25)
+
+
+def test_the_work_for_an_error():
+    shown = list(panel("forces", "fig-own-forces").values())
+    for name, which, error in (
+        ("verlet_work", 0, 1e-3), ("better_work", 1, 1e-3),
+        ("paid_work", 2, 1e-3), ("paid_fine", 2, 1e-5),
+    ):  # fmt: skip
+        points = shown[which].tolist()
+        while points[-1][1] <= error:
+            work = points.pop()[0]
+        assert CHAPTER.glued[name.replace("_", "-")] == f"{work:.0f}"
+
+
+def test_the_rule_is_per_cents_from_spheres():
+    first = spheres(3)[0]
+    ratio = -2 * first / (1 - first)
+    assert CHAPTER.glued["ratio"] == f"{ratio:.3f}"
+    done = solve([1.0] * 5, [1.0, 0.0, 0.0, 0.0, 0.0], [1.0] * 4, ratio, number=float)
+    off = np.abs(np.array(done.velocities, float) - spheres(5)).max()
+    assert number(CHAPTER.glued["rule"]) == pytest.approx(off, abs=0.005)
+    (line,) = [
+        line.get_ydata()[0]
+        for line in CHAPTER.figures["fig-own-forces"].axes[0].get_lines()
+        if line.get_linestyle() == "--"
+    ]
+    assert line == pytest.approx(off, abs=1e-8)
