@@ -74,8 +74,8 @@ def test_the_table_of_laws_is_that_of_the_stored_fits():
     kept = [key for key in FITS if key[2:] == ("both", "4")]
     assert len(lines) == len(kept)
     for law, strikers, *_ in kept:
-        how = f" {words[strikers]} "
-        (numbers,) = [x.split(how)[1] for x in lines if x.split(how)[0].strip() == law]
+        how, shown = f" {words[strikers]} ", law.replace(", A", ", loss")
+        (numbers,) = [x.split(how)[1] for x in lines if x.split(how)[0].strip() == shown]
         both = FITS[law, strikers, "both", "4"]
         total = float(both["chi_one"]) + float(both["chi_two"])
         predicted = FITS[law, strikers, "one", "4"]
