@@ -3,73 +3,104 @@
 import numpy as np
 import pytest
 from matplotlib.animation import FFMpegWriter
-from matplotlib.patches import PathPatch
+from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from PIL import Image
 from test_animation import RUN, TRACE
 
+from cradle import Chain, SequentialCollisions, swing
 from cradle.pictures.animation import animate, animate_swing
-from cradle.pictures.frames import RATE, Frames
+from cradle.pictures.frames import RATE, show
+from cradle.pictures.impacts import PALETTE
 from cradle.pictures.keyframes import Animation
 
+TIMES = np.arange(RATE + 1) / RATE
 
-def middles(frames, part):
+
+def middles(animation, part):
     """Where the shapes of a part are, in units of the file."""
-    found = [
-        patch.get_transform().transform_path(patch.get_path()).get_extents()
-        for patch, name, _ in frames.parts
-        if isinstance(patch, PathPatch) and name.endswith(part)
-    ]
-    inverse = frames.axes.transData.inverted()
-    return [inverse.transform(((box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2)) for box in found]
+    figure = animation.figure
+    found = figure.findobj(lambda one: (one.get_gid() or "").endswith(part))
+    boxes = [one.get_window_extent() for one in found if isinstance(one, (Line2D, Patch))]
+    return [((b.x0 + b.x1) / 2, figure.bbox.height - (b.y0 + b.y1) / 2) for b in boxes]
 
 
 @pytest.mark.parametrize("row", [0, 17, 45, 77])
 def test_balls_of_a_swing_hang_where_they_are(row):
     """Pivot + l sin and cos of the angle, as the run has it; 105 units are a length."""
-    frames = Frames(animate_swing(RUN).svg)
-    assert frames.duration == 3.0
-    frames.show(0.0 if row == 0 else RUN.times[row])
-    pivots = []
-    for ball, x in enumerate(RUN.positions[row]):
-        ((_, _), (a, b)) = middles(frames, f"s0b{ball}")
-        angle = x / 0.1
-        pivots.append(a - 105 * np.sin(angle))
-        assert b == pytest.approx(34 + 105 * np.cos(angle), abs=0.3)
-    frames.show(None)  # at rest at the release, but for the first
-    at = [middles(frames, f"s0b{ball}")[1][0] for ball in (1, 2)]
-    np.testing.assert_allclose(pivots[1:], at, atol=0.3)
+    animation = animate_swing([RUN] * 4, columns=2)
+    width, height = animation.figure.bbox.size / 2
+    show(animation, RUN.times[row])
+    hanging = {}
+    for k, ball in np.ndindex(4, 3):
+        x, y = middles(animation, f"s{k}b{ball}")[-1]
+        angle = RUN.positions[row, ball] / 0.1
+        hanging[k, ball] = x - 105 * np.sin(angle)
+        assert y - k // 2 * height == pytest.approx(34 + 105 * np.cos(angle), abs=0.3)
+    show(animation, None)  # at rest at the release, but for the first
+    for k, ball in np.ndindex(4, 3):
+        (x, _), first = middles(animation, f"s{k}b{ball}")[-1], hanging[k % 2, ball]
+        assert hanging[k, ball] == pytest.approx(first, abs=1e-6)
+        assert ball == 0 or x == pytest.approx(hanging[k, ball], abs=0.3)
+        assert hanging[k, ball] - hanging[0, ball] == pytest.approx(k % 2 * width, abs=1e-6)
+
+
+@pytest.mark.parametrize("k", [0, 7])
+def test_pixels_of_a_film_show_the_ball_where_it_is(k, tmp_path):
+    """Picture k of a GIF: the rim of ball 3 has a colour of its own, the ball is in its middle."""
+    run = swing(Chain([1, 1, 1], [0] * 3, 1), SequentialCollisions(), [-0.05, 0, 0], TIMES)
+    animate_swing(run).save(tmp_path / "a.gif")
+    with Image.open(tmp_path / "a.gif") as film:
+        assert film.n_frames == RATE
+        film.seek(k)
+        pixels = np.asarray(film.convert("RGB"), float) / 255
+    rows, columns = np.nonzero(np.abs(pixels - to_rgb(PALETTE[2])).max(axis=2) < 0.12)
+    x = run.positions[np.searchsorted(TIMES, k / RATE), 2]
+    middle = 240 + 34 + 105 * np.sin(x / 0.1), 34 + 105 * np.cos(x / 0.1)
+    found = (columns.min() + columns.max() + 1) / 2, (rows.min() + rows.max() + 1) / 2
+    np.testing.assert_allclose(found, middle, atol=1)
+    assert k == 0 or x > 0.02  # the last ball has left
 
 
 def test_bars_dots_and_stars_of_an_impact():
     """The picture of a middle instant: half of all impulses, by the trace itself."""
-    frames = Frames(animate(TRACE).svg)
-    assert frames.duration == 10.0
+    animation = animate(TRACE)
+    stars = animation.figure.findobj(lambda one: "star" in (one.get_gid() or ""))
     along = TRACE.path_impulses.sum(axis=1)
     half = [np.interp(along[-1] / 2, along, TRACE.path[:, ball]) for ball in range(3)]
-    frames.show(0.0)
-    shown = lambda: [p.get_visible() for p, name, _ in frames.parts if "star" in name]  # noqa: E731
-    assert not any(shown())
+    show(animation, 0.0)
+    assert len(stars) == 2
+    assert not any(star.get_visible() for star in stars)
     ends = {}
     for time in (1.5, 4.0, 6.5):
-        frames.show(time)
-        ends[time] = [middles(frames, f"dot{ball}")[-1] for ball in range(3)]
+        show(animation, time)
+        ends[time] = [middles(animation, f"dot{ball}")[-1] for ball in range(3)]
+        # The bar from the middle of its ball to its tip, which has the velocity's sign.
+        if time == 4.0:
+            unit = np.diff([middles(animation, f"ball{ball}")[0][0] for ball in (0, 1)])[0]
+            for ball in range(3):
+                foot, tip = (middles(animation, f"{part}{ball}")[0][0] for part in ("ball", "tip"))
+                assert tip - foot == pytest.approx(0.95 * unit * half[ball], abs=0.1)
+                bar = middles(animation, f"bar{ball}")[0][0]
+                assert bar == pytest.approx((foot + tip) / 2, abs=0.1)
     for ball in range(3):
         a, b, c = (ends[time][ball] for time in (1.5, 4.0, 6.5))
         # Along the axis half of the way; up as the velocities are, on the scale of their ends.
         assert b[0] == pytest.approx((a[0] + c[0]) / 2, abs=0.1)
         scale = (ends[1.5][0][1] - ends[1.5][1][1]) / (TRACE.path[0, 0] - TRACE.path[0, 1])
         assert b[1] - a[1] == pytest.approx(scale * (half[ball] - TRACE.path[0, ball]), abs=0.2)
-    frames.show(1.6)
-    assert any(shown())
+    show(animation, 1.6)
+    assert any(star.get_visible() for star in stars)
 
 
 def test_files_of_every_kind(tmp_path):
-    swing = animate_swing(RUN, ["three balls"])
+    film = animate_swing(RUN, ["three balls"])
     for name, begins in (("a.svg", "<svg"), ("a.HTML", "<!doctype html>"), ("a", "<svg")):
-        swing.save(tmp_path / name)
+        film.save(tmp_path / name)
         assert (tmp_path / name).read_text(encoding="utf-8").startswith(begins)
-    swing.save(tmp_path / "a.gif")
-    swing.save(tmp_path / "a.png")
+    film.save(tmp_path / "a.gif")
+    film.save(tmp_path / "a.png")
     with Image.open(tmp_path / "a.gif") as film, Image.open(tmp_path / "a.png") as still:
         assert film.n_frames == 3 * RATE
         assert film.info["duration"] == 1000 / RATE
@@ -87,4 +118,6 @@ def test_what_cannot_be_written_is_said(tmp_path, monkeypatch):
         animate_swing(RUN).save(tmp_path / "a.mp4")
     with pytest.raises(ValueError, match=r"path = '.*a\.bmp'; must end in \.svg, \.html, \.gif"):
         Animation("<svg/>").save(tmp_path / "a.bmp")
+    with pytest.raises(ValueError, match=r"a\.gif needs the figure of an animation, and this one"):
+        Animation("<svg/>").save(tmp_path / "a.gif")
     assert not list(tmp_path.iterdir())

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
+from matplotlib.text import Text
 
 from cradle.input.values import Vector, must_be, one_number, whole_number
 from cradle.pictures.impacts import PALETTE, velocities, velocity_impulse
-from cradle.pictures.keyframes import KEY, Animation, keyframes, number, with_style
+from cradle.pictures.keyframes import KEY, SEEN, Animation, Move, number, with_style
 from cradle.swinging.record import Swing
 from cradle.trace import Trace
 
@@ -80,8 +83,9 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
         diagram.set(xlim=x, ylim=y)
         file, nothing = io.StringIO(), dict.fromkeys(("Creator", "Date", "Format", "Type"))
         figure.savefig(file, format="svg", metadata=nothing)
-    style = _impact_style(trace, centres, (row, diagram), along, shown)
-    return Animation(with_style(file.getvalue(), style, alt))
+    moves = tuple(_impact_moves(trace, centres, (row, diagram), along, shown))
+    style = "".join(move.css() for move in moves)
+    return Animation(with_style(file.getvalue(), style, alt), figure, moves)
 
 
 def _draw_balls(trace: Trace, ax: Axes) -> Vector:
@@ -107,10 +111,10 @@ def _draw_balls(trace: Trace, ax: Axes) -> Vector:
     return np.asarray(centres)
 
 
-def _impact_style(
+def _impact_moves(
     trace: Trace, centres: Vector, axes: tuple[Axes, Axes], along: Vector, shown: Sequence[int]
-) -> str:
-    """Return the keyframes: one at each point of the curves, and at the ends of the flights."""
+) -> Iterator[Move]:
+    """Yield how all move, at each point of the curves, and at the ends of the flights."""
     row, diagram = axes
     before, slow, after, rest = _ACTS
     impulses, path = trace.curve()
@@ -130,47 +134,31 @@ def _impact_style(
     shift[-2:] = per_speed * unit * trace.velocities
     shift[-1] = shift[-2]
     bar = 0.95 / (float(np.abs(path).max()) or 1.0)  # diameters of the largest ball, for 1 m/s
-    style: list[str] = []
-
-    def moved(part: str, values: Vector, form: str, off: float = 0.03, at: int = still) -> None:
-        style.append(keyframes(KEY + part, times, values, f"transform:{form}", off, at))
-
     places = row.transData.transform(np.column_stack([centres, np.full(len(centres), 0.73)]))
     for ball, centre in enumerate(places[:, 0].tolist()):
         x, v = shift[:, ball], path[index, ball] * bar
         for name, values in (("ball", x), ("ballname", x), ("tip", x + unit * v)):
-            moved(f"{name}{ball}", values[:, None], "translateX({}px)")
-        style.append(f"#{KEY}bar{ball}{{transform-origin:{number(centre)}px 0}}\n")
-        moved(f"bar{ball}", np.column_stack([x, v]), "translateX({}px) scaleX({})", 0.001)
+            yield Move(
+                f"{KEY}{name}{ball}", times, values[:, None], "translateX({}px)", 0.03, still
+            )
+        both, form = np.column_stack([x, v]), "translateX({}px) scaleX({})"
+        yield Move(f"{KEY}bar{ball}", times, both, form, 0.001, still, (centre, 0.0))
     # The diagram: dots on the curves, and a cover that draws back to the right.
     curves = np.dstack(np.broadcast_arrays(along[:, None], path))
     drawn = diagram.transData.transform(curves.reshape(-1, 2)).reshape(curves.shape)
     for ball in shown:
         way = (drawn[:, ball] - drawn[-1, ball]) * [1, -1]
-        moved(f"dot{ball}", way[index], "translate({}px,{}px)")
+        yield Move(f"{KEY}dot{ball}", times, way[index], "translate({}px,{}px)", 0.03, still)
     box, height = diagram.bbox, row.get_figure().bbox.height  # type: ignore[union-attr]
     hidden = (box.x1 - drawn[index, 0, 0]) / box.width
     hidden[still + 1 :] = 0.0  # beyond the last point too
-    style.append(f"#{KEY}cover{{transform-origin:{number(box.x1)}px {number(height)}px}}\n")
-    moved("cover", hidden[:, None], "scaleX({})", 0.0005, still + 1)
-    return "".join(style + _stars(impulses, times))
-
-
-def _stars(impulses: Vector, times: Vector) -> list[str]:
-    """Return the keyframes of the stars: seen while the impulse of their contact grows."""
-    style = []
-    for contact, grows in enumerate((np.diff(impulses, axis=0) > 0.0).T.tolist()):
-        name, frames, last = f"{KEY}star{contact}", ["0%{opacity:0}"], False
-        for time, now in zip(times[1:], [*grows, False], strict=False):
-            if now != last:
-                frames.append(f"{number(100 * time / times[-1])}%{{opacity:{int(now)}}}")
-                last = now
-        # Steps: a star keeps its state until the next keyframe.
-        style.append(
-            f"#{name}{{opacity:0;animation:{name} {number(times[-1])}s step-end infinite}}\n"
-            f"@keyframes {name}{{{' '.join(frames)}}}\n"
-        )
-    return style
+    edge = float(box.x1), float(height)
+    yield Move(f"{KEY}cover", times, hidden[:, None], "scaleX({})", 0.0005, still + 1, edge)
+    # A star is seen while the impulse of its contact grows.
+    lit = np.zeros((len(times), impulses.shape[1]))
+    lit[1:points] = np.diff(impulses, axis=0) > 0.0
+    for contact in range(impulses.shape[1]):
+        yield Move(f"{KEY}star{contact}", times, lit[:, contact, None], SEEN, 0.0, 0)
 
 
 def animate_swing(
@@ -239,11 +227,12 @@ def animate_swing(
     # letters are larger, for a page shows the whole smaller.
     cell = 480.0 if beside == 1 else max(300.0, *(2 * one.half_width for one in swings))
     edge, letters = 240.0 - cell / 2, 15 if beside == 1 else 20
-    rows, top, lines = [], 0.0, lines or [""] * len(several)
+    rows, places, top, lines = [], [], 0.0, lines or [""] * len(several)
     for first in range(0, len(several), beside):
         heights = []
         for k, one in enumerate(swings[first : first + beside]):
-            text, place = escape(lines[first + k]), f"{number(k * cell - edge)} {number(top)}"
+            places.append((k * cell - edge, top))
+            text, place = escape(lines[first + k]), " ".join(map(number, places[-1]))
             if text:
                 text = f'<text x="{number(edge + 12)}" y="20" font-size="{letters}">{text}</text>'
             rows.append(f'<g transform="translate({place})">{text}{one.svg}</g>')
@@ -255,14 +244,27 @@ def animate_swing(
         f'{number(top)}" {size} font-family="sans-serif"><rect {size} fill="white"/>'
         f"{''.join(rows)}</svg>"
     )
-    return Animation(with_style(svg, "".join(one.style for one in swings), alt))
+    style = "".join(move.css() for one in swings for move in one.moves)
+    figure, moves = Figure((cell * beside / 72, top / 72), dpi=72), []
+    wide, high = figure.bbox.size
+    for line, (x, y), one in zip(lines, places, swings, strict=True):
+        box = x / wide, 1 - (y + one.height) / high, 480 / wide, one.height / high
+        ax = figure.add_axes(box, xlim=(0, 480), ylim=(one.height, 0))
+        ax.set_axis_off()
+        ax.text(edge + 12, 20, line, size=letters, parse_math=False)
+        for artist in one.artists:
+            ax.add_artist(artist)
+        for move in one.moves:
+            moves.append(move._replace(origin=(move.origin[0] + x, move.origin[1] + y)))
+    return Animation(with_style(svg, style, alt), figure, tuple(moves))
 
 
 class _Drawn(NamedTuple):
-    """A swing's picture and its keyframes, in units of the file."""
+    """A swing's picture, twice, and how it moves, in units of the file."""
 
     svg: str
-    style: str
+    artists: list[Artist]
+    moves: list[Move]
     height: float
     #: How far the balls reach from the middle, with a margin.
     half_width: float
@@ -289,22 +291,28 @@ def _draw_swing(run: Swing, name: str, duration: float, speed: float, still: flo
     order = np.argsort(times, kind="stable")
     times, places = times[order], places[order]
     row = int(np.argmin(np.abs(times - still)))
-    drawn, style, turn = [], [], "transform:rotate({}deg)"
+    drawn, artists, moves = [], [], []
     for ball, (x, length, radius) in enumerate(zip(pivots, lengths, radii, strict=True)):
-        y, part = beam + length * scale, f"{name}{ball}"
+        y, part, colour = beam + length * scale, f"{name}{ball}", PALETTE[ball % len(PALETTE)]
         drawn.append(
             f'<g id="{part}"><path d="M{number(x)} {beam}V{number(y - radius)}" stroke="#555"/>'
             f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(radius - 1.25)}" '
-            f'fill="#f2f2f2" stroke-width="2.5" stroke="{PALETTE[ball % len(PALETTE)]}"/>'
+            f'fill="#f2f2f2" stroke-width="2.5" stroke="{colour}"/>'
             f'<text x="{number(x)}" y="{number(y + 5)}" font-size="14" '
             f'text-anchor="middle">{ball + 1}</text></g>'
         )
         # A positive angle of SVG turns what hangs to the left.
         angle = -np.degrees(places[:, ball] / length)
-        style.append(f"#{part}{{transform-origin:{number(x)}px {beam}px}}\n")
-        style.append(keyframes(part, times / speed, angle[:, None], turn, 0.1, row))
+        turned = part, times / speed, angle[:, None], "rotate({}deg)", 0.1, row
+        moves.append(Move(*turned, (float(x), beam)))
+        artists += [
+            Line2D([x, x], [beam, y - radius], color="#555", lw=1, gid=part),
+            Circle((x, y), radius - 1.25, fc="#f2f2f2", ec=colour, lw=2.5, gid=part),
+            Text(x, y + 5, f"{ball + 1}", fontsize=14, ha="center", gid=part),
+        ]
     ends = pivots[0] - 30, pivots[-1] + 30
     drawn.append(
         f'<path d="M{number(ends[0])} {beam}H{number(ends[1])}" stroke="#333" stroke-width="4"/>'
     )
-    return _Drawn("".join(drawn), "".join(style), low, float(row_width / 2 + out + 10.0))
+    artists.append(Line2D(ends, [beam, beam], color="#333", lw=4, solid_capstyle="butt"))
+    return _Drawn("".join(drawn), artists, moves, low, float(row_width / 2 + out + 10.0))

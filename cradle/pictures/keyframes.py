@@ -10,17 +10,21 @@ a reader who asks for less motion, and paper: both get the still.
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cradle.input.values import Vector
 
 # Stands before the name of every moving part, until the picture's own key takes its place.
 KEY = "moving-part-"
+# What the number of a part does that comes and goes.
+SEEN = "opacity:{}"
 _STYLE_OF_ALL = '<style type="text/css">*{stroke-linejoin: round; stroke-linecap: butt}</style>'
 
 
@@ -35,6 +39,8 @@ class Animation:
     ----------
     svg : str
         The picture as a file.
+    figure, moves : Figure or None, tuple of Move
+        For pixels: the same picture by matplotlib, and how its parts move, in units of the file.
 
     Examples
     --------
@@ -43,6 +49,8 @@ class Animation:
     """
 
     svg: str
+    figure: Figure | None = field(default=None, repr=False, compare=False)
+    moves: tuple[Move, ...] = field(default=(), repr=False, compare=False)
 
     def _repr_html_(self) -> str:
         key = f"p{zlib.crc32(self.svg.encode()):08x}"
@@ -82,7 +90,7 @@ class Animation:
         if kind in (".png", ".gif", ".mp4"):
             from cradle.pictures.frames import save_pixels
 
-            save_pixels(self.svg, file)
+            save_pixels(self, file)
         elif kind in (".svg", ".html", ""):
             page = f"<!doctype html>\n<meta charset='utf-8'>\n{self._repr_html_()}\n"
             file.write_text(page if kind == ".html" else self.svg, encoding="utf-8")
@@ -115,18 +123,33 @@ def number(value: float) -> str:
     return f"{value:.3f}".rstrip("0").rstrip(".")
 
 
-def keyframes(
-    name: str, times: Vector, values: Vector, form: str, tolerance: float, still: int
-) -> str:
-    """Return the style of one moving part: where it rests, and how it moves."""
+class Move(NamedTuple):
+    """How a part moves: times in s, a row of numbers at each, and what they do, as CSS."""
 
-    def css(row: int) -> str:
-        return form.format(*(number(float(value)) for value in values[row]))
+    part: str
+    times: Vector
+    values: Vector
+    form: str
+    tolerance: float
+    still: int  # the row of the still
+    origin: tuple[float, float] = (0.0, 0.0)  # what turns and stretches does so about this point
 
-    rows = thin(times, values, tolerance).tolist()
-    frames = " ".join(f"{number(100 * times[k] / times[-1])}%{{{css(k)}}}" for k in rows)
-    moves = f"animation:{name} {number(times[-1])}s linear infinite"
-    return f"#{name}{{{css(still)};{moves}}}\n@keyframes {name}{{{frames}}}\n"
+    def css(self) -> str:
+        """Return the style of the part: where it rests, and its keyframes."""
+
+        def state(row: int) -> str:
+            css = self.form.format(*map(number, self.values[row].tolist()))
+            return css if self.form == SEEN else f"transform:{css}"
+
+        part, times, pace = self.part, self.times, "linear"
+        rows = thin(times, self.values, self.tolerance).tolist()
+        if self.form == SEEN:  # it lasts until the next keyframe
+            pace, rows = "step-end", [0, *(np.flatnonzero(np.diff(self.values[:, 0])) + 1)]
+        frames = " ".join(f"{number(100 * times[k] / times[-1])}%{{{state(k)}}}" for k in rows)
+        moves = f"animation:{part} {number(times[-1])}s {pace} infinite"
+        x, y = self.origin
+        about = f"#{part}{{transform-origin:{number(x)}px {f'{y}px' if y else 0}}}\n" if x else ""
+        return f"{about}#{part}{{{state(self.still)};{moves}}}\n@keyframes {part}{{{frames}}}\n"
 
 
 def with_style(svg: str, style: str, alt: str) -> str:
