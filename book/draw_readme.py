@@ -1,13 +1,16 @@
-"""Draw the picture of README.md from the solver: `python book/draw_readme.py`."""
+"""Draw the pictures of README.md from the solver: `python book/draw_readme.py`."""
 
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from cradle import Chain, ImpulseCorrelation, collide
+from cradle import Chain, ImpulseCorrelation, SpringChain, collide, swing
 from cradle.pictures import impacts as figures
+from cradle.pictures.animation import Animation, animate_swing
 
 PICTURE = Path(__file__).parent / "_static" / "cradle.png"
+FILM = PICTURE.with_name("toy.svg")
 
 
 def draw() -> Figure:
@@ -47,6 +50,14 @@ def draw() -> Figure:
     return fig
 
 
+def film() -> Animation:
+    """Show the toy for four seconds: five equal steel balls that touch, one pulled back."""
+    toy, times = Chain([1] * 5, [0] * 5), np.linspace(0, 4, 101)
+    run = swing(toy, SpringChain(), [-0.06, 0, 0, 0, 0], times)
+    return animate_swing(run, speed=0.5)
+
+
 if __name__ == "__main__":
     # No version and no date inside: the same picture at every run.
     draw().savefig(PICTURE, dpi=200, metadata={"Software": None})
+    film().save(FILM)

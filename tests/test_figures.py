@@ -5,6 +5,7 @@ import re
 import struct
 from itertools import pairwise
 
+import draw_readme
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
@@ -173,6 +174,19 @@ def test_readme_picture_is_sharp_and_small(root):
     assert width >= 1500
     assert height >= 700
     assert len(head) < 200_000
+
+
+def test_readme_film_is_the_toys(root):
+    """The stored film is what the script draws: its words, and its numbers to their last digits."""
+    stored = (root / "book" / "_static" / "toy.svg").read_text(encoding="utf-8")
+    made = draw_readme.film().svg
+    key, number = r"m[0-9a-f]{8}-", r"-?\d+(?:\.\d+)?"
+    words = [re.sub(number, "0", re.sub(key, "", svg)) for svg in (stored, made)]
+    assert words[0] == words[1]
+    values = [np.array(re.findall(number, re.sub(key, "", svg)), float) for svg in (stored, made)]
+    np.testing.assert_allclose(*values, atol=0.002)
+    assert len(stored) < 200_000
+    assert "toy.svg" in (root / "README.md").read_text(encoding="utf-8")
 
 
 def drawn(draw):
