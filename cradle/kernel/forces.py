@@ -1,7 +1,7 @@
 """Contact forces in time: velocity Verlet, made fourth-order by what costs no second root.
 
 Balls drift by h v between nodes and are kicked by h F at them.  Three things make the velocities
-after the impact exact to h^4:
+after the impact exact to h^4, at very small steps to h^3.5:
 
     the kick     the sum of the kicks is the integral of the force along the path y, and the nodes
                  follow x = y - h^2/12 dv/dt: so the force is that at x + h^2/12 dv/dt, by its slope

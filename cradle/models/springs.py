@@ -28,14 +28,11 @@ from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
 
 #: Least and largest error that can be asked for; steps of one run after which it is given up.
 FINEST, COARSEST, MOST_STEPS = 1e-12, 0.02, 20_000_000
-_CHUNK = 2048
-# What is too little to matter, relative to the accuracy.
-_FAINT = 0.01
+_CHUNK, _FAINT = 2048, 0.01  # rows at once; what is too little to matter, over the accuracy
 # A step times the largest frequency from which on a run shows whether it was short enough; a
 # coarser one that only measures the frequency; and what it may measure too little.
 _ENOUGH, _COARSE, _SPARE = 0.25, 0.5, 1.05
-# Kinks of a contact, on average, from which on two runs are compared: 1.2 collisions; and radians
-# of the quickest ball's swing, of which each adds to the error.
+# Kinks of a contact and radians of the quickest ball, on average, from which on runs are compared.
 _OFTEN, _LONG = 2.4, 30.0
 # Runs of a chain, each finer than the one before.
 _TRIALS = 16
