@@ -1,17 +1,15 @@
 """The stored table of times and errors (benchmarks/run.py), and textbook answers beside it."""
 
-import csv
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from chains import ELASTIC
 from chapters import points
+from stored import read
 from truth import solve
 
 from cradle import paper_chain
 
-DATA = Path(__file__).parents[1] / "data"
 NUMBERS = (
     "parameter", "numerical_error", "model_error", "momentum_error", "energy_change",
     "microseconds", "time_ratio", "repeats", "evaluations",
@@ -20,8 +18,7 @@ NUMBERS = (
 
 @cache
 def table():
-    with (DATA / "benchmarks.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = read("benchmarks.csv")
     for row in rows:
         for name in NUMBERS:
             row[name] = float(row[name]) if row[name] else None

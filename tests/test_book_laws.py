@@ -1,14 +1,13 @@
 """What the text of book/laws.ipynb says, by second routes."""
 
-import csv
-
 import numpy as np
 import pytest
 from chains import ELASTIC, HERTZ, LINEAR
 from chapters import Chapter, number, points
 from energy_law import strike
-from measured_table import DATA, find, fused, marks, sequential
+from measured_table import find, fused, marks, sequential
 from scipy.optimize import minimize
+from stored import read
 from truth import solve
 
 from cradle import Chain, SpringChain, collide
@@ -71,11 +70,10 @@ def test_fig_laws_curve_angles():
 
 
 def test_fig_laws_map():
-    with (DATA / "implied_ratio.csv").open(encoding="utf-8") as file:
-        rows = [
-            {k: float(v or "nan") for k, v in r.items() if k != "note"}
-            for r in csv.DictReader(file)
-        ]
+    rows = [
+        {k: float(v or "nan") for k, v in row.items() if k != "note"}
+        for row in read("implied_ratio.csv")
+    ]
 
     def at(exponent, gamma, m2=1.0, m3=1.0):
         (row,) = [

@@ -221,7 +221,7 @@ def outcomes(
     def solve(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
         """Solve the chunk of chains that begins there; return how it ended, and where."""
         rows = slice(begin, min(begin + chunk, count))
-        part = Inputs(*(_rows(array, lead, rows) for array in arrays))
+        part = Inputs(*(rows_of(array, lead, rows) for array in arrays))
         v, hits, collapsed, *last = whole
         out = Outputs(v[rows], hits[rows], collapsed[rows], *last)
         job = Job(part, out, options, large=large).run(stop)
@@ -230,12 +230,12 @@ def outcomes(
 
     starts = range(0, count, chunk)
     # At the first failure in the order of the chains; none has been returned before.
-    for status, failed in _in_order(solve, starts, progress):
+    for status, failed in in_order(solve, starts, progress):
         if status == REFUSED:
             raise_refused(options.bounded, *given.values())
         if status != FINISHED:
             # Alone, with its record; it stops where it stopped here, and raises.
-            m, v, e, f, b = (_rows(array, lead, slice(failed, failed + 1))[0] for array in arrays)
+            m, v, e, f, b = (rows_of(array, lead, slice(failed, failed + 1))[0] for array in arrays)
             model = ImpulseCorrelation(
                 f, b, meeting=meeting, excess="saturate", max_events=max_events
             )
@@ -275,13 +275,13 @@ def shaped(
         raise ValueError(f"leading axes do not broadcast: {shapes}") from None
 
 
-def _in_order(
+def in_order(
     solve: Callable[..., tuple[int, int]], starts: range, progress: bool
 ) -> Iterable[tuple[int, int]]:
     """Yield the results of `solve` in order, made by as many threads as there are processors."""
     if progress:
         with progress_bar(total=len(starts), unit="chunk") as bar:
-            for ended in _in_order(solve, starts, progress=False):
+            for ended in in_order(solve, starts, progress=False):
                 bar.update()
                 yield ended
     elif len(starts) < 2 or (workers := min(len(starts), os.cpu_count() or 1)) < 2:
@@ -306,7 +306,7 @@ def _chunk(n: int) -> int:
     return 16_384 if n <= 3 else 4096
 
 
-def _rows(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
+def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
     """Return some rows of `array` broadcast to the leading shape, or the one row that all share."""
     size = array.shape[-1]
     if array.size == size:

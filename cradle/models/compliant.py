@@ -13,7 +13,6 @@ from cradle.input.values import (
     Vector,
     must_be,
     number_or_row,
-    one_number,
     refuse_where,
     row_of,
     whole_number,
@@ -155,12 +154,9 @@ class SpringChain:
     max_steps: int = field(default=springs.MOST_STEPS, kw_only=True)
 
     def __post_init__(self) -> None:
-        one = one_number("exponent", self.exponent, "must lie in [1, 10]", 1.0, 10.0)
-        object.__setattr__(self, "exponent", one)
-        finest, coarsest = springs.FINEST, springs.COARSEST
-        rule = f"must lie in [{finest}, {coarsest}]"
-        one = one_number("accuracy", self.accuracy, rule, finest, coarsest)
-        object.__setattr__(self, "accuracy", one)
+        p, accuracy = springs.exponent_and_accuracy(self.exponent, self.accuracy)
+        object.__setattr__(self, "exponent", p)
+        object.__setattr__(self, "accuracy", accuracy)
         for name, rule, low in (
             ("stiffness", "must be above 0", 0.0),
             ("viscosity", "must be at least 0", 0.0),

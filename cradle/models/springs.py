@@ -21,7 +21,7 @@ from cradle.input.values import (
 )
 from cradle.kernel.kinks import Forces, Law
 from cradle.kernel.state import ENERGY, FINISHED, LEDGER, MOMENTUM, ORDER, REFUSED, UNFINISHED
-from cradle.models.batch import _in_order, _rows, shaped
+from cradle.models.batch import in_order, rows_of, shaped
 from cradle.runtime.job import DEFECTS, LARGE
 from cradle.runtime.springs import room, solve
 from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
@@ -34,17 +34,13 @@ _CHUNK, _FAINT = 2048, 0.01  # rows at once; what is too little to matter, over 
 _ENOUGH, _COARSE, _SPARE = 0.25, 0.5, 1.05
 # Kinks of a contact and radians of the quickest ball, on average, from which on runs are compared.
 _OFTEN, _LONG = 2.4, 30.0
-# Runs of a chain, each finer than the one before.
-_TRIALS = 16
-# Step times A times the square of a frequency, at most.
-_DAMPED = 0.5
-# Mass of the lightest ball and stiffness of the softest contact, as a part of the largest.
-_SMALLEST = 1e-9
+_TRIALS = 16  # runs of a chain, each finer than the one before
+_DAMPED = 0.5  # step times A times the square of a frequency, at most
+_SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
 # The longest time that counts in the losses, the widest gap and the narrowest, in contact times and
 # depths; and the widest at which its last digit still is below this accuracy.
 _LONGEST, _WIDEST, _NARROWEST, _BLURRED = 0.3, 1e9, 1e-12, 1e13
-# The least depth, and one over the largest.
-_TINY = 1e-300
+_TINY = 1e-300  # the least depth, and one over the largest
 
 
 class Problem(NamedTuple):
@@ -92,6 +88,13 @@ class Solved(NamedTuple):
     h: Vector  # the last step
     steps: Any  # of all runs
     defect: Any  # what an outcome breaks, 0 for nothing; or, below zero, why it was not reached
+
+
+def exponent_and_accuracy(exponent: float, accuracy: float) -> tuple[float, float]:
+    """Return both, within their ranges."""
+    rule = f"must lie in [{FINEST}, {COARSEST}]"
+    p = one_number("exponent", exponent, "must lie in [1, 10]", 1.0, 10.0)
+    return p, one_number("accuracy", accuracy, rule, FINEST, COARSEST)
 
 
 def law_of(chains: Forces, p: float, accuracy: float, most: int = MOST_STEPS) -> Law:
@@ -313,9 +316,7 @@ def spring_velocities(
     >>> spring_velocities([1] * 5, [1, 0, 0, 0, 0], viscosity=0.05, gaps=0.1).round(2)
     array([-0.  ,  0.02,  0.03,  0.1 ,  0.85])
     """
-    p = one_number("exponent", exponent, "must lie in [1, 10]", 1.0, 10.0)
-    rule = f"must lie in [{FINEST}, {COARSEST}]"
-    accuracy = one_number("accuracy", accuracy, rule, FINEST, COARSEST)
+    p, accuracy = exponent_and_accuracy(exponent, accuracy)
     given = {"masses": masses, "velocities": velocities, "stiffness": stiffness}
     given |= {"viscosity": viscosity, "gaps": gaps}
     arrays, lead = shaped(given, (0, 0, 1, 1, 1))
@@ -325,7 +326,7 @@ def spring_velocities(
     out = np.empty((count, n))
 
     def problem(rows: slice) -> Problem:
-        m, v, k, loss, gap = (_rows(array, lead, rows) for array in arrays)
+        m, v, k, loss, gap = (rows_of(array, lead, rows) for array in arrays)
         return Problem(m, v, k, loss, gap, p, accuracy)
 
     def run_chunk(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
@@ -341,7 +342,7 @@ def spring_velocities(
         at = int((found.defect != 0).argmax())
         return int(found.defect[at]), begin + at
 
-    for defect, at in _in_order(run_chunk, range(0, count, _CHUNK), progress):
+    for defect, at in in_order(run_chunk, range(0, count, _CHUNK), progress):
         if defect:
             one = problem(slice(at, at + 1))
             refuse_beyond(one, one.own(), tuple(map(int, np.unravel_index(at, lead))))
