@@ -178,6 +178,12 @@ def test_works_are_those_of_springs_at_e_1():
     assert again
 
 
+def test_what_touches_at_rest_and_is_not_pushed_does_not_act():
+    trace = collide(Chain([1, 1, 1, 1], [0, 0, 1, 0], 0.5), EnergyDistribution(1.0))
+    assert trace.collisions.tolist() == [0, 0, 1]
+    assert trace.velocities[:2].tolist() == [0, 0]
+
+
 def test_gaps_matter_where_a_contact_closes_again():
     """Ball 3 runs ahead: springs let it gain a gap, rigid balls touch whenever they approach."""
     chain = Chain([1, 1, 1], [1, 0, 0.5], 1)
