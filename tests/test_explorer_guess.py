@@ -17,7 +17,7 @@ from explorer import (
 )
 from test_layout import browser  # noqa: F401
 
-from cradle import Chain, ImpulseCorrelation, collide
+from cradle import Chain, ImpulseCorrelation, SpringChain, collide
 
 NUMBERS = """(node) => [...node.querySelectorAll('text.number')]
   .map((text) => +text.textContent.replace('\\u2212', '-'))"""
@@ -160,8 +160,10 @@ def test_two_cradles_side_by_side(visit):
     tab = still(visit, "#speeds=1,0,0&forward=0.3")
     kept = drawn(tab)["after"]
     other = tab.locator(".outcome > div:not(.drawn) .plot")
+    three = Chain([1] * 3, [1, 0, 0])
     for label, expected in (
-        ("ratio 0.15", collide(Chain([1] * 3, [1, 0, 0]), ImpulseCorrelation(0.15)).velocities),
+        ("ratio 0.15", collide(three, ImpulseCorrelation(0.15)).velocities),
+        ("spheres that touch", collide(three, SpringChain()).velocities),
         ("this setting, kept as it is", kept),
     ):
         tab.get_by_label(label, exact=True).check(force=True)

@@ -122,7 +122,7 @@ def test_copied_python_gives_the_same_numbers(visit):
         "navigator.clipboard.writeText = (text) => ((window.copied = text), Promise.resolve())"
     )
     for fragment in ("speeds=1,0.5,0,-0.35&forward=0.3,0.12&backward=0.2&masses=1,0.05,3,0.166",
-                     "scene=ABCCAB", "scene=half"):  # fmt: skip
+                     "scene=ABCCAB", "scene=half", "speeds=1,0,0&restitution=0.9&law=spheres&gap=2"):  # fmt: skip
         go_to(tab, fragment)
         asked = later(tab, 50)
         press(tab, "Copy Python")
@@ -132,7 +132,11 @@ def test_copied_python_gives_the_same_numbers(visit):
         assert tab.inner_text(".told") == ""
         program = {}
         exec(tab.evaluate("window.copied"), program)
-        assert program["trace"].velocities.tolist() == asked["after"]
+        after = program["trace"].velocities
+        if "spheres" in fragment:  # to five digits
+            np.testing.assert_allclose(after, asked["after"], rtol=0, atol=2e-5)
+            continue
+        assert after.tolist() == asked["after"]
         np.testing.assert_allclose(program["run"].impacts[0].after, asked["after"], atol=1e-9)
 
 

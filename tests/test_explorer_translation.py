@@ -197,6 +197,8 @@ def test_the_build_writes_it(tmp_path, root, source):
     assert not list(tmp_path.iterdir())
     build("html")
     assert (tmp_path / "_static" / "explorer_engine.js").read_text("utf-8") == source
+    spheres = explorer_engine.spheres()
+    assert (tmp_path / "_static" / "explorer_spheres.js").read_text("utf-8") == spheres
     config = yaml.safe_load((root / "_config.yml").read_text("utf-8"))
     assert config["sphinx"]["local_extensions"]["explorer_engine"] == "book/_ext"
 

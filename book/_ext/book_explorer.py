@@ -19,6 +19,7 @@ from sphinx.application import Sphinx
 #: In this order: the solver, the data, and each script after those it uses.
 SCRIPTS = (
     "explorer_engine.js",
+    "explorer_spheres.js",
     "explorer_data.js",
     "explorer_setting.js",
     "explorer_swing.js",

@@ -26,13 +26,21 @@ from explorer_pairs import equal_pairs
 from sphinx.application import Sphinx
 
 from cradle import kernel
+from cradle.kernel import state
 from cradle.runtime import compile as runtime
 from cradle.runtime import job as drive
 
 #: Hand-written parts, beside this file: before the event loop, and after it.
 PARTS = ("engine_numbers.js", "engine_collide.js")
-#: The script in the built book.
-SCRIPT = "_static/explorer_engine.js"
+#: The part after the contact forces, and all that these need before.
+SPHERES = "engine_spheres.js"
+NUMBERS = """const max = (a, b) => (b > a ? b : a);
+const min = (a, b) => (b < a ? b : a);"""
+#: The scripts in the built book.
+SCRIPT, SPHERES_SCRIPT = (
+    "_static/explorer_engine.js",
+    "_static/explorer_spheres.js",
+)
 
 OPERATORS: dict[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/",
@@ -40,11 +48,21 @@ OPERATORS: dict[type, str] = {
     # Loose on purpose: truth values and numbers compare as in Python.
     ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
 }  # fmt: skip
+#: Words of JavaScript alone.
+RESERVED = {
+    "case", "catch", "const", "default", "delete", "do", "enum", "export", "extends", "function",
+    "let", "new", "super", "switch", "this", "throw", "typeof", "var", "void",
+}  # fmt: skip
 #: Functions without an effect, and their names in the script.
 PURE = {
     "abs": "Math.abs", "max": "max", "min": "min", "sqrt": "Math.sqrt", "log": "Math.log",
-    "frexp": "frexp", "ldexp": "ldexp",
+    "frexp": "frexp", "ldexp": "ldexp", "pow": "Math.pow",
 }  # fmt: skip
+
+
+def free(name: str) -> str:
+    """Return a name of Python's that may be a word of JavaScript's."""
+    return f"{name}$" if name in RESERVED else name
 
 
 def refuse(node: ast.AST, why: str) -> NoReturn:
@@ -81,7 +99,7 @@ def expression(node: ast.expr) -> str:
         return known
     match node:
         case ast.Name(name):
-            return name
+            return free(name)
         case ast.Attribute(ast.Name("math"), "inf"):
             return "Infinity"
         case ast.Attribute(owner, name):
@@ -233,9 +251,9 @@ def block(body: list[ast.stmt]) -> list[str]:
 
 def function(node: ast.FunctionDef) -> list[str]:
     """Return a function; its variables are declared at its beginning, as in Python."""
-    given = [argument.arg for argument in node.args.args]
+    given = [free(argument.arg) for argument in node.args.args]
     stored = {
-        part.id
+        free(part.id)
         for part in ast.walk(node)
         if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)
     }
@@ -313,7 +331,12 @@ def engine() -> str:
         + f"\nconst DEFECTS = {json.dumps(drive.DEFECTS)};\n"
     )
     inside = "\n".join([before, loop, after])
-    # In one room a second function of a name would replace the first without a word.
+    return room(inside)
+
+
+def room(inside: str) -> str:
+    """Return a script in a room of its own."""
+    # A second function of a name would replace the first without a word.
     names = Counter(re.findall(r"^function (\w+)", inside, re.MULTILINE))
     if names.most_common(1)[0][1] > 1:
         raise ValueError(
@@ -322,12 +345,26 @@ def engine() -> str:
     return f'(function () {{\n"use strict";\n{inside}}})();\n'
 
 
+def spheres() -> str:
+    """Return the script of the contact forces, which adds `cradle.spheres` to the page."""
+    after = (Path(__file__).parent / SPHERES).read_text(encoding="utf-8")
+    codes = [
+        f"{name} = {getattr(state, name)}"
+        for name in ("FINISHED", "PAUSED", "UNFINISHED")
+    ]
+    source = "\n".join([*codes, runtime.unit(("kinks", "forces"))])
+    # Powers other than those of spheres, which are roots, need not have the same bits.
+    source = source.replace("x ** (p - 1.0)", "pow(x, p - 1.0)")
+    return room(f"{NUMBERS}\n{translate(source)}\n{after}")
+
+
 def write_engine(app: Sphinx, exception: Exception | None) -> None:
     """Put the script into the built book."""
     if exception is None and app.builder.format == "html":
-        target = Path(app.outdir, SCRIPT)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(engine(), encoding="utf-8")
+        for name, script in ((SCRIPT, engine), (SPHERES_SCRIPT, spheres)):
+            target = Path(app.outdir, name)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(script(), encoding="utf-8")
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

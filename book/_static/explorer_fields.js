@@ -167,18 +167,13 @@
   class RegionMap {
     constructor(setting) {
       this.key = RegionMap.key(setting);
-      const { speeds, restitution, forward, backward } = setting;
+      const { masses: _, ...others } = setting;
       this.points = new Gradual(CELLS * CELLS, (k) => {
         const left = ((Math.floor(k / CELLS) + 0.5) / CELLS) * LARGEST;
         const right = (((k % CELLS) + 0.5) / CELLS) * LARGEST;
         const masses = [1 / left, 1, 1 / right];
-        const { status, velocities, collisions, collapsed } = explorer.outcome({
-          masses,
-          speeds,
-          restitution,
-          forward,
-          backward,
-        });
+        const asked = { ...others, masses };
+        const { status, velocities, collisions, collapsed } = explorer.outcome(asked);
         if (status !== "finished") return { pattern: -1, odd: false };
         // As balls keep their order, the number of those that go back names them.
         const pattern = [...velocities].filter((v) => v < 0).length;
@@ -187,8 +182,8 @@
     }
 
     // The map does not change when its own point moves.
-    static key({ speeds, restitution, forward, backward }) {
-      return JSON.stringify([speeds, restitution, forward, backward]);
+    static key({ speeds, restitution, forward, backward, law, gap }) {
+      return JSON.stringify([speeds, restitution, forward, backward, law, gap]);
     }
 
     // Paint what is known, in the colours given for 0, 1, 2, 3 balls that go back; the last one

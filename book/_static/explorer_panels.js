@@ -129,6 +129,7 @@
       ratio: ratio("ratio", ["forward", "backward"]),
       forward: ratio("ratio, pushed from the left", ["forward"]),
       backward: ratio("ratio, pushed from the right", ["backward"]),
+      gap: slider({ words: "gaps", low: 0, high: 100, step: 0.1, unit: "µm", input: act.gap }),
     };
   }
 
@@ -156,9 +157,17 @@
             : `the paper's ball ${value}, ${1000 * explorer.data.masses[value]} g`,
       })),
     });
+    const law = choice({
+      words: "law",
+      choose: act.law,
+      options: [
+        { value: "rule", text: "the paper's rule", title: "restitution and ratios" },
+        { value: "spheres", text: "spheres", title: "of steel, which push by Hertz's law" },
+      ],
+    });
     const sliders = settingSliders(act);
-    const wanted = { count, scope, material, ...sliders };
-    const has = (name) => parts.has({ forward: "ratio", backward: "ratio" }[name] ?? name);
+    const wanted = { count, scope, material, law, ...sliders };
+    const has = (name) => parts.has({ forward: "ratio", backward: "ratio", gap: "law" }[name] ?? name);
     const nodes = Object.keys(wanted)
       .filter(has)
       .map((name) => wanted[name].node);
@@ -185,20 +194,23 @@
       const worn = new Set(balls.map((ball) => setting.letters[ball]));
       material.show(worn.size === 1 ? [...worn][0] : null);
       const one = chosen !== "all";
+      const spheres = explorer.law(setting) === "spheres";
+      law.show(explorer.law(setting));
+      const ratios = (row) => (one && !spheres ? inner.map((k) => row[k]) : []);
+      const both = inner.flatMap((k) => [setting.forward[k], setting.backward[k]]);
       const rows = {
         speed: one ? [setting.speeds[balls[0]]] : [],
         mass: balls.map((ball) => setting.masses[ball]),
         restitution: contacts.map((c) => setting.restitution[c]),
-        ratio: one ? [] : inner.flatMap((k) => [setting.forward[k], setting.backward[k]]),
-        forward: one ? inner.map((k) => setting.forward[k]) : [],
-        backward: one ? inner.map((k) => setting.backward[k]) : [],
+        ratio: one || spheres ? [] : both,
+        forward: ratios(setting.forward),
+        backward: ratios(setting.backward),
+        gap: spheres ? [setting.gap] : [],
       };
       for (const [name, values] of Object.entries(rows)) sliders[name].show(values, setting);
-      sliders.restitution.rename(
-        one && contacts.length
-          ? `restitution, balls ${contacts[0] + 1} and ${contacts[0] + 2}`
-          : "restitution",
-      );
+      const restitution = spheres ? "restitution at 1 m/s" : "restitution";
+      const pair = one && contacts.length ? `, balls ${contacts[0] + 1} and ${contacts[0] + 2}` : "";
+      sliders.restitution.rename(restitution + pair);
     }
     return { node: make("div", { class: "settings" }, ...nodes), show };
   }
@@ -220,12 +232,8 @@
     const [bars, momentum, energy] = [1, 2, 3].map(() => make("div", { class: "plot" }));
     const handles = panels.handles(act);
     const told = make("p", { class: "note" });
-    const caption = make(
-      "p",
-      { class: "note" },
-      "Momentum: ball by ball, up to the dashed line; balls that go back take some off. " +
-        "Energy: 100\u00a0% is what there was before the hit; grey is lost, or stored in the contacts.",
-    );
+    const second = make(level, {});
+    const caption = make("p", { class: "note" });
     const node = make(
       "div",
       { class: "outcome" },
@@ -233,7 +241,7 @@
       make("div", { class: "drawn" }, bars, handles.node),
       told,
       other ?? "",
-      make(level, {}, "Momentum and energy"),
+      second,
       momentum,
       energy,
       caption,
@@ -244,9 +252,15 @@
       title.textContent = covered
         ? `Your guess: after ${name} (m/s)`
         : `${part < 1 ? "During" : "After"} ${name} (m/s)`;
+      second.textContent = covered ? "Momentum and energy of your guess" : "Momentum and energy";
+      caption.textContent =
+        "Momentum: ball by ball, up to the dashed line; balls that go back take some off. Energy: 100\u00a0% is " +
+        `what there was before the hit; grey is ${covered ? "what you have not given away" : "lost, or stored in the contacts"}.`;
       const ghost = guess?.open && guess.touched && number === 0 ? { guess: guess.values } : {};
       const drawn = covered ? { span: explorer.guessReach(setting).span, gap: 0.9 } : ghost;
-      bars.innerHTML = now ? explorer.bars(box(bars), setting, hit.before, now, drawn) : "";
+      // The numbers of a guess stand where the outlines of the velocities before would be.
+      const before = covered ? hit.before.map(() => 0) : hit.before;
+      bars.innerHTML = now ? explorer.bars(box(bars), setting, before, now, drawn) : "";
       momentum.innerHTML = now ? explorer.momentum(box(momentum), setting, hit.before, now) : "";
       energy.innerHTML = now ? explorer.energy(box(energy), setting, hit.before, now) : "";
       handles.show(state, box(bars));
@@ -259,7 +273,7 @@
 
   // At the side of the first one, with the same clock: another ratio, or a setting that was kept.
   function besidePanel(act) {
-    const options = [["", "nothing"], ["0", "ratio 0"], ["0.15", "ratio 0.15"], ["kept", "this setting, kept as it is"]]; // prettier-ignore
+    const options = [["", "nothing"], ["0", "ratio 0"], ["0.15", "ratio 0.15"], ["spheres", "spheres that touch"], ["kept", "this setting, kept as it is"]]; // prettier-ignore
     const chosen = choice({
       words: "beside it",
       choose: act.beside,
@@ -278,7 +292,8 @@
       place.hidden = !other;
       bars.hidden = !other || covered;
       if (!other) return;
-      name.textContent = `The cradle at its side, ${typeof beside === "object" ? "as it was kept" : `ratio ${beside}`}:`;
+      const how = { object: "as it was kept" }[typeof beside] ?? { spheres: "spheres that touch" }[beside];
+      name.textContent = `The cradle at its side, ${how ?? `ratio ${beside}`}:`;
       const { setting } = other;
       stage.lay(setting, stageBox(place));
       stage.balls.forEach(({ group }) => group.removeAttribute("tabindex"));

@@ -20,7 +20,7 @@
       const total = record ? explorer.progress(record) : [0];
       const end = total[total.length - 1];
       const events = (record?.events ?? []).flatMap((event, k) =>
-        event.kind === "maximum_compression" ? [] : [{ ...event, at: total[k + 1] / end }],
+        event.kind === "maximum_compression" ? [] : [{ ...event, at: total[event.row ?? k + 1] / end }],
       );
       if (record !== listed)
         node.replaceChildren(
@@ -133,10 +133,13 @@
       const chosen = panels.concerned(setting, scope).inner;
       const inner = chosen.length ? chosen : explorer.all(setting.forward);
       shown = state;
-      if (!inner.length) {
+      const spheres = explorer.law(setting) === "spheres";
+      if (!inner.length || spheres) {
         sweep = null;
         plot.replaceChildren();
-        note.textContent = "Two balls have no ratio: it belongs to a ball with two neighbours.";
+        note.textContent = spheres
+          ? "Spheres have no ratio: how they push says it all. Choose the paper's rule to see this picture."
+          : "Two balls have no ratio: it belongs to a ball with two neighbours.";
         return;
       }
       if (!sweep || sweep.key !== Sweep.key(setting, inner)) sweep = new Sweep(setting, inner);

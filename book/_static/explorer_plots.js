@@ -263,7 +263,7 @@
 
   function marks(record, contact, plot, em) {
     const events = record.events
-      .map((event, k) => ({ ...event, row: k + 1 }))
+      .map((event, k) => ({ row: k + 1, ...event }))
       .filter((event) => event.contact === contact);
     if (events.length > MARKED) return "";
     const several = events.filter((event) => event.kind === "end").length > 1;

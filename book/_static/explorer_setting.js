@@ -10,9 +10,14 @@
     restitution: [0, 1],
     forward: [0, 1],
     backward: [0, 1],
+    gap: [0, 1000],
   };
   const LENGTHS = { masses: 0, speeds: 0, restitution: 1, forward: 2, backward: 2 };
   const NONE = "-";
+  // By whose law the balls collide. With "spheres" a setting has `law` and `gap`, in micrometres;
+  // without these it is the paper's rule.
+  const LAWS = ["rule", "spheres"];
+  const law = (setting) => setting.law ?? LAWS[0];
   // m/s; the square of a smaller speed, an energy, might be no number.
   const SLOWEST = 1e-6;
 
@@ -31,6 +36,10 @@
       const at = setting[name].findIndex((value) => !(value >= low && value <= high));
       if (at >= 0) return `${name}[${at}] = ${setting[name][at]}; must lie in [${low}, ${high}]`;
     }
+    if (!LAWS.includes(law(setting))) return `law = ${setting.law}; must be ${LAWS.join(" or ")}`;
+    const gap = setting.gap ?? 0;
+    if (!(gap >= LIMITS.gap[0] && gap <= LIMITS.gap[1]))
+      return `gap = ${gap}; must lie in [${LIMITS.gap}] micrometres`;
     const slow = setting.speeds.findIndex((speed) => speed !== 0 && Math.abs(speed) < SLOWEST);
     if (slow >= 0)
       return `speeds[${slow}] = ${setting.speeds[slow]}; must be 0 or at least ${SLOWEST} in size`;
@@ -76,6 +85,7 @@
     );
     const ratio = 0.15;
     const sized = {
+      ...setting,
       masses: fit(setting.masses, count),
       speeds,
       restitution: fit(setting.restitution, count - 1),
@@ -109,6 +119,11 @@
     return { ...setting, ...Object.fromEntries(rows) };
   }
 
+  function withLaw(setting, chosen) {
+    const { law: _, gap = 0, ...rest } = setting;
+    return chosen === "spheres" ? { ...rest, law: chosen, gap } : rest;
+  }
+
   // Pull one ball so far that it comes to its lowest point with this speed; it takes along the
   // balls in its way.
   function pulled(setting, ball, speed) {
@@ -127,6 +142,8 @@
 
   const equal = (one, other) =>
     one.letters === other.letters &&
+    law(one) === law(other) &&
+    (one.gap ?? 0) === (other.gap ?? 0) &&
     Object.keys(LENGTHS).every((name) => String(one[name]) === String(other[name]));
 
   // --- the address: one word where all values are equal ---------------------------------------
@@ -140,6 +157,7 @@
     if (forward.length) parts.push(`forward=${short(forward)}`);
     if (String(backward) !== String(forward)) parts.push(`backward=${short(backward)}`);
     if (/[^-]/.test(letters)) parts.push(`letters=${letters}`);
+    if (law(setting) === "spheres") parts.push(`law=spheres`, `gap=${setting.gap}`);
     parts.push(`picture=${picture}`);
     return parts.join("&");
   }
@@ -167,7 +185,7 @@
   function fromFragment(text) {
     const given = new Map(text.split("&").map((part) => part.split("=", 2)));
     const unknown = [...given.keys()].find(
-      (key) => !(Object.hasOwn(LENGTHS, key) || key === "letters" || key === "picture"),
+      (key) => !(Object.hasOwn(LENGTHS, key) || ["letters", "picture", "law", "gap"].includes(key)),
     );
     if (unknown !== undefined) return { error: `${unknown} is no part of a setting` };
     const numbers = (name) =>
@@ -196,6 +214,8 @@
       backward: row("backward", forward),
       letters,
     };
+    const named = { law: given.get("law") ?? LAWS[0], gap: given.has("gap") ? numbers("gap")[0] : 0 };
+    if (named.law !== LAWS[0]) Object.assign(plainly, named);
     // What an address leaves out, the letters say where they can.
     const left = Object.entries(measured(plainly, all(speeds))).filter(([name]) => !given.has(name));
     const setting = { ...plainly, ...Object.fromEntries(left) };
@@ -207,19 +227,22 @@
 
   function python(setting) {
     const list = (row) => `[${row.join(", ")}]`;
+    const spheres = law(setting) === "spheres";
+    const [name, model] = spheres
+      ? ["SpringChain", springs(setting)]
+      : ["ImpulseCorrelation", ratios(setting)];
+    const names = ["Chain", "Pendulums", name, "collide", "swing"].sort((a, b) => (a < b ? -1 : 1));
     return `import numpy as np
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, collide, swing
+from cradle import ${names.join(", ")}
 
 chain = Chain(
     masses=${list(setting.masses)},
     velocities=${list(setting.speeds)},
-    restitution=${list(setting.restitution)},
+    restitution=${spheres ? 1 : list(setting.restitution)},
 )
-model = ImpulseCorrelation(
-    forward=${list(setting.forward)},
-    backward=${list(setting.backward)},
-    excess="saturate",
+model = ${name}(
+${model}
 )
 trace = collide(chain, model)  # the first hit
 print(trace.velocities)
@@ -232,6 +255,19 @@ print(run)
 `;
   }
 
+  const ratios = (setting) => `    forward=[${setting.forward.join(", ")}],
+    backward=[${setting.backward.join(", ")}],
+    excess="saturate",`;
+
+  // Steel, by Hertz's law; losses that give two balls the restitution at 1 m/s.
+  function springs(setting) {
+    const { stiffness, viscosity } = globalThis.cradle.spheresLaw(setting);
+    return `    stiffness=[${stiffness.join(", ")}],  # N/m^1.5
+    viscosity=[${viscosity.join(", ")}],  # s
+    gaps=${setting.gap}e-6,  # m
+    accuracy=1e-6,`;
+  }
+
   Object.assign(explorer, {
     LIMITS,
     NONE,
@@ -239,12 +275,14 @@ print(run)
     atRest,
     equal,
     fromFragment,
+    law,
     lettered,
     plain,
     pulled,
     python,
     resized,
     toFragment,
+    withLaw,
     withMass,
     withRatio,
     withRestitution,

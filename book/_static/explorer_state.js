@@ -55,8 +55,14 @@
     lay() {
       const { setting } = this;
       const { beside } = this.view;
-      const other = typeof beside === "object" ? beside : explorer.withRatio(setting, explorer.all(setting.forward), +beside);
-      this.other = beside === "" ? null : new Swing(other);
+      this.other = null;
+      if (beside === "") return;
+      const { all, withLaw, withRatio } = explorer;
+      const spheres = beside === "spheres";
+      const other = spheres
+        ? { ...withLaw(setting, beside), gap: 0 }
+        : withRatio(withLaw(setting, "rule"), all(setting.forward), +beside);
+      this.other = new Swing(typeof beside === "object" ? beside : other);
     }
 
     beside(chosen) {

@@ -22,6 +22,14 @@
     maxEvents: EVENTS,
   });
 
+  // The answer of the law that the setting names; with its history if asked for.
+  function answered(setting, velocities, record) {
+    const { masses, restitution, gap } = setting;
+    if (explorer.law(setting) === "spheres")
+      return globalThis.cradle.spheres({ masses, velocities, restitution, gap: 1e-6 * gap, record });
+    return globalThis.cradle.collide({ ...question(setting, velocities), record });
+  }
+
   // Touching balls that hardly move against each other get their common velocity (rule 2 of
   // cradle/swinging/resting.py).
   function settled(masses, velocities, least) {
@@ -48,8 +56,7 @@
   }
 
   // The outcome of a hit without its history, for sweeps and maps.
-  const outcome = (setting, velocities = setting.speeds) =>
-    globalThis.cradle.outcome(question(setting, velocities));
+  const outcome = (setting, velocities = setting.speeds) => answered(setting, velocities, false);
 
   class Swing {
     constructor(setting) {
@@ -89,8 +96,7 @@
     record(number) {
       const { before, happened, status } = this.hit(number);
       if (!happened || status !== "finished") return null;
-      const asked = { ...question(this.setting, before), record: true };
-      return globalThis.cradle.collide(asked);
+      return answered(this.setting, before, true);
     }
 
     // The number of the last hit up to a time; -1 before the first one.

@@ -54,7 +54,14 @@
     return number === 0 ? "the first hit" : `hit ${number + 1}`;
   }
 
-  function noAnswer(status) {
+  function noAnswer(status, setting) {
+    if (status === "lossy")
+      return "Spheres that lose so much are not followed here: choose a restitution of 0.65 or more.";
+    if (status === "unfinished" && explorer.law(setting) === "spheres")
+      return (
+        "To follow the contact forces of this hit takes more steps than a page should compute " +
+        "between two pictures. The Python package has no such limit."
+      );
     if (status === "unfinished")
       return (
         `This hit takes more than ${explorer.EVENTS} events, more than a page should compute ` +
@@ -66,7 +73,7 @@
   // One hit in full: `hit` and `answer` (its record or outcome) as explorer_swing.js makes them.
   function outcome(setting, hit, number, answer) {
     const { masses } = setting;
-    if (hit.status !== "finished") return noAnswer(hit.status);
+    if (hit.status !== "finished") return noAnswer(hit.status, setting);
     if (!hit.happened) {
       if (hit.before.every((v) => v === 0)) return "No ball is pulled back. Drag one to a side.";
       return "The balls swing together: none strikes another.";
@@ -74,7 +81,8 @@
     const before = sum(kinetic(masses, hit.before));
     const lost = 1 - sum(kinetic(masses, hit.after)) / before;
     const percent = lost < 0.0005 ? "Less than 0.1" : fixed(100 * lost, lost < 0.1 ? 1 : 0);
-    const kept = Math.abs(lost) < 1e-9;
+    // Contact forces are followed to five digits.
+    const kept = Math.abs(lost) < (explorer.law(setting) === "spheres" ? 1e-4 : 1e-9);
     const said = [
       `Before ${hitName(number)}, ${motions(hit.before)}.`,
       `After it, ${motions(hit.after)}.`,
