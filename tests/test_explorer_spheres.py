@@ -8,6 +8,7 @@ from explorer import (
     SETTING,
     address_of_page,  # noqa: F401
     drawn,
+    press,
     still,
     visits,  # noqa: F401
 )
@@ -78,6 +79,22 @@ def test_the_history_is_that_of_the_trace(spheres, e, gap):
     assert abs(np.diff(path, axis=0)).max() < 0.1
 
 
+@pytest.mark.parametrize("stiffness", [0.02, 1.0, 7.0])
+def test_linear_springs(spheres, visit, page, stiffness):
+    """The engine's, and those of the live cradle of chapter 2."""
+    law = {"stiffness": [1.0, stiffness], "exponent": 1.0}
+    given = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "viscosity": [0, 0]} | law
+    expected = collide(Chain([1] * 3, [1, 0, 0]), SpringChain(**law)).velocities
+    answer = spheres("cradle.forces", given)["velocities"]
+    np.testing.assert_allclose(answer, expected, rtol=0, atol=1e-5)
+    tab = still(visit, address=page.replace("explorer.html", "compliance.html"))
+    press(tab, "Next hit")
+    box = tab.get_by_label("stiffness ratio, as a number")
+    box.fill(str(stiffness))
+    box.press("Enter")
+    assert drawn(tab)["after"] == answer
+
+
 def test_what_has_no_answer_says_so(spheres):
     assert asked(spheres, [1.0, 1.0], [1.0, 0.0], 0.5)[0] == {"status": "lossy"}
     light = asked(spheres, [1.0, 1e-9, 1.0], [1.0, 0.0, 0.0])[0]
@@ -101,12 +118,12 @@ def test_a_reader_chooses_spheres(visit):
     assert (setting["law"], setting["gap"]) == ("spheres", 3.5)
     tab.get_by_label("All ratios", exact=True).check(force=True)
     drawn(tab)
-    assert "Spheres have no ratio" in tab.inner_text(".pictures")
+    assert "There is no ratio here" in tab.inner_text(".pictures")
     again = still(visit, f"#{tab.evaluate(f'{EXPLORER}.state.fragment()')}")
     assert drawn(again)["after"] == apart
     refused = still(visit, "#speeds=1,0&law=glue")
     drawn(refused)
-    assert "law = glue; must be rule or spheres" in refused.inner_text(".words")
+    assert "law = glue; must be rule or spheres or springs" in refused.inner_text(".words")
     lossy = still(visit, "#speeds=1,0,0&law=spheres&restitution=0.2")
     drawn(lossy)
     assert "choose a restitution of 0.65" in lossy.inner_text(".words")

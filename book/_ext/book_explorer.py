@@ -13,6 +13,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from docutils import nodes
 from sphinx.application import Sphinx
 
@@ -172,7 +173,11 @@ def chapters() -> list[dict[str, Any]]:
     """Return scenes of single chapters, which are not walked through."""
     meets = equal(3, 0.15, e=0.25)
     meets["speeds"] = [1.0, 0.8, 0.0]
-    told = [("meets", "Balls that meet again", meets, "inside")]
+    springs = equal(3, 0.15) | {"law": "springs", "stiffness": 1.0}
+    told = [
+        ("meets", "Balls that meet again", meets, "inside"),
+        ("springs", "Three balls on springs", springs, "inside"),
+    ]
     keys = ("key", "title", "setting", "picture")
     return [dict(zip(keys, scene, strict=True), text="") for scene in told]
 
@@ -208,7 +213,7 @@ def draw(setting: dict[str, Any], path: Path) -> None:
     """Draw a scene for readers without scripts: the balls, and their velocities during the hit."""
     from matplotlib.figure import Figure
 
-    from cradle import Chain, ImpulseCorrelation, collide
+    from cradle import Chain, ImpulseCorrelation, SpringChain, collide
     from cradle.pictures import impacts as figures
     from cradle.pictures.balls import chain_sketch
 
@@ -218,6 +223,9 @@ def draw(setting: dict[str, Any], path: Path) -> None:
     model = ImpulseCorrelation(
         setting["forward"], setting["backward"], excess="saturate"
     )
+    if "stiffness" in setting:
+        ratios = np.arange(len(chain) - 1)
+        model = SpringChain(setting["stiffness"] ** ratios, 1)
     figure = Figure(
         figsize=(7, 5.4), layout="constrained", facecolor="white"
     )

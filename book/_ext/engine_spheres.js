@@ -1,10 +1,10 @@
-// Spheres of steel in a row, touching or with gaps: their contact forces followed in time by the
-// package's own loop, in the chain's own units. Between two runs with steps h and h / 2 no velocity
+// Spheres of steel in a row, touching or with gaps, and balls on linear springs: their contact
+// forces followed in time by the package's own loop, in the chain's own units. Between two runs with steps h and h / 2 no velocity
 // may differ by more than half of the accuracy.
 
 // Young's modulus in Pa, Poisson's ratio, density in kg/m^3.
 const STEEL = { modulus: 210e9, poisson: 0.3, density: 7800 };
-const P = 1.5; // Hertz
+const HERTZ = 1.5;
 const ACCURACY = 1e-5; // of the fastest closing speed
 const MOST = 100000; // steps of a run
 const HALVINGS = 8;
@@ -25,23 +25,24 @@ function stiffness(left, right) {
 
 const reduced = (left, right) => (left / (left + right)) * right;
 // The depth of two balls is of this size, m.
-const depth = (left, right, speed, k) => ((reduced(left, right) * speed ** 2) / k) ** (1 / (P + 1));
+const depth = (left, right, speed, k, p = HERTZ) =>
+  ((reduced(left, right) * speed ** 2) / k) ** (1 / (p + 1));
 
 // A bound of the square of a ball's frequency: two contacts store at most all the energy there is.
-function highest({ w, v, k }) {
+function highest({ w, v, k, p }) {
   const m = w.map((x) => 1 / x);
   const mean = sum(m.map((x, i) => x * v[i])) / sum(m);
   const energy = sum(m.map((x, i) => 0.5 * x * (v[i] - mean) ** 2));
   const both = m.map((_, i) => (k[i - 1] ?? 0) + (k[i] ?? 0));
-  const part = Math.max(...both.map((x, i) => x ** (2 / (P + 1)) * w[i]));
-  return P * part * ((P + 1) * energy) ** ((P - 1) / (P + 1));
+  const part = Math.max(...both.map((x, i) => x ** (2 / (p + 1)) * w[i]));
+  return p * part * ((p + 1) * energy) ** ((p - 1) / (p + 1));
 }
 
 // One run with steps h: its status, velocities, and, if recorded, where the chain was after each.
 function follow(chain, h, recorded) {
   const n = chain.v.length;
   const lossy = chain.loss.some((time) => time > 0);
-  const law = Law(P, 0.01 * ACCURACY, MOST, lossy, false);
+  const law = Law(chain.p, 0.01 * ACCURACY, MOST, lossy, false);
   const { w, v, k, loss, d } = chain;
   const out = Motions([zeros(n)], [0], [0], [0]);
   const [links, clocks] = [made(n, Link), [Clock()]];
@@ -80,7 +81,7 @@ const found = new Map([[1, 0]]);
 function lossOf(restitution) {
   if (found.has(restitution)) return found.get(restitution);
   const back = (loss) => {
-    const { v } = fine({ w: [0.5, 0.5], v: [1, 0], k: [1], loss: [loss], d: [0] }, false);
+    const { v } = fine({ w: [0.5, 0.5], v: [1, 0], k: [1], loss: [loss], d: [0], p: HERTZ }, false);
     return v[1] - v[0];
   };
   let [low, high] = [0, LONGEST];
@@ -95,7 +96,7 @@ function lossOf(restitution) {
 }
 
 // k and A of each contact: restitutions are those at a closing speed of 1 m/s.
-function law({ masses, restitution }) {
+function spheresLaw({ masses, restitution }) {
   const k = contacts(masses, stiffness);
   const viscosity = contacts(masses, (left, right, c) => lossOf(restitution[c]) * depth(left, right, 1, k[c]));
   return { stiffness: k, viscosity };
@@ -142,13 +143,19 @@ function story(chain, { pages, h, v: after }) {
 
 // Return the outcome for spheres that hang apart by `gap`, m; with its events and its path if
 // `record` is true. Restitutions below what the law reaches have no answer: "lossy".
-function spheres({ masses, velocities, restitution, gap, record = false }) {
-  const { stiffness: k, viscosity } = law({ masses, restitution });
-  if (viscosity.some(Number.isNaN)) return { status: "lossy" };
+function spheres(given) {
+  const law = spheresLaw(given);
+  if (law.viscosity.some(Number.isNaN)) return { status: "lossy" };
+  return forces({ ...given, ...law, exponent: HERTZ });
+}
+
+// The same for any stiffnesses and viscosities.
+function forces(given) {
+  const { masses, velocities, exponent: p, stiffness: k, viscosity, gap = 0, record = false } = given;
   const closing = contacts(velocities, (left, right) => left - right);
   const at = closing.indexOf(Math.max(...closing));
   const [speed, mass] = [closing[at], reduced(masses[at], masses[at + 1])];
-  const unit = depth(masses[at], masses[at + 1], speed, k[at]);
+  const unit = depth(masses[at], masses[at + 1], speed, k[at], p);
   if (!(speed > 0)) return { status: "finished", velocities, collisions: zeros(k.length), collapsed: false, saturated: [] };
   const chain = {
     w: masses.map((m) => mass / m),
@@ -156,6 +163,7 @@ function spheres({ masses, velocities, restitution, gap, record = false }) {
     k: k.map((x) => x / k[at]),
     loss: viscosity.map((time) => time * (speed / unit)),
     d: k.map(() => 0 - gap / unit),
+    p,
   };
   const done = fine(chain, record);
   if (done.status !== FINISHED) return { status: "unfinished" };
@@ -178,4 +186,4 @@ function certified(masses, before, after, speed) {
   return Math.abs(sum(change)) <= 1e-10 * size && gained <= ACCURACY * speed * size && order.every(Boolean);
 }
 
-Object.assign(globalThis.cradle, { spheres, spheresLaw: law });
+Object.assign(globalThis.cradle, { forces, spheres, spheresLaw });

@@ -13,7 +13,7 @@
   "use strict";
   const { Stage, State, controls, panels } = explorer;
   const ALL_PARTS =
-    "scenes tasks count scope material law speed mass restitution ratio beside inside sweep map share";
+    "scenes tasks count scope material law stiffness speed mass restitution ratio beside inside sweep map share";
   const LONGEST_FRAME = 0.1; // s; a page that was hidden must not jump
 
   const less = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -168,6 +168,7 @@
         restitution: setting((old, e) => explorer.withRestitution(old, concerned().contacts, e)),
         law: setting(explorer.withLaw),
         gap: setting((old, gap) => ({ ...old, gap })),
+        stiffness: setting((old, stiffness) => ({ ...old, stiffness })),
         ratio: setting((old, ratio, directions, inner = concerned().inner) =>
           explorer.withRatio(old, inner, ratio, directions),
         ),

@@ -182,8 +182,8 @@
     }
 
     // The map does not change when its own point moves.
-    static key({ speeds, restitution, forward, backward, law, gap }) {
-      return JSON.stringify([speeds, restitution, forward, backward, law, gap]);
+    static key({ masses: _, letters: __, ...others }) {
+      return JSON.stringify(others);
     }
 
     // Paint what is known, in the colours given for 0, 1, 2, 3 balls that go back; the last one

@@ -130,6 +130,14 @@
       forward: ratio("ratio, pushed from the left", ["forward"]),
       backward: ratio("ratio, pushed from the right", ["backward"]),
       gap: slider({ words: "gaps", low: 0, high: 100, step: 0.1, unit: "µm", input: act.gap }),
+      stiffness: slider({
+        words: "stiffness ratio",
+        low: 0.01,
+        high: 1000,
+        step: 0.01,
+        logarithmic: true,
+        input: act.stiffness,
+      }),
     };
   }
 
@@ -163,6 +171,7 @@
       options: [
         { value: "rule", text: "the paper's rule", title: "restitution and ratios" },
         { value: "spheres", text: "spheres", title: "of steel, which push by Hertz's law" },
+        ...(parts.has("scenes") ? [{ value: "springs", text: "linear springs" }] : []),
       ],
     });
     const sliders = settingSliders(act);
@@ -194,21 +203,22 @@
       const worn = new Set(balls.map((ball) => setting.letters[ball]));
       material.show(worn.size === 1 ? [...worn][0] : null);
       const one = chosen !== "all";
-      const spheres = explorer.law(setting) === "spheres";
-      law.show(explorer.law(setting));
-      const ratios = (row) => (one && !spheres ? inner.map((k) => row[k]) : []);
+      const chosenLaw = explorer.law(setting);
+      law.show(chosenLaw);
+      const ratios = (row) => (one && chosenLaw === "rule" ? inner.map((k) => row[k]) : []);
       const both = inner.flatMap((k) => [setting.forward[k], setting.backward[k]]);
       const rows = {
         speed: one ? [setting.speeds[balls[0]]] : [],
         mass: balls.map((ball) => setting.masses[ball]),
-        restitution: contacts.map((c) => setting.restitution[c]),
-        ratio: one || spheres ? [] : both,
+        restitution: chosenLaw === "springs" ? [] : contacts.map((c) => setting.restitution[c]),
+        ratio: one || chosenLaw !== "rule" ? [] : both,
         forward: ratios(setting.forward),
         backward: ratios(setting.backward),
-        gap: spheres ? [setting.gap] : [],
+        gap: chosenLaw === "spheres" ? [setting.gap] : [],
+        stiffness: chosenLaw === "springs" ? [setting.stiffness] : [],
       };
       for (const [name, values] of Object.entries(rows)) sliders[name].show(values, setting);
-      const restitution = spheres ? "restitution at 1 m/s" : "restitution";
+      const restitution = chosenLaw === "spheres" ? "restitution at 1 m/s" : "restitution";
       const pair = one && contacts.length ? `, balls ${contacts[0] + 1} and ${contacts[0] + 2}` : "";
       sliders.restitution.rename(restitution + pair);
     }

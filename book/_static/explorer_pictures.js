@@ -133,12 +133,12 @@
       const chosen = panels.concerned(setting, scope).inner;
       const inner = chosen.length ? chosen : explorer.all(setting.forward);
       shown = state;
-      const spheres = explorer.law(setting) === "spheres";
-      if (!inner.length || spheres) {
+      const forces = explorer.law(setting) !== "rule";
+      if (!inner.length || forces) {
         sweep = null;
         plot.replaceChildren();
-        note.textContent = spheres
-          ? "Spheres have no ratio: how they push says it all. Choose the paper's rule to see this picture."
+        note.textContent = forces
+          ? "There is no ratio here: how the contacts push says it all. Choose the paper's rule to see this picture."
           : "Two balls have no ratio: it belongs to a ball with two neighbours.";
         return;
       }

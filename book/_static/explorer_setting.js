@@ -11,12 +11,14 @@
     forward: [0, 1],
     backward: [0, 1],
     gap: [0, 1000],
+    stiffness: [0.01, 1000],
   };
   const LENGTHS = { masses: 0, speeds: 0, restitution: 1, forward: 2, backward: 2 };
   const NONE = "-";
-  // By whose law the balls collide. With "spheres" a setting has `law` and `gap`, in micrometres;
-  // without these it is the paper's rule.
-  const LAWS = ["rule", "spheres"];
+  // By whose law the balls collide. A setting without one has the paper's rule. Each other law has a
+  // number: the gaps, in micrometres; or how much stiffer each spring is than the one before.
+  const LAWS = ["rule", "spheres", "springs"];
+  const NUMBER = { spheres: ["gap", 0], springs: ["stiffness", 1] };
   const law = (setting) => setting.law ?? LAWS[0];
   // m/s; the square of a smaller speed, an energy, might be no number.
   const SLOWEST = 1e-6;
@@ -37,9 +39,10 @@
       if (at >= 0) return `${name}[${at}] = ${setting[name][at]}; must lie in [${low}, ${high}]`;
     }
     if (!LAWS.includes(law(setting))) return `law = ${setting.law}; must be ${LAWS.join(" or ")}`;
-    const gap = setting.gap ?? 0;
-    if (!(gap >= LIMITS.gap[0] && gap <= LIMITS.gap[1]))
-      return `gap = ${gap}; must lie in [${LIMITS.gap}] micrometres`;
+    const [number] = NUMBER[setting.law] ?? [];
+    const [least, most] = LIMITS[number] ?? [];
+    if (number && !(setting[number] >= least && setting[number] <= most))
+      return `${number} = ${setting[number]}; must lie in [${least}, ${most}]`;
     const slow = setting.speeds.findIndex((speed) => speed !== 0 && Math.abs(speed) < SLOWEST);
     if (slow >= 0)
       return `speeds[${slow}] = ${setting.speeds[slow]}; must be 0 or at least ${SLOWEST} in size`;
@@ -120,8 +123,9 @@
   }
 
   function withLaw(setting, chosen) {
-    const { law: _, gap = 0, ...rest } = setting;
-    return chosen === "spheres" ? { ...rest, law: chosen, gap } : rest;
+    const { law: _, gap: __, stiffness: ___, ...rest } = setting;
+    const [number, usual] = NUMBER[chosen] ?? [];
+    return number ? { ...rest, law: chosen, [number]: setting[number] ?? usual } : rest;
   }
 
   // Pull one ball so far that it comes to its lowest point with this speed; it takes along the
@@ -143,7 +147,8 @@
   const equal = (one, other) =>
     one.letters === other.letters &&
     law(one) === law(other) &&
-    (one.gap ?? 0) === (other.gap ?? 0) &&
+    one.gap === other.gap &&
+    one.stiffness === other.stiffness &&
     Object.keys(LENGTHS).every((name) => String(one[name]) === String(other[name]));
 
   // --- the address: one word where all values are equal ---------------------------------------
@@ -157,7 +162,8 @@
     if (forward.length) parts.push(`forward=${short(forward)}`);
     if (String(backward) !== String(forward)) parts.push(`backward=${short(backward)}`);
     if (/[^-]/.test(letters)) parts.push(`letters=${letters}`);
-    if (law(setting) === "spheres") parts.push(`law=spheres`, `gap=${setting.gap}`);
+    const [number] = NUMBER[setting.law] ?? [];
+    if (number) parts.push(`law=${setting.law}`, `${number}=${setting[number]}`);
     parts.push(`picture=${picture}`);
     return parts.join("&");
   }
@@ -185,7 +191,7 @@
   function fromFragment(text) {
     const given = new Map(text.split("&").map((part) => part.split("=", 2)));
     const unknown = [...given.keys()].find(
-      (key) => !(Object.hasOwn(LENGTHS, key) || ["letters", "picture", "law", "gap"].includes(key)),
+      (key) => !(Object.hasOwn(LENGTHS, key) || ["letters", "picture", "law", "gap", "stiffness"].includes(key)),
     );
     if (unknown !== undefined) return { error: `${unknown} is no part of a setting` };
     const numbers = (name) =>
@@ -214,8 +220,10 @@
       backward: row("backward", forward),
       letters,
     };
-    const named = { law: given.get("law") ?? LAWS[0], gap: given.has("gap") ? numbers("gap")[0] : 0 };
-    if (named.law !== LAWS[0]) Object.assign(plainly, named);
+    const named = given.get("law") ?? LAWS[0];
+    const [number, usual] = NUMBER[named] ?? [];
+    if (named !== LAWS[0]) plainly.law = named;
+    if (number) plainly[number] = given.has(number) ? numbers(number)[0] : usual;
     // What an address leaves out, the letters say where they can.
     const left = Object.entries(measured(plainly, all(speeds))).filter(([name]) => !given.has(name));
     const setting = { ...plainly, ...Object.fromEntries(left) };
@@ -227,10 +235,8 @@
 
   function python(setting) {
     const list = (row) => `[${row.join(", ")}]`;
-    const spheres = law(setting) === "spheres";
-    const [name, model] = spheres
-      ? ["SpringChain", springs(setting)]
-      : ["ImpulseCorrelation", ratios(setting)];
+    const rule = law(setting) === "rule";
+    const [name, model] = rule ? ["ImpulseCorrelation", ratios(setting)] : ["SpringChain", springs(setting)];
     const names = ["Chain", "Pendulums", name, "collide", "swing"].sort((a, b) => (a < b ? -1 : 1));
     return `import numpy as np
 
@@ -239,7 +245,7 @@ from cradle import ${names.join(", ")}
 chain = Chain(
     masses=${list(setting.masses)},
     velocities=${list(setting.speeds)},
-    restitution=${spheres ? 1 : list(setting.restitution)},
+    restitution=${rule ? list(setting.restitution) : 1},
 )
 model = ${name}(
 ${model}
@@ -259,8 +265,15 @@ print(run)
     backward=[${setting.backward.join(", ")}],
     excess="saturate",`;
 
+  // Linear springs, the first of 1 N/m.
+  const stiffnesses = ({ masses, stiffness }) => masses.slice(1).map((_, c) => stiffness ** c);
+
   // Steel, by Hertz's law; losses that give two balls the restitution at 1 m/s.
   function springs(setting) {
+    if (setting.law === "springs")
+      return `    stiffness=[${stiffnesses(setting).join(", ")}],  # N/m
+    exponent=1,
+    accuracy=1e-6,`;
     const { stiffness, viscosity } = globalThis.cradle.spheresLaw(setting);
     return `    stiffness=[${stiffness.join(", ")}],  # N/m^1.5
     viscosity=[${viscosity.join(", ")}],  # s
@@ -281,6 +294,7 @@ print(run)
     pulled,
     python,
     resized,
+    stiffnesses,
     toFragment,
     withLaw,
     withMass,

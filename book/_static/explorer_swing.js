@@ -25,8 +25,14 @@
   // The answer of the law that the setting names; with its history if asked for.
   function answered(setting, velocities, record) {
     const { masses, restitution, gap } = setting;
-    if (explorer.law(setting) === "spheres")
-      return globalThis.cradle.spheres({ masses, velocities, restitution, gap: 1e-6 * gap, record });
+    const given = { masses, velocities, record };
+    if (setting.law === "spheres")
+      return globalThis.cradle.spheres({ ...given, restitution, gap: 1e-6 * gap });
+    if (setting.law === "springs") {
+      const stiffness = explorer.stiffnesses(setting);
+      const viscosity = stiffness.map(() => 0);
+      return globalThis.cradle.forces({ ...given, exponent: 1, stiffness, viscosity });
+    }
     return globalThis.cradle.collide({ ...question(setting, velocities), record });
   }
 

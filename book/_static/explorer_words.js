@@ -57,7 +57,7 @@
   function noAnswer(status, setting) {
     if (status === "lossy")
       return "Spheres that lose so much are not followed here: choose a restitution of 0.65 or more.";
-    if (status === "unfinished" && explorer.law(setting) === "spheres")
+    if (status === "unfinished" && explorer.law(setting) !== "rule")
       return (
         "To follow the contact forces of this hit takes more steps than a page should compute " +
         "between two pictures. The Python package has no such limit."
@@ -82,7 +82,7 @@
     const lost = 1 - sum(kinetic(masses, hit.after)) / before;
     const percent = lost < 0.0005 ? "Less than 0.1" : fixed(100 * lost, lost < 0.1 ? 1 : 0);
     // Contact forces are followed to five digits.
-    const kept = Math.abs(lost) < (explorer.law(setting) === "spheres" ? 1e-4 : 1e-9);
+    const kept = Math.abs(lost) < (explorer.law(setting) === "rule" ? 1e-9 : 1e-4);
     const said = [
       `Before ${hitName(number)}, ${motions(hit.before)}.`,
       `After it, ${motions(hit.after)}.`,
