@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.advice.measured import Evidence, Measured, evidence, measured_chain, rows, unit_time
+from cradle.advice.measured import Measured, evidence, measured_chain, rows, unit_time
 from cradle.advice.recommendation import Recommendation
 from cradle.chain import Chain
 from cradle.input.values import must_be, one_number, shown, whole_number
@@ -99,13 +99,11 @@ def recommend(
 
     Examples
     --------
-    >>> from cradle import Chain, collide
+    >>> from cradle import Chain
     >>> chain = Chain([1, 1, 1], [1, 0, 0])
     >>> advice = recommend(chain, ("forces", "times"), accuracy=1e-3, stiffness=1e10)
     >>> advice.numerical_error <= 1e-3, advice.model_error, advice.measured_on
     (True, 0.0, ('three equal',))
-    >>> collide(chain, advice.model).velocities.round(2).tolist()
-    [-0.07, 0.08, 0.99]
     >>> recommend(Chain([1, 1, 1], [1, 0, 0], 0.9), "forces", stiffness=1e10)
     Traceback (most recent call last):
     ...
@@ -126,9 +124,9 @@ springs, which lose nothing; with losses, ask for impulses
     _refuse(wish)
     found = []
     failures: dict[str, list[str]] = {}
-    for group, name in _models(wish):
+    for group, kind, make in _models(wish):
         try:
-            found.append(_best(group, name, wish))
+            found.append(_best(group, kind.__name__, make, wish))
         except _Unfit as why:
             failures.setdefault(why.args[0], []).append(why.args[1])
     if not found:
@@ -152,11 +150,6 @@ class _Wish(NamedTuple):
     stiffness: float | Sequence[float] | None
 
     @property
-    def timed(self) -> str:
-        """The first wish that needs a time; empty if none does."""
-        return next((name for name in self.wanted if name in ("forces", "times")), "")
-
-    @property
     def elastic(self) -> bool:
         """Whether springs apply."""
         return bool((self.chain.restitution == 1.0).all())
@@ -172,20 +165,9 @@ class _Wish(NamedTuple):
         return self.ratios is None and self.stiffness is None and len(self.chain) > 2
 
     @property
-    def uniform(self) -> bool:
-        """Whether the contacts are equal springs, as all that were measured."""
-        return len(set(np.ravel(1.0 if self.stiffness is None else self.stiffness))) == 1
-
-    def model(self, row: Measured) -> Model:
-        """Return the model of a row, with what is known."""
-        stiffness = 1.0 if self.stiffness is None else self.stiffness
-        if row.group == "event":
-            return self.ratios or ImpulseCorrelation(0.0)
-        if row.group == "springs":
-            return SpringChain(stiffness, accuracy=row.parameter)
-        if row.group == "energy":
-            return EnergyDistribution(stiffness, rtol=row.parameter)
-        return SequentialCollisions()
+    def like(self) -> Chain | None:
+        """The chain, if its contacts are equal springs, as all that were measured."""
+        return self.chain if len(set(np.ravel(self.stiffness or 1.0))) == 1 else None
 
 
 class _Unfit(Exception):
@@ -211,14 +193,15 @@ def _refuse(wish: _Wish) -> None:
         raise ValueError(f"velocities = {chain.velocities.tolist()}; no balls approach: no impact")
     lossy = int(np.argmin(chain.restitution))
     loss = f"restitution[{lossy}] = {float(chain.restitution[lossy])!r}"
-    if wish.timed and not wish.elastic:
+    timed = next((name for name in wish.wanted if name in ("forces", "times")), "")
+    if timed and not wish.elastic:
         raise ValueError(
-            f"wanted = {wish.timed!r}, {loss}; must be 1: forces and times come from springs, "
+            f"wanted = {timed!r}, {loss}; must be 1: forces and times come from springs, "
             "which lose nothing; with losses, ask for impulses"
         )
-    if wish.timed and wish.stiffness is None:
+    if timed and wish.stiffness is None:
         raise ValueError(
-            f"wanted = {wish.timed!r}; needs stiffness: rigid models have impulses alone; give "
+            f"wanted = {timed!r}; needs stiffness: rigid models have impulses alone; give "
             "that of the contacts in N/m^(3/2), for two steel balls of radius 1 cm stiffness=1e10"
         )
     if wish.model_error is not None and not wish.elastic:
@@ -238,21 +221,30 @@ def _refuse(wish: _Wish) -> None:
         )
 
 
-def _models(wish: _Wish) -> list[tuple[str, str]]:
-    """Return groups of the table and names of the models that what is known allows."""
-    found = []
-    if wish.ratios is not None or len(wish.chain) == 2:
-        found.append(("event", "ImpulseCorrelation"))
-    if wish.stiffness is not None:
-        springs = ("springs", "SpringChain"), ("energy", "EnergyDistribution")
-        found.append(springs[not wish.elastic])
-    judged = wish.elastic and wish.uniform and measured_chain(wish.chain)
+_Maker = Callable[[Measured], Model]
+
+
+def _models(wish: _Wish) -> Iterator[tuple[str, type, _Maker]]:
+    """Yield what is known allows: a group of the table, the model, how a row's setting makes it."""
+    ratios, stiffness = wish.ratios, wish.stiffness
+    if ratios is not None or len(wish.chain) == 2:
+        yield "event", ImpulseCorrelation, lambda _: ratios or ImpulseCorrelation(0.0)
+    if stiffness is not None and wish.elastic:
+        yield "springs", SpringChain, lambda row: SpringChain(stiffness, accuracy=row.parameter)
+    elif stiffness is not None:
+        yield (
+            "energy",
+            EnergyDistribution,
+            lambda row: EnergyDistribution(stiffness, rtol=row.parameter),
+        )
+    judged = wish.elastic and wish.like and measured_chain(wish.chain)
     if wish.modest and (wish.bare or judged):
-        found.append(("outcome", "SequentialCollisions"))
-    return found
+        yield "outcome", SequentialCollisions, lambda _: SequentialCollisions()
 
 
-def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recommendation]:
+def _best(
+    group: str, name: str, make: _Maker, wish: _Wish
+) -> tuple[tuple[bool, float], Recommendation]:
     """Return a model in its cheapest setting that fulfils a wish, after what orders models."""
     gives = {"velocities" if one == "fastest ball" else one for one in wish.wanted}
     found = tuple(
@@ -262,12 +254,11 @@ def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recom
     if not found:
         raise _Unfit(f"wanted = {wish.wanted!r}", f"{name} has no {' and '.join(sorted(gives))}")
     # What a model refuses it refuses now: the same balls at rest cost it no work.
-    chain, model = wish.chain, wish.model(found[0])
-    model.solve(Chain(chain.masses, 0.0 * chain.velocities, chain.restitution))
-    like = chain if wish.uniform else None
-    best = _cheapest(evidence(found, like, wish.ratios if group == "event" else None), name, wish)
-    row = best.rows[0]
-    apart = row.model_error if best.exact else None
+    chain = wish.chain
+    make(found[0]).solve(Chain(chain.masses, 0.0 * chain.velocities, chain.restitution))
+    where, settings = evidence(found, wish.like, wish.ratios if group == "event" else None)
+    row = _cheapest(where, settings, name, wish.accuracy)
+    apart = row.model_error if where == "here" else None
     if group == "springs" or (len(chain) == 2 and wish.elastic):
         apart = 0.0
     if wish.model_error is not None and (apart is None or apart > wish.model_error):
@@ -276,34 +267,35 @@ def _best(group: str, name: str, wish: _Wish) -> tuple[tuple[bool, float], Recom
     slow = None
     if row.setting.startswith("compiled"):  # the same in the event loop as it stands
         plain = tuple(one for one in rows("event", "plain") if one.model == "ImpulseCorrelation")
-        slow = evidence(plain, like, wish.ratios)[0]
-    known_error = best.measured and row.numerical_error is not None
-    kind = "timed" if group == "springs" and wish.timed else group
+        there, (other,) = evidence(plain, wish.like, wish.ratios)
+        slow = None if there == "elsewhere" else other.time_ratio * unit_time()
+    measured = where != "elsewhere"
+    kind = "timed" if group == "springs" and {"forces", "times"} & set(wish.wanted) else group
     kind = "two balls" if group == "event" and len(chain) == 2 else kind
-    return (not best.measured, best.cost), Recommendation(
-        model=wish.model(row),
+    return (not measured, row.time_ratio), Recommendation(
+        model=make(row),
         setting=row.setting,
         call=_BATCH if "batch" in row.setting else "collide(chain, model)",
-        numerical_error=best.error if known_error else None,
+        numerical_error=row.numerical_error if measured else None,
         model_error=apart,
-        seconds=best.cost * unit_time() if best.measured else None,
-        plain_seconds=slow.cost * unit_time() if slow and slow.measured else None,
-        measured_on=best.chains if best.measured else (),
+        seconds=row.time_ratio * unit_time() if measured else None,
+        plain_seconds=slow,
+        measured_on=row.chains if measured else (),
         reason=_REASONS[kind],
     )
 
 
-def _cheapest(settings: list[Evidence], name: str, wish: _Wish) -> Evidence:
+def _cheapest(where: str, settings: list[Measured], name: str, accuracy: float) -> Measured:
     """Return the cheapest setting that has the accuracy."""
-    margin = 1.0 if settings[0].exact else _MARGIN
-    fit = [one for one in settings if margin * one.error <= wish.accuracy]
+    margin = 1.0 if where == "here" else _MARGIN
+    errors = [row.numerical_error or 0.0 for row in settings]
+    fit = [row for row, error in zip(settings, errors, strict=True) if margin * error <= accuracy]
     if fit:
-        return min(fit, key=lambda one: one.cost)
-    least = min(settings, key=lambda one: one.error)
-    stricter = "" if least.exact else f"; on other chains it must be {_MARGIN:g} times better"
-    stricter += f": ask for {1.05 * margin * least.error:.1e} or more"
+        return min(fit, key=lambda row: row.time_ratio)
+    least = settings[int(np.argmin(errors))]
+    stricter = "" if where == "here" else f"; on other chains it must be {_MARGIN:g} times better"
     raise _Unfit(
-        f"accuracy = {wish.accuracy!r}",
-        f"the least numerical error of {name} measured is {least.error:.2g} "
-        f"({', '.join(least.chains)}){stricter}",
+        f"accuracy = {accuracy!r}",
+        f"the least numerical error of {name} measured is {min(errors):.2g} "
+        f"({', '.join(least.chains)}){stricter}: ask for {1.05 * margin * min(errors):.1e} or more",
     )

@@ -6,13 +6,14 @@ from dataclasses import dataclass, fields
 from html import escape
 from typing import Any
 
-from cradle.advice.measured import lasting
+import numpy as np
+
 from cradle.models import Model
 
 
 @dataclass(frozen=True, repr=False)
 class Recommendation:
-    """A model for a scene, and what to expect of it.
+    """A model for a scene, and what to expect of it.  What was not measured is None.
 
     Attributes
     ----------
@@ -23,19 +24,18 @@ class Recommendation:
     call : str
         What to call.
     numerical_error : float or None
-        Distance from the exact answer of the same model on the chains of `measured_on`: of any
-        ball's velocity, at most, as a part of the closing speed.  Another chain may have a few
-        times as much; `accuracy` leaves room for that.  None: not measured.
+        Largest distance of a velocity from the exact answer of the same model on the chains of
+        `measured_on`, as a part of the closing speed.  Another chain may have a few times as much;
+        `accuracy` leaves room for that.
     model_error : float or None
         The same from Hertz springs, the theory of elastic spheres (equal ones, unless `stiffness`
-        says otherwise); no setting makes it smaller.  None: not measured, or, with losses, not to
-        be measured: there is no such theory.
+        says otherwise); no setting makes it smaller.  With losses there is no such theory: None.
     seconds : float or None
         Time of one impact on the machine that measured, to a factor of two; once the event loop is
-        compiled, if the model has one.  None: not measured.
+        compiled, if the model has one.
     plain_seconds : float or None
         The same of one call in plain Python, as small work runs: nothing is compiled before the
-        work pays for it.  None: not measured, or the same.
+        work pays for it.  None, too, if it is the same.
     measured_on : tuple of str
         The measured chains that these numbers come from: this very chain, or those around it, of
         which the worst counts.  Empty: none.
@@ -89,6 +89,13 @@ class Recommendation:
         style = ' style="overflow-wrap: anywhere"'  # on a phone, too, nothing is cut
         rows = [f"<tr><th>{escape(a)}</th><td{style}>{escape(b)}</td></tr>" for a, b in lines]
         return f'<table class="dataframe">{"".join(rows)}</table>'  # pages style it as a table
+
+
+def lasting(seconds: float) -> str:
+    """Return a time in two digits; microseconds are us, for terminals without the letter mu."""
+    units = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
+    name = next((unit for unit, size in units.items() if seconds < 999.5 * size), "s")
+    return f"{np.format_float_positional(float(f'{seconds / units[name]:.1e}'), trim='-')} {name}"
 
 
 def made(model: Any) -> str:
