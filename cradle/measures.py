@@ -1,4 +1,7 @@
-"""What is read off outcomes: bouncing patterns, conditioning, effective ratios, conservation."""
+"""What is read off outcomes: bouncing patterns, conditioning, effective ratios, conservation.
+
+Equations and sections are those of Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
 from cradle.closed_form import largest_ratios
-from cradle.conserving import conserving_angle, conserving_outcomes
-from cradle.input.values import Vector, checked, must_be, one_number
+from cradle.input.values import Vector, checked, must_be, one_number, row_of
 from cradle.models import Model, collide
 from cradle.models.batch import post_impact_velocities
+from cradle.models.correlation import ImpulseCorrelation
 from cradle.trace import Event, Trace
-
-__all__ = [
-    "Condition", "bouncing_pattern", "condition_number", "conserving_angle", "conserving_outcomes",
-    "effective_ratio",
-]  # fmt: skip
 
 #: Pattern by the number of balls that bounce back: none, the first, the first two.
 _PATTERNS = np.array([2, 1, 3])
@@ -27,18 +25,14 @@ _PATTERNS = np.array([2, 1, 3])
 #: Ratios that are tried to bracket an effective ratio.
 _RATIOS = 257
 
+_Three = tuple[float, float, float]
+
 
 def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
     """Return which balls of three bounce back: pattern 1, 2 or 3 (the paper's I, II, III).
 
-    Ball 1 strikes two balls at rest and comes from the left.  As balls never overtake each other,
-    the number of balls that go back (velocity below zero) names them:
-
-    - pattern 1: ball 1 alone bounces back;
-    - pattern 2: no ball bounces back;
-    - pattern 3: balls 1 and 2 bounce back.
-
-    A ball at rest counts as one that does not go back.
+    Ball 1 comes from the left and strikes two balls at rest.  In pattern 1 it alone goes back
+    (velocity below zero), in pattern 2 no ball does, in pattern 3 balls 1 and 2 do (section 2.5).
 
     Parameters
     ----------
@@ -53,12 +47,8 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
     Raises
     ------
     ValueError
-        If the last axis is not three balls long, a velocity is not finite, or the last ball goes
-        back: then momentum did not come from the left.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, section 2.5, Fig. 6.
+        If there are not three balls, a velocity is not finite, or the last ball goes back: then
+        momentum did not come from the left.
 
     Examples
     --------
@@ -73,14 +63,7 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
 
 
 class Condition(NamedTuple):
-    """How much an outcome amplifies relative changes of its inputs; see `condition_number`.
-
-    Examples
-    --------
-    >>> from cradle import Chain, ImpulseCorrelation
-    >>> condition_number(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.5)).most
-    'forward[0]'
-    """
+    """How much an outcome amplifies relative changes of its inputs; see `condition_number`."""
 
     #: Relative change of the outcome over relative change of the inputs.
     number: float
@@ -96,15 +79,13 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
     Every input in turn, each mass, velocity, restitution and ratio, is moved by the part `step` of
     itself, up and down, and the impact is solved again.  The largest change of any velocity counts,
     relative to the largest speed after the impact; the changes are added over all inputs and
-    divided by `step`.  A number of 1000 says: inputs known to seven digits give an outcome known to
-    about four.
+    divided by `step` (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 1.6).
+    A number of 1000 says: inputs known to seven digits give an outcome known to about four.
 
-    A condition number holds near the chain, at the distance `step`.  Where `same_events` is False,
-    an edge lies within that distance: another sequence of events follows, and the outcome may jump,
-    so that the number grows as 1 / `step`; ask again with the accuracy of your own inputs as
-    the step.  An edge that only several inputs together reach is not seen.  Inputs that are
-    zero stay zero, so balls that touch go on touching.  A side on which an input would leave its
-    range is left out.
+    Where `same_events` is False another sequence of events follows within `step`, and the outcome
+    may jump, so that the number grows as 1 / `step`; ask again with the accuracy of your own inputs
+    as the step.  An edge that only several inputs together reach is not seen.  Inputs that are zero
+    stay zero; a side on which an input would leave its range is left out.
 
     Parameters
     ----------
@@ -113,7 +94,7 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
     model : Model
         The impact law; the ratios of `ImpulseCorrelation` are inputs too.
     step : float
-        Relative change of each input, above 1e-12 so that rounding does not count.
+        Relative change of each input, 1e-12 to 0.1: above the rounding of numbers.
 
     Returns
     -------
@@ -122,37 +103,26 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
 
     Raises
     ------
-    TypeError
-        If `chain` is no `Chain` or `model` no impact model.
-    ValueError
-        If `step` is no number from 1e-12 to 0.1, or the model cannot treat the chain.
-    ImpactNotFinished
-        If one of the impacts takes too long.
-
-    References
-    ----------
-    Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed. (2002), section 1.6.
+    TypeError, ValueError, ImpactNotFinished
+        As `collide`; `ValueError`, too, if `step` is out of its range.
 
     Examples
     --------
     At its bound (Eq. 34) a ratio acts through a square root, so its sixth digit counts:
 
-    >>> from cradle import Chain, ImpulseCorrelation
-    >>> chain = Chain([1, 1, 1], [1, 0, 0], 1)
     >>> for ratio in (0.15, 0.5):
-    ...     number, most, same_events = condition_number(chain, ImpulseCorrelation(ratio))
-    ...     print(f"{number:.2g}", most, same_events)
+    ...     found = condition_number(Chain([1, 1, 1], [1, 0, 0]), ImpulseCorrelation(ratio))
+    ...     print(f"{found.number:.2g}", found.most, found.same_events)
     3.7 velocities[0] True
     2.4e+03 forward[0] True
     """
     step = one_number("step", step, "must lie in [1e-12, 0.1]", 1e-12, 0.1)
-    base = collide(chain, model)
+    base, n = collide(chain, model), len(chain)
     own = {name: getattr(chain, name) for name in ("masses", "velocities", "restitution")}
     ratios: dict[str, Any] = {}
-    if hasattr(model, "forward") and hasattr(model, "backward"):
-        backward = model.forward if model.backward is None else model.backward
-        for name, values in (("forward", model.forward), ("backward", backward)):
-            ratios[name] = np.broadcast_to(np.asarray(values, float), (len(chain) - 2,))
+    if isinstance(model, ImpulseCorrelation):
+        both = model.forward, model.forward if model.backward is None else model.backward
+        ratios["forward"], ratios["backward"] = (row_of("ratios", x, n - 2, n) for x in both)
     law: Any = model
     sequence = _events_at_balls(base)
     total, largest, most, same = 0.0, -1.0, "", True
@@ -190,11 +160,11 @@ def _events_at_balls(trace: Trace) -> list[list[Event]]:
 def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     """Return the constant ratio that gives the outcome of an impact of three balls.
 
-    The outcome may come from any model.  The ratio lies between 0 and its bound (Eq. 34); the
-    restitution is that of the chain.  It is the ratio at the middle ball in both directions, as in
-    `ImpulseCorrelation(ratio)`, held at its bound where one is smaller.  If several ratios give the
-    outcome, the smallest is returned.  Two outcomes that lose no energy differ by one number, so
-    that there one ratio often suffices; with losses there is in general none.
+    The outcome may come from any model; the restitution is that of the chain.  The ratio lies
+    between 0 and its bound (Eq. 34) and acts in both directions, as in `ImpulseCorrelation(ratio)`,
+    held at its bound where one is smaller.  If several give the outcome, it is the smallest.
+    Outcomes that lose no energy differ by one number, so that one ratio often suffices; with losses
+    there is in general none.
 
     Parameters
     ----------
@@ -215,10 +185,6 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     ValueError
         If `tolerance` is no number of at least 0, there are not three balls, none approach, or no
         ratio gives the outcome: then the message has the one that comes nearest.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, Eqs. 16 and 34.
 
     Examples
     --------
@@ -276,3 +242,104 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
         f"no ratio in [0, {bound:.6g}] gives the velocities {target.tolist()}; the nearest, "
         f"{best.x:.6g}, misses by {best.fun:.3g} of the fastest closing speed"
     )
+
+
+def conserving_outcomes(
+    masses: ArrayLike, velocities: ArrayLike, angles: ArrayLike | None = None
+) -> tuple[Vector, Vector]:
+    """Return all outcomes of three balls that keep momentum, energy and the order of the balls.
+
+    They are an arc, from v1 = v2 at angle 0 to v2 = v3 at ``arccos((m1 m3 / ((m1 + m2)
+    (m2 + m3)))^(1/2))``, 60 degrees for equal balls (Walkiewicz and Newby, Am. J. Phys. 40 (1972)
+    133-137): with s = v2 - v1, and w the velocity of ball 3 from the centre of mass of balls 1 and
+    2, energy leaves the circle ``mu s^2 + M w^2 = const``; mu and M are the reduced masses.
+
+    Parameters
+    ----------
+    masses, velocities : array_like, shape (3,)
+        kg, and m/s before the impact.
+    angles : array_like, shape (K,), optional
+        Angles on the arc, rad; 181 from end to end if left out.
+
+    Returns
+    -------
+    angles, velocities : ndarray, shapes (K,) and (K, 3)
+        rad and m/s.
+
+    Raises
+    ------
+    ValueError
+        If there are not three balls, a value is wrong, or an angle is off the arc.
+
+    Examples
+    --------
+    >>> angles, outcomes = conserving_outcomes([1, 1, 1], [1, 0, 0])
+    >>> outcomes[[0, -1]].round(3) + 0.0
+    array([[ 0.   ,  0.   ,  1.   ],
+           [-0.333,  0.667,  0.667]])
+    """
+    m, v = _three(masses, velocities)
+    m1, m2, m3 = m
+    first, second = m1 / (m1 + m2), m2 / (m1 + m2)
+    full = float(np.arctan2(*_polar(m, 1.0, first)))  # there v2 = v3
+    if angles is None:
+        angle = np.linspace(0.0, full, 181)
+    else:
+        angle = checked("angles", angles, f"must lie in [0, {full:.6g}]", 0.0, full)
+    s, w, pair = _relative(m, v)
+    radius, (one, other) = np.hypot(*_polar(m, s, w)), _polar(m, 1.0, 1.0)
+    s_after = radius * np.sin(angle) / one
+    # cos(angle) as what is missing to v2 = v3: near 90 degrees it has few digits itself.
+    w_after = first * s_after + radius * (np.sin(full - angle) / np.sin(full)) / other
+    pair = pair + m3 / (m1 + m2 + m3) * (w - w_after)
+    balls = [pair - second * s_after, pair + first * s_after, pair + w_after]
+    return angle, np.stack(balls, axis=-1)
+
+
+def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
+    """Return the angle of an outcome on the arc of `conserving_outcomes`.
+
+    Parameters
+    ----------
+    masses, velocities : array_like, shape (3,)
+        kg, and m/s after the impact.
+
+    Returns
+    -------
+    float
+        The angle, rad; 0 for balls that all have one velocity, and off the arc where they are not
+        in order.
+
+    Examples
+    --------
+    >>> from math import degrees
+    >>> round(degrees(conserving_angle([1, 1, 1], [-1 / 3, 2 / 3, 2 / 3])), 6)
+    60.0
+    """
+    m, v = _three(masses, velocities)
+    s, w, _ = _relative(m, v)
+    return float(np.arctan2(*_polar(m, s, w)))
+
+
+def _three(masses: ArrayLike, velocities: ArrayLike) -> tuple[_Three, _Three]:
+    """Return masses, in units in which no sum overflows, and velocities of three balls."""
+    chain = Chain(masses, velocities)
+    if len(chain) != 3:
+        raise ValueError(f"masses has shape ({len(chain)},); must be (3,): three balls")
+    m1, m2, m3 = np.ldexp(chain.masses, -int(np.frexp(chain.masses.max())[1])).tolist()
+    v1, v2, v3 = chain.velocities.tolist()
+    return (m1, m2, m3), (v1, v2, v3)
+
+
+def _relative(m: _Three, v: _Three) -> _Three:
+    """Return the velocities of ball 2 from ball 1, of ball 3 from these two, and of these two."""
+    s = v[1] - v[0]
+    pair = v[0] + m[1] / (m[0] + m[1]) * s
+    return s, v[2] - pair, pair
+
+
+def _polar(m: _Three, s: float, w: float) -> tuple[float, float]:
+    """Return s and w times the roots of their reduced masses: sine and cosine of the arc."""
+    m1, m2, m3 = m
+    mu, both = m1 / (m1 + m2) * m2, m3 / (m1 + m2 + m3) * (m1 + m2)
+    return np.sqrt(mu) * s, np.sqrt(both) * w
