@@ -1,7 +1,8 @@
 """What the paper gives in closed form: one collision per contact, largest ratios, pattern lines.
 
-Notation of the equations: balls 1, 2, 3 with masses m1, m2, m3; contact impulses tau_2 (balls 1-2)
-and tau_3 (balls 2-3), restitution e2 and e3; alpha is the forward ratio at ball 2.
+Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583.  Notation of its equations: balls 1, 2, 3
+with masses m1, m2, m3; contact impulses tau_2 (balls 1-2) and tau_3 (balls 2-3), restitution e2 and
+e3; alpha is the forward ratio at ball 2.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from cradle.input.values import Vector, checked, numbers, one_number
 from cradle.kernel.state import LIMITS
 
 _Balls = tuple[Vector, ...]
+_UNIT = ("must lie in [0, 1]", 0.0, 1.0)
 #: What is asked of a restitution that divides.
 _NO_ZERO = (f"must lie in [{LIMITS.least_restitution}, 1]", LIMITS.least_restitution, 1.0)
 
@@ -63,6 +65,9 @@ def three_balls(
 ) -> Vector:
     """Solve three balls with one collision per contact (Eqs. 22-33).
 
+    Ranges are not checked, which would take longer than the formulas: outside them the result has
+    no meaning.  `one_collision_each` tells where it applies.
+
     Parameters
     ----------
     masses, velocities : array_like, shape (..., 3)
@@ -75,18 +80,13 @@ def three_balls(
     Returns
     -------
     ndarray, shape (..., 3)
-        Velocities after the impact, m/s.  NaN where the radical of Eq. 30 is not real or an input
-        is NaN; see `one_collision_each` for where the result applies.  The ranges above are not
-        checked, which would take longer than the formulas: outside them the result has no meaning.
+        Velocities after the impact, m/s; NaN where the radical of Eq. 30 is not real or an input
+        is NaN.
 
     Raises
     ------
     ValueError
         If a value is no number, or a shape is wrong.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu (2001), Eqs. 22, 24, 26, 28, 30, 31-33.
 
     Examples
     --------
@@ -107,21 +107,12 @@ def final_impulses(
     Parameters
     ----------
     masses, velocities, restitution, ratio : array_like
-        As for `three_balls`.
+        As for `three_balls`, with the same errors.
 
     Returns
     -------
     tau_2, tau_3 : ndarray, shape (...)
         N s; tau_3 is NaN where the velocities of `three_balls` are.
-
-    Raises
-    ------
-    ValueError
-        As `three_balls`.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu (2001), Eqs. 22, 24, 28, 30.
 
     Examples
     --------
@@ -135,7 +126,7 @@ def final_impulses(
 def one_collision_each(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, ratio: ArrayLike
 ) -> NDArray[np.bool_]:
-    """Tell where three balls collide once per contact, so that Eqs. 30-33 hold.
+    """Tell where three balls collide once per contact, so that Eqs. 30-33 hold (Eqs. 34, 43, 44).
 
     Two conditions: contact 2-3 still closes when contact 1-2 ends, and ball 2 does not fall back
     on ball 1 (for v2 = v3 = 0 the second is Eq. 44).
@@ -143,21 +134,12 @@ def one_collision_each(
     Parameters
     ----------
     masses, velocities, restitution, ratio : array_like
-        As for `three_balls`.
+        As for `three_balls`, with the same errors.
 
     Returns
     -------
     ndarray of bool, shape (...)
         False where the result of `three_balls` is NaN.
-
-    Raises
-    ------
-    ValueError
-        As `three_balls`.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu (2001), Eqs. 34, 43, 44.
 
     Examples
     --------
@@ -174,7 +156,7 @@ def one_collision_each(
 def largest_ratios(
     masses: ArrayLike, forward: ArrayLike, backward: ArrayLike
 ) -> tuple[Vector, Vector]:
-    """Largest admissible ratios of a chain, forward (Eq. 53) and backward (its mirror image).
+    """Largest admissible ratios of a chain, forward (Eqs. 34, 53) and backward (mirrored).
 
     A contact cannot pull: a larger ratio would open a driven contact that has absorbed nothing.
     The bound at a ball needs the ratio of the next ball in the direction of the drive; there is
@@ -197,10 +179,6 @@ def largest_ratios(
     ValueError
         If a value or a shape is wrong; the message names the value and the rule.
 
-    References
-    ----------
-    Ceanga and Hurmuzlu (2001), Eqs. 34 and 53; the mirrored bound is not printed there.
-
     Examples
     --------
     >>> [bound.tolist() for bound in largest_ratios([1, 1, 1, 1], [0.5, 0.5], [0.5, 0.5])]
@@ -218,7 +196,7 @@ def largest_ratios(
                 f"{name} has shape {ratio.shape}; must be (..., {size}) for {size + 2} balls: one "
                 "number for each ball between two others"
             )
-        checked(name, ratio, "must lie in [0, 1]", 0.0, 1.0)
+        checked(name, ratio, *_UNIT)
 
     def bound(m: Vector, ratio: Vector) -> Vector:
         onward = np.zeros(ratio.shape)
@@ -230,7 +208,7 @@ def largest_ratios(
 
 
 def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLike) -> Vector:
-    """Mass ratio r1 = m2/m1 at and below which ball 2 falls back on ball 1 (Eq. 44).
+    """Mass ratio r1 = m2/m1 at and below which ball 2 falls back on ball 1 (Eq. 44, Fig. 6).
 
     Parameters
     ----------
@@ -247,21 +225,15 @@ def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLi
     Raises
     ------
     ValueError
-        If a value is wrong; the message names the value and the rule.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu (2001), Eq. 44 and Fig. 6 (its legend says Eq. 47).
+        If a value is out of its range.
 
     Examples
     --------
     >>> float(back_impact_line(1.0, 0.5, 0.5, 0.15).round(4))
     0.8275
     """
-    r2 = checked("r2", r2, "must be at least 0", 0.0)
-    e2 = checked("e2", e2, *_NO_ZERO)
-    e3 = checked("e3", e3, "must lie in [0, 1]", 0.0, 1.0)
-    ratio = checked("ratio", ratio, "must lie in [0, 1]", 0.0, 1.0)
+    r2, e2 = checked("r2", r2, "must be at least 0", 0.0), checked("e2", e2, *_NO_ZERO)
+    e3, ratio = checked("e3", e3, *_UNIT), checked("ratio", ratio, *_UNIT)
     with np.errstate(invalid="ignore"):
         root = np.sqrt(1.0 - ratio * (1.0 + r2))
     return np.asarray((1.0 + e2) * (1.0 + e3 * root) / (e2 * (1.0 + r2)) - (1.0 + ratio / e2))
@@ -272,32 +244,15 @@ def first_ball_stops(e2: float, ratio: float) -> float:
 
     Parameters
     ----------
-    e2 : float
-        Restitution of contact 1-2, 1e-30 to 1.
-    ratio : float
-        Forward ratio, 0 to 1.
-
-    Returns
-    -------
-    float
-        r1.
-
-    Raises
-    ------
-    ValueError
-        If a value is wrong; the message names the value and the rule.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu (2001), Eq. 45.
+    e2, ratio : float
+        Restitution of contact 1-2, 1e-30 to 1, and the forward ratio, 0 to 1; else a `ValueError`.
 
     Examples
     --------
     >>> first_ball_stops(0.5, 0.15)
     1.7
     """
-    e2 = one_number("e2", e2, *_NO_ZERO)
-    return (1.0 - one_number("ratio", ratio, "must lie in [0, 1]", 0.0, 1.0)) / e2
+    return (1.0 - one_number("ratio", ratio, *_UNIT)) / one_number("e2", e2, *_NO_ZERO)
 
 
 def middle_ball_stops(e3: float, ratio: float) -> float:
@@ -305,31 +260,14 @@ def middle_ball_stops(e3: float, ratio: float) -> float:
 
     Parameters
     ----------
-    e3 : float
-        Restitution of contact 2-3, 0 to 1.
-    ratio : float
-        Forward ratio, 0 to 1.
-
-    Returns
-    -------
-    float
-        r2.
-
-    Raises
-    ------
-    ValueError
-        If a value is wrong; the message names the value and the rule.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu (2001), Eq. 46.
+    e3, ratio : float
+        Restitution of contact 2-3 and the forward ratio, 0 to 1; else a `ValueError`.
 
     Examples
     --------
     >>> round(middle_ball_stops(0.5, 0.15), 6)
     0.442608
     """
-    e3 = one_number("e3", e3, "must lie in [0, 1]", 0.0, 1.0)
-    ratio = one_number("ratio", ratio, "must lie in [0, 1]", 0.0, 1.0)
+    e3, ratio = one_number("e3", e3, *_UNIT), one_number("ratio", ratio, *_UNIT)
     half = 0.5 * ratio * e3
     return float(e3 * np.sqrt(1.0 - ratio + half * half) - half * e3)
