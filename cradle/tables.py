@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cradle.chain import Chain
 from cradle.closed_form import largest_ratios
-from cradle.input.values import a, one_number, shown
+from cradle.input.values import a, one_number, one_of, shown
 from cradle.models.correlation import ImpulseCorrelation
 
 if TYPE_CHECKING:
@@ -34,11 +34,6 @@ __all__ = [
 def data_folder() -> Traversable:
     """Return the folder of the data files: inside the installed package, or beside it.
 
-    Returns
-    -------
-    Traversable
-        A path-like object.
-
     Examples
     --------
     >>> (data_folder() / "ratios.csv").is_file()
@@ -52,19 +47,14 @@ def data_folder() -> Traversable:
 
 @cache
 def table_rows(name: str) -> tuple[dict[str, str], ...]:
-    """Return the rows of a file of the data, texts by column; what they hold is for the tests."""
+    """Return the rows of a file of the data, texts by column."""
     with (data_folder() / name).open(encoding="utf-8") as file:
         return tuple(csv.DictReader(file))
 
 
 @cache
 def ball_masses() -> Mapping[str, float]:
-    """Return the mass of each ball type.
-
-    Returns
-    -------
-    Mapping of str to float
-        Ball type ("A" to "D") to mass in kg; read-only.
+    """Return the mass in kg of each ball type, "A" to "D"; read-only.
 
     Examples
     --------
@@ -77,12 +67,12 @@ def ball_masses() -> Mapping[str, float]:
 
 @cache
 def paper_sequences() -> Mapping[str, int]:
-    """Return the ten sequences of balls with which the paper tests its parameters.
+    """Return the ten sequences of balls with which the paper tests its parameters; read-only.
 
     Returns
     -------
     Mapping of str to int
-        Sequence, first ball first, to the number of the paper's figure that shows it; read-only.
+        Sequence, first ball first, to the number of the paper's figure that shows it.
 
     Examples
     --------
@@ -95,14 +85,14 @@ def paper_sequences() -> Mapping[str, int]:
 
 @cache
 def _restitution() -> Mapping[str, float]:
-    """Table 1 as a mapping from the pair "XY" to the coefficient of restitution."""
+    """Return Table 1 as a mapping from the pair "XY" to the coefficient of restitution."""
     rows = table_rows("restitution.csv")
     return {row["ball"] + other: float(row[other]) for row in rows for other in ball_masses()}
 
 
 @cache
 def _ratios() -> Mapping[str, float]:
-    """Table 2 as a mapping from the triplet "XYZ" to the Impulse Correlation Ratio."""
+    """Return Table 2 as a mapping from the triplet "XYZ" to the Impulse Correlation Ratio."""
     return {row["triplet"]: float(row["ratio"]) for row in table_rows("ratios.csv")}
 
 
@@ -126,9 +116,7 @@ def restitution_table() -> pd.DataFrame:
     """
     import pandas as pd
 
-    balls = list(ball_masses())
-    values = [[_restitution()[ball + other] for other in balls] for ball in balls]
-    return pd.DataFrame(values, index=pd.Index(balls, name="ball"), columns=balls)
+    return pd.DataFrame(table_rows("restitution.csv")).set_index("ball").astype(float)
 
 
 def ratio_table() -> pd.DataFrame:
@@ -137,14 +125,9 @@ def ratio_table() -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        64 rows in alphabetical order; columns ``triplet`` (str), ``ratio`` (float),
-        ``bound`` (float, the largest ratio that Eq. 34 admits, m_right / (m_middle + m_right)) and
-        ``admissible`` (bool, ratio <= bound).
-
-    Notes
-    -----
-    Only for three balls is Eq. 34 the whole bound. In a longer chain the ratio of the next triplet
-    enters (Eq. 53) and raises it.
+        64 rows in alphabetical order; columns ``triplet`` (str), ``ratio`` (float), ``bound``
+        (float, m_right / (m_middle + m_right); in a longer chain the ratio of the next triplet
+        raises it, Eq. 53) and ``admissible`` (bool, ratio <= bound).
 
     Examples
     --------
@@ -157,11 +140,9 @@ def ratio_table() -> pd.DataFrame:
     """
     import pandas as pd
 
-    masses = [[ball_masses()[ball] for ball in triplet] for triplet in _ratios()]
-    bound, _ = largest_ratios(masses, [0.0], [0.0])
-    table = pd.DataFrame(
-        {"triplet": list(_ratios()), "ratio": list(_ratios().values()), "bound": bound[:, 0]}
-    )
+    table = pd.DataFrame(table_rows("ratios.csv")).astype({"ratio": float})
+    masses = [[ball_masses()[ball] for ball in triplet] for triplet in table.triplet]
+    table["bound"] = largest_ratios(masses, [0.0], [0.0])[0]
     return table.assign(admissible=table.ratio <= table.bound)
 
 
@@ -178,41 +159,32 @@ def paper_chain(
     ----------
     sequence : str or iterable of str
         Ball types, first ball first: at least two letters out of "A" to "D".
-    speed : float, optional
+    speed : float
         Velocity of the first ball in m/s.
-    excess : {"raise", "saturate"}, optional
-        What to do with a ratio above its largest admissible value, see `ImpulseCorrelation`.
-    meeting : float, optional
-        Where two runs of impact meet, see `ImpulseCorrelation`.
+    excess, meeting
+        As for `ImpulseCorrelation`.
 
     Returns
     -------
     chain : Chain
-        Masses in kg, velocities (speed, 0, ...) in m/s, and Table 1's coefficient of restitution
-        for each pair of neighbours.
+        Velocities (speed, 0, ...), and Table 1's restitution for each pair of neighbours.
     model : ImpulseCorrelation
         Table 2's ratios. The forward ratio at ball Y of the neighbours X, Y, Z is the entry XYZ;
         the backward ratio is the entry of the reversed triplet, ZYX.
 
     Raises
     ------
-    TypeError
-        If `sequence` is no text and no list of letters.
-    ValueError
-        If a letter names no ball type, if the sequence is shorter than two balls, or if `Chain` or
+    TypeError, ValueError
+        If `sequence` is no text or list of at least two letters of ball types, or `Chain` or
         `ImpulseCorrelation` refuses another argument.
 
     Examples
     --------
     >>> chain, model = paper_chain("CDAB", speed=0.5)
-    >>> [float(m) for m in chain.masses]
-    [0.053, 0.166, 0.045, 0.053]
-    >>> [float(e) for e in chain.restitution]                 # CD, DA, AB
+    >>> chain.restitution.tolist()                            # CD, DA, AB
     [0.3, 0.94, 0.53]
-    >>> [float(a) for a in model.forward]                     # CDA, DAB
-    [0.196, 0.09]
-    >>> [float(b) for b in model.backward]                    # ADC, BAD
-    [0.001, 0.05]
+    >>> model.forward, model.backward                         # CDA, DAB; ADC, BAD
+    ((0.196, 0.09), (0.001, 0.05))
     """
     masses = ball_masses()
     balls = _letters(sequence)
@@ -235,17 +207,12 @@ def paper_chain(
 def _letters(sequence: str | Iterable[str]) -> str:
     """Return the ball types of a sequence as one word, or refuse it."""
     try:
-        types, letters = list(ball_masses()), list(sequence)
+        letters = list(sequence)
     except TypeError:
         given = a(type(sequence).__name__)
         raise TypeError(f"sequence is {given}; must be letters, as in 'ABC'") from None
     for position, ball in enumerate(letters):
-        if not (isinstance(ball, str) and ball in types):
-            capital = isinstance(ball, str) and ball.upper() in types
-            hint = f": a capital letter, {ball.upper()!r}" if capital else ""
-            raise ValueError(
-                f"sequence[{position}] = {shown(ball)}; must be one of {', '.join(types)}{hint}"
-            )
+        one_of(f"sequence[{position}]", ball, [*ball_masses()])
     if len(letters) < 2:
         raise ValueError(f"sequence = {shown(sequence)}; must name at least 2 balls")
     return "".join(letters)

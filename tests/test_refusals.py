@@ -160,7 +160,7 @@ BOUNDS = [
 
 LETTERS = [
     ("ABXA", "sequence[2] = 'X'; must be one of A, B, C, D"),
-    ("abc", "sequence[0] = 'a'; must be one of A, B, C, D: a capital letter, 'A'"),
+    ("abc", "sequence[0] = 'a'; must be one of A, B, C, D"),
     (["A", "e"], "sequence[1] = 'e'; must be one of A, B, C, D"),
     (["A", "BC"], "sequence[1] = 'BC'; must be one of A, B, C, D"),
     ([1, 2], "sequence[0] = 1; must be one of A, B, C, D"),
