@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 
 
 class Event(NamedTuple):
-    """One event of an impact.
-
-    Examples
-    --------
-    >>> Event("end", 0)
-    Event(kind='end', contact=0)
-    """
+    """One event of an impact."""
 
     #: "maximum_compression", "end", "close", "collapse" (the limit of an infinite sequence) or
     #: "repetition" (a cycle of events that has been repeated many times at once).
@@ -40,10 +34,8 @@ class Trace:
 
     Attributes
     ----------
-    chain : Chain
-        The chain before the impact.
-    model : object
-        The model that was used.
+    chain, model : Chain, Model
+        What was solved: the chain before the impact, and the law.
     velocities : ndarray, shape (N,)
         Velocities after the impact, m/s.
     impulses : ndarray, shape (N - 1,)
@@ -69,16 +61,10 @@ class Trace:
     saturated : tuple of int
         Contacts that were held closed at the largest admissible ratio (Eqs. 34, 53) at some time.
     margin : float
-        How close another sequence of events came: the least distance of two events of one run,
-        of two meetings, or of a ratio from its bound, relative to what is compared; ties are meant
-        to be ties.  Below about 1e-12 another outcome may lie within the last digit of the input.
-        It sees close calls, one at a time.  An impact of hundreds of collisions can also amplify
-        a last digit step by step; `condition_number` tells, with a `step` of 1e-10 or less.
-        Nor does it tell which `collisions` are too slow to mean anything.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, Figs. 3, 5, 7, 8 show such paths.
+        How close another sequence of events came: the least distance of two events of one run, of
+        two meetings, or of a ratio from its bound, relative to what is compared; ties are meant to
+        be ties.  Below about 1e-12 another outcome may lie within the last digit of the input.  It
+        does not see what hundreds of collisions amplify step by step; `condition_number` does.
 
     Examples
     --------
@@ -113,24 +99,19 @@ class Trace:
         Returns
         -------
         pandas.DataFrame
-            Columns ``step`` (0 to K), ``event`` and ``contact`` (what happened there; "before"
-            and missing at step 0), ``ball``, ``velocity`` (m/s), and ``left`` and
-            ``right``, the impulses so far of the ball's two contacts (N s; 0 beyond the ends), so
-            that each ball's mass times its change of velocity is ``left - right``.  Models with
-            a time add ``time`` (s).
+            Columns ``step`` (0 to K), ``event`` and ``contact`` (what happened there; "before" and
+            missing at step 0), ``ball``, ``velocity`` (m/s), ``left`` and ``right``, the impulses
+            so far of the ball's two contacts (N s; its momentum has grown by ``left - right``).
+            Models with a time add ``time`` (s).
 
         Examples
         --------
         >>> from cradle import Chain, ImpulseCorrelation, collide
         >>> trace = collide(Chain([1, 1], [1, 0], 1), ImpulseCorrelation(0.0))
-        >>> print(trace.to_frame().to_string(index=False))
-         step               event  contact  ball  velocity  left  right
-            0              before     <NA>     0       1.0   0.0    0.0
-            0              before     <NA>     1       0.0   0.0    0.0
-            1 maximum_compression        0     0       0.5   0.0    0.5
-            1 maximum_compression        0     1       0.5   0.5    0.0
-            2                 end        0     0       0.0   0.0    1.0
-            2                 end        0     1       1.0   1.0    0.0
+        >>> print(trace.to_frame().tail(2).to_string(index=False))
+         step event  contact  ball  velocity  left  right
+            2   end        0     0       0.0   0.0    1.0
+            2   end        0     1       1.0   1.0    0.0
         """
         import pandas as pd
 
@@ -153,22 +134,7 @@ class Trace:
         )
 
     def curve(self) -> tuple[Vector, Vector]:
-        """Return impulses and velocities to be joined by straight lines in a picture.
-
-        Returns
-        -------
-        impulses : ndarray, shape (S, N - 1)
-            Impulses so far, N s.
-        velocities : ndarray, shape (S, N)
-            Velocities there, m/s.
-
-        Examples
-        --------
-        >>> from cradle import Chain, ImpulseCorrelation, collide
-        >>> impulses, velocities = collide(Chain([1, 1], [1, 0]), ImpulseCorrelation(0.0)).curve()
-        >>> impulses.ravel().tolist()
-        [0.0, 0.5, 1.0]
-        """
+        """Return impulses (N s) and velocities (m/s) that straight lines join in a picture."""
         return self.path_impulses, self.path
 
     def _clock(self) -> dict[str, Vector]:
@@ -183,17 +149,12 @@ class Trace:
         ax : matplotlib.axes.Axes, optional
             Where to draw; new axes if left out.
         contact : int, optional
-            Contact c joins balls c and c + 1.  If left out, all balls are drawn.
+            Contact c joins balls c and c + 1; no other value (`ValueError`).  All if left out.
 
         Returns
         -------
         matplotlib.axes.Axes
             The axes, as from `velocities` and `velocity_impulse` of `cradle.pictures.impacts`.
-
-        Raises
-        ------
-        ValueError
-            If there is no such contact.
 
         Examples
         --------
@@ -230,29 +191,26 @@ class Trace:
 
 
 class ImpactNotFinished(RuntimeError):
-    """An impact was still going on after `max_events` steps; `trace` holds what was reached.
+    """An impact was still going on after `max_events` steps.
 
-    The path of that trace covers at most the first 100 000 events; its velocities, impulses and
-    works are those reached.
-
-    Parameters
+    Attributes
     ----------
-    message : str
-        What to say.
     trace : Trace
-        What was reached.
-    stored : float, optional
+        What was reached; of the path at most the first 100 000 events.
+    stored : float or None
         Work that the contacts can still release, over the heaviest mass times the square of the
-        largest speed before.  If left out, it is not known: all energy that is not lost yet counts.
+        largest speed before.  None: not known, so that all energy that is not lost yet counts.
 
     Examples
     --------
     >>> from cradle import Chain, ImpulseCorrelation, collide
     >>> try:
-    ...     collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.1, max_events=1))
+    ...     collide(Chain([1, 1, 1], [1, 0, 0], 0.9), ImpulseCorrelation(0.1, max_events=1))
     ... except ImpactNotFinished as stopped:
     ...     print(stopped.trace.velocities.round(3).tolist())
-    [-0.053, 0.947, 0.105]
+    ...     print(stopped.bounds.round(3).tolist())
+    [0.0, 0.9, 0.1]
+    [[-0.273, 0.03, 0.333], [0.333, 0.637, 0.94]]
     """
 
     def __init__(self, message: str, trace: Trace, stored: float | None = None) -> None:
@@ -262,35 +220,16 @@ class ImpactNotFinished(RuntimeError):
 
     @property
     def bounds(self) -> Vector:
-        """Least and largest velocity that each ball can end with, m/s.
+        """Least and largest velocity that each ball can end with, m/s, shape (2, N).
 
         They follow from what holds until the end: momentum stays, energy does not grow, and in the
         end no ball is faster than the next on its right.  `SpringChain` and `EnergyDistribution`
         keep momentum and energy to the tolerance of their integration only, and so the bounds.
-
-        Returns
-        -------
-        ndarray, shape (2, N)
-            The least velocities and the largest.
-
-        Notes
-        -----
-        Count velocities from that of the centre of mass.  If ball i ends at x > 0, the balls from
-        i on, of mass A, are at least as fast: they have a momentum of A x or more, and the others,
-        of mass B, the opposite one.  The least energy of that is (A + A^2 / B) x^2 / 2.  What is
-        left is no less: where both are equal, x is largest.
-
-        Examples
-        --------
-        >>> from cradle import Chain, ImpulseCorrelation, collide
-        >>> try:
-        ...     collide(Chain([1, 1, 1], [1, 0, 0], 0.9), ImpulseCorrelation(0.1, max_events=1))
-        ... except ImpactNotFinished as stopped:
-        ...     print(stopped.trace.velocities.round(3).tolist())
-        ...     print(stopped.bounds.round(3).tolist())
-        [0.0, 0.9, 0.1]
-        [[-0.273, 0.03, 0.333], [0.333, 0.637, 0.94]]
         """
+        # Count velocities from that of the centre of mass.  If ball i ends at x > 0, the balls from
+        # i on, of mass A, are at least as fast: they have a momentum of A x or more, and the
+        # others, of mass B, the opposite one.  The least energy of that is (A + A^2 / B) x^2 / 2.
+        # What is left is no less: where both are equal, x is largest.
         chain, v, left = self.trace.chain, self.trace.velocities, self.stored
         heaviest, unit = chain.masses.max(), np.abs(chain.velocities).max()
         if left is None:
@@ -304,8 +243,7 @@ class ImpactNotFinished(RuntimeError):
         largest = np.sqrt(twice * (until - m) / after / m.sum())
         least = np.sqrt(twice * (after - m) / until / m.sum())
         bounds: Vector = np.array([centre - least - rounding, centre + largest + rounding])
-        bounds *= unit
-        return bounds
+        return bounds * float(unit)
 
     def __str__(self) -> str:
         """Return the message, how fast balls still approach, and what is decided."""
@@ -320,23 +258,8 @@ class ImpactNotFinished(RuntimeError):
 class ImpactNotCertified(RuntimeError):
     """An outcome failed the check that every answer has to pass, so it is not returned.
 
-    This is a defect of the solver, not of the input: please report `chain` and `model`.
-
-    Attributes
-    ----------
-    chain : Chain
-        The chain.
-    model : object
-        The model.
-    defect : str
-        What the outcome would have broken.
-
-    Examples
-    --------
-    >>> raise ImpactNotCertified("a chain", "a model", "balls still approach")
-    Traceback (most recent call last):
-    ...
-    cradle.trace.ImpactNotCertified: balls still approach: 'a chain', 'a model'
+    This is a defect of the solver, not of the input: please report `chain` and `model`; `defect`
+    says what the outcome would have broken.
     """
 
     def __init__(self, chain: Any, model: Any, defect: str) -> None:
