@@ -1,43 +1,36 @@
-"""What is asked of input: real numbers, limits, masses, whole numbers, rows."""
+"""What is asked of input: real numbers, limits, masses, whole numbers, rows; and how it is refused.
+
+A refusal names the value, its place and the rule: `masses[1] = -1.0; must be above 0`.
+"""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.input.words import (
-    a,
-    first,
-    is_whole,
-    must_be,
-    one_of,
-    place,
-    place_in,
-    refusal,
-    refuse_where,
-    shown,
-    whole_rule,
-)  # fmt: skip
 from cradle.kernel.state import LIMITS
 
 Vector = NDArray[np.float64]
+_Thing = TypeVar("_Thing")
 
-
-class _Masked:
-    """Stands for the type of masked values."""
-
-
+#: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
+LIGHTEST = 1e-150
+# The longest value that an error repeats, in characters.
+_SHOWN = 80
 _USUAL = {float, int, np.float64}
 # Python would turn these into floats, or NumPy with a warning, but they are no real numbers.
-_NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating, _Masked)
+_NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating)
+
+# --- real numbers and their limits ------------------------------------------------------------
 
 
-def numbers(name: str, values: ArrayLike | None) -> Vector:
+def numbers(name: str, values: ArrayLike | None, at: tuple[int, ...] = ()) -> Vector:
     """Return `values` as floats of any size; an array of floats comes back as it is.
 
     A number is whatever `float` takes: fractions and decimals too.  Not so text, truth values,
@@ -48,58 +41,32 @@ def numbers(name: str, values: ArrayLike | None) -> Vector:
     if type(values) is float:
         return np.array(values)
     given: Any = values
-    kinds = _types(values)
-    strange = not kinds <= _USUAL and any(issubclass(kind, _NO_NUMBERS) for kind in kinds)
-    if not strange:
-        try:
-            array = np.asarray(values)
-        except (TypeError, ValueError):
-            strange = True
-    if strange or array.dtype.kind not in "iuf" or array.itemsize > 8:
-        # One by one, each as it was given; long doubles go further than floats.
-        cells = list(_cells(values))
-        floats = [_as_float(name, at, cell) for at, cell in cells]
-        _refuse_ragged(name, values)
-        return np.array(floats, dtype=np.float64).reshape(np.shape(given))
-    return array.astype(np.float64)
-
-
-def _types(values: Any) -> set[type]:
-    """Return the types of the cells of nested lists, of arrays those of their elements."""
     if isinstance(values, (list, tuple)):
-        kinds = set(map(type, values))
-        if kinds <= _USUAL:
-            return kinds
-        inner = [_types(value) for value in values if _holds_cells(type(value))]
-        return {kind for kind in kinds if not _holds_cells(kind)}.union(*inner)
-    if _is_masked(values):
-        return {_Masked}
-    return {values.dtype.type} if isinstance(values, np.ndarray) else {type(values)}
-
-
-def _holds_cells(kind: type) -> bool:
-    return issubclass(kind, (list, tuple, np.ndarray))
+        if {*map(type, values)} <= _USUAL:
+            with suppress(OverflowError):
+                return np.array(values, dtype=np.float64)
+    elif not _is_masked(values):
+        with suppress(TypeError, ValueError):
+            given = array = np.asarray(values)
+            if array.dtype.kind in "iuf" and array.itemsize <= 8:  # long doubles go further
+                return array.astype(np.float64)
+    if not (isinstance(given, (list, tuple)) or (isinstance(given, np.ndarray) and given.ndim)):
+        return np.array(_as_float(name, at, given[()] if type(values) is np.ndarray else values))
+    # One by one, each as it was given.
+    rows = [numbers(name, row, (*at, k)) for k, row in enumerate(given)]
+    for k, row in enumerate(rows):
+        if row.shape != rows[0].shape:
+            one, other = f"{name}{place((*at, k))}", f"{name}{place((*at, 0))}"
+            raise ValueError(
+                f"{one} has shape {row.shape}, {other} has {rows[0].shape}; must have one shape"
+            )
+    return np.array(rows, dtype=np.float64)
 
 
 def _is_masked(value: Any) -> bool:
     """Tell whether anything is masked, without loading `numpy.ma` if nobody else has."""
     ma = sys.modules.get("numpy.ma")
     return ma is not None and bool(ma.is_masked(value))
-
-
-def _cells(values: Any, at: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Any]]:
-    """Yield the index and the value of each cell of nested lists and arrays."""
-    if isinstance(values, (list, tuple)):
-        for k, value in enumerate(values):
-            yield from _cells(value, (*at, k))
-    elif not hasattr(values, "__array__") or np.ndim(values) == 0:
-        yield at, values
-    elif _is_masked(values):
-        for index in np.ndindex(values.shape):
-            yield (*at, *index), values[index]  # `np.ma.masked` where it is masked
-    else:
-        for index, value in np.ndenumerate(np.asarray(values)):
-            yield (*at, *index), value
 
 
 def _as_float(name: str, at: tuple[int, ...], cell: Any) -> float:
@@ -110,43 +77,15 @@ def _as_float(name: str, at: tuple[int, ...], cell: Any) -> float:
             raise TypeError
         value = float(cell)
     except OverflowError:
-        raise _beyond_floats(name, at, cell) from None
+        value = math.inf
     except (TypeError, ValueError):
         rule = "must be a real number" if at else "must be real numbers, one shape, none masked"
         known = type(cell).__module__ in ("builtins", "numpy", "numpy.ma", "numpy.ma.core")
         what = "" if known else f" ({type(cell).__module__}.{type(cell).__qualname__})"
         raise refusal(name, at, f" = {shown(cell)}{what}; {rule}") from None
     if math.isinf(value) and cell != value:
-        raise _beyond_floats(name, at, cell)
+        raise refusal(name, at, f" = {shown(cell)}; must be within the range of floats")
     return value
-
-
-def _beyond_floats(name: str, at: tuple[int, ...], value: Any) -> ValueError:
-    return refusal(name, at, f" = {shown(value)}; must be within the range of floats")
-
-
-def _refuse_ragged(name: str, values: Any, at: tuple[int, ...] = ()) -> None:
-    """Raise if rows beside each other differ in shape."""
-    if not isinstance(values, (list, tuple)):
-        return
-    for k, row in enumerate(values):
-        _refuse_ragged(name, row, (*at, k))
-        shape, first = np.shape(row), np.shape(values[0])
-        if shape != first:
-            raise ValueError(
-                f"{name}{place((*at, k))} has shape {shape}, {name}{place((*at, 0))} has {first}; "
-                "must have one shape"
-            )
-
-
-#: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
-LIGHTEST = 1e-150
-
-__all__ = [
-    "Vector", "a", "checked", "checked_masses", "checked_restitution", "first", "is_whole",
-    "must_be", "number_or_row", "numbers", "one_number", "one_of", "place_in", "refusal",
-    "refuse_overflow", "refuse_where", "row_of", "shown", "whole_number", "whole_rule",
-]  # fmt: skip
 
 
 def checked(
@@ -161,29 +100,34 @@ def checked(
     array = numbers(name, values)
     if array is values:
         array = array.copy()
-    wrong = ~np.isfinite(array) | (array < low) | (array > high)
-    if open_low:
-        wrong |= array <= low
-    if wrong.any():
-        refuse_where(
-            name, array, wrong, rule if np.isfinite(array[first(wrong)]) else "must be finite"
-        )
+    refuse_where(name, array, ~np.isfinite(array), "must be finite")
+    refuse_where(name, array, (array < low) | (array > high) | (open_low & (array == low)), rule)
     return array
 
 
-def one_number(
-    name: str,
-    value: ArrayLike,
-    rule: str = "must be finite",
-    low: float = -np.inf,
-    high: float = np.inf,
-    open_low: bool = False,
-) -> float:
-    """Return `value` as a float inside its limits."""
-    number = checked(name, value, rule, low, high, open_low)
+def one_number(name: str, value: ArrayLike, *limits: Any, **more: Any) -> float:
+    """Return `value` as a float, all that `checked` asks fulfilled."""
+    number = checked(name, value, *limits, **more)
     if number.ndim:
         raise ValueError(f"{name} = {shown(value)}; must be one number")
     return float(number)
+
+
+def number_or_row(
+    name: str, values: ArrayLike | None, length: str, *limits: Any, **more: Any
+) -> float | tuple[float, ...]:
+    """Return one number for all balls or contacts, or a row with one for each, to be kept."""
+    array = checked(name, values, *limits, **more)
+    if array.ndim > 1:
+        raise ValueError(f"{name} has shape {array.shape}; must be () or ({length},)")
+    return tuple(array.tolist()) if array.ndim else float(array)
+
+
+def row_of(name: str, kept: float | Sequence[float], size: int, balls: int) -> Vector:
+    """Return what `number_or_row` kept as a row for a chain."""
+    if not isinstance(kept, float) and len(kept) != size:
+        raise ValueError(f"{name} has {len(kept)} values; {balls} balls need {size}, or one number")
+    return np.full(size, kept)
 
 
 def checked_masses(masses: ArrayLike) -> Vector:
@@ -220,6 +164,21 @@ def refuse_overflow(velocities: Vector, masses: Vector) -> None:
             raise refusal("velocities", at, rest)
 
 
+# --- whole numbers, words, types --------------------------------------------------------------
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Tell whether a value is a whole number: an int or NumPy's, but no bool."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+
+
+def whole_rule(value: object) -> str:
+    """Return what an error says of a value that is no whole number, or not of that type."""
+    if isinstance(value, float) and value.is_integer() and abs(value) < 2.0**53:
+        return f"must be an int ({int(value)})"
+    return "must be a whole number"
+
+
 def whole_number(name: str, value: object) -> int:
     """Return `value` as a whole number of at least 1."""
     if is_whole(value) and value >= 1:
@@ -227,24 +186,70 @@ def whole_number(name: str, value: object) -> int:
     raise ValueError(f"{name} = {shown(value)}; {whole_rule(value)}, at least 1")
 
 
-def number_or_row(
-    name: str,
-    values: ArrayLike | None,
-    length: str,
-    rule: str,
-    low: float = -np.inf,
-    high: float = np.inf,
-    open_low: bool = False,
-) -> float | tuple[float, ...]:
-    """Return one number for all balls or contacts, or a row with one for each, to be kept."""
-    array = checked(name, values, rule, low, high, open_low)
-    if array.ndim > 1:
-        raise ValueError(f"{name} has shape {array.shape}; must be () or ({length},)")
-    return tuple(array.tolist()) if array.ndim else float(array)
+def place_in(name: str, value: object, size: int) -> int:
+    """Return `value` as the place of a thing in a row."""
+    if is_whole(value) and 0 <= value < size:
+        return int(value)
+    raise ValueError(f"{name} = {shown(value)}; must be one of 0 to {size - 1}")
 
 
-def row_of(name: str, kept: float | Sequence[float], size: int, balls: int) -> Vector:
-    """Return what `number_or_row` kept as a row for a chain."""
-    if not isinstance(kept, float) and len(kept) != size:
-        raise ValueError(f"{name} has {len(kept)} values; {balls} balls need {size}, or one number")
-    return np.full(size, kept)
+def one_of(name: str, value: object, choices: Sequence[str]) -> str:
+    """Return `value` if it is one of some words."""
+    if not isinstance(value, str) or value not in choices:
+        two = len(choices) == 2
+        rule = " or ".join(map(repr, choices)) if two else f"one of {', '.join(choices)}"
+        raise ValueError(f"{name} = {shown(value)}; must be {rule}")
+    return value
+
+
+def must_be(kind: type[_Thing], name: str, thing: object) -> _Thing:
+    """Return `thing` if it is of the type `kind`."""
+    if not isinstance(thing, kind):
+        what = f"the class {thing.__name__}" if isinstance(thing, type) else a(type(thing).__name__)
+        raise TypeError(f"{name} is {what}; must be {a(kind.__name__)}")
+    return thing
+
+
+# --- the words of a refusal -------------------------------------------------------------------
+
+
+def refusal(name: str, at: tuple[Any, ...], rest: str) -> ValueError:
+    """Return the error that refuses a value; it knows its place, so that it can be moved."""
+    index = tuple(int(k) for k in at)
+    error = ValueError(f"{name}{place(index)}{rest}")
+    vars(error).update(name=name, index=index, rest=rest)
+    return error
+
+
+def refuse_where(name: str, values: Vector, wrong: NDArray[np.bool_], rule: str) -> None:
+    """Raise if any value is wrong."""
+    if wrong.any():
+        at = first(wrong)
+        value = float(np.broadcast_to(values, wrong.shape)[at])
+        raise refusal(name, at, f" = {value!r}; {rule}")
+
+
+def first(true: NDArray[np.bool_]) -> tuple[int, ...]:
+    """Return the index of the first true value."""
+    return tuple(int(k) for k in np.unravel_index(int(np.argmax(true)), true.shape))
+
+
+def place(at: tuple[int, ...]) -> str:
+    """Return an index as an error names it."""
+    return f"[{', '.join(map(str, at))}]" if at else ""
+
+
+def shown(value: object) -> str:
+    """Return a value as an error repeats it: on one line, and cut if it is long."""
+    # NumPy's own scalars as plain numbers; of a long list no more than is shown.
+    if isinstance(value, (np.floating, np.complexfloating)):
+        return str(value)
+    if isinstance(value, (list, tuple)) and len(value) > _SHOWN:
+        value = [*value[:_SHOWN]]
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+
+
+def a(name: str) -> str:
+    """Return a name with its indefinite article."""
+    return f"{'an' if name[:1].lower() in tuple('aeiou') else 'a'} {name}"

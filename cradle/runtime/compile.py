@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from cradle import kernel as plain
-from cradle.input.words import one_of
+from cradle.input.values import one_of
 
 #: Set this environment variable to ``plain`` to run the kernel as it stands, to ``compiled`` to
 #: compile at the first call.
