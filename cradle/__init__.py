@@ -4,22 +4,19 @@ One idea: every impact model is a rule from a chain of balls to a path of contac
 
     Chain -> collide(chain, model) -> Trace -> measures -> figures
 
-Folders are roles:
+Read `cradle.textbook` first: the rules of an impact in 250 lines.  Then follow the arrows:
 
-- on top `cradle.chain`, the chain before the impact; `cradle.trace`, what happened;
-  `cradle.textbook`, `cradle.closed_form` and `cradle.tables`, what the paper gives;
-  `cradle.measures`, what is read off outcomes; `cradle.row`, balls that a physics engine moves.
-- `cradle.input`: what is asked of input, and the words of a refusal.
-- `cradle.kernel`: the event loop; `cradle.runtime` compiles it and feeds it.
-- `cradle.models`: one file a model, and the verb `collide`.
-- `cradle.swinging`: impacts and pendulums in turn; `cradle.swinging.stride`, one step of a `Row`.
-- `cradle.fit`: ratios and restitution from measured velocities.
-- `cradle.advice`: which model a scene needs, by what was measured.
-- `cradle.pictures`: matplotlib, imported only when asked for.
-- `cradle.command`: the command line, `python -m cradle`.
+- `cradle.chain`, the balls before the impact; `cradle.models`, a file for each model, and the verb
+  `collide`; `cradle.trace`, what happened; `cradle.measures`, what is read off it;
+  `cradle.pictures`, what is drawn (matplotlib, loaded only when asked for).
+- What the paper gives: `cradle.tables`, its balls and chains; `cradle.closed_form`, its formulas.
+- Many impacts: `cradle.swinging`, the pendulums between them; `cradle.row`, a physics engine.
+- Your own cradle: `cradle.fit`, ratios and restitution from measurements; `cradle.advice`, which
+  model a scene needs; `cradle.command`, all of it from the command line, `python -m cradle`.
+- Below: `cradle.kernel`, the same rules, fast; `cradle.runtime` compiles them and feeds them;
+  `cradle.input`, what is asked of input, and the words of a refusal.
 
-Read `cradle.textbook` first: the rules of an impact in 250 lines.  The distribution is called
-cradle-companion; its version is `cradle.__version__`.
+The distribution is called cradle-companion; its version is `cradle.__version__`.
 """
 
 from cradle.advice import Recommendation, recommend
@@ -40,38 +37,13 @@ from cradle.tables import paper_chain, paper_sequences, ratio_table, restitution
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
 __all__ = [
-    "Chain",
-    "DissipationTrace",
-    "EnergyDistribution",
-    "EnergyTrace",
-    "Event",
-    "FusedChain",
-    "Impact",
-    "ImpactNotCertified",
-    "ImpactNotFinished",
-    "ImpulseCorrelation",
-    "Model",
-    "Outcomes",
-    "Pendulums",
-    "QuadraticDissipation",
-    "Recommendation",
-    "SequentialCollisions",
-    "SpringChain",
-    "Swing",
-    "TimedTrace",
-    "Trace",
-    "collide",
-    "outcomes",
-    "paper_chain",
-    "paper_sequences",
-    "post_impact_velocities",
-    "ratio_table",
-    "recommend",
-    "restitution_table",
-    "spring_velocities",
-    "swing",
-    "warm_up",
-]
+    "Chain", "DissipationTrace", "EnergyDistribution", "EnergyTrace", "Event", "FusedChain",
+    "Impact", "ImpactNotCertified", "ImpactNotFinished", "ImpulseCorrelation", "Model", "Outcomes",
+    "Pendulums", "QuadraticDissipation", "Recommendation", "SequentialCollisions", "SpringChain",
+    "Swing", "TimedTrace", "Trace", "collide", "outcomes", "paper_chain", "paper_sequences",
+    "post_impact_velocities", "ratio_table", "recommend", "restitution_table", "spring_velocities",
+    "swing", "warm_up",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> str:
