@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from cradle.advice.measured import Measured, evidence, measured_chain, rows, unit_time
 from cradle.advice.recommendation import Recommendation
 from cradle.chain import Chain
-from cradle.input.values import must_be, one_number, shown, whole_number
+from cradle.input.values import must_be, one_number, one_of, whole_number
 from cradle.models import Model
 from cradle.models.compliant import SpringChain
 from cradle.models.correlation import ImpulseCorrelation
@@ -89,13 +89,12 @@ def recommend(
 
     Notes
     -----
-    The errors are those of velocities; errors of forces and times have not been measured.  The
-    chains measured are rows that touch, struck by a ball at one end: three and five equal elastic
-    balls, three with a light one in the middle, the paper's ABCCA, and, solved event by event,
-    random ones; all springs were equal.  A chain lies among them if its number of balls, its spread
-    of masses and its restitution lie between theirs.  Then the worst that was measured counts, and
-    must be ten times better than `accuracy`.  Of models whose times differ by less than half, as
-    measurements of one time do, it is the one that uses most of what is known.
+    Errors of velocities have been measured, not those of forces and times, on rows that touch,
+    struck by a ball at one end: three and five equal elastic balls, three with a light one in the
+    middle, the paper's ABCCA, and, event by event, random ones; all springs were equal.  For a
+    chain whose number of balls, spread of masses and restitution lie between theirs the worst that
+    was measured counts, and must be ten times better than `accuracy`.  Of models whose times differ
+    by less than half, as measurements do, it is the one that uses most of what is known.
 
     Examples
     --------
@@ -119,7 +118,8 @@ springs, which lose nothing; with losses, ask for impulses
         ratios = ImpulseCorrelation(ratios)
     if stiffness is not None:
         stiffness = SpringChain(stiffness).stiffness
-    wishes = _wishes(wanted)
+    several = isinstance(wanted, Collection) and not isinstance(wanted, (str, np.ndarray))
+    wishes = tuple(one_of("wanted", x, WANTED) for x in (several and [*wanted]) or [wanted])
     wish = _Wish(chain, wishes, accuracy, model_error, impacts, ratios, stiffness)
     _refuse(wish)
     found = []
@@ -172,18 +172,6 @@ class _Wish(NamedTuple):
 
 class _Unfit(Exception):
     """A wish, and why a model does not fulfil it."""
-
-
-def _wishes(wanted: str | Collection[str]) -> tuple[str, ...]:
-    try:
-        wishes = (wanted,) if isinstance(wanted, str) else tuple(wanted)
-    except TypeError:
-        wishes = ()
-    wrong = [one for one in wishes if not (isinstance(one, str) and one in WANTED)]
-    if not wishes or wrong:
-        rule = f"must be one or several of {', '.join(WANTED)}"
-        raise ValueError(f"wanted = {shown(wrong[0] if wrong else wanted)}; {rule}")
-    return wishes
 
 
 def _refuse(wish: _Wish) -> None:

@@ -17,12 +17,10 @@ class Recommendation:
 
     Attributes
     ----------
-    model : Model
-        Ready for `collide`.
+    model, call : Model, str
+        Ready for `collide`, and what to call.
     setting : str
         The row of the measured table: integrator and tolerance, one call or a batch.
-    call : str
-        What to call.
     numerical_error : float or None
         Largest distance of a velocity from the exact answer of the same model on the chains of
         `measured_on`, as a part of the closing speed.  Another chain may have a few times as much;
@@ -30,15 +28,13 @@ class Recommendation:
     model_error : float or None
         The same from Hertz springs, the theory of elastic spheres (equal ones, unless `stiffness`
         says otherwise); no setting makes it smaller.  With losses there is no such theory: None.
-    seconds : float or None
-        Time of one impact on the machine that measured, to a factor of two; once the event loop is
-        compiled, if the model has one.
-    plain_seconds : float or None
-        The same of one call in plain Python, as small work runs: nothing is compiled before the
-        work pays for it.  None, too, if it is the same.
+    seconds, plain_seconds : float or None
+        Time of one impact on the machine that measured, to a factor of two, once the event loop is
+        compiled, if the model has one; and of one call in plain Python, as small work runs: nothing
+        is compiled before the work pays for it.
     measured_on : tuple of str
-        The measured chains that these numbers come from: this very chain, or those around it, of
-        which the worst counts.  Empty: none.
+        The chains that these numbers come from: this very chain, or those around it, of which the
+        worst counts.  Empty: none.
     reason : str
         Why this model.
 

@@ -4,28 +4,41 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 
 def table_lines(source: Any) -> list[tuple[str, dict[str, Any]]]:
     """Return the rows of a file or of columns by name, each with a name of its place."""
-    if isinstance(source, (str, Path)) or hasattr(source, "open"):
-        path = Path(source) if isinstance(source, str) else source
-        return _file_lines(path.name, path.read_bytes())
-    if hasattr(source, "read"):
-        return _file_lines(getattr(source, "name", "the file"), source.read())
-    if not (isinstance(source, Mapping) or hasattr(source, "columns")):
+    source = Path(source) if isinstance(source, str) else source
+    if isinstance(source, Mapping) or hasattr(source, "columns"):
+        names = _once([str(name) for name in source])
+        columns = [list(source[name]) for name in source]
+        if len(lengths := {len(values) for values in columns}) > 1:
+            raise ValueError(f"columns have different lengths: {sorted(lengths)}")
+        rows = enumerate(zip(*columns, strict=True), 1)
+        return [(f"row {k}", dict(zip(names, row, strict=True))) for k, row in rows]
+    if not (hasattr(source, "read_bytes") or hasattr(source, "read")):
         raise TypeError(f"source is a {type(source).__name__}; must be a path or a table")
-    names = [str(name) for name in source]
-    _refuse_repeated(names)
-    columns = [list(source[name]) for name in source]
-    lengths = {len(values) for values in columns}
-    if len(lengths) > 1:
-        raise ValueError(f"columns have different lengths: {sorted(lengths)}")
-    rows = zip(*columns, strict=True)
-    return [(f"row {k}", dict(zip(names, row, strict=True))) for k, row in enumerate(rows, 1)]
+    content = source.read_bytes() if hasattr(source, "read_bytes") else source.read()
+    lines = text_rows(getattr(source, "name", "the file"), content)
+    names = _once(lines.pop(min(lines)) if lines else [])
+    for number, cells in lines.items():
+        if len(cells) != len(names):
+            raise ValueError(
+                f"line {number}: {len(cells)} values; the header has {len(names)} columns "
+                "(between commas, decimals need a point)"
+            )
+    return [(f"line {n}", dict(zip(names, cells, strict=True))) for n, cells in lines.items()]
+
+
+def _once(names: list[str]) -> list[str]:
+    """Return the names of columns, or refuse one that is there twice: which counts is not said."""
+    for name in names:
+        if name and names.count(name) > 1:  # a spreadsheet may add columns without a name
+            raise ValueError(f"column {name!r} is there {names.count(name)} times; keep one")
+    return names
 
 
 def text_rows(name: str, content: bytes, comments: bool = False) -> dict[int, list[str]]:
@@ -56,23 +69,3 @@ def text_rows(name: str, content: bytes, comments: bool = False) -> dict[int, li
         lines = {number: re.sub(r",(?=\d)", ".", line) for number, line in lines.items()}
     rows = csv.reader(lines.values(), delimiter=mark, skipinitialspace=True)
     return dict(zip(lines, ([cell.strip() for cell in row] for row in rows), strict=True))
-
-
-def _file_lines(name: str, content: bytes) -> list[tuple[str, dict[str, Any]]]:
-    """Return the rows of a table by the names of its columns."""
-    (_, header), *rows = [*text_rows(name, content).items()] or [(1, list[str]())]
-    _refuse_repeated(header)
-    for number, cells in rows:
-        if len(cells) != len(header):
-            raise ValueError(
-                f"line {number}: {len(cells)} values; the header has {len(header)} columns "
-                "(between commas, decimals need a point)"
-            )
-    return [(f"line {n}", dict(zip(header, cells, strict=True))) for n, cells in rows]
-
-
-def _refuse_repeated(names: Sequence[str]) -> None:
-    """Refuse a column that is there twice: which one counts is not said."""
-    for name in names:
-        if name and names.count(name) > 1:  # a spreadsheet may add columns without a name
-            raise ValueError(f"column {name!r} is there {names.count(name)} times; keep one")
