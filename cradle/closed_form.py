@@ -179,11 +179,10 @@ def largest_ratios(
     >>> [bound.tolist() for bound in largest_ratios([1, 1, 1, 1], [0.5, 0.5], [0.5, 0.5])]
     [[0.6666666666666666, 0.5], [0.5, 0.6666666666666666]]
     """
-    m = numbers("masses", masses)
-    if not m.ndim or m.shape[-1] < 2:
+    m = checked("masses", masses, "must be above 0", 0.0, open_low=True)
+    if m.shape[-1:] < (2,):
         raise ValueError(f"masses has shape {m.shape}; must be (..., N) with N >= 2")
-    checked("masses", m, "must be above 0", 0.0, open_low=True)
-    f, b = numbers("forward", forward), numbers("backward", backward)
+    f, b = checked("forward", forward, *_UNIT), checked("backward", backward, *_UNIT)
     size = m.shape[-1] - 2
     for name, ratio in (("forward", f), ("backward", b)):
         if ratio.shape[-1:] != (size,):
@@ -191,7 +190,6 @@ def largest_ratios(
                 f"{name} has shape {ratio.shape}; must be (..., {size}) for {size + 2} balls: one "
                 "number for each ball between two others"
             )
-        checked(name, ratio, *_UNIT)
 
     def bound(m: Vector, ratio: Vector) -> Vector:
         onward = np.zeros(ratio.shape)

@@ -41,12 +41,11 @@ class Trace:
     impulses : ndarray, shape (N - 1,)
         Total impulse of each contact, N s.
     absorbed : ndarray, shape (N - 1,)
-        Work that each contact absorbed in compression, over all its collisions, J.  Where an
-        infinite sequence was taken to its limit, what all contacts lost is exact; how the rest of
-        the sequence shared it is what its last cycle shows, to 1e-4 of the largest of them.
+        Work that each contact absorbed in compression, over all its collisions, J.  Of an infinite
+        sequence taken to its limit the sum is exact, the shares of its rest are good to 1e-4.
     collisions : ndarray of int, shape (N - 1,)
-        How often each contact became active.  Collisions slower than the last digit of the
-        velocities mean nothing: an endless sequence may end there, without `collapsed`.
+        How often each contact became active.  Those slower than the last digit of the velocities
+        mean nothing: an endless sequence may end there, without `collapsed`.
     path : ndarray, shape (K + 1, N)
         Velocities before the impact and at every event, m/s.  Between two rows every velocity is
         linear in every impulse, but before a "collapse" or a "repetition", which stand for many.
@@ -99,10 +98,9 @@ class Trace:
         Returns
         -------
         pandas.DataFrame
-            Columns ``step`` (0 to K), ``event`` and ``contact`` (what happened there; "before" and
-            missing at step 0), ``ball``, ``velocity`` (m/s), ``left`` and ``right``, the impulses
-            so far of the ball's two contacts (N s; its momentum has grown by ``left - right``).
-            Models with a time add ``time`` (s).
+            Columns ``step`` (0 to K), ``event`` and ``contact`` ("before" and missing at step 0),
+            ``ball``, ``velocity`` (m/s), ``left`` and ``right``, the impulses so far of the ball's
+            two contacts (N s).  Models with a time add ``time`` (s).
 
         Examples
         --------
