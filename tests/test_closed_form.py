@@ -53,8 +53,6 @@ def test_one_collision_per_contact():
 def test_where_the_closed_form_does_not_apply_the_solver_finds_more_collisions():
     chains = random_three_balls(seed=44)
     masses, velocities, e, ratio = chains
-    gain = (1 + e[:, 0]) * masses[:, 0] * (velocities[:, 0] - velocities[:, 1])
-    gain /= (1 - ratio) * masses[:, 0] + masses[:, 1]
     after = three_balls(*chains)
     # Not within rounding of the two edges: ball 2 falling back on ball 1, contact 2-3 ending first.
     clear = np.abs(after[:, 0] - after[:, 1]) > 1e-9
@@ -67,9 +65,6 @@ def test_where_the_closed_form_does_not_apply_the_solver_finds_more_collisions()
         assert once == apply[i], i
         more += not once
     assert more > 300
-
-
-# --- Eqs. 44 to 46 -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("e2", "e3", "ratio"), [(0.5, 0.5, 0.15), (0.9, 0.6, 0.05)])
@@ -85,9 +80,6 @@ def test_eq_44_on_a_map_of_both_mass_ratios(e2, e3, ratio):
         )
         assert (trace.collisions.tolist() == [1, 1]) == single
         assert one_collision_each(masses, [1, 0, 0], [e2, e3], ratio) == single
-
-
-# --- largest ratios ------------------------------------------------------------------------
 
 
 def test_largest_ratios_give_zero_closing_acceleration():
@@ -108,13 +100,12 @@ def test_largest_ratios_give_zero_closing_acceleration():
 def test_largest_ratios_broadcast():
     m, f = np.ones((4, 1, 5)), np.full((3, 3), 0.5)
     forward, backward = largest_ratios(m, f, f[0])
-    assert forward.shape == (4, 3, 3)
-    assert backward.shape == (4, 1, 3)
-    one, _ = largest_ratios(m[0, 0], f[0], f[0])
-    np.testing.assert_array_equal(forward[2, 1], one)
-
-
-# --- input that has no meaning -------------------------------------------------------------
+    assert (forward.shape, backward.shape) == ((4, 3, 3), (4, 1, 3))
+    np.testing.assert_array_equal(forward[2, 1], largest_ratios(m[0, 0], f[0], f[0])[0])
+    # Two balls have no ball in between, and no chains no bounds.
+    assert [bound.shape for bound in largest_ratios([1, 2], [], [])] == [(0,), (0,)]
+    shapes = [bound.shape for bound in largest_ratios(np.ones((0, 4)), *np.ones((2, 0, 2)))]
+    assert shapes == [(0, 2), (0, 2)]
 
 
 def test_three_balls_pass_on_nan():
@@ -125,13 +116,6 @@ def test_three_balls_pass_on_nan():
     assert np.isnan(after).any(axis=1).tolist() == [False, True, True]
     once = one_collision_each(masses, velocities, [1, 1], 0.1)
     assert once.tolist() == [True, False, False]
-
-
-def test_largest_ratios_of_none():
-    """Two balls have no ball in between, and no chains no bounds."""
-    assert [bound.shape for bound in largest_ratios([1, 2], [], [])] == [(0,), (0,)]
-    shapes = [bound.shape for bound in largest_ratios(np.ones((0, 4)), *np.ones((2, 0, 2)))]
-    assert shapes == [(0, 2), (0, 2)]
 
 
 def test_eq_44_beyond_the_bound_is_nan():
