@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from cradle.input.values import Vector, checked, numbers, one_number
 from cradle.kernel.state import LIMITS
 
+_Balls = tuple[Vector, ...]
 _UNIT = ("must lie in [0, 1]", 0.0, 1.0)
 #: What is asked of a restitution that divides.
 _NO_ZERO = (f"must lie in [{LIMITS.least_restitution}, 1]", LIMITS.least_restitution, 1.0)
@@ -20,15 +21,15 @@ _NO_ZERO = (f"must lie in [{LIMITS.least_restitution}, 1]", LIMITS.least_restitu
 
 def _split(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, ratio: ArrayLike
-) -> tuple[Vector, Vector, Vector, Vector]:
-    """Check shapes; return masses, velocities and restitution, balls first, and the ratio."""
+) -> tuple[_Balls, _Balls, _Balls, Vector]:
+    """Check shapes; return masses, velocities and restitution one by one, and the ratio."""
     sizes = {"masses": 3, "velocities": 3, "restitution": 2}
     arrays = map(numbers, sizes, (masses, velocities, restitution))
     given = dict(zip(sizes, arrays, strict=True))
     for name, array in given.items():
         if array.shape[-1:] != (sizes[name],):
             raise ValueError(f"{name} has shape {array.shape}; must be (..., {sizes[name]})")
-    m, v, e = (np.moveaxis(array, -1, 0) for array in given.values())
+    m, v, e = (tuple(array[..., k] for k in range(array.shape[-1])) for array in given.values())
     alpha = numbers("ratio", ratio)
     try:
         np.broadcast_shapes(m[0].shape, v[0].shape, e[0].shape, alpha.shape)
@@ -38,7 +39,7 @@ def _split(
     return m, v, e, alpha
 
 
-def _taus(m: Vector, v: Vector, e: Vector, alpha: Vector) -> tuple[Vector, Vector, Vector]:
+def _taus(m: _Balls, v: _Balls, e: _Balls, alpha: Vector) -> tuple[Vector, Vector, Vector]:
     """Return what contact 2-3 would gain from the whole impulse tau_2 at once, tau_2 and tau_3."""
     (m1, m2, m3), (v1, v2, v3), (e2, e3) = m, v, e
     gain = (1.0 + e2) * m1 * (v1 - v2) / ((1.0 - alpha) * m1 + m2)
@@ -49,7 +50,7 @@ def _taus(m: Vector, v: Vector, e: Vector, alpha: Vector) -> tuple[Vector, Vecto
     return gain, tau_2, tau_3c * (1.0 + e3 * root)  # Eq. 30
 
 
-def _after(m: Vector, v: Vector, tau_2: Vector, tau_3: Vector) -> tuple[Vector, ...]:
+def _after(m: _Balls, v: _Balls, tau_2: Vector, tau_3: Vector) -> _Balls:
     """Return the velocities after the impact, ball by ball."""
     (m1, m2, m3), (v1, v2, v3) = m, v
     return v1 - tau_2 / m1, v2 + (tau_2 - tau_3) / m2, v3 + tau_3 / m3

@@ -42,8 +42,8 @@ def numbers(name: str, values: ArrayLike | None, at: tuple[int, ...] = ()) -> Ve
         return np.array(values)
     given: Any = values
     if isinstance(values, (list, tuple)):
-        if {*map(type, values)} <= _USUAL:
-            with suppress(OverflowError):
+        if _usual(values):
+            with suppress(OverflowError, ValueError):
                 return np.array(values, dtype=np.float64)
     elif not _is_masked(values):
         with suppress(TypeError, ValueError):
@@ -61,6 +61,12 @@ def numbers(name: str, values: ArrayLike | None, at: tuple[int, ...] = ()) -> Ve
                 f"{one} has shape {row.shape}, {other} has {rows[0].shape}; must have one shape"
             )
     return np.array(rows, dtype=np.float64)
+
+
+def _usual(values: Sequence[Any]) -> bool:
+    """Tell whether nested lists hold nothing but Python's own numbers."""
+    kinds = {*map(type, values)}
+    return kinds <= _USUAL or (kinds <= {list, tuple} and all(map(_usual, values)))
 
 
 def _is_masked(value: Any) -> bool:
@@ -100,8 +106,12 @@ def checked(
     array = numbers(name, values)
     if array is values:
         array = array.copy()
-    refuse_where(name, array, ~np.isfinite(array), "must be finite")
-    refuse_where(name, array, (array < low) | (array > high) | (open_low & (array == low)), rule)
+    wrong = ~np.isfinite(array) | (array < low) | (array > high)
+    if open_low:
+        wrong |= array == low
+    if wrong.any():
+        refuse_where(name, array, ~np.isfinite(array), "must be finite")
+        refuse_where(name, array, wrong, rule)
     return array
 
 
