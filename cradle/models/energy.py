@@ -18,14 +18,13 @@ from cradle.input.values import (
     row_of,
     whole_number,
 )
-from cradle.models.release import Process
-from cradle.trace import ImpactNotFinished, Trace
+from cradle.models.release import Process, Stopped
+from cradle.trace import Event, ImpactNotFinished, Trace
 
-# Smallest restitution above 0.
+# Smallest restitution above 0: a shorter release is a step too short for the integrator.
 _SMALLEST = 1e-6
 # SciPy takes no smaller relative tolerance.
 _SMALLEST_RTOL = 100 * float(np.finfo(np.float64).eps)
-_RTOL_RULE = f"must lie in [{_SMALLEST_RTOL:.3g}, 0.1]"
 
 
 def fastest(chain: Chain) -> tuple[int, float, float]:
@@ -62,8 +61,6 @@ class CurvedTrace(Trace):
 class EnergyTrace(CurvedTrace):
     """The path of an impact whose ratios of impulses change all the time; N balls, S steps.
 
-    Its events are joined by smooth curves, not by the straight lines of a constant ratio.
-
     Attributes
     ----------
     step_velocities : ndarray, shape (S, N)
@@ -72,10 +69,6 @@ class EnergyTrace(CurvedTrace):
         Impulses so far at each step, N s.
     evaluations : int
         How often the ratios were evaluated.
-
-    References
-    ----------
-    Liu, Zhao and Brogliato, Proc. R. Soc. A 464 (2008) 3193-3211.
 
     Examples
     --------
@@ -97,22 +90,12 @@ class EnergyDistribution:
     E is the energy that a contact stores.  With the closing speed u it changes by ``dE = u dP`` in
     compression (u > 0) and by ``dE = u dP / e^2`` in release (u < 0), so it is used up when the
     part e^2 of the work absorbed has been given back.  A contact that is compressed again before
-    its end keeps what it stores: the rule then holds for the totals, and the loss of kinetic energy
-    is the sum of ``(1 - e^2)`` times the work absorbed.  With e = 0 the stored energy is lost at
-    u = 0; the contact ends there, and closes anew if a neighbour pushes on.
+    its end keeps what it stores.  With e = 0 the stored energy is lost at u = 0; the contact ends
+    there, and closes anew if a neighbour pushes on.
 
-    *Where the springs come in.*  A spring with the force ``F = k x^p`` stores
-    ``E = k x^(p+1) / (p + 1)``, so F is ``k^(1/(1+p)) ((p + 1) E)^(p/(1+p))``: the law above says
-    that impulses grow like forces of springs, ``dP = F dt`` with a common t.  The variable x then
-    obeys ``dx/dt = u`` in compression and ``u / e^2`` in release.  Nothing is singular at E = 0,
-    where the law itself reads 0/0.  With e = 1 this is the spring chain, t its time; with e < 1,
-    springs that are stiffer in release and leave a dent.
-
-    After the end of a contact there are two readings.  With `gaps` a gap opens, and must close
-    before the contact acts again, as between the springs.  Without, the balls are rigid and
-    impulses take no time: the contact acts as soon as its balls approach, as in the authors'
-    program (OSNSMultipleImpact of the Siconos library).  The two differ only where a contact acts
-    that was open before.
+    A spring with the force ``F = k x^p`` stores ``E = k x^(p+1) / (p + 1)``, so the law says that
+    impulses grow like forces of springs, ``dP = F dt`` with a common t, where ``dx/dt = u`` in
+    compression and ``u / e^2`` in release.  So it is solved; nothing is singular at E = 0.
 
     Parameters
     ----------
@@ -121,7 +104,9 @@ class EnergyDistribution:
     exponent : float
         p, at least 1: 1 a linear spring, 3/2 the contact of two elastic spheres (Hertz).
     gaps : bool
-        Whether a gap must close before an open contact acts.
+        Whether a contact that has ended leaves a gap that must close before it acts again, as
+        between springs.  If not, it acts as soon as its balls approach, as in the authors' program
+        (OSNSMultipleImpact of Siconos).
     rtol : float
         Relative tolerance of the integration.  An impact that goes on with speeds alone below rtol
         times that of the fastest closing is ended plastically: `Trace.collapsed`, if contacts that
@@ -156,18 +141,18 @@ class EnergyDistribution:
     max_evaluations: int = field(default=1_000_000, kw_only=True)
 
     def __post_init__(self) -> None:
-        above = "must be above 0"
-        k = number_or_row("stiffness", self.stiffness, "N - 1", above, 0.0, open_low=True)
+        k = number_or_row(
+            "stiffness", self.stiffness, "N - 1", "must be above 0", 0.0, np.inf, True
+        )
         soft = np.asarray(k) < LIGHTEST * np.max(k, initial=0.0)
         rule = f"must be at least {LIGHTEST} of the stiffest contact"
         refuse_where("stiffness", np.asarray(k), soft, rule)
-        kept = {
-            "stiffness": k,
-            "exponent": one_number("exponent", self.exponent, "must be at least 1", 1.0),
-            "rtol": one_number("rtol", self.rtol, _RTOL_RULE, _SMALLEST_RTOL, 0.1),
-        }
-        for name, value in kept.items():
-            object.__setattr__(self, name, value)
+        rtol_rule = f"must lie in [{_SMALLEST_RTOL:.3g}, 0.1]"
+        vars(self).update(
+            stiffness=k,
+            exponent=one_number("exponent", self.exponent, "must be at least 1", 1.0),
+            rtol=one_number("rtol", self.rtol, rtol_rule, _SMALLEST_RTOL, 0.1),
+        )
         whole_number("max_evaluations", self.max_evaluations)
         if not isinstance(self.gaps, bool):
             raise ValueError(f"gaps = {self.gaps!r}; must be True or False")
@@ -184,10 +169,30 @@ class EnergyDistribution:
         refuse_where("restitution", chain.restitution, small, rule)
         c, mass, speed = fastest(chain)
         scaled = chain.masses / mass, chain.closing_speeds / speed, k / k[c]
-        process = Process(*scaled, chain.restitution, self)
-        reason = process.run()
-        account = process.account(chain.velocities, mass, speed)
-        trace = EnergyTrace(chain=chain, model=self, **account)
+        process, reason = Process(*scaled, chain.restitution, self), ""
+        try:
+            process.run()
+        except Stopped as stopped:
+            reason = str(stopped)
+        kinds, contacts, states = zip(*process.record, strict=True)
+        change, _, impulses = process.parts(np.array(states).T)
+        step_change, _, step_impulses = process.parts(np.concatenate(process.steps, axis=1))
+        last_change, _, last_impulses = process.parts(process.y)
+        trace = EnergyTrace(
+            chain=chain,
+            model=self,
+            velocities=chain.velocities + speed * last_change,
+            impulses=mass * speed * last_impulses,
+            absorbed=mass * speed * speed * process.absorbed,
+            collisions=process.collisions,
+            path=chain.velocities + speed * change.T,
+            path_impulses=mass * speed * impulses.T,
+            events=tuple(map(Event, kinds[1:], contacts[1:])),
+            step_velocities=chain.velocities + speed * step_change.T,
+            step_impulses=mass * speed * step_impulses.T,
+            evaluations=process.evaluations,
+            collapsed=process.collapsed,
+        )
         if reason:
             raise ImpactNotFinished(
                 f"the impact was not finished after {len(trace.events)} events: {reason}", trace

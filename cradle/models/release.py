@@ -4,31 +4,27 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cradle.input.values import Vector
-from cradle.trace import Event
-
-if TYPE_CHECKING:
-    from cradle.models.energy import EnergyDistribution
 
 _EPSILON = float(np.finfo(np.float64).eps)
 
 
-class TooManyEvaluations(Exception):
-    """The forces were evaluated as often as allowed."""
+class Stopped(Exception):
+    """Why the motion could not be followed to its end."""
 
 
 class Process:
-    """The motion of a chain in its own units, and the record of it.
+    """The motion of a chain's springs in its own units, and the record of it.
 
     The state of N balls is one vector y: changes of velocity (N), the x of `EnergyDistribution`
     (N - 1; below zero they are gaps) and impulses (N - 1).
     """
 
-    def __init__(self, m: Vector, u: Vector, k: Vector, e: Vector, model: EnergyDistribution):
+    def __init__(self, m: Vector, u: Vector, k: Vector, e: Vector, model: Any):
         n, p = len(m), model.exponent
         self.m, self.u, self.k, self.e, self.p = m, u, k, e, p
         self.gaps, self.rtol, self.most = model.gaps, model.rtol, model.max_evaluations
@@ -54,26 +50,6 @@ class Process:
         n = len(self.m)
         return y[:n], y[n : 2 * n - 1], y[2 * n - 1 :]
 
-    def account(self, velocities: Vector, mass: float, speed: float) -> dict[str, Any]:
-        """Return what happened, in the chain's units, as fields of an `EnergyTrace`."""
-        kinds, contacts, states = zip(*self.record, strict=True)
-        change, _, impulses = self.parts(np.array(states).T)
-        step_change, _, step_impulses = self.parts(np.concatenate(self.steps, axis=1))
-        reached = self.parts(self.y)
-        return {
-            "velocities": velocities + speed * reached[0],
-            "impulses": mass * speed * reached[2],
-            "absorbed": mass * speed * speed * self.absorbed,
-            "collisions": self.collisions,
-            "path": velocities + speed * change.T,
-            "path_impulses": mass * speed * impulses.T,
-            "events": tuple(map(Event, kinds[1:], contacts[1:])),
-            "step_velocities": velocities + speed * step_change.T,
-            "step_impulses": mass * speed * step_impulses.T,
-            "evaluations": self.evaluations,
-            "collapsed": self.collapsed,
-        }
-
     def speeds(self, y: Vector) -> Vector:
         """Return the closing speeds; what is no more than rounding is zero."""
         n = len(self.m)
@@ -92,7 +68,7 @@ class Process:
         A closed contact that a trial step draws apart pulls, so that the step sees no kink.
         """
         if self.evaluations == self.most:
-            raise TooManyEvaluations
+            raise Stopped(f"max_evaluations = {self.most} reached")
         self.evaluations += 1
         d, out = np.where(self.closed, self.parts(y)[1], 0.0), np.zeros_like(y)
         change, growth, force = self.parts(out)
@@ -103,42 +79,13 @@ class Process:
         growth[:] = self.speeds(y) * self.weights
         return out
 
-    def run(self) -> str:
-        """Run to the last separation; return why it could not be reached, or nothing."""
+    def run(self) -> None:
+        """Run to the last separation."""
         self.settle([])
         self.record = self.record[:1]  # what touches from the start does not close
-        try:
-            while self.closed.any() or self.fly():
-                if self.closed.any() and (failure := self.integrate()):
-                    return failure
-        except TooManyEvaluations:
-            return f"max_evaluations = {self.most} reached{self.advice()}"
+        while self.closed.any() or (self.gaps and (self.speeds(self.y) > self.rtol).any()):
+            self.integrate()
         self.part()
-        return ""
-
-    def advice(self) -> str:
-        """Return what makes the steps of the integration short, and which models take none."""
-        pairs = np.minimum(self.m[:-1], self.m[1:])
-        c = int(np.argmax(self.k / pairs))
-        ball = c if self.m[c] <= self.m[c + 1] else c + 1
-        return (
-            f"; ball {ball} on contact {c}, the quickest of the springs, makes the steps short; "
-            "SequentialCollisions and ImpulseCorrelation (with a ratio) take no steps"
-        )
-
-    def fly(self) -> bool:
-        """Fly with all contacts open to the next closing; False if there is none."""
-        u, d = self.speeds(self.y), self.parts(self.y)[1]
-        if not (self.gaps and (u > self.rtol).any()):
-            return False
-        ahead = np.flatnonzero(u > 0.0)
-        needed = -d[ahead] / u[ahead]
-        first = int(np.argmin(needed))
-        self.t += float(needed[first])
-        self.y = self.y.copy()
-        self.parts(self.y)[1][:] += u * needed[first]
-        self.settle([int(ahead[first])])
-        return True
 
     def solution(self, begin: float, y: Vector, end: float, **options: Any) -> Any:
         """Return SciPy's integration of the rates."""
@@ -150,57 +97,46 @@ class Process:
         with np.errstate(over="ignore", invalid="ignore"):
             return solve_ivp(self.rate, (begin, end), y, **options)
 
-    def integrate(self) -> str:
-        """Integrate to the next event; return why it failed, or nothing."""
+    def integrate(self) -> None:
+        """Integrate to the next event."""
         released = np.divide(1.0, self.e**2, out=np.ones_like(self.e), where=self.e > 0.0)
         self.weights = np.where(self.closed & ~self.loading, released, self.closed | self.gaps)
         # Balls at rest together that nothing touches have no events.
         d = self.parts(self.y)[1]
         contacts = np.flatnonzero(self.closed | (d != 0.0) | (self.speeds(self.y) != 0.0)).tolist()
         events = [self.crossing(c) for c in contacts] + [self.extreme(c) for c in contacts]
-
-        def extremes(found: Any) -> list[tuple[float, int, Vector]]:
-            half = len(contacts)
-            by_contact = zip(contacts, found.t_events[half:], found.y_events[half:], strict=True)
-            turns = [(t, c, y) for c, ts, ys in by_contact for t, y in zip(ts, ys, strict=True)]
-            return sorted(turns, key=lambda turn: turn[:2])
-
-        found = self.solution(self.t, self.y, np.inf, events=events)
-        turns = extremes(found)
+        side = np.where(self.closed, 1.0, -1.0)
+        end = np.inf
         # A contact that opens and closes again (or the reverse) within one step goes unnoticed,
         # but for its extreme: a second run that ends there has to cross zero before.
-        side = np.where(self.closed, 1.0, -1.0)
-        missed = [t for t, c, y in turns if side[c] * self.parts(y)[1][c] < 0.0]
-        if missed:
-            found = self.solution(self.t, self.y, missed[0], events=events)
-            turns = extremes(found)
+        for _ in range(2):
+            found = self.solution(self.t, self.y, end, events=events)
+            half = slice(len(contacts), None)
+            pages = zip(contacts, found.t_events[half], found.y_events[half], strict=True)
+            turns = [(t, c, y) for c, ts, ys in pages for t, y in zip(ts, ys, strict=True)]
+            turns.sort(key=lambda turn: turn[:2])
+            missed = [t for t, c, y in turns if side[c] * self.parts(y)[1][c] < 0.0]
+            if not missed:
+                break
+            end = missed[0]
         if found.status < 0:
-            return str(found.message)
+            raise Stopped(found.message)
         crossed = [c for c, ts in zip(contacts, found.t_events, strict=False) if len(ts)]
-        if crossed:
-            found.y[:, -1] = self.again(found)
+        if crossed and found.t[-2] < found.t[-1]:
+            # The force is not smooth where a contact opens or closes, and there SciPy interpolates
+            # less exactly than it steps: the last step again, to where the crossing was found.
+            begin, end = found.t[-2:]
+            last = self.solution(begin, found.y[:, -2], end, first_step=end - begin)
+            if last.status >= 0:
+                found.y[:, -1] = last.y[:, -1]
         self.steps.append(found.y)
         self.t, self.y = float(found.t[-1]), found.y[:, -1].copy()
+        # An extreme may fall on the end, where rounding can hide it.
         for _, c, y in turns:
             self.turn(c, y)
-        # An extreme may fall on the end, where rounding can hide it.
-        ahead = self.closed & (self.loading == (self.speeds(self.y) < 0.0))
-        for c in np.flatnonzero(ahead).tolist():
-            self.turn(c, self.y)
+        for c in np.flatnonzero(self.closed & (self.loading == (self.speeds(self.y) < 0.0))):
+            self.turn(int(c), self.y)
         self.settle(crossed)
-        return ""
-
-    def again(self, found: Any) -> Any:
-        """Return the state at the end of an integration, better than by interpolation.
-
-        The force is not smooth where a contact opens or closes, and there SciPy's interpolation is
-        less exact than its steps: the last step is done again to where the crossing was found.
-        """
-        begin, end = found.t[-2:]
-        if begin == end:
-            return found.y[:, -1]
-        last = self.solution(begin, found.y[:, -2], end, first_step=end - begin)
-        return found.y[:, -1] if last.status < 0 else last.y[:, -1]
 
     def crossing(self, c: int) -> Any:
         """Return SciPy's event of contact c opening or closing."""
