@@ -54,9 +54,8 @@ def fresh_runtime(monkeypatch):
     """Let the runtime find out anew what there is; afterwards too."""
     monkeypatch.delenv(runtime.VARIABLE, raising=False)
     monkeypatch.setattr(runtime, "_spent", 0.0)
-    monkeypatch.setattr(runtime, "_look", runtime.LOADS_AFTER)
     # The caches of this process are kept: to load compiled code again would take seconds.
-    for name in ("available", "compiled", "_stored", "_announce"):
+    for name in ("available", "compiled", "_stored", "_announce", "_found"):
         monkeypatch.setattr(runtime, name, functools.cache(vars(runtime)[name].__wrapped__))
 
 
@@ -183,7 +182,7 @@ def test_small_work_runs_plain_and_more_work_compiled(monkeypatch):
         ([1], 1.1 * runtime.LOADS_AFTER, False, "compiled"),
     ):
         ready[:] = on_disk
-        monkeypatch.setattr(runtime, "_look", runtime.LOADS_AFTER)
+        runtime._found.cache_clear()
         monkeypatch.setattr(runtime, "_spent", spent)
         assert runtime.chosen(large) is expected
     monkeypatch.setenv(runtime.VARIABLE, "plain")
@@ -231,7 +230,7 @@ def test_ready_code_is_loaded_without_a_word(monkeypatch, caplog):
 
 @pytest.mark.usefixtures("fresh_runtime")
 @needs_numba
-def test_compiled_code_is_looked_for_seldom(monkeypatch):
+def test_compiled_code_is_looked_for_once(monkeypatch):
     """Not before each of many small impacts, which take less time than a look."""
     looks = []
     monkeypatch.setattr(runtime, "loaded", lambda *_: False)
@@ -239,7 +238,8 @@ def test_compiled_code_is_looked_for_seldom(monkeypatch):
     for _ in range(1000):
         assert runtime.chosen() is kernel
         runtime.spend(4 * runtime.LOADS_AFTER / 1000)
-    assert len(looks) == 3
+    assert len(looks) == 1
+    assert looks[0] > runtime.LOADS_AFTER
 
 
 @pytest.mark.usefixtures("fresh_runtime")
@@ -312,69 +312,6 @@ def test_without_a_folder_for_compiled_code_it_says_so_once(monkeypatch, tmp_pat
     assert said.getMessage().startswith("no writable folder for compiled code: it is compiled anew")
 
 
-def kept_files(folder):
-    name = f"{runtime._name()}.batch-1.py311"
-    files = [folder / "__pycache__" / f"{name}.{end}" for end in ("nbi", "1.nbc")]
-    files[0].parent.mkdir()
-    for file in files:
-        file.write_bytes(b"half")
-    return files
-
-
-@pytest.mark.usefixtures("fresh_runtime")
-@needs_numba
-@pytest.mark.parametrize("again", [False, True])
-def test_code_on_disk_that_cannot_be_read_is_removed_once(monkeypatch, tmp_path, caplog, again):
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    monkeypatch.setattr(runtime, "_folder", lambda: tmp_path)
-    monkeypatch.setattr(runtime, "loaded", lambda *_: False)
-    files = kept_files(tmp_path)
-    other = files[0].with_name("another_unit.batch-1.py311.nbi")
-    other.write_bytes(b"")
-
-    def door(value):
-        if again or files[0].exists():
-            raise EOFError("Ran out of input")
-        return value
-
-    with caplog.at_level(logging.WARNING, "cradle"):
-        if again:
-            with pytest.raises(EOFError):
-                runtime.first_call(door, 3)
-        else:
-            assert runtime.first_call(door, 3) == 3
-    assert not any(file.exists() for file in files)
-    assert other.exists()
-    (said,) = caplog.records
-    assert "cannot be read (EOFError: Ran out of input); compiled anew" in said.getMessage()
-    if again:
-        with pytest.raises(EOFError):  # nothing is left to remove
-            runtime.first_call(door, 3)
-        assert len(caplog.records) == 1
-
-
-@pytest.mark.exhaustive
-@needs_numba
-def test_half_a_file_of_compiled_code_is_compiled_anew(tmp_path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-
-    def warm_up():
-        return subprocess.run(
-            [sys.executable, "-W", "error", "-m", "cradle", "warm-up"],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-
-    warm_up()
-    for pattern in ("*.nbc", "*.nbi"):
-        (file,) = tmp_path.rglob(pattern)
-        file.write_bytes(file.read_bytes()[:100])
-        assert "cannot be read" in warm_up().stderr
-        assert "loaded in" in warm_up().stdout
-
-
 @pytest.mark.usefixtures("fresh_runtime")
 @pytest.mark.parametrize("large", [False, True])
 def test_the_wish_for_a_kernel_is_one_of_two_words(monkeypatch, large):
@@ -425,7 +362,7 @@ def test_compiled_code_stays_out_of_the_package(monkeypatch, tmp_path, variable)
     stored = runtime._stored()
     assert stored.parent.name == "cradle-companion"
     assert stored.is_relative_to(tmp_path)
-    assert stored.read_text(encoding="utf-8") == runtime._compilable()
+    assert stored.read_text(encoding="utf-8") == runtime._for_numba(runtime.unit())
     assert set(package.rglob("*")) == before
 
 

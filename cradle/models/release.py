@@ -60,7 +60,9 @@ class Process:
 
     def stored(self, y: Vector) -> Vector:
         """Return the energy that each contact stores."""
-        return self.k * np.maximum(self.parts(y)[1], 0.0) ** (self.p + 1.0) / (self.p + 1.0)
+        depth = np.maximum(self.parts(y)[1], 0.0)
+        energy: Vector = self.k * depth ** (self.p + 1.0) / (self.p + 1.0)
+        return energy
 
     def rate(self, _: float, y: Vector) -> Vector:
         """Return dy/dt while no contact opens, closes or turns.
@@ -134,8 +136,9 @@ class Process:
         # An extreme may fall on the end, where rounding can hide it.
         for _, c, y in turns:
             self.turn(c, y)
-        for c in np.flatnonzero(self.closed & (self.loading == (self.speeds(self.y) < 0.0))):
-            self.turn(int(c), self.y)
+        hidden = self.closed & (self.loading == (self.speeds(self.y) < 0.0))
+        for c in np.flatnonzero(hidden).tolist():
+            self.turn(c, self.y)
         self.settle(crossed)
 
     def crossing(self, c: int) -> Any:

@@ -16,7 +16,7 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -51,7 +51,6 @@ _MEANINGS: dict[str, dict[str, Any]] = {
 
 logger = logging.getLogger("cradle")
 _spent = 0.0  # seconds of plain work so far, in this process
-_look = LOADS_AFTER  # seconds of plain work after which to look for compiled code on disk
 _hurry = contextvars.ContextVar("hurry", default=False)  # a frame of a game cannot wait
 _deciding = threading.Lock()
 
@@ -76,7 +75,11 @@ def unit(rooms: tuple[str, ...] = plain.ROOMS) -> str:
 
 
 class _Unsigned(ast.NodeTransformer):
-    """Write every index that is worked out as a number without a sign."""
+    """Write every index that is worked out as a number without a sign.
+
+    An index below zero would count from the end.  The kernel has none, but numba would ask at each
+    of them, which takes a quarter of an impact's time.
+    """
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         self.generic_visit(node)
@@ -87,23 +90,15 @@ class _Unsigned(ast.NodeTransformer):
 
 @functools.cache
 def _for_numba(source: str) -> str:
-    """Return a source in the form in which it is compiled.
-
-    An index below zero would count from the end.  The kernel has none, but numba would ask at each
-    of them, which takes a quarter of an impact's time.
-    """
-    tree = _Unsigned().visit(ast.parse(source))
-    return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
-
-
-def _compilable() -> str:
-    return _for_numba(unit())
+    """Return a source in the form in which it is compiled."""
+    return ast.unparse(ast.fix_missing_locations(_Unsigned().visit(ast.parse(source)))) + "\n"
 
 
 def _name() -> str:
+    """Return the name of the unit: a hash of its text and of how it is compiled."""
     import hashlib
 
-    told = f"{_compilable()}{_MEANINGS}"
+    told = f"{_for_numba(unit())}{_MEANINGS}"
     return f"cradle_kernel_{hashlib.sha256(told.encode()).hexdigest()[:16]}"
 
 
@@ -112,9 +107,8 @@ def _folder() -> Path:
 
     There a wheel or a source distribution built later would take them along.
     """
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    if chosen:
-        return Path(chosen)
+    if wish := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(wish)
     home = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
     usual = "~/Library/Caches" if sys.platform == "darwin" else "~/.cache"
     return (Path(home) if home else Path(usual).expanduser()) / "cradle-companion"
@@ -132,14 +126,11 @@ def _stored() -> Path | None:
         with tempfile.NamedTemporaryFile(
             "w", encoding="utf-8", dir=path.parent, suffix=".tmp", delete=False
         ) as file:
-            file.write(_compilable())
-        if path.exists():
-            Path(file.name).unlink()
-        else:
-            # numba keeps compiled code as long as the time of its source does not change: the name
-            # says enough, so the time is one for all, also where a cache is copied.
-            os.utime(file.name, (0, 0))
-            Path(file.name).replace(path)
+            file.write(_for_numba(unit()))
+        # numba keeps compiled code as long as the time of its source does not change: the name says
+        # enough, so the time is one for all, also where a cache is copied.
+        os.utime(file.name, (0, 0))
+        Path(file.name).replace(path)
     except (OSError, RuntimeError):  # the latter where nobody knows a home
         return None
     return path
@@ -176,7 +167,7 @@ def compiled() -> Any | None:
     marks = {mark: numba.njit(**options, cache=mark in kept) for mark, options in _MEANINGS.items()}
     vars(module).update(marks, unsigned=np.uint64)
     sys.modules[name] = module
-    exec(compile(_compilable(), module.__file__, "exec"), vars(module))
+    exec(compile(_for_numba(unit()), module.__file__, "exec"), vars(module))
     # numba compiles a function anew for each whole number that is written down in a call; not so
     # for these.
     for constant, value in vars(module).items():
@@ -185,44 +176,16 @@ def compiled() -> Any | None:
     return module
 
 
-def _files(pattern: str) -> Iterator[Path]:
-    """Yield the files that numba keeps of this very kernel."""
-    path = _stored() if available() else None
-    if path is not None:
-        folder = path.parent if os.environ.get("NUMBA_CACHE_DIR") else path.parent / "__pycache__"
-        yield from folder.rglob(f"{_name()}.{pattern}")
-
-
 def on_disk(door: str = "batch") -> bool:
     """Tell whether compiled code of this very kernel is on disk, from a door on."""
-    return any(_files(f"{door}-*.nbi"))
+    path = _stored() if available() else None
+    return path is not None and any(path.parent.rglob(f"{_name()}.{door}-*.nbi"))
 
 
 def loaded(door: str = "batch") -> bool:
     """Tell whether compiled code has run in this process, from a door on."""
     module = compiled() if compiled.cache_info().currsize else None
     return module is not None and bool(vars(module)[door].overloads)
-
-
-def first_call(door: Callable[..., Any], *arguments: Any) -> Any:
-    """Call compiled code that has not run yet: it is loaded, or compiled.
-
-    Code on disk that cannot be read, such as half a file of a full disk, is removed, once, and
-    compiled anew.
-    """
-    try:
-        return door(*arguments)
-    except Exception as error:  # half a file can raise anything; the kernel itself nothing
-        broken = [] if loaded(door.__name__) else [*_files("*.nb[ci]")]
-        if not broken:
-            raise
-        for file in broken:
-            file.unlink(missing_ok=True)
-        logger.warning(
-            "compiled code in %s cannot be read (%s: %s); compiled anew, up to a minute",
-            broken[0].parent, type(error).__name__, error,
-        )  # fmt: skip
-    return door(*arguments)
 
 
 def spend(seconds: float) -> None:
@@ -241,9 +204,12 @@ def without_waiting() -> Iterator[None]:
         _hurry.reset(before)
 
 
+# To look costs more than a small impact, so there is one look.
+_found = functools.cache(lambda door: on_disk(door))
+
+
 def chosen(large: bool = False, door: str = "batch") -> Any:
     """Return the kernel in force behind a door; `large` work is surely worth compiling for."""
-    global _look
     wish = os.environ.get(VARIABLE)
     if wish:
         one_of(VARIABLE, wish, ("plain", "compiled"))
@@ -251,13 +217,9 @@ def chosen(large: bool = False, door: str = "batch") -> Any:
         return compiled()
     if wish == "plain" or not available() or _hurry.get():
         return plain
-    if not (wish == "compiled" or large or _spent > PAYS_AFTER):
-        if _spent <= _look:
-            return plain
-        # To look costs more than a small impact, so not at each of them.
-        _look = _spent + LOADS_AFTER
-        if not on_disk(door):
-            return plain
+    pays = wish == "compiled" or large or _spent > PAYS_AFTER
+    if not (pays or (_spent > LOADS_AFTER and _found(door))):
+        return plain
     # Threads that come here together share one module, which numba compiles once.
     with _deciding:
         module = compiled()

@@ -138,10 +138,8 @@ class Job:
                 self._begin(kernel is not plain)
                 resumed = False
             begun = time.perf_counter()
-            known = not self.compiled or runtime.loaded()
-            call = kernel.batch if known else functools.partial(runtime.first_call, kernel.batch)
             effort = _EFFORT[bool(self.compiled)]
-            self.next, self.status = call(
+            self.next, self.status = kernel.batch(
                 self.next, resumed, self.n, self.given, self.options, self.outputs, self.state,
                 effort,
             )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import threading
 import time
 from typing import Any, get_type_hints
@@ -71,8 +70,6 @@ def solve(
                 vars(_kept)[str(compiled)] = kept
             given = chains if compiled else Forces(*(part.tolist() for part in chains))
         call = kernel.springs if compiled else plain.springs
-        if compiled and not runtime.loaded("springs"):
-            call = functools.partial(runtime.first_call, call)
         begun = time.perf_counter()
         effort = _EFFORT[compiled] if record is None else _PAGES
         k, status = call(k, resumed, n, given, law, out, *kept, pages, effort)
