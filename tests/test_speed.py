@@ -211,7 +211,7 @@ def test_a_batch_needs_inputs_outputs_and_a_small_work_area(shape):
     results = 8 * 6 * count + count
     assert found.velocities.nbytes + found.collisions.nbytes < peak
     # A chunk's inputs (3 + 3 + 2 + 1 + 1 numbers a chain), with indices and as much again in spare.
-    chunk = 8 * 2 * 16 * batch._chunk(3)
+    chunk = 8 * 2 * 16 * batch.CHUNK[3]
     assert peak <= results + chunk * (os.cpu_count() or 1) + 2**20
 
 
@@ -245,7 +245,7 @@ def within(seconds, function):
 
 @needs_numba
 def test_threads_do_not_change_a_bit():
-    rows = batch._chunk(4)
+    rows = batch.CHUNK[4]
     chains = mixed_batch(5 * rows + 77)
     whole = outcomes(*chains)
     for begin in range(0, len(whole.velocities), rows):
@@ -260,7 +260,7 @@ def test_threads_do_not_change_a_bit():
 @needs_numba
 @pytest.mark.parametrize("workers", [1, 2, 7])
 def test_any_number_of_threads(workers, monkeypatch):
-    chains = mixed_batch(4 * batch._chunk(4) + 5)
+    chains = mixed_batch(4 * batch.CHUNK[4] + 5)
     expected = post_impact_velocities(*chains)
     monkeypatch.setattr(os, "cpu_count", lambda: workers)
     assert post_impact_velocities(*chains).tobytes() == expected.tobytes()
@@ -268,7 +268,7 @@ def test_any_number_of_threads(workers, monkeypatch):
 
 @needs_numba
 def test_an_error_in_the_middle_names_its_element():
-    rows = batch._chunk(4)
+    rows = batch.CHUNK[4]
     m, v, e, f, b = mixed_batch(6 * rows)
     at, later = 2 * rows + 1234, 5 * rows + 1
     for array, value, message in (
@@ -289,7 +289,7 @@ def test_an_error_in_the_middle_names_its_element():
 
 @needs_numba
 def test_an_impact_that_does_not_finish_in_the_middle_is_handed_back():
-    rows = batch._chunk(3)
+    rows = batch.CHUNK[3]
     m, v, e = np.ones((4 * rows, 3)), np.array([1.0, 0.0, 0.0]), 1.0
     m[[rows + 17, 3 * rows], 1] = 1e-6, 2e-6
     error = within(600, lambda: post_impact_velocities(m, v, e, 0.0, max_events=50))

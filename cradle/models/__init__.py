@@ -38,12 +38,10 @@ def collide(
     model : Model
         The impact law, such as `ImpulseCorrelation`.
     record : bool, optional
-        Whether to keep the path; for models whose `solve` lets one choose, such as
-        `ImpulseCorrelation`.  Left out, a path of more than ten million numbers is cut, with a
-        warning.
+        Whether to keep the path; for `ImpulseCorrelation`.  Left out, a path of more than ten
+        million numbers is cut, with a warning.
     progress : bool
-        Show how many events there have been so far; for models that count them, such as
-        `ImpulseCorrelation`, the others ignore it.
+        Show how many events `ImpulseCorrelation` has counted so far; other models ignore it.
 
     Returns
     -------
@@ -80,10 +78,7 @@ def collide(
     trace = model.solve(chain, **options)
     if record is None and trace.left_out:
         kept = len(trace.events)
-        takes = _takes(type(model), "record")
-        advice = "; record=True keeps all, record=False none" if takes else ""
-        warnings.warn(
-            f"the path holds the first {kept} of {kept + trace.left_out} events{advice}",
-            stacklevel=2,
-        )
+        advice = "; record=True keeps all, record=False none" * _takes(type(model), "record")
+        told = f"the path holds the first {kept} of {kept + trace.left_out} events{advice}"
+        warnings.warn(told, stacklevel=2)
     return trace

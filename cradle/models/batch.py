@@ -13,11 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.input.values import (
-    Vector,
-    numbers,
-    shown,
-)
+from cradle.input.values import Vector, numbers, shown
 from cradle.kernel import Inputs, Options, Outputs
 from cradle.models.correlation import (
     MAX_EVENTS,
@@ -32,6 +28,10 @@ from cradle.trace import ImpactNotCertified
 
 if TYPE_CHECKING:
     import xarray
+
+#: Chains solved at a time, more where short cuts are likely; so much memory is needed beyond inputs
+#: and outputs.
+CHUNK = {2: 16_384, 3: 16_384, 4: 4096}
 
 
 def post_impact_velocities(
@@ -91,16 +91,9 @@ def post_impact_velocities(
            [-0.333,  0.667,  0.667]])
     """
     return outcomes(
-        masses,
-        velocities,
-        restitution,
-        forward,
-        backward,
-        meeting=meeting,
-        excess=excess,
-        max_events=max_events,
-        progress=progress,
-    ).velocities
+        masses, velocities, restitution, forward, backward,
+        meeting=meeting, excess=excess, max_events=max_events, progress=progress,
+    ).velocities  # fmt: skip
 
 
 class Outcomes(NamedTuple):
@@ -137,20 +130,14 @@ class Outcomes(NamedTuple):
         ImportError
             If xarray, of the extra ``book``, is not installed.
         ValueError
-            If the number of names is not that of the leading axes.
+            If these are not as many names as leading axes.
         """
-        try:
-            import xarray
-        except ImportError:
-            raise ImportError(
-                "to_xarray needs xarray: pip install 'cradle-companion[book]'"
-            ) from None
+        import xarray
+
         lead = self.collapsed.ndim
         names = tuple(f"chain_{k}" for k in range(lead)) if dims is None else dims
-        if not (isinstance(names, tuple) and all(isinstance(name, str) for name in names)):
-            raise TypeError(f"dims = {shown(dims)}; must be a tuple of names")
-        if len(names) != lead:
-            raise ValueError(f"dims = {names}; the outcomes have {lead} leading axes")
+        if not (isinstance(names, tuple) and [*map(type, names)] == [str] * lead):
+            raise ValueError(f"dims = {shown(dims)}; must be a tuple, a name for each leading axis")
         balls = self.velocities.shape[-1]
         return xarray.Dataset(
             {
@@ -211,7 +198,7 @@ def outcomes(
     # Whether these are in range is checked by the kernel.
     arrays, lead = shaped(given, (0, 0, 1, 2, 2))
     n, count = arrays[0].shape[-1], math.prod(lead)
-    chunk = _chunk(n)
+    chunk = CHUNK[min(n, 4)]
     if count == 0:
         check_values(excess == "raise", *given.values())
     whole = outputs(count, n)
@@ -296,14 +283,6 @@ def in_order(
             finally:
                 stop.set()
                 pool.shutdown(cancel_futures=True)
-
-
-def _chunk(n: int) -> int:
-    """Return how many chains of n balls are solved at a time, more where they may be short cuts.
-
-    So much memory is needed beyond inputs and outputs.
-    """
-    return 16_384 if n <= 3 else 4096
 
 
 def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:

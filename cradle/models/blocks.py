@@ -23,8 +23,8 @@ def post_impact_block(
     Parameters
     ----------
     *arrays : array_like
-        Masses, velocities, restitution, forward ratios and, if wanted, backward ratios, as for
-        `post_impact_velocities`; cut along leading axes, never along the last.
+        Masses, velocities, restitution, forward and, if wanted, backward ratios; cut along leading
+        axes, never along the last.
     block_info : mapping, optional
         Where the block lies; dask hands it over.
     **options
@@ -37,15 +37,12 @@ def post_impact_block(
 
     Raises
     ------
-    ValueError
-        As `post_impact_velocities`; the index is that in the whole array.
-    ImpactNotFinished
-        As `post_impact_velocities`; a note says where the block begins.
+    ValueError, ImpactNotFinished
+        As `post_impact_velocities`; the index is that in the whole array, or a note says where the
+        block begins.
 
     Examples
     --------
-    What dask does for the second of two blocks of four chains each:
-
     >>> info = {0: {"array-location": [(4, 8), (0, 3)]}, None: {"array-location": [(4, 8), (0, 3)]}}
     >>> masses = np.ones((4, 3))
     >>> masses[1, 2] = -1.0

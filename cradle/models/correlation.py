@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NoReturn
 
 import numpy as np
@@ -40,12 +40,6 @@ _MOST_NUMBERS = 10_000_000
 _EVERY = 2**40
 # The longest path kept of an impact that did not finish.
 _UNFINISHED_EVENTS = 100_000
-
-
-def _most_events(n: int) -> int:
-    return max(_MOST_NUMBERS // (2 * n - 1), 1)  # N velocities and N - 1 impulses each
-
-
 #: What is asked of a ratio.
 _RANGE = ("must lie in [0, 1]", 0.0, 1.0)
 _KINDS = ("maximum_compression", "end", "close", "collapse", "repetition")
@@ -102,54 +96,34 @@ class ImpulseCorrelation:
     [-0.913, -0.155, 1.068]
     """
 
-    forward: float | tuple[float, ...]
-    backward: float | tuple[float, ...] | None = None
-    meeting: float = 0.5
-    excess: str = "raise"
-    max_events: int = MAX_EVENTS
+    forward: ArrayLike
+    backward: ArrayLike | None = None
+    meeting: float = field(default=0.5, kw_only=True)
+    excess: str = field(default="raise", kw_only=True)
+    max_events: int = field(default=MAX_EVENTS, kw_only=True)
 
-    def __init__(
-        self,
-        forward: ArrayLike,
-        backward: ArrayLike | None = None,
-        *,
-        meeting: float = 0.5,
-        excess: str = "raise",
-        max_events: int = MAX_EVENTS,
-    ) -> None:
-        check_options(meeting, excess, max_events)
-        ratios = {"forward": forward} | ({} if backward is None else {"backward": backward})
-        kept = {name: number_or_row(name, x, "N - 2", *_RANGE) for name, x in ratios.items()}
-        options = {"meeting": float(meeting), "excess": excess, "max_events": int(max_events)}
-        vars(self).update({"backward": None} | kept | options)
+    def __post_init__(self) -> None:
+        check_options(self.meeting, self.excess, self.max_events)
+        for name in ("forward", "backward"):
+            if (given := getattr(self, name)) is not None or name == "forward":
+                vars(self)[name] = number_or_row(name, given, "N - 2", *_RANGE)
+        vars(self).update(meeting=float(self.meeting), max_events=int(self.max_events))
 
     def solve(self, chain: Chain, *, record: bool | None = None, progress: bool = False) -> Trace:
         """Solve the impact of `chain`; see `collide`.
 
-        Parameters
-        ----------
-        chain : Chain
-            The balls at the instant before.
-        record : bool, optional
-            Whether to keep the path.  Left out, its first ten million numbers are kept, 2 N - 1
-            for each event; `Trace.left_out` tells how many events follow, and `collide` warns.
-        progress : bool
-            Show how many events there have been so far.
-
-        Returns
-        -------
-        Trace
-            The path and the outcome.
+        Without `record`, the first ten million numbers of the path are kept, 2 N - 1 for each
+        event; `Trace.left_out` tells how many events follow.
         """
         must_be(Chain, "chain", chain)
         n = len(chain)
-        forward = row_of("forward", self.forward, n - 2, n)
-        given = self.backward
-        backward = forward if given is None else row_of("backward", given, n - 2, n)
+        ratios = {name: vars(self)[name] for name in ("forward", "backward")}
+        rows = [row_of(name, x, n - 2, n) for name, x in ratios.items() if x is not None]
         # Copies: compiled code is made for arrays that may be written to.
-        own = (chain.masses, chain.velocities, chain.restitution, forward, backward)
+        own = (chain.masses, chain.velocities, chain.restitution, rows[0], rows[-1])
         inputs = Inputs(*(part[None].copy() for part in own))
-        room = _most_events(n) if record is None else _EVERY if record else 0
+        most = max(_MOST_NUMBERS // (2 * n - 1), 1)  # N velocities and N - 1 impulses each
+        room = most if record is None else _EVERY if record else 0
         options = Options(self.meeting, self.max_events, self.excess == "raise")
         job = Job(inputs, outputs(1, n, last=True), options, room)
         if progress:
@@ -223,8 +197,7 @@ def check_values(
     """Raise if a value is outside its limits: what the kernel refuses, in words."""
     m, v = checked_masses(masses), checked("velocities", velocities)
     checked_restitution(restitution)
-    ratios = {"forward": checked("forward", forward, *_RANGE)}
-    ratios["backward"] = checked("backward", backward, *_RANGE)
+    f, b = checked("forward", forward, *_RANGE), checked("backward", backward, *_RANGE)
     refuse_overflow(v, m)
     if m.size:
         # How a ball as light as that parts the heavy ones is below rounding.
@@ -233,8 +206,9 @@ def check_values(
         refuse_where("masses", m, small, f"for this model it must be {least}")
     if not bounded:
         return
-    f, b = (np.broadcast_to(x, (m.shape[-1] - 2,)) if x.ndim == 0 else x for x in ratios.values())
-    for name, given, bound in zip(ratios, (f, b), largest_ratios(m, f, b), strict=True):
+    f, b = (np.broadcast_to(x, (m.shape[-1] - 2,)) if x.ndim == 0 else x for x in (f, b))
+    bounds = largest_ratios(m, f, b)
+    for name, given, bound in zip(("forward", "backward"), (f, b), bounds, strict=True):
         above = given > bound * LIMITS.rounded
         if above.any():
             at = first(above)

@@ -28,8 +28,6 @@ class SequentialCollisions:
     4. Collisions in different places have no common clock.  From six balls on it can matter which
        comes first; then it is as with ``ImpulseCorrelation(0, meeting=0.5)``.
 
-    An infinite sequence is taken to its limit, and the trace says so (`Trace.collapsed`).
-
     Parameters
     ----------
     order : {"left", "right"}
@@ -40,7 +38,7 @@ class SequentialCollisions:
     Raises
     ------
     ValueError
-        If a value is outside its range; the message names the value and the rule.
+        If a value is outside its range.
 
     References
     ----------
@@ -52,8 +50,6 @@ class SequentialCollisions:
     >>> from cradle import Chain, collide
     >>> collide(Chain([1, 1, 1], [1, 0, 0], 1), SequentialCollisions()).velocities.tolist()
     [0.0, 0.0, 1.0]
-
-    Balls struck from both sides: the order decides.
 
     >>> chain = Chain([1, 2, 1], [1, 0, -1], 1)
     >>> for order in ("left", "right"):
@@ -77,11 +73,10 @@ class SequentialCollisions:
             m, v, e = chain.masses[::-1], 0.0 - chain.velocities[::-1], chain.restitution[::-1]
             seen = Chain._of(m, v, e)
         try:
-            trace = ImpulseCorrelation(0.0, max_events=self.max_events).solve(seen)
+            return self._own(ImpulseCorrelation(0.0, max_events=self.max_events).solve(seen), chain)
         except ImpactNotFinished as stopped:
-            reached = self._own(stopped.trace, chain)
-            raise ImpactNotFinished(stopped.args[0], reached, stopped.stored) from None
-        return self._own(trace, chain)
+            message, reached, stored = stopped.args
+            raise ImpactNotFinished(message, self._own(reached, chain), stored) from None
 
     def _own(self, trace: Trace, chain: Chain) -> Trace:
         """Return the trace as that of this model, seen from the side from which the chain is."""
@@ -100,11 +95,9 @@ class FusedChain:
     """The balls on either side of the struck contact move as one body (Han and Gilmore's first).
 
     One contact approaches; all others touch at equal velocities.  The balls to its left and those
-    to its right collide like two balls, with the energetic restitution of the struck contact.  The
-    other contacts are neither compressed nor opened, so their own restitution has no say: they
-    pass on just the impulse that keeps the balls of a body together.  That is the largest
-    admissible ratio at every ball (Eq. 53): ``ImpulseCorrelation(1, 1, excess="saturate")`` solves
-    it, and `Trace.saturated` names those contacts.
+    to its right collide like two balls, with the energetic restitution of the struck contact; the
+    others only keep the balls of a body together.  That is the largest admissible ratio at every
+    ball (Eq. 53): ``ImpulseCorrelation(1, 1, excess="saturate")``; `Trace.saturated` names them.
 
     Raises
     ------
