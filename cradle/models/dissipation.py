@@ -129,6 +129,7 @@ class QuadraticDissipation:
         if self.distance and n != 3:
             raise ValueError(f"distance = {self.distance!r}; needs three balls, the chain has {n}")
         impulses, absorbed = np.zeros((2, n - 1))
+        change = np.zeros(n)
         path, path_impulses, events = [v], [impulses], []
         left, right = np.maximum.accumulate(m), np.maximum.accumulate(m[::-1])[::-1]
         light = np.zeros(n, dtype=bool)
@@ -155,11 +156,17 @@ class QuadraticDissipation:
             u = closing(v)
             stretch = np.cumsum(u < 0.0)
             active = (u >= 0.0) & np.isin(stretch, stretch[u > 0.0])
-            passed, reactions = _impulses(m, u, active, np.append(kappa, self.distance))
-            passed, held = np.where(active, passed, 0.0), np.where(active, reactions > 0.0, held)
+            jump, passed, held = np.zeros(n), np.zeros(n - 1), held & ~active
+            for k in np.unique(stretch[active]):
+                at = np.flatnonzero(active & (stretch == k))
+                balls = slice(at[0], at[-1] + 2)
+                outer = self.distance if len(at) == 2 == n - 1 else 0.0
+                jump[balls], w = _growth(m[balls], u[at], kappa[at], outer)
+                passed[at] = -np.cumsum((m * jump)[balls])[:-1]
+                held[at] = w == 0.0
             impulses = impulses + passed
-            # From all impulses: one alone may be below the last digit of a heavy ball's velocity.
-            after = chain.velocities - np.diff(impulses, prepend=0.0, append=0.0) / m
+            change = change + jump
+            after = chain.velocities + change
             absorbed += passed * unit * 0.5 * (u + closing(after))
             v = after
             contacts = np.flatnonzero(active).tolist()
@@ -198,44 +205,20 @@ class QuadraticDissipation:
         return row_of("coefficients", self.coefficients, len(chain) - 1, len(chain))
 
 
-def _impulses(
-    m: Vector, u: Vector, active: NDArray[np.bool_], kappa: Vector
-) -> tuple[Vector, Vector]:
-    """Return the impulses of one problem, passing through each contact, and the reactions in them.
+def _growth(m: Vector, u: Vector, kappa: Vector, distance: float) -> tuple[Vector, Vector]:
+    """Return the changes of velocity of balls that touch, and their closing speeds after, negated.
 
-    u holds closing speeds; kappa those of the contacts, then of the outer balls.
+    u holds closing speeds, kappa the coefficients, `distance` that of the outer balls.
     """
-    from scipy.linalg import solve_triangular
     from scipy.optimize import nnls
 
-    # Rows that give the closing speeds from the velocities: contacts, then the outer balls.  In
-    # units of m^(1/2) for w = m^(1/2) v and of mu^(1/2) for the speeds their products have a
-    # diagonal of ones, and an impulse q = k (u- + u+) / 2 has the stiffness k / mu = 2 kappa.
-    n = len(m)
-    pairs = np.vstack([np.eye(n)[:-1] - np.eye(n)[1:], np.eye(n)[0] - np.eye(n)[-1]])
-    rows = pairs / np.sqrt(m)
-    size = np.linalg.norm(rows, axis=1)  # mu^(-1/2)
-    rows /= size[:, None]
-    before = np.append(u, u.sum()) / size
-    # Nothing absorbs at an open contact.
-    kappa = np.append(active, active.all()) * kappa
-    part, rest = kappa / (1.0 + kappa), 1.0 / (1.0 + kappa)
-    gram = rows @ rows.T
-    # q = kappa (u- + u+) with u+ = u- - G (q + r), so q = P (2 u- - G r) and u+ = free - S r, with
-    # P = (1 / kappa + G)^-1, S = G - G P G and reactions r >= 0 of the contacts.
-    root = np.sqrt(part)
-    inverse = np.linalg.inv(np.diag(rest) + root[:, None] * gram * root)
-    soft = root[:, None] * inverse * root
-    # 1 - G P, written so that nothing cancels for a large kappa.
-    kept = np.eye(n) - gram @ soft
-    stiff = kappa > 1.0
-    kept[stiff] = (rest[:, None] * inverse * root)[stiff] / root[stiff, None]
-    free = (kept - gram @ soft) @ before
-    # u+ <= 0, r >= 0, r u+ = 0: non-negative least squares with S = L L'.
-    at = np.flatnonzero(active)
-    response = kept @ gram
-    lower = np.linalg.cholesky(0.5 * (response + response.T)[np.ix_(at, at)])
-    reactions = np.zeros(n)
-    reactions[at], _ = nnls(lower.T, solve_triangular(lower, free[at], lower=True))
-    impulses = (2.0 * soft @ before + reactions @ kept) / size
-    return impulses[:-1] + impulses[-1], reactions[:-1]
+    # With w = - u+ >= 0 the problem is one of least squares: sum m dv^2 + sum kappa mu (u - w)^2,
+    # where dv grows by u + w from ball to ball and moves no centre of mass.
+    parted = np.tri(len(m), len(u), -1)
+    parted -= m @ parted / m.sum()
+    rows = np.vstack([np.eye(len(u)), np.ones(len(u))])
+    mu = np.append(m[:-1] / (m[:-1] + m[1:]) * m[1:], m[0] / (m[0] + m[-1]) * m[-1])
+    inertia = np.sqrt(m)[:, None] * parted
+    loss = np.sqrt(np.append(kappa, distance) * mu)[:, None] * rows
+    w, _ = nnls(np.vstack([inertia, loss]), np.concatenate([-inertia @ u, loss @ u]))
+    return parted @ (u + w), w
