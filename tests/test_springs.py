@@ -232,7 +232,7 @@ def random_chains(seed, count, n, loss=0.0):
     v = np.where(rng.random((count, 1)) < 0.5, struck(n), uniform(rng, -1, 1, (count, n)))
     v[:, 0], v[:, 1] = 1.0, np.minimum(v[:, 1], 0.5)  # somebody closes
     gaps = np.where(rng.random((count, n - 1)) < 0.3, uniform(rng, 0, 0.3, (count, n - 1)), 0.0)
-    _, _, speed, depth = springs.Problem(m, v, k, 0 * k, gaps, 1.5, 1e-3).own(timed=True)
+    _, _, speed, depth = springs.Problem(m, v, k, 0 * k, gaps, 1.5, 1e-3).own()
     return m, v, k, gaps, loss * uniform(rng, 0.3, 1, (count, n - 1)) * depth / speed
 
 

@@ -267,8 +267,10 @@ def run(n, h, law, effort, s, clock, record):
         effort -= high - low
         if clock.closed == 0 and not law.leans:
             clock.closed = 1
-            clock.time += fly(h, low, high, s)
-            put_down(n, s, clock, record)
+            flown = fly(h, low, high, s)
+            clock.time += flown
+            if flown > 0.0:
+                put_down(n, s, clock, record)
             continue
         clock.steps += 1
         clock.time += h

@@ -2,26 +2,49 @@
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
 from cradle.input.values import (
     Vector,
+    checked,
+    checked_masses,
     must_be,
     number_or_row,
+    one_number,
+    refuse_overflow,
     refuse_where,
     row_of,
     whole_number,
 )
-from cradle.kernel.kinks import Forces, Law
-from cradle.models import springs
+from cradle.models.batch import in_order, rows_of, shaped
 from cradle.models.energy import CurvedTrace, fastest
-from cradle.runtime.springs import room, solve
-from cradle.trace import Event
+from cradle.models.springs import (
+    COARSEST,
+    FINEST,
+    MOST_STEPS,
+    Path,
+    Problem,
+    law_of,
+    refuse_beyond,
+    run,
+)
+from cradle.runtime.job import DEFECTS, FINISHED, LARGE
+from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
+
+# What is asked of the parameters of contacts: a rule, limits, whether the lower one is excluded.
+_RULES = {
+    "stiffness": ("must be above 0", 0.0, np.inf, True),
+    "viscosity": ("must be at least 0", 0.0, np.inf, False),
+    "gaps": ("must be finite", -np.inf, np.inf, False),
+}
+_CHUNK = 2048  # chains at once
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -33,21 +56,13 @@ class TimedTrace(CurvedTrace):
 
     Attributes
     ----------
-    times : ndarray, shape (K + 1,)
-        Time of each row of the path, s; the first is 0.
-    forces : ndarray, shape (K + 1, N - 1)
-        Contact forces at each row of the path, N; the largest of a contact is at a maximum
-        compression.
+    times, forces : ndarray, shapes (K + 1,) and (K + 1, N - 1)
+        Time of each row of the path, s, the first is 0; and contact forces there, N, the largest of
+        a contact at a maximum compression.
     durations : ndarray, shape (N - 1,)
         Time that each contact was closed, over all its collisions, s.
-    step_times : ndarray, shape (S,)
-        Times of the steps, s.
-    step_forces : ndarray, shape (S, N - 1)
-        Contact forces there, N: curves of the force over the time.
-    step_velocities : ndarray, shape (S, N)
-        Velocities there, m/s.
-    step_impulses : ndarray, shape (S, N - 1)
-        Impulses so far, there, N s.
+    step_times, step_forces, step_velocities, step_impulses : ndarray, (S,) and (S, N - 1 or N)
+        The curves at the steps: s, N, m/s, and N s so far.
     evaluations : int
         How many steps were taken, in all runs.
     error : float
@@ -91,53 +106,34 @@ class TimedTrace(CurvedTrace):
 
 @dataclass(frozen=True)
 class SpringChain:
-    """Balls on massless springs: contacts push with k (delta^p + A d(delta^p)/dt), never pull.
+    """Balls on massless springs: contacts push with k (d^p + A d(d^p)/dt), never pull.
 
-    delta is the compression of the contact, p = 1 a linear spring, p = 3/2 the contact of two
-    spheres (Hertz); A is the time of their losses, 0 for elastic ones.  Contacts that do not open
-    start at delta = 0.  So do those that open: in the limit of rigid balls every gap is nothing
-    beside the balls, but it counts beside the compressions, and it must close before the contact
-    pushes.  Without losses and gaps the outcome depends on the ratios of masses, stiffnesses and
-    closing speeds alone.
+    d is the compression of the contact, p = 1 a linear spring, p = 3/2 the contact of two spheres
+    (Hertz); A is the time of their losses.  A contact that opens is then a gap, which counts beside
+    the compressions: it must close before the contact pushes.
 
-    The motion is followed in time by velocity Verlet with two corrections, which make the outcome
-    exact to the fourth power of the step, with losses to about the third
-    (`cradle.kernel.forces`).  `absorbed` is the energy stored at each maximum of a compression,
-    less that at a minimum between two of them.
-
-    Speeds below a hundredth of the accuracy, times that of the fastest closing, are too little to
-    matter.  So are collisions at such speeds: long chains leave balls behind that hardly move, and
-    how often those touch depends on the accuracy.
+    The motion is followed in time (`cradle.kernel.forces`).  `absorbed` is the energy stored at
+    each maximum of a compression, less that at a minimum between two of them.  Speeds below a
+    hundredth of the accuracy, times that of the fastest closing, are too little to matter; so are
+    collisions at such speeds: how often balls touch that a long chain leaves behind depends on it.
 
     Parameters
     ----------
-    stiffness : float or sequence, length N - 1
-        k of each contact, N/m^p; above 0.  If left out, 1 for all: velocities depend on the ratios
-        of stiffnesses alone, but times and forces are then no one's.
-    exponent : float
-        p, from 1 to 10.
-    viscosity : float or sequence, length N - 1
-        A of each contact, s.
-    gaps : float or sequence, length N - 1
-        Distance of two balls before the impact, m; below zero a lean, as for `spring_velocities`.
-    accuracy : float
-        Largest error of a velocity after the impact, relative to the fastest closing.
+    stiffness, exponent, viscosity, gaps, accuracy
+        As for `spring_velocities`; rows of one chain, length N - 1, or numbers.  With a stiffness
+        left out times and forces are no one's.
     max_steps : int
         Steps of one run after which the impact is given up.
 
     Raises
     ------
-    ValueError
-        If a value is outside its range; on solving, if a restitution is below 1, or a value is too
-        small or large beside the others to be resolved.
-    ImpactNotFinished
-        On solving, if `max_steps` is reached, or finer and finer runs do not agree.
+    ValueError, ImpactNotFinished, ImpactNotCertified
+        ValueError if a value is outside its range; the others, and ValueError if a restitution is
+        below 1, on solving, as `spring_velocities`.
 
     References
     ----------
-    Hinch and Saint-Jean, Proc. R. Soc. A 455 (1999) 3201-3220; Ceanga and Hurmuzlu, J. Appl. Mech.
-    68 (2001) 575-583, Eqs. 7-11; Brilliantov, Spahn, Hertzsch and Poeschel, Phys. Rev. E 53 (1996)
-    5382-5392.
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, Eqs. 7-11; and as `spring_velocities`.
 
     Examples
     --------
@@ -151,19 +147,15 @@ class SpringChain:
     viscosity: float | Sequence[float] = field(default=0.0, kw_only=True)
     gaps: float | Sequence[float] = field(default=0.0, kw_only=True)
     accuracy: float = field(default=1e-9, kw_only=True)
-    max_steps: int = field(default=springs.MOST_STEPS, kw_only=True)
+    max_steps: int = field(default=MOST_STEPS, kw_only=True)
 
     def __post_init__(self) -> None:
-        p, accuracy = springs.exponent_and_accuracy(self.exponent, self.accuracy)
-        object.__setattr__(self, "exponent", p)
-        object.__setattr__(self, "accuracy", accuracy)
-        for name, rule, low in (
-            ("stiffness", "must be above 0", 0.0),
-            ("viscosity", "must be at least 0", 0.0),
-            ("gaps", "must be finite", -np.inf),
-        ):
-            row = getattr(self, name), "N - 1", rule, low, np.inf, name == "stiffness"
-            object.__setattr__(self, name, number_or_row(name, *row))
+        for name, low, high in ("exponent", 1.0, 10.0), ("accuracy", FINEST, COARSEST):
+            rule = f"must lie in [{low:g}, {high:g}]"
+            object.__setattr__(self, name, one_number(name, getattr(self, name), rule, low, high))
+        for name, rules in _RULES.items():
+            row = number_or_row(name, getattr(self, name), "N - 1", *rules)
+            object.__setattr__(self, name, row)
         whole_number("max_steps", self.max_steps)
 
     def solve(self, chain: Chain) -> TimedTrace:
@@ -172,37 +164,34 @@ class SpringChain:
         rule = "must be 1 for SpringChain, whose losses are its viscosity"
         refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
         fastest(chain)  # is within the range of floats
-        k, loss, gap = (
-            row_of(name, getattr(self, name), n - 1, n)
-            for name in ("stiffness", "viscosity", "gaps")
-        )
-        rows = chain.masses, chain.velocities, k, loss, gap
-        springs.admit(springs.Problem(*rows, self.exponent, self.accuracy))
-        m, v, k, loss, gap = (row[None] for row in rows)
-        problem = springs.Problem(m, v, k, loss, gap, self.exponent, self.accuracy)
-        own = forces, *units = problem.own(timed=True)
-        springs.refuse_beyond(problem, own)
+        contacts = [row_of(name, getattr(self, name), n - 1, n) for name in _RULES]
+        m, v, k, loss, gap = (row[None] for row in (chain.masses, chain.velocities, *contacts))
+        problem = Problem(m, v, k, loss, gap, self.exponent, self.accuracy)
+        own = forces, *units = problem.own()
+        refuse_beyond(problem, own)
         mass, speed, length = (float(unit[0, 0]) for unit in units)
-        law = springs.law_of(forces, self.exponent, self.accuracy, self.max_steps)
-        found = springs.run(forces, law)
-        if found.defect[0]:
-            reached = chain.velocities + speed * (found.v[0] - forces.v[0])
-            springs.refuse(problem, int(found.defect[0]), reached, self)
-        path = _Path(forces, law, found.h)
-        times, kinds, contacts, v, force = path.events(found.v[0])
+        law = law_of(forces, self.exponent, self.accuracy, self.max_steps)
+        found = run(forces, law)
+        defect, start = int(found.defect[0]), chain.velocities
+        if defect > 0:
+            raise ImpactNotCertified(chain, self, DEFECTS[defect])
+        if defect:
+            raise self._unfinished(chain, start + speed * (found.v[0] - forces.v[0]))
+        path = Path(forces, law, found.h)
+        times, events, v, force = path.events(found.v[0])
         joule = mass * speed * speed
         newton, second = joule / length, length / speed
         return TimedTrace(
             chain=chain,
             model=self,
-            velocities=chain.velocities + speed * (v[-1] - v[0]),
+            velocities=start + speed * (v[-1] - v[0]),
             impulses=mass * speed * path.impulses(v[-1]),
             absorbed=joule * path.absorbed,
             collisions=path.collisions,
-            path=chain.velocities + speed * (v - v[0]),
+            path=start + speed * (v - v[0]),
             path_impulses=mass * speed * path.impulses(v),
-            events=tuple(map(Event, kinds, contacts)),
-            step_velocities=chain.velocities + speed * (path.v - v[0]),
+            events=events,
+            step_velocities=start + speed * (path.v - v[0]),
             step_impulses=mass * speed * path.impulses(path.v),
             evaluations=int(found.steps[0]),
             times=second * times,
@@ -213,115 +202,120 @@ class SpringChain:
             error=float(found.error[0]),
         )
 
+    def _unfinished(self, chain: Chain, reached: Vector) -> ImpactNotFinished:
+        """Return the error of an impact that was given up at these velocities."""
+        m, v = chain.masses, chain.velocities
+        none, impulses = np.zeros(len(m) - 1), np.cumsum(m * (v - reached))[:-1]
+        c = int(np.argmax(np.broadcast_to(self.stiffness, none.shape) / np.minimum(m[:-1], m[1:])))
+        held = "; or leans hold balls together" if np.min(self.gaps) < 0.0 else ""
+        return ImpactNotFinished(
+            f"the impact was not finished: contact {c}, the quickest of the springs, makes the "
+            "steps short; or balls that collide often amplify errors, and finer runs do not agree"
+            + held,
+            Trace(
+                chain, self, reached, impulses, none, none.astype(np.int64), np.array([v, reached]),
+                np.array([none, impulses]), (), left_out=1,
+            ),
+        )  # fmt: skip
 
-class _Path:
-    """The motion of one chain in its own units: at the nodes of a run, and what happens between.
 
-    The run gives velocities between nodes.  By the sum of Euler and Maclaurin they are those at the
-    node before, half a step and a twelfth of its square of the rates later.
+def spring_velocities(
+    masses: ArrayLike,
+    velocities: ArrayLike,
+    stiffness: ArrayLike = 1.0,
+    *,
+    exponent: float = 1.5,
+    viscosity: ArrayLike = 0.0,
+    gaps: ArrayLike = 0.0,
+    accuracy: float = 1e-3,
+    progress: bool = False,
+) -> Vector:
+    """Post-impact velocities of many chains of balls on springs; leading axes broadcast.
+
+    Each contact pushes with k (d^p + A d(d^p)/dt) while that is above zero, d its compression:
+    p = 3/2 is the contact of two spheres, elastic or viscoelastic.  The velocities depend on the
+    ratios of the stiffnesses alone where there are neither losses nor gaps.
+
+    Parameters
+    ----------
+    masses, velocities : array_like, shape (..., N)
+        kg and m/s.
+    stiffness : array_like, shape (..., N - 1) or ()
+        k, N/m^p; above 0.
+    exponent : float
+        p, from 1 to 10.
+    viscosity : array_like, shape (..., N - 1) or ()
+        A, s; 0 for an elastic contact.  Two spheres lose the more the faster they collide.
+    gaps : array_like, shape (..., N - 1) or ()
+        Distance of two balls before the impact, m; it closes before the contact pushes.  Below
+        zero a lean: how far the strings press the two together at rest.  Their pull stays what it
+        is until the last contact has opened.
+    accuracy : float
+        Largest error of a velocity, relative to the fastest closing; from 1e-12 to 0.02.  It is
+        estimated and met, not proven.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    ndarray, shape (..., N)
+        Velocities after the impact, m/s.
+
+    Raises
+    ------
+    ValueError
+        If a value or a shape is wrong, or too small or large beside the others to be resolved; the
+        message names the first value and the rule.
+    ImpactNotFinished
+        If an impact takes more than twenty million steps, or finer and finer runs do not agree, or
+        leans hold balls together.
+    ImpactNotCertified
+        If an outcome breaks momentum, energy or order.
+
+    References
+    ----------
+    Hinch and Saint-Jean, Proc. R. Soc. A 455 (1999) 3201-3220; Brilliantov, Spahn, Hertzsch and
+    Poeschel, Phys. Rev. E 53 (1996) 5382-5392.
+
+    Examples
+    --------
+    Five equal elastic spheres; and with gaps of a tenth of the compression and losses:
+
+    >>> spring_velocities([1] * 5, [1, 0, 0, 0, 0], accuracy=1e-6).round(4)
+    array([-0.0711, -0.0303, -0.0145,  0.127 ,  0.9888])
+    >>> spring_velocities([1] * 5, [1, 0, 0, 0, 0], viscosity=0.05, gaps=0.1).round(2)
+    array([-0.  ,  0.02,  0.03,  0.1 ,  0.85])
     """
+    law = SpringChain(exponent=exponent, accuracy=accuracy)
+    p, accuracy = law.exponent, law.accuracy
+    given = {"masses": masses, "velocities": velocities, "stiffness": stiffness}
+    given |= {"viscosity": viscosity, "gaps": gaps}
+    arrays, lead = shaped(given, (0, 0, 1, 1, 1))
+    m, v, *contacts = arrays
+    refuse_overflow(checked("velocities", v), checked_masses(m))
+    for (name, rules), values in zip(_RULES.items(), contacts, strict=True):
+        checked(name, values, *rules)
+    n, count = m.shape[-1], math.prod(lead)
+    out = np.empty((count, n))
 
-    def __init__(self, chain: Forces, law: Law, h: Vector) -> None:
-        record: list[Any] = []
-        solve(chain._replace(h=h), law, room(*chain.v.shape), record=record)
-        pages, n = np.concatenate(record), chain.v.shape[1]
-        t, low, high = (pages[:, 0, k, None] for k in range(3))
-        v, (d, y, f, seen) = pages[:, 1, :n], (pages[:, k, : n - 1] for k in range(2, 6))
-        self.p, self.w, self.k, self.loss = law.p, chain.w[0], chain.k[0], chain.loss[0]
-        inside = ((low <= np.arange(len(self.k))) & (np.arange(len(self.k)) < high)) | law.leans
-        pull = self.pushes(chain.d[0])
-        if not law.lossy:
-            y = d - h**2 / 12.0 * np.diff(self.driven(np.where(inside, f - pull, 0.0)))
-        y = np.where(inside, y, d + (t - seen) * (v[:, :-1] - v[:, 1:]))
-        #: Times, compressions, and whether contacts are closed, at the start and at the nodes.
-        self.t, self.y = np.append(0.0, t), np.vstack([chain.d, y])
-        self.closed = np.vstack([chain.d > 0.0, inside & (f > 0.0)])
-        e = np.where(self.closed, self.pushes(self.y), 0.0) - pull
-        slope = self.p * np.where(
-            self.closed, self.k * np.maximum(self.y, 0.0) ** (self.p - 1.0), 0.0
-        )
-        v = np.vstack([chain.v, v - 0.5 * h * self.driven(e[1:])]) + self.driven(self.loss * e)
-        rate = slope * (v[:, :-1] - v[:, 1:])
-        v[1:] -= h**2 / 12.0 * self.driven(rate)[1:]
-        #: Velocities, accelerations, forces.
-        self.v, self.force = v, np.maximum(e + pull + self.loss * rate, 0.0)
-        self.a = self.driven(e + self.loss * rate)
-        self.collisions = np.zeros(len(self.k), np.int64)
-        self.durations, self.absorbed = np.zeros((2, len(self.k)))
+    def run_chunk(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
+        """Solve the chunk of chains that begins there; the first that fails alone, to raise."""
+        rows = slice(begin, min(begin + _CHUNK, count))
+        m, v, k, loss, gap = (rows_of(array, lead, rows) for array in arrays)
+        problem = Problem(m, v, k, loss, gap, p, accuracy)
+        own = forces, _, speed, _ = problem.own()
+        refuse_beyond(problem, own, lead, begin)
+        found = run(forces, law_of(forces, p, accuracy), count * n >= LARGE, stop)
+        out[rows] = problem.v + speed * (found.v - forces.v)
+        if found.defect.any():
+            at = begin + int((found.defect != 0).argmax())
+            m, v, k, loss, gap = (rows_of(array, lead, slice(at, at + 1))[0] for array in arrays)
+            model = SpringChain(k, p, viscosity=loss, gaps=gap, accuracy=accuracy)
+            chain = Chain(m, v)
+            model.solve(chain)
+            raise ImpactNotCertified(chain, model, "among others it fails, alone it does not")
+        return FINISHED, begin
 
-    def pushes(self, y: Vector) -> Vector:
-        """Return what closed contacts push with at rest."""
-        push: Vector = self.k * np.maximum(y, 0.0) ** self.p
-        return push
-
-    def driven(self, push: Vector) -> Vector:
-        """Return what pushes of the contacts do to the balls."""
-        driven: Vector = -np.diff(np.pad(push, [(0, 0), (1, 1)])) * self.w
-        return driven
-
-    def impulses(self, v: Vector) -> Vector:
-        """Return the impulses of the contacts, from velocities; none of one that never closed."""
-        passed = np.cumsum((self.v[0] - v) / self.w, axis=-1)[..., :-1]
-        return np.where(self.collisions > 0, passed, 0.0)
-
-    def between(self, j: int, s: float, x: Vector, rate: Vector) -> Any:
-        """Return x at the part s of the step after node j."""
-        return _cubic(s, self.t[j + 1] - self.t[j], x[j], x[j + 1], rate[j], rate[j + 1])
-
-    def zero(self, j: int, x: Vector, rate: Vector) -> float:
-        """Return the part of the step after node j at which x, of one contact, is zero."""
-        low, high, (before, after) = 0.0, 1.0, x[j : j + 2].tolist()
-        step, rates = float(self.t[j + 1] - self.t[j]), rate[j : j + 2].tolist()
-        while low < (s := 0.5 * (low + high)) < high:
-            falls = _cubic(s, step, before, after, *rates) < 0.0
-            low, high = (s, high) if falls == (after > before) else (low, s)
-        return s
-
-    def events(self, last: Vector) -> tuple[Vector, list[str], list[int], Vector, Vector]:
-        """Return times, kinds and contacts, and velocities and forces, these from the start on.
-
-        At the end the velocities are `last`.  Collisions, durations and works are booked beside.
-        """
-        closing = np.diff(self.closed.astype(int), axis=0)
-        if len(closing):
-            closing[-1][self.closed[-1]] = -1  # what is left is too little to matter
-        u, grow = -np.diff(self.v), -np.diff(self.a)
-        early, touching = self.p * self.loss, np.minimum.accumulate(self.y, axis=0) >= -1e-12
-        turned = ((u[:-1] > 0.0) != (u[1:] > 0.0)) & (self.closed[:-1] | self.closed[1:])
-        found: list[Any] = []
-        for kind, where, x, rate in (
-            ("maximum_compression", turned, u, grow),
-            ("end", closing < 0, self.y + early * u, u + early * grow),
-            ("close", closing > 0, self.y, u),
-        ):
-            for j, c in zip(*(at.tolist() for at in np.nonzero(where)), strict=True):
-                began = kind == "close" and bool(touching[j, c])
-                s = 0.0 if began else self.zero(j, x[:, c], rate[:, c])
-                t = 0.0 if began else self.t[j] + s * (self.t[j + 1] - self.t[j])
-                y = self.between(j, s, self.y, u)
-                push = np.where(self.closed[j] | self.closed[j + 1], self.pushes(y), 0.0)
-                self.collisions[c] += kind == "close"
-                if kind == "maximum_compression":
-                    stored = push[c] * y[c] / (self.p + 1.0)
-                    self.absorbed[c] += stored if u[j, c] > 0.0 else -stored
-                    if u[j, c] <= 0.0:
-                        continue
-                else:
-                    push[c] = 0.0
-                    self.durations[c] += t if kind == "end" else -t
-                if not began:
-                    found.append((t, kind, c, self.between(j, s, self.v, self.a), push))
-        self.collisions += self.closed[0]
-        found.sort(key=lambda event: (event[0], event[1] != "maximum_compression"))
-        if found:
-            found[-1] = (*found[-1][:3], last, found[-1][4])
-        times, kinds, contacts, v, force = zip(
-            (0.0, "", -1, self.v[0], self.force[0]), *found, strict=True
-        )
-        return np.array(times), [*kinds[1:]], [*contacts[1:]], np.array(v), np.array(force)
-
-
-def _cubic(s: float, h: float, x: Any, y: Any, rate: Any, end: Any) -> Any:
-    """Return what goes from x to y in a step h, with these rates there, at the part s of it."""
-    rise = y - x
-    return x + s * (rise + (1.0 - s) * ((1.0 - s) * (rate * h - rise) - s * (end * h - rise)))
+    for _ in in_order(run_chunk, range(0, count, _CHUNK), progress):
+        pass
+    return out.reshape(*lead, n)

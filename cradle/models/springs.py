@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-import math
-import threading
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
 
-from cradle.chain import Chain
-from cradle.input.values import (
-    Vector,
-    checked,
-    checked_masses,
-    one_number,
-    refusal,
-    refuse_overflow,
-    refuse_where,
-)
+from cradle.input.values import Vector, first, refusal
 from cradle.kernel.kinks import Forces, Law
-from cradle.kernel.state import ENERGY, FINISHED, LEDGER, MOMENTUM, ORDER, REFUSED, UNFINISHED
-from cradle.models.batch import in_order, rows_of, shaped
-from cradle.runtime.job import DEFECTS, LARGE
+from cradle.kernel.state import ENERGY, FINISHED, LEDGER, MOMENTUM, ORDER, UNFINISHED
 from cradle.runtime.springs import room, solve
-from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
+from cradle.trace import Event
 
 #: Least and largest error that can be asked for; steps of one run after which it is given up.
 FINEST, COARSEST, MOST_STEPS = 1e-12, 0.02, 20_000_000
-_CHUNK, _FAINT = 2048, 0.01  # rows at once; what is too little to matter, over the accuracy
+_FAINT = 0.01  # what is too little to matter, over the accuracy
 # A step times the largest frequency from which on a run shows whether it was short enough; a
 # coarser one that only measures the frequency; and what it may measure too little.
 _ENOUGH, _COARSE, _SPARE = 0.25, 0.5, 1.05
@@ -54,30 +42,23 @@ class Problem(NamedTuple):
     p: float
     accuracy: float
 
-    def own(self, timed: bool = False) -> tuple[Forces, Vector, Vector, Vector]:
+    def own(self) -> tuple[Forces, Vector, Vector, Vector]:
         """Return the chains in their own units; and mass, speed and length, (rows, 1).
 
-        These are those of the contact that closes fastest; the speed is 1 if none closes.  The
-        length is 1 where nobody asks for it.
+        These are those of the contact that closes fastest; the speed is 1 if none closes.
         """
         rows, n = max(map(len, self[:5])), self.m.shape[1]
         m, v = (np.broadcast_to(part, (rows, n)) for part in self[:2])
         k, loss, gap = (np.broadcast_to(part, (rows, n - 1)) for part in self[2:5])
         u = v[:, :-1] - v[:, 1:]
-        at = u.argmax(axis=-1)[:, None]
-        ball, left, right, unit = (
-            np.take_along_axis(x, i, -1) for x, i in ((v, at), (m, at), (m, at + 1), (k, at))
-        )
-        speed, mass = np.take_along_axis(u, at, -1), left / (left + right) * right
-        speed = np.where(speed > 0.0, speed, 1.0)
-        length = np.ones_like(speed)
-        if timed or loss.any() or gap.any():
-            with np.errstate(divide="ignore", over="ignore"):
-                energy = np.log(mass) + 2.0 * np.log(speed) - np.log(unit)
-                length = np.exp(energy / (self.p + 1.0))
-        w, v, k = mass / m, (v - ball) / speed, k / unit
-        own = Forces(w, v, k, loss * (speed / length), -gap / length, speed[:, 0])
-        return own, mass, speed, length
+        at = np.arange(rows)[:, None], u.argmax(axis=-1)[:, None]
+        left, right = m[at], m[:, 1:][at]
+        with np.errstate(all="ignore"):  # what is beyond floats is refused
+            mass, speed = left / (left + right) * right, np.where(u[at] > 0.0, u[at], 1.0)
+            energy = np.log(mass) + 2.0 * np.log(speed) - np.log(k[at])
+            length = np.exp(energy / (self.p + 1.0))
+            v, loss, d = (v - v[at]) / speed, loss * (speed / length), -gap / length
+            return Forces(mass / m, v, k / k[at], loss, d, speed[:, 0]), mass, speed, length
 
 
 class Solved(NamedTuple):
@@ -88,13 +69,6 @@ class Solved(NamedTuple):
     h: Vector  # the last step
     steps: Any  # of all runs
     defect: Any  # what an outcome breaks, 0 for nothing; or, below zero, why it was not reached
-
-
-def exponent_and_accuracy(exponent: float, accuracy: float) -> tuple[float, float]:
-    """Return both, within their ranges."""
-    rule = f"must lie in [{FINEST}, {COARSEST}]"
-    p = one_number("exponent", exponent, "must lie in [1, 10]", 1.0, 10.0)
-    return p, one_number("accuracy", accuracy, rule, FINEST, COARSEST)
 
 
 def law_of(chains: Forces, p: float, accuracy: float, most: int = MOST_STEPS) -> Law:
@@ -188,163 +162,140 @@ def _highest(chains: Forces, p: float) -> Vector:
     return np.where(most > 0.0, most, 1.0)
 
 
-def admit(problem: Problem) -> None:
-    """Raise if a value is outside its limits."""
-    m = checked_masses(problem.m)
-    v = checked("velocities", problem.v)
-    k = checked("stiffness", problem.k, "must be above 0", 0.0, open_low=True)
-    checked("viscosity", problem.loss, "must be at least 0", 0.0)
-    checked("gaps", problem.gap)
-    if m.size and v.size:
-        refuse_overflow(v, m)
-        largest = ("masses", m, "heaviest ball"), ("stiffness", k, "stiffest contact")
-        for name, array, of in largest:
-            small = array < _SMALLEST * array.max(axis=-1, keepdims=True)
-            rule = f"must be at least {_SMALLEST} of the {of} of its chain"
-            refuse_where(name, array, small, rule)
+def refuse_beyond(problem: Problem, own: Any, lead: tuple[int, ...] = (), begin: int = 0) -> None:
+    """Raise if something is too small or large beside the rest of its chain to be resolved.
 
-
-def beyond(problem: Problem, own: tuple[Forces, Vector, Vector, Vector]) -> list[Any]:
-    """Return names, values, where they are too small or large in their chain's units, and rules."""
+    The rows are those from number `begin` on of chains with these leading axes.
+    """
     (_, _, _, loss, d, _), mass, _, length = own
+    m, _, k, lost, gap = problem[:5]
     most = min(_WIDEST, _BLURRED * problem.accuracy)
     far = ~((mass > 0.0) & (length >= _TINY) & (length <= 1.0 / _TINY)) | np.isnan(d)
-    of, k, gap = "the depth of the fastest closing", problem.k, problem.gap
-    late = f"must be at most {_LONGEST} contact times, depth over speed of the fastest closing"
-    return [
+    of, late = "the depth of the fastest closing", "contact times, depth over speed of the fastest"
+    least = f"must be at least {_SMALLEST} of the"
+    for name, values, wrong, rule in (
+        ("masses", m, _small(m), f"{least} heaviest ball of its chain"),
+        ("stiffness", k, _small(k), f"{least} stiffest contact of its chain"),
         ("stiffness", k, far, "a contact's time is beyond floats: choose other units"),
-        ("viscosity", problem.loss, loss > _LONGEST, late),
+        ("viscosity", lost, loss > _LONGEST, f"must be at most {_LONGEST} {late} closing"),
         ("gaps", gap, -d > most, f"must be at most {most:g} times {of} at this accuracy"),
         ("gaps", gap, (d != 0.0) & (abs(d) < _NARROWEST), f"must be 0, or {_NARROWEST} of {of}"),
         ("gaps", gap, d > 1.0, f"must be a lean of at most {of}"),
-    ]
-
-
-def refuse_beyond(problem: Problem, own: Any, at: tuple[int, ...] = ()) -> None:
-    """Raise if something of a chain, the only row, cannot be resolved; `at` is its place."""
-    for name, values, wrong, rule in beyond(problem, own):
+    ):
         if wrong.any():
-            c = int(wrong[0].argmax())
-            raise refusal(name, (*at, c), f" = {float(values[0, c])!r}; {rule}")
+            row, c = first(np.broadcast_to(wrong, np.broadcast_shapes(wrong.shape, values.shape)))
+            value = float(values[row if len(values) > 1 else 0, c])
+            at = *map(int, np.unravel_index(begin + row, lead)), c
+            raise refusal(name, at, f" = {value!r}; {rule}")
 
 
-def refuse(problem: Problem, defect: int, reached: Vector, model: Any = None) -> NoReturn:
-    """Raise for a chain, the only row, that was not finished, or not certified."""
-    m, v, k, *law = (row[0] for row in problem[:5])
-    chain, names = Chain(m, v), ("stiffness", "viscosity", "gaps", "exponent", "accuracy")
-    values = (*(row.tolist() for row in (k, *law)), *problem[5:])
-    model = model or dict(zip(names, values, strict=True))
-    if defect > 0:
-        raise ImpactNotCertified(chain, model, DEFECTS[defect])
-    none, impulses = np.zeros(len(m) - 1), np.cumsum(m * (v - reached))[:-1]
-    c = int(np.argmax(k / np.minimum(m[:-1], m[1:])))
-    held = "; or leans hold balls together" if (law[1] < 0.0).any() else ""
-    raise ImpactNotFinished(
-        f"the impact was not finished: contact {c}, the quickest of the springs, makes the steps "
-        f"short; or balls that collide often amplify errors, and finer runs do not agree{held}",
-        Trace(
-            chain, model, reached, impulses, none, none.astype(np.int64), np.array([v, reached]),
-            np.array([none, impulses]), (), left_out=1,
-        ),
-    )  # fmt: skip
+def _small(values: Vector) -> Any:
+    return values < _SMALLEST * values.max(axis=-1, keepdims=True)
 
 
-def spring_velocities(
-    masses: ArrayLike,
-    velocities: ArrayLike,
-    stiffness: ArrayLike = 1.0,
-    *,
-    exponent: float = 1.5,
-    viscosity: ArrayLike = 0.0,
-    gaps: ArrayLike = 0.0,
-    accuracy: float = 1e-3,
-    progress: bool = False,
-) -> Vector:
-    """Post-impact velocities of many chains of balls on springs; leading axes broadcast.
+class Path:
+    """The motion of one chain in its own units: at the nodes of a run, and what happens between.
 
-    Each contact pushes with k (d^p + A d(d^p)/dt) while that is above zero, d its compression:
-    p = 3/2 is the contact of two spheres, elastic or viscoelastic.  The velocities depend on the
-    ratios of the stiffnesses alone where there are neither losses nor gaps.
-
-    Parameters
-    ----------
-    masses, velocities : array_like, shape (..., N)
-        kg and m/s.
-    stiffness : array_like, shape (..., N - 1) or ()
-        k, N/m^p; above 0.
-    exponent : float
-        p, from 1 to 10.
-    viscosity : array_like, shape (..., N - 1) or ()
-        A, s; 0 for an elastic contact.  Two spheres lose the more the faster they collide.
-    gaps : array_like, shape (..., N - 1) or ()
-        Distance of two balls before the impact, m; it closes before the contact pushes.  Below
-        zero a lean: how far the strings press the two together at rest.  Their pull stays what it
-        is until the last contact has opened.
-    accuracy : float
-        Largest error of a velocity, relative to the fastest closing; from 1e-12 to 0.02.  It is
-        estimated and met, not proven.
-    progress : bool
-        Show a progress bar.
-
-    Returns
-    -------
-    ndarray, shape (..., N)
-        Velocities after the impact, m/s.
-
-    Raises
-    ------
-    ValueError
-        If a value or a shape is wrong, or too small or large beside the others to be resolved; the
-        message names the first value and the rule.
-    ImpactNotFinished
-        If an impact takes more than twenty million steps, or finer and finer runs do not agree, or
-        leans hold balls together.
-    ImpactNotCertified
-        If an outcome breaks momentum, energy or order.
-
-    References
-    ----------
-    Hinch and Saint-Jean, Proc. R. Soc. A 455 (1999) 3201-3220; Brilliantov, Spahn, Hertzsch and
-    Poeschel, Phys. Rev. E 53 (1996) 5382-5392.
-
-    Examples
-    --------
-    Five equal elastic spheres; and with gaps of a tenth of the compression and losses:
-
-    >>> spring_velocities([1] * 5, [1, 0, 0, 0, 0], accuracy=1e-6).round(4)
-    array([-0.0711, -0.0303, -0.0145,  0.127 ,  0.9888])
-    >>> spring_velocities([1] * 5, [1, 0, 0, 0, 0], viscosity=0.05, gaps=0.1).round(2)
-    array([-0.  ,  0.02,  0.03,  0.1 ,  0.85])
+    The run gives velocities between nodes.  By the sum of Euler and Maclaurin they are those at the
+    node before, half a step and a twelfth of its square of the rates later.
     """
-    p, accuracy = exponent_and_accuracy(exponent, accuracy)
-    given = {"masses": masses, "velocities": velocities, "stiffness": stiffness}
-    given |= {"viscosity": viscosity, "gaps": gaps}
-    arrays, lead = shaped(given, (0, 0, 1, 1, 1))
-    m, v, k, loss, gap = arrays
-    admit(Problem(m, v, k, loss, gap, p, accuracy))
-    n, count = m.shape[-1], math.prod(lead)
-    out = np.empty((count, n))
 
-    def problem(rows: slice) -> Problem:
-        m, v, k, loss, gap = (rows_of(array, lead, rows) for array in arrays)
-        return Problem(m, v, k, loss, gap, p, accuracy)
+    def __init__(self, chain: Forces, law: Law, h: Vector) -> None:
+        record: list[Any] = []
+        solve(chain._replace(h=h), law, room(*chain.v.shape), record=record)
+        pages, n = np.concatenate(record), chain.v.shape[1]
+        t, low, high = (pages[:, 0, k, None] for k in range(3))
+        v, (d, y, f, seen) = pages[:, 1, :n], (pages[:, k, : n - 1] for k in range(2, 6))
+        self.p, self.w, self.k, self.early = law.p, chain.w[0], chain.k[0], law.p * chain.loss[0]
+        loss, contacts = chain.loss[0], np.arange(n - 1)
+        inside = (low <= contacts) & (contacts < high) | law.leans
+        pull = self.pushes(chain.d[0])
+        if not law.lossy:
+            y = d - h**2 / 12.0 * np.diff(self.driven(np.where(inside, f - pull, 0.0)))
+        y = np.where(inside, y, d + (t - seen) * (v[:, :-1] - v[:, 1:]))
+        #: Times, compressions, and whether contacts are closed, at the start and at the nodes.
+        self.t, self.y = np.append(0.0, t), np.vstack([chain.d, y])
+        self.closed = np.vstack([chain.d > 0.0, inside & (f > 0.0)])
+        push = np.where(self.closed, self.pushes(self.y), 0.0)
+        slope = self.p * push / np.where(push > 0.0, self.y, 1.0)
+        held = push - pull
+        v = np.vstack([chain.v, v - 0.5 * h * self.driven(held[1:])]) + self.driven(loss * held)
+        rate = slope * (v[:, :-1] - v[:, 1:])
+        v[1:] -= h**2 / 12.0 * self.driven(rate)[1:]
+        #: Velocities, accelerations, forces.
+        self.v, self.force = v, np.maximum(push + loss * rate, 0.0)
+        self.a = self.driven(held + loss * rate)
 
-    def run_chunk(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
-        """Solve the chunk of chains that begins there; return a defect, and where."""
-        rows = slice(begin, min(begin + _CHUNK, count))
-        part = problem(rows)
-        own = forces, _, speed, _ = part.own()
-        wrong = np.any([where.any(axis=-1) for _, _, where, _ in beyond(part, own)], axis=0)
-        if wrong.any():
-            return -REFUSED, begin + int(wrong.argmax())
-        found = run(forces, law_of(forces, p, accuracy), count * n >= LARGE, stop)
-        out[rows] = part.v + speed * (found.v - forces.v)
-        at = int((found.defect != 0).argmax())
-        return int(found.defect[at]), begin + at
+    def pushes(self, y: Vector) -> Vector:
+        """Return what closed contacts push with at rest."""
+        push: Vector = self.k * np.maximum(y, 0.0) ** self.p
+        return push
 
-    for defect, at in in_order(run_chunk, range(0, count, _CHUNK), progress):
-        if defect:
-            one = problem(slice(at, at + 1))
-            refuse_beyond(one, one.own(), tuple(map(int, np.unravel_index(at, lead))))
-            refuse(one, defect, out[at])
-    return out.reshape(*lead, n)
+    def driven(self, push: Vector) -> Vector:
+        """Return what pushes of the contacts do to the balls."""
+        driven: Vector = -np.diff(np.pad(push, [(0, 0), (1, 1)])) * self.w
+        return driven
+
+    def impulses(self, v: Vector) -> Vector:
+        """Return the impulses of the contacts, from velocities; none of one that never closed."""
+        passed = np.cumsum((self.v[0] - v) / self.w, axis=-1)[..., :-1]
+        return np.where(self.collisions > 0, passed, 0.0)
+
+    def events(self, last: Vector) -> tuple[Vector, tuple[Event, ...], Vector, Vector]:
+        """Return times, events, velocities and forces, these and the times from the start on.
+
+        At the end the velocities are `last`.  Collisions, durations and works are booked beside.
+        """
+        size, steps = len(self.k), len(self.t) - 1
+        self.collisions = self.closed[0].astype(np.int64)
+        self.durations, self.absorbed = np.zeros((2, size))
+        if not steps:
+            return self.t, (), self.v, self.force
+        closing = np.diff(self.closed.astype(int), axis=0)
+        closing[-1][self.closed[-1]] = -1  # what is left is too little to matter
+        u, grow = -np.diff(self.v), -np.diff(self.a)
+        touching = np.minimum.accumulate(self.y, axis=0) >= -1e-12
+        turned = ((u[:-1] > 0.0) != (u[1:] > 0.0)) & (self.closed[:-1] | self.closed[1:])
+        where = []
+        for kind, wanted, x, rate in (
+            ("maximum_compression", turned, u, grow),
+            ("end", closing < 0, self.y + self.early * u, u + self.early * grow),
+            ("close", closing > 0, self.y, u),
+        ):
+            pieces = CubicHermiteSpline(self.t, x, rate).c
+            for j, c in np.argwhere(wanted).tolist():
+                began = kind == "close" and touching[j, c]
+                t = 0.0 if began else self.t[j] + _zero(pieces[:, j, c], self.t[j + 1] - self.t[j])
+                where.append((t, kind, j, c))
+        where.sort(key=lambda event: (event[0], event[1] != "maximum_compression"))
+        found: list[Any] = [(0.0, None, self.v[0], self.force[0])]
+        depth, speed = (
+            CubicHermiteSpline(self.t, self.y, u),
+            CubicHermiteSpline(self.t, self.v, self.a),
+        )
+        for t, kind, j, c in where:
+            y = depth(t)
+            push = np.where(self.closed[j] | self.closed[j + 1], self.pushes(y), 0.0)
+            if kind == "maximum_compression":
+                stored = push[c] * y[c] / (self.p + 1.0)
+                self.absorbed[c] += stored if u[j, c] > 0.0 else -stored
+            else:
+                push[c] = 0.0
+                self.collisions[c] += kind == "close"
+                self.durations[c] += t if kind == "end" else -t
+            shown = u[j, c] > 0.0 if kind == "maximum_compression" else kind == "end" or t > 0.0
+            if shown:
+                found.append((t, Event(kind, c), speed(t), push))
+        if len(found) > 1:
+            found[-1] = (*found[-1][:2], last, found[-1][3])
+        times, events, v, force = zip(*found, strict=True)
+        return np.array(times), events[1:], np.array(v), np.array(force)
+
+
+def _zero(cubic: Vector, h: float) -> float:
+    """Return where a cubic is zero between 0 and h; at the end that is nearer to it, if nowhere."""
+    a, b, c, d = cubic.tolist()
+    end = ((a * h + b) * h + c) * h + d
+    if d * end >= 0.0:
+        return h if abs(end) < abs(d) else 0.0
+    return float(brentq(lambda s: ((a * s + b) * s + c) * s + d, 0.0, h, xtol=1e-300, rtol=1e-15))
