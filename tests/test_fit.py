@@ -29,7 +29,6 @@ from cradle.fit import (
 )
 from cradle.fit.answers import FOLDED, Group
 from cradle.fit.likelihood import chi_squares
-from cradle.fit.parameters import Points
 from cradle.fit.search import RISE, refine, scan
 from cradle.fit.tracks import Track
 from cradle.tables import data_folder
@@ -348,9 +347,8 @@ def lowest_chi_square(before, moved, ratios):
         lowest = 2 * least_squares(residuals, np.zeros(free.sum()), xtol=1e-12).cost
     else:
         lowest = (residuals(np.zeros(0)) ** 2).sum()
-    given = {("A", "B", "C"): np.array([forward]), ("C", "B", "A"): np.array([backward])}
-    e = {("A", "B"): 0.6, ("B", "C"): 0.7}
-    (found,) = chi_squares([shots], Points(e, given), [])
+    values = {("A", "B", "C"): forward, ("C", "B", "A"): backward}
+    (found,) = chi_squares([shots], values | {("A", "B"): 0.6, ("B", "C"): 0.7}, [])
     return found, lowest
 
 

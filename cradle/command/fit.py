@@ -143,11 +143,11 @@ def _refuse_unused(
     given: Iterable[str], known: Iterable[str], shots: Shots, predict: str | None
 ) -> None:
     """Refuse a value that no chain needs (its name may be misspelt), and one that is there."""
-    from cradle.fit.parameters import label, pair_keys, parameter_key, ratio_keys
+    from cradle.fit.parameters import fitted_keys, label, pair_keys, parameter_key
 
     chains = [one.types for one in shots.sets] + ([parameter_key(predict)] if predict else [])
     pairs = {key for types in chains for key in pair_keys(types)}
-    triplets = {key for types in chains for key in ratio_keys(types)}
+    triplets = {key for types in chains if len(types) > 2 for key in fitted_keys(types)}
     values = [("--restitution", name, tuple(sorted(parameter_key(name)))) for name in given]
     values += [("--known", name, parameter_key(name)) for name in known]
     there_by = {("--restitution", pair_keys(one.types)[0]): f"set {one.name} is fitted for it; "
@@ -178,13 +178,13 @@ def _predicted(
     found: Fit, shots: Shots, sequence: str, speed: float
 ) -> tuple[dict[str, Any], list[str]]:
     """Return a prediction and what was measured of such chains: for JSON, and as lines."""
-    from cradle.fit.parameters import ratio_keys
+    from cradle.fit.parameters import fitted_keys
 
     predicted = found.predict(sequence, speed)
     rows, measured = predicted.rows(), []
     lines = ["", f"{sequence} at {speed:g} m/s; lower to upper: the central 95 % of predictions"]
     tables, remarks = [rows], []
-    keys = ratio_keys(predicted.types)
+    keys = fitted_keys(predicted.types) if len(predicted.types) > 2 else set()
     # A pair has given its restitution; ratios that are all known take nothing from the shots.
     taught = not keys or any(keys & set(group.keys) for group in found.groups)
     for one in (one for one in shots.sets if one.types == predicted.types):

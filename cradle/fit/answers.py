@@ -116,10 +116,14 @@ class Group:
     excess: Vector
     weights: Vector
 
+    @property
+    def density(self) -> Vector:
+        """How likely each point is, up to a factor."""
+        return np.asarray(np.exp(-0.5 * self.excess) * self.weights)
+
     def draw(self, uniform: Vector) -> Vector:
         """Return points in proportion to their likelihood, one for each number in [0, 1)."""
-        density = np.exp(-0.5 * self.excess) * self.weights
-        total = np.cumsum(density)
+        total = np.cumsum(self.density)
         return np.asarray(self.points[np.searchsorted(total, uniform * total[-1], side="right")])
 
 
@@ -143,11 +147,10 @@ class Prediction:
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one row per ball."""
-        return [
-            {"ball": k + 1, "type": kind, "velocity": float(self.median[k]),
-             "lower": float(self.lower[k]), "upper": float(self.upper[k])}
-            for k, kind in enumerate(self.types)
-        ]  # fmt: skip
+        names = ("ball", "type", "velocity", "lower", "upper")
+        columns = (x.tolist() for x in (self.median, self.lower, self.upper))
+        balls = zip(range(1, len(self.types) + 1), self.types, *columns, strict=True)
+        return [dict(zip(names, ball, strict=True)) for ball in balls]
 
     def table(self) -> pd.DataFrame:
         """Return the rows as a table."""
@@ -157,8 +160,5 @@ class Prediction:
 
     def __repr__(self) -> str:
         """Return the predictions in one line."""
-        parts = [
-            f"{m:.3f} [{a:.3f}, {b:.3f}]"
-            for m, a, b in zip(self.median, self.lower, self.upper, strict=True)
-        ]
+        parts = [f"{r['velocity']:.3f} [{r['lower']:.3f}, {r['upper']:.3f}]" for r in self.rows()]
         return f"Prediction({label(self.types)}: {', '.join(parts)} m/s)"

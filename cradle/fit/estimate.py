@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.fit.answers import Estimate, Group
 from cradle.fit.likelihood import chi_squares
-from cradle.fit.parameters import Key, Points, label, pair_keys, parameter_key, ratio_keys
+from cradle.fit.parameters import Key, fitted_keys, label, outcomes, pair_keys, parameter_key
 from cradle.fit.result import Fit
-from cradle.fit.search import refine, scan
+from cradle.fit.search import Scan, refine, scan
 from cradle.fit.shots import Shots, ShotSet
 from cradle.input.values import Vector, checked, one_number
 from cradle.kernel.state import LIMITS
@@ -42,11 +43,6 @@ def restitution(shots: Shots) -> Fit:
     ValueError
         If no set has two balls.
 
-    Notes
-    -----
-    Two balls need no model: momentum and e give the velocities.  Chi-square is profiled over the
-    velocities before the impact, exactly.
-
     Examples
     --------
     >>> from cradle.fit import read_shots
@@ -62,28 +58,15 @@ def restitution(shots: Shots) -> Fit:
         raise ValueError("no set has two balls; restitution comes from pairs")
     estimates, chi_square, freedom = {}, 0.0, -len(pairs)
     for key, sets in sorted(pairs.items()):
-
-        def chi(e: Vector, sets: Sequence[ShotSet] = sets) -> Vector:
-            return np.asarray(sum(_pair_chi_square(one, e) for one in sets))
-
-        found, lowest = scan(chi, np.linspace(0.0, 1.0, _GRID))
+        found, lowest = scan(partial(_chi_of_pair, sets, key), np.linspace(0.0, 1.0, _GRID))
         estimates[label(key)] = Estimate.of("restitution", key, 1.0, found)
         chi_square += lowest
         freedom += sum(one.after.size for one in sets)
     return Fit(shots, estimates, {}, (), chi_square, freedom)
 
 
-def _pair_chi_square(shots: ShotSet, e: Vector) -> Vector:
-    """Chi-square of shots of two balls at each e, profiled over the velocities before."""
-    m1, m2 = shots.masses
-    share = np.array([[m1, m2], [m1, m2]]) / (m1 + m2)
-    relative = np.array([[-m2, m2], [m1, -m1]]) / (m1 + m2)
-    matrix = share + e[:, None, None] * relative  # after = matrix @ before
-    residual = shots.after[:, None, :] - np.einsum("pij,kj->kpi", matrix, shots.before)
-    covariance = np.einsum("pij,kj,plj->kpil", matrix, shots.sigma_before**2, matrix)
-    covariance = covariance + (np.eye(2) * shots.sigma[:, None, :] ** 2)[:, None]
-    solved = np.linalg.solve(covariance, residual[..., None])[..., 0]
-    return np.asarray((residual * solved).sum(axis=(0, 2)))
+def _chi_of_pair(sets: Sequence[ShotSet], key: Key, e: Vector) -> Vector:
+    return chi_squares(sets, {key: e}, [])
 
 
 def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma: float) -> Fit:
@@ -183,19 +166,22 @@ def ratio(
             bounds[key] = float(right / (middle + right))
             bounds[key[::-1]] = float(left / (left + middle))
     bounds = {key: bound for key, bound in bounds.items() if key not in fixed}
-    acting = {key for key in bounds if any(_acts(key, one, bounds, fixed, values) for one in sets)}
+    acting = set[Key]().union(*(_acting(one, bounds, {**values, **fixed}) for one in sets))
     found = {key: Estimate.of("ratio", key, bound, None) for key, bound in bounds.items()}
-    groups, chi_square, freedom = [], 0.0, -len(acting)
-    for keys, members in _components(sets, acting):
-        group, estimates, lowest = _fit_group(keys, members, bounds, fixed, (values, errors))
+    groups, chi_square, freedom = [], 0.0, 0
+    taken = {**dict.fromkeys(bounds, 0.0), **values, **fixed}  # without effect: any value
+    for keys in _together(fitted_keys(one.types) & acting for one in sets):
+        members = [one for one in sets if fitted_keys(one.types) & set(keys)]
+        group, scans, lowest = _searched(keys, members, bounds, taken, errors)
         groups.append(group)
-        found.update(zip(keys, estimates, strict=True))
+        found.update({key: Estimate.of("ratio", key, bounds[key], one)
+                      for key, one in zip(keys, scans, strict=True)})  # fmt: skip
         chi_square += lowest
-        freedom += sum(one.after.size for one in members)
+        freedom += sum(one.after.size for one in members) - len(keys)
     given = {label(key): (value, errors.get(key, 0.0)) for key, value in values.items()}
     named = {label(key): one for key, one in found.items()}
-    taken = {label(key): value for key, value in fixed.items()}
-    return Fit(shots, named, given, tuple(groups), chi_square, freedom, taken)
+    known = {label(key): value for key, value in fixed.items()}
+    return Fit(shots, named, given, tuple(groups), chi_square, freedom, known)
 
 
 def _restitution_values(
@@ -236,71 +222,52 @@ def _known_ratios(known: Mapping[str, float], masses: Mapping[str, float]) -> di
     return fixed
 
 
-def _acts(
-    key: Key, one: ShotSet, bounds: Mapping[Key, float], fixed: Mapping[Key, float],
-    restitution: Mapping[Key, float],
-) -> bool:  # fmt: skip
-    """Tell whether a ratio changes any outcome of a set, tried at points all over the ranges."""
-    keys = ratio_keys(one.types)
-    if key not in keys:
-        return False
+def _acting(one: ShotSet, bounds: Mapping[Key, float], given: Mapping[Key, float]) -> set[Key]:
+    """Return the ratios that change any outcome of a set, tried at points all over the ranges."""
+    keys = sorted(fitted_keys(one.types) & bounds.keys())
     # Multiples of irrational numbers fill a box evenly.
     turns = np.arange(1, _TRIALS + 1)
-    ratios = {}
-    for place, k in enumerate(sorted(keys)):
-        part = (turns * np.sqrt(place + 2.0)) % 1.0
-        ratios[k] = np.full(_TRIALS, fixed[k]) if k in fixed else bounds[k] * part
+    values = {**given, **{key: bounds[key] * (turns * np.sqrt(place + 2.0) % 1.0)
+                          for place, key in enumerate(keys)}}  # fmt: skip
     # Outcomes go with the speed: shots that differ in nothing else are solved once.
     speeds = np.abs(one.before).max(axis=1, keepdims=True)
     before = np.unique(one.before / speeds, axis=0)[:, None, :]
-    base = Points(restitution, ratios).outcomes(one.types, one.masses, before)
-    for value in (0.0, 0.5 * bounds[key], bounds[key]):
-        changed = {**ratios, key: np.full(_TRIALS, value)}
-        outcome = Points(restitution, changed).outcomes(one.types, one.masses, before)
-        if (np.abs(outcome - base) > 1e-9).any():
-            return True
-    return False
+    base = outcomes(one.types, one.masses, before, values)
+
+    def acts(key: Key) -> bool:
+        changed = ({**values, key: share * bounds[key]} for share in (0.0, 0.5, 1.0))
+        tried = (outcomes(one.types, one.masses, before, trial) for trial in changed)
+        return any((np.abs(outcome - base) > 1e-9).any() for outcome in tried)
+
+    return set(filter(acts, keys))
 
 
-def _components(sets: Sequence[ShotSet], acting: set[Key]) -> list[tuple[list[Key], list[ShotSet]]]:
-    """Return groups of ratios that act in the same sets, with those sets."""
-    groups: list[tuple[set[Key], list[ShotSet]]] = []
-    for one in sets:
-        keys = ratio_keys(one.types) & acting
-        touched = [group for group in groups if group[0] & keys]
-        groups = [group for group in groups if group not in touched]
-        members = [member for group in touched for member in group[1]]
-        groups.append((keys.union(*(group[0] for group in touched)), [*members, one]))
-    return [(sorted(keys), members) for keys, members in groups if keys]
+def _together(acting: Iterable[set[Key]]) -> list[list[Key]]:
+    """Join the ratios that act in the same sets."""
+    groups: list[set[Key]] = []
+    for keys in filter(None, acting):
+        apart = [group for group in groups if not group & keys]
+        groups = [*apart, keys.union(*(group for group in groups if group & keys))]
+    return [sorted(group) for group in groups]
 
 
-def _fit_group(
+def _searched(
     keys: list[Key], sets: Sequence[ShotSet], bounds: Mapping[Key, float],
-    fixed: Mapping[Key, float], known: tuple[dict[Key, float], dict[Key, float]],
-) -> tuple[Group, list[Estimate], float]:  # fmt: skip
-    """Fit the ratios that act together."""
-    values, errors = known
+    given: Mapping[Key, float], errors: Mapping[Key, float],
+) -> tuple[Group, list[Scan], float]:  # fmt: skip
+    """Search the ratios that act together."""
     needed = {key for one in sets for key in pair_keys(one.types)}
     uncertain = [(key, sigma) for key, sigma in sorted(errors.items()) if key in needed]
-    silent = {key for one in sets for key in ratio_keys(one.types)} - set(keys)
 
     def chi(points: Vector) -> Vector:
-        columns = points.reshape(len(points), -1)
-        # Those without effect may have any value.
-        ratios = {key: np.full(len(points), fixed.get(key, 0.0)) for key in silent}
-        ratios.update(zip(keys, columns.T, strict=True))
-        return chi_squares(sets, Points(values, ratios), uncertain)
+        columns = points.reshape(len(points), -1).T
+        return chi_squares(sets, {**given, **dict(zip(keys, columns, strict=True))}, uncertain)
 
     upper = np.array([bounds[key] for key in keys])
-    if len(keys) == 1:
-        # Near the bound the outcome goes like the square root of what is left to it.
-        grid = upper[0] * (1.0 - np.linspace(1.0, 0.0, _GRID) ** 2)
-        one, lowest = scan(chi, grid)
-        found, group = [one], Group(tuple(keys), grid[:, None], one.excess, np.gradient(grid))
-    else:
-        found, points, excess, lowest = refine(chi, upper)
-        group = Group(tuple(keys), points, excess, np.ones(len(points)))
-    estimates = [
-        Estimate.of("ratio", key, bounds[key], one) for key, one in zip(keys, found, strict=True)
-    ]
-    return group, estimates, lowest
+    if len(keys) > 1:
+        scans, points, excess, lowest = refine(chi, upper)
+        return Group(tuple(keys), points, excess, np.ones(len(points))), scans, lowest
+    # Near the bound the outcome goes like the square root of what is left to it.
+    grid = upper[0] * (1.0 - np.linspace(1.0, 0.0, _GRID) ** 2)
+    one, lowest = scan(chi, grid)
+    return Group(tuple(keys), grid[:, None], one.excess, np.gradient(grid)), [one], lowest

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cradle.fit.parameters import Key, Points, pair_keys
+from cradle.fit.parameters import Key, Values, outcomes, pair_keys
 from cradle.fit.shots import ShotSet
 from cradle.input.values import Vector
 
@@ -23,13 +23,11 @@ _CHUNK = 4096
 Uncertain = Sequence[tuple[Key, float]]
 
 
-def responses(
-    shots: ShotSet, points: Points, uncertain: Uncertain
-) -> tuple[Vector, Vector, Vector]:
+def responses(shots: ShotSet, values: Values, uncertain: Uncertain) -> tuple[Vector, Vector]:
     """Return velocities after K shots at P points, shape (K, P, N), and what they change with.
 
-    That is each uncertain restitution, (K, P, N, E), and one standard error of each measured
-    velocity before, (K, P, N, M).
+    That is one standard error of each of M measured velocities before, then each of E uncertain
+    coefficients of restitution: (K, P, N, M + E).
     """
     moving = np.flatnonzero((shots.before != 0).any(axis=0))
     at_rest_exactly = not np.delete(shots.sigma_before, moving, axis=1).any()
@@ -37,59 +35,55 @@ def responses(
     unit = np.eye(shots.masses.size)
     before = unit[None, moving] if single else shots.before[:, None, :]
 
-    def solve(points: Points, change: Vector | float = 0.0) -> Vector:
-        return points.outcomes(shots.types, shots.masses, before + change)
+    def solve(changed: Values, change: Vector | float = 0.0) -> Vector:
+        return outcomes(shots.types, shots.masses, before + change, {**values, **changed})
 
-    outcome = solve(points)
-    slopes = np.zeros((*outcome.shape, len(uncertain)))
+    outcome = solve({})
+    slopes = [np.zeros_like(outcome)] * len(uncertain)
     for k, (key, sigma) in enumerate(uncertain):
         if key in pair_keys(shots.types):
-            e = points.restitution[key]
-            up, down = min(1.0, e + sigma) - e, max(0.0, e - sigma) - e
-            above, below = (
-                solve(Points({**points.restitution, key: e + step}, points.ratios))
-                for step in (up, down)
-            )
-            slopes[..., k] = (above - below) / (up - down)
+            low, high = max(0.0, values[key] - sigma), min(1.0, values[key] + sigma)
+            slopes[k] = (solve({key: high}) - solve({key: low})) / (high - low)
     if single:
         # Homogeneous of degree one: the slope with the striker's velocity is the outcome itself.
         speed, error = (v[:, moving, None] for v in (shots.before, shots.sigma_before))
-        return outcome * speed, slopes * speed[..., None], (outcome * error)[..., None]
-    measured = np.flatnonzero((shots.sigma_before > 0).any(axis=0))
-    movers = np.zeros((*outcome.shape, measured.size))
-    for k, ball in enumerate(measured):
+        return outcome * speed, np.stack([outcome * error, *(s * speed for s in slopes)], axis=-1)
+    movers = []
+    for ball in np.flatnonzero((shots.sigma_before > 0).any(axis=0)):
         error = shots.sigma_before[:, ball, None, None]
         step = unit[ball] * error.max()
-        movers[..., k] = (solve(points, step) - solve(points, -step)) / (2 * error.max()) * error
-    return outcome, slopes, movers
+        movers.append((solve({}, step) - solve({}, -step)) / (2 * error.max()) * error)
+    return outcome, np.stack([*movers, *slopes, outcome], axis=-1)[..., :-1]
 
 
 def normal_equations(
-    shots: ShotSet, points: Points, uncertain: Uncertain
+    shots: ShotSet, values: Values, uncertain: Uncertain
 ) -> tuple[Vector, Vector, Vector]:
     """Chi-square at the nominal restitution, its slope and curvature, profiled over `before`.
 
     Of restitution changed by d it is chi_square - 2 slope d + d curvature d.
     """
-    outcome, slopes, movers = responses(shots, points, uncertain)
+    outcome, changes = responses(shots, values, uncertain)
+    measured = changes.shape[-1] - len(uncertain)
+    movers, slopes = changes[..., :measured], changes[..., measured:]
     residual = shots.after[:, None, :] - outcome
     columns = np.concatenate([residual[..., None], slopes], axis=-1)
     weight = (1.0 / shots.sigma**2)[:, None, :, None]
     products = np.einsum("kpni,kpnj->pij", columns, columns * weight)
     weighted = movers * weight
-    inner = np.einsum("kpnm,kpnl->kpml", movers, weighted) + np.eye(weighted.shape[-1])
+    inner = np.einsum("kpnm,kpnl->kpml", movers, weighted) + np.eye(measured)
     cross = np.einsum("kpnm,kpni->kpmi", weighted, columns)
     products -= np.einsum("kpmi,kpmj->pij", cross, np.linalg.solve(inner, cross))
     return products[:, 0, 0], products[:, 0, 1:], products[:, 1:, 1:]
 
 
-def chi_squares(sets: Sequence[ShotSet], points: Points, uncertain: Uncertain) -> Vector:
+def chi_squares(sets: Sequence[ShotSet], values: Values, uncertain: Uncertain) -> Vector:
     """Chi-square of all shots at each point, profiled over restitution and velocities before."""
-    size = max((values.size for values in points.ratios.values()), default=1)
+    size = max(np.size(value) for value in values.values())
     found = []
     for begin in range(0, size, _CHUNK):
-        ratios = {key: values[begin : begin + _CHUNK] for key, values in points.ratios.items()}
-        some = Points(points.restitution, ratios)
+        some = {key: value[begin : begin + _CHUNK] if np.size(value) == size > 1 else value
+                for key, value in values.items()}  # fmt: skip
         parts = zip(*(normal_equations(one, some, uncertain) for one in sets), strict=True)
         totals: list[Any] = [sum(part) for part in parts]
         chi_square, slope, curvature = totals

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from cradle.models.batch import post_impact_velocities
 
 #: A parameter: the types of two balls (restitution, in alphabetical order) or of three (ratio).
 Key = tuple[str, ...]
+#: Parameters at P points: of shape (P,), or a number for all points.
+Values = Mapping[Key, Any]
 
 
 def label(key: Key) -> str:
@@ -46,27 +48,16 @@ def triplet_keys(types: Sequence[str]) -> tuple[list[Key], list[Key]]:
     return forward, [key[::-1] for key in forward]
 
 
-def ratio_keys(types: Sequence[str]) -> set[Key]:
-    """Return the ratio parameters of a chain, of both ways, each once."""
-    forward, backward = triplet_keys(types)
-    return {*forward, *backward}
+def fitted_keys(types: Sequence[str]) -> set[Key]:
+    """Return what shots of a chain are fitted for: of a pair its restitution, else both ratios."""
+    return set(pair_keys(types)) if len(types) == 2 else set().union(*triplet_keys(types))
 
 
-@dataclass(frozen=True, eq=False)
-class Points:
-    """P parameter points at which chains are solved: of shape (P,), or one value for all."""
-
-    restitution: Mapping[Key, float | Vector]
-    ratios: Mapping[Key, Vector]
-
-    def outcomes(self, types: Sequence[str], masses: Vector, velocities: Vector) -> Vector:
-        """Solve a chain at all points; `velocities` (..., 1, N) -> (..., P, N)."""
-        forward, backward = triplet_keys(types)
-        # No triplet in a pair: one point.
-        size = max((self.ratios[key].size for key in forward), default=1)
-        ratios = [
-            np.stack([self.ratios[key] for key in keys], axis=-1) if keys else np.zeros((size, 0))
-            for keys in (forward, backward)
-        ]
-        e = np.stack([self.restitution[key] for key in pair_keys(types)], axis=-1)
-        return post_impact_velocities(masses, velocities, e, *ratios, excess="saturate")
+def outcomes(types: Sequence[str], masses: Vector, velocities: Vector, values: Values) -> Vector:
+    """Solve a chain at P points; velocities (..., 1, N) -> (..., P, N)."""
+    e, forward, backward = (
+        np.stack(np.broadcast_arrays(*(values[key] for key in keys)), axis=-1)
+        if keys else np.zeros((1, 0))
+        for keys in (pair_keys(types), *triplet_keys(types))
+    )  # fmt: skip
+    return post_impact_velocities(masses, velocities, e, forward, backward, excess="saturate")

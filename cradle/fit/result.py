@@ -12,10 +12,10 @@ import numpy as np
 from cradle.fit.answers import FOLDED, Estimate, Group, Prediction
 from cradle.fit.parameters import (
     Key,
-    Points,
+    fitted_keys,
     label,
+    outcomes,
     pair_keys,
-    ratio_keys,
     triplet_keys,
     types_in_a_row,
 )
@@ -94,22 +94,17 @@ class Fit:
 
     def expected(self, shots: ShotSet) -> Vector | None:
         """Return the velocities after the shots of a set by the best parameters, shape (K, N)."""
-        values = {one.key: one.value for one in self.estimates.values()}
-        e = {key: values.get(key, self.given.get(label(key), (None,))[0])
-             for key in pair_keys(shots.types)}  # fmt: skip
         acting = {key for group in self.groups for key in group.keys}
-        ratios = {}
-        for key in ratio_keys(shots.types):
-            value = self.known.get(label(key), values.get(key))
-            if value is None and (key in acting or key not in values):
-                return None
-            ratios[key] = np.array([value or 0.0])  # one without effect may have any value
-        known = {key: value for key, value in e.items() if value is not None}
-        if len(known) < len(e):
+        best: dict[str, float | None] = {name: value for name, (value, _) in self.given.items()}
+        for name, one in self.estimates.items():
+            idle = one.kind == "ratio" and one.key not in acting  # it may have any value
+            best[name] = 0.0 if one.value is None and idle else one.value
+        best |= self.known
+        keys = [*pair_keys(shots.types), *fitted_keys(shots.types)]
+        values = {key: best.get(label(key)) for key in keys}
+        if None in values.values():
             return None
-        return Points(known, ratios).outcomes(shots.types, shots.masses, shots.before[:, None])[
-            :, 0
-        ]
+        return outcomes(shots.types, shots.masses, shots.before[:, None], values)[:, 0]
 
     def correlations(self) -> dict[tuple[str, str], float]:
         """Return how the errors of ratios that were fitted together go with one another.
@@ -129,11 +124,9 @@ class Fit:
         """
         found = {}
         for group in self.groups:
-            weights = group.weights * np.exp(-0.5 * group.excess)
-            spread = np.atleast_2d(np.cov(group.points.T, aweights=weights))
-            matrix = spread / np.sqrt(np.outer(np.diag(spread), np.diag(spread)))
-            for i, j in combinations(range(len(group.keys)), 2):
-                found[label(group.keys[i]), label(group.keys[j])] = float(matrix[i, j])
+            for (i, one), (j, other) in combinations(enumerate(map(label, group.keys)), 2):
+                spread = np.cov(group.points[:, [i, j]].T, aweights=group.density)
+                found[one, other] = float(spread[0, 1] / np.sqrt(spread[0, 0] * spread[1, 1]))
         return found
 
     def summary(self) -> str:
@@ -163,12 +156,11 @@ class Fit:
             f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}, "
             f"chance {self.probability:.2g}"
         )
-        for (a, b), value in self.correlations().items():
-            lines.append(f"correlation of {a} and {b}: {value:.2f}")
+        lines += [f"correlation of {a} and {b}: {value:.2f}"
+                  for (a, b), value in self.correlations().items()]  # fmt: skip
         fitted = {one.key for one in self.estimates.values()}
         for shots in self.shots.sets:
-            own = pair_keys(shots.types) if len(shots.types) == 2 else ratio_keys(shots.types)
-            expected = self.expected(shots) if fitted & set(own) else None
+            expected = self.expected(shots) if fitted & fitted_keys(shots.types) else None
             if expected is None:
                 continue
             share = shots.sigma_before / np.where(shots.before, np.abs(shots.before), 1.0)
@@ -246,19 +238,15 @@ class Fit:
         Returns
         -------
         Prediction
-            Spread by the errors of the ratios and of the coefficients of restitution; a ratio that
-            the data left open takes all values up to its bound.
+            Spread by the errors of ratios and coefficients of restitution, drawn independently of
+            each other; ratios fitted together are drawn together, and one that the data left open
+            takes all values up to its bound.
 
         Raises
         ------
         ValueError
             If fewer than 2 balls are named, or the mass of a type, the coefficient of restitution
             of a pair or the ratio of a triplet (or of its reverse) is neither fitted nor given.
-
-        Notes
-        -----
-        Ratios that were fitted together are drawn together.  Ratios and coefficients of
-        restitution are drawn independently, though the ones were fitted with the others.
 
         Examples
         --------
@@ -276,34 +264,30 @@ class Fit:
                 there = ", ".join(masses)
                 raise ValueError(f"no mass is known of type {kind!r}; there are {there}")
         balls, before = np.array([masses[kind] for kind in row]), speed * np.eye(1, len(row))
-        velocities = self._draws(row).outcomes(row, balls, before)
+        velocities = outcomes(row, balls, before, self._draws(row))
         ends = [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2]
         lower, median, upper = np.quantile(velocities, ends, axis=0)
         return Prediction(row, median, lower, upper)
 
-    def _draws(self, types: tuple[str, ...]) -> Points:
+    def _draws(self, types: tuple[str, ...]) -> dict[Key, Vector]:
         """Draw coefficients of restitution and ratios of a chain from what was fitted."""
         random = np.random.default_rng(0)
-        restitution: dict[Key, float | Vector] = {}
+        values: dict[Key, Vector] = {}
         given = {**self.given, **self.values()}
         for key in dict.fromkeys(pair_keys(types)):
             if label(key) not in given:
                 raise ValueError(f"the coefficient of restitution of {label(key)} is not known")
             value, error = given[label(key)]
-            restitution[key] = np.clip(value + error * random.standard_normal(_DRAWS), 0.0, 1.0)
-        ratios: dict[Key, Vector] = {}
+            values[key] = np.clip(value + error * random.standard_normal(_DRAWS), 0.0, 1.0)
         for group in self.groups:
-            ratios.update(zip(group.keys, group.draw(random.random(_DRAWS)).T, strict=True))
-        forward, backward = triplet_keys(types)
-        for key in forward + backward:
+            values.update(zip(group.keys, group.draw(random.random(_DRAWS)).T, strict=True))
+        for key in (key for keys in triplet_keys(types) for key in keys if key not in values):
             name = label(key)
-            if key in ratios:
-                continue
             if name in self.known:
-                ratios[key] = np.full(_DRAWS, self.known[name])
+                values[key] = np.full(_DRAWS, self.known[name])
             elif name in self.estimates:
-                ratios[key] = self.estimates[name].bound * random.random(_DRAWS)
+                values[key] = self.estimates[name].bound * random.random(_DRAWS)
             else:
                 there = ", ".join(n for n, e in self.estimates.items() if e.kind == "ratio")
                 raise ValueError(f"the ratio of {name} is not known; fitted: {there or 'none'}")
-        return Points(restitution, ratios)
+        return values

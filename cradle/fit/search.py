@@ -18,8 +18,6 @@ from cradle.input.values import Vector
 LEVEL = 0.95
 RISE = 3.841458820694124
 
-# Finer grids: points of each, and how many.  Together they narrow a cell by 20^4.
-_FINE, _ROUNDS = 41, 4
 # Points of a grid in several dimensions that go on to the next finer one.
 _KEPT = 600
 # Points inside the confidence set that make its ends known to a small part of its width.
@@ -28,7 +26,6 @@ _ENOUGH = 400
 _CELLS = {2: 61, 3: 21, 4: 11, 5: 7, 6: 5}
 
 Function = Callable[[Vector], Vector]
-Intervals = tuple[tuple[float, float], ...]
 
 
 class Mode(NamedTuple):
@@ -50,59 +47,38 @@ class Scan(NamedTuple):
     """Chi-square of one parameter: its minima, the confidence set, its excess at points tried."""
 
     modes: tuple[Mode, ...]
-    intervals: Intervals
+    intervals: tuple[tuple[float, float], ...]
     grid: Vector
     excess: Vector
 
 
 def scan(function: Function, grid: Vector) -> tuple[Scan, float]:
-    """Search one dimension: grid, then polish every minimum and every end of the confidence set."""
+    """Search one dimension: a grid, then walk to each minimum and each end of the set."""
+    from scipy.optimize import brentq
+
     values = function(grid)
-    padded = np.concatenate([[np.inf], values, [np.inf]])
-    # The first point of a level stretch stands for it.
-    lows = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
-    minima = sorted((_polished(function, grid, int(k)) for k in lows), key=lambda pair: pair[1])
-    lowest = minima[0][1]
-    modes = tuple(Mode(x, y - lowest) for x, y in minima if _is_minimum(x, y, values, grid))
-    excess = values - lowest
+    padded = np.pad(values, 1, constant_values=np.inf)
+    # The first point of a level stretch stands for it, unless its steps are those of rounding.
+    lows = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:])).tolist()
+    lows = [k for k in lows if values[k] == values.min() or
+            values[max(k - 3, 0) : k + 4].max() > values[k] + 1e-9 * max(1.0, values[k])]  # fmt: skip
+    starts, steps = grid[lows, None], np.gradient(grid)[lows, None]
+    points, minima, lowest = _walked(lambda p: function(p[:, 0]), starts, steps, grid[-1:])
+    modes = tuple(Mode(float(x), y) for x, y in zip(points[:, 0], minima, strict=True))
     # Minima narrower than a cell of the grid count too.
-    extra = [mode for mode in modes if mode.excess <= RISE]
-    x = np.concatenate([grid, [mode.value for mode in extra]])
-    order = np.argsort(x, kind="stable")
-    x = x[order]
-    inside = np.concatenate([excess, [mode.excess for mode in extra]])[order] <= RISE
-    ends = [x[0]] * bool(inside[0])
-    ends += [_crossing(function, x[k : k + 2], lowest) for k in np.flatnonzero(np.diff(inside))]
-    ends = [float(end) for end in ends + [x[-1]] * bool(inside[-1])]
+    extra = np.array([mode for mode in modes if mode.excess <= RISE])
+    x, at = np.unique(np.concatenate([grid, extra[:, 0]]), return_index=True)
+    excess = values - lowest
+    inside = np.concatenate([[False], np.append(excess, extra[:, 1])[at] <= RISE, [False]])
+
+    def over(at: float) -> float:
+        return float(function(np.array([at]))[0]) - lowest - RISE
+
+    def end(k: int) -> float:
+        return float(x[k - (k > 0)] if k in (0, x.size) else brentq(over, x[k - 1], x[k]))
+
+    ends = [end(k) for k in np.flatnonzero(np.diff(inside)).tolist()]
     return Scan(modes, tuple(zip(ends[::2], ends[1::2], strict=True)), grid, excess), lowest
-
-
-def _is_minimum(x: float, y: float, values: Vector, grid: Vector) -> bool:
-    """Tell a minimum from rounding on a level stretch of chi-square."""
-    near = np.abs(np.arange(grid.size) - np.searchsorted(grid, x)) <= 3
-    return bool(values[near].max() - y > 1e-9 * max(1.0, abs(y))) or bool(y == values.min())
-
-
-def _polished(function: Function, grid: Vector, at: int) -> tuple[float, float]:
-    """Return a minimum next to a grid point, by finer and finer grids between its neighbours."""
-    low, high = grid[max(at - 1, 0)], grid[min(at + 1, grid.size - 1)]
-    best, value = float(grid[at]), np.inf
-    for _ in range(_ROUNDS):
-        fine = np.union1d(np.linspace(low, high, _FINE), [best])
-        values = function(fine)
-        k = int(np.argmin(values))
-        best, value = float(fine[k]), float(values[k])
-        low, high = fine[max(k - 1, 0)], fine[min(k + 1, fine.size - 1)]
-    return best, value
-
-
-def _crossing(function: Function, ends: Vector, lowest: float) -> float:
-    """Return where chi-square passes `RISE` above its lowest value, between two points."""
-    for _ in range(_ROUNDS):
-        fine = np.linspace(ends[0], ends[1], _FINE)
-        k = np.flatnonzero(np.diff(function(fine) - lowest <= RISE))[0]
-        ends = fine[k : k + 2]
-    return 0.5 * float(ends[0] + ends[1])
 
 
 def refine(function: Function, upper: Vector) -> tuple[list[Scan], Vector, Vector, float]:
@@ -117,57 +93,52 @@ def refine(function: Function, upper: Vector) -> tuple[list[Scan], Vector, Vecto
             "at a time: add shots of fewer balls, or fix some by known="
         )
     step = upper / _CELLS[size]
-    centres = [s * (np.arange(_CELLS[size]) + 0.5) for s in step]
-    points = np.array(list(product(*centres)))
+    points = np.array(list(product(*(s * (np.arange(_CELLS[size]) + 0.5) for s in step))))
     halves = np.array(list(product((-0.25, 0.25), repeat=size)))
     while True:
         values = function(points)
+        order = np.argsort(values, kind="stable")
         inside = values - values.min() <= RISE
         if np.count_nonzero(inside) >= _ENOUGH or (step < 1e-6 * upper).all():
             break
-        best = points[np.argsort(values, kind="stable")[:_KEPT]]
-        points = (best[:, None, :] + halves * step).reshape(-1, size)
+        points = (points[order[:_KEPT], None, :] + halves * step).reshape(-1, size)
         step = step / 2
-    minima = sorted(
-        (_descended(function, point, step, upper) for point in _lows(points, values, step)),
-        key=lambda pair: pair[1],
-    )
-    lowest = minima[0][1]
+    # Points that no neighbour undercuts, among those near the lowest.
+    some = order[:1500][values[order[:1500]] - values.min() <= 4 * RISE]
+    near = np.all(np.abs(points[some, None] - points[None, some]) < 1.5 * step, axis=-1)
+    lower = values[some][None, :] < values[some][:, None]
+    lows = points[some[~np.any(near & lower, axis=1)]]
+    best, minima, lowest = _walked(function, lows, np.broadcast_to(step, lows.shape), upper)
     excess = values - lowest
-    low = excess <= 4 * RISE
     scans = []
     for axis, bound in enumerate(upper.tolist()):
-        modes = tuple(Mode(float(point[axis]), value - lowest) for point, value in minima)
         # The confidence set, to about a step.
         places, half = np.unique(points[excess <= RISE, axis]), 0.5 * step[axis]
-        places = places if places.size else minima[0][0][axis : axis + 1]
+        places = places if places.size else best[:1, axis]
         parts = np.split(places, np.flatnonzero(np.diff(places) > 3.0 * half) + 1)
-        ends = [(float(part[0] - half), float(part[-1] + half)) for part in parts]
-        order = np.argsort(points[low, axis])
-        scans.append(Scan(modes, tuple((max(0.0, a), min(b, bound)) for a, b in ends),
-                          points[low, axis][order], excess[low][order]))  # fmt: skip
+        ends = [(max(0.0, float(part[0] - half)), min(float(part[-1] + half), bound))
+                for part in parts]  # fmt: skip
+        low = [k for k in np.argsort(points[:, axis]) if excess[k] <= 4 * RISE]
+        modes = tuple(Mode(float(x), y) for x, y in zip(best[:, axis], minima, strict=True))
+        scans.append(Scan(modes, tuple(ends), points[low, axis], excess[low]))
     return scans, points, excess, lowest
 
 
-def _lows(points: Vector, values: Vector, step: Vector) -> Vector:
-    """Return the points that no neighbour undercuts, among those near the lowest."""
-    some = np.argsort(values, kind="stable")[:1500]
-    some = some[values[some] - values[some[0]] <= 4 * RISE]
-    near = np.all(np.abs(points[some, None] - points[None, some]) < 1.5 * step, axis=-1)
-    lower = values[some][None, :] < values[some][:, None]
-    return np.asarray(points[some[~np.any(near & lower, axis=1)]])
+def _walked(
+    function: Function, points: Vector, steps: Vector, upper: Vector
+) -> tuple[Vector, list[float], float]:
+    """Walk from each point to a minimum by the best of its neighbours, with smaller steps.
 
-
-def _descended(
-    function: Function, point: Vector, step: Vector, upper: Vector
-) -> tuple[Vector, float]:
-    """Walk to the minimum by the best of all neighbours, with smaller and smaller steps."""
-    moves = np.array(list(product((-1.0, 0.0, 1.0), repeat=point.size)))
+    Returns the minima, lowest first, their excess, and the lowest value.
+    """
+    moves = np.array(list(product((0.0, -1.0, 1.0), repeat=upper.size)))
     for _ in range(40):
-        around = np.clip(point + moves * step, 0.0, upper)
-        values = function(around)
-        k = int(np.argmin(values))
-        if not moves[k].any() or (around[k] == point).all():
-            step = step / 2
-        point, value = around[k], float(values[k])
-    return point, value
+        around = np.clip(points[:, None] + moves * steps[:, None], 0.0, upper)
+        values = function(around.reshape(-1, upper.size)).reshape(len(points), -1)
+        best = around[np.arange(len(points)), np.argmin(values, axis=1)]
+        steps = np.where((best == points).all(axis=1, keepdims=True), steps / 2, steps)
+        points = best
+    minima = values.min(axis=1)
+    order = np.argsort(minima, kind="stable")
+    lowest = float(minima[order[0]])
+    return points[order], (minima[order] - lowest).tolist(), lowest

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cradle.fit.answers import Estimate
-from cradle.fit.parameters import pair_keys, ratio_keys
+from cradle.fit.parameters import fitted_keys
 from cradle.fit.result import Fit
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
@@ -57,7 +57,7 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
         _, axes = plt.subplots(2, 1, figsize=(5.6, 7), layout="constrained")
     draw_likelihood(estimate, axes[0])
     for one in fit.shots.sets:
-        if estimate.key in (pair_keys(one.types) if len(one.types) == 2 else ratio_keys(one.types)):
+        if estimate.key in fitted_keys(one.types):
             _draw_data(fit, one, axes[1])
             break
     else:
