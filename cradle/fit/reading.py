@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -28,30 +27,18 @@ OPTIONAL = {
     "sigma_before": "standard error of `before`; if left out, sigma for a moving ball, 0 at rest",
 }
 
-_MASS_UNITS = {"kg": 1.0, "g": 1e-3}
-_VELOCITY_UNITS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}
-# What no ball of a cradle is likely to exceed, and what to say then: the unit is probably another.
-_LIKELY = {
-    "mass": (5.0, "kg", "grams: say mass_unit='g'", "mass_unit='kg'"),
-    "before": (20.0, "m/s", "cm/s: say velocity_unit='cm/s'", "velocity_unit='m/s'"),
+# Units, the first if none is told; what no ball of a cradle is likely to exceed, and another unit
+# that such a number may be in.
+_UNITS: dict[str, tuple[dict[str, float], float, str, str]] = {
+    "mass_unit": ({"kg": 1.0, "g": 1e-3}, 5.0, "grams", "g"),
+    "velocity_unit": ({"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}, 20.0, "cm/s", "cm/s"),
 }
-_LIKELY["after"] = _LIKELY["before"]
 _ABOVE = "must be above 0"
 # A defect of a measurement counts from so many standard errors on.
 _BEYOND = 5.0
 
-
-class _Row(NamedTuple):
-    set: str
-    shot: str
-    ball: int
-    type: str
-    mass: float
-    before: float
-    after: float
-    sigma: float
-    sigma_before: float
-    where: str
+# A row: the cells by column, in kg and m/s, and under "where" its place in the source.
+_Row = dict[str, Any]
 
 
 def read_shots(
@@ -115,19 +102,13 @@ def read_shots(
         if "sigma" in there:
             raise ValueError(f"sigma = {sigma!r}; the table has a column sigma: leave out one of "
                              "them")  # fmt: skip
-    scale = (_MASS_UNITS[one_of("mass_unit", mass_unit or "kg", list(_MASS_UNITS))],
-             _VELOCITY_UNITS[one_of("velocity_unit", velocity_unit or "m/s",
-                                    list(_VELOCITY_UNITS))])  # fmt: skip
-    rows = [_row(where, line, scale, sigma) for where, line in lines]
-    for name, (limit, unit, other, same) in _LIKELY.items():
-        given = mass_unit if name == "mass" else velocity_unit
-        for row in rows:
-            if given is None and abs(value := getattr(row, name)) > limit:
-                rule = f"is it in {other} (or in {unit} indeed: say {same})"
-                _refuse(row.where, name, f"{value:g} {unit} is unlikely; {rule}")
+    units = {"mass_unit": mass_unit, "velocity_unit": velocity_unit}
+    for option, unit in units.items():
+        one_of(option, unit or next(iter(_UNITS[option][0])), list(_UNITS[option][0]))
     groups: dict[str, dict[str, list[_Row]]] = {}
-    for row in rows:
-        groups.setdefault(row.set, {}).setdefault(row.shot, []).append(row)
+    for where, line in lines:
+        row = _row(where, line if sigma is None else {**line, "sigma": sigma}, units)
+        groups.setdefault(row["set"], {}).setdefault(row["shot"], []).append(row)
     return Shots(tuple(_shot_set(name, shots) for name, shots in groups.items()))
 
 
@@ -135,76 +116,89 @@ def _refuse(where: str, column: str, words: str) -> NoReturn:
     raise ValueError(f"{where}, column {column}: {words}") from None
 
 
-def _row(where: str, line: dict[str, Any], scale: tuple[float, float], sigma: float | None) -> _Row:
+def _row(where: str, line: dict[str, Any], units: dict[str, str | None]) -> _Row:
     """Return one row in kg and m/s."""
 
-    def number(name: str, rule: str = "must be finite", low: float = -np.inf) -> float:
+    def number(
+        name: str, unit: str = "", rule: str = "must be finite", low: float = -np.inf
+    ) -> float:
         place = f"{where}, column {name}"
         try:
             value = float(line[name])
         except (TypeError, ValueError):
             raise ValueError(f"{place} = {line[name]!r}; must be a number") from None
-        return one_number(place, value, rule, low, open_low=rule == _ABOVE)
+        value = one_number(place, value, rule, low, open_low=rule == _ABOVE)
+        if not unit:
+            return value
+        scales, limit, other, short = _UNITS[unit]
+        usual = next(iter(scales))
+        value *= scales[units[unit] or usual]
+        if units[unit] is None and abs(value) > limit and "sigma" not in name:
+            _refuse(where, name, f"{value:g} {usual} is unlikely; is it in {other}: say "
+                    f"{unit}={short!r} (or in {usual} indeed: say {unit}={usual!r})")  # fmt: skip
+        return value
 
-    ball, mass = number("ball"), number("mass", _ABOVE, 0.0) * scale[0]
+    row: _Row = {name: str(line[name]).strip() for name in ("set", "shot", "type")}
+    ball = number("ball")
     if ball < 1 or ball != int(ball):
         _refuse(where, "ball", f"{line['ball']!r}; must be 1, 2, ... from the left")
-    before, after = number("before") * scale[1], number("after") * scale[1]
-    error = scale[1] * (number("sigma", _ABOVE, 0.0) if sigma is None else float(sigma))
-    earlier = error if before else 0.0
+    row |= {"where": where, "ball": int(ball), "mass": number("mass", "mass_unit", _ABOVE, 0.0)}
+    row |= {name: number(name, "velocity_unit") for name in ("before", "after")}
+    row["sigma"] = number("sigma", "velocity_unit", _ABOVE, 0.0)
+    row["sigma_before"] = row["sigma"] if row["before"] else 0.0
     if line.get("sigma_before") not in (None, ""):
-        earlier = scale[1] * number("sigma_before", "must be at least 0", 0.0)
-    group, shot, kind = (str(line[name]).strip() for name in ("set", "shot", "type"))
-    return _Row(group, shot, int(ball), kind, mass, before, after, error, earlier, where)
+        rule = "must be at least 0"
+        row["sigma_before"] = number("sigma_before", "velocity_unit", rule, 0.0)
+    return row
 
 
 def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
     """Put the rows of a set together; all its shots have the same balls."""
-    table = [sorted(rows, key=lambda row: row.ball) for rows in shots.values()]
+    table = [sorted(rows, key=lambda row: row["ball"]) for rows in shots.values()]
     first = table[0]
     for (shot, given), rows in zip(shots.items(), table, strict=True):
-        places, what = [row.ball for row in rows], f"set {name}, shot {shot} has"
+        places, what = [row["ball"] for row in rows], f"set {name}, shot {shot}"
         if len(rows) < 2 or places != list(range(1, len(rows) + 1)):
-            _refuse(given[0].where, "ball", f"{what} balls {places}; each shot needs 1, 2, ... N, "
-                                            "each once, N >= 2")  # fmt: skip
+            _refuse(given[0]["where"], "ball", f"{what} has balls {places}; each shot needs "
+                    "1, 2, ... N, each once, N >= 2")  # fmt: skip
         if len(rows) != len(first):
-            _refuse(rows[0].where, "ball", f"{what} {len(rows)} balls; the first shot of the set "
-                                           f"has {len(first)}")  # fmt: skip
-        for row, model in zip(rows, first, strict=True):
+            _refuse(rows[0]["where"], "ball", f"{what} has {len(rows)} balls; the first shot of "
+                    f"the set has {len(first)}")  # fmt: skip
+        for row, usual in zip(rows, first, strict=True):
             for column in ("type", "mass"):
-                value, usual = getattr(row, column), getattr(model, column)
-                if value != usual:
-                    words = f"{value!r}; ball {row.ball} of set {name} has {usual!r} elsewhere"
-                    _refuse(row.where, column, words)
-        _check_physics(f"set {name}, shot {shot}", rows)
-    types = "".join(row.type for row in first)
+                if row[column] != usual[column]:
+                    _refuse(row["where"], column, f"{row[column]!r}; ball {row['ball']} of set "
+                            f"{name} has {usual[column]!r} elsewhere")  # fmt: skip
+        _check_physics(what, rows)
+    types = "".join(row["type"] for row in first)
     rest = name.removeprefix(types)
     if rest != name and rest.isalpha() and rest.isupper():  # all other names are free
-        _refuse(first[0].where, "set", f"set {name} has the balls {types} alone; is the row of "
+        _refuse(first[0]["where"], "set", f"set {name} has the balls {types} alone; is the row of "
                 f"ball {len(first) + 1} missing?  If not, give the set another name")  # fmt: skip
-    values = {
-        column: np.array([[getattr(row, column) for row in rows] for rows in table])
-        for column in ("before", "after", "sigma", "sigma_before")
-    }
-    masses = np.array([row.mass for row in first])
-    return ShotSet(name, tuple(row.type for row in first), tuple(shots), masses, **values)
+    columns = (np.array([[row[column] for row in rows] for rows in table])
+               for column in ("before", "after", "sigma", "sigma_before"))  # fmt: skip
+    kinds, masses = zip(*((row["type"], row["mass"]) for row in first), strict=True)
+    return ShotSet(name, kinds, tuple(shots), np.array(masses), *columns)
 
 
 def _check_physics(what: str, rows: list[_Row]) -> None:
     """Raise if no balls approach, balls pass through each other, or energy is gained."""
-    if all(a.before <= b.before for a, b in pairwise(rows)):
-        _refuse(rows[0].where, "before", f"{what}: no balls approach")
-    for left, right in pairwise(rows):
-        if left.after - right.after > _BEYOND * np.hypot(left.sigma, right.sigma):
-            _refuse(right.where, "after", f"{what}: ball {left.ball} at {left.after:g} m/s "
-                    f"would pass through ball {right.ball} at {right.after:g} m/s")  # fmt: skip
-    gain = sum(0.5 * r.mass * (r.after**2 - r.before**2) for r in rows)
-    error = np.sqrt(sum(
-        r.mass**2 * ((r.after * r.sigma) ** 2 + (r.before * r.sigma_before) ** 2) for r in rows
-    ))  # fmt: skip
+    mass, before, after, sigma, earlier = np.array(
+        [[row[name] for name in ("mass", "before", "after", "sigma", "sigma_before")]
+         for row in rows]
+    ).T  # fmt: skip
+    if (np.diff(before) >= 0).all():
+        _refuse(rows[0]["where"], "before", f"{what}: no balls approach")
+    through = -np.diff(after) > _BEYOND * np.hypot(sigma[:-1], sigma[1:])
+    if through.any():
+        k = int(np.argmax(through))
+        _refuse(rows[k + 1]["where"], "after", f"{what}: ball {k + 1} at {after[k]:g} m/s "
+                f"would pass through ball {k + 2} at {after[k + 1]:g} m/s")  # fmt: skip
+    gain = 0.5 * (mass * (after**2 - before**2)).sum()
+    error = np.sqrt((mass**2 * ((after * sigma) ** 2 + (before * earlier) ** 2)).sum())
     if gain > _BEYOND * error:
-        share = gain / sum(0.5 * r.mass * r.before**2 for r in rows)
+        share = gain / (0.5 * mass * before**2).sum()
         raise ValueError(
-            f"{rows[0].where}, columns before and after: {what} gains {100 * share:.3g} % of its "
-            f"energy, {gain / error:.3g} standard errors; check units, signs and sigma"
+            f"{rows[0]['where']}, columns before and after: {what} gains {100 * share:.3g} % of "
+            f"its energy, {gain / error:.3g} standard errors; check units, signs and sigma"
         )

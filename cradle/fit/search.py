@@ -59,9 +59,9 @@ def scan(function: Function, grid: Vector) -> tuple[Scan, float]:
     values = function(grid)
     padded = np.pad(values, 1, constant_values=np.inf)
     # The first point of a level stretch stands for it, unless its steps are those of rounding.
-    lows = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:])).tolist()
-    lows = [k for k in lows if values[k] == values.min() or
-            values[max(k - 3, 0) : k + 4].max() > values[k] + 1e-9 * max(1.0, values[k])]  # fmt: skip
+    lows = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
+    rises = np.array([values[max(k - 3, 0) : k + 4].max() - values[k] for k in lows])
+    lows = lows[(values[lows] == values.min()) | (rises > 1e-9 * np.maximum(1.0, values[lows]))]
     starts, steps = grid[lows, None], np.gradient(grid)[lows, None]
     points, minima, lowest = _walked(lambda p: function(p[:, 0]), starts, steps, grid[-1:])
     modes = tuple(Mode(float(x), y) for x, y in zip(points[:, 0], minima, strict=True))

@@ -16,9 +16,8 @@ class ShotSet:
     Attributes
     ----------
     name : str
-        The set's name.
     types : tuple of str, length N
-        Types of the balls, left to right.
+        Left to right.
     shots : tuple of str, length K
         Names of the shots.
     masses : ndarray, shape (N,)
@@ -90,12 +89,7 @@ class ShotSet:
 
 @dataclass(frozen=True, eq=False)
 class Shots:
-    """Measured shots of one or several arrangements.
-
-    Attributes
-    ----------
-    sets : tuple of ShotSet
-        In the order of the table.
+    """Measured shots of one or several arrangements: `sets`, in the order of the table.
 
     Examples
     --------
@@ -129,15 +123,6 @@ class Shots:
 
     def without(self, *names: str) -> Shots:
         """Return the shots less some sets: what is not to be fitted, but to be predicted.
-
-        Parameters
-        ----------
-        names : str
-            Of the sets to leave out.
-
-        Returns
-        -------
-        Shots
 
         Raises
         ------
