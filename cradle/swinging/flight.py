@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -17,7 +17,8 @@ from cradle.swinging.pendulums import TIE, Hanging, mean
 # Below this part of its largest value a derivative is a rounding error.
 _ROUNDING = 1e-11
 _RTOL = 1e-12
-_MOST_STEPS = 1_000_000
+# Of the polynomials: the next term of a swing in a radian is below 1e-17.
+_DEGREE = 14
 
 
 class Meeting(NamedTuple):
@@ -50,20 +51,20 @@ def _first_balls(together: Sequence[bool]) -> list[int]:
 def first_fall(
     level: float, terms: Sequence[tuple[complex, complex]], parting: bool, horizon: float
 ) -> float:
-    """Return when ``level + sum Re(C exp(rate t))`` first falls to zero.
+    """Return when ``level + sum Re(C exp(rate t))`` first falls to zero; if parting it starts there.
 
-    One term without decay, or about the level zero, has a root in closed form.  Otherwise the
-    search marches from below: with a bound K on the second derivative from now on, the parabola
-    ``f + f' h - K h^2 / 2`` lies below the function, so a step to its root passes no root of the
-    function.  Near a crossing this is Newton's method.
+    One term without decay, or about the level zero, has a root in closed form; one with decay has
+    turning points in closed form, and its first minimum is the lowest.
     """
     terms = [(c, rate) for c, rate in terms if c != 0.0]
     if not terms:
         return math.inf
-    if len(terms) == 1 and (level == 0.0 or terms[0][1].real == 0.0):
-        c, rate = terms[0]
-        if parting:
-            c = complex(-level, -abs(c.imag))
+    if len(terms) > 1:
+        return _search(level, terms, parting, horizon)
+    ((c, rate),) = terms
+    if parting:
+        c = complex(-level, -abs(c.imag))
+    if level == 0.0 or rate.real == 0.0:
         if level >= abs(c):
             return math.inf
         angle = math.acos(max(-level / abs(c), -1.0))
@@ -74,88 +75,62 @@ def first_fall(
             if wait > 2.0 * math.pi - TIE:
                 wait = 0.0
         return wait / rate.imag
-    return _march(level, terms, parting, horizon)
+
+    def value(time: float) -> float:
+        return level + (c * cmath.exp(rate * time)).real
+
+    low = (-0.5 * math.pi - cmath.phase(c * rate)) % (2.0 * math.pi) / rate.imag
+    high = max(low - math.pi / rate.imag, 0.0)
+    if value(low) >= -4e-16 * (abs(level) + abs(c)):
+        return math.inf
+    if value(high) <= 0.0:
+        return high
+    from scipy.optimize import brentq  # slow to import
+
+    return float(brentq(value, high, low, xtol=1e-16, rtol=1e-15))
 
 
-def _march(
+def _search(
     level: float, terms: Sequence[tuple[complex, complex]], parting: bool, horizon: float
 ) -> float:
-    size = sum(abs(c) for c, _ in terms)
-    decay = min(-rate.real for _, rate in terms)
-    bounds = _Bounds(terms)
-    time = min(_first_step(terms, bounds), bounds.radian) if parting else 0.0
-    for _ in range(_MOST_STEPS):
-        left = math.exp(-decay * time)
-        if time > horizon or size * left < level:
-            return math.inf
-        waves = [(c, rate, cmath.exp(rate * time)) for c, rate in terms]
-        if parting:  # f(0) = 0: the difference from the start keeps its digits
-            value = sum((c * complex(np.expm1(rate * time))).real for c, rate in terms)
-            noise = 4e-16 * bounds.plain[0] * time
-        else:
-            value = level + sum((c * wave).real for c, _, wave in waves)
-            noise = 4e-16 * (abs(level) + size)
-        slope, *higher = (
-            sum((c * rate**n * wave).real for c, rate, wave in waves) for n in (1, 2, 3)
-        )
-        if value <= noise and (slope < 0.0 or value < -noise):
-            return time
-        second, *others = (left * bound for bound in bounds.after(time))
-        value = max(value, noise)
-        root = math.sqrt(slope * slope + 2.0 * second * value)
-        step = (root + slope) / second if slope > 0.0 else 2.0 * value / (root - slope)
-        # Where it rises more and more, the next terms of Taylor's series carry further.
-        for order, (derivative, bound) in enumerate(zip(higher, others, strict=True), start=2):
-            if min(slope, derivative) < 0.0:
-                break
-            step = max(step, (order + 1) * derivative / bound)
-        # Next to the root a step can be too small for the last digit of the time.
-        time = max(time + min(step, bounds.radian), math.nextafter(time, math.inf))
-    raise RuntimeError(f"no end of the search for a meeting after {_MOST_STEPS} steps")
+    """Return the same by all roots of polynomials that follow a radian to the last digit."""
+    c, rate = np.array(terms).T
+    size, radian = np.abs(c), 1.0 / float(np.abs(rate).max())
+    if (left := float(size.sum())) > level > 0.0 > (decay := float(rate.real.max())):
+        horizon = min(horizon, math.log(level / left) / decay)  # from then on it stays above zero
+
+    def value(time: Vector) -> Vector:
+        return np.asarray(level + (np.exp(np.multiply.outer(time, rate)) @ c).real)
+
+    def rise(time: Vector) -> Vector:  # from a start at zero, over the time: without that root
+        return np.asarray((np.expm1(np.multiply.outer(time, rate)) @ c).real * radian / time)
+
+    # How far it may lie below its values at points an eighth of a radian apart.
+    dip = float(size @ np.abs(rate) ** 2) * (radian / 8.0) ** 2 / 8.0
+    noise = 4e-16 * (abs(level) + left)
+    for block in np.arange(0.0, horizon, 64.0 * radian).tolist():
+        told = value(block + radian / 8.0 * np.arange(513))
+        told[0] *= block > 0.0 or not parting
+        least = np.minimum(told[1:], told[:-1]).reshape(64, 8).min(axis=1)
+        for k in np.flatnonzero(least <= dip).tolist():
+            begin, end = block + k * radian, block + (k + 1) * radian
+            told_by = rise if parting and end == radian else value
+            marks = np.array([begin, *_roots(told_by, begin, end), end])
+            below = told_by(0.5 * (marks[1:] + marks[:-1])) < -noise
+            if below.any():
+                # A contact that is to part and does not closes a moment later.
+                return float(marks[below.argmax()]) or TIE * radian * parting
+    return math.inf
 
 
-class _Bounds:
-    """Bounds on the derivatives of ``sum Re(C exp(rate t))``, without their decay.
+def _roots(value: Callable[[Vector], Vector], begin: float, end: float) -> Vector:
+    """Return the roots in a radian of a function that a polynomial follows there."""
+    from numpy.polynomial import Chebyshev  # not all need it, and it is slow to import
 
-    Two bodies that swing nearly alike have nearly opposite C and nearly equal rates.  What is left
-    of them is ``(C + C') exp(rate t) + C' (exp(rate' t) - exp(rate t))``, and the last bracket is
-    at most ``abs(rate' - rate) t``.
-    """
-
-    def __init__(self, terms: Sequence[tuple[complex, complex]]) -> None:
-        #: Of derivatives 1 to 4 at any time; `now` and `growth` are of derivatives 2 to 4.
-        self.plain = [sum(abs(c) * abs(rate) ** n for c, rate in terms) for n in range(1, 5)]
-        self.now, self.growth = self.plain[1:], [0.0] * 3
-        #: What a step may not exceed.
-        self.radian = 1.0 / abs(terms[0][1])
-        if len(terms) == 2:
-            orders, ((one, rate), (other, near)) = range(2, 5), terms
-            self.now = [
-                abs(one + other) * abs(rate) ** n + abs(other) * abs(near**n - rate**n)
-                for n in orders
-            ]
-            self.growth = [abs(other) * abs(rate) ** n * abs(near - rate) for n in orders]
-
-    def after(self, time: float) -> list[float]:
-        """Return bounds on derivatives 2 to 4 from `time` on, for a radian."""
-        until = time + self.radian
-        return [
-            min(plain, now + growth * until)
-            for plain, now, growth in zip(self.plain[1:], self.now, self.growth, strict=True)
-        ]
-
-
-def _first_step(terms: Sequence[tuple[complex, complex]], bounds: _Bounds) -> float:
-    """Return a step that passes no root, for a function that rises from exactly zero.
-
-    If its first derivative that is not zero is the n-th, d, and the next one is at most K, the
-    function stays above d h^n / n! - K h^(n+1) / (n+1)!, so up to h = (n + 1) d / K.
-    """
-    for order, bound in enumerate(bounds.after(0.0), start=1):
-        derivative = sum((c * rate**order).real for c, rate in terms)
-        if derivative > _ROUNDING * bounds.plain[order - 1]:
-            return (order + 1) * derivative / bound
-    return TIE / max(abs(rate) for _, rate in terms)
+    near = Chebyshev.interpolate(value, _DEGREE, (begin, end))
+    roots = near.trim(1e-15 * np.abs(near.coef).max()).roots()
+    real = roots.real[roots.imag == 0.0]
+    return np.sort(real[(begin < real) & (real < end)])
 
 
 class _Bodies(NamedTuple):
