@@ -14,7 +14,9 @@ import numpy as np
 from cradle.input.values import Vector
 from cradle.swinging.pendulums import TIE, Hanging, mean
 
-# Below this part of its largest value a derivative is a rounding error.
+#: Of each contact, whether its balls touch and move together, or touch and part.
+Marks = tuple[bool, ...]
+# Below this part of what it is made of a force is a rounding error.
 _ROUNDING = 1e-11
 _RTOL = 1e-12
 # Of the polynomials: the next term of a swing in a radian is below 1e-17.
@@ -32,17 +34,6 @@ class Meeting(NamedTuple):
     releasing: list[int]
 
 
-class Start(NamedTuple):
-    """All that a flight needs to know of its start."""
-
-    positions: Vector
-    velocities: Vector
-    #: Of each contact, whether its balls touch and move together.
-    together: tuple[bool, ...]
-    #: Of each contact, whether its balls touch and part.
-    parting: list[bool]
-
-
 def _first_balls(together: Sequence[bool]) -> list[int]:
     """Return the first ball of each body: balls that move together are one."""
     return [0, *(c + 1 for c, one in enumerate(together) if not one)]
@@ -51,7 +42,7 @@ def _first_balls(together: Sequence[bool]) -> list[int]:
 def first_fall(
     level: float, terms: Sequence[tuple[complex, complex]], parting: bool, horizon: float
 ) -> float:
-    """Return when ``level + sum Re(C exp(rate t))`` first falls to zero; if parting it starts there.
+    """Return when ``level + sum Re(C exp(rate t))`` falls to zero; parting, it starts there.
 
     One term without decay, or about the level zero, has a root in closed form; one with decay has
     turning points in closed form, and its first minimum is the lowest.
@@ -174,10 +165,11 @@ class SmallAngleFlight:
     A ball swings alone as x'' = -w^2 x - 2 d x'.  Balls that rest against each other are one body.
     """
 
-    def __init__(self, hanging: Hanging, state: Start) -> None:
-        self.state, self.tie = state, hanging.tie
-        self.bodies = _bodies(hanging, state.together)
-        x, v = state.positions.tolist(), state.velocities.tolist()
+    def __init__(
+        self, hanging: Hanging, x: Vector, v: Vector, together: Marks, parting: Marks
+    ) -> None:
+        self.together, self.parting, self.tie = together, parting, hanging.tie
+        self.bodies, x, v = _bodies(hanging, together), x.tolist(), v.tolist()
         #: Of each ball.
         self.amplitude: list[complex] = []
         for first, count, lowest, rate in self.bodies.each:
@@ -187,7 +179,7 @@ class SmallAngleFlight:
 
     def next_meeting(self, horizon: float) -> Meeting:
         """Return the first event within `horizon` seconds."""
-        together, rates = self.state.together, self.bodies.rate.tolist()
+        together, rates = self.together, self.bodies.rate.tolist()
         times = [
             (self._release if one else self._meeting)(c, rates, horizon)
             for c, one in enumerate(together)
@@ -205,7 +197,7 @@ class SmallAngleFlight:
         """Return when the gap of contact c closes."""
         (one, other), (rate, near) = self.amplitude[c : c + 2], rates[c : c + 2]
         terms = [(other - one, rate)] if rate == near else [(other, near), (-one, rate)]
-        return first_fall(self.bodies.gaps[c], terms, self.state.parting[c], horizon)
+        return first_fall(self.bodies.gaps[c], terms, self.parting[c], horizon)
 
     def _release(self, c: int, rates: list[complex], horizon: float) -> float:
         """Return when the force in contact c, whose balls move together, falls to zero."""
@@ -229,54 +221,59 @@ class FullFlight:
     angle: steps of a quarter of that miss none, and balls that part do not meet before.
     """
 
-    def __init__(self, hanging: Hanging, state: Start) -> None:
-        self.state, self.hanging, self.gravity = state, hanging, hanging.gravity
+    def __init__(
+        self, hanging: Hanging, x: Vector, v: Vector, together: Marks, parting: Marks
+    ) -> None:
+        self.gravity, self.tie = hanging.gravity, hanging.tie
         self.length, self.damping = float(hanging.length[0]), float(hanging.damping[0])
-        self.first = _first_balls(state.together)
-        #: The number of each ball's body.
-        self.body = np.cumsum([0, *(not one for one in state.together)])
-        self.start = np.concatenate([state.positions[self.first], state.velocities[self.first]])
+        self.half = math.pi / math.sqrt(hanging.fastest**2 - self.damping**2)
+        first = _first_balls(together)
+        #: The number of each ball's body, and the contact before each body but the first.
+        self.body, self.contacts = np.cumsum([0, *(not one for one in together)]), first[1:]
+        self.start = np.concatenate([x[first], v[first]])
+        self.waits = [self.half * (1.0 - TIE) * parting[ball - 1] for ball in self.contacts]
 
     def _rate(self, _: float, y: Vector) -> Vector:
         x, v = np.split(y, 2)
         return np.concatenate([v, -self.gravity * np.sin(x / self.length) - 2.0 * self.damping * v])
 
     def _integrate(self, begin: float, y: Vector, end: float, **options: Any) -> Any:
-        # SciPy is slow to import, and only pendulums of any angle need it here.
-        from scipy.integrate import solve_ivp
+        from scipy.integrate import solve_ivp  # slow to import, and only needed here
 
-        scale = max(float(np.abs(self.start).max()), 1e-300)
-        tolerances = {"rtol": _RTOL, "atol": _RTOL * scale}
-        found = solve_ivp(self._rate, (begin, end), y, "DOP853", **tolerances, **options)
+        least = _RTOL * max(float(np.abs(self.start).max()), 1e-300)
+        known = {"method": "DOP853", "rtol": _RTOL, "atol": least}
+        found = solve_ivp(self._rate, (begin, end), y, **known, **options)
         if found.status < 0:
             raise RuntimeError(f"the integration of the pendulums failed: {found.message}")
         return found
 
     def next_meeting(self, horizon: float) -> Meeting:
         """Return the first event within `horizon` seconds."""
-        half = math.pi / math.sqrt(self.hanging.fastest**2 - self.damping**2)
-        contacts = [ball - 1 for ball in self.first[1:]]
-        waits = [half * (1.0 - TIE) * self.state.parting[c] for c in contacts]
 
         def gap(k: int) -> Any:
             def event(t: float, y: Vector) -> float:
                 # At the start a gap is open, or its balls are about to meet.
-                return float(y[k + 1] - y[k]) if t > waits[k] else 1.0
+                return float(y[k + 1] - y[k]) if t > self.waits[k] else 1.0
 
             vars(event).update(terminal=True, direction=-1)
             return event
 
-        events = [gap(k) for k in range(len(contacts))]
-        found = self._integrate(0.0, self.start, horizon, events=events, max_step=half / 4.0)
+        events = [gap(k) for k in range(len(self.contacts))]
+        step = self.half / 4.0
+        found = self._integrate(0.0, self.start, horizon, events=events, max_step=step)
         if found.status == 0:
             return Meeting(math.inf, [], [])
         time, (x, v) = float(found.t[-1]), np.split(found.y[:, -1], 2)
-        soon = (np.diff(x) + self.hanging.tie * np.diff(v) <= 0.0) & (time > np.array(waits))
+        soon = (np.diff(x) + self.tie * np.diff(v) <= 0.0) & (time > np.array(self.waits))
         met = [len(times) > 0 for times in found.t_events]
-        return Meeting(time, [c for c, now in zip(contacts, met | soon, strict=True) if now], [])
+        closing = [b - 1 for b, now in zip(self.contacts, met | soon, strict=True) if now]
+        return Meeting(time, closing, [])
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
-        """Return positions and velocities at T times since the start, shapes (T, N)."""
+        """Return positions and velocities at T times since the start, shapes (T, N).
+
+        SciPy's interpolation is not exact enough.
+        """
         found, begin, y = [], 0.0, self.start
         for time in times.tolist():
             if time > begin:

@@ -26,18 +26,13 @@ class Impact(NamedTuple):
     Impact(time=0.5, contacts=(0,), before=[1, 0], after=[0, 1])
     """
 
-    #: s since the release.
-    time: float
+    time: float  #: s since the release
     #: Contacts that took part: they touched, and their stretch had an approaching one.
     contacts: tuple[int, ...]
-    #: Where the balls were, shape (N,), m.
-    positions: Vector
-    #: Velocities just before, shape (N,), m/s.
-    before: Vector
-    #: Velocities just after, shape (N,), m/s.
-    after: Vector
-    #: What the contacts kept back, J.
-    energy_loss: float
+    positions: Vector  #: where the balls were, shape (N,), m
+    before: Vector  #: velocities just before, shape (N,), m/s
+    after: Vector  #: velocities just after, shape (N,), m/s
+    energy_loss: float  #: what the contacts kept back, J
     #: The path of each chain that collided, from left to right; a long one is cut, and its
     #: `Trace.left_out` tells.
     traces: tuple[Trace, ...]

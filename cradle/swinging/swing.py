@@ -26,7 +26,7 @@ from cradle.input.values import (
     whole_number,
 )
 from cradle.models import Model, collide
-from cradle.swinging.flight import FullFlight, Meeting, SmallAngleFlight, Start
+from cradle.swinging.flight import FullFlight, Meeting, SmallAngleFlight
 from cradle.swinging.pendulums import TIE, Hanging, Pendulums, mean
 from cradle.swinging.record import Impact, Swing
 from cradle.swinging.resting import NEAR, RESTING, common_velocities, pressed, stretches
@@ -63,8 +63,8 @@ def swing(
         the right.  No ball may overlap its neighbour, nor be beyond `Pendulums.reach`: a quarter
         of a circle, or half a circle with ``angle="full"``.
     times : array_like, shape (T,)
-        When to report positions and velocities, s since the release; rising, from 0 on.  The run
-        ends at the last one, at the latest.
+        When to report positions and velocities, s since the release; rising, from 0 on; the run
+        ends at the last one, if not before.
     pendulums : Pendulums, optional
         How the balls hang; small angles, 0.1 m, no gaps, no damping if left out.
     max_impacts : int
@@ -79,16 +79,13 @@ def swing(
 
     Raises
     ------
-    TypeError
+    TypeError, ImpactNotFinished
         As `collide`.
     ValueError
         If a value is wrong, balls overlap, or the model cannot treat an impact.
-    ImpactNotFinished
-        If an impact takes more steps than the model allows.
     RuntimeError
-        If contacts open and close again and again at one instant, so that the run cannot go on; or
-        if balls would pass each other, or energy or momentum come from nothing or be lost: every
-        flight and every instant is checked.
+        If contacts open and close without end at one instant; or if balls would pass each other, or
+        energy or momentum come from nothing or be lost: every flight and every instant is checked.
 
     Examples
     --------
@@ -113,20 +110,12 @@ def swing(
     least = one_number("min_energy", min_energy, "must lie in [0, 1]", 0.0, 1.0)
     run = _Run(chain, model, hanging, checked("positions", positions))
     ended = run.to_the_end(at, most, least)
-    found = at[: sum(len(x) for x, _ in run.series)]
-    certify(run, found)
-    return Swing(
-        chain=chain,
-        model=model,
-        pendulums=hanging,
-        times=found,
-        positions=np.concatenate([x for x, _ in run.series]),
-        velocities=np.concatenate([v for _, v in run.series]),
-        impacts=tuple(run.impacts),
-        ended=ended,
-        end=run.t,
-        together=tuple(np.flatnonzero(run.together).tolist()),
-    )
+    x, v = (np.concatenate(parts) for parts in zip(*run.series, strict=True))
+    found = at[: len(x)]
+    certify(run, found, x, v)
+    together = tuple(np.flatnonzero(run.together).tolist())
+    told = tuple(run.impacts), ended, run.t, together
+    return Swing(chain, model, hanging, found, x, v, *told)
 
 
 class _Run:
@@ -141,10 +130,8 @@ class _Run:
         reach = pendulums.reach(n)
         most = "a quarter of a circle" if pendulums.angle == "small" else "half a circle"
         beyond = np.abs(x) > reach
-        if beyond.any():
-            far = reach[np.argmax(beyond)]
-            rule = f"must be within {far:.4g} m: pendulums of this length reach {most}"
-            refuse_where("positions", x, beyond, rule)
+        far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most}"
+        refuse_where("positions", x, beyond, f"must be within {far}")
         self.chain, self.hanging = chain, (hanging := Hanging(pendulums, chain.masses))
         self.model = functools.cache(functools.partial(part, model, n))
         self.offsets = functools.cache(hanging.offsets)
@@ -168,17 +155,14 @@ class _Run:
 
     def to_the_end(self, times: Vector, most: int, least: float) -> str:
         """Fly from event to event; return why the run ended."""
-        done, end = 0, float(times[-1])
+        done, end, ended = 0, float(times[-1]), "impacts"
         instant, idle = 0.0, 0  # events without an impact at one instant
         kind = SmallAngleFlight if self.hanging.small else FullFlight
-        while True:
-            if len(self.impacts) >= most:
-                ended = "impacts"
-                break
+        while len(self.impacts) < most:
             if least and self.hanging.energy(self.x, self.v) < least * self.released:
                 ended = "energy"
                 break
-            flight = kind(self.hanging, Start(self.x, self.v, self.together, self.parting))
+            flight = kind(self.hanging, self.x, self.v, self.together, self.parting)
             meeting = flight.next_meeting(end - self.t)
             later = self.t + meeting.time
             here = int(times.searchsorted(later, side="left"))
@@ -192,9 +176,9 @@ class _Run:
             known = len(self.impacts)
             self.t, self.x, self.v = later, x[0], v[0]
             self.settle(meeting)
-            if self.t - instant > self.hanging.tie or len(self.impacts) > known:
-                instant, idle = self.t, 0
             idle += 1
+            if self.t - instant > self.hanging.tie or len(self.impacts) > known:
+                instant, idle = self.t, 1
             if idle > MOST_IDLE * len(self.x):
                 raise RuntimeError(
                     f"the swing does not get beyond t = {self.t} s: contacts {meeting.closing} "
@@ -231,7 +215,7 @@ class _Run:
             least = 1e-12 * self.speed * hanging.fastest
             resting = pressed(hanging.masses, alone, resting, least)
         self.together = tuple(resting)
-        self.parting = [t and not one for t, one in zip(touching, resting, strict=True)]
+        self.parting = tuple(t and not one for t, one in zip(touching, resting, strict=True))
 
     def align(self, first: int, last: int) -> None:
         """Move balls that touch, but for rounding, to where they touch; keep their centre."""
@@ -290,7 +274,7 @@ INSTANT = 1e-10
 RADIAN = 1e-11
 
 
-def certify(run: _Run, times: Vector) -> None:
+def certify(run: _Run, times: Vector, seen_x: Vector, seen_v: Vector) -> None:
     """Demand order, momentum and energy of every flight and of every instant.
 
     How much energy an impact keeps is told by its own trace.
@@ -298,32 +282,28 @@ def certify(run: _Run, times: Vector) -> None:
     hanging, m = run.hanging, run.hanging.masses
     instants, *states = map(np.array, zip(*run.instants, strict=True))
     came, placed, v, struck, left = states
-    momenta = np.abs((left - v) @ m), INSTANT * ((np.abs(left) + np.abs(v)) @ m)
-    _demand(*momenta, instants, "impacts have made or lost {:g} kg m/s")
+    most = INSTANT * ((np.abs(left) + np.abs(v)) @ m)
+    _demand(np.abs((left - v) @ m), most, instants, "impacts have made or lost {:g} kg m/s")
     before, kept = hanging.energy(placed, struck), hanging.energy(placed, left)
     most = INSTANT * np.maximum(before, kept)
-    what = "{:g} J are made or lost beside the impacts"
-    _demand(np.abs(kept - before), most, instants, what)
+    _demand(np.abs(kept - before), most, instants, "{:g} J are made or lost beside the impacts")
     # Flights: to where they end, and to where they are looked at.
     begun = instants.searchsorted(times, side="right") - 1
     begun = np.concatenate([np.arange(len(instants) - 1), begun])
     until = np.concatenate([instants[1:], times])
-    x, v = (
-        np.concatenate([events[1:], *seen])
-        for events, seen in zip((came, v), zip(*run.series, strict=True), strict=True)
-    )
+    x, v = np.concatenate([came[1:], seen_x]), np.concatenate([v[1:], seen_v])
     worst = (x[:, :-1] - x[:, 1:] - hanging.gaps).max(axis=-1)
     _demand(worst, TIE * run.size, until, "balls overlap by {:g} m")
     gain = hanging.energy(x, v) - kept[begun]
     most = RADIAN * (1.0 + (until - instants[begun]) * hanging.fastest) * kept[begun]
-    wrong = gain if hanging.damping.any() else np.abs(gain)
-    _demand(wrong, most, until, "a flight has made or lost {:g} J", gain)
+    least = -math.inf if hanging.damping.any() else -most
+    _demand(gain, most, until, "a flight has made or lost {:g} J", least)
 
 
-def _demand(defect: Vector, most: Any, times: Vector, what: str, told: Any = None) -> None:
-    """Raise for the first of some times at which a defect is too large, or no number."""
-    sound = defect <= most
-    if not sound.all():
-        k = np.flatnonzero(~sound)[np.argmin(times[~sound])]
-        size = (defect if told is None else told)[k]
-        raise RuntimeError(f"the swing is not certified: at t = {times[k]} s {what.format(size)}")
+def _demand(gain: Vector, most: Any, times: Vector, what: str, least: Any = -math.inf) -> None:
+    """Raise for the first of some times at which something is out of its bounds, or no number."""
+    wrong = ~((least <= gain) & (gain <= most))
+    if wrong.any():
+        k = np.flatnonzero(wrong)[np.argmin(times[wrong])]
+        what = what.format(gain[k])
+        raise RuntimeError(f"the swing is not certified: at t = {times[k]} s {what}")
