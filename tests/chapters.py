@@ -59,6 +59,20 @@ class Chapter:
                 texts.append(output.data["text/plain"] + "\n")
         return "".join(texts)
 
+    def tells(self, values: dict[str, object], off: float = 0.0) -> None:
+        """Check that the text shows these values: words as they are, numbers rounded to its digits.
+
+        `off` is what the route to the values may itself be wrong by.
+        """
+        for name, value in values.items():
+            told = self.glued[name]
+            if isinstance(value, str):
+                assert told == value, name
+            else:
+                digits = re.search(r"[.](\d+)", told)
+                unit = 10.0 ** -len(digits[1] if digits else "")
+                assert abs(number(told) - value) <= (0.5 + 1e-9) * unit + off, (name, told, value)
+
 
 def code(chapter: str) -> list:
     """Return the code cells of a chapter."""
@@ -233,15 +247,25 @@ RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
 def number(text):
-    """Read a number as a sentence has it: one, 222 144, 2.2 million, 0.004, 3·10⁻⁷."""
+    """Read a number as a sentence has it: one, 222 144, −0.3, 2.2 million, 0.004, 3·10⁻⁷."""
     if text in WORDS:
         return WORDS.index(text)
-    plain = text.replace("\u202f", "").removesuffix(" million")
+    plain = text.replace("\u202f", "").replace("−", "-").removesuffix(" million")
     factor, _, power = (
         plain.rpartition("10") if set(plain) & set("⁻⁰¹²³⁴⁵⁶⁷⁸⁹") else (plain, "", "0")
     )
     scale = 1e6 if text.endswith(" million") else 10.0 ** int(power.translate(RAISED))
     return float(factor.removesuffix("·") or 1) * scale
+
+
+def numbers(text):
+    """Read all numbers with a point in a text."""
+    return [float(x) for x in re.findall(r"-?\d+\.\d*", text.replace("−", "-"))]
+
+
+def floats(values):
+    """Numbers of any kind as an array of floats."""
+    return np.array([float(x) for x in values])
 
 
 def points(ax, size=None):

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from built_book import SHARED, built
 from hypothesis import HealthCheck, settings
+from pages import launched, visiting
 
 # The same examples at every run of the same sources. Hypothesis also draws the numbers that it
 # finds in the modules loaded so far: other sources, or a part of the tests, may give others. The
@@ -95,3 +96,23 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 def html(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The pages of the book, built once for all processes."""
     return built(Path(os.environ.get(SHARED) or tmp_path_factory.mktemp("built")))
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A Chromium for the tests of one file: the loop of its driver ends before others begin."""
+    with launched() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def page(html: Path) -> str:
+    """The address of the explorer's page."""
+    return (html / "book" / "explorer.html").as_uri()
+
+
+@pytest.fixture
+def visit(browser, page: str):
+    """What opens the explorer's page, or another one."""
+    with visiting(browser, page) as visit:
+        yield visit

@@ -4,13 +4,8 @@ No test depends on how fast the machine is. Where time matters, the page gets a 
 still until the test moves it; elsewhere tests wait for a state.
 """
 
-import re
-from pathlib import Path
-
 import numpy as np
-import pytest
 from chains import random_chains, uniform
-from test_layout import PATIENCE
 
 from cradle import Chain, ImpulseCorrelation, collide
 
@@ -26,43 +21,6 @@ AT_REST = f"""async () => {{
   }}
   return false;
 }}"""
-
-
-@pytest.fixture(scope="module", name="page")
-def address_of_page(html: Path) -> str:
-    """Return the address of the explorer's page."""
-    return (html / "book" / "explorer.html").as_uri()
-
-
-@pytest.fixture(name="visit")
-def visits(request, page):
-    """Open the page; at the end: no error on the console, and no request that leaves the disk."""
-    browser = request.getfixturevalue("browser")
-    contexts, faults = [], []
-
-    def open_page(fragment="", *, address=page, width=1400, height=900, stopped=False, **options):
-        context = browser.new_context(viewport={"width": width, "height": height}, **options)
-        context.set_default_timeout(PATIENCE)
-        contexts.append(context)
-        tab = context.new_page()
-        if stopped:  # for dates, timers and frames alike; `tab.clock.run_for` lets time pass
-            tab.clock.install(time=0)
-            tab.clock.pause_at(10**6)
-        tab.on("console", lambda said: said.type == "error" and faults.append(said.text))
-        tab.on("pageerror", lambda error: faults.append(str(error)))
-        tab.on("request", lambda r: r.url.startswith(("file:", "data:")) or faults.append(r.url))
-        if address != page:
-            # A chapter: seconds go into its equations, which are not looked at here.
-            tab.route("**/tex-svg-full.js", lambda route: route.fulfill(body=""))
-        tab.goto(address + fragment)
-        if options.get("java_script_enabled", True):
-            tab.wait_for_function("globalThis.cradleExplorer?.live?.length > 0")
-        return tab
-
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert not faults
 
 
 def still(visit, fragment="", **options):
@@ -130,9 +88,3 @@ def settings(count: int):
 def middle(tab, selector: str) -> tuple[float, float]:
     box = tab.locator(selector).bounding_box()
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-
-def colour(node, name: str) -> str:
-    """Return a colour of an element as it is shown: #rrggbb."""
-    shown = node.evaluate("(node, name) => getComputedStyle(node)[name]", name)
-    return "#" + "".join(f"{int(part):02x}" for part in re.findall(r"\d+", shown)[:3])

@@ -333,7 +333,7 @@ def test_two_strikers_have_no_closed_form():
         leaders.append(after[-1])
     assert leaders[0] < leaders[1] - 0.02 < leaders[2] - 0.04
     for name, balls in (("short", 20), ("long", 100)):
-        after = solve([1.0] * balls, [1.0, 1.0] + [0.0] * (balls - 2), [1.0] * (balls - 1), 0.3)
+        after = solve([1] * balls, struck(balls, 2)[1].tolist(), 1, 0.3, number=float)
         assert float(CHAPTER.glued[f"two-{name}"]) == pytest.approx(after.velocities[-1], abs=6e-3)
 
 
@@ -342,7 +342,7 @@ def test_a_leader_predicted_from_shorter_rows():
     few, more, kept, guess, solved = (
         float(CHAPTER.glued[name]) for name in ("leader-20", "leader-40", "kept", "guess", "solved")
     )
-    after = solve([1.0] * 20, [1.0] + [0.0] * 19, [0.99] * 19, 0.3).velocities
+    after = solve([1] * 20, struck(20)[1].tolist(), 0.99, 0.3, number=float).velocities
     assert few == pytest.approx(after[-1], abs=6e-5)
     assert kept == pytest.approx((more / few) ** (1 / 20), abs=1e-4)
     assert guess == pytest.approx(more * kept**120, abs=5e-3)

@@ -1,13 +1,12 @@
 """The chapter on extremes: the numbers in its text and figures, from the maps and anew."""
 
-import csv
 import math
-from pathlib import Path
 
 import extreme_chains as x
 import numpy as np
 import pytest
-from chapters import Chapter, number, points
+from chapters import Chapter, floats, number, points
+from stored import read
 
 from cradle import (
     Chain,
@@ -20,27 +19,36 @@ from cradle import (
     post_impact_velocities,
 )
 
-ROOT = Path(__file__).parents[1]
+
+def stored(part, **equal):
+    """Rows of a stored table of the study whose columns have these values."""
+    rows = read(f"extremes_{part}.csv")
+    return [row for row in rows if all(row[name] == value for name, value in equal.items())]
 
 
-def stored(part):
-    with (ROOT / "data" / f"extremes_{part}.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+def sequence(name):
+    """One of the paper's chains as a case of the study."""
+    chain, model = paper_chain(name, excess="saturate")
+    own = chain.masses, chain.velocities, chain.restitution
+    return x.case(*own, model.forward, model.backward)
 
 
-@pytest.fixture(scope="module")
-def glued():
-    """Numbers that the text of the chapter shows."""
-    return Chapter("extremes").glued
+def first_jump(name):
+    """The nearest edge behind which the outcome jumps."""
+    jumps = [row for row in stored("edges", sequence=name) if float(row["jump"]) > 1e-8]
+    return min(jumps, key=lambda row: float(row["distance"]))
 
 
-@pytest.fixture(scope="module")
-def inventory():
-    """Numbers that the text of the appendix shows."""
-    return Chapter("extremes_inventory").glued
+def exactly(problem, which, k, value):
+    """Velocities by fifty digits with one input moved by so much."""
+    return floats(x.moved(problem, which, k, value).exact().velocities)
 
 
-def test_fig_extremes_map(glued):
+CHAPTER, APPENDIX = Chapter("extremes"), Chapter("extremes_inventory")
+glued, inventory = CHAPTER.glued, APPENDIX.glued
+
+
+def test_fig_extremes_map():
     rows = stored("map")
     assert number(glued["points"]) == 4 * len(rows)
     assert sum(int(row["faulty"]) for row in rows) == 0
@@ -52,7 +60,7 @@ def test_fig_extremes_map(glued):
     assert int(glued["thirteen"]) == round(100 * len(thirteen) / len(moving))
 
 
-def test_fig_extremes_edges(glued):
+def test_fig_extremes_edges():
     near = [row for row in stored("edges") if math.isfinite(float(row["distance"]))]
     jumps = [row for row in near if float(row["jump"]) > 1e-8]
     assert glued["jumping"] == " and ".join(sorted({row["sequence"] for row in jumps}))
@@ -66,60 +74,28 @@ def test_fig_extremes_edges(glued):
     assert float(glued["first-jump"]) == pytest.approx(100 * float(first["distance"]), abs=0.051)
 
 
-def test_jumps_behind_the_first_edge(glued):
+def test_jumps_behind_the_first_edge():
     """The stored jumps, the largest by fifty digits on both sides, and one input scanned anew."""
     rows = stored("jumps")
     assert number(glued["jumps"]) == len(rows)
     assert glued["jumping"] == " and ".join(sorted({row["sequence"] for row in rows}))
     largest = max(rows, key=lambda row: float(row["jump"]))
-    ball = int(largest["index"]) + 1
-    assert glued["largest-input"] == f"mass of ball {ball} of {largest['sequence']}"
-    chain, model = paper_chain(largest["sequence"], excess="saturate")
-    own = chain.masses, chain.velocities, chain.restitution
-    problem = x.case(*own, model.forward, model.backward)
-    scale = chain.masses[ball - 1]
-    change = float(largest["change"])
-    sides = [
-        np.array(
-            [
-                float(v)
-                for v in x.moved(problem, "masses", ball - 1, part * scale).exact().velocities
-            ]
-        )
-        for part in (change - 1e-4, change + 1e-4)
-    ]
+    name, k, change = largest["sequence"], int(largest["index"]), float(largest["change"])
+    assert glued["largest-input"] == f"mass of ball {k + 1} of {name}"
+    problem = sequence(name)
+    scale = problem.masses[k]
+    sides = [exactly(problem, "masses", k, (change + d) * scale) for d in (-1e-4, 1e-4)]
     jump = np.abs(sides[1] - sides[0]).max() / sides[0].max()
     assert 100 * jump == pytest.approx(float(glued["largest-jump"]), abs=0.1)
     assert number(glued["largest-at"]) == pytest.approx(-100 * change, abs=0.5)
-    again = x.jumps(problem, "masses", ball - 1, scale)
-    here = [
-        r
-        for r in rows
-        if (r["sequence"], r["input"], r["index"]) == (largest["sequence"], "masses", str(ball - 1))
-    ]
+    again = x.jumps(problem, "masses", k, scale)
+    here = stored("jumps", sequence=name, input="masses", index=str(k))
     assert len(again) == len(here) > 1
-    np.testing.assert_allclose(
-        again, [(float(r["change"]), float(r["jump"])) for r in here], rtol=2e-3
-    )
+    expected = [(float(r["change"]), float(r["jump"])) for r in here]
+    np.testing.assert_allclose(again, expected, rtol=2e-3)
 
 
-def test_fig_extremes_jump():
-    """The two branches on either side of the nearest jump, solved anew with fifty digits."""
-    rows = [row for row in stored("edges") if row["sequence"] == "BCACBA"]
-    edge = min(
-        (row for row in rows if float(row["jump"]) > 1e-8), key=lambda row: float(row["distance"])
-    )
-    chain, model = paper_chain("BCACBA", excess="saturate")
-    own = chain.masses, chain.velocities, chain.restitution
-    problem = x.case(*own, model.forward, model.backward)
-    name, k = edge["input"], int(edge["index"])
-    value = getattr(problem, name)[k] * float(edge["distance"]) * float(edge["side"])
-    sides = [x.moved(problem, name, k, value * (1 + s)).exact().velocities for s in (-1e-3, 1e-3)]
-    size = max(abs(a - b) for a, b in zip(*sides)) / max(map(abs, sides[0]))
-    assert float(size) == pytest.approx(float(edge["jump"]), rel=0.05)
-
-
-def test_fig_extremes_count(glued, inventory):
+def test_fig_extremes_count():
     rows = [row for row in stored("elastic") if float(row["ratio"]) == 0]
     most = max(rows, key=lambda row: int(row["impacts"]))
     assert number(glued["most"]) == int(most["impacts"])
@@ -172,7 +148,7 @@ def test_no_jump_lies_within_the_last_digit_of_a_ratio():
     assert 0.002 < most < 0.003  # the text: some thousandths, near a bound (DAD in CDADB)
 
 
-def test_fig_extremes_edge(glued):
+def test_fig_extremes_edge():
     """The border by the closed form, by the eigenvalues of the cycle, and by the solver."""
     for row in stored("limits"):
         if float(row["ratio"]) == 0:
@@ -202,7 +178,7 @@ def test_fig_extremes_edge(glued):
     assert number(glued["border-most"]) == max(made)
 
 
-def test_fig_extremes_growth(glued):
+def test_fig_extremes_growth():
     rows = stored("growth")
     uneven = [r for r in rows if float(r["spread"]) > 0]
     amplified = max(float(r["largest"]) / float(r["size"]) for r in uneven)
@@ -225,7 +201,7 @@ def test_fig_extremes_growth(glued):
             assert r["size"] in ("1e-12", "1e-09")
 
 
-def test_fig_extremes_unequal(glued, figures):
+def test_fig_extremes_unequal():
     rows = stored("unequal")
     families = list(dict.fromkeys(r["family"] for r in rows))
     for name, family, balls, ratio in (
@@ -237,7 +213,7 @@ def test_fig_extremes_unequal(glued, figures):
             r for r in rows if (r["family"], r["balls"], r["ratio"]) == (family, balls, ratio)
         )
         assert glued[f"jump-{name}"] == f"{row['jumps']} of 24 rows"
-    for ax, family in zip(figures["fig-extremes-unequal"].axes, families, strict=True):
+    for ax, family in zip(CHAPTER.figures["fig-extremes-unequal"].axes, families, strict=True):
         shown = np.concatenate([np.asarray(b.lines[0].get_ydata(), float) for b in ax.containers])
         expected = [float(r["median"]) for r in rows if r["family"] == family]
         np.testing.assert_allclose(np.sort(shown), np.sort(expected))
@@ -258,38 +234,42 @@ def test_table_of_cost():
     again = collide(Chain([1, 1, 1], [1, 0, 0], 1), SpringChain(1.0, accuracy=1e-8))
     assert again.evaluations == pytest.approx(int(spring["evaluations"]), rel=0.1)
     # A cell of the table is the best of its row: the event solver needs least, nearly everywhere.
-    table = Chapter("extremes_inventory").cells["inventory-11"].outputs[0].data["text/plain"]
+    table = APPENDIX.cells["inventory-11"].outputs[0].data["text/plain"]
     assert len(table.splitlines()) == 2 + len(x.POINTS)
 
 
-def test_table_of_unfinished_chains(inventory):
-    rows, never = stored("finish"), stored("unfinished")
-    assert number(inventory["hundred"]) == sum(int(r["chains"]) for r in rows)
-    assert number(inventory["unfinished"]) == len(never)
-    assert number(inventory["periodic"]) == sum(int(r["period"]) > 0 for r in never)
-    assert number(inventory["spent"]) == sum(float(r["energy"]) < 1e-12 for r in never)
-    assert number(inventory["fewest"]) == min(int(r["balls"]) for r in never)
-    left = [r["family"] for r in never if r["finished"] == "0"]
-    for pattern in ("nested", "cycle", "irregular"):
-        found = [r for r in never if r["finished"] == "0" and r["late_pattern"] == pattern]
-        assert number(inventory[f"late-{pattern}"]) == len(found)
-    predicted = [float(r["late_predicted"]) for r in never if r["finished"] == "0"]
-    kinds = [number(inventory[f"late-{k}"].split()[0]) for k in ("soon", "later", "never")]
-    bounds = np.searchsorted(sorted(predicted), [1e8, math.inf])
-    assert np.cumsum(kinds).tolist() == [*bounds, len(left)]
-    for family in ("within", "saturate"):
-        assert number(inventory[f"rest-{family}"]) == left.count(family)
+def test_table_of_unfinished_chains():
+    never = stored("unfinished")
+    left, done = stored("unfinished", finished="0"), stored("unfinished", finished="1")
+    families, patterns = ([r[c] for r in left] for c in ("family", "late_pattern"))
+    still_open, predicted = (
+        np.sort(floats(r[c] for r in left)) for c in ("open", "late_predicted")
+    )
+    soon, later = np.searchsorted(predicted, [1e8, math.inf])
+    claims = {
+        "hundred": sum(int(r["chains"]) for r in stored("finish")),
+        "unfinished": len(never),
+        "periodic": sum(int(r["period"]) > 0 for r in never),
+        "spent": sum(float(r["energy"]) < 1e-12 for r in never),
+        "fewest": min(int(r["balls"]) for r in never),
+        "late-soon": soon,
+        "late-later": later - soon,
+        "late-never": len(left) - later,
+    }
+    claims |= {f"late-{kind}": patterns.count(kind) for kind in ("nested", "cycle", "irregular")}
+    claims |= {f"rest-{family}": families.count(family) for family in ("within", "saturate")}
+    for name, limit in (("six", 1e-6), ("three", 1e-3), ("one", 0.1)):
+        claims[f"decided-{name}"] = decided = np.searchsorted(still_open, limit, side="right")
+        assert 0 < decided < len(left)
+    found = {name: number(inventory[name].split(" ")[0]) for name in claims}
+    assert found == claims
     # Half of the last digit; where it is just half, either way.
     assert number(inventory["rest-share"]) == pytest.approx(len(left) / 1000, abs=0.005 + 1e-9)
-    still_open = sorted(float(r["open"]) for r in never if r["finished"] == "0")
-    for name, limit in (("six", 1e-6), ("three", 1e-3), ("one", 0.1)):
-        decided = np.searchsorted(still_open, limit, side="right")
-        assert 0 < number(inventory[f"decided-{name}"]) == decided < len(left)
-    done = [int(r["collisions"]) for r in never if r["finished"] == "1"]
-    assert number(inventory["default-most"]) == pytest.approx(max(done), rel=0.05)
+    most = max(int(r["collisions"]) for r in done)
+    assert number(inventory["default-most"]) == pytest.approx(most, rel=0.05)
 
 
-def test_exercises(glued):
+def test_exercises():
     """Masses 1, 1/4, 1: tan of the angle is 3/4, and 180 / 36.87 is 4.88; a border by trace."""
     assert math.sqrt(0.25 * 2.25) == 0.75
     assert number(glued["quarter"]) == math.ceil(math.pi / math.atan(0.75)) - 1 == 4
@@ -301,38 +281,33 @@ def test_exercises(glued):
 
 def test_cells_show_what_they_claim():
     """Verdicts that a cell prints or tabulates, read back from the stored page."""
-    page = Chapter("extremes_inventory")
-    assert page.printed("inventory-13").count("same digits") == 2
-    assert page.printed("inventory-05").count(": below ") == 2
-    invariants = page.cells["inventory-03"].outputs[-1].data["text/plain"]
+    assert APPENDIX.printed("inventory-13").count("same digits") == 2
+    assert APPENDIX.printed("inventory-05").count(": below ") == 2
+    invariants = APPENDIX.cells["inventory-03"].outputs[-1].data["text/plain"]
     assert invariants.count("never above") == 4
-    elastic = page.cells["inventory-07"].outputs[-1].data["text/plain"]
+    elastic = APPENDIX.cells["inventory-07"].outputs[-1].data["text/plain"]
     assert elastic.count("yes") == 3
-    lines = Chapter("extremes").printed("extremes-19").splitlines()
+    lines = CHAPTER.printed("extremes-19").splitlines()
     for line, light in zip(lines, (1e-1, 1e-3, 1e-5), strict=True):
         walls = math.ceil(math.pi / math.atan(math.sqrt(light * (2 + light)))) - 1
         assert line.endswith(f"wedge {walls}, solver {walls}")
 
 
-@pytest.fixture(scope="module")
-def figures():
-    return Chapter("extremes").figures
-
-
-def test_fig_extremes_growth_as_drawn(figures):
+def test_fig_extremes_growth_as_drawn():
     rows = stored("growth")
-    for ax, spread in zip(figures["fig-extremes-growth"].axes, (0.0, 0.1), strict=True):
-        here = [r for r in rows if float(r["spread"]) == spread]
-        keys = sorted({(float(r["restitution"]), float(r["size"])) for r in here})
-        for line, key in zip(points(ax), keys, strict=True):
-            some = [r for r in here if (float(r["restitution"]), float(r["size"])) == key]
-            expected = [(float(r["balls"]), max(float(r["largest"]), 1e-15)) for r in some]
-            np.testing.assert_allclose(line, expected, rtol=1e-12)
+    for ax, spread in zip(CHAPTER.figures["fig-extremes-growth"].axes, (0.0, 0.1), strict=True):
+        lines = {}
+        for r in rows:
+            if float(r["spread"]) == spread:
+                line = lines.setdefault((float(r["restitution"]), float(r["size"])), [])
+                line.append((float(r["balls"]), max(float(r["largest"]), 1e-15)))
+        for line, key in zip(points(ax), sorted(lines), strict=True):
+            np.testing.assert_allclose(line, lines[key], rtol=1e-12)
 
 
-def test_fig_extremes_map_as_drawn(figures):
+def test_fig_extremes_map_as_drawn():
     """Each cell of the right column is the worst excess of its rows; left: the digits."""
-    axes = figures["fig-extremes-map"].axes[:8]
+    axes = CHAPTER.figures["fig-extremes-map"].axes[:8]
     rows = stored("map")
     kinds = list(dict.fromkeys(row["ratio"] for row in rows))
     powers = sorted({float(row["power"]) for row in rows})
@@ -363,8 +338,8 @@ def test_fig_extremes_map_as_drawn(figures):
                     assert math.isnan(digits[i, j])
 
 
-def test_fig_extremes_edges_as_drawn(figures):
-    (ax,) = figures["fig-extremes-edges"].axes
+def test_fig_extremes_edges_as_drawn():
+    (ax,) = CHAPTER.figures["fig-extremes-edges"].axes
     near = [row for row in stored("edges") if math.isfinite(float(row["distance"]))]
     names = [label.get_text() for label in ax.get_yticklabels()]
     harmless, jumps = (line for line in points(ax) if len(line) > 2)
@@ -376,29 +351,24 @@ def test_fig_extremes_edges_as_drawn(figures):
         np.testing.assert_allclose(sorted(map(tuple, drawn)), expected, rtol=1e-12)
 
 
-def test_fig_extremes_jump_as_drawn(figures):
+def test_fig_extremes_jump_as_drawn():
     """Points of both branches by the reference solver; the step between them is the stored jump."""
-    (ax,) = figures["fig-extremes-jump"].axes
+    (ax,) = CHAPTER.figures["fig-extremes-jump"].axes
     name = ax.get_title()
-    rows = [r for r in stored("edges") if r["sequence"] == name and float(r["jump"]) > 1e-8]
-    edge = min(rows, key=lambda row: float(row["distance"]))
+    edge, problem = first_jump(name), sequence(name)
     first, second = (line for line in points(ax) if len(line) > 2)
-    chain, model = paper_chain(name, excess="saturate")
-    own = chain.masses, chain.velocities, chain.restitution
-    problem = x.case(*own, model.forward, model.backward)
     which, k = edge["input"], int(edge["index"])
     ball = int(ax.get_ylabel().split()[3].rstrip(",")) - 1
     for line in (first[0], first[50], first[-1], second[0], second[40], second[-1]):
         value = getattr(problem, which)[k] * line[0] / 100
-        solved = x.moved(problem, which, k, value).exact().velocities
-        assert line[1] == pytest.approx(float(solved[ball]), abs=1e-9)
+        assert line[1] == pytest.approx(exactly(problem, which, k, value)[ball], abs=1e-9)
     step = abs(second[0, 1] - first[-1, 1])
-    largest = max(collide(chain, model).velocities)
+    largest = max(collide(*paper_chain(name, excess="saturate")).velocities)
     assert step / largest == pytest.approx(float(edge["jump"]), rel=0.1)
 
 
-def test_fig_extremes_count_and_edge_as_drawn(figures):
-    (ax,) = figures["fig-extremes-count"].axes
+def test_fig_extremes_count_and_edge_as_drawn():
+    (ax,) = CHAPTER.figures["fig-extremes-count"].axes
     rows = [r for r in stored("elastic") if float(r["ratio"]) == 0]
     wedge, counted, _ = points(ax)
     for row, at, one in zip(rows, wedge, counted, strict=True):
@@ -406,7 +376,7 @@ def test_fig_extremes_count_and_edge_as_drawn(figures):
         walls = math.ceil(math.pi / math.atan(math.sqrt(light * (2 + light)))) - 1
         assert at == pytest.approx((light, walls), abs=1.001)
         assert one == pytest.approx((light, int(row["impacts"])))
-    (ax,) = figures["fig-extremes-edge"].axes
+    (ax,) = CHAPTER.figures["fig-extremes-edge"].axes
     theory, *found = points(ax)
     for e, border in theory[::30]:
         assert border == pytest.approx(x.infinite_below(e), rel=1e-9)

@@ -5,9 +5,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from chains import uniform
-from chapters import Chapter, number
+from chapters import Chapter, floats, number
 from scipy.optimize import brentq
-from test_book_n_balls import outcome
+from test_book_n_balls import READINGS, outcome
 from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequences
@@ -67,26 +67,24 @@ def test_eqs_1_to_4_leave_one_unknown():
     ]
 
 
+def both_solvers(ratio):
+    """Three equal elastic balls by the independent solver and by the package."""
+    yield floats(solve([1, 1, 1], [1, 0, 0], 1, ratio).velocities)
+    yield collide(EQUAL, ImpulseCorrelation(ratio)).velocities
+
+
 def test_eq_5_fused_rest():
     first, rest = elastic(Fraction(1), Fraction(1), Fraction(2), Fraction(0))
-    expected = [float(x) for x in (first, rest, rest)]
-    for velocities in (
-        solve([1, 1, 1], [1, 0, 0], 1, "0.5").velocities,
-        collide(EQUAL, ImpulseCorrelation(0.5)).velocities,
-    ):
-        np.testing.assert_allclose([float(v) for v in velocities], expected, rtol=0, atol=1e-14)
+    for velocities in both_solvers(0.5):
+        np.testing.assert_allclose(velocities, floats((first, rest, rest)), rtol=0, atol=1e-14)
     assert f"({first}, {rest}, {rest})" in CHAPTER.printed("sympy-answers")
 
 
 def test_eq_6_sequential():
     v1, v2 = elastic(Fraction(1), Fraction(1), Fraction(1), Fraction(0))
     v2, v3 = elastic(Fraction(1), v2, Fraction(1), Fraction(0))
-    expected = [float(x) for x in (v1, v2, v3)]
-    for velocities in (
-        solve([1, 1, 1], [1, 0, 0], 1, 0).velocities,
-        collide(EQUAL, ImpulseCorrelation(0)).velocities,
-    ):
-        np.testing.assert_allclose([float(v) for v in velocities], expected, rtol=0, atol=1e-14)
+    for velocities in both_solvers(0):
+        np.testing.assert_allclose(velocities, floats((v1, v2, v3)), rtol=0, atol=1e-14)
     assert f"({v1}, {v2}, {v3})" in CHAPTER.printed("sympy-answers")
 
 
@@ -103,32 +101,6 @@ def test_fig_1_is_drawn_and_described():
     assert cell.metadata["mystnb"]["figure"]["name"] == "fig-p1"
     alt = cell.metadata["mystnb"]["image"]["alt"]
     assert all(word in alt for word in ("Three balls", "tau 2", "tau 3", "velocity before"))
-
-
-def test_fig_own_problem_family():
-    """The ellipse holds the conserving outcomes; the model walks the possible arc."""
-    rng = np.random.default_rng(6)
-    for _ in range(100):
-        m, v = uniform(rng, 0.1, 10, 3), uniform(rng, -1, 1, 3)
-        u2, u3 = v[0] - v[1], v[1] - v[2]
-        relative = m[0] * m[1] * u2**2 + m[1] * m[2] * u3**2 + m[0] * m[2] * (u2 + u3) ** 2
-        centre = m @ v / m.sum()
-        assert m @ v**2 == pytest.approx(m.sum() * centre**2 + relative / m.sum(), rel=1e-12)
-    # The plotted curve, turned back into velocities: momentum and energy are those before.
-    for angle in np.radians(np.arange(0, 360, 5)):
-        radius = 1 / np.sqrt(1 + np.sin(angle) * np.cos(angle))
-        u2, u3 = radius * np.cos(angle), radius * np.sin(angle)
-        v3 = (1 - u2 - 2 * u3) / 3
-        v = np.array([v3 + u3 + u2, v3 + u3, v3])
-        assert v.sum() == pytest.approx(1, abs=1e-14)
-        assert (v**2).sum() == pytest.approx(1, abs=1e-14)
-    # The model's dots: on the curve, ordered from one end of the arc to the other.
-    dots = [solve([1, 1, 1], [1, 0, 0], 1, f"0.{i}").velocities for i in range(6)]
-    u2, u3 = np.array([[float(v[0] - v[1]), float(v[1] - v[2])] for v in dots]).T
-    np.testing.assert_allclose(u2**2 + u2 * u3 + u3**2, 1, rtol=0, atol=1e-14)
-    assert (np.diff(u2) < 0).all()
-    assert (np.diff(u3) > 0).all()
-    np.testing.assert_allclose([u2[0], u3[0], u2[-1], u3[-1]], [0, -1, -1, 0], rtol=0, atol=1e-14)
 
 
 def test_a_light_middle_ball_meets_outcomes_more_than_once():
@@ -158,22 +130,20 @@ def test_the_two_lines_of_the_second_closing_speed():
         assert impulses[bend] / impulses[turn] == pytest.approx(2 * a, rel=1e-12)
 
 
-def test_fig_own_problem_definitions():
-    """Energy left by three definitions of e = 1, in closed form (equal balls)."""
+def test_energy_left_by_three_definitions():
+    """Of e = 1, equal balls: the closed forms of the figure (test_book_figures.py) by paths."""
     for a in np.linspace(0, 0.499, 12):
         trace = collide(EQUAL, ImpulseCorrelation(a))
         left, right = trace.impulses
-        row = 1 + trace.events.index(("maximum_compression", 1))
-        compressed = trace.path_impulses[row, 1]
-
-        def energy(right, left=left):
-            return (1 - left) ** 2 + (left - right) ** 2 + right**2
-
-        assert energy(2 * compressed) == pytest.approx((4 + a**2) / (2 - a) ** 2, rel=1e-13)
-        assert energy(left / 2) == pytest.approx((2 + a**2) / (2 - a) ** 2, rel=1e-13)
-        assert energy(right) == pytest.approx(1, rel=1e-13)
-    assert READING.glued["problem-poisson-most"] == f"{(4 + 0.499**2) / (2 - 0.499) ** 2:.3f}"
-    assert READING.glued["problem-newton-least"] == f"{2 / 4:.3f}"
+        compressed = trace.path_impulses[1 + trace.events.index(("maximum_compression", 1)), 1]
+        for pushed, energy in (
+            (2 * compressed, (4 + a**2) / (2 - a) ** 2),  # Poisson
+            (left / 2, (2 + a**2) / (2 - a) ** 2),  # Newton
+            (right, 1),
+        ):
+            found = (1 - left) ** 2 + (left - pushed) ** 2 + pushed**2
+            assert found == pytest.approx(energy, rel=1e-13)
+    READING.tells({"problem-poisson-most": 4.249001 / 1.501**2, "problem-newton-least": 2 / 4})
 
 
 def test_exercise_2_heavy_middle():
@@ -188,34 +158,27 @@ def test_exercise_2_heavy_middle():
 
 def test_what_the_rules_matter():
     """The table of the model's parts, by the reference solver and the textbook solver."""
-    fig_8 = [1] * 4, [1, "0.5", 0, 0], 1, "0.1"
 
-    def after(velocities=fig_8[1], **options):
-        found = solve([1] * 4, velocities, 1, "0.1", number=float, **options)
-        return np.array([float(v) for v in found.velocities])
+    def after(velocities=(1, "0.5", 0, 0), **options):
+        return floats(solve([1] * 4, velocities, 1, "0.1", number=float, **options).velocities)
 
-    image = -after([0, 0, "-0.5", -1])[::-1]
-    assert CHAPTER.glued["mirror"] == f"{abs(image - after()).max():.2f}"
-    places = [after(meeting=x) for x in np.linspace(0, 1, 11).tolist()]
-    assert number(CHAPTER.glued["meeting"]) == pytest.approx(np.ptp(places, 0).max(), abs=6e-4)
-    read = [outcome(way).velocities for way in DRIVES]
-    spread = np.ptp([[float(v) for v in velocities] for velocities in read], 0).max()
-    assert CHAPTER.glued["readings"] == f"{spread:.2f}"
-    ten = {}
+    def spread(outcomes):
+        return np.ptp(outcomes, axis=0).max()
+
+    places = np.linspace(0, 1, 11).tolist()
+    CHAPTER.tells({
+        "mirror": abs(-after([0, 0, "-0.5", -1])[::-1] - after()).max(),
+        "readings": spread([floats(outcome(way).velocities) for way in READINGS.values()]),
+    })  # fmt: skip
+    CHAPTER.tells({"meeting": spread([after(meeting=x) for x in places])}, off=1e-4)
+    most, held = 0.0, 0
     for name in paper_sequences():
         chain, model = paper_chain(name, excess="saturate")
         balls = list(chain.masses), list(chain.velocities), list(chain.restitution)
-        found = [
-            solve(*balls, model.forward, model.backward, meeting=x, excess="saturate", number=float)
-            for x in (0.0, 0.5, 1.0)
-        ]
-        moved = np.ptp([[float(v) for v in one.velocities] for one in found], 0).max()
-        ten[name] = moved, found[1].held
-    assert number(CHAPTER.glued["meeting-ten"]) == pytest.approx(
-        max(moved for moved, _ in ten.values()), rel=0.02
-    )
-    held = sum(bool(contacts) for _, contacts in ten.values())
+        how = {"excess": "saturate", "number": float}
+        found = [solve(*balls, model.forward, model.backward, meeting=x, **how)
+                 for x in (0.0, 0.5, 1.0)]  # fmt: skip
+        most = max(most, spread([floats(one.velocities) for one in found]))
+        held += bool(found[1].held)
+    assert number(CHAPTER.glued["meeting-ten"]) == pytest.approx(most, rel=0.02)
     assert CHAPTER.glued["held"] == ["none", "one", "two", "three"][held]
-
-
-DRIVES = ("forward", "backward"), ("forward", "forward"), ("backward", "backward")

@@ -51,16 +51,10 @@ def check(answer, status, trace):
     if status == "unsound":
         assert answer == {"status": status, "defect": trace}
         return
-    for name, other in [
-        ("velocities", "velocities"),
-        ("impulses", "impulses"),
-        ("absorbed", "absorbed"),
-        ("collisions", "collisions"),
-        ("path", "path"),
-        ("pathImpulses", "path_impulses"),
-        ("margin", "margin"),
-    ]:
-        assert bits(answer[name]) == bits(getattr(trace, other)), name
+    for name in (
+        "velocities", "impulses", "absorbed", "collisions", "path", "pathImpulses", "margin",
+    ):  # fmt: skip
+        assert bits(answer[name]) == bits(getattr(trace, name.replace("I", "_i"))), name
     assert answer["collapsed"] is trace.collapsed
     assert tuple(answer["saturated"]) == trace.saturated
     events = [(event["kind"], event["contact"]) for event in answer["events"]]
@@ -96,39 +90,32 @@ def problems(name, count, largest=12):
 
 
 COUNTS = {
-    "generic": 400,
-    "ties": 700,
-    "ties within bounds": 500,
-    "tiny ratios": 300,
+    "generic": 250,
+    "ties": 400,
+    "ties within bounds": 300,
+    "tiny ratios": 200,
     "mixed zeros": 150,
-    "light balls": 200,
+    "light balls": 100,
 }
-
-
-def test_every_family_is_asked():
-    assert {"generic", *FAMILIES} == set(COUNTS)
 
 
 @pytest.mark.parametrize("name", COUNTS)
 def test_impacts_to_the_last_bit(script, name):
     chains = problems(name, COUNTS[name])
     assert len(chains) >= COUNTS[name] / 2
-    kinds = set()
     # Light balls between heavy ones collide a hundred thousand times: that is not looked at here.
     answers = script.each("cradle.collide", [asked(chain, maxEvents=2000) for chain in chains])
-    finished = 0
-    for chain, answer in zip(chains, answers):
-        status, trace = expected(chain, max_events=2000)
-        check(answer, status, trace)
-        if status != "finished":
-            continue
-        finished += 1
-        kinds |= {kind for kind, _ in trace.events}
-        kinds |= {"held"} if trace.saturated else set()
-    assert finished > 0.8 * len(chains)
+    outcomes = [expected(chain, max_events=2000) for chain in chains]
+    for answer, outcome in zip(answers, outcomes):
+        check(answer, *outcome)
+    finished = [trace for status, trace in outcomes if status == "finished"]
+    assert len(finished) > 0.8 * len(chains)
+    kinds = {kind for trace in finished for kind, _ in trace.events}
     assert {"maximum_compression", "end", "close"} <= kinds
     if name in ("generic", "ties"):
-        assert {"collapse", "held"} <= kinds
+        assert "collapse" in kinds
+        assert any(trace.saturated for trace in finished)
+    assert {"generic", *FAMILIES} == set(COUNTS)
 
 
 def test_the_outcome_alone_is_the_same(script):
@@ -257,17 +244,17 @@ def test_ratios_above_their_bound(script):
     chains = problems("ties", 200) + problems("generic", 200)
     rows = [asked(chain, saturate=False, maxEvents=1) for chain in chains]
     answers = script.each("cradle.outcome", rows)
-    sentences = []
-    for chain in chains:
+    refused = 0
+    for chain, answer in zip(chains, answers):
         model = ImpulseCorrelation(chain.forward, chain.backward, meeting=chain.meeting)
         sentence = None
         try:
             collide(Chain(chain.masses, [0] * len(chain.masses), chain.restitution), model)
-        except ValueError as refused:
-            sentence = str(refused)
-        sentences.append(sentence)
-    assert 50 < len(chains) - sentences.count(None) < 350
-    assert [answer if isinstance(answer, str) else None for answer in answers] == sentences
+        except ValueError as error:
+            sentence = str(error)
+            refused += 1
+        assert (answer if isinstance(answer, str) else None) == sentence
+    assert 50 < refused < 350
 
 
 def test_largest_ratios(script):

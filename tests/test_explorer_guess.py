@@ -7,15 +7,12 @@ import pytest
 from chapters import Chapter
 from explorer import (
     EXPLORER,
-    address_of_page,  # noqa: F401
     chain_of,
     drawn,
     later,
     press,
     still,
-    visits,  # noqa: F401
 )
-from test_layout import browser  # noqa: F401
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide
 
@@ -67,8 +64,6 @@ def test_the_first_page_is_guessed(visit, page):
     ("name", "said", "words"),
     [
         ("multiple_impacts", "3", "You said 3; it is 4."),
-        ("multiple_impacts", "4", "Yes: 4."),
-        ("patterns", "ball 1", "You said ball 1; it is none."),
         ("patterns", "none", "Yes: none."),
     ],
 )

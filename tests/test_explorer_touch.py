@@ -4,15 +4,12 @@ import pytest
 from explorer import (
     EXPLORER,
     SETTING,
-    address_of_page,  # noqa: F401
     drawn,
     go_to,
     middle,
     same_outcome,
     still,
-    visits,  # noqa: F401
 )
-from test_layout import browser  # noqa: F401
 
 TIME = f"{EXPLORER}.state.clock.time"
 
@@ -82,6 +79,39 @@ def test_two_fingers_pull_two_balls(phone):
     hand.up(1)
     assert same_outcome(drawn(tab))
     assert drawn(tab)["speeds"] == shown["speeds"]
+
+
+def test_a_ball_follows_the_finger_as_the_mouse(visit, phone):
+    """The page does not scroll under it; what is pressed is large enough (WCAG 2.2, 2.5.8)."""
+    mouse, tab = still(visit, width=390), phone()
+    x, y = middle(tab, ball(4))
+    mouse.mouse.move(x, y)
+    mouse.mouse.down()
+    mouse.mouse.move(x + 80, y, steps=20)
+    by_mouse = drawn(mouse)["speeds"][4]
+    assert by_mouse < -0.5
+    mouse.mouse.up()
+    tab.evaluate(
+        "document.querySelector('.stage')"
+        ".addEventListener('pointercancel', () => (globalThis.lost = true))"
+    )
+    hand = Hand(tab)
+    hand.down(1, (x, y))
+    hand.move(1, 80, 0, steps=20)
+    shown = drawn(tab)
+    hand.up(1)
+    assert tab.evaluate("globalThis.lost") is None
+    assert shown["speeds"][4] == pytest.approx(by_mouse, abs=0.15)  # a finger is still at first
+    assert tab.evaluate("window.scrollY") == 0
+    sizes = tab.evaluate(
+        """(() => {
+          const kinds = ':is(button, select, .choice label, .ball .reach)';
+          return [...document.querySelectorAll(`.cradle-explorer ${kinds}`)]
+            .filter((node) => node.checkVisibility())
+            .map((node) => node.getBoundingClientRect().height);
+        })()"""
+    )
+    assert min(sizes) >= 24
 
 
 def test_a_second_finger_on_the_same_ball_is_none(phone):

@@ -1,12 +1,15 @@
-"""The pages in a browser: nothing cut, nothing wider than its window, in both widths and modes."""
+"""The pages in a browser, each opened once: nothing is cut, pale, out of order or said in error.
 
-import os
+Then single pages: slow phones, print, and the pictures of the live cradle.
+"""
+
 import re
-import shutil
 from pathlib import Path
 
 import book_figures
 import pytest
+from explorer import EXPLORER, drawn, later, still
+from pages import ALL_SET, MISFITS, PATIENCE, code, contrast, listened, luminance, shape, show
 
 #: Widths and modes of the window.  Widths decide what fits, modes which pictures are shown; pages
 #: take long to load, and the weekly tests look at the other pairs.
@@ -14,100 +17,10 @@ VIEWS = ((1280, "dark"), (360, "light"))
 OTHER_VIEWS = ((1280, "light"), (360, "dark"), (390, "light"), (390, "dark"))
 #: The window is low: only what is in it is painted.
 HEIGHT = 200
-#: Widths of phones.
-PHONES = (390, 360)
-#: Contrast that letters need, and lines and marks (WCAG 2.1: 1.4.6 and 1.4.11).
-LETTERS, LINES = 7.0, 3.0
-#: Milliseconds until a browser that does not answer is given up: far above any slow machine's need.
-PATIENCE = 300_000
-
-# What a page shows that does not fit: [kind, beginning of its text, has, needs].
-MISFITS = """() => {
-  const found = [];
-  const say = (kind, node, has, needs) =>
-    found.push([kind, (node.textContent || node.alt || "").trim().slice(0, 70), has, needs]);
-  if (document.scrollingElement.scrollWidth > innerWidth)
-    say("page", document.querySelector("h1"), innerWidth, document.scrollingElement.scrollWidth);
-  const wide = (node) => node.checkVisibility() && node.scrollWidth > node.clientWidth + 1;
-  // Code and messages: every line is seen as a whole, without scrolling.
-  for (const node of document.querySelectorAll(".bd-content pre"))
-    if (wide(node)) say("code", node, node.clientWidth, node.scrollWidth);
-  // Equations on a line of their own: whole, or in a box that scrolls and starts at its left end.
-  for (const node of document.querySelectorAll('.bd-content mjx-container[display="true"]')) {
-    for (const box of [node, node.parentElement]) {
-      if (!wide(box)) continue;
-      const scrolls = ["auto", "scroll"].includes(getComputedStyle(box).overflowX);
-      const left = node.querySelector("svg").getBoundingClientRect().left;
-      if (innerWidth > 600 || !scrolls || left < box.getBoundingClientRect().left - 1)
-        say("equation", node, box.clientWidth, box.scrollWidth);
-    }
-    const number = node.parentElement.querySelector(".eqno");
-    if (number && node.checkVisibility()) {
-      const end = node.getBoundingClientRect().right, start = number.getBoundingClientRect().left;
-      if (start < end - 1) say("number on equation", node, start, end);
-    }
-  }
-  // Formulas in a line of text: their box does not cut them.
-  for (const node of document.querySelectorAll('.bd-content mjx-container:not([display])'))
-    if (wide(node) && getComputedStyle(node).overflowX !== "visible")
-      say("formula", node, node.clientWidth, node.scrollWidth);
-  // Tables of numbers: on a desk no column is cut.
-  for (const node of document.querySelectorAll(".bd-content table.dataframe")) {
-    const box = node.closest(".output") ?? node.parentElement;
-    if (innerWidth > 1200 && wide(box)) say("table", node, box.clientWidth, box.scrollWidth);
-  }
-  // Formulas in a table: they stay in their column.
-  for (const node of document.querySelectorAll(".bd-content td mjx-container > svg")) {
-    if (!node.checkVisibility()) continue;
-    const end = node.getBoundingClientRect().right, column = node.closest("td");
-    const edge = column.getBoundingClientRect().right;
-    if (end > edge + 1) say("formula over its column", column, edge, end);
-  }
-  // Figures: one of the two is shown, and its letters can be read.
-  for (const box of document.querySelectorAll(".figure-box")) {
-    const shown = [...box.children].filter((image) => image.checkVisibility());
-    const closed = !box.checkVisibility();
-    if (!closed && shown.length !== 1) say("figures shown", box, 1, shown.length);
-    for (const image of shown) {
-      const share = image.getBoundingClientRect().width / image.getAttribute("width");
-      const letters = share * box.dataset.letters;
-      if (!(letters > 10.9)) say("small letters", image, letters, 10.9);
-      // Colours of a map are a scale, and mean the same in both modes.
-      const filters = [];
-      for (let node = image; node && image.matches(".map"); node = node.parentElement)
-        filters.push(getComputedStyle(node).filter);
-      if (filters.some((filter) => filter !== "none")) say("turned map", image, filters, "none");
-    }
-  }
-  // Columns of tables: none is squeezed to a word or two a line.
-  for (const node of document.querySelectorAll(".bd-content td")) {
-    if (!node.checkVisibility()) continue;
-    const range = document.createRange();
-    range.selectNodeContents(node);
-    const line = parseFloat(getComputedStyle(node).lineHeight);
-    const lines = range.getBoundingClientRect().height / line;
-    const letters = node.textContent.trim().length;
-    if (lines > 6.5 && letters / lines < 8) say("squeezed column", node, letters / lines, 8);
-  }
-  // Words in tables: whole, where the table does not say otherwise.
-  for (const node of document.querySelectorAll(".bd-content :is(td, th)")) {
-    if (!node.checkVisibility() || getComputedStyle(node).overflowWrap === "anywhere") continue;
-    const texts = document.createTreeWalker(node, NodeFilter.SHOW_TEXT);
-    for (let text; (text = texts.nextNode());) {
-      if (!text.parentElement.checkVisibility() || text.parentElement.closest("mjx-container"))
-        continue;
-      for (const { 0: word, index } of text.data.matchAll(/[\\p{L}\\p{N}_]+/gu)) {
-        const range = document.createRange();
-        range.setStart(text, index);
-        range.setEnd(text, index + word.length);
-        const boxes = [...range.getClientRects()].filter(({ width }) => width > 0);
-        const lines = new Set(boxes.map(({ top }) => Math.round(top / 4)));
-        if (lines.size > 1) say("broken word", text, word, lines.size);
-      }
-    }
-  }
-  return found;
-}"""
+#: Widths of phones; the smallest.
+PHONES, SMALLEST = (390, 360), 320
+#: Contrast that letters need, and lines and marks (WCAG 2.1: 1.4.3, 1.4.6 and 1.4.11).
+READABLE, LETTERS, LINES = 4.5, 7.0, 3.0
 
 # Numbers of equations: [number, its right end, that of the column], and how large its letters are.
 NUMBERS = """() => [...document.querySelectorAll('.bd-content mjx-container[display="true"]')]
@@ -122,47 +35,87 @@ NUMBERS = """() => [...document.querySelectorAll('.bd-content mjx-container[disp
     return [[number.id || number.textContent, right, end, letters]];
   })"""
 
-# Equations wait until they are about to be seen: set them all.
-ALL_SET = """async () => {
-  await window.MathJax?.startup?.promise;
-  await window.MathJax?.startup?.document?.lazyTypesetAll?.();
+# Letters whose contrast with their ground is below what is asked: [contrast, its colours, words].
+# Pictures have a ground of their own that no style names; they are looked at elsewhere.
+PALE = """(least) => {
+  const parse = (colour) => {
+    const srgb = colour.startsWith("color(srgb");
+    const parts = (colour.match(/-?[\\d.]+(e-?\\d+)?/g) ?? []).map(Number);
+    const [r, g, b, alpha = 1] = parts;
+    return [...[r, g, b].map((p) => (srgb ? 255 * p : p)), alpha];
+  };
+  const over = ([r, g, b, a], ground) => [r, g, b].map((p, k) => p * a + ground[k] * (1 - a));
+  const luminance = (colour) => {
+    const linear = colour.map((p) => p / 255)
+      .map((p) => (p <= 0.04045 ? p / 12.92 : ((p + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
+  };
+  const found = {};
+  const look = (node, colour, words) => {
+    const above = [];
+    for (let at = node; at; at = at.parentElement) above.unshift(at);
+    const ground = above.reduce(
+      (under, at) => over(parse(getComputedStyle(at).backgroundColor), under), [255, 255, 255]);
+    const letters = over(parse(colour), ground);
+    const [low, high] = [luminance(letters), luminance(ground)].sort((a, b) => a - b);
+    const ratio = (high + 0.05) / (low + 0.05);
+    if (ratio < least) found[`${node.tagName}.${node.className} ${colour}`] =
+      [ratio, ground.map(Math.round).join(), words.trim().slice(0, 30)];
+  };
+  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  for (let text = texts.nextNode(); text; text = texts.nextNode()) {
+    const node = text.parentElement;
+    if (!text.textContent.trim()) continue;
+    if (node.closest("svg, :disabled, noscript, script, style")) continue;
+    if (node.checkVisibility({ visibilityProperty: true, opacityProperty: true }))
+      look(node, getComputedStyle(node).color, text.textContent);
+  }
+  for (const box of document.querySelectorAll("input[placeholder]"))
+    if (box.checkVisibility())
+      look(box, getComputedStyle(box, "::placeholder").color, "placeholder");
+  return Object.entries(found);
 }"""
 
-FRAMES = """() => new Promise((done) =>
-  requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"""
+# A heading more than one step below the one before it.
+SKIPPED = """() => {
+  const levels = [...document.querySelectorAll("h1, h2, h3, h4, h5, h6")]
+    .filter((node) => node.checkVisibility()).map((node) => [+node.tagName[1], node.innerText]);
+  return levels.filter(([level], k) => level > (k ? levels[k - 1][0] : 0) + 1);
+}"""
+
+# Tabs go from one control to the next; a formula is none.
+STOPS = """[...document.querySelectorAll('mjx-container[tabindex], mjx-container [tabindex="0"]')]
+  .map((node) => node.textContent)"""
+
+STILL = "*, *::before { transition: none !important; animation: none !important; }"
+FOUND = "/found \\d+ page/.test(document.body.innerText)"
 
 
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    command = next(
-        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-    )
-    if command is None:
-        if os.environ.get("CRADLE_REQUIRE_BROWSER"):
-            pytest.fail("CRADLE_REQUIRE_BROWSER is set and there is no Chromium")
-        pytest.skip("no Chromium on this machine")
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(
-            executable_path=command, args=["--no-sandbox"], timeout=PATIENCE
-        )
-        yield browser
-        browser.close()
-
-
-def shape(tab, width: int, mode: str) -> None:
-    """Give the window this width and the page this mode."""
-    tab.set_viewport_size({**tab.viewport_size, "width": width})
-    tab.emulate_media(color_scheme=mode)
-
-
-def show(tab, width: int, mode: str) -> None:
-    """Give the window this width and the page this mode, and wait until it has followed."""
-    shape(tab, width, mode)
-    shown = "[innerWidth, document.documentElement.dataset.theme]"
-    tab.wait_for_function(f"(asked) => `${{{shown}}}` === `${{asked}}`", arg=[width, mode])
-    # fit_equations.js follows the window, and hears of it before the next frame.
-    tab.evaluate(FRAMES)
+def looked_at(tab, page: Path, views) -> dict[str, list]:
+    """Open a page; list its faults by kind, and the numbers of its equations on phones."""
+    tab.goto("about:blank")
+    shape(tab, SMALLEST, "light")
+    searched = page.stem == "search"
+    tab.goto(page.as_uri() + ("?q=restitution" if searched else ""))
+    if searched:
+        tab.wait_for_function(FOUND)
+        assert tab.locator("#search-results li").count() > 10
+    tab.add_style_tag(content=STILL)
+    tab.evaluate(ALL_SET)
+    wide = tab.evaluate("document.scrollingElement.scrollWidth")
+    found = {"wide": [wide] * (wide > SMALLEST), "misfits": [], "numbers": [], "pale": []}
+    found["headings"], found["stops"] = tab.evaluate(SKIPPED), tab.evaluate(STOPS)
+    tagged = re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8"))
+    sights = {**dict.fromkeys(views), (1280, "light"): None, (1280, "dark"): None}
+    for width, mode in sights | dict.fromkeys((width, "light") for width in PHONES if tagged):
+        show(tab, width, mode)
+        if (width, mode) in views and page.parent.name == "book":
+            found["misfits"] += [[width, mode, *misfit] for misfit in tab.evaluate(MISFITS)]
+        if width == 1280:
+            found["pale"] += [[mode, *pale] for pale in tab.evaluate(PALE, READABLE)]
+        elif tagged and mode == "light":
+            found["numbers"] += [(width, *number) for number in tab.evaluate(NUMBERS)]
+    return found
 
 
 @pytest.fixture(
@@ -173,49 +126,37 @@ def show(tab, width: int, mode: str) -> None:
         pytest.param((3, OTHER_VIEWS), id="3", marks=pytest.mark.exhaustive),
     ],
 )
-def looked_at(request, html: Path, browser):
-    """Load every page once; return by page what does not fit, and the numbers of its equations.
+def seen(request, html: Path, browser):
+    """Every page once, by its name.
 
     Letters of formulas are rounded to device pixels: of these there are 1, 2 or 3 a pixel.
     """
     density, views = request.param
     context = browser.new_context(
-        device_scale_factor=density, viewport={"width": views[0][0], "height": HEIGHT}
+        device_scale_factor=density, viewport={"width": SMALLEST, "height": HEIGHT}
     )
     context.set_default_timeout(PATIENCE)
     tab = context.new_page()
-    said: list[str] = []
-    tab.on("console", lambda entry: said.append(entry.text) if entry.type == "error" else None)
-    tab.on("pageerror", lambda error: said.append(str(error)))
-    found = {}
-    for page in sorted((html / "book").glob("*.html")):
-        said.clear()
-        tab.goto("about:blank")  # so that nothing is laid out anew for the first view
-        shape(tab, *views[0])
-        tab.goto(page.as_uri())
-        tab.evaluate(ALL_SET)
-        faults, numbers = [], []
-        for width, mode in views:
-            show(tab, width, mode)
-            faults += [[width, mode, *misfit] for misfit in tab.evaluate(MISFITS)]
-        if re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8")):
-            for width in PHONES:
-                show(tab, width, "light")
-                numbers += [(width, *number) for number in tab.evaluate(NUMBERS)]
-        found[page.stem] = faults + said, numbers
+    said, found = listened(tab), {}
+    for page in [*sorted((html / "book").glob("*.html")), *sorted(html.glob("*.html"))]:
+        if page.name != "index.html":  # leads to the first page
+            said.clear()
+            found[page.stem] = looked_at(tab, page, views) | {"said": said.copy()}
     context.close()
+    assert len(found) > 25
     return found
 
 
-def test_nothing_is_cut(looked_at: dict):
-    assert len(looked_at) > 15
-    faults = [(page, fault) for page, (faults, _) in looked_at.items() for fault in faults]
-    assert not faults, "\n".join(f"{page}: {fault}" for page, fault in faults)
+@pytest.mark.parametrize("kind", ["said", "misfits", "wide", "headings", "stops", "pale"])
+def test_pages(seen, kind: str):
+    """No error, no cut, no bar sideways, no heading left out, no false stop, no pale words."""
+    faults = [f"{page}: {fault}" for page, view in seen.items() for fault in view[kind]]
+    assert not faults, "\n".join(faults)
 
 
-def test_numbers_of_equations_on_a_phone(looked_at: dict):
+def test_numbers_of_equations_on_a_phone(seen):
     """None is cut, and none needs letters that are smaller than those of figures."""
-    numbers = [(page, *number) for page, (_, numbers) in looked_at.items() for number in numbers]
+    numbers = [(page, *number) for page, view in seen.items() for number in view["numbers"]]
     assert len(numbers) >= 53 * len(PHONES)  # of the paper alone
     cut = [number for number in numbers if number[3] > number[4] + 0.5 or number[5] < 7.8]
     assert not cut, "\n".join(map(str, cut))
@@ -259,28 +200,16 @@ def test_a_misfit_is_seen(browser, body: str, kind: str):
     tab.close()
 
 
-def test_search_from_a_disk(browser, html: Path):
-    """It finds pages, and asks for nothing that the browser refuses to a page from a disk."""
+@pytest.mark.parametrize(
+    ("style", "pale"),
+    [("color: #777", True), ("color: #767676", False), ("background: #176de8", True),
+     ("opacity: 1; color: rgb(0 0 0 / 50%)", True), ("color: color(srgb 0.5 0.5 0.5)", True)],
+)  # fmt: skip
+def test_pale_letters_are_seen(browser, style, pale):
     tab = browser.new_page()
-    faults = []
-    tab.on("console", lambda said: said.type == "error" and faults.append(said.text))
-    tab.goto((html / "search.html").as_uri() + "?q=restitution")
-    tab.wait_for_function("/found \\d+ page/.test(document.body.innerText)", timeout=PATIENCE)
-    assert tab.locator("#search-results li").count() > 10
-    assert not faults
+    tab.set_content(f"<!DOCTYPE html><p style='color: #000; {style}'>words</p>")
+    assert bool(tab.evaluate(PALE, READABLE)) is pale
     tab.close()
-
-
-def luminance(colour: str) -> float:
-    """Relative luminance as WCAG defines it."""
-    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
-    return sum(k * p for k, p in zip((0.2126, 0.7152, 0.0722), linear))
-
-
-def contrast(one: str, other: str) -> float:
-    high, low = sorted((luminance(one), luminance(other)), reverse=True)
-    return (high + 0.05) / (low + 0.05)
 
 
 def test_colours_of_dark_mode_can_be_seen():
@@ -317,3 +246,144 @@ def test_every_figure_has_both_colourings(html: Path):
         dark = shown.count(f"{path.stem}-dark.svg")
         assert shown.count(path.name) > 0, path
         assert dark == (0 if path in maps else shown.count(path.name)), path
+
+
+# --- a slow phone ---
+
+
+def test_equations_wait_until_they_are_seen(browser, html: Path):
+    """At first those in sight are set, and a voice can read all of them; on paper all are set."""
+    tab = browser.new_page(viewport={"width": 390, "height": 800})
+    tab.set_default_timeout(PATIENCE)
+    tab.goto((html / "book" / "reading.html").as_uri())
+    tab.wait_for_function("document.querySelector('mjx-container svg')")
+    tab.evaluate("MathJax.startup.promise")
+    count = "document.querySelectorAll('mjx-container{}').length"
+    everything, first = (tab.evaluate(count.format(end)) for end in ("", " > svg"))
+    assert everything > 200
+    assert 0 < first < everything / 4
+    assert tab.evaluate(count.format(" math")) == everything
+    formulas = "[...document.querySelectorAll('.bd-article mjx-container')]"
+    shown = f"{formulas}.filter((node) => node.checkVisibility())"
+    tab.evaluate(f"{shown}.pop().scrollIntoView({{ behavior: 'instant' }})")
+    tab.wait_for_function(f"{shown}.pop().firstElementChild?.matches('svg')")
+    tab.pdf()
+    assert tab.evaluate(count.format(" > svg")) == everything
+    tab.close()
+
+
+SHIFTS = """
+  globalThis.shifts = [];
+  new PerformanceObserver((list) => shifts.push(...list.getEntries().map(({ value }) => value)))
+    .observe({ type: "layout-shift", buffered: true });
+"""
+
+
+@pytest.mark.parametrize("width", [320, 390, 1400])
+@pytest.mark.parametrize("name", ["explorer", "intro", "patterns"])
+def test_a_page_does_not_jump(browser, html: Path, name: str, width: int):
+    """The live cradle comes late, into its own place. Below .1 a shift counts as good."""
+    tab = browser.new_page(viewport={"width": width, "height": 800})
+    tab.set_default_timeout(PATIENCE)
+    tab.add_init_script(SHIFTS)
+    tab.goto((html / "book" / f"{name}.html").as_uri())
+    tab.wait_for_function("globalThis.cradleExplorer?.live?.length > 0")
+    tab.evaluate(ALL_SET.replace("lazyTypesetAll", "none"))
+    tab.evaluate("new Promise((done) => setTimeout(done, 300))")
+    assert sum(tab.evaluate("shifts")) < 0.1
+    tab.close()
+
+
+# --- paper --------------------------------------------------------------------------------------
+
+
+def test_print_from_dark_mode(visit):
+    """Black on white, with all that is still to be computed; then the page is as it was."""
+    tab = still(visit, "#scene=map", color_scheme="dark", stopped=True)
+    later(tab, 50)
+    map_ = "document.querySelector('.map canvas')"
+    ground = "getComputedStyle(document.body).backgroundColor"
+    ink = "getComputedStyle(document.querySelector('.words')).color"
+    painted = f"""(() => {{
+      const canvas = {map_};
+      const {{ data }} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      const light = (k) => data[k] + data[k + 1] + data[k + 2] > 3 * 127;
+      const cells = data.filter((value, k) => k % 4 === 3);
+      return [cells.every((value) => value === 255),
+        cells.filter((value, k) => light(4 * k)).length / cells.length];
+    }})()"""
+    dark = tab.evaluate(f"[{ground}, {ink}]")
+    tab.emulate_media(media="print")
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert tab.evaluate(ground) == "rgb(255, 255, 255)"
+    assert sum(map(int, re.findall(r"\d+", tab.evaluate(ink))[:3])) < 200
+    assert tab.evaluate(painted) == [True, 1]
+    for name in ("Let go", "Copy link"):
+        assert not tab.get_by_role("button", name=name).is_visible()
+    assert not tab.locator("input[type=range]").first.is_visible()
+    assert tab.get_by_label("ratio, as a number", exact=True).is_visible()
+    tab.emulate_media(media="screen")
+    tab.evaluate("dispatchEvent(new Event('afterprint'))")
+    later(tab, 50)
+    assert tab.evaluate(f"[{ground}, {ink}]") == dark
+    assert tab.evaluate(painted)[1] < 0.5
+
+
+# --- the live cradle's pictures -------------------------------------------------------------------
+
+
+def test_numbers_in_colours_can_be_read(visit):
+    """Of seven balls, beside their lines and on the bar of energy, in both modes."""
+    masses = "speeds=1,0,0,0,0,0,0&masses=1,2,3,4,3,2,1&forward=0.3"
+    tab = still(visit, f"#{masses}")
+    drawn(tab)
+    for mode, ground in (("light", "#ffffff"), ("dark", "#121212")):
+        show(tab, 1400, mode)
+        drawn(tab)
+        found = tab.evaluate(
+            """() => {
+              const pen = document.createElement("canvas").getContext("2d");
+              const code = (colour) => {
+                pen.fillStyle = colour;
+                pen.fillRect(0, 0, 1, 1);
+                const [r, g, b] = pen.getImageData(0, 0, 1, 1).data;
+                return "#" + [r, g, b].map((part) => part.toString(16).padStart(2, "0")).join("");
+              };
+              const fill = (node) => code(getComputedStyle(node).fill);
+              const parts = [...document.querySelectorAll(".outcome .part, .outcome .gone")];
+              return [
+                [...document.querySelectorAll(".pictures .name")].map(fill),
+                parts.filter((part) => part.nextElementSibling?.matches("text"))
+                  .map((part) => [fill(part.nextElementSibling), fill(part)]),
+              ];
+            }"""
+        )
+        names, bars = found
+        assert len(names) == 7
+        assert min(contrast(name, ground) for name in names) >= READABLE
+        assert len(set(names)) == 7
+        assert len(bars) > 1
+        assert min(contrast(*pair) for pair in bars) >= READABLE
+    # On every colour of the palette, whether this hit shows it or not.
+    for ball in range(7):
+        letters, under = tab.evaluate(
+            f"""() => {{
+              const setting = {{ ...{EXPLORER}.state.setting, masses: [1, 1, 1, 1, 1, 1, 1] }};
+              const now = [0, 0, 0, 0, 0, 0, 0].map((_, k) => +(k === {ball}));
+              const host = {EXPLORER}.panels.outcome.node.querySelectorAll(".plot")[1];
+              host.innerHTML = cradleExplorer.energy({{ width: 300, em: 16 }}, setting, now, now);
+              const colour = (node) => getComputedStyle(node).fill;
+              const part = host.querySelectorAll(".part")[{ball}];
+              return [colour(host.querySelector("text")), colour(part)];
+            }}"""
+        )
+        assert contrast(code(letters), code(under)) >= READABLE, ball
+
+
+def test_notes_and_places_can_be_read(visit):
+    """The soft colour of notes, places and small letters."""
+    tab = still(visit, "#scene=ABCCAB")
+    drawn(tab)
+    for mode in ("light", "dark"):
+        show(tab, 1400, mode)
+        assert tab.evaluate(PALE, READABLE) == []

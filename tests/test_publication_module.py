@@ -8,7 +8,7 @@ import sys
 import threading
 
 import pytest
-from test_layout import PATIENCE, browser  # noqa: F401
+from pages import PATIENCE
 
 from cradle import Chain, ImpulseCorrelation, collide
 
@@ -55,7 +55,7 @@ def test_files(folder):
     assert len((folder / "README.md").read_text(encoding="utf-8").splitlines()) <= 20
 
 
-def test_module_and_example(browser, folder, address):  # noqa: F811
+def test_module_and_example(browser, folder, address):
     """The same bits as Python; nothing left on the global object; what README shows runs."""
     tab, errors = browser.new_page(), []
     tab.set_default_timeout(PATIENCE)

@@ -5,8 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from explorer import PATIENCE, address_of_page, visits  # noqa: F401
-from test_layout import browser  # noqa: F401
+from pages import PATIENCE
 
 import reader_solver  # isort: skip
 import solver_numpy  # isort: skip  (both are found by way of pyproject.toml)
