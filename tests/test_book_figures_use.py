@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chapters import Chapter, drawn, lines, panel
+from chapters import Chapter, drawn, floats, lines, panel
 from truth import solve
 
 from cradle.tables import paper_chain
@@ -21,7 +21,7 @@ def velocities(chain, forward, backward=None):
     """Velocities after an impact by the independent solver."""
     masses, before, restitution = (list(map(float, values)) for values in chain)
     done = solve(masses, before, restitution, forward, backward, excess="saturate", number=float)
-    return np.array([float(v) for v in done.velocities])
+    return floats(done.velocities)
 
 
 def strokes(count, e, ratio=0.15):
@@ -37,18 +37,17 @@ def shots(name):
     """Striker's speeds of a stored set, and velocities afterwards over them, by shot."""
     with (DATA / "shots_synthetic.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if line[0] != "#"))
-    rows = [row for row in rows if row["set"] == name]
-    after = np.array([float(row["after"]) for row in rows]).reshape(-1, len(name))
-    striker = np.array([float(row["before"]) for row in rows]).reshape(-1, len(name))[:, :1]
-    return striker[:, 0], after / striker
+    before, after = (
+        floats(row[column] for row in rows if row["set"] == name).reshape(-1, len(name))
+        for column in ("before", "after")
+    )
+    return before[:, 0], after / before[:, :1]
 
 
 def dots(ax, count):
     """What error bars mark: points of the lines that have a marker and so many points."""
-    return [
-        line.get_xydata() for line in ax.get_lines()
-        if line.get_marker() == "o" and len(line.get_xydata()) == count
-    ]  # fmt: skip
+    marked = [line.get_xydata() for line in ax.get_lines() if line.get_marker() == "o"]
+    return [xy for xy in marked if len(xy) == count]
 
 
 def test_fig_toy_models():
@@ -165,18 +164,3 @@ def test_fig_measure_fold():
         for k in (0, 250, 500, 790):
             miss = np.linalg.norm(velocities(balls, float(line[k, 0])) - data)
             assert line[k, 1] == pytest.approx(miss, abs=1e-10)
-
-
-def test_fig_beyond_map():
-    ax = drawn("beyond")["fig-beyond-map"].axes[0]
-    count = ax.collections[0].get_array().reshape(250, 250)
-    axis = (np.arange(250) + 0.5) * 3 / 250
-    for row, column in ((200, 200), (60, 60), (20, 100), (100, 5), (12, 40), (9, 9)):
-        r1, r2 = axis[row], axis[column]
-        done = solve(
-            [1 / r1, 1.0, 1 / r2], [1.0, 0.0, 0.0], [0.5, 0.5], 0.15, 0.15, number=float
-        )  # fmt: skip
-        assert count[row, column] == sum(kind == "end" for kind, _ in done.events), (row, column)
-    x, r1 = ax.get_lines()[0].get_xydata().T
-    line = 1.5 * (1 + 0.5 * np.sqrt(1 - 0.15 * (1 + x))) / (0.5 * (1 + x)) - 1.3  # Eq. 44
-    np.testing.assert_allclose(r1, line, rtol=1e-12)

@@ -3,22 +3,11 @@
 import mpmath
 import numpy as np
 import pytest
+from chains import HERTZ
 from chapters import Chapter, number, panel, stored_run
-from scipy.integrate import solve_ivp
 from truth import solve
 
 CHAPTER = Chapter("forces")
-
-
-def spheres(n):
-    """Velocities after the first of n equal elastic spheres strikes, by SciPy at 1e-12."""
-
-    def rate(_, y):
-        push = np.maximum(y[: n - 1] - y[1:n], 0) ** 1.5
-        return np.concatenate([y[n:], np.append(0, push) - np.append(push, 0)])
-
-    start = np.append(np.zeros(n), np.eye(n)[0])
-    return solve_ivp(rate, (0, 30), start, "DOP853", rtol=1e-12, atol=1e-14).y[n:, -1]
 
 
 def test_zeta_is_hurwitzs():
@@ -50,11 +39,11 @@ def test_the_work_for_an_error():
 
 
 def test_the_rule_is_per_cents_from_spheres():
-    first = spheres(3)[0]
+    first = HERTZ["three equal"][0]
     ratio = -2 * first / (1 - first)
     assert CHAPTER.glued["ratio"] == f"{ratio:.3f}"
-    done = solve([1.0] * 5, [1.0, 0.0, 0.0, 0.0, 0.0], [1.0] * 4, ratio, number=float)
-    off = np.abs(np.array(done.velocities, float) - spheres(5)).max()
+    done = solve([1] * 5, [1, 0, 0, 0, 0], 1, ratio, number=float)
+    off = np.abs(np.array(done.velocities, float) - HERTZ["five equal"]).max()
     assert number(CHAPTER.glued["rule"]) == pytest.approx(off, abs=0.005)
     (line,) = [
         line.get_ydata()[0]

@@ -1,15 +1,14 @@
 """Chapter "Measure your own cradle": what its text says, by second routes, and with other files."""
 
-import csv
 import math
-from functools import cache
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from chapters import Chapter
-from scipy.optimize import brentq
+from scipy.stats import norm
+from stored import read
 from test_book_parameters import code, pictures_in_memory, run
 from truth import solve
 
@@ -23,10 +22,9 @@ GLUED = CHAPTER.glued | TABLE.glued
 __all__ = ["pictures_in_memory"]
 
 
-@cache
-def stored(name):
-    with (ROOT / "data" / name).open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+def stored(name, **equal):
+    rows = read(name)
+    return [row for row in rows if all(row[key] == value for key, value in equal.items())]
 
 
 def test_every_page_that_shows_data_calls_them_synthetic():
@@ -43,18 +41,15 @@ def test_error_of_a_line_by_least_squares():
 
 
 def test_numbers_of_the_study():
-    rows = stored("fit_study.csv")
     for noise in ("0.003", "0.01", "0.03"):
-        some = [row for row in rows if row["noise"] == noise]
-        trials = sum(int(row["datasets"]) for row in some)
-        covered = sum(int(row["covered"]) for row in some) / trials
-        assert GLUED[f"covered-{noise}"] == f"{100 * covered:.1f}"
-        widths = sorted(float(row["width"]) for row in some)
+        rows = stored("fit_study.csv", noise=noise)
+        trials, covered = (sum(int(row[name]) for row in rows) for name in ("datasets", "covered"))
+        assert GLUED[f"covered-{noise}"] == f"{100 * covered / trials:.1f}"
+        widths = sorted(float(row["width"]) for row in rows)
         assert float(GLUED[f"width-{noise}"]) == pytest.approx(widths[32], abs=2e-3)
-    some = [row for row in rows if row["noise"] == "0.01"]
+    rows = stored("fit_study.csv", noise="0.01")
     for name in ("wrong_least_squares", "wrong_bounded", "wrong_five_starts"):
-        wrong = sum(int(row[name]) for row in some)
-        assert GLUED[name] == f"{100 * wrong / (64 * 25):.1f}"
+        assert GLUED[name] == f"{100 * sum(int(row[name]) for row in rows) / (64 * 25):.1f}"
 
 
 def test_third_digit_by_the_closed_form():
@@ -116,14 +111,10 @@ def test_wrong_coefficient_makes_another_ratio_the_best():
 
 
 def test_power_by_theory():
-    delta = next(float(r["detectable"]) for r in stored("fit_precision.csv")
-                 if r["triplet"] == "AAA")  # fmt: skip
-    sensitivity = next(float(r["sensitivity"]) for r in stored("fit_precision.csv")
-                       if r["triplet"] == "AAA")  # fmt: skip
-    error = 0.01 / (sensitivity * math.sqrt(10)) * math.sqrt(2)
-    normal = lambda x: 0.5 * (1 + math.erf(x / math.sqrt(2)))  # noqa: E731
-    limit = brentq(lambda x: normal(x) - 0.975, 0, 5) * error
-    power = 1 - normal((limit - delta) / error)
+    (row,) = stored("fit_precision.csv", triplet="AAA")
+    error = 0.01 / (float(row["sensitivity"]) * math.sqrt(10)) * math.sqrt(2)
+    limit = norm.ppf(0.975) * error
+    power = norm.sf((limit - float(row["detectable"])) / error)
     assert power == pytest.approx(0.8, abs=0.01)
     assert float(GLUED["power"]) == pytest.approx(100 * power, abs=5)
     assert float(GLUED["false"]) == pytest.approx(5, abs=2.5)

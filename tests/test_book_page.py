@@ -28,25 +28,18 @@ def test_numbers_for_people(value, text):
     assert people(value) == text
 
 
-def test_counts():
+def test_counts_and_small_whole_numbers_are_words():
     assert [count(n, "chain") for n in (0, 1, 12, 35)] == [
         "no chains", "one chain", "twelve chains", "35 chains"
     ]  # fmt: skip
     assert count(2, "ball", "pairs of balls") == "two pairs of balls"
-
-
-def test_small_whole_numbers_are_words():
     assert [said(n) for n in (0, 12, 13, 2.0, 0.5)] == ["no", "twelve", "13", "2", "0.5"]
+    assert (below(1e-15), below(2e-4)) == ("< 10⁻¹²", "2·10⁻⁴")
 
 
 def test_a_row_of_velocities():
     assert aligned([-1 / 3, 2 / 3, -1e-9]) == " -0.333  0.667  0.000"
     assert aligned([1], digits=1) == "  1.0"
-
-
-def test_below():
-    assert below(1e-15) == "< 10⁻¹²"
-    assert below(2e-4) == "2·10⁻⁴"
 
 
 def test_a_listing_keeps_every_line_of_code():

@@ -32,6 +32,11 @@ def test_every_program_is_here():
     assert {path.stem for path in EXAMPLES.glob("*.py")} == set(PROGRAMS)
 
 
+def motion(bodies):
+    """Positions and velocities as arrays."""
+    return (np.array(part, float) for part in bodies.motion())
+
+
 @pytest.fixture(params=PROGRAMS)
 def program(request):
     """A program as a module, if its engine is installed."""
@@ -43,7 +48,7 @@ def program(request):
 
 def energies(program, bodies):
     """Each ball's energy above its lowest point, J."""
-    x, v = (np.array(part, float) for part in bodies.motion())
+    x, v = motion(bodies)
     height = x[:, 1] + program.LENGTH
     return program.MASS * (0.5 * (v**2).sum(axis=1) + GRAVITY * height)
 
@@ -54,7 +59,7 @@ def closed(bodies):
 
 def test_an_adapter_tells_and_does_what_a_row_asks(program):
     bodies = program.cradle(pulled=2, angle=0.3)
-    x, v = (np.array(part, float) for part in bodies.motion())
+    x, v = motion(bodies)
     angle = np.array([-0.3, -0.3, 0, 0, 0])
     arms = program.LENGTH * np.column_stack([np.sin(angle), -np.cos(angle)])
     pivots = np.column_stack([2 * program.RADIUS * np.arange(5), np.zeros(5)])
@@ -63,7 +68,7 @@ def test_an_adapter_tells_and_does_what_a_row_asks(program):
     # Along the arc: the string takes no part of these.
     bodies.push(4, (0.25, 0.0))
     bodies.push(1, (0.5 * math.cos(0.3), -0.5 * math.sin(0.3)))
-    _, v = (np.array(part, float) for part in bodies.motion())
+    _, v = motion(bodies)
     expected = np.zeros((5, 2))
     expected[4, 0] = 0.25 / program.MASS
     expected[1] = 0.5 * math.cos(0.3) / program.MASS, -0.5 * math.sin(0.3) / program.MASS
@@ -80,7 +85,7 @@ def test_one_impact_is_that_of_collide(program):
     row = program.mended(bodies)
     bodies.push(0, (1.5, 0.0))
     row.step(STEP)
-    _, v = (np.array(part, float) for part in bodies.motion())
+    _, v = motion(bodies)
     expected = collide(Chain([1] * 5, [1.5, 0, 0, 0, 0]), ImpulseCorrelation(0.1325)).velocities
     np.testing.assert_allclose(v[:, 0], expected, atol=5e-5)
     rise = expected**2 / program.LENGTH * STEP  # up the arc, for one step

@@ -3,9 +3,9 @@
 import re
 import subprocess
 import sys
-import xml.etree.ElementTree as ElementTree
 from importlib.metadata import version
 from pathlib import Path
+from xml.etree.ElementTree import fromstring as tree_of
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -32,47 +32,41 @@ from cradle.formatting import as_html
 # --- the desk toy --------------------------------------------------------------------------
 
 
+TOY = Chain([1] * 5, [1, 0, 0, 0, 0])
+
+
 def test_the_toy_by_a_second_route(root: Path):
-    """The README's numbers: from its text, from the model, and from an integration of our own."""
+    """The numbers of README and landing page: from their texts, the model, another program."""
     readme = (root / "README.md").read_text(encoding="utf-8")
     sentence = readme.partition("**The last ball")[2].partition("**")[0]
     assert re.findall(r"\d+(?= %| and|,)", sentence) == ["99", "13", "7", "3", "1"]
-    after = collide(Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain()).velocities
+    told = Chapter("intro").glued
+    assert [told[f"desk-{ball}"] for ball in ("last", "fourth", "back")] == ["99", "13", "7"]
+    after = collide(TOY, SpringChain()).velocities
     assert (np.abs(after[::-1]) * 100).round().tolist() == [99, 13, 1, 3, 7]
     assert (after[:3] < 0).all()
     np.testing.assert_allclose(elastic_spheres([1] * 5, 2e-3), after, rtol=0, atol=1e-6)
-
-
-def test_the_landing_page_says_the_same_of_the_toy():
-    told = Chapter("intro").glued
-    assert [told[f"desk-{ball}"] for ball in ("last", "fourth", "back")] == ["99", "13", "7"]
+    # Mass, size, stiffness and speed cancel.
+    steel = collide(Chain([0.045] * 5, [0.3, 0, 0, 0, 0]), SpringChain(1.3e10))
+    np.testing.assert_allclose(steel.velocities / 0.3, after, rtol=0, atol=1e-9)
 
 
 def test_the_ratio_of_three_spheres_on_five():
     """The landing page sets it beside five spheres: by our own integration, v1 = -a/(2 - a)."""
     back, *_ = elastic_spheres([1] * 3, 2e-3)
-    ratio = -2 * back / (1 - back)
-    told = Chapter("intro").glued
+    ratio, told = -2 * back / (1 - back), Chapter("intro").glued
     assert told["spheres"] == f"{ratio:.4f}"
-    five = collide(Chain([1] * 5, [1, 0, 0, 0, 0]), ImpulseCorrelation(ratio)).velocities
-    numbers = re.findall(r"[-\d.]+", told["spheres-five"].replace("−", "-"))
-    assert [float(x) for x in numbers] == [round(float(v), 2) + 0.0 for v in five]
-    spheres = elastic_spheres([1] * 5, 2e-3)
-    assert (spheres[1:3] < -0.01).all()  # "spheres throw them back a little"
+    five = collide(TOY, ImpulseCorrelation(ratio)).velocities
+    shown = re.findall(r"[-\d.]+", told["spheres-five"].replace("−", "-"))
+    assert [float(x) for x in shown] == [round(float(v), 2) + 0.0 for v in five]
+    assert (elastic_spheres([1] * 5, 2e-3)[1:3] < -0.01).all()  # "spheres throw them back a little"
     assert abs(five[1:3]).max() < 1e-12  # and the ratio leaves them at rest
 
 
-def test_mass_size_stiffness_and_speed_of_the_toy_cancel():
-    after = collide(Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain()).velocities
-    steel = collide(Chain([0.045] * 5, [0.3, 0, 0, 0, 0]), SpringChain(1.3e10))
-    np.testing.assert_allclose(steel.velocities / 0.3, after, rtol=0, atol=1e-9)
-
-
 def test_what_the_readme_says_of_the_other_answers():
-    chain = Chain([1] * 5, [1, 0, 0, 0, 0])
-    assert collide(chain, SequentialCollisions()).velocities.tolist() == [0, 0, 0, 0, 1]
-    elastic = collide(chain, EnergyDistribution()).velocities
-    np.testing.assert_allclose(elastic, collide(chain, SpringChain()).velocities, atol=1e-7)
+    assert collide(TOY, SequentialCollisions()).velocities.tolist() == [0, 0, 0, 0, 1]
+    elastic = collide(TOY, EnergyDistribution()).velocities
+    np.testing.assert_allclose(elastic, collide(TOY, SpringChain()).velocities, atol=1e-7)
     lossy = Chain([1] * 5, [1, 0, 0, 0, 0], 0.97)
     assert collide(lossy, EnergyDistribution()).velocities[-1] < elastic[-1]
     with pytest.raises(ValueError, match="must be 1 for SpringChain"):
@@ -127,12 +121,7 @@ MODELS = [
 ]
 
 
-def parsed(html: str) -> ElementTree.Element:
-    """Return the HTML as a tree: it is well formed, so that it cannot spill into the page."""
-    return ElementTree.fromstring(html)
-
-
-def cells(tree: ElementTree.Element) -> list[list[str]]:
+def cells(tree) -> list[list[str]]:
     return [[cell.text or "" for cell in row] for row in tree.iter("tr")]
 
 
@@ -140,7 +129,9 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def test_picture_and_table_of_a_chain():
-    tree = parsed(Chain([8, 1, 1], [1, 0, -2], [1, 0.5])._repr_html_())
+    """HTML that is well formed cannot spill into a page; the picture has the page's colours."""
+    html = Chain([8, 1, 1], [1, 0, -2], [1, 0.5])._repr_html_()
+    tree = tree_of(html)
     assert cells(tree) == [
         ["ball", "mass (kg)", "velocity (m/s)", "restitution with the next"],
         ["0", "8", "1", "1"],
@@ -151,12 +142,15 @@ def test_picture_and_table_of_a_chain():
     assert radii[0] == pytest.approx(2 * radii[1])  # of one density
     steps = [path.get("d").split(" h ")[1].split()[0] for path in tree.iter(f"{SVG}path")]
     assert [float(step) for step in steps] == [15, -30]  # arrows: to the right, twice to the left
+    colours = re.findall(r'(?:fill|stroke|color)="([^"]*)"', html)
+    assert set(colours) == {"currentColor", "none"}
+    assert "style>" not in html
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
 def test_picture_and_table_of_a_trace(model):
     trace = collide(Chain([1, 1, 1], [1, 0, 0]), model)
-    tree = parsed(trace._repr_html_())
+    tree = tree_of(trace._repr_html_())
     head, *rows = cells(tree)
     assert head[2:4] == ["before (m/s)", "after (m/s)"]
     assert [row[3] for row in rows] == [f"{v + 0.0:.6g}" for v in trace.velocities]
@@ -164,15 +158,8 @@ def test_picture_and_table_of_a_trace(model):
     assert len(list(tree.iter(f"{SVG}circle"))) == 6
 
 
-def test_pictures_take_the_colours_of_the_page():
-    svg = Chain([1, 1], [1, 0])._repr_html_()
-    colours = set(re.findall(r'(?:fill|stroke|color)="([^"]*)"', svg))
-    assert colours == {"currentColor", "none"}
-    assert "style>" not in svg
-
-
 def test_long_chains_are_cut():
-    tree = parsed(Chain([1] * 500, [1] + [0] * 499)._repr_html_())
+    tree = tree_of(Chain([1] * 500, [1] + [0] * 499)._repr_html_())
     names = [row[0] for row in cells(tree)[1:]]
     assert names == [*map(str, range(8)), "…", *map(str, range(496, 500))]
     assert len(list(tree.iter(f"{SVG}circle"))) == 12
@@ -184,9 +171,9 @@ def test_pictures_of_extremes():
     for chain, radii in ((light, [18, 2, 18]), (tiny, [18, 18])):
         html = chain._repr_html_()
         assert not re.search(r"nan|inf", html)
-        assert [float(c.get("r")) for c in parsed(html).iter(f"{SVG}circle")] == radii
+        assert [float(c.get("r")) for c in tree_of(html).iter(f"{SVG}circle")] == radii
     escaped = as_html(np.ones(1), {"<b>": np.zeros(1)}, {"&": np.zeros(1)})
-    assert [text.text for text in parsed(escaped).iter(f"{SVG}text")] == ["<b>"]
+    assert [text.text for text in tree_of(escaped).iter(f"{SVG}text")] == ["<b>"]
 
 
 # --- tables and plots of a path ------------------------------------------------------------
