@@ -7,7 +7,6 @@ forms, by the independent solver in truth.py, and by another integrator.
 from functools import cache
 from pathlib import Path
 
-import dask.array as da
 import long_chains
 import mpmath
 import numpy as np
@@ -78,16 +77,6 @@ def test_every_row_of_the_benchmark_is_stored():
     assert len(find("springs")) == sum(map(len, b.SPRINGS.values()))
 
 
-@needs_numba
-def test_stored_map_is_the_map():
-    (row,) = find("map")
-    side = round(row["chains"] ** 0.5)
-    found = outcomes(long_chains.map_of_three(side), [1, 0, 0], row["restitution"], row["ratio"])
-    assert found.collisions[~found.collapsed].sum() == row["collisions"]
-    assert found.collapsed.sum() == row["collapsed"]
-    assert row["time_ratio"] < 1000  # a million chains, in the time of a thousand on springs
-
-
 def test_stored_elastic_rows_have_the_closed_form():
     rows = find("elastic")
     stored = column(rows, "first", "second_last", "last")
@@ -123,23 +112,6 @@ def test_closed_form_of_a_row_at_fifty_digits(balls, ratio):
         assert max(off) < mpmath.mpf(10) ** -48
 
 
-def test_stored_rows_with_losses_again():
-    """Where the order of events is no chance, all digits; else the front and the fast balls."""
-    b = long_chains
-    for row in find("losses", collapsed=0.0):
-        if row["balls"] > 80:
-            continue
-        found = outcomes(*struck(int(row["balls"])), row["restitution"], row["ratio"])
-        if row["orders"] == 1:
-            assert found.collisions.sum() == row["collisions"]
-            after = found.velocities[[0, -3, -2, -1]]
-            stored = [row[name] for name in ("first", "third_last", "second_last", "last")]
-            np.testing.assert_allclose(after, stored, rtol=1e-9, atol=1e-13)
-        np.testing.assert_allclose(found.velocities[-1], row["last"], rtol=1e-4)
-        fast = (found.velocities > b.FAST).sum()
-        assert row["fast_least"] <= fast <= row["fast_most"]
-
-
 @pytest.mark.parametrize(("balls", "restitution"), [(20, 0.99), (12, 0.9)])
 @pytest.mark.parametrize("ratio", [0.0, 0.1, 0.45])
 def test_rows_with_losses_at_fifty_digits(balls, restitution, ratio):
@@ -149,17 +121,6 @@ def test_rows_with_losses_at_fifty_digits(balls, restitution, ratio):
     assert list(expected.collisions) == after.collisions.tolist()
     expected = np.array([float(v) for v in expected.velocities])
     np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-13)
-
-
-@pytest.mark.parametrize("exponent", [1.5, 1.0])
-def test_stored_springs_again(exponent):
-    for row in find("springs", exponent=exponent):
-        balls = int(row["balls"])
-        if balls <= 15:
-            model = SpringChain(1.0, exponent, accuracy=1e-9)
-            after = collide(Chain(*struck(balls), 1.0), model).velocities
-            stored = [row[name] for name in ("first", "third_last", "second_last", "last")]
-            np.testing.assert_allclose(after[[0, -3, -2, -1]], stored, rtol=0, atol=2e-6)
 
 
 def test_rows_of_linear_springs_by_their_modes():
@@ -353,22 +314,6 @@ def sweep(n=4):
         uniform(rng, 0, 0.2, (12, 1, n - 2)),
         uniform(rng, 0, 0.2, (9, n - 2)),
     )
-
-
-@pytest.mark.parametrize("scheduler", ["synchronous", "threads"])
-@pytest.mark.parametrize("size", [1, 5, 12])
-def test_dask_gives_the_same_bits(scheduler, size):
-    inputs = sweep()
-    pieces = [da.from_array(x, chunks=(*[size] * (x.ndim - 1), -1)) for x in inputs]
-    lazy = da.apply_gufunc(
-        post_impact_velocities,
-        "(n),(n),(m),(k),(k)->(n)",
-        *(x.rechunk({0: min(size, x.shape[0])}) for x in pieces),
-        output_dtypes=float,
-    )
-    direct = post_impact_velocities(*inputs)
-    assert lazy.shape == direct.shape == (12, 9, 4)
-    assert lazy.compute(scheduler=scheduler).tobytes() == direct.tobytes()
 
 
 @pytest.mark.parametrize("chunks", [None, {"case": 5, "loss": 4}])

@@ -22,7 +22,7 @@ from cradle import (
     ratio_table,
     restitution_table,
 )
-from cradle.closed_form import largest_ratios, one_collision_each, three_balls
+from cradle.closed_form import largest_ratios, three_balls
 from cradle.tables import ball_masses
 
 SUSPECTS = ("DBB", "BBD", "DBC", "CBD")
@@ -194,20 +194,6 @@ def test_table_2_most_open_entries():
     width = {t: edge(t, TABLE_2.bound[t]) - edge(t, 0.0) for t in TABLE_2.index}
     assert {t for t, w in width.items() if w > 0.2} == {"BBD", "CBD"}
     assert 0.03 < np.median(list(width.values())) < 0.04
-
-
-def test_table_2_daa_has_two_sets_of_ratios():
-    """One with two collisions of balls 1 and 2, one with one: there Eqs. 30-33 hold."""
-    chain, model = paper_chain("DAA")
-    printed = collide(chain, model)
-    assert printed.collisions.tolist() == [2, 1]
-    twin = 0.397
-    args = (chain.masses, chain.velocities, chain.restitution, twin)
-    assert one_collision_each(*args)
-    assert np.abs(three_balls(*args) - printed.velocities).max() < 0.01
-    assert distance("DAA", 0.3) > 0.01  # nothing in between
-    chapter = collide(chain, ImpulseCorrelation(twin, model.backward))
-    np.testing.assert_allclose(chapter.velocities, three_balls(*args), rtol=1e-12)
 
 
 def test_why_two_entries_are_open():

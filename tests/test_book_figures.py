@@ -32,20 +32,16 @@ LIGHT = [100, 1, 100], [1, 0, 0], 1  # Fig. 7, ratio 0.15
 CLOSE = {"rtol": 0, "atol": 1e-12}
 
 
-def texts(figure):
-    """All words of a figure: titles, labels, legends, notes."""
-    return " ".join(text.get_text() for text in figure.findobj(Text))
-
-
-@pytest.mark.parametrize("chapter", CHAPTERS)
-def test_decimals_of_descriptions_are_in_the_figure(chapter):
-    for cell in code(chapter):
+def test_decimals_of_descriptions_are_in_the_figure():
+    """Of the landing page: other descriptions have none (test_notebooks.py)."""
+    for cell in code("intro"):
         settings = cell.metadata.get("mystnb", {})
-        figure = drawn(chapter).get(settings.get("figure", {}).get("name"))
-        if figure is None:  # the landing page's moving picture has a test of its own
+        figure = drawn("intro").get(settings.get("figure", {}).get("name"))
+        if figure is None:  # the moving picture has a test of its own
             continue
         limits = [x for ax in figure.axes for x in (*ax.get_xlim(), *ax.get_ylim())]
-        said = [float(x) for x in re.findall(r"\d+\.\d+", texts(figure))] + limits
+        texts = " ".join(text.get_text() for text in figure.findobj(Text))
+        said = [float(x) for x in re.findall(r"\d+\.\d+", texts)] + limits
         for number in re.findall(r"\d+\.\d+", settings["image"]["alt"]):
             assert float(number) in said, (cell.id, number)
 

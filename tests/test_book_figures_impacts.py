@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from chapters import after, drawn, lines, panel, points, solved
+from chapters import Chapter, after, drawn, lines, panel, points, solved
 from test_book_n_balls import FIG_8, contact_work
 from test_book_patterns import by_turns, edge, turn
 
@@ -206,6 +206,9 @@ def test_fig_overlap():
     ]
     met = trace.path[trace.events.index(("close", 1)) + 1, 1]
     assert (low + high) / 2 == pytest.approx(met, abs=1e-12)
+    words = Chapter("n_balls").printed("fig8-overlap").replace(",", "").split()
+    printed = words[words.index("overlap") + 1], words[words.index("midpoint") - 1]
+    assert [float(x) for x in printed] == pytest.approx([low, high], abs=6e-5)
 
 
 def test_fig_experiments_swap_as_drawn():

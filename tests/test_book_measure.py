@@ -12,7 +12,7 @@ from stored import read
 from test_book_parameters import code, pictures_in_memory, run
 from truth import solve
 
-from cradle import paper_chain, ratio_table
+from cradle import paper_chain
 from cradle.closed_form import one_collision_each, three_balls
 
 ROOT = Path(__file__).parents[1]
@@ -40,18 +40,6 @@ def test_error_of_a_line_by_least_squares():
     assert f"{1000 * error:.0f}" == GLUED["error"]
 
 
-def test_numbers_of_the_study():
-    for noise in ("0.003", "0.01", "0.03"):
-        rows = stored("fit_study.csv", noise=noise)
-        trials, covered = (sum(int(row[name]) for row in rows) for name in ("datasets", "covered"))
-        assert GLUED[f"covered-{noise}"] == f"{100 * covered / trials:.1f}"
-        widths = sorted(float(row["width"]) for row in rows)
-        assert float(GLUED[f"width-{noise}"]) == pytest.approx(widths[32], abs=2e-3)
-    rows = stored("fit_study.csv", noise="0.01")
-    for name in ("wrong_least_squares", "wrong_bounded", "wrong_five_starts"):
-        assert GLUED[name] == f"{100 * sum(int(row[name]) for row in rows) / (64 * 25):.1f}"
-
-
 def test_third_digit_by_the_closed_form():
     """Where balls collide once each: sensitivities from the formulas, slope by slope."""
     study = {row["triplet"]: row for row in stored("fit_precision.csv")}
@@ -74,18 +62,6 @@ def test_third_digit_by_the_closed_form():
         needed = 0.0005 / 1.96 * math.sqrt(20 * seen)
         assert float(study[name]["third_digit"]) == pytest.approx(needed, rel=0.01)
     assert checked >= 4
-
-
-def test_counts_of_the_table():
-    rows = stored("fit_precision.csv")
-    needed = np.array([float(row["third_digit"]) for row in rows])
-    assert GLUED["loose"] == str((needed < 0.001).sum())
-    assert GLUED["third-median"] == f"{100 * np.median(needed):.2f}"
-    assert GLUED["traps"] == str(sum(bool(row["trap_low"]) for row in rows)) == "8"
-    assert GLUED["here"] == "8"
-    middle = ratio_table().set_index("triplet").ratio
-    others = [middle[t] for t in middle.index if t[1] == "A" and "D" in t[::2] and t != "DAD"]
-    assert (len(others), min(others), max(others)) == (6, 0.050, 0.215)
 
 
 def test_masses_within_half_a_gram():

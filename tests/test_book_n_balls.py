@@ -158,23 +158,6 @@ def test_fig_8_path():
     )
 
 
-def test_fig_8_overlap_and_midpoint():
-    # Each of the two pairs, left alone, ends with the energy of its relative motion that its
-    # contact has: absorbed so far, and what is still to be absorbed.
-    trace = collide(FIG_8, ImpulseCorrelation(0.1))
-    ends = trace.events.index(("end", 1)) + 1
-    v, impulse = trace.path[ends], trace.path_impulses
-    back = impulse[ends, 0] - impulse[trace.events.index(("close", 0)) + 1, 0]
-    left = math.hypot(v[0] - v[1], math.sqrt(4 * back * (v[0] - v[1]) / 2))
-    right = math.hypot(v[2] - v[3], math.sqrt(4 * contact_work(trace, 2, ends)))
-    high, low = (v[0] + v[1] + left) / 2, (v[2] + v[3] - right) / 2
-    met = trace.path[trace.events.index(("close", 1)) + 1]
-    assert met[1] == pytest.approx((low + high) / 2, rel=1e-13) == pytest.approx(met[2], rel=1e-15)
-    words = CHAPTER.printed("fig8-overlap").replace(",", "").split()
-    assert float(words[words.index("overlap") + 1]) == pytest.approx(low, abs=6e-5)
-    assert float(words[words.index("midpoint") - 1]) == pytest.approx(high, abs=6e-5)
-
-
 def contact_work(trace, c, row):
     """Work done on contact c up to a row of the path, by the trapezoidal rule (exact here)."""
     u = trace.path[: row + 1, c] - trace.path[: row + 1, c + 1]

@@ -151,13 +151,6 @@ def test_eq_44_ends_of_the_curve():
     CHAPTER.tells({"end-1": height(0), "end-2": brentq(height, 1, 4)})
 
 
-def test_curves_of_fig_6_meet_in_one_point():
-    for _, _, e2, alpha in zip(*random_cases(6, 100)):
-        e3 = 1.3 - e2
-        r1, r2 = first_ball_stops(e2, alpha), middle_ball_stops(e3, alpha)
-        assert back_impact_line(r2, e2, e3, alpha) == pytest.approx(r1, rel=1e-11)
-
-
 # --- Fig. 6 ------------------------------------------------------------------------------------
 
 
@@ -313,14 +306,6 @@ def test_fig_7_last_digit(light):
         0.348,
         0.999,
     ]
-
-
-@pytest.mark.parametrize("alpha", [0.0, 0.15, 0.5, 0.9])
-def test_micro_collisions(alpha):
-    """n = pi sqrt((1 - alpha) / (r1 + r2)) for e = 1 as the middle ball vanishes."""
-    for r1, r2 in ((1e-6, 1e-6), (1e-6, 3e-6), (4e-6, 1e-6)):
-        estimate = np.pi * np.sqrt((1 - alpha) / (r1 + r2))
-        assert abs(count(r1, r2, 1.0, alpha) - estimate) < 2.5
 
 
 def test_light_ball_has_no_limit():

@@ -4,20 +4,17 @@ The table is measured (benchmarks/run.py); its velocities are compared with answ
 independent solver in truth.py, with closed formulas, and with converged springs from elsewhere.
 """
 
-import re
-from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pytest
 from chains import ELASTIC, HERTZ
-from chapters import Chapter, number, points
-from measured_table import find, fused, marks, masses_and_restitution, sequential, table
-from page import people
+from chapters import Chapter, points
+from measured_table import find, fused, marks, sequential, table
 from stored import read
 from truth import solve
 
-from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, paper_chain
+from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide
 
 ROOT = Path(__file__).parents[1]
 CHAPTER = Chapter("trade")
@@ -50,21 +47,6 @@ def test_times_are_medians_and_say_what_the_text_says():
         for how in ("compiled", "plain")
     }
     assert calls["plain"] > calls["compiled"] > 3  # a call costs more than its impact
-
-
-def test_stored_velocities_of_the_event_solver():
-    """Nothing in the table is older than the solver: its outcomes are today's."""
-    for scene in (*ELASTIC, "ABCCA"):
-        m, _ = masses_and_restitution(scene)
-        chain, model = (
-            paper_chain(scene, excess="saturate")
-            if scene == "ABCCA"
-            else (Chain(m, [1] + [0] * (len(m) - 1), 1), ImpulseCorrelation(0.167))
-        )
-        for row in find("event", chain=scene):
-            np.testing.assert_allclose(
-                row["velocities"], collide(chain, model).velocities, rtol=0, atol=1e-11
-            )
 
 
 def test_fig_trade_cost_events_are_exact_at_a_fixed_price():
@@ -318,90 +300,6 @@ def test_savings_are_savings():
     line, three = pairs[-1]
     assert "1000" in line["setting"]
     assert line["time_ratio"] < 10 * three["time_ratio"]  # 333 times as many balls
-
-
-def test_sequential_collisions_tell_who_moves_off_fastest():
-    for scene in ELASTIC:
-        for answer in (sequential(scene), np.array(HERTZ[scene])):
-            assert np.argmax(answer) == len(answer) - 1
-            assert answer[-1] - answer[-2] > 0.2
-        assert abs(np.diff(fused(scene)[1:])).max() < 1e-12
-
-
-def test_the_decision_follows_from_the_table():
-    """Each choice by another route: of the rows that give what is wanted, none is cheaper."""
-
-    def cheapest(group, model, error, what="velocities", setting="", chain="three equal"):
-        fit = [
-            row
-            for row in find(group, setting, chain=chain)
-            if row["model"].startswith(model)
-            and what in row["gives"]
-            and "plain" not in row["setting"]
-            and not (row["numerical_error"] or 0) > error
-        ]
-        return min(fit, key=lambda row: row["time_ratio"])
-
-    chosen = [
-        find("saving", model="two balls")[0],
-        cheapest("outcome", "SequentialCollisions", 1),
-        cheapest("event", "", 1e-6, setting="compiled, batch"),
-        cheapest("event", "", 1e-6, "path", "one call"),
-        cheapest("springs", "SpringChain, Hertz", 1e-2),
-        cheapest("springs", "SpringChain, Hertz", 1e-6, "forces"),
-        cheapest("energy", "", 1e-3, chain="ABCCA"),
-    ]
-    unit = np.median([r["microseconds"] / r["time_ratio"] for r in table() if r["time_ratio"]])
-    units = {"µs": 1, "ms": 1e3, "s": 1e6}
-    *rows, last = shown("trade-decision")
-    for row, expected in zip(rows, chosen, strict=True):
-        _, _, _, setting, time, error, apart = row
-        worded = re.sub(r"\de-\d\d", lambda m: people(float(m[0])), expected["setting"])
-        assert setting == worded or expected["group"] == "saving", row
-        value, name = time.split()
-        assert float(value) * units[name] == pytest.approx(unit * expected["time_ratio"], rel=0.06)
-        exact = expected["numerical_error"]
-        assert (
-            error == "not measured"
-            if exact is None
-            else number(error) == pytest.approx(exact, rel=0.5)
-        )
-        if expected["model_reference"].startswith("Hertz"):
-            assert float(apart) == pytest.approx(expected["model_error"], rel=0.06)
-        else:
-            assert apart == ("0" if expected["group"] == "springs" else "not measured")
-    assert last[4:] == ["not measured", "not measured", "0"]
-    assert chosen[2]["time_ratio"] < 2
-    assert chosen[4]["time_ratio"] > 50 * chosen[2]["time_ratio"]
-
-
-def test_impossible_wishes_are_refused():
-    refused = {wish: (known, answer) for wish, known, answer in shown("trade-refused")}
-    assert len(refused) == 5
-    assert "needs ratios or stiffness" in refused["velocities"][1]
-    assert "needs stiffness" in refused["forces"][1]
-    assert "restitution[0] = 0.9; must be 1" in refused["forces, with losses"][1]
-    # The text: the first refusal says how wrong sequential collisions are without ratios.
-    said = re.search(r"off by (\S+) to (\S+) of", refused["velocities"][1])
-    errors = [np.abs(sequential(scene) - HERTZ[scene]).max() for scene in ELASTIC]
-    expected = [min(errors), max(errors)]
-    assert [float(x) for x in said.groups()] == pytest.approx(expected, rel=0.05)
-    for error in ("model_error = 0.01", "accuracy = 1e-14"):
-        assert any(answer.startswith(error) for _, answer in refused.values())
-
-
-def shown(cell):
-    """Rows of the table that a cell shows."""
-    (text,) = (
-        output.data["text/html"]
-        for output in CHAPTER.cells[cell].outputs
-        if "text/html" in output.get("data", {})
-    )
-    body = text.partition("<tbody>")[2]
-    return [
-        [unescape(cell) for cell in re.findall(r"<t[hd]>(.*?)</t[hd]>", row, flags=re.DOTALL)]
-        for row in body.split("</tr>")[:-1]
-    ]
 
 
 def test_fig_trade_total_drawn():
