@@ -88,3 +88,17 @@ def settings(count: int):
 def middle(tab, selector: str) -> tuple[float, float]:
     box = tab.locator(selector).bounding_box()
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def grab(tab, selector: str, beside: float = 0.0) -> tuple[float, float]:
+    """Press the mouse on the middle of an element, or beside it; return where the middle is."""
+    x, y = middle(tab, selector)
+    tab.mouse.move(x + beside, y)
+    tab.mouse.down()
+    return x, y
+
+
+def bars(tab, selector: str = ".outcome .drawn") -> list[float]:
+    """Return the numbers that a picture of bars shows."""
+    texts = tab.locator(f"{selector} text.number").all_text_contents()
+    return [float(text.replace("\u2212", "-")) for text in texts]

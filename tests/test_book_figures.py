@@ -140,13 +140,32 @@ def test_fig_problem_family():
         np.testing.assert_array_equal(shown[name], [point])
 
 
-def test_fig_problem_definitions():
-    shown = panel("reading", "fig-own-problem-definitions")
-    a = shown["Stronge: work"][:, 0]
-    for name, energy in (("Poisson: impulses", 4 + a**2), ("Stronge: work", (2 - a) ** 2),
-                         ("Newton: speeds", 2 + a**2)):  # fmt: skip
-        expected = np.column_stack([a, energy / (2 - a) ** 2])
-        np.testing.assert_allclose(shown[name], expected, rtol=1e-12)
+@pytest.mark.parametrize(
+    ("chapter", "figure", "formulas", "tolerance"),
+    [
+        ("reading", "fig-own-problem-definitions", {
+            "Poisson: impulses": lambda a: (4 + a**2) / (2 - a) ** 2,
+            "Stronge: work": lambda a: 1 + 0 * a,
+            "Newton: speeds": lambda a: (2 + a**2) / (2 - a) ** 2,
+        }, {"rtol": 1e-12}),
+        ("three_balls", "fig-p4", {
+            "$v_1^+$": lambda a: -2 * a / (4 - 2 * a),
+            "$v_2^+$": lambda a: 2 * (1 - np.sqrt(1 - 2 * a)) / (4 - 2 * a),
+            "$v_3^+$": lambda a: 2 * (1 + np.sqrt(1 - 2 * a)) / (4 - 2 * a),
+        }, {"rtol": 0, "atol": 1e-7}),
+        ("reading", "fig-own-three-ranges", {
+            "Eq. 34": lambda x: 1 + 0 * x,
+            "$1+X$": lambda x: 1 + x,
+            "$1+(1+e_3)X$": lambda x: 1 + 1.5 * x,
+            "$(1+X)^2$: radical real below": lambda x: (1 + x) ** 2,
+        }, {"rtol": 1e-14}),
+    ],
+)  # fmt: skip
+def test_curves_with_a_formula(chapter, figure, formulas, tolerance):
+    shown = panel(chapter, figure)
+    for name, formula in formulas.items():
+        x, y = shown[name].T
+        np.testing.assert_allclose(y, formula(x), err_msg=name, **tolerance)
 
 
 def test_fig_compliance_ratio():
@@ -205,27 +224,14 @@ def test_fig_three_triangle_and_extended():
     np.testing.assert_allclose(shown["second piece, extended"], extended, **CLOSE)
 
 
-def test_fig_4():
+def test_fig_4_ends():
     shown = panel("three_balls", "fig-p4")
-    a = shown["$v_1^+$"][:, 0]
-    s = np.sqrt(1 - 2 * a)
-    for name, value in (
-        ("$v_1^+$", s**2 - 1), ("$v_2^+$", 2 * (1 - s)), ("$v_3^+$", 2 * (1 + s)),
-    ):  # fmt: skip
-        expected = np.column_stack([a, value / (3 + s**2)])
-        np.testing.assert_allclose(shown[name], expected, rtol=0, atol=1e-7)
     np.testing.assert_allclose(shown["Eq. (6)"], [(0, 0), (0, 0), (0, 1)])
     np.testing.assert_allclose(shown["Eq. (5)"], [(0.5, -1 / 3), (0.5, 2 / 3), (0.5, 2 / 3)])
 
 
 def test_fig_three_ranges():
     shown = panel("reading", "fig-own-three-ranges")
-    x = shown["$1+X$"][:, 0]
-    for name, bound in (
-        ("Eq. 34", 1 + 0 * x), ("$1+X$", 1 + x), ("$1+(1+e_3)X$", 1 + 1.5 * x),
-        ("$(1+X)^2$: radical real below", (1 + x) ** 2),
-    ):  # fmt: skip
-        np.testing.assert_allclose(shown[name], np.column_stack([x, bound]), rtol=1e-14)
     for state, low, high in (
         ("still closes", 0, 1), ("already opens", 1, 1.5), ("ends first", 1.5, math.inf),
     ):  # fmt: skip

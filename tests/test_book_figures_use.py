@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chapters import Chapter, drawn, floats, lines, panel
+from test_book_toy import strokes
 from truth import solve
 
 from cradle.tables import paper_chain
 
 DATA = Path(__file__).parents[1] / "data"
+STRUCK = [1, 0, 0, 0, 0]
 
 
 def velocities(chain, forward, backward=None):
@@ -22,15 +24,6 @@ def velocities(chain, forward, backward=None):
     masses, before, restitution = (list(map(float, values)) for values in chain)
     done = solve(masses, before, restitution, forward, backward, excess="saturate", number=float)
     return floats(done.velocities)
-
-
-def strokes(count, e, ratio=0.15):
-    """Velocities after each stroke of five equal balls, the first released."""
-    found, v = [], np.array([1.0, 0, 0, 0, 0])
-    for _ in range(count):
-        found.append(velocities(([1] * 5, v, [e] * 4), ratio))
-        v = -found[-1]
-    return np.array(found)
 
 
 def shots(name):
@@ -56,7 +49,7 @@ def test_fig_toy_models():
     assert {image.shape[0] for image in shown} == {5}
     sequential, ratio, springs, solid, lossy = shown
     for image, e, a in ((sequential, 1, 0), (ratio, 1, 0.15), (lossy, 0.97, 0.15)):
-        expected = np.abs(strokes(20, e, a)).T
+        expected = np.abs(strokes(20, STRUCK, e, a)).T
         np.testing.assert_allclose(image[:, :20], expected, rtol=0, atol=1e-9)
     # One stroke of five Hertz springs, integrated elsewhere, and a body of four by momentum.
     hertz = [0.071085017, 0.030273764, 0.014463629, 0.127044986, 0.988777424]
@@ -69,7 +62,7 @@ def test_fig_toy_drift():
     assert len(shown) == 6
     for e in (0.9, 0.95, 0.99):
         five, two = shown[f"five, e = {e:g}"], shown[f"two, e = {e:g}"]
-        after = strokes(20, e)
+        after = strokes(20, STRUCK, e)
         relative = 5 * after.var(axis=1) / 0.8
         np.testing.assert_allclose(five[:20, 1], relative, rtol=1e-6)
         np.testing.assert_allclose(two[:, 1], e ** (2 * two[:, 0]), rtol=1e-7)
@@ -103,20 +96,15 @@ def test_fig_measure_check():
 
 
 def test_fig_measure_tracks():
-    ax = drawn("measure")["fig-measure-tracks"].axes[0]
-    rows = [
-        [float(x) for x in line.split()]
-        for line in (DATA / "video_synthetic.txt").read_text(encoding="utf-8").splitlines()[3:]
-    ]
-    times, *columns = np.array(rows).T
-    for name, x in zip("BAC", columns[::2], strict=True):
-        line = lines(ax)[f"ball {name}"]
+    shown = lines(drawn("measure")["fig-measure-tracks"].axes[0])
+    table = np.loadtxt(DATA / "video_synthetic.txt", skiprows=3, encoding="utf-8")
+    for name, x in zip("BAC", table[:, 1::2].T, strict=True):
+        line = shown[f"ball {name}"]
         np.testing.assert_allclose(line[:, 1], 1000 * x, rtol=1e-12)
-        np.testing.assert_allclose(np.diff(line[:, 0]), 1000 * np.diff(times), rtol=1e-9)
+        np.testing.assert_allclose(np.diff(line[:, 0]), 1000 * np.diff(table[:, 0]), rtol=1e-9)
     # The struck balls begin to move at time zero.
-    moved = lines(ax)["ball C"]
-    rest, later = moved[moved[:, 0] < 0, 1], moved[moved[:, 0] > 20, 1]
-    assert rest.max() < later.min()
+    time, moved = shown["ball C"].T
+    assert moved[time < 0].max() < moved[time > 20].min()
 
 
 @pytest.mark.parametrize(

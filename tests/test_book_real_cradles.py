@@ -1,5 +1,7 @@
 """Chapter "Two real cradles": what it prints, says and draws, by second routes."""
 
+import re
+
 import numpy as np
 import pytest
 import real_cradles
@@ -27,10 +29,9 @@ def rows(cell):
     """Numbers at the end of each line of a printed table, by the words before them."""
     found = {}
     for line in CHAPTER.printed(cell).splitlines()[1:]:
-        words = line.split()
-        numbers = [word for word in words if word.lstrip("-").replace(".", "", 1).isdigit()]
+        words, numbers = re.fullmatch(r"(.*?)((?:\s+-?\d+(?:\.\d+)?)*)", line.strip()).groups()
         if numbers:
-            found[" ".join(words[: len(words) - len(numbers)])] = [float(x) for x in numbers]
+            found[" ".join(words.split())] = [float(x) for x in numbers.split()]
     return found
 
 
@@ -130,12 +131,11 @@ def test_figures_of_the_strikes_show_how_far_laws_are_from_what_was_read():
 
 
 def test_later_strikes():
-    shown = {
-        line[:40].strip(): float(line[40:]) for line in CHAPTER.printed("later-code").splitlines()
-    }
+    lines = CHAPTER.printed("later-code").splitlines()
+    shown = {line[:40].strip(): float(line[40:]) for line in lines}
+    wrong = {"three ratios; all five meet at once", "spheres, touching, with loss"}
     assert len(shown) == 6
-    wrong = {name for name, value in shown.items() if value > 0.03}
-    assert wrong == {"three ratios; all five meet at once", "spheres, touching, with loss"}
+    assert {name for name, value in shown.items() if value > 0.03} == wrong
     assert max(value for name, value in shown.items() if name not in wrong) < 0.01
 
 
@@ -167,8 +167,7 @@ def test_fig_half():
 
 
 def test_a_line_and_not_an_exponential():
-    shown = [line for line in CHAPTER.printed("decay").splitlines() if "chi-square" in line]
-    chi = [float(line.split("chi-square")[1].split("/")[0]) for line in shown]
+    chi = [float(x) for x in re.findall(r"chi-square\s+([\d.]+)", CHAPTER.printed("decay"))]
     t = table("cradle_peaks.csv")
     for k, ball in enumerate((1, 5)):
         use = (t["ball"] == ball) & (t["kind"] == "flight") & (t["t_s"] < 20)

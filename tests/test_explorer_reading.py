@@ -1,7 +1,6 @@
 """The live explorer for every reader: address, keys, words, widths, modes, motion, no scripts."""
 
 import re
-from decimal import Decimal
 from urllib.parse import unquote
 
 import numpy as np
@@ -9,11 +8,12 @@ import pytest
 from explorer import (
     EXPLORER,
     SETTING,
+    bars,
     chain_of,
     drawn,
     go_to,
+    grab,
     later,
-    middle,
     press,
     same_outcome,
     settings,
@@ -27,7 +27,6 @@ from cradle import (
     collide,
     paper_chain,
     post_impact_velocities,
-    textbook,
 )
 from cradle.measures import bouncing_pattern
 
@@ -119,25 +118,23 @@ def test_letters_bring_their_numbers(visit):
     assert (found["masses"], found["restitution"]) == ([*chain.masses[:2], 1], [0.5, 0.5])
 
 
-def test_the_address_of_a_heading_stays(visit):
-    """Until the reader changes something, it is what was asked for."""
+def test_a_reader_walks_on_from_a_changed_setting(visit):
+    """An address stays as it was asked for until something changes.
+
+    Then no scene is named any more, and the keys go on from the last one.
+    """
     tab = still(visit, "#in-a-lecture", stopped=True)
     tab.clock.run_for(1000)
     assert tab.evaluate("location.hash") == "#in-a-lecture"
+    go_to(tab, "scene=half")
+    tab.clock.run_for(1000)
     tab.get_by_label("ratio", exact=True).press("ArrowRight")
     tab.clock.run_for(1000)
-    assert "forward=0.01" in tab.evaluate("location.hash")
-
-
-def test_a_reader_walks_on_from_a_changed_setting(visit):
-    """After a change no scene is named any more, and the keys go on from the last one."""
-    tab = still(visit, "#scene=half")
-    tab.get_by_label("ratio", exact=True).press("ArrowRight")
-    drawn(tab)
+    assert "forward=0.5" in tab.evaluate("location.hash")
     assert tab.locator(".walk select").input_value() == ""
     assert tab.inner_text(".scene-text") == ""
     press(tab, "next scene")
-    drawn(tab)
+    tab.clock.run_for(1000)
     assert tab.locator(".walk select").input_value() == "three"
 
 
@@ -259,9 +256,7 @@ def take(tab, scene: str):
 
 def touch(tab, selector: str, way: int = 0):
     """Press the mouse on an element, move it to the side, and let it go."""
-    x, y = middle(tab, selector)
-    tab.mouse.move(x, y)
-    tab.mouse.down()
+    x, y = grab(tab, selector)
     tab.mouse.move(x + way, y, steps=4)
     tab.mouse.up()
     return later(tab, 50)
@@ -552,21 +547,20 @@ def test_bars_follow_the_swing(visit):
     """They show each hit, and so do title and words; a voice tells the first one alone."""
     tab = visit("#scene=losses", stopped=True)
     tab.clock.run_for(1500)
-    title, numbers = tab.locator(".outcome h2").first, tab.locator(".outcome .number")
-    heard = tab.locator(".said [aria-live=polite]").text_content()
+    title, said = tab.locator(".outcome h2").first, tab.locator(".said [aria-live=polite]")
+    heard = said.text_content()
     assert "Before the first hit" in heard
     for number in range(1, 4):
         tab.clock.run_for(1004)  # half a period
         hit = tab.evaluate(f"{EXPLORER}.state.swing.hit({number})")
         assert title.inner_text() == f"After hit {number + 1} (m/s)"
-        shown = [float(text.replace("\u2212", "-")) for text in numbers.all_text_contents()]
-        assert shown == pytest.approx(hit["after"], abs=0.0051)
+        assert bars(tab, ".outcome") == pytest.approx(hit["after"], abs=0.0051)
         assert "After it, ball" in tab.inner_text(".words")
         assert tab.inner_text(".words").startswith(f"Before hit {number + 1}, ")
-        assert tab.locator(".said [aria-live=polite]").text_content() == heard
+        assert said.text_content() == heard
     press(tab, "Pause")
     tab.clock.run_for(1000)
-    assert tab.locator(".said [aria-live=polite]").text_content() == tab.inner_text(".words")
+    assert said.text_content() == tab.inner_text(".words")
 
 
 def test_sweeps_and_maps_share_the_frame(visit):
@@ -643,9 +637,7 @@ def test_map_is_the_solvers(visit):
     assert len(np.unique(expected)) == 3
 
     # Drag the point to where the first ball bounces back, by pointer and by key.
-    x, y = middle(tab, ".point .present")
-    tab.mouse.move(x, y)
-    tab.mouse.down()
+    x, y = grab(tab, ".point .present")
     tab.mouse.move(x + 20, y - 60, steps=4)
     tab.mouse.up()
     moved = drawn(tab)
@@ -734,19 +726,17 @@ def test_scenes_do_what_their_texts_say(visit):
 
 def test_links_of_scenes(visit, html):
     """They lead to a heading that is there."""
-    tab = still(visit)
-    linked = {}
+    tab, linked = still(visit), set()
     for scene in tab.evaluate("cradleExplorer.data.scenes"):
         go_to(tab, f"scene={scene['key']}")
         drawn(tab)
         text = tab.locator(".scene-text")
         assert text.inner_text().startswith(scene["text"][:60])
-        linked[scene["key"]] = [a.get_attribute("href") for a in text.locator("a").all()]
-    addresses = {key: found for key, found in linked.items() if found}
-    assert set(addresses) == {"one", "small"}
-    for (address,) in addresses.values():
-        page, _, heading = address.partition("#")
-        assert f'<section id="{heading}">' in (html / "book" / page).read_text(encoding="utf-8")
+        for link in text.locator("a").all():
+            page, _, heading = link.get_attribute("href").partition("#")
+            assert f'<section id="{heading}">' in (html / "book" / page).read_text("utf-8")
+            linked.add(scene["key"])
+    assert linked == {"one", "small"}
 
 
 def test_what_rests_is_said_to_rest(visit):
@@ -756,8 +746,6 @@ def test_what_rests_is_said_to_rest(visit):
     words = tab.inner_text(".words")
     assert "balls 2 and 3 rest and" in words
     assert "almost" not in words
-    exact = textbook.solve([1] * 5, [1, 0, 0, 0, 0], 1, 0.15, number=Decimal).velocities
-    assert max(map(abs, exact[1:3])) < Decimal("1e-25")
 
 
 @pytest.mark.parametrize(
@@ -799,9 +787,7 @@ def test_the_first_page_does_what_it_says(visit, page):
     assert later(tab, 50)["speeds"] == [1, 0, 0, 0, 0]
     tab.get_by_label("ratio", exact=True).press("Home")
     press(tab, "Pull back")
-    x, y = middle(tab, ".ball[data-ball='1'] .disc")
-    tab.mouse.move(x, y)
-    tab.mouse.down()
+    x, y = grab(tab, ".ball[data-ball='1'] .disc")
     tab.mouse.move(x - 60, y - 10, steps=4)
     tab.mouse.up()
     shown = later(tab, 50)

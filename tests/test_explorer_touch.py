@@ -6,6 +6,7 @@ from explorer import (
     SETTING,
     drawn,
     go_to,
+    grab,
     middle,
     same_outcome,
     still,
@@ -172,9 +173,7 @@ def test_a_tap_and_a_finger_to_the_side_do_their_work(phone, place, row):
 def test_another_setting_while_a_ball_is_held(visit):
     """Typed, or followed as a link: balls that are gone are let go, the others stay in the hand."""
     tab = still(visit)
-    x, y = middle(tab, ball(4))
-    tab.mouse.move(x, y)
-    tab.mouse.down()
+    x, y = grab(tab, ball(4))
     tab.mouse.move(x + 40, y, steps=4)
     held = drawn(tab)["speeds"]
     assert held[4] < 0
