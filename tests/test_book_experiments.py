@@ -47,13 +47,6 @@ def interchanged():
     return table
 
 
-def test_table_1_symmetric_and_lossy_with_c():
-    table = restitution_table()
-    assert (table == table.T).all(axis=None)
-    assert ((table > 0) & (table < 1)).all(axis=None)
-    assert table.loc["C"].max() == 0.31
-
-
 def test_table_2_bounds_and_counts():
     assert len(TABLE_2) == len(ball_masses()) ** 3 == 64
     assert list(TABLE_2.index[~TABLE_2.admissible]) == ["CCA", "DBB", "DBC"]
