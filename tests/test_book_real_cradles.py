@@ -61,15 +61,19 @@ def test_velocities_of_the_models_by_the_fitting_script():
     assert shown["three ratios, one by one"][5] < 10 < shown["three ratios, strikers together"][5]
 
 
+def chi_square(row):
+    return float(row["chi_one"]) + float(row["chi_two"])
+
+
 def test_what_is_said_to_be_refuted_is_and_what_is_not_is_not():
     for reading in ("4", "2"):
         chi = {
-            key[:2]: (float(row["chi_one"]) + float(row["chi_two"])) / int(row["freedom"])
+            key[:2]: chi_square(row) / int(row["freedom"])
             for key, row in FITS.items()
             if key[2:] == ("both", reading)
         }
-        fits = {key for key, value in chi.items() if value < 1}
-        assert fits == {("three ratios, e", "apart"), ("spheres, four gaps, A", "own gap")}
+        fits = {("three ratios, e", "apart"), ("spheres, four gaps, A", "own gap")}
+        assert {key for key, value in chi.items() if value < 1} == fits
         assert min(value for key, value in chi.items() if key not in fits) > 4
 
 
@@ -187,14 +191,12 @@ def test_another_height():
 
 def test_touching_spheres_of_free_masses():
     """Equal masses are among them, and they do not help."""
-    law, equal = "touching spheres, A, four masses", "touching spheres, A"
+    law = "touching spheres, A, four masses"
     for reading in ("4", "2"):
-        row, plain = FITS[law, "apart", "both", reading], FITS[equal, "apart", "both", reading]
-        total = float(row["chi_one"]) + float(row["chi_two"])
-        assert total < float(plain["chi_one"]) + float(plain["chi_two"])
-        assert total > 30 * int(row["freedom"])
+        row, plain = (FITS[x, "apart", "both", reading] for x in (law, "touching spheres, A"))
+        assert 30 * int(row["freedom"]) < chi_square(row) < chi_square(plain)
         p = parameters(law, "apart", "both", reading)
-        data = first_strikes(int(reading))
         for release, name in ((1, "chi_one"), (2, "chi_two")):
+            data = first_strikes(int(reading))
             again = real_cradles.chi_square(law, p, True, data, (release,))
             assert again == pytest.approx(float(row[name]), rel=0.02)

@@ -332,52 +332,35 @@ def test_print_from_dark_mode(visit):
 # --- the live cradle's pictures -------------------------------------------------------------------
 
 
+# Colours of the names of lines; of letters on the bar of energy and under them, ball by ball.
+COLOURS = f"""() => {{
+  const pen = document.createElement("canvas").getContext("2d");
+  const code = (node) => {{
+    pen.fillStyle = getComputedStyle(node).fill;
+    pen.fillRect(0, 0, 1, 1);
+    return `rgb(${{[...pen.getImageData(0, 0, 1, 1).data].slice(0, 3).join()}})`;
+  }};
+  const names = [...document.querySelectorAll(".pictures .name")].map(code);
+  const host = {EXPLORER}.panels.outcome.node.querySelectorAll(".plot")[1];
+  const setting = {{ ...{EXPLORER}.state.setting, masses: [1, 1, 1, 1, 1, 1, 1] }};
+  return [names, setting.masses.map((_, ball) => {{
+    const now = setting.masses.map((_, k) => +(k === ball));
+    host.innerHTML = cradleExplorer.energy({{ width: 300, em: 16 }}, setting, now, now);
+    return [host.querySelector("text"), host.querySelectorAll(".part")[ball]].map(code);
+  }})];
+}}"""
+
+
 def test_numbers_in_colours_can_be_read(visit):
     """Of seven balls, beside their lines and on the bar of energy, in both modes."""
-    masses = "speeds=1,0,0,0,0,0,0&masses=1,2,3,4,3,2,1&forward=0.3"
-    tab = still(visit, f"#{masses}")
-    drawn(tab)
+    tab = still(visit, "#speeds=1,0,0,0,0,0,0&masses=1,2,3,4,3,2,1&forward=0.3")
     for mode, ground in (("light", "#ffffff"), ("dark", "#121212")):
         show(tab, 1400, mode)
         drawn(tab)
-        found = tab.evaluate(
-            """() => {
-              const pen = document.createElement("canvas").getContext("2d");
-              const code = (colour) => {
-                pen.fillStyle = colour;
-                pen.fillRect(0, 0, 1, 1);
-                const [r, g, b] = pen.getImageData(0, 0, 1, 1).data;
-                return "#" + [r, g, b].map((part) => part.toString(16).padStart(2, "0")).join("");
-              };
-              const fill = (node) => code(getComputedStyle(node).fill);
-              const parts = [...document.querySelectorAll(".outcome .part, .outcome .gone")];
-              return [
-                [...document.querySelectorAll(".pictures .name")].map(fill),
-                parts.filter((part) => part.nextElementSibling?.matches("text"))
-                  .map((part) => [fill(part.nextElementSibling), fill(part)]),
-              ];
-            }"""
-        )
-        names, bars = found
-        assert len(names) == 7
-        assert min(contrast(name, ground) for name in names) >= READABLE
-        assert len(set(names)) == 7
-        assert len(bars) > 1
-        assert min(contrast(*pair) for pair in bars) >= READABLE
-    # On every colour of the palette, whether this hit shows it or not.
-    for ball in range(7):
-        letters, under = tab.evaluate(
-            f"""() => {{
-              const setting = {{ ...{EXPLORER}.state.setting, masses: [1, 1, 1, 1, 1, 1, 1] }};
-              const now = [0, 0, 0, 0, 0, 0, 0].map((_, k) => +(k === {ball}));
-              const host = {EXPLORER}.panels.outcome.node.querySelectorAll(".plot")[1];
-              host.innerHTML = cradleExplorer.energy({{ width: 300, em: 16 }}, setting, now, now);
-              const colour = (node) => getComputedStyle(node).fill;
-              const part = host.querySelectorAll(".part")[{ball}];
-              return [colour(host.querySelector("text")), colour(part)];
-            }}"""
-        )
-        assert contrast(code(letters), code(under)) >= READABLE, ball
+        names, bars = tab.evaluate(COLOURS)
+        assert len(names) == len(set(names)) == len(bars) == 7
+        assert min(contrast(code(name), ground) for name in names) >= READABLE
+        assert min(contrast(*map(code, pair)) for pair in bars) >= READABLE
 
 
 def test_notes_and_places_can_be_read(visit):
