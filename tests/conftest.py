@@ -61,7 +61,8 @@ LONG = (
     "tests/test_explorer_reading.py", "tests/test_layout.py", "book/toy.ipynb",
     "tests/test_book_figures_use.py", "book/reading.ipynb", "book/patterns.ipynb",
     "tests/test_textbook.py", "tests/test_speed.py", "tests/test_book_figures.py",
-    "tests/test_explorer_page.py", "tests/test_explorer_engine.py", "tests/test_examples.py",
+    "tests/test_explorer_touch.py", "tests/test_explorer_page.py", "tests/test_portable.py",
+    "tests/test_explorer_engine.py", "tests/test_entries.py", "tests/test_examples.py",
 )  # fmt: skip
 
 

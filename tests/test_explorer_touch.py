@@ -30,7 +30,7 @@ class Hand:
         self.places[finger] = tuple(place)
         self._send("touchStart")
 
-    def move(self, finger: int, x: float, y: float, steps: int = 10):
+    def move(self, finger: int, x: float, y: float, steps: int = 6):
         """Move by so many pixels."""
         start = self.places[finger]
         for step in range(1, steps + 1):
@@ -144,7 +144,7 @@ def test_scrolling_past_a_picture_changes_nothing(phone, place):
     scrolled = tab.evaluate("scrollY")
     hand = Hand(tab)
     hand.down(1, (x + 40 if "map" in place else x, y))
-    hand.move(1, 12, -150, steps=15)
+    hand.move(1, 12, -150, steps=8)
     hand.up(1)
     tab.wait_for_function("(before) => scrollY > before + 40", arg=scrolled)
     assert drawn(tab) == before
