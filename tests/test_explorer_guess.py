@@ -144,6 +144,7 @@ def test_two_cradles_side_by_side(visit):
     tab = still(visit, "#speeds=1,0,0&forward=0.3")
     kept = drawn(tab)["after"]
     other = ".outcome > div:not(.drawn) .plot >> nth=0 >> css="
+    three = Chain([1] * 3, [1, 0, 0])
     for label, expected in (
         ("ratio 0.15", collide(three, ImpulseCorrelation(0.15)).velocities),
         ("spheres that touch", collide(three, SpringChain()).velocities),

@@ -81,8 +81,10 @@ def test_copied_python_gives_the_same_numbers(visit):
     tab.evaluate(
         "navigator.clipboard.writeText = (text) => ((window.copied = text), Promise.resolve())"
     )
-    for fragment in ("speeds=1,0.5,0,-0.35&forward=0.3,0.12&backward=0.2&masses=1,0.05,3,0.166",
-                     "scene=ABCCAB", "scene=half", "speeds=1,0,0&restitution=0.9&law=spheres&gap=2"):  # fmt: skip
+    for fragment in (
+        "speeds=1,0.5,0,-0.35&forward=0.3,0.12&backward=0.2&masses=1,0.05,3,0.166",
+        "scene=ABCCAB", "scene=half", "speeds=1,0,0&restitution=0.9&law=spheres&gap=2",
+    ):  # fmt: skip
         go_to(tab, fragment)
         asked = later(tab, 50)
         press(tab, "Copy Python")

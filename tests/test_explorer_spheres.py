@@ -6,14 +6,11 @@ from chains import magnitudes, uniform
 from explorer import (
     EXPLORER,
     SETTING,
-    address_of_page,  # noqa: F401
     drawn,
     press,
     still,
-    visits,  # noqa: F401
 )
 from script import Script
-from test_layout import browser  # noqa: F401
 
 from cradle import Chain, SpringChain, collide, spring_velocities
 
