@@ -6,7 +6,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from chapters import Chapter
+from chapters import Chapter, floats
 from scipy.stats import norm
 from stored import read
 from test_book_parameters import code, pictures_in_memory, run
@@ -75,7 +75,7 @@ def test_wrong_coefficient_makes_another_ratio_the_best():
 
     def velocities(e, value):
         found = solve([0.166, 0.045, 0.166], [1, 0, 0], e, value, number=float)
-        return np.array([float(v) for v in found.velocities])
+        return floats(found.velocities)
 
     last = float(GLUED["e-0.03"])
     assert last == pytest.approx(0.782, abs=0.002)

@@ -389,8 +389,8 @@ def test_the_readers_solver_against_the_reference_solver():
         ratio = uniform(rng, 0, 1) * min(m[2] / (m[1] + m[2]), m[0] / (m[0] + m[1]))
         *_, (_, _, found, impulses) = names["three_balls"](m, v, e, ratio)
         exact = solve(list(m), v, list(e), ratio)
-        np.testing.assert_allclose(found, [float(x) for x in exact.velocities], atol=1e-10)
-        np.testing.assert_allclose(impulses, [float(x) for x in exact.impulses], atol=1e-10)
+        np.testing.assert_allclose(found, floats(exact.velocities), atol=1e-10)
+        np.testing.assert_allclose(impulses, floats(exact.impulses), atol=1e-10)
         repeated += sum(exact.collisions) > 2
     assert repeated > 5
     lines = sum(
