@@ -5,7 +5,6 @@
 the change of the exact outcome when every input changes by its last digit.
 """
 
-import collections
 import itertools
 import math
 from fractions import Fraction
@@ -13,27 +12,16 @@ from typing import NamedTuple
 
 import mpmath
 import numpy as np
-import plain
 from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
-from march import march
 from problem import Problem
 from truth import EventLimit, as_meant
 
 from cradle import (
-    Chain,
-    EnergyDistribution,
     ImpactNotFinished,
-    ImpulseCorrelation,
-    SpringChain,
-    collide,
-    kernel,
     outcomes,
     post_impact_velocities,
 )
-from cradle.kernel.state import COLLAPSE, LIMITS, REPETITION
 from cradle.measures import _events_at_balls as events_at_balls
-from cradle.models.correlation import MAX_EVENTS
-from cradle.runtime import job as drive
 
 EPS = 2.0**-52
 TINIEST = 5e-324  # the smallest number above zero
@@ -256,43 +244,6 @@ def truth(problem, trace, longest=400, conditioned=80):
             parts = (part(problem, exact, longest) for part in (unavoidable, slack_of_bound))
             change = [a + b for a, b in zip(*parts)]
         return exact.velocities, change
-
-
-# --- long chains -------------------------------------------------------------------------------
-
-SIZES = (2, 3, 5, 10, 20, 30, 50, 100, 200, 500, 1000)
-ROWS = {
-    # name: neighbouring mass ratio, restitution, correlation ratio
-    "equal, e = 1, ratio 0": (1.0, 1.0, 0.0),
-    "equal, e = 1, ratio .1": (1.0, 1.0, 0.1),
-    "equal, e = .9, ratio 0": (1.0, 0.9, 0.0),
-    "equal, e = .9, ratio .1": (1.0, 0.9, 0.1),
-    "taper .97, e = .9, ratio 0": (0.97, 0.9, 0.0),
-    "taper .97, e = 1, ratio .1": (0.97, 1.0, 0.1),
-}
-
-
-def row_case(name, n):
-    """The first of n balls strikes the others."""
-    step, e, ratio = ROWS[name]
-    masses = [step**i for i in range(n)]
-    return case(masses, [1.0] + [0.0] * (n - 1), e, ratio)
-
-
-def handed_on(masses, e):
-    """Velocities after one binary collision a pair, left to right, in the digits in force."""
-    v = [mpmath.mpf(1)] + [mpmath.mpf(0)] * (len(masses) - 1)
-    masses, e = [as_meant(m) for m in masses], as_meant(e)
-    for c, (a, b) in enumerate(zip(masses, masses[1:])):
-        v[c], v[c + 1] = v[c] * (a - e * b) / (a + b), v[c] * (1 + e) * a / (a + b)
-    return v
-
-
-def equal_elastic(n, ratio):
-    """Velocities of n equal elastic balls, the first striking, one ratio: book/beyond.ipynb."""
-    a = as_meant(ratio)
-    root = mpmath.sqrt(1 - 2 * a)
-    return [-a / (2 - a)] + [mpmath.mpf(0)] * (n - 3) + [(1 - root) / (2 - a), (1 + root) / (2 - a)]
 
 
 # --- growth of a perturbation ------------------------------------------------------------------
@@ -538,182 +489,15 @@ def any_chain(family, decades, index):
     return case(masses, velocities, e, forward, backward)
 
 
-def work(problem, max_events):
-    """Collisions, whether collapsed, and what stopped it if it did not finish, of the fast run."""
+def longer_than(problem, steps):
+    """Collisions, whether it collapsed, whether so many steps were too few; and what is open then.
+
+    Open is how much a velocity can still change, over the largest closing speed at the start.
+    """
     try:
-        found = outcomes(*problem[:5], excess="saturate", max_events=max_events)
+        found = outcomes(*problem[:5], excess="saturate", max_events=steps)
     except ImpactNotFinished as stopped:
-        return int(stopped.trace.collisions.sum()), False, stopped
-    return int(found.collisions.sum()), bool(found.collapsed), None
-
-
-def to_the_default(problem):
-    """Collisions at the solver's default limit, 1 if that was enough, and what is still open.
-
-    That is how much a velocity can still change, over the largest closing speed at the start.
-    """
-    collisions, _, stopped = work(problem, MAX_EVENTS)
-    if stopped is None:
-        return collisions, 1, 0.0
-    change = np.abs(stopped.bounds - stopped.trace.velocities).max()
-    return collisions, 0, change / max(a - b for a, b in itertools.pairwise(problem.velocities))
-
-
-def relative_energy(masses, velocities):
-    """Energy of the motion relative to the centre of mass."""
-    m, v = np.asarray(masses), np.asarray(velocities)
-    return float(0.5 * m @ (v - m @ v / m.sum()) ** 2)
-
-
-def period(sequence):
-    """Smallest period of a sequence that repeats at least three times, or 0."""
-    s = np.asarray(sequence)
-    return next((p for p in range(1, len(s) // 3) if np.array_equal(s[p:], s[:-p])), 0)
-
-
-def portrait(problem, trace):
-    """Why a chain takes so long: period of its events, energy left half way and at the end.
-
-    Energies relative to the start, of the motion relative to the centre of mass.
-    """
-    start = relative_energy(problem.masses, problem.velocities)
-    left = [
-        relative_energy(problem.masses, velocities) / start
-        for velocities in (trace.path[len(trace.path) // 2], trace.velocities)
-    ]
-    events = [e for e in trace.events if e.kind in ("end", "close")]
-    tail = [2 * e.contact + (e.kind == "end") for e in events[-2000:]]
-    return period(tail), *left
-
-
-class Late(NamedTuple):
-    """The last events before a limit, closing speeds (own units) after each, and who is active."""
-
-    kinds: np.ndarray
-    contacts: np.ndarray
-    closing_speeds: np.ndarray
-    active: np.ndarray
-
-
-def late(problem, steps, room=20_000, **limits):
-    """The last events, no more than `room`, of a chain that is stopped after so many steps.
-
-    Up to near the limit by the event loop as it is; then on, plain, with another record, and with
-    other limits of the kernel if told.
-    """
-    n = len(problem.masses)
-    limit = max(steps - 2 * room, 0)
-    inputs = kernel.Inputs(*(np.array([part], float) for part in problem[:5]))
-    options = kernel.Options(problem.meeting, max(limit, 1), False)
-    job = drive.Job(inputs, drive.outputs(1, n), options, large=limit > 100_000).run()
-    assert job.status == drive.UNFINISHED
-    last = collections.deque(maxlen=room)
-
-    def keep(kind, c, n, state):
-        """The kernel's `record`: closing speeds to all their digits."""
-        state.tally[0].events += 1
-        last.append((kind, c, [state.contact[j].u.real for j in range(n - 1)]))
-
-    names = plain.rooms(record=lambda _: keep, **limits)
-    state = job.state
-    if job.compiled:
-        state = plain.as_objects(state, n)
-    state.tally[0].effort = state.tally[0].room = 2**62
-    state.tally[0].rounds -= 1  # the one at which it stopped was not made
-    state = state._replace(record=plain.no_record())
-    chain = names["Inputs"](*(list(map(float, part)) for part in problem[:5]))
-    status = names["impact"](n, chain, problem.meeting, steps, True, state)
-    assert status == drive.UNFINISHED
-    kinds, contacts, speeds = (np.array(part) for part in zip(*last, strict=True))
-    active = np.array([state.contact[c].active for c in range(n - 1)])
-    return Late(kinds, contacts, speeds, active)
-
-
-class Explanation(NamedTuple):
-    """What an unfinished chain does at the end, from its last events.
-
-    pattern: "nested" if infinite sequences are among these events, "cycle" if they repeat in a
-    fixed order, else "irregular".  steady: contacts that are active throughout without an event.
-    returns: how often the rarest of the events that come back at all occurs.  Between the first and
-    the last return: `shrink`, by what power of e the closing speeds of all other contacts shrink,
-    and `turn`, how far they turn (relative to their largest), both per thousand events; `drift`,
-    the largest relative change of a steady contact's closing speed, likewise.  scale: the
-    largest closing speed of the others, relative to the largest initial one.  predicted: events
-    until, at this pace, that is exhausted or a steady contact comes to u = 0; inf if neither.
-    """
-
-    pattern: str
-    period: int
-    steady: int
-    returns: int
-    shrink: float
-    turn: float
-    drift: float
-    scale: float
-    predicted: float
-
-
-def explain(problem, seen):
-    """See `Explanation`."""
-    kinds, contacts, speeds, active = seen
-    tokens = (REPETITION + 1) * contacts + kinds
-    names, counts = np.unique(tokens, return_counts=True)
-    again = counts >= 4
-    rarest = names[again][np.argmin(counts[again])]
-    (rows,) = np.nonzero(tokens == rarest)
-    first, last = speeds[rows[0]], speeds[rows[-1]]
-    thousands = (rows[-1] - rows[0]) / 1000
-    moving = np.isin(np.arange(len(active)), contacts)
-    steady = (active == 1) & ~moving
-    sizes = [np.abs(row[moving]).max() for row in (first, last)]
-    shrink = math.log(sizes[0] / sizes[1]) / thousands
-    turn = np.abs(last[moving] / sizes[1] - first[moving] / sizes[0]).max() / thousands
-    change = (last - first)[steady] / thousands
-    drift = max((abs(d / v) for d, v in zip(change, first[steady]) if v), default=0.0)
-    largest = max(a - b for a, b in itertools.pairwise(problem.velocities))
-    scale = sizes[1] * 2.0 ** math.frexp(max(map(abs, problem.velocities)))[1] / largest
-    ends = [v / -d for d, v in zip(change, last[steady]) if d * v < 0]
-    if shrink > 0:
-        ends.append(max(math.log(scale / LIMITS.exhausted), 0.0) / shrink)
-    repeats = period(tokens[-2000:])
-    pattern = "nested" if (kinds == COLLAPSE).any() else "cycle" if repeats else "irregular"
-    return Explanation(
-        pattern, repeats, int(steady.sum()), len(rows), shrink, float(turn), float(drift), scale,
-        1000.0 * min(ends, default=math.inf),
-    )  # fmt: skip
-
-
-# --- the same points by steps and by springs ---------------------------------------------------
-
-POINTS = {
-    "equal": ((1.0, 1.0, 1.0), 1.0, 0.15),
-    "middle 1e-2": ((1.0, 1e-2, 1.0), 1.0, 0.15),
-    "middle 1e-4": ((1.0, 1e-4, 1.0), 1.0, 0.15),
-    "lossy": ((1.0, 1.0, 1.0), 0.9, 0.15),
-    "near the bound": ((1.0, 1.0, 1.0), 0.9, 0.4999),
-    "infinite": ((1.0, 1e-2, 1.0), 0.5, 0.15),
-}
-
-
-def costs(point):
-    """Rows (method, effort, evaluations, error) of one point, errors relative to the striker."""
-    masses, e, ratio = POINTS[point]
-    chain = Chain(masses, [1, 0, 0], e)
-    trace = collide(chain, ImpulseCorrelation(ratio))
-    with mpmath.workdps(50):
-        exact = truth(case(masses, [1, 0, 0], e, ratio), trace, 5000, 0)[0]
-        exact = np.array([float(v) for v in exact])
-    yield "events", 0.0, len(trace.events), float(np.abs(trace.velocities - exact).max())
-    for steps in (10, 100, 1000, 10_000):
-        try:
-            end = march(masses, [1, 0, 0], e, ratio, steps=steps, max_steps=3_000_000)
-        except RuntimeError:
-            break
-        yield "march", float(steps), end.steps, float(np.abs(end.velocities - exact).max())
-    if e == 1:
-        # Without losses the energy law is the spring chain, in SciPy's hands.
-        best = collide(chain, EnergyDistribution(1.0, rtol=3e-14))
-        for power in (4, 6, 8, 10, 12):
-            end = collide(chain, SpringChain(1.0, accuracy=10.0**-power))
-            off = float(np.abs(end.velocities - best.velocities).max())
-            yield "springs", 10.0**-power, end.evaluations, off
+        change = np.abs(stopped.bounds - stopped.trace.velocities).max()
+        closing = max(a - b for a, b in itertools.pairwise(problem.velocities))
+        return int(stopped.trace.collisions.sum()), False, True, change / closing
+    return int(found.collisions.sum()), bool(found.collapsed), False, 0.0

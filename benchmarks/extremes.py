@@ -25,6 +25,7 @@ from chains import power_of_ten
 from stored import options, write
 
 from cradle import outcomes, paper_chain
+from cradle.models.correlation import MAX_EVENTS
 from cradle.tables import paper_sequences
 
 
@@ -60,28 +61,6 @@ def the_map(given):
     if keep:
         with keep.open("wb") as file:
             pickle.dump(known, file)
-
-
-def lengths(_):
-    for name, n in itertools.product(x.ROWS, x.SIZES):
-        problem = x.row_case(name, n)
-        # The path of a thousand balls is large: not more of it than needed.
-        trace, finished = problem.attempt(4_000_000 // n)
-        defects = x.invariants(trace)
-        error = math.nan
-        with mpmath.workdps(50):
-            exact = None
-            step, e, ratio = x.ROWS[name]
-            if ratio == 0 and trace.collisions.max() == 1:
-                exact = x.handed_on(problem.masses, e)
-            elif step == e == 1 and n > 20:
-                exact = x.equal_elastic(n, ratio)
-            elif finished and len(trace.events) <= 1400:
-                exact = problem.exact().velocities
-            if exact:
-                error = x.compare(trace, (exact, None))[0]
-        yield (name, n, len(trace.events), int(finished), defects["momentum"],
-               max(defects["gain"], 0.0), defects["ledger"], error)  # fmt: skip
 
 
 def growth(_):
@@ -158,51 +137,32 @@ def limits(_):
 
 
 LONG = 50_000
+#: How much of the largest closing speed is open in an unfinished chain, at most.
+DECIDED = (1e-6, 1e-3, 0.1, 1.0)
 
 
 def long_or_not(family, decades, index):
-    """Return balls, the columns of `finish`, and a row of `unfinished` if there is one.
-
-    Chains that the solver's default limit does not finish either are explained, one by one.
-    """
+    """Return the number of balls of a chain, and what it adds to the columns of `finish`."""
     problem = x.any_chain(family, decades, index)
-    n = len(problem.masses)
-    collisions, collapsed, stopped = x.work(problem, LONG)
-    row = (1, collapsed, collisions > 100, collisions > 1000, collisions > 10_000)
-    unfinished = None
-    if stopped:
-        later, finished, still_open = x.to_the_default(problem)
-        seen = (*x.portrait(problem, stopped.trace), later, finished, still_open)
-        why = [""] * len(x.Explanation._fields)
-        if not finished:
-            why = x.explain(problem, x.late(problem, x.MAX_EVENTS))
-        unfinished = (family, decades, index, n, *seen, *why)
-    return n, (*row, stopped is not None), unfinished
+    collisions, collapsed, unfinished, _ = x.longer_than(problem, LONG)
+    left = [False] * (1 + len(DECIDED))
+    if unfinished:
+        _, _, left[0], still_open = x.longer_than(problem, MAX_EVENTS)
+        left[1:] = [left[0] and still_open <= part for part in DECIDED]
+    longer = (collisions > 100, collisions > 1000, collisions > 10_000)
+    return len(problem.masses), (1, collapsed, *longer, unfinished, *left)
 
 
-def finish(given):
-    """Count by family and number of balls: finished, collapsed, long; unfinished ones by name."""
-    unfinished = []
+def finish(_):
+    """Count by family and number of balls."""
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
         for family, decades in x.FAMILIES:
-            table = np.zeros((9, 6), dtype=int)
+            table = np.zeros((9, 7 + len(DECIDED)), dtype=int)
             chains = partial(long_or_not, family, decades)
-            for n, row, name in pool.map(chains, range(x.CHAINS), chunksize=100):
+            for n, row in pool.map(chains, range(x.CHAINS), chunksize=100):
                 table[n] += row
-                unfinished += [name] if name else []
             for n in range(2, 9):
                 yield (family, decades, n, *table[n].tolist())
-            print(family, decades, len(unfinished), flush=True)
-    header = ["family", "decades", "index", "balls", "period", "energy_half", "energy"]
-    header += ["collisions", "finished", "open"]
-    header += [f"late_{name}" for name in x.Explanation._fields]
-    write("extremes_unfinished.csv", header, map(written, unfinished), given.output)
-
-
-def cost(_):
-    for point in x.POINTS:
-        for row in x.costs(point):
-            yield (point, *row)
 
 
 PARTS = {
@@ -210,16 +170,15 @@ PARTS = {
         the_map,
         "shape power restitution ratio error condition own events compared faulty unfinished",
     ),
-    "lengths": (lengths, "row balls events finished momentum gain ledger error"),
     "growth": (growth, "spread restitution size balls median largest leading"),
     "unequal": (unequal, "family balls ratio least median largest jumps unfinished"),
     "edges": (edges, "sequence input index side distance jump"),
     "jumps": (jumps, "sequence input index change jump"),
     "elastic": (elastic, "power ratio impacts theory error condition own gain collapsed"),
-    "cost": (cost, "point method effort evaluations error"),
     "finish": (
         finish,
-        "family decades balls chains collapsed above_100 above_1000 above_10000 unfinished",
+        "family decades balls chains collapsed above_100 above_1000 above_10000 unfinished left "
+        "open_1e-6 open_1e-3 open_0.1 open_1",
     ),
     "limits": (limits, "restitution ratio edge theory half below above double"),
 }

@@ -14,7 +14,6 @@ import sys
 from pathlib import Path
 
 import extreme_chains as x
-import fuzz
 import implied_ratio
 import long_chains
 import numpy as np
@@ -38,9 +37,7 @@ DIGESTS = {
     "march": "a97434643281d2bf",
     "any_chain": "87dfa8052a172419",
     "map_case": "bbd9219024af0b70",
-    "row_case": "15a608993d40e327",
     "rows_of_balls": "c612d597425685ea",
-    "fuzz": "ac0faf1c1d4f64b3",
     "mixed_chains": "c66e75d3b56d4584",
     "batches": "555f86c323e3f8a1",
     "closed form": "7d3aac996dcd8716",
@@ -74,15 +71,9 @@ def inputs():
             for ratio in x.RATIOS:
                 for part in x.map_case(shape, power, 0.3, ratio, "row"):
                     yield "map_case", part
-    for name in x.ROWS:
-        yield "row_case", x.row_case(name, 100).masses
     for spread, e in ((0.0, 0.9), (0.1, 1.0)):
         for part in (*x.rows_of_balls(spread, 30, e, 1e-9), *x.rows_of_balls(spread, 3, e, 1e-12)):
             yield "rows_of_balls", np.concatenate([each.ravel() for each in part])
-    for _ in range(500):
-        *parts, options = fuzz.problem(rng.bytes(160))
-        for part in (*parts, [options.get("meeting", 0.0)]):
-            yield "fuzz", [0.0] if part is None else part
     for chain, _ in test_kernel.mixed_chains(2, 70):
         for part in chain:
             yield "mixed_chains", part
