@@ -169,9 +169,9 @@
       words: "law",
       choose: act.law,
       options: [
-        { value: "rule", text: "the paper's rule", title: "restitution and ratios" },
+        { value: "rule", text: "paper's", title: "the paper's rule, by restitution and ratios" },
         { value: "spheres", text: "spheres", title: "of steel, which push by Hertz's law" },
-        ...(parts.has("scenes") ? [{ value: "springs", text: "linear springs" }] : []),
+        ...(parts.has("scenes") ? [{ value: "springs", text: "springs", title: "linear ones" }] : []),
       ],
     });
     const sliders = settingSliders(act);

@@ -138,7 +138,7 @@
         sweep = null;
         plot.replaceChildren();
         note.textContent = forces
-          ? "There is no ratio here: how the contacts push says it all. Choose the paper's rule to see this picture."
+          ? "There is no ratio here: how the contacts push says it all. Choose the paper's law to see this picture."
           : "Two balls have no ratio: it belongs to a ball with two neighbours.";
         return;
       }
