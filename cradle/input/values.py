@@ -133,7 +133,7 @@ def number_or_row(
     return tuple(array.tolist()) if array.ndim else float(array)
 
 
-def row_of(name: str, kept: float | Sequence[float], size: int, balls: int) -> Vector:
+def row_of(name: str, kept: Any, size: int, balls: int) -> Vector:
     """Return what `number_or_row` kept as a row for a chain."""
     if not isinstance(kept, float) and len(kept) != size:
         raise ValueError(f"{name} has {len(kept)} values; {balls} balls need {size}, or one number")
