@@ -1,8 +1,12 @@
 """What the notebooks of the book share and a reader need not see: numbers and drawings."""
 
+import ast
 import inspect
+import json
 import textwrap
 from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -43,6 +47,26 @@ def tell(chapter: str, **values: object) -> None:
         glue(
             f"{chapter}-{name.replace('_', '-')}", str(value), display=False
         )
+
+
+def borrow(chapter: str, names: str, into: dict[str, Any]) -> list[Any]:
+    """Return functions that the cells of another chapter define, made among a notebook's names."""
+    path = Path(__file__).with_name(f"{chapter}.ipynb")
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        lines = [
+            line for line in cell["source"] if not line.startswith("%")
+        ]
+        if cell["cell_type"] == "code":
+            for node in ast.parse("".join(lines)).body:
+                if (
+                    isinstance(node, ast.FunctionDef)
+                    and node.name in names.split()
+                ):
+                    exec(
+                        compile(ast.Module([node], []), path.name, "exec"),
+                        into,
+                    )
+    return [into[name] for name in names.split()]
 
 
 def people(value: float, digits: int = 2) -> str:
