@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
-from scipy.optimize import brentq
 
 from cradle.input.values import Vector, first, refusal
 from cradle.kernel.kinks import Forces, Law
@@ -246,6 +244,8 @@ class Path:
 
         At the end the velocities are `last`.  Collisions, durations and works are booked beside.
         """
+        from scipy.interpolate import CubicHermiteSpline  # slow to import
+
         size, steps = len(self.k), len(self.t) - 1
         self.collisions = self.closed[0].astype(np.int64)
         self.durations, self.absorbed = np.zeros((2, size))
@@ -294,6 +294,8 @@ class Path:
 
 def _zero(cubic: Vector, h: float) -> float:
     """Return where a cubic is zero between 0 and h; at the end that is nearer to it, if nowhere."""
+    from scipy.optimize import brentq
+
     a, b, c, d = cubic.tolist()
     end = ((a * h + b) * h + c) * h + d
     if d * end >= 0.0:
