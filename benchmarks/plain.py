@@ -36,7 +36,8 @@ def no_record() -> Record:
 def as_objects(state: Any, n: int) -> Any:
     """The work area of compiled code as that of the plain loop."""
     copy = drive._area(n, False, no_record())
-    for records, things in zip(state[:4], copy[:4], strict=True):
+    pairs = [*zip(state[:4], copy[:4], strict=True), *zip(state.memory, copy.memory, strict=True)]
+    for records, things in [*pairs, (state.tally, copy.tally)]:
         for record, thing in zip(records, things, strict=True):
             for name in record.dtype.names:
                 setattr(thing, name, record[name].item())

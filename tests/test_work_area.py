@@ -40,7 +40,8 @@ def filled(seed):
     def area(n, compiled, record):
         draw = Draw(seed)
         state = drive._area(n, compiled, record)
-        for thing in (thing for group in state[:4] for thing in group):
+        groups = (state.ball, state.contact, state.run, state.level, *state.memory, state.tally)
+        for thing in (thing for group in groups for thing in group):
             for name, kind in get_type_hints(type(thing)).items():
                 if name not in OTHERS:
                     number = kind(draw.decimal(-4, 4, 2))
@@ -81,18 +82,19 @@ def strict(seed):
 
     def area(n, compiled, record):
         state = filled(seed)(n, compiled, record)
+        memory = Strict(Strict(row) for row in state.memory)
         parts = {name: Strict(getattr(state, name)) for name in state._fields[:4]}
         kinds, contacts, *paths = record
         paths = (Strict(Strict(row) for row in path) for path in paths)
         record = type(record)(Strict(kinds), Strict(contacts), *paths)
-        return state._replace(**parts, record=record)
+        return state._replace(**parts, memory=memory, record=record)
 
     return area
 
 
 def test_a_strict_sequence_refuses_an_index_below_zero():
     state = strict(1)(3, False, plain.no_record())
-    for part in state[:4]:
+    for part in (state.ball, state.contact, state.run, state.level, state.memory, *state.memory):
         assert part[0] is not None
         with pytest.raises(AssertionError):
             part[-1]

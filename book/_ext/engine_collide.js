@@ -113,7 +113,8 @@ const zeros = (size) => made(size, zero);
 
 // A work area for n balls, all zeros.
 function area(n, record) {
-  return State(made(n, Ball), made(n, Contact), made(n, Run), [Tally()], record);
+  const memory = [made(n, Memory), made(n, Memory)];
+  return State(made(n, Ball), made(n, Contact), made(n, Run), made(2, Level), memory, [Tally()], record);
 }
 
 // Rows that the last record of n balls did not need, kept for the next one if they are not many.

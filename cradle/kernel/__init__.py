@@ -7,6 +7,7 @@
     events       start, hand-over, closing                                    R2, R4, R5
     meeting      two runs that meet                                           R8.3, R8.4
     collapse     contacts that are exhausted, and how they end                R9
+    snapshot     what has repeated itself since                               R9
     cycles       impacts that repeat themselves on another scale              R9
     certificate  momentum, order, energy, ledger of every answer
     loop         the rounds                                                   R8
@@ -26,8 +27,8 @@ from cradle.kernel.forces import springs
 
 #: The rooms of the event loop, and all, in an order in which each uses only those before it.
 EVENT_LOOP = (
-    "state", "numbers", "rules", "record", "events", "meeting", "collapse", "cycles",
-    "certificate", "loop", "batch",
+    "state", "numbers", "rules", "record", "events", "meeting", "collapse", "snapshot",
+    "cycles", "certificate", "loop", "batch",
 )  # fmt: skip
 ROOMS = (*EVENT_LOOP, "kinks", "forces")
 

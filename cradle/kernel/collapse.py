@@ -92,14 +92,20 @@ def exhausted_stretch(c, n, state):
     """Return the stretch (first, last) around c of contacts that only chatter.
 
     Empty if nothing in it can lose energy, unless it is dust: elastic sequences are finite, or hand
-    all their energy on.
+    all their energy on; or if its balls move with more than a faint energy: heavy ones, slower than
+    a light ball that struck them.
     """
+    ball, contact = state.ball, state.contact
     first, last = last_chatter(c, -1, n, state), last_chatter(c, 1, n, state)
-    loses, fastest = False, 0.0
+    loses = False
+    common_velocity(first, last, ONE, ONE, ball, contact)
+    energy = fastest = 0.0
     for k in range(first, last + 1):
-        loses = loses or state.contact[k].e.real < 1.0
-        fastest = max(fastest, abs(state.contact[k].u.real))
-    if loses or fastest < LIMITS.dust * state.tally[0].fastest:
+        loses = loses or contact[k].e.real < 1.0
+        fastest = max(fastest, abs(contact[k].u.real))
+        energy += 0.5 * contact[k].x.real * contact[k].u.real
+    loses = loses or fastest < LIMITS.dust * state.tally[0].fastest
+    if loses and energy <= LIMITS.faint * state.tally[0].energy:
         return first, last
     return c, c - 1
 

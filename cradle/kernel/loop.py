@@ -2,23 +2,26 @@
 
 import math
 
-from cradle.kernel.cycles import forget, take_limits
-from cradle.kernel.events import close_contacts, end_contacts, grow, start
+from cradle.kernel.cycles import take_limits
+from cradle.kernel.events import close_contacts, end_contacts, grow, reduced_mass, start
 from cradle.kernel.meeting import first_meeting, who_goes
 from cradle.kernel.numbers import ONE, ZERO, minus, negative, over, plus, read, scaled, times
 from cradle.kernel.record import record, record_compressions
 from cradle.kernel.rules import pull_beside, pulls_at, rates, segment
+from cradle.kernel.snapshot import forget
 from cradle.kernel.state import (
     CERTAIN,
     CLOSE,
     FINISHED,
     LIMITS,
+    LOWER,
     NO_EVENT,
     PASSED,
     PAUSED,
     SLOPED,
     UNFINISHED,
     UNSOUND,
+    UPPER,
     apart,
     jit,
 )
@@ -137,7 +140,7 @@ def prepare(n, chain, meeting, state):
     tally.unit, mass_unit = math.ldexp(1.0, -tally.shift), math.ldexp(1.0, -tally.mass_shift)
     tally.meeting = read(meeting)
     tally.events = tally.rounds = tally.stamp = tally.collapsed = tally.defect = 0
-    tally.cut_off, tally.fastest, tally.margin = LIMITS.cut, 0.0, 1.0
+    tally.cut_off, tally.fastest, tally.energy, tally.margin = LIMITS.cut, 0.0, 0.0, 1.0
     for i in range(n):
         b = ball[i]
         b.v = chain.v[i]
@@ -161,7 +164,9 @@ def prepare(n, chain, meeting, state):
         k.active = k.tiny = k.hits = k.held = k.fixed = k.due = k.stamp = 0
         if k.u.real > 0.0:
             tally.fastest = max(tally.fastest, k.u.real)
-    forget(tally)
+            tally.energy = max(tally.energy, reduced_mass(c, ball) * k.u.real * k.u.real)
+    forget(LOWER, state.level)
+    forget(UPPER, state.level)
     start(n, state)
 
 

@@ -29,6 +29,8 @@ FINISHED, UNFINISHED, REFUSED, PAUSED, UNSOUND = 0, 1, 2, 3, 4
 MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE, REPETITION = 0, 1, 2, 3, 4
 # R8.1: ends that are known without the slopes, and those that need them.
 CERTAIN, SLOPED = 0, 1
+# R9: the two levels on which cycles are looked for, ends of contacts and collapses.
+LOWER, UPPER = 0, 1
 # What an answer can break; 0 is none.
 NO_EVENT, PASSED, MOMENTUM, PULL, ORDER, ENERGY, LEDGER = 1, 2, 3, 4, 5, 6, 7
 
@@ -50,6 +52,8 @@ class Limits(NamedTuple):
     exhausted: float
     #: R9: a speed so low that sequences of impacts go on for ever, relative to the same.
     dust: float
+    #: R9: kinetic energy that a collapse may cost, relative to that of the initial closing.
+    faint: float
     #: R9: exhausted collisions in a row that are a collapse.
     repeats: int
     #: R9: how many cycles are worth taking at once.
@@ -58,11 +62,13 @@ class Limits(NamedTuple):
     self_similar: float
     #: R9: how far a cycle may turn before it is exhausted, relative to its own scale.
     bend: float
+    #: R9: what a jump beside a steady neighbour may leave in doubt, relative to the largest
+    #: initial closing speed.
+    doubt: float
     #: R9: the least part of an impulse that a ball beside a steady neighbour is taken to keep.
     kept: float
-    #: R9: how many contacts to each side a snapshot holds, and for how many ends at least.
+    #: R9: how many contacts to each side a snapshot holds.
     window: int
-    hold: int
     #: Mass of the lightest ball allowed, as a part of the heaviest.
     lightest: float
     #: Least coefficient of restitution allowed, but zero.
@@ -78,13 +84,14 @@ LIMITS = Limits(
     vanishing=1 << 40,
     exhausted=1e-18,
     dust=2.0**-100,
+    faint=1e-20,
     repeats=8,
     many=64,
     self_similar=1e-13,
     bend=1e-2,
+    doubt=1e-13,
     kept=1e-30,
     window=64,
-    hold=16,
     lightest=1e-15,
     least_restitution=1e-30,
     sound=64 * 2.0**-52,
@@ -137,12 +144,6 @@ class Contact:
     power: int  # binary exponent of the rate
     x: complex  # room for what a function works out in passing
     y: complex
-    then_u: complex  # R9: what it was at the snapshot
-    then_q: complex
-    then_p: complex
-    then_a: complex
-    then_hits: int
-    then_code: int  # whether it was active, and who drove whom at its balls
 
 
 class Run:
@@ -164,6 +165,28 @@ class Run:
     right: complex
 
 
+class Level:
+    """R9: one of two levels on which cycles are looked for."""
+
+    mark: int  # contact at whose end, or collapse, the snapshot was taken; -1 for none
+    count: int  # ends, or collapses, so far
+    due: int  # at this count the next snapshot is taken
+    taken: int  # snapshots so far
+    low: int  # the contacts that it holds
+    high: int
+
+
+class Memory:
+    """R9: a snapshot of one contact."""
+
+    u: complex
+    q: complex
+    p: complex
+    a: complex
+    hits: int
+    code: int  # whether it is active, and who drives whom at its balls
+
+
 class Tally:
     """The impact as a whole."""
 
@@ -173,12 +196,6 @@ class Tally:
     ends: int  # contacts that have ended in this round, and the last of them
     ended: int
     worn: int  # R9: the last of them that is worn out, or -1
-    mark: int  # R9: contact at whose end, or collapse, the snapshot was taken; -1 for none
-    count: int  # R9: ends so far; at how many the next snapshot is due; snapshots so far
-    due: int
-    taken: int
-    low: int  # R9: the contacts that the snapshot holds
-    high: int
     collapsed: int  # 1 if contacts have collapsed
     effort: int  # contacts that may still be touched, and events written, before a pause
     room: int
@@ -190,6 +207,7 @@ class Tally:
     defect: int  # what the answer breaks
     cut_off: float  # rates below this are zero
     fastest: float  # the largest closing speed at the start
+    energy: float  # R9: the largest m u^2 of a contact at the start, m its reduced mass
     meeting: complex  # R8: where two runs meet, as a part of the overlap
     margin: float  # how far the nearest decision was from a tie, relative to what it compares
 
@@ -213,10 +231,12 @@ class Record(NamedTuple):
 
 
 class State(NamedTuple):
-    """All of it: sequences of the things above."""
+    """All of it: sequences of the things above, `level` of two, `memory` of two rows."""
 
     ball: Any
     contact: Any
     run: Any
+    level: Any
+    memory: Any
     tally: Any  # of one
     record: Record

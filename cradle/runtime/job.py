@@ -50,7 +50,7 @@ class Stopped(Exception):
 #: The kernel's records: their fields, all zero; and as NumPy's types.
 _ZEROS: dict[str, dict[str, Any]] = {
     name: {field: kind() for field, kind in get_type_hints(getattr(rooms, name)).items()}
-    for name in ("Ball", "Contact", "Run", "Tally")
+    for name in ("Ball", "Contact", "Run", "Level", "Memory", "Tally")
 }
 _TYPES = {
     name: np.dtype([(field, np.array(zero, None).dtype) for field, zero in fields.items()])
@@ -69,8 +69,10 @@ def _area(n: int, compiled: bool, record: rooms.Record) -> rooms.State:
             vars(thing).update(_ZEROS[name])
         return things
 
-    groups = blank("Ball", n), blank("Contact", n), blank("Run", n), blank("Tally", 1)
-    return rooms.State(*groups, record)
+    memory = blank("Memory", 2 * n)
+    memory = memory.reshape(2, n) if compiled else [memory[:n], memory[n:]]
+    groups = blank("Ball", n), blank("Contact", n), blank("Run", n)
+    return rooms.State(*groups, blank("Level", 2), memory, blank("Tally", 1), record)
 
 
 _kept = threading.local()
