@@ -6,13 +6,13 @@ these balls with each other, and `Row.step` takes the place of the engine's step
 
 The engine's steps stay whole.  An engine keeps an energy that belongs to the length h of its step
 (for v += h a, x += h v it is v^2/2 + V - h v V'/2), so to cut a step at each contact pumps energy.
-From step to step a ball moves on a polygon: straight on with the speed w of the step, then a kick.
-With the corners x and x' of a side, and k the stiffness that draws the ball back, w^2 + k x x'
-stays the same.  A contact turns the side: with a time t of the step left, x' becomes x' + t u, and
-w becomes w + u.  Where the balls hang alike and touch, that changes the energy of the row by the
-sum of m ((w + u)^2 - w^2), up to terms whose mean is zero; and that sum is what `collide` keeps.
-Two pushes do it: m u t / h before the engine's step, the rest after it, when w is known.  It lies
-between the velocities before and after the step; where, the row learns from steps without contact.
+A ball moves on a polygon: straight on with the speed w of the step, then a kick.  With the corners
+x and x' of a side, and k the stiffness that draws the ball back, w^2 + k x x' stays the same.  A
+contact with a time t of the step left makes x' + t u of x', and w + u of w.  Where the balls hang
+alike and touch, that changes the energy of the row by the sum of m ((w + u)^2 - w^2), up to terms
+whose mean is zero; and that sum is what `collide` keeps.  Two pushes do it: m u t / h before the
+engine's step, the rest after it, when w is known: between the velocities before and after the
+step; where, the row learns from steps without contact.
 
 A solver that puts balls back onto their strings takes a part of each velocity that it turns: of w
 the part q (h w / l)^2, with q up to 1/2.  The row learns q too, and lets each part of a side that a
@@ -68,28 +68,25 @@ class Row(Alone):
     bodies : Bodies
         The engine's adapter.  The engine must not collide these balls with each other.
     chain : Chain
-        Masses and restitution of the balls from left to right; its velocities are not used.  The
-        mass is what a push at the centre meets: where a ball turns about its pivot as one piece
-        with its arm, its moment of inertia about the pivot over the arm's length squared.
+        Masses and restitution from left to right; its velocities are not used.  The mass is what a
+        push at the centre meets: of a ball that turns as one piece with its arm, the moment of
+        inertia about the pivot over the arm's length squared.
     model : Model
         The impact law, such as ``ImpulseCorrelation(0.13)``.
     radii : float or array_like, shape (N,)
         Of the balls, m; above 0.
     pivots : array_like, shape (N, 2), optional
-        Where the strings end, m, in the order of the row.  A ball on a string takes up the part of
-        an impulse along the tangent of its arc; its string takes the rest.  Without pivots the
-        balls are free.
+        Where the strings end, m, in the order of the row.  A string takes the part of an impulse
+        across the ball's arc.  Without pivots the balls are free.
     touching : float, optional
         Balls whose gap is at most this touch, m; a thousandth of the smallest radius r if left
-        out.  Steel balls of a toy are pressed into each other by about that.
+        out, by which steel balls of a toy are pressed into each other.
     resting : float, optional
-        Balls that touch and close no faster than this do not rebound: they go on together, m/s;
-        sqrt(a r) / 100 with the acceleration a if left out.
+        Balls that touch and close no faster than this go on together, m/s; sqrt(a r) / 100 with
+        the acceleration a if left out.
     acceleration : float
-        That of gravity, m/s^2, or what else draws neighbours together at most.  From it follows
-        for how long nobody need look at balls that do not hang on equal strings, and how a long
-        step bends the way of those that hang.  All are looked at every hundredth of a second, if
-        the steps are shorter, in case something else strikes them.
+        That of gravity, m/s^2, or what else draws neighbours together at most: for how long nobody
+        need look at them (a hundredth of a second at most), and how a step bends their way.
 
     Raises
     ------
@@ -111,17 +108,14 @@ class Row(Alone):
     Notes
     -----
     A step never compiles: impacts run plain, a millisecond or two each for five balls, unless
-    `cradle.warm_up` was called before.  Rows of one world are stepped by `step_rows`.
-
-    Any units will do, such as pixels, if all lengths have the same one, and the acceleration too.
+    `cradle.warm_up` was called before.  Rows of one world are stepped by `step_rows`.  Any unit of
+    length will do, such as pixels, if the acceleration has it too.
 
     Examples
     --------
     An engine of ten lines, and three balls in it of which the first one flies:
 
-    >>> import numpy as np
-    >>> from cradle import Chain
-    >>> from cradle.row import Row
+    >>> from cradle import Chain, ImpulseCorrelation
     >>> class Free:
     ...     def __init__(self, x, v):
     ...         self.x, self.v = np.array(x), np.array(v)
@@ -131,7 +125,6 @@ class Row(Alone):
     ...         self.v[ball] += impulse  # mass 1
     ...     def advance(self, step):
     ...         self.x += step * self.v
-    >>> from cradle import ImpulseCorrelation
     >>> balls = Free([[-1.0, 0.0], [0.0, 0.0], [0.2, 0.0]], [[2.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
     >>> row = Row(balls, Chain([1, 1, 1], [0, 0, 0], 1), ImpulseCorrelation(0.5), 0.1)
     >>> for _ in range(60):
@@ -191,9 +184,8 @@ class Row(Alone):
         """Look at the balls at the next step: call it after moving or kicking one of them."""
         self.quiet, self._last = 0.0, None
 
-    def _motion(self) -> tuple[list[complex], list[complex]]:
-        x, v = self.bodies.motion()
-        return [complex(*place) for place in x], [complex(*speed) for speed in v]
+    def _motion(self) -> list[list[complex]]:
+        return [[complex(*one) for one in told] for told in self.bodies.motion()]
 
     def _push(self, own: Plane, x: Plane) -> None:
         impulses = self.chain.masses * own * self.ways(x)

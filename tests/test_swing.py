@@ -2,7 +2,6 @@
 
 import math
 import re
-from fractions import Fraction
 from functools import partial
 
 import numpy as np
@@ -80,13 +79,6 @@ def test_period_any_angle(amplitude):
     )
 
 
-def test_small_amplitudes_of_any_angle_are_small_angle():
-    arguments = balls(3), ImpulseCorrelation(0.15), [-1e-5, 0, 0], np.linspace(0, 0.45, 9)
-    full = swing(*arguments, pendulums=Pendulums(angle="full"))
-    small = swing(*arguments)
-    np.testing.assert_allclose(full.positions, small.positions, rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize("size", [1e-8, 1e-12, 1e-100])
 def test_tiny_amplitudes_of_any_angle_are_as_exact(size):
     arguments = balls(3, 0.9), ImpulseCorrelation(0.1), [-size, 0, 0], [3.0]
@@ -123,15 +115,6 @@ def test_as_many_fly_off_as_are_pulled_back(k):
     out = np.abs(run.positions[1::2]).max()
     assert out == pytest.approx(0.02, rel=1e-13)
     np.testing.assert_allclose(run.positions[1], -np.array(pulled(5, k))[::-1], atol=1e-15)
-
-
-def test_fused_three_balls_by_hand():
-    """(1, 0, 0) -> (-1/3, 2/3, 2/3) -> reversed, (-1, 0, 0) -> ...: back after two strokes."""
-    run = swing(balls(3), FusedChain(), pulled(3), [2.0], pendulums=ONE_HERTZ)
-    speed = 0.02 * 2 * math.pi
-    for stroke, impact in enumerate(run.impacts):
-        expected = ([-1 / 3, 2 / 3, 2 / 3], [-1, 0, 0])[stroke % 2]
-        np.testing.assert_allclose(impact.after / speed, expected, atol=1e-14)
 
 
 @pytest.mark.parametrize(("ratio", "e"), [(0.15, 1.0), (0.15, 0.9), (0.4, 1.0), (0.05, 0.7)])
@@ -200,19 +183,6 @@ def test_damping_between_impacts():
 
 
 # Towards swinging together
-
-
-def test_drift_of_two_balls():
-    """The relative velocity of two balls falls to e at each stroke, their common one stays."""
-    e = 0.9
-    chain = Chain([2, 1], [0, 0], e)
-    run = swing(chain, ImpulseCorrelation(0), [-0.02, 0], [30.2], pendulums=ONE_HERTZ)
-    speed = 0.02 * 2 * math.pi
-    for k, impact in enumerate(run.impacts, start=1):
-        relative = impact.after[1] - impact.after[0]
-        assert relative == pytest.approx(speed * e**k, rel=1e-11)
-        mean = chain.masses @ impact.after / 3
-        assert mean == pytest.approx((-1) ** (k - 1) * speed * 2 / 3, rel=1e-13)
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.15])
@@ -557,20 +527,6 @@ def test_a_root_next_to_the_start(terms, parting, root):
     assert first_fall(0.0, terms, parting, 10.0) == root
 
 
-def test_a_root_between_two_times_next_to_each_other():
-    """The last step of the search is below the last digit of the time."""
-    terms = [
-        (-0.01448557016100738 + 0.02186895842441968j, 10.827079640119111j),
-        (0.018632421094327153 - 0.03978151421195931j, 5.726939861931363j),
-    ]
-    level = 0.0003635328839619234
-    root = first_fall(level, terms, False, 1.0)
-    assert root == pytest.approx(
-        brentq(lambda t: level + sum((c * np.exp(r * t)).real for c, r in terms), 0.4, 0.6),
-        abs=1e-11,
-    )
-
-
 def test_a_slow_rise_is_followed_in_few_steps(monkeypatch):
     """A contact begins to part with hardly any acceleration; the rate of that carries it on."""
     rates = [complex(-0.1, 1.0), complex(-0.3, 1.2)]
@@ -772,20 +728,8 @@ def test_frames():
     assert none.empty
 
 
-def test_ratio_zero_exact_in_fractions():
-    """Equal balls, e = 1, ratio 0: velocities are exchanged; the map needs no rounding."""
-    run = swing(balls(4), ImpulseCorrelation(0), [-0.02, -0.01, 0, 0], [3.3], pendulums=ONE_HERTZ)
-    v = [Fraction(2), Fraction(1), Fraction(0), Fraction(0)]
-    speed = 0.01 * 2 * math.pi
-    for impact in run.impacts[:6]:
-        v = sorted(v)  # equal elastic balls pass their velocities on: as if they ran through
-        np.testing.assert_allclose(impact.after / speed, [float(a) for a in v], atol=1e-12)
-        v = [-a for a in v]
-
-
 def test_what_is_said_of_small_angles():
     """How much too fast they swing, against the period of a pendulum of any angle."""
-    periods = [ellipk(math.sin(a / 2) ** 2) / (math.pi / 2) for a in (0.4, 1.0, math.pi / 2)]
-    assert [round(100 * (x - 1)) for x in periods[:2]] == [1, 7]
-    assert round(100 * (1 - 1 / periods[2])) == 15
+    periods = [ellipk(math.sin(a / 2) ** 2) / (math.pi / 2) for a in (0.4, 1.0)]
+    assert [round(100 * (x - 1)) for x in periods] == [1, 7]
     assert periods[0] - 1 == pytest.approx(0.4**2 / 16, rel=0.05)

@@ -62,7 +62,7 @@ def fit(
       cradle fit shots.csv --summary
       cradle fit shots.csv --json --plot fit.png
     """
-    from cradle.fit import read_shots
+    from cradle.fit import ratio, read_shots, restitution
     from cradle.fit.answers import FOLDED
     from cradle.fit.parameters import types_in_a_row
     from cradle.fit.result import RESULT_COLUMNS
@@ -78,16 +78,20 @@ def fit(
         types_in_a_row(predict)
         one_number("speed", striker, "must be above 0", 0.0, open_low=True)
     given = [_named(one) for one in options.pop("given")]
-    known = [_ratio(one) for one in options.pop("known")]
+    known = [(name, ratio) for name, (ratio, _) in map(_named, options["known"])]
+    if wrong := [one for one in options.pop("known") if ":" in one]:
+        raise click.UsageError(f"{wrong[0]!r}: write TRIPLET=RATIO; a known ratio has no error")
     shots = read_shots(sys.stdin.buffer if str(file) == "-" else file, **options)
     there = {one.name for one in shots.sets}  # a name may have a comma
     lists = [[part] if part in there else part.split(",") for part in without]
     used = shots.without(*(name.strip() for names in lists for name in names))
     _refuse_unused([name for name, _ in given], [name for name, _ in known], used, predict)
-    everything = _fits(used, dict(given), dict(known))
-    fits = [one for one in everything if one.estimates]
+    # The pairs, then with what they gave all longer chains; the last fit predicts.
+    pairs = [restitution(used)] if any(len(one.types) == 2 for one in used.sets) else []
+    values = {name: value for one in pairs for name, value in one.values().items()}
+    last = ratio(used, {**values, **dict(given)}, known=dict(known))
+    fits = [one for one in (*pairs, last) if one.estimates]
     momentum, count = shots.momentum_check()
-    rows = [row for one in fits for row in one.rows()]
     extra = {
         "chi_square": [one.chi_square for one in fits],
         "degrees_of_freedom": [one.degrees_of_freedom for one in fits],
@@ -95,30 +99,31 @@ def fit(
         "shots": count,
         "without": [one.name for one in shots.sets if one not in used.sets],
     }
-    notes = ["intervals: 95 % confidence sets"]
+    quality = []
     for one in fits:
         good = one.probability > 1e-3
         why = "" if good else " (a poor fit: the errors do not explain the differences)"
-        notes.append(f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}{why}")
-    if known and not everything[-1].estimates:
+        quality.append(f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}{why}")
+    notes = []
+    if known and not last.estimates:
         notes.append("fit: no ratio is fitted; those of --known are taken as they are")
     whole = " (all of the file)" if extra["without"] else ""
     good = chance(momentum, count) > 1e-3
     lost = "" if good else "; masses, velocities or their errors are wrong"
     notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{whole}{lost}")
     if predict is not None:
-        more, lines = _predicted(everything[-1], shots, predict, striker)
+        more, lines = _predicted(last, shots, predict, striker)
         extra.update(more)
         notes += lines
     if plot is not None:
         plot_fits(fits, plot)
     if summary:
-        click.echo("\n".join([*(one.summary() for one in fits), *notes[1 + len(fits) :]]))
-    else:
-        notes[1:1] = [
-            f"{e.name}{FOLDED}" for one in fits for e in one.estimates.values() if e.folded
-        ]
-        show(rows, extra, "\n".join(notes), as_json, as_csv, RESULT_COLUMNS)
+        click.echo("\n".join([*(one.summary() for one in fits), *notes]))
+        return
+    folds = [f"{e.name}{FOLDED}" for one in fits for e in one.estimates.values() if e.folded]
+    lines = ["intervals: 95 % confidence sets", *folds, *quality, *notes]
+    rows = [row for one in fits for row in one.rows()]
+    show(rows, extra, "\n".join(lines), as_json, as_csv, RESULT_COLUMNS)
 
 
 def _named(given: str) -> tuple[str, tuple[float, float]]:
@@ -131,84 +136,64 @@ def _named(given: str) -> tuple[str, tuple[float, float]]:
         raise click.UsageError(f"{given!r}: write NAME=NUMBER or NAME=NUMBER:ERROR") from None
 
 
-def _ratio(given: str) -> tuple[str, float]:
-    """Read TRIPLET=RATIO."""
-    name, (value, _) = _named(given)
-    if ":" in given:
-        raise click.UsageError(f"{given!r}: write TRIPLET=RATIO; a known ratio has no error")
-    return name, value
-
-
 def _refuse_unused(
     given: Iterable[str], known: Iterable[str], shots: Shots, predict: str | None
 ) -> None:
     """Refuse a value that no chain needs (its name may be misspelt), and one that is there."""
-    from cradle.fit.parameters import fitted_keys, label, pair_keys, parameter_key
+    from cradle.fit.parameters import label, pair_keys, parameter_key, ratio_keys
 
     chains = [one.types for one in shots.sets] + ([parameter_key(predict)] if predict else [])
-    pairs = {key for types in chains for key in pair_keys(types)}
-    triplets = {key for types in chains if len(types) > 2 for key in fitted_keys(types)}
-    values = [("--restitution", name, tuple(sorted(parameter_key(name)))) for name in given]
-    values += [("--known", name, parameter_key(name)) for name in known]
+    kinds = {
+        "--restitution": ("pair", {key for types in chains for key in pair_keys(types)}),
+        "--known": ("triplet", {key for types in chains for key in ratio_keys(types)}),
+    }
     there_by = {("--restitution", pair_keys(one.types)[0]): f"set {one.name} is fitted for it; "
                 f"leave one of them out (--without {quote(one.name)})"
                 for one in shots.sets if len(one.types) == 2}  # fmt: skip
+    values = [("--restitution", name, tuple(sorted(parameter_key(name)))) for name in given]
+    values += [("--known", name, parameter_key(name)) for name in known]
     for option, name, key in values:
         if (option, key) in there_by:
             raise click.UsageError(f"{option} {name}: {there_by[option, key]}")
         there_by[option, key] = "given twice"
-        kind, needed = ("triplet", triplets) if option == "--known" else ("pair", pairs)
+        kind, needed = kinds[option]
         if key not in needed:
             there = ", ".join(sorted(map(label, needed))) or "none"
             raise click.UsageError(f"{option} {name}: no chain has this {kind}; there are {there}")
-
-
-def _fits(
-    shots: Shots, given: dict[str, tuple[float, float]], known: dict[str, float]
-) -> list[Fit]:
-    """Fit the pairs, then with what they gave all longer chains; the last fit predicts."""
-    from cradle.fit import ratio, restitution
-
-    pairs = [restitution(shots)] if any(len(one.types) == 2 for one in shots.sets) else []
-    values = {name: value for one in pairs for name, value in one.values().items()}
-    return [*pairs, ratio(shots, {**values, **given}, known=known)]
 
 
 def _predicted(
     found: Fit, shots: Shots, sequence: str, speed: float
 ) -> tuple[dict[str, Any], list[str]]:
     """Return a prediction and what was measured of such chains: for JSON, and as lines."""
-    from cradle.fit.parameters import fitted_keys
+    from cradle.fit.parameters import ratio_keys
 
     predicted = found.predict(sequence, speed)
-    rows, measured = predicted.rows(), []
-    lines = ["", f"{sequence} at {speed:g} m/s; lower to upper: the central 95 % of predictions"]
-    tables, remarks = [rows], []
-    keys = fitted_keys(predicted.types) if len(predicted.types) > 2 else set()
+    rows, measured, tables, remarks = predicted.rows(), [], [], []
+    keys = ratio_keys(predicted.types)
     # A pair has given its restitution; ratios that are all known take nothing from the shots.
     taught = not keys or any(keys & set(group.keys) for group in found.groups)
     for one in (one for one in shots.sets if one.types == predicted.types):
-        fitted = one in found.shots.sets and taught
+        used = one in found.shots.sets
         try:
             mean, error = one.mean_after(speed)
         except ValueError as reason:
             remarks.append(f"not compared: {reason}")
             continue
         columns = {"measured": mean.tolist(), "error": error.tolist()}
-        measured.append({"set": one.name, "shots": len(one.shots), "fitted": fitted, **columns})
+        measured.append({"set": one.name, "shots": len(one.shots), "fitted": used and taught}
+                        | columns)  # fmt: skip
         tables.append([{**row, "measured": m, "error": e}
                        for row, m, e in zip(rows, *columns.values(), strict=True)])  # fmt: skip
         # Without a triplet's own set its ratio is known no longer.
         hint = f" (for one: --without {quote(one.name)})" if len(one.types) > 3 else ""
-        part = f"part of the fit: this is no check{hint}" if fitted else "left out of the fit"
-        if one in found.shots.sets and not fitted:
+        part = f"part of the fit: this is no check{hint}" if used else "left out of the fit"
+        if used and not taught:
             part = "not fitted: it changes no ratio"
-        remarks.append(
-            f"measured: mean of {len(one.shots)} shots of set {one.name}, each scaled to "
-            f"{speed:g} m/s; the set was {part}"
-        )
-    lines += map(text, tables[1:] or tables)
-    lines += remarks
+        remarks.append(f"measured: mean of {len(one.shots)} shots of set {one.name}, each scaled "
+                       f"to {speed:g} m/s; the set was {part}")  # fmt: skip
+    lines = ["", f"{sequence} at {speed:g} m/s; lower to upper: the central 95 % of predictions"]
+    lines += [*map(text, tables or [rows]), *remarks]
     several = [e.name for e in found.estimates.values() if e.key in keys and len(e.intervals) > 1]
     if several:
         lines.append(

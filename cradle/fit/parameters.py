@@ -48,9 +48,14 @@ def triplet_keys(types: Sequence[str]) -> tuple[list[Key], list[Key]]:
     return forward, [key[::-1] for key in forward]
 
 
+def ratio_keys(types: Sequence[str]) -> set[Key]:
+    """Return the ratio parameters of a chain, of both ways, each once."""
+    return set[Key]().union(*triplet_keys(types))
+
+
 def fitted_keys(types: Sequence[str]) -> set[Key]:
-    """Return what shots of a chain are fitted for: of a pair its restitution, else both ratios."""
-    return set(pair_keys(types)) if len(types) == 2 else set().union(*triplet_keys(types))
+    """Return what shots of a chain are fitted for: of a pair its restitution, else its ratios."""
+    return ratio_keys(types) or set(pair_keys(types))
 
 
 def outcomes(types: Sequence[str], masses: Vector, velocities: Vector, values: Values) -> Vector:

@@ -212,10 +212,6 @@ class Fit:
         axes : sequence of two Axes, optional
             Where to draw; new axes if left out.
 
-        Returns
-        -------
-        sequence of Axes
-
         Raises
         ------
         ValueError

@@ -127,55 +127,39 @@ class QuadraticDissipation:
         kappa = self._kappa(chain)
         if self.distance and n != 3:
             raise ValueError(f"distance = {self.distance!r}; needs three balls, the chain has {n}")
-        impulses, absorbed = np.zeros((2, n - 1))
-        change = np.zeros(n)
-        path, path_impulses, events = [v], [impulses], []
         left, right = np.maximum.accumulate(m), np.maximum.accumulate(m[::-1])[::-1]
-        light = np.zeros(n, dtype=bool)
-        light[1:-1] = m[1:-1] < _LIGHTEST * np.minimum(left[:-2], right[2:])
         rule = (
             f"must be at least {_LIGHTEST} of the heaviest ball on its left, or on its right, for "
             "QuadraticDissipation"
         )
-        refuse_where("masses", chain.masses, light, rule)
-        rounding = 1e-14 * np.abs(v - v.mean()).max() + 4e-16 * np.abs(v).max()
-        held = np.zeros(n - 1, dtype=bool)
-
-        def closing(v: Vector) -> Vector:
-            u = v[:-1] - v[1:]
-            # A reaction keeps the closing speed at 0.  A rounding error of the speeds, or of the
-            # impulses over a light mass, is none.
-            ends = np.concatenate([[0.0], impulses, [0.0]])
-            noise = rounding + 1e-15 * (ends[:-1] + ends[1:]) / m
-            return np.where(held | (np.abs(u) <= np.maximum(noise[:-1], noise[1:])), 0.0, u)
-
+        refuse_where("masses", chain.masses, m < _LIGHTEST * np.minimum(left, right), rule)
+        change, impulses, absorbed = np.zeros(n), *np.zeros((2, n - 1))
+        path, path_impulses, events = [v], [impulses], []
+        # Closing speeds are known no better than the velocities that they are differences of.
+        u, rounding = v[:-1] - v[1:], 1e-14 * np.abs(v - v.mean()).max() + 4e-16 * np.abs(v).max()
         problems = 0
-        while (closing(v) > 0.0).any() and problems < self.max_problems:
+        while (u > rounding).any() and problems < self.max_problems:
             problems += 1
-            u = closing(v)
-            stretch = np.cumsum(u < 0.0)
+            u = np.where(np.abs(u) <= rounding, 0.0, u)
+            jump, passed = np.zeros(n), np.zeros(n - 1)
+            stretch, after = np.cumsum(u < 0.0), u.copy()
             active = (u >= 0.0) & np.isin(stretch, stretch[u > 0.0])
-            jump, passed, held = np.zeros(n), np.zeros(n - 1), held & ~active
-            for k in np.unique(stretch[active]):
-                at = np.flatnonzero(active & (stretch == k))
+            for at in (np.flatnonzero(active & (stretch == k)) for k in np.unique(stretch[active])):
                 balls = slice(at[0], at[-1] + 2)
                 outer = self.distance if len(at) == 2 == n - 1 else 0.0
-                jump[balls], w = _growth(m[balls], u[at], kappa[at], outer)
-                passed[at] = -np.cumsum((m * jump)[balls])[:-1]
-                held[at] = w == 0.0
-            impulses = impulses + passed
-            change = change + jump
-            after = chain.velocities + change
-            absorbed += passed * unit * 0.5 * (u + closing(after))
-            v = after
+                jump[balls], parting = _parted(m[balls], u[at], kappa[at], outer)
+                passed[at], after[at] = -np.cumsum((m * jump)[balls])[:-1], -parting
+            after = np.where(active, after, u - np.diff(jump))
+            absorbed += passed * unit * 0.5 * (u + after)
+            u, impulses, change = after, impulses + passed, change + jump
             contacts = np.flatnonzero(active).tolist()
             events += [Event("end", c) for c in contacts]
-            path += [v] * len(contacts)
+            path += [v + change] * len(contacts)
             path_impulses += [impulses] * len(contacts)
         trace = DissipationTrace(
             chain=chain,
             model=self,
-            velocities=v,
+            velocities=path[-1],
             impulses=impulses * unit,
             absorbed=absorbed,
             collisions=np.bincount([event.contact for event in events], minlength=n - 1),
@@ -183,12 +167,9 @@ class QuadraticDissipation:
             path_impulses=np.array(path_impulses) * unit,
             events=tuple(events),
         )
-        if (closing(v) > 0.0).any():
-            raise ImpactNotFinished(
-                f"the impact was not finished after max_problems = {self.max_problems}",
-                trace,
-                0.0,  # between two problems nothing is stored
-            )
+        if (u > rounding).any():
+            told = f"the impact was not finished after max_problems = {self.max_problems}"
+            raise ImpactNotFinished(told, trace, 0.0)  # between two problems nothing is stored
         return trace
 
     def _kappa(self, chain: Chain) -> Vector:
@@ -204,8 +185,8 @@ class QuadraticDissipation:
         return row_of("coefficients", self.coefficients, len(chain) - 1, len(chain))
 
 
-def _growth(m: Vector, u: Vector, kappa: Vector, distance: float) -> tuple[Vector, Vector]:
-    """Return the changes of velocity of balls that touch, and their closing speeds after, negated.
+def _parted(m: Vector, u: Vector, kappa: Vector, distance: float) -> tuple[Vector, Vector]:
+    """Return how the velocities of balls that touch change, and how fast the balls part after it.
 
     u holds closing speeds, kappa the coefficients, `distance` that of the outer balls.
     """

@@ -23,20 +23,7 @@ _LEGEND: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.08),
 
 
 def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequence[Axes]:
-    """Draw one estimate of a fit: its likelihood, and its data with their predictions.
-
-    Parameters
-    ----------
-    fit : Fit
-        The fit.
-    name : str, optional
-        Which estimate; the first identified one if left out.
-    axes : sequence of two Axes, optional
-        Where to draw; new axes if left out.
-
-    Returns
-    -------
-    sequence of Axes
+    """Draw one estimate of a fit, the first identified one if `name` is None; see `Fit.plot`.
 
     Examples
     --------
@@ -49,10 +36,8 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
     """
     if not fit.estimates:
         raise ValueError("nothing was fitted; there is nothing to draw")
-    if name is None:
-        identified = (n for n, one in fit.estimates.items() if one.identified)
-        name = next(identified, next(iter(fit.estimates)))
-    estimate = fit[name]
+    # The first identified one, else the first one.
+    estimate = fit[name or min(fit.estimates, key=lambda one: not fit[one].identified)]
     if axes is None:
         _, axes = plt.subplots(2, 1, figsize=(5.6, 7), layout="constrained")
     draw_likelihood(estimate, axes[0])

@@ -18,26 +18,30 @@ from cradle.runtime.job import FINISHED, Stopped
 _EFFORT = {False: 5_000, True: 5_000_000}
 # The same with a record, of which each step is a page.
 _PAGES = 1024
+#: The fields of the kernel's records, all zero.
+_ZEROS: dict[type, dict[str, Any]] = {
+    kind: {field: number() for field, number in get_type_hints(kind).items()}
+    for kind in (Link, Clock)
+}
+_TYPES = {
+    kind: np.dtype([(field, np.array(zero).dtype) for field, zero in fields.items()])
+    for kind, fields in _ZEROS.items()
+}
 
 
 def _blank(kind: type, size: int, compiled: bool) -> Any:
     """Return records, all zero: NumPy's for compiled code, Python objects for plain."""
-    fields = {field: number() for field, number in get_type_hints(kind).items()}
     if compiled:
-        return np.zeros(size, [(field, np.array(zero).dtype) for field, zero in fields.items()])
+        return np.zeros(size, _TYPES[kind])
     things = [kind() for _ in range(size)]
     for thing in things:
-        vars(thing).update(fields)
+        vars(thing).update(_ZEROS[kind])
     return things
 
 
 def room(rows: int, n: int) -> Motions:
     """Return room for what so many chains come to."""
-    counts = np.zeros((2, rows), np.int64)
-    return Motions(np.empty((rows, n)), np.zeros(rows), *counts)
-
-
-_kept = threading.local()
+    return Motions(np.empty((rows, n)), np.zeros(rows), *np.zeros((2, rows), np.int64))
 
 
 def solve(
@@ -52,34 +56,26 @@ def solve(
 
     It ends when `stop` is set.  The steps of one chain are written to a `record`.
     """
-    rows, n = out.v.shape
-    k, status, resumed = 0, FINISHED, False
+    (rows, n), k, status = out.v.shape, 0, FINISHED
     compiled: bool | None = None
-    kept: Any = None
     pages = np.empty((0 if record is None else _PAGES, 6, max(n, 3)))
-    while k < rows:
+    while k < rows and status in (FINISHED, PAUSED):
         if stop is not None and stop.is_set():
             raise Stopped
         kernel = runtime.chosen(large, "springs")
         if compiled is None or (compiled is not (kernel is not plain) and record is None):
             # A chain that has begun plain begins anew.
-            compiled, resumed = kernel is not plain, False
-            kept = vars(_kept).get(str(compiled))
-            if kept is None or len(kept[0]) != n:
-                kept = _blank(Link, n, compiled), _blank(Clock, 1, compiled)
-                vars(_kept)[str(compiled)] = kept
+            compiled, status = kernel is not plain, FINISHED
+            area = _blank(Link, n, compiled), _blank(Clock, 1, compiled)
             given = chains if compiled else Forces(*(part.tolist() for part in chains))
         call = kernel.springs if compiled else plain.springs
         begun = time.perf_counter()
         effort = _EFFORT[compiled] if record is None else _PAGES
-        k, status = call(k, resumed, n, given, law, out, *kept, pages, effort)
+        k, status = call(k, status == PAUSED, n, given, law, out, *area, pages, effort)
         if not compiled:
             runtime.spend(time.perf_counter() - begun)
         if record is not None:
-            clock = kept[1][0] if compiled else vars(kept[1][0])
+            clock = area[1][0] if compiled else vars(area[1][0])
             record.append(pages[: clock["row"]].copy())
             clock["row"] = 0
-        resumed = status == PAUSED
-        if not (resumed or status == FINISHED):
-            break
     return k, status

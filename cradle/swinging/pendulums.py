@@ -37,9 +37,9 @@ class Pendulums:
         Rate at which the amplitude of a ball that swings alone decays, 1/s; below its natural
         frequency sqrt(g/l), or it would not swing.
     angle : {"small", "full"}
-        Small-angle pendulums, or pendulums of any angle.  The latter need equal lengths, no gaps
-        and one damping: then contacts stay horizontal, at any angle.  A small-angle pendulum swings
-        too fast by about the square of the amplitude over 16: by 1 % at 0.4 rad, by 7 % at 1 rad.
+        Pendulums of any angle need equal lengths, no gaps and one damping: then contacts stay
+        horizontal.  Small-angle ones swing too fast by about the square of the amplitude over 16:
+        by 1 % at 0.4 rad, by 7 % at 1 rad.
 
     Raises
     ------
@@ -89,9 +89,8 @@ class Pendulums:
     def reach(self, size: int) -> Vector:
         """Return how far each of `size` balls may be pulled aside for a release, m along its arc.
 
-        Small-angle pendulums hang on strings, which are slack above their pivots: a quarter of a
-        circle, where the period is 15 % too short already.  Others may hang on rods: half a circle,
-        not quite to the top, where a ball would stand.
+        A quarter of a circle: above its pivot a string is slack.  Others may hang on rods: half a
+        circle, not quite to the top, where a ball would stand.
         """
         part = 0.5 if self.angle == "small" else 1.0 - 2.0**-20
         return part * np.pi * self.row("length", size)
@@ -131,10 +130,8 @@ class Hanging:
         self.length, self.damping = pendulums.row("length", n), pendulums.row("damping", n)
         self.fastest = float(self.frequency.max())
         self.tie = TIE / self.fastest  # events nearer than this are one, s
-        self._half_masses, self._half_pulls = (
-            0.5 * masses,
-            0.5 * masses * self.gravity / self.length,
-        )
+        self._half_masses = 0.5 * masses
+        self._half_pulls = 0.5 * masses * self.gravity / self.length
 
     def offsets(self, first: int, last: int) -> Vector:
         """Return how far the balls of a body hang from its first one, where they touch, m."""

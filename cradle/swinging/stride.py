@@ -52,19 +52,12 @@ class Flight(NamedTuple):
 
 
 class Alone:
-    """A row of balls; the parameters are those of `cradle.row.Row`."""
+    """A row of balls at places x; the parameters are those of `cradle.row.Row`."""
 
     def __init__(
-        self,
-        x: ArrayLike,
-        chain: Chain,
-        model: Model,
-        radii: ArrayLike,
-        pivots: ArrayLike | None,
-        touching: float | None,
-        resting: float | None,
-        acceleration: float,
-    ) -> None:
+        self, x: ArrayLike, chain: Chain, model: Model, radii: ArrayLike, pivots: ArrayLike | None,
+        touching: float | None, resting: float | None, acceleration: float,
+    ) -> None:  # fmt: skip
         n = len(must_be(Chain, "chain", chain))
         with without_waiting():
             collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
@@ -90,11 +83,10 @@ class Alone:
             c = int(np.argmax(overlaps))
             rule = f"must be at most `touching` = {self.touching:g} at the start"
             raise ValueError(f"balls {c} and {c + 1} overlap by {overlaps[c]:g} m; {rule}")
-        self.pivots: Plane | None = None
+        self.pivots = None if pivots is None else self._plane("pivots", pivots)
         #: How fast neighbours may come to close; 0 on equal strings: these are accelerated alike.
         self.speeding = self.acceleration
-        if pivots is not None:
-            self.pivots = self._plane("pivots", pivots)
+        if self.pivots is not None:
             way = self.pivots[-1] - self.pivots[0]
             back = (np.diff(self.pivots) / way).real < 0.0
             if back.any():
@@ -105,7 +97,7 @@ class Alone:
                 )
             if ((at[-1] - at[0]) / way).real <= 0.0:
                 raise ValueError("pivots lead the other way than the balls; must be in their order")
-            lengths = np.abs(at - self.pivots)
+            lengths = self.arms(at)
             if np.ptp(lengths) <= 1e-3 * lengths.min():
                 self.speeding = 0.0
         #: Part of a velocity that a step takes, over the square of the angle by which it turns.
@@ -216,7 +208,13 @@ class Alone:
             balls = slice(first, last)
             axis = lines[first : last - 1].sum()
             axis /= abs(axis)
-            self._refuse_a_bend(lines[first : last - 1], axis, first)
+            off = np.abs(np.angle(lines[first : last - 1] / axis)).max()
+            if off > _BEND:
+                raise ValueError(
+                    f"balls {first} to {last - 1} touch, but not in a straight row: a line of "
+                    f"centres is {math.degrees(off):.0f} degrees off; at most "
+                    f"{math.degrees(_BEND):.0f} are allowed"
+                )
             # How a ball's own way lies to the axis; a free ball's is the axis.
             free = self.pivots is None
             along = np.ones(last - first) if free else (ways[balls] / axis).real
@@ -231,8 +229,8 @@ class Alone:
                     after = collide(chain, part(self.model, len(x), first, last)).velocities
                 impulses = np.cumsum(masses * (before - after))[:-1]
                 c = int(np.argmax(impulses))
-                told = time, range(first, last), before, after, first + c, float(impulses[c])
-                hits.append(Hit(*told))
+                strongest = first + c, float(impulses[c])
+                hits.append(Hit(time, range(first, last), before, after, *strongest))
             after, rests = self._rested(masses, after, gaps[first : last - 1])
             settled += rests
             gained[balls] = (after - before) * (axis if free else 1.0 / along)
@@ -256,15 +254,6 @@ class Alone:
         if x.shape != (n, 2):
             raise ValueError(f"{name} has shape {x.shape}; {n} balls need ({n}, 2)")
         return x[:, 0] + 1j * x[:, 1]
-
-    def _refuse_a_bend(self, lines: Plane, axis: complex, first: int) -> None:
-        off = np.abs(np.angle(lines / axis)).max()
-        if off > _BEND:
-            raise ValueError(
-                f"balls {first} to {first + len(lines)} touch, but not in a straight row: a line "
-                f"of centres is {math.degrees(off):.0f} degrees off; at most "
-                f"{math.degrees(_BEND):.0f} are allowed"
-            )
 
     def _refuse_a_pack(self, x: Plane) -> None:
         half = 0.5 * np.array(self.radii)  # halves add up to no more than a float can hold
