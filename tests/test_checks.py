@@ -156,7 +156,6 @@ def test_the_first_wrong_value_is_named():
     wrong = np.array([[False, False], [False, True]])
     with pytest.raises(ValueError, match=r"^x\[1, 1\] = 3\.0; must not be$") as error:
         refuse_where("x", np.array([2.0, 3.0]), wrong, "must not be")
-    assert error.value.index == (1, 1)
     with pytest.raises(ValueError, match=r"^x = 3\.0; must not be$"):
         refuse_where("x", np.array(3.0), np.array(True), "must not be")
 

@@ -32,7 +32,6 @@ from cradle import (
     fit,
     measures,
 )
-from cradle.models.blocks import post_impact_block
 from cradle.pictures import animation, balls
 from cradle.pictures import impacts as figures
 from cradle.row import Row
@@ -58,11 +57,6 @@ class Still:
 
     def advance(self, step):
         pass
-
-
-def one_block(masses, velocities, restitution, forward, backward, **options):
-    """Arrays by place, as dask hands them over."""
-    return post_impact_block(masses, velocities, restitution, forward, backward, **options)
 
 
 BALLS = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "restitution": 1}
@@ -104,8 +98,6 @@ ENTRIES = {
     },
     Row(Still(), THREE, MODEL, 0.1).step: {"duration": 0.01},
     TRACE.plot: {"ax": Figure().subplots(), "contact": 0},
-    SEVERAL.to_xarray: {"dims": ("ratio",)},
-    one_block: SEVEN,
     measures.bouncing_pattern: {"velocities": [0, 0, 1]},
     measures.condition_number: {"chain": THREE, "model": MODEL, "step": 1e-6},
     measures.effective_ratio: {"trace": TRACE, "tolerance": 1e-6},

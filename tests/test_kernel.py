@@ -709,23 +709,3 @@ def test_work_area_need_not_be_cleared():
             assert getattr(found, name) == getattr(expected, name), name
         for name in ("collapsed", "events", "rounds", "margin", "effort"):
             assert getattr(found, name) == getattr(expected, name), name
-
-
-# --- named axes ---------------------------------------------------------------------------------
-
-
-def test_outcomes_with_named_axes():
-    xarray = pytest.importorskip("xarray")
-    found = outcomes([100, 1, 100], [1, 0, 0], [[[1.0]], [[0.1]]] * np.ones((2, 3, 2)), 0.15)
-    table = found.to_xarray(("e", "copy"))
-    assert isinstance(table, xarray.Dataset)
-    assert table["velocities"].dims == ("e", "copy", "ball")
-    assert table["collisions"].dims == ("e", "copy", "contact")
-    assert table["collapsed"].dims == ("e", "copy")
-    for name, values in zip(found._fields, found, strict=True):
-        assert table[name].to_numpy().tobytes() == values.tobytes()
-    assert table.sizes == {"e": 2, "copy": 3, "ball": 3, "contact": 2}
-    assert found.to_xarray()["collapsed"].dims == ("chain_0", "chain_1")
-    assert table["ball"].to_numpy().tolist() == [0, 1, 2]
-    with pytest.raises(ValueError, match=r"dims = \('e',\); must be a tuple, a name for each"):
-        found.to_xarray(("e",))

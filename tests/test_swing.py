@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 from truth import solve
 

@@ -224,11 +224,8 @@ def must_be(kind: type[_Thing], name: str, thing: object) -> _Thing:
 
 
 def refusal(name: str, at: tuple[Any, ...], rest: str) -> ValueError:
-    """Return the error that refuses a value; it knows its place, so that it can be moved."""
-    index = tuple(int(k) for k in at)
-    error = ValueError(f"{name}{place(index)}{rest}")
-    vars(error).update(name=name, index=index, rest=rest)
-    return error
+    """Return the error that refuses a value at its place."""
+    return ValueError(f"{name}{place(tuple(map(int, at)))}{rest}")
 
 
 def refuse_where(name: str, values: Vector, wrong: NDArray[np.bool_], rule: str) -> None:

@@ -7,13 +7,13 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.input.values import Vector, numbers, shown
+from cradle.input.values import Vector, numbers
 from cradle.kernel import Inputs, Options, Outputs
 from cradle.models.correlation import (
     MAX_EVENTS,
@@ -25,9 +25,6 @@ from cradle.models.correlation import (
 from cradle.progress import progress_bar
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
 from cradle.trace import ImpactNotCertified
-
-if TYPE_CHECKING:
-    import xarray
 
 #: Chains solved at a time, more where short cuts are likely; so much memory is needed beyond inputs
 #: and outputs.
@@ -111,42 +108,6 @@ class Outcomes(NamedTuple):
     collisions: NDArray[np.int64]
     #: Whether an infinite sequence of impacts was taken to its limit, shape (...).
     collapsed: NDArray[np.bool_]
-
-    def to_xarray(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
-        """Return the outcomes with named axes.
-
-        Parameters
-        ----------
-        dims : tuple of str, optional
-            Names of the leading axes; ``chain_0``, ``chain_1`` ... if left out.
-
-        Returns
-        -------
-        xarray.Dataset
-            `velocities` (..., ball), `collisions` (..., contact), `collapsed` (...).
-
-        Raises
-        ------
-        ImportError
-            If xarray, of the extra ``book``, is not installed.
-        ValueError
-            If these are not as many names as leading axes.
-        """
-        import xarray
-
-        lead = self.collapsed.ndim
-        names = tuple(f"chain_{k}" for k in range(lead)) if dims is None else dims
-        if not (isinstance(names, tuple) and [*map(type, names)] == [str] * lead):
-            raise ValueError(f"dims = {shown(dims)}; must be a tuple, a name for each leading axis")
-        balls = self.velocities.shape[-1]
-        return xarray.Dataset(
-            {
-                "velocities": ((*names, "ball"), self.velocities),
-                "collisions": ((*names, "contact"), self.collisions),
-                "collapsed": (names, self.collapsed),
-            },
-            coords={"ball": range(balls), "contact": range(balls - 1)},
-        )
 
 
 def outcomes(
