@@ -175,8 +175,8 @@ def test_defects_have_the_package_s_words(source):
 
 def test_an_outcome_that_is_not_certified_has_no_numbers(source):
     """If no rounding at all were allowed, the certificate would refuse this chain."""
-    assert source.count(" sound: ") == 1
-    script = Script(source.replace(" sound: ", " sound: -"))
+    assert source.count(", sound = ") == 1
+    script = Script(source.replace(", sound = ", ", sound = -"))
     answer = script("cradle.collide", {"masses": [1, 1, 1], "velocities": [1, 0, 0], "forward": 0})
     script.context.close()
     assert answer == {

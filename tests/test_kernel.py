@@ -589,13 +589,13 @@ OTHER_BUILT_IN = set(dir(builtins)) - BUILT_IN - {"_"}
 
 
 def is_declaration(node):
-    """A class of annotated fields, without values or methods."""
+    """A class of annotated fields, without methods; those of `Limits` have values."""
     fields = [part for part in node.body if not isinstance(part, ast.Expr)]
     bases = [ast.unparse(base) for base in node.bases]
     return (
         bases in ([], ["NamedTuple"])
         and not node.decorator_list
-        and all(isinstance(part, ast.AnnAssign) and part.value is None for part in fields)
+        and all(isinstance(part, ast.AnnAssign) for part in fields)
     )
 
 
@@ -605,11 +605,11 @@ def not_plain(source, room="other"):
     at_top = {id(node) for node in tree.body}
     # `state` makes the marks of functions, where nobody has made them, and the limits.
     limits = [
-        node
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "Limits"
+        id(field)
+        for node in tree.body
+        if isinstance(node, ast.ClassDef) and node.name == "Limits" and room == "state"
+        for field in node.body
     ]
-    keywords = {id(k) for call in limits for k in call.keywords if room == "state"}
     marks = [node for node in tree.body if isinstance(node, ast.If)] if room == "state" else []
     at_top |= {id(node) for mark in marks for node in mark.body}
 
@@ -624,9 +624,7 @@ def not_plain(source, room="other"):
             case ast.FunctionDef():
                 return id(node) in at_top
             case ast.AnnAssign():
-                return node.value is None
-            case ast.keyword():
-                return id(node) in keywords
+                return node.value is None or id(node) in limits
             case ast.Attribute(value=value, attr=name):
                 if isinstance(value, ast.Call):  # the parts of a pair that a function returns
                     return name in PARTS

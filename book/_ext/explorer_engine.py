@@ -270,10 +270,15 @@ def record(node: ast.ClassDef) -> list[str]:
     """Return what makes a record: of given parts for a named tuple, of zeros for the others."""
     names = [field.target.id for field in node.body]
     if node.bases:
-        inside = ", ".join(names)
+        given = ", ".join(
+            f"{field.target.id} = {expression(field.value)}"
+            if field.value
+            else field.target.id
+            for field in node.body
+        )
         return [
-            f"function {node.name}({inside}) {{",
-            f" return {{{inside}}};",
+            f"function {node.name}({given}) {{",
+            f" return {{{', '.join(names)}}};",
             "}",
         ]
     inside = ", ".join(
@@ -304,12 +309,6 @@ def translate(source: str) -> str:
                 lines += function(node)
             case ast.ClassDef():
                 lines += record(node)
-            case ast.Assign([ast.Name(name)], ast.Call(_, [], parts)):
-                inside = ", ".join(
-                    f"{part.arg}: {expression(part.value)}"
-                    for part in parts
-                )
-                lines.append(f"const {name} = {{{inside}}};")
             case ast.Assign([target], value):
                 lines.append(
                     f"const {expression(target)} = {expression(value)};"

@@ -6,14 +6,7 @@ from typing import Any, NamedTuple
 from cradle.kernel.certificate import certify
 from cradle.kernel.loop import impact
 from cradle.kernel.record import settle
-from cradle.kernel.state import (
-    FINISHED,
-    LIMITS,
-    REFUSED,
-    UNSOUND,
-    apart,
-    door,
-)
+from cradle.kernel.state import FINISHED, LIMITS, REFUSED, UNSOUND, apart, door
 
 
 class Inputs(NamedTuple):

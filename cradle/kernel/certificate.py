@@ -10,11 +10,9 @@ from cradle.kernel.state import ENERGY, LEDGER, LIMITS, MOMENTUM, ORDER, PULL, a
 def certify(n, ball, contact, tally):
     """Return what a settled outcome breaks, or 0; each sum within the rounding of its terms.
 
-    The loop follows closing speeds and works; velocities come from impulses alone.  So it is a
-    check of all of these that the velocities part as the closing speeds say, and that the energy
-    lost, the sum of impulse times mean closing speed, is what the contacts keep back, (1 - e^2) of
-    the work that each absorbed.  Momentum and order are those of the
-    velocities as they are handed out.
+    The loop follows closing speeds and works, velocities come from impulses alone: so they must
+    part as the closing speeds say, and the energy lost, impulse times mean closing speed, must be
+    what the contacts keep back, (1 - e^2) of their work.
     """
     unit = tally.unit
     momentum = terms = grain = 0.0

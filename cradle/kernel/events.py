@@ -3,7 +3,7 @@
 from cradle.kernel.numbers import ZERO, minus, negative
 from cradle.kernel.record import record
 from cradle.kernel.rules import has_ended, is_clear, opens_at_zero, source_of
-from cradle.kernel.state import CERTAIN, CLOSE, END, LIMITS, SLOPED, apart, jit
+from cradle.kernel.state import CLOSE, END, LIMITS, apart, jit
 
 
 @jit
@@ -161,10 +161,10 @@ def count_exhausted(c, n, ball, contact, tally):
 
 
 @jit
-def end_contacts(which, n, state):
+def end_contacts(slopes, n, state):
     """R3, R8.1: end every contact that needs no progress to end; left to right.
 
-    SLOPED are those that open from u = 0 the slopes are known; CERTAIN all others, before.
+    With the `slopes` known, those that open from u = 0; before, all others.
     """
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
     first = tally.first
@@ -173,8 +173,7 @@ def end_contacts(which, n, state):
         if run[first].stirred == 1:
             high = run[first].high
             for c in range(run[first].low, high + 1):
-                sloped = which == SLOPED and opens_at_zero(c, ball, contact)
-                if not (sloped or (which == CERTAIN and has_ended(c, contact))):
+                if not (opens_at_zero(c, ball, contact) if slopes else has_ended(c, contact)):
                     continue
                 tally.ends += 1
                 tally.ended = c

@@ -10,7 +10,6 @@ from cradle.kernel.record import record, record_compressions
 from cradle.kernel.rules import pull_beside, pulls_at, rates, segment
 from cradle.kernel.snapshot import forget
 from cradle.kernel.state import (
-    CERTAIN,
     CLOSE,
     FINISHED,
     LIMITS,
@@ -18,7 +17,6 @@ from cradle.kernel.state import (
     NO_EVENT,
     PASSED,
     PAUSED,
-    SLOPED,
     UNFINISHED,
     UNSOUND,
     UPPER,
@@ -65,13 +63,6 @@ def set_speed(k, u, change, tally):
 
 
 @jit
-def set_exactly(k, u):
-    """Set a closing speed that is known by construction."""
-    k.u = u
-    k.made = abs(u.real)
-
-
-@jit
 def advance(first, n, state):
     """Take a run straight on its way: velocities are linear in the impulses, works quadratic."""
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
@@ -96,7 +87,7 @@ def advance(first, n, state):
             k.before, k.stamp = negative(k.u), tally.stamp
         if ends:
             k.q = ZERO
-            set_exactly(k, now)
+            k.u, k.made = now, abs(now.real)  # known by construction
         else:
             set_speed(k, now, pulls * s.real, tally)
     run[first].stirred = 1
@@ -121,7 +112,7 @@ def go(n, state):
     if gap >= 0:
         if contact[gap].u.real != 0.0:
             tally.defect = PASSED
-        set_exactly(contact[gap], ZERO)
+        contact[gap].u, contact[gap].made = ZERO, 0.0
         grow(gap, n, state.ball, contact, run, tally)
         record(CLOSE, gap, n, state)
 
@@ -210,10 +201,10 @@ def impact(n, chain, meeting, max_rounds, resumed, state):
             return PAUSED
         # R8.1: ends first, those that are known without the slopes before the others; then R9.
         tally.ends, tally.worn = 0, -1
-        end_contacts(CERTAIN, n, state)
+        end_contacts(False, n, state)
         certain = tally.ends
         if new_rates(n, state):
-            end_contacts(SLOPED, n, state)
+            end_contacts(True, n, state)
         collapsed = tally.ends > 0 and take_limits(n, state)
         if tally.first >= n:
             break

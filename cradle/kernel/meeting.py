@@ -50,10 +50,7 @@ def parts_to_meeting(first, after, run, ball, contact, tally):
 
 @jit
 def part_of(way, whole, made):
-    """Return a part of a segment: none or all of it if only rounding says otherwise.
-
-    No way is wider than what the gap was made of.
-    """
+    """Return a part of a segment: none or all of it if only rounding says otherwise."""
     rounding = 0.5 * LIMITS.tie * made
     if way.real <= rounding:
         return ZERO
@@ -64,11 +61,7 @@ def part_of(way, whole, made):
 
 @jit
 def first_meeting(n, state):
-    """R8.4: of several gaps that must close the one first reached, as its left run, or -1.
-
-    It is the one whose larger part is least, of equals the one whose smaller part is, then the
-    left one.
-    """
+    """R8.4: of several gaps that must close the one first reached, as its left run, or -1."""
     run, tally = state.run, state.tally[0]
     best = -1
     first = tally.first
@@ -87,7 +80,7 @@ def first_meeting(n, state):
 
 @jit
 def is_reached_sooner(one, other, tally):
-    """R8.4: tell whether the gap after run `one` is reached sooner than that after `other`."""
+    """R8.4: compare two gaps by the larger parts of their runs, then the smaller; ties go left."""
     larger = minus(most(one.left, one.right), most(other.left, other.right)).real
     if is_clear(larger, 1.0, tally):
         return larger < 0.0

@@ -37,10 +37,7 @@ def source_of(first, last, ball):
 
 @jit
 def wait(low, high, ball, contact, outer):
-    """Let contacts low..high of a run wait: they have no impulse, and their `outer` balls no pull.
-
-    `outer` is 0 for the left ball of each contact and 1 for the right one.
-    """
+    """Let contacts low..high wait: no impulse, no pull of their left (outer 0) or right balls."""
     for c in range(low, high + 1):
         contact[c].rate = contact[c].slope = ball[c + outer].pull = ZERO
 

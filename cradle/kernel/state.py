@@ -27,8 +27,6 @@ if "jit" not in globals():
 FINISHED, UNFINISHED, REFUSED, PAUSED, UNSOUND = 0, 1, 2, 3, 4
 # Kinds of event.
 MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE, REPETITION = 0, 1, 2, 3, 4
-# R8.1: ends that are known without the slopes, and those that need them.
-CERTAIN, SLOPED = 0, 1
 # R9: the two levels on which cycles are looked for, ends of contacts and collapses.
 LOWER, UPPER = 0, 1
 # What an answer can break; 0 is none.
@@ -40,62 +38,44 @@ class Limits(NamedTuple):
 
     #: R8: a closing speed, or a difference of two, below this part of what it was made of is zero;
     #: the other seven of the 32 digits are left to the roundings of the way there.
-    tie: float
+    tie: float = 2.0**-84
     #: R7: a ratio that this factor brings to its bound is meant to be the bound.
-    rounded: float
+    rounded: float = 1.0 + 4 * 2.0**-52
     #: R1: a rate below this part of its run's largest, times the lightest ball's part of the
     #: heaviest, is zero: no ball could notice it.
-    cut: float
+    cut: float = 2.0**-120
     #: R6: one vanishing ratio, as a binary exponent far below that of any number.
-    vanishing: int
+    vanishing: int = 1 << 40
     #: R9: an exhausted contact's speed, relative to the largest initial closing speed.
-    exhausted: float
+    exhausted: float = 1e-18
     #: R9: a speed so low that sequences of impacts go on for ever, relative to the same.
-    dust: float
+    dust: float = 2.0**-100
     #: R9: kinetic energy that a collapse may cost, relative to that of the initial closing.
-    faint: float
+    faint: float = 1e-20
     #: R9: exhausted collisions in a row that are a collapse.
-    repeats: int
+    repeats: int = 8
     #: R9: how many cycles are worth taking at once.
-    many: int
+    many: int = 64
     #: R9: how closely a cycle must repeat itself, relative to its own scale.
-    self_similar: float
+    self_similar: float = 1e-13
     #: R9: how far a cycle may turn before it is exhausted, relative to its own scale.
-    bend: float
+    bend: float = 1e-2
     #: R9: what a jump beside a steady neighbour may leave in doubt, relative to the largest
     #: initial closing speed.
-    doubt: float
+    doubt: float = 1e-13
     #: R9: the least part of an impulse that a ball beside a steady neighbour is taken to keep.
-    kept: float
+    kept: float = 1e-30
     #: R9: how many contacts to each side a snapshot holds.
-    window: int
+    window: int = 64
     #: Mass of the lightest ball allowed, as a part of the heaviest.
-    lightest: float
+    lightest: float = 1e-15
     #: Least coefficient of restitution allowed, but zero.
-    least_restitution: float
+    least_restitution: float = 1e-30
     #: The certificate: what each sum may be off, relative to its terms.
-    sound: float
+    sound: float = 64 * 2.0**-52
 
 
-LIMITS = Limits(
-    tie=2.0**-84,
-    rounded=1.0 + 4 * 2.0**-52,
-    cut=2.0**-120,
-    vanishing=1 << 40,
-    exhausted=1e-18,
-    dust=2.0**-100,
-    faint=1e-20,
-    repeats=8,
-    many=64,
-    self_similar=1e-13,
-    bend=1e-2,
-    doubt=1e-13,
-    kept=1e-30,
-    window=64,
-    lightest=1e-15,
-    least_restitution=1e-30,
-    sound=64 * 2.0**-52,
-)
+LIMITS = Limits()
 
 
 class Ball:
