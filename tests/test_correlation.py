@@ -217,12 +217,6 @@ def test_a_ball_that_no_impulse_reaches_keeps_its_velocity_to_the_last_bit():
     assert after[1] != velocities[1]
 
 
-def test_touching_balls_at_rest_apart_from_the_impact_stay_idle():
-    """R2: a stretch without an approaching contact is not part of the impact."""
-    trace = collide(Chain([1] * 5, [0, 0, 1, 0.9, 2], 1), ImpulseCorrelation(0.1))
-    assert trace.collisions.tolist() == [0, 0, 1, 0]
-
-
 # --- the record ----------------------------------------------------------------------------
 
 

@@ -24,7 +24,6 @@ from cradle import (
     ImpactNotFinished,
     ImpulseCorrelation,
     collide,
-    kernel,
     outcomes,
     paper_chain,
     post_impact_velocities,
@@ -137,25 +136,6 @@ def test_rows_of_the_map(seed):
         assert tied or condition == pytest.approx(row["condition"], rel=1e-3), row
         assert error <= 2 * row["error"] + 2, row
         assert own <= 2 * row["own"] + 2, row
-
-
-@pytest.mark.parametrize("shape", x.SHAPES)
-def test_compiled_and_plain_kernel_agree_on_the_map(shape, monkeypatch):
-    if runtime.compiled() is None:
-        pytest.skip("numba is not installed")
-    for power, e, ratio, velocities in itertools.product(
-        (-12, -6, 0, 9), x.RESTITUTION, x.RATIOS, ("one ulp apart", "squeezed")
-    ):
-        problem = x.map_case(shape, power, e, ratio, velocities)
-        monkeypatch.delenv(runtime.VARIABLE, raising=False)
-        one, finished = problem.attempt(2000)
-        monkeypatch.setenv(runtime.VARIABLE, "plain")
-        assert runtime.chosen() is kernel
-        other, also = problem.attempt(2000)
-        assert finished == also
-        assert one.events == other.events
-        for name in ("velocities", "impulses", "absorbed", "collisions", "path"):
-            assert getattr(one, name).tobytes() == getattr(other, name).tobytes(), name
 
 
 @pytest.mark.parametrize("size", [1e-150, 1e-40, 3e-7, 7e12, 1e150])
