@@ -154,7 +154,7 @@ def test_the_first_wrong_value_is_named():
     """Of a value that stands for several, too: the place is the one where it is wrong."""
     refuse_where("x", np.ones(2), np.zeros(2, dtype=bool), "must not be")
     wrong = np.array([[False, False], [False, True]])
-    with pytest.raises(ValueError, match=r"^x\[1, 1\] = 3\.0; must not be$") as error:
+    with pytest.raises(ValueError, match=r"^x\[1, 1\] = 3\.0; must not be$"):
         refuse_where("x", np.array([2.0, 3.0]), wrong, "must not be")
     with pytest.raises(ValueError, match=r"^x = 3\.0; must not be$"):
         refuse_where("x", np.array(3.0), np.array(True), "must not be")
