@@ -312,6 +312,69 @@ def test_without_a_folder_for_compiled_code_it_says_so_once(monkeypatch, tmp_pat
     assert said.getMessage().startswith("no writable folder for compiled code: it is compiled anew")
 
 
+def kept_files(folder):
+    name = f"{runtime._name()}.batch-1.py311"
+    files = [folder / "__pycache__" / f"{name}.{end}" for end in ("nbi", "1.nbc")]
+    files[0].parent.mkdir()
+    for file in files:
+        file.write_bytes(b"half")
+    return files
+
+
+@pytest.mark.usefixtures("fresh_runtime")
+@needs_numba
+@pytest.mark.parametrize("again", [False, True])
+def test_code_on_disk_that_cannot_be_read_is_removed_once(monkeypatch, tmp_path, caplog, again):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(runtime, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(runtime, "loaded", lambda *_: False)
+    files = kept_files(tmp_path)
+    other = files[0].with_name("another_unit.batch-1.py311.nbi")
+    other.write_bytes(b"")
+
+    def door(value):
+        if again or files[0].exists():
+            raise EOFError("Ran out of input")
+        return value
+
+    with caplog.at_level(logging.WARNING, "cradle"):
+        if again:
+            with pytest.raises(EOFError):
+                runtime.call(door, 3)
+        else:
+            assert runtime.call(door, 3) == 3
+    assert not any(file.exists() for file in files)
+    assert other.exists()
+    (said,) = caplog.records
+    assert "cannot be read (EOFError: Ran out of input); compiled anew" in said.getMessage()
+    if again:
+        with pytest.raises(EOFError):  # nothing is left to remove
+            runtime.call(door, 3)
+        assert len(caplog.records) == 1
+
+
+@pytest.mark.exhaustive
+@needs_numba
+def test_half_a_file_of_compiled_code_is_compiled_anew(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def warm_up():
+        return subprocess.run(
+            [sys.executable, "-W", "error", "-m", "cradle", "warm-up"],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+
+    warm_up()
+    for pattern in ("*.nbc", "*.nbi"):
+        (file,) = tmp_path.rglob(pattern)
+        file.write_bytes(file.read_bytes()[:100])
+        assert "cannot be read" in warm_up().stderr
+        assert "loaded in" in warm_up().stdout
+
+
 @pytest.mark.usefixtures("fresh_runtime")
 @pytest.mark.parametrize("large", [False, True])
 def test_the_wish_for_a_kernel_is_one_of_two_words(monkeypatch, large):

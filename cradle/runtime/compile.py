@@ -16,7 +16,7 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -176,16 +176,38 @@ def compiled() -> Any | None:
     return module
 
 
+def _files(pattern: str) -> list[Path]:
+    """Return the files that numba keeps of this very kernel."""
+    path = _stored() if available() else None
+    return [] if path is None else [*path.parent.rglob(f"{_name()}.{pattern}")]
+
+
 def on_disk(door: str = "batch") -> bool:
     """Tell whether compiled code of this very kernel is on disk, from a door on."""
-    path = _stored() if available() else None
-    return path is not None and any(path.parent.rglob(f"{_name()}.{door}-*.nbi"))
+    return bool(_files(f"{door}-*.nbi"))
 
 
 def loaded(door: str = "batch") -> bool:
     """Tell whether compiled code has run in this process, from a door on."""
     module = compiled() if compiled.cache_info().currsize else None
     return module is not None and bool(vars(module)[door].overloads)
+
+
+def call(door: Callable[..., Any], *arguments: Any) -> Any:
+    """Call the kernel; compiled code on disk that cannot be read is removed, and made anew."""
+    try:
+        return door(*arguments)
+    except Exception as error:  # half a file can raise anything; the kernel itself nothing
+        broken = [] if loaded(door.__name__) else _files("*.nb[ci]")
+        if not broken:
+            raise
+        for file in broken:
+            file.unlink(missing_ok=True)
+        logger.warning(
+            "compiled code in %s cannot be read (%s: %s); compiled anew, up to a minute",
+            broken[0].parent, type(error).__name__, error,
+        )  # fmt: skip
+    return door(*arguments)
 
 
 def spend(seconds: float) -> None:

@@ -141,9 +141,9 @@ class Job:
                 resumed = False
             begun = time.perf_counter()
             effort = _EFFORT[bool(self.compiled)]
-            self.next, self.status = kernel.batch(
-                self.next, resumed, self.n, self.given, self.options, self.outputs, self.state,
-                effort,
+            self.next, self.status = runtime.call(
+                kernel.batch, self.next, resumed, self.n, self.given, self.options, self.outputs,
+                self.state, effort,
             )  # fmt: skip
             if not self.compiled:
                 runtime.spend(time.perf_counter() - begun)

@@ -71,7 +71,8 @@ def solve(
         call = kernel.springs if compiled else plain.springs
         begun = time.perf_counter()
         effort = _EFFORT[compiled] if record is None else _PAGES
-        k, status = call(k, status == PAUSED, n, given, law, out, *area, pages, effort)
+        started = status == PAUSED
+        k, status = runtime.call(call, k, started, n, given, law, out, *area, pages, effort)
         if not compiled:
             runtime.spend(time.perf_counter() - begun)
         if record is not None:
