@@ -29,7 +29,7 @@ from cradle import (
     recommend,
     textbook,
 )
-from cradle.command import console, fit
+from cradle.command import console
 from cradle.command.console import text as shown
 from cradle.command.describe import described
 from cradle.command.solve import main, run
@@ -623,7 +623,9 @@ def test_errors_end_in_one_line_and_a_code(capsys, line, code, message):
 @pytest.mark.parametrize("wrong", ["--predict A", "--predict ABA --speed 0"])
 @pytest.mark.usefixtures("folder")
 def test_a_wrong_prediction_is_refused_before_the_fit(monkeypatch, capsys, wrong):
-    monkeypatch.setattr(fit, "_fits", lambda *_: pytest.fail("fitted all the same"))
+    for name in ("restitution", "ratio"):
+        fails = lambda *_, **__: pytest.fail("fitted all the same")  # noqa: E731
+        monkeypatch.setattr(f"cradle.fit.{name}", fails)
     with pytest.raises(SystemExit):
         run(shlex.split(f"fit shots.csv {wrong}"))
     assert "must " in capsys.readouterr().err
