@@ -58,7 +58,7 @@ def first_fall(
     if level == 0.0 or rate.real == 0.0:
         if level >= abs(c):
             return math.inf
-        angle = math.acos(max(-level / abs(c), -1.0))
+        angle = math.acos(-level / abs(c))
         wait = angle - cmath.phase(c)
         if not parting:
             wait %= 2.0 * math.pi
@@ -99,13 +99,14 @@ def _search(
     # How far it may lie below its values at points an eighth of a radian apart.
     dip = float(size @ np.abs(rate) ** 2) * (radian / 8.0) ** 2 / 8.0
     noise = 4e-16 * (abs(level) + left)
-    for block in np.arange(0.0, horizon, 64.0 * radian).tolist():
-        told = value(block + radian / 8.0 * np.arange(513))
-        told[0] *= block > 0.0 or not parting
-        least = np.minimum(told[1:], told[:-1]).reshape(64, 8).min(axis=1)
+    for block in np.arange(0.0, horizon, 8.0 * radian).tolist():
+        told_by = rise if parting and block == 0.0 else value
+        told = told_by(np.maximum(block + radian / 8.0 * np.arange(65), TIE * radian))
+        least = np.minimum(told[1:], told[:-1]).reshape(8, 8).min(axis=1)
         for k in np.flatnonzero(least <= dip).tolist():
             begin, end = block + k * radian, block + (k + 1) * radian
-            told_by = rise if parting and end == radian else value
+            if begin > horizon:
+                break
             marks = np.array([begin, *_roots(told_by, begin, end), end])
             below = told_by(0.5 * (marks[1:] + marks[:-1])) < -noise
             if below.any():
@@ -116,12 +117,22 @@ def _search(
 
 def _roots(value: Callable[[Vector], Vector], begin: float, end: float) -> Vector:
     """Return the roots in a radian of a function that a polynomial follows there."""
-    from numpy.polynomial import Chebyshev  # not all need it, and it is slow to import
+    from numpy.polynomial.chebyshev import chebroots, chebtrim
 
-    near = Chebyshev.interpolate(value, _DEGREE, (begin, end))
-    roots = near.trim(1e-15 * np.abs(near.coef).max()).roots()
-    real = roots.real[roots.imag == 0.0]
-    return np.sort(real[(begin < real) & (real < end)])
+    nodes, inverse = _nodes()
+    terms = inverse @ value(begin + 0.5 * (end - begin) * (1.0 + nodes))
+    roots = chebroots(chebtrim(terms, 1e-15 * np.abs(terms).max()))
+    real = roots.real[(roots.imag == 0.0) & (np.abs(roots.real) < 1.0)]
+    return np.asarray(begin + 0.5 * (end - begin) * (1.0 + np.sort(real)))
+
+
+@functools.cache
+def _nodes() -> tuple[Vector, Vector]:
+    """Return the nodes of the polynomials in [-1, 1], and what makes terms of values there."""
+    from numpy.polynomial.chebyshev import chebpts1, chebvander  # slow to import
+
+    nodes: Vector = chebpts1(_DEGREE + 1)
+    return nodes, np.asarray(np.linalg.inv(chebvander(nodes, _DEGREE)))
 
 
 class _Bodies(NamedTuple):
@@ -180,11 +191,11 @@ class SmallAngleFlight:
     def next_meeting(self, horizon: float) -> Meeting:
         """Return the first event within `horizon` seconds."""
         together, rates = self.together, self.bodies.rate.tolist()
-        times = [
-            (self._release if one else self._meeting)(c, rates, horizon)
-            for c, one in enumerate(together)
-        ]
-        first = min(times)
+        times, first = list[float](), math.inf
+        for c, one in enumerate(together):  # none need be sought after the first of those found
+            event = self._release if one else self._meeting
+            times.append(event(c, rates, min(horizon, first + self.tie)))
+            first = min(first, times[-1])
         if first > horizon:
             return Meeting(math.inf, [], [])
         return Meeting(
