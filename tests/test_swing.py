@@ -116,6 +116,15 @@ def test_as_many_fly_off_as_are_pulled_back(k):
     np.testing.assert_allclose(run.positions[1], -np.array(pulled(5, k))[::-1], atol=1e-15)
 
 
+def test_fused_three_balls_by_hand():
+    """(1, 0, 0) -> (-1/3, 2/3, 2/3) -> reversed, (-1, 0, 0) -> ...: back after two strokes."""
+    run = swing(balls(3), FusedChain(), pulled(3), [2.0], pendulums=ONE_HERTZ)
+    for stroke, impact in enumerate(run.impacts):
+        expected = ([-1 / 3, 2 / 3, 2 / 3], [-1, 0, 0])[stroke % 2]
+        np.testing.assert_allclose(impact.after / (0.04 * math.pi), expected, atol=1e-14)
+    assert len(run.impacts) == 4
+
+
 @pytest.mark.parametrize(("ratio", "e"), [(0.15, 1.0), (0.15, 0.9), (0.4, 1.0), (0.05, 0.7)])
 def test_second_third_and_twentieth_stroke(ratio, e):
     """All meet again at the lowest point, velocities reversed: strokes are a map, solved anew."""
