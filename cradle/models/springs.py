@@ -17,7 +17,7 @@ FINEST, COARSEST, MOST_STEPS = 1e-12, 0.02, 20_000_000
 _FAINT = 0.01  # what is too little to matter, over the accuracy
 # A step times the largest frequency from which on a run shows whether it was short enough; a
 # coarser one that only measures the frequency; and what it may measure too little.
-_ENOUGH, _COARSE, _SPARE = 0.25, 0.5, 1.05
+_ENOUGH, _COARSE, _SPARE = 0.2, 0.5, 1.05
 # Kinks of a contact and radians of the quickest ball, on average, from which on runs are compared.
 _OFTEN, _LONG = 2.4, 30.0
 _TRIALS = 16  # runs of a chain, each finer than the one before
@@ -43,7 +43,8 @@ class Problem(NamedTuple):
     def own(self) -> tuple[Forces, Vector, Vector, Vector]:
         """Return the chains in their own units; and mass, speed and length, (rows, 1).
 
-        These are those of the contact that closes fastest; the speed is 1 if none closes.
+        These are those of the contact that closes fastest; the speed is 1 if none closes.  All the
+        balls together are at rest.
         """
         rows, n = max(map(len, self[:5])), self.m.shape[1]
         m, v = (np.broadcast_to(part, (rows, n)) for part in self[:2])
@@ -56,6 +57,7 @@ class Problem(NamedTuple):
             energy = np.log(mass) + 2.0 * np.log(speed) - np.log(k[at])
             length = np.exp(energy / (self.p + 1.0))
             v, loss, d = (v - v[at]) / speed, loss * (speed / length), -gap / length
+            v -= (m * v).sum(axis=-1, keepdims=True) / m.sum(axis=-1, keepdims=True)
             return Forces(mass / m, v, k / k[at], loss, d, speed[:, 0]), mass, speed, length
 
 
@@ -82,17 +84,20 @@ def run(chains: Forces, law: Law, large: bool = False, stop: Any = None) -> Solv
 
     The step bounds the error where a contact collides about once and loses nothing: measured on
     random chains, it was C (h omega)^4, at very small steps K (h omega)^3.5.  Balls that collide
-    again and again amplify it, and losses add to it: then runs with h, h / 2 ... tell.
+    again and again amplify it, losses and leans add to it: then finer and finer runs tell.
     """
     (count, n), lossy, accuracy = chains.v.shape, law.lossy, law.slow / _FAINT
     c = 0.03 + 0.94 * max(0.0, 1.5 - law.p)
     eta = min((accuracy / c) ** 0.25, (4.0 * accuracy / c) ** (1.0 / 3.5), 0.6)
     eta = min(1.6 * eta, 0.6) if lossy else eta
-    worst = np.maximum(chains.loss.max(axis=-1), 1e-300)
-    top, first = _highest(chains, law.p), eta if eta >= _ENOUGH else _COARSE
-    h = np.minimum(first / np.sqrt(top), _DAMPED / (worst * top))
+    # Near by luck, two runs can agree: with losses it takes three.
+    finer, doubt = (2.0**0.5, 6.0) if lossy else (2.0, 0.5)
+    top = _highest(chains, law.p)
+    damped = _DAMPED / np.maximum(chains.loss.max(axis=-1), 1e-300)
+    h = np.minimum((eta if eta >= _ENOUGH else _COARSE) / np.sqrt(top), damped / top)
     out = Solved(chains.v.copy(), np.zeros(count), h, *np.zeros((2, count), np.int64))
-    before, changes = np.full((count, n), np.inf), np.full(count, np.inf if lossy else 0.0)
+    # Of the run before, if it was fine enough: its outcome counts, and its change from another.
+    known, changes = np.zeros(count, bool), np.full(count, np.inf if lossy else 0.0)
     todo = np.flatnonzero((chains.v[:, :-1] > chains.v[:, 1:]).any(axis=-1))
     for _ in range(_TRIALS):
         if not todo.size:
@@ -100,40 +105,38 @@ def run(chains: Forces, law: Law, large: bool = False, stop: Any = None) -> Solv
         part = chains if todo.size == count else Forces(*(array[todo] for array in chains))
         moved, h = room(todo.size, n), out.h[todo]
         at, status = solve(part._replace(h=h), law, moved, large, stop)
-        out.v[todo] = moved.v
         out.steps[todo] += moved.steps
+        change = abs(moved.v - out.v[todo]).max(axis=-1)
+        out.v[todo] = moved.v
         if status != FINISHED:
             todo = todo[at:]
             break
         phase = h * np.sqrt(moved.top)
         off = phase / eta
         fine = off <= 1.0
-        # The run before may have been near by luck: its own change counts too, with losses always.
-        change = (2.0 if lossy else 0.5) * abs(moved.v - before[todo]).max(axis=-1) / accuracy
-        told = np.maximum(change, 0.25 * changes[todo])
-        changes[todo] = np.where(np.isfinite(change) | lossy, change, 0.0)
-        before[todo] = np.where(fine[:, None], moved.v, np.inf)
         many = (moved.kinks > _OFTEN * (n - 1)) | (moved.steps * phase > _LONG * (n - 1))
-        compare = fine & (lossy | many)
-        error = np.where(compare, np.maximum(off**4, told), off**4)
+        compare = fine & (many | lossy | law.leans)
+        told = np.where(known[todo], doubt * change / accuracy, np.inf)
+        changed = np.maximum(told, 0.25 * changes[todo])
+        error = np.maximum(off**4, np.where(compare, changed, 0.0))
+        changes[todo] = np.where(known[todo] | lossy, told, 0.0)
         out.error[todo] = accuracy * error
-        h = np.where(fine, 0.5 * h, h / (off * _SPARE))
         again = error > 1.0
+        known[todo] = fine
+        h = np.where(fine, h / finer, h / (off * _SPARE))
         todo, h, top = todo[again], h[again], moved.top[again]
-        out.h[todo] = np.minimum(h, _DAMPED / (worst[todo] * top))
+        out.h[todo] = np.minimum(h, damped[todo] / top)
     out.defect[todo[0]] = -UNFINISHED
     return out
 
 
 def _defects(chains: Forces, law: Law, out: Solved) -> Any:
     """Return what each outcome breaks, or 0: momentum, order, energy."""
-    m, accuracy = 1.0 / chains.w, law.slow / _FAINT
-    mean = (m * chains.v).sum(axis=-1, keepdims=True) / m.sum(axis=-1, keepdims=True)
-    before, after = chains.v - mean, out.v - mean
-    change, rounding = after - before, 2.0**-52 * (64.0 + out.steps)
-    size = (m * (abs(after) + abs(before))).sum(axis=-1)
-    gained = (m * change * 0.5 * (after + before)).sum(axis=-1)
-    slack = accuracy * size + rounding * (m * before * before).sum(axis=-1)
+    m, rounding = 1.0 / chains.w, 2.0**-52 * (64.0 + out.steps)
+    change = out.v - chains.v
+    size = (m * (abs(out.v) + abs(chains.v))).sum(axis=-1)
+    gained = (m * change * 0.5 * (out.v + chains.v)).sum(axis=-1)
+    slack = law.slow / _FAINT * size + rounding * (m * chains.v * chains.v).sum(axis=-1)
     defect = np.where(gained <= slack, 0, ENERGY)
     if not (law.lossy or law.leans):
         defect[~(gained >= -slack)] = LEDGER
@@ -148,13 +151,11 @@ def _highest(chains: Forces, p: float) -> Vector:
     Two contacts store at most all the energy E there is, so p (k d^(p - 1) + k' d'^(p - 1)) is at
     most p (k + k')^(2 / (p + 1)) ((p + 1) E)^((p - 1) / (p + 1)), by Hoelder's inequality.
     """
-    m = 1.0 / chains.w
-    mean = (m * chains.v).sum(axis=-1, keepdims=True) / m.sum(axis=-1, keepdims=True)
-    stored = (chains.k * np.maximum(chains.d, 0.0) ** (p + 1.0)).sum(axis=-1) / (p + 1.0)
-    energy = 0.5 * (m * (chains.v - mean) ** 2).sum(axis=-1) + stored
-    both = np.zeros(m.shape)
+    energy = 0.5 * (chains.v * chains.v / chains.w).sum(axis=-1)
+    if chains.d.any():
+        energy += (chains.k * np.maximum(chains.d, 0.0) ** (p + 1.0)).sum(axis=-1) / (p + 1.0)
+    both = np.pad(chains.k, [(0, 0), (0, 1)])
     both[:, 1:] += chains.k
-    both[:, :-1] += chains.k
     part = (both ** (2.0 / (p + 1.0)) * chains.w).max(axis=-1)
     most = p * part * ((p + 1.0) * energy) ** ((p - 1.0) / (p + 1.0))
     return np.where(most > 0.0, most, 1.0)
@@ -269,12 +270,10 @@ class Path:
                 where.append((t, kind, j, c))
         where.sort(key=lambda event: (event[0], event[1] != "maximum_compression"))
         found: list[Any] = [(0.0, None, self.v[0], self.force[0])]
-        depth, speed = (
-            CubicHermiteSpline(self.t, self.y, u),
-            CubicHermiteSpline(self.t, self.v, self.a),
-        )
-        for t, kind, j, c in where:
-            y = depth(t)
+        times = [t for t, *_ in where]
+        depths = CubicHermiteSpline(self.t, self.y, u)(times)
+        velocities = CubicHermiteSpline(self.t, self.v, self.a)(times)
+        for (t, kind, j, c), y, v in zip(where, depths, velocities, strict=True):
             push = np.where(self.closed[j] | self.closed[j + 1], self.pushes(y), 0.0)
             if kind == "maximum_compression":
                 stored = push[c] * y[c] / (self.p + 1.0)
@@ -285,11 +284,11 @@ class Path:
                 self.durations[c] += t if kind == "end" else -t
             shown = u[j, c] > 0.0 if kind == "maximum_compression" else kind == "end" or t > 0.0
             if shown:
-                found.append((t, Event(kind, c), speed(t), push))
+                found.append((t, Event(kind, c), v, push))
         if len(found) > 1:
             found[-1] = (*found[-1][:2], last, found[-1][3])
-        times, events, v, force = zip(*found, strict=True)
-        return np.array(times), events[1:], np.array(v), np.array(force)
+        at, events, path, force = zip(*found, strict=True)
+        return np.array(at), events[1:], np.array(path), np.array(force)
 
 
 def _zero(cubic: Vector, h: float) -> float:
