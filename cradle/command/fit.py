@@ -62,7 +62,7 @@ def fit(
       cradle fit shots.csv --summary
       cradle fit shots.csv --json --plot fit.png
     """
-    from cradle.fit import ratio, read_shots, restitution
+    from cradle.fit import read_shots
     from cradle.fit.answers import FOLDED
     from cradle.fit.parameters import types_in_a_row
     from cradle.fit.result import RESULT_COLUMNS
@@ -86,10 +86,7 @@ def fit(
     lists = [[part] if part in there else part.split(",") for part in without]
     used = shots.without(*(name.strip() for names in lists for name in names))
     _refuse_unused([name for name, _ in given], [name for name, _ in known], used, predict)
-    # The pairs, then with what they gave all longer chains; the last fit predicts.
-    pairs = [restitution(used)] if any(len(one.types) == 2 for one in used.sets) else []
-    values = {name: value for one in pairs for name, value in one.values().items()}
-    last = ratio(used, {**values, **dict(given)}, known=dict(known))
+    *pairs, last = _fits(used, dict(given), dict(known))
     fits = [one for one in (*pairs, last) if one.estimates]
     momentum, count = shots.momentum_check()
     extra = {
@@ -160,6 +157,17 @@ def _refuse_unused(
         if key not in needed:
             there = ", ".join(sorted(map(label, needed))) or "none"
             raise click.UsageError(f"{option} {name}: no chain has this {kind}; there are {there}")
+
+
+def _fits(
+    shots: Shots, given: dict[str, tuple[float, float]], known: dict[str, float]
+) -> list[Fit]:
+    """Fit the pairs, then with what they gave all longer chains; the last fit predicts."""
+    from cradle.fit import ratio, restitution
+
+    pairs = [restitution(shots)] if any(len(one.types) == 2 for one in shots.sets) else []
+    values = {name: value for one in pairs for name, value in one.values().items()}
+    return [*pairs, ratio(shots, {**values, **given}, known=known)]
 
 
 def _predicted(
