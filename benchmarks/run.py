@@ -1,8 +1,8 @@
-"""Measure speed against accuracy: all models, two fixed-step schemes, today's physics engines.
+"""Measure speed against accuracy: all models, a fixed-step scheme, today's physics engines.
 
 Usage::
 
-    python benchmarks/run.py             # two to five minutes; writes data/benchmarks.csv
+    python benchmarks/run.py             # a minute or two; writes data/benchmarks.csv
     python benchmarks/run.py --quick     # half a minute; prints only, unless --output is given
 
 Every time stands beside that of one reference impact, taken at the same moment: read the ratios.

@@ -53,7 +53,7 @@ def test_fig_trade_cost_events_are_exact_at_a_fixed_price():
 
 
 def test_fig_trade_cost_springs():
-    verlet = find("penalty", "Verlet", model="penalty, Hertz")
+    verlet = find("penalty", model="penalty, Hertz")
     one_call = find("event", "compiled, one call", chain="three equal")
     assert cost(verlet, 1e-2) < min(row["time_ratio"] for row in one_call)
     assert cost(verlet, 1e-6) > 5 * cost(verlet, 1e-2)
@@ -65,13 +65,12 @@ def test_fig_trade_cost_springs():
     assert cost(springs, 1e-8, "evaluations") < cost(verlet, 1e-8, "evaluations")
 
 
-@pytest.mark.parametrize("scheme", ["semi-implicit Euler", "velocity Verlet"])
-def test_fig_trade_stiffness_two_sweeps_on_one_curve(scheme):
-    by_step = find("penalty", scheme, model="penalty, linear")
+def test_fig_trade_stiffness_two_sweeps_on_one_curve():
+    by_step = find("penalty", model="penalty, linear")
     phase, error = np.log([[np.pi * r["parameter"], r["numerical_error"]] for r in by_step]).T
     rising = np.argsort(phase)
     compared = 0
-    for row in find("stiffness", scheme):
+    for row in find("stiffness"):
         at = np.log(row["parameter"])
         if phase.min() <= at <= phase.max():
             expected = np.interp(at, phase[rising], error[rising])
@@ -79,7 +78,7 @@ def test_fig_trade_stiffness_two_sweeps_on_one_curve(scheme):
             assert abs(np.log(row["numerical_error"]) - expected) < np.log(2.5)
             compared += 1
     assert compared >= 5
-    percent = [r["parameter"] for r in find("stiffness", scheme) if r["numerical_error"] <= 1e-2]
+    percent = [r["parameter"] for r in find("stiffness") if r["numerical_error"] <= 1e-2]
     assert 0.1 <= max(percent) <= 0.6
 
 
@@ -193,7 +192,7 @@ def test_fig_trade_cost_drawn():
     (ax,) = CHAPTER.figures["fig-trade-cost"].axes
     chosen = [
         find("march", chain="three equal"),
-        find("penalty", "Verlet", model="penalty, Hertz"),
+        find("penalty", model="penalty, Hertz"),
         find("springs", "accuracy", chain="three equal", model="SpringChain, Hertz"),
         find("energy", "rtol", chain="three equal"),
     ]
@@ -215,16 +214,10 @@ def test_fig_trade_stiffness_drawn():
     columns = "numerical_error", "energy_change"
     for ax, column in zip(CHAPTER.figures["fig-trade-stiffness"].axes, columns):
         drawn = [np.array(sorted(map(tuple, line))) for line in points(ax)]
-        for scheme in ("semi-implicit Euler", "velocity Verlet"):
-            for rows, factor in (
-                (find("penalty", scheme, model="penalty, linear"), np.pi),
-                (find("stiffness", scheme), 1),
-            ):
-                expected = np.array(sorted((factor * r["parameter"], abs(r[column])) for r in rows))
-                assert any(
-                    line.shape == expected.shape and np.allclose(line, expected, rtol=1e-12, atol=0)
-                    for line in drawn
-                )
+        sweeps = (find("penalty", model="penalty, linear"), np.pi), (find("stiffness"), 1)
+        for line, (rows, factor) in zip(drawn, sweeps, strict=True):
+            expected = np.array(sorted((factor * r["parameter"], abs(r[column])) for r in rows))
+            np.testing.assert_allclose(line, expected, rtol=1e-12)
 
 
 def test_fig_trade_models():

@@ -149,7 +149,7 @@ for verb in (film, fit, recommend, swing, template):
 
 @main.command(name="warm-up")
 def warm_up() -> None:
-    """Compile the event loop now, so that long work starts at once later.
+    """Compile both loops now, so that long work starts at once later.
 
     Small work is never compiled, and need not wait for this.
 
@@ -160,7 +160,7 @@ def warm_up() -> None:
     from cradle.runtime import compile as runtime
     from cradle.runtime import job as drive
 
-    there, begun = runtime.on_disk(), time.perf_counter()
+    there, begun = runtime.on_disk("springs"), time.perf_counter()
     drive.warm_up()
     seconds = time.perf_counter() - begun
     if not runtime.loaded():

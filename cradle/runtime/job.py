@@ -192,7 +192,7 @@ class Job:
 
 @functools.cache
 def warm_up() -> None:
-    """Compile the event loop, or load it compiled, if numba is there: then nothing waits for it.
+    """Compile both loops, or load them compiled, if numba is there: then nothing waits for them.
 
     The first time on a machine takes up to a minute, afterwards a second.  Programs that must not
     stop, such as games with a `cradle.row.Row`, call it while they load.
@@ -201,6 +201,11 @@ def warm_up() -> None:
     --------
     >>> warm_up()
     """
-    one = np.ones((1, 2))
-    inputs = plain.Inputs(one, np.array([[1.0, 0.0]]), np.ones((1, 1)), *[np.ones((1, 0))] * 2)
+    from cradle.kernel.kinks import Forces, Law
+    from cradle.runtime.springs import room, solve
+
+    one, still, apart, none = np.ones((1, 2)), np.zeros((1, 2)), np.ones((1, 1)), np.zeros((1, 1))
+    inputs = plain.Inputs(one, still, apart, *[np.ones((1, 0))] * 2)
     Job(inputs, outputs(1, 2), plain.Options(0.5, 1000, True), large=True).run()
+    chain = Forces(one, still, apart, none, none, np.ones(1))
+    solve(chain, Law(1.5, 1e-5, 1000, False, False), room(1, 2), large=True)
