@@ -168,7 +168,7 @@ def test_gaps_of_a_part_of_the_compression():
         assert glued(f"gap-{name}") == pytest.approx(share * glued("compression"), rel=0.01)
     CHAPTER.tells({"gaps-most": np.abs(np.eye(5)[4] - touching).max()}, off=1e-4)
     assert glued("gap-tenth-moves") == pytest.approx(glued("gaps-most") / 2, rel=0.1)
-    shown = panel("toy", "fig-toy-gaps")
+    shown = panel("toy", "fig-toy-gaps", 1) | panel("toy", "fig-toy-gaps")
     assert list(shown) == [f"ball {k}" for k in range(1, 6)]
     velocities = np.array([line[:, 1] for line in shown.values()])
     np.testing.assert_allclose(velocities.sum(axis=0), 1, atol=3e-4)
