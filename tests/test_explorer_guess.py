@@ -51,6 +51,24 @@ def test_the_first_page_is_guessed(visit, page):
     assert bars(tab) == np.round(after, 2).tolist()
 
 
+def test_the_balls_wait_after_a_hit_that_was_guessed(visit, page):
+    """So that the guess can be compared; the next hits go on by themselves."""
+    address = page.replace("explorer.html", "intro.html")
+    tab = still(visit, address=address, stopped=True)
+    later(tab, 50)
+    tab.get_by_label("your guess for ball 5, m/s").press("ArrowRight")
+    press(tab, "Let go")
+    for _ in range(3):
+        later(tab, 1000)
+    clock = f"{EXPLORER}.state.clock"
+    assert tab.evaluate(f"[{clock}.playing, {EXPLORER}.state.view.number]") == [False, 0]
+    assert tab.locator(".outcome .drawn .guess").count() == 5
+    press(tab, "Go on")
+    for _ in range(3):
+        later(tab, 1000)
+    assert tab.evaluate(f"{clock}.playing && {EXPLORER}.state.view.number > 0")
+
+
 @pytest.mark.parametrize(
     ("name", "said", "words"),
     [

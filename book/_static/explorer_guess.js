@@ -85,7 +85,8 @@
     const node = make("div", { class: "question" }, make("p", {}, make("b", {}, ask)), list?.node ?? "", told, next);
     function show({ guess, hit, record, now }) {
       const open = !guess || guess.open;
-      next.hidden = !(open && task);
+      next.hidden = !task;
+      next.style.visibility = open ? "" : "hidden"; // its place is kept, so that nothing jumps
       if (!list) return;
       list.node.inert = open;
       list.show(guess?.answer ?? null);

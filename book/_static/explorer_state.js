@@ -17,7 +17,7 @@
     constructor({ scene, playing, picture, guessing = "" }) {
       this.picture = picture;
       this.guessing = guessing;
-      this.clock = { time: 0, playing, slow: false, inside: null };
+      this.clock = { time: 0, playing, slow: false, inside: null, guessed: false };
       this.view = {
         scene: "", // a key, or none for a setting of the reader's own
         scope: "all", // or the number of a ball
@@ -78,12 +78,13 @@
       guess.touched = true;
     }
 
-    // The balls have moved.
+    // The balls have moved; return whether the outcome was covered until now.
     open() {
       const { guess } = this.view;
-      if (!guess || guess.open) return;
+      if (!guess || guess.open) return false;
       guess.open = true;
       if (this.guessing === "once") this.guessing = "";
+      return true;
     }
 
     // Return what brings everything back to where it is now.
@@ -160,20 +161,21 @@
     }
 
     // Let time pass; return whether more than positions has changed. In slow motion the clock
-    // stands still during a hit, which takes no time.
+    // stands still during a hit, which takes no time. After a hit that was guessed the balls wait,
+    // so that the guess can be compared.
     advance(seconds) {
       const { clock, view, swing } = this;
       if (clock.inside !== null) {
         clock.inside += seconds / INSIDE;
         view.part = Math.min(clock.inside, 1);
         if (clock.inside < 1) return false;
-        clock.inside = null;
+        Object.assign(clock, { inside: null, playing: !clock.guessed });
         return true;
       }
       const next = swing.latest(clock.time) + 1;
       clock.time += seconds * (clock.slow ? SLOW : 1);
       if (clock.time < Swing.time(next)) return false;
-      this.open();
+      clock.guessed = this.open();
       const { status, happened } = swing.hit(next);
       if (status !== "finished") {
         Object.assign(clock, { time: Swing.time(next), playing: false });
@@ -182,6 +184,7 @@
       }
       if (!happened) return false;
       if (clock.slow) Object.assign(clock, { time: Swing.time(next), inside: 0 });
+      else if (clock.guessed) Object.assign(clock, { time: Swing.time(next), playing: false });
       this.show(next, clock.slow ? 0 : 1);
       return true;
     }
