@@ -86,6 +86,7 @@
         node("scenes"),
         node("tasks"),
         make("div", { class: "desk" }, left, node("settings"), right),
+        this.panels.question?.after ?? "",
         node("share"),
         this.page ? "" : make("p", { class: "more" }, this.link),
       );

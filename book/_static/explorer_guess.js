@@ -82,11 +82,11 @@
     const list = options && choice({ words: "your answer", options, choose: act.answer });
     const told = make("p", { class: "told", role: "status" });
     const next = make("p", {}, make("b", {}, "Now you. "), task ?? "");
-    const node = make("div", { class: "question" }, make("p", {}, make("b", {}, ask)), list?.node ?? "", told, next);
+    const node = make("div", { class: "question" }, make("p", {}, make("b", {}, ask)), list?.node ?? "", told);
+    const after = make("div", { class: "question" }, next); // below the cradle: nothing jumps
     function show({ guess, hit, record, now }) {
       const open = !guess || guess.open;
-      next.hidden = !task;
-      next.style.visibility = open ? "" : "hidden"; // its place is kept, so that nothing jumps
+      next.hidden = !(open && task);
       if (!list) return;
       list.node.inert = open;
       list.show(guess?.answer ?? null);
@@ -95,7 +95,7 @@
       else if (right === guess.answer) told.textContent = `Yes: ${right}.`;
       else told.textContent = `You said ${guess.answer}; it is ${right}.`;
     }
-    return { node, show };
+    return { node, after, show };
   }
 
   Object.assign(explorer, { guessInWords: inWords, guessReach: reach });

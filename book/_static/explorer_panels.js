@@ -241,7 +241,7 @@
     const title = make(level, {});
     const [bars, momentum, energy] = [1, 2, 3].map(() => make("div", { class: "plot" }));
     const handles = panels.handles(act);
-    const told = make("p", { class: "note told" });
+    const told = make("p", { class: "note guessed" });
     const second = make(level, {});
     const caption = make("p", { class: "note" });
     const node = make(
