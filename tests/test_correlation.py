@@ -48,9 +48,10 @@ MODEL = [
         {"excess": np.array(["raise"])},
         "excess = array(['raise'], dtype='<U5'); must be 'raise' or 'saturate'",
     ),
-    ({"max_events": 0}, "max_events = 0; must be at least 1"),
-    ({"max_events": -1}, "max_events = -1; must be at least 1"),
-    ({"max_events": 1e6}, "max_events = 1000000.0; must be an int (1000000)"),
+    ({"max_events": 0}, "max_events = 0; must be a whole number, at least 1"),
+    ({"max_events": -1}, "max_events = -1; must be a whole number, at least 1"),
+    ({"max_events": 2**63}, f"max_events = {2**63}; must be a whole number, at least 1 and below"),
+    ({"max_events": 1e6}, "max_events = 1000000.0; must be an int, at least 1 and below 2**63"),
     ({"max_events": True}, "max_events = True; must be a whole number"),
     ({"max_events": "many"}, "max_events = 'many'; must be a whole number"),
 ]
@@ -496,17 +497,6 @@ def test_the_error_of_a_worker_reaches_its_caller():
     other = pickle.loads(pickle.dumps(stopped.value))
     assert str(other) == str(stopped.value)
     assert other.trace.velocities.tobytes() == stopped.value.trace.velocities.tobytes()
-
-
-def test_max_events_has_a_largest_value():
-    for call in (
-        lambda: ImpulseCorrelation(0.1, max_events=2**63),
-        lambda: post_impact_velocities([1, 1, 1], [1, 0, 0], 1, 0.1, max_events=2**63),
-    ):
-        with pytest.raises(
-            ValueError, match=r"max_events = 9223372036854775808; must be at least 1"
-        ):
-            call()
 
 
 def test_batch_and_single_draw_the_line_of_excess_alike():

@@ -75,7 +75,7 @@ UNDEFINED = "velocities leave it undefined which balls move as one body: contact
 REFUSED = [
     (partial(SequentialCollisions, "first"), "order = 'first'; must be 'left' or 'right'"),
     (partial(SequentialCollisions, None), "order = None; must be 'left' or 'right'"),
-    (partial(SequentialCollisions, max_events=0), "max_events = 0; must be at least 1"),
+    (partial(SequentialCollisions, max_events=0), "max_events = 0; must be a whole number, at"),
     (partial(SequentialCollisions, max_events=1.5), "max_events = 1.5; must be a whole number"),
     *(
         (impact(FusedChain(), [1] * 4, v), f"{UNDEFINED}{what} FusedChain needs")

@@ -237,7 +237,7 @@ OTHERS = [
     (paper_chain, (3,), "sequence is an int; must be letters, as in 'ABC'"),
     (post_impact_velocities, (MASKED, [1, 0, 0], 1, 0.1), "masses[1] = masked; must be a real"),
     (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
-    (TRACE.plot, {"contact": 4}, "contact = 4; must be one of 0 to 1"),
+    (TRACE.plot, {"contact": 4}, "contact = 4; must be a whole number, 0 to 1"),
     (drawn, ([],), "traces has chains of [] balls; must be of one length"),
     (drawn, ([[1, 0], [1, 0, 0]],), "traces has chains of [2, 3] balls"),
     (drawn, ([[1, 0], [0, -1]],), "traces has a first ball at rest"),

@@ -163,8 +163,9 @@ function solved(chain, maxEvents, recorded) {
 function collide(given) {
   const recorded = given.record ?? true;
   const limit = given.maxEvents ?? MAX_EVENTS;
-  if (!Number.isInteger(limit)) throw new Error(`max_events = ${limit}; must be a whole number`);
-  if (limit < 1) throw new Error(`max_events = ${limit}; must be at least 1 and below 2**63`);
+  if (!(Number.isInteger(limit) && limit >= 1)) {
+    throw new Error(`max_events = ${limit}; must be a whole number, at least 1 and below 2**63`);
+  }
   const { status, state, out } = solved(checkedImpact(given), limit, recorded);
   const tally = state.tally[0];
   if (status === UNSOUND || status === REFUSED) {

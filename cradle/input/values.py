@@ -9,7 +9,7 @@ import math
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, TypeGuard, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,8 +26,6 @@ _SHOWN = 80
 _USUAL = {float, int, np.float64}
 # Python would turn these into floats, or NumPy with a warning, but they are no real numbers.
 _NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating)
-
-# --- real numbers and their limits ------------------------------------------------------------
 
 
 def numbers(name: str, values: ArrayLike | None, at: tuple[int, ...] = ()) -> Vector:
@@ -162,45 +160,23 @@ def refuse_overflow(velocities: Vector, masses: Vector) -> None:
     """Raise if the kinetic energy or a momentum of a chain is no finite number."""
     v, m = np.broadcast_arrays(velocities, masses)
     with np.errstate(over="ignore"):
-        sums = {
-            "kinetic energy": (m * v * v).sum(axis=-1),
-            "momentum": 2.0 * (m * np.abs(v)).sum(axis=-1),  # an impulse is no larger
-        }
-    for what, values in sums.items():
-        if not np.isfinite(values).all():
-            lead = first(~np.isfinite(values))
-            at = (*lead, int(np.argmax(np.abs(v[lead]))))
-            rest = f" = {float(v[at])!r}; {what} overflows: choose larger units"
-            raise refusal("velocities", at, rest)
+        energy = (m * v * v).sum(axis=-1)
+        impulse = 2.0 * (m * np.abs(v)).sum(axis=-1)  # none is larger
+    for what, sums in (("kinetic energy", energy), ("momentum", impulse)):
+        if not np.isfinite(sums).all():
+            fastest = np.abs(v) == np.abs(v).max(axis=-1, keepdims=True)
+            wrong = fastest & ~np.isfinite(sums)[..., None]
+            refuse_where("velocities", v, wrong, f"{what} overflows: choose larger units")
 
 
-# --- whole numbers, words, types --------------------------------------------------------------
-
-
-def is_whole(value: object) -> TypeGuard[int]:
-    """Tell whether a value is a whole number: an int or NumPy's, but no bool."""
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-
-
-def whole_rule(value: object) -> str:
-    """Return what an error says of a value that is no whole number, or not of that type."""
-    if isinstance(value, float) and value.is_integer() and abs(value) < 2.0**53:
-        return f"must be an int ({int(value)})"
-    return "must be a whole number"
-
-
-def whole_number(name: str, value: object) -> int:
-    """Return `value` as a whole number of at least 1."""
-    if is_whole(value) and value >= 1:
+def whole_number(
+    name: str, value: object, rule: str = "at least 1", low: int = 1, high: int = 2**63 - 1
+) -> int:
+    """Return `value` as a whole number inside the limits: an int or NumPy's, but no bool."""
+    if isinstance(value, (int, np.integer)) and type(value) is not bool and low <= value <= high:
         return int(value)
-    raise ValueError(f"{name} = {shown(value)}; {whole_rule(value)}, at least 1")
-
-
-def place_in(name: str, value: object, size: int) -> int:
-    """Return `value` as the place of a thing in a row."""
-    if is_whole(value) and 0 <= value < size:
-        return int(value)
-    raise ValueError(f"{name} = {shown(value)}; must be one of 0 to {size - 1}")
+    kind = "an int" if isinstance(value, float) and value.is_integer() else "a whole number"
+    raise ValueError(f"{name} = {shown(value)}; must be {kind}, {rule}")
 
 
 def one_of(name: str, value: object, choices: Sequence[str]) -> str:
@@ -218,9 +194,6 @@ def must_be(kind: type[_Thing], name: str, thing: object) -> _Thing:
         what = f"the class {thing.__name__}" if isinstance(thing, type) else a(type(thing).__name__)
         raise TypeError(f"{name} is {what}; must be {a(kind.__name__)}")
     return thing
-
-
-# --- the words of a refusal -------------------------------------------------------------------
 
 
 def refusal(name: str, at: tuple[Any, ...], rest: str) -> ValueError:

@@ -16,7 +16,6 @@ from cradle.input.values import (
     checked_masses,
     checked_restitution,
     first,
-    is_whole,
     must_be,
     number_or_row,
     one_number,
@@ -24,7 +23,7 @@ from cradle.input.values import (
     refuse_overflow,
     refuse_where,
     row_of,
-    whole_rule,
+    whole_number,
 )
 from cradle.kernel import Inputs, Options
 from cradle.kernel.state import LIMITS
@@ -184,10 +183,7 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
     if not (type(meeting) is float and 0.0 <= meeting <= 1.0):
         one_number("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
     one_of("excess", excess, ("raise", "saturate"))
-    if not is_whole(max_events):
-        raise ValueError(f"max_events = {max_events!r}; {whole_rule(max_events)}")
-    if not 1 <= max_events < 2**63:
-        raise ValueError(f"max_events = {max_events!r}; must be at least 1 and below 2**63")
+    whole_number("max_events", max_events, "at least 1 and below 2**63")
 
 
 def check_values(

@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
-from cradle.input.values import Vector, must_be, place_in
+from cradle.input.values import Vector, must_be, whole_number
 from cradle.trace import Trace
 
 __all__ = [
@@ -168,7 +168,8 @@ def velocity_impulse(
     >>> [line.get_label() for line in ax.get_lines()[:2]]
     ['$v_2$', '$v_3$']
     """
-    contact = place_in("contact", contact, len(must_be(Trace, "trace", trace).impulses))
+    last = len(must_be(Trace, "trace", trace).impulses) - 1
+    contact = whole_number("contact", contact, f"0 to {last}", 0, last)
     ax = axes_or_new(ax)
     impulses, path = trace.curve()
     for ball in (contact, contact + 1):
