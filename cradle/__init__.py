@@ -1,6 +1,6 @@
 """Newton's cradle by the Impulse Correlation Ratio: a companion to Ceanga and Hurmuzlu (2001).
 
-One idea: every impact model is a rule from a chain of balls to a path of contact impulses.
+Every impact model is a rule from a chain of balls to a path of contact impulses.
 
     Chain -> collide(chain, model) -> Trace -> measures -> figures
 

@@ -34,10 +34,8 @@ class Chain:
 
     Parameters
     ----------
-    masses : array_like, shape (N,)
-        Masses in kg, left to right, N >= 2; above 0.
-    velocities : array_like, shape (N,)
-        Velocities in m/s.
+    masses, velocities : array_like, shape (N,)
+        kg, above 0, and m/s, left to right; N >= 2.
     restitution : float or array_like, shape (N - 1,)
         Energetic coefficient of restitution of each contact, 0 to 1 (Stronge, 1990).  If left out,
         1: elastic balls, that lose nothing.
@@ -102,12 +100,10 @@ class Chain:
         return type(self), (self.masses, self.velocities, self.restitution)
 
     def __repr__(self) -> str:
-        """Return the call that makes this chain."""
         values = [f"{name}={(value + 0.0).tolist()}" for name, value in vars(self).items()]  # no -0
         return f"Chain({', '.join(values)})"
 
     def _repr_html_(self) -> str:
-        """Return a picture and a table for a notebook."""
         columns = {
             "mass (kg)": self.masses,
             "velocity (m/s)": self.velocities + 0.0,  # no -0
@@ -116,17 +112,14 @@ class Chain:
         return as_html(self.masses, {"": self.velocities}, columns)
 
     def __eq__(self, other: object) -> bool:
-        """Tell whether two chains have the same values."""
         if not isinstance(other, Chain):
             return NotImplemented
         return all(map(np.array_equal, self.__reduce__()[1], other.__reduce__()[1]))
 
     def __hash__(self) -> int:
-        """Return equal numbers for equal chains."""
         return hash(tuple(tuple(values.tolist()) for values in self.__reduce__()[1]))
 
     def __len__(self) -> int:
-        """Return the number of balls, N."""
         return int(self.masses.size)
 
     @property

@@ -13,71 +13,54 @@ from numpy.typing import ArrayLike, NDArray
 from cradle.input.values import Vector, checked, numbers, one_number
 from cradle.kernel.state import LIMITS
 
-_Balls = tuple[Vector, ...]
 _UNIT = ("must lie in [0, 1]", 0.0, 1.0)
 #: What is asked of a restitution that divides.
 _NO_ZERO = (f"must lie in [{LIMITS.least_restitution}, 1]", LIMITS.least_restitution, 1.0)
 
 
-def _split(
+def _solved(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, ratio: ArrayLike
-) -> tuple[_Balls, _Balls, _Balls, Vector]:
-    """Check shapes; return masses, velocities and restitution one by one, and the ratio."""
-    sizes = {"masses": 3, "velocities": 3, "restitution": 2}
-    arrays = map(numbers, sizes, (masses, velocities, restitution))
-    given = dict(zip(sizes, arrays, strict=True))
-    for name, array in given.items():
-        if array.shape[-1:] != (sizes[name],):
-            raise ValueError(f"{name} has shape {array.shape}; must be (..., {sizes[name]})")
-    m, v, e = (tuple(array[..., k] for k in range(array.shape[-1])) for array in given.values())
-    alpha = numbers("ratio", ratio)
+) -> tuple[Vector, Vector, tuple[Vector, ...], NDArray[np.bool_]]:
+    """Return tau_2, tau_3, the velocities after, and where there is one collision per contact."""
+    values = {"masses": masses, "velocities": velocities, "restitution": restitution}
+    given = {name: numbers(name, value) for name, value in values.items()}
+    for name, size in zip(given, (3, 3, 2), strict=True):
+        if given[name].shape[-1:] != (size,):
+            raise ValueError(f"{name} has shape {given[name].shape}; must be (..., {size})")
+    given["ratio"] = alpha = numbers("ratio", ratio)
+    balls = (tuple(np.moveaxis(array, -1, 0)) for array in list(given.values())[:3])
+    (m1, m2, m3), (v1, v2, v3), (e2, e3) = balls
     try:
-        np.broadcast_shapes(m[0].shape, v[0].shape, e[0].shape, alpha.shape)
+        np.broadcast_shapes(m1.shape, v1.shape, e2.shape, alpha.shape)
     except ValueError:
-        shapes = [f"{name} {array.shape}" for name, array in {**given, "ratio": alpha}.items()]
-        raise ValueError(f"leading axes do not broadcast: {', '.join(shapes)}") from None
-    return m, v, e, alpha
-
-
-def _taus(m: _Balls, v: _Balls, e: _Balls, alpha: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return what contact 2-3 would gain from the whole impulse tau_2 at once, tau_2 and tau_3."""
-    (m1, m2, m3), (v1, v2, v3), (e2, e3) = m, v, e
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in given.items())
+        raise ValueError(f"leading axes do not broadcast: {shapes}") from None
     gain = (1.0 + e2) * m1 * (v1 - v2) / ((1.0 - alpha) * m1 + m2)
     tau_2 = m2 * gain  # Eq. 24
-    tau_3c = (gain + (v2 - v3)) * m2 * m3 / (m2 + m3)  # Eq. 28
+    closing = gain + (v2 - v3)  # of contact 2-3, from the whole impulse tau_2 at once
+    tau_3c = closing * m2 * m3 / (m2 + m3)  # Eq. 28
     with np.errstate(invalid="ignore"):
-        root = np.sqrt(1.0 - alpha * (m2 / m3 + 1.0) * (gain / (gain + (v2 - v3))) ** 2)
-    return gain, tau_2, tau_3c * (1.0 + e3 * root)  # Eq. 30
-
-
-def _after(m: _Balls, v: _Balls, tau_2: Vector, tau_3: Vector) -> _Balls:
-    """Return the velocities after the impact, ball by ball."""
-    (m1, m2, m3), (v1, v2, v3) = m, v
-    return v1 - tau_2 / m1, v2 + (tau_2 - tau_3) / m2, v3 + tau_3 / m3
+        root = np.sqrt(1.0 - alpha * (m2 / m3 + 1.0) * (gain / closing) ** 2)
+    tau_3 = tau_3c * (1.0 + e3 * root)  # Eq. 30
+    after = v1 - tau_2 / m1, v2 + (tau_2 - tau_3) / m2, v3 + tau_3 / m3
+    once = (alpha * (m2 + m3) * gain <= closing * m3) & (after[0] <= after[1])
+    return tau_2, tau_3, after, np.asarray(once)
 
 
 def three_balls(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, ratio: ArrayLike
 ) -> Vector:
-    """Solve three balls with one collision per contact (Eqs. 22-33).
+    """Return the velocities after one collision per contact of three balls, m/s (Eqs. 22-33).
 
-    Ranges are not checked, which would take longer than the formulas: outside them the result has
-    no meaning.  `one_collision_each` tells where it applies.
+    Ranges are not checked: outside them the result, shape (..., 3), has no meaning.  It is NaN
+    where the radical of Eq. 30 is not real.  `one_collision_each` tells where it applies.
 
     Parameters
     ----------
     masses, velocities : array_like, shape (..., 3)
         kg, above 0, and m/s, with v1 > v2 >= v3.
-    restitution : array_like, shape (..., 2)
-        e2 and e3, 0 to 1.
-    ratio : array_like, shape (...)
-        Forward Impulse Correlation Ratio alpha, 0 to 1.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Velocities after the impact, m/s; NaN where the radical of Eq. 30 is not real or an input
-        is NaN.
+    restitution, ratio : array_like, shapes (..., 2) and (...)
+        e2 and e3, and the forward Impulse Correlation Ratio alpha, 0 to 1.
 
     Raises
     ------
@@ -90,33 +73,23 @@ def three_balls(
     array([[ 0.   ,  0.   ,  1.   ],
            [-0.333,  0.667,  0.667]])
     """
-    m, v, e, alpha = _split(masses, velocities, restitution, ratio)
-    _, tau_2, tau_3 = _taus(m, v, e, alpha)
-    return np.stack(np.broadcast_arrays(*_after(m, v, tau_2, tau_3)), axis=-1)
+    after = _solved(masses, velocities, restitution, ratio)[2]
+    return np.stack(np.broadcast_arrays(*after), axis=-1)
 
 
 def final_impulses(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, ratio: ArrayLike
 ) -> tuple[Vector, Vector]:
-    """Return the final impulses of three balls with one collision per contact (Eqs. 24 and 30).
+    """Return the final impulses tau_2 and tau_3 of `three_balls`, N s, shapes (...) (Eqs. 24, 30).
 
-    Parameters
-    ----------
-    masses, velocities, restitution, ratio : array_like
-        As for `three_balls`, with the same errors.
-
-    Returns
-    -------
-    tau_2, tau_3 : ndarray, shape (...)
-        N s; tau_3 is NaN where the velocities of `three_balls` are.
+    Arguments, errors and NaN are those of `three_balls`.
 
     Examples
     --------
     >>> final_impulses([1, 1, 1], [1, 0, 0], [1, 1], 0.0)
     (np.float64(1.0), np.float64(1.0))
     """
-    _, tau_2, tau_3 = _taus(*_split(masses, velocities, restitution, ratio))
-    return tau_2, tau_3
+    return _solved(masses, velocities, restitution, ratio)[:2]
 
 
 def one_collision_each(
@@ -125,28 +98,15 @@ def one_collision_each(
     """Tell where three balls collide once per contact, so that Eqs. 30-33 hold (Eqs. 34, 43, 44).
 
     Two conditions: contact 2-3 still closes when contact 1-2 ends, and ball 2 does not fall back
-    on ball 1 (for v2 = v3 = 0 the second is Eq. 44).
-
-    Parameters
-    ----------
-    masses, velocities, restitution, ratio : array_like
-        As for `three_balls`, with the same errors.
-
-    Returns
-    -------
-    ndarray of bool, shape (...)
-        False where the result of `three_balls` is NaN.
+    on ball 1 (for v2 = v3 = 0 the second is Eq. 44).  Arguments and errors are those of
+    `three_balls`; the answer, shape (...), is False where its result is NaN.
 
     Examples
     --------
     >>> one_collision_each([1, 1, 1], [1, 0, 0], [1, 1], [0.1, 0.6])
     array([ True, False])
     """
-    m, v, e, alpha = _split(masses, velocities, restitution, ratio)
-    gain, tau_2, tau_3 = _taus(m, v, e, alpha)
-    v1, v2, _ = _after(m, v, tau_2, tau_3)
-    still_closes = alpha * (m[1] + m[2]) * gain <= (gain + (v[1] - v[2])) * m[2]
-    return np.asarray(still_closes & (v1 <= v2))
+    return _solved(masses, velocities, restitution, ratio)[3]
 
 
 def largest_ratios(
@@ -163,17 +123,12 @@ def largest_ratios(
     masses : array_like, shape (..., N)
         kg, above 0; N >= 2.
     forward, backward : array_like, shape (..., N - 2)
-        Ratios at the interior balls, 0 to 1.
-
-    Returns
-    -------
-    forward, backward : ndarray, shape (..., N - 2)
-        The largest admissible ratios.
+        Ratios at the interior balls, 0 to 1; the bounds come back in the same shapes.
 
     Raises
     ------
     ValueError
-        If a value or a shape is wrong; the message names the value and the rule.
+        If a value or a shape is wrong.
 
     Examples
     --------
@@ -204,22 +159,9 @@ def largest_ratios(
 def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLike) -> Vector:
     """Mass ratio r1 = m2/m1 at and below which ball 2 falls back on ball 1 (Eq. 44, Fig. 6).
 
-    Parameters
-    ----------
-    r2 : array_like
-        Mass ratio m2/m3, at least 0.
-    e2, e3, ratio : array_like
-        Restitution of the two contacts, e2 at least 1e-30, and the forward ratio; 0 to 1.
-
-    Returns
-    -------
-    ndarray
-        r1; NaN where the ratio exceeds its bound (Eq. 34).
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
+    The arguments broadcast: the mass ratio r2 = m2/m3, at least 0, the restitution of the two
+    contacts, e2 at least 1e-30, and the forward ratio, all 0 to 1; others are a `ValueError`.  It
+    is NaN where the ratio exceeds its bound (Eq. 34).
 
     Examples
     --------
@@ -236,10 +178,7 @@ def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLi
 def first_ball_stops(e2: float, ratio: float) -> float:
     """Mass ratio r1 = m2/m1 at which ball 1 is left at rest (Eq. 45).
 
-    Parameters
-    ----------
-    e2, ratio : float
-        Restitution of contact 1-2, 1e-30 to 1, and the forward ratio, 0 to 1; else a `ValueError`.
+    The restitution of contact 1-2 is 1e-30 to 1, the forward ratio 0 to 1; else a `ValueError`.
 
     Examples
     --------
@@ -252,10 +191,7 @@ def first_ball_stops(e2: float, ratio: float) -> float:
 def middle_ball_stops(e3: float, ratio: float) -> float:
     """Mass ratio r2 = m2/m3 at which ball 2 is left at rest (Eq. 46).
 
-    Parameters
-    ----------
-    e3, ratio : float
-        Restitution of contact 2-3 and the forward ratio, 0 to 1; else a `ValueError`.
+    The restitution of contact 2-3 and the forward ratio are 0 to 1; else a `ValueError`.
 
     Examples
     --------

@@ -1,7 +1,4 @@
-"""What is read off outcomes: bouncing patterns, conditioning, effective ratios, conservation.
-
-Equations and sections are those of Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583.
-"""
+"""What is read off outcomes: bouncing patterns, conditioning, effective ratios, conservation."""
 
 from __future__ import annotations
 
@@ -32,17 +29,13 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
     """Return which balls of three bounce back: pattern 1, 2 or 3 (the paper's I, II, III).
 
     Ball 1 comes from the left and strikes two balls at rest.  In pattern 1 it alone goes back
-    (velocity below zero), in pattern 2 no ball does, in pattern 3 balls 1 and 2 do (section 2.5).
+    (velocity below zero), in pattern 2 no ball does, in pattern 3 balls 1 and 2 do (Ceanga and
+    Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, section 2.5).
 
     Parameters
     ----------
     velocities : array_like, shape (..., 3)
-        Velocities after the impact, m/s.
-
-    Returns
-    -------
-    ndarray of int, shape (...)
-        1, 2 or 3.
+        Velocities after the impact, m/s; the patterns have the shape (...).
 
     Raises
     ------
@@ -87,16 +80,10 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
 
     Parameters
     ----------
-    chain : Chain
-        The balls at the instant before.
-    model : Model
-        The impact law; the ratios of `ImpulseCorrelation` are inputs too.
+    chain, model : Chain, Model
+        As for `collide`; the ratios of `ImpulseCorrelation` are inputs too.
     step : float
         Relative change of each input, 1e-12 to 0.1: above the rounding of numbers.
-
-    Returns
-    -------
-    Condition
 
     Raises
     ------
@@ -107,10 +94,8 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
     --------
     At its bound (Eq. 34) a ratio acts through a square root, so its sixth digit counts:
 
-    >>> for ratio in (0.15, 0.5):
-    ...     found = condition_number(Chain([1, 1, 1], [1, 0, 0]), ImpulseCorrelation(ratio))
-    ...     print(f"{found.number:.2g}", found.most, found.same_events)
-    3.7 velocities[0] True
+    >>> found = condition_number(Chain([1, 1, 1], [1, 0, 0]), ImpulseCorrelation(0.5))
+    >>> print(f"{found.number:.2g}", found.most, found.same_events)
     2.4e+03 forward[0] True
     """
     step = one_number("step", step, "must lie in [1e-12, 0.1]", 1e-12, 0.1)
@@ -157,23 +142,17 @@ def _events_at_balls(trace: Trace) -> list[list[Event]]:
 def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     """Return the constant ratio that gives the outcome of an impact of three balls.
 
-    The outcome may come from any model; the restitution is that of the chain.  The ratio lies
-    between 0 and its bound (Eq. 34) and acts in both directions, as in `ImpulseCorrelation(ratio)`,
-    held at its bound where one is smaller.  If several give the outcome, it is the smallest.
-    Outcomes that lose no energy differ by one number, so that one ratio often suffices; with losses
-    there is in general none.
+    It lies between 0 and its bound (Eq. 34) and acts in both directions, as in
+    `ImpulseCorrelation(ratio)`, held at its bound where one is smaller.  If several give the
+    outcome, it is the smallest.  Outcomes that lose no energy differ by one number, so that one
+    ratio often suffices; with losses there is in general none.
 
     Parameters
     ----------
     trace : Trace
-        An impact of three balls.
+        An impact of three balls, by any model.
     tolerance : float
         How far velocities may be from those of the ratio, as a part of the fastest closing speed.
-
-    Returns
-    -------
-    float
-        The ratio.
 
     Raises
     ------
@@ -251,12 +230,8 @@ def conserving_outcomes(
     masses, velocities : array_like, shape (3,)
         kg, and m/s before the impact.
     angles : array_like, shape (K,), optional
-        Angles on the arc, rad; 181 from end to end if left out.
-
-    Returns
-    -------
-    angles, velocities : ndarray, shapes (K,) and (K, 3)
-        rad and m/s.
+        Angles on the arc, rad; 181 from end to end if left out.  They come back, with the
+        velocities there, shape (K, 3).
 
     Raises
     ------
@@ -287,18 +262,10 @@ def conserving_outcomes(
 
 
 def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
-    """Return the angle of an outcome on the arc of `conserving_outcomes`.
+    """Return the angle of an outcome on the arc of `conserving_outcomes`, rad.
 
-    Parameters
-    ----------
-    masses, velocities : array_like, shape (3,)
-        kg, and m/s after the impact.
-
-    Returns
-    -------
-    float
-        The angle, rad; 0 for balls that all have one velocity, and off the arc where they are not
-        in order.
+    Arguments are as there, with the velocities after the impact.  It is 0 for balls that all have
+    one velocity, and off the arc where they are not in order.
 
     Examples
     --------

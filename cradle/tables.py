@@ -1,8 +1,7 @@
-"""The paper's measured parameters: ball types, Tables 1 and 2, the ten test sequences.
+"""The paper's measured parameters: ball types A to D, Tables 1 and 2, the ten test sequences.
 
-A ball type is one letter, A to D. Coefficients of restitution belong to pairs of neighbours,
-Impulse Correlation Ratios to triplets. The numbers are read from the CSV files of ``data/``,
-whose README gives their origin, units and doubtful readings.
+The numbers are read from the CSV files of ``data/``, whose README gives their origin, units and
+doubtful readings.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Mapping
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
@@ -67,12 +67,7 @@ def ball_masses() -> Mapping[str, float]:
 
 @cache
 def paper_sequences() -> Mapping[str, int]:
-    """Return the ten sequences of balls with which the paper tests its parameters; read-only.
-
-    Returns
-    -------
-    Mapping of str to int
-        Sequence, first ball first, to the number of the paper's figure that shows it.
+    """Return the ten test sequences and the numbers of the paper's figures of them; read-only.
 
     Examples
     --------
@@ -83,26 +78,8 @@ def paper_sequences() -> Mapping[str, int]:
     return MappingProxyType({row["sequence"]: int(row["figure"]) for row in rows})
 
 
-@cache
-def _restitution() -> Mapping[str, float]:
-    """Return Table 1 as a mapping from the pair "XY" to the coefficient of restitution."""
-    rows = table_rows("restitution.csv")
-    return {row["ball"] + other: float(row[other]) for row in rows for other in ball_masses()}
-
-
-@cache
-def _ratios() -> Mapping[str, float]:
-    """Return Table 2 as a mapping from the triplet "XYZ" to the Impulse Correlation Ratio."""
-    return {row["triplet"]: float(row["ratio"]) for row in table_rows("ratios.csv")}
-
-
 def restitution_table() -> pd.DataFrame:
-    """Return Table 1, the coefficients of restitution of all pairs of ball types.
-
-    Returns
-    -------
-    pandas.DataFrame
-        4 x 4, symmetric, dimensionless; index and columns "A" to "D".
+    """Return Table 1, the coefficients of restitution of all pairs of ball types, as a DataFrame.
 
     Examples
     --------
@@ -120,14 +97,10 @@ def restitution_table() -> pd.DataFrame:
 
 
 def ratio_table() -> pd.DataFrame:
-    """Return Table 2, the Impulse Correlation Ratios of all triplets, with the bound of Eq. 34.
+    """Return Table 2, the Impulse Correlation Ratios of all triplets, as a DataFrame of 64 rows.
 
-    Returns
-    -------
-    pandas.DataFrame
-        64 rows in alphabetical order; columns ``triplet`` (str), ``ratio`` (float), ``bound``
-        (float, m_right / (m_middle + m_right); in a longer chain the ratio of the next triplet
-        raises it, Eq. 53) and ``admissible`` (bool, ratio <= bound).
+    The columns are ``triplet``, ``ratio``, ``bound``, the largest ratio that three balls admit
+    (Eq. 34; in a longer chain the ratio of the next triplet raises it, Eq. 53), and ``admissible``.
 
     Examples
     --------
@@ -155,6 +128,9 @@ def paper_chain(
 ) -> tuple[Chain, ImpulseCorrelation]:
     """Build a chain of the paper's balls, the first one striking the others at rest.
 
+    Pairs of neighbours have Table 1's restitution, and the ratios are those of Table 2: at ball Y
+    of the neighbours X, Y, Z the entry XYZ forward, and the entry ZYX backward.
+
     Parameters
     ----------
     sequence : str or iterable of str
@@ -164,19 +140,11 @@ def paper_chain(
     excess, meeting
         As for `ImpulseCorrelation`.
 
-    Returns
-    -------
-    chain : Chain
-        Velocities (speed, 0, ...), and Table 1's restitution for each pair of neighbours.
-    model : ImpulseCorrelation
-        Table 2's ratios. The forward ratio at ball Y of the neighbours X, Y, Z is the entry XYZ;
-        the backward ratio is the entry of the reversed triplet, ZYX.
-
     Raises
     ------
     TypeError, ValueError
-        If `sequence` is no text or list of at least two letters of ball types, or `Chain` or
-        `ImpulseCorrelation` refuses another argument.
+        If `sequence` is no such text or list, or another argument is refused by `Chain` or
+        `ImpulseCorrelation`.
 
     Examples
     --------
@@ -186,33 +154,25 @@ def paper_chain(
     >>> model.forward, model.backward                         # CDA, DAB; ADC, BAD
     ((0.196, 0.09), (0.001, 0.05))
     """
-    masses = ball_masses()
-    balls = _letters(sequence)
-    pairs = [balls[i : i + 2] for i in range(len(balls) - 1)]
-    triplets = [balls[i : i + 3] for i in range(len(balls) - 2)]
+    if not isinstance(sequence, Iterable):
+        raise TypeError(f"sequence is {a(type(sequence).__name__)}; must be letters, as in 'ABC'")
+    masses, balls = ball_masses(), list(sequence)
+    for position, ball in enumerate(balls):
+        one_of(f"sequence[{position}]", ball, [*masses])
+    if len(balls) < 2:
+        raise ValueError(f"sequence = {shown(sequence)}; must name at least 2 balls")
+    triplets = ["".join(three) for three in zip(balls, balls[1:], balls[2:], strict=False)]
+    table_1 = {row["ball"]: row for row in table_rows("restitution.csv")}
+    table_2 = {row["triplet"]: float(row["ratio"]) for row in table_rows("ratios.csv")}
     chain = Chain(
         masses=[masses[ball] for ball in balls],
         velocities=[one_number("speed", speed)] + [0.0] * (len(balls) - 1),
-        restitution=[_restitution()[pair] for pair in pairs],
+        restitution=[float(table_1[ball][other]) for ball, other in pairwise(balls)],
     )
     model = ImpulseCorrelation(
-        forward=[_ratios()[triplet] for triplet in triplets],
-        backward=[_ratios()[triplet[::-1]] for triplet in triplets],
+        forward=[table_2[triplet] for triplet in triplets],
+        backward=[table_2[triplet[::-1]] for triplet in triplets],
         meeting=meeting,
         excess=excess,
     )
     return chain, model
-
-
-def _letters(sequence: str | Iterable[str]) -> str:
-    """Return the ball types of a sequence as one word, or refuse it."""
-    try:
-        letters = list(sequence)
-    except TypeError:
-        given = a(type(sequence).__name__)
-        raise TypeError(f"sequence is {given}; must be letters, as in 'ABC'") from None
-    for position, ball in enumerate(letters):
-        one_of(f"sequence[{position}]", ball, [*ball_masses()])
-    if len(letters) < 2:
-        raise ValueError(f"sequence = {shown(sequence)}; must name at least 2 balls")
-    return "".join(letters)

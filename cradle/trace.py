@@ -36,21 +36,17 @@ class Trace:
     ----------
     chain, model : Chain, Model
         What was solved: the chain before the impact, and the law.
-    velocities : ndarray, shape (N,)
-        Velocities after the impact, m/s.
-    impulses : ndarray, shape (N - 1,)
-        Total impulse of each contact, N s.
+    velocities, impulses : ndarray, shapes (N,) and (N - 1,)
+        Velocities after the impact, m/s, and total impulse of each contact, N s.
     absorbed : ndarray, shape (N - 1,)
         Work that each contact absorbed in compression, over all its collisions, J.  Of an infinite
         sequence taken to its limit the sum is exact, the shares of its rest are good to 1e-4.
     collisions : ndarray of int, shape (N - 1,)
         How often each contact became active.  Those slower than the last digit of the velocities
         mean nothing: an endless sequence may end there, without `collapsed`.
-    path : ndarray, shape (K + 1, N)
-        Velocities before the impact and at every event, m/s.  Between two rows every velocity is
-        linear in every impulse, but before a "collapse" or a "repetition", which stand for many.
-    path_impulses : ndarray, shape (K + 1, N - 1)
-        Impulses so far, at the same instants, N s.
+    path, path_impulses : ndarray, shapes (K + 1, N) and (K + 1, N - 1)
+        Velocities, m/s, and impulses so far, N s, before the impact and at every event.  Between
+        two rows they are linear, but before a "collapse" or "repetition", which stand for many.
     events : tuple of Event, length K
         What happened at each row of the path but the first.
     left_out : int
@@ -61,9 +57,9 @@ class Trace:
         Contacts that were held closed at the largest admissible ratio (Eqs. 34, 53) at some time.
     margin : float
         How close another sequence of events came: the least distance of two events of one run, of
-        two meetings, or of a ratio from its bound, relative to what is compared; ties are meant to
-        be ties.  Below about 1e-12 another outcome may lie within the last digit of the input.  It
-        does not see what hundreds of collisions amplify step by step; `condition_number` does.
+        two meetings, or of a ratio from its bound, relative to what is compared; exact ties do not
+        count.  Below about 1e-12 another outcome may lie within the last digit of the input.  What
+        hundreds of collisions amplify step by step, `condition_number` sees.
 
     Examples
     --------
@@ -95,12 +91,9 @@ class Trace:
     def to_frame(self) -> pd.DataFrame:
         """Return the path as a table, a row for each ball at each row of the path.
 
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``step`` (0 to K), ``event`` and ``contact`` ("before" and missing at step 0),
-            ``ball``, ``velocity`` (m/s), ``left`` and ``right``, the impulses so far of the ball's
-            two contacts (N s).  Models with a time add ``time`` (s).
+        Columns are ``step`` (0 to K), ``event`` and ``contact`` ("before" and missing at step 0),
+        ``ball``, ``velocity`` (m/s), ``left`` and ``right``, the impulses so far of the ball's two
+        contacts (N s).  Models with a time add ``time`` (s).
 
         Examples
         --------
@@ -142,17 +135,8 @@ class Trace:
     def plot(self, ax: Axes | None = None, *, contact: int | None = None) -> Axes:
         """Draw the velocities over the impact, or the velocity-impulse diagram of a contact.
 
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; new axes if left out.
-        contact : int, optional
-            Contact c joins balls c and c + 1; no other value (`ValueError`).  All if left out.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes, as from `velocities` and `velocity_impulse` of `cradle.pictures.impacts`.
+        As `velocities` and `velocity_impulse` of `cradle.pictures.impacts`, into new axes if `ax`
+        is left out.  A `contact` that the chain does not have is a `ValueError`.
 
         Examples
         --------
@@ -169,7 +153,6 @@ class Trace:
         return figures.velocity_impulse(self, contact, ax)
 
     def _repr_html_(self) -> str:
-        """Return a picture and a table for a notebook."""
         columns = {
             "mass (kg)": self.chain.masses,
             "before (m/s)": self.chain.velocities + 0.0,
@@ -181,7 +164,6 @@ class Trace:
         return as_html(self.chain.masses, states, columns)
 
     def __repr__(self) -> str:
-        """Return a short account."""
         return (
             f"Trace(velocities={as_text(self.velocities)}, "
             f"collisions={self.collisions.tolist()}, collapsed={self.collapsed})"
@@ -205,9 +187,7 @@ class ImpactNotFinished(RuntimeError):
     >>> try:
     ...     collide(Chain([1, 1, 1], [1, 0, 0], 0.9), ImpulseCorrelation(0.1, max_events=1))
     ... except ImpactNotFinished as stopped:
-    ...     print(stopped.trace.velocities.round(3).tolist())
     ...     print(stopped.bounds.round(3).tolist())
-    [0.0, 0.9, 0.1]
     [[-0.273, 0.03, 0.333], [0.333, 0.637, 0.94]]
     """
 
@@ -226,8 +206,8 @@ class ImpactNotFinished(RuntimeError):
         """
         # Count velocities from that of the centre of mass.  If ball i ends at x > 0, the balls from
         # i on, of mass A, are at least as fast: they have a momentum of A x or more, and the
-        # others, of mass B, the opposite one.  The least energy of that is (A + A^2 / B) x^2 / 2.
-        # What is left is no less: where both are equal, x is largest.
+        # others, of mass B, the opposite one.  The least energy of that is (A + A^2 / B) x^2 / 2;
+        # where it equals what is left, x is largest.
         chain, v, left = self.trace.chain, self.trace.velocities, self.stored
         heaviest, unit = chain.masses.max(), np.abs(chain.velocities).max()
         if left is None:
@@ -236,15 +216,13 @@ class ImpactNotFinished(RuntimeError):
         centre = v[0] + m @ (v - v[0]) / m.sum()
         rounding = 2.0**-50
         twice = max(m @ (np.abs(v - centre) + rounding) ** 2 + 2.0 * left, 0.0)
-        after = np.cumsum(m[::-1])[::-1]
-        until = np.cumsum(m)
+        after, until = np.cumsum(m[::-1])[::-1], np.cumsum(m)
         largest = np.sqrt(twice * (until - m) / after / m.sum())
         least = np.sqrt(twice * (after - m) / until / m.sum())
         bounds: Vector = np.array([centre - least - rounding, centre + largest + rounding])
         return bounds * float(unit)
 
     def __str__(self) -> str:
-        """Return the message, how fast balls still approach, and what is decided."""
         v = self.trace.velocities
         change = 1.0051 * np.abs(self.bounds - v).max()  # three digits, up
         return (
@@ -265,5 +243,4 @@ class ImpactNotCertified(RuntimeError):
         self.chain, self.model, self.defect = chain, model, defect
 
     def __str__(self) -> str:
-        """Return the defect and what shows it."""
         return f"{self.defect}: {shown(self.chain)}, {shown(self.model)}"
