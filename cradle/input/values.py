@@ -170,7 +170,7 @@ def refuse_overflow(velocities: Vector, masses: Vector) -> None:
 
 
 def whole_number(
-    name: str, value: object, rule: str = "at least 1", low: int = 1, high: int = 2**63 - 1
+    name: str, value: object, rule: str = "at least 1", low: int = 1, high: float = math.inf
 ) -> int:
     """Return `value` as a whole number inside the limits: an int or NumPy's, but no bool."""
     if isinstance(value, (int, np.integer)) and type(value) is not bool and low <= value <= high:

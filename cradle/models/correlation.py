@@ -183,7 +183,7 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
     if not (type(meeting) is float and 0.0 <= meeting <= 1.0):
         one_number("meeting", meeting, "must lie in [0, 1]", 0.0, 1.0)
     one_of("excess", excess, ("raise", "saturate"))
-    whole_number("max_events", max_events, "at least 1 and below 2**63")
+    whole_number("max_events", max_events, "at least 1 and below 2**63", high=2**63 - 1)
 
 
 def check_values(
