@@ -222,6 +222,7 @@ def test_two_balls_need_no_ratio():
         assert off(chain, advice, newton) < 1e-14
         assert "restitution alone determines" in advice.reason
         assert (advice.numerical_error is None) == (impacts == 1)  # as the table has it
+        assert advice.plain_seconds is None  # once the time of the compiled batch stood there
     assert recommend(Chain([1, 2], [1, 0])).model_error == 0.0
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.advice.measured import Measured, evidence, measured_chain, rows, unit_time
+from cradle.advice.measured import LAWS, Measured, evidence, measured_chain, rows, unit_time
 from cradle.advice.recommendation import Recommendation
 from cradle.chain import Chain
 from cradle.input.values import must_be, one_number, one_of, whole_number
@@ -20,9 +20,6 @@ from cradle.models.sequential import SequentialCollisions
 
 WANTED = ("velocities", "impulses", "path", "forces", "times", "fastest ball")
 
-# A chain among the measured ones can be worse than each of them, by a few times.  It has the
-# accuracy if they are all better by this factor.
-_MARGIN = 10.0
 # Two tables measured one after the other differ by less than this factor, but for a few rows: times
 # closer than that do not decide between models.
 _NOISE = 1.5
@@ -63,10 +60,9 @@ def recommend(
     wanted : str or collection of str
         One or several of "velocities", "impulses", "path", "forces", "times" (how long the
         contacts last) and "fastest ball" (which one it is).
-    accuracy : float
-        Largest numerical error of a velocity, as a part of the closing speed; 1e-15 to 1.
-    model_error : float, optional
-        Largest distance from Hertz springs, elastic spheres, in the same unit; any if left out.
+    accuracy, model_error : float
+        Largest numerical error of a velocity, as a part of the closing speed, 1e-15 to 1, and in
+        the same unit the largest distance from Hertz springs, elastic spheres; any if left out.
     impacts : int
         How many impacts of such chains are to be solved; several go into one call where a model
         has one, measured with 2000.
@@ -75,11 +71,6 @@ def recommend(
     stiffness : float or sequence of length N - 1, optional
         k of the contacts of spheres (Hertz) if the material is known, N/m^(3/2); 1 for equal ones
         if neither forces nor times are wanted.
-
-    Returns
-    -------
-    Recommendation
-        The model, its setting, its expected errors and cost, the reason.
 
     Raises
     ------
@@ -121,12 +112,11 @@ springs, which lose nothing; with losses, ask for impulses
     several = isinstance(wanted, Collection) and not isinstance(wanted, (str, np.ndarray))
     wishes = tuple(one_of("wanted", x, WANTED) for x in (several and [*wanted]) or [wanted])
     wish = _Wish(chain, wishes, accuracy, model_error, impacts, ratios, stiffness)
-    _refuse(wish)
     found = []
     failures: dict[str, list[str]] = {}
-    for group, kind, make in _models(wish):
+    for group, make in _models(wish).items():
         try:
-            found.append(_best(group, kind.__name__, make, wish))
+            found.append(_best(group, make, wish))
         except _Unfit as why:
             failures.setdefault(why.args[0], []).append(why.args[1])
     if not found:
@@ -150,21 +140,6 @@ class _Wish(NamedTuple):
     stiffness: float | Sequence[float] | None
 
     @property
-    def elastic(self) -> bool:
-        """Whether springs apply."""
-        return bool((self.chain.restitution == 1.0).all())
-
-    @property
-    def modest(self) -> bool:
-        """Whether a model that needs restitution alone may do."""
-        return set(self.wanted) == {"fastest ball"} or self.model_error is not None
-
-    @property
-    def bare(self) -> bool:
-        """Whether nothing but restitution is known, and it is not enough."""
-        return self.ratios is None and self.stiffness is None and len(self.chain) > 2
-
-    @property
     def like(self) -> Chain | None:
         """The chain, if its contacts are equal springs, as all that were measured."""
         return self.chain if len(set(np.ravel(self.stiffness or 1.0))) == 1 else None
@@ -174,92 +149,80 @@ class _Unfit(Exception):
     """A wish, and why a model does not fulfil it."""
 
 
-def _refuse(wish: _Wish) -> None:
-    """Raise if no model can fulfil a wish from what is known, whatever was measured."""
-    chain = wish.chain
-    if not (chain.closing_speeds > 0.0).any():
-        raise ValueError(f"velocities = {chain.velocities.tolist()}; no balls approach: no impact")
+def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
+    """Return what is known allows, by group: how a row makes its model.  Or nothing can do it."""
+    chain, wanted, _, model_error, _, ratios, stiffness = wish
     lossy = int(np.argmin(chain.restitution))
     loss = f"restitution[{lossy}] = {float(chain.restitution[lossy])!r}"
-    timed = next((name for name in wish.wanted if name in ("forces", "times")), "")
-    if timed and not wish.elastic:
-        raise ValueError(
-            f"wanted = {timed!r}, {loss}; must be 1: forces and times come from springs, "
-            "which lose nothing; with losses, ask for impulses"
-        )
-    if timed and wish.stiffness is None:
-        raise ValueError(
-            f"wanted = {timed!r}; needs stiffness: rigid models have impulses alone; give "
-            "that of the contacts in N/m^(3/2), for two steel balls of radius 1 cm stiffness=1e10"
-        )
-    if wish.model_error is not None and not wish.elastic:
-        raise ValueError(
-            f"model_error = {wish.model_error!r}, {loss}; must be left out unless all are 1: there "
-            "is no theory of balls with losses to measure against"
-        )
-    if wish.bare and not wish.modest:
-        sequential = [row for row in rows("outcome") if row.model == "SequentialCollisions"]
-        errors = [row.model_error for row in sequential if row.model_error is not None]
-        raise ValueError(
-            f"wanted = {wish.wanted[0]!r}; needs ratios or stiffness: restitution alone does not "
-            f"determine the impact of {len(chain)} balls.  Give stiffness=1 if all contacts are "
-            "equal spheres, or the ratios that were measured.  SequentialCollisions, which needs "
-            f"neither, was off by {min(errors):.2g} to {max(errors):.2g} of the closing speed on "
-            "the elastic chains measured; it may tell the 'fastest ball'"
-        )
-
-
-_Maker = Callable[[Measured], Model]
-
-
-def _models(wish: _Wish) -> Iterator[tuple[str, type, _Maker]]:
-    """Yield what is known allows: a group of the table, the model, how a row's setting makes it."""
-    ratios, stiffness = wish.ratios, wish.stiffness
-    if ratios is not None or len(wish.chain) == 2:
-        yield "event", ImpulseCorrelation, lambda _: ratios or ImpulseCorrelation(0.0)
-    if stiffness is not None and wish.elastic:
-        yield "springs", SpringChain, lambda row: SpringChain(stiffness, accuracy=row.parameter)
+    elastic = bool((chain.restitution == 1.0).all())
+    timed = next((name for name in wanted if name in ("forces", "times")), "")
+    # Nothing but restitution is known, and it is not enough; and where that may do all the same.
+    bare = ratios is None and stiffness is None and len(chain) > 2
+    modest = set(wanted) == {"fastest ball"} or model_error is not None
+    errors = [row.model_error for row in rows("outcome") if row.model_error is not None]
+    refused = {
+        f"velocities = {chain.velocities.tolist()}; no balls approach: no impact":
+            not (chain.closing_speeds > 0.0).any(),
+        f"wanted = {timed!r}, {loss}; must be 1: forces and times come from springs, which lose "
+        "nothing; with losses, ask for impulses":
+            timed and not elastic,
+        f"wanted = {timed!r}; needs stiffness: rigid models have impulses alone; give that of the "
+        "contacts in N/m^(3/2), for two steel balls of radius 1 cm stiffness=1e10":
+            timed and stiffness is None,
+        f"model_error = {model_error!r}, {loss}; must be left out unless all are 1: there is no "
+        "theory of balls with losses to measure against":
+            model_error is not None and not elastic,
+        f"wanted = {wanted[0]!r}; needs ratios or stiffness: restitution alone does not determine "
+        f"the impact of {len(chain)} balls.  Give stiffness=1 if all contacts are equal spheres, "
+        "or the ratios that were measured.  SequentialCollisions, which needs neither, was off by "
+        f"{min(errors):.2g} to {max(errors):.2g} of the closing speed on the elastic chains "
+        "measured; it may tell the 'fastest ball'":
+            bare and not modest,
+    }  # fmt: skip
+    for words, wrong in refused.items():
+        if wrong:
+            raise ValueError(words)
+    models: dict[str, Callable[[Measured], Model]] = {}
+    if ratios is not None or len(chain) == 2:
+        models["event"] = lambda _: ratios or ImpulseCorrelation(0.0)
+    if stiffness is not None and elastic:
+        models["springs"] = lambda row: SpringChain(stiffness, accuracy=row.parameter)
     elif stiffness is not None:
-        yield (
-            "energy",
-            EnergyDistribution,
-            lambda row: EnergyDistribution(stiffness, rtol=row.parameter),
-        )
-    judged = wish.elastic and wish.like and measured_chain(wish.chain)
-    if wish.modest and (wish.bare or judged):
-        yield "outcome", SequentialCollisions, lambda _: SequentialCollisions()
+        models["energy"] = lambda row: EnergyDistribution(stiffness, rtol=row.parameter)
+    if modest and (bare or (elastic and wish.like and measured_chain(chain))):
+        models["outcome"] = lambda _: SequentialCollisions()
+    return models
 
 
 def _best(
-    group: str, name: str, make: _Maker, wish: _Wish
+    group: str, make: Callable[[Measured], Model], wish: _Wish
 ) -> tuple[tuple[bool, float], Recommendation]:
     """Return a model in its cheapest setting that fulfils a wish, after what orders models."""
+    chain, name = wish.chain, LAWS[group].partition(",")[0]
     gives = {"velocities" if one == "fastest ball" else one for one in wish.wanted}
     found = tuple(
-        row for row in rows(group) if row.model.startswith(name) and gives <= row.gives
-        and (wish.impacts > 1 or "batch" not in row.setting)
+        row for row in rows(group)
+        if gives <= row.gives and (wish.impacts > 1 or "batch" not in row.setting)
     )  # fmt: skip
     if not found:
         raise _Unfit(f"wanted = {wish.wanted!r}", f"{name} has no {' and '.join(sorted(gives))}")
     # What a model refuses it refuses now: the same balls at rest cost it no work.
-    chain = wish.chain
     make(found[0]).solve(Chain(chain.masses, 0.0 * chain.velocities, chain.restitution))
     where, settings = evidence(found, wish.like, wish.ratios if group == "event" else None)
     row = _cheapest(where, settings, name, wish.accuracy)
     apart = row.model_error if where == "here" else None
-    if group == "springs" or (len(chain) == 2 and wish.elastic):
+    two = len(chain) == 2
+    if group == "springs" or (two and chain.restitution[0] == 1.0):
         apart = 0.0
     if wish.model_error is not None and (apart is None or apart > wish.model_error):
         known = "was not measured here" if apart is None else f"is {apart:.2g}"
         raise _Unfit(f"model_error = {wish.model_error!r}", f"that of {name} {known}")
     slow = None
     if row.setting.startswith("compiled"):  # the same in the event loop as it stands
-        plain = tuple(one for one in rows("event", "plain") if one.model == "ImpulseCorrelation")
-        there, (other,) = evidence(plain, wish.like, wish.ratios)
+        there, (other,) = evidence(rows("event", "plain"), wish.like, wish.ratios)
         slow = None if there == "elsewhere" else other.time_ratio * unit_time()
     measured = where != "elsewhere"
     kind = "timed" if group == "springs" and {"forces", "times"} & set(wish.wanted) else group
-    kind = "two balls" if group == "event" and len(chain) == 2 else kind
     return (not measured, row.time_ratio), Recommendation(
         model=make(row),
         setting=row.setting,
@@ -269,21 +232,23 @@ def _best(
         seconds=row.time_ratio * unit_time() if measured else None,
         plain_seconds=slow,
         measured_on=row.chains if measured else (),
-        reason=_REASONS[kind],
+        reason=_REASONS["two balls" if group == "event" and two else kind],
     )
 
 
 def _cheapest(where: str, settings: list[Measured], name: str, accuracy: float) -> Measured:
     """Return the cheapest setting that has the accuracy."""
-    margin = 1.0 if where == "here" else _MARGIN
-    errors = [row.numerical_error or 0.0 for row in settings]
-    fit = [row for row, error in zip(settings, errors, strict=True) if margin * error <= accuracy]
+    # A chain among the measured ones can be worse than each of them, by a few times.
+    margin, stricter = 1.0, ""
+    if where != "here":
+        margin, stricter = 10.0, "; on other chains it must be 10 times better"
+    errors = [margin * (row.numerical_error or 0.0) for row in settings]
+    fit = [row for row, error in zip(settings, errors, strict=True) if error <= accuracy]
     if fit:
         return min(fit, key=lambda row: row.time_ratio)
     least = settings[int(np.argmin(errors))]
-    stricter = "" if where == "here" else f"; on other chains it must be {_MARGIN:g} times better"
     raise _Unfit(
         f"accuracy = {accuracy!r}",
-        f"the least numerical error of {name} measured is {min(errors):.2g} "
-        f"({', '.join(least.chains)}){stricter}: ask for {1.05 * margin * min(errors):.1e} or more",
+        f"the least numerical error of {name} measured is {least.numerical_error:.2g} "
+        f"({', '.join(least.chains)}){stricter}: ask for {1.05 * min(errors):.1e} or more",
     )

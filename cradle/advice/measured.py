@@ -1,6 +1,8 @@
 """What was measured of the models: errors and times, on which chains; read from the data.
 
 The table is `benchmarks.csv`, the one that the book shows ("Which model does your scene need?").
+No number is an estimate: it was measured on this very chain, or is the worst of those measured on
+chains around it, or there is none.
 """
 
 from __future__ import annotations
@@ -16,27 +18,25 @@ from cradle.models.correlation import ImpulseCorrelation
 from cradle.runtime import compile as runtime
 from cradle.tables import paper_chain, table_rows
 
-__all__ = ["Measured", "evidence", "measured_chain", "rows", "unit_time"]
+#: The groups of the table that are chosen from, and in each the model.
+LAWS = {
+    "event": "ImpulseCorrelation",
+    "springs": "SpringChain, Hertz",
+    "energy": "EnergyDistribution, Hertz",
+    "outcome": "SequentialCollisions",
+}
 
 
 class Measured(NamedTuple):
-    """One model in one setting, on one chain or at its worst on several."""
+    """One model in one setting, on one chain or at its worst on several; None: not measured."""
 
-    model: str
     setting: str
-    #: The setting as a number.
-    parameter: float
-    #: Names of the chains.
-    chains: tuple[str, ...]
-    #: Largest distance of a velocity from the exact answer of the same model, over the closing
-    #: speed; None where the table has none.
-    numerical_error: float | None
-    #: The same from Hertz springs.
-    model_error: float | None
-    #: Time of an impact in the table's unit.
-    time_ratio: float
-    #: What the model gives: "velocities", "impulses", "path", "forces", "times".
-    gives: frozenset[str]
+    parameter: float  # the setting as a number
+    chains: tuple[str, ...]  # their names
+    numerical_error: float | None  # of velocities, from the exact answer, over the closing speed
+    model_error: float | None  # the same from Hertz springs
+    time_ratio: float  # time of an impact in the table's unit
+    gives: frozenset[str]  # "velocities", "impulses", "path", "forces", "times"
 
 
 @cache
@@ -51,18 +51,18 @@ def unit_time() -> float:
 def rows(group: str, kernel: str = "") -> tuple[Measured, ...]:
     """Return the rows of a group, in settings that this installation and its calls have."""
     kernel = kernel or ("compiled" if runtime.available() else "plain")
-    path, batch = f"{kernel}, one call with its path", f"{kernel}, batch"
+    calls = f"{kernel}, one call with its path", f"{kernel}, batch"
     found = []
     for line in table_rows("benchmarks.csv"):
         if line["model"] == "two balls" and line["setting"].startswith("all: "):
             # A batch of two balls, by `post_impact_velocities`.
-            line = line | {"group": "event", "model": "ImpulseCorrelation", "setting": batch}
-        there = group != "event" or line["setting"] in (path, batch)
-        if line["group"] == group and there and not line["model"].endswith("linear"):
+            line = line | {"group": "event", "model": LAWS["event"], "setting": "compiled, batch"}
+        there = group != "event" or line["setting"] in calls
+        if (line["group"], line["model"]) == (group, LAWS[group]) and there:
             error = line["numerical_error"]
             apart = line["model_error"] if line["model_reference"].startswith("Hertz") else ""
             found.append(Measured(
-                line["model"], line["setting"], float(line["parameter"] or 0.0), (line["chain"],),
+                line["setting"], float(line["parameter"] or 0.0), (line["chain"],),
                 float(error) if error else None, float(apart) if apart else None,
                 float(line["time_ratio"]), frozenset(line["gives"].split(", ")),
             ))  # fmt: skip
@@ -83,7 +83,7 @@ def evidence(
     every = list(settings.values())
     if chain is not None:
         name = measured_chain(chain, ratios)
-        if here := [row for same in every for row in same if row.chains == (name,)]:
+        if here := [row for row in rows if row.chains == (name,)]:
             return "here", here
         if around := [_worst(found) for same in every if (found := _around(same, chain))]:
             return "around", around
@@ -102,12 +102,9 @@ def _worst(rows: list[Measured]) -> Measured:
 @cache
 def _chains() -> dict[str, tuple[Chain, ImpulseCorrelation]]:
     """Return the measured chains that are not random, with their ratios."""
-    _, same = paper_chain("AAA")
+    same = ImpulseCorrelation(np.ravel(paper_chain("AAA")[1].forward)[0])
     elastic = {"three equal": [1.0] * 3, "five equal": [1.0] * 5, "light middle": [1.0, 0.01, 1.0]}
-    chains = {
-        name: (Chain(m, np.eye(len(m))[0]), ImpulseCorrelation(np.ravel(same.forward)[0]))
-        for name, m in elastic.items()
-    }
+    chains = {name: (Chain(m, np.eye(len(m))[0]), same) for name, m in elastic.items()}
     return chains | {"ABCCA": paper_chain("ABCCA", excess="saturate")}
 
 
@@ -126,11 +123,11 @@ def _figures(chain: Chain, ratios: ImpulseCorrelation | None = None) -> Vector:
 
     The striker is first; of any other chain there are none.
     """
-    m, e, u = chain.masses, chain.restitution, chain.closing_speeds
+    m, e, u, n = chain.masses, chain.restitution, chain.closing_speeds, len(chain)
     laws = []
     if ratios is not None:
         both = ratios.forward, ratios.forward if ratios.backward is None else ratios.backward
-        laws = [row_of("ratios", kept, len(m) - 2, len(m)) for kept in both]
+        laws = [row_of("ratios", kept, n - 2, n) for kept in both]
     if u[-1] > 0.0 and not u[:-1].any():
         m, e, u, laws = m[::-1], e[::-1], u[::-1], [part[::-1] for part in laws[::-1]]
     if not u[0] > 0.0 or u[1:].any():

@@ -17,10 +17,8 @@ class Recommendation:
 
     Attributes
     ----------
-    model, call : Model, str
-        Ready for `collide`, and what to call.
-    setting : str
-        The row of the measured table: integrator and tolerance, one call or a batch.
+    model, call, setting : Model, str, str
+        Ready for `collide`; what to call; integrator and tolerance, one call or a batch.
     numerical_error : float or None
         Largest distance of a velocity from the exact answer of the same model on the chains of
         `measured_on`, as a part of the closing speed.  Another chain may have a few times as much;
@@ -30,11 +28,9 @@ class Recommendation:
         says otherwise); no setting makes it smaller.  With losses there is no such theory: None.
     seconds, plain_seconds : float or None
         Time of one impact on the machine that measured, to a factor of two, once the event loop is
-        compiled, if the model has one; and of one call in plain Python, as small work runs: nothing
-        is compiled before the work pays for it.
+        compiled, if the model has one; and of one call in plain Python, as small work runs.
     measured_on : tuple of str
-        The chains that these numbers come from: this very chain, or those around it, of which the
-        worst counts.  Empty: none.
+        The chains of these numbers: this very one, or those around it, of which the worst counts.
     reason : str
         Why this model.
 
@@ -61,26 +57,25 @@ class Recommendation:
         def number(value: float | None) -> str:
             return "not measured" if value is None else f"{value:.1e}" if value else "0"
 
-        slower = ""
+        time = "not measured" if self.seconds is None else lasting(self.seconds)
         if self.plain_seconds is not None:
-            slower = f" compiled; {lasting(self.plain_seconds)} in plain Python, as small work runs"
+            slow = lasting(self.plain_seconds)
+            time += f" compiled; {slow} in plain Python, as small work runs"
         return {
             "setting": self.setting,
             "call": self.call,
             "numerical error": number(self.numerical_error),
             "model error": number(self.model_error),
-            "time": "not measured" if self.seconds is None else lasting(self.seconds) + slower,
+            "time": time,
             "measured on": "; ".join(self.measured_on) or "nothing like this",
             "reason": self.reason,
         }
 
     def __repr__(self) -> str:
-        """Return the model and a line for each thing to know."""
         lines = [f"  {title + ':':<17}{text}" for title, text in self._lines().items()]
         return "\n".join([f"Recommendation: {made(self.model)}", *lines])
 
     def _repr_html_(self) -> str:
-        """Return a table for a notebook."""
         lines = {"model": made(self.model), **self._lines()}.items()
         style = ' style="overflow-wrap: anywhere"'  # on a phone, too, nothing is cut
         rows = [f"<tr><th>{escape(a)}</th><td{style}>{escape(b)}</td></tr>" for a, b in lines]
