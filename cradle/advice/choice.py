@@ -94,11 +94,6 @@ def recommend(
     >>> advice = recommend(chain, ("forces", "times"), accuracy=1e-3, stiffness=1e10)
     >>> advice.numerical_error <= 1e-3, advice.model_error, advice.measured_on
     (True, 0.0, ('three equal',))
-    >>> recommend(Chain([1, 1, 1], [1, 0, 0], 0.9), "forces", stiffness=1e10)
-    Traceback (most recent call last):
-    ...
-    ValueError: wanted = 'forces', restitution[0] = 0.9; must be 1: forces and times come from \
-springs, which lose nothing; with losses, ask for impulses
     """
     must_be(Chain, "chain", chain)
     one_number("accuracy", accuracy, "must lie in [1e-15, 1]", 1e-15, 1.0)
@@ -111,7 +106,8 @@ springs, which lose nothing; with losses, ask for impulses
         stiffness = SpringChain(stiffness).stiffness
     several = isinstance(wanted, Collection) and not isinstance(wanted, (str, np.ndarray))
     wishes = tuple(one_of("wanted", x, WANTED) for x in (several and [*wanted]) or [wanted])
-    wish = _Wish(chain, wishes, accuracy, model_error, impacts, ratios, stiffness)
+    like = chain if len({*np.ravel(stiffness or 1.0)}) == 1 else None
+    wish = _Wish(chain, wishes, accuracy, model_error, impacts, ratios, stiffness, like)
     found = []
     failures: dict[str, list[str]] = {}
     for group, make in _models(wish).items():
@@ -138,11 +134,7 @@ class _Wish(NamedTuple):
     impacts: int
     ratios: ImpulseCorrelation | None
     stiffness: float | Sequence[float] | None
-
-    @property
-    def like(self) -> Chain | None:
-        """The chain, if its contacts are equal springs, as all that were measured."""
-        return self.chain if len(set(np.ravel(self.stiffness or 1.0))) == 1 else None
+    like: Chain | None  # the chain, if its contacts are equal springs, as all that were measured
 
 
 class _Unfit(Exception):
@@ -151,7 +143,7 @@ class _Unfit(Exception):
 
 def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
     """Return what is known allows, by group: how a row makes its model.  Or nothing can do it."""
-    chain, wanted, _, model_error, _, ratios, stiffness = wish
+    chain, wanted, _, model_error, _, ratios, stiffness, like = wish
     lossy = int(np.argmin(chain.restitution))
     loss = f"restitution[{lossy}] = {float(chain.restitution[lossy])!r}"
     elastic = bool((chain.restitution == 1.0).all())
@@ -189,7 +181,7 @@ def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
         models["springs"] = lambda row: SpringChain(stiffness, accuracy=row.parameter)
     elif stiffness is not None:
         models["energy"] = lambda row: EnergyDistribution(stiffness, rtol=row.parameter)
-    if modest and (bare or (elastic and wish.like and measured_chain(chain))):
+    if modest and (bare or (elastic and like and measured_chain(chain))):
         models["outcome"] = lambda _: SequentialCollisions()
     return models
 
@@ -217,10 +209,6 @@ def _best(
     if wish.model_error is not None and (apart is None or apart > wish.model_error):
         known = "was not measured here" if apart is None else f"is {apart:.2g}"
         raise _Unfit(f"model_error = {wish.model_error!r}", f"that of {name} {known}")
-    slow = None
-    if row.setting.startswith("compiled"):  # the same in the event loop as it stands
-        there, (other,) = evidence(rows("event", "plain"), wish.like, wish.ratios)
-        slow = None if there == "elsewhere" else other.time_ratio * unit_time()
     measured = where != "elsewhere"
     kind = "timed" if group == "springs" and {"forces", "times"} & set(wish.wanted) else group
     return (not measured, row.time_ratio), Recommendation(
@@ -230,7 +218,6 @@ def _best(
         numerical_error=row.numerical_error if measured else None,
         model_error=apart,
         seconds=row.time_ratio * unit_time() if measured else None,
-        plain_seconds=slow,
         measured_on=row.chains if measured else (),
         reason=_REASONS["two balls" if group == "event" and two else kind],
     )

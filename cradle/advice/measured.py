@@ -48,9 +48,9 @@ def unit_time() -> float:
 
 
 @cache
-def rows(group: str, kernel: str = "") -> tuple[Measured, ...]:
+def rows(group: str) -> tuple[Measured, ...]:
     """Return the rows of a group, in settings that this installation and its calls have."""
-    kernel = kernel or ("compiled" if runtime.available() else "plain")
+    kernel = "compiled" if runtime.available() else "plain"
     calls = f"{kernel}, one call with its path", f"{kernel}, batch"
     found = []
     for line in table_rows("benchmarks.csv"):

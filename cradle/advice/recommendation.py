@@ -26,9 +26,9 @@ class Recommendation:
     model_error : float or None
         The same from Hertz springs, the theory of elastic spheres (equal ones, unless `stiffness`
         says otherwise); no setting makes it smaller.  With losses there is no such theory: None.
-    seconds, plain_seconds : float or None
+    seconds : float or None
         Time of one impact on the machine that measured, to a factor of two, once the event loop is
-        compiled, if the model has one; and of one call in plain Python, as small work runs.
+        compiled, if the model has one.
     measured_on : tuple of str
         The chains of these numbers: this very one, or those around it, of which the worst counts.
     reason : str
@@ -47,7 +47,6 @@ class Recommendation:
     numerical_error: float | None
     model_error: float | None
     seconds: float | None
-    plain_seconds: float | None
     measured_on: tuple[str, ...]
     reason: str
 
@@ -58,9 +57,8 @@ class Recommendation:
             return "not measured" if value is None else f"{value:.1e}" if value else "0"
 
         time = "not measured" if self.seconds is None else lasting(self.seconds)
-        if self.plain_seconds is not None:
-            slow = lasting(self.plain_seconds)
-            time += f" compiled; {slow} in plain Python, as small work runs"
+        if self.seconds is not None and self.setting.startswith("compiled"):
+            time += " once compiled; small work runs in plain Python, many times slower"
         return {
             "setting": self.setting,
             "call": self.call,
