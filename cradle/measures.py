@@ -19,9 +19,6 @@ from cradle.trace import Event, Trace
 #: Pattern by the number of balls that bounce back: none, the first, the first two.
 _PATTERNS = np.array([2, 1, 3])
 
-#: Ratios that are tried to bracket an effective ratio.
-_RATIOS = 257
-
 _Three = tuple[float, float, float]
 
 
@@ -168,15 +165,16 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     """
     tolerance = one_number("tolerance", tolerance, "must be at least 0", 0.0)
     # SciPy is slow to import, and only this measure needs it.
-    from scipy.optimize import brentq, minimize_scalar
+    from scipy.optimize import brentq
 
     chain, target = must_be(Trace, "trace", trace).chain, trace.velocities
     u = chain.closing_speeds
     if len(chain) != 3:
         raise ValueError(f"trace has {len(chain)} balls; an effective ratio is that of three")
     if not (u > 0.0).any():
-        what = f"closing_speeds = {u.tolist()}"
-        raise ValueError(f"{what}; any ratio fits balls that do not approach")
+        raise ValueError(
+            f"closing_speeds = {u.tolist()}; any ratio fits balls that do not approach"
+        )
     # The leftmost approaching contact drives (forward), or the right one alone (backward).
     bounds = largest_ratios(chain.masses, np.zeros(1), np.zeros(1))
     bound = float(bounds[0 if u[0] > 0.0 else 1][0])
@@ -188,7 +186,7 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
         )
         return np.asarray((after - target) / u.max())
 
-    grid = np.linspace(0.0, bound, _RATIOS)
+    grid = np.linspace(0.0, bound, 257)
     missed = distances(grid)
     ball = int(np.argmax(np.ptp(missed, axis=0)))  # the one that tells most
     side = np.sign(missed[:, ball])
@@ -203,15 +201,12 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
         # The smallest that fits; but an end that fits beside a root gives way to the root.
         beside = candidates <= candidates[far <= tolerance].min() + grid[1]
         return float(candidates[np.argmin(np.where(beside, far, np.inf))])
-    near = int(np.argmin(np.abs(missed).max(axis=1)))
-    best = minimize_scalar(
-        lambda ratio: float(np.abs(distances(ratio)).max()),
-        bounds=(grid[max(near - 1, 0)], grid[min(near + 1, _RATIOS - 1)]),
-        method="bounded",
-    )
+    near = np.abs(missed).max(axis=1).argmin()
+    finer = np.linspace(grid[max(near - 1, 0)], grid[min(near + 1, 256)], 257)
+    misses = np.abs(distances(finer)).max(axis=1)
     raise ValueError(
         f"no ratio in [0, {bound:.6g}] gives the velocities {target.tolist()}; the nearest, "
-        f"{best.x:.6g}, misses by {best.fun:.3g} of the fastest closing speed"
+        f"{finer[misses.argmin()]:.6g}, misses by {misses.min():.3g} of the fastest closing speed"
     )
 
 
