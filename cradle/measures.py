@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +16,6 @@ from cradle.models import Model, collide
 from cradle.models.batch import post_impact_velocities
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.trace import Event, Trace
-
-#: Pattern by the number of balls that bounce back: none, the first, the first two.
-_PATTERNS = np.array([2, 1, 3])
 
 _Three = tuple[float, float, float]
 
@@ -49,18 +47,16 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
     if v.shape[-1:] != (3,):
         raise ValueError(f"velocities has shape {v.shape}; must be (..., 3): those of three balls")
     checked("velocities of ball 3", v[..., 2], "must be at least 0: ball 1 came from the left", 0.0)
-    return np.asarray(_PATTERNS[np.count_nonzero(v < 0.0, axis=-1)])
+    back = np.count_nonzero(v < 0.0, axis=-1)  # none, the first, or the first two
+    return np.asarray(np.array([2, 1, 3])[back])
 
 
 class Condition(NamedTuple):
     """How much an outcome amplifies relative changes of its inputs; see `condition_number`."""
 
-    #: Relative change of the outcome over relative change of the inputs.
-    number: float
-    #: The input that contributes most.
-    most: str
-    #: Whether the sequence of events stayed the same throughout.
-    same_events: bool
+    number: float  # relative change of the outcome over relative change of the inputs
+    most: str  # the input that contributes most
+    same_events: bool  # whether the sequence of events stayed the same throughout
 
 
 def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Condition:
@@ -103,27 +99,23 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
         both = model.forward, model.forward if model.backward is None else model.backward
         ratios["forward"], ratios["backward"] = (row_of("ratios", x, n - 2, n) for x in both)
     law: Any = model
-    sequence = _events_at_balls(base)
-    total, largest, most, same = 0.0, -1.0, "", True
+    sequence, same, changes = _events_at_balls(base), True, dict[str, float]()
     for name, values in (own | ratios).items():
-        for k in np.flatnonzero(values):
-            change = 0.0
-            for factor in (1.0 - step, 1.0 + step):
-                moved = values.copy()
-                moved[k] *= factor
-                given = own | ratios | {name: moved}
-                try:
-                    changed = replace(law, **{n: given[n] for n in ratios}) if ratios else law
-                    trace = collide(Chain(*(given[n] for n in own)), changed)
-                except ValueError:
-                    continue
-                change = max(change, float(np.abs(trace.velocities - base.velocities).max()))
-                same = same and _events_at_balls(trace) == sequence
-            total += change
-            if change > largest:
-                largest, most = change, f"{name}[{k}]"
+        for k, factor in product(np.flatnonzero(values), (1.0 - step, 1.0 + step)):
+            moved = values.copy()
+            moved[k] *= factor
+            given = own | ratios | {name: moved}
+            try:
+                changed = replace(law, **{n: given[n] for n in ratios}) if ratios else law
+                trace = collide(Chain(*(given[n] for n in own)), changed)
+            except ValueError:
+                continue
+            change = float(np.abs(trace.velocities - base.velocities).max())
+            changes[f"{name}[{k}]"] = max(change, changes.get(f"{name}[{k}]", 0.0))
+            same = same and _events_at_balls(trace) == sequence
     speed = float(np.abs(base.velocities).max()) or 1.0
-    return Condition(total / speed / step, most, same)
+    most = max(changes, key=changes.__getitem__)
+    return Condition(sum(changes.values()) / speed / step, most, same)
 
 
 def _events_at_balls(trace: Trace) -> list[list[Event]]:
