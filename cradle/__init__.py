@@ -6,17 +6,15 @@ Every impact model is a rule from a chain of balls to a path of contact impulses
 
 Read `cradle.textbook` first: the rules of an impact in 250 lines.  Then follow the arrows:
 
-- `cradle.chain`, the balls before the impact; `cradle.models`, a file for each model, and the verb
-  `collide`; `cradle.trace`, what happened; `cradle.measures`, what is read off it;
-  `cradle.pictures`, what is drawn (matplotlib, loaded only when asked for).
-- What the paper gives: `cradle.tables`, its balls and chains; `cradle.closed_form`, its formulas.
-- Many impacts: `cradle.swinging`, the pendulums between them; `cradle.row`, a physics engine.
-- Your own cradle: `cradle.fit`, ratios and restitution from measurements; `cradle.advice`, which
-  model a scene needs; `cradle.command`, all of it from the command line, `python -m cradle`.
-- Below: `cradle.kernel`, the same rules, fast; `cradle.runtime` compiles them and feeds them;
-  `cradle.input`, what is asked of input, and the words of a refusal.
-
-The distribution is called cradle-companion; its version is `cradle.__version__`.
+- `chain`, the balls before the impact; `models`, a file for each model, and the verb `collide`;
+  `trace`, what happened; `measures`, what is read off it; `pictures`, what is drawn (matplotlib,
+  loaded only when asked for).
+- What the paper gives: `tables`, its balls and chains; `closed_form`, its formulas.
+- Many impacts: `swinging`, the pendulums between them; `row`, a physics engine.
+- Your own cradle: `fit`, ratios and restitution from measurements; `advice`, which model a scene
+  needs; `command`, all of it from the command line, `python -m cradle`.
+- Below: `kernel`, the same rules, fast; `runtime` compiles them and feeds them; `input`, what is
+  asked of input, and the words of a refusal.
 """
 
 from cradle.advice import Recommendation, recommend
@@ -46,7 +44,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> str:
-    """Return the version of the installed distribution; looked up when it is asked for."""
+    """Return `__version__`, that of the distribution cradle-companion, when it is asked for."""
     if name != "__version__":
         raise AttributeError(f"module 'cradle' has no attribute {name!r}")
     from importlib.metadata import version

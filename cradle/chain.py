@@ -21,7 +21,6 @@ from cradle.kernel.state import LIMITS
 
 
 def _within(values: Vector, low: float, high: float) -> bool:
-    """Tell whether all values are usual ones, of which nothing need be asked."""
     return all(low <= value <= high for value in values.ravel().tolist())
 
 
@@ -29,8 +28,8 @@ def _within(values: Vector, low: float, high: float) -> bool:
 class Chain:
     """A straight chain of balls at the instant before an impact.
 
-    Ball i has velocity ``velocities[i]``, positive to the right; contact c joins balls c and
-    c + 1.  Contacts whose balls do not separate (closing speed at or above zero) touch.
+    Velocities are positive to the right; contact c joins balls c and c + 1.  Contacts whose balls
+    do not separate (closing speed at or above zero) touch.
 
     Parameters
     ----------
@@ -60,19 +59,16 @@ class Chain:
     ) -> None:
         m, v = numbers("masses", masses), numbers("velocities", velocities)
         e = numbers("restitution", restitution)
+        # Of usual values nothing more need be asked.
         usual = _within(m, 1e-70, 1e70) and _within(v, -1e70, 1e70)
         if not (usual and _within(e, LIMITS.least_restitution, 1.0)):
             m, v, e = checked_masses(m), checked("velocities", v), checked_restitution(e)
         if m.ndim != 1 or m.size < 2:
-            raise ValueError(
-                f"masses has shape {m.shape}; a chain needs (N,) with N >= 2: "
-                "one row of two or more numbers"
-            )
+            rule = "a chain needs (N,) with N >= 2: one row of two or more numbers"
+            raise ValueError(f"masses has shape {m.shape}; {rule}")
         if v.shape != m.shape:
-            raise ValueError(
-                f"velocities has shape {v.shape}; {m.size} masses need ({m.size},): "
-                f"one velocity for each of {m.size} balls"
-            )
+            rule = f"{m.size} masses need ({m.size},): one velocity for each of {m.size} balls"
+            raise ValueError(f"velocities has shape {v.shape}; {rule}")
         if e.shape not in ((), (m.size - 1,)):
             contacts = "1 contact" if m.size == 2 else f"{m.size - 1} contacts"
             raise ValueError(

@@ -1,8 +1,7 @@
-"""What the paper gives in closed form: one collision per contact, largest ratios, pattern lines.
+"""What the paper gives in closed form (Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583).
 
-Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583.  Notation of its equations: balls 1, 2, 3
-with masses m1, m2, m3; contact impulses tau_2 (balls 1-2) and tau_3 (balls 2-3), restitution e2 and
-e3; alpha is the forward ratio at ball 2.
+Balls 1, 2, 3 have masses m1, m2, m3, contacts 1-2 and 2-3 the impulses tau_2 and tau_3 and the
+restitution e2 and e3; alpha is the forward ratio at ball 2.
 """
 
 from __future__ import annotations
@@ -52,8 +51,9 @@ def three_balls(
 ) -> Vector:
     """Return the velocities after one collision per contact of three balls, m/s (Eqs. 22-33).
 
-    Ranges are not checked: outside them the result, shape (..., 3), has no meaning.  It is NaN
-    where the radical of Eq. 30 is not real.  `one_collision_each` tells where it applies.
+    The result, shape (..., 3), is NaN where the radical of Eq. 30 is not real, and
+    `one_collision_each` tells where it applies.  What is no number or has a wrong shape is a
+    `ValueError`; ranges are not checked.
 
     Parameters
     ----------
@@ -61,11 +61,6 @@ def three_balls(
         kg, above 0, and m/s, with v1 > v2 >= v3.
     restitution, ratio : array_like, shapes (..., 2) and (...)
         e2 and e3, and the forward Impulse Correlation Ratio alpha, 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        If a value is no number, or a shape is wrong.
 
     Examples
     --------
@@ -97,9 +92,8 @@ def one_collision_each(
 ) -> NDArray[np.bool_]:
     """Tell where three balls collide once per contact, so that Eqs. 30-33 hold (Eqs. 34, 43, 44).
 
-    Two conditions: contact 2-3 still closes when contact 1-2 ends, and ball 2 does not fall back
-    on ball 1 (for v2 = v3 = 0 the second is Eq. 44).  Arguments and errors are those of
-    `three_balls`; the answer, shape (...), is False where its result is NaN.
+    Contact 2-3 must still close when contact 1-2 ends, and ball 2 not fall back on ball 1.
+    Arguments and errors are those of `three_balls`; the answer, shape (...), is False for its NaN.
 
     Examples
     --------
@@ -114,9 +108,9 @@ def largest_ratios(
 ) -> tuple[Vector, Vector]:
     """Largest admissible ratios of a chain, forward (Eqs. 34, 53) and backward (mirrored).
 
-    A contact cannot pull: a larger ratio would open a driven contact that has absorbed nothing.
+    A larger ratio would open a driven contact that has absorbed nothing, but a contact cannot pull.
     The bound at a ball needs the ratio of the next ball in the direction of the drive; there is
-    none at the last, where the bound is Eq. 34.
+    none at the last, where the bound is Eq. 34.  Wrong values and shapes are a `ValueError`.
 
     Parameters
     ----------
@@ -124,11 +118,6 @@ def largest_ratios(
         kg, above 0; N >= 2.
     forward, backward : array_like, shape (..., N - 2)
         Ratios at the interior balls, 0 to 1; the bounds come back in the same shapes.
-
-    Raises
-    ------
-    ValueError
-        If a value or a shape is wrong.
 
     Examples
     --------
@@ -142,10 +131,8 @@ def largest_ratios(
     size = m.shape[-1] - 2
     for name, ratio in (("forward", f), ("backward", b)):
         if ratio.shape[-1:] != (size,):
-            raise ValueError(
-                f"{name} has shape {ratio.shape}; must be (..., {size}) for {size + 2} balls: one "
-                "number for each ball between two others"
-            )
+            rule = f"must be (..., {size}) for {size + 2} balls: one number for each inner ball"
+            raise ValueError(f"{name} has shape {ratio.shape}; {rule}")
 
     def bound(m: Vector, ratio: Vector) -> Vector:
         onward = np.zeros(ratio.shape)

@@ -25,18 +25,9 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
 
     Ball 1 comes from the left and strikes two balls at rest.  In pattern 1 it alone goes back
     (velocity below zero), in pattern 2 no ball does, in pattern 3 balls 1 and 2 do (Ceanga and
-    Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, section 2.5).
-
-    Parameters
-    ----------
-    velocities : array_like, shape (..., 3)
-        Velocities after the impact, m/s; the patterns have the shape (...).
-
-    Raises
-    ------
-    ValueError
-        If there are not three balls, a velocity is not finite, or the last ball goes back: then
-        momentum did not come from the left.
+    Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, section 2.5).  The velocities after the impact have
+    the shape (..., 3), m/s, the patterns (...).  Another shape, a velocity that is not finite and a
+    last ball that goes back are a `ValueError`: then momentum did not come from the left.
 
     Examples
     --------
@@ -62,26 +53,15 @@ class Condition(NamedTuple):
 def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Condition:
     """Measure how much an outcome amplifies relative changes of its inputs.
 
-    Every input in turn, each mass, velocity, restitution and ratio, is moved by the part `step` of
-    itself, up and down, within its range, and the impact is solved again.  The largest change of
-    any velocity counts, relative to the largest speed after the impact; the changes are added over
-    all inputs and divided by `step` (Higham, Accuracy and Stability of Numerical Algorithms, 2002,
-    section 1.6).  A number of 1000 says: inputs known to seven digits give an outcome known to
-    about four.  Where `same_events` is False another sequence of events follows within `step`, and
-    the outcome may jump; ask again with the accuracy of your own inputs as the step.  An edge that
-    only several inputs together reach is not seen.
-
-    Parameters
-    ----------
-    chain, model : Chain, Model
-        As for `collide`; the ratios of `ImpulseCorrelation` are inputs too.
-    step : float
-        Relative change of each input, 1e-12 to 0.1: above the rounding of numbers.
-
-    Raises
-    ------
-    TypeError, ValueError, ImpactNotFinished
-        As `collide`; `ValueError`, too, if `step` is out of its range.
+    Each mass, velocity, restitution and ratio of `ImpulseCorrelation` in turn is moved by the part
+    `step` of itself (1e-12 to 0.1, else a `ValueError`), up and down, within its range, and the
+    impact is solved again, with the errors of `collide`.  The largest change of any velocity
+    counts, relative to the largest speed after the impact; the changes are added over all inputs
+    and divided by `step` (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section
+    1.6).  A number of 1000 says: inputs known to seven digits give an outcome known to about four.
+    Where `same_events` is False another sequence of events follows within `step`, and the outcome
+    may jump; ask again with the accuracy of your own inputs as the step.  An edge that only several
+    inputs together reach is not seen.
 
     Examples
     --------
@@ -133,21 +113,10 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
 
     It lies between 0 and its bound (Eq. 34) and acts in both directions, as in
     `ImpulseCorrelation(ratio)`, held at its bound where one is smaller.  If several give the
-    outcome, it is the smallest.  Outcomes that lose no energy differ by one number, so that one
-    ratio often suffices; with losses there is in general none.
-
-    Parameters
-    ----------
-    trace : Trace
-        An impact of three balls, by any model.
-    tolerance : float
-        How far velocities may be from those of the ratio, as a part of the fastest closing speed.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is wrong, there are not three balls, none approach, or no ratio gives the
-        outcome: then the message has the one that comes nearest.
+    outcome within `tolerance`, as a part of the fastest closing speed, it is the smallest.
+    Outcomes that lose no energy differ by one number, so that one ratio often suffices; with losses
+    there is in general none, and the `ValueError` names the one that comes nearest.  Not three
+    balls, and none that approach, are a `ValueError` too.
 
     Examples
     --------
@@ -215,15 +184,10 @@ def conserving_outcomes(
     Parameters
     ----------
     masses, velocities : array_like, shape (3,)
-        kg, and m/s before the impact.
+        kg, and m/s before the impact; others are a `ValueError`, as an angle off the arc is.
     angles : array_like, shape (K,), optional
         Angles on the arc, rad; 181 from end to end if left out.  They come back, with the
         velocities there, shape (K, 3).
-
-    Raises
-    ------
-    ValueError
-        If there are not three balls, a value is wrong, or an angle is off the arc.
 
     Examples
     --------
@@ -265,10 +229,10 @@ def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
 
 
 def _relative(masses: ArrayLike, velocities: ArrayLike) -> tuple[_Three, _Three, Vector]:
-    """Return what describes three balls.
+    """Return masses in units in which no sum overflows, relative velocities, and two roots.
 
-    Their masses, in units in which no sum overflows; the velocities of ball 2 from ball 1, of ball
-    3 from these two, and of these two; the roots of the reduced masses of the first two.
+    Velocities are those of ball 2 from ball 1, of ball 3 from these two, and of these two; the
+    roots are of the reduced masses of the first two.
     """
     chain = Chain(masses, velocities)
     if len(chain) != 3:

@@ -32,13 +32,7 @@ __all__ = [
 
 
 def data_folder() -> Traversable:
-    """Return the folder of the data files: inside the installed package, or beside it.
-
-    Examples
-    --------
-    >>> (data_folder() / "ratios.csv").is_file()
-    True
-    """
+    """Return the folder of the data files: inside the installed package, or beside it."""
     from importlib.resources import files
 
     installed = files("cradle") / "data"
@@ -99,8 +93,7 @@ def restitution_table() -> pd.DataFrame:
 def ratio_table() -> pd.DataFrame:
     """Return Table 2, the Impulse Correlation Ratios of all triplets, as a DataFrame of 64 rows.
 
-    The columns are ``triplet``, ``ratio``, ``bound``, the largest ratio that three balls admit
-    (Eq. 34; in a longer chain the ratio of the next triplet raises it, Eq. 53), and ``admissible``.
+    The bound is that of three balls (Eq. 34); in longer chains the next triplet raises it (Eq. 53).
 
     Examples
     --------
@@ -134,17 +127,10 @@ def paper_chain(
     Parameters
     ----------
     sequence : str or iterable of str
-        Ball types, first ball first: at least two letters out of "A" to "D".
-    speed : float
-        Velocity of the first ball in m/s.
-    excess, meeting
-        As for `ImpulseCorrelation`.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `sequence` is no such text or list, or another argument is refused by `Chain` or
-        `ImpulseCorrelation`.
+        Ball types, first ball first: at least two letters out of "A" to "D"; else a `ValueError`,
+        or a `TypeError`.
+    speed, excess, meeting
+        Velocity of the first ball, m/s; the others as for `ImpulseCorrelation`.
 
     Examples
     --------

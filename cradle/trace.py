@@ -19,12 +19,13 @@ if TYPE_CHECKING:
 
 
 class Event(NamedTuple):
-    """One event of an impact."""
+    """One event of an impact, at the contact that joins balls `contact` and `contact` + 1.
 
-    #: "maximum_compression", "end", "close", "collapse" (the limit of an infinite sequence) or
-    #: "repetition" (a cycle of events that has been repeated many times at once).
+    Its kind is "maximum_compression", "end", "close", "collapse" (the limit of an infinite
+    sequence) or "repetition" (a cycle of events that has been repeated many times at once).
+    """
+
     kind: str
-    #: Index of the contact; contact c joins balls c and c + 1.
     contact: int
 
 
@@ -49,17 +50,16 @@ class Trace:
         two rows they are linear, but before a "collapse" or "repetition", which stand for many.
     events : tuple of Event, length K
         What happened at each row of the path but the first.
-    left_out : int
-        How many more events there were, if the path was cut; 0 with ``record=False``.
-    collapsed : bool
-        True if an infinite sequence of impacts was taken to its limit.
-    saturated : tuple of int
-        Contacts that were held closed at the largest admissible ratio (Eqs. 34, 53) at some time.
+    collapsed, saturated : bool, tuple of int
+        Whether an infinite sequence of impacts was taken to its limit; contacts that were held
+        closed at the largest admissible ratio (Eqs. 34, 53) at some time.
     margin : float
         How close another sequence of events came: the least distance of two events of one run, of
         two meetings, or of a ratio from its bound, relative to what is compared; exact ties do not
         count.  Below about 1e-12 another outcome may lie within the last digit of the input.  What
         hundreds of collisions amplify step by step, `condition_number` sees.
+    left_out : int
+        How many more events there were, if the path was cut; 0 with ``record=False``.
 
     Examples
     --------
@@ -91,14 +91,13 @@ class Trace:
     def to_frame(self) -> pd.DataFrame:
         """Return the path as a table, a row for each ball at each row of the path.
 
-        Columns are ``step`` (0 to K), ``event`` and ``contact`` ("before" and missing at step 0),
-        ``ball``, ``velocity`` (m/s), ``left`` and ``right``, the impulses so far of the ball's two
-        contacts (N s).  Models with a time add ``time`` (s).
+        Velocities are in m/s; ``left`` and ``right`` are the impulses so far of the ball's two
+        contacts, N s.  Models with a time add ``time``, s.
 
         Examples
         --------
         >>> from cradle import Chain, ImpulseCorrelation, collide
-        >>> trace = collide(Chain([1, 1], [1, 0], 1), ImpulseCorrelation(0.0))
+        >>> trace = collide(Chain([1, 1], [1, 0]), ImpulseCorrelation(0.0))
         >>> print(trace.to_frame().tail(2).to_string(index=False))
          step event  contact  ball  velocity  left  right
             2   end        0     0       0.0   0.0    1.0
@@ -137,14 +136,6 @@ class Trace:
 
         As `velocities` and `velocity_impulse` of `cradle.pictures.impacts`, into new axes if `ax`
         is left out.  A `contact` that the chain does not have is a `ValueError`.
-
-        Examples
-        --------
-        >>> from cradle import Chain, ImpulseCorrelation, collide
-        >>> from matplotlib.figure import Figure
-        >>> trace = collide(Chain([1, 1], [1, 0], 1), ImpulseCorrelation(0.0))
-        >>> len(trace.plot(Figure().subplots()).get_lines())
-        2
         """
         from cradle.pictures import impacts as figures
 
@@ -173,13 +164,9 @@ class Trace:
 class ImpactNotFinished(RuntimeError):
     """An impact was still going on after `max_events` steps.
 
-    Attributes
-    ----------
-    trace : Trace
-        What was reached; of the path at most the first 100 000 events.
-    stored : float or None
-        Work that the contacts can still release, over the heaviest mass times the square of the
-        largest speed before.  None: not known, so that all energy that is not lost yet counts.
+    Its `trace` is what was reached, of the path at most the first 100 000 events.  `stored` is the
+    work that the contacts can still release, over the heaviest mass times the square of the largest
+    speed before, or None if not known, so that all energy that is not lost yet counts.
 
     Examples
     --------
@@ -234,8 +221,7 @@ class ImpactNotFinished(RuntimeError):
 class ImpactNotCertified(RuntimeError):
     """An outcome failed the check that every answer has to pass, so it is not returned.
 
-    This is a defect of the solver, not of the input: please report `chain` and `model`; `defect`
-    says what the outcome would have broken.
+    This is a defect of the solver: please report `chain`, `model`, and `defect`, what was broken.
     """
 
     def __init__(self, chain: Any, model: Any, defect: str) -> None:

@@ -20,8 +20,7 @@ from cradle.models.sequential import SequentialCollisions
 
 WANTED = ("velocities", "impulses", "path", "forces", "times", "fastest ball")
 
-# Two tables measured one after the other differ by less than this factor, but for a few rows: times
-# closer than that do not decide between models.
+# Two measurements of a time differ by less than this factor: so it does not decide between models.
 _NOISE = 1.5
 _BATCH = "post_impact_velocities(masses, velocities, restitution, forward, backward)"
 
@@ -58,8 +57,8 @@ def recommend(
     chain : Chain
         The balls, with their restitution.
     wanted : str or collection of str
-        One or several of "velocities", "impulses", "path", "forces", "times" (how long the
-        contacts last) and "fastest ball" (which one it is).
+        Of "velocities", "impulses", "path", "forces", "times" (how long contacts last) and
+        "fastest ball" (which one it is).
     accuracy, model_error : float
         Largest numerical error of a velocity, as a part of the closing speed, 1e-15 to 1, and in
         the same unit the largest distance from Hertz springs, elastic spheres; any if left out.
@@ -75,17 +74,16 @@ def recommend(
     Raises
     ------
     ValueError
-        If a value is wrong, a model refuses the chain, or no model fits; the message says what is
-        missing.
+        If a value is wrong, or no model fits; the message says what is missing.
 
     Notes
     -----
-    Errors of velocities have been measured, not those of forces and times, on rows that touch,
-    struck by a ball at one end: three and five equal elastic balls, three with a light one in the
-    middle, the paper's ABCCA, and, event by event, random ones; all springs were equal.  For a
-    chain whose number of balls, spread of masses and restitution lie between theirs the worst that
-    was measured counts, and must be ten times better than `accuracy`.  Of models whose times differ
-    by less than half, as measurements do, it is the one that uses most of what is known.
+    Errors of velocities were measured, not of forces and times, on rows that touch, struck at one
+    end: three and five equal elastic balls, three with a light one in the middle, the paper's
+    ABCCA, and, event by event, random ones; all springs were equal.  For a chain whose number of
+    balls, spread of masses and restitution lie between theirs the worst counts, and must be ten
+    times better than `accuracy`.  Of models whose times differ by less than half, as measurements
+    do, it is the one that uses most of what is known.
 
     Examples
     --------
@@ -226,9 +224,8 @@ def _best(
 def _cheapest(where: str, settings: list[Measured], name: str, accuracy: float) -> Measured:
     """Return the cheapest setting that has the accuracy."""
     # A chain among the measured ones can be worse than each of them, by a few times.
-    margin, stricter = 1.0, ""
-    if where != "here":
-        margin, stricter = 10.0, "; on other chains it must be 10 times better"
+    margin = 1.0 if where == "here" else 10.0
+    stricter = "; on other chains it must be 10 times better" if margin > 1.0 else ""
     errors = [margin * (row.numerical_error or 0.0) for row in settings]
     fit = [row for row, error in zip(settings, errors, strict=True) if error <= accuracy]
     if fit:

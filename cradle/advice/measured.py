@@ -1,6 +1,5 @@
-"""What was measured of the models: errors and times, on which chains; read from the data.
+"""What was measured of the models, read from `benchmarks.csv`, the table that the book shows.
 
-The table is `benchmarks.csv`, the one that the book shows ("Which model does your scene need?").
 No number is an estimate: it was measured on this very chain, or is the worst of those measured on
 chains around it, or there is none.
 """
