@@ -200,8 +200,7 @@ def test_scatter_of_times_does_not_choose_the_model(monkeypatch):
 
     def scattered(*group):
         return tuple(
-            row._replace(time_ratio=row.time_ratio * uniform(rng, 0.8, 1.2))
-            for row in measured(*group)
+            row._replace(seconds=row.seconds * uniform(rng, 0.8, 1.2)) for row in measured(*group)
         )
 
     models = [recommend(chain, **asked).model for chain in (THREE, FIVE, LIGHT)]
@@ -306,7 +305,7 @@ def test_the_worst_of_the_chains_around_counts():
         same = [row for row in rows("springs") if row.setting == one.setting]
         assert one.chains == ("three equal", "five equal", "light middle")
         assert one.numerical_error == max(row.numerical_error for row in same)
-        assert one.time_ratio == max(row.time_ratio for row in same)
+        assert one.seconds == max(row.seconds for row in same)
     batches = tuple(row for row in rows("event") if "batch" in row.setting)
     _, (batch,) = evidence(batches, striking([1, 2, 1], 0.9))
     # One that reaches the chain alone tells more than all together.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.advice.measured import LAWS, Measured, evidence, measured_chain, rows, unit_time
+from cradle.advice.measured import LAWS, Measured, evidence, measured_chain, rows
 from cradle.advice.recommendation import Recommendation
 from cradle.chain import Chain
 from cradle.input.values import must_be, one_number, one_of, whole_number
@@ -199,7 +199,20 @@ def _best(
     # What a model refuses it refuses now: the same balls at rest cost it no work.
     make(found[0]).solve(Chain(chain.masses, 0.0 * chain.velocities, chain.restitution))
     where, settings = evidence(found, wish.like, wish.ratios if group == "event" else None)
-    row = _cheapest(where, settings, name, wish.accuracy)
+    # A chain among the measured ones can be worse than each of them, by a few times.
+    margin = 1.0 if where == "here" else 10.0
+    errors = [margin * (row.numerical_error or 0.0) for row in settings]
+    if min(errors) > wish.accuracy:
+        least = settings[int(np.argmin(errors))]
+        raise _Unfit(
+            f"accuracy = {wish.accuracy!r}",
+            f"the least numerical error of {name} measured is {least.numerical_error:.2g} "
+            f"({', '.join(least.chains)})"
+            + "; on other chains it must be 10 times better" * (where != "here")
+            + f": ask for {1.05 * min(errors):.1e} or more",
+        )
+    fit = [row for row, error in zip(settings, errors, strict=True) if error <= wish.accuracy]
+    row = min(fit, key=lambda row: row.seconds)
     apart = row.model_error if where == "here" else None
     two = len(chain) == 2
     if group == "springs" or (two and chain.restitution[0] == 1.0):
@@ -209,30 +222,13 @@ def _best(
         raise _Unfit(f"model_error = {wish.model_error!r}", f"that of {name} {known}")
     measured = where != "elsewhere"
     kind = "timed" if group == "springs" and {"forces", "times"} & set(wish.wanted) else group
-    return (not measured, row.time_ratio), Recommendation(
+    return (not measured, row.seconds), Recommendation(
         model=make(row),
         setting=row.setting,
         call=_BATCH if "batch" in row.setting else "collide(chain, model)",
         numerical_error=row.numerical_error if measured else None,
         model_error=apart,
-        seconds=row.time_ratio * unit_time() if measured else None,
+        seconds=row.seconds if measured else None,
         measured_on=row.chains if measured else (),
         reason=_REASONS["two balls" if group == "event" and two else kind],
-    )
-
-
-def _cheapest(where: str, settings: list[Measured], name: str, accuracy: float) -> Measured:
-    """Return the cheapest setting that has the accuracy."""
-    # A chain among the measured ones can be worse than each of them, by a few times.
-    margin = 1.0 if where == "here" else 10.0
-    stricter = "; on other chains it must be 10 times better" if margin > 1.0 else ""
-    errors = [margin * (row.numerical_error or 0.0) for row in settings]
-    fit = [row for row, error in zip(settings, errors, strict=True) if error <= accuracy]
-    if fit:
-        return min(fit, key=lambda row: row.time_ratio)
-    least = settings[int(np.argmin(errors))]
-    raise _Unfit(
-        f"accuracy = {accuracy!r}",
-        f"the least numerical error of {name} measured is {least.numerical_error:.2g} "
-        f"({', '.join(least.chains)}){stricter}: ask for {1.05 * min(errors):.1e} or more",
     )

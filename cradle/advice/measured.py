@@ -34,16 +34,8 @@ class Measured(NamedTuple):
     chains: tuple[str, ...]  # their names
     numerical_error: float | None  # of velocities, from the exact answer, over the closing speed
     model_error: float | None  # the same from Hertz springs
-    time_ratio: float  # time of an impact in the table's unit
+    seconds: float  # time of an impact
     gives: frozenset[str]  # "velocities", "impulses", "path", "forces", "times"
-
-
-@cache
-def unit_time() -> float:
-    """Return the unit of times, s: one impact of three balls in a batch, where it was measured."""
-    timed = [line for line in table_rows("benchmarks.csv") if line["time_ratio"]]
-    times = [float(line["microseconds"]) / float(line["time_ratio"]) for line in timed]
-    return 1e-6 * float(np.median(times))
 
 
 @cache
@@ -51,8 +43,11 @@ def rows(group: str) -> tuple[Measured, ...]:
     """Return the rows of a group, in settings that this installation and its calls have."""
     kernel = "compiled" if runtime.available() else "plain"
     calls = f"{kernel}, one call with its path", f"{kernel}, batch"
-    found = []
-    for line in table_rows("benchmarks.csv"):
+    lines, found = table_rows("benchmarks.csv"), []
+    # Times are told in a unit that was measured beside them, and that has one length here.
+    timed = [line for line in lines if line["time_ratio"]]
+    units = [float(line["microseconds"]) / float(line["time_ratio"]) for line in timed]
+    for line in lines:
         if line["model"] == "two balls" and line["setting"].startswith("all: "):
             # A batch of two balls, by `post_impact_velocities`.
             line = line | {"group": "event", "model": LAWS["event"], "setting": "compiled, batch"}
@@ -63,7 +58,8 @@ def rows(group: str) -> tuple[Measured, ...]:
             found.append(Measured(
                 line["setting"], float(line["parameter"] or 0.0), (line["chain"],),
                 float(error) if error else None, float(apart) if apart else None,
-                float(line["time_ratio"]), frozenset(line["gives"].split(", ")),
+                float(line["time_ratio"]) * 1e-6 * float(np.median(units)),
+                frozenset(line["gives"].split(", ")),
             ))  # fmt: skip
     return tuple(found)
 
@@ -94,7 +90,7 @@ def _worst(rows: list[Measured]) -> Measured:
     return rows[0]._replace(
         chains=tuple(row.chains[0] for row in rows),
         numerical_error=max(row.numerical_error or 0.0 for row in rows),
-        time_ratio=max(row.time_ratio for row in rows),
+        seconds=max(row.seconds for row in rows),
     )
 
 
@@ -118,10 +114,7 @@ def measured_chain(chain: Chain, ratios: ImpulseCorrelation | None = None) -> st
 
 
 def _figures(chain: Chain, ratios: ImpulseCorrelation | None = None) -> Vector:
-    """Return masses over the striker's, restitution and ratios of a chain struck at one end.
-
-    The striker is first; of any other chain there are none.
-    """
+    """Return masses over the striker's, restitution, ratios of a row struck at one end; or none."""
     m, e, u, n = chain.masses, chain.restitution, chain.closing_speeds, len(chain)
     laws = []
     if ratios is not None:

@@ -21,8 +21,7 @@ _Thing = TypeVar("_Thing")
 
 #: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
 LIGHTEST = 1e-150
-# The longest value that an error repeats, in characters.
-_SHOWN = 80
+_SHOWN = 80  # characters of a value that an error repeats
 _USUAL = {float, int, np.float64}
 # Python would turn these into floats, or NumPy with a warning, but they are no real numbers.
 _NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating)
@@ -39,25 +38,22 @@ def numbers(name: str, values: ArrayLike | None, at: tuple[int, ...] = ()) -> Ve
     if type(values) is float:
         return np.array(values)
     given: Any = values
-    if isinstance(values, (list, tuple)):
-        if _usual(values):
-            with suppress(OverflowError, ValueError):
+    with suppress(OverflowError, TypeError, ValueError):
+        if isinstance(values, (list, tuple)):
+            if _usual(values):
                 return np.array(values, dtype=np.float64)
-    elif not _is_masked(values):
-        with suppress(TypeError, ValueError):
-            given = array = np.asarray(values)
-            if array.dtype.kind in "iuf" and array.itemsize <= 8:  # long doubles go further
-                return array.astype(np.float64)
+        elif not _is_masked(values):
+            given = np.asarray(values)
+            if given.dtype.kind in "iuf" and given.itemsize <= 8:  # long doubles go further
+                return np.array(given, dtype=np.float64)
     if not (isinstance(given, (list, tuple)) or (isinstance(given, np.ndarray) and given.ndim)):
         return np.array(_as_float(name, at, given[()] if type(values) is np.ndarray else values))
     # One by one, each as it was given.
     rows = [numbers(name, row, (*at, k)) for k, row in enumerate(given)]
     for k, row in enumerate(rows):
         if row.shape != rows[0].shape:
-            one, other = f"{name}{place((*at, k))}", f"{name}{place((*at, 0))}"
-            raise ValueError(
-                f"{one} has shape {row.shape}, {other} has {rows[0].shape}; must have one shape"
-            )
+            other = f"{name}{place((*at, 0))} has {rows[0].shape}"
+            raise refusal(name, (*at, k), f" has shape {row.shape}, {other}; must have one shape")
     return np.array(rows, dtype=np.float64)
 
 
@@ -84,7 +80,7 @@ def _as_float(name: str, at: tuple[int, ...], cell: Any) -> float:
         value = math.inf
     except (TypeError, ValueError):
         rule = "must be a real number" if at else "must be real numbers, one shape, none masked"
-        known = type(cell).__module__ in ("builtins", "numpy", "numpy.ma", "numpy.ma.core")
+        known = type(cell).__module__.startswith(("builtins", "numpy"))
         what = "" if known else f" ({type(cell).__module__}.{type(cell).__qualname__})"
         raise refusal(name, at, f" = {shown(cell)}{what}; {rule}") from None
     if math.isinf(value) and cell != value:
@@ -93,23 +89,16 @@ def _as_float(name: str, at: tuple[int, ...], cell: Any) -> float:
 
 
 def checked(
-    name: str,
-    values: ArrayLike | None,
-    rule: str = "must be finite",
-    low: float = -np.inf,
-    high: float = np.inf,
-    open_low: bool = False,
-) -> Vector:
+    name: str, values: ArrayLike | None, rule: str = "must be finite",
+    low: float = -np.inf, high: float = np.inf, open_low: bool = False,
+) -> Vector:  # fmt: skip
     """Return `values` as floats, all finite and inside the limits."""
     array = numbers(name, values)
     if array is values:
         array = array.copy()
-    wrong = ~np.isfinite(array) | (array < low) | (array > high)
-    if open_low:
-        wrong |= array == low
-    if wrong.any():
-        refuse_where(name, array, ~np.isfinite(array), "must be finite")
-        refuse_where(name, array, wrong, rule)
+    refuse_where(name, array, ~np.isfinite(array), "must be finite")
+    outside = (array < low) | (array > high) | (open_low & (array == low))
+    refuse_where(name, array, outside, rule)
     return array
 
 
@@ -196,9 +185,9 @@ def must_be(kind: type[_Thing], name: str, thing: object) -> _Thing:
     return thing
 
 
-def refusal(name: str, at: tuple[Any, ...], rest: str) -> ValueError:
+def refusal(name: str, at: tuple[int, ...], rest: str) -> ValueError:
     """Return the error that refuses a value at its place."""
-    return ValueError(f"{name}{place(tuple(map(int, at)))}{rest}")
+    return ValueError(f"{name}{place(at)}{rest}")
 
 
 def refuse_where(name: str, values: Vector, wrong: NDArray[np.bool_], rule: str) -> None:
@@ -216,7 +205,7 @@ def first(true: NDArray[np.bool_]) -> tuple[int, ...]:
 
 def place(at: tuple[int, ...]) -> str:
     """Return an index as an error names it."""
-    return f"[{', '.join(map(str, at))}]" if at else ""
+    return f"[{', '.join(str(int(k)) for k in at)}]" if at else ""
 
 
 def shown(value: object) -> str:
