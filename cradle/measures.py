@@ -100,12 +100,10 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
 
 def _events_at_balls(trace: Trace) -> list[list[Event]]:
     """Return ends, closings and collapses as each ball sees them: others have no common clock."""
-    seen: list[list[Event]] = [[] for _ in range(len(trace.chain))]
-    for event in trace.events:
-        if event.kind != "maximum_compression":
-            seen[event.contact].append(event)
-            seen[event.contact + 1].append(event)
-    return seen
+    seen = [event for event in trace.events if event.kind != "maximum_compression"]
+    return [
+        [one for one in seen if ball - one.contact in (0, 1)] for ball in range(len(trace.chain))
+    ]
 
 
 def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:

@@ -25,11 +25,6 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-__all__ = [
-    "ball_masses", "data_folder", "paper_chain", "paper_sequences", "ratio_table",
-    "restitution_table",
-]  # fmt: skip
-
 
 def data_folder() -> Traversable:
     """Return the folder of the data files: inside the installed package, or beside it."""

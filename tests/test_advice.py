@@ -26,8 +26,8 @@ from cradle import (
     post_impact_velocities,
     recommend,
 )
+from cradle.advice.choice import lasting
 from cradle.advice.measured import evidence, measured_chain, rows
-from cradle.advice.recommendation import lasting
 
 #: Numbers of the table may come from another version of SciPy, and errors near rounding vary.
 SLACK, ROUNDING = 2.0, 2.0**-50

@@ -1,6 +1,5 @@
 """Which model a scene needs: from what is known and what is wanted, by what was measured."""
 
-from cradle.advice.choice import recommend
-from cradle.advice.recommendation import Recommendation
+from cradle.advice.choice import Recommendation, recommend
 
 __all__ = ["Recommendation", "recommend"]

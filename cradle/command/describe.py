@@ -91,7 +91,7 @@ class Described(NamedTuple):
     @property
     def note(self) -> str:
         """The model, and what is assumed, for people."""
-        from cradle.advice.recommendation import made
+        from cradle.advice.choice import made
 
         lines = [f"model: {made(self.model)}"]
         return "\n".join(lines + [f"assumed: {'; '.join(self.assumed)}"] * bool(self.assumed))

@@ -84,7 +84,7 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
       cradle solve --masses 45,53,53 --unit g --restitution 0.53,0.36 --ratio 0.104
       cradle solve --masses 1,1,1 --velocities 1,0,-1 --model sequential --csv
     """
-    from cradle.advice.recommendation import made
+    from cradle.advice.choice import made
     from cradle.models import collide
 
     # One chain: faster as it stands than the compiler takes to load.

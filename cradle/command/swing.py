@@ -48,7 +48,7 @@ def swing(
       cradle swing ABACA --by 0.03 --seconds 1
       cradle swing --masses 1,1,1,1,1 --csv
     """
-    from cradle.advice.recommendation import made
+    from cradle.advice.choice import made
     from cradle.chain import Chain
     from cradle.input.values import one_number, whole_number
     from cradle.swinging.pendulums import Pendulums
