@@ -17,8 +17,6 @@ from cradle.models.batch import post_impact_velocities
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.trace import Event, Trace
 
-_Three = tuple[float, float, float]
-
 
 def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
     """Return which balls of three bounce back: pattern 1, 2 or 3 (the paper's I, II, III).
@@ -226,7 +224,7 @@ def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
     return float(np.arctan2(one * s, other * w))
 
 
-def _relative(masses: ArrayLike, velocities: ArrayLike) -> tuple[_Three, _Three, Vector]:
+def _relative(masses: ArrayLike, velocities: ArrayLike) -> tuple[list[float], list[float], Vector]:
     """Return masses in units in which no sum overflows, relative velocities, and two roots.
 
     Velocities are those of ball 2 from ball 1, of ball 3 from these two, and of these two; the
@@ -239,4 +237,4 @@ def _relative(masses: ArrayLike, velocities: ArrayLike) -> tuple[_Three, _Three,
     v1, v2, v3 = chain.velocities.tolist()
     pair = v1 + m2 / (m1 + m2) * (v2 - v1)
     roots = np.sqrt([m1 / (m1 + m2) * m2, m3 / (m1 + m2 + m3) * (m1 + m2)])
-    return (m1, m2, m3), (v2 - v1, v3 - pair, pair), roots
+    return [m1, m2, m3], [v2 - v1, v3 - pair, pair], roots

@@ -113,7 +113,7 @@ class Trace:
         return pd.DataFrame(
             {
                 "step": np.repeat(np.arange(steps), balls),
-                **{name: values.repeat(balls) for name, values in self._clock().items()},
+                **({"time": self.times.repeat(balls)} if hasattr(self, "times") else {}),
                 "event": np.repeat(kinds, balls),
                 "contact": contacts.repeat(balls).array,
                 "ball": np.tile(np.arange(balls), steps),
@@ -126,10 +126,6 @@ class Trace:
     def curve(self) -> tuple[Vector, Vector]:
         """Return impulses (N s) and velocities (m/s) that straight lines join in a picture."""
         return self.path_impulses, self.path
-
-    def _clock(self) -> dict[str, Vector]:
-        """Return what tells the time of each row of the path; a rigid model has no time."""
-        return {}
 
     def plot(self, ax: Axes | None = None, *, contact: int | None = None) -> Axes:
         """Draw the velocities over the impact, or the velocity-impulse diagram of a contact.

@@ -99,10 +99,6 @@ class TimedTrace(CurvedTrace):
         lost = m * (v - self.velocities) * (0.5 * (v - centre) + 0.5 * (self.velocities - centre))
         return float(lost.sum())
 
-    def _clock(self) -> dict[str, Vector]:
-        """Return the times of the rows of the path."""
-        return {"time": self.times}
-
 
 @dataclass(frozen=True)
 class SpringChain:
