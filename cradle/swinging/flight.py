@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -16,6 +16,8 @@ from cradle.swinging.pendulums import TIE, Hanging, mean
 
 #: Of each contact, whether its balls touch and move together, or touch and part.
 Marks = tuple[bool, ...]
+#: A term Re(C exp(rate t)) of a sum: C and its rate.
+Wave = tuple[complex, complex]
 # Below this part of what it is made of a force is a rounding error.
 _ROUNDING = 1e-11
 _RTOL = 1e-12
@@ -26,40 +28,29 @@ _DEGREE = 14
 class Meeting(NamedTuple):
     """The next event of a flight."""
 
-    #: Time since the flight began, s; infinite if nothing happens.
-    time: float
-    #: Contacts whose balls meet.
-    closing: list[int]
-    #: Contacts whose balls were pressed together and are drawn apart from now on.
-    releasing: list[int]
+    time: float  #: s since the flight began; infinite if nothing happens
+    closing: list[int]  #: contacts whose balls meet
+    releasing: list[int]  #: contacts whose balls were pressed together and are now drawn apart
 
 
-def _first_balls(together: Sequence[bool]) -> list[int]:
-    """Return the first ball of each body: balls that move together are one."""
-    return [0, *(c + 1 for c, one in enumerate(together) if not one)]
-
-
-def first_fall(
-    level: float, terms: Sequence[tuple[complex, complex]], parting: bool, horizon: float
-) -> float:
+def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -> float:
     """Return when ``level + sum Re(C exp(rate t))`` falls to zero; parting, it starts there.
 
     One term without decay, or about the level zero, has a root in closed form; one with decay has
     turning points in closed form, and its first minimum is the lowest.
     """
-    terms = [(c, rate) for c, rate in terms if c != 0.0]
-    if not terms:
+    waves = [(c, rate) for c, rate in waves if c != 0.0]
+    if not waves:
         return math.inf
-    if len(terms) > 1:
-        return _search(level, terms, parting, horizon)
-    ((c, rate),) = terms
+    if len(waves) > 1:
+        return _search(level, waves, parting, horizon)
+    ((c, rate),) = waves
     if parting:
         c = complex(-level, -abs(c.imag))
     if level == 0.0 or rate.real == 0.0:
         if level >= abs(c):
             return math.inf
-        angle = math.acos(-level / abs(c))
-        wait = angle - cmath.phase(c)
+        wait = math.acos(-level / abs(c)) - cmath.phase(c)
         if not parting:
             wait %= 2.0 * math.pi
             # It meets now, and rounding says that it has just met.
@@ -81,11 +72,9 @@ def first_fall(
     return float(brentq(value, high, low, xtol=1e-16, rtol=1e-15))
 
 
-def _search(
-    level: float, terms: Sequence[tuple[complex, complex]], parting: bool, horizon: float
-) -> float:
+def _search(level: float, waves: list[Wave], parting: bool, horizon: float) -> float:
     """Return the same by all roots of polynomials that follow a radian to the last digit."""
-    c, rate = np.array(terms).T
+    c, rate = np.array(waves).T
     size, radian = np.abs(c), 1.0 / float(np.abs(rate).max())
     if (left := float(size.sum())) > level > 0.0 > (decay := float(rate.real.max())):
         horizon = min(horizon, math.log(level / left) / decay)  # from then on it stays above zero
@@ -143,19 +132,18 @@ class _Bodies(NamedTuple):
     #: Of each ball, where it hangs, and its rate: it is at centre + Re(amplitude exp(rate t)).
     centre: Vector
     rate: Vector
-    #: Of each contact between two bodies the gap at rest; of one inside a body the force at rest,
-    #: that per amplitude, and what both are measured by.
-    gaps: list[float]
-    forces: dict[int, tuple[float, complex, float, float]]
+    #: Of each contact what falls to zero when its balls meet, or are drawn apart that move
+    #: together (a gap, a force): a constant, and what is to be added for either ball's amplitude.
+    falls: list[tuple[float, complex, complex]]
 
 
 @functools.lru_cache(64)
-def _bodies(hanging: Hanging, together: tuple[bool, ...]) -> _Bodies:
+def _bodies(hanging: Hanging, together: Marks) -> _Bodies:
     """Return the bodies: their frequencies, dampings and lowest points are means over the mass."""
-    n, square, first = len(hanging.masses), hanging.gravity / hanging.length, _first_balls(together)
+    n, square = len(hanging.masses), hanging.gravity / hanging.length
     centre, rates = np.zeros(n), np.zeros(n, dtype=complex)
     each, forces = [], {}
-    for a, b in pairwise([*first, n]):
+    for a, b in pairwise([*_first_balls(together), n]):
         m, w2, d = (row[a:b] for row in (hanging.masses, square, hanging.damping))
         offset, pull, damping = -hanging.offsets(a, b), mean(w2, m), mean(d, m)
         lowest = -mean(w2 * offset, m) / pull
@@ -164,10 +152,19 @@ def _bodies(hanging: Hanging, together: tuple[bool, ...]) -> _Bodies:
         each.append((a, b - a, lowest, rate))
         for k in range(1, b - a):  # what stops the balls before k from moving as they would alone
             level, weight = -float(m[:k] @ (w2 * (lowest + offset))[:k]), float(m[:k] @ w2[:k])
-            wave = complex(m[:k] @ (w2 + 2.0 * d * rate + rate * rate)[:k])
-            forces[a + k - 1] = level, wave, weight, float(np.abs(centre[a : a + k]).max())
+            wave = -complex(m[:k] @ (w2 + 2.0 * d * rate + rate * rate)[:k])
+            far = float(np.abs(centre[a : a + k]).max())
+            alike = abs(wave) <= _ROUNDING * weight and abs(level) <= _ROUNDING * weight * far
+            # Balls that swing together by themselves need no force.
+            forces[a + k - 1] = (math.inf, 0j, 0j) if alike else (level, wave, 0j)
     gaps = (hanging.gaps + centre[1:] - centre[:-1]).tolist()
-    return _Bodies(each, centre, rates, gaps, forces)
+    falls = [forces.get(c, (gap, -1.0 + 0j, 1.0 + 0j)) for c, gap in enumerate(gaps)]
+    return _Bodies(each, centre, rates, falls)
+
+
+def _first_balls(together: Marks) -> list[int]:
+    """Return the first ball of each body: balls that move together are one."""
+    return [0, *(c + 1 for c, one in enumerate(together) if not one)]
 
 
 class SmallAngleFlight:
@@ -190,33 +187,21 @@ class SmallAngleFlight:
 
     def next_meeting(self, horizon: float) -> Meeting:
         """Return the first event within `horizon` seconds."""
-        together, rates = self.together, self.bodies.rate.tolist()
-        times, first = list[float](), math.inf
-        for c, one in enumerate(together):  # none need be sought after the first of those found
-            event = self._release if one else self._meeting
-            times.append(event(c, rates, min(horizon, first + self.tie)))
+        times, first, rates = list[float](), math.inf, self.bodies.rate.tolist()
+        swings = zip(pairwise(self.amplitude), pairwise(rates), strict=True)
+        falls = zip(self.bodies.falls, swings, self.parting, strict=True)
+        for (level, one, other), ((a, b), (rate, near)), parts in falls:
+            waves = [(one * a + other * b, rate)]
+            if rate != near:
+                waves = [(other * b, near), (one * a, rate)]
+            # None need be sought after the first of those found.
+            times.append(first_fall(level, waves, parts, min(horizon, first + self.tie)))
             first = min(first, times[-1])
         if first > horizon:
             return Meeting(math.inf, [], [])
-        return Meeting(
-            first,
-            [c for c, t in enumerate(times) if t <= first + self.tie and not together[c]],
-            [c for c, t in enumerate(times) if t == first and together[c]],
-        )
-
-    def _meeting(self, c: int, rates: list[complex], horizon: float) -> float:
-        """Return when the gap of contact c closes."""
-        (one, other), (rate, near) = self.amplitude[c : c + 2], rates[c : c + 2]
-        terms = [(other - one, rate)] if rate == near else [(other, near), (-one, rate)]
-        return first_fall(self.bodies.gaps[c], terms, self.parting[c], horizon)
-
-    def _release(self, c: int, rates: list[complex], horizon: float) -> float:
-        """Return when the force in contact c, whose balls move together, falls to zero."""
-        level, wave, weight, far = self.bodies.forces[c]
-        wave = -self.amplitude[c] * wave
-        if abs(wave) + abs(level) <= _ROUNDING * (weight * (abs(self.amplitude[c]) + far)):
-            return math.inf  # they swing together by themselves
-        return first_fall(level, [(wave, rates[c])], False, horizon)
+        met = [c for c, time in enumerate(times) if time <= first + self.tie]
+        closing = [c for c in met if not self.together[c]]
+        return Meeting(first, closing, [c for c in met if self.together[c] and times[c] == first])
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
         """Return positions and velocities at T times since the start, shapes (T, N)."""

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from cradle.input.values import (
     Vector,
-    first,
     number_or_row,
     one_number,
     one_of,
@@ -27,24 +26,20 @@ class Pendulums:
 
     Parameters
     ----------
-    length : float or sequence, length N
-        Distance from each pivot to the centre of its ball, m; above 0.
-    gravity : float
-        m/s^2; above 0.
-    gaps : float or sequence, length N - 1
-        Distance between the surfaces of neighbours at rest, m; 0 if they just touch.
-    damping : float or sequence, length N
-        Rate at which the amplitude of a ball that swings alone decays, 1/s; below its natural
-        frequency sqrt(g/l), or it would not swing.
+    length, gravity : float or (length) array_like of shape (N,)
+        From each pivot to the centre of its ball, m; m/s^2.  Both above 0.
+    gaps : float or array_like of shape (N - 1,)
+        Between the surfaces of neighbours at rest, m; 0 if they just touch.
+    damping : float or array_like of shape (N,)
+        Rate at which a ball's amplitude decays, 1/s; below its frequency sqrt(g/l).
     angle : {"small", "full"}
         Pendulums of any angle need equal lengths, no gaps and one damping: then contacts stay
-        horizontal.  Small-angle ones swing too fast by about the square of the amplitude over 16:
-        by 1 % at 0.4 rad, by 7 % at 1 rad.
+        horizontal.  Small-angle ones swing too fast: by 1 % at 0.4 rad, by 7 % at 1 rad.
 
     Raises
     ------
     ValueError
-        If a value is outside its range; the message names the value and the rule.
+        If a value is outside its range.
 
     Examples
     --------
@@ -87,11 +82,8 @@ class Pendulums:
         return row_of(name, getattr(self, name), size, size + (name == "gaps"))
 
     def reach(self, size: int) -> Vector:
-        """Return how far each of `size` balls may be pulled aside for a release, m along its arc.
-
-        A quarter of a circle: above its pivot a string is slack.  Others may hang on rods: half a
-        circle, not quite to the top, where a ball would stand.
-        """
+        """Return how far each of `size` balls may be pulled aside, m along its arc."""
+        # Above its pivot a string is slack; on a rod a ball would stand at the top.
         part = 0.5 if self.angle == "small" else 1.0 - 2.0**-20
         return part * np.pi * self.row("length", size)
 
@@ -106,10 +98,9 @@ class Pendulums:
         frequency: Vector = np.sqrt(self.gravity / self.row("length", size))
         damping = self.row("damping", size)
         slow = damping >= frequency
-        if slow.any():
-            least = float(frequency[first(slow)])
-            rule = f"must be below the natural frequency sqrt(g/l) = {least!r}"
-            refuse_where("damping", damping, slow, rule)
+        least = float(frequency[slow.argmax()])
+        rule = f"must be below the natural frequency sqrt(g/l) = {least!r}"
+        refuse_where("damping", damping, slow, rule)
         return frequency
 
 
@@ -130,8 +121,6 @@ class Hanging:
         self.length, self.damping = pendulums.row("length", n), pendulums.row("damping", n)
         self.fastest = float(self.frequency.max())
         self.tie = TIE / self.fastest  # events nearer than this are one, s
-        self._half_masses = 0.5 * masses
-        self._half_pulls = 0.5 * masses * self.gravity / self.length
 
     def offsets(self, first: int, last: int) -> Vector:
         """Return how far the balls of a body hang from its first one, where they touch, m."""
@@ -141,12 +130,12 @@ class Hanging:
         """Return the acceleration of each ball if it swung alone, m/s^2."""
         angle = positions / self.length
         sine = angle if self.small else np.sin(angle)
-        return np.asarray(0.0 - self.gravity * sine - 2.0 * self.damping * velocities)
+        return np.asarray(-self.gravity * sine - 2.0 * self.damping * velocities)
 
     def energy(self, positions: Vector, velocities: Vector) -> Vector:
         """Return kinetic and potential energy, J; the last axis is summed."""
         away = positions
         if not self.small:  # 1 - cos a = 2 sin^2(a/2), without cancellation
             away = 2.0 * self.length * np.sin(0.5 * positions / self.length)
-        each = self._half_masses * velocities**2 + self._half_pulls * away**2
-        return np.asarray(each.sum(axis=-1))
+        each = self.masses * (velocities**2 + self.gravity / self.length * away**2)
+        return np.asarray(0.5 * each.sum(axis=-1))

@@ -27,22 +27,17 @@ class Impact(NamedTuple):
     """
 
     time: float  #: s since the release
-    #: Contacts that took part: they touched, and their stretch had an approaching one.
-    contacts: tuple[int, ...]
+    contacts: tuple[int, ...]  #: that touched, in stretches with an approaching one
     positions: Vector  #: where the balls were, shape (N,), m
     before: Vector  #: velocities just before, shape (N,), m/s
     after: Vector  #: velocities just after, shape (N,), m/s
     energy_loss: float  #: what the contacts kept back, J
-    #: The path of each chain that collided, from left to right; a long one is cut, and its
-    #: `Trace.left_out` tells.
-    traces: tuple[Trace, ...]
+    traces: tuple[Trace, ...]  #: of each chain that collided; see `Trace.left_out` of long ones
 
     def __repr__(self) -> str:
         """Return a short account."""
-        return (
-            f"Impact(time={self.time:.6g}, contacts={self.contacts}, "
-            f"before={as_text(self.before)}, after={as_text(self.after)})"
-        )
+        speeds = f"before={as_text(self.before)}, after={as_text(self.after)}"
+        return f"Impact(time={self.time:.6g}, contacts={self.contacts}, {speeds})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,23 +46,16 @@ class Swing:
 
     Attributes
     ----------
-    chain : Chain
-        The balls, with their velocities at the release.
-    model : object
-        The impact model.
-    pendulums : Pendulums
-        How they hang.
+    chain, model, pendulums : Chain, object, Pendulums
+        What `swing` was given.
     times : ndarray, shape (T,)
         s since the release; those asked for, up to the end of the run.
     positions, velocities : ndarray, shape (T, N)
-        Of each ball along its arc, from its lowest point, m and m/s; at the instant of an impact,
-        those after it.
+        Along each ball's arc from its lowest point, m and m/s; after an impact at that instant.
     impacts : tuple of Impact
         In the order in which they happened.
-    ended : {"times", "impacts", "energy"}
-        Why the run ended: at the last of the times, after `max_impacts`, or below `min_energy`.
-    end : float
-        When it ended, s.
+    ended, end : {"times", "impacts", "energy"}, float
+        Whether the last time, `max_impacts` or `min_energy` ended the run; and when, s.
     together : tuple of int
         Contacts whose balls moved together at the end.
 
@@ -93,21 +81,10 @@ class Swing:
     @property
     def energy(self) -> Vector:
         """Kinetic and potential energy of all balls at each time, shape (T,), J."""
-        hanging = Hanging(self.pendulums, self.chain.masses)
-        return hanging.energy(self.positions, self.velocities)
+        return Hanging(self.pendulums, self.chain.masses).energy(self.positions, self.velocities)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a row for each time and ball: time, ball, position, velocity.
-
-        Examples
-        --------
-        >>> from cradle import ImpulseCorrelation, swing
-        >>> balls = Chain([1, 1], [0, 0], 1)
-        >>> swing(balls, ImpulseCorrelation(0), [-0.02, 0], [0]).to_frame()
-           time  ball  position  velocity
-        0   0.0     0     -0.02       0.0
-        1   0.0     1      0.00       0.0
-        """
+        """Return a row for each time and ball: time, ball, position, velocity."""
         parts = {"position": self.positions, "velocity": self.velocities}
         return self._by_ball({"time": self.times}, parts)
 
@@ -123,10 +100,12 @@ class Swing:
         0       0  0.317     0     1.0    0.0
         1       0  0.317     1     0.0    1.0
         """
-        times = np.array([impact.time for impact in self.impacts])
-        names = ("before", "after")
-        parts = {name: np.array([getattr(one, name) for one in self.impacts]) for name in names}
-        return self._by_ball({"impact": np.arange(len(times)), "time": times}, parts)
+        times, before, after = (
+            np.array([getattr(one, name) for one in self.impacts])
+            for name in ("time", "before", "after")
+        )
+        rows = {"impact": np.arange(len(times)), "time": times}
+        return self._by_ball(rows, {"before": before, "after": after})
 
     def _by_ball(self, rows: dict[str, Any], parts: dict[str, Vector]) -> pd.DataFrame:
         """Return a row for each of these rows and each ball."""
