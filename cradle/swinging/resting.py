@@ -3,15 +3,14 @@
 The rules, in the order in which `swing` applies them at every event:
 
 1. *Touching.* Those contacts touch that close at this instant (within `TIE`), and those whose gap
-   is no more than a rounding error (`NEAR`).  Each stretch of touching contacts with one that
-   approaches faster than `RESTING` of the swing's speed is a chain of its own, solved by `collide`.
+   is a rounding error (`NEAR`).  Each stretch of touching contacts with one that approaches faster
+   than `RESTING` of the swing's speed is a chain of its own, solved by `collide`.
 2. *Resting.* Touching balls whose relative speed is then below `RESTING` of the swing's speed take
-   their common velocity: from now on they touch and move together.  Without this rule balls that
-   are pressed against each other would collide for ever, ever more softly, in a finite time.
-3. *Pressing.* Of the contacts that move together those stay so in which the balls, left alone,
-   would not separate: neighbouring balls are pooled while the left one would accelerate no less
-   than the right one.  A pool moves as one body.  Equal pendulums without gaps swing alike, so
-   they keep together, without a force, until another ball strikes them.
+   their common velocity.  Without this rule balls that are pressed against each other would
+   collide for ever, ever more softly, in a finite time.
+3. *Pressing.* Resting balls that, left alone, would not separate move on as one body: neighbours
+   are pooled while the left one would accelerate no less than the right one.  Equal pendulums
+   without gaps swing alike, so they keep together, without a force, until a ball strikes them.
 4. *Pulling apart.* When the force in a contact of a body falls to zero, the contact opens, and
    stays open for this instant, whatever else happens in it.
 """
@@ -22,6 +21,7 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 from cradle.input.values import Vector
+from cradle.swinging.pendulums import mean
 
 #: Speeds below this part of the swing's speed are none: they carry 1e-20 of its energy.
 RESTING = 1e-10
@@ -31,13 +31,10 @@ NEAR = 1e-12
 
 def stretches(contacts: Iterable[bool]) -> list[tuple[int, int]]:
     """Return the first ball of each stretch of marked contacts, and the one after its last."""
-    found: list[tuple[int, int]] = []
-    for c, marked in enumerate(contacts):
-        if marked and found and found[-1][1] == c + 1:
-            found[-1] = found[-1][0], c + 2
-        elif marked:
-            found.append((c, c + 2))
-    return found
+    edges = [
+        c for c, (one, other) in enumerate(pairwise([False, *contacts, False])) if one != other
+    ]
+    return [(first, end + 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def common_velocities(
@@ -46,17 +43,15 @@ def common_velocities(
     """Give touching balls that hardly move against each other their common velocity (rule 2)."""
     v, resting = velocities.copy(), [False] * len(touching)
     while True:
-        opening = [b - a > least for a, b in pairwise(v.tolist())]
-        slow = [t and not opens for t, opens in zip(touching, opening, strict=True)]
-        found = [s or rests for s, rests in zip(slow, resting, strict=True)]
+        slow = [b - a <= least for a, b in pairwise(v.tolist())]
+        marks = zip(resting, touching, slow, strict=True)
+        found = [rests or (touches and now) for rests, touches, now in marks]
         if found == resting:
             return v, resting
         # The common velocity may be as slow against the next ball: look again.
         resting = found
-        for first, last in stretches(resting):
-            body = slice(first, last)
-            if (v[body] != v[first]).any():
-                v[body] = masses[body] @ v[body] / masses[body].sum()
+        for body in (slice(*ends) for ends in stretches(resting)):
+            v[body] = mean(v[body], masses[body])
 
 
 def pressed(
@@ -64,17 +59,15 @@ def pressed(
 ) -> list[bool]:
     """Return the resting contacts whose balls, left alone, would not separate (rule 3).
 
-    The contact forces are those under which no ball passes its neighbour and no contact pulls.
-    Among all accelerations without passing, these come nearest to those of the balls left alone,
-    in the mean square weighted by mass (Gauss's principle of least constraint).  For a row of
-    balls that is isotonic regression, which pooling solves exactly.
+    Of all accelerations without passing, contacts that push and do not pull give those nearest to
+    the balls left alone, in the mean square by mass (Gauss's principle of least constraint).  For
+    a row that is isotonic regression, which pooling solves exactly.
     """
-    kept = [False] * len(resting)
-    alone = list(zip(masses.tolist(), accelerations.tolist(), strict=True))
+    kept, m, a = [False] * len(resting), masses.tolist(), accelerations.tolist()
     for first, last in stretches(resting):
         pools: list[tuple[float, float, int]] = []  # mass, acceleration, number of balls
-        for m, a in alone[first:last]:
-            pools.append((m, a, 1))
+        for ball in range(first, last):
+            pools.append((m[ball], a[ball], 1))
             while len(pools) > 1 and pools[-2][1] >= pools[-1][1] - least:
                 (m1, a1, n1), (m2, a2, n2) = pools.pop(-2), pools.pop(-1)
                 pools.append((m1 + m2, (m1 * a1 + m2 * a2) / (m1 + m2), n1 + n2))

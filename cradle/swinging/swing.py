@@ -1,14 +1,13 @@
 """The swinging cradle: impacts by any model of the package, pendulums between them.
 
-The rules of touching and resting balls: `cradle.swinging.resting`.  Every flight and every
-instant is checked before a run is returned: order, momentum, energy and ledger.
+The rules of touching and resting balls are told in `cradle.swinging.resting`.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -56,21 +55,18 @@ def swing(
     chain : Chain
         Masses, restitution, and the velocities at the release (usually zeros).
     model : Model
-        The impact law, such as `ImpulseCorrelation`.  Where a part of the chain collides alone,
-        the model's values for that part are used, with ``excess="saturate"`` if it has that field.
+        The impact law, such as `ImpulseCorrelation`.  Where a part of the chain collides alone, it
+        has its part of the values, with ``excess="saturate"`` if the law has that field.
     positions : array_like, shape (N,)
-        Where the balls are released, along their arcs from their lowest points, m; positive to
-        the right.  No ball may overlap its neighbour, nor be beyond `Pendulums.reach`: a quarter
-        of a circle, or half a circle with ``angle="full"``.
+        Where the balls are released, along their arcs from their lowest points, m; positive to the
+        right.  At most a quarter of a circle, or half a circle with ``angle="full"``.
     times : array_like, shape (T,)
-        When to report positions and velocities, s since the release; rising, from 0 on; the run
-        ends at the last one, if not before.
+        When to report positions and velocities, s since the release; rising, from 0 on.
     pendulums : Pendulums, optional
         How the balls hang; small angles, 0.1 m, no gaps, no damping if left out.
-    max_impacts : int
-        End the run after this number of impacts.
-    min_energy : float
-        End the run when the energy after an impact is below this part of that at the release.
+    max_impacts, min_energy : int, float
+        End the run, before the last time, after this number of impacts, or when the energy is below
+        this part of that at the release.
 
     Returns
     -------
@@ -84,8 +80,8 @@ def swing(
     ValueError
         If a value is wrong, balls overlap, or the model cannot treat an impact.
     RuntimeError
-        If contacts open and close without end at one instant; or if balls would pass each other, or
-        energy or momentum come from nothing or be lost: every flight and every instant is checked.
+        If contacts open and close without end at one instant, balls pass each other, or energy or
+        momentum come from nothing or are lost: every flight and every instant is checked.
 
     Examples
     --------
@@ -111,11 +107,10 @@ def swing(
     run = _Run(chain, model, hanging, checked("positions", positions))
     ended = run.to_the_end(at, most, least)
     x, v = (np.concatenate(parts) for parts in zip(*run.series, strict=True))
-    found = at[: len(x)]
-    certify(run, found, x, v)
+    at = at[: len(x)]
+    certify(run, at, x, v)
     together = tuple(np.flatnonzero(run.together).tolist())
-    told = tuple(run.impacts), ended, run.t, together
-    return Swing(chain, model, hanging, found, x, v, *told)
+    return Swing(chain, model, hanging, at, x, v, tuple(run.impacts), ended, run.t, together)
 
 
 class _Run:
@@ -197,17 +192,16 @@ class _Run:
             touching[c] = True
         self.x, self.v = x.copy(), v.copy()
         groups = stretches(touching)
-        for group in groups:
-            self.align(*group)
+        for first, last in groups:  # to where they touch but for rounding; their centre stays
+            offset = self.offsets(first, last)
+            self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
         self.collide(groups, v)
         struck = self.v
         # What opens at this instant rests no more in it, whatever else happens.
         for c in meeting.releasing:
             self.freed[c] = self.t
-        kept = [
-            t and self.t - freed > hanging.tie
-            for t, freed in zip(touching, self.freed, strict=True)
-        ]
+        contacts = zip(touching, self.freed, strict=True)
+        kept = [touches and self.t - freed > hanging.tie for touches, freed in contacts]
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
         self.instants.append((self.t, x, self.x, v, struck, self.v))
         if any(resting):
@@ -216,12 +210,6 @@ class _Run:
             resting = pressed(hanging.masses, alone, resting, least)
         self.together = tuple(resting)
         self.parting = tuple(t and not one for t, one in zip(touching, resting, strict=True))
-
-    def align(self, first: int, last: int) -> None:
-        """Move balls that touch, but for rounding, to where they touch; keep their centre."""
-        m, offset = self.hanging.masses[first:last], self.offsets(first, last)
-        x = self.x[first:last] + offset
-        self.x[first:last] = mean(x, m) - offset
 
     def collide(self, groups: list[tuple[int, int]], before: Vector) -> None:
         """Solve the impacts of this instant and record them as one."""
@@ -242,9 +230,8 @@ class _Run:
             contacts += range(first, last - 1)
             traces.append(trace)
         if traces:
-            loss = sum(trace.energy_loss for trace in traces)
-            one = Impact(self.t, tuple(contacts), self.x, before, self.v, loss, tuple(traces))
-            self.impacts.append(one)
+            told = sum(trace.energy_loss for trace in traces), tuple(traces)
+            self.impacts.append(Impact(self.t, tuple(contacts), self.x, before, self.v, *told))
 
 
 def part(model: Any, n: int, first: int, last: int) -> Model:
@@ -253,16 +240,15 @@ def part(model: Any, n: int, first: int, last: int) -> Model:
     A part may end where a ratio's bound counts on the next ball (Eq. 53), so ratios above the
     part's own bounds are held there (rule of the largest admissible ratio), not refused.
     """
-    if last - first == n:
-        return model  # type: ignore[no-any-return]
     changes: dict[str, Any] = {}
-    for field in fields(model) if hasattr(model, "__dataclass_fields__") else ():
-        value = getattr(model, field.name)
-        if field.name == "excess":
-            changes["excess"] = "saturate"
-        elif isinstance(value, tuple | list) and len(value) in (n - 1, n - 2):
-            missing = n - len(value)  # 1: one for each contact; 2: one for each inner ball
-            changes[field.name] = tuple(value[first : last - missing])
+    if last - first < n and is_dataclass(model):
+        for name in (field.name for field in fields(model)):
+            value = getattr(model, name)
+            if name == "excess":
+                changes["excess"] = "saturate"
+            elif isinstance(value, tuple | list) and len(value) in (n - 1, n - 2):
+                missing = n - len(value)  # 1: one for each contact; 2: one for each inner ball
+                changes[name] = tuple(value[first : last - missing])
     return replace(model, **changes) if changes else model  # type: ignore[no-any-return]
 
 
