@@ -1,9 +1,5 @@
 """A row of balls in a physics engine: the engine moves them, `collide` solves their impacts.
 
-Engines solve one contact after another, or all at once as one body; neither is what a row of
-elastic balls does.  `Row` takes the contacts of one row over: the engine is told not to collide
-these balls with each other, and `Row.step` takes the place of the engine's step.
-
 The engine's steps stay whole.  An engine keeps an energy that belongs to the length h of its step
 (for v += h a, x += h v it is v^2/2 + V - h v V'/2), so to cut a step at each contact pumps energy.
 A ball moves on a polygon: straight on with the speed w of the step, then a kick.  With the corners
@@ -68,31 +64,24 @@ class Row(Alone):
     bodies : Bodies
         The engine's adapter.  The engine must not collide these balls with each other.
     chain : Chain
-        Masses and restitution from left to right; its velocities are not used.  The mass is what a
-        push at the centre meets: of a ball that turns as one piece with its arm, the moment of
-        inertia about the pivot over the arm's length squared.
+        Masses and restitution from left to right.  The mass is what a push at the centre meets: of
+        a ball in one piece with its arm, the moment of inertia about the pivot over arm squared.
     model : Model
         The impact law, such as ``ImpulseCorrelation(0.13)``.
     radii : float or array_like, shape (N,)
         Of the balls, m; above 0.
     pivots : array_like, shape (N, 2), optional
-        Where the strings end, m, in the order of the row.  A string takes the part of an impulse
+        Where the strings end, m, in the order of the row; a string takes the part of an impulse
         across the ball's arc.  Without pivots the balls are free.
-    touching : float, optional
-        Balls whose gap is at most this touch, m; a thousandth of the smallest radius r if left
-        out, by which steel balls of a toy are pressed into each other.
-    resting : float, optional
-        Balls that touch and close no faster than this go on together, m/s; sqrt(a r) / 100 with
-        the acceleration a if left out.
+    touching, resting : float, optional
+        Balls touch whose gap is at most this, m, and then go on together if they close no faster
+        than that, m/s; r / 1000 and sqrt(a r) / 100 if left out, with the smallest radius r.
     acceleration : float
-        That of gravity, m/s^2, or what else draws neighbours together at most: for how long nobody
-        need look at them (a hundredth of a second at most), and how a step bends their way.
+        The acceleration a of gravity, m/s^2, or what else draws neighbours together at most.
 
     Raises
     ------
-    TypeError
-        If an argument is of the wrong kind.
-    ValueError
+    TypeError, ValueError
         If a value is wrong, or the balls are no row: balls that are no neighbours touch, balls
         overlap by more than `touching`, or pivots are not in the order of the balls.
 
@@ -100,8 +89,8 @@ class Row(Alone):
     ----------
     on_hit : callable, optional
         Called with each `Hit` of a step, when the step is made: set it to play a sound.
-    impacts, settled : int
-        How many impacts were solved so far, and how often touching balls were brought to rest.
+    impacts : int
+        How many impacts were solved so far.
     time : float
         For how long the row has been stepped, s.
 
@@ -113,20 +102,17 @@ class Row(Alone):
 
     Examples
     --------
-    An engine of ten lines, and three balls in it of which the first one flies:
-
     >>> from cradle import Chain, ImpulseCorrelation
-    >>> class Free:
-    ...     def __init__(self, x, v):
-    ...         self.x, self.v = np.array(x), np.array(v)
+    >>> class Free:  # an engine
+    ...     x, v = np.array([[-1, 0], [0, 0], [0.2, 0]]), np.array([[2.0, 0], [0, 0], [0, 0]])
     ...     def motion(self):
     ...         return self.x.tolist(), self.v.tolist()
     ...     def push(self, ball, impulse):
     ...         self.v[ball] += impulse  # mass 1
     ...     def advance(self, step):
     ...         self.x += step * self.v
-    >>> balls = Free([[-1.0, 0.0], [0.0, 0.0], [0.2, 0.0]], [[2.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
-    >>> row = Row(balls, Chain([1, 1, 1], [0, 0, 0], 1), ImpulseCorrelation(0.5), 0.1)
+    >>> balls = Free()
+    >>> row = Row(balls, Chain([1, 1, 1], [0, 0, 0], 1), ImpulseCorrelation(0.5), radii=0.1)
     >>> for _ in range(60):
     ...     row.step(1 / 60)
     >>> balls.v[:, 0].round(6).tolist(), row.impacts
@@ -155,11 +141,11 @@ class Row(Alone):
         super().__init__(x, chain, model, radii, pivots, touching, resting, acceleration)
         self.bodies = bodies
         self.on_hit: Callable[[Hit], object] | None = None
-        self.impacts, self.settled, self.time = 0, 0, 0.0
+        self.impacts, self.time = 0, 0.0
         #: Where the speed of a step lies: 0 is the velocity before it, 1 the one after it.
         self.lag = 0.5
         self._samples, self._losses = list[float](), list[float]()
-        self._last: tuple[Plane, Plane, float, float] | None = None
+        self._last: tuple[Plane, Plane, float] | None = None
         self._lessons = self._doubts = 0
 
     def step(self, duration: float) -> None:
@@ -210,9 +196,9 @@ class Row(Alone):
         own = self.own(v, x)
         if learning:
             self._learn(x, own, duration)
-            self.quiet = 0.0  # to compare two neighbouring looks
         flight = self.fly(x, own + self.lag * duration * self._pull(x), duration) if near else None
         if flight is None:
+            self.quiet *= not learning  # to compare two neighbouring looks
             return None
         self._last = None
         self._push(flight.early, x)
@@ -223,17 +209,16 @@ class Row(Alone):
         started, self.time = self.time, self.time + duration
         if begun is None:
             return
-        x, own, (_, early, _, _) = begun
+        x, own, (_, early, _) = begun
         now, v = map(np.array, self._motion())
         # The speed of the step, whether its kick comes first, last, or half and half.
         taken = self.taken(x, own + early, duration)
         speeds = own + self.lag * (self.own(v, now) + taken - early - own)
         bent = self._pull(x) - self._pull(now)
         speeds += self.lag * (1.0 - self.lag) * duration * bent
-        change, _, hits, settled = self.fly(x, speeds, duration) or Flight(-taken, early, [], 0)
+        change, _, hits = self.fly(x, speeds, duration) or Flight(-taken, early, [])
         self._push(change - early + taken, now)
         self.impacts += len(hits)
-        self.settled += settled
         for hit in hits:
             if self.on_hit is not None:
                 self.on_hit(hit._replace(time=started + hit.time))
@@ -243,15 +228,13 @@ class Row(Alone):
         return -self.acceleration * self.ways(x).imag + 0j
 
     def _learn(self, x: Plane, own: Plane, duration: float) -> None:
-        """Compare the ways since the last look with the velocities then and now."""
-        last, self._last = self._last, (x, own, self.time, duration)
+        """Compare the ways of the last step with the velocities before and after it."""
+        last, self._last = self._last, (x, own, duration)
         if last is None:
             return
-        was, before, then, step = last
-        passed = self.time - then
-        steady = math.isclose(passed, step, rel_tol=1e-6)
-        mean, gain = self.travelled(was, x) / passed, own - before
-        speed, gained = np.abs(0.5 * (own + before)), np.abs(gain)
+        was, before, step = last
+        way, gain = self.travelled(was, x), own - before
+        mean, speed, gained = way / step, np.abs(0.5 * (own + before)), np.abs(gain)
         fast = speed > np.maximum(4.0 * gained, self.resting)
         self._lessons += 1
         if fast.any():
@@ -265,15 +248,15 @@ class Row(Alone):
         # Near the turning points the lag is seen: the kicks are in proportion to the pulls.
         first, second = self._pull(was).real, self._pull(x).real
         seen = (gained > 0.05 * speed) & (np.abs(first) > 0.05 * self.acceleration)
-        if seen.any() and steady:
+        if seen.any():
             share = ((mean - before)[seen] / gain[seen]).real
             late = share * second[seen]
             self._samples += (late / (late + (1.0 - share) * first[seen])).tolist()
             self.lag = float(np.clip(np.median(self._samples), 0.0, 1.0))
         # Near the lowest point one sees what a solver takes of a velocity that it turns.
-        turn = self.travelled(was, x).real / self.arms(was)
+        turn = way.real / self.arms(was)
         seen = fast & (np.abs(turn) > 0.01)
-        if seen.any() and steady and self._samples:
+        if seen.any() and self._samples:
             kick = step * (self.lag * first + (1.0 - self.lag) * second)
             less = (kick - gain.real)[seen] / (0.5 * (own + before)).real[seen]
             self._losses += (less / turn[seen] ** 2).tolist()
@@ -285,10 +268,8 @@ def step_rows(rows: Sequence[Row], duration: float) -> None:
 
     Parameters
     ----------
-    rows : sequence of Row
-        All rows of one world.
-    duration : float
-        Of the step, s.
+    rows, duration : sequence of Row, float
+        All rows of the world, and how long the step lasts, s.
 
     Raises
     ------

@@ -331,7 +331,7 @@ def test_balls_at_rest_cost_no_impact():
     row = hung(bodies)
     looks.clear()
     steps(row, 2000, 1e-3)
-    assert row.impacts == row.settled == 0
+    assert row.impacts == 0
     np.testing.assert_array_equal(bodies.angles, 0)
     assert len(looks) <= 220  # every hundredth of a second
 
@@ -356,7 +356,6 @@ def test_balls_that_press_each_other_rest(e: float, step: float):
         row.step(step)
         least = min(least, gaps(bodies).min())
     assert row.impacts < 20
-    assert row.settled > 0
     assert least > -10 * row.touching
     assert np.abs(bodies.angles - wide).max() < 0.01
 

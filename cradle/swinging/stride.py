@@ -1,14 +1,13 @@
-"""A row of balls that makes one step alone: straight on, or along its arcs, and its contacts.
+"""A row of balls that makes one step alone; `cradle.row.Row` is one that an engine moves.
 
-`Alone` knows no engine; `cradle.row.Row` is one that an engine moves.  Places and velocities are
-complex numbers, x + i y in the plane of the row.  A ball's own velocity is that in its own way:
-along its arc, a real number, where it hangs; where it is free, all of it.
+Places and velocities are complex numbers, x + i y in the plane of the row.  A ball's own velocity
+is that in its own way: along its arc, a real number, where it hangs; where it is free, all of it.
 """
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from cradle.runtime.compile import without_waiting
 from cradle.swinging.resting import common_velocities, stretches
 from cradle.swinging.swing import part
 
+_ABOVE_ZERO: Any = "must be above 0", 0.0, math.inf, True
 # Contact lines of one cluster may differ by this angle, rad: beyond it the balls are no row.
 _BEND = 0.1
 # Somebody looks at the balls at least that often, s.
@@ -48,7 +48,6 @@ class Flight(NamedTuple):
     change: Plane  #: all of it
     early: Plane  #: the part that, from the start on, takes the balls to where the step ends
     hits: list[Hit]
-    settled: int  #: how often balls that touch were brought to rest
 
 
 class Alone:
@@ -61,23 +60,19 @@ class Alone:
         n = len(must_be(Chain, "chain", chain))
         with without_waiting():
             collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
-        size = checked("radii", radii, "must be above 0", 0.0, open_low=True)
+        size = checked("radii", radii, *_ABOVE_ZERO)
         if size.shape not in ((), (n,)):
             raise ValueError(f"radii has shape {size.shape}; {n} balls need () or ({n},)")
         self.chain, self.model = chain, model
         self.radii: list[float] = np.broadcast_to(size, (n,)).tolist()
-        self.reach = [a + b for a, b in pairwise(self.radii)]
-
-        def above_zero(name: str, value: float) -> float:
-            return one_number(name, value, "must be above 0", 0.0, open_low=True)
-
-        self.acceleration = above_zero("acceleration", acceleration)
-        least = min(self.radii)
-        self.touching = above_zero("touching", 1e-3 * least if touching is None else touching)
+        self.reach, least = [a + b for a, b in pairwise(self.radii)], min(self.radii)
+        self.acceleration = one_number("acceleration", acceleration, *_ABOVE_ZERO)
+        near = 1e-3 * least if touching is None else touching
         slow = 0.01 * math.sqrt(self.acceleration * least) if resting is None else resting
-        self.resting = above_zero("resting", slow)
+        self.touching = one_number("touching", near, *_ABOVE_ZERO)
+        self.resting = one_number("resting", slow, *_ABOVE_ZERO)
         at = self._plane("motion: positions", x)
-        self._refuse_a_pack(at)
+        self._refuse_a_pack(at.tolist())
         overlaps = self.reach - np.abs(np.diff(at))
         if (overlaps > self.touching).any():
             c = int(np.argmax(overlaps))
@@ -87,19 +82,9 @@ class Alone:
         #: How fast neighbours may come to close; 0 on equal strings: these are accelerated alike.
         self.speeding = self.acceleration
         if self.pivots is not None:
-            way = self.pivots[-1] - self.pivots[0]
-            back = (np.diff(self.pivots) / way).real < 0.0
-            if back.any():
-                ball = int(np.argmax(back)) + 1
-                raise ValueError(
-                    f"pivots[{ball}] lies behind pivots[{ball - 1}] on the way from the first to "
-                    "the last; the balls must be told from one end of the row to the other"
-                )
-            if ((at[-1] - at[0]) / way).real <= 0.0:
-                raise ValueError("pivots lead the other way than the balls; must be in their order")
+            self._refuse_disorder(at, self.pivots)
             lengths = self.arms(at)
-            if np.ptp(lengths) <= 1e-3 * lengths.min():
-                self.speeding = 0.0
+            self.speeding *= np.ptp(lengths) > 1e-3 * lengths.min()
         #: Part of a velocity that a step takes, over the square of the angle by which it turns.
         self.loss = 0.0
         #: For how long nothing can happen, s.
@@ -142,21 +127,19 @@ class Alone:
         """Make a step with these own velocities; None if nothing touches."""
         change, early = np.zeros((2, len(x)), complex)
         hits: list[Hit] = []
-        left, settled, touched = duration, 0, False
+        left, touched = duration, False
         for _ in range(_MOST_IMPACTS):
             touches, arrival, self.quiet = self.look(x.tolist(), (own * self.ways(x)).tolist())
             if touches:
-                gained, rests = self._solve(x, own, duration - left, hits)
-                own = own + gained
-                change += gained
+                gained, touched = self._solve(x, own, duration - left, hits), True
+                own, change = own + gained, change + gained
                 early += left / duration * gained
-                settled, touched = settled + rests, True
             passed = min(arrival, left)
             taken = passed / duration * self.taken(x, own, duration)
             own, change = own - taken, change - taken
             if passed == left:
                 self.quiet -= left
-                return Flight(change, early, hits, settled) if touched else None
+                return Flight(change, early, hits) if touched else None
             x, left = self.moved(x, passed * own), left - passed
         raise RuntimeError(
             f"more than {_MOST_IMPACTS} impacts in a step of {duration!r} s; the balls are "
@@ -196,12 +179,12 @@ class Alone:
             if closing + root > 0.0:
                 quiet = min(quiet, 2.0 * room / (closing + root))
         if self.speeding:  # nothing else keeps the balls in order
-            self._refuse_a_pack(np.array(x))
+            self._refuse_a_pack(x)
         return strike or rest, 0.0 if strike else arrival, quiet
 
-    def _solve(self, x: Plane, own: Plane, time: float, hits: list[Hit]) -> tuple[Plane, int]:
+    def _solve(self, x: Plane, own: Plane, time: float, hits: list[Hit]) -> Plane:
         """Solve each cluster of touching balls; return what their own velocities gain."""
-        gained, settled, ways = np.zeros(len(x), complex), 0, self.ways(x)
+        gained, ways = np.zeros(len(x), complex), self.ways(x)
         lines, v = np.diff(x), own * ways
         gaps = np.abs(lines) - self.reach
         for first, last in stretches((gaps <= self.touching).tolist()):
@@ -231,22 +214,19 @@ class Alone:
                 c = int(np.argmax(impulses))
                 strongest = first + c, float(impulses[c])
                 hits.append(Hit(time, range(first, last), before, after, *strongest))
-            after, rests = self._rested(masses, after, gaps[first : last - 1])
-            settled += rests
+            after = self._rested(masses, after, gaps[first : last - 1])
             gained[balls] = (after - before) * (axis if free else 1.0 / along)
-        return gained, settled
+        return gained
 
-    def _rested(self, masses: Vector, v: Vector, gaps: Vector) -> tuple[Vector, bool]:
-        """Return velocities after those that touch have come to rest, and whether any have."""
-        slow = v[:-1] - v[1:] > 0.0
-        if slow.any():
-            v, _ = common_velocities(masses, v, slow.tolist(), 0.0)
-        deep = gaps < -self.touching
-        if deep.any():
+    def _rested(self, masses: Vector, v: Vector, gaps: Vector) -> Vector:
+        """Return velocities after those that touch and still approach have come to rest."""
+        v, _ = common_velocities(masses, v, (v[:-1] > v[1:]).tolist(), 0.0)
+        if (gaps < -self.touching).any():
             # Balls that overlap by more than is unseen part, slower than what counts as an impact.
-            ramp = np.concatenate([[0.0], np.cumsum(np.where(deep, 0.5 * self.resting, 0.0))])
-            v = v + ramp - masses @ ramp / masses.sum()
-        return v, bool(slow.any())
+            parting = np.where(gaps < -self.touching, 0.5 * self.resting, 0.0)
+            ramp = np.concatenate([[0.0], np.cumsum(parting)])
+            v += ramp - masses @ ramp / masses.sum()
+        return v
 
     def _plane(self, name: str, places: ArrayLike) -> Plane:
         """Return places in the plane as complex numbers."""
@@ -255,12 +235,24 @@ class Alone:
             raise ValueError(f"{name} has shape {x.shape}; {n} balls need ({n}, 2)")
         return x[:, 0] + 1j * x[:, 1]
 
-    def _refuse_a_pack(self, x: Plane) -> None:
-        half = 0.5 * np.array(self.radii)  # halves add up to no more than a float can hold
-        room = np.add.outer(half, half) + 0.5 * self.touching
-        near = np.argwhere(np.triu(0.5 * np.abs(np.subtract.outer(x, x)) <= room, 2))
-        if len(near):
-            i, j = near[0]
+    def _refuse_disorder(self, at: Plane, pivots: Plane) -> None:
+        way = pivots[-1] - pivots[0]
+        back = (np.diff(pivots) / way).real < 0.0
+        if back.any():
+            ball = int(np.argmax(back)) + 1
             raise ValueError(
-                f"balls {i} and {j} touch and are no neighbours; a row alone can be solved, no pack"
+                f"pivots[{ball}] lies behind pivots[{ball - 1}] on the way from the first to the "
+                "last; the balls must be told from one end of the row to the other"
             )
+        if ((at[-1] - at[0]) / way).real <= 0.0:
+            raise ValueError("pivots lead the other way than the balls; must be in their order")
+
+    def _refuse_a_pack(self, x: list[complex]) -> None:
+        for i, j in combinations(range(len(x)), 2):
+            line = x[j] - x[i]
+            gap = math.hypot(line.real, line.imag) - (self.radii[i] + self.radii[j])
+            if j > i + 1 and gap <= self.touching:
+                raise ValueError(
+                    f"balls {i} and {j} touch and are no neighbours; a row alone can be solved, no "
+                    "pack"
+                )
