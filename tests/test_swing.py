@@ -22,7 +22,7 @@ from cradle import (
 )
 from cradle.swinging import flight
 from cradle.swinging import swing as swinging
-from cradle.swinging.flight import FullFlight, Meeting, SmallAngleFlight, first_fall
+from cradle.swinging.flight import FullFlight, SmallAngleFlight, first_fall
 
 ONE_HERTZ = Pendulums(length=9.81 / (4 * math.pi**2))  # sqrt(g/l) = 2 pi / s: a period of 1 s
 
@@ -462,7 +462,7 @@ def test_balls_that_swing_alike_touch_all_the_time():
 
 
 def test_a_run_that_stands_still_says_so(monkeypatch):
-    monkeypatch.setattr(SmallAngleFlight, "next_meeting", lambda *_: Meeting(0.0, [0], [1]))
+    monkeypatch.setattr(SmallAngleFlight, "next_meeting", lambda *_: (0.0, [0], [1]))
     with pytest.raises(RuntimeError, match=r"does not get beyond t = 0\.0 s: contacts \[0\] close"):
         swing(balls(3), ImpulseCorrelation(0), [0.0] * 3, [1.0])
 
@@ -479,7 +479,7 @@ def test_near_balls_of_any_angle_cost_what_their_time_costs(monkeypatch, e):
     def searched(self, horizon):
         begun = counts[0]
         meeting = search(self, horizon)
-        searches.append((min(meeting.time, horizon), counts[0] - begun))
+        searches.append((min(meeting[0], horizon), counts[0] - begun))
         return meeting
 
     def counted(self, time, y):
@@ -605,7 +605,7 @@ def pushed(join):
 LOST = "a flight has made or lost"
 #: Where something is broken, how, in which words it is refused, and how the balls hang.
 BROKEN = [
-    (SmallAngleFlight, "next_meeting", lambda _: lambda *_: Meeting(math.inf, [], []),
+    (SmallAngleFlight, "next_meeting", lambda _: lambda *_: (math.inf, [], []),
      r"balls overlap by 0\.0", {}),
     (SmallAngleFlight, "at", faster(3e-10), LOST, {}),
     (SmallAngleFlight, "at", faster(0.02), LOST, {"damping": 0.1}),

@@ -16,6 +16,9 @@ from cradle.swinging.pendulums import TIE, Hanging, mean
 
 #: Of each contact, whether its balls touch and move together, or touch and part.
 Marks = tuple[bool, ...]
+#: The next event of a flight: when it is, s since the flight began, infinite if never; the contacts
+#: whose balls meet; and those whose balls were pressed together and are drawn apart from now on.
+Meeting = tuple[float, list[int], list[int]]
 #: A term Re(C exp(rate t)) of a sum: C and its rate.
 Wave = tuple[complex, complex]
 # Below this part of what it is made of a force is a rounding error.
@@ -23,14 +26,6 @@ _ROUNDING = 1e-11
 _RTOL = 1e-12
 # Of the polynomials: the next term of a swing in a radian is below 1e-17.
 _DEGREE = 14
-
-
-class Meeting(NamedTuple):
-    """The next event of a flight."""
-
-    time: float  #: s since the flight began; infinite if nothing happens
-    closing: list[int]  #: contacts whose balls meet
-    releasing: list[int]  #: contacts whose balls were pressed together and are now drawn apart
 
 
 def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -> float:
@@ -198,10 +193,10 @@ class SmallAngleFlight:
             times.append(first_fall(level, waves, parts, min(horizon, first + self.tie)))
             first = min(first, times[-1])
         if first > horizon:
-            return Meeting(math.inf, [], [])
+            return math.inf, [], []
         met = [c for c, time in enumerate(times) if time <= first + self.tie]
         closing = [c for c in met if not self.together[c]]
-        return Meeting(first, closing, [c for c in met if self.together[c] and times[c] == first])
+        return first, closing, [c for c in met if self.together[c] and times[c] == first]
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
         """Return positions and velocities at T times since the start, shapes (T, N)."""
@@ -258,12 +253,11 @@ class FullFlight:
         step = self.half / 4.0
         found = self._integrate(0.0, self.start, horizon, events=events, max_step=step)
         if found.status == 0:
-            return Meeting(math.inf, [], [])
+            return math.inf, [], []
         time, (x, v) = float(found.t[-1]), np.split(found.y[:, -1], 2)
         soon = (np.diff(x) + self.tie * np.diff(v) <= 0.0) & (time > np.array(self.waits))
         met = [len(times) > 0 for times in found.t_events]
-        closing = [b - 1 for b, now in zip(self.contacts, met | soon, strict=True) if now]
-        return Meeting(time, closing, [])
+        return time, [b - 1 for b, now in zip(self.contacts, met | soon, strict=True) if now], []
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
         """Return positions and velocities at T times since the start, shapes (T, N).

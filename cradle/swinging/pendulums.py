@@ -1,8 +1,9 @@
-"""How the balls hang: strings, gravity, gaps, damping."""
+"""How the balls hang."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +21,7 @@ from cradle.input.values import (
 TIE = 1e-9
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False)
 class Pendulums:
     """How the balls hang: strings, gravity, gaps, and the damping of the swing.
 
@@ -47,35 +48,27 @@ class Pendulums:
     [9.905, 9.905, 9.905, 9.905, 9.905]
     """
 
-    length: float | tuple[float, ...]
-    gravity: float
-    gaps: float | tuple[float, ...]
-    damping: float | tuple[float, ...]
-    angle: str
+    length: ArrayLike = 0.1
+    _: KW_ONLY
+    gravity: float = 9.81
+    gaps: ArrayLike = 0.0
+    damping: ArrayLike = 0.0
+    angle: str = "small"
 
-    def __init__(
-        self,
-        length: ArrayLike = 0.1,
-        *,
-        gravity: float = 9.81,
-        gaps: ArrayLike = 0.0,
-        damping: ArrayLike = 0.0,
-        angle: str = "small",
-    ) -> None:
-        g = one_number("gravity", gravity, "must be above 0", 0.0, open_low=True)
-        least = "must be at least 0"
+    def __post_init__(self) -> None:
+        above, least = ("must be above 0", 0.0, math.inf, True), ("must be at least 0", 0.0)
+        g = one_number("gravity", self.gravity, *above)
         values = {
-            "length": number_or_row("length", length, "N", "must be above 0", 0.0, open_low=True),
-            "gaps": number_or_row("gaps", gaps, "N - 1", least, 0.0),
-            "damping": number_or_row("damping", damping, "N", least, 0.0),
+            "length": number_or_row("length", self.length, "N", *above),
+            "gaps": number_or_row("gaps", self.gaps, "N - 1", *least),
+            "damping": number_or_row("damping", self.damping, "N", *least),
         }
-        one_of("angle", angle, ("small", "full"))
-        if angle == "full":
-            for name, value in values.items():
-                if len(set(np.ravel(value))) > 1 or (name == "gaps" and np.any(value)):
-                    rule = "must be 0" if name == "gaps" else "must be equal"
-                    raise ValueError(f"{name} = {value!r}; {rule} with angle='full'")
-        vars(self).update(values, gravity=g, angle=angle)
+        one_of("angle", self.angle, ("small", "full"))
+        for name, value in values.items() if self.angle == "full" else ():
+            if len(set(np.ravel(value))) > 1 or (name == "gaps" and np.any(value)):
+                rule = "must be 0" if name == "gaps" else "must be equal"
+                raise ValueError(f"{name} = {value!r}; {rule} with angle='full'")
+        vars(self).update(values, gravity=g)
 
     def row(self, name: str, size: int) -> Vector:
         """Return `length`, `gaps` or `damping` for each of `size` balls or contacts."""
@@ -88,13 +81,7 @@ class Pendulums:
         return part * np.pi * self.row("length", size)
 
     def natural_frequency(self, size: int) -> Vector:
-        """Return sqrt(g/l) of each of `size` balls, rad/s.
-
-        Examples
-        --------
-        >>> Pendulums(length=9.81).natural_frequency(2).tolist()
-        [1.0, 1.0]
-        """
+        """Return sqrt(g/l) of each of `size` balls, rad/s."""
         frequency: Vector = np.sqrt(self.gravity / self.row("length", size))
         damping = self.row("damping", size)
         slow = damping >= frequency

@@ -25,7 +25,7 @@ from cradle.input.values import (
     whole_number,
 )
 from cradle.models import Model, collide
-from cradle.swinging.flight import FullFlight, Meeting, SmallAngleFlight
+from cradle.swinging.flight import FullFlight, SmallAngleFlight
 from cradle.swinging.pendulums import TIE, Hanging, Pendulums, mean
 from cradle.swinging.record import Impact, Swing
 from cradle.swinging.resting import NEAR, RESTING, common_velocities, pressed, stretches
@@ -145,21 +145,19 @@ class _Run:
                 f"positions = {x.tolist()}; balls {c} and {c + 1} overlap by {-distance[c]:g} m"
             )
         self.freed = [-math.inf] * (n - 1)  # when the force in each contact last fell to zero
-        near = np.abs(distance) <= TIE * self.size
-        self.settle(Meeting(0.0, np.flatnonzero(near).tolist(), []))
+        self.settle([], [])
 
     def to_the_end(self, times: Vector, most: int, least: float) -> str:
         """Fly from event to event; return why the run ended."""
         done, end, ended = 0, float(times[-1]), "impacts"
-        instant, idle = 0.0, 0  # events without an impact at one instant
-        kind = SmallAngleFlight if self.hanging.small else FullFlight
+        idle, kind = 0, SmallAngleFlight if self.hanging.small else FullFlight
         while len(self.impacts) < most:
             if least and self.hanging.energy(self.x, self.v) < least * self.released:
                 ended = "energy"
                 break
             flight = kind(self.hanging, self.x, self.v, self.together, self.parting)
-            meeting = flight.next_meeting(end - self.t)
-            later = self.t + meeting.time
+            wait, closing, opening = flight.next_meeting(end - self.t)
+            later = self.t + wait
             here = int(times.searchsorted(later, side="left"))
             if here > done or later > end:
                 self.series.append(flight.at(times[done:here] - self.t))
@@ -167,28 +165,26 @@ class _Run:
             if later > end:
                 self.t = end
                 return "times"
-            x, v = flight.at(np.array([meeting.time]))
+            x, v = flight.at(np.array([wait]))
             known = len(self.impacts)
             self.t, self.x, self.v = later, x[0], v[0]
-            self.settle(meeting)
-            idle += 1
-            if self.t - instant > self.hanging.tie or len(self.impacts) > known:
-                instant, idle = self.t, 1
+            self.settle(closing, opening)
+            idle = idle + 1 if wait <= self.hanging.tie and len(self.impacts) == known else 0
             if idle > MOST_IDLE * len(self.x):
                 raise RuntimeError(
-                    f"the swing does not get beyond t = {self.t} s: contacts {meeting.closing} "
-                    f"close and {meeting.releasing} open there again and again without an impact"
+                    f"the swing does not get beyond t = {self.t} s: contacts {closing} close and "
+                    f"{opening} open there again and again without an impact"
                 )
         # The instant at which the run ends is reported if it was asked for.
         count = int(np.searchsorted(times[done:], self.t, side="right"))
         self.series.append((np.tile(self.x, (count, 1)), np.tile(self.v, (count, 1))))
         return ended
 
-    def settle(self, meeting: Meeting) -> None:
+    def settle(self, closing: list[int], opening: list[int]) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
         hanging, x, v = self.hanging, self.x, self.v
         touching = (hanging.gaps + (x[1:] - x[:-1]) <= NEAR * self.size).tolist()
-        for c in meeting.closing:
+        for c in closing:
             touching[c] = True
         self.x, self.v = x.copy(), v.copy()
         groups = stretches(touching)
@@ -198,7 +194,7 @@ class _Run:
         self.collide(groups, v)
         struck = self.v
         # What opens at this instant rests no more in it, whatever else happens.
-        for c in meeting.releasing:
+        for c in opening:
             self.freed[c] = self.t
         contacts = zip(touching, self.freed, strict=True)
         kept = [touches and self.t - freed > hanging.tie for touches, freed in contacts]
