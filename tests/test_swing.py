@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from numpy.polynomial import chebyshev
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 from truth import solve
@@ -20,7 +21,6 @@ from cradle import (
     swing,
     textbook,
 )
-from cradle.swinging import flight
 from cradle.swinging import swing as swinging
 from cradle.swinging.flight import FullFlight, SmallAngleFlight, first_fall
 
@@ -535,15 +535,21 @@ def test_a_root_next_to_the_start(terms, parting, root):
     assert first_fall(0.0, terms, parting, 10.0) == root
 
 
-def test_a_slow_rise_is_followed_in_few_steps(monkeypatch):
+@pytest.fixture
+def looked(monkeypatch):
+    """The polynomials whose roots are sought."""
+    found, roots = [], chebyshev.chebroots
+    monkeypatch.setattr(chebyshev, "chebroots", lambda c: found.append(c) or roots(c))
+    return found
+
+
+def test_a_slow_rise_is_followed_in_few_steps(looked):
     """A contact begins to part with hardly any acceleration; the rate of that carries it on."""
     rates = [complex(-0.1, 1.0), complex(-0.3, 1.2)]
     powers = np.array([[rate**n for rate in rates] for n in range(4)])
     columns = np.concatenate([powers.real, -powers.imag], axis=1)
     parts = np.linalg.solve(columns, [0, 0, 1e-10, 1])  # value and derivatives at the start
     terms = [(complex(parts[k], parts[2 + k]), rate) for k, rate in enumerate(rates)]
-    looked, roots = [], flight._roots
-    monkeypatch.setattr(flight, "_roots", lambda *a: looked.append(a) or roots(*a))
     root = first_fall(0.0, terms, True, 20.0)
     assert len(looked) < 10
     value = lambda t: sum((c * (np.exp(rate * t) - 1)).real for c, rate in terms)  # noqa: E731
@@ -554,14 +560,12 @@ def test_a_slow_rise_is_followed_in_few_steps(monkeypatch):
 
 @pytest.mark.parametrize("difference", [1e-2, 1e-6, 1e-10, 1e-12])
 @pytest.mark.parametrize("begin", [0.0, 1.0])
-def test_periods_that_hardly_differ_are_followed_in_few_steps(monkeypatch, begin, difference):
+def test_periods_that_hardly_differ_are_followed_in_few_steps(looked, begin, difference):
     """cos t - cos(w t) = 2 sin((w + 1) t / 2) sin((w - 1) t / 2), first zero 2 pi / (w + 1)."""
     w = 1.0 + difference
     terms = [(1 + 0j, 1j), (-1 + 0j, w * 1j)]
     if begin:
         terms = [(c * np.exp(rate * begin), rate) for c, rate in terms]
-    looked, roots = [], flight._roots
-    monkeypatch.setattr(flight, "_roots", lambda *a: looked.append(a) or roots(*a))
     root = first_fall(0.0, terms, not begin, 1e5)
     # Values are known to the rounding of their terms.
     assert begin + root == pytest.approx(2 * np.pi / (w + 1), abs=1e-12 + 3e-15 / difference)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import cmath
 import functools
 import math
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -69,6 +68,8 @@ def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -
 
 def _search(level: float, waves: list[Wave], parting: bool, horizon: float) -> float:
     """Return the same by all roots of polynomials that follow a radian to the last digit."""
+    from numpy.polynomial.chebyshev import chebroots, chebtrim  # slow to import
+
     c, rate = np.array(waves).T
     size, radian = np.abs(c), 1.0 / float(np.abs(rate).max())
     if (left := float(size.sum())) > level > 0.0 > (decay := float(rate.real.max())):
@@ -80,34 +81,24 @@ def _search(level: float, waves: list[Wave], parting: bool, horizon: float) -> f
     def rise(time: Vector) -> Vector:  # from a start at zero, over the time: without that root
         return np.asarray((np.expm1(np.multiply.outer(time, rate)) @ c).real * radian / time)
 
-    # How far it may lie below its values at points an eighth of a radian apart.
-    dip = float(size @ np.abs(rate) ** 2) * (radian / 8.0) ** 2 / 8.0
     noise = 4e-16 * (abs(level) + left)
-    for block in np.arange(0.0, horizon, 8.0 * radian).tolist():
-        told_by = rise if parting and block == 0.0 else value
-        told = told_by(np.maximum(block + radian / 8.0 * np.arange(65), TIE * radian))
-        least = np.minimum(told[1:], told[:-1]).reshape(8, 8).min(axis=1)
-        for k in np.flatnonzero(least <= dip).tolist():
-            begin, end = block + k * radian, block + (k + 1) * radian
-            if begin > horizon:
-                break
-            marks = np.array([begin, *_roots(told_by, begin, end), end])
-            below = told_by(0.5 * (marks[1:] + marks[:-1])) < -noise
-            if below.any():
-                # A contact that is to part and does not closes a moment later.
-                return float(marks[below.argmax()]) or TIE * radian * parting
-    return math.inf
-
-
-def _roots(value: Callable[[Vector], Vector], begin: float, end: float) -> Vector:
-    """Return the roots in a radian of a function that a polynomial follows there."""
-    from numpy.polynomial.chebyshev import chebroots, chebtrim
-
+    # How far it may lie below its values at nodes, an eighth of a radian apart.
+    dip = float(size @ np.abs(rate) ** 2) * (radian / 8.0) ** 2 / 8.0
     nodes, inverse = _nodes()
-    terms = inverse @ value(begin + 0.5 * (end - begin) * (1.0 + nodes))
-    roots = chebroots(chebtrim(terms, 1e-15 * np.abs(terms).max()))
-    real = roots.real[(roots.imag == 0.0) & (np.abs(roots.real) < 1.0)]
-    return np.asarray(begin + 0.5 * (end - begin) * (1.0 + np.sort(real)))
+    for k in range(math.ceil(horizon / radian)):
+        begin, told_by = k * radian, rise if parting and k == 0 else value
+        values = told_by(begin + 0.5 * radian * (1.0 + nodes))
+        if values.min() > dip:
+            continue
+        terms = inverse @ values
+        roots = chebroots(chebtrim(terms, 1e-15 * np.abs(terms).max()))
+        real = np.sort(roots.real[(roots.imag == 0.0) & (np.abs(roots.real) < 1.0)])
+        marks = begin + 0.5 * radian * (1.0 + np.array([-1.0, *real, 1.0]))
+        below = told_by(0.5 * (marks[1:] + marks[:-1])) < -noise
+        if below.any():
+            # A contact that is to part and does not closes a moment later.
+            return float(marks[below.argmax()]) or TIE * radian * parting
+    return math.inf
 
 
 @functools.cache
