@@ -1,18 +1,17 @@
 """A row of balls in a physics engine: the engine moves them, `collide` solves their impacts.
 
-The engine's steps stay whole.  An engine keeps an energy that belongs to the length h of its step
-(for v += h a, x += h v it is v^2/2 + V - h v V'/2), so to cut a step at each contact pumps energy.
-A ball moves on a polygon: straight on with the speed w of the step, then a kick.  With the corners
-x and x' of a side, and k the stiffness that draws the ball back, w^2 + k x x' stays the same.  A
-contact with a time t of the step left makes x' + t u of x', and w + u of w.  Where the balls hang
-alike and touch, that changes the energy of the row by the sum of m ((w + u)^2 - w^2), up to terms
-whose mean is zero; and that sum is what `collide` keeps.  Two pushes do it: m u t / h before the
-engine's step, the rest after it, when w is known: between the velocities before and after the
-step; where, the row learns from steps without contact.
+The engine's steps stay whole.  It keeps an energy that belongs to the length h of its step: that is
+v^2/2 + V - h v V'/2 for v += h a, x += h v; so to cut a step at each contact pumps energy.  A ball
+moves on a polygon: straight on with the speed w of the step, then a kick.  With the corners x and
+x' of a side, and k the stiffness that draws the ball back, w^2 + k x x' stays the same.  A contact
+with a time t of the step left makes x' + t u of x', and w + u of w.  Where the balls hang alike and
+touch, that changes the energy of the row by the sum of m ((w + u)^2 - w^2), up to terms whose mean
+is zero; and that sum is what `collide` keeps.  Two pushes do it: m u t / h before the engine's
+step, and the rest after it, when w is known.  Where w lies between the velocities before and after
+a step, the row learns from steps without contact.
 
-A solver that puts balls back onto their strings takes a part of each velocity that it turns: of w
-the part q (h w / l)^2, with q up to 1/2.  The row learns q too, and lets each part of a side that a
-contact divides lose what it would lose alone, in the place of what the engine took.
+A solver that puts balls back onto their strings takes the part q (h w / l)^2 of each w, q up to
+1/2.  The row learns q too; then each part of a divided side loses what it would lose alone.
 """
 
 from __future__ import annotations
@@ -96,9 +95,8 @@ class Row(Alone):
 
     Notes
     -----
-    A step never compiles: impacts run plain, a millisecond or two each for five balls, unless
-    `cradle.warm_up` was called before.  Rows of one world are stepped by `step_rows`.  Any unit of
-    length will do, such as pixels, if the acceleration has it too.
+    A step never compiles: an impact of five balls takes a millisecond or two if `cradle.warm_up`
+    was not called before.  Any unit of length will do if the acceleration has it too.
 
     Examples
     --------
@@ -133,10 +131,8 @@ class Row(Alone):
     ) -> None:
         missing = [name for name in ("motion", "push", "advance") if not hasattr(bodies, name)]
         if missing:
-            raise TypeError(
-                f"bodies is {a(type(bodies).__name__)} without {', '.join(missing)}; must be an "
-                "adapter with motion, push and advance"
-            )
+            what = f"bodies is {a(type(bodies).__name__)} without {', '.join(missing)}"
+            raise TypeError(f"{what}; must be an adapter with motion, push and advance")
         x = bodies.motion()[0]
         super().__init__(x, chain, model, radii, pivots, touching, resting, acceleration)
         self.bodies = bodies
@@ -153,11 +149,10 @@ class Row(Alone):
 
         Raises
         ------
-        ValueError
-            If the duration or what `motion` tells is wrong, or balls that touch are not in a row.
-        RuntimeError
-            If balls have passed through each other, the impacts of the step do not end, or the
-            world is seen to move on between the steps of this row: see `step_rows`.
+        ValueError, RuntimeError
+            If the duration or what `motion` tells is wrong, balls that touch are not in a row, have
+            passed through each other or collide without end, or the world is seen to move on
+            between the steps of this row: see `step_rows`.
         """
         if type(duration) is float and 0.0 < duration <= self.quiet:  # the usual case, and fast
             self.quiet -= duration
@@ -201,7 +196,7 @@ class Row(Alone):
             self.quiet *= not learning  # to compare two neighbouring looks
             return None
         self._last = None
-        self._push(flight.early, x)
+        self._push(flight[1], x)
         return x, own, flight
 
     def _after(self, begun: tuple[Plane, Plane, Flight] | None, duration: float) -> None:
@@ -216,7 +211,7 @@ class Row(Alone):
         speeds = own + self.lag * (self.own(v, now) + taken - early - own)
         bent = self._pull(x) - self._pull(now)
         speeds += self.lag * (1.0 - self.lag) * duration * bent
-        change, _, hits = self.fly(x, speeds, duration) or Flight(-taken, early, [])
+        change, _, hits = self.fly(x, speeds, duration) or (-taken, early, [])
         self._push(change - early + taken, now)
         self.impacts += len(hits)
         for hit in hits:

@@ -42,12 +42,9 @@ class Hit(NamedTuple):
     impulse: float  #: of that contact, N s
 
 
-class Flight(NamedTuple):
-    """What the contacts of a step do to the balls' own velocities, m/s."""
-
-    change: Plane  #: all of it
-    early: Plane  #: the part that, from the start on, takes the balls to where the step ends
-    hits: list[Hit]
+#: What the contacts of a step do to the balls' own velocities, m/s: all of it, and the part that,
+#: from the start on, takes the balls to where the step ends; and the impacts.
+Flight = tuple[Plane, Plane, list[Hit]]
 
 
 class Alone:
@@ -82,7 +79,11 @@ class Alone:
         #: How fast neighbours may come to close; 0 on equal strings: these are accelerated alike.
         self.speeding = self.acceleration
         if self.pivots is not None:
-            self._refuse_disorder(at, self.pivots)
+            back = (np.diff(self.pivots) / (at[-1] - at[0])).real < 0.0
+            if back.any():
+                ball = int(np.argmax(back)) + 1
+                rule = "on the way from the first ball to the last; must be in the order of the row"
+                raise ValueError(f"pivots[{ball}] lies behind pivots[{ball - 1}] {rule}")
             lengths = self.arms(at)
             self.speeding *= np.ptp(lengths) > 1e-3 * lengths.min()
         #: Part of a velocity that a step takes, over the square of the angle by which it turns.
@@ -139,7 +140,7 @@ class Alone:
             own, change = own - taken, change - taken
             if passed == left:
                 self.quiet -= left
-                return Flight(change, early, hits) if touched else None
+                return (change, early, hits) if touched else None
             x, left = self.moved(x, passed * own), left - passed
         raise RuntimeError(
             f"more than {_MOST_IMPACTS} impacts in a step of {duration!r} s; the balls are "
@@ -163,10 +164,8 @@ class Alone:
                 for name, told in (("positions", x), ("velocities", v)):
                     checked(f"motion: {name}", [(one.real, one.imag) for one in told])
             if not gap > -0.5 * reach:
-                raise RuntimeError(
-                    f"balls {c} and {c + 1} overlap by {-gap:g} m; the step is too long, or "
-                    "something else pushes them"
-                )
+                why = "the step is too long, or something else pushes them"
+                raise RuntimeError(f"balls {c} and {c + 1} overlap by {-gap:g} m; {why}")
             closing /= distance
             if gap <= self.touching:
                 strike |= closing > self.resting
@@ -211,9 +210,8 @@ class Alone:
                 with without_waiting():
                     after = collide(chain, part(self.model, len(x), first, last)).velocities
                 impulses = np.cumsum(masses * (before - after))[:-1]
-                c = int(np.argmax(impulses))
-                strongest = first + c, float(impulses[c])
-                hits.append(Hit(time, range(first, last), before, after, *strongest))
+                loudest = first + int(np.argmax(impulses)), float(impulses.max())
+                hits.append(Hit(time, range(first, last), before, after, *loudest))
             after = self._rested(masses, after, gaps[first : last - 1])
             gained[balls] = (after - before) * (axis if free else 1.0 / along)
         return gained
@@ -235,24 +233,10 @@ class Alone:
             raise ValueError(f"{name} has shape {x.shape}; {n} balls need ({n}, 2)")
         return x[:, 0] + 1j * x[:, 1]
 
-    def _refuse_disorder(self, at: Plane, pivots: Plane) -> None:
-        way = pivots[-1] - pivots[0]
-        back = (np.diff(pivots) / way).real < 0.0
-        if back.any():
-            ball = int(np.argmax(back)) + 1
-            raise ValueError(
-                f"pivots[{ball}] lies behind pivots[{ball - 1}] on the way from the first to the "
-                "last; the balls must be told from one end of the row to the other"
-            )
-        if ((at[-1] - at[0]) / way).real <= 0.0:
-            raise ValueError("pivots lead the other way than the balls; must be in their order")
-
     def _refuse_a_pack(self, x: list[complex]) -> None:
         for i, j in combinations(range(len(x)), 2):
             line = x[j] - x[i]
             gap = math.hypot(line.real, line.imag) - (self.radii[i] + self.radii[j])
             if j > i + 1 and gap <= self.touching:
-                raise ValueError(
-                    f"balls {i} and {j} touch and are no neighbours; a row alone can be solved, no "
-                    "pack"
-                )
+                rule = "a row alone can be solved, no pack"
+                raise ValueError(f"balls {i} and {j} touch and are no neighbours; {rule}")
