@@ -672,7 +672,7 @@ def test_correlations_are_those_of_the_ellipse():
     axis = np.linspace(0.0, 0.1, 101)
     points = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1).reshape(-1, 2)
     excess = np.einsum("pi,ij,pj->p", points - 0.05, matrix, points - 0.05)
-    group = Group((tuple("ABC"), tuple("CBA")), points, excess, np.ones(len(points)))
+    group = Group((tuple("ABC"), tuple("CBA")), points, np.exp(-excess / 2))
     found = Fit(Shots(()), {}, {}, (group,), 0.0, 1).correlations()
     spread = np.linalg.inv(matrix)
     assert found == {

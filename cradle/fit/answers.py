@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -107,24 +107,12 @@ class Estimate:
         return f"{self.kind} {self.name} = {self.value:.{digits}f} {sets}{end}"
 
 
-@dataclass(frozen=True, eq=False)
-class Group:
-    """Ratios fitted together: points tried, chi-square there, and the size of their cells."""
+class Group(NamedTuple):
+    """Ratios fitted together: points tried, and how likely each is, up to a factor."""
 
     keys: tuple[Key, ...]
     points: Vector
-    excess: Vector
-    weights: Vector
-
-    @property
-    def density(self) -> Vector:
-        """How likely each point is, up to a factor."""
-        return np.asarray(np.exp(-0.5 * self.excess) * self.weights)
-
-    def draw(self, uniform: Vector) -> Vector:
-        """Return points in proportion to their likelihood, one for each number in [0, 1)."""
-        total = np.cumsum(self.density)
-        return np.asarray(self.points[np.searchsorted(total, uniform * total[-1], side="right")])
+    density: Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +124,8 @@ class Prediction:
     types : tuple of str, length N
     median, lower, upper : ndarray, shape (N,)
         Median and ends of the central 95 % of the predictions, m/s.  Where a ratio has a confidence
-        set of several pieces, the predictions may come in several groups; what lies between the
-        groups is then inside these ends too.
+        set of several pieces, the predictions may come in groups; what lies between the groups is
+        then inside these ends too.
     """
 
     types: tuple[str, ...]

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.fit.answers import Estimate, Group
 from cradle.fit.likelihood import chi_squares
-from cradle.fit.parameters import Key, fitted_keys, label, outcomes, pair_keys, parameter_key
+from cradle.fit.parameters import (
+    Key,
+    fitted_keys,
+    label,
+    outcomes,
+    pair_keys,
+    parameter_key,
+    ratio_keys,
+)
 from cradle.fit.result import Fit
 from cradle.fit.search import Scan, refine, scan
 from cradle.fit.shots import Shots, ShotSet
@@ -50,23 +57,12 @@ def restitution(shots: Shots) -> Fit:
     >>> restitution(read_shots(data_folder() / "shots_template.csv"))
     Fit(restitution AB = 0.5270 [0.5113, 0.5429]; chi-square 0.8 of 3)
     """
-    pairs: dict[Key, list[ShotSet]] = {}
-    for one in shots.sets:
-        if len(one.types) == 2:
-            pairs.setdefault(pair_keys(one.types)[0], []).append(one)
-    if not pairs:
+    sets = [one for one in shots.sets if len(one.types) == 2]
+    if not sets:
         raise ValueError("no set has two balls; restitution comes from pairs")
-    estimates, chi_square, freedom = {}, 0.0, -len(pairs)
-    for key, sets in sorted(pairs.items()):
-        found, lowest = scan(partial(_chi_of_pair, sets, key), np.linspace(0.0, 1.0, _GRID))
-        estimates[label(key)] = Estimate.of("restitution", key, 1.0, found)
-        chi_square += lowest
-        freedom += sum(one.after.size for one in sets)
-    return Fit(shots, estimates, {}, (), chi_square, freedom)
-
-
-def _chi_of_pair(sets: Sequence[ShotSet], key: Key, e: Vector) -> Vector:
-    return chi_squares(sets, {key: e}, [])
+    bounds = dict.fromkeys(sorted(pair_keys(one.types)[0] for one in sets), 1.0)
+    found, _, lowest, freedom = _estimates("restitution", sets, bounds, set(bounds), {}, {})
+    return Fit(shots, found, {}, (), lowest, freedom)
 
 
 def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma: float) -> Fit:
@@ -98,7 +94,7 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
     """
     high = checked("drop", drop, "must be above 0", 0.0, open_low=True)
     low = checked("rise", rise, "must be above 0", 0.0, open_low=True)
-    error = float(checked("sigma", sigma, "must be above 0", 0.0, open_low=True))
+    error = one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
     if high.ndim != 1 or high.shape != low.shape:
         raise ValueError(f"drop has shape {high.shape}, rise {low.shape}; must be alike, (K,)")
 
@@ -108,8 +104,8 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
 
     key = parameter_key(name)
     found, lowest = scan(chi, np.linspace(0.0, 1.0, _GRID))
-    estimate = Estimate.of("restitution", key, 1.0, found)
-    return Fit(Shots(()), {label(key): estimate}, {}, (), lowest, high.size - 1)
+    estimates = {label(key): Estimate.of("restitution", key, 1.0, found)}
+    return Fit(Shots(()), estimates, {}, (), lowest, high.size - 1)
 
 
 def ratio(
@@ -159,29 +155,14 @@ def ratio(
         raise ValueError("no set has three balls or more; ratios come from triplets")
     values, errors = _restitution_values(restitution, sets)
     fixed = _known_ratios(known or {}, shots.masses)
-    bounds: dict[Key, float] = {}  # of three balls (Eq. 34)
-    for one in sets:
-        for i in range(len(one.types) - 2):
-            key, (left, middle, right) = one.types[i : i + 3], one.masses[i : i + 3]
-            bounds[key] = float(right / (middle + right))
-            bounds[key[::-1]] = float(left / (left + middle))
-    bounds = {key: bound for key, bound in bounds.items() if key not in fixed}
+    bounds = {key: _bound(key, shots.masses)
+              for one in sets for key in ratio_keys(one.types) if key not in fixed}  # fmt: skip
     acting = set[Key]().union(*(_acting(one, bounds, {**values, **fixed}) for one in sets))
-    found = {key: Estimate.of("ratio", key, bound, None) for key, bound in bounds.items()}
-    groups, chi_square, freedom = [], 0.0, 0
     taken = {**dict.fromkeys(bounds, 0.0), **values, **fixed}  # without effect: any value
-    for keys in _together(fitted_keys(one.types) & acting for one in sets):
-        members = [one for one in sets if fitted_keys(one.types) & set(keys)]
-        group, scans, lowest = _searched(keys, members, bounds, taken, errors)
-        groups.append(group)
-        found.update({key: Estimate.of("ratio", key, bounds[key], one)
-                      for key, one in zip(keys, scans, strict=True)})  # fmt: skip
-        chi_square += lowest
-        freedom += sum(one.after.size for one in members) - len(keys)
+    found, groups, lowest, freedom = _estimates("ratio", sets, bounds, acting, taken, errors)
     given = {label(key): (value, errors.get(key, 0.0)) for key, value in values.items()}
-    named = {label(key): one for key, one in found.items()}
     known = {label(key): value for key, value in fixed.items()}
-    return Fit(shots, named, given, tuple(groups), chi_square, freedom, known)
+    return Fit(shots, found, given, groups, lowest, freedom, known)
 
 
 def _restitution_values(
@@ -216,10 +197,15 @@ def _known_ratios(known: Mapping[str, float], masses: Mapping[str, float]) -> di
         key, name = parameter_key(given), f"known[{given!r}]"
         fixed[key] = one_number(name, value, "must lie in [0, 1]", 0.0, 1.0)
         if len(key) == 3 and masses.keys() >= set(key):
-            bound = masses[key[2]] / (masses[key[1]] + masses[key[2]])
+            bound = _bound(key, masses)
             rule = f"must not exceed the bound of these balls, {bound:.6g} (Eq. 34)"
             one_number(name, value, rule, high=bound * LIMITS.rounded)
     return fixed
+
+
+def _bound(key: Key, masses: Mapping[str, float]) -> float:
+    """Return the largest ratio of three balls (Eq. 34)."""
+    return masses[key[2]] / (masses[key[1]] + masses[key[2]])
 
 
 def _acting(one: ShotSet, bounds: Mapping[Key, float], given: Mapping[Key, float]) -> set[Key]:
@@ -251,11 +237,29 @@ def _together(acting: Iterable[set[Key]]) -> list[list[Key]]:
     return [sorted(group) for group in groups]
 
 
+def _estimates(
+    kind: str, sets: Sequence[ShotSet], bounds: Mapping[Key, float], acting: set[Key],
+    given: Mapping[Key, float], errors: Mapping[Key, float],
+) -> tuple[dict[str, Estimate], tuple[Group, ...], float, int]:  # fmt: skip
+    """Fit what acts in the sets; return it by name, its groups, chi-square, degrees of freedom."""
+    found = {label(key): Estimate.of(kind, key, bound, None) for key, bound in bounds.items()}
+    groups, chi_square, freedom = [], 0.0, 0
+    for keys in _together(fitted_keys(one.types) & acting for one in sets):
+        members = [one for one in sets if fitted_keys(one.types) & {*keys}]
+        group, scans, lowest = _searched(keys, members, bounds, given, errors)
+        groups.append(group)
+        for key, one in zip(keys, scans, strict=True):
+            found[label(key)] = Estimate.of(kind, key, bounds[key], one)
+        chi_square += lowest
+        freedom += sum(one.after.size for one in members) - len(keys)
+    return found, tuple(groups), chi_square, freedom
+
+
 def _searched(
     keys: list[Key], sets: Sequence[ShotSet], bounds: Mapping[Key, float],
     given: Mapping[Key, float], errors: Mapping[Key, float],
 ) -> tuple[Group, list[Scan], float]:  # fmt: skip
-    """Search the ratios that act together."""
+    """Search the parameters that act together."""
     needed = {key for one in sets for key in pair_keys(one.types)}
     uncertain = [(key, sigma) for key, sigma in sorted(errors.items()) if key in needed]
 
@@ -266,8 +270,9 @@ def _searched(
     upper = np.array([bounds[key] for key in keys])
     if len(keys) > 1:
         scans, points, excess, lowest = refine(chi, upper)
-        return Group(tuple(keys), points, excess, np.ones(len(points))), scans, lowest
+        return Group(tuple(keys), points, np.exp(-0.5 * excess)), scans, lowest
     # Near the bound the outcome goes like the square root of what is left to it.
     grid = upper[0] * (1.0 - np.linspace(1.0, 0.0, _GRID) ** 2)
     one, lowest = scan(chi, grid)
-    return Group(tuple(keys), grid[:, None], one.excess, np.gradient(grid)), [one], lowest
+    density = np.exp(-0.5 * one.excess) * np.gradient(grid)
+    return Group(tuple(keys), grid[:, None], density), [one], lowest

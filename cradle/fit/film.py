@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -53,9 +53,9 @@ def speeds_from_heights(
     heights : array_like
         Heights above the lowest point, m; negative for a ball that swings to the left.
     sigma : float
-        Standard error of a height, m.
+        Standard error of a height, m; above 0.
     gravity : float
-        m/s^2.
+        m/s^2; above 0.
 
     Returns
     -------
@@ -89,9 +89,8 @@ def velocities_from_tracks(
 ) -> Velocities:
     """Find the impact in the tracks, and the velocities just before and just after it.
 
-    All tracks bend at one moment, which is found first.  Then the velocity of each ball is fitted
-    on either side of it by itself, so that the errors are independent.  The balls but the striker
-    rest before.
+    First the moment at which all tracks bend, then on either side of it the velocity of each ball
+    by itself, so that the errors are independent.  The balls but the striker rest before.
 
     Parameters
     ----------
@@ -115,12 +114,7 @@ def velocities_from_tracks(
     ------
     ValueError
         If there are fewer than two balls, too few marks on either side, or the marks do not lie on
-        such a motion (see `Velocities.probability`; below 0.001).
-
-    Notes
-    -----
-    A pendulum that passes its lowest point with velocity v is then, with w^2 = g/l, k = v/(2 w l)
-    and Jacobi's functions of modulus k, at (v/w) sn(w t) dn(w t), measured along the row.
+        such a motion (`Velocities.probability` below 0.001).
 
     Examples
     --------
@@ -133,23 +127,22 @@ def velocities_from_tracks(
     balls = list(tracks.values())
     if len(balls) < 2 or not 0 <= striker < len(balls):
         raise ValueError(f"{len(balls)} tracks, striker = {striker}; needs two balls and a striker")
-    if length is not None:
-        length = one_number("length", length, "must be above 0", 0.0, open_low=True)
-        for name, ball in tracks.items():
-            if (span := float(np.ptp(ball.positions))) > 2.0 * length:
-                raise ValueError(
-                    f"track {name!r} spans {span:.3g} m, more than a pendulum of {length:g} m; say "
-                    "the unit of the positions"
-                )
-    if window is not None:
-        window = one_number("window", window, "must be above 0", 0.0, open_low=True)
-    if scatter is not None:
-        one_number("scatter", scatter, "must be above 0", 0.0, open_low=True)
+    for what, value in (("length", length), ("window", window), ("scatter", scatter)):
+        if value is not None:
+            one_number(what, value, "must be above 0", 0.0, open_low=True)
+    for name, ball in tracks.items():
+        if length is not None and (span := float(np.ptp(ball.positions))) > 2.0 * length:
+            raise ValueError(
+                f"track {name!r} spans {span:.3g} m, more than a pendulum of {length:g} m; say "
+                "the unit of the positions"
+            )
     frame = max(float(np.median(np.diff(ball.times))) for ball in balls if ball.times.size > 1)
     least = window or max(0.05, (_LEAST + 0.5) * frame)
     coarse = _coarse_time(balls, striker, least)
     longest = _LONGEST if length is None else 0.5 * np.pi * float(np.sqrt(length / _GRAVITY))
-    tried = [window] if window else _shrinking(longest, least)
+    tried = [window or max(longest, least)]
+    while 0.8 * tried[-1] >= least:
+        tried.append(0.8 * tried[-1])
     for k, wide in enumerate(tried):
         found = _around(tracks, coarse, wide, length, striker)
         if found.probability > (0.2 if k else 0.01):
@@ -169,10 +162,52 @@ def velocities_from_tracks(
     return found._replace(sigma=ratio * found.sigma, sigma_before=ratio * found.sigma_before)
 
 
-def _shrinking(longest: float, least: float) -> list[float]:
-    """Return windows from the longest one on, each four fifths of the last."""
-    steps = int(np.log(max(longest / least, 1.0)) / np.log(1.25))
-    return [longest * 0.8**k for k in range(steps + 1)] if longest > least else [least]
+def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
+    """Return the moment at which a bend in all tracks explains most."""
+    moments = np.unique(np.concatenate([ball.times for ball in balls]))
+    best, most = None, -np.inf
+    for moment in 0.5 * (moments[:-1] + moments[1:]):
+        near = [np.abs(ball.times - moment) <= window for ball in balls]
+        marks = [(ball.times[some] - moment, ball.positions[some])
+                 for ball, some in zip(balls, near, strict=True)]  # fmt: skip
+        if any(min((t < 0).sum(), (t >= 0).sum()) < 4 for t, _ in marks):
+            continue
+        gain = 0.0
+        for k, (t, x) in enumerate(marks):
+            bent = [side**power for side in _sides(t, k == striker) for power in (1, 2)]
+            gain += _rest([t, t**2], x) - _rest(bent, x)
+        if gain > most:
+            best, most = float(moment), gain
+    if best is None:
+        raise ValueError(f"no moment has 4 marks of every ball within {window:g} s on either side")
+    return best
+
+
+def _sides(t: Vector, strikes: bool) -> list[Vector]:
+    """Return the time after the impact, and of the striker that before it too."""
+    return [np.maximum(t, 0.0), np.minimum(t, 0.0)][: 1 + strikes]
+
+
+def _rest(columns: Sequence[Vector], x: Vector) -> float:
+    """Return the sum of squares that columns and a constant leave of x."""
+    matrix = np.stack([np.ones(x.size), *columns], axis=-1)
+    left = x - matrix @ np.linalg.lstsq(matrix, x, rcond=None)[0]
+    return float(left @ left)
+
+
+def _way(t: Vector, velocity: float, length: float | None) -> Vector:
+    """Return the way from the place of the impact, for each m/s of the velocity v there.
+
+    Along the row a pendulum goes (v/w) sn(w t) dn(w t), with Jacobi's functions of modulus
+    k = v/(2 w l), w^2 = g/l, if it passes its lowest point at time 0.
+    """
+    if length is None:
+        return t
+    from scipy.special import ellipj
+
+    w = np.sqrt(_GRAVITY / length)
+    sn, _, dn, _ = ellipj(w * t, min(1.0, (0.5 * velocity / (w * length)) ** 2))
+    return np.asarray(sn * dn / w)
 
 
 def _around(
@@ -193,57 +228,16 @@ def _around(
 def _window(tracks: Mapping[str, Track], time: float, window: float) -> list[Track]:
     """Return the marks near the impact; there must be some on either side."""
     used = []
-    for name, track in tracks.items():
-        near = np.abs(track.times - time) <= window
-        times = track.times[near]
-        sides = [int((times < time).sum()), int((times >= time).sum())]
+    for name, (times, positions) in tracks.items():
+        near = np.abs(times - time) <= window
+        sides = [int((near & (times < time)).sum()), int((near & (times >= time)).sum())]
         if min(sides) < _LEAST:
             raise ValueError(
                 f"track {name!r} has {sides[0]} marks before and {sides[1]} after the impact at "
                 f"{time:.4g} s within window = {window:g} s; needs {_LEAST} on each side"
             )
-        used.append(Track(times, track.positions[near]))
+        used.append(Track(times[near], positions[near]))
     return used
-
-
-def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
-    """Return the moment at which a bend in all tracks explains most."""
-    moments = np.unique(np.concatenate([ball.times for ball in balls]))
-    best, most = None, -np.inf
-    for moment in 0.5 * (moments[:-1] + moments[1:]):
-        near = [np.abs(ball.times - moment) <= window for ball in balls]
-        marks = [(ball.times[some] - moment, ball.positions[some])
-                 for ball, some in zip(balls, near, strict=True)]  # fmt: skip
-        if any(min((t < 0).sum(), (t >= 0).sum()) < 4 for t, _ in marks):
-            continue
-        gain = 0.0
-        for k, (t, x) in enumerate(marks):
-            earlier, later = np.minimum(t, 0.0), np.maximum(t, 0.0)
-            bent = [later, later**2] + [earlier, earlier**2] * (k == striker)
-            gain += _rest([t, t**2], x) - _rest(bent, x)
-        if gain > most:
-            best, most = float(moment), gain
-    if best is None:
-        raise ValueError(f"no moment has 4 marks of every ball within {window:g} s on either side")
-    return best
-
-
-def _rest(columns: list[Vector], x: Vector) -> float:
-    """Return the sum of squares that columns and a constant leave of x."""
-    matrix = np.stack([np.ones(x.size), *columns], axis=-1)
-    left = x - matrix @ np.linalg.lstsq(matrix, x, rcond=None)[0]
-    return float(left @ left)
-
-
-def _way(t: Vector, velocity: float, length: float | None) -> Vector:
-    """Return the way from the place of the impact, for each m/s of the velocity there."""
-    if length is None:
-        return t
-    from scipy.special import ellipj
-
-    w = np.sqrt(_GRAVITY / length)
-    sn, _, dn, _ = ellipj(w * t, min(1.0, (0.5 * velocity / (w * length)) ** 2))
-    return np.asarray(sn * dn / w)
 
 
 def _moment(
@@ -252,17 +246,15 @@ def _moment(
     """Return the moment of the impact and the balls' places then: all tracks meet there."""
     from scipy.optimize import least_squares
 
-    count = len(balls)
-
     def residuals(p: Vector) -> Vector:
-        parts = []
-        for k, ball in enumerate(balls):
-            t = ball.times - p[0]
-            way = p[2 + count + k] * _way(np.maximum(t, 0.0), p[2 + count + k], length)
-            if k == striker:
-                way = way + p[1] * _way(np.minimum(t, 0.0), p[1], length)
-            parts.append(ball.positions - p[2 + k] - way)
-        return np.concatenate(parts)
+        (moment, before), places, velocities = p[:2], *np.split(p[2:], 2)
+        left = []
+        for k, (times, x) in enumerate(balls):
+            after, *earlier = _sides(times - moment, k == striker)
+            left.append(x - places[k] - velocities[k] * _way(after, velocities[k], length))
+            for t in earlier:
+                left[k] -= before * _way(t, before, length)
+        return np.concatenate(left)
 
     def line(ball: Track, some: NDArray[np.bool_]) -> Vector:
         return np.asarray(np.polyfit(ball.times[some] - time, ball.positions[some], 1))
@@ -271,28 +263,16 @@ def _moment(
     before = line(balls[striker], balls[striker].times < time)[0]
     start = np.concatenate([[time, before], lines[1], lines[0]])
     found = least_squares(residuals, start, x_scale="jac").x
-    return float(found[0]), found[2 : 2 + count]
-
-
-def _slope(t: Vector, x: Vector, length: float | None) -> tuple[float, float, float, float]:
-    """Return velocity at time 0, its variance over that of a mark, and the squares left over.
-
-    The place is free: the velocities of different balls and sides have independent errors.  The
-    last number is the squares that would be left if the way could bend otherwise too.
-    """
-    velocity = 0.0
-    for _ in range(4):  # the way depends a little on the velocity itself
-        way = _way(t, velocity, length)
-        matrix = np.stack([np.ones(t.size), way], axis=-1)
-        velocity = float(np.linalg.lstsq(matrix, x, rcond=None)[0][1])
-    variance = float(np.linalg.inv(matrix.T @ matrix)[1, 1])
-    return velocity, variance, _rest([way], x), _rest([way, t**2, t**3], x)
+    return float(found[0]), found[2 : 2 + len(balls)]
 
 
 def _velocities(
     balls: list[Track], time: float, length: float | None, striker: int, window: float
 ) -> Velocities:
-    """Fit the velocity of every ball on its own, on either side of the impact."""
+    """Fit the velocity of every ball on its own, on either side of the impact.
+
+    The place is free, so that the velocities of different balls and sides have independent errors.
+    """
     from scipy.special import fdtrc
 
     velocities, variances = np.zeros((2, 2, len(balls)))
@@ -302,17 +282,20 @@ def _velocities(
         # The moment is known to a part of a frame: a mark nearer than half a frame may be of
         # either side, and is left out.
         near = 0.5 * float(np.median(np.diff(t)))
-        sides = {1: t > near, 0: t < -near} if k == striker else {1: t > near}
-        for side, some in sides.items():
-            velocities[side, k], variances[side, k], left, more = _slope(
-                t[some], ball.positions[some], length
-            )
-            squares, freedom = squares + left, freedom + int(some.sum()) - 2
-            bent, bends = bent + more, bends + 2
+        for side, some in enumerate([t > near, t < -near][: 1 + (k == striker)]):
+            times, x = t[some], ball.positions[some]
+            for _ in range(4):  # the way depends a little on the velocity itself
+                way = _way(times, velocities[side, k], length)
+                off = way - way.mean()
+                velocities[side, k] = off @ x / (off @ off)
+            variances[side, k] = 1.0 / (off @ off)
+            squares, freedom = squares + _rest([way], x), freedom + x.size - 2
+            # What would be left if the way could bend otherwise too.
+            bent, bends = bent + _rest([way, times**2, times**3], x), bends + 2
     scatter = float(np.sqrt(squares / freedom))
     gain, spare = (squares - bent) / bends, bent / (freedom - bends) if freedom > bends else 0.0
     # Marks without scatter, as of a computed motion, leave rounding alone, and no question.
     exact = scatter < 1e-5 * max(float(np.ptp(ball.positions)) for ball in balls)
     chance = 1.0 if exact or not spare else float(fdtrc(bends, freedom - bends, gain / spare))
-    (before, after), (sigma_before, sigma) = velocities, scatter * np.sqrt(variances)
+    (after, before), (sigma, sigma_before) = velocities, scatter * np.sqrt(variances)
     return Velocities(time, before, after, sigma, sigma_before, scatter, window, chance)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import KeysView, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -48,14 +48,15 @@ def triplet_keys(types: Sequence[str]) -> tuple[list[Key], list[Key]]:
     return forward, [key[::-1] for key in forward]
 
 
-def ratio_keys(types: Sequence[str]) -> set[Key]:
+def ratio_keys(types: Sequence[str]) -> KeysView[Key]:
     """Return the ratio parameters of a chain, of both ways, each once."""
-    return set[Key]().union(*triplet_keys(types))
+    both = zip(*triplet_keys(types), strict=True)
+    return dict.fromkeys(key for keys in both for key in keys).keys()
 
 
-def fitted_keys(types: Sequence[str]) -> set[Key]:
+def fitted_keys(types: Sequence[str]) -> KeysView[Key]:
     """Return what shots of a chain are fitted for: of a pair its restitution, else its ratios."""
-    return ratio_keys(types) or set(pair_keys(types))
+    return ratio_keys(types) or dict.fromkeys(pair_keys(types)).keys()
 
 
 def outcomes(types: Sequence[str], masses: Vector, velocities: Vector, values: Values) -> Vector:

@@ -54,6 +54,18 @@ class Fit:
         Measured velocities after impacts, less the parameters fitted.
     known : mapping of str to float
         Ratios that were not fitted.
+
+    Examples
+    --------
+    >>> from cradle.fit import ratio, read_shots, restitution
+    >>> from cradle.tables import data_folder
+    >>> shots = read_shots(data_folder() / "shots_template.csv")
+    >>> print(restitution(shots).summary())
+    restitution AB = 0.5270 [0.5113, 0.5429], standard error 0.0081
+    chi-square 0.8, degrees of freedom 3, chance 0.85
+    residuals of AB: 0.4 standard errors, the largest 0.6 (shot 1, ball 1)
+    >>> ratio(shots, restitution(shots)).predict("ABA")
+    Prediction(ABA: 0.130 [0.112, 0.148], 0.244 [0.231, 0.257], 0.583 [0.571, 0.595] m/s)
     """
 
     shots: Shots
@@ -94,11 +106,9 @@ class Fit:
 
     def expected(self, shots: ShotSet) -> Vector | None:
         """Return the velocities after the shots of a set by the best parameters, shape (K, N)."""
-        acting = {key for group in self.groups for key in group.keys}
         best: dict[str, float | None] = {name: value for name, (value, _) in self.given.items()}
-        for name, one in self.estimates.items():
-            idle = one.kind == "ratio" and one.key not in acting  # it may have any value
-            best[name] = 0.0 if one.value is None and idle else one.value
+        # What acts in no shot may have any value.
+        best |= {name: one.value if one.modes else 0.0 for name, one in self.estimates.items()}
         best |= self.known
         keys = [*pair_keys(shots.types), *fitted_keys(shots.types)]
         values = {key: best.get(label(key)) for key in keys}
@@ -113,14 +123,6 @@ class Fit:
         -------
         dict of (str, str) to float
             In [-1, 1], by the names of two estimates; of parameters fitted apart there is none.
-
-        Examples
-        --------
-        >>> from cradle.fit import ratio, read_shots
-        >>> from cradle.tables import data_folder
-        >>> shots = read_shots(data_folder() / "shots_template.csv")
-        >>> ratio(shots, {"AB": (0.53, 0.01)}).correlations()
-        {}
         """
         found = {}
         for group in self.groups:
@@ -138,15 +140,6 @@ class Fit:
             A line for each estimate, with its standard error and 95 % confidence set; chi-square,
             degrees of freedom and chance; correlations; for each set the residuals over their
             standard errors: root of the mean square (about 1 for a good fit) and the largest one.
-
-        Examples
-        --------
-        >>> from cradle.fit import read_shots, restitution
-        >>> from cradle.tables import data_folder
-        >>> print(restitution(read_shots(data_folder() / "shots_template.csv")).summary())
-        restitution AB = 0.5270 [0.5113, 0.5429], standard error 0.0081
-        chi-square 0.8, degrees of freedom 3, chance 0.85
-        residuals of AB: 0.4 standard errors, the largest 0.6 (shot 1, ball 1)
         """
         lines = []
         for one in self.estimates.values():
@@ -174,22 +167,7 @@ class Fit:
         return "\n".join(lines)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return one row per estimate.
-
-        Returns
-        -------
-        list of dict
-            `intervals` holds the 95 % confidence set as (lower, upper) pairs, one for each range of
-            values that explains the data; values between two of them do not.
-
-        Examples
-        --------
-        >>> from cradle.fit import read_shots, restitution
-        >>> from cradle.tables import data_folder
-        >>> (row,) = restitution(read_shots(data_folder() / "shots_template.csv")).rows()
-        >>> [(round(lower, 4), round(upper, 4)) for lower, upper in row["intervals"]]
-        [(0.5113, 0.5429)]
-        """
+        """Return one row per estimate; `intervals` is its confidence set, as in `Estimate`."""
         return [
             dict(zip(RESULT_COLUMNS, (name, one.kind, one.value, one.intervals, len(one.modes),
                                one.identified, one.at_bound, one.bound), strict=True))
@@ -243,14 +221,6 @@ class Fit:
         ValueError
             If fewer than 2 balls are named, or the mass of a type, the coefficient of restitution
             of a pair or the ratio of a triplet (or of its reverse) is neither fitted nor given.
-
-        Examples
-        --------
-        >>> from cradle.fit import ratio, read_shots, restitution
-        >>> from cradle.tables import data_folder
-        >>> shots = read_shots(data_folder() / "shots_template.csv")
-        >>> ratio(shots, restitution(shots)).predict("ABA")
-        Prediction(ABA: 0.130 [0.112, 0.148], 0.244 [0.231, 0.257], 0.583 [0.571, 0.595] m/s)
         """
         row = types_in_a_row(types)
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
@@ -276,7 +246,9 @@ class Fit:
             value, error = given[label(key)]
             values[key] = np.clip(value + error * random.standard_normal(_DRAWS), 0.0, 1.0)
         for group in self.groups:
-            values.update(zip(group.keys, group.draw(random.random(_DRAWS)).T, strict=True))
+            total = np.cumsum(group.density)
+            drawn = np.searchsorted(total, random.random(_DRAWS) * total[-1], side="right")
+            values.update(zip(group.keys, group.points[drawn].T, strict=True))
         for key in (key for keys in triplet_keys(types) for key in keys if key not in values):
             name = label(key)
             if name in self.known:

@@ -24,13 +24,6 @@ class ShotSet:
         kg.
     before, after, sigma, sigma_before : ndarray, shape (K, N)
         Velocities and their standard errors, m/s.
-
-    Examples
-    --------
-    >>> from cradle.fit import read_shots
-    >>> from cradle.tables import data_folder
-    >>> read_shots(data_folder() / "shots_template.csv")["AB"].types
-    ('A', 'B')
     """
 
     name: str
@@ -95,8 +88,11 @@ class Shots:
     --------
     >>> from cradle.fit import read_shots
     >>> from cradle.tables import data_folder
-    >>> read_shots(data_folder() / "shots_template.csv")
+    >>> shots = read_shots(data_folder() / "shots_template.csv")
+    >>> shots
     Shots(AB: 2 shots of 2 balls, ABA: 1 shot of 3 balls)
+    >>> shots["AB"].types, shots.without("ABA"), shots.momentum_check()[1]
+    (('A', 'B'), Shots(AB: 2 shots of 2 balls), 3)
     """
 
     sets: tuple[ShotSet, ...]
@@ -128,13 +124,6 @@ class Shots:
         ------
         ValueError
             If there is no set of that name, or no set is left.
-
-        Examples
-        --------
-        >>> from cradle.fit import read_shots
-        >>> from cradle.tables import data_folder
-        >>> read_shots(data_folder() / "shots_template.csv").without("ABA")
-        Shots(AB: 2 shots of 2 balls)
         """
         there = [one.name for one in self.sets]
         for name in names:
@@ -146,23 +135,10 @@ class Shots:
         return Shots(kept)
 
     def momentum_check(self) -> tuple[float, int]:
-        """Return chi-square of the momentum gained and the number of shots.
+        """Return the sum of squares of all `ShotSet.momentum_residuals`, and the number of shots.
 
-        The sum of squares of `ShotSet.momentum_residuals`.  Far above the number of shots it says
-        that masses, velocities or their errors are wrong, whatever the model.
-
-        Returns
-        -------
-        chi_square : float
-        shots : int
-
-        Examples
-        --------
-        >>> from cradle.fit import read_shots
-        >>> from cradle.tables import data_folder
-        >>> shots = read_shots(data_folder() / "shots_template.csv")
-        >>> shots.momentum_check()[1]
-        3
+        Chi-square of the momentum gained: far above the number of shots it says that masses,
+        velocities or their errors are wrong, whatever the model.
         """
         residuals = np.concatenate([s.momentum_residuals for s in self.sets])
         return float(residuals @ residuals), residuals.size
