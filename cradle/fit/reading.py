@@ -27,8 +27,8 @@ OPTIONAL = {
     "sigma_before": "standard error of `before`; if left out, sigma for a moving ball, 0 at rest",
 }
 
-# Units, the first if none is told; what no ball of a cradle is likely to exceed, and another unit
-# that such a number may be in.
+# Units, the first if none is told; what no ball of a cradle is likely to exceed; another unit that
+# such a number may be in, in words and as an option.
 _UNITS: dict[str, tuple[dict[str, float], float, str, str]] = {
     "mass_unit": ({"kg": 1.0, "g": 1e-3}, 5.0, "grams", "g"),
     "velocity_unit": ({"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}, 20.0, "cm/s", "cm/s"),
@@ -54,11 +54,11 @@ def read_shots(
     ----------
     source : path, binary file, DataFrame or mapping of columns
         A CSV file (UTF-8, comma, one header line; lines that begin with # and empty rows are
-        skipped), a pandas DataFrame, or columns by name.  Columns: `COLUMNS` and `OPTIONAL`.
+        skipped), a pandas DataFrame, or columns by name: `COLUMNS` and `OPTIONAL`.
     mass_unit : {"kg", "g"}, optional
-        Unit of the masses.  Left out, it is kg, and masses that look like grams are refused.
     velocity_unit : {"m/s", "cm/s", "mm/s"}, optional
-        Unit of the velocities and their errors; likewise.
+        Of velocities and their errors.  Left out, units are kg and m/s, and numbers that look like
+        others are refused.
     sigma : float, optional
         Standard error of all velocities, in the unit of the velocities, for a table without it.
 
@@ -70,9 +70,9 @@ def read_shots(
     Raises
     ------
     ValueError
-        If a column is missing or there twice, sigma is given beside a column sigma, a value is
-        wrong, balls pass through each other, or a shot gains more energy than its errors allow; the
-        message names row and column.
+        If a column is missing or there twice, sigma is given twice, a value is wrong, balls pass
+        through each other, or a shot gains more energy than its errors allow; the message names row
+        and column.
 
     Examples
     --------
@@ -119,17 +119,16 @@ def _refuse(where: str, column: str, words: str) -> NoReturn:
 def _row(where: str, line: dict[str, Any], units: dict[str, str | None]) -> _Row:
     """Return one row in kg and m/s."""
 
-    def number(
-        name: str, unit: str = "", rule: str = "must be finite", low: float = -np.inf
-    ) -> float:
+    def number(name: str, rule: str = "must be finite", low: float = -np.inf) -> float:
         place = f"{where}, column {name}"
         try:
             value = float(line[name])
         except (TypeError, ValueError):
             raise ValueError(f"{place} = {line[name]!r}; must be a number") from None
         value = one_number(place, value, rule, low, open_low=rule == _ABOVE)
-        if not unit:
+        if name == "ball":
             return value
+        unit = "mass_unit" if name == "mass" else "velocity_unit"
         scales, limit, other, short = _UNITS[unit]
         usual = next(iter(scales))
         value *= scales[units[unit] or usual]
@@ -142,13 +141,12 @@ def _row(where: str, line: dict[str, Any], units: dict[str, str | None]) -> _Row
     ball = number("ball")
     if ball < 1 or ball != int(ball):
         _refuse(where, "ball", f"{line['ball']!r}; must be 1, 2, ... from the left")
-    row |= {"where": where, "ball": int(ball), "mass": number("mass", "mass_unit", _ABOVE, 0.0)}
-    row |= {name: number(name, "velocity_unit") for name in ("before", "after")}
-    row["sigma"] = number("sigma", "velocity_unit", _ABOVE, 0.0)
+    row |= {"where": where, "ball": int(ball), "mass": number("mass", _ABOVE, 0.0)}
+    row |= {name: number(name) for name in ("before", "after")}
+    row["sigma"] = number("sigma", _ABOVE, 0.0)
     row["sigma_before"] = row["sigma"] if row["before"] else 0.0
     if line.get("sigma_before") not in (None, ""):
-        rule = "must be at least 0"
-        row["sigma_before"] = number("sigma_before", "velocity_unit", rule, 0.0)
+        row["sigma_before"] = number("sigma_before", "must be at least 0", 0.0)
     return row
 
 

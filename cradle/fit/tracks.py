@@ -30,8 +30,9 @@ Tracks = dict[str, Track]
 # Logger Pro     ``Latest: Time (s)``, ``Latest: X (m)``, ``Latest: X 2 (m)``; as text ``Time  X``,
 #                ``t  x``, and a line of units
 # Capstone       ``Time (s) Run #1``, ``Position (m) Run #1``
-_TITLE = re.compile(r"(?:.*:)?\s*(.*?)\s*(?:\(([^)]*)\))?\s*(?:Run.*)?", re.IGNORECASE)
-_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "s": 1.0, "ms": 1e-3}
+# A title less what stands before a colon, its unit in brackets and its run.
+_TITLE = re.compile(r"^(?:.*:)?\s*(.*?)\s*(?:\(([^)]*)\))?\s*(?:Run.*)?$", re.IGNORECASE)
+_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "s": 1.0, "ms": 1e-3, "px": 1.0, "": 1.0}
 
 
 def read_tracker(
@@ -46,11 +47,10 @@ def read_tracker(
     column : str
         Which column holds the position along the row.
     time_scale : float
-        True time over the time of the video: 30 / 240 for a video that shows 240 frames a second
-        slowed down to 30.
+        True time over the time of the video: 30 / 240 where 240 frames a second are shown as 30.
     unit : float
-        Length of the file's unit in m: 0.01 if the calibration stick was given in cm, or the size
-        of a pixel.  Columns that name their unit, such as ``X (cm)``, need none.
+        Length of the file's unit in m, such as 0.01 or the size of a pixel, where the file does not
+        name it as in ``X (cm)``.
 
     Returns
     -------
@@ -77,17 +77,16 @@ def read_tracker(
     marks: dict[str, list[tuple[float, float]]] = {}
     for number, (first, *others) in rows.items():
         cells = [first.lstrip("# "), *others]
-        if cells[0] and _title(cells[0]).name in ("t", "time"):
+        if cells[0] and _title(cells[0]).text.casefold() in ("t", "time"):
             titles = [_title(cell) for cell in cells]
-        elif titles and {*map(str.strip, cells)} <= {*_UNITS, "px", ""} and any(cells):
+        elif titles and {*map(str.strip, cells)} <= _UNITS.keys() and any(cells):
             titles = [one._replace(unit=cell) for one, cell in zip(titles, cells, strict=False)]
         elif titles and not first.startswith("#"):
             where = f"{file.name}, line {number}"
-            owners = _owners(titles, column, above, block)
-            for at, name in owners.items():
+            for at, name in _owners(titles, column, above, block).items():
                 if at < len(cells) and cells[at]:
-                    time = _mark(where, cells[0], titles[0], time_scale)
-                    place = _mark(where, cells[at], titles[at], unit)
+                    time = time_scale * _number(where, cells[0], titles[0])
+                    place = _number(where, cells[at], titles[at], unit)
                     marks.setdefault(name, []).append((time, place))
         else:
             above, block = cells, " ".join(cells).strip()
@@ -114,22 +113,20 @@ def read_tracker(
 
 class _Title(NamedTuple):
     text: str
-    name: str
     unit: str
 
 
 def _title(cell: str) -> _Title:
-    """Return the title of a column without run and unit, in small letters, and its unit."""
-    found = _TITLE.fullmatch(cell)
-    name, unit = found.groups() if found else (cell, None)
-    return _Title(name, name.casefold(), unit or "")
+    """Return the title of a column without run and unit, and its unit."""
+    ((text, unit),) = _TITLE.findall(cell)
+    return _Title(text, unit)
 
 
 def _owners(titles: list[_Title], column: str, above: list[str], block: str) -> dict[int, str]:
     """Return the ball of each column of positions."""
     form = re.compile(rf"(?:(.+?)/.*)?(?:{re.escape(column)}|position)(?:\W*(?:ch )?\d+)?", re.I)
     found = {at: match for at, one in enumerate(titles) if (match := form.fullmatch(one.text))}
-    names = {titles[at].name for at in found}
+    names = {titles[at].text.casefold() for at in found}
     owners, name = {}, ""
     over = [*above, *[""] * len(titles)]
     for at, match in found.items():
@@ -145,19 +142,15 @@ def _owners(titles: list[_Title], column: str, above: list[str], block: str) -> 
     return owners
 
 
-def _mark(where: str, cell: str, title: _Title, scale: float) -> float:
-    """Return a time in s or a position in m."""
-    if title.unit not in {*_UNITS, "px", ""}:
-        rule = "must be in s, ms, m, cm, mm or px"
-        raise ValueError(f"{where}, column {title.text}: unit {title.unit!r}; {rule}")
-    if title.unit == "px" and scale == 1.0:
-        raise ValueError(f"{where}, column {title.text}: px; say how large a pixel is, in m: unit")
+def _number(where: str, cell: str, title: _Title, told: float = 1.0) -> float:
+    """Return a time in s or a position in m; `told` is the unit where the title has none."""
+    where = f"{where}, column {title.text}"
+    if title.unit not in _UNITS:
+        raise ValueError(f"{where}: unit {title.unit!r}; must be in s, ms, m, cm, mm or px")
+    if title.unit == "px" and told == 1.0:
+        raise ValueError(f"{where}: px; say how large a pixel is, in m: unit")
     try:
         value = float(cell)
     except ValueError:
-        raise ValueError(f"{where}, column {title.text}: {cell!r}; must be a number") from None
-    return (
-        value
-        * (_UNITS.get(title.unit, 1.0) if title.name in ("t", "time") else 1.0)
-        * (scale if title.name in ("t", "time") or title.unit in ("", "px") else _UNITS[title.unit])
-    )
+        raise ValueError(f"{where}: {cell!r}; must be a number") from None
+    return value * (told if title.unit in ("", "px") else _UNITS[title.unit])
