@@ -89,9 +89,10 @@ def _velocities(
         raise click.UsageError("give --length or --period of the pendulums, or --level: one")
     if (position_unit == "px") != (scale is not None):
         raise click.UsageError("--position-unit px and --scale, pixels in a metre, go together")
-    size = 1.0 / one_number("--scale", scale or 1.0, "must be above 0", 0.0, open_low=True)
-    unit = _SIZES.get(position_unit or "m", size)
-    tracks = read_tracker(file, time_scale=1.0 / slower, unit=unit)
+    pixels = 1.0 if scale is None else scale
+    one_number("--scale", pixels, "must be above 0", 0.0, open_low=True)
+    size = _SIZES.get(position_unit or "m", 1.0 / pixels)
+    tracks = read_tracker(file, time_scale=1.0 / slower, unit=size)
     if not len(types) == len(masses) == len(tracks):
         raise ValueError(
             f"{file.name} has {len(tracks)} tracks, --set {len(types)} types and --masses "

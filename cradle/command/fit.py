@@ -96,17 +96,18 @@ def fit(
         "shots": count,
         "without": [one.name for one in shots.sets if one not in used.sets],
     }
-    quality = []
-    for one in fits:
-        good = one.probability > 1e-3
-        why = "" if good else " (a poor fit: the errors do not explain the differences)"
-        quality.append(f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}{why}")
+    quality = [
+        f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}"
+        + " (a poor fit: the errors do not explain the differences)" * (one.probability <= 1e-3)
+        for one in fits
+    ]
     notes = []
     if known and not last.estimates:
         notes.append("fit: no ratio is fitted; those of --known are taken as they are")
     whole = " (all of the file)" if extra["without"] else ""
-    good = chance(momentum, count) > 1e-3
-    lost = "" if good else "; masses, velocities or their errors are wrong"
+    lost = (
+        "" if chance(momentum, count) > 1e-3 else "; masses, velocities or their errors are wrong"
+    )
     notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{whole}{lost}")
     if predict is not None:
         more, lines = _predicted(last, shots, predict, striker)
@@ -140,23 +141,20 @@ def _refuse_unused(
     from cradle.fit.parameters import label, pair_keys, parameter_key, ratio_keys
 
     chains = [one.types for one in shots.sets] + ([parameter_key(predict)] if predict else [])
-    kinds = {
-        "--restitution": ("pair", {key for types in chains for key in pair_keys(types)}),
-        "--known": ("triplet", {key for types in chains for key in ratio_keys(types)}),
-    }
-    there_by = {("--restitution", pair_keys(one.types)[0]): f"set {one.name} is fitted for it; "
-                f"leave one of them out (--without {quote(one.name)})"
-                for one in shots.sets if len(one.types) == 2}  # fmt: skip
-    values = [("--restitution", name, tuple(sorted(parameter_key(name)))) for name in given]
-    values += [("--known", name, parameter_key(name)) for name in known]
-    for option, name, key in values:
-        if (option, key) in there_by:
-            raise click.UsageError(f"{option} {name}: {there_by[option, key]}")
-        there_by[option, key] = "given twice"
-        kind, needed = kinds[option]
-        if key not in needed:
-            there = ", ".join(sorted(map(label, needed))) or "none"
-            raise click.UsageError(f"{option} {name}: no chain has this {kind}; there are {there}")
+    there = {("--restitution", pair_keys(one.types)[0]): f"set {one.name} is fitted for it; leave "
+             f"one of them out (--without {quote(one.name)})"
+             for one in shots.sets if len(one.types) == 2}  # fmt: skip
+    values = [("--restitution", "pair", name, tuple(sorted(parameter_key(name)))) for name in given]
+    values += [("--known", "triplet", name, parameter_key(name)) for name in known]
+    for option, kind, name, key in values:
+        if (option, key) in there:
+            raise click.UsageError(f"{option} {name}: {there[option, key]}")
+        there[option, key] = "given twice"
+        keys_of = pair_keys if kind == "pair" else ratio_keys
+        needed = {label(one) for types in chains for one in keys_of(types)}
+        if label(key) not in needed:
+            raise click.UsageError(f"{option} {name}: no chain has this {kind}; there are "
+                                   f"{', '.join(sorted(needed)) or 'none'}")  # fmt: skip
 
 
 def _fits(
@@ -179,31 +177,31 @@ def _predicted(
     predicted = found.predict(sequence, speed)
     rows, measured, tables, remarks = predicted.rows(), [], [], []
     keys = ratio_keys(predicted.types)
+    ratios = [one for one in found.estimates.values() if one.key in keys]
     # A pair has given its restitution; ratios that are all known take nothing from the shots.
-    taught = not keys or any(keys & set(group.keys) for group in found.groups)
+    taught = not keys or any(one.modes for one in ratios)
     for one in (one for one in shots.sets if one.types == predicted.types):
         used = one in found.shots.sets
         try:
-            mean, error = one.mean_after(speed)
+            mean, error = (x.tolist() for x in one.mean_after(speed))
         except ValueError as reason:
             remarks.append(f"not compared: {reason}")
             continue
-        columns = {"measured": mean.tolist(), "error": error.tolist()}
-        measured.append({"set": one.name, "shots": len(one.shots), "fitted": used and taught}
-                        | columns)  # fmt: skip
+        measured.append({"set": one.name, "shots": len(one.shots), "fitted": used and taught,
+                         "measured": mean, "error": error})  # fmt: skip
         tables.append([{**row, "measured": m, "error": e}
-                       for row, m, e in zip(rows, *columns.values(), strict=True)])  # fmt: skip
-        # Without a triplet's own set its ratio is known no longer.
-        hint = f" (for one: --without {quote(one.name)})" if len(one.types) > 3 else ""
-        part = f"part of the fit: this is no check{hint}" if used else "left out of the fit"
+                       for row, m, e in zip(rows, mean, error, strict=True)])  # fmt: skip
+        part = "left out of the fit"
         if used and not taught:
             part = "not fitted: it changes no ratio"
+        elif used:  # without a triplet's own set its ratio is known no longer
+            hint = f" (for one: --without {quote(one.name)})" if len(one.types) > 3 else ""
+            part = f"part of the fit: this is no check{hint}"
         remarks.append(f"measured: mean of {len(one.shots)} shots of set {one.name}, each scaled "
                        f"to {speed:g} m/s; the set was {part}")  # fmt: skip
     lines = ["", f"{sequence} at {speed:g} m/s; lower to upper: the central 95 % of predictions"]
     lines += [*map(text, tables or [rows]), *remarks]
-    several = [e.name for e in found.estimates.values() if e.key in keys and len(e.intervals) > 1]
-    if several:
+    if several := [one.name for one in ratios if len(one.intervals) > 1]:
         lines.append(
             f"intervals in pieces: {', '.join(several)}; the predictions may come in groups, and "
             "lower to upper holds what lies between the groups too"

@@ -25,40 +25,20 @@ _ALL = 0.999
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """One coefficient of restitution or one ratio.
+    """One coefficient of restitution or one ratio."""
 
-    Attributes
-    ----------
-    kind : {"restitution", "ratio"}
-    key : tuple of str
-        Types of the balls.
-    value : float or None
-        Where chi-square is lowest; None if the data tell nothing.
-    intervals : tuple of (float, float)
-        The 95 % confidence set, by profile likelihood; several intervals if several ranges of
-        values explain the data.
-    modes : tuple of Mode
-        All minima of chi-square that were found, lowest first.
-    identified : bool
-        False if the confidence set covers the whole range.
-    at_bound : {"", "lower", "upper"}
-        Whether the lowest chi-square is at an end of the range.
-    bound : float
-        Upper end of the range; the lower one is 0.
-    grid, excess : ndarray, shape (P,)
-        Values tried, and chi-square there above its lowest value.
-    """
-
-    kind: str
-    key: Key
-    value: float | None
+    kind: str  #: "restitution" or "ratio".
+    key: Key  #: Types of the balls.
+    value: float | None  #: Where chi-square is lowest; None if the data tell nothing.
+    #: The 95 % confidence set, by profile likelihood; several (lower, upper) if several ranges of
+    #: values explain the data.
     intervals: tuple[tuple[float, float], ...]
-    modes: tuple[Mode, ...]
-    identified: bool
-    at_bound: str
-    bound: float
-    grid: Vector
-    excess: Vector
+    modes: tuple[Mode, ...]  #: All minima of chi-square that were found, lowest first.
+    identified: bool  #: False if the confidence set covers the whole range.
+    at_bound: str  #: "lower" or "upper" if the lowest chi-square is at an end of the range, or "".
+    bound: float  #: Upper end of the range; the lower one is 0.
+    grid: Vector  #: Values tried, shape (P,).
+    excess: Vector  #: Chi-square there above its lowest value, shape (P,).
 
     @classmethod
     def of(cls, kind: str, key: Key, bound: float, found: Scan | None) -> Estimate:
@@ -117,19 +97,14 @@ class Group(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Velocities predicted for a chain, with what the errors of the parameters leave open.
+    """Velocities predicted for N balls, with what the errors of the parameters leave open.
 
-    Attributes
-    ----------
-    types : tuple of str, length N
-    median, lower, upper : ndarray, shape (N,)
-        Median and ends of the central 95 % of the predictions, m/s.  Where a ratio has a confidence
-        set of several pieces, the predictions may come in groups; what lies between the groups is
-        then inside these ends too.
+    `lower` to `upper` holds the central 95 % of the predictions.  Where a ratio has a confidence
+    set of several pieces, these may come in groups; what lies between the groups is inside too.
     """
 
     types: tuple[str, ...]
-    median: Vector
+    median: Vector  #: Shape (N,), m/s; so are the ends.
     lower: Vector
     upper: Vector
 

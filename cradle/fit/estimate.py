@@ -73,14 +73,14 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
     name : str
         Name of the pair, such as "AB".
     drop, rise : array_like, shape (K,)
-        Heights above the point of contact before and after, in the same unit; above 0.
+        Heights above the point of contact before and after, in one unit: e^2 = rise / drop.
     sigma : float
         Standard error of each height, in that unit.
 
     Returns
     -------
     Fit
-        One estimate.  The speeds are as the square roots of the heights: e^2 = rise / drop.
+        One estimate.
 
     Raises
     ------
@@ -120,17 +120,17 @@ def ratio(
     shots : Shots
         Sets of three balls and more are used.
     restitution : Fit or mapping
-        Of every pair of neighbours: the result of `restitution`, or a mapping from the pair's name
-        to the coefficient or to (coefficient, standard error).
+        The result of `restitution`, or a mapping from the name of each pair of neighbours to the
+        coefficient or to (coefficient, standard error).
     known : mapping, optional
-        Ratios that are not to be fitted, from the triplet's name to the ratio.  With it no set
-        needs three balls: what is known predicts, and nothing is fitted.
+        Ratios that are not to be fitted, by the names of triplets.  With it no set needs three
+        balls: what is known predicts, and nothing is fitted.
 
     Returns
     -------
     Fit
-        One estimate for each triplet and direction that is not known.  The ratios lie between 0 and
-        the bound of three balls (Eq. 34).
+        One estimate for each triplet and direction that is not known, between 0 and the bound of
+        three balls (Eq. 34).
 
     Raises
     ------

@@ -17,30 +17,16 @@ _LEAST, _LONGEST = 5, 0.25
 
 
 class Velocities(NamedTuple):
-    """Velocities of all balls around an impact, from their tracks.
+    """Velocities of N balls around an impact, from their tracks."""
 
-    Attributes
-    ----------
-    time : float
-        When the impact happened, s.
-    before, after, sigma, sigma_before : ndarray, shape (N,)
-        m/s; ball by ball, with standard errors.
-    scatter : float
-        Standard deviation of the marks about the motion fitted, m.
-    window : float
-        How much time on either side was used, s.
-    probability : float
-        Chance that marks bend at least as much about the motion fitted if it is the true one.
-    """
-
-    time: float
-    before: Vector
+    time: float  #: When the impact happened, s.
+    before: Vector  #: Shape (N,), m/s; so are the next three.
     after: Vector
-    sigma: Vector
-    sigma_before: Vector
-    scatter: float
-    window: float
-    probability: float
+    sigma: Vector  #: Standard errors of `after`.
+    sigma_before: Vector  #: Standard errors of `before`.
+    scatter: float  #: Standard deviation of the marks about the motion fitted, m.
+    window: float  #: How much time on either side was used, s.
+    probability: float  #: Chance that marks bend at least as much if the motion fitted is right.
 
 
 def speeds_from_heights(
@@ -51,11 +37,9 @@ def speeds_from_heights(
     Parameters
     ----------
     heights : array_like
-        Heights above the lowest point, m; negative for a ball that swings to the left.
-    sigma : float
-        Standard error of a height, m; above 0.
-    gravity : float
-        m/s^2; above 0.
+        Above the lowest point, m; negative for a ball that swings to the left.
+    sigma, gravity : float
+        Standard error of a height, m; m/s^2.  Above 0.
 
     Returns
     -------

@@ -39,22 +39,6 @@ _DRAWS = 4000
 class Fit:
     """All estimates of a fit.
 
-    Attributes
-    ----------
-    shots : Shots
-        The data.
-    estimates : mapping of str to Estimate
-    given : mapping of str to (float, float)
-        Coefficients of restitution that the fit was given, with their errors.
-    groups : tuple of Group
-        Ratios that were fitted together.
-    chi_square : float
-        Its lowest value, all estimates together.
-    degrees_of_freedom : int
-        Measured velocities after impacts, less the parameters fitted.
-    known : mapping of str to float
-        Ratios that were not fitted.
-
     Examples
     --------
     >>> from cradle.fit import ratio, read_shots, restitution
@@ -68,13 +52,13 @@ class Fit:
     Prediction(ABA: 0.130 [0.112, 0.148], 0.244 [0.231, 0.257], 0.583 [0.571, 0.595] m/s)
     """
 
-    shots: Shots
+    shots: Shots  #: The data.
     estimates: Mapping[str, Estimate]
-    given: Mapping[str, tuple[float, float]]
-    groups: tuple[Group, ...]
-    chi_square: float
-    degrees_of_freedom: int
-    known: Mapping[str, float] = field(default_factory=dict)
+    given: Mapping[str, tuple[float, float]]  #: Coefficients of restitution, with their errors.
+    groups: tuple[Group, ...]  #: Ratios that were fitted together.
+    chi_square: float  #: Its lowest value, all estimates together.
+    degrees_of_freedom: int  #: Velocities measured after impacts, less the parameters fitted.
+    known: Mapping[str, float] = field(default_factory=dict)  #: Ratios that were not fitted.
 
     def __getitem__(self, name: str) -> Estimate:
         """Return one estimate."""
@@ -89,20 +73,14 @@ class Fit:
 
     def values(self) -> dict[str, tuple[float, float]]:
         """Return each identified value with its standard error."""
-        return {
-            name: (one.value, one.standard_error)
-            for name, one in self.estimates.items()
-            if one.value is not None
-        }
+        found = self.estimates.items()
+        return {name: (e.value, e.standard_error) for name, e in found if e.value is not None}
 
     def __repr__(self) -> str:
         """Return the estimates in one line, and how well they fit."""
-        shown = [str(one) for one in self.estimates.values()]
-        poor = "" if self.probability > 1e-3 else ", a poor fit"
-        return (
-            f"Fit({', '.join(shown)}; "
-            f"chi-square {self.chi_square:.1f} of {self.degrees_of_freedom}{poor})"
-        )
+        shown = ", ".join(map(str, self.estimates.values()))
+        chi = f"chi-square {self.chi_square:.1f} of {self.degrees_of_freedom}"
+        return f"Fit({shown}; {chi}{'' if self.probability > 1e-3 else ', a poor fit'})"
 
     def expected(self, shots: ShotSet) -> Vector | None:
         """Return the velocities after the shots of a set by the best parameters, shape (K, N)."""
@@ -117,12 +95,9 @@ class Fit:
         return outcomes(shots.types, shots.masses, shots.before[:, None], values)[:, 0]
 
     def correlations(self) -> dict[tuple[str, str], float]:
-        """Return how the errors of ratios that were fitted together go with one another.
+        """Return how the errors of two ratios that were fitted together go with one another.
 
-        Returns
-        -------
-        dict of (str, str) to float
-            In [-1, 1], by the names of two estimates; of parameters fitted apart there is none.
+        In [-1, 1], by their names; of parameters fitted apart there is none.
         """
         found = {}
         for group in self.groups:
@@ -134,12 +109,8 @@ class Fit:
     def summary(self) -> str:
         """Return all that the fit says, as text: values and errors, how well they fit, residuals.
 
-        Returns
-        -------
-        str
-            A line for each estimate, with its standard error and 95 % confidence set; chi-square,
-            degrees of freedom and chance; correlations; for each set the residuals over their
-            standard errors: root of the mean square (about 1 for a good fit) and the largest one.
+        Residuals are over their standard errors: root of the mean square (about 1 for a good fit)
+        and the largest one, of each set.
         """
         lines = []
         for one in self.estimates.values():
@@ -168,11 +139,11 @@ class Fit:
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one row per estimate; `intervals` is its confidence set, as in `Estimate`."""
-        return [
-            dict(zip(RESULT_COLUMNS, (name, one.kind, one.value, one.intervals, len(one.modes),
-                               one.identified, one.at_bound, one.bound), strict=True))
-            for name, one in self.estimates.items()
-        ]  # fmt: skip
+        rows = [
+            (name, e.kind, e.value, e.intervals, len(e.modes), e.identified, e.at_bound, e.bound)
+            for name, e in self.estimates.items()
+        ]
+        return [dict(zip(RESULT_COLUMNS, row, strict=True)) for row in rows]
 
     def table(self) -> pd.DataFrame:
         """Return the rows as a table; where nothing was identified the value is missing."""
@@ -202,19 +173,16 @@ class Fit:
     def predict(self, types: str | Sequence[str], speed: float = 1.0) -> Prediction:
         """Predict a longer chain, the first ball striking the others at rest.
 
+        The errors of ratios and coefficients of restitution are drawn independently of each other;
+        ratios fitted together are drawn together, and one that the data left open takes all values
+        up to its bound.
+
         Parameters
         ----------
         types : str or sequence of str, length N
             Types of the balls, left to right; in one string such as "ABA" or "steel-brass-steel".
         speed : float
             Of the first ball, m/s.
-
-        Returns
-        -------
-        Prediction
-            Spread by the errors of ratios and coefficients of restitution, drawn independently of
-            each other; ratios fitted together are drawn together, and one that the data left open
-            takes all values up to its bound.
 
         Raises
         ------

@@ -29,18 +29,10 @@ Function = Callable[[Vector], Vector]
 
 
 class Mode(NamedTuple):
-    """A minimum of chi-square.
+    """A minimum of chi-square."""
 
-    Examples
-    --------
-    >>> Mode(0.2, 0.0)
-    Mode(value=0.2, excess=0.0)
-    """
-
-    #: Where it is.
-    value: float
-    #: Chi-square there above the lowest.
-    excess: float
+    value: float  #: Where it is.
+    excess: float  #: Chi-square there above the lowest.
 
 
 class Scan(NamedTuple):

@@ -11,29 +11,16 @@ from cradle.input.values import Vector, one_number
 
 @dataclass(frozen=True, eq=False)
 class ShotSet:
-    """All shots of one arrangement of N balls; K shots.
-
-    Attributes
-    ----------
-    name : str
-    types : tuple of str, length N
-        Left to right.
-    shots : tuple of str, length K
-        Names of the shots.
-    masses : ndarray, shape (N,)
-        kg.
-    before, after, sigma, sigma_before : ndarray, shape (K, N)
-        Velocities and their standard errors, m/s.
-    """
+    """All shots of one arrangement of N balls; K shots."""
 
     name: str
-    types: tuple[str, ...]
-    shots: tuple[str, ...]
-    masses: Vector
-    before: Vector
+    types: tuple[str, ...]  #: Of the N balls, left to right.
+    shots: tuple[str, ...]  #: Names of the K shots.
+    masses: Vector  #: Shape (N,), kg.
+    before: Vector  #: Velocities, shape (K, N), m/s; so are the next three.
     after: Vector
-    sigma: Vector
-    sigma_before: Vector
+    sigma: Vector  #: Standard errors of `after`.
+    sigma_before: Vector  #: Standard errors of `before`.
 
     @property
     def momentum_residuals(self) -> Vector:

@@ -23,46 +23,31 @@ _LEGEND: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.08),
 
 
 def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequence[Axes]:
-    """Draw one estimate of a fit, the first identified one if `name` is None; see `Fit.plot`.
-
-    Examples
-    --------
-    >>> from cradle.fit import read_shots, restitution
-    >>> from cradle.tables import data_folder
-    >>> fit = restitution(read_shots(data_folder() / "shots_template.csv"))
-    >>> from matplotlib.figure import Figure
-    >>> [axes.get_title() for axes in draw_fit(fit, "AB", Figure().subplots(1, 2))]
-    ['likelihood of restitution AB', 'data of set AB']
-    """
+    """Draw one estimate of a fit and its data; see `Fit.plot`."""
     if not fit.estimates:
         raise ValueError("nothing was fitted; there is nothing to draw")
-    # The first identified one, else the first one.
-    estimate = fit[name or min(fit.estimates, key=lambda one: not fit[one].identified)]
+    name = name or next((k for k, one in fit.estimates.items() if one.identified), None)
+    estimate = fit[name or next(iter(fit.estimates))]
     if axes is None:
         _, axes = plt.subplots(2, 1, figsize=(5.6, 7), layout="constrained")
     draw_likelihood(estimate, axes[0])
-    for one in fit.shots.sets:
-        if estimate.key in fitted_keys(one.types):
-            _draw_data(fit, one, axes[1])
-            break
+    data = [one for one in fit.shots.sets if estimate.key in fitted_keys(one.types)]
+    if data:
+        _draw_data(fit, data[0], axes[1])
     else:
         axes[1].set_axis_off()
     return axes
 
 
 def draw_likelihood(estimate: Estimate, ax: Axes) -> Axes:
-    """Draw chi-square above its lowest value, with the confidence set and all minima.
+    """Draw chi-square above its lowest value, the confidence set and all minima, and return `ax`.
 
-    Parameters
-    ----------
-    estimate : Estimate
-        What was fitted.
-    ax : Axes
-        Where to draw.
-
-    Returns
-    -------
-    Axes
+    Examples
+    --------
+    >>> from cradle.fit import restitution_from_heights
+    >>> fit = restitution_from_heights("AA", [1.0, 1.0], [0.88, 0.90], 0.01)
+    >>> draw_likelihood(fit["AA"], plt.figure().subplots()).get_title()
+    'likelihood of restitution AA'
     """
     x, y = estimate.grid, estimate.excess
     cloud = x.size > 2 and bool((np.diff(x) <= 0).any())  # of several parameters
