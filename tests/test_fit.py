@@ -27,8 +27,8 @@ from cradle.fit import (
     speeds_from_heights,
     velocities_from_tracks,
 )
-from cradle.fit.answers import FOLDED, Group
-from cradle.fit.likelihood import chi_squares
+from cradle.fit.parameters import chi_squares
+from cradle.fit.result import FOLDED, Group
 from cradle.fit.search import RISE, refine, scan
 from cradle.fit.tracks import Track
 from cradle.tables import data_folder

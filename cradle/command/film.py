@@ -51,7 +51,7 @@ def film(
       cradle film film.txt --set BAC --masses 0.053,0.045,0.053 --period 2.2 --slower 2
     """
     from cradle.fit.parameters import parameter_key
-    from cradle.fit.reading import COLUMNS, OPTIONAL
+    from cradle.fit.shots import COLUMNS, OPTIONAL
 
     if shot is not None and len(files) > 1:
         raise click.UsageError("--shot names one film; several have the names of their files")

@@ -63,9 +63,8 @@ def fit(
       cradle fit shots.csv --json --plot fit.png
     """
     from cradle.fit import read_shots
-    from cradle.fit.answers import FOLDED
     from cradle.fit.parameters import types_in_a_row
-    from cradle.fit.result import RESULT_COLUMNS
+    from cradle.fit.result import FOLDED, RESULT_COLUMNS
     from cradle.fit.shots import chance
     from cradle.input.values import one_number
 

@@ -7,10 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.fit.answers import Estimate, Group
-from cradle.fit.likelihood import chi_squares
 from cradle.fit.parameters import (
     Key,
+    chi_squares,
     fitted_keys,
     label,
     outcomes,
@@ -18,7 +17,7 @@ from cradle.fit.parameters import (
     parameter_key,
     ratio_keys,
 )
-from cradle.fit.result import Fit
+from cradle.fit.result import Estimate, Fit, Group
 from cradle.fit.search import Scan, refine, scan
 from cradle.fit.shots import Shots, ShotSet
 from cradle.input.values import Vector, checked, one_number

@@ -1,4 +1,10 @@
-"""What is fitted, by the types of the balls: its names, and chains solved for many values of it."""
+"""What is fitted, named by the types of the balls, and how well values of it explain shots.
+
+The velocities before an impact are measured too, and the coefficients of restitution are known
+with errors only.  Both enter as nuisances: chi-square is profiled over them.  The outcomes are
+linear in the velocity of a single striker, so that the profile over it is exact; in the
+coefficients of restitution they are taken as linear over one standard error.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from cradle.fit.shots import ShotSet
 from cradle.input.values import Vector, shown
 from cradle.models.batch import post_impact_velocities
 
@@ -15,6 +22,10 @@ from cradle.models.batch import post_impact_velocities
 Key = tuple[str, ...]
 #: Parameters at P points: of shape (P,), or a number for all points.
 Values = Mapping[Key, Any]
+Uncertain = Sequence[tuple[Key, float]]
+
+# Parameter points evaluated at a time, to bound the memory.
+_CHUNK = 4096
 
 
 def label(key: Key) -> str:
@@ -67,3 +78,75 @@ def outcomes(types: Sequence[str], masses: Vector, velocities: Vector, values: V
         for keys in (pair_keys(types), *triplet_keys(types))
     )  # fmt: skip
     return post_impact_velocities(masses, velocities, e, forward, backward, excess="saturate")
+
+
+def responses(shots: ShotSet, values: Values, uncertain: Uncertain) -> tuple[Vector, Vector]:
+    """Return velocities after K shots at P points, shape (K, P, N), and what they change with.
+
+    That is one standard error of each of M measured velocities before, then each of E uncertain
+    coefficients of restitution: (K, P, N, M + E).
+    """
+    moving = np.flatnonzero((shots.before != 0).any(axis=0))
+    at_rest_exactly = not np.delete(shots.sigma_before, moving, axis=1).any()
+    single = moving.size == 1 and (shots.before[:, moving] > 0).all() and at_rest_exactly
+    unit = np.eye(shots.masses.size)
+    before = unit[None, moving] if single else shots.before[:, None, :]
+
+    def solve(changed: Values, change: Vector | float = 0.0) -> Vector:
+        return outcomes(shots.types, shots.masses, before + change, {**values, **changed})
+
+    outcome = solve({})
+    slopes = [np.zeros_like(outcome)] * len(uncertain)
+    for k, (key, sigma) in enumerate(uncertain):
+        if key in pair_keys(shots.types):
+            low, high = max(0.0, values[key] - sigma), min(1.0, values[key] + sigma)
+            slopes[k] = (solve({key: high}) - solve({key: low})) / (high - low)
+    if single:
+        # Homogeneous of degree one: the slope with the striker's velocity is the outcome itself.
+        speed, error = (v[:, moving, None] for v in (shots.before, shots.sigma_before))
+        return outcome * speed, np.stack([outcome * error, *(s * speed for s in slopes)], axis=-1)
+    movers = []
+    for ball in np.flatnonzero((shots.sigma_before > 0).any(axis=0)):
+        error = shots.sigma_before[:, ball, None, None]
+        step = unit[ball] * error.max()
+        movers.append((solve({}, step) - solve({}, -step)) / (2 * error.max()) * error)
+    return outcome, np.stack([*movers, *slopes, outcome], axis=-1)[..., :-1]
+
+
+def normal_equations(
+    shots: ShotSet, values: Values, uncertain: Uncertain
+) -> tuple[Vector, Vector, Vector]:
+    """Chi-square at the nominal restitution, its slope and curvature, profiled over `before`.
+
+    Of restitution changed by d it is chi_square - 2 slope d + d curvature d.
+    """
+    outcome, changes = responses(shots, values, uncertain)
+    measured = changes.shape[-1] - len(uncertain)
+    movers, slopes = changes[..., :measured], changes[..., measured:]
+    residual = shots.after[:, None, :] - outcome
+    columns = np.concatenate([residual[..., None], slopes], axis=-1)
+    weight = (1.0 / shots.sigma**2)[:, None, :, None]
+    products = np.einsum("kpni,kpnj->pij", columns, columns * weight)
+    weighted = movers * weight
+    inner = np.einsum("kpnm,kpnl->kpml", movers, weighted) + np.eye(measured)
+    cross = np.einsum("kpnm,kpni->kpmi", weighted, columns)
+    products -= np.einsum("kpmi,kpmj->pij", cross, np.linalg.solve(inner, cross))
+    return products[:, 0, 0], products[:, 0, 1:], products[:, 1:, 1:]
+
+
+def chi_squares(sets: Sequence[ShotSet], values: Values, uncertain: Uncertain) -> Vector:
+    """Chi-square of all shots at each point, profiled over restitution and velocities before."""
+    size = max(np.size(value) for value in values.values())
+    found = []
+    for begin in range(0, size, _CHUNK):
+        some = {key: value[begin : begin + _CHUNK] if np.size(value) == size > 1 else value
+                for key, value in values.items()}  # fmt: skip
+        parts = zip(*(normal_equations(one, some, uncertain) for one in sets), strict=True)
+        totals: list[Any] = [sum(part) for part in parts]
+        chi_square, slope, curvature = totals
+        if uncertain:  # profiled over the coefficients of restitution that the sets share
+            curvature = curvature + np.diag([1.0 / sigma**2 for _, sigma in uncertain])
+            step = np.linalg.solve(curvature, slope[..., None])[..., 0]
+            chi_square = chi_square - (slope * step).sum(axis=-1)
+        found.append(chi_square)
+    return np.concatenate(found)

@@ -1,12 +1,44 @@
-"""What is measured: shots, velocities before and after impacts, in sets."""
+"""What is measured: shots, velocities before and after impacts, read from tables and checked."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 
-from cradle.input.values import Vector, one_number
+from cradle.input.csv import table_lines
+from cradle.input.values import Vector, one_number, one_of
+
+#: Columns that every table of shots has, and what they hold.
+COLUMNS = {
+    "set": "name of the arrangement; all shots of a set have the same balls in the same order",
+    "shot": "number or name of the shot within its set",
+    "ball": "position in the row, 1 at the left",
+    "type": "what kind of ball it is; balls of one type are alike",
+    "mass": "kg",
+    "before": "velocity just before the impact, m/s, positive to the right",
+    "after": "velocity after the impact, m/s",
+    "sigma": "standard error of `after`, m/s",
+}
+#: One more column that may be there.
+OPTIONAL = {
+    "sigma_before": "standard error of `before`; if left out, sigma for a moving ball, 0 at rest",
+}
+
+# Units, the first if none is told; what no ball of a cradle is likely to exceed; another unit that
+# such a number may be in, in words and as an option.
+_UNITS: dict[str, tuple[dict[str, float], float, str, str]] = {
+    "mass_unit": ({"kg": 1.0, "g": 1e-3}, 5.0, "grams", "g"),
+    "velocity_unit": ({"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}, 20.0, "cm/s", "cm/s"),
+}
+_ABOVE = "must be above 0"
+# A defect of a measurement counts from so many standard errors on.
+_BEYOND = 5.0
+
+# A row: the cells by column, in kg and m/s, and under "where" its place in the source.
+_Row = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,3 +168,164 @@ def chance(chi_square: float, degrees_of_freedom: int) -> float:
     from scipy.special import chdtrc
 
     return float(chdtrc(max(degrees_of_freedom, 1), chi_square))
+
+
+def read_shots(
+    source: str | Path | Any,
+    *,
+    mass_unit: str | None = None,
+    velocity_unit: str | None = None,
+    sigma: float | None = None,
+) -> Shots:
+    """Read a table of shots and check it.
+
+    Parameters
+    ----------
+    source : path, binary file, DataFrame or mapping of columns
+        A CSV file (UTF-8, comma, one header line; lines that begin with # and empty rows are
+        skipped), a pandas DataFrame, or columns by name: `COLUMNS` and `OPTIONAL`.
+    mass_unit : {"kg", "g"}, optional
+    velocity_unit : {"m/s", "cm/s", "mm/s"}, optional
+        Of velocities and their errors.  Left out, units are kg and m/s, and numbers that look like
+        others are refused.
+    sigma : float, optional
+        Standard error of all velocities, in the unit of the velocities, for a table without it.
+
+    Returns
+    -------
+    Shots
+        The measured shots, in kg and m/s.
+
+    Raises
+    ------
+    ValueError
+        If a column is missing or there twice, sigma is given twice, a value is wrong, balls pass
+        through each other, or a shot gains more energy than its errors allow; the message names row
+        and column.
+
+    Examples
+    --------
+    >>> shots = read_shots(
+    ...     {"set": ["AB", "AB"], "shot": [1, 1], "ball": [1, 2], "type": ["A", "B"],
+    ...      "mass": [45, 53], "before": [1.0, 0.0], "after": [0.17, 0.70], "sigma": [0.01, 0.01]},
+    ...     mass_unit="g",
+    ... )
+    >>> shots["AB"].masses
+    array([0.045, 0.053])
+    """
+    lines = table_lines(source)
+    if not lines:
+        raise ValueError("the table has no rows")
+    there = list(lines[0][1])
+    for name in COLUMNS:
+        if name not in there and (name != "sigma" or sigma is None):
+            other = "; or give sigma=" if name == "sigma" else ""
+            alike = [one for one in there if one.lower() == name]
+            hint = "".join(f": write {one} in small letters" for one in alike)
+            raise ValueError(
+                f"column {name!r} is missing ({COLUMNS[name]}{other}); "
+                f"there are {', '.join(there)}{hint}"
+            )
+    if sigma is not None:
+        one_number("sigma", sigma, _ABOVE, 0.0, open_low=True)
+        if "sigma" in there:
+            raise ValueError(f"sigma = {sigma!r}; the table has a column sigma: leave out one of "
+                             "them")  # fmt: skip
+    units = {"mass_unit": mass_unit, "velocity_unit": velocity_unit}
+    for option, unit in units.items():
+        one_of(option, unit or next(iter(_UNITS[option][0])), list(_UNITS[option][0]))
+    groups: dict[str, dict[str, list[_Row]]] = {}
+    for where, line in lines:
+        row = _row(where, line if sigma is None else {**line, "sigma": sigma}, units)
+        groups.setdefault(row["set"], {}).setdefault(row["shot"], []).append(row)
+    return Shots(tuple(_shot_set(name, shots) for name, shots in groups.items()))
+
+
+def _refuse(where: str, column: str, words: str) -> NoReturn:
+    raise ValueError(f"{where}, column {column}: {words}") from None
+
+
+def _row(where: str, line: dict[str, Any], units: dict[str, str | None]) -> _Row:
+    """Return one row in kg and m/s."""
+
+    def number(name: str, rule: str = "must be finite", low: float = -np.inf) -> float:
+        place = f"{where}, column {name}"
+        try:
+            value = float(line[name])
+        except (TypeError, ValueError):
+            raise ValueError(f"{place} = {line[name]!r}; must be a number") from None
+        value = one_number(place, value, rule, low, open_low=rule == _ABOVE)
+        if name == "ball":
+            return value
+        unit = "mass_unit" if name == "mass" else "velocity_unit"
+        scales, limit, other, short = _UNITS[unit]
+        usual = next(iter(scales))
+        value *= scales[units[unit] or usual]
+        if units[unit] is None and abs(value) > limit and "sigma" not in name:
+            _refuse(where, name, f"{value:g} {usual} is unlikely; is it in {other}: say "
+                    f"{unit}={short!r} (or in {usual} indeed: say {unit}={usual!r})")  # fmt: skip
+        return value
+
+    row: _Row = {name: str(line[name]).strip() for name in ("set", "shot", "type")}
+    ball = number("ball")
+    if ball < 1 or ball != int(ball):
+        _refuse(where, "ball", f"{line['ball']!r}; must be 1, 2, ... from the left")
+    row |= {"where": where, "ball": int(ball), "mass": number("mass", _ABOVE, 0.0)}
+    row |= {name: number(name) for name in ("before", "after")}
+    row["sigma"] = number("sigma", _ABOVE, 0.0)
+    row["sigma_before"] = row["sigma"] if row["before"] else 0.0
+    if line.get("sigma_before") not in (None, ""):
+        row["sigma_before"] = number("sigma_before", "must be at least 0", 0.0)
+    return row
+
+
+def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
+    """Put the rows of a set together; all its shots have the same balls."""
+    table = [sorted(rows, key=lambda row: row["ball"]) for rows in shots.values()]
+    first = table[0]
+    for (shot, given), rows in zip(shots.items(), table, strict=True):
+        places, what = [row["ball"] for row in rows], f"set {name}, shot {shot}"
+        if len(rows) < 2 or places != list(range(1, len(rows) + 1)):
+            _refuse(given[0]["where"], "ball", f"{what} has balls {places}; each shot needs "
+                    "1, 2, ... N, each once, N >= 2")  # fmt: skip
+        if len(rows) != len(first):
+            _refuse(rows[0]["where"], "ball", f"{what} has {len(rows)} balls; the first shot of "
+                    f"the set has {len(first)}")  # fmt: skip
+        for row, usual in zip(rows, first, strict=True):
+            for column in ("type", "mass"):
+                if row[column] != usual[column]:
+                    _refuse(row["where"], column, f"{row[column]!r}; ball {row['ball']} of set "
+                            f"{name} has {usual[column]!r} elsewhere")  # fmt: skip
+        _check_physics(what, rows)
+    types = "".join(row["type"] for row in first)
+    rest = name.removeprefix(types)
+    if rest != name and rest.isalpha() and rest.isupper():  # all other names are free
+        _refuse(first[0]["where"], "set", f"set {name} has the balls {types} alone; is the row of "
+                f"ball {len(first) + 1} missing?  If not, give the set another name")  # fmt: skip
+    columns = (np.array([[row[column] for row in rows] for rows in table])
+               for column in ("before", "after", "sigma", "sigma_before"))  # fmt: skip
+    kinds, masses = zip(*((row["type"], row["mass"]) for row in first), strict=True)
+    return ShotSet(name, kinds, tuple(shots), np.array(masses), *columns)
+
+
+def _check_physics(what: str, rows: list[_Row]) -> None:
+    """Raise if no balls approach, balls pass through each other, or energy is gained."""
+    mass, before, after, sigma, earlier = np.array(
+        [[row[name] for name in ("mass", "before", "after", "sigma", "sigma_before")]
+         for row in rows]
+    ).T  # fmt: skip
+    if (np.diff(before) >= 0).all():
+        _refuse(rows[0]["where"], "before", f"{what}: no balls approach")
+    through = -np.diff(after) > _BEYOND * np.hypot(sigma[:-1], sigma[1:])
+    if through.any():
+        k = int(np.argmax(through))
+        _refuse(rows[k + 1]["where"], "after", f"{what}: ball {k + 1} at {after[k]:g} m/s "
+                f"would pass through ball {k + 2} at {after[k + 1]:g} m/s")  # fmt: skip
+    gain = 0.5 * (mass * (after**2 - before**2)).sum()
+    error = np.sqrt((mass**2 * ((after * sigma) ** 2 + (before * earlier) ** 2)).sum())
+    if gain > _BEYOND * error:
+        share = gain / (0.5 * mass * before**2).sum()
+        raise ValueError(
+            f"{rows[0]['where']}, columns before and after: {what} gains {100 * share:.3g} % of "
+            f"its energy, {gain / error:.3g} standard errors; check units, signs and sigma"
+        )

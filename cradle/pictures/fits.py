@@ -10,9 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from cradle.fit.answers import Estimate
 from cradle.fit.parameters import fitted_keys
-from cradle.fit.result import Fit
+from cradle.fit.result import Estimate, Fit
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
 from cradle.pictures.impacts import PALETTE, ball_style
