@@ -23,8 +23,6 @@ from cradle.fit.shots import Shots, ShotSet
 from cradle.input.values import Vector, checked, one_number
 from cradle.kernel.state import LIMITS
 
-# Values of a coefficient or ratio on the first grid.
-_GRID = 2001
 # Points at which it is tried whether a ratio acts at all.
 _TRIALS = 513
 
@@ -34,15 +32,7 @@ Known = Mapping[str, "float | tuple[float, float]"]
 def restitution(shots: Shots) -> Fit:
     """Fit the coefficient of restitution of every pair of balls that was shot alone.
 
-    Parameters
-    ----------
-    shots : Shots
-        Sets of two balls are used; others are left aside.
-
-    Returns
-    -------
-    Fit
-        One estimate a pair, named by its types in alphabetical order.
+    One estimate a pair, named by its types in alphabetical order; longer sets are left aside.
 
     Raises
     ------
@@ -76,11 +66,6 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
     sigma : float
         Standard error of each height, in that unit.
 
-    Returns
-    -------
-    Fit
-        One estimate.
-
     Raises
     ------
     ValueError
@@ -98,11 +83,11 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
         raise ValueError(f"drop has shape {high.shape}, rise {low.shape}; must be alike, (K,)")
 
     def chi(e: Vector) -> Vector:
-        square = e[:, None] ** 2
+        square = e**2
         return np.asarray(((low - square * high) ** 2 / (1 + square**2)).sum(axis=1) / error**2)
 
     key = parameter_key(name)
-    found, lowest = scan(chi, np.linspace(0.0, 1.0, _GRID))
+    (found,), _, _, lowest = scan(chi, np.ones(1))
     estimates = {label(key): Estimate.of("restitution", key, 1.0, found)}
     return Fit(Shots(()), estimates, {}, (), lowest, high.size - 1)
 
@@ -112,24 +97,19 @@ def ratio(
 ) -> Fit:
     """Fit the Impulse Correlation Ratio of every triplet in shots of three balls and more.
 
-    Triplets whose ratios act in the same shots are fitted together.
+    One estimate for each triplet and direction that is not known, between 0 and the bound of three
+    balls (Eq. 34).  Those that act in the same shots are fitted together.
 
     Parameters
     ----------
     shots : Shots
-        Sets of three balls and more are used.
+        Sets of two balls are left aside.
     restitution : Fit or mapping
         The result of `restitution`, or a mapping from the name of each pair of neighbours to the
         coefficient or to (coefficient, standard error).
     known : mapping, optional
         Ratios that are not to be fitted, by the names of triplets.  With it no set needs three
         balls: what is known predicts, and nothing is fitted.
-
-    Returns
-    -------
-    Fit
-        One estimate for each triplet and direction that is not known, between 0 and the bound of
-        three balls (Eq. 34).
 
     Raises
     ------
@@ -263,15 +243,9 @@ def _searched(
     uncertain = [(key, sigma) for key, sigma in sorted(errors.items()) if key in needed]
 
     def chi(points: Vector) -> Vector:
-        columns = points.reshape(len(points), -1).T
-        return chi_squares(sets, {**given, **dict(zip(keys, columns, strict=True))}, uncertain)
+        columns = zip(keys, points.T, strict=True)
+        return chi_squares(sets, {**given, **dict(columns)}, uncertain)
 
-    upper = np.array([bounds[key] for key in keys])
-    if len(keys) > 1:
-        scans, points, excess, lowest = refine(chi, upper)
-        return Group(tuple(keys), points, np.exp(-0.5 * excess)), scans, lowest
-    # Near the bound the outcome goes like the square root of what is left to it.
-    grid = upper[0] * (1.0 - np.linspace(1.0, 0.0, _GRID) ** 2)
-    one, lowest = scan(chi, grid)
-    density = np.exp(-0.5 * one.excess) * np.gradient(grid)
-    return Group(tuple(keys), grid[:, None], density), [one], lowest
+    search = refine if len(keys) > 1 else scan
+    scans, points, density, lowest = search(chi, np.array([bounds[key] for key in keys]))
+    return Group(tuple(keys), points, density), scans, lowest

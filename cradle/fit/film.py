@@ -90,10 +90,6 @@ def velocities_from_tracks(
     scatter : float, optional
         Standard deviation of a mark, m, known from many shots; left out, that of these tracks.
 
-    Returns
-    -------
-    Velocities
-
     Raises
     ------
     ValueError

@@ -1,7 +1,8 @@
 """Exhaustive search: a grid over the whole range, then finer grids where it matters.
 
-Chi-square of an impact has several minima and flat stretches.  A search from one start finds one
-of the minima; a grid finds all that are wider than its cells.
+Chi-square of an impact has several minima and flat stretches; a search from one start finds one of
+the minima.  A function takes points of shape (P, parameters), from 0 to `upper`, and both searches
+return what each axis shows, the points, how likely each is up to a factor, and the lowest value.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from cradle.input.values import Vector
 LEVEL = 0.95
 RISE = 3.841458820694124
 
+# Points of the grid in one dimension.
+_GRID = 2001
 # Points of a grid in several dimensions that go on to the next finer one.
 _KEPT = 600
 # Points inside the confidence set that make its ends known to a small part of its width.
@@ -26,6 +29,7 @@ _ENOUGH = 400
 _CELLS = {2: 61, 3: 21, 4: 11, 5: 7, 6: 5}
 
 Function = Callable[[Vector], Vector]
+Found = tuple[list["Scan"], Vector, Vector, float]
 
 
 class Mode(NamedTuple):
@@ -44,19 +48,21 @@ class Scan(NamedTuple):
     excess: Vector
 
 
-def scan(function: Function, grid: Vector) -> tuple[Scan, float]:
+def scan(function: Function, upper: Vector) -> Found:
     """Search one dimension: a grid, then walk to each minimum and each end of the set."""
     from scipy.optimize import brentq
 
-    values = function(grid)
+    # Near the bound the outcome goes like the square root of what is left to it.
+    points = upper * (1.0 - np.linspace(1.0, 0.0, _GRID)[:, None] ** 2)
+    grid, values = points[:, 0], function(points)
     padded = np.pad(values, 1, constant_values=np.inf)
     # The first point of a level stretch stands for it, unless its steps are those of rounding.
     lows = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
     rises = np.array([values[max(k - 3, 0) : k + 4].max() - values[k] for k in lows])
     lows = lows[(values[lows] == values.min()) | (rises > 1e-9 * np.maximum(1.0, values[lows]))]
-    starts, steps = grid[lows, None], np.gradient(grid)[lows, None]
-    points, minima, lowest = _walked(lambda p: function(p[:, 0]), starts, steps, grid[-1:])
-    modes = tuple(Mode(float(x), y) for x, y in zip(points[:, 0], minima, strict=True))
+    cells = np.gradient(grid)
+    best, minima, lowest = _walked(function, points[lows], cells[lows, None], upper)
+    modes = tuple(Mode(float(x), y) for x, y in zip(best[:, 0], minima, strict=True))
     # Minima narrower than a cell of the grid count too.
     extra = np.array([mode for mode in modes if mode.excess <= RISE])
     x, at = np.unique(np.concatenate([grid, extra[:, 0]]), return_index=True)
@@ -64,20 +70,18 @@ def scan(function: Function, grid: Vector) -> tuple[Scan, float]:
     inside = np.concatenate([[False], np.append(excess, extra[:, 1])[at] <= RISE, [False]])
 
     def over(at: float) -> float:
-        return float(function(np.array([at]))[0]) - lowest - RISE
+        return float(function(np.array([[at]]))[0]) - lowest - RISE
 
     def end(k: int) -> float:
         return float(x[k - (k > 0)] if k in (0, x.size) else brentq(over, x[k - 1], x[k]))
 
     ends = [end(k) for k in np.flatnonzero(np.diff(inside)).tolist()]
-    return Scan(modes, tuple(zip(ends[::2], ends[1::2], strict=True)), grid, excess), lowest
+    found = Scan(modes, tuple(zip(ends[::2], ends[1::2], strict=True)), grid, excess)
+    return [found], points, np.exp(-0.5 * excess) * cells, lowest
 
 
-def refine(function: Function, upper: Vector) -> tuple[list[Scan], Vector, Vector, float]:
-    """Search several dimensions from 0 to `upper`: a grid of cells, then the best cells divided.
-
-    Returns what each axis shows, all points of the last grid, their excess, and the lowest value.
-    """
+def refine(function: Function, upper: Vector) -> Found:
+    """Search several dimensions: a grid of cells, then the best cells divided."""
     size = upper.size
     if size not in _CELLS:
         raise ValueError(
@@ -113,7 +117,7 @@ def refine(function: Function, upper: Vector) -> tuple[list[Scan], Vector, Vecto
         low = [k for k in np.argsort(points[:, axis]) if excess[k] <= 4 * RISE]
         modes = tuple(Mode(float(x), y) for x, y in zip(best[:, axis], minima, strict=True))
         scans.append(Scan(modes, tuple(ends), points[low, axis], excess[low]))
-    return scans, points, excess, lowest
+    return scans, points, np.exp(-0.5 * excess), lowest
 
 
 def _walked(

@@ -62,17 +62,9 @@ class ShotSet:
         return np.asarray(gain / error)
 
     def mean_after(self, speed: float = 1.0) -> tuple[Vector, Vector]:
-        """Return the mean velocities after the impact, each shot scaled to one speed.
+        """Return means of the velocities after the impact, with their errors: each shape (N,), m/s.
 
-        Parameters
-        ----------
-        speed : float
-            Of the first ball before the impact, m/s.
-
-        Returns
-        -------
-        mean, error : ndarray, shape (N,)
-            m/s; the standard errors follow from those of the velocities before and after.
+        Each shot is scaled to one `speed` of the first ball, m/s.
 
         Raises
         ------
@@ -125,10 +117,8 @@ class Shots:
 
     def __repr__(self) -> str:
         """Return the sets with their sizes."""
-        parts = [
-            f"{s.name}: {len(s.shots)} shot{'s' * (len(s.shots) > 1)} of {len(s.types)} balls"
-            for s in self.sets
-        ]
+        parts = [f"{s.name}: {len(s.shots)} shot{'s' * (len(s.shots) > 1)} of {len(s.types)} balls"
+                 for s in self.sets]  # fmt: skip
         return f"Shots({', '.join(parts)})"
 
     @property
@@ -177,7 +167,7 @@ def read_shots(
     velocity_unit: str | None = None,
     sigma: float | None = None,
 ) -> Shots:
-    """Read a table of shots and check it.
+    """Read a table of shots and check it; in the result all is in kg and m/s.
 
     Parameters
     ----------
@@ -189,12 +179,7 @@ def read_shots(
         Of velocities and their errors.  Left out, units are kg and m/s, and numbers that look like
         others are refused.
     sigma : float, optional
-        Standard error of all velocities, in the unit of the velocities, for a table without it.
-
-    Returns
-    -------
-    Shots
-        The measured shots, in kg and m/s.
+        Standard error of all velocities, in their unit, for a table without it.
 
     Raises
     ------
@@ -205,12 +190,9 @@ def read_shots(
 
     Examples
     --------
-    >>> shots = read_shots(
-    ...     {"set": ["AB", "AB"], "shot": [1, 1], "ball": [1, 2], "type": ["A", "B"],
-    ...      "mass": [45, 53], "before": [1.0, 0.0], "after": [0.17, 0.70], "sigma": [0.01, 0.01]},
-    ...     mass_unit="g",
-    ... )
-    >>> shots["AB"].masses
+    >>> table = {"set": ["AB", "AB"], "shot": [1, 1], "ball": [1, 2], "type": ["A", "B"],
+    ...          "mass": [45, 53], "before": [1.0, 0.0], "after": [0.17, 0.70]}
+    >>> read_shots(table, mass_unit="g", sigma=0.01)["AB"].masses
     array([0.045, 0.053])
     """
     lines = table_lines(source)
@@ -229,8 +211,8 @@ def read_shots(
     if sigma is not None:
         one_number("sigma", sigma, _ABOVE, 0.0, open_low=True)
         if "sigma" in there:
-            raise ValueError(f"sigma = {sigma!r}; the table has a column sigma: leave out one of "
-                             "them")  # fmt: skip
+            rule = "the table has a column sigma: leave out one of them"
+            raise ValueError(f"sigma = {sigma!r}; {rule}")
     units = {"mass_unit": mass_unit, "velocity_unit": velocity_unit}
     for option, unit in units.items():
         one_of(option, unit or next(iter(_UNITS[option][0])), list(_UNITS[option][0]))

@@ -40,6 +40,8 @@ def read_tracker(
 ) -> Tracks:
     """Read a text file exported by Tracker, Kinovea, Logger Pro or Capstone.
 
+    Frames where a ball was not marked are left out of its track.
+
     Parameters
     ----------
     path : str or Path
@@ -51,11 +53,6 @@ def read_tracker(
     unit : float
         Length of the file's unit in m, such as 0.01 or the size of a pixel, where the file does not
         name it as in ``X (cm)``.
-
-    Returns
-    -------
-    Tracks
-        By name; frames where a ball was not marked are left out.
 
     Raises
     ------
