@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from cradle.fit.tracks import Track
 from cradle.input.values import Vector, checked, one_number
@@ -154,18 +154,14 @@ def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
             continue
         gain = 0.0
         for k, (t, x) in enumerate(marks):
-            bent = [side**power for side in _sides(t, k == striker) for power in (1, 2)]
+            earlier, later = np.minimum(t, 0.0), np.maximum(t, 0.0)
+            bent = [later, later**2] + [earlier, earlier**2] * (k == striker)
             gain += _rest([t, t**2], x) - _rest(bent, x)
         if gain > most:
             best, most = float(moment), gain
     if best is None:
         raise ValueError(f"no moment has 4 marks of every ball within {window:g} s on either side")
     return best
-
-
-def _sides(t: Vector, strikes: bool) -> list[Vector]:
-    """Return the time after the impact, and of the striker that before it too."""
-    return [np.maximum(t, 0.0), np.minimum(t, 0.0)][: 1 + strikes]
 
 
 def _rest(columns: Sequence[Vector], x: Vector) -> float:
@@ -195,7 +191,16 @@ def _around(
 ) -> Velocities:
     """Fit the moment in a window, then every ball on its own on either side of it."""
     for _ in range(3):  # the window moves with the moment that is found in it
-        used = _window(tracks, time, window)
+        used = []
+        for name, (t, x) in tracks.items():
+            near = np.abs(t - time) <= window
+            sides = int((near & (t < time)).sum()), int((near & (t >= time)).sum())
+            if min(sides) < _LEAST:
+                raise ValueError(
+                    f"track {name!r} has {sides[0]} marks before and {sides[1]} after the impact "
+                    f"at {time:.4g} s within window = {window:g} s; needs {_LEAST} on each side"
+                )
+            used.append(Track(t[near], x[near]))
         time, places = _moment(used, time, length, striker)
     if (np.diff(places) <= 0).any():
         raise ValueError(
@@ -205,45 +210,25 @@ def _around(
     return _velocities(used, time, length, striker, window)
 
 
-def _window(tracks: Mapping[str, Track], time: float, window: float) -> list[Track]:
-    """Return the marks near the impact; there must be some on either side."""
-    used = []
-    for name, (times, positions) in tracks.items():
-        near = np.abs(times - time) <= window
-        sides = [int((near & (times < time)).sum()), int((near & (times >= time)).sum())]
-        if min(sides) < _LEAST:
-            raise ValueError(
-                f"track {name!r} has {sides[0]} marks before and {sides[1]} after the impact at "
-                f"{time:.4g} s within window = {window:g} s; needs {_LEAST} on each side"
-            )
-        used.append(Track(times[near], positions[near]))
-    return used
-
-
 def _moment(
     balls: list[Track], time: float, length: float | None, striker: int
 ) -> tuple[float, Vector]:
     """Return the moment of the impact and the balls' places then: all tracks meet there."""
     from scipy.optimize import least_squares
 
-    def residuals(p: Vector) -> Vector:
-        (moment, before), places, velocities = p[:2], *np.split(p[2:], 2)
-        left = []
-        for k, (times, x) in enumerate(balls):
-            after, *earlier = _sides(times - moment, k == striker)
-            left.append(x - places[k] - velocities[k] * _way(after, velocities[k], length))
-            for t in earlier:
-                left[k] -= before * _way(t, before, length)
+    def residuals(p: Vector) -> Vector:  # moment, velocity before, then after and place of each
+        left = [
+            x - place - v * _way(np.maximum(t - p[0], 0.0), v, length)
+            for (t, x), v, place in zip(balls, p[2::2], p[3::2], strict=True)
+        ]
+        left[striker] -= p[1] * _way(np.minimum(balls[striker].times - p[0], 0.0), p[1], length)
         return np.concatenate(left)
 
-    def line(ball: Track, some: NDArray[np.bool_]) -> Vector:
-        return np.asarray(np.polyfit(ball.times[some] - time, ball.positions[some], 1))
-
-    lines = np.transpose([line(ball, ball.times >= time) for ball in balls])
-    before = line(balls[striker], balls[striker].times < time)[0]
-    start = np.concatenate([[time, before], lines[1], lines[0]])
-    found = least_squares(residuals, start, x_scale="jac").x
-    return float(found[0]), found[2 : 2 + len(balls)]
+    lines = [np.polyfit(t[t >= time] - time, x[t >= time], 1) for t, x in balls]
+    t, x = balls[striker]
+    before = np.polyfit(t[t < time] - time, x[t < time], 1)[0]
+    found = least_squares(residuals, [time, before, *np.ravel(lines)], x_scale="jac").x
+    return float(found[0]), found[3::2]
 
 
 def _velocities(

@@ -33,16 +33,14 @@ def label(key: Key) -> str:
     return ("" if all(len(name) == 1 for name in key) else "-").join(key)
 
 
-def parameter_key(name: str | Key) -> Key:
-    """Return the types of balls that a parameter's name joins."""
-    if isinstance(name, tuple):
-        return name
-    return tuple(name.split("-")) if "-" in name else tuple(name)
+def parameter_key(name: str | Sequence[str]) -> Key:
+    """Return the types of balls that a name joins."""
+    return tuple(name.split("-") if isinstance(name, str) and "-" in name else name)
 
 
-def types_in_a_row(types: str | Sequence[str]) -> tuple[str, ...]:
+def types_in_a_row(types: str | Sequence[str]) -> Key:
     """Return the types of a row of balls, at least two."""
-    row = parameter_key(types) if isinstance(types, str) else tuple(types)
+    row = parameter_key(types)
     if len(row) < 2:
         raise ValueError(f"types = {shown(types)}; must name at least 2 balls")
     return row

@@ -33,7 +33,9 @@ _UNITS: dict[str, tuple[dict[str, float], float, str, str]] = {
     "mass_unit": ({"kg": 1.0, "g": 1e-3}, 5.0, "grams", "g"),
     "velocity_unit": ({"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}, 20.0, "cm/s", "cm/s"),
 }
-_ABOVE = "must be above 0"
+# What a number must be, and its lowest value.
+_RULES = {"mass": ("must be above 0", 0.0), "sigma": ("must be above 0", 0.0),
+          "sigma_before": ("must be at least 0", 0.0)}  # fmt: skip
 # A defect of a measurement counts from so many standard errors on.
 _BEYOND = 5.0
 
@@ -209,7 +211,7 @@ def read_shots(
                 f"there are {', '.join(there)}{hint}"
             )
     if sigma is not None:
-        one_number("sigma", sigma, _ABOVE, 0.0, open_low=True)
+        one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
         if "sigma" in there:
             rule = "the table has a column sigma: leave out one of them"
             raise ValueError(f"sigma = {sigma!r}; {rule}")
@@ -227,38 +229,36 @@ def _refuse(where: str, column: str, words: str) -> NoReturn:
     raise ValueError(f"{where}, column {column}: {words}") from None
 
 
+def _number(where: str, line: dict[str, Any], name: str, units: dict[str, str | None]) -> float:
+    """Return the number in a column, in kg or m/s."""
+    place = f"{where}, column {name}"
+    try:
+        value = float(line[name])
+    except (TypeError, ValueError):
+        raise ValueError(f"{place} = {line[name]!r}; must be a number") from None
+    rule, low = _RULES.get(name, ("must be finite", -np.inf))
+    value = one_number(place, value, rule, low, open_low="above" in rule)
+    if name == "ball":
+        return value
+    unit = "mass_unit" if name == "mass" else "velocity_unit"
+    scales, limit, other, short = _UNITS[unit]
+    usual = next(iter(scales))
+    value *= scales[units[unit] or usual]
+    if units[unit] is None and abs(value) > limit and "sigma" not in name:
+        _refuse(where, name, f"{value:g} {usual} is unlikely; is it in {other}: say "
+                f"{unit}={short!r} (or in {usual} indeed: say {unit}={usual!r})")  # fmt: skip
+    return value
+
+
 def _row(where: str, line: dict[str, Any], units: dict[str, str | None]) -> _Row:
     """Return one row in kg and m/s."""
-
-    def number(name: str, rule: str = "must be finite", low: float = -np.inf) -> float:
-        place = f"{where}, column {name}"
-        try:
-            value = float(line[name])
-        except (TypeError, ValueError):
-            raise ValueError(f"{place} = {line[name]!r}; must be a number") from None
-        value = one_number(place, value, rule, low, open_low=rule == _ABOVE)
-        if name == "ball":
-            return value
-        unit = "mass_unit" if name == "mass" else "velocity_unit"
-        scales, limit, other, short = _UNITS[unit]
-        usual = next(iter(scales))
-        value *= scales[units[unit] or usual]
-        if units[unit] is None and abs(value) > limit and "sigma" not in name:
-            _refuse(where, name, f"{value:g} {usual} is unlikely; is it in {other}: say "
-                    f"{unit}={short!r} (or in {usual} indeed: say {unit}={usual!r})")  # fmt: skip
-        return value
-
-    row: _Row = {name: str(line[name]).strip() for name in ("set", "shot", "type")}
-    ball = number("ball")
-    if ball < 1 or ball != int(ball):
+    row: _Row = {"where": where, **{n: str(line[n]).strip() for n in ("set", "shot", "type")}}
+    told = line.get("sigma_before") not in (None, "")
+    for name in ("ball", "mass", "before", "after", "sigma", *["sigma_before"] * told):
+        row[name] = _number(where, line, name, units)
+    if row["ball"] < 1 or row["ball"] % 1:
         _refuse(where, "ball", f"{line['ball']!r}; must be 1, 2, ... from the left")
-    row |= {"where": where, "ball": int(ball), "mass": number("mass", _ABOVE, 0.0)}
-    row |= {name: number(name) for name in ("before", "after")}
-    row["sigma"] = number("sigma", _ABOVE, 0.0)
-    row["sigma_before"] = row["sigma"] if row["before"] else 0.0
-    if line.get("sigma_before") not in (None, ""):
-        row["sigma_before"] = number("sigma_before", "must be at least 0", 0.0)
-    return row
+    return {"sigma_before": row["sigma"] if row["before"] else 0.0, **row, "ball": int(row["ball"])}
 
 
 def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:

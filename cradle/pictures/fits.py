@@ -25,8 +25,8 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
     """Draw one estimate of a fit and its data; see `Fit.plot`."""
     if not fit.estimates:
         raise ValueError("nothing was fitted; there is nothing to draw")
-    name = name or next((k for k, one in fit.estimates.items() if one.identified), None)
-    estimate = fit[name or next(iter(fit.estimates))]
+    # The first identified one, else the first one.
+    estimate = fit[name or min(fit.estimates, key=lambda one: not fit[one].identified)]
     if axes is None:
         _, axes = plt.subplots(2, 1, figsize=(5.6, 7), layout="constrained")
     draw_likelihood(estimate, axes[0])
