@@ -62,10 +62,9 @@ def film(
         writer.writerow([*COLUMNS, *OPTIONAL])
     for file, one in zip(files, found, strict=True):
         for k, kind in enumerate(types):
-            mass = UNITS[unit] * masses[k]
-            numbers = (mass, one.before[k], one.after[k], one.sigma[k], one.sigma_before[k])
-            row = [name, shot or file.stem, k + 1, kind, *(f"{x:.6g}" for x in numbers)]
-            writer.writerow(row)
+            velocities = (x[k] for x in (one.before, one.after, one.sigma, one.sigma_before))
+            numbers = (f"{x:.6g}" for x in (UNITS[unit] * masses[k], *velocities))
+            writer.writerow([name, shot or file.stem, k + 1, kind, *numbers])
         click.echo(
             f"{file.name}: impact at {one.time:.4g} s, window {one.window:.3g} s, marks scatter by "
             f"{one.scatter:.2g} m; chance of such a fit {one.probability:.2g}", err=True,

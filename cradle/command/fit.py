@@ -62,7 +62,7 @@ def fit(
       cradle fit shots.csv --summary
       cradle fit shots.csv --json --plot fit.png
     """
-    from cradle.fit import read_shots
+    from cradle.fit import ratio, read_shots, restitution
     from cradle.fit.parameters import types_in_a_row
     from cradle.fit.result import FOLDED, RESULT_COLUMNS
     from cradle.fit.shots import chance
@@ -77,7 +77,7 @@ def fit(
         types_in_a_row(predict)
         one_number("speed", striker, "must be above 0", 0.0, open_low=True)
     given = [_named(one) for one in options.pop("given")]
-    known = [(name, ratio) for name, (ratio, _) in map(_named, options["known"])]
+    known = [(name, value) for name, (value, _) in map(_named, options["known"])]
     if wrong := [one for one in options.pop("known") if ":" in one]:
         raise click.UsageError(f"{wrong[0]!r}: write TRIPLET=RATIO; a known ratio has no error")
     shots = read_shots(sys.stdin.buffer if str(file) == "-" else file, **options)
@@ -85,7 +85,9 @@ def fit(
     lists = [[part] if part in there else part.split(",") for part in without]
     used = shots.without(*(name.strip() for names in lists for name in names))
     _refuse_unused([name for name, _ in given], [name for name, _ in known], used, predict)
-    *pairs, last = _fits(used, dict(given), dict(known))
+    pairs = [restitution(used)] if any(len(one.types) == 2 for one in used.sets) else []
+    values = {**(pairs[0].values() if pairs else {}), **dict(given)}
+    last = ratio(used, values, known=dict(known))  # it predicts
     fits = [one for one in (*pairs, last) if one.estimates]
     momentum, count = shots.momentum_check()
     extra = {
@@ -100,13 +102,10 @@ def fit(
         + " (a poor fit: the errors do not explain the differences)" * (one.probability <= 1e-3)
         for one in fits
     ]
-    notes = []
-    if known and not last.estimates:
-        notes.append("fit: no ratio is fitted; those of --known are taken as they are")
+    notes = ["fit: no ratio is fitted; those of --known are taken as they are"]
+    notes *= bool(known and not last.estimates)
     whole = " (all of the file)" if extra["without"] else ""
-    lost = (
-        "" if chance(momentum, count) > 1e-3 else "; masses, velocities or their errors are wrong"
-    )
+    lost = "; masses, velocities or their errors are wrong" * (chance(momentum, count) <= 1e-3)
     notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{whole}{lost}")
     if predict is not None:
         more, lines = _predicted(last, shots, predict, striker)
@@ -154,17 +153,6 @@ def _refuse_unused(
         if label(key) not in needed:
             raise click.UsageError(f"{option} {name}: no chain has this {kind}; there are "
                                    f"{', '.join(sorted(needed)) or 'none'}")  # fmt: skip
-
-
-def _fits(
-    shots: Shots, given: dict[str, tuple[float, float]], known: dict[str, float]
-) -> list[Fit]:
-    """Fit the pairs, then with what they gave all longer chains; the last fit predicts."""
-    from cradle.fit import ratio, restitution
-
-    pairs = [restitution(shots)] if any(len(one.types) == 2 for one in shots.sets) else []
-    values = {name: value for one in pairs for name, value in one.values().items()}
-    return [*pairs, ratio(shots, {**values, **given}, known=known)]
 
 
 def _predicted(

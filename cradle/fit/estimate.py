@@ -197,14 +197,13 @@ def _acting(one: ShotSet, bounds: Mapping[Key, float], given: Mapping[Key, float
     # Outcomes go with the speed: shots that differ in nothing else are solved once.
     speeds = np.abs(one.before).max(axis=1, keepdims=True)
     before = np.unique(one.before / speeds, axis=0)[:, None, :]
-    base = outcomes(one.types, one.masses, before, values)
 
-    def acts(key: Key) -> bool:
-        changed = ({**values, key: share * bounds[key]} for share in (0.0, 0.5, 1.0))
-        tried = (outcomes(one.types, one.masses, before, trial) for trial in changed)
-        return any((np.abs(outcome - base) > 1e-9).any() for outcome in tried)
+    def solved(changed: Mapping[Key, float]) -> Vector:
+        return outcomes(one.types, one.masses, before, {**values, **changed})
 
-    return set(filter(acts, keys))
+    base = solved({})
+    return {key for key in keys for share in (0.0, 0.5, 1.0)
+            if (np.abs(solved({key: share * bounds[key]}) - base) > 1e-9).any()}  # fmt: skip
 
 
 def _together(acting: Iterable[set[Key]]) -> list[list[Key]]:

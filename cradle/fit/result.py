@@ -128,10 +128,10 @@ class Prediction:
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one row per ball."""
-        names = ("ball", "type", "velocity", "lower", "upper")
         columns = (x.tolist() for x in (self.median, self.lower, self.upper))
-        balls = zip(range(1, len(self.types) + 1), self.types, *columns, strict=True)
-        return [dict(zip(names, ball, strict=True)) for ball in balls]
+        return [{"ball": ball, "type": kind, "velocity": v, "lower": lower, "upper": upper}
+                for ball, (kind, v, lower, upper)
+                in enumerate(zip(self.types, *columns, strict=True), 1)]  # fmt: skip
 
     def table(self) -> pd.DataFrame:
         """Return the rows as a table."""
@@ -262,14 +262,9 @@ class Fit:
         return pd.DataFrame(self.rows(), columns=RESULT_COLUMNS).set_index("name")
 
     def plot(self, name: str | None = None, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
-        """Draw the likelihood of one estimate, and its data with their predictions.
+        """Draw the likelihood of one estimate, and its data with what is predicted of them.
 
-        Parameters
-        ----------
-        name : str, optional
-            Which estimate; the first identified one if left out.
-        axes : sequence of two Axes, optional
-            Where to draw; new axes if left out.
+        The first identified one if `name` is left out; on two `axes`, or on new ones.
 
         Raises
         ------
