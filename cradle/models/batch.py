@@ -45,8 +45,7 @@ def post_impact_velocities(
 ) -> Vector:
     """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
 
-    The same event loop as `collide` with `ImpulseCorrelation`, without the record.  Compiled, some
-    thousands of chains and more are shared out to all processors.
+    As `collide` with `ImpulseCorrelation`, without the path.
 
     Parameters
     ----------
@@ -69,11 +68,10 @@ def post_impact_velocities(
     Raises
     ------
     ValueError
-        If a value or a shape is wrong; the message names the first value and the rule.
-    ImpactNotFinished
-        If an impact takes more than `max_events` steps; `trace` is that of the first such chain.
-    ImpactNotCertified
-        If an outcome fails the check that every answer has to pass.
+        If a value or a shape is wrong.
+    ImpactNotFinished, ImpactNotCertified
+        If an impact takes more than `max_events` steps, or an outcome fails the check that every
+        answer has to pass: for the first such chain.
 
     References
     ----------
@@ -94,13 +92,7 @@ def post_impact_velocities(
 
 
 class Outcomes(NamedTuple):
-    """What a batch of impacts leaves.
-
-    Examples
-    --------
-    >>> outcomes([100, 1, 100], [1, 0, 0], 1, 0.15).collisions.tolist()
-    [10, 10]
-    """
+    """What a batch of impacts leaves; see `outcomes`."""
 
     #: Velocities after the impact, shape (..., N), m/s.
     velocities: Vector
@@ -122,40 +114,17 @@ def outcomes(
     max_events: int = MAX_EVENTS,
     progress: bool = False,
 ) -> Outcomes:
-    """Solve many chains of N balls at once, and count their collisions too.
-
-    Parameters
-    ----------
-    masses, velocities, restitution, forward, backward, meeting, excess, max_events, progress
-        As for `post_impact_velocities`.
-
-    Returns
-    -------
-    Outcomes
-        Velocities, collisions and collapses.
-
-    Raises
-    ------
-    ValueError, ImpactNotFinished, ImpactNotCertified
-        As `post_impact_velocities`.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583; Fig. 6 is a map of such counts.
+    """Count the collisions of many chains too; all else as `post_impact_velocities`.
 
     Examples
     --------
-    >>> outcomes([1, 1, 1], [1, 0, 0], [[1, 1], [0, 0]], 0).collapsed.tolist()
-    [False, True]
+    >>> found = outcomes([1, 1, 1], [1, 0, 0], [[1, 1], [0, 0]], 0)
+    >>> found.collisions[0].tolist(), found.collapsed.tolist()  # Fig. 6 is a map of such counts
+    ([1, 1], [False, True])
     """
     check_options(meeting, excess, max_events)
-    given = {
-        "masses": masses,
-        "velocities": velocities,
-        "restitution": restitution,
-        "forward": forward,
-        "backward": forward if backward is None else backward,
-    }
+    given = {"masses": masses, "velocities": velocities, "restitution": restitution}
+    given |= {"forward": forward, "backward": forward if backward is None else backward}
     # Whether these are in range is checked by the kernel.
     arrays, lead = shaped(given, (0, 0, 1, 2, 2))
     n, count = arrays[0].shape[-1], math.prod(lead)
@@ -228,11 +197,9 @@ def in_order(
 ) -> Iterable[tuple[int, int]]:
     """Yield the results of `solve` in order, made by as many threads as there are processors."""
     if progress:
-        with progress_bar(total=len(starts), unit="chunk") as bar:
-            for ended in in_order(solve, starts, progress=False):
-                bar.update()
-                yield ended
-    elif len(starts) < 2 or (workers := min(len(starts), os.cpu_count() or 1)) < 2:
+        ended = in_order(solve, starts, progress=False)
+        yield from progress_bar(iterable=ended, total=len(starts), unit="chunk")
+    elif (workers := min(len(starts), os.cpu_count() or 1)) < 2:
         yield from map(solve, starts)
     else:
         from concurrent.futures import ThreadPoolExecutor
@@ -247,15 +214,12 @@ def in_order(
 
 
 def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
-    """Return some rows of `array` broadcast to the leading shape, or the one row that all share."""
+    """Return some rows of `array` broadcast to the leading shape, or the one row that all share.
+
+    They are copies: compiled code is made for arrays that may be written to.
+    """
     size = array.shape[-1]
     if array.size == size:
-        part = array.reshape(1, size)
-    elif array.shape[:-1] == lead and array.flags.c_contiguous:
-        part = array.reshape(math.prod(lead), size)[rows]
-    else:
-        # Without making the others.
-        full = np.broadcast_to(array, (*lead, size))
-        return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
-    # Compiled code is made for arrays that may be written to; it writes to no input.
-    return part if part.flags.writeable and part.flags.c_contiguous else part.copy()
+        return array.reshape(1, size).copy()
+    full = np.broadcast_to(array, (*lead, size))  # without making the others
+    return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]

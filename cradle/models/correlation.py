@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from cradle.chain import Chain
 from cradle.closed_form import largest_ratios
 from cradle.input.values import (
+    Vector,
     checked,
     checked_masses,
     checked_restitution,
@@ -52,34 +53,29 @@ class ImpulseCorrelation:
 
     At an interior ball the impulse of the driven contact grows in proportion to that of the
     contact that drives it.  Every contact ends when it has given back the part e^2 of the work it
-    absorbed.  Between events all velocities are linear in the impulses, so the impact is solved
-    event by event, without a step size.
+    absorbed.  Velocities are linear in the impulses between events, so no step size is needed.
+
+    Where several contacts of a touching stretch approach, the leftmost one drives all the others,
+    so balls that are struck from both sides do not end as their mirror image does.
 
     Parameters
     ----------
-    forward : float or sequence, length N - 2
-        Ratio at each interior ball when its left contact drives its right one.
-    backward : float or sequence, length N - 2, optional
-        The same when the right contact drives the left one; as `forward` if left out.
+    forward, backward : float or sequence, length N - 2
+        Ratio at each interior ball when its left contact drives its right one, and when its right
+        one drives its left one; `backward` as `forward` if left out.
     meeting : float
         Where two balls meet that are driven towards each other by separate collisions, as a part
         of the overlap of their velocities; 1/2 is the paper's midpoint.
     excess : {"raise", "saturate"}
-        What to do with a ratio above its bound (Eq. 53): refuse it, or accept it and hold the
-        contact closed while the ratio would open it.
+        What to do with a ratio above its bound (Eq. 53): refuse it, or hold the contact closed
+        while the ratio would open it.
     max_events : int
-        Largest number of steps before the impact is given up.
+        Number of steps after which the impact is given up.
 
     Raises
     ------
     ValueError
-        If a value is outside its range; the message names the value and the rule.
-
-    Notes
-    -----
-    Where several contacts of a touching stretch approach, the leftmost one drives all the others
-    (rule R2 of the book), so balls that are struck from both sides do not end as their mirror
-    image does.  `SpringChain` has no such rule.
+        If a value is outside its range.
 
     References
     ----------
@@ -91,8 +87,6 @@ class ImpulseCorrelation:
     >>> model = ImpulseCorrelation(forward=0.15)
     >>> collide(Chain([1, 1, 1], [1, 0, 0], [1, 1]), model).velocities.round(4).tolist()
     [-0.0811, 0.0883, 0.9928]
-    >>> collide(Chain([1, 1, 1], [1, 0, -1]), model).velocities.round(3).tolist()
-    [-0.913, -0.155, 1.068]
     """
 
     forward: ArrayLike
@@ -108,18 +102,16 @@ class ImpulseCorrelation:
                 vars(self)[name] = number_or_row(name, given, "N - 2", *_RANGE)
         vars(self).update(meeting=float(self.meeting), max_events=int(self.max_events))
 
-    def solve(self, chain: Chain, *, record: bool | None = None, progress: bool = False) -> Trace:
-        """Solve the impact of `chain`; see `collide`.
+    def ratios(self, n: int) -> tuple[Vector, Vector]:
+        """Return the ratios forward and backward at the interior balls of a chain of n balls."""
+        backward = self.forward if self.backward is None else self.backward
+        return row_of("forward", self.forward, n - 2, n), row_of("backward", backward, n - 2, n)
 
-        Without `record`, the first ten million numbers of the path are kept, 2 N - 1 for each
-        event; `Trace.left_out` tells how many events follow.
-        """
-        must_be(Chain, "chain", chain)
-        n = len(chain)
-        ratios = {name: vars(self)[name] for name in ("forward", "backward")}
-        rows = [row_of(name, x, n - 2, n) for name, x in ratios.items() if x is not None]
+    def solve(self, chain: Chain, *, record: bool | None = None, progress: bool = False) -> Trace:
+        """Solve the impact of `chain`; see `collide`."""
+        n = len(must_be(Chain, "chain", chain))
+        own = chain.masses, chain.velocities, chain.restitution, *self.ratios(n)
         # Copies: compiled code is made for arrays that may be written to.
-        own = (chain.masses, chain.velocities, chain.restitution, rows[0], rows[-1])
         inputs = Inputs(*(part[None].copy() for part in own))
         most = max(_MOST_NUMBERS // (2 * n - 1), 1)  # N velocities and N - 1 impulses each
         room = most if record is None else _EVERY if record else 0

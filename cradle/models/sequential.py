@@ -17,23 +17,17 @@ from cradle.trace import Event, ImpactNotFinished, Trace
 class SequentialCollisions:
     """One collision of two balls after another (Johnson; Han and Gilmore's second answer).
 
-    A contact gets no impulse while a neighbouring collision goes on: the Impulse Correlation
-    Ratio is zero everywhere, and `ImpulseCorrelation` solves it.  For balls that touch, the order
-    of collisions is a choice, and the outcome can depend on it.  Here it is:
-
-    1. In each stretch of touching balls the approaching contact at the end named by `order`
-       collides first; the others wait.
-    2. When a collision ends, both neighbouring contacts may collide next, each on its own.
-    3. A contact that waits between two collisions collides when both have ended.
-    4. Collisions in different places have no common clock.  From six balls on it can matter which
-       comes first; then it is as with ``ImpulseCorrelation(0, meeting=0.5)``.
+    A contact gets no impulse while a neighbouring collision goes on: as with
+    ``ImpulseCorrelation(0)``, which solves it.  When a collision ends, both neighbouring contacts
+    may collide next; one that waits between two collisions does so when both have ended.
 
     Parameters
     ----------
     order : {"left", "right"}
-        Which of several approaching contacts of a touching stretch collides first.
+        The end of a stretch of touching balls whose approaching contact collides first; the
+        outcome can depend on it.
     max_events : int
-        Largest number of steps before the impact is given up.
+        Number of steps after which the impact is given up.
 
     Raises
     ------
@@ -48,9 +42,6 @@ class SequentialCollisions:
     Examples
     --------
     >>> from cradle import Chain, collide
-    >>> collide(Chain([1, 1, 1], [1, 0, 0], 1), SequentialCollisions()).velocities.tolist()
-    [0.0, 0.0, 1.0]
-
     >>> chain = Chain([1, 2, 1], [1, 0, -1], 1)
     >>> for order in ("left", "right"):
     ...     print(collide(chain, SequentialCollisions(order)).velocities.round(3).tolist())
@@ -94,16 +85,14 @@ class SequentialCollisions:
 class FusedChain:
     """The balls on either side of the struck contact move as one body (Han and Gilmore's first).
 
-    One contact approaches; all others touch at equal velocities.  The balls to its left and those
-    to its right collide like two balls, with the energetic restitution of the struck contact; the
-    others only keep the balls of a body together.  That is the largest admissible ratio at every
-    ball (Eq. 53): ``ImpulseCorrelation(1, 1, excess="saturate")``; `Trace.saturated` names them.
+    The balls on the left of the one approaching contact and those on its right collide like two
+    balls, with the restitution of that contact.  That is the largest admissible ratio at every ball
+    (Eq. 53), and so ``ImpulseCorrelation(1, excess="saturate")`` solves it.
 
     Raises
     ------
     ValueError
-        On solving, for any other chain: where a second contact approaches, or one opens, it is
-        undefined which balls are one body.
+        On solving, if a second contact approaches, or one opens: which balls are one body?
 
     References
     ----------
