@@ -201,7 +201,11 @@ def test_plain_work_is_counted(plain, monkeypatch):
 @pytest.mark.usefixtures("fresh_runtime")
 @needs_numba
 @pytest.mark.parametrize(
-    ("folder", "when"), [(Path("somewhere"), "once on this machine"), (None, "in this process")]
+    ("folder", "when"),
+    [
+        (Path("somewhere"), "once on this machine"),
+        (None, "in this process, as no folder for it is writable (set NUMBA_CACHE_DIR)"),
+    ],
 )
 def test_a_compilation_says_so_once(monkeypatch, caplog, folder, when):
     monkeypatch.setenv(runtime.VARIABLE, "compiled")
@@ -299,18 +303,14 @@ rooms_source = runtime.unit
 
 @pytest.mark.usefixtures("fresh_runtime")
 @needs_numba
-def test_without_a_folder_for_compiled_code_it_says_so_once(monkeypatch, tmp_path, caplog):
+def test_what_cannot_be_written_is_not_on_disk(monkeypatch, tmp_path):
     """Nothing can be written below a regular file, whoever one is."""
     file = tmp_path / "file"
     file.write_text("no folder")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(file / "below"))
     assert runtime._stored() is None
     assert not runtime.on_disk()
-    with caplog.at_level(logging.WARNING, "cradle"):
-        module = runtime.compiled()
-        assert runtime.compiled() is module
-    (said,) = caplog.records
-    assert said.getMessage().startswith("no writable folder for compiled code: it is compiled anew")
+    assert runtime.compiled() is not None
 
 
 def kept_files(folder):
@@ -347,7 +347,7 @@ def test_code_on_disk_that_cannot_be_read_is_removed_once(monkeypatch, tmp_path,
     assert not any(file.exists() for file in files)
     assert other.exists()
     (said,) = caplog.records
-    assert "cannot be read (EOFError: Ran out of input); compiled anew" in said.getMessage()
+    assert "cannot be read (EOFError('Ran out of input')); compiled anew" in said.getMessage()
     if again:
         with pytest.raises(EOFError):  # nothing is left to remove
             runtime.call(door, 3)

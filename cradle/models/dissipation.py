@@ -28,20 +28,13 @@ _LIGHTEST = 1e-6
 class DissipationTrace(Trace):
     """The outcome of an impact that has no phases: all contacts end at one instant.
 
-    Here `absorbed` is the net work that each contact takes from the balls: its impulse times the
-    mean of its closing speeds before and after.  A contact can also give work that another one
-    takes; the sum is what is lost, whatever the restitution of the chain.
-
-    Examples
-    --------
-    >>> from cradle import Chain, collide
-    >>> collide(Chain([1, 1], [1, 0], 0.5), QuadraticDissipation()).absorbed.round(6)
-    array([0.1875])
+    Here `absorbed` is the net work that each contact takes from the balls, J: its impulse times the
+    mean of its closing speeds before and after, below zero if it gives work that others take.
     """
 
     @property
     def energy_loss(self) -> float:
-        """Kinetic energy lost, in joules."""
+        """Kinetic energy lost, in joules, whatever the restitution of the chain."""
         return float(np.sum(self.absorbed))
 
 
@@ -53,37 +46,30 @@ class QuadraticDissipation:
 
         1/2 sum_i m_i (v_i - v_i^-)^2 + sum_c k_c D_c^2
 
-    as small as possible while no two balls go on approaching.  So the percussion of a contact is
-    ``k_c D_c``, and a reaction beside it where the balls would still approach.  Energy cannot
-    grow: the loss is the sum of ``k_c D_c^2`` and of reactions times D_c, none of them negative.
+    as small as possible while no two balls go on approaching.  So the impulse of a contact is
+    ``k_c D_c``, and a reaction beside it where the balls would still approach; it can hold back
+    balls that part.  Contacts that open before the impact take no part; if their balls approach
+    after it, another such problem follows.
 
     Two balls of reduced mass mu have ``e = (kappa - 1) / (kappa + 1)`` with kappa = k / (2 mu), or
-    e = 0 where kappa is below 1.  The coefficients are such kappa, each with the mu of its pair.
-    e = 1 is a limit only.
-
-    Contacts that open before the impact take no part.  If their balls approach after it, another
-    such problem follows, with the velocities reached.  A percussion opposes D_c whatever its sign,
-    so it can hold back balls that part: two balls at rest that are struck by a third one stay
-    together, unless `distance` adds the same term for the pair of the outer balls.  Of the outcomes
-    of three equal balls that lose no energy, only the two of Han and Gilmore are limits of this.
+    e = 0 where kappa is below 1.
 
     Parameters
     ----------
     coefficients : float or sequence, length N - 1, optional
-        kappa of each contact, at least 0.  If left out, (1 + e) / (1 - e) with the restitution e of
-        the chain, which must be below 1; if given, the restitution of the chain has no say.
+        kappa of each contact, 0 to 1e9, in place of the restitution e of the chain; if left out,
+        (1 + e) / (1 - e), for which e must be below 1.
     distance : float
-        kappa of the pair of balls 1 and 3; for three balls only.  It acts if neither contact opens.
-        The percussion of this pair passes through both contacts: `Trace.impulses` hold it.
+        kappa of a term for the outer two of three balls; it acts if neither contact opens, and its
+        impulse passes through both.
     max_problems : int
         Number of problems after which the impact is given up.
 
     Raises
     ------
     ValueError
-        If a value is outside its range, or infinite; on solving, if there are not as many as
-        contacts, if e = 1 gives a coefficient, for `distance` with other than three balls, or if
-        light balls between heavy ones leave the equations too few digits.
+        If a value is outside its range; on solving, if the chain does not suit the values, or light
+        balls between heavy ones leave the equations too few digits.
     ImpactNotFinished
         On solving, if balls still approach after `max_problems`.
 
@@ -95,8 +81,6 @@ class QuadraticDissipation:
     Examples
     --------
     >>> from cradle import Chain, collide
-    >>> collide(Chain([2, 1], [1, 0], 0.5), QuadraticDissipation()).velocities.round(6)
-    array([0.5, 1. ])
     >>> three = Chain([1, 1, 1], [1, 0, 0], 1)
     >>> for model in (QuadraticDissipation(1e9), QuadraticDissipation(0, distance=1e9)):
     ...     print(collide(three, model).velocities.round(6) + 0.0)

@@ -1,8 +1,9 @@
 """How the event loop runs: as it stands, or compiled by numba, with the same bits.
 
 The rooms of `cradle.kernel` are joined to one source file, named after a hash of their text and of
-how they are compiled, and compiled as one unit, kept on disk: an edit anywhere makes a new unit.
-Compiling and loading take seconds, so small work runs plain until plain work has taken as long.
+how they are compiled, and compiled as one unit, kept on disk by numba: an edit anywhere makes a new
+unit, where numba alone would ask of each function its own file only.  Compiling and loading take
+seconds, so small work runs plain until plain work has taken as long.
 """
 
 from __future__ import annotations
@@ -103,10 +104,7 @@ def _name() -> str:
 
 
 def _folder() -> Path:
-    """Return where the unit and its compiled code are kept: never in the package itself.
-
-    There a wheel or a source distribution built later would take them along.
-    """
+    """Return where the unit and its compiled code are kept: not where a wheel would take them."""
     if wish := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(wish)
     home = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
@@ -117,20 +115,16 @@ def _folder() -> Path:
 @functools.cache
 def _stored() -> Path | None:
     """Write the unit where compiled code can be kept beside it; None if that cannot be written."""
-    import tempfile
-
     try:
         path = _folder() / f"{_name()}.py"
         path.parent.mkdir(parents=True, exist_ok=True)
         # Compiled code goes there too, so try to write even if the unit is there already.
-        with tempfile.NamedTemporaryFile(
-            "w", encoding="utf-8", dir=path.parent, suffix=".tmp", delete=False
-        ) as file:
-            file.write(_for_numba(unit()))
+        part = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
+        part.write_text(_for_numba(unit()), encoding="utf-8")
         # numba keeps compiled code as long as the time of its source does not change: the name says
         # enough, so the time is one for all, also where a cache is copied.
-        os.utime(file.name, (0, 0))
-        Path(file.name).replace(path)
+        os.utime(part, (0, 0))
+        part.replace(path)
     except (OSError, RuntimeError):  # the latter where nobody knows a home
         return None
     return path
@@ -139,9 +133,8 @@ def _stored() -> Path | None:
 @functools.cache
 def available() -> bool:
     """Tell whether numba is installed and not switched off."""
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
-        return False
-    return "numba" in sys.modules or importlib.util.find_spec("numba") is not None
+    off = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+    return not off and importlib.util.find_spec("numba") is not None
 
 
 @functools.cache
@@ -153,19 +146,13 @@ def compiled() -> Any | None:
         import numba
     except ImportError:
         return None
-    path = _stored()
-    if path is None:
-        logger.warning(
-            "no writable folder for compiled code: it is compiled anew in each process; set "
-            "NUMBA_CACHE_DIR, or %s=plain to run without",
-            VARIABLE,
-        )
-    name = _name()
+    path, name = _stored(), _name()
     module = ModuleType(name)
     module.__file__ = str(path or name)
-    kept = {"door"} if path is not None else set()
-    marks = {mark: numba.njit(**options, cache=mark in kept) for mark, options in _MEANINGS.items()}
-    vars(module).update(marks, unsigned=np.uint64)
+    for mark, options in _MEANINGS.items():
+        kept = mark == "door" and path is not None
+        vars(module)[mark] = numba.njit(**options, cache=kept)
+    vars(module)["unsigned"] = np.uint64
     sys.modules[name] = module
     exec(compile(_for_numba(unit()), module.__file__, "exec"), vars(module))
     # numba compiles a function anew for each whole number that is written down in a call; not so
@@ -203,10 +190,8 @@ def call(door: Callable[..., Any], *arguments: Any) -> Any:
             raise
         for file in broken:
             file.unlink(missing_ok=True)
-        logger.warning(
-            "compiled code in %s cannot be read (%s: %s); compiled anew, up to a minute",
-            broken[0].parent, type(error).__name__, error,
-        )  # fmt: skip
+        told = "compiled code in %s cannot be read (%r); compiled anew, up to a minute"
+        logger.warning(told, broken[0].parent, error)
     return door(*arguments)
 
 
@@ -252,5 +237,7 @@ def chosen(large: bool = False, door: str = "batch") -> Any:
 
 @functools.cache
 def _announce() -> None:
-    where = "in this process" if _stored() is None else "once on this machine"
+    where = "once on this machine"
+    if _stored() is None:
+        where = "in this process, as no folder for it is writable (set NUMBA_CACHE_DIR)"
     logger.warning("compiling the event loop, %s: up to a minute", where)

@@ -1,7 +1,7 @@
 """From arrays to the event loop and back: work areas, pauses, plain or compiled.
 
-The event loop stops by itself after some effort and is called again: so Ctrl-C works, a record can
-grow, and small work can begin plain and go on compiled.
+The loop stops by itself after some effort and is called again: so Ctrl-C works, a record can grow,
+and small work can begin plain and go on compiled.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import functools
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -47,43 +48,34 @@ class Stopped(Exception):
     """Another thread has failed, or the user has had enough."""
 
 
-#: The kernel's records: their fields, all zero; and as NumPy's types.
-_ZEROS: dict[str, dict[str, Any]] = {
-    name: {field: kind() for field, kind in get_type_hints(getattr(rooms, name)).items()}
-    for name in ("Ball", "Contact", "Run", "Level", "Memory", "Tally")
-}
-_TYPES = {
-    name: np.dtype([(field, np.array(zero, None).dtype) for field, zero in fields.items()])
-    for name, fields in _ZEROS.items()
-}
+_kept = threading.local()  # a thread's work areas, for its next call
+
+
+@functools.cache
+def _zeros(kind: type) -> tuple[dict[str, Any], np.dtype[Any]]:
+    """Return the fields of a record of the kernel, all zero, and its type for NumPy."""
+    fields = {name: number() for name, number in get_type_hints(kind).items()}
+    return fields, np.dtype([(name, np.array(zero).dtype) for name, zero in fields.items()])
+
+
+def blank(kind: type, size: int, compiled: bool) -> Any:
+    """Return records of the kernel, all zero: NumPy's for compiled code, objects for plain."""
+    fields, dtype = _zeros(kind)
+    if compiled:
+        return np.zeros(size, dtype)
+    things = [kind() for _ in range(size)]
+    for thing in things:
+        vars(thing).update(fields)
+    return things
 
 
 def _area(n: int, compiled: bool, record: rooms.Record) -> rooms.State:
-    """Return a work area: NumPy records for compiled code, Python objects for plain."""
-
-    def blank(name: str, size: int) -> Any:
-        if compiled:
-            return np.zeros(size, _TYPES[name])
-        things = [getattr(rooms, name)() for _ in range(size)]
-        for thing in things:
-            vars(thing).update(_ZEROS[name])
-        return things
-
-    memory = blank("Memory", 2 * n)
-    memory = memory.reshape(2, n) if compiled else [memory[:n], memory[n:]]
-    groups = blank("Ball", n), blank("Contact", n), blank("Run", n)
-    return rooms.State(*groups, blank("Level", 2), memory, blank("Tally", 1), record)
-
-
-_kept = threading.local()
-
-
-def _kept_area(n: int, compiled: bool) -> rooms.State:
-    """Return this thread's work area for n balls, without a record, kept for its next call."""
-    areas: dict[Any, rooms.State] = vars(_kept)
-    if compiled not in areas or len(areas[compiled].ball) != n:
-        areas[compiled] = _area(n, compiled, _record(0, n))
-    return areas[compiled]
+    """Return a work area for n balls."""
+    kinds = rooms.Ball, rooms.Contact, rooms.Run, rooms.Memory, rooms.Memory
+    ball, contact, run, *memory = (blank(kind, n, compiled) for kind in kinds)
+    level, tally = blank(rooms.Level, 2, compiled), blank(rooms.Tally, 1, compiled)
+    kept = np.array(memory) if compiled else memory
+    return rooms.State(ball, contact, run, level, kept, tally, record)
 
 
 def _record(room: int, n: int) -> rooms.Record:
@@ -102,27 +94,18 @@ def outputs(rows: int, n: int, last: bool = False) -> plain.Outputs:
     return plain.Outputs(np.empty((rows, n)), hits, collapsed, *parts)
 
 
+@dataclass
 class Job:
-    """Chains of n balls on their way through the event loop, from `inputs` into `outputs`.
+    """Chains of n balls on their way through the event loop, from `inputs` into `outputs`."""
 
-    Inputs have a row for each chain, or one row for all.  Of the last chain up to `room` events are
-    recorded; `large` work is surely worth compiling for.
-    """
-
-    def __init__(
-        self,
-        inputs: plain.Inputs,
-        outputs: plain.Outputs,
-        options: plain.Options,
-        room: int = 0,
-        large: bool = False,
-    ) -> None:
-        self.inputs, self.outputs, self.options = inputs, outputs, options
-        self.n, self.rows = inputs.m.shape[-1], len(outputs.v)
-        self.room, self.large = room, large
-        # The number of the next chain, and how the one before it ended.
-        self.next, self.status = 0, FINISHED
-        self.compiled: bool | None = None
+    inputs: plain.Inputs  # a row for each chain, or one row for all
+    outputs: plain.Outputs
+    options: plain.Options
+    room: int = 0  # events to record of the last chain, at most
+    large: bool = False  # surely worth compiling for
+    next: int = 0  # number of the next chain
+    status: int = FINISHED  # how the chain before it ended
+    compiled: bool | None = None
 
     def run(
         self, stop: threading.Event | None = None, pause: Callable[[], object] | None = None
@@ -131,8 +114,8 @@ class Job:
 
         It ends when `stop` is set, and calls `pause` whenever the event loop pauses.
         """
-        resumed = False
-        while self.next < self.rows:
+        resumed, rows = False, len(self.outputs.v)
+        while self.next < rows:
             if stop is not None and stop.is_set():
                 raise Stopped
             kernel = runtime.chosen(self.large)
@@ -158,11 +141,14 @@ class Job:
 
     def _begin(self, compiled: bool) -> None:
         """Lay out the work area for one runtime; what is solved so far stays."""
-        self.compiled, self.given = compiled, self.inputs
+        self.compiled, self.given, self.n = compiled, self.inputs, self.outputs.v.shape[1]
         if not compiled:
             # Python's own numbers: faster than NumPy's one at a time, and the same digits.
             self.given = plain.Inputs(*(part.tolist() for part in self.inputs))
-        self.state = _kept_area(self.n, compiled)
+        areas: dict[Any, rooms.State] = vars(_kept)
+        if compiled not in areas or len(areas[compiled].ball) != self.n:
+            areas[compiled] = _area(self.n, compiled, _record(0, self.n))
+        self.state = areas[compiled]
         self._make_room(64 + _ROUND * self.n)
 
     def tally(self, name: str) -> Any:
@@ -194,8 +180,7 @@ class Job:
 def warm_up() -> None:
     """Compile both loops, or load them compiled, if numba is there: then nothing waits for them.
 
-    The first time on a machine takes up to a minute, afterwards a second.  Programs that must not
-    stop, such as games with a `cradle.row.Row`, call it while they load.
+    The first time on a machine takes up to a minute, afterwards a second.
 
     Examples
     --------
