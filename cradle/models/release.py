@@ -10,8 +10,6 @@ import numpy as np
 
 from cradle.input.values import Vector
 
-_EPSILON = float(np.finfo(np.float64).eps)
-
 
 class Stopped(Exception):
     """Why the motion could not be followed to its end."""
@@ -39,8 +37,6 @@ class Process:
         self.collisions = np.zeros(n - 1, dtype=np.int64)
         self.absorbed = np.zeros(n - 1)
         self.collapsed = False
-        #: Largest change of each velocity at an event so far: what rounding was left by.
-        self.largest = np.zeros(n)
         self.record = [("", -1, self.y)]
         self.steps = [self.y[:, None]]
         self.evaluations = 0
@@ -52,10 +48,9 @@ class Process:
 
     def speeds(self, y: Vector) -> Vector:
         """Return the closing speeds; what is no more than rounding is zero."""
-        n = len(self.m)
-        u = self.u + (y[: n - 1] - y[1:n])
-        change = np.maximum(self.largest, np.abs(y[:n]))
-        rounding = 4.0 * _EPSILON * (np.abs(self.u) + change[:-1] + change[1:])
+        change = y[: len(self.m)]
+        u, size = self.u - np.diff(change), np.abs(change)
+        rounding = 2.0**-50 * (np.abs(self.u) + size[:-1] + size[1:])
         return np.where(np.abs(u) <= rounding, 0.0, u)
 
     def stored(self, y: Vector) -> Vector:
@@ -89,30 +84,24 @@ class Process:
             self.integrate()
         self.part()
 
-    def solution(self, begin: float, y: Vector, end: float, **options: Any) -> Any:
-        """Return SciPy's integration of the rates."""
-        # SciPy is slow to import, and only this model needs it.
-        from scipy.integrate import solve_ivp
-
-        options |= {"method": "DOP853", "rtol": self.rtol, "atol": self.atol}
-        # For a large p a trial step far too long overflows, and is rejected.
-        with np.errstate(over="ignore", invalid="ignore"):
-            return solve_ivp(self.rate, (begin, end), y, **options)
-
     def integrate(self) -> None:
         """Integrate to the next event."""
+        from scipy.integrate import solve_ivp  # slow to import
+
         released = np.divide(1.0, self.e**2, out=np.ones_like(self.e), where=self.e > 0.0)
         self.weights = np.where(self.closed & ~self.loading, released, self.closed | self.gaps)
         # Balls at rest together that nothing touches have no events.
         d = self.parts(self.y)[1]
         contacts = np.flatnonzero(self.closed | (d != 0.0) | (self.speeds(self.y) != 0.0)).tolist()
         events = [self.crossing(c) for c in contacts] + [self.extreme(c) for c in contacts]
-        side = np.where(self.closed, 1.0, -1.0)
-        end = np.inf
+        options = {"rtol": self.rtol, "atol": self.atol, "events": events}
+        side, end = np.where(self.closed, 1.0, -1.0), np.inf
         # A contact that opens and closes again (or the reverse) within one step goes unnoticed,
         # but for its extreme: a second run that ends there has to cross zero before.
         for _ in range(2):
-            found = self.solution(self.t, self.y, end, events=events)
+            # For a large p a trial step far too long overflows, and is rejected.
+            with np.errstate(over="ignore", invalid="ignore"):
+                found = solve_ivp(self.rate, (self.t, end), self.y, "DOP853", **options)
             half = slice(len(contacts), None)
             pages = zip(contacts, found.t_events[half], found.y_events[half], strict=True)
             turns = [(t, c, y) for c, ts, ys in pages for t, y in zip(ts, ys, strict=True)]
@@ -123,14 +112,6 @@ class Process:
             end = missed[0]
         if found.status < 0:
             raise Stopped(found.message)
-        crossed = [c for c, ts in zip(contacts, found.t_events, strict=False) if len(ts)]
-        if crossed and found.t[-2] < found.t[-1]:
-            # The force is not smooth where a contact opens or closes, and there SciPy interpolates
-            # less exactly than it steps: the last step again, to where the crossing was found.
-            begin, end = found.t[-2:]
-            last = self.solution(begin, found.y[:, -2], end, first_step=end - begin)
-            if last.status >= 0:
-                found.y[:, -1] = last.y[:, -1]
         self.steps.append(found.y)
         self.t, self.y = float(found.t[-1]), found.y[:, -1].copy()
         # An extreme may fall on the end, where rounding can hide it.
@@ -139,7 +120,7 @@ class Process:
         hidden = self.closed & (self.loading == (self.speeds(self.y) < 0.0))
         for c in np.flatnonzero(hidden).tolist():
             self.turn(c, self.y)
-        self.settle(crossed)
+        self.settle([c for c, ts in zip(contacts, found.t_events, strict=False) if len(ts)])
 
     def crossing(self, c: int) -> Any:
         """Return SciPy's event of contact c opening or closing."""
@@ -171,8 +152,7 @@ class Process:
     def settle(self, crossed: list[int]) -> None:
         """Open the contacts that have ended, close those that approach, and record both."""
         self.y = self.y.copy()
-        change, d, _ = self.parts(self.y)
-        self.largest = np.maximum(self.largest, np.abs(change))
+        _, d, _ = self.parts(self.y)
         d[crossed] = 0.0
         if not self.gaps:
             # Where several end at one instant, rounding shows gaps that rigid balls never close.
