@@ -7,7 +7,14 @@ from energy_law import strike
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cradle import Chain, EnergyDistribution, EnergyTrace, SpringChain, collide
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    EnergyTrace,
+    ImpactNotFinished,
+    SpringChain,
+    collide,
+)
 
 
 @pytest.mark.parametrize(("masses", "exponent", "velocities"), SPRINGS)
@@ -211,10 +218,12 @@ def test_endless_plastic_impacts_end_in_one_body(gaps):
     np.testing.assert_allclose(trace.velocities, 1 / 3, rtol=0, atol=1e-14)
 
 
-def test_the_least_restitution_above_zero():
-    """Below that a release is a step too short for the integrator."""
-    after = collide(Chain([1, 1], [1, 0], 1e-6), EnergyDistribution(1.0)).velocities
-    assert after[1] - after[0] == pytest.approx(1e-6, abs=1e-8)
+def test_short_releases_are_followed_or_said_not_to_be():
+    for e in (1e-6, 1e-9):
+        after = collide(Chain([1, 1], [1, 0], e), EnergyDistribution(1.0)).velocities
+        assert after[1] - after[0] == pytest.approx(e, rel=1e-5)
+    with pytest.raises(ImpactNotFinished, match="after 1 events: Required step size is less"):
+        collide(Chain([1, 1], [1, 0], 1e-12), EnergyDistribution(1.0))
 
 
 @pytest.mark.parametrize(
