@@ -103,7 +103,7 @@ REFUSED = [
     (partial(DISSIPATION, distance=[1]), "distance = [1]; must be one number"),
     (partial(DISSIPATION, max_problems=0), "max_problems = 0; must be a whole number, at least 1"),
     (impact(DISSIPATION(), e=[0.5, 1]),
-     "restitution[1] = 1.0; must be below 1 - 2e-09 for QuadraticDissipation: e = 1 is"),
+     "restitution[1] = 1.0; must be below 1 - 2e-09 for QuadraticDissipation: e = 1 is a limit"),
     (impact(DISSIPATION([1, 2, 3])), "coefficients has 3 values; 3 balls need 2, or one"),
     (impact(DISSIPATION(1, distance=1), [1, 1], [1, 0]),
      "distance = 1.0; needs three balls, the chain has 2"),

@@ -184,9 +184,8 @@ def shaped(
             raise ValueError(
                 f"{name} has shape {arrays[k].shape}; must be () or (..., {size}) for {n} balls"
             )
-    leads = {array.shape[:-1] for array in arrays}
     try:
-        return arrays, leads.pop() if len(leads) == 1 else np.broadcast_shapes(*leads)
+        return arrays, np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     except ValueError:
         shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
         raise ValueError(f"leading axes do not broadcast: {shapes}") from None

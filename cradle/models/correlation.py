@@ -38,8 +38,6 @@ MAX_EVENTS = 5_000_000
 # Numbers that a path may hold unless it is asked for in full: 80 MB.
 _MOST_NUMBERS = 10_000_000
 _EVERY = 2**40
-# The longest path kept of an impact that did not finish.
-_UNFINISHED_EVENTS = 100_000
 #: What is asked of a ratio.
 _RANGE = ("must lie in [0, 1]", 0.0, 1.0)
 _KINDS = ("maximum_compression", "end", "close", "collapse", "repetition")
@@ -126,12 +124,9 @@ class ImpulseCorrelation:
             raise_refused(options.bounded, *own)
         trace = self._trace(chain, job)
         if job.status == UNFINISHED:
-            raise ImpactNotFinished(
-                f"the impact was not finished after max_events = {self.max_events} steps, "
-                f"{job.tally('events')} events",
-                trace,
-                _over_largest(job, chain),
-            )
+            steps = f"max_events = {self.max_events} steps, {job.tally('events')} events"
+            told = f"the impact was not finished after {steps}"
+            raise ImpactNotFinished(told, trace, _over_largest(job, chain))
         if job.status == UNSOUND:
             raise ImpactNotCertified(chain, self, DEFECTS[job.tally("defect")])
         return trace
@@ -142,8 +137,6 @@ class ImpulseCorrelation:
         written.velocities[0] = chain.velocities
         count = job.tally("events")
         kept = min(count, len(written.kinds))
-        if job.status == UNFINISHED:
-            kept = min(kept, _UNFINISHED_EVENTS)
         events = map(_event, written.kinds[:kept].tolist(), written.contacts[:kept].tolist())
         return Trace(
             chain=chain,

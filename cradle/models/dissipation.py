@@ -112,11 +112,9 @@ class QuadraticDissipation:
         if self.distance and n != 3:
             raise ValueError(f"distance = {self.distance!r}; needs three balls, the chain has {n}")
         left, right = np.maximum.accumulate(m), np.maximum.accumulate(m[::-1])[::-1]
-        rule = (
-            f"must be at least {_LIGHTEST} of the heaviest ball on its left, or on its right, for "
-            "QuadraticDissipation"
-        )
-        refuse_where("masses", chain.masses, m < _LIGHTEST * np.minimum(left, right), rule)
+        light = m < _LIGHTEST * np.minimum(left, right)
+        rule = f"must be at least {_LIGHTEST} of the heaviest ball on one of its sides for this law"
+        refuse_where("masses", chain.masses, light, rule)
         change, impulses, absorbed = np.zeros(n), *np.zeros((2, n - 1))
         path, path_impulses, events = [v], [impulses], []
         # Closing speeds are known no better than the velocities that they are differences of.
@@ -159,12 +157,9 @@ class QuadraticDissipation:
     def _kappa(self, chain: Chain) -> Vector:
         """Return the coefficient of each contact."""
         if self.coefficients is None:
-            e = chain.restitution
-            rule = (
-                f"must be below 1 - {2.0 / _LARGEST:g} for QuadraticDissipation: e = 1 is the "
-                "limit of an infinite coefficient"
-            )
-            refuse_where("restitution", e, 1.0 - e < 2.0 / _LARGEST, rule)
+            e, least = chain.restitution, 2.0 / _LARGEST
+            rule = f"must be below 1 - {least:g} for QuadraticDissipation: e = 1 is a limit only"
+            refuse_where("restitution", e, 1.0 - e < least, rule)
             return (1.0 + e) / (1.0 - e)
         return row_of("coefficients", self.coefficients, len(chain) - 1, len(chain))
 

@@ -93,8 +93,8 @@ class Process:
         # Balls at rest together that nothing touches have no events.
         d = self.parts(self.y)[1]
         contacts = np.flatnonzero(self.closed | (d != 0.0) | (self.speeds(self.y) != 0.0)).tolist()
-        events = [self.crossing(c) for c in contacts] + [self.extreme(c) for c in contacts]
-        options = {"rtol": self.rtol, "atol": self.atol, "events": events}
+        crossings, extremes = zip(*map(self.watched, contacts), strict=True)
+        options = {"rtol": self.rtol, "atol": self.atol, "events": crossings + extremes}
         side, end = np.where(self.closed, 1.0, -1.0), np.inf
         # A contact that opens and closes again (or the reverse) within one step goes unnoticed,
         # but for its extreme: a second run that ends there has to cross zero before.
@@ -122,19 +122,22 @@ class Process:
             self.turn(c, self.y)
         self.settle([c for c, ts in zip(contacts, found.t_events, strict=False) if len(ts)])
 
-    def crossing(self, c: int) -> Any:
-        """Return SciPy's event of contact c opening or closing."""
-        if not (self.closed[c] or self.gaps):
-            return _leaving(-1.0, lambda y: self.speeds(y)[c])
-        return _leaving(1.0 if self.closed[c] else -1.0, lambda y: self.parts(y)[1][c])
+    def watched(self, c: int) -> tuple[Any, Any]:
+        """Return SciPy's events of contact c: it opens or closes; and it turns."""
 
-    def extreme(self, c: int) -> Any:
-        """Return SciPy's event of contact c turning from compression to release or back."""
-        # The rate has a kink there, unless e = 1: no step may cross it.  Without a kink the
-        # integration goes on, and may meet several extremes, of both kinds.
+        def depth(y: Vector) -> float:
+            return float(self.parts(y)[1][c])
+
+        def speed(y: Vector) -> float:
+            return float(self.speeds(y)[c])
+
+        own = depth if self.closed[c] or self.gaps else speed
+        crossing = _leaving(1.0 if self.closed[c] else -1.0, own)
+        # The rate has a kink where a contact turns, unless e = 1: no step may cross it.  Without a
+        # kink the integration goes on, and may meet several extremes, of both kinds.
         if self.closed[c] and self.e[c] < 1.0:
-            return _leaving(1.0 if self.loading[c] else -1.0, lambda y: self.speeds(y)[c])
-        return lambda _, y: float(self.speeds(y)[c])
+            return crossing, _leaving(1.0 if self.loading[c] else -1.0, speed)
+        return crossing, lambda _, y: speed(y)
 
     def turn(self, c: int, y: Vector) -> None:
         """Book an extreme of a compression: the energy stored there, and a maximum as an event."""
@@ -212,7 +215,7 @@ def _leaving(side: float, value: Callable[[Vector], float]) -> Any:
     """Return SciPy's event, an end, of a value leaving its side of zero; zero is still there."""
 
     def event(_: float, y: Vector) -> float:
-        return float(value(y)) or side
+        return value(y) or side
 
     vars(event).update(terminal=True, direction=-side)
     return event

@@ -38,16 +38,15 @@ PAYS_AFTER, LOADS_AFTER = 10.0, 0.5
 # and the kernel makes none.  It allocates nothing, so arrays need no reference counts (`_nrt`),
 # without which the loop runs several times faster.  Only the door is called from Python.  A
 # function that says nothing about `forceinline` would take it over from its caller.
-_DOOR: dict[str, Any] = {
+_APART: dict[str, Any] = {
     "nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": False,
-    "no_cfunc_wrapper": True,
+    "no_cfunc_wrapper": True, "no_cpython_wrapper": True,
 }  # fmt: skip
-_APART = {**_DOOR, "no_cpython_wrapper": True}
 #: What numba is told about the marks of the kernel's functions.
 _MEANINGS: dict[str, dict[str, Any]] = {
     "jit": {**_APART, "forceinline": True},
     "apart": _APART,
-    "door": _DOOR,
+    "door": {**_APART, "no_cpython_wrapper": False},
 }
 
 logger = logging.getLogger("cradle")
