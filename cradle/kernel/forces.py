@@ -27,68 +27,53 @@ def idle(c, slow, s):
 
 
 @jit
-def touches(d, move, was, early):
-    """Tell whether a contact pushes: once open, not before it closes, or its losses push again."""
-    if was == 0.0 and early < 1.0:
-        return d > 0.0 and move > 0.0
-    return d > 0.0 and d + early * move > 0.0
+def push(p, a, d, move, early):
+    """Return force and slope of a contact: once open, none until it closes or its losses push."""
+    if d > 0.0 and (move > 0.0 if a.f == 0.0 and early < 1.0 else d + early * move > 0.0):
+        g = a.k * grade(p, d)
+        return g * d, p * g
+    return 0.0, 0.0
 
 
 @jit
-def note(c, kinks, move, now, was, h, s, clock):
-    """Note the kink of contact c, number `kinks` of this step; return how many there are now.
-
-    What its force ends with has gone from `was` to `now` in the step.
-    """
-    s[kinks].kink, s[kinks].rise = c, move
-    if s[c].f > 0.0:
-        clock.ended = clock.time - h * now / (now - was)
-    return kinks + 1
-
-
-@jit
-def step(p, h, low, high, s, clock):
-    """Drift to the next node and kick; return how many contacts are closed, kinks, and the top.
+def step(p, h, low, high, s):
+    """Drift to the next node and kick; return the number of kinks, and the largest frequency^2.
 
     The force of a contact waits for that of the next, the kick of a ball for the forces of both.
     """
     part = h * h / 12.0
-    closed = kinks = 0
+    kinks = 0
     top = force = steep = gain = given = 0.0
     here = s[low].v
     for c in range(low, high):
         a = s[c]
         there = s[c + 1].v
         move = h * (here - there)
-        d = a.d + move
-        a.d = d
-        f = g = 0.0
-        if touches(d, move, a.f, 0.0):
-            g = a.k * grade(p, d)
-            f, g = g * d, p * g
-            closed += 1
+        a.d += move
+        f, g = push(p, a, a.d, move, 0.0)
         if (f > 0.0) != (a.f > 0.0):
-            kinks = note(c, kinks, move, d, d - move, h, s, clock)
+            s[kinks].kink, a.move = c, move
+            kinks += 1
         a.f, a.g = f, g
         f -= a.pull
         dv = (force - f) * a.w
         if c > low:
-            push = force + part * steep * (gain - dv)
-            s[c - 1].v += h * (given - push) * s[c - 1].w
-            given = push
+            kick = force + part * steep * (gain - dv)
+            s[c - 1].v += h * (given - kick) * s[c - 1].w
+            given = kick
         top = max(top, (steep + g) * a.w)
         force, steep, gain, here = f, g, dv, there
     last = s[high]
-    push = force + part * steep * (gain - force * last.w)
-    s[high - 1].v += h * (given - push) * s[high - 1].w
-    last.v += h * push * last.w
-    return closed, kinks, max(top, steep * last.w)
+    kick = force + part * steep * (gain - force * last.w)
+    s[high - 1].v += h * (given - kick) * s[high - 1].w
+    last.v += h * kick * last.w
+    return kinks, max(top, steep * last.w)
 
 
 @jit
-def drift_lossy(p, h, low, high, s, clock):
+def drift_lossy(p, h, low, high, s):
     """Drift with losses, to where extrapolation has the node; return as `step`."""
-    closed = kinks = 0
+    kinks = 0
     top = steep = 0.0
     for c in range(low, high):
         a = s[c]
@@ -96,19 +81,15 @@ def drift_lossy(p, h, low, high, s, clock):
         new = a.d + (2.0 * a.lag - a.trend)
         move = new - a.y
         early = a.loss * p / h
-        was, now = a.y + early * a.move, new + early * move
-        a.push = was
-        f = g = 0.0
-        if touches(new, move, a.f, early):
-            g = a.k * grade(p, new)
-            f, g = g * new, p * g
-            closed += 1
+        a.push = a.y + early * a.move
+        f, g = push(p, a, new, move, early)
         if (f > 0.0) != (a.f > 0.0):
-            kinks = note(c, kinks, move, now, was, h, s, clock)
+            s[kinks].kink = c
+            kinks += 1
         a.f, a.g, a.move, a.y = f, g, move, new
         top = max(top, (steep + g) * a.w)
         steep = g
-    return closed, kinks, max(top, steep * s[high].w)
+    return kinks, max(top, steep * s[high].w)
 
 
 @jit
@@ -150,11 +131,10 @@ def kick_lossy(h, low, high, s):
 
 
 @jit
-def bring(c, time, u, s):
-    """Bring contact c, whose balls have flown freely at closing speed u, to this time."""
-    a = s[c]
-    a.d += (time - a.seen) * u
-    a.f = a.g = a.push = a.lag = a.trend = 0.0
+def bring(a, time, u):
+    """Let the balls of an open contact fly freely for this time, at this closing speed."""
+    a.d += time * u
+    a.f = a.g = a.lag = a.trend = 0.0
     a.y = a.d
 
 
@@ -170,11 +150,8 @@ def fly(h, low, high, s):
     if not soonest > h:
         return 0.0
     for c in range(low, high):
-        s[c].d += soonest * (s[c].v - s[c + 1].v)
-    s[first].d = 0.0
-    for c in range(low, high):
-        s[c].lag = s[c].trend = 0.0
-        s[c].y = s[c].d
+        bring(s[c], soonest, s[c].v - s[c + 1].v)
+    s[first].d = s[first].y = 0.0
     return soonest
 
 
@@ -184,18 +161,17 @@ def begin(n, chain, law, s, clock):
 
     Where contacts push from the start, the sums owe h^2/12 times the rates there.
     """
-    clock.low, clock.high, clock.closed, clock.steps, clock.kinks = n, 0, 1, 0, 0
+    clock.low, clock.high, clock.steps, clock.kinks, clock.row = n, 0, 0, 0, 0
     clock.time = clock.top = clock.ended = 0.0
-    clock.row = 0
+    clock.stiff = 1.0
     for i in range(n):
         a = s[i]
         a.w, a.v = chain.w[i], chain.v[i]
-        a.dv = a.b = a.db = a.f = a.g = a.move = a.lag = a.trend = a.seen = a.pull = 0.0
+        a.k = a.loss = a.pull = a.d = a.y = a.f = a.g = a.move = a.lag = a.trend = a.seen = 0.0
         if i == n - 1:
-            a.k = a.loss = a.d = a.y = a.push = 0.0
             continue
         a.k, a.loss, a.d = chain.k[i], chain.loss[i], chain.d[i]
-        a.y = a.push = a.d
+        a.y = a.d
         if a.d > 0.0:
             part = a.k * grade(law.p, a.d)
             a.f = a.pull = part * a.d
@@ -265,8 +241,8 @@ def run(n, h, law, effort, s, clock, record):
     low, high = clock.low, clock.high
     while low < high and clock.steps < law.most and effort > 0:
         effort -= high - low
-        if clock.closed == 0 and not law.leans:
-            clock.closed = 1
+        if clock.stiff == 0.0 and not law.leans:
+            clock.stiff = 1.0
             flown = fly(h, low, high, s)
             clock.time += flown
             if flown > 0.0:
@@ -277,20 +253,20 @@ def run(n, h, law, effort, s, clock, record):
         time = clock.time
         left, right = s[low].v, s[high].v
         if lossy:
-            closed, kinks, stiff = drift_lossy(p, h, low, high, s, clock)
+            kinks, clock.stiff = drift_lossy(p, h, low, high, s)
         else:
-            closed, kinks, stiff = step(p, h, low, high, s, clock)
+            kinks, clock.stiff = step(p, h, low, high, s)
         if kinks > 0:
             clock.kinks += kinks
-            pay(n, p, h, kinks, slow, lossy, s)
-        clock.top, clock.closed = max(clock.top, stiff), closed
+            pay(n, p, h, kinks, slow, lossy, s, clock)
+        clock.top = max(clock.top, clock.stiff)
         first, last = low, high - 1
         if high < n - 1 and s[last].f > 0.0 and s[last].d > slow:
-            bring(high, time, right - s[high + 1].v, s)
+            bring(s[high], time - s[high].seen, right - s[high + 1].v)
             high += 1
         if low > 0 and s[first].f > 0.0 and s[first].d > slow:
             low -= 1
-            bring(low, time, s[low].v - left, s)
+            bring(s[low], time - s[low].seen, s[low].v - left)
         if lossy:
             kick_lossy(h, low, high, s)
             # What was before a kink tells nothing of what follows.
@@ -298,21 +274,14 @@ def run(n, h, law, effort, s, clock, record):
                 c = s[i].kink
                 for near in range(max(c - 1, low), min(c + 2, high)):
                     s[near].trend = s[near].lag
-        if law.leans:
-            while low < high and idle(low, slow, s):
-                low += 1
-            low = 0 if low < high else high
-        else:
-            while low < high and idle(low, slow, s) and (low + 1 == high or idle(low + 1, slow, s)):
-                s[low].seen = time
-                low += 1
-            while (
-                low < high
-                and idle(high - 1, slow, s)
-                and (low + 1 == high or idle(high - 2, slow, s))
-            ):
-                high -= 1
-                s[high].seen = time
+        while low < high and idle(low, slow, s) and (low + 1 == high or idle(low + 1, slow, s)):
+            s[low].seen = time
+            low += 1
+        while low < high and idle(high - 1, slow, s) and idle(high - 2, slow, s):
+            high -= 1
+            s[high].seen = time
+        if law.leans and low < high:
+            low, high = 0, n - 1
         clock.low, clock.high = low, high
         put_down(n, s, clock, record)
     if low < high:

@@ -24,17 +24,16 @@ class Link:
     d: float  # compression at a node, as the drifts have it; below zero a gap
     f: float  # force at the node,
     g: float  # its slope df/dd,
-    move: float  # and how much the compression has grown in the step before it
+    move: float  # and how much d has grown in the step before it; without losses, at a kink alone
     y: float  # with losses: compression at the node, as it is,
     lag: float  # what it is more than `d`,
     trend: float  # and was a step before,
     push: float  # force less the pull, corrected; before, see `resumed`
     dv: float  # acceleration
-    b: float  # velocity of the impulses A f, and its rate of change
-    db: float
+    b: float  # velocity of the impulses A f,
+    db: float  # and its rate of change
     seen: float  # time at which the contact was last looked at
-    kink: int  # a contact that has closed or opened in this step,
-    rise: float  # and how much its compression has grown in it
+    kink: int  # a contact that has closed or opened in this step
 
 
 class Forces(NamedTuple):
@@ -72,11 +71,11 @@ class Clock:
 
     low: int
     high: int
-    closed: int  # how many contacts were closed at the last node
     steps: int
     kinks: int  # how often contacts closed and opened so far
     time: float
-    top: float  # the largest square of a frequency so far
+    stiff: float  # largest square of a frequency at the last node, 0 if all contacts are open,
+    top: float  # and so far
     ended: float  # when the last contact opened
     row: int  # of the record, to be written next
 
@@ -136,13 +135,11 @@ def crossing(p, h, k, loss, closes, theta, move):
 
 
 @apart
-def resumed(h, a, early):
+def resumed(h, a, theta):
     """Return the same for a contact that its losses had opened and that pushes again before d = 0.
 
-    What its force is in proportion to, d plus `early` moves, was `push` at the node before.
+    It does so theta steps before the node.
     """
-    now = a.y + early * a.move
-    theta = min(max(now / (now - a.push), 0.0), 1.0) if now > a.push else 0.5
     rate = a.g * a.move
     first = a.f - theta * rate
     half, third = 0.5 - theta, 0.5 * (theta * (1.0 - theta) - 1.0 / 6.0)
@@ -152,18 +149,20 @@ def resumed(h, a, early):
 
 
 @apart
-def pay(n, p, h, kinks, slow, lossy, s):
+def pay(n, p, h, kinks, slow, lossy, s, clock):
     """Give back what the kinks of this step owe, where it can be noticed: kick and shift apart."""
     for i in range(kinks):
-        c, move = s[i].kink, s[i].rise
+        c = s[i].kink
         a = s[c]
-        d, loss = a.d, 0.0
+        move, left, right = a.move, a.w, s[c + 1].w
+        d, loss, now, was = a.d, 0.0, a.d, a.d - move
         if lossy:
-            d, loss = a.y, a.loss
+            d, loss, now, was = a.y, a.loss, a.y + a.loss * p / h * move, a.push
+        if a.f == 0.0:  # what its force is in proportion to was above zero at the node before
+            clock.ended = clock.time - h * now / (now - was)
         j = x = 0.0
-        left, right = a.w, s[c + 1].w
         if a.f > 0.0 and d > move and loss > 0.0:
-            j, x = resumed(h, a, loss * p / h)
+            j, x = resumed(h, a, min(max(now / (now - was), 0.0), 1.0) if now > was else 0.5)
         elif loss == 0.0 and h * a.k * abs(move) * grade(p, abs(move)) * (left + right) <= slow:
             continue
         elif a.f == 0.0 and move < 0.0:
