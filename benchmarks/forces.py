@@ -20,7 +20,7 @@ from verlet import verlet
 
 os.environ["CRADLE_KERNEL"] = "compiled"
 from cradle import post_impact_velocities
-from cradle.models.springs import Problem, law_of, run
+from cradle.models.springs import law_of, run, scaled
 
 #: Compressions and speeds, relative to the first, at which Verlet stops.
 FAINT = 1e-6
@@ -54,14 +54,13 @@ class Ours:
         rows, n = masses.shape
         ones = np.ones((rows, n - 1))
         v = np.tile(struck(n), (rows, 1))
-        self.problem = Problem(masses, v, ones, loss * ones, 0.0 * ones, 1.5, accuracy)
+        self.given, self.accuracy = (masses, v, ones, loss * ones, 0.0 * ones), accuracy
 
     def run(self):
-        problem = self.problem
-        forces, _, speed, _ = problem.own()
-        found = run(forces, law_of(forces, problem.p, problem.accuracy), True)
+        forces, _, speed, _ = scaled(self.given, 1.5, self.accuracy)
+        found = run(forces, law_of(forces, 1.5, self.accuracy), True)
         assert not found.defect.any()
-        return problem.v + speed * (found.v - forces.v)
+        return self.given[1] + speed * (found.v - forces.v)
 
 
 class Verlet:

@@ -232,7 +232,7 @@ def random_chains(seed, count, n, loss=0.0):
     v = np.where(rng.random((count, 1)) < 0.5, struck(n), uniform(rng, -1, 1, (count, n)))
     v[:, 0], v[:, 1] = 1.0, np.minimum(v[:, 1], 0.5)  # somebody closes
     gaps = np.where(rng.random((count, n - 1)) < 0.3, uniform(rng, 0, 0.3, (count, n - 1)), 0.0)
-    _, _, speed, depth = springs.Problem(m, v, k, 0 * k, gaps, 1.5, 1e-3).own()
+    _, _, speed, depth = springs.scaled([m, v, k, 0 * k, gaps], 1.5, 1e-3)
     return m, v, k, gaps, loss * uniform(rng, 0.3, 1, (count, n - 1)) * depth / speed
 
 
@@ -428,9 +428,8 @@ def test_plain_and_compiled_agree_to_the_last_bit(monkeypatch, p, loss):
 def test_nan_ends_and_is_no_answer(monkeypatch, kernel):
     """No check of input stands before the loop here: it must end, and not as finished."""
     monkeypatch.setenv(runtime.VARIABLE, kernel)
-    own = springs.Problem(
-        *map(np.array, ([[1.0, 1]], [[1.0, 0]], [[1.0]], [[0.0]], [[0.0]])), 1.5, 1e-3
-    ).own()[0]
+    rows = [np.array([row]) for row in ([1.0, 1], [1.0, 0], [1.0], [0.0], [0.0])]
+    own = springs.scaled(rows, 1.5, 1e-3)[0]
     law = springs.law_of(own, 1.5, 1e-3, most=1000)
     for name in ("k", "w", "v"):
         broken = own._replace(

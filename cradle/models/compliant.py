@@ -25,16 +25,7 @@ from cradle.input.values import (
 )
 from cradle.models.batch import in_order, rows_of, shaped
 from cradle.models.energy import CurvedTrace, fastest
-from cradle.models.springs import (
-    COARSEST,
-    FINEST,
-    MOST_STEPS,
-    Path,
-    Problem,
-    law_of,
-    refuse_beyond,
-    run,
-)
+from cradle.models.springs import COARSEST, FINEST, MOST_STEPS, Path, law_of, run, scaled
 from cradle.runtime.job import DEFECTS, FINISHED, LARGE
 from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
 
@@ -51,8 +42,8 @@ _CHUNK = 2048  # chains at once
 class TimedTrace(CurvedTrace):
     """The path of an impact that has a time; N balls, K events, S steps of the integration.
 
-    Its events are joined by smooth curves, not by the straight lines of a rigid model.  The outcome
-    has the accuracy asked for; what happens on the way is less exact near a closing or an opening.
+    Its events are joined by smooth curves.  The outcome has the accuracy asked for; what happens on
+    the way is less exact near a closing or an opening.
 
     Attributes
     ----------
@@ -68,17 +59,12 @@ class TimedTrace(CurvedTrace):
     error : float
         Estimated error of a velocity, relative to the fastest closing.
 
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, section 2.2.
-
     Examples
     --------
     The duration of a contact of two balls on a linear spring is pi sqrt(mu / k):
 
     >>> from cradle import Chain, collide
-    >>> trace = collide(Chain([2, 2], [1, 0], 1), SpringChain(1.0, exponent=1))
-    >>> trace.durations.round(6)
+    >>> collide(Chain([2, 2], [1, 0]), SpringChain(1.0, exponent=1)).durations.round(6)
     array([3.141593])
     """
 
@@ -102,16 +88,12 @@ class TimedTrace(CurvedTrace):
 
 @dataclass(frozen=True)
 class SpringChain:
-    """Balls on massless springs: contacts push with k (d^p + A d(d^p)/dt), never pull.
+    """Balls on massless springs: the contact forces of `spring_velocities`, followed in time.
 
-    d is the compression of the contact, p = 1 a linear spring, p = 3/2 the contact of two spheres
-    (Hertz); A is the time of their losses.  A contact that opens is then a gap, which counts beside
-    the compressions: it must close before the contact pushes.
-
-    The motion is followed in time (`cradle.kernel.forces`).  `absorbed` is the energy stored at
-    each maximum of a compression, less that at a minimum between two of them.  Speeds below a
-    hundredth of the accuracy, times that of the fastest closing, are too little to matter; so are
-    collisions at such speeds: how often balls touch that a long chain leaves behind depends on it.
+    `absorbed` is the energy stored at each maximum of a compression, less that at a minimum between
+    two of them.  Speeds below a hundredth of the accuracy, times that of the fastest closing, are
+    too little to matter; so are collisions at such speeds: how often balls touch that a long chain
+    leaves behind depends on it.
 
     Parameters
     ----------
@@ -124,8 +106,7 @@ class SpringChain:
     Raises
     ------
     ValueError, ImpactNotFinished, ImpactNotCertified
-        ValueError if a value is outside its range; the others, and ValueError if a restitution is
-        below 1, on solving, as `spring_velocities`.
+        As `spring_velocities`, the last two on solving; and ValueError if a restitution is below 1.
 
     References
     ----------
@@ -161,14 +142,12 @@ class SpringChain:
         refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
         fastest(chain)  # is within the range of floats
         contacts = [row_of(name, getattr(self, name), n - 1, n) for name in _RULES]
-        m, v, k, loss, gap = (row[None] for row in (chain.masses, chain.velocities, *contacts))
-        problem = Problem(m, v, k, loss, gap, self.exponent, self.accuracy)
-        own = forces, *units = problem.own()
-        refuse_beyond(problem, own)
+        rows = [row[None] for row in (chain.masses, chain.velocities, *contacts)]
+        forces, *units = scaled(rows, self.exponent, self.accuracy)
         mass, speed, length = (float(unit[0, 0]) for unit in units)
         law = law_of(forces, self.exponent, self.accuracy, self.max_steps)
-        found = run(forces, law)
-        defect, start = int(found.defect[0]), chain.velocities
+        found, start = run(forces, law), chain.velocities
+        defect = int(found.defect[0])
         if defect > 0:
             raise ImpactNotCertified(chain, self, DEFECTS[defect])
         if defect:
@@ -229,8 +208,8 @@ def spring_velocities(
     """Post-impact velocities of many chains of balls on springs; leading axes broadcast.
 
     Each contact pushes with k (d^p + A d(d^p)/dt) while that is above zero, d its compression:
-    p = 3/2 is the contact of two spheres, elastic or viscoelastic.  The velocities depend on the
-    ratios of the stiffnesses alone where there are neither losses nor gaps.
+    p = 1 is a linear spring, p = 3/2 the contact of two spheres, elastic or viscoelastic.  The
+    velocities depend on the ratios of the stiffnesses alone where there are no losses and gaps.
 
     Parameters
     ----------
@@ -243,7 +222,7 @@ def spring_velocities(
     viscosity : array_like, shape (..., N - 1) or ()
         A, s; 0 for an elastic contact.  Two spheres lose the more the faster they collide.
     gaps : array_like, shape (..., N - 1) or ()
-        Distance of two balls before the impact, m; it closes before the contact pushes.  Below
+        Distance of two balls before the impact, m, which closes before the contact pushes.  Below
         zero a lean: how far the strings press the two together at rest.  Their pull stays what it
         is until the last contact has opened.
     accuracy : float
@@ -260,13 +239,10 @@ def spring_velocities(
     Raises
     ------
     ValueError
-        If a value or a shape is wrong, or too small or large beside the others to be resolved; the
-        message names the first value and the rule.
-    ImpactNotFinished
-        If an impact takes more than twenty million steps, or finer and finer runs do not agree, or
-        leans hold balls together.
-    ImpactNotCertified
-        If an outcome breaks momentum, energy or order.
+        If a value or a shape is wrong, or too small or large beside the others to be resolved.
+    ImpactNotFinished, ImpactNotCertified
+        If an impact takes more than twenty million steps, finer and finer runs do not agree, or
+        leans hold balls together; if an outcome breaks momentum, energy or order.
 
     References
     ----------
@@ -275,11 +251,11 @@ def spring_velocities(
 
     Examples
     --------
-    Five equal elastic spheres; and with gaps of a tenth of the compression and losses:
+    Five equal spheres, elastic; and with losses and gaps of a tenth of the compression:
 
-    >>> spring_velocities([1] * 5, [1, 0, 0, 0, 0], accuracy=1e-6).round(4)
-    array([-0.0711, -0.0303, -0.0145,  0.127 ,  0.9888])
-    >>> spring_velocities([1] * 5, [1, 0, 0, 0, 0], viscosity=0.05, gaps=0.1).round(2)
+    >>> for law in {}, {"viscosity": 0.05, "gaps": 0.1}:
+    ...     spring_velocities([1] * 5, [1, 0, 0, 0, 0], **law).round(2)
+    array([-0.07, -0.03, -0.01,  0.13,  0.99])
     array([-0.  ,  0.02,  0.03,  0.1 ,  0.85])
     """
     law = SpringChain(exponent=exponent, accuracy=accuracy)
@@ -287,22 +263,19 @@ def spring_velocities(
     given = {"masses": masses, "velocities": velocities, "stiffness": stiffness}
     given |= {"viscosity": viscosity, "gaps": gaps}
     arrays, lead = shaped(given, (0, 0, 1, 1, 1))
-    m, v, *contacts = arrays
-    refuse_overflow(checked("velocities", v), checked_masses(m))
-    for (name, rules), values in zip(_RULES.items(), contacts, strict=True):
+    refuse_overflow(checked("velocities", arrays[1]), checked_masses(arrays[0]))
+    for (name, rules), values in zip(_RULES.items(), arrays[2:], strict=True):
         checked(name, values, *rules)
-    n, count = m.shape[-1], math.prod(lead)
+    n, count = arrays[0].shape[-1], math.prod(lead)
     out = np.empty((count, n))
 
     def run_chunk(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
         """Solve the chunk of chains that begins there; the first that fails alone, to raise."""
         rows = slice(begin, min(begin + _CHUNK, count))
-        m, v, k, loss, gap = (rows_of(array, lead, rows) for array in arrays)
-        problem = Problem(m, v, k, loss, gap, p, accuracy)
-        own = forces, _, speed, _ = problem.own()
-        refuse_beyond(problem, own, lead, begin)
+        part = [rows_of(array, lead, rows) for array in arrays]
+        forces, _, speed, _ = scaled(part, p, accuracy, lead, begin)
         found = run(forces, law_of(forces, p, accuracy), count * n >= LARGE, stop)
-        out[rows] = problem.v + speed * (found.v - forces.v)
+        out[rows] = part[1] + speed * (found.v - forces.v)
         if found.defect.any():
             at = begin + int((found.defect != 0).argmax())
             m, v, k, loss, gap = (rows_of(array, lead, slice(at, at + 1))[0] for array in arrays)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,42 +24,56 @@ _OFTEN, _LONG = 2.4, 30.0
 _TRIALS = 16  # runs of a chain, each finer than the one before
 _DAMPED = 0.5  # step times A times the square of a frequency, at most
 _SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
-# The longest time that counts in the losses, the widest gap and the narrowest, in contact times and
-# depths; and the widest at which its last digit still is below this accuracy.
-_LONGEST, _WIDEST, _NARROWEST, _BLURRED = 0.3, 1e9, 1e-12, 1e13
+_LONGEST = 0.3  # A, in contact times
 _TINY = 1e-300  # the least depth, and one over the largest
+# The widest gap and the narrowest, in depths; the widest whose last digit is below this accuracy.
+_WIDEST, _NARROWEST, _BLURRED = 1e9, 1e-12, 1e13
 
 
-class Problem(NamedTuple):
-    """Chains, a row for each or one for all, and the law of their contacts."""
+def scaled(
+    given: Sequence[Vector], p: float, accuracy: float, lead: tuple[int, ...] = (), begin: int = 0
+) -> tuple[Forces, Vector, Vector, Vector]:
+    """Return chains in their own units; and the mass, speed and length of these, (rows, 1).
 
-    m: Vector
-    v: Vector
-    k: Vector
-    loss: Vector
-    gap: Vector
-    p: float
-    accuracy: float
+    `given` are masses, velocities, stiffnesses, viscosities and gaps, a row for each or one for
+    all: those from number `begin` on of chains with these leading axes.  The units are those of the
+    contact that closes fastest, the speed is 1 if none closes; all the balls together are at rest.
+    What is too small or large beside the rest of its chain to be resolved is refused.
+    """
+    rows, n = max(map(len, given)), given[0].shape[1]
+    m, v = (np.broadcast_to(part, (rows, n)) for part in given[:2])
+    k, lost, gap = (np.broadcast_to(part, (rows, n - 1)) for part in given[2:])
+    u = v[:, :-1] - v[:, 1:]
+    at = np.arange(rows)[:, None], u.argmax(axis=-1)[:, None]
+    left, right = m[at], m[:, 1:][at]
+    with np.errstate(all="ignore"):  # what is beyond floats is refused
+        mass, speed = left / (left + right) * right, np.where(u[at] > 0.0, u[at], 1.0)
+        energy = np.log(mass) + 2.0 * np.log(speed) - np.log(k[at])
+        length = np.exp(energy / (p + 1.0))
+        w, v, loss, d = mass / m, (v - v[at]) / speed, lost * (speed / length), -gap / length
+        v -= (m * v).sum(axis=-1, keepdims=True) / m.sum(axis=-1, keepdims=True)
+    most = min(_WIDEST, _BLURRED * accuracy)
+    far = ~((mass > 0.0) & (length >= _TINY) & (length <= 1.0 / _TINY)) | np.isnan(d)
+    of, late = "the depth of the fastest closing", "contact times, depth over speed of the fastest"
+    least = f"must be at least {_SMALLEST} of the"
+    for name, values, wrong, rule in (
+        ("masses", m, _small(m), f"{least} heaviest ball of its chain"),
+        ("stiffness", k, _small(k), f"{least} stiffest contact of its chain"),
+        ("stiffness", k, far, "a contact's time is beyond floats: choose other units"),
+        ("viscosity", lost, loss > _LONGEST, f"must be at most {_LONGEST} {late} closing"),
+        ("gaps", gap, -d > most, f"must be at most {most:g} times {of} at this accuracy"),
+        ("gaps", gap, (d != 0.0) & (abs(d) < _NARROWEST), f"must be 0, or {_NARROWEST} of {of}"),
+        ("gaps", gap, d > 1.0, f"must be a lean of at most {of}"),
+    ):
+        if wrong.any():
+            row, c = first(wrong)
+            place = *map(int, np.unravel_index(begin + row, lead)), c
+            raise refusal(name, place, f" = {float(values[row, c])!r}; {rule}")
+    return Forces(w, v, k / k[at], loss, d, speed[:, 0]), mass, speed, length
 
-    def own(self) -> tuple[Forces, Vector, Vector, Vector]:
-        """Return the chains in their own units; and mass, speed and length, (rows, 1).
 
-        These are those of the contact that closes fastest; the speed is 1 if none closes.  All the
-        balls together are at rest.
-        """
-        rows, n = max(map(len, self[:5])), self.m.shape[1]
-        m, v = (np.broadcast_to(part, (rows, n)) for part in self[:2])
-        k, loss, gap = (np.broadcast_to(part, (rows, n - 1)) for part in self[2:5])
-        u = v[:, :-1] - v[:, 1:]
-        at = np.arange(rows)[:, None], u.argmax(axis=-1)[:, None]
-        left, right = m[at], m[:, 1:][at]
-        with np.errstate(all="ignore"):  # what is beyond floats is refused
-            mass, speed = left / (left + right) * right, np.where(u[at] > 0.0, u[at], 1.0)
-            energy = np.log(mass) + 2.0 * np.log(speed) - np.log(k[at])
-            length = np.exp(energy / (self.p + 1.0))
-            v, loss, d = (v - v[at]) / speed, loss * (speed / length), -gap / length
-            v -= (m * v).sum(axis=-1, keepdims=True) / m.sum(axis=-1, keepdims=True)
-            return Forces(mass / m, v, k / k[at], loss, d, speed[:, 0]), mass, speed, length
+def _small(values: Vector) -> Any:
+    return values < _SMALLEST * values.max(axis=-1, keepdims=True)
 
 
 class Solved(NamedTuple):
@@ -161,37 +176,6 @@ def _highest(chains: Forces, p: float) -> Vector:
     return np.where(most > 0.0, most, 1.0)
 
 
-def refuse_beyond(problem: Problem, own: Any, lead: tuple[int, ...] = (), begin: int = 0) -> None:
-    """Raise if something is too small or large beside the rest of its chain to be resolved.
-
-    The rows are those from number `begin` on of chains with these leading axes.
-    """
-    (_, _, _, loss, d, _), mass, _, length = own
-    m, _, k, lost, gap = problem[:5]
-    most = min(_WIDEST, _BLURRED * problem.accuracy)
-    far = ~((mass > 0.0) & (length >= _TINY) & (length <= 1.0 / _TINY)) | np.isnan(d)
-    of, late = "the depth of the fastest closing", "contact times, depth over speed of the fastest"
-    least = f"must be at least {_SMALLEST} of the"
-    for name, values, wrong, rule in (
-        ("masses", m, _small(m), f"{least} heaviest ball of its chain"),
-        ("stiffness", k, _small(k), f"{least} stiffest contact of its chain"),
-        ("stiffness", k, far, "a contact's time is beyond floats: choose other units"),
-        ("viscosity", lost, loss > _LONGEST, f"must be at most {_LONGEST} {late} closing"),
-        ("gaps", gap, -d > most, f"must be at most {most:g} times {of} at this accuracy"),
-        ("gaps", gap, (d != 0.0) & (abs(d) < _NARROWEST), f"must be 0, or {_NARROWEST} of {of}"),
-        ("gaps", gap, d > 1.0, f"must be a lean of at most {of}"),
-    ):
-        if wrong.any():
-            row, c = first(np.broadcast_to(wrong, np.broadcast_shapes(wrong.shape, values.shape)))
-            value = float(values[row if len(values) > 1 else 0, c])
-            at = *map(int, np.unravel_index(begin + row, lead)), c
-            raise refusal(name, at, f" = {value!r}; {rule}")
-
-
-def _small(values: Vector) -> Any:
-    return values < _SMALLEST * values.max(axis=-1, keepdims=True)
-
-
 class Path:
     """The motion of one chain in its own units: at the nodes of a run, and what happens between.
 
@@ -276,19 +260,17 @@ class Path:
         for (t, kind, j, c), y, v in zip(where, depths, velocities, strict=True):
             push = np.where(self.closed[j] | self.closed[j + 1], self.pushes(y), 0.0)
             if kind == "maximum_compression":
-                stored = push[c] * y[c] / (self.p + 1.0)
-                self.absorbed[c] += stored if u[j, c] > 0.0 else -stored
+                shown = bool(u[j, c] > 0.0)  # between two maxima is a minimum
+                self.absorbed[c] += (1 if shown else -1) * push[c] * y[c] / (self.p + 1.0)
             else:
-                push[c] = 0.0
+                shown, push[c] = kind == "end" or t > 0.0, 0.0
                 self.collisions[c] += kind == "close"
                 self.durations[c] += t if kind == "end" else -t
-            shown = u[j, c] > 0.0 if kind == "maximum_compression" else kind == "end" or t > 0.0
             if shown:
                 found.append((t, Event(kind, c), v, push))
-        if len(found) > 1:
-            found[-1] = (*found[-1][:2], last, found[-1][3])
-        at, events, path, force = zip(*found, strict=True)
-        return np.array(at), events[1:], np.array(path), np.array(force)
+        at, events, path, force = map(list, zip(*found, strict=True))
+        path[-1] = last
+        return np.array(at), tuple(events[1:]), np.array(path), np.array(force)
 
 
 def _zero(cubic: Vector, h: float) -> float:
