@@ -29,7 +29,8 @@ class Chain:
     """A straight chain of balls at the instant before an impact.
 
     Velocities are positive to the right; contact c joins balls c and c + 1.  Contacts whose balls
-    do not separate (closing speed at or above zero) touch.
+    do not separate (closing speed at or above zero) touch.  A wrong value or length is a
+    `ValueError`, whose message names it and the rule.
 
     Parameters
     ----------
@@ -38,11 +39,6 @@ class Chain:
     restitution : float or array_like, shape (N - 1,)
         Energetic coefficient of restitution of each contact, 0 to 1 (Stronge, 1990).  If left out,
         1: elastic balls, that lose nothing.
-
-    Raises
-    ------
-    ValueError
-        If a value or a length is wrong; the message names the value and the rule.
 
     Examples
     --------

@@ -177,13 +177,9 @@ def conserving_outcomes(
     133-137): with s = v2 - v1, and w the velocity of ball 3 from the centre of mass of balls 1 and
     2, energy leaves the circle ``mu s^2 + M w^2 = const``; mu and M are the reduced masses.
 
-    Parameters
-    ----------
-    masses, velocities : array_like, shape (3,)
-        kg, and m/s before the impact; others are a `ValueError`, as an angle off the arc is.
-    angles : array_like, shape (K,), optional
-        Angles on the arc, rad; 181 from end to end if left out.  They come back, with the
-        velocities there, shape (K, 3).
+    The masses, kg, and the velocities before the impact, m/s, have the shape (3,), the angles, rad,
+    (K,); 181 from end to end if left out.  They come back, with the velocities there, shape (K, 3).
+    Other values and an angle off the arc are a `ValueError`.
 
     Examples
     --------

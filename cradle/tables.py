@@ -1,7 +1,6 @@
 """The paper's measured parameters: ball types A to D, Tables 1 and 2, the ten test sequences.
 
-The numbers are read from the CSV files of ``data/``, whose README gives their origin, units and
-doubtful readings.
+They are read from ``data/``, whose README gives their origin, units and doubtful readings.
 """
 
 from __future__ import annotations

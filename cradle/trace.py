@@ -31,12 +31,10 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """The path of an impact and its outcome; N balls, K events.
+    """The path of an impact of `chain` by `model`, and its outcome; N balls, K events.
 
     Attributes
     ----------
-    chain, model : Chain, Model
-        What was solved: the chain before the impact, and the law.
     velocities, impulses : ndarray, shapes (N,) and (N - 1,)
         Velocities after the impact, m/s, and total impulse of each contact, N s.
     absorbed : ndarray, shape (N - 1,)
@@ -176,16 +174,15 @@ class ImpactNotFinished(RuntimeError):
 
     def __init__(self, message: str, trace: Trace, stored: float | None = None) -> None:
         super().__init__(message, trace, stored)  # all of them, so that it can be pickled
-        self.trace = trace
-        self.stored = stored
+        self.trace, self.stored = trace, stored
 
     @property
     def bounds(self) -> Vector:
         """Least and largest velocity that each ball can end with, m/s, shape (2, N).
 
-        They follow from what holds until the end: momentum stays, energy does not grow, and in the
-        end no ball is faster than the next on its right.  `SpringChain` and `EnergyDistribution`
-        keep momentum and energy to the tolerance of their integration only, and so the bounds.
+        Until the end momentum stays and energy does not grow (in `SpringChain` and
+        `EnergyDistribution` to the tolerance of their integration), and in the end no ball is
+        faster than the next on its right.
         """
         # Count velocities from that of the centre of mass.  If ball i ends at x > 0, the balls from
         # i on, of mass A, are at least as fast: they have a momentum of A x or more, and the

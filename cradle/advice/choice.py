@@ -59,12 +59,6 @@ class Recommendation:
     measured_on, reason : tuple of str, str
         The chains of these numbers: this very one, or those around it, of which the worst counts;
         and why this model.
-
-    Examples
-    --------
-    >>> from cradle import Chain, recommend
-    >>> recommend(Chain([1] * 20, [1] + [0] * 19), stiffness=1.0).seconds is None
-    True
     """
 
     model: Model
@@ -118,6 +112,8 @@ def recommend(
 ) -> Recommendation:
     """Recommend the cheapest model that gives what is wanted from what is known.
 
+    Where a value is wrong or no model fits, the `ValueError` says what is missing.
+
     Parameters
     ----------
     chain : Chain
@@ -136,11 +132,6 @@ def recommend(
     stiffness : float or sequence of length N - 1, optional
         k of the contacts of spheres (Hertz) if the material is known, N/m^(3/2); 1 for equal ones
         if neither forces nor times are wanted.
-
-    Raises
-    ------
-    ValueError
-        If a value is wrong, or no model fits; the message says what is missing.
 
     Notes
     -----
