@@ -37,6 +37,8 @@ class Process:
         self.collisions = np.zeros(n - 1, dtype=np.int64)
         self.absorbed = np.zeros(n - 1)
         self.collapsed = False
+        #: Largest change of each velocity at an event so far: what rounding was left by.
+        self.largest = np.zeros(n)
         self.record = [("", -1, self.y)]
         self.steps = [self.y[:, None]]
         self.evaluations = 0
@@ -49,7 +51,7 @@ class Process:
     def speeds(self, y: Vector) -> Vector:
         """Return the closing speeds; what is no more than rounding is zero."""
         change = y[: len(self.m)]
-        u, size = self.u - np.diff(change), np.abs(change)
+        u, size = self.u - np.diff(change), np.maximum(self.largest, np.abs(change))
         rounding = 2.0**-50 * (np.abs(self.u) + size[:-1] + size[1:])
         return np.where(np.abs(u) <= rounding, 0.0, u)
 
@@ -102,25 +104,25 @@ class Process:
             # For a large p a trial step far too long overflows, and is rejected.
             with np.errstate(over="ignore", invalid="ignore"):
                 found = solve_ivp(self.rate, (self.t, end), self.y, "DOP853", **options)
-            half = slice(len(contacts), None)
-            pages = zip(contacts, found.t_events[half], found.y_events[half], strict=True)
-            turns = [(t, c, y) for c, ts, ys in pages for t, y in zip(ts, ys, strict=True)]
-            turns.sort(key=lambda turn: turn[:2])
-            missed = [t for t, c, y in turns if side[c] * self.parts(y)[1][c] < 0.0]
+            half = len(contacts)
+            turns = zip(contacts, found.t_events[half:], found.y_events[half:], strict=True)
+            missed = [
+                t for c, ts, ys in turns for t, y in zip(ts, ys, strict=True)
+                if side[c] * self.parts(y)[1][c] < 0.0
+            ]  # fmt: skip
             if not missed:
                 break
-            end = missed[0]
+            end = min(missed)
         if found.status < 0:
             raise Stopped(found.message)
         self.steps.append(found.y)
         self.t, self.y = float(found.t[-1]), found.y[:, -1].copy()
-        # An extreme may fall on the end, where rounding can hide it.
-        for _, c, y in turns:
-            self.turn(c, y)
-        hidden = self.closed & (self.loading == (self.speeds(self.y) < 0.0))
-        for c in np.flatnonzero(hidden).tolist():
-            self.turn(c, self.y)
-        self.settle([c for c, ts in zip(contacts, found.t_events, strict=False) if len(ts)])
+        crossed, turned = (
+            [c for c, ts in zip(contacts, part, strict=True) if len(ts)]
+            for part in (found.t_events[:half], found.t_events[half:])
+        )
+        self.turn(turned)
+        self.settle(crossed)
 
     def watched(self, c: int) -> tuple[Any, Any]:
         """Return SciPy's events of contact c: it opens or closes; and it turns."""
@@ -133,29 +135,26 @@ class Process:
 
         own = depth if self.closed[c] or self.gaps else speed
         crossing = _leaving(1.0 if self.closed[c] else -1.0, own)
-        # The rate has a kink where a contact turns, unless e = 1: no step may cross it.  Without a
-        # kink the integration goes on, and may meet several extremes, of both kinds.
-        if self.closed[c] and self.e[c] < 1.0:
+        # Where a closed contact turns the rate has a kink, unless e = 1: no step may cross it.
+        if self.closed[c]:
             return crossing, _leaving(1.0 if self.loading[c] else -1.0, speed)
         return crossing, lambda _, y: speed(y)
 
-    def turn(self, c: int, y: Vector) -> None:
-        """Book an extreme of a compression: the energy stored there, and a maximum as an event."""
-        acceleration = self.rate(0.0, y)
-        falling = bool(acceleration[c] < acceleration[c + 1])
-        # Extremes alternate; one at the end of an integration must not count in the next again.
-        if not self.closed[c] or self.parts(y)[1][c] <= 0.0 or falling != self.loading[c]:
-            return
-        self.loading[c] = not falling
-        stored = self.stored(y)[c]
-        self.absorbed[c] += stored if falling else -stored
-        if falling:
-            self.record.append(("maximum_compression", c, y))
+    def turn(self, turned: list[int]) -> None:
+        """Book extremes of compressions: the energy stored there, and maxima as events."""
+        # Where several turn at one instant, only one has ended the integration.
+        turning = self.loading == (self.speeds(self.y) < 0.0)
+        turning[turned] = True
+        turning &= self.closed & (self.parts(self.y)[1] > 0.0)
+        self.absorbed += np.where(turning, self.stored(self.y) * np.where(self.loading, 1, -1), 0.0)
+        self.note("maximum_compression", turning & self.loading)
+        self.loading ^= turning
 
     def settle(self, crossed: list[int]) -> None:
         """Open the contacts that have ended, close those that approach, and record both."""
         self.y = self.y.copy()
-        _, d, _ = self.parts(self.y)
+        change, d, _ = self.parts(self.y)
+        self.largest = np.maximum(self.largest, np.abs(change))
         d[crossed] = 0.0
         if not self.gaps:
             # Where several end at one instant, rounding shows gaps that rigid balls never close.
