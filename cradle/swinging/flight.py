@@ -209,11 +209,11 @@ class FullFlight:
         self.gravity, self.tie = hanging.gravity, hanging.tie
         self.length, self.damping = float(hanging.length[0]), float(hanging.damping[0])
         self.half = math.pi / math.sqrt(hanging.fastest**2 - self.damping**2)
-        first = _first_balls(together)
-        #: The number of each ball's body, and the contact before each body but the first.
-        self.body, self.contacts = np.cumsum([0, *(not one for one in together)]), first[1:]
-        self.start = np.concatenate([x[first], v[first]])
-        self.waits = [self.half * (1.0 - TIE) * parting[ball - 1] for ball in self.contacts]
+        #: The number of each ball's body, the first ball of each, and until when none meets it.
+        self.body = np.cumsum([0, *(not one for one in together)])
+        self.first = np.array(_first_balls(together))
+        self.waits = self.half * (1.0 - TIE) * np.array(parting)[self.first[1:] - 1]
+        self.start = np.concatenate([x[self.first], v[self.first]])
 
     def _rate(self, _: float, y: Vector) -> Vector:
         x, v = np.split(y, 2)
@@ -231,24 +231,19 @@ class FullFlight:
 
     def next_meeting(self, horizon: float) -> Meeting:
         """Return the first event within `horizon` seconds."""
+        size = len(self.waits) + 1
 
-        def gap(k: int) -> Any:
-            def event(t: float, y: Vector) -> float:
-                # At the start a gap is open, or its balls are about to meet.
-                return float(y[k + 1] - y[k]) if t > self.waits[k] else 1.0
+        def nearest(t: float, y: Vector) -> float:
+            return float(np.diff(y[:size])[t > self.waits].min(initial=1.0))
 
-            vars(event).update(terminal=True, direction=-1)
-            return event
-
-        events = [gap(k) for k in range(len(self.contacts))]
-        step = self.half / 4.0
-        found = self._integrate(0.0, self.start, horizon, events=events, max_step=step)
+        vars(nearest).update(terminal=True, direction=-1)
+        found = self._integrate(0.0, self.start, horizon, events=nearest, max_step=self.half / 4.0)
         if found.status == 0:
             return math.inf, [], []
         time, (x, v) = float(found.t[-1]), np.split(found.y[:, -1], 2)
-        soon = (np.diff(x) + self.tie * np.diff(v) <= 0.0) & (time > np.array(self.waits))
-        met = [len(times) > 0 for times in found.t_events]
-        return time, [b - 1 for b, now in zip(self.contacts, met | soon, strict=True) if now], []
+        gaps = np.where(time > self.waits, np.diff(x), np.inf)
+        met = (gaps + self.tie * np.diff(v) <= 0.0) | (gaps == gaps.min())
+        return time, (self.first[1:][met] - 1).tolist(), []
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
         """Return positions and velocities at T times since the start, shapes (T, N).

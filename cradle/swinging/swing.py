@@ -257,35 +257,29 @@ RADIAN = 1e-11
 
 
 def certify(run: _Run, times: Vector, seen_x: Vector, seen_v: Vector) -> None:
-    """Demand order, momentum and energy of every flight and of every instant.
-
-    How much energy an impact keeps is told by its own trace.
-    """
+    """Demand order, momentum and energy of flights and instants; impacts are certified already."""
     hanging, m = run.hanging, run.hanging.masses
-    instants, *states = map(np.array, zip(*run.instants, strict=True))
-    came, placed, v, struck, left = states
-    most = INSTANT * ((np.abs(left) + np.abs(v)) @ m)
-    _demand(np.abs((left - v) @ m), most, instants, "impacts have made or lost {:g} kg m/s")
+    instants, came, placed, v, struck, left = map(np.array, zip(*run.instants, strict=True))
+    push = INSTANT * ((np.abs(left) + np.abs(v)) @ m)
     before, kept = hanging.energy(placed, struck), hanging.energy(placed, left)
-    most = INSTANT * np.maximum(before, kept)
-    _demand(np.abs(kept - before), most, instants, "{:g} J are made or lost beside the impacts")
+    work = INSTANT * np.maximum(before, kept)
     # Flights: to where they end, and to where they are looked at.
     begun = instants.searchsorted(times, side="right") - 1
     begun = np.concatenate([np.arange(len(instants) - 1), begun])
     until = np.concatenate([instants[1:], times])
-    x, v = np.concatenate([came[1:], seen_x]), np.concatenate([v[1:], seen_v])
-    worst = (x[:, :-1] - x[:, 1:] - hanging.gaps).max(axis=-1)
-    _demand(worst, TIE * run.size, until, "balls overlap by {:g} m")
-    gain = hanging.energy(x, v) - kept[begun]
+    x = np.concatenate([came[1:], seen_x])
+    gain = hanging.energy(x, np.concatenate([v[1:], seen_v])) - kept[begun]
     most = RADIAN * (1.0 + (until - instants[begun]) * hanging.fastest) * kept[begun]
     least = -math.inf if hanging.damping.any() else -most
-    _demand(gain, most, until, "a flight has made or lost {:g} J", least)
-
-
-def _demand(gain: Vector, most: Any, times: Vector, what: str, least: Any = -math.inf) -> None:
-    """Raise for the first of some times at which something is out of its bounds, or no number."""
-    wrong = ~((least <= gain) & (gain <= most))
-    if wrong.any():
-        k = np.flatnonzero(wrong)[np.argmin(times[wrong])]
-        what = what.format(gain[k])
-        raise RuntimeError(f"the swing is not certified: at t = {times[k]} s {what}")
+    overlap = (x[:, :-1] - x[:, 1:] - hanging.gaps).max(axis=-1)
+    for what, at, value, low, high in (
+        ("impacts have made or lost {:g} kg m/s", instants, (left - v) @ m, -push, push),
+        ("{:g} J are made or lost beside the impacts", instants, kept - before, -work, work),
+        ("balls overlap by {:g} m", until, overlap, -math.inf, TIE * run.size),
+        ("a flight has made or lost {:g} J", until, gain, least, most),
+    ):
+        wrong = ~((low <= value) & (value <= high))  # also what is no number
+        if wrong.any():
+            k = np.flatnonzero(wrong)[np.argmin(at[wrong])]
+            told = f"at t = {at[k]} s {what.format(value[k])}"
+            raise RuntimeError(f"the swing is not certified: {told}")
