@@ -46,7 +46,7 @@ function follow(chain, h, recorded) {
   const { w, v, k, loss, d } = chain;
   const out = Motions([zeros(n)], [0], [0], [0]);
   const [links, clocks] = [made(n, Link), [Clock()]];
-  const record = recorded ? made(PAGES, () => made(6, () => zeros(Math.max(n, 3)))) : [];
+  const record = recorded ? made(PAGES, () => made(4, () => zeros(n))) : [];
   const pages = [];
   let status = PAUSED;
   for (let resumed = false; status === PAUSED; resumed = true) {
@@ -111,7 +111,7 @@ function story(chain, { pages, h, v: after }) {
   const path = [chain.v];
   const events = [];
   const pushed = (v, push) => v.map((x, i) => x + ((push[i - 1] ?? 0) - (push[i] ?? 0)) * chain.w[i]);
-  for (const [, v, d, , f] of pages) {
+  for (const [, v, d, f] of pages) {
     const force = f.slice(0, n - 1);
     // The loop's velocities are those of half a step later, and lack the impulses of the losses.
     const late = force.map((x, c) => x * (chain.loss[c] - 0.5 * h));

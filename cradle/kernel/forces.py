@@ -196,16 +196,22 @@ def begin(n, chain, law, s, clock):
 
 
 @apart
-def put_down(n, s, clock, record):
-    """Write down where the chain is, if there is a record: time, contacts watched, and motion."""
+def put_down(n, lossy, s, clock, record):
+    """Write down a page, if there is a record: time; velocities, compressions, forces.
+
+    Balls of contacts that are not watched have flown freely since these were last looked at.
+    """
     if len(record) > 0:
         page = record[clock.row]
-        now, v, d, y, f, seen = page[0], page[1], page[2], page[3], page[4], page[5]
-        now[0], now[1], now[2] = clock.time, clock.low, clock.high
-        for i in range(n):
-            a = s[i]
-            v[i], d[i], y[i], f[i], seen[i] = a.v, a.d, a.y, a.f, a.seen
         clock.row += 1
+        page[0][0] = clock.time
+        v, y, f = page[1], page[2], page[3]
+        for c in range(n):
+            a = s[c]
+            v[c], y[c], f[c] = a.v, a.y if lossy else a.d, a.f
+            if c < n - 1 and not clock.low <= c < clock.high:
+                y[c] += (clock.time - a.seen) * (a.v - s[c + 1].v)
+                f[c] = 0.0
 
 
 @apart
@@ -246,7 +252,7 @@ def run(n, h, law, effort, s, clock, record):
             flown = fly(h, low, high, s)
             clock.time += flown
             if flown > 0.0:
-                put_down(n, s, clock, record)
+                put_down(n, lossy, s, clock, record)
             continue
         clock.steps += 1
         clock.time += h
@@ -283,7 +289,7 @@ def run(n, h, law, effort, s, clock, record):
         if law.leans and low < high:
             low, high = 0, n - 1
         clock.low, clock.high = low, high
-        put_down(n, s, clock, record)
+        put_down(n, lossy, s, clock, record)
     if low < high:
         return (UNFINISHED if clock.steps >= law.most else PAUSED), effort
     return FINISHED, effort

@@ -186,19 +186,15 @@ class Path:
     def __init__(self, chain: Forces, law: Law, h: Vector) -> None:
         record: list[Any] = []
         solve(chain._replace(h=h), law, room(*chain.v.shape), record=record)
-        pages, n = np.concatenate(record), chain.v.shape[1]
-        t, low, high = (pages[:, 0, k, None] for k in range(3))
-        v, (d, y, f, seen) = pages[:, 1, :n], (pages[:, k, : n - 1] for k in range(2, 6))
-        self.p, self.w, self.k, self.early = law.p, chain.w[0], chain.k[0], law.p * chain.loss[0]
-        loss, contacts = chain.loss[0], np.arange(n - 1)
-        inside = (low <= contacts) & (contacts < high) | law.leans
+        pages, loss = np.concatenate(record), chain.loss[0]
+        self.p, self.w, self.k, self.early = law.p, chain.w[0], chain.k[0], law.p * loss
+        v, y, f = pages[:, 1], pages[:, 2, :-1], pages[:, 3, :-1]
         pull = self.pushes(chain.d[0])
         if not law.lossy:
-            y = d - h**2 / 12.0 * np.diff(self.driven(np.where(inside, f - pull, 0.0)))
-        y = np.where(inside, y, d + (t - seen) * (v[:, :-1] - v[:, 1:]))
+            y = y - h**2 / 12.0 * np.diff(self.driven(f - pull))
         #: Times, compressions, and whether contacts are closed, at the start and at the nodes.
-        self.t, self.y = np.append(0.0, t), np.vstack([chain.d, y])
-        self.closed = np.vstack([chain.d > 0.0, inside & (f > 0.0)])
+        self.t, self.y = np.append(0.0, pages[:, 0, 0]), np.vstack([chain.d, y])
+        self.closed = np.vstack([chain.d > 0.0, f > 0.0])
         push = np.where(self.closed, self.pushes(self.y), 0.0)
         slope = self.p * push / np.where(push > 0.0, self.y, 1.0)
         held = push - pull

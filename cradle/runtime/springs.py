@@ -58,7 +58,7 @@ def solve(
     """
     (rows, n), k, status = out.v.shape, 0, FINISHED
     compiled: bool | None = None
-    pages = np.empty((0 if record is None else _PAGES, 6, max(n, 3)))
+    pages = np.empty((0 if record is None else _PAGES, 4, n))
     while k < rows and status in (FINISHED, PAUSED):
         if stop is not None and stop.is_set():
             raise Stopped
