@@ -450,7 +450,7 @@ def test_no_function_is_inlined_that_is_meant_to_stand_apart():
     """
     module = runtime.compiled()
     inlined = {"jit": True, "apart": False, "door": False}
-    for node in ast.parse(runtime.unit()).body:
+    for node in ast.parse(runtime._for_numba(runtime.unit())).body:
         if isinstance(node, ast.FunctionDef) and hasattr(getattr(module, node.name), "py_func"):
             (mark,) = (ast.unparse(part) for part in node.decorator_list)
             options = getattr(module, node.name).targetoptions

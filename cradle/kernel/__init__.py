@@ -1,34 +1,30 @@
 """The event loop in rooms: the rules of `cradle.textbook`, fast and at the extremes.
 
-    state        groups of arrays, the notation; the limits of rounding
-    numbers      sums of two floats, 32 digits
-    rules        one run: rates, ratios in force, its way to its next event   R1, R3, R6, R7
-    record       what is written down
-    events       start, hand-over, closing                                    R2, R4, R5
-    meeting      two runs that meet                                           R8.3, R8.4
-    collapse     contacts that are exhausted, and how they end                R9
-    snapshot     what has repeated itself since                               R9
-    cycles       impacts that repeat themselves on another scale              R9
-    certificate  momentum, order, energy, ledger of every answer
-    loop         the rounds                                                   R8
-    batch        many chains; the door
+    state     groups of arrays, the notation; the limits of rounding
+    numbers   sums of two floats, 32 digits
+    rules     one run: rates, ratios in force, its way to its next event      R1, R3, R6, R7
+    record    what is written down; momentum, order, energy, ledger of every answer
+    events    start, hand-over, closing                                       R2, R4, R5
+    meeting   two runs that meet                                              R8.3, R8.4
+    collapse  contacts that are exhausted, and how they end                   R9
+    cycles    impacts that repeat themselves on another scale                 R9
+    loop      the rounds; many chains; the door                               R8
 
 and contact forces in time, with a door of their own:
 
-    kinks        the records, the law of force; what a contact that closes or opens owes
-    forces       steps, runs; the door
+    kinks     the records, the law of force; what a contact that closes or opens owes
+    forces    steps, runs; the door
 
 The rooms are plain: numbers, loops, sequences, tuples of arrays and `math`.  They run as they
 stand, and compiled as one unit (`cradle.runtime`), with the same bits.
 """
 
-from cradle.kernel.batch import Inputs, Options, Outputs, batch
 from cradle.kernel.forces import springs
+from cradle.kernel.loop import Inputs, Options, Outputs, batch
 
 #: The rooms of the event loop, and all, in an order in which each uses only those before it.
 EVENT_LOOP = (
-    "state", "numbers", "rules", "record", "events", "meeting", "collapse", "snapshot",
-    "cycles", "certificate", "loop", "batch",
+    "state", "numbers", "rules", "record", "events", "meeting", "collapse", "cycles", "loop",
 )  # fmt: skip
 ROOMS = (*EVENT_LOOP, "kinks", "forces")
 

@@ -3,9 +3,9 @@
 What they have left is far below the last digit of an answer, and they alone go on making events.
 """
 
-from cradle.kernel.events import deactivate, exhausted, run_of, stir
+from cradle.kernel.events import deactivate, exhausted, stir
 from cradle.kernel.numbers import ONE, ZERO, minus, over, plus, times
-from cradle.kernel.state import LIMITS, apart, jit
+from cradle.kernel.state import LIMITS, apart
 
 
 @apart
@@ -17,13 +17,15 @@ def end_plastically(first, last, n, state):
         contact[c].made = 0.0
         contact[c].tiny = 0
         if contact[c].active == 1:
-            deactivate(c, run_of(c, contact), n, state.ball, contact, run, state.tally[0])
+            begin = c
+            while begin > 0 and contact[begin - 1].active == 1:
+                begin -= 1
+            deactivate(c, begin, n, state.ball, contact, run, state.tally[0])
     for c in (first - 1, last + 1):
         if 0 <= c < n - 1:
             stir(c, n, run, contact)
 
 
-@jit
 def change_of(c, low, high, ball, contact):
     """Return how impulses x of contacts low..high change the closing speed of contact c."""
     before = contact[c - 1].x if low <= c - 1 <= high else ZERO
@@ -60,7 +62,6 @@ def common_velocity(first, last, left_part, right_part, ball, contact):
         contact[c].x = impulse
 
 
-@jit
 def chatters(c, state):
     """Tell whether contact c is in an exhausted collision, or has just been.
 
@@ -74,7 +75,6 @@ def chatters(c, state):
     return dust or k.tiny > 0 or (k.active == 1 and k.w > 0.0)
 
 
-@jit
 def last_chatter(c, step, n, state):
     """Return the last contact from c on that chatters too, with nothing but zeros between."""
     last, k = c, c + step
@@ -85,29 +85,6 @@ def last_chatter(c, step, n, state):
             break
         k += step
     return last
-
-
-@apart
-def exhausted_stretch(c, n, state):
-    """Return the stretch (first, last) around c of contacts that only chatter.
-
-    Empty if nothing in it can lose energy, unless it is dust: elastic sequences are finite, or hand
-    all their energy on; or if its balls move with more than a faint energy: heavy ones, slower than
-    a light ball that struck them.
-    """
-    ball, contact = state.ball, state.contact
-    first, last = last_chatter(c, -1, n, state), last_chatter(c, 1, n, state)
-    loses = False
-    common_velocity(first, last, ONE, ONE, ball, contact)
-    energy = fastest = 0.0
-    for k in range(first, last + 1):
-        loses = loses or contact[k].e.real < 1.0
-        fastest = max(fastest, abs(contact[k].u.real))
-        energy += 0.5 * contact[k].x.real * contact[k].u.real
-    loses = loses or fastest < LIMITS.dust * state.tally[0].fastest
-    if loses and energy <= LIMITS.faint * state.tally[0].energy:
-        return first, last
-    return c, c - 1
 
 
 @apart
@@ -139,3 +116,22 @@ def merge(first, last, n, state):
             break
     end_plastically(first, last, n, state)
     return first, last
+
+
+@apart
+def merge_exhausted(c, n, state):
+    """Merge the contacts around c that only chatter; return (first, last), empty if none are.
+
+    Something in them must lose energy, unless they are dust: elastic sequences are finite, or hand
+    all their energy on.
+    """
+    contact = state.contact
+    first, last = last_chatter(c, -1, n, state), last_chatter(c, 1, n, state)
+    loses = False
+    fastest = 0.0
+    for k in range(first, last + 1):
+        loses = loses or contact[k].e.real < 1.0
+        fastest = max(fastest, abs(contact[k].u.real))
+    if loses or fastest < LIMITS.dust * state.tally[0].fastest:
+        return merge(first, last, n, state)
+    return c, c - 1

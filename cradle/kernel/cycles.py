@@ -8,29 +8,90 @@ collapses are counted, not ends.
 
 import math
 
-from cradle.kernel.collapse import (
-    change_of,
-    common_velocity,
-    end_plastically,
-    exhausted_stretch,
-    merge,
-)
+from cradle.kernel.collapse import change_of, common_velocity, end_plastically, merge_exhausted
 from cradle.kernel.events import reduced_mass
 from cradle.kernel.numbers import ONE, ZERO, minus, over, plus, scaled, times
 from cradle.kernel.record import record
-from cradle.kernel.snapshot import cluster_around, forget, remember, since
-from cradle.kernel.state import (
-    COLLAPSE,
-    LIMITS,
-    LOWER,
-    REPETITION,
-    UPPER,
-    apart,
-    jit,
-)
+from cradle.kernel.state import COLLAPSE, LIMITS, LOWER, REPETITION, UPPER, Cluster, apart
 
 
-@jit
+def forget(number, levels):
+    """Drop the snapshot of a level, and begin to count anew: short impacts need none."""
+    level = levels[number]
+    level.mark = -1
+    level.count = level.taken = 0
+    level.due = 16 if number == LOWER else 4
+
+
+def code(c, state):
+    """Return one number for whether contact c is active, and who drives whom at its balls."""
+    return 9 * state.contact[c].active + 3 * state.ball[c].turn + state.ball[c + 1].turn
+
+
+@apart
+def remember(number, c, n, state):
+    """Take a snapshot of the contacts around c.
+
+    It is kept for 1, 1, 2, 1, 1, 2, 4, ... times the least distance: short cycles are found soon.
+    """
+    level, contact, memory = state.level[number], state.contact, state.memory[number]
+    level.mark = c
+    level.taken += 1
+    distance, k = 16 if number == LOWER else 4, level.taken
+    while k == 2 * (k // 2):
+        distance, k = 2 * distance, k // 2
+    level.due = level.count + distance
+    for j in range(max(c - LIMITS.window, 0), min(c + LIMITS.window, n - 2) + 1):
+        k, then = contact[j], memory[j]
+        then.u, then.q, then.p, then.a = k.u, k.q, k.p, k.a
+        then.hits, then.code = k.hits, code(j, state)
+
+
+def since(c, contact, memory):
+    """Return the impulse of contact c since the snapshot."""
+    return minus(contact[c].p, memory[c].p)
+
+
+@apart
+def cluster_around(c, number, n, state):
+    """Return the contacts of a possible cycle around contact c; empty (last < first) if none.
+
+    Contacts left..right had an impulse since the snapshot; of these first..last collided anew and
+    the others, steady neighbours, stayed active.  All are active and driven as they were then, and
+    one that collided loses energy.
+    """
+    contact, run, memory = state.contact, state.run, state.memory[number]
+    low, high = max(c - LIMITS.window, 0), min(c + LIMITS.window, n - 2)
+    left = right = c
+    while left > low and since(left - 1, contact, memory).real > 0.0:
+        left -= 1
+    while right < high and since(right + 1, contact, memory).real > 0.0:
+        right += 1
+    # Each of infinitely many rounds lets all other runs go on, too.
+    begin, end = run[n - 1].onward, run[n - 1].back
+    alone = begin == n - 1 or (run[begin].last >= left and end <= right)
+    first, last, anew = right + 1, left - 1, 0
+    loses = False
+    same = since(c, contact, memory).real > 0.0  # else c has collided without an impulse
+    same = same and (left > low or left == 0) and (right < high or right == n - 2)
+    for k in range(left, right + 1):
+        same = same and memory[k].code == code(k, state)
+        if contact[k].hits != memory[k].hits:
+            first = min(first, k)
+            last = k
+            anew += 1
+            loses = loses or contact[k].e.real < 1.0
+        else:
+            same = same and contact[k].active == 1
+    same = same and anew == last - first + 1
+    for k in (left - 2, right + 2):
+        if low <= k <= high and since(k, contact, memory).real > 0.0:
+            same = False
+    if same and loses and alone:
+        return Cluster(left, first, last, right)
+    return Cluster(c, c, c - 1, c)
+
+
 def kept_part(neighbour, edge, exists, contact, memory):
     """Return 1 - h for a steady neighbour with h times the impulse of the outermost contact."""
     if not exists:
@@ -46,9 +107,9 @@ def kept_part(neighbour, edge, exists, contact, memory):
 def limit(cluster, number, state):
     """Leave in x the impulses to the limit: the balls first..last + 1 come to one velocity.
 
-    Returns T, the sum of all cycles to come over the last one, T = L / (1 - L); how far the state
-    is from its snapshot scaled by L, relative to its own size; and this size.  T is 0 if there is
-    no limit, and below -1 if the cycles come from there and grow, driven by steady neighbours.
+    Returns T = L / (1 - L), all cycles to come over the last one; how far the state is from its
+    snapshot scaled by L, relative to its own size; and this size.  T is 0 if there is no limit, and
+    below -1 if the cycles come from there and grow, driven by steady neighbours.
     """
     ball, contact, memory = state.ball, state.contact, state.memory[number]
     left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
@@ -72,57 +133,47 @@ def limit(cluster, number, state):
         stored = contact[c].q.real - factor * factor * memory[c].q.real
         off = max(off, abs(stored) / reduced_mass(c, ball) / size / size)
     # The steady neighbours' impulses go with those of the contacts beside them.
-    if left < first:
-        one = times(contact[first].x, minus(ONE, left_part))
-        one = over(one, since(first - 1, contact, memory))
-        for c in range(left, first):
-            contact[c].x = times(since(c, contact, memory), one)
-    if last < right:
-        other = times(contact[last].x, minus(ONE, right_part))
-        other = over(other, since(last + 1, contact, memory))
-        for c in range(last + 1, right + 1):
-            contact[c].x = times(since(c, contact, memory), other)
+    for c in range(left, first):
+        there = times(contact[first].x, minus(ONE, left_part))
+        there = over(there, since(first - 1, contact, memory))
+        contact[c].x = times(since(c, contact, memory), there)
+    for c in range(last + 1, right + 1):
+        there = times(contact[last].x, minus(ONE, right_part))
+        there = over(there, since(last + 1, contact, memory))
+        contact[c].x = times(since(c, contact, memory), there)
     return total, off, size
 
 
-@jit
 def stays_at_zero(c, contact, memory):
     """Tell whether contact c has been at u = 0 since the snapshot: its balls move as one."""
     k, then = contact[c], memory[c]
-    idle = k.a.real == then.a.real and k.a.imag == then.a.imag
+    idle = minus(k.a, then.a).real == 0.0
     return k.active == 1 and k.u.real == 0.0 and then.u.real == 0.0 and idle
 
 
-@jit
-def sum_of_squares(total, part):
-    """Return the sum of L^2, L^4, ... on this part of the way to the limit."""
-    return part * (2.0 - part) * total * (total / (1.0 + 2.0 * total))
+def scaled_by(a, x):
+    """Return a x for any float x."""
+    return times(a, complex(x, 0.0))
 
 
 @apart
 def neighbours_stay(cluster, total, part, number, n, state):
-    """Work out what the neighbours of a cycle absorb; tell whether none comes to its own event.
+    """Leave in y what the neighbours of a cycle absorb; tell whether none comes to its own event.
 
-    Their works on this part of the way are left in y.  Impulse and closing speed of a neighbour go
-    the same part of their ways, so its work is that of the straight line between, but for what it
-    was more in the last cycle, times the sum of L^2, L^4, ...  A cycle that grows goes on only
-    while its neighbours' works stay below the energy of the first closing.
+    Impulse and closing speed of a neighbour go the same part of their ways, so its work is that of
+    the straight line between, but for what it was more in the last cycle, times the sum of L^2,
+    L^4, ...  A cycle that grows goes on while these are below the energy of the first closing.
     """
     ball, contact, memory = state.ball, state.contact, state.memory[number]
     left, right = cluster.left, cluster.right
-    squares = sum_of_squares(total, part)
+    squares = part * (2.0 - part) * total * (total / (1.0 + 2.0 * total))
     for c in range(max(left - 1, 0), min(right + 1, n - 2) + 1):
-        if cluster.first <= c <= cluster.last:
-            continue
         k, then = contact[c], memory[c]
         k.y = ZERO
-        if stays_at_zero(c, contact, memory):
+        if cluster.first <= c <= cluster.last or stays_at_zero(c, contact, memory):
             continue
-        change = scaled_by(change_of(c, left, right, ball, contact), part)
-        speed = plus(k.u, change)
+        speed = plus(k.u, scaled_by(change_of(c, left, right, ball, contact), part))
         if k.u.real * then.u.real < 0.0 or k.u.real * speed.real < 0.0:
-            return False
-        if (k.u.real == 0.0) != (speed.real == 0.0):
             return False
         if c < left or c > right:
             continue
@@ -138,18 +189,11 @@ def neighbours_stay(cluster, total, part, number, n, state):
     return True
 
 
-@jit
-def scaled_by(a, x):
-    """Return a x for any float x."""
-    return times(a, complex(x, 0.0))
-
-
 @apart
 def jump(cluster, part, number, n, state):
     """Go a part of the way to the limit: impulses by x, neighbours' works by y.
 
-    The works of the cycle itself are known from what disappears of motion and stores: (1 - e^2) of
-    them.
+    (1 - e^2) of the works of the cycle itself is what disappears of motion and stores.
     """
     ball, contact, memory = state.ball, state.contact, state.memory[number]
     left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
@@ -186,14 +230,13 @@ def jump(cluster, part, number, n, state):
 
 
 @apart
-def go_on(cluster, total, n, state):
-    """Repeat a cycle 2, 4, 8 ... times, before a neighbour comes to its event; tell if it did.
+def go_on(c, cluster, total, n, state):
+    """Repeat the cycle that contact c ends 2, 4, 8 ... times, before a neighbour has its event.
 
-    After k cycles everything is L^k of what it was, L = T / (1 + T), and the balls have gone the
-    part 1 - L^k of the way to the limit: half of it at most, as a neighbour's event may be at the
-    limit itself.
+    After k cycles the balls have gone the part 1 - L^k of the way to the limit, L = T / (1 + T):
+    half of it at most, as a neighbour's event may be at the limit itself.
     """
-    contact, memory = state.contact, state.memory[LOWER]
+    contact, run, memory = state.contact, state.run, state.memory[LOWER]
     cycles, part = 1, 1.0 / (1.0 + total)
     while True:
         further = part * (2.0 - part)
@@ -201,37 +244,39 @@ def go_on(cluster, total, n, state):
             break
         cycles, part = 2 * cycles, further
     if cycles < LIMITS.many:
-        return False
+        return
     neighbours_stay(cluster, total, part, LOWER, n, state)
     jump(cluster, part, LOWER, n, state)
-    for c in range(cluster.first, cluster.last + 1):
-        contact[c].hits += cycles * (contact[c].hits - memory[c].hits)
-    return True
-
-
-@apart
-def repeated(c, n, state):
-    """Note that the cycle that contact c ends has been repeated; look for another one from here."""
-    run = state.run
-    first = state.tally[0].first
-    while first < n:
+    for k in range(cluster.first, cluster.last + 1):
+        contact[k].hits += cycles * (contact[k].hits - memory[k].hits)
+    first = run[n - 1].onward
+    while first < n - 1:
         run[first].stirred = 1
         first = run[first].onward
-    forget(LOWER, state.level)
+    forget(LOWER, state.level)  # look for another one from here
     record(REPETITION, c, n, state)
+
+
+def is_in_doubt(cluster, bent, state):
+    """Tell whether a bent cycle's limit is open: with steady neighbours it depends on the bend."""
+    if cluster.left == cluster.first and cluster.last == cluster.right:
+        return False
+    farthest = 0.0
+    for i in range(cluster.left, cluster.right + 2):
+        before = state.contact[i - 1].x.real if i > cluster.left else 0.0
+        after = state.contact[i].x.real if i <= cluster.right else 0.0
+        farthest = max(farthest, abs(before - after) * state.ball[i].inverse.real)
+    return bent * farthest > LIMITS.doubt * state.tally[0].fastest
 
 
 @apart
 def cycle(number, c, n, state):
     """If the neighbourhood of contact c repeats itself on another scale, go to the limit.
 
-    Light balls need many cycles to settle on one factor.  It is enough that what still changes
-    will not matter: the bend, how far the state turns by the time that it is exhausted, is below
-    its limit at the pace since the snapshot.  Without steady neighbours the limit does not depend
-    on the bend.  With them it does: then what it leaves open must be too small to matter.
-
-    Where there is no limit, or a neighbour comes to its event before it, the cycle is repeated as
-    often as it surely repeats itself.
+    Light balls need many cycles to settle on one factor.  It is enough that the bend, how far the
+    state will turn by the time that it is exhausted, is below its limit; and that it leaves nothing
+    in doubt.  Where there is no limit, or a neighbour comes to its event before it, the cycle is
+    repeated as often as it surely repeats itself.
 
     Returns (first, last) of the contacts that have collapsed, empty if none have.
     """
@@ -245,8 +290,7 @@ def cycle(number, c, n, state):
     if off > LIMITS.self_similar:
         if total < 0.0:
             return c, c - 1  # a cycle that grows does so by one factor
-        # How often the scale still shrinks by L before nothing is left; log(1 / L) is above
-        # 1 / (T + 1/2), and as good as that for a slow cycle.
+        # How often the scale still shrinks by L: log(1 / L) is about 1 / (T + 1/2).
         threshold = max(LIMITS.exhausted * state.tally[0].fastest, 5e-324)
         bent = off * max(math.log(size / threshold), 1.0) * (total + 0.5)
         if not bent < LIMITS.bend:
@@ -258,25 +302,11 @@ def cycle(number, c, n, state):
             jump(cluster, 1.0, number, n, state)
             end_plastically(cluster.first, cluster.last, n, state)
             return cluster.first, cluster.last
-    if number == LOWER and bent == 0.0 and go_on(cluster, total, n, state):
-        repeated(c, n, state)
+    if number == LOWER and bent == 0.0:
+        go_on(c, cluster, total, n, state)
     return c, c - 1
 
 
-@jit
-def is_in_doubt(cluster, bent, state):
-    """Tell whether steady neighbours leave open where a bent cycle's limit is."""
-    if cluster.left == cluster.first and cluster.last == cluster.right:
-        return False
-    farthest = 0.0
-    for i in range(cluster.left, cluster.right + 2):
-        before = state.contact[i - 1].x.real if i > cluster.left else 0.0
-        after = state.contact[i].x.real if i <= cluster.right else 0.0
-        farthest = max(farthest, abs(before - after) * state.ball[i].inverse.real)
-    return bent * farthest > LIMITS.doubt * state.tally[0].fastest
-
-
-@jit
 def look(number, c, n, state):
     """See whether contact c has come round; take a new snapshot if the last one is old."""
     level = state.level[number]
@@ -290,9 +320,17 @@ def look(number, c, n, state):
 
 
 @apart
-def look_above(first, last, n, state):
-    """Contacts first..last have collapsed; see whether such collapses come round too."""
-    level = state.level
+def take_limits(n, state):
+    """R9, after contacts have ended: tell whether some have collapsed; if so, in cycles, too."""
+    level, tally = state.level, state.tally[0]
+    level[LOWER].count += tally.ends
+    first, last = tally.ended, tally.ended - 1
+    if tally.worn >= 0:
+        first, last = merge_exhausted(tally.worn, n, state)
+    if last < first:
+        first, last = look(LOWER, tally.ended, n, state)
+    if last < first:
+        return False
     forget(LOWER, level)
     level[UPPER].count += 1
     one, other = look(UPPER, first, n, state)
@@ -301,22 +339,5 @@ def look_above(first, last, n, state):
         first, last = one, other
     for c in range(first, last + 1):
         record(COLLAPSE, c, n, state)
-    state.tally[0].collapsed = 1
-
-
-@jit
-def take_limits(n, state):
-    """R9, after contacts have ended; tell whether some have collapsed."""
-    tally = state.tally[0]
-    state.level[LOWER].count += tally.ends
-    first, last = tally.ended, tally.ended - 1
-    if tally.worn >= 0:
-        first, last = exhausted_stretch(tally.worn, n, state)
-        if first <= last:
-            first, last = merge(first, last, n, state)
-    if last < first:
-        first, last = look(LOWER, tally.ended, n, state)
-    if last < first:
-        return False
-    look_above(first, last, n, state)
+    tally.collapsed = 1
     return True

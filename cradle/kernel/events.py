@@ -2,30 +2,23 @@
 
 from cradle.kernel.numbers import ZERO, minus, negative
 from cradle.kernel.record import record
-from cradle.kernel.rules import has_ended, is_clear, opens_at_zero, source_of
-from cradle.kernel.state import CLOSE, END, LIMITS, apart, jit
+from cradle.kernel.rules import (
+    active_beside,
+    has_ended,
+    is_clear,
+    opens_at_zero,
+    rates,
+    source_of,
+)
+from cradle.kernel.state import CLOSE, END, LIMITS, apart
 
 
-@jit
-def link(before, after, n, run, tally):
-    """Make two runs neighbours in the list; -1 stands for its beginning, n for its end."""
-    if before < 0:
-        tally.first = after
-    else:
-        run[before].onward = after
-    if after < n:
-        run[after].back = before
+def link(before, after, run):
+    """Make two runs neighbours in the ring."""
+    run[before].onward = after
+    run[after].back = before
 
 
-@jit
-def run_of(c, contact):
-    """Return the first contact of the run of the active contact c."""
-    while c > 0 and contact[c - 1].active == 1:
-        c -= 1
-    return c
-
-
-@jit
 def stir(c, n, run, contact):
     """Note that the runs at contact c and across an idle contact beside it have changed."""
     for k in range(max(c - 2, 0), min(c + 2, n - 2) + 1):
@@ -36,7 +29,6 @@ def stir(c, n, run, contact):
                 run[run[k].first].stirred = 1
 
 
-@jit
 def make_run(first, last, source, low, high, run):
     """Write a run down; source, low and high are those of a longer one, or of this."""
     run[first].last = last
@@ -47,65 +39,55 @@ def make_run(first, last, source, low, high, run):
     run[first].stirred = 1
 
 
-@jit
 def start(n, state):
     """R2: in each touching stretch the leftmost approaching contact is the source."""
-    ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
-    link(-1, n, n, run, tally)
-    before = -1
+    ball, contact, run = state.ball, state.contact, state.run
+    link(n - 1, n - 1, run)
     c = 0
     while c < n - 1:
-        if contact[c].u.real < 0.0:
-            c += 1
-            continue
-        first = c
-        source = -1
+        first, source = c, -1
         while c < n - 1 and contact[c].u.real >= 0.0:
             if source < 0 and contact[c].u.real > 0.0:
                 source = c
             c += 1
         if source >= 0:
             for k in range(first, c):
-                contact[k].active = 1
-                contact[k].hits = 1
+                contact[k].active = contact[k].hits = 1
                 if k > first:
                     ball[k].turn = 1 if k > source else -1
             make_run(first, c - 1, source, first, c - 1, run)
-            link(before, first, n, run, tally)
-            link(first, n, n, run, tally)
-            before = first
-
-
-@jit
-def join(one, other, source, n, run, tally):
-    """Make one run of two that touch."""
-    make_run(one, run[other].last, source, run[one].low, run[other].high, run)
-    link(one, run[other].onward, n, run, tally)
+            link(run[n - 1].back, first, run)
+            link(first, n - 1, run)
+        c += 1
 
 
 @apart
-def grow(c, n, ball, contact, run, tally):
-    """R4, R5: contact c closes: a run of its own, joined to those beside it, which drive it."""
+def grow(c, n, ball, contact, run):
+    """R4, R5: contact c closes; it joins the runs beside it, one or two, which drive it."""
     k = contact[c]
     k.q = k.rate = ZERO  # it drives nobody in this round
     k.w = 0.0
     k.active = 1
     k.hits += 1
+    first = last = low = high = c
+    source = -1  # R8.5: several sources
     from_left = c > 0 and contact[c - 1].active == 1
     from_right = c < n - 2 and contact[c + 1].active == 1
-    first = run[c - 1].first if from_left else c
-    before = first if from_left else run[c + 1].back
-    after = c + 1 if from_right else run[first].onward
-    make_run(c, c, c, c, c, run)
-    link(before, c, n, run, tally)
-    link(c, after, n, run, tally)
     if from_left:
         ball[c].turn = 1
-        join(first, c, run[first].source, n, run, tally)
+        first = run[c - 1].first
+        low = run[first].low
     if from_right:
         ball[c + 1].turn = -1
-        source = -1 if from_left else run[c + 1].source  # R8.5: several sources
-        join(first, c + 1, source, n, run, tally)
+        last, high = run[c + 1].last, run[c + 1].high
+    if not from_left:
+        source = run[c + 1].source
+        link(run[c + 1].back, c, run)
+    elif not from_right:
+        source = run[first].source
+    if from_right:
+        link(first, run[c + 1].onward, run)
+    make_run(first, last, source, low, high, run)
     stir(c, n, run, contact)
 
 
@@ -115,28 +97,25 @@ def deactivate(c, first, n, ball, contact, run, tally):
     contact[c].q = ZERO
     contact[c].active = 0
     contact[c].before, contact[c].stamp = negative(contact[c].u), tally.stamp
-    ball[c].turn = 0
-    ball[c + 1].turn = 0
+    ball[c].turn = ball[c + 1].turn = 0
     last, source, low, high = run[first].last, run[first].source, run[first].low, run[first].high
     before, after = run[first].back, run[first].onward
     for one, other in ((first, c - 1), (c + 1, last)):
         if one <= other:
             own = source if source >= 0 else source_of(one, other, ball)
             make_run(one, other, own, low, high, run)
-            link(before, one, n, run, tally)
+            link(before, one, run)
             before = one
-    link(before, after, n, run, tally)
+    link(before, after, run)
     stir(c, n, run, contact)
 
 
-@jit
 def reduced_mass(c, ball):
     """Return the reduced mass of the two balls of contact c."""
     one, other = ball[c].m.real, ball[c + 1].m.real
     return one / (one + other) * other
 
 
-@jit
 def exhausted(c, work, ball, contact, tally):
     """R9: tell whether next to nothing is left of contact c, neither closing speed nor `work`."""
     threshold = LIMITS.exhausted * tally.fastest
@@ -145,7 +124,6 @@ def exhausted(c, work, ball, contact, tally):
     return 2.0 * work < reduced_mass(c, ball) * threshold * threshold
 
 
-@jit
 def count_exhausted(c, n, ball, contact, tally):
     """R9: count a collision as exhausted if all of it was; a genuine one clears its neighbours.
 
@@ -160,20 +138,21 @@ def count_exhausted(c, n, ball, contact, tally):
     return False
 
 
-@jit
-def end_contacts(slopes, n, state):
+def end_contacts(at_zero, n, state):
     """R3, R8.1: end every contact that needs no progress to end; left to right.
 
-    With the `slopes` known, those that open from u = 0; before, all others.
+    Of runs that have changed: first those whose past says so; then, by new rates, those `at_zero`.
     """
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
-    first = tally.first
-    while first < n:
+    first = run[n - 1].onward
+    while first < n - 1:
         after = run[first].onward
         if run[first].stirred == 1:
+            if at_zero:
+                rates(first, run, ball, contact, tally)
             high = run[first].high
             for c in range(run[first].low, high + 1):
-                if not (opens_at_zero(c, ball, contact) if slopes else has_ended(c, contact)):
+                if not (opens_at_zero(c, ball, contact) if at_zero else has_ended(c, contact)):
                     continue
                 tally.ends += 1
                 tally.ended = c
@@ -187,7 +166,6 @@ def end_contacts(slopes, n, state):
         first = after
 
 
-@jit
 def about_to_close(c, n, contact):
     """R5: tell whether the idle contact c is at zero, driven from one side.
 
@@ -195,18 +173,15 @@ def about_to_close(c, n, contact):
     """
     if not 0 <= c < n - 1 or contact[c].active == 1 or contact[c].u.real < 0.0:
         return False
-    from_left = c > 0 and contact[c - 1].active == 1
-    return from_left != (c < n - 2 and contact[c + 1].active == 1)
+    return active_beside(c, n, contact) == 1
 
 
-@jit
 def distance(c, contact, tally):
     """Return how far contact c was from closing before the last progress, or at its end since."""
     k = contact[c]
     return k.before if k.stamp == tally.stamp else ZERO
 
 
-@jit
 def closes_now(c, n, contact, tally):
     """R5, R8.6: tell whether contact c closes; of two on one free ball the nearer, or left one."""
     if not about_to_close(c, n, contact):
@@ -218,18 +193,17 @@ def closes_now(c, n, contact, tally):
     return not (is_clear(farther, one.real, tally) and farther > 0.0)
 
 
-@jit
 def close_contacts(n, state):
     """R5, R8.1: activate every idle contact that is about to close, left to right; tell if any."""
     contact, run, tally = state.contact, state.run, state.tally[0]
     closed = False
-    first = tally.first
-    while first < n:
+    first = run[n - 1].onward
+    while first < n - 1:
         after = run[first].onward
         if run[first].stirred == 1:
             for c in (first - 1, run[first].last + 1):
                 if closes_now(c, n, contact, tally):
-                    grow(c, n, state.ball, contact, run, tally)
+                    grow(c, n, state.ball, contact, run)
                     record(CLOSE, c, n, state)
                     closed = True
         first = after

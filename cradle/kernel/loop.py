@@ -1,14 +1,14 @@
-"""The event loop: rounds of events, each a closed-form root of the impulses (R8)."""
+"""The event loop: rounds of events, each a closed-form root of the impulses (R8); the door."""
 
 import math
+from typing import Any, NamedTuple
 
-from cradle.kernel.cycles import take_limits
+from cradle.kernel.cycles import forget, take_limits
 from cradle.kernel.events import close_contacts, end_contacts, grow, reduced_mass, start
 from cradle.kernel.meeting import first_meeting, who_goes
 from cradle.kernel.numbers import ONE, ZERO, minus, negative, over, plus, read, scaled, times
-from cradle.kernel.record import record, record_compressions
-from cradle.kernel.rules import pull_beside, pulls_at, rates, segment
-from cradle.kernel.snapshot import forget
+from cradle.kernel.record import certify, goes_all, record, record_compressions, settle
+from cradle.kernel.rules import course
 from cradle.kernel.state import (
     CLOSE,
     FINISHED,
@@ -17,104 +17,76 @@ from cradle.kernel.state import (
     NO_EVENT,
     PASSED,
     PAUSED,
+    REFUSED,
     UNFINISHED,
     UNSOUND,
     UPPER,
     apart,
-    jit,
+    door,
 )
 
 
-@jit
-def book_work(k, impulse, now):
-    """R3: book the works of contact k: an impulse takes its closing speed straight to `now`."""
-    u = k.u
-    if u.real * now.real >= 0.0:
-        work = scaled(times(impulse, plus(u, now)), 0.5)
-        gain = work if work.real > 0.0 else ZERO
-        give = ZERO if work.real > 0.0 else work
-    else:
-        # Squares of closing speeds share out work: rate u^2 / (2 |slope|) on each side of zero.
-        half = over(scaled(impulse, 0.5), minus(u, now))
-        gain = times(half, times(u, u))
-        give = negative(times(half, times(now, now)))
-        if u.real < 0.0:
-            gain, give = give, gain
-    if gain.real > 0.0 or (impulse.real > 0.0 and max(u.real, now.real) > 0.0):
-        k.w += max(gain.real, 5e-324)  # a work that underflows is one nevertheless (R7)
-        k.a = plus(k.a, gain)
-    k.q = plus(k.q, plus(times(k.square, gain), give))
-    if k.q.real <= 0.0:
-        k.q = ZERO
+class Inputs(NamedTuple):
+    """Chains: one a row, or one row for all."""
+
+    m: Any
+    v: Any
+    e: Any
+    forward: Any
+    backward: Any
 
 
-@jit
-def set_speed(k, u, change, tally):
-    """Set the closing speed of a contact whose balls have changed by so much, both together.
+class Options(NamedTuple):
+    """How to solve them."""
 
-    What is zero but for its last digits is zero.  An idle contact that has passed it is a defect.
-    """
-    k.made += change
-    k.u = u
-    if abs(u.real) <= LIMITS.tie * k.made:
-        k.u = ZERO
-    elif k.active == 0 and u.real > 0.0:
-        tally.defect = PASSED
+    meeting: float
+    max_events: int  # most rounds; the textbook allows two for each event
+    bounded: bool  # refuse ratios above Eq. 53
 
 
-@jit
-def advance(first, n, state):
-    """Take a run straight on its way: velocities are linear in the impulses, works quadratic."""
-    ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
-    low, high, s = run[first].low, run[first].high, run[first].way
-    for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
-        k = contact[c]
-        own = low <= c <= high
-        if not own and k.active == 1:
-            continue  # it waits
-        slope = k.slope if own else pull_beside(c, low, ball)
-        pulls = pulls_at(c, ball) if own else abs(slope.real)
-        ends = run[first].goes == 2 and k.due == 1
-        now = k.final if ends else plus(k.u, times(slope, s))
-        if own:
-            impulse = times(k.rate, s)
-            k.p = plus(k.p, impulse)
-            if k.fixed == 1 and impulse.real > 0.0:
-                k.held = 1
-            if k.fixed == 0:
-                book_work(k, impulse, now)
-        elif k.stamp < tally.stamp:
-            k.before, k.stamp = negative(k.u), tally.stamp
-        if ends:
-            k.q = ZERO
-            k.u, k.made = now, abs(now.real)  # known by construction
-        else:
-            set_speed(k, now, pulls * s.real, tally)
-    run[first].stirred = 1
+class Outputs(NamedTuple):
+    """Outcomes, a row for each chain; impulses, works and held contacts of the last one alone."""
+
+    v: Any
+    hits: Any
+    collapsed: Any
+    p: Any
+    a: Any
+    held: Any
 
 
-@jit
-def go(n, state):
-    """R8.3 to R8.6: take every run on; close the gap at which two of them meet."""
-    run, contact, tally = state.run, state.contact, state.tally[0]
-    tally.stamp += 1
-    gap = who_goes(first_meeting(n, state), n, state)
-    first = tally.first
-    while first < n:
-        if run[first].goes > 0:
-            if not run[first].way.real < math.inf:
-                tally.defect = NO_EVENT
-                return
-            if tally.capacity > 0:
-                record_compressions(first, run[first].way, n, state)
-            advance(first, n, state)
-        first = run[first].onward
-    if gap >= 0:
-        if contact[gap].u.real != 0.0:
-            tally.defect = PASSED
-        contact[gap].u, contact[gap].made = ZERO, 0.0
-        grow(gap, n, state.ball, contact, run, tally)
-        record(CLOSE, gap, n, state)
+def above_bound(ratio, m, driven, onward):
+    """R7: tell whether a ratio is above its bound, as `closed_form.largest_ratios` draws it."""
+    return ratio > 1.0 / (1.0 + m / driven * (1.0 - onward)) * LIMITS.rounded
+
+
+@apart
+def admissible(n, chain, bounded):
+    """Tell whether all inputs are within their limits, ratios within Eq. 53 too if `bounded`."""
+    m, v, e, forward, backward = chain.m, chain.v, chain.e, chain.forward, chain.backward
+    heaviest = energy = momentum = 0.0
+    for i in range(n):
+        heaviest = max(heaviest, m[i])
+        momentum += 2.0 * (m[i] * abs(v[i]))
+        energy += m[i] * v[i] * v[i]
+    if not (energy < math.inf and momentum < math.inf):
+        return False
+    for i in range(n):
+        if not (0.0 < m[i] < math.inf and m[i] >= LIMITS.lightest * heaviest):
+            return False
+    for c in range(n - 1):
+        if not (e[c] == 0.0 or LIMITS.least_restitution <= e[c] <= 1.0):
+            return False
+    for i in range(n - 2):
+        if not (0.0 <= forward[i] <= 1.0 and 0.0 <= backward[i] <= 1.0):
+            return False
+        onward, back = forward[i + 1] if i < n - 3 else 0.0, backward[i - 1] if i > 0 else 0.0
+        if bounded and (
+            above_bound(forward[i], m[i + 1], m[i + 2], onward)
+            or above_bound(backward[i], m[i + 1], m[i], back)
+        ):
+            return False
+    return True
 
 
 @apart
@@ -161,41 +133,96 @@ def prepare(n, chain, meeting, state):
     start(n, state)
 
 
-@jit
-def new_rates(n, state):
-    """Work out the rates of the runs that have changed; tell whether a contact is about to open."""
-    run, tally = state.run, state.tally[0]
-    opening = False
-    first = tally.first
-    while first < n:
-        if run[first].stirred == 1:
-            opens = rates(first, run, state.ball, state.contact, tally)
-            opening = opening or opens
-            tally.effort -= 2 + run[first].high - run[first].low
-        first = run[first].onward
-    return opening
+def book_work(k, impulse, now):
+    """R3: book the works of contact k: an impulse takes its closing speed straight to `now`."""
+    u = k.u
+    if u.real * now.real >= 0.0:
+        work = scaled(times(impulse, plus(u, now)), 0.5)
+        gain = work if work.real > 0.0 else ZERO
+        give = ZERO if work.real > 0.0 else work
+    else:
+        # Squares of closing speeds share out work: rate u^2 / (2 |slope|) on each side of zero.
+        half = over(scaled(impulse, 0.5), minus(u, now))
+        gain = times(half, times(u, u))
+        give = negative(times(half, times(now, now)))
+        if u.real < 0.0:
+            gain, give = give, gain
+    if gain.real > 0.0 or (impulse.real > 0.0 and max(u.real, now.real) > 0.0):
+        k.w += max(gain.real, 5e-324)  # a work that underflows is one nevertheless (R7)
+        k.a = plus(k.a, gain)
+    k.q = plus(k.q, plus(times(k.square, gain), give))
+    if k.q.real <= 0.0:
+        k.q = ZERO
 
 
-@jit
-def new_segments(n, state):
-    """R8.2: work out the segments of the runs that have changed."""
-    run, tally = state.run, state.tally[0]
-    first = tally.first
-    while first < n:
-        if run[first].stirred == 1:
-            segment(first, n, run, state.ball, state.contact, tally)
-        first = run[first].onward
+def advance(one, n, state):
+    """Take a run straight on its way: velocities are linear in the impulses, works quadratic.
+
+    What is zero but for its last digits is zero.  An idle contact that has passed it is a defect.
+    """
+    ball, contact, tally = state.ball, state.contact, state.tally[0]
+    low, high = one.low, one.high
+    for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
+        k = contact[c]
+        own = low <= c <= high
+        if not own and k.active == 1:
+            continue  # it waits
+        slope, pulls = course(c, low, high, ball, contact)
+        ends = k.due == 1 and goes_all(one)
+        now = k.final if ends else plus(k.u, times(slope, one.way))
+        if own:
+            impulse = times(k.rate, one.way)
+            k.p = plus(k.p, impulse)
+            if k.fixed == 1 and impulse.real > 0.0:
+                k.held = 1
+            if k.fixed == 0:
+                book_work(k, impulse, now)
+        elif k.stamp < tally.stamp:
+            k.before, k.stamp = negative(k.u), tally.stamp
+        k.u = now
+        if ends:
+            k.q = ZERO
+            k.made = abs(now.real)  # known by construction
+            continue
+        k.made += pulls * one.way.real
+        if abs(now.real) <= LIMITS.tie * k.made:
+            k.u = ZERO
+        elif k.active == 0 and now.real > 0.0:
+            tally.defect = PASSED
+    one.stirred = 1
 
 
-@jit
-def impact(n, chain, meeting, max_rounds, resumed, state):
+def go(n, state):
+    """R8.2 to R8.6: take every run on; close the gap at which two of them meet."""
+    run, contact, tally = state.run, state.contact, state.tally[0]
+    tally.stamp += 1
+    gap = who_goes(first_meeting(n, state), n, state)
+    first = run[n - 1].onward
+    while first < n - 1:
+        one = run[first]
+        if one.part.real > 0.0:
+            one.way = times(one.reach, one.part)
+            if not one.way.real < math.inf:
+                tally.defect = NO_EVENT
+                return
+            if tally.capacity > 0:
+                record_compressions(one, n, state)
+            advance(one, n, state)
+        first = one.onward
+    if gap >= 0:
+        if contact[gap].u.real != 0.0:
+            tally.defect = PASSED
+        contact[gap].u, contact[gap].made = ZERO, 0.0
+        grow(gap, n, state.ball, contact, run)
+        record(CLOSE, gap, n, state)
+
+
+def impact(n, max_rounds, state):
     """Solve one impact: run rounds until no contact is active; return the status.
 
-    With tally.effort or tally.room used up it stops, PAUSED, to be `resumed`.
+    With tally.effort or tally.room used up it stops, PAUSED, and can be called again.
     """
-    tally = state.tally[0]
-    if not resumed:
-        prepare(n, chain, meeting, state)
+    run, tally = state.run, state.tally[0]
     while True:
         if tally.effort < 0 or tally.events > tally.room:
             return PAUSED
@@ -203,20 +230,65 @@ def impact(n, chain, meeting, max_rounds, resumed, state):
         tally.ends, tally.worn = 0, -1
         end_contacts(False, n, state)
         certain = tally.ends
-        if new_rates(n, state):
-            end_contacts(True, n, state)
+        end_contacts(True, n, state)
         collapsed = tally.ends > 0 and take_limits(n, state)
-        if tally.first >= n:
-            break
+        if run[n - 1].onward == n - 1:
+            return FINISHED
         tally.rounds += 1
         if tally.rounds > max_rounds:
             return UNFINISHED
         # R8.1: then closings; both need no progress, so the next round looks again.
         if tally.ends > certain or collapsed or close_contacts(n, state):
             continue
-        # R8.2 to R8.6: progress.
-        new_segments(n, state)
         go(n, state)
         if tally.defect > 0:
             return UNSOUND
-    return FINISHED
+
+
+@apart
+def hand_out(k, n, out, ball, contact, tally):
+    """Write the outcome of chain k in the caller's units."""
+    shift, mass_shift = tally.shift, tally.mass_shift
+    out_v, hits = out.v[k], out.hits[k]
+    for i in range(n):
+        out_v[i] = ball[i].after
+    out.collapsed[k] = tally.collapsed
+    for c in range(n - 1):
+        hits[c] = contact[c].hits
+    for c in range(len(out.p)):
+        out.p[c] = math.ldexp(contact[c].p.real, shift + mass_shift)
+        out.a[c] = math.ldexp(contact[c].a.real, 2 * shift + mass_shift)
+        out.held[c] = contact[c].held
+
+
+@door
+def batch(begin, resumed, n, inputs, options, out, state, effort):
+    """Solve the chains of `out` from number `begin` on; return the next one's number, and status.
+
+    It stops at the first chain whose status is not FINISHED: PAUSED, when `effort` (contacts
+    touched) is used up, to be `resumed` there.
+    """
+    ball, contact, tally = state.ball, state.contact, state.tally[0]
+    tally.effort, tally.capacity = effort, len(state.record.kinds)
+    for k in range(begin, len(out.v)):
+        if not resumed:
+            chain = Inputs(
+                inputs.m[min(k, len(inputs.m) - 1)],
+                inputs.v[min(k, len(inputs.v) - 1)],
+                inputs.e[min(k, len(inputs.e) - 1)],
+                inputs.forward[min(k, len(inputs.forward) - 1)],
+                inputs.backward[min(k, len(inputs.backward) - 1)],
+            )
+            if not admissible(n, chain, options.bounded):
+                return k, REFUSED
+            prepare(n, chain, options.meeting, state)
+        resumed = False
+        status = impact(n, options.max_events, state)
+        settle(n, ball, contact, tally.unit)
+        if status == FINISHED:
+            tally.defect = certify(n, ball, contact, tally)
+            status = UNSOUND if tally.defect > 0 else FINISHED
+        hand_out(k, n, out, ball, contact, tally)
+        if status != FINISHED:
+            return k, status
+    return len(out.v), FINISHED

@@ -7,8 +7,6 @@ operations have the same bits wherever floats have: no step may be reordered or 
 
 import math
 
-from cradle.kernel.state import jit
-
 ZERO = complex(0.0, 0.0)
 ONE = complex(1.0, 0.0)
 NEVER = complex(math.inf, 0.0)
@@ -21,14 +19,12 @@ TENS = (
 )  # fmt: skip
 
 
-@jit
 def pair(high, low):
     """Return high + low, where low is the smaller one."""
     total = high + low
     return complex(total, low - (total - high))
 
 
-@jit
 def sum_of(x, y):
     """Return the sum of two floats, to the last bit."""
     total = x + y
@@ -36,7 +32,6 @@ def sum_of(x, y):
     return complex(total, (x - (total - part)) + (y - part))
 
 
-@jit
 def product_of(x, y):
     """Return the product of two floats, to the last bit."""
     total = x * y
@@ -49,40 +44,34 @@ def product_of(x, y):
     return complex(total, ((xh * yh - total) + xh * yl + xl * yh) + xl * yl)
 
 
-@jit
 def plus(a, b):
     """Return a + b."""
     s = sum_of(a.real, b.real)
     return pair(s.real, s.imag + (a.imag + b.imag))
 
 
-@jit
 def minus(a, b):
     """Return a - b."""
     s = sum_of(a.real, -b.real)
     return pair(s.real, s.imag + (a.imag - b.imag))
 
 
-@jit
 def negative(a):
     """Return -a."""
     return complex(-a.real, -a.imag)
 
 
-@jit
 def times(a, b):
     """Return a b."""
     p = product_of(a.real, b.real)
     return pair(p.real, p.imag + (a.real * b.imag + a.imag * b.real))
 
 
-@jit
 def scaled(a, x):
     """Return a x for a power of two x."""
     return complex(a.real * x, a.imag * x)
 
 
-@jit
 def over(a, b):
     """Return a / b: a first quotient, and what it leaves over."""
     q = a.real / b.real
@@ -90,7 +79,6 @@ def over(a, b):
     return pair(q, ((a.real - p.real) - p.imag + (a.imag - q * b.imag)) / b.real)
 
 
-@jit
 def root(a):
     """Return the square root of a number that is not below zero."""
     if a.real <= 0.0:
@@ -100,25 +88,21 @@ def root(a):
     return pair(x, ((a.real - p.real) - p.imag + a.imag) / (2.0 * x))
 
 
-@jit
 def less(a, b):
     """Tell whether a < b."""
     return a.real < b.real or (a.real == b.real and a.imag < b.imag)
 
 
-@jit
 def least(a, b):
     """Return the smaller one, the first of equals."""
     return b if less(b, a) else a
 
 
-@jit
 def most(a, b):
     """Return the larger one, the first of equals."""
     return b if less(a, b) else a
 
 
-@jit
 def read(x):
     """Return what a float means: the decimal of up to 15 digits that it prints as, or its bits.
 

@@ -1,4 +1,4 @@
-"""What is written down: events, and velocities and impulses in the caller's units.
+"""What is written down, and the check that every answer has to pass before it is returned.
 
 A record is made beside the run and changes nothing in it.
 """
@@ -6,10 +6,18 @@ A record is made beside the run and changes nothing in it.
 import math
 
 from cradle.kernel.numbers import NEVER, ZERO, least, less, minus, negative, over, plus, times
-from cradle.kernel.state import LIMITS, MAXIMUM_COMPRESSION, apart, jit
+from cradle.kernel.state import (
+    ENERGY,
+    LEDGER,
+    LIMITS,
+    MAXIMUM_COMPRESSION,
+    MOMENTUM,
+    ORDER,
+    PULL,
+    apart,
+)
 
 
-@jit
 def velocity(b, change, unit):
     """Return the velocity of a ball in the caller's units, from what impulses have changed it by.
 
@@ -48,6 +56,57 @@ def settle(n, ball, contact, unit):
 
 
 @apart
+def certify(n, ball, contact, tally):
+    """Return what a settled outcome breaks, or 0; each sum within the rounding of its terms.
+
+    The loop follows closing speeds and works, velocities come from impulses alone: so they must
+    part as the closing speeds say, and the energy lost, impulse times mean closing speed, must be
+    what the contacts keep back, (1 - e^2) of their work.
+    """
+    unit = tally.unit
+    momentum = terms = grain = 0.0
+    lost = kept = absorbed = energy = 0.0
+    strongest = weakest = least_work = 0.0
+    speed = plus(ball[0].start, ball[0].x)
+    for i in range(n):
+        b = ball[i]
+        push = contact[i].p.real if i < n - 1 else 0.0
+        change = b.after * unit - b.v * unit
+        momentum += b.m.real * change
+        terms += b.m.real * (abs(change) + abs(b.start.real)) + abs(push)
+        grain += b.m.real * (5e-324 * unit)  # no finer velocity is a float
+        if i == n - 1:
+            break
+        k, right = contact[i], ball[i + 1]
+        next_speed = plus(right.start, right.x)
+        closing = minus(speed, next_speed).real
+        spread = abs(speed.real) + abs(next_speed.real) + tally.fastest
+        slack = LIMITS.sound * spread
+        if not (closing <= slack and abs(closing - k.u.real) <= slack):
+            return ORDER
+        if (b.after - right.after) * unit > LIMITS.tie * spread:
+            return ORDER
+        speed = next_speed
+        first = minus(b.start, right.start).real
+        lost += 0.5 * push * (first + closing)
+        energy += abs(push) * (abs(first) + abs(closing))
+        kept += (1.0 - k.square.real) * k.a.real
+        absorbed += k.a.real
+        strongest, weakest = max(strongest, push), min(weakest, push)
+        least_work = min(least_work, k.a.real)
+    slack = (LIMITS.sound + n * 2.0**-52) * (energy + absorbed)
+    if not abs(momentum) <= LIMITS.sound * terms + grain < math.inf:
+        return MOMENTUM
+    if least_work < -slack or weakest < -LIMITS.sound * strongest:
+        return PULL
+    if not -lost <= slack < math.inf:
+        return ENERGY
+    if not abs(lost - kept) <= slack:
+        return LEDGER
+    return 0
+
+
+@apart
 def write(kind, c, low, high, way, n, state):
     """Write an event and the state when contacts low..high have gone so far on at their rates."""
     record, tally = state.record, state.tally[0]
@@ -67,7 +126,6 @@ def write(kind, c, low, high, way, n, state):
         before = after
 
 
-@jit
 def record(kind, c, n, state):
     """Count an event; write it and the state after it, if there is room."""
     if state.tally[0].events < state.tally[0].capacity:
@@ -75,22 +133,27 @@ def record(kind, c, n, state):
     state.tally[0].events += 1
 
 
+def goes_all(one):
+    """Tell whether a run goes all of its segment: the events at its end are due then."""
+    return one.part.real == 1.0 and one.part.imag == 0.0
+
+
 @apart
-def record_compressions(first, way, n, state):
+def record_compressions(one, n, state):
     """Record every maximum compression of a run on its way, in order of progress.
 
     It changes no rate, so the run itself does not stop for it: the state there is made on the side.
     """
-    contact, run, tally = state.contact, state.run, state.tally[0]
-    low, high = run[first].low, run[first].high
+    contact, tally = state.contact, state.tally[0]
+    low, high, way = one.low, one.high, one.way
     for c in range(low, high + 1):
         k = contact[c]
         k.x = NEVER
         if k.u.real > 0.0 and k.slope.real < 0.0:
             at = over(k.u, negative(k.slope))
-            ends = run[first].goes == 2 and k.due == 1
             # One that comes at the end of the way is one of it, whatever its last digits say.
-            if ends or minus(at, way).real <= LIMITS.tie * k.age:
+            late = minus(at, way).real
+            if late <= LIMITS.tie * k.age or (k.due == 1 and goes_all(one)):
                 k.x = at
     while True:
         found = low

@@ -1,7 +1,7 @@
-"""The rules of one run: impulse rates (R1, R6), ratios in force (R7), its straight way (R3, R8.2).
+"""One run: its impulse rates (R1, R6), ratios in force (R7) and straight way (R3, R8.2).
 
-A run's contacts low..high have impulses, or balls that move; contacts beyond them wait, because no
-impulse that a ball could notice reaches them (`reached`).
+Its contacts low..high have impulses, or balls that move; contacts beyond them wait, because no
+impulse that a ball could notice reaches them.
 """
 
 import math
@@ -20,10 +20,9 @@ from cradle.kernel.numbers import (
     scaled,
     times,
 )
-from cradle.kernel.state import LIMITS, apart, jit
+from cradle.kernel.state import LIMITS, apart
 
 
-@jit
 def source_of(first, last, ball):
     """R1: the one contact of a run that drives all others, or -1 if there are several."""
     source = first
@@ -35,79 +34,64 @@ def source_of(first, last, ball):
     return source
 
 
-@jit
-def wait(low, high, ball, contact, outer):
-    """Let contacts low..high wait: no impulse, no pull of their left (outer 0) or right balls."""
-    for c in range(low, high + 1):
-        contact[c].rate = contact[c].slope = ball[c + outer].pull = ZERO
+def farthest(c, end, smallest, contact):
+    """R1: how far towards `end` impulses reach from the source c, at nominal ratios or beyond."""
+    x, way = 1.0, 1 if c < end else -1
+    while way * (end - c) > 0 and x > smallest:
+        ratio = contact[c].forward if way == 1 else contact[c - 1].backward
+        x *= ratio.real
+        c += way
+    return c
 
 
-@jit
 def reached(first, run, smallest, ball, contact):
-    """R1: set low..high of a run: as far as impulses reach at the nominal ratios, or beyond.
+    """R1: set low..high of a run; what was reached before now waits.
 
     No ratio in force is larger than its nominal one.  From the one source outwards rates only
-    become less; with several sources all contacts count.  What was reached before now waits.
+    become less; with several sources all contacts count.
     """
-    source, last = run[first].source, run[first].last
-    low, high = run[first].low, run[first].high
-    run[first].low = first
-    run[first].high = last
-    if source < 0:
-        return
-    x = 1.0
-    c = source
-    while c < last and x > smallest:
-        x *= contact[c].forward.real
-        c += 1
-    run[first].high = c
-    wait(c + 1, high, ball, contact, 1)
-    x = 1.0
-    c = source
-    while c > first and x > smallest:
-        x *= contact[c - 1].backward.real
-        c -= 1
-    run[first].low = c
-    wait(low, c - 1, ball, contact, 0)
+    one = run[first]
+    low, high, source = one.low, one.high, one.source
+    one.low = first if source < 0 else farthest(source, first, smallest, contact)
+    one.high = one.last if source < 0 else farthest(source, one.last, smallest, contact)
+    for c in range(low, one.low):
+        contact[c].rate = contact[c].slope = ball[c].pull = ZERO
+    for c in range(one.high + 1, high + 1):
+        contact[c].rate = contact[c].slope = ball[c + 1].pull = ZERO
 
 
-@jit
-def keep_closed(i, driven, far, onward, ball, contact, tally):
+def keep_closed(i, low, high, ball, contact, tally):
     """R7: lower the ratio at ball i to its bound (Eq. 53) if the driven contact would open at once.
 
-    There the contact is held at u = 0.  `far` is its other ball, which passes the part `onward` of
-    the contact's impulse on.
+    There the contact is held at u = 0.  One that is driven from both sides cannot open.
     """
-    b, k = ball[i], contact[driven]
-    if k.u.real == 0.0 and k.w == 0.0:
-        one = ball[far].m
-        both = plus(one, times(b.m, minus(ONE, onward)))
-        nominal, bound = b.ratio.real * both.real, one.real
-        if nominal * LIMITS.rounded >= bound:
-            k.fixed = 1 if nominal > bound * LIMITS.rounded else 2
-            b.ratio = over(one, both)
-        if k.fixed != 2:
-            tally.margin = min(tally.margin, abs(nominal - bound) / bound)
+    b, far = ball[i], i + ball[i].turn
+    k = contact[min(i, far)]
+    if ball[far].turn == -b.turn or k.u.real != 0.0 or k.w != 0.0:
+        return
+    one = ball[far].m
+    onward = ball[far].ratio if low < far <= high and ball[far].turn == b.turn else ZERO
+    both = plus(one, times(b.m, minus(ONE, onward)))
+    nominal, bound = b.ratio.real * both.real, one.real
+    if nominal * LIMITS.rounded >= bound:
+        k.fixed = 1 if nominal > bound * LIMITS.rounded else 2
+        b.ratio = over(one, both)
+    if k.fixed != 2:
+        tally.margin = min(tally.margin, abs(nominal - bound) / bound)
 
 
-@jit
 def ratios_in_force(low, high, ball, contact, tally):
-    """R7: the ratios in force in a run, each chain of drives from its far end to its driver.
-
-    A contact driven from both sides cannot open, so it is never held.
-    """
+    """R7: the ratios in force in a run, each chain of drives from its far end to its driver."""
     for c in range(low, high + 1):
         contact[c].fixed = 0
     for i in range(low + 1, high + 1):
         ball[i].ratio = contact[i - 1].forward if ball[i].turn == 1 else contact[i - 1].backward
-    for c in range(high, low, -1):
-        if ball[c].turn == 1 and ball[c + 1].turn != -1:
-            onward = ball[c + 1].ratio if c < high and ball[c + 1].turn == 1 else ZERO
-            keep_closed(c, c, c + 1, onward, ball, contact, tally)
-    for c in range(low, high):
-        if ball[c + 1].turn == -1 and ball[c].turn != 1:
-            onward = ball[c].ratio if c > low and ball[c].turn == -1 else ZERO
-            keep_closed(c + 1, c, c, onward, ball, contact, tally)
+    for i in range(high, low, -1):
+        if ball[i].turn == 1:
+            keep_closed(i, low, high, ball, contact, tally)
+    for i in range(low + 1, high + 1):
+        if ball[i].turn == -1:
+            keep_closed(i, low, high, ball, contact, tally)
 
 
 @apart
@@ -140,27 +124,48 @@ def several_sources(low, high, smallest, ball, contact):
         contact[c].rate = x if k > -1000 and x.real > smallest else ZERO
 
 
-@jit
-def passed_on(rate, ratio, smallest):
-    """R1: impulse rate of a contact whose driver has this one."""
-    x = times(rate, ratio)
-    return x if x.real > smallest else ZERO
-
-
-@jit
-def impulse_rates(low, high, source, smallest, ball, contact):
-    """R1, R6: impulse rates of contacts low..high of a run."""
+def rates(first, run, ball, contact, tally):
+    """R1, R6: rates of a run, pulls (Eqs. 47-48: m dv = dP left - dP right), slopes."""
+    smallest, source = tally.cut_off, run[first].source
+    reached(first, run, smallest, ball, contact)
+    low, high = run[first].low, run[first].high
+    tally.effort -= 2 + high - low
+    ratios_in_force(low, high, ball, contact, tally)
     if source < 0:
         several_sources(low, high, smallest, ball, contact)
     else:
         contact[source].rate = ONE
         for c in range(source + 1, high + 1):
-            contact[c].rate = passed_on(contact[c - 1].rate, ball[c].ratio, smallest)
+            x = times(contact[c - 1].rate, ball[c].ratio)
+            contact[c].rate = x if x.real > smallest else ZERO
         for c in range(source - 1, low - 1, -1):
-            contact[c].rate = passed_on(contact[c + 1].rate, ball[c + 1].ratio, smallest)
+            x = times(contact[c + 1].rate, ball[c + 1].ratio)
+            contact[c].rate = x if x.real > smallest else ZERO
+    ball[low].pull = negative(times(contact[low].rate, ball[low].inverse))
+    for c in range(low, high + 1):
+        onward = contact[c + 1].rate if c < high else ZERO
+        ball[c + 1].pull = times(minus(contact[c].rate, onward), ball[c + 1].inverse)
+        held = contact[c].fixed > 0
+        contact[c].slope = ZERO if held else minus(ball[c].pull, ball[c + 1].pull)
 
 
-@jit
+def is_clear(difference, size, tally):
+    """Tell whether a difference of two numbers of this size is none of rounding; note how large."""
+    part = abs(difference) / size if size > 0.0 else 0.0
+    if part <= LIMITS.tie:
+        return False
+    tally.margin = min(tally.margin, part)
+    return True
+
+
+def has_ended(c, contact):
+    """R3: tell whether contact c has ended: it opens, or has e = 0 and no longer closes."""
+    k = contact[c]
+    if k.q.real > 0.0:
+        return False
+    return k.u.real < 0.0 or (k.u.real == 0.0 and k.e.real == 0.0 and k.w > 0.0)
+
+
 def opens_at_zero(c, ball, contact):
     """R3: tell whether contact c, at u = 0 with nothing to release, is about to open.
 
@@ -173,47 +178,6 @@ def opens_at_zero(c, ball, contact):
     return k.slope.real < 0.0 or (source and k.rate.real == 0.0)
 
 
-@jit
-def rates(first, run, ball, contact, tally):
-    """R1, R6, R7: impulse rates, pulls (Eqs. 47-48: m dv = dP left - dP right) and slopes of a run.
-
-    Returns whether a contact at u = 0 with nothing to release is about to open.
-    """
-    reached(first, run, tally.cut_off, ball, contact)
-    low, high = run[first].low, run[first].high
-    ratios_in_force(low, high, ball, contact, tally)
-    impulse_rates(low, high, run[first].source, tally.cut_off, ball, contact)
-    ball[low].pull = negative(times(contact[low].rate, ball[low].inverse))
-    opens = False
-    for c in range(low, high + 1):
-        onward = contact[c + 1].rate if c < high else ZERO
-        ball[c + 1].pull = times(minus(contact[c].rate, onward), ball[c + 1].inverse)
-        held = contact[c].fixed > 0
-        contact[c].slope = ZERO if held else minus(ball[c].pull, ball[c + 1].pull)
-        opens = opens or opens_at_zero(c, ball, contact)
-    return opens
-
-
-@jit
-def is_clear(difference, size, tally):
-    """Tell whether a difference of two numbers of this size is none of rounding; note how large."""
-    part = abs(difference) / size if size > 0.0 else 0.0
-    if part <= LIMITS.tie:
-        return False
-    tally.margin = min(tally.margin, part)
-    return True
-
-
-@jit
-def has_ended(c, contact):
-    """R3: tell whether contact c has ended: it opens, or has e = 0 and no longer closes."""
-    k = contact[c]
-    if k.q.real > 0.0:
-        return False
-    return k.u.real < 0.0 or (k.u.real == 0.0 and k.e.real == 0.0 and k.w > 0.0)
-
-
-@jit
 def way_to_end(k, tally):
     """R3: progress until contact k has released all, and its closing speed then; or NEVER.
 
@@ -242,25 +206,23 @@ def way_to_end(k, tally):
     return over(plus(k.q, k.q), times(k.rate, minus(speed, k.u))), negative(speed)
 
 
-@jit
-def is_gap(c, n, contact):
-    """R8: tell whether the idle contact c has active contacts on both sides."""
-    return 0 < c < n - 2 and contact[c - 1].active == 1 and contact[c + 1].active == 1
+def active_beside(c, n, contact):
+    """Return how many of the contacts beside contact c are active; beside an idle gap (R8) two."""
+    left = contact[c - 1].active if c > 0 else 0
+    return left + (contact[c + 1].active if c < n - 2 else 0)
 
 
-@jit
-def pulls_at(c, ball):
-    """Return how fast the two balls of contact c change their velocities, both together."""
-    return abs(ball[c].pull.real) + abs(ball[c + 1].pull.real)
+def course(c, low, high, ball, contact):
+    """Return what a run does per unit of progress to contact c, its own or an idle one beside it.
+
+    How much its closing speed changes; and the velocities of its balls, both together.
+    """
+    if low <= c <= high:
+        return contact[c].slope, abs(ball[c].pull.real) + abs(ball[c + 1].pull.real)
+    slope = negative(ball[low].pull) if c < low else ball[c].pull
+    return slope, abs(slope.real)
 
 
-@jit
-def pull_beside(c, low, ball):
-    """Return the closing speed per unit of progress that a run gives an idle contact beside it."""
-    return negative(ball[low].pull) if c < low else ball[c].pull
-
-
-@jit
 def segment(first, n, run, ball, contact, tally):
     """R8.2: progress of a run to its own next rate-changing event, and which contacts have it then.
 
@@ -273,15 +235,12 @@ def segment(first, n, run, ball, contact, tally):
     sure = 0.0  # how old the closing speed of the first is
     for c in range(left, right + 1):
         k = contact[c]
+        slope, pulls = course(c, low, high, ball, contact)
+        k.until, k.final = NEVER, ZERO
         if low <= c <= high:
             k.until, k.final = way_to_end(k, tally)
-            pulls = pulls_at(c, ball)
-        else:
-            # Idle neighbours close; a gap, shared with another run, is no event of this run's own.
-            k.until, k.final, k.slope = NEVER, ZERO, pull_beside(c, low, ball)
-            if k.slope.real > 0.0 and not is_gap(c, n, contact):
-                k.until = over(negative(k.u), k.slope)
-            pulls = abs(k.slope.real)
+        elif slope.real > 0.0 and active_beside(c, n, contact) == 1:
+            k.until = over(negative(k.u), slope)  # a gap, shared with another run, is no own event
         k.age = k.made / pulls if pulls > 0.0 else 0.0
         if less(k.until, reach):
             reach = k.until
@@ -294,5 +253,5 @@ def segment(first, n, run, ball, contact, tally):
         k.due = 1 if late <= LIMITS.tie * max(k.age, sure) else 0
         if k.due == 0:
             second = least(second, k.until)
-    if reach.real < second.real < math.inf:
+    if less(reach, second) and second.real < math.inf:
         tally.margin = min(tally.margin, minus(second, reach).real / second.real)

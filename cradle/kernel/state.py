@@ -1,26 +1,20 @@
 """What the event loop knows: groups of arrays, each field explained; and its limits.
 
-The comments of the fields are the notation of this package.  There are n balls; ball i lies between
-contacts i - 1 and i, contact c between balls c and c + 1.  Masses and velocities are counted in the
-chain's own units, powers of two, in which the largest are near 1 (`scales`): that changes no digit.
-A field that is `complex` holds a number of 32 digits (`cradle.kernel.numbers`).
+There are n balls; contact c joins balls c and c + 1.  Masses and velocities are counted in the
+chain's own units, powers of two in which the largest are near 1: that changes no digit.  A field
+that is `complex` holds a number of 32 digits (`cradle.kernel.numbers`).
 """
 
 from typing import Any, NamedTuple
 
-if "jit" not in globals():
-
-    def jit(function: Any) -> Any:
-        """Mark a function that is compiled into its callers; `cradle.runtime` replaces this."""
-        return function
+if "door" not in globals():
 
     def apart(function: Any) -> Any:
-        """Mark a function that is called seldom: compiled once, not into each caller."""
+        """Mark a function that is not compiled into its callers; `cradle.runtime` replaces this."""
         return function
 
-    def door(function: Any) -> Any:
-        """Mark the function that is called from outside, whose compiled code is kept on disk."""
-        return function
+    #: Marks the function that is called from outside, whose compiled code is kept on disk.
+    door = jit = apart
 
 
 # Status codes.
@@ -34,45 +28,28 @@ NO_EVENT, PASSED, MOMENTUM, PULL, ORDER, ENERGY, LEDGER = 1, 2, 3, 4, 5, 6, 7
 
 
 class Limits(NamedTuple):
-    """What rounding and infinity are measured by."""
+    """What rounding and infinity are measured by; speeds relative to the largest closing one."""
 
-    #: R8: a closing speed, or a difference of two, below this part of what it was made of is zero;
-    #: the other seven of the 32 digits are left to the roundings of the way there.
+    # R8: a closing speed, or a difference of two, below this part of what it was made of is zero;
+    # the other seven of the 32 digits are left to the roundings of the way there.
     tie: float = 2.0**-84
-    #: R7: a ratio that this factor brings to its bound is meant to be the bound.
-    rounded: float = 1.0 + 4 * 2.0**-52
-    #: R1: a rate below this part of its run's largest, times the lightest ball's part of the
-    #: heaviest, is zero: no ball could notice it.
+    rounded: float = 1.0 + 4 * 2.0**-52  # R7: a ratio that this brings to its bound is meant to be
+    # R1: a rate below this part of its run's largest, times the lightest ball's part of the
+    # heaviest, is zero: no ball could notice it.
     cut: float = 2.0**-120
-    #: R6: one vanishing ratio, as a binary exponent far below that of any number.
-    vanishing: int = 1 << 40
-    #: R9: an exhausted contact's speed, relative to the largest initial closing speed.
-    exhausted: float = 1e-18
-    #: R9: a speed so low that sequences of impacts go on for ever, relative to the same.
-    dust: float = 2.0**-100
-    #: R9: kinetic energy that a collapse may cost, relative to that of the initial closing.
-    faint: float = 1e-20
-    #: R9: exhausted collisions in a row that are a collapse.
-    repeats: int = 8
-    #: R9: how many cycles are worth taking at once.
-    many: int = 64
-    #: R9: how closely a cycle must repeat itself, relative to its own scale.
-    self_similar: float = 1e-13
-    #: R9: how far a cycle may turn before it is exhausted, relative to its own scale.
-    bend: float = 1e-2
-    #: R9: what a jump beside a steady neighbour may leave in doubt, relative to the largest
-    #: initial closing speed.
-    doubt: float = 1e-13
-    #: R9: the least part of an impulse that a ball beside a steady neighbour is taken to keep.
-    kept: float = 1e-30
-    #: R9: how many contacts to each side a snapshot holds.
-    window: int = 64
-    #: Mass of the lightest ball allowed, as a part of the heaviest.
-    lightest: float = 1e-15
-    #: Least coefficient of restitution allowed, but zero.
-    least_restitution: float = 1e-30
-    #: The certificate: what each sum may be off, relative to its terms.
-    sound: float = 64 * 2.0**-52
+    vanishing: int = 1 << 40  # R6: binary exponent of one vanishing ratio, beyond any number's
+    exhausted: float = 1e-18  # R9: speed of an exhausted contact
+    dust: float = 2.0**-100  # R9: speed so low that sequences of impacts go on for ever
+    repeats: int = 8  # R9: exhausted collisions in a row that are a collapse
+    many: int = 64  # R9: how many cycles are worth taking at once
+    self_similar: float = 1e-13  # R9: how closely a cycle must repeat itself, on its own scale
+    bend: float = 1e-2  # R9: how far a cycle may turn before it is exhausted, on its own scale
+    doubt: float = 1e-13  # R9: speed that a jump beside a steady neighbour may leave in doubt
+    kept: float = 1e-30  # R9: least part of an impulse that a ball beside such a one keeps
+    window: int = 64  # R9: how many contacts to each side a snapshot holds
+    lightest: float = 1e-15  # mass of the lightest ball allowed, as a part of the heaviest
+    least_restitution: float = 1e-30  # least coefficient allowed, but zero
+    sound: float = 64 * 2.0**-52  # the certificate: what a sum may be off, relative to its terms
 
 
 LIMITS = Limits()
@@ -83,9 +60,9 @@ class Ball:
 
     v: float  # velocity before the impact, in the caller's units,
     start: complex  # and in the chain's own
+    after: float  # velocity after the impact, in the caller's units
     m: complex  # mass
     inverse: complex  # 1 / mass
-    after: float  # velocity after the impact, in the caller's units
     pull: complex  # velocity per unit of progress of the ball's run, dv/ds
     ratio: complex  # ratio in force at the ball
     turn: int  # direction: 1 forward, -1 backward, 0 none
@@ -93,10 +70,7 @@ class Ball:
 
 
 class Contact:
-    """One contact; it joins the ball of its own number and the next.
-
-    `u` is zero exactly if the contact is at zero by construction, or by a tie.
-    """
+    """One contact; `u` is zero exactly if it is at zero by construction, or by a tie."""
 
     e: complex  # restitution
     square: complex  # e^2
@@ -127,22 +101,24 @@ class Contact:
 
 
 class Run:
-    """One run, under the number of its first contact; linked from left to right."""
+    """One run, under the number of its first contact.
+
+    Runs are linked from left to right in a ring that begins and ends at n - 1, which is no contact.
+    """
 
     last: int  # last contact
     first: int  # under the number of a run's last contact: its first
     source: int  # the contact that drives all others, -1 if there are several
     low: int  # contacts low..high have impulses or moving balls; the others wait
     high: int
-    onward: int  # first contact of the next run, or n
-    back: int  # first contact of the run before, or -1
+    onward: int  # the next run, and the one before
+    back: int
     stirred: int  # 1 if it has changed since its rates and its segment were worked out
     reach: complex  # progress to the run's own next event: its segment
-    way: complex  # how far it goes in this round
-    goes: int  # 0 if it stays, 1 if it goes a part of its segment, 2 if all of it
-    meets: int  # 1 if it must meet the next run, after these parts
-    left: complex  # of their two segments
-    right: complex
+    part: complex  # what part of its segment it goes in this round,
+    way: complex  # and how far that is
+    left: complex  # part of its segment after which it meets the next run, NEVER if it need not,
+    right: complex  # and the part of that run's
 
 
 class Level:
@@ -152,8 +128,6 @@ class Level:
     count: int  # ends, or collapses, so far
     due: int  # at this count the next snapshot is taken
     taken: int  # snapshots so far
-    low: int  # the contacts that it holds
-    high: int
 
 
 class Memory:
@@ -180,7 +154,6 @@ class Tally:
     effort: int  # contacts that may still be touched, and events written, before a pause
     room: int
     capacity: int  # how many events the record holds
-    first: int  # first contact of the first run, or n
     shift: int  # binary exponents of the largest velocity and the largest mass
     mass_shift: int
     unit: float  # what velocities are multiplied by, 2**-shift

@@ -74,12 +74,17 @@ def unit(rooms: tuple[str, ...] = plain.ROOMS) -> str:
     return ast.unparse(ast.Module(body, [])) + "\n"
 
 
-class _Unsigned(ast.NodeTransformer):
-    """Write every index that is worked out as a number without a sign.
+class _Numba(ast.NodeTransformer):
+    """Write every index that is worked out as a number without a sign, and what is inlined.
 
     An index below zero would count from the end.  The kernel has none, but numba would ask at each
     of them, which takes a quarter of an impact's time.
     """
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        self.generic_visit(node)
+        node.decorator_list = node.decorator_list or [ast.Name("jit", ast.Load())]
+        return node
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         self.generic_visit(node)
@@ -91,7 +96,7 @@ class _Unsigned(ast.NodeTransformer):
 @functools.cache
 def _for_numba(source: str) -> str:
     """Return a source in the form in which it is compiled."""
-    return ast.unparse(ast.fix_missing_locations(_Unsigned().visit(ast.parse(source)))) + "\n"
+    return ast.unparse(ast.fix_missing_locations(_Numba().visit(ast.parse(source)))) + "\n"
 
 
 def _name() -> str:
