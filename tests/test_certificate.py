@@ -28,7 +28,8 @@ def solved(masses, velocities, e, ratio, boost=0.0):
 
 
 def verdict(state, kernel=KERNEL):
-    given = len(state.ball), state.ball, state.contact
+    v = [0.0] * len(state.ball)
+    given = len(v), v, state.ball, state.contact
     kernel["settle"](*given, state.tally[0].unit)
     return kernel["certify"](*given, state.tally[0])
 

@@ -17,8 +17,7 @@ from delicate import CHAINS
 from plain import rooms, solve
 
 from cradle.kernel import cycles
-from cradle.kernel.numbers import NEVER
-from cradle.kernel.state import FINISHED, REFUSED, UNFINISHED, UNSOUND
+from cradle.kernel.state import FINISHED, NEVER, REFUSED, UNFINISHED, UNSOUND
 
 WRONG = "wrong"
 

@@ -3,12 +3,12 @@
     state     groups of arrays, the notation; the limits of rounding
     numbers   sums of two floats, 32 digits
     rules     one run: rates, ratios in force, its way to its next event      R1, R3, R6, R7
-    record    what is written down; momentum, order, energy, ledger of every answer
+    record    what is written down
     events    start, hand-over, closing                                       R2, R4, R5
-    meeting   two runs that meet                                              R8.3, R8.4
     collapse  contacts that are exhausted, and how they end                   R9
     cycles    impacts that repeat themselves on another scale                 R9
-    loop      the rounds; many chains; the door                               R8
+    progress  segments, two runs that meet                                    R8.2 to R8.6
+    loop      the rounds; the certificate of every answer; the door           R8.1
 
 and contact forces in time, with a door of their own:
 
@@ -24,7 +24,7 @@ from cradle.kernel.loop import Inputs, Options, Outputs, batch
 
 #: The rooms of the event loop, and all, in an order in which each uses only those before it.
 EVENT_LOOP = (
-    "state", "numbers", "rules", "record", "events", "meeting", "collapse", "cycles", "loop",
+    "state", "numbers", "rules", "record", "events", "collapse", "cycles", "progress", "loop",
 )  # fmt: skip
 ROOMS = (*EVENT_LOOP, "kinks", "forces")
 

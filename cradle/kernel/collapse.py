@@ -4,8 +4,8 @@ What they have left is far below the last digit of an answer, and they alone go 
 """
 
 from cradle.kernel.events import deactivate, exhausted, stir
-from cradle.kernel.numbers import ONE, ZERO, minus, over, plus, times
-from cradle.kernel.state import LIMITS, apart
+from cradle.kernel.numbers import minus, over, plus, times
+from cradle.kernel.state import LIMITS, ONE, ZERO, apart
 
 
 @apart
@@ -39,8 +39,8 @@ def change_of(c, low, high, ball, contact):
 def common_velocity(first, last, left_part, right_part, ball, contact):
     """Leave in x of contacts first..last the impulses that bring all their balls to one velocity.
 
-    A steady neighbour whose impulse is h times that of the outermost contact beside it makes the
-    ball between them act as one of mass m / (1 - h); the parts are these 1 - h.
+    A steady neighbour with h times the impulse of the contact beside it makes the ball between act
+    as one of mass m / (1 - h); the parts are these 1 - h.
     """
     mass = momentum = speed = ZERO  # velocities count from that of the first ball
     for i in range(first, last + 2):
@@ -62,37 +62,30 @@ def common_velocity(first, last, left_part, right_part, ball, contact):
         contact[c].x = impulse
 
 
-def chatters(c, state):
-    """Tell whether contact c is in an exhausted collision, or has just been.
-
-    Or if it has collided lately at a speed that is as far below an exhausted one: dust.
-    """
-    k = state.contact[c]
-    work = k.w if k.active == 1 and k.w > 0.0 else k.q.real
-    if not exhausted(c, work, state.ball, state.contact, state.tally[0]):
-        return False
-    dust = k.hits > 0 and k.made < LIMITS.dust * state.tally[0].fastest
-    return dust or k.tiny > 0 or (k.active == 1 and k.w > 0.0)
-
-
 def last_chatter(c, step, n, state):
-    """Return the last contact from c on that chatters too, with nothing but zeros between."""
-    last, k = c, c + step
-    while 0 <= k < n - 1:
-        if chatters(k, state):
-            last = k
-        elif state.contact[k].u.real != 0.0:
+    """Return the last contact from c on that only chatters, with nothing but zeros between.
+
+    It is or was in an exhausted collision, or in one at a speed far below that: dust.
+    """
+    tally, last, j = state.tally[0], c, c + step
+    while 0 <= j < n - 1:
+        k = state.contact[j]
+        now = k.active == 1 and k.w > 0.0
+        dust = k.hits > 0 and k.made < LIMITS.dust * tally.fastest
+        gone = exhausted(j, k.w if now else k.q.real, state.ball, state.contact, tally)
+        if gone and (now or dust or k.tiny > 0):
+            last = j
+        elif k.u.real != 0.0:
             break
-        k += step
+        j += step
     return last
 
 
 @apart
 def merge(first, last, n, state):
-    """End the contacts first..last plastically: their balls take the common velocity.
+    """Bring the balls of contacts first..last to one velocity; return what has ended, first..last.
 
-    Balls that zeros beside them join to theirs go with them, and an idle neighbour that this makes
-    approach joins.
+    Balls joined to theirs by zeros go with them; idle neighbours that this makes approach join.
     """
     ball, contact = state.ball, state.contact
     while True:
@@ -122,8 +115,7 @@ def merge(first, last, n, state):
 def merge_exhausted(c, n, state):
     """Merge the contacts around c that only chatter; return (first, last), empty if none are.
 
-    Something in them must lose energy, unless they are dust: elastic sequences are finite, or hand
-    all their energy on.
+    One must lose energy, unless all are dust: elastic sequences are finite, or hand it all on.
     """
     contact = state.contact
     first, last = last_chatter(c, -1, n, state), last_chatter(c, 1, n, state)

@@ -1,18 +1,27 @@
 """R9: the second sign of a collapse: impacts that repeat themselves in cycles.
 
-The state at the end of a contact is that at its end a cycle before on a smaller scale.  Then all
-cycles to come are smaller copies of the last one, by the factor L, L^2, ..., and their sum is a
-geometric series.  Cycles that contain collapses are found in the same way, on a second level: there
-collapses are counted, not ends.
+The state at the end of a contact is that at its end a cycle before, scaled by L.  Then all cycles
+to come are copies of the last one by L, L^2, ..., and their sum is a geometric series.  Cycles that
+contain collapses are found in the same way, on a second level: collapses are counted, not ends.
 """
 
 import math
 
 from cradle.kernel.collapse import change_of, common_velocity, end_plastically, merge_exhausted
 from cradle.kernel.events import reduced_mass
-from cradle.kernel.numbers import ONE, ZERO, minus, over, plus, scaled, times
+from cradle.kernel.numbers import minus, over, plus, scaled, times
 from cradle.kernel.record import record
-from cradle.kernel.state import COLLAPSE, LIMITS, LOWER, REPETITION, UPPER, Cluster, apart
+from cradle.kernel.state import (
+    COLLAPSE,
+    LIMITS,
+    LOWER,
+    ONE,
+    REPEAT,
+    UPPER,
+    ZERO,
+    Cluster,
+    apart,
+)
 
 
 def forget(number, levels):
@@ -151,11 +160,6 @@ def stays_at_zero(c, contact, memory):
     return k.active == 1 and k.u.real == 0.0 and then.u.real == 0.0 and idle
 
 
-def scaled_by(a, x):
-    """Return a x for any float x."""
-    return times(a, complex(x, 0.0))
-
-
 @apart
 def neighbours_stay(cluster, total, part, number, n, state):
     """Leave in y what the neighbours of a cycle absorb; tell whether none comes to its own event.
@@ -167,12 +171,13 @@ def neighbours_stay(cluster, total, part, number, n, state):
     ball, contact, memory = state.ball, state.contact, state.memory[number]
     left, right = cluster.left, cluster.right
     squares = part * (2.0 - part) * total * (total / (1.0 + 2.0 * total))
+    share = complex(part, 0.0)
     for c in range(max(left - 1, 0), min(right + 1, n - 2) + 1):
         k, then = contact[c], memory[c]
         k.y = ZERO
         if cluster.first <= c <= cluster.last or stays_at_zero(c, contact, memory):
             continue
-        speed = plus(k.u, scaled_by(change_of(c, left, right, ball, contact), part))
+        speed = plus(k.u, times(change_of(c, left, right, ball, contact), share))
         if k.u.real * then.u.real < 0.0 or k.u.real * speed.real < 0.0:
             return False
         if c < left or c > right:
@@ -182,8 +187,8 @@ def neighbours_stay(cluster, total, part, number, n, state):
             return False
         straight = times(impulse, scaled(plus(then.u, k.u), 0.5))
         done = minus(k.a, then.a) if k.u.real > 0.0 else minus(k.q, then.q)
-        way = times(scaled_by(k.x, part), scaled(plus(k.u, speed), 0.5))
-        k.y = plus(way, scaled_by(minus(done, straight), squares))
+        way = times(times(k.x, share), scaled(plus(k.u, speed), 0.5))
+        k.y = plus(way, times(minus(done, straight), complex(squares, 0.0)))
         if k.active == 1 and k.u.real < 0.0 and k.q.real + k.y.real <= 0.0:
             return False
     return True
@@ -198,10 +203,11 @@ def jump(cluster, part, number, n, state):
     ball, contact, memory = state.ball, state.contact, state.memory[number]
     left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
     lost = loss = 0.0
-    left_over = minus(ONE, complex(part, 0.0))
+    share = complex(part, 0.0)
+    left_over = minus(ONE, share)
     rest = left_over.real
     for c in range(left, right + 1):
-        contact[c].x = scaled_by(contact[c].x, part)
+        contact[c].x = times(contact[c].x, share)
     for c in range(max(left - 1, 0), min(right + 1, n - 2) + 1):
         k = contact[c]
         before = k.u.real
@@ -226,7 +232,7 @@ def jump(cluster, part, number, n, state):
     squares = max(lost / loss, 0.0) if loss > 0.0 else 0.0
     for c in range(first, last + 1):
         more = minus(contact[c].a, memory[c].a)
-        contact[c].a = plus(contact[c].a, scaled_by(more, squares))
+        contact[c].a = plus(contact[c].a, times(more, complex(squares, 0.0)))
 
 
 @apart
@@ -254,7 +260,7 @@ def go_on(c, cluster, total, n, state):
         run[first].stirred = 1
         first = run[first].onward
     forget(LOWER, state.level)  # look for another one from here
-    record(REPETITION, c, n, state)
+    record(REPEAT, c, n, state)
 
 
 def is_in_doubt(cluster, bent, state):

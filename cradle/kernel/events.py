@@ -1,16 +1,9 @@
 """Events: contacts end, close and hand over; runs split and grow accordingly (R2 to R5)."""
 
-from cradle.kernel.numbers import ZERO, minus, negative
+from cradle.kernel.numbers import minus, negative
 from cradle.kernel.record import record
-from cradle.kernel.rules import (
-    active_beside,
-    has_ended,
-    is_clear,
-    opens_at_zero,
-    rates,
-    source_of,
-)
-from cradle.kernel.state import CLOSE, END, LIMITS, apart
+from cradle.kernel.rules import active_beside, is_clear, is_over, rates, source_of
+from cradle.kernel.state import CLOSE, END, LIMITS, ZERO, apart
 
 
 def link(before, after, run):
@@ -125,10 +118,7 @@ def exhausted(c, work, ball, contact, tally):
 
 
 def count_exhausted(c, n, ball, contact, tally):
-    """R9: count a collision as exhausted if all of it was; a genuine one clears its neighbours.
-
-    Returns whether so many in a row may be a collapse.
-    """
+    """R9: count an exhausted collision; tell whether so many in a row may be a collapse."""
     if not exhausted(c, contact[c].w, ball, contact, tally):
         for k in range(max(c - 1, 0), min(c + 1, n - 2) + 1):
             contact[k].tiny = 0
@@ -139,10 +129,7 @@ def count_exhausted(c, n, ball, contact, tally):
 
 
 def end_contacts(at_zero, n, state):
-    """R3, R8.1: end every contact that needs no progress to end; left to right.
-
-    Of runs that have changed: first those whose past says so; then, by new rates, those `at_zero`.
-    """
+    """R3, R8.1: end what needs no progress to end: by its past; then, at new rates, `at_zero`."""
     ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
     first = run[n - 1].onward
     while first < n - 1:
@@ -152,7 +139,7 @@ def end_contacts(at_zero, n, state):
                 rates(first, run, ball, contact, tally)
             high = run[first].high
             for c in range(run[first].low, high + 1):
-                if not (opens_at_zero(c, ball, contact) if at_zero else has_ended(c, contact)):
+                if not is_over(c, at_zero, ball, contact):
                     continue
                 tally.ends += 1
                 tally.ended = c
@@ -167,19 +154,10 @@ def end_contacts(at_zero, n, state):
 
 
 def about_to_close(c, n, contact):
-    """R5: tell whether the idle contact c is at zero, driven from one side.
-
-    Its neighbour pushes, be it by a vanishing number (R6).
-    """
+    """R5, R6: tell whether contact c is idle, at zero, and driven from one side, however weakly."""
     if not 0 <= c < n - 1 or contact[c].active == 1 or contact[c].u.real < 0.0:
         return False
     return active_beside(c, n, contact) == 1
-
-
-def distance(c, contact, tally):
-    """Return how far contact c was from closing before the last progress, or at its end since."""
-    k = contact[c]
-    return k.before if k.stamp == tally.stamp else ZERO
 
 
 def closes_now(c, n, contact, tally):
@@ -188,8 +166,11 @@ def closes_now(c, n, contact, tally):
         return False
     if not about_to_close(c + 1, n, contact):
         return True
-    one = distance(c, contact, tally)
-    farther = minus(one, distance(c + 1, contact, tally)).real
+    # How far they were from closing before the last progress, or when they ended since.
+    left, right = contact[c], contact[c + 1]
+    one = left.before if left.stamp == tally.stamp else ZERO
+    other = right.before if right.stamp == tally.stamp else ZERO
+    farther = minus(one, other).real
     return not (is_clear(farther, one.real, tally) and farther > 0.0)
 
 

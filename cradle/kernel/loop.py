@@ -4,23 +4,26 @@ import math
 from typing import Any, NamedTuple
 
 from cradle.kernel.cycles import forget, take_limits
-from cradle.kernel.events import close_contacts, end_contacts, grow, reduced_mass, start
-from cradle.kernel.meeting import first_meeting, who_goes
-from cradle.kernel.numbers import ONE, ZERO, minus, negative, over, plus, read, scaled, times
-from cradle.kernel.record import certify, goes_all, record, record_compressions, settle
-from cradle.kernel.rules import course
+from cradle.kernel.events import close_contacts, end_contacts, reduced_mass, start
+from cradle.kernel.numbers import minus, negative, over, plus, read, scaled, times
+from cradle.kernel.progress import go
+from cradle.kernel.record import velocity
 from cradle.kernel.state import (
-    CLOSE,
+    ENERGY,
     FINISHED,
+    LEDGER,
     LIMITS,
     LOWER,
-    NO_EVENT,
-    PASSED,
+    MOMENTUM,
+    ONE,
+    ORDER,
     PAUSED,
+    PULL,
     REFUSED,
     UNFINISHED,
     UNSOUND,
     UPPER,
+    ZERO,
     apart,
     door,
 )
@@ -133,95 +136,8 @@ def prepare(n, chain, meeting, state):
     start(n, state)
 
 
-def book_work(k, impulse, now):
-    """R3: book the works of contact k: an impulse takes its closing speed straight to `now`."""
-    u = k.u
-    if u.real * now.real >= 0.0:
-        work = scaled(times(impulse, plus(u, now)), 0.5)
-        gain = work if work.real > 0.0 else ZERO
-        give = ZERO if work.real > 0.0 else work
-    else:
-        # Squares of closing speeds share out work: rate u^2 / (2 |slope|) on each side of zero.
-        half = over(scaled(impulse, 0.5), minus(u, now))
-        gain = times(half, times(u, u))
-        give = negative(times(half, times(now, now)))
-        if u.real < 0.0:
-            gain, give = give, gain
-    if gain.real > 0.0 or (impulse.real > 0.0 and max(u.real, now.real) > 0.0):
-        k.w += max(gain.real, 5e-324)  # a work that underflows is one nevertheless (R7)
-        k.a = plus(k.a, gain)
-    k.q = plus(k.q, plus(times(k.square, gain), give))
-    if k.q.real <= 0.0:
-        k.q = ZERO
-
-
-def advance(one, n, state):
-    """Take a run straight on its way: velocities are linear in the impulses, works quadratic.
-
-    What is zero but for its last digits is zero.  An idle contact that has passed it is a defect.
-    """
-    ball, contact, tally = state.ball, state.contact, state.tally[0]
-    low, high = one.low, one.high
-    for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):
-        k = contact[c]
-        own = low <= c <= high
-        if not own and k.active == 1:
-            continue  # it waits
-        slope, pulls = course(c, low, high, ball, contact)
-        ends = k.due == 1 and goes_all(one)
-        now = k.final if ends else plus(k.u, times(slope, one.way))
-        if own:
-            impulse = times(k.rate, one.way)
-            k.p = plus(k.p, impulse)
-            if k.fixed == 1 and impulse.real > 0.0:
-                k.held = 1
-            if k.fixed == 0:
-                book_work(k, impulse, now)
-        elif k.stamp < tally.stamp:
-            k.before, k.stamp = negative(k.u), tally.stamp
-        k.u = now
-        if ends:
-            k.q = ZERO
-            k.made = abs(now.real)  # known by construction
-            continue
-        k.made += pulls * one.way.real
-        if abs(now.real) <= LIMITS.tie * k.made:
-            k.u = ZERO
-        elif k.active == 0 and now.real > 0.0:
-            tally.defect = PASSED
-    one.stirred = 1
-
-
-def go(n, state):
-    """R8.2 to R8.6: take every run on; close the gap at which two of them meet."""
-    run, contact, tally = state.run, state.contact, state.tally[0]
-    tally.stamp += 1
-    gap = who_goes(first_meeting(n, state), n, state)
-    first = run[n - 1].onward
-    while first < n - 1:
-        one = run[first]
-        if one.part.real > 0.0:
-            one.way = times(one.reach, one.part)
-            if not one.way.real < math.inf:
-                tally.defect = NO_EVENT
-                return
-            if tally.capacity > 0:
-                record_compressions(one, n, state)
-            advance(one, n, state)
-        first = one.onward
-    if gap >= 0:
-        if contact[gap].u.real != 0.0:
-            tally.defect = PASSED
-        contact[gap].u, contact[gap].made = ZERO, 0.0
-        grow(gap, n, state.ball, contact, run)
-        record(CLOSE, gap, n, state)
-
-
 def impact(n, max_rounds, state):
-    """Solve one impact: run rounds until no contact is active; return the status.
-
-    With tally.effort or tally.room used up it stops, PAUSED, and can be called again.
-    """
+    """Run rounds until no contact is active, or until effort or room are used up: PAUSED."""
     run, tally = state.run, state.tally[0]
     while True:
         if tally.effort < 0 or tally.events > tally.room:
@@ -246,19 +162,81 @@ def impact(n, max_rounds, state):
 
 
 @apart
-def hand_out(k, n, out, ball, contact, tally):
-    """Write the outcome of chain k in the caller's units."""
-    shift, mass_shift = tally.shift, tally.mass_shift
-    out_v, hits = out.v[k], out.hits[k]
+def settle(n, v, ball, contact, unit):
+    """Leave changes of velocity in `x`, and velocities in `v`, these in the caller's units.
+
+    Balls that move as one, or whose order is lost in the last digits, have one velocity: that of
+    the ball which impulses have changed least.
+    """
+    before = ZERO
     for i in range(n):
-        out_v[i] = ball[i].after
-    out.collapsed[k] = tally.collapsed
-    for c in range(n - 1):
-        hits[c] = contact[c].hits
-    for c in range(len(out.p)):
-        out.p[c] = math.ldexp(contact[c].p.real, shift + mass_shift)
-        out.a[c] = math.ldexp(contact[c].a.real, 2 * shift + mass_shift)
-        out.held[c] = contact[c].held
+        after = contact[i].p if i < n - 1 else ZERO
+        ball[i].x = times(minus(before, after), ball[i].inverse)
+        v[i] = velocity(ball[i], ball[i].x, unit)
+        before = after
+    first = 0
+    while first < n:
+        last = best = first
+        while last < n - 1 and (
+            contact[last].u.real == 0.0 or (contact[last].u.real < 0.0 and v[last] > v[last + 1])
+        ):
+            last += 1
+            if abs(ball[last].x.real) < abs(ball[best].x.real):
+                best = last
+        common = v[best]
+        for i in range(first, last + 1):
+            v[i] = common
+        first = last + 1
+
+
+@apart
+def certify(n, v, ball, contact, tally):
+    """Return what a settled outcome breaks, or 0; each sum within the rounding of its terms.
+
+    Velocities come from impulses alone: they must part as the closing speeds say, and the energy
+    lost, impulse times mean closing speed, must be (1 - e^2) of the contacts' works.
+    """
+    unit = tally.unit
+    momentum = terms = grain = 0.0
+    lost = kept = absorbed = energy = 0.0
+    strongest = weakest = least_work = 0.0
+    speed = plus(ball[0].start, ball[0].x)
+    for i in range(n):
+        b = ball[i]
+        push = contact[i].p.real if i < n - 1 else 0.0
+        change = v[i] * unit - b.v * unit
+        momentum += b.m.real * change
+        terms += b.m.real * (abs(change) + abs(b.start.real)) + abs(push)
+        grain += b.m.real * (5e-324 * unit)  # no finer velocity is a float
+        if i == n - 1:
+            break
+        k, right = contact[i], ball[i + 1]
+        next_speed = plus(right.start, right.x)
+        closing = minus(speed, next_speed).real
+        spread = abs(speed.real) + abs(next_speed.real) + tally.fastest
+        slack = LIMITS.sound * spread
+        if not (closing <= slack and abs(closing - k.u.real) <= slack):
+            return ORDER
+        if (v[i] - v[i + 1]) * unit > LIMITS.tie * spread:
+            return ORDER
+        speed = next_speed
+        first = minus(b.start, right.start).real
+        lost += 0.5 * push * (first + closing)
+        energy += abs(push) * (abs(first) + abs(closing))
+        kept += (1.0 - k.square.real) * k.a.real
+        absorbed += k.a.real
+        strongest, weakest = max(strongest, push), min(weakest, push)
+        least_work = min(least_work, k.a.real)
+    slack = (LIMITS.sound + n * 2.0**-52) * (energy + absorbed)
+    if not abs(momentum) <= LIMITS.sound * terms + grain < math.inf:
+        return MOMENTUM
+    if least_work < -slack or weakest < -LIMITS.sound * strongest:
+        return PULL
+    if not -lost <= slack < math.inf:
+        return ENERGY
+    if not abs(lost - kept) <= slack:
+        return LEDGER
+    return 0
 
 
 @door
@@ -269,7 +247,7 @@ def batch(begin, resumed, n, inputs, options, out, state, effort):
     touched) is used up, to be `resumed` there.
     """
     ball, contact, tally = state.ball, state.contact, state.tally[0]
-    tally.effort, tally.capacity = effort, len(state.record.kinds)
+    tally.effort = effort
     for k in range(begin, len(out.v)):
         if not resumed:
             chain = Inputs(
@@ -283,12 +261,19 @@ def batch(begin, resumed, n, inputs, options, out, state, effort):
                 return k, REFUSED
             prepare(n, chain, options.meeting, state)
         resumed = False
+        v, hits = out.v[k], out.hits[k]
         status = impact(n, options.max_events, state)
-        settle(n, ball, contact, tally.unit)
+        settle(n, v, ball, contact, tally.unit)
         if status == FINISHED:
-            tally.defect = certify(n, ball, contact, tally)
+            tally.defect = certify(n, v, ball, contact, tally)
             status = UNSOUND if tally.defect > 0 else FINISHED
-        hand_out(k, n, out, ball, contact, tally)
+        out.collapsed[k] = tally.collapsed
+        for c in range(n - 1):
+            hits[c] = contact[c].hits
+        for c in range(len(out.p)):
+            out.p[c] = math.ldexp(contact[c].p.real, tally.shift + tally.mass_shift)
+            out.a[c] = math.ldexp(contact[c].a.real, 2 * tally.shift + tally.mass_shift)
+            out.held[c] = contact[c].held
         if status != FINISHED:
             return k, status
     return len(out.v), FINISHED

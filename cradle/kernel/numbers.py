@@ -7,9 +7,8 @@ operations have the same bits wherever floats have: no step may be reordered or 
 
 import math
 
-ZERO = complex(0.0, 0.0)
-ONE = complex(1.0, 0.0)
-NEVER = complex(math.inf, 0.0)
+from cradle.kernel.state import ZERO
+
 SPLIT = 2.0**27 + 1.0  # cuts a float into two halves, whose products are exact
 ROUND = 1.5 * 2.0**52  # added and taken away again it leaves a whole number
 #: The powers of ten that are floats.

@@ -6,21 +6,8 @@ impulse that a ball could notice reaches them.
 
 import math
 
-from cradle.kernel.numbers import (
-    NEVER,
-    ONE,
-    ZERO,
-    least,
-    less,
-    minus,
-    negative,
-    over,
-    plus,
-    root,
-    scaled,
-    times,
-)
-from cradle.kernel.state import LIMITS, apart
+from cradle.kernel.numbers import least, less, minus, negative, over, plus, root, scaled, times
+from cradle.kernel.state import LIMITS, NEVER, ONE, ZERO, apart
 
 
 def source_of(first, last, ball):
@@ -35,7 +22,7 @@ def source_of(first, last, ball):
 
 
 def farthest(c, end, smallest, contact):
-    """R1: how far towards `end` impulses reach from the source c, at nominal ratios or beyond."""
+    """R1: how far towards `end` impulses reach from the source c: no ratio is above its nominal."""
     x, way = 1.0, 1 if c < end else -1
     while way * (end - c) > 0 and x > smallest:
         ratio = contact[c].forward if way == 1 else contact[c - 1].backward
@@ -45,11 +32,7 @@ def farthest(c, end, smallest, contact):
 
 
 def reached(first, run, smallest, ball, contact):
-    """R1: set low..high of a run; what was reached before now waits.
-
-    No ratio in force is larger than its nominal one.  From the one source outwards rates only
-    become less; with several sources all contacts count.
-    """
+    """R1: set low..high of a run, all of it with several sources; what was reached now waits."""
     one = run[first]
     low, high, source = one.low, one.high, one.source
     one.low = first if source < 0 else farthest(source, first, smallest, contact)
@@ -61,9 +44,9 @@ def reached(first, run, smallest, ball, contact):
 
 
 def keep_closed(i, low, high, ball, contact, tally):
-    """R7: lower the ratio at ball i to its bound (Eq. 53) if the driven contact would open at once.
+    """R7: lower the ratio at ball i to its bound (Eq. 53) if the contact driven would open at once.
 
-    There the contact is held at u = 0.  One that is driven from both sides cannot open.
+    It is held at u = 0 there.  One that is driven from both sides cannot open.
     """
     b, far = ball[i], i + ball[i].turn
     k = contact[min(i, far)]
@@ -98,8 +81,7 @@ def ratios_in_force(low, high, ball, contact, tally):
 def several_sources(low, high, smallest, ball, contact):
     """R1, R6: rates of a run with more than one source, where products of ratios are divided.
 
-    Each rate is x * 2**k, so that long products neither overflow nor vanish, and a ratio of zero
-    is one more vanishing factor: of the contacts, those of the leading order move.
+    Each is x * 2**k: long products do not overflow, and a ratio of zero is one vanishing factor.
     """
     x = ONE
     k = top = 0
@@ -158,32 +140,25 @@ def is_clear(difference, size, tally):
     return True
 
 
-def has_ended(c, contact):
-    """R3: tell whether contact c has ended: it opens, or has e = 0 and no longer closes."""
+def is_over(c, at_zero, ball, contact):
+    """R3: tell whether contact c ends: it opens, or has e = 0 and no longer closes.
+
+    `at_zero`: it is about to open; if nobody drives it, by its own push, even a vanishing one (R6).
+    """
     k = contact[c]
     if k.q.real > 0.0:
         return False
-    return k.u.real < 0.0 or (k.u.real == 0.0 and k.e.real == 0.0 and k.w > 0.0)
-
-
-def opens_at_zero(c, ball, contact):
-    """R3: tell whether contact c, at u = 0 with nothing to release, is about to open.
-
-    One that nobody drives opens by its own push, be it a vanishing number (R6).
-    """
-    k = contact[c]
-    if k.u.real != 0.0 or k.q.real > 0.0:
-        return False
+    if not at_zero:
+        return k.u.real < 0.0 or (k.u.real == 0.0 and k.e.real == 0.0 and k.w > 0.0)
     source = ball[c].turn != 1 and ball[c + 1].turn != -1
-    return k.slope.real < 0.0 or (source and k.rate.real == 0.0)
+    return k.u.real == 0.0 and (k.slope.real < 0.0 or (source and k.rate.real == 0.0))
 
 
 def way_to_end(k, tally):
     """R3: progress until contact k has released all, and its closing speed then; or NEVER.
 
-    While it opens, Q(s) = Q + rate (u s + slope s^2 / 2), which is zero where u^2 has become
-    u^2 - 2 slope Q / rate.  Where it closes first, Q gains e^2 of the work until then,
-    rate u^2 / (2 |slope|), so that it ends at u^2 = e^2 u^2 - 2 slope Q / rate.
+    While it opens, Q + rate (u s + slope s^2 / 2) is zero where u^2 is u^2 - 2 slope Q / rate.  If
+    it closes first, Q gains e^2 of rate u^2 / (2 |slope|): it ends at e^2 u^2 - 2 slope Q / rate.
     """
     closes = k.u.real > 0.0
     if k.rate.real == 0.0 or (k.slope.real >= 0.0 and k.u.real >= 0.0):
@@ -213,10 +188,7 @@ def active_beside(c, n, contact):
 
 
 def course(c, low, high, ball, contact):
-    """Return what a run does per unit of progress to contact c, its own or an idle one beside it.
-
-    How much its closing speed changes; and the velocities of its balls, both together.
-    """
+    """Return du/ds at contact c of a run or beside it, and the pulls of its balls together."""
     if low <= c <= high:
         return contact[c].slope, abs(ball[c].pull.real) + abs(ball[c + 1].pull.real)
     slope = negative(ball[low].pull) if c < low else ball[c].pull
@@ -224,7 +196,7 @@ def course(c, low, high, ball, contact):
 
 
 def segment(first, n, run, ball, contact, tally):
-    """R8.2: progress of a run to its own next rate-changing event, and which contacts have it then.
+    """R8.2: progress of a run to its own next event, and which contacts have it then.
 
     Two events are one if they are closer than what their closing speeds are known to.
     """

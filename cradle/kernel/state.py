@@ -5,6 +5,7 @@ chain's own units, powers of two in which the largest are near 1: that changes n
 that is `complex` holds a number of 32 digits (`cradle.kernel.numbers`).
 """
 
+import math
 from typing import Any, NamedTuple
 
 if "door" not in globals():
@@ -20,7 +21,7 @@ if "door" not in globals():
 # Status codes.
 FINISHED, UNFINISHED, REFUSED, PAUSED, UNSOUND = 0, 1, 2, 3, 4
 # Kinds of event.
-MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE, REPETITION = 0, 1, 2, 3, 4
+MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE, REPEAT = 0, 1, 2, 3, 4
 # R9: the two levels on which cycles are looked for, ends of contacts and collapses.
 LOWER, UPPER = 0, 1
 # What an answer can break; 0 is none.
@@ -54,13 +55,15 @@ class Limits(NamedTuple):
 
 LIMITS = Limits()
 
+# Numbers of 32 digits.
+ZERO, ONE, NEVER = complex(0.0, 0.0), complex(1.0, 0.0), complex(math.inf, 0.0)
+
 
 class Ball:
     """One ball."""
 
     v: float  # velocity before the impact, in the caller's units,
     start: complex  # and in the chain's own
-    after: float  # velocity after the impact, in the caller's units
     m: complex  # mass
     inverse: complex  # 1 / mass
     pull: complex  # velocity per unit of progress of the ball's run, dv/ds
@@ -153,7 +156,6 @@ class Tally:
     collapsed: int  # 1 if contacts have collapsed
     effort: int  # contacts that may still be touched, and events written, before a pause
     room: int
-    capacity: int  # how many events the record holds
     shift: int  # binary exponents of the largest velocity and the largest mass
     mass_shift: int
     unit: float  # what velocities are multiplied by, 2**-shift
