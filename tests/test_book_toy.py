@@ -198,7 +198,7 @@ def test_fig_toy_inside_and_film():
     inside = CHAPTER.cells["inside"].outputs[0].data["text/html"]
     bars = [
         float(x)
-        for x in re.findall(r"-bar\d\{transform:translateX\(0px\) scaleX\(([-\d.]+)\);", inside)
+        for x in re.findall(r"-bar\d-\]\{transform:translate\(0px\) scaleX\(([-\d.]+)\);", inside)
     ]
     expected = strokes(2, [1, 0, 0, 0, 0])[1]
     np.testing.assert_allclose(np.array(bars) / bars[0], expected / expected[0], atol=2e-3)

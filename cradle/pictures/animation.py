@@ -1,24 +1,20 @@
-"""Moving pictures of an impact, drawn by matplotlib, and of a swing; see `keyframes`."""
+"""Moving pictures of an impact and of swings."""
 
 from __future__ import annotations
 
-import io
+import math
 from collections.abc import Iterator, Sequence
-from html import escape
-from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
-from matplotlib.text import Text
+from numpy.typing import NDArray
 
 from cradle.input.values import Vector, must_be, one_number, whole_number
 from cradle.pictures.impacts import PALETTE, velocities, velocity_impulse
-from cradle.pictures.keyframes import KEY, SEEN, Animation, Move, number, with_style
+from cradle.pictures.keyframes import SEEN, SHIFT, STRETCH, TURN, Animation, Move, moving
 from cradle.swinging.record import Swing
 from cradle.trace import Trace
 
@@ -28,6 +24,7 @@ __all__ = ["Animation", "animate", "animate_swing"]
 _ACTS = (1.5, 5.0, 2.0, 1.5)
 
 
+@mpl.rc_context({"font.size": 10})
 def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Animation:
     """Show an impact in slow motion: the balls, and their velocities being drawn.
 
@@ -40,8 +37,7 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
     trace : Trace
         The impact.
     contact : int, optional
-        Draw this contact's velocity-impulse diagram.  If left out, the velocities of all balls
-        against the sum of all impulses.
+        Draw this contact's velocity-impulse diagram; if left out, the velocities of all balls.
     alt : str
         What the picture shows, for those who do not see it.
 
@@ -58,107 +54,82 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
     """
     must_be(Trace, "trace", trace)
     must_be(str, "alt", alt)
-    with mpl.rc_context({"svg.hashsalt": "cradle", "svg.fonttype": "path", "font.size": 10}):
-        # At 72 dots an inch, points of the figure are units of the file.
-        figure = Figure(figsize=(6.4, 5.4), dpi=72, layout="constrained", facecolor="white")
-        row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.6])
-        centres = _draw_balls(trace, row)
-        impulses, _ = trace.curve()
-        if contact is None:
-            velocities(trace, diagram)
-            along, shown = impulses.sum(axis=1), range(len(trace.chain))
-        else:
-            velocity_impulse(trace, contact, diagram)
-            along, shown = impulses[:, contact], range(contact, contact + 2)
-        x, y = diagram.get_xlim(), diagram.get_ylim()
-        cover = Rectangle((x[0], y[0]), x[1] - x[0], y[1] - y[0], fc="white", alpha=0.9, zorder=4)
-        cover.set_gid(f"{KEY}cover")
-        diagram.add_patch(cover)
-        for ball in shown:
-            (dot,) = diagram.plot(
-                along[-1], trace.velocities[ball], "o", ms=9, mfc="white",
-                mec=PALETTE[ball % len(PALETTE)], mew=2.5, zorder=6, clip_on=False,
-            )  # fmt: skip
-            dot.set_gid(f"{KEY}dot{ball}")
-        diagram.set(xlim=x, ylim=y)
-        file, nothing = io.StringIO(), dict.fromkeys(("Creator", "Date", "Format", "Type"))
-        figure.savefig(file, format="svg", metadata=nothing)
-    moves = tuple(_impact_moves(trace, centres, (row, diagram), along, shown))
-    style = "".join(move.css() for move in moves)
-    return Animation(with_style(file.getvalue(), style, alt), figure, moves)
+    figure = Figure(figsize=(6.4, 5.4), dpi=72, layout="constrained", facecolor="white")
+    row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.6])
+    # The times, and the point of the curves at each: all of them, and the ends of the flights.
+    done = trace.curve()[0].sum(axis=1)
+    points = len(done)
+    index = np.clip(np.arange(-1, points + 2), 0, points - 1)
+    slow = _ACTS[0] + _ACTS[1] * (done / done[-1] if done[-1] else np.linspace(0, 1, points))
+    times = np.concatenate([[0.0], slow, slow[-1] + np.cumsum(_ACTS[2:])])
+    moves = [*_balls(trace, row, times, index)]
+    moves += _diagram(trace, contact, diagram, times, index)
+    return moving(figure, moves, alt)
 
 
-def _draw_balls(trace: Trace, ax: Axes) -> Vector:
-    """Draw the balls as they touch, a star on each contact, and a bar of unit length on each."""
+def _balls(trace: Trace, ax: Axes, times: Vector, index: NDArray[np.intp]) -> Iterator[Move]:
+    """Draw the balls as they touch, their velocities as bars, and a star on each contact.
+
+    The balls move in the flights alone; bars are in diameters of the largest one.
+    """
+    impulses, path = trace.curve()
+    still, reach = len(path), 2.6
     radii = 0.5 * np.cbrt(trace.chain.masses / trace.chain.masses.max())
     centres = np.cumsum(2 * radii) - radii
-    for ball, (x, radius) in enumerate(zip(centres.tolist(), radii.tolist(), strict=True)):
-        colour = PALETTE[ball % len(PALETTE)]
-        parts: list[tuple[str, Any]] = [
-            ("ball", ax.add_patch(Circle((x, 0), radius, fc="0.95", ec=colour, lw=2))),
-            ("ballname", ax.text(x, -0.02, f"{ball + 1}", ha="center", va="center", size=12)),
-            ("bar", ax.add_patch(Rectangle((x, 0.68), 1, 0.1, fc=colour, ec="none"))),
-            ("tip", ax.add_patch(Circle((x, 0.73), 0.09, fc="white", ec=colour, lw=2))),
-        ]
-        for name, part in parts:
-            part.set_gid(f"{KEY}{name}{ball}")
-    for contact, x in enumerate((centres + radii)[:-1].tolist()):
-        (star,) = ax.plot(x, 0, "*", ms=15, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
-        star.set_gid(f"{KEY}star{contact}")
-    reach = 2.6
     ax.set(xlim=(-reach, centres[-1] + radii[-1] + reach), ylim=(-0.6, 0.95), aspect="equal")
     ax.set_axis_off()
-    return np.asarray(centres)
-
-
-def _impact_moves(
-    trace: Trace, centres: Vector, axes: tuple[Axes, Axes], along: Vector, shown: Sequence[int]
-) -> Iterator[Move]:
-    """Yield how all move, at each point of the curves, and at the ends of the flights."""
-    row, diagram = axes
-    before, slow, after, rest = _ACTS
-    impulses, path = trace.curve()
-    points, done = len(path), impulses.sum(axis=1)
-    share = done / done[-1] if done[-1] else np.linspace(0, 1, points)
-    times = np.concatenate(
-        [[0.0], before + slow * share, [before + slow + after, sum(_ACTS[:3]) + rest]]
-    )
-    index = np.clip(np.arange(-1, points + 2), 0, points - 1)
-    still = points  # the end of the impact
-    # Where each ball is drawn, in units of the file: it moves in the flights alone.
-    unit = float(row.transData.transform((1, 0))[0] - row.transData.transform((0, 0))[0])
     per_speed = 1.9 / (float(np.abs(trace.path[[0, -1]]).max()) or 1.0)
-    come = 0.0 if (trace.chain.closing_speeds < 0.0).any() else -per_speed
-    shift = np.zeros((len(times), len(trace.chain)))
-    shift[0] = come * unit * trace.path[0]
-    shift[-2:] = per_speed * unit * trace.velocities
-    shift[-1] = shift[-2]
-    bar = 0.95 / (float(np.abs(path).max()) or 1.0)  # diameters of the largest ball, for 1 m/s
-    places = row.transData.transform(np.column_stack([centres, np.full(len(centres), 0.73)]))
-    for ball, centre in enumerate(places[:, 0].tolist()):
-        x, v = shift[:, ball], path[index, ball] * bar
-        for name, values in (("ball", x), ("ballname", x), ("tip", x + unit * v)):
-            yield Move(
-                f"{KEY}{name}{ball}", times, values[:, None], "translateX({}px)", 0.03, still
-            )
-        both, form = np.column_stack([x, v]), "translateX({}px) scaleX({})"
-        yield Move(f"{KEY}bar{ball}", times, both, form, 0.001, still, (centre, 0.0))
-    # The diagram: dots on the curves, and a cover that draws back to the right.
-    curves = np.dstack(np.broadcast_arrays(along[:, None], path))
-    drawn = diagram.transData.transform(curves.reshape(-1, 2)).reshape(curves.shape)
-    for ball in shown:
-        way = (drawn[:, ball] - drawn[-1, ball]) * [1, -1]
-        yield Move(f"{KEY}dot{ball}", times, way[index], "translate({}px,{}px)", 0.03, still)
-    box, height = diagram.bbox, row.get_figure().bbox.height  # type: ignore[union-attr]
-    hidden = (box.x1 - drawn[index, 0, 0]) / box.width
-    hidden[still + 1 :] = 0.0  # beyond the last point too
-    edge = float(box.x1), float(height)
-    yield Move(f"{KEY}cover", times, hidden[:, None], "scaleX({})", 0.0005, still + 1, edge)
+    flown = np.zeros((len(times), len(centres)))
+    if not (trace.chain.closing_speeds < 0.0).any():
+        flown[0] = -per_speed * trace.path[0]
+    flown[-2:] = per_speed * trace.velocities
+    bars = 0.95 * path[index] / (float(np.abs(path).max()) or 1.0)
+    level = np.zeros(len(times))
+    for ball, (x, radius) in enumerate(zip(centres.tolist(), radii.tolist(), strict=True)):
+        colour, way, bar = PALETTE[ball % len(PALETTE)], flown[:, ball], bars[:, ball]
+        parts = [
+            ax.add_patch(Circle((x, 0), radius, fc="0.95", ec=colour, lw=2)),
+            ax.text(x, -0.02, f"{ball + 1}", ha="center", va="center", size=12),
+        ]
+        yield Move(f"ball{ball}", parts, times, np.column_stack([way, level]), SHIFT, still)
+        parts = [ax.add_patch(Rectangle((x, 0.68), 1, 0.1, fc=colour, ec="none"))]
+        both = np.column_stack([way, bar])
+        yield Move(f"bar{ball}", parts, times, both, STRETCH, still, (x, 0.0))
+        parts = [ax.add_patch(Circle((x, 0.73), 0.09, fc="white", ec=colour, lw=2))]
+        yield Move(f"tip{ball}", parts, times, np.column_stack([way + bar, level]), SHIFT, still)
     # A star is seen while the impulse of its contact grows.
-    lit = np.zeros((len(times), impulses.shape[1]))
-    lit[1:points] = np.diff(impulses, axis=0) > 0.0
-    for contact in range(impulses.shape[1]):
-        yield Move(f"{KEY}star{contact}", times, lit[:, contact, None], SEEN, 0.0, 0)
+    lit = np.zeros((len(times), len(centres) - 1))
+    lit[1:still] = np.diff(impulses, axis=0) > 0.0
+    for contact, x in enumerate((centres + radii)[:-1].tolist()):
+        star = ax.plot(x, 0, "*", ms=15, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
+        yield Move(f"star{contact}", star, times, lit[:, [contact]], SEEN, 0)
+
+
+def _diagram(
+    trace: Trace, contact: int | None, ax: Axes, times: Vector, index: NDArray[np.intp]
+) -> Iterator[Move]:
+    """Draw the diagram, dots on its curves, and a cover that draws back to the right."""
+    impulses, path = trace.curve()
+    if contact is None:
+        velocities(trace, ax)
+        along, shown = impulses.sum(axis=1), range(len(trace.chain))
+    else:
+        velocity_impulse(trace, contact, ax)
+        along, shown = impulses[:, contact], range(contact, contact + 2)
+    still, (x0, x1), (y0, y1) = len(path), ax.get_xlim(), ax.get_ylim()
+    cover = ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fc="white", alpha=0.9, zorder=4))
+    hidden = (x1 - along[index]) / (x1 - x0)
+    hidden[still + 1 :] = 0.0  # beyond the last point too
+    values = np.column_stack([np.zeros(len(times)), hidden])
+    yield Move("cover", [cover], times, values, STRETCH, still + 1, (x1, 0.0))
+    for ball in shown:
+        curve = np.column_stack([along, path[:, ball]])
+        dot = ax.plot(
+            *curve[-1:].T, "o", ms=9, mfc="white", mec=PALETTE[ball % len(PALETTE)], mew=2.5,
+            zorder=6, clip_on=False,
+        )  # fmt: skip
+        yield Move(f"dot{ball}", dot, times, (curve - curve[-1])[index], SHIFT, still)
+    ax.set(xlim=(x0, x1), ylim=(y0, y1))
 
 
 def animate_swing(
@@ -191,7 +162,6 @@ def animate_swing(
     Returns
     -------
     Animation
-        The picture.
 
     Raises
     ------
@@ -220,99 +190,61 @@ def animate_swing(
     one_number("speed", speed, "must lie in [1e-6, 1e6]", 1e-6, 1e6)
     one_number("still", still)
     beside = min(whole_number("columns", columns), len(several))
-    swings = [
-        _draw_swing(run, f"{KEY}s{k}b", duration, speed, still) for k, run in enumerate(several)
-    ]
-    # Side by side they stand closer: the room beside the balls is cut to what the swings need, and
-    # letters are larger, for a page shows the whole smaller.
-    cell = 480.0 if beside == 1 else max(300.0, *(2 * one.half_width for one in swings))
-    edge, letters = 240.0 - cell / 2, 15 if beside == 1 else 20
-    rows, places, top, lines = [], [], 0.0, lines or [""] * len(several)
-    for first in range(0, len(several), beside):
-        heights = []
-        for k, one in enumerate(swings[first : first + beside]):
-            places.append((k * cell - edge, top))
-            text, place = escape(lines[first + k]), " ".join(map(number, places[-1]))
-            if text:
-                text = f'<text x="{number(edge + 12)}" y="20" font-size="{letters}">{text}</text>'
-            rows.append(f'<g transform="translate({place})">{text}{one.svg}</g>')
-            heights.append(one.height + (14 if text else 0))
-        top += max(heights)
-    size = f'width="{number(cell * beside)}" height="{number(top)}"'
-    svg = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {number(cell * beside)} '
-        f'{number(top)}" {size} font-family="sans-serif"><rect {size} fill="white"/>'
-        f"{''.join(rows)}</svg>"
-    )
-    style = "".join(move.css() for one in swings for move in one.moves)
-    figure, moves = Figure((cell * beside / 72, top / 72), dpi=72), []
-    wide, high = figure.bbox.size
-    for line, (x, y), one in zip(lines, places, swings, strict=True):
-        box = x / wide, 1 - (y + one.height) / high, 480 / wide, one.height / high
-        ax = figure.add_axes(box, xlim=(0, 480), ylim=(one.height, 0))
-        ax.set_axis_off()
-        ax.text(edge + 12, 20, line, size=letters, parse_math=False)
-        for artist in one.artists:
-            ax.add_artist(artist)
-        for move in one.moves:
-            moves.append(move._replace(origin=(move.origin[0] + x, move.origin[1] + y)))
-    return Animation(with_style(svg, style, alt), figure, tuple(moves))
-
-
-class _Drawn(NamedTuple):
-    """A swing's picture, twice, and how it moves, in units of the file."""
-
-    svg: str
-    artists: list[Artist]
-    moves: list[Move]
-    height: float
-    #: How far the balls reach from the middle, with a margin.
-    half_width: float
-
-
-def _draw_swing(run: Swing, name: str, duration: float, speed: float, still: float) -> _Drawn:
-    lengths = run.pendulums.row("length", len(run.chain))
-    scale = 105.0 / float(lengths.max())  # units of the file in a metre
-    # Ball sizes are free: the model needs none.  Here they leave room for the widest swing.
-    radii = 17.0 * np.cbrt(run.chain.masses / run.chain.masses.max())
-    gaps = run.pendulums.row("gaps", len(lengths) - 1) * scale
-    pivots = np.concatenate([[0.0], np.cumsum(radii[:-1] + radii[1:] + gaps)])
-    pivots += 240.0 - (pivots[0] - radii[0] + pivots[-1] + radii[-1]) / 2
-    row_width = pivots[-1] + radii[-1] - pivots[0] + radii[0]
-    out = np.abs(np.sin(run.positions / lengths) * lengths).max() * scale
-    beam = 34.0
-    low = beam + 105.0 + float(radii.max()) + 8.0
-    inside = (run.times > run.times[0]) & (run.times <= run.times[0] + duration)
-    hits = [hit for hit in run.impacts if 0.0 < hit.time - run.times[0] < duration]
-    # Between two of the times an impact is a kink: it needs a keyframe of its own.
-    times = np.array([0.0, *run.times[inside], *(hit.time for hit in hits)])
-    times[1:] -= run.times[0]
-    places = np.vstack([run.positions[:1], run.positions[inside], *(hit.positions for hit in hits)])
-    order = np.argsort(times, kind="stable")
-    times, places = times[order], places[order]
-    row = int(np.argmin(np.abs(times - still)))
-    drawn, artists, moves = [], [], []
-    for ball, (x, length, radius) in enumerate(zip(pivots, lengths, radii, strict=True)):
-        y, part, colour = beam + length * scale, f"{name}{ball}", PALETTE[ball % len(PALETTE)]
-        drawn.append(
-            f'<g id="{part}"><path d="M{number(x)} {beam}V{number(y - radius)}" stroke="#555"/>'
-            f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(radius - 1.25)}" '
-            f'fill="#f2f2f2" stroke-width="2.5" stroke="{colour}"/>'
-            f'<text x="{number(x)}" y="{number(y + 5)}" font-size="14" '
-            f'text-anchor="middle">{ball + 1}</text></g>'
-        )
-        # A positive angle of SVG turns what hangs to the left.
-        angle = -np.degrees(places[:, ball] / length)
-        turned = part, times / speed, angle[:, None], "rotate({}deg)", 0.1, row
-        moves.append(Move(*turned, (float(x), beam)))
-        artists += [
-            Line2D([x, x], [beam, y - radius], color="#555", lw=1, gid=part),
-            Circle((x, y), radius - 1.25, fc="#f2f2f2", ec=colour, lw=2.5, gid=part),
-            Text(x, y + 5, f"{ball + 1}", fontsize=14, ha="center", gid=part),
+    # Side by side they stand closer: the room beside the balls is cut to what the swings need.
+    cell = 480.0 if beside == 1 else max(300.0, *(2 * _hung(run)[-1] for run in several))
+    high = 178.0 if lines else 164.0
+    wide, deep = cell * beside, high * math.ceil(len(several) / beside)
+    figure = Figure((wide / 72, deep / 72), dpi=72, facecolor="white")
+    ax = figure.add_axes((0, 0, 1, 1), xlim=(0, wide), ylim=(deep, 0))
+    ax.set_axis_off()
+    moves: list[Move] = []
+    for k, run in enumerate(several):
+        left, top = k % beside * cell, k // beside * high
+        if lines:  # larger where a page shows the whole smaller
+            size = 15 if beside == 1 else 20
+            ax.text(left + 12, top + 20, lines[k], size=size, parse_math=False)
+        moves += [
+            move._replace(times=move.times / speed, still=int(np.abs(move.times - still).argmin()))
+            for move in _swing(run, f"s{k}b", ax, (left + cell / 2, top + 34), duration)
         ]
-    ends = pivots[0] - 30, pivots[-1] + 30
-    drawn.append(
-        f'<path d="M{number(ends[0])} {beam}H{number(ends[1])}" stroke="#333" stroke-width="4"/>'
-    )
-    artists.append(Line2D(ends, [beam, beam], color="#333", lw=4, solid_capstyle="butt"))
-    return _Drawn("".join(drawn), artists, moves, low, float(row_width / 2 + out + 10.0))
+    return moving(figure, moves, alt, "px")
+
+
+def _hung(run: Swing) -> tuple[float, Vector, Vector, float]:
+    """Return, in units of the file, a metre, radii, pivots from their middle, and the whole reach.
+
+    Ball sizes are free, for the model needs none: here they leave room for the widest swing.
+    """
+    lengths = run.pendulums.row("length", len(run.chain))
+    metre = 105.0 / float(lengths.max())
+    radii = 17.0 * np.cbrt(run.chain.masses / run.chain.masses.max())
+    apart = radii[:-1] + radii[1:] + metre * run.pendulums.row("gaps", len(lengths) - 1)
+    pivots = np.concatenate([[0.0], np.cumsum(apart)])
+    pivots -= (pivots[-1] + radii[-1] - radii[0]) / 2
+    out = metre * np.abs(np.sin(run.positions / lengths) * lengths).max()
+    return metre, radii, pivots, float(pivots[-1] + radii[-1] + out + 10.0)
+
+
+def _swing(
+    run: Swing, name: str, ax: Axes, place: tuple[float, float], duration: float
+) -> Iterator[Move]:
+    """Draw a swing below the middle of its beam, and how each ball turns about its pivot."""
+    # Between two of the times an impact is a kink: it needs a keyframe of its own.
+    times = np.array([*run.times, *(hit.time for hit in run.impacts)]) - run.times[0]
+    rows = [k for k in np.argsort(times, kind="stable") if 0.0 <= times[k] <= duration]
+    places = np.vstack([run.positions, *(hit.positions for hit in run.impacts)])[rows]
+    lengths = run.pendulums.row("length", len(run.chain))
+    angles = -np.degrees(places / lengths)  # positive turns what hangs to the left
+    metre, radii, pivots, _ = _hung(run)
+    (middle, beam), radii = place, radii.tolist()
+    ends = middle + pivots[[0, -1]] + [-30, 30]
+    for ball, (x, length) in enumerate(zip((middle + pivots).tolist(), lengths, strict=True)):
+        y = beam + length * metre
+        hanging = ax.plot(
+            [x, x], [beam, y], "#555", lw=1, marker="o", markevery=[1], mfc="#f2f2f2",
+            mec=PALETTE[ball % len(PALETTE)], mew=2.5, ms=2 * radii[ball] - 2.5, clip_on=False,
+        )  # fmt: skip
+        number = ax.text(x, y + 5, f"{ball + 1}", size=14, ha="center")
+        parts = [*hanging, number]
+        yield Move(f"{name}{ball}", parts, times[rows], angles[:, [ball]], TURN, 0, (x, beam))
+    ax.plot(ends, [beam, beam], "#333", lw=4, solid_capstyle="butt", clip_on=False)

@@ -1,10 +1,7 @@
-"""Drawings of impacts.
+"""Drawings of impacts, on the axes that are given or on new ones.
 
 Balls and impulses carry the paper's numbers here: ball i is B(i + 1) with velocity v(i + 1), and
-the impulse of contact c is tau(c + 2). Colours come from the palette of Okabe and Ito; a second
-cue (dash, marker or letter) always goes with them.
-
-Every function draws on the axes it is given, or on new ones, and returns them.
+the impulse of contact c is tau(c + 2). With a colour always goes a dash, a marker or a letter.
 """
 
 from __future__ import annotations
@@ -28,14 +25,9 @@ __all__ = [
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 
 _DASHES: tuple[Any, ...] = (
-    "solid",
-    (0, (6, 2)),
-    (0, (1.5, 1.5)),
-    (0, (6, 2, 1.5, 2)),
-    (0, (10, 3)),
-    (0, (3, 1, 1, 1, 1, 1)),
-    (0, (1, 3)),
-)
+    "solid", (0, (6, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)), (0, (10, 3)),
+    (0, (3, 1, 1, 1, 1, 1)), (0, (1, 3)),
+)  # fmt: skip
 
 #: Marker, letter and name of each kind of event.
 EVENT_STYLES = {
@@ -46,25 +38,14 @@ EVENT_STYLES = {
     "repetition": ("*", "r", "cycle, repeated many times"),
 }
 
-# A longer legend takes several lines.
-_LEGEND = 6
-
-# Labels nearer than this part of the axis would overlap.
-_CROWDED = 0.07
-
 
 def ball_style(ball: int) -> dict[str, Any]:
-    """Return colour and dash of a ball's line, the same in every figure.
+    """Return colour and dash of a ball's line, as arguments of `matplotlib.axes.Axes.plot`.
 
     Parameters
     ----------
     ball : int
         Index of the ball, from 0; styles repeat after seven balls.
-
-    Returns
-    -------
-    dict
-        Keyword arguments of `matplotlib.axes.Axes.plot`.
 
     Examples
     --------
@@ -92,13 +73,11 @@ def axes_or_new(ax: Axes | None) -> Axes:
 def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     """Draw the velocities of all balls against the progress of the impact.
 
-    Those of springs are curves: lines join the steps of the integration, and a smaller `rtol` of
-    the model gives more of them.
+    Those of springs are curves: lines join the steps of the integration.
 
     Parameters
     ----------
     trace : Trace
-        The impact.
     ax : Axes, optional
         Where to draw; new axes if left out.
 
@@ -124,7 +103,7 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     ax.set(xlabel="sum of all impulses (N s)", ylabel="velocity (m/s)")
     ax.margins(x=0)
     ax.grid(alpha=0.3)
-    beside = min(len(trace.chain), _LEGEND)
+    beside = min(len(trace.chain), 6)  # a longer legend takes several lines
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=beside, frameon=False)
     return ax
 
@@ -137,18 +116,16 @@ def velocity_impulse(
     The velocities of the contact's two balls stand against its impulse. Where other contacts act
     while this one rests, its impulse does not grow, and a velocity jumps. Markers and letters
     show the contact's events (`EVENT_STYLES`); with several collisions the letter carries a number.
-    Springs have curves here too, as in `velocities`.
 
     Parameters
     ----------
     trace : Trace
-        The impact.
     contact : int
         Contact c joins balls c and c + 1.
     ax : Axes, optional
         Where to draw; new axes if left out.
     other : int, optional
-        Contact whose impulse the upper axis shows (`impulse_axis`); none if left out.
+        Contact whose impulse an upper axis shows, as by `impulse_axis`.
 
     Returns
     -------
@@ -177,7 +154,6 @@ def velocity_impulse(
         ax.plot(impulses[:, contact], path[:, ball], label=label, lw=2, **ball_style(ball))
     ax.set(xlabel=_impulse(contact), ylabel="velocity (m/s)")
     ax.grid(alpha=0.3)
-
     _mark_events(trace, contact, ax)
     if other is not None:
         impulse_axis(trace, contact, other, ax)
@@ -186,10 +162,9 @@ def velocity_impulse(
 
 def _mark_events(trace: Trace, contact: int, ax: Axes) -> None:
     """Mark a contact's events on its diagram, and put all names into a legend below it."""
-    impulse = trace.path_impulses[:, contact]
-    several = trace.collisions[contact] > 1
-    collision = 1
-    kinds: list[str] = []
+    handles = ax.get_lines()[:2]
+    several, collision = trace.collisions[contact] > 1, 1
+    kinds: set[str] = set()
     names: dict[float, list[str]] = {}
     for row, event in enumerate(trace.events, start=1):
         if event.contact != contact:
@@ -197,24 +172,21 @@ def _mark_events(trace: Trace, contact: int, ax: Axes) -> None:
         marker, letter, _ = EVENT_STYLES[event.kind]
         # A closing that comes before all else starts the first collision: the contact was idle.
         collision += event.kind == "close" and bool(kinds)
-        kinds.append(event.kind)
-        x, pair = float(impulse[row]), trace.path[row, contact : contact + 2]
+        kinds.add(event.kind)
+        x, pair = float(trace.path_impulses[row, contact]), trace.path[row, contact : contact + 2]
         ax.plot([x, x], pair, marker, mfc="white", mec="black", ms=6, zorder=3)
         names.setdefault(x, []).append(f"{letter}{collision}" if several else letter)
     taken = -np.inf
     for x, letters in names.items():
         ax.axvline(x, color="0.6", lw=0.7, ls=":", zorder=0)
         if x > taken:
-            ax.annotate(
-                " ".join(letters), (x, 0), (2, 3), xycoords=ax.get_xaxis_transform(),
-                textcoords="offset points", fontsize=9,
-            )  # fmt: skip
-            taken = x + 0.035 * len(letters) * float(impulse[-1])
-    handles = ax.get_lines()[:2]
+            place: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "fontsize": 9}
+            ax.annotate(" ".join(letters), (x, 0), (2, 3), textcoords="offset points", **place)
+            taken = x + 0.035 * len(letters) * float(trace.impulses[contact])
     for kind, (marker, letter, name) in EVENT_STYLES.items():
         if kind in kinds:
-            handles.append(Line2D([], [], marker=marker, ls="none", mfc="white", mec="black",
-                                  label=f"{letter}: {name}"))  # fmt: skip
+            style: dict[str, Any] = {"marker": marker, "ls": "none", "mfc": "white", "mec": "black"}
+            handles.append(Line2D([], [], label=f"{letter}: {name}", **style))
     # Below the axes, where it hides no line.
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3,
               frameon=False)  # fmt: skip
@@ -225,17 +197,13 @@ def impulse_axis(
 ) -> Axes:
     """Add an upper axis with another contact's impulse to a velocity-impulse diagram.
 
-    The two impulses do not grow in one fixed proportion, so each tick is placed where the path of
-    the impact has it.
+    The two do not grow in one proportion: each tick stands where the path of the impact has it.
 
     Parameters
     ----------
     trace : Trace
-        The impact.
-    contact : int
-        Contact whose impulse is on the lower axis.
-    other : int
-        Contact whose impulse the upper axis shows.
+    contact, other : int
+        Contacts whose impulses the lower axis and the upper one show.
     ax : Axes
         Axes drawn by `velocity_impulse`.
     values : array_like, optional
@@ -258,41 +226,32 @@ def impulse_axis(
     [0.0, 0.5, 0.6667]
     """
     if values is None:
-        ticks = _event_ticks(trace.path_impulses[:, contact], trace.path_impulses[:, other])
+        places, labels = _event_ticks(*trace.path_impulses[:, [contact, other]].T)
     else:
         impulses, _ = trace.curve()
-        lower, upper = impulses[:, contact], impulses[:, other]
         marked = np.atleast_1d(np.asarray(values, dtype=np.float64))
-        places = np.interp(marked, upper, lower)
-        ticks = [(float(x), f"{value:.3g}") for x, value in zip(places, marked, strict=True)]
+        places = np.interp(marked, impulses[:, other], impulses[:, contact]).tolist()
+        labels = [f"{value:.3g}" for value in marked]
     above = ax.twiny()
     above.set_xlim(ax.get_xlim())
-    above.set_xticks([x for x, _ in ticks], [label for _, label in ticks], fontsize=9)
+    above.set_xticks(places, labels, fontsize=9)
     above.set_xlabel(_impulse(other))
     return above
 
 
-def _event_ticks(lower: Vector, upper: Vector) -> list[tuple[float, str]]:
+def _event_ticks(lower: Vector, upper: Vector) -> tuple[list[float], list[str]]:
     """Place and label ticks at the events: ends and jumps first, others where there is room."""
     groups: dict[float, list[float]] = {}
     for x, value in zip(lower.tolist(), upper.tolist(), strict=True):
         groups.setdefault(x, []).append(value)
-    edges = (float(lower[0]), float(lower[-1]))
-
-    def importance(x: float) -> tuple[bool, float]:
-        return (x not in edges, -(groups[x][-1] - groups[x][0]))
-
-    def width(x: float) -> float:
-        # The label of a jump is two numbers wide.
-        return _CROWDED * edges[1] * (2.5 if groups[x][0] != groups[x][-1] else 1.0)
-
+    ends = (float(lower[0]), float(lower[-1]))
+    jumps = {x: group[-1] - group[0] for x, group in groups.items()}
+    # Labels nearer than this would overlap; that of a jump is two numbers wide.
+    widths = {x: 0.07 * ends[1] * (2.5 if jump else 1.0) for x, jump in jumps.items()}
     kept: list[float] = []
-    for x in sorted(groups, key=importance):
-        if all(abs(x - taken) > (width(x) + width(taken)) / 2 for taken in kept):
+    for x in sorted(groups, key=lambda x: (x not in ends, -jumps[x])):
+        if all(abs(x - taken) > (widths[x] + widths[taken]) / 2 for taken in kept):
             kept.append(x)
-
-    def label(x: float) -> str:
-        first, last = f"{groups[x][0]:.3g}", f"{groups[x][-1]:.3g}"
-        return first if first == last else f"{first} → {last}"
-
-    return [(x, label(x)) for x in sorted(kept)]
+    kept.sort()
+    words = [list(dict.fromkeys(f"{groups[x][end]:.3g}" for end in (0, -1))) for x in kept]
+    return kept, [" → ".join(both) for both in words]

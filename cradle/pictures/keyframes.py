@@ -1,30 +1,45 @@
-"""Moving pictures of an impact and of a swing, as SVG with keyframes in CSS.
+"""Pictures by matplotlib of which parts move: as SVG with keyframes in CSS, or as pixels.
 
-A film of pixels would need some hundred frames.  Here the solver's own events are the keyframes:
-between two events of an impact every velocity is linear in the progress, and a browser
-interpolates linearly.  So the motion is exact, sharp at any size, and a few kilobytes long; of
-springs the steps of the integration are the keyframes.  A style sheet, unlike SMIL, can also honour
-a reader who asks for less motion, and paper: both get the still.
+The solver's own events are the keyframes.  Between two of them every velocity is linear in the
+progress, as a browser interpolates: the motion is exact, sharp at any size, and a few kilobytes
+long.  A style sheet, unlike SMIL, also honours readers who ask for less motion, and paper: both get
+the still.
 """
 
 from __future__ import annotations
 
+import io
 import zlib
+from bisect import insort
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from matplotlib.transforms import Affine2D
+from numpy.typing import ArrayLike, NDArray
 
 from cradle.input.values import Vector
 
-# Stands before the name of every moving part, until the picture's own key takes its place.
-KEY = "moving-part-"
-# What the number of a part does that comes and goes.
+#: Pictures a second of a film; a GIF counts hundredths of a second.
+RATE = 25
+# What the numbers of a part do, as CSS.
 SEEN = "opacity:{}"
+TURN = "transform:rotate({}deg)"
+SHIFT = "transform:translate({}px,{}px)"
+STRETCH = "transform:translate({}px) scaleX({})"
+_MAPS: dict[str, Callable[..., Affine2D]] = {
+    TURN: Affine2D.rotate_deg,
+    SHIFT: Affine2D.translate,
+    STRETCH: lambda moved, x, share: moved.scale(share, 1.0).translate(x, 0.0),
+}
+_TOLERANCES = {TURN: [0.1], SHIFT: [0.03, 0.03], STRETCH: [0.03, 0.0005]}
+# Stands before the name of every moving part, until the picture's own key takes its place.
+_KEY = "moving-part-"
 _STYLE_OF_ALL = '<style type="text/css">*{stroke-linejoin: round; stroke-linecap: butt}</style>'
 
 
@@ -39,18 +54,18 @@ class Animation:
     ----------
     svg : str
         The picture as a file.
-    figure, moves : Figure or None, tuple of Move
-        For pixels: the same picture by matplotlib, and how its parts move, in units of the file.
+    figure, moves : Figure, tuple of Move
+        The same for matplotlib, and how its parts move.
 
     Examples
     --------
-    >>> Animation("<svg/>")
+    >>> Animation("<svg/>", Figure(), ())
     Animation(0 kB)
     """
 
     svg: str
-    figure: Figure | None = field(default=None, repr=False, compare=False)
-    moves: tuple[Move, ...] = field(default=(), repr=False, compare=False)
+    figure: Figure = field(repr=False, compare=False)
+    moves: tuple[Move, ...] = field(repr=False, compare=False)
 
     def _repr_html_(self) -> str:
         key = f"p{zlib.crc32(self.svg.encode()):08x}"
@@ -83,90 +98,125 @@ class Animation:
 
         Examples
         --------
-        >>> Animation("<svg/>").save("/dev/null")
+        >>> Animation("<svg/>", Figure(), ()).save("/dev/null")
         """
         file = Path(path)
         kind = file.suffix.lower()
-        if kind in (".png", ".gif", ".mp4"):
-            from cradle.pictures.frames import save_pixels
-
-            save_pixels(self, file)
-        elif kind in (".svg", ".html", ""):
+        if kind in (".svg", ".html", ""):
             page = f"<!doctype html>\n<meta charset='utf-8'>\n{self._repr_html_()}\n"
             file.write_text(page if kind == ".html" else self.svg, encoding="utf-8")
+        elif kind == ".png":
+            self.show(None)
+            self.figure.savefig(file, dpi=144)
+        elif kind in (".gif", ".mp4"):
+            self._film(file, kind)
         else:
             raise ValueError(f"path = {str(path)!r}; must end in .svg, .html, .gif, .mp4 or .png")
 
+    def _film(self, file: Path, kind: str) -> None:
+        from matplotlib.animation import FFMpegWriter, PillowWriter
 
-def thin(times: Vector, values: Vector, tolerance: float) -> NDArray[np.int64]:
-    """Return the rows that straight lines need to stay within the tolerance (Douglas, Peucker)."""
-    keep = np.zeros(len(times), dtype=bool)
-    keep[[0, -1]] = True
-    spans = [(0, len(times) - 1)]
-    while spans:
-        a, b = spans.pop()
-        if b - a < 2:
-            continue
-        part = (times[a + 1 : b] - times[a]) / ((times[b] - times[a]) or 1.0)
-        line = values[a] + part[:, None] * (values[b] - values[a])
-        off = np.abs(values[a + 1 : b] - line).max(axis=1)
-        if off.max() > tolerance:
-            middle = a + 1 + int(np.argmax(off))
-            keep[middle] = True
-            spans += [(a, middle), (middle, b)]
-    return np.flatnonzero(keep)
+        if kind == ".mp4" and not FFMpegWriter.isAvailable():
+            raise ValueError(
+                f"{file} needs the program ffmpeg, which is not here; .gif needs nothing"
+            )
+        writer, dpi = (FFMpegWriter, 144) if kind == ".mp4" else (PillowWriter, 72)
+        duration = max((float(move.times[-1]) for move in self.moves), default=0.0)
+        film = writer(fps=RATE)
+        with film.saving(self.figure, str(file), dpi=dpi):
+            for k in range(max(1, round(RATE * duration))):
+                self.show(k / RATE)
+                film.grab_frame()
+
+    def show(self, time: float | None) -> None:
+        """Bring every part of the figure to where it is at a time, s; None is the still."""
+        for move in self.moves:
+            values, (x, y) = move.at(time), move.origin
+            for artist in move.artists:
+                if move.form == SEEN:
+                    artist.set_visible(values[0] > 0.5)
+                else:
+                    moved = _MAPS[move.form](Affine2D().translate(-x, -y), *values)
+                    artist.set_transform(moved.translate(x, y) + artist.axes.transData)
+
+
+class Move(NamedTuple):
+    """How artists move together; lengths are in the data units of their axes."""
+
+    part: str
+    artists: Sequence[Any]
+    times: Vector  # s
+    values: NDArray[np.float64]  # a row at each time
+    form: str  # what the values do
+    still: int  # the row of the still
+    origin: tuple[float, float] = (0.0, 0.0)  # what turns and stretches does so about this point
+
+    def at(self, time: float | None) -> list[float]:
+        """Return the values at a time, s; None is the still."""
+        row = self.still if time is None else np.searchsorted(self.times, time, side="right") - 1
+        if time is None or self.form == SEEN:  # it lasts until the next keyframe
+            return [float(value) for value in self.values[row]]
+        return [float(np.interp(time, self.times, column)) for column in self.values.T]
+
+    def css(self) -> str:
+        """Return the style of the part: where it rests, and its keyframes; a point is a px."""
+        ax, name = self.artists[0].axes, f"{_KEY}{self.part}"
+        corners = ax.transData.transform([self.origin, np.add(self.origin, 1.0)])
+        (x, y), (wide, high) = corners[0], np.diff(corners, axis=0)[0]
+        if self.form == SEEN:
+            pace, values = "step-end", self.values
+            rows = [0, *(np.flatnonzero(np.diff(values[:, 0])) + 1).tolist()]
+        else:
+            pace, size = "linear", {TURN: [1], SHIFT: [wide, -high], STRETCH: [wide, 1]}
+            values = self.values * size[self.form]
+            rows = thin(self.times, values, _TOLERANCES[self.form])
+        states = [self.form.format(*map(number, row)) for row in values.tolist()]
+        end = self.times[-1]
+        frames = " ".join(f"{number(100 * self.times[k] / end)}%{{{states[k]}}}" for k in rows)
+        about = f"{number(x)}px {number(ax.figure.bbox.height - y)}px"
+        return (
+            f"[id^={name}-]{{{states[self.still]};transform-origin:{about};"
+            f"animation:{name} {number(end)}s {pace} infinite}}\n@keyframes {name}{{{frames}}}\n"
+        )
+
+
+def thin(times: Vector, values: NDArray[np.float64], tolerance: ArrayLike) -> list[int]:
+    """Return the rows that straight lines need to stay within the tolerance of each column."""
+    rows = [0, len(times) - 1]
+    while True:
+        lines = [np.interp(times, times[rows], column[rows]) for column in values.T]
+        off = (np.abs(values - np.transpose(lines)) / tolerance).max(axis=1)
+        off[rows] = 0.0
+        if off.max() <= 1.0:
+            return rows
+        insort(rows, int(off.argmax()))
 
 
 def number(value: float) -> str:
     """Return a number as CSS, to a thousandth."""
-    value = round(value, 3) + 0.0  # no -0
-    return f"{value:.3f}".rstrip("0").rstrip(".")
+    return f"{round(value, 3) + 0.0:.7g}"  # no -0
 
 
-class Move(NamedTuple):
-    """How a part moves: times in s, a row of numbers at each, and what they do, as CSS."""
+def moving(figure: Figure, moves: Sequence[Move], alt: str, unit: str = "pt") -> Animation:
+    """Return a figure of 72 dots an inch as a picture that moves, with stillness where it is asked.
 
-    part: str
-    times: Vector
-    values: Vector
-    form: str
-    tolerance: float
-    still: int  # the row of the still
-    origin: tuple[float, float] = (0.0, 0.0)  # what turns and stretches does so about this point
-
-    def css(self) -> str:
-        """Return the style of the part: where it rests, and its keyframes."""
-
-        def state(row: int) -> str:
-            css = self.form.format(*map(number, self.values[row].tolist()))
-            return css if self.form == SEEN else f"transform:{css}"
-
-        part, times, pace = self.part, self.times, "linear"
-        rows = thin(times, self.values, self.tolerance).tolist()
-        if self.form == SEEN:  # it lasts until the next keyframe
-            pace, rows = "step-end", [0, *(np.flatnonzero(np.diff(self.values[:, 0])) + 1)]
-        frames = " ".join(f"{number(100 * times[k] / times[-1])}%{{{state(k)}}}" for k in rows)
-        moves = f"animation:{part} {number(times[-1])}s {pace} infinite"
-        x, y = self.origin
-        about = f"#{part}{{transform-origin:{number(x)}px {f'{y}px' if y else 0}}}\n" if x else ""
-        return f"{about}#{part}{{{state(self.still)};{moves}}}\n@keyframes {part}{{{frames}}}\n"
-
-
-def with_style(svg: str, style: str, alt: str) -> str:
-    """Put a style sheet into a picture; stillness for those who ask for it, and on paper.
-
-    In a page the names of all pictures share one space, so each gets a key of its own in the
-    place of `KEY`.
+    In a page the names of all pictures share one space, so each gets a key of its own.
     """
-    still = "".join(
-        f"@media {media} {{ [id^={KEY}] {{ animation: none !important }} }}\n"
+    for move in moves:
+        for k, artist in enumerate(move.artists):
+            artist.set_gid(f"{_KEY}{move.part}-{k}")
+    file, nothing = io.StringIO(), dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    with mpl.rc_context({"svg.hashsalt": "cradle", "svg.fonttype": "path"}):
+        figure.savefig(file, format="svg", metadata=nothing)
+    figure.set_layout_engine("none")  # parts that move leave the others where they are
+    # Matplotlib sets a style for `*`: in a page that would be every picture.
+    svg = file.getvalue().replace(_STYLE_OF_ALL, "").replace('pt"', f'{unit}"', 2)
+    style = "".join(move.css() for move in moves) + "".join(
+        f"@media {media} {{ [id^={_KEY}] {{ animation: none !important }} }}\n"
         for media in ("print", "(prefers-reduced-motion: reduce)")
     )
-    start = svg.index("<svg")
-    head = svg.index(">", start)
-    # Matplotlib sets these two for `*`: in a page that would be every picture.
     root = 'style="max-width:100%;height:auto;stroke-linejoin:round;stroke-linecap:butt"'
-    body = svg[head + 1 :].replace(_STYLE_OF_ALL, "")
-    name = f'role="img" aria-label="{escape(alt)}"' if alt else ""
-    moving = f"{svg[start:head]} {name} {root}>\n<style>\n{style}{still}</style>{body}"
-    return moving.replace(KEY, f"m{zlib.crc32(moving.encode()):08x}-")
+    root += f' role="img" aria-label="{escape(alt)}"' if alt else ""
+    head, body = svg[svg.index("<svg") :].split(">", 1)
+    svg = f"{head} {root}>\n<style>\n{style}</style>{body}"
+    return Animation(svg.replace(_KEY, f"m{zlib.crc32(svg.encode()):08x}-"), figure, tuple(moves))
