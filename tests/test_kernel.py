@@ -10,7 +10,6 @@ import subprocess
 import sys
 import threading
 import time
-import types
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -19,7 +18,6 @@ import pytest
 from chains import random_chains, with_ends
 from plain import rooms, solve
 from test_work_area import filled
-from tqdm import tqdm
 
 from cradle import (
     Chain,
@@ -31,7 +29,6 @@ from cradle import (
     outcomes,
 )
 from cradle import post_impact_velocities as batch
-from cradle.progress import progress_bar
 from cradle.runtime import compile as runtime
 from cradle.runtime import job as drive
 
@@ -561,17 +558,6 @@ def test_a_path_holds_ten_million_numbers_unless_asked_for(monkeypatch):
         # This model takes no `record`, so it is not advised.
         with pytest.warns(UserWarning, match=r"events$"):
             collide(chain, SequentialCollisions())
-
-
-@pytest.mark.parametrize("widgets", [False, True])
-def test_without_widgets_a_bar_is_drawn_with_letters(monkeypatch, widgets):
-    """In a notebook without them `tqdm.auto` would warn."""
-    monkeypatch.setattr("importlib.util.find_spec", lambda _: widgets or None)
-    fancy = types.ModuleType("tqdm.auto")
-    fancy.tqdm = lambda **_: "fancy"
-    monkeypatch.setitem(sys.modules, "tqdm.auto", fancy)
-    bar = progress_bar(disable=True)
-    assert bar == "fancy" if widgets else type(bar) is tqdm
 
 
 @pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])

@@ -17,10 +17,9 @@ import click
 
 def format_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of `show`."""
-    command = click.option("--csv", "as_csv", is_flag=True, help="Print the table as CSV.")(command)
-    return click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")(
-        command
-    )
+    as_csv = click.option("--csv", "as_csv", is_flag=True, help="Print the table as CSV.")
+    as_json = click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+    return as_json(as_csv(command))
 
 
 def show(
@@ -35,9 +34,8 @@ def show(
         click.echo(json.dumps({"rows": list(rows), **extra}, indent=2))
     elif as_csv:
         table = io.StringIO()
-        writer = csv.DictWriter(table, names, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({name: _plain(value) for name, value in row.items()} for row in rows)
+        writer = csv.writer(table, lineterminator="\n")
+        writer.writerows([names, *([_plain(row[name]) for name in names] for row in rows)])
         click.echo(table.getvalue(), nl=False)
     else:
         click.echo(f"{text(rows, names)}\n{note}")
@@ -45,14 +43,12 @@ def show(
 
 def text(rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> str:
     """Return rows as a table of text; its columns are those of the first row, if not `names`."""
-    names = names or list(rows[0])
-    columns = [_texts([row[name] for row in rows]) for name in names]
-    table = [list(names), *map(list, zip(*columns, strict=True))]
-    widths = [max(len(line[k]) for line in table) for k in range(len(table[0]))]
-    return "\n".join(
-        "  ".join(word.rjust(width) for word, width in zip(line, widths, strict=True)).rstrip()
-        for line in table
-    )
+    columns = []
+    for name in names or rows[0]:
+        words = [name, *_texts([row[name] for row in rows])]
+        width = max(map(len, words))
+        columns.append([word.rjust(width) for word in words])
+    return "\n".join("  ".join(line).rstrip() for line in zip(*columns, strict=True))
 
 
 def _texts(column: Sequence[Any]) -> list[str]:
@@ -68,19 +64,13 @@ def _texts(column: Sequence[Any]) -> list[str]:
     floats = [abs(value) for value in column if isinstance(value, float) and math.isfinite(value)]
     largest = max(floats, default=0.0) or 1.0
     decimals = max(4, 3 - math.floor(math.log10(largest)))
-
-    def cell(value: Any) -> str:
-        if value is None:
-            return "-"
-        if isinstance(value, bool):
-            return "yes" if value else "no"
-        if not isinstance(value, float):
-            return str(value)
-        if decimals > 8 or largest >= 1e8:
-            return f"{value:.4g}"
-        return f"{value:z.{decimals}f}"
-
-    return [cell(value) for value in column]
+    form = ".4g" if decimals > 8 or largest >= 1e8 else f"z.{decimals}f"
+    words = {None: "-", True: "yes", False: "no"}
+    return [
+        f"{value:{form}}" if isinstance(value, float) else
+        words[value] if value is None or isinstance(value, bool) else str(value)
+        for value in column
+    ]  # fmt: skip
 
 
 def _plain(value: Any) -> Any:
@@ -104,26 +94,14 @@ def image_format(path: str) -> str:
 
 @contextmanager
 def waiting(hint: str, after: float = 2.0) -> Iterator[None]:
-    """Say after some seconds that work goes on, and what would be faster; count the time."""
-    done = threading.Event()
-
-    def tell() -> None:
-        if done.wait(after):
-            return
-        from cradle.progress import progress_bar
-
-        click.echo(f"cradle: still working; {hint}", err=True)
-        with progress_bar(bar_format="{elapsed}", disable=None) as bar:
-            while not done.wait(0.5):
-                bar.refresh()
-
-    teller = threading.Thread(target=tell, daemon=True)
+    """Say after some seconds that work goes on, and what would be faster."""
+    words = f"cradle: still working; {hint}"
+    teller = threading.Timer(after, click.echo, [words], {"err": True})
     teller.start()
     try:
         yield
     finally:
-        done.set()
-        teller.join()
+        teller.cancel()
 
 
 def plot_fits(fits: Sequence[Any], path: str) -> None:

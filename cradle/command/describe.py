@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import click
 
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpulseCorrelation,
+    Model,
+    SequentialCollisions,
+    SpringChain,
+    paper_chain,
+)
+from cradle.advice.choice import made
 from cradle.command.console import waiting
-
-if TYPE_CHECKING:
-    from cradle.chain import Chain
-    from cradle.models import Model
-
-# What a command needs is imported in the command: the first answer comes within a second.
+from cradle.input.values import one_number
 
 UNITS = {"kg": 1.0, "g": 1e-3}
-_MODELS = ("ratio", "spheres", "sequential")
 
 
 def numbers_of(_: click.Context, __: click.Parameter, value: str | None) -> list[float] | None:
@@ -39,16 +44,15 @@ def chain_options(command: Callable[..., None]) -> Callable[..., None]:
         click.option("--unit", type=click.Choice(list(UNITS)), help="Of masses [kg]."),
         click.option("--velocities", callback=numbers_of, help="Instead of --speed: 1,0,0."),
         click.option("--restitution", callback=numbers_of, help="One, or one per contact [1]."),
-        click.option("--model", type=click.Choice(_MODELS), help="How the balls collide: by "
-                     "ratios, as elastic spheres (Hertz; with losses the energy law), or one pair "
-                     "after the other [ratio if there are ratios, else spheres]."),
+        click.option("--model", type=click.Choice(["ratio", "spheres", "sequential"]),
+                     help="How the balls collide: by ratios, as elastic spheres (Hertz; with "
+                     "losses the energy law), or one pair after the other [ratio if there are "
+                     "ratios, else spheres]."),
         click.option("--ratio", callback=numbers_of, help="One, or one per inner ball."),
         click.option("--backward", callback=numbers_of, help="Ratios from the right [as --ratio]."),
         click.option("--saturate", is_flag=True, help="Admit ratios above their bound."),
     ]  # fmt: skip
-    for option in reversed(options):
-        command = option(command)
-    return command
+    return functools.reduce(lambda made, option: option(made), reversed(options), command)
 
 
 def swing_options(otherwise: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -60,8 +64,6 @@ def swing_options(otherwise: str) -> Callable[[Callable[..., None]], Callable[..
 
 def pendulum_length(length: float | None, period: float | None) -> float | None:
     """Return the length of pendulums that have this length, or this period of small swings."""
-    from cradle.input.values import one_number
-
     if length is not None and period is not None:
         raise click.UsageError("give one of --length and --period")
     if period is None:
@@ -71,30 +73,26 @@ def pendulum_length(length: float | None, period: float | None) -> float | None:
 
 
 class Described(NamedTuple):
-    """A chain and how it collides."""
+    """A chain, how it collides, what was not given and stands for it, and the paper's types."""
 
     chain: Chain
     model: Model
-    #: What was not given and stands for it, in words.
     assumed: tuple[str, ...]
-    #: Types of the balls, where they are the paper's.
     letters: str = ""
 
     def waiting(self) -> AbstractContextManager[None]:
         """Return what says that long work goes on, and what would be faster."""
         return waiting(
             "--ratio 0.1 or --model sequential would take seconds"
-            if type(self.model).__name__ in ("SpringChain", "EnergyDistribution")
+            if isinstance(self.model, (SpringChain, EnergyDistribution))
             else "fewer balls would be faster"
         )
 
     @property
     def note(self) -> str:
         """The model, and what is assumed, for people."""
-        from cradle.advice.choice import made
-
-        lines = [f"model: {made(self.model)}"]
-        return "\n".join(lines + [f"assumed: {'; '.join(self.assumed)}"] * bool(self.assumed))
+        assumed = f"\nassumed: {'; '.join(self.assumed)}" if self.assumed else ""
+        return f"model: {made(self.model)}{assumed}"
 
 
 def described(
@@ -105,15 +103,10 @@ def described(
     backward: list[float] | None = None, saturate: bool = False,
 ) -> Described:  # fmt: skip
     """Return the chain and the model that the options describe."""
-    from cradle.chain import Chain
-    from cradle.input.values import one_number
-    from cradle.models.correlation import ImpulseCorrelation
-    from cradle.tables import paper_chain
-
     assumed = []
     if sequence is not None and sequence.isdecimal() and masses is None:
         masses, sequence = [1.0] * int(sequence), None
-        assumed.append("equal balls of 1 kg" if unit is None else f"equal balls of 1 {unit}")
+        assumed.append(f"equal balls of 1 {unit or 'kg'}")
     if (sequence is None) == (masses is None):
         raise click.UsageError(
             "give how many equal balls, such as 5, or a sequence of the paper's balls, such as "
@@ -125,17 +118,17 @@ def described(
         raise click.UsageError("give one of --speed and --velocities")
     striker = 1.0 if speed is None else one_number("speed", speed)
     excess: Literal["raise", "saturate"] = "saturate" if saturate else "raise"
-    if sequence is not None:
+    if masses is None:
         given = {"--unit": unit, "--velocities": velocities, "--restitution": restitution,
                  "--ratio": ratio, "--backward": backward}  # fmt: skip
         for name, value in given.items():
             if value is not None:
                 raise click.UsageError(f"{name} goes with --masses; {sequence} has its own values")
-        chain, ratios = paper_chain(sequence.upper(), striker, excess=excess)
+        letters = str(sequence).upper()
+        chain, ratios = paper_chain(letters, striker, excess=excess)
         law = ratios if model in (None, "ratio") else _without_ratios(chain, model)
-        return Described(chain, law, (), sequence.upper())
-    assert masses is not None
-    before = [striker] + [0.0] * (len(masses) - 1) if velocities is None else velocities
+        return Described(chain, law, (), letters)
+    before = velocities or [striker] + [0.0] * (len(masses) - 1)
     balls = [UNITS[unit or "kg"] * m for m in masses]
     chain = Chain(balls, before, one_or_all(restitution or [1.0]))
     assumed += [] if velocities else [f"the first ball strikes at {striker:g} m/s"]
@@ -155,16 +148,8 @@ def described(
 
 def _without_ratios(chain: Chain, model: str | None) -> Model:
     if model == "sequential":
-        from cradle.models.sequential import SequentialCollisions
-
         return SequentialCollisions()
-    if (chain.restitution == 1.0).all():
-        from cradle.models.compliant import SpringChain
-
-        return SpringChain()
-    from cradle.models.energy import EnergyDistribution
-
-    return EnergyDistribution()
+    return SpringChain() if (chain.restitution == 1.0).all() else EnergyDistribution()
 
 
 def one_or_all(values: list[float] | None) -> Any:

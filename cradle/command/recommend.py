@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+import cradle
 from cradle.command.describe import chain_options, described, numbers_of, one_or_all
 
 
@@ -33,17 +34,14 @@ def recommend(
       cradle recommend ABACA --impacts 1000
       cradle recommend --masses 1,2,1 --wanted "fastest ball"
     """
-    from cradle.advice import recommend as recommend_from
-    from cradle.models.correlation import ImpulseCorrelation
-
     if options.pop("model") is not None:
         raise click.UsageError("leave --model out: it is what is recommended")
     given = described(**options)
     wishes = [name.strip() for names in wanted for name in names.split(",")]
-    known = given.model if isinstance(given.model, ImpulseCorrelation) else None
-    advice = recommend_from(
+    law, more = given.model, len(given.chain) > 2  # two balls have no ratio
+    advice = cradle.recommend(
         given.chain, wishes, accuracy=accuracy, model_error=model_error, impacts=impacts,
-        ratios=known if len(given.chain) > 2 else None,
+        ratios=law if more and isinstance(law, cradle.ImpulseCorrelation) else None,
         stiffness=one_or_all(stiffness),
     )  # fmt: skip
     click.echo(repr(advice))

@@ -14,14 +14,16 @@ from typing import Any
 
 import click
 
+from cradle import ImpactNotCertified, ImpactNotFinished, collide
+from cradle.advice.choice import made
 from cradle.command.console import format_options, image_format, picture, show
 from cradle.command.describe import chain_options, described
 from cradle.command.film import film
 from cradle.command.fit import fit, template
 from cradle.command.recommend import recommend
 from cradle.command.swing import swing
-
-# What a command needs is imported in the command: the first answer comes within a second.
+from cradle.runtime import compile as runtime
+from cradle.runtime import job as drive
 
 # What errors say of arguments, as options; a row of values counts from 1, like the tables.
 _ROW = r"\b(masses|velocities|restitution|ratio|backward|stiffness|gaps|damping)"
@@ -84,10 +86,6 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
       cradle solve --masses 45,53,53 --unit g --restitution 0.53,0.36 --ratio 0.104
       cradle solve --masses 1,1,1 --velocities 1,0,-1 --model sequential --csv
     """
-    from cradle.advice.choice import made
-    from cradle.models import collide
-
-    # One chain: faster as it stands than the compiler takes to load.
     given = described(**options)
     chain = given.chain
     with given.waiting():
@@ -98,23 +96,21 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
          "before": float(chain.velocities[k]), "after": float(trace.velocities[k]) + 0.0}
         for k in range(len(chain))
     ]  # fmt: skip
+    lost = float(trace.energy_loss / (chain.kinetic_energy or 1.0))  # nothing, of balls at rest
+    collisions, held = trace.collisions.tolist(), [contact + 1 for contact in trace.saturated]
     extra = {
-        "model": made(given.model),
-        "assumed": given.assumed,
-        # Of balls at rest nothing is lost.
-        "energy_lost": float(trace.energy_loss / (chain.kinetic_energy or 1.0)),
-        "collisions": trace.collisions.tolist(),
-        "collapsed": trace.collapsed,
-        "held_contacts": [contact + 1 for contact in trace.saturated],
-    }
-    held = ", ".join(map(str, extra["held_contacts"]))
-    lines = ["no balls approach: no impact"] * (not (chain.closing_speeds > 0.0).any())
-    lines.append(
-        f"energy lost: {100 * extra['energy_lost']:z.2f} %; collisions of the contacts: "
-        f"{', '.join(map(str, extra['collisions']))}"
-    )
-    lines += [f"held closed at their largest ratio: contact {held} (--saturate)"] * bool(held)
-    lines += ["an infinite sequence of impacts was taken to its limit"] * trace.collapsed
+        "model": made(given.model), "assumed": given.assumed, "energy_lost": lost,
+        "collisions": collisions, "collapsed": trace.collapsed, "held_contacts": held,
+    }  # fmt: skip
+    lines = []
+    if not (chain.closing_speeds > 0.0).any():
+        lines.append("no balls approach: no impact")
+    counts, contacts = (", ".join(map(str, counted)) for counted in (collisions, held))
+    lines.append(f"energy lost: {100 * lost:z.2f} %; collisions of the contacts: {counts}")
+    if held:
+        lines.append(f"held closed at their largest ratio: contact {contacts} (--saturate)")
+    if trace.collapsed:
+        lines.append("an infinite sequence of impacts was taken to its limit")
     show(rows, extra, "\n".join([*lines, given.note]), as_json, as_csv)
 
 
@@ -132,7 +128,6 @@ def plot(output: str, **options: Any) -> None:
     """
     from matplotlib.figure import Figure
 
-    from cradle.models import collide
     from cradle.pictures.impacts import velocities
 
     given, figure = described(**options), Figure((7, 4.3), layout="constrained")
@@ -157,29 +152,25 @@ def warm_up() -> None:
     Examples:
       cradle warm-up
     """
-    from cradle.runtime import compile as runtime
-    from cradle.runtime import job as drive
-
     there, begun = runtime.on_disk("springs"), time.perf_counter()
     drive.warm_up()
     seconds = time.perf_counter() - begun
     if not runtime.loaded():
-        click.echo(
+        told = (
             f"not compiled: numba is missing or switched off, or {runtime.VARIABLE}=plain is set; "
             "the event loop runs plain"
         )
     elif there:
-        click.echo(f"compiled already; loaded in {seconds:.1f} s")
+        told = f"compiled already; loaded in {seconds:.1f} s"
     elif runtime.on_disk():
-        click.echo(f"compiled in {seconds:.0f} s, once on this machine")
+        told = f"compiled in {seconds:.0f} s, once on this machine"
     else:
-        click.echo(f"compiled in {seconds:.0f} s for this process alone: no folder can be written")
+        told = f"compiled in {seconds:.0f} s for this process alone: no folder can be written"
+    click.echo(told)
 
 
 def run(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit; wrong input ends in one line on standard error."""
-    from cradle.trace import ImpactNotCertified, ImpactNotFinished
-
     try:
         main(arguments, prog_name="cradle")
     except (ValueError, OSError, ImpactNotFinished, ImpactNotCertified) as error:

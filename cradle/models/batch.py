@@ -22,7 +22,6 @@ from cradle.models.correlation import (
     check_values,
     raise_refused,
 )
-from cradle.progress import progress_bar
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
 from cradle.trace import ImpactNotCertified
 
@@ -196,8 +195,10 @@ def in_order(
 ) -> Iterable[tuple[int, int]]:
     """Yield the results of `solve` in order, made by as many threads as there are processors."""
     if progress:
+        from tqdm import tqdm
+
         ended = in_order(solve, starts, progress=False)
-        yield from progress_bar(iterable=ended, total=len(starts), unit="chunk")
+        yield from tqdm(ended, total=len(starts), unit="chunk")
     elif (workers := min(len(starts), os.cpu_count() or 1)) < 2:
         yield from map(solve, starts)
     else:

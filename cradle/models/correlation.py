@@ -28,7 +28,6 @@ from cradle.input.values import (
 )
 from cradle.kernel import Inputs, Options
 from cradle.kernel.state import LIMITS
-from cradle.progress import progress_bar
 from cradle.runtime.job import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job, outputs
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
@@ -116,7 +115,9 @@ class ImpulseCorrelation:
         options = Options(self.meeting, self.max_events, self.excess == "raise")
         job = Job(inputs, outputs(1, n, last=True), options, room)
         if progress:
-            with progress_bar(unit=" events") as bar:
+            from tqdm import tqdm
+
+            with tqdm(unit=" events") as bar:
                 job.run(pause=lambda: bar.update(job.tally("events") - bar.n))
         else:
             job.run()
