@@ -1,4 +1,4 @@
-"""Chains and impacts as HTML for notebooks: a small picture (SVG) and a table, without a plotter.
+"""Chains and impacts for people: rows of numbers, and for notebooks a small picture and a table.
 
 All is drawn in the colour of the text around it, so that it can be read on light and dark pages.
 """
@@ -14,27 +14,6 @@ from numpy.typing import NDArray
 
 _Vector = NDArray[np.float64]
 
-# Of a long chain this many balls are shown, from the left and from the right.
-_LEFT, _RIGHT = 8, 4
-
-# Pixels: height of a row, largest radius, arrow of the fastest ball, width of an omission.
-_ROW, _RADIUS, _ARROW, _OMITTED = 70, 18.0, 30.0, 28.0
-
-
-def as_html(
-    masses: _Vector, states: Mapping[str, _Vector], columns: Mapping[str, NDArray[Any]]
-) -> str:
-    """Return a picture of a chain in one or several states, and a table below it."""
-    n = len(masses)
-    balls = list(range(n)) if n <= _LEFT + _RIGHT else [*range(_LEFT), *range(n - _RIGHT, n)]
-    rows = []
-    for ball in balls:
-        if ball and ball - 1 not in balls:
-            rows.append(["…"] * (len(columns) + 1))
-        cells = [f"{v[ball]:.6g}" if ball < len(v) else "" for v in columns.values()]
-        rows.append([str(ball), *cells])
-    return f"<div>{_picture(masses, states, balls)}{_table(['ball', *columns], rows)}</div>"
-
 
 def as_text(values: _Vector) -> str:
     """Return a row of velocities or impulses as people write it, six digits of each."""
@@ -47,46 +26,55 @@ def without_rounding(values: _Vector) -> _Vector:
     return np.where(small, 0.0, values) + 0.0
 
 
+def as_html(
+    masses: _Vector, states: Mapping[str, _Vector], columns: Mapping[str, NDArray[Any]]
+) -> str:
+    """Return a picture of a chain in one or several states, and a table below it.
+
+    Of a chain of more than 12 balls the first eight and the last four are shown.
+    """
+    n = len(masses)
+    balls = list(range(n)) if n <= 12 else [*range(8), *range(n - 4, n)]
+    rows = [["ball", *columns]]
+    for ball in balls:
+        if ball and ball - 1 not in balls:
+            rows.append(["…"] * len(rows[0]))
+        cells = [f"{v[ball]:.6g}" if ball < len(v) else "" for v in columns.values()]
+        rows.append([str(ball), *cells])
+    head, *body = (
+        f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in row)}</tr>"
+        for row, tag in zip(rows, ["th"] + ["td"] * len(rows), strict=False)
+    )
+    table = f"<table><thead>{head}</thead><tbody>{''.join(body)}</tbody></table>"
+    return f"<div>{_picture(masses, states, balls)}{table}</div>"
+
+
 def _picture(masses: _Vector, states: Mapping[str, _Vector], balls: list[int]) -> str:
-    """Draw the chain once for each state, with an arrow above each ball that moves."""
+    """Draw the chain once for each state, with an arrow above each ball that moves; in pixels."""
     # At least two pixels, or a light ball would not be seen.
-    radii = np.maximum(_RADIUS * np.cbrt(masses[balls] / masses.max()), 2.0)
-    omitted = _OMITTED * (np.diff(balls, prepend=-1) > 1)
-    label = 8.0 * max(map(len, states)) + 20.0
-    centres = label + np.cumsum(2.0 * radii + omitted) - radii
-    width = centres[-1] + radii[-1] + _ARROW
+    radii = np.maximum(18.0 * np.cbrt(masses[balls] / masses.max()), 2.0)
+    omitted = 28.0 * (np.diff(balls, prepend=-1) > 1)
+    centres = 8.0 * max(map(len, states)) + 20.0 + np.cumsum(2.0 * radii + omitted) - radii
+    width, height = centres[-1] + radii[-1] + 30.0, 70 * len(states)
     fastest = max(float(np.abs(v).max()) for v in states.values()) or 1.0
     parts = []
-    for row, (name, velocities) in enumerate(states.items()):
-        y = _ROW * row + 46
+    for y, (name, velocities) in zip(range(46, height, 70), states.items(), strict=True):
         parts.append(f'<text x="2" y="{y + 4}" stroke="none">{escape(name)}</text>')
-        for ball, x, r, gap in zip(balls, centres, radii, omitted, strict=True):
+        for x, r, gap, v in zip(centres, radii, omitted, velocities[balls], strict=True):
             parts.append(f'<circle cx="{x:.1f}" cy="{y}" r="{r:.1f}" fill-opacity="0.12"/>')
             if gap:
                 parts.append(f'<text x="{x - r - 20:.1f}" y="{y + 4}" stroke="none">…</text>')
             # All arrows on one scale; shorter ones than a pixel tell nothing.
-            length = float(_ARROW * (velocities[ball] / fastest))
+            length = float(30.0 * (v / fastest))
             if abs(length) >= 1.0:
                 head = np.copysign(min(5.0, abs(length)), length)
                 parts.append(
                     f'<path fill="none" d="M {x - length / 2:.1f} {y - 30} h {length:.1f} '
                     f'm {-head:.1f} -4 l {head:.1f} 4 l {-head:.1f} 4"/>'
                 )
-    height = _ROW * len(states)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height}" '
         f'width="{width:.0f}" height="{height}" role="img" aria-label="row of {len(masses)} balls" '
         'style="max-width: 100%" font-family="sans-serif" font-size="13" fill="currentColor">'
-        '<g stroke="currentColor" stroke-width="1.5">'
-        f"{''.join(parts)}</g></svg>"
+        f'<g stroke="currentColor" stroke-width="1.5">{"".join(parts)}</g></svg>'
     )
-
-
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    """Return a plain table; the page styles it."""
-
-    def line(cells: list[str], tag: str) -> str:
-        return f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
-
-    body = "".join(line(row, "td") for row in rows)
-    return f"<table><thead>{line(head, 'th')}</thead><tbody>{body}</tbody></table>"
