@@ -73,7 +73,7 @@ def _balls(trace: Trace, ax: Axes, times: Vector, index: NDArray[np.intp]) -> It
     The balls move in the flights alone; bars are in diameters of the largest one.
     """
     impulses, path = trace.curve()
-    still, reach = len(path), 2.6
+    still, reach = float(times[-3]), 2.6  # the end of the impact
     radii = 0.5 * np.cbrt(trace.chain.masses / trace.chain.masses.max())
     centres = np.cumsum(2 * radii) - radii
     ax.set(xlim=(-reach, centres[-1] + radii[-1] + reach), ylim=(-0.6, 0.95), aspect="equal")
@@ -99,10 +99,10 @@ def _balls(trace: Trace, ax: Axes, times: Vector, index: NDArray[np.intp]) -> It
         yield Move(f"tip{ball}", parts, times, np.column_stack([way + bar, level]), SHIFT, still)
     # A star is seen while the impulse of its contact grows.
     lit = np.zeros((len(times), len(centres) - 1))
-    lit[1:still] = np.diff(impulses, axis=0) > 0.0
+    lit[1 : len(path)] = np.diff(impulses, axis=0) > 0.0
     for contact, x in enumerate((centres + radii)[:-1].tolist()):
         star = ax.plot(x, 0, "*", ms=15, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
-        yield Move(f"star{contact}", star, times, lit[:, [contact]], SEEN, 0)
+        yield Move(f"star{contact}", star, times, lit[:, [contact]], SEEN, 0.0)
 
 
 def _diagram(
@@ -116,19 +116,19 @@ def _diagram(
     else:
         velocity_impulse(trace, contact, ax)
         along, shown = impulses[:, contact], range(contact, contact + 2)
-    still, (x0, x1), (y0, y1) = len(path), ax.get_xlim(), ax.get_ylim()
+    (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     cover = ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fc="white", alpha=0.9, zorder=4))
     hidden = (x1 - along[index]) / (x1 - x0)
-    hidden[still + 1 :] = 0.0  # beyond the last point too
+    hidden[-2:] = 0.0  # beyond the last point too
     values = np.column_stack([np.zeros(len(times)), hidden])
-    yield Move("cover", [cover], times, values, STRETCH, still + 1, (x1, 0.0))
+    yield Move("cover", [cover], times, values, STRETCH, float(times[-2]), (x1, 0.0))
     for ball in shown:
         curve = np.column_stack([along, path[:, ball]])
         dot = ax.plot(
             *curve[-1:].T, "o", ms=9, mfc="white", mec=PALETTE[ball % len(PALETTE)], mew=2.5,
             zorder=6, clip_on=False,
         )  # fmt: skip
-        yield Move(f"dot{ball}", dot, times, (curve - curve[-1])[index], SHIFT, still)
+        yield Move(f"dot{ball}", dot, times, (curve - curve[-1])[index], SHIFT, float(times[-3]))
     ax.set(xlim=(x0, x1), ylim=(y0, y1))
 
 
@@ -152,10 +152,9 @@ def animate_swing(
     speed : float
         1 plays in real time, less in slow motion.
     still : float
-        Which instant stands still in print and for readers who ask for less motion, s after the
-        first of the times.
+        What print and readers who ask for less motion see, s after the first of the times.
     columns : int
-        How many stand side by side, from left to right and from top to bottom.
+        How many stand side by side.
     alt : str
         What the picture shows, for those who do not see it.
 
@@ -166,8 +165,7 @@ def animate_swing(
     Raises
     ------
     ValueError
-        If a run has no duration, there are not as many labels as runs, `speed` or `still` is out
-        of range, or `columns` is no whole number above 0.
+        If a run has no duration, there are not as many labels as runs, or a number is out of range.
 
     Examples
     --------
@@ -203,10 +201,8 @@ def animate_swing(
         if lines:  # larger where a page shows the whole smaller
             size = 15 if beside == 1 else 20
             ax.text(left + 12, top + 20, lines[k], size=size, parse_math=False)
-        moves += [
-            move._replace(times=move.times / speed, still=int(np.abs(move.times - still).argmin()))
-            for move in _swing(run, f"s{k}b", ax, (left + cell / 2, top + 34), duration)
-        ]
+        for move in _swing(run, f"s{k}b", ax, (left + cell / 2, top + 34), duration):
+            moves.append(move._replace(times=move.times / speed, still=still / speed))
     return moving(figure, moves, alt, "px")
 
 
@@ -244,7 +240,6 @@ def _swing(
             [x, x], [beam, y], "#555", lw=1, marker="o", markevery=[1], mfc="#f2f2f2",
             mec=PALETTE[ball % len(PALETTE)], mew=2.5, ms=2 * radii[ball] - 2.5, clip_on=False,
         )  # fmt: skip
-        number = ax.text(x, y + 5, f"{ball + 1}", size=14, ha="center")
-        parts = [*hanging, number]
-        yield Move(f"{name}{ball}", parts, times[rows], angles[:, [ball]], TURN, 0, (x, beam))
+        parts = [*hanging, ax.text(x, y + 5, f"{ball + 1}", size=14, ha="center")]
+        yield Move(f"{name}{ball}", parts, times[rows], angles[:, [ball]], TURN, 0.0, (x, beam))
     ax.plot(ends, [beam, beam], "#333", lw=4, solid_capstyle="butt", clip_on=False)

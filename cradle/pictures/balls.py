@@ -1,4 +1,4 @@
-"""Drawings of chains, and of their outcomes ball by ball; numbers and colours as in `impacts`."""
+"""Drawings of chains, and of outcomes ball by ball; axes, numbers and colours as in `impacts`."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def outcome_by_ball(
     --------
     >>> from cradle import collide, paper_chain
     >>> from matplotlib.figure import Figure
-    >>> trace = collide(*paper_chain("BABA", speed=2.0))
-    >>> ax = outcome_by_ball(trace, Figure().subplots(), letters="BABA")
+    >>> impact = collide(*paper_chain("BABA"))
+    >>> ax = outcome_by_ball(impact, Figure().subplots(), letters="BABA")
     >>> [label.get_text() for label in ax.get_xticklabels()]
     ['1\nB', '2\nA', '3\nB', '4\nA']
     """
@@ -82,7 +82,6 @@ def chain_sketch(chain: Chain, ax: Axes | None = None, *, letters: str = "") -> 
     Parameters
     ----------
     chain : Chain
-        The balls.
     ax : Axes, optional
         Where to draw; new axes if left out.
     letters : str
@@ -104,9 +103,9 @@ def chain_sketch(chain: Chain, ax: Axes | None = None, *, letters: str = "") -> 
         raise ValueError(f"letters = {shown(letters)}; {n} balls need {n}, or none")
     ax = axes_or_new(ax)
     radii = 0.5 * np.cbrt(chain.masses / np.max(chain.masses))
-    left = np.concatenate([[0.0], np.cumsum(2 * radii)[:-1]])
+    centres = np.cumsum(2 * radii) - radii
     fastest = np.abs(chain.velocities).max() or 1.0
-    for ball, (radius, x) in enumerate(zip(radii.tolist(), (left + radii).tolist(), strict=True)):
+    for ball, (radius, x) in enumerate(zip(radii.tolist(), centres.tolist(), strict=True)):
         ax.add_patch(Circle((x, 0), radius, fc="0.93", ec=PALETTE[ball % len(PALETTE)], lw=2))
         name = letters[ball] if letters else indexed("B", ball + 1)
         # A name that does not fit in its ball stands above it.
@@ -120,6 +119,6 @@ def chain_sketch(chain: Chain, ax: Axes | None = None, *, letters: str = "") -> 
         if ball < len(chain) - 1:
             name = indexed(r"\tau", ball + 2)
             ax.text(x + radius, -0.62, name, ha="center", va="center", fontsize=9)
-    ax.set(xlim=(-0.2, left[-1] + 2 * radii[-1] + 0.2), ylim=(-1.0, 1.0), aspect="equal")
+    ax.set(xlim=(-0.2, centres[-1] + radii[-1] + 0.2), ylim=(-1.0, 1.0), aspect="equal")
     ax.set_axis_off()
     return ax

@@ -1,9 +1,8 @@
 """Pictures by matplotlib of which parts move: as SVG with keyframes in CSS, or as pixels.
 
-The solver's own events are the keyframes.  Between two of them every velocity is linear in the
-progress, as a browser interpolates: the motion is exact, sharp at any size, and a few kilobytes
-long.  A style sheet, unlike SMIL, also honours readers who ask for less motion, and paper: both get
-the still.
+The solver's own events are the keyframes, and between them a browser interpolates linearly, as
+velocities go: the motion is exact, sharp at any size, and a few kilobytes long.  A style sheet,
+unlike SMIL, also gives the still to paper and to readers who ask for less motion.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D
 from numpy.typing import ArrayLike, NDArray
@@ -32,12 +32,12 @@ SEEN = "opacity:{}"
 TURN = "transform:rotate({}deg)"
 SHIFT = "transform:translate({}px,{}px)"
 STRETCH = "transform:translate({}px) scaleX({})"
-_MAPS: dict[str, Callable[..., Affine2D]] = {
-    TURN: Affine2D.rotate_deg,
-    SHIFT: Affine2D.translate,
-    STRETCH: lambda moved, x, share: moved.scale(share, 1.0).translate(x, 0.0),
+# How matplotlib does the same, and how far straight lines may be off.
+_FORMS: dict[str, tuple[Callable[..., Any], list[float]]] = {
+    TURN: (Affine2D.rotate_deg, [0.1]),
+    SHIFT: (Affine2D.translate, [0.03, 0.03]),
+    STRETCH: (lambda moved, x, share: moved.scale(share, 1).translate(x, 0), [0.03, 0.0005]),
 }
-_TOLERANCES = {TURN: [0.1], SHIFT: [0.03, 0.03], STRETCH: [0.03, 0.0005]}
 # Stands before the name of every moving part, until the picture's own key takes its place.
 _KEY = "moving-part-"
 _STYLE_OF_ALL = '<style type="text/css">*{stroke-linejoin: round; stroke-linecap: butt}</style>'
@@ -108,35 +108,32 @@ class Animation:
         elif kind == ".png":
             self.show(None)
             self.figure.savefig(file, dpi=144)
-        elif kind in (".gif", ".mp4"):
-            self._film(file, kind)
-        else:
+        elif kind == ".gif":
+            self._film(PillowWriter(RATE), file, 72)
+        elif kind != ".mp4":
             raise ValueError(f"path = {str(path)!r}; must end in .svg, .html, .gif, .mp4 or .png")
+        elif not FFMpegWriter.isAvailable():
+            lacks = "the program ffmpeg, which is not here; .gif needs nothing"
+            raise ValueError(f"{file} needs {lacks}")
+        else:
+            self._film(FFMpegWriter(RATE), file, 144)
 
-    def _film(self, file: Path, kind: str) -> None:
-        from matplotlib.animation import FFMpegWriter, PillowWriter
-
-        if kind == ".mp4" and not FFMpegWriter.isAvailable():
-            raise ValueError(
-                f"{file} needs the program ffmpeg, which is not here; .gif needs nothing"
-            )
-        writer, dpi = (FFMpegWriter, 144) if kind == ".mp4" else (PillowWriter, 72)
+    def _film(self, writer: AbstractMovieWriter, file: Path, dpi: float) -> None:
         duration = max((float(move.times[-1]) for move in self.moves), default=0.0)
-        film = writer(fps=RATE)
-        with film.saving(self.figure, str(file), dpi=dpi):
+        with writer.saving(self.figure, str(file), dpi):
             for k in range(max(1, round(RATE * duration))):
                 self.show(k / RATE)
-                film.grab_frame()
+                writer.grab_frame()
 
     def show(self, time: float | None) -> None:
         """Bring every part of the figure to where it is at a time, s; None is the still."""
         for move in self.moves:
-            values, (x, y) = move.at(time), move.origin
+            values, (x, y) = move.at(move.still if time is None else time), move.origin
             for artist in move.artists:
                 if move.form == SEEN:
                     artist.set_visible(values[0] > 0.5)
                 else:
-                    moved = _MAPS[move.form](Affine2D().translate(-x, -y), *values)
+                    moved = _FORMS[move.form][0](Affine2D().translate(-x, -y), *values)
                     artist.set_transform(moved.translate(x, y) + artist.axes.transData)
 
 
@@ -148,36 +145,34 @@ class Move(NamedTuple):
     times: Vector  # s
     values: NDArray[np.float64]  # a row at each time
     form: str  # what the values do
-    still: int  # the row of the still
+    still: float  # the time of the still, s
     origin: tuple[float, float] = (0.0, 0.0)  # what turns and stretches does so about this point
 
-    def at(self, time: float | None) -> list[float]:
-        """Return the values at a time, s; None is the still."""
-        row = self.still if time is None else np.searchsorted(self.times, time, side="right") - 1
-        if time is None or self.form == SEEN:  # it lasts until the next keyframe
-            return [float(value) for value in self.values[row]]
+    def at(self, time: float) -> list[float]:
+        """Return the values at a time, s."""
+        if self.form == SEEN:  # it lasts until the next keyframe
+            return [float(self.values[np.searchsorted(self.times, time, side="right") - 1, 0])]
         return [float(np.interp(time, self.times, column)) for column in self.values.T]
 
     def css(self) -> str:
         """Return the style of the part: where it rests, and its keyframes; a point is a px."""
-        ax, name = self.artists[0].axes, f"{_KEY}{self.part}"
-        corners = ax.transData.transform([self.origin, np.add(self.origin, 1.0)])
-        (x, y), (wide, high) = corners[0], np.diff(corners, axis=0)[0]
+        ax, name, times = self.artists[0].axes, f"{_KEY}{self.part}", self.times
+        (x, y), far = ax.transData.transform([self.origin, np.add(self.origin, 1.0)])
+        wide, high = far - (x, y)
+        units = {TURN: [1], SHIFT: [wide, -high], STRETCH: [wide, 1], SEEN: [1]}[self.form]
         if self.form == SEEN:
-            pace, values = "step-end", self.values
-            rows = [0, *(np.flatnonzero(np.diff(values[:, 0])) + 1).tolist()]
+            pace, rows = "step-end", [0, *(np.flatnonzero(np.diff(self.values[:, 0])) + 1)]
         else:
-            pace, size = "linear", {TURN: [1], SHIFT: [wide, -high], STRETCH: [wide, 1]}
-            values = self.values * size[self.form]
-            rows = thin(self.times, values, _TOLERANCES[self.form])
-        states = [self.form.format(*map(number, row)) for row in values.tolist()]
-        end = self.times[-1]
-        frames = " ".join(f"{number(100 * self.times[k] / end)}%{{{states[k]}}}" for k in rows)
-        about = f"{number(x)}px {number(ax.figure.bbox.height - y)}px"
-        return (
-            f"[id^={name}-]{{{states[self.still]};transform-origin:{about};"
-            f"animation:{name} {number(end)}s {pace} infinite}}\n@keyframes {name}{{{frames}}}\n"
-        )
+            pace, rows = "linear", thin(times, self.values * units, _FORMS[self.form][1])
+
+        def state(values: Sequence[float]) -> str:
+            return self.form.format(*map(number, np.multiply(values, units).tolist()))
+
+        frames = (f"{number(100 * times[k] / times[-1])}%{{{state(self.values[k])}}}" for k in rows)
+        about = f"transform-origin:{number(x)}px {number(ax.figure.bbox.height - y)}px"
+        moves = f"animation:{name} {number(times[-1])}s {pace} infinite"
+        rest = f"[id^={name}-]{{{state(self.at(self.still))};{about};{moves}}}"
+        return f"{rest}\n@keyframes {name}{{{' '.join(frames)}}}\n"
 
 
 def thin(times: Vector, values: NDArray[np.float64], tolerance: ArrayLike) -> list[int]:
