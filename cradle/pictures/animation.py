@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
-from numpy.typing import NDArray
 
 from cradle.input.values import Vector, must_be, one_number, whole_number
 from cradle.pictures.impacts import PALETTE, velocities, velocity_impulse
@@ -20,8 +19,7 @@ from cradle.trace import Trace
 
 __all__ = ["Animation", "animate", "animate_swing"]
 
-# Seconds of the flight before the impact, of the impact, of the flight after it, and of a rest.
-_ACTS = (1.5, 5.0, 2.0, 1.5)
+_END = 6.5  # of an impact in slow motion, s; the instant of the still
 
 
 @mpl.rc_context({"font.size": 10})
@@ -56,60 +54,57 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
     must_be(str, "alt", alt)
     figure = Figure(figsize=(6.4, 5.4), dpi=72, layout="constrained", facecolor="white")
     row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.6])
-    # The times, and the point of the curves at each: all of them, and the ends of the flights.
-    done = trace.curve()[0].sum(axis=1)
-    points = len(done)
-    index = np.clip(np.arange(-1, points + 2), 0, points - 1)
-    slow = _ACTS[0] + _ACTS[1] * (done / done[-1] if done[-1] else np.linspace(0, 1, points))
-    times = np.concatenate([[0.0], slow, slow[-1] + np.cumsum(_ACTS[2:])])
-    moves = [*_balls(trace, row, times, index)]
-    moves += _diagram(trace, contact, diagram, times, index)
+    impulses, path = trace.curve()
+    done = impulses.sum(axis=1)
+    progress = done / done[-1] if done[-1] else np.linspace(0, 1, len(done))
+    # A flight of 1.5 s, the impact, a flight of 2 s, and a rest.
+    times = np.concatenate([[0.0], 1.5 + (_END - 1.5) * progress, [_END + 2.0, _END + 3.5]])
+    impulses, path = (
+        np.vstack([rows[:1], rows, rows[-1:], rows[-1:]]) for rows in (impulses, path)
+    )
+    moves = [*_balls(trace, row, times, impulses, path)]
+    moves += _diagram(trace, contact, diagram, times, impulses, path)
     return moving(figure, moves, alt)
 
 
-def _balls(trace: Trace, ax: Axes, times: Vector, index: NDArray[np.intp]) -> Iterator[Move]:
+def _balls(trace: Trace, ax: Axes, times: Vector, impulses: Vector, path: Vector) -> Iterator[Move]:
     """Draw the balls as they touch, their velocities as bars, and a star on each contact.
 
     The balls move in the flights alone; bars are in diameters of the largest one.
     """
-    impulses, path = trace.curve()
-    still, reach = float(times[-3]), 2.6  # the end of the impact
     radii = 0.5 * np.cbrt(trace.chain.masses / trace.chain.masses.max())
     centres = np.cumsum(2 * radii) - radii
-    ax.set(xlim=(-reach, centres[-1] + radii[-1] + reach), ylim=(-0.6, 0.95), aspect="equal")
+    ax.set(xlim=(-2.6, centres[-1] + radii[-1] + 2.6), ylim=(-0.6, 0.95), aspect="equal")
     ax.set_axis_off()
-    per_speed = 1.9 / (float(np.abs(trace.path[[0, -1]]).max()) or 1.0)
-    flown = np.zeros((len(times), len(centres)))
+    per_speed = 1.9 / (float(np.abs(path[[0, -1]]).max()) or 1.0)
+    flown = np.zeros(path.shape)
     if not (trace.chain.closing_speeds < 0.0).any():
-        flown[0] = -per_speed * trace.path[0]
-    flown[-2:] = per_speed * trace.velocities
-    bars = 0.95 * path[index] / (float(np.abs(path).max()) or 1.0)
-    level = np.zeros(len(times))
+        flown[0] = -per_speed * path[0]
+    flown[-2:] = per_speed * path[-1]
+    bars = 0.95 * path / (float(np.abs(path).max()) or 1.0)
     for ball, (x, radius) in enumerate(zip(centres.tolist(), radii.tolist(), strict=True)):
         colour, way, bar = PALETTE[ball % len(PALETTE)], flown[:, ball], bars[:, ball]
         parts = [
             ax.add_patch(Circle((x, 0), radius, fc="0.95", ec=colour, lw=2)),
             ax.text(x, -0.02, f"{ball + 1}", ha="center", va="center", size=12),
         ]
-        yield Move(f"ball{ball}", parts, times, np.column_stack([way, level]), SHIFT, still)
+        yield Move(f"ball{ball}", parts, times, np.column_stack([way, 0 * way]), SHIFT, _END)
         parts = [ax.add_patch(Rectangle((x, 0.68), 1, 0.1, fc=colour, ec="none"))]
         both = np.column_stack([way, bar])
-        yield Move(f"bar{ball}", parts, times, both, STRETCH, still, (x, 0.0))
+        yield Move(f"bar{ball}", parts, times, both, STRETCH, _END, (x, 0.0))
         parts = [ax.add_patch(Circle((x, 0.73), 0.09, fc="white", ec=colour, lw=2))]
-        yield Move(f"tip{ball}", parts, times, np.column_stack([way + bar, level]), SHIFT, still)
+        yield Move(f"tip{ball}", parts, times, np.column_stack([way + bar, 0 * way]), SHIFT, _END)
     # A star is seen while the impulse of its contact grows.
-    lit = np.zeros((len(times), len(centres) - 1))
-    lit[1 : len(path)] = np.diff(impulses, axis=0) > 0.0
+    lit = np.diff(impulses, axis=0, append=impulses[-1:]) > 0.0
     for contact, x in enumerate((centres + radii)[:-1].tolist()):
         star = ax.plot(x, 0, "*", ms=15, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
-        yield Move(f"star{contact}", star, times, lit[:, [contact]], SEEN, 0.0)
+        yield Move(f"star{contact}", star, times, lit[:, [contact]].astype(float), SEEN, _END)
 
 
 def _diagram(
-    trace: Trace, contact: int | None, ax: Axes, times: Vector, index: NDArray[np.intp]
+    trace: Trace, contact: int | None, ax: Axes, times: Vector, impulses: Vector, path: Vector
 ) -> Iterator[Move]:
     """Draw the diagram, dots on its curves, and a cover that draws back to the right."""
-    impulses, path = trace.curve()
     if contact is None:
         velocities(trace, ax)
         along, shown = impulses.sum(axis=1), range(len(trace.chain))
@@ -118,17 +113,17 @@ def _diagram(
         along, shown = impulses[:, contact], range(contact, contact + 2)
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     cover = ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fc="white", alpha=0.9, zorder=4))
-    hidden = (x1 - along[index]) / (x1 - x0)
+    hidden = (x1 - along) / (x1 - x0)
     hidden[-2:] = 0.0  # beyond the last point too
-    values = np.column_stack([np.zeros(len(times)), hidden])
-    yield Move("cover", [cover], times, values, STRETCH, float(times[-2]), (x1, 0.0))
+    values = np.column_stack([0 * hidden, hidden])
+    yield Move("cover", [cover], times, values, STRETCH, float(times[-1]), (x1, 0.0))
     for ball in shown:
         curve = np.column_stack([along, path[:, ball]])
         dot = ax.plot(
             *curve[-1:].T, "o", ms=9, mfc="white", mec=PALETTE[ball % len(PALETTE)], mew=2.5,
             zorder=6, clip_on=False,
         )  # fmt: skip
-        yield Move(f"dot{ball}", dot, times, (curve - curve[-1])[index], SHIFT, float(times[-3]))
+        yield Move(f"dot{ball}", dot, times, curve - curve[-1], SHIFT, _END)
     ax.set(xlim=(x0, x1), ylim=(y0, y1))
 
 
@@ -178,11 +173,11 @@ def animate_swing(
     must_be(str, "alt", alt)
     given = runs if isinstance(runs, Sequence) else [runs]
     several = [must_be(Swing, "runs", run) for run in given]
+    words = labels if isinstance(labels, (list, tuple)) else [labels]
+    lines = [must_be(str, "labels", line) for line in words]
     duration = min((np.ptp(run.times) for run in several), default=0.0)
     if not duration > 0.0:
         raise ValueError("runs has no swing, or one without a duration")
-    given_lines = labels if isinstance(labels, (list, tuple)) else [labels]
-    lines = [must_be(str, "labels", line) for line in given_lines]
     if lines and len(lines) != len(several):
         raise ValueError(f"labels has {len(lines)} lines; {len(several)} swings need as many")
     one_number("speed", speed, "must lie in [1e-6, 1e6]", 1e-6, 1e6)

@@ -43,9 +43,7 @@ def outcome_by_ball(
     Examples
     --------
     >>> from cradle import collide, paper_chain
-    >>> from matplotlib.figure import Figure
-    >>> impact = collide(*paper_chain("BABA"))
-    >>> ax = outcome_by_ball(impact, Figure().subplots(), letters="BABA")
+    >>> ax = outcome_by_ball(collide(*paper_chain("BABA")), letters="BABA")
     >>> [label.get_text() for label in ax.get_xticklabels()]
     ['1\nB', '2\nA', '3\nB', '4\nA']
     """
@@ -93,8 +91,7 @@ def chain_sketch(chain: Chain, ax: Axes | None = None, *, letters: str = "") -> 
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = chain_sketch(Chain([8, 1], [1, 0], 1), Figure().subplots())
+    >>> ax = chain_sketch(Chain([8, 1], [1, 0], 1))
     >>> [round(patch.get_radius(), 3) for patch in ax.patches if isinstance(patch, Circle)]
     [0.5, 0.25]
     """

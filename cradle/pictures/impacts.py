@@ -87,10 +87,8 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from cradle import Chain, ImpulseCorrelation, collide
-    >>> from matplotlib.figure import Figure
-    >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
-    >>> ax = velocities(trace, Figure().subplots())
+    >>> from cradle import collide, paper_chain
+    >>> ax = velocities(collide(*paper_chain("AAA")))
     >>> [line.get_label() for line in ax.get_lines()]
     ['$v_1$', '$v_2$', '$v_3$']
     """
@@ -138,10 +136,8 @@ def velocity_impulse(
 
     Examples
     --------
-    >>> from cradle import Chain, ImpulseCorrelation, collide
-    >>> from matplotlib.figure import Figure
-    >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
-    >>> ax = velocity_impulse(trace, 1, Figure().subplots(), other=0)
+    >>> from cradle import collide, paper_chain
+    >>> ax = velocity_impulse(collide(*paper_chain("AAA")), 1, other=0)
     >>> [line.get_label() for line in ax.get_lines()[:2]]
     ['$v_2$', '$v_3$']
     """
@@ -218,10 +214,8 @@ def impulse_axis(
     Examples
     --------
     >>> from cradle import Chain, ImpulseCorrelation, collide
-    >>> from matplotlib.figure import Figure
     >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.5))
-    >>> ax = velocity_impulse(trace, 1, Figure().subplots())
-    >>> upper = impulse_axis(trace, 1, 0, ax, values=[0, 1, 4 / 3])
+    >>> upper = impulse_axis(trace, 1, 0, velocity_impulse(trace, 1), values=[0, 1, 4 / 3])
     >>> upper.get_xticks().round(4).tolist()
     [0.0, 0.5, 0.6667]
     """
@@ -229,7 +223,7 @@ def impulse_axis(
         places, labels = _event_ticks(*trace.path_impulses[:, [contact, other]].T)
     else:
         impulses, _ = trace.curve()
-        marked = np.atleast_1d(np.asarray(values, dtype=np.float64))
+        marked = np.atleast_1d(np.asarray(values, float))
         places = np.interp(marked, impulses[:, other], impulses[:, contact]).tolist()
         labels = [f"{value:.3g}" for value in marked]
     above = ax.twiny()
