@@ -1,6 +1,6 @@
-"""Chains and impacts for people: rows of numbers, and for notebooks a small picture and a table.
+"""Chains and impacts for people: as text, and for notebooks as a small picture and a table.
 
-All is drawn in the colour of the text around it, so that it can be read on light and dark pages.
+They have the colour of the text around them, for light pages and dark ones.
 """
 
 from __future__ import annotations

@@ -95,8 +95,7 @@ def image_format(path: str) -> str:
 @contextmanager
 def waiting(hint: str, after: float = 2.0) -> Iterator[None]:
     """Say after some seconds that work goes on, and what would be faster."""
-    words = f"cradle: still working; {hint}"
-    teller = threading.Timer(after, click.echo, [words], {"err": True})
+    teller = threading.Timer(after, click.echo, [f"cradle: still working; {hint}"], {"err": True})
     teller.start()
     try:
         yield

@@ -10,15 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 import click
 
-from cradle import (
-    Chain,
-    EnergyDistribution,
-    ImpulseCorrelation,
-    Model,
-    SequentialCollisions,
-    SpringChain,
-    paper_chain,
-)
+import cradle
 from cradle.advice.choice import made
 from cradle.command.console import waiting
 from cradle.input.values import one_number
@@ -75,8 +67,8 @@ def pendulum_length(length: float | None, period: float | None) -> float | None:
 class Described(NamedTuple):
     """A chain, how it collides, what was not given and stands for it, and the paper's types."""
 
-    chain: Chain
-    model: Model
+    chain: cradle.Chain
+    model: cradle.Model
     assumed: tuple[str, ...]
     letters: str = ""
 
@@ -84,7 +76,7 @@ class Described(NamedTuple):
         """Return what says that long work goes on, and what would be faster."""
         return waiting(
             "--ratio 0.1 or --model sequential would take seconds"
-            if isinstance(self.model, (SpringChain, EnergyDistribution))
+            if isinstance(self.model, (cradle.SpringChain, cradle.EnergyDistribution))
             else "fewer balls would be faster"
         )
 
@@ -108,16 +100,15 @@ def described(
         masses, sequence = [1.0] * int(sequence), None
         assumed.append(f"equal balls of 1 {unit or 'kg'}")
     if (sequence is None) == (masses is None):
-        raise click.UsageError(
-            "give how many equal balls, such as 5, or a sequence of the paper's balls, such as "
-            "ABCCA, or --masses"
-        )
+        need = "how many equal balls, such as 5, or a sequence of the paper's balls, such as ABCCA"
+        raise click.UsageError(f"give {need}, or --masses")
     if model not in (None, "ratio") and (ratio or backward or saturate):
         raise click.UsageError(f"--model {model} has no ratios; leave them out, and --saturate")
     if not (speed is None or velocities is None):
         raise click.UsageError("give one of --speed and --velocities")
     striker = 1.0 if speed is None else one_number("speed", speed)
     excess: Literal["raise", "saturate"] = "saturate" if saturate else "raise"
+    law: cradle.Model
     if masses is None:
         given = {"--unit": unit, "--velocities": velocities, "--restitution": restitution,
                  "--ratio": ratio, "--backward": backward}  # fmt: skip
@@ -125,31 +116,28 @@ def described(
             if value is not None:
                 raise click.UsageError(f"{name} goes with --masses; {sequence} has its own values")
         letters = str(sequence).upper()
-        chain, ratios = paper_chain(letters, striker, excess=excess)
-        law = ratios if model in (None, "ratio") else _without_ratios(chain, model)
-        return Described(chain, law, (), letters)
-    before = velocities or [striker] + [0.0] * (len(masses) - 1)
-    balls = [UNITS[unit or "kg"] * m for m in masses]
-    chain = Chain(balls, before, one_or_all(restitution or [1.0]))
-    assumed += [] if velocities else [f"the first ball strikes at {striker:g} m/s"]
-    assumed += [] if restitution else ["no energy is lost (--restitution)"]
-    if ratio is not None:
-        law = ImpulseCorrelation(one_or_all(ratio), one_or_all(backward), excess=excess)
-        return Described(chain, law, tuple(assumed))
-    if model == "ratio" or backward or saturate:
-        raise click.UsageError("ratios need --ratio, such as 0.1 or one for each inner ball")
-    if model is None and len(chain) == 2:  # they have no ratio, and all models agree
-        return Described(chain, ImpulseCorrelation(0.0), tuple(assumed))
-    if model is None:
-        kind = "elastic spheres" if (chain.restitution == 1.0).all() else "spheres with losses"
+        chain, law = cradle.paper_chain(letters, striker, excess=excess)
+    else:
+        letters, before = "", velocities or [striker] + [0.0] * (len(masses) - 1)
+        balls = [UNITS[unit or "kg"] * m for m in masses]
+        chain = cradle.Chain(balls, before, one_or_all(restitution or [1.0]))
+        assumed += [] if velocities else [f"the first ball strikes at {striker:g} m/s"]
+        assumed += [] if restitution else ["no energy is lost (--restitution)"]
+        if ratio is None and (model == "ratio" or backward or saturate):
+            raise click.UsageError("ratios need --ratio, such as 0.1 or one for each inner ball")
+        # Two balls have no ratio, and all models agree.
+        law = cradle.ImpulseCorrelation(
+            one_or_all(ratio or [0.0]), one_or_all(backward), excess=excess
+        )
+    elastic = bool((chain.restitution == 1.0).all())
+    if masses and ratio is None and model is None and len(chain) > 2:
+        model, kind = "spheres", "elastic spheres" if elastic else "spheres with losses"
         assumed.append(f"the balls collide as {kind} (--model, --ratio)")
-    return Described(chain, _without_ratios(chain, model), tuple(assumed))
-
-
-def _without_ratios(chain: Chain, model: str | None) -> Model:
     if model == "sequential":
-        return SequentialCollisions()
-    return SpringChain() if (chain.restitution == 1.0).all() else EnergyDistribution()
+        law = cradle.SequentialCollisions()
+    elif model == "spheres":
+        law = cradle.SpringChain() if elastic else cradle.EnergyDistribution()
+    return Described(chain, law, tuple(assumed), letters)
 
 
 def one_or_all(values: list[float] | None) -> Any:

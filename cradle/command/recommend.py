@@ -38,10 +38,10 @@ def recommend(
         raise click.UsageError("leave --model out: it is what is recommended")
     given = described(**options)
     wishes = [name.strip() for names in wanted for name in names.split(",")]
-    law, more = given.model, len(given.chain) > 2  # two balls have no ratio
+    law = given.model if len(given.chain) > 2 else None  # two balls have no ratio
     advice = cradle.recommend(
         given.chain, wishes, accuracy=accuracy, model_error=model_error, impacts=impacts,
-        ratios=law if more and isinstance(law, cradle.ImpulseCorrelation) else None,
+        ratios=law if isinstance(law, cradle.ImpulseCorrelation) else None,
         stiffness=one_or_all(stiffness),
     )  # fmt: skip
     click.echo(repr(advice))

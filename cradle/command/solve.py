@@ -102,16 +102,15 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
         "model": made(given.model), "assumed": given.assumed, "energy_lost": lost,
         "collisions": collisions, "collapsed": trace.collapsed, "held_contacts": held,
     }  # fmt: skip
-    lines = []
-    if not (chain.closing_speeds > 0.0).any():
-        lines.append("no balls approach: no impact")
     counts, contacts = (", ".join(map(str, counted)) for counted in (collisions, held))
-    lines.append(f"energy lost: {100 * lost:z.2f} %; collisions of the contacts: {counts}")
-    if held:
-        lines.append(f"held closed at their largest ratio: contact {contacts} (--saturate)")
-    if trace.collapsed:
-        lines.append("an infinite sequence of impacts was taken to its limit")
-    show(rows, extra, "\n".join([*lines, given.note]), as_json, as_csv)
+    told = {
+        "no balls approach: no impact": not (chain.closing_speeds > 0.0).any(),
+        f"energy lost: {100 * lost:z.2f} %; collisions of the contacts: {counts}": True,
+        f"held closed at their largest ratio: contact {contacts} (--saturate)": held,
+        "an infinite sequence of impacts was taken to its limit": trace.collapsed,
+        given.note: True,
+    }
+    show(rows, extra, "\n".join(words for words in told if told[words]), as_json, as_csv)
 
 
 @main.command()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -28,27 +29,21 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
 
     The balls fly in.  Then the clock stands still, for an impact takes no time: the diagram grows
     with the impulses, a star marks each contact that is pressed, and the bars on the balls are
-    their velocities at that point of the diagram.  At last the balls fly off.
+    their velocities at that point of the diagram.  At last the balls fly off.  The still shows the
+    end of the impact.
 
     Parameters
     ----------
     trace : Trace
-        The impact.
     contact : int, optional
         Draw this contact's velocity-impulse diagram; if left out, the velocities of all balls.
     alt : str
         What the picture shows, for those who do not see it.
 
-    Returns
-    -------
-    Animation
-        The still shows the whole diagram, and the velocities after the impact.
-
     Examples
     --------
-    >>> from cradle import Chain, ImpulseCorrelation, collide
-    >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.15))
-    >>> animate(trace).save("impact.svg")  # doctest: +SKIP
+    >>> from cradle import collide, paper_chain
+    >>> animate(collide(*paper_chain("AAA"))).save("impact.svg")  # doctest: +SKIP
     """
     must_be(Trace, "trace", trace)
     must_be(str, "alt", alt)
@@ -84,16 +79,15 @@ def _balls(trace: Trace, ax: Axes, times: Vector, impulses: Vector, path: Vector
     bars = 0.95 * path / (float(np.abs(path).max()) or 1.0)
     for ball, (x, radius) in enumerate(zip(centres.tolist(), radii.tolist(), strict=True)):
         colour, way, bar = PALETTE[ball % len(PALETTE)], flown[:, ball], bars[:, ball]
-        parts = [
-            ax.add_patch(Circle((x, 0), radius, fc="0.95", ec=colour, lw=2)),
-            ax.text(x, -0.02, f"{ball + 1}", ha="center", va="center", size=12),
-        ]
-        yield Move(f"ball{ball}", parts, times, np.column_stack([way, 0 * way]), SHIFT, _END)
-        parts = [ax.add_patch(Rectangle((x, 0.68), 1, 0.1, fc=colour, ec="none"))]
+        disk = ax.add_patch(Circle((x, 0), radius, fc="0.95", ec=colour, lw=2))
+        name = ax.text(x, -0.02, f"{ball + 1}", ha="center", va="center", size=12)
+        line = ax.add_patch(Rectangle((x, 0.68), 1, 0.1, fc=colour, ec="none"))
+        tip = ax.add_patch(Circle((x, 0.73), 0.09, fc="white", ec=colour, lw=2))
+        along, end = np.column_stack([way, 0 * way]), np.column_stack([way + bar, 0 * way])
+        yield Move(f"ball{ball}", [disk, name], times, along, SHIFT, _END)
+        yield Move(f"tip{ball}", [tip], times, end, SHIFT, _END)
         both = np.column_stack([way, bar])
-        yield Move(f"bar{ball}", parts, times, both, STRETCH, _END, (x, 0.0))
-        parts = [ax.add_patch(Circle((x, 0.73), 0.09, fc="white", ec=colour, lw=2))]
-        yield Move(f"tip{ball}", parts, times, np.column_stack([way + bar, 0 * way]), SHIFT, _END)
+        yield Move(f"bar{ball}", [line], times, both, STRETCH, _END, (x, 0.0))
     # A star is seen while the impulse of its contact grows.
     lit = np.diff(impulses, axis=0, append=impulses[-1:]) > 0.0
     for contact, x in enumerate((centres + radii)[:-1].tolist()):
@@ -117,12 +111,10 @@ def _diagram(
     hidden[-2:] = 0.0  # beyond the last point too
     values = np.column_stack([0 * hidden, hidden])
     yield Move("cover", [cover], times, values, STRETCH, float(times[-1]), (x1, 0.0))
+    ring: dict[str, Any] = {"ms": 9, "mfc": "white", "mew": 2.5, "zorder": 6, "clip_on": False}
     for ball in shown:
         curve = np.column_stack([along, path[:, ball]])
-        dot = ax.plot(
-            *curve[-1:].T, "o", ms=9, mfc="white", mec=PALETTE[ball % len(PALETTE)], mew=2.5,
-            zorder=6, clip_on=False,
-        )  # fmt: skip
+        dot = ax.plot(*curve[-1:].T, "o", mec=PALETTE[ball % len(PALETTE)], **ring)
         yield Move(f"dot{ball}", dot, times, curve - curve[-1], SHIFT, _END)
     ax.set(xlim=(x0, x1), ylim=(y0, y1))
 
@@ -153,10 +145,6 @@ def animate_swing(
     alt : str
         What the picture shows, for those who do not see it.
 
-    Returns
-    -------
-    Animation
-
     Raises
     ------
     ValueError
@@ -165,10 +153,9 @@ def animate_swing(
     Examples
     --------
     >>> from cradle import Chain, ImpulseCorrelation, swing
-    >>> balls = Chain([1] * 5, [0] * 5, 1)
-    >>> run = swing(balls, ImpulseCorrelation(0), [-0.03, 0, 0, 0, 0], np.linspace(0, 4, 161))
+    >>> run = swing(Chain([1] * 3, [0] * 3), ImpulseCorrelation(0), [-0.03, 0, 0], [0, 0.1, 0.2])
     >>> animate_swing(run).svg.count("@keyframes")
-    5
+    3
     """
     must_be(str, "alt", alt)
     given = runs if isinstance(runs, Sequence) else [runs]
@@ -202,12 +189,10 @@ def animate_swing(
 
 
 def _hung(run: Swing) -> tuple[float, Vector, Vector, float]:
-    """Return, in units of the file, a metre, radii, pivots from their middle, and the whole reach.
-
-    Ball sizes are free, for the model needs none: here they leave room for the widest swing.
-    """
+    """Return a metre, radii, pivots from their middle, and the reach, in units of the file."""
     lengths = run.pendulums.row("length", len(run.chain))
     metre = 105.0 / float(lengths.max())
+    # The model needs no sizes: these leave room for the widest swing.
     radii = 17.0 * np.cbrt(run.chain.masses / run.chain.masses.max())
     apart = radii[:-1] + radii[1:] + metre * run.pendulums.row("gaps", len(lengths) - 1)
     pivots = np.concatenate([[0.0], np.cumsum(apart)])
@@ -227,14 +212,13 @@ def _swing(
     lengths = run.pendulums.row("length", len(run.chain))
     angles = -np.degrees(places / lengths)  # positive turns what hangs to the left
     metre, radii, pivots, _ = _hung(run)
-    (middle, beam), radii = place, radii.tolist()
-    ends = middle + pivots[[0, -1]] + [-30, 30]
-    for ball, (x, length) in enumerate(zip((middle + pivots).tolist(), lengths, strict=True)):
-        y = beam + length * metre
-        hanging = ax.plot(
-            [x, x], [beam, y], "#555", lw=1, marker="o", markevery=[1], mfc="#f2f2f2",
-            mec=PALETTE[ball % len(PALETTE)], mew=2.5, ms=2 * radii[ball] - 2.5, clip_on=False,
-        )  # fmt: skip
+    middle, beam = place
+    look: dict[str, Any] = {"marker": "o", "markevery": [1], "mfc": "#f2f2f2", "mew": 2.5}
+    for ball, x in enumerate((middle + pivots).tolist()):
+        y = beam + lengths[ball] * metre
+        look |= {"mec": PALETTE[ball % len(PALETTE)], "ms": 2 * radii[ball] - 2.5}
+        hanging = ax.plot([x, x], [beam, y], "#555", lw=1, clip_on=False, **look)
         parts = [*hanging, ax.text(x, y + 5, f"{ball + 1}", size=14, ha="center")]
         yield Move(f"{name}{ball}", parts, times[rows], angles[:, [ball]], TURN, 0.0, (x, beam))
+    ends = middle + pivots[[0, -1]] + [-30, 30]
     ax.plot(ends, [beam, beam], "#333", lw=4, solid_capstyle="butt", clip_on=False)

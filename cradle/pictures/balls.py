@@ -30,10 +30,6 @@ def outcome_by_ball(
     letters : str
         A name for each ball, written under its number.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ValueError
@@ -84,10 +80,6 @@ def chain_sketch(chain: Chain, ax: Axes | None = None, *, letters: str = "") -> 
         Where to draw; new axes if left out.
     letters : str
         Names written in the balls; B1, B2, ... if left out.
-
-    Returns
-    -------
-    Axes
 
     Examples
     --------

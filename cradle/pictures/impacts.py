@@ -40,12 +40,7 @@ EVENT_STYLES = {
 
 
 def ball_style(ball: int) -> dict[str, Any]:
-    """Return colour and dash of a ball's line, as arguments of `matplotlib.axes.Axes.plot`.
-
-    Parameters
-    ----------
-    ball : int
-        Index of the ball, from 0; styles repeat after seven balls.
+    """Return colour and dash of a ball from 0, for `Axes.plot`; they repeat after seven balls.
 
     Examples
     --------
@@ -81,10 +76,6 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     ax : Axes, optional
         Where to draw; new axes if left out.
 
-    Returns
-    -------
-    Axes
-
     Examples
     --------
     >>> from cradle import collide, paper_chain
@@ -111,9 +102,10 @@ def velocity_impulse(
 ) -> Axes:
     """Draw the velocity-impulse diagram of one contact, as in the paper's Figs. 3, 5 and 8.
 
-    The velocities of the contact's two balls stand against its impulse. Where other contacts act
-    while this one rests, its impulse does not grow, and a velocity jumps. Markers and letters
-    show the contact's events (`EVENT_STYLES`); with several collisions the letter carries a number.
+    The velocities of the contact's two balls stand against its impulse (sections 2.3, 2.4 and 3.2).
+    Where other contacts act while this one rests, its impulse does not grow, and a velocity jumps.
+    Markers and letters show the contact's events (`EVENT_STYLES`); with several collisions the
+    letter carries a number.
 
     Parameters
     ----------
@@ -124,15 +116,6 @@ def velocity_impulse(
         Where to draw; new axes if left out.
     other : int, optional
         Contact whose impulse an upper axis shows, as by `impulse_axis`.
-
-    Returns
-    -------
-    Axes
-        The lower axes.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, sections 2.3, 2.4 and 3.2.
 
     Examples
     --------
@@ -181,8 +164,8 @@ def _mark_events(trace: Trace, contact: int, ax: Axes) -> None:
             taken = x + 0.035 * len(letters) * float(trace.impulses[contact])
     for kind, (marker, letter, name) in EVENT_STYLES.items():
         if kind in kinds:
-            style: dict[str, Any] = {"marker": marker, "ls": "none", "mfc": "white", "mec": "black"}
-            handles.append(Line2D([], [], label=f"{letter}: {name}", **style))
+            style: dict[str, Any] = {"marker": marker, "label": f"{letter}: {name}"}
+            handles.append(Line2D([], [], ls="none", mfc="white", mec="black", **style))
     # Below the axes, where it hides no line.
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3,
               frameon=False)  # fmt: skip
@@ -191,7 +174,7 @@ def _mark_events(trace: Trace, contact: int, ax: Axes) -> None:
 def impulse_axis(
     trace: Trace, contact: int, other: int, ax: Axes, values: ArrayLike | None = None
 ) -> Axes:
-    """Add an upper axis with another contact's impulse to a velocity-impulse diagram.
+    """Add an upper axis with another contact's impulse to a diagram, and return its axes.
 
     The two do not grow in one proportion: each tick stands where the path of the impact has it.
 
@@ -205,11 +188,6 @@ def impulse_axis(
     values : array_like, optional
         Impulses to mark, N s. If left out, those at the events; where the lower contact rests
         while the other one acts, the tick shows the impulse before and after.
-
-    Returns
-    -------
-    Axes
-        The new upper axes.
 
     Examples
     --------

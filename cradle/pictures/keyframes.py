@@ -38,29 +38,18 @@ _FORMS: dict[str, tuple[Callable[..., Any], list[float]]] = {
     SHIFT: (Affine2D.translate, [0.03, 0.03]),
     STRETCH: (lambda moved, x, share: moved.scale(share, 1).translate(x, 0), [0.03, 0.0005]),
 }
-# Stands before the name of every moving part, until the picture's own key takes its place.
+# Before the name of every moving part, until a key of the picture's own takes its place: in a page
+# the names of all pictures share one space.
 _KEY = "moving-part-"
 _STYLE_OF_ALL = '<style type="text/css">*{stroke-linejoin: round; stroke-linecap: butt}</style>'
 
 
 @dataclass(frozen=True)
 class Animation:
-    """A moving picture; a notebook shows it with a box to tick for a pause.
+    """A moving picture: `svg`, and the same as a figure of matplotlib with the moves of its parts.
 
-    In a page it is part of the page, not an image file: browsers tell image files neither that
-    they are printed nor that they should pause.
-
-    Attributes
-    ----------
-    svg : str
-        The picture as a file.
-    figure, moves : Figure, tuple of Move
-        The same for matplotlib, and how its parts move.
-
-    Examples
-    --------
-    >>> Animation("<svg/>", Figure(), ())
-    Animation(0 kB)
+    A notebook shows it with a box to tick for a pause.  In a page it is part of the page, not an
+    image file: browsers tell image files neither that they are printed nor that they should pause.
     """
 
     svg: str
@@ -69,18 +58,14 @@ class Animation:
 
     def _repr_html_(self) -> str:
         key = f"p{zlib.crc32(self.svg.encode()):08x}"
-        style = (
-            f"#{key}:checked ~ svg * {{ animation-play-state: paused !important }}\n"
-            f"@media print, (prefers-reduced-motion: reduce) {{ .{key} {{ display: none }} }}"
-        )
-        box = f'<input type="checkbox" id="{key}" class="{key}">'
         return (
-            f'<div class="animation"><style>{style}</style>{box}'
+            f'<div class="animation"><style>#{key}:checked ~ svg * {{ animation-play-state: paused '
+            f"!important }}\n@media print, (prefers-reduced-motion: reduce) {{ .{key} {{ display: "
+            f'none }} }}</style><input type="checkbox" id="{key}" class="{key}">'
             f'<label for="{key}" class="{key}"> pause</label><br>{self.svg}</div>'
         )
 
     def __repr__(self) -> str:
-        """Return a short account."""
         return f"Animation({len(self.svg.encode()) / 1000:.0f} kB)"
 
     def save(self, path: str | Path) -> None:
@@ -95,10 +80,6 @@ class Animation:
         ------
         ValueError
             If the ending is another one, or a film needs a program that is missing.
-
-        Examples
-        --------
-        >>> Animation("<svg/>", Figure(), ()).save("/dev/null")
         """
         file = Path(path)
         kind = file.suffix.lower()
@@ -113,8 +94,8 @@ class Animation:
         elif kind != ".mp4":
             raise ValueError(f"path = {str(path)!r}; must end in .svg, .html, .gif, .mp4 or .png")
         elif not FFMpegWriter.isAvailable():
-            lacks = "the program ffmpeg, which is not here; .gif needs nothing"
-            raise ValueError(f"{file} needs {lacks}")
+            need = "the program ffmpeg, which is not here; .gif needs nothing"
+            raise ValueError(f"{file} needs {need}")
         else:
             self._film(FFMpegWriter(RATE), file, 144)
 
@@ -193,10 +174,7 @@ def number(value: float) -> str:
 
 
 def moving(figure: Figure, moves: Sequence[Move], alt: str, unit: str = "pt") -> Animation:
-    """Return a figure of 72 dots an inch as a picture that moves, with stillness where it is asked.
-
-    In a page the names of all pictures share one space, so each gets a key of its own.
-    """
+    """Return a figure of 72 dots an inch as a picture that moves."""
     for move in moves:
         for k, artist in enumerate(move.artists):
             artist.set_gid(f"{_KEY}{move.part}-{k}")
