@@ -27,6 +27,7 @@ from cradle.runtime import job as drive
 
 # What errors say of arguments, as options; a row of values counts from 1, like the tables.
 _ROW = r"\b(masses|velocities|restitution|ratio|backward|stiffness|gaps|damping)"
+_SHOOT = r"shoot these two balls alone, or give --restitution \1=E:ERROR"
 _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"excess='saturate'": "--saturate",
     r"(mass|velocity)_unit='(\S+)'": r"--\1-unit \2",
@@ -37,12 +38,9 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"\bmodel_error = ": "--model-error ",
     r"\btypes = ": "--predict ",
     r"restitution has no '(.+?)', which set (.+) needs; it has (.*)": (
-        r"set \2 needs the restitution of \1: shoot these two balls alone, or give "
-        r"--restitution \1=E:ERROR (there are: \3)"
+        rf"set \2 needs the restitution of \1: {_SHOOT} (there are: \3)"
     ),
-    r"the coefficient of restitution of (\S+) is not known": (
-        r"\g<0>: shoot these two balls alone, or give --restitution \1=E:ERROR"
-    ),
+    r"the coefficient of restitution of (\S+) is not known": rf"\g<0>: {_SHOOT}",
     r"the ratio of (\S+) is not known": r"\g<0> (--known \1=RATIO)",
     r"(restitution|known)\['(.+?)'\](?:\[\d\])? = ": r"--\1 \2: ",
     r"\bforward\b(?=\[| = | has)": "ratio",
