@@ -68,7 +68,7 @@ def test_dots_and_cover_are_in_step():
             slope, offset = np.polyfit(edge, x, 1)
             np.testing.assert_allclose(x, offset + slope * edge, atol=0.3)
             assert slope < 0
-        assert f'-dot{max(shown) + 1}-' not in svg
+        assert f"-dot{max(shown) + 1}-" not in svg
 
 
 def test_nobody_moves_during_the_impact():
