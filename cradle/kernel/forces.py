@@ -81,12 +81,12 @@ def drift_lossy(p, h, low, high, s):
         new = a.d + (2.0 * a.lag - a.trend)
         move = new - a.y
         early = a.loss * p / h
-        a.push = a.y + early * a.move
+        a.before = a.y + early * a.move
         f, g = push(p, a, new, move, early)
         if (f > 0.0) != (a.f > 0.0):
             s[kinks].kink = c
             kinks += 1
-        a.f, a.g, a.move, a.y = f, g, move, new
+        a.f, a.g, a.push, a.move, a.y, a.trend = f, g, f - a.pull, move, new, a.lag
         top = max(top, (steep + g) * a.w)
         steep = g
     return kinks, max(top, steep * s[high].w)
@@ -99,15 +99,11 @@ def kick_lossy(h, low, high, s):
     The impulses of the losses move the nodes to come.
     """
     part = h * h / 12.0
-    for c in range(low, high):
-        s[c].trend, s[c].push = s[c].lag, s[c].f - s[c].pull
     for _ in range(2):
         force = impulse = rate = 0.0
         for c in range(low, high + 1):
             a = s[c]
-            f = j = r = 0.0
-            if c < high:
-                f, j, r = a.push, a.loss * a.push, a.loss * a.g * a.move / h
+            f, j, r = a.push, a.loss * a.push, a.loss * a.g * a.move / h
             a.dv, a.b, a.db = (force - f) * a.w, (impulse - j) * a.w, (rate - r) * a.w
             force, impulse, rate = f, j, r
         for c in range(low, high):
@@ -119,23 +115,27 @@ def kick_lossy(h, low, high, s):
     force = impulse = moved = 0.0
     for c in range(low, high + 1):
         a = s[c]
-        f = j = 0.0
-        if c < high:
-            f, j = a.push, a.loss * a.push
-            a.y = a.d + a.lag
-        a.v += h * (force - f) * a.w
-        move = h * (impulse - j) * a.w
+        a.y = a.d + a.lag
+        a.v += h * (force - a.push) * a.w
+        move = h * (impulse - a.loss * a.push) * a.w
         if c > low:
             s[c - 1].d += moved - move
-        force, impulse, moved = f, j, move
+        force, impulse, moved = a.push, a.loss * a.push, move
 
 
 @jit
 def bring(a, time, u):
     """Let the balls of an open contact fly freely for this time, at this closing speed."""
     a.d += time * u
-    a.f = a.g = a.lag = a.trend = 0.0
+    a.f = a.g = a.push = a.lag = a.trend = 0.0
     a.y = a.d
+
+
+@jit
+def rest(a, time):
+    """Watch a contact no longer."""
+    a.seen = time
+    a.g = a.push = 0.0
 
 
 @jit
@@ -164,35 +164,30 @@ def begin(n, chain, law, s, clock):
     clock.low, clock.high, clock.steps, clock.kinks, clock.row = n, 0, 0, 0, 0
     clock.time = clock.top = clock.ended = 0.0
     clock.stiff = 1.0
+    part = chain.h * chain.h / 12.0
+    force = impulse = 0.0
     for i in range(n):
         a = s[i]
         a.w, a.v = chain.w[i], chain.v[i]
-        a.k = a.loss = a.pull = a.d = a.y = a.f = a.g = a.move = a.lag = a.trend = a.seen = 0.0
-        if i == n - 1:
-            continue
-        a.k, a.loss, a.d = chain.k[i], chain.loss[i], chain.d[i]
-        a.y = a.d
-        if a.d > 0.0:
-            part = a.k * grade(law.p, a.d)
-            a.f = a.pull = part * a.d
-            a.g = law.p * part
-        if chain.v[i] > chain.v[i + 1]:
-            clock.low = min(clock.low, i)
-            clock.high = i + 1
+        a.k = a.loss = a.d = a.y = a.f = a.g = a.push = a.move = a.lag = a.trend = a.seen = 0.0
+        f = 0.0
+        if i < n - 1:
+            a.k, a.loss, a.d = chain.k[i], chain.loss[i], chain.d[i]
+            a.y = a.d
+            u = chain.v[i] - chain.v[i + 1]
+            a.f, a.g = push(law.p, a, a.d, 1.0, 0.0)
+            f = a.g * u
+            if u > 0.0:
+                clock.low = min(clock.low, i)
+                clock.high = i + 1
+        a.pull = a.f
+        a.v += part * a.w * (force - f)
+        a.db = a.w * (impulse - a.loss * f)
+        if i > 0:
+            s[i - 1].d += part * (s[i - 1].db - a.db)
+        force, impulse = f, a.loss * f
     if law.leans and clock.high > 0:
         clock.low, clock.high = 0, n - 1
-        part = chain.h * chain.h / 12.0
-        force = impulse = 0.0
-        for i in range(n):
-            f = j = 0.0
-            if i < n - 1:
-                f = s[i].g * (chain.v[i] - chain.v[i + 1])
-                j = s[i].loss * f
-            s[i].v += part * s[i].w * (force - f)
-            s[i].db = s[i].w * (impulse - j)
-            if i > 0:
-                s[i - 1].d += part * (s[i - 1].db - s[i].db)
-            force, impulse = f, j
 
 
 @apart
@@ -281,11 +276,11 @@ def run(n, h, law, effort, s, clock, record):
                 for near in range(max(c - 1, low), min(c + 2, high)):
                     s[near].trend = s[near].lag
         while low < high and idle(low, slow, s) and (low + 1 == high or idle(low + 1, slow, s)):
-            s[low].seen = time
+            rest(s[low], time)
             low += 1
         while low < high and idle(high - 1, slow, s) and idle(high - 2, slow, s):
             high -= 1
-            s[high].seen = time
+            rest(s[high], time)
         if law.leans and low < high:
             low, high = 0, n - 1
         clock.low, clock.high = low, high

@@ -28,7 +28,8 @@ class Link:
     y: float  # with losses: compression at the node, as it is,
     lag: float  # what it is more than `d`,
     trend: float  # and was a step before,
-    push: float  # force less the pull, corrected; before, see `resumed`
+    push: float  # force less the pull, corrected; none if the contact is not watched
+    before: float  # at the node before: what the force was in proportion to, see `pay`
     dv: float  # acceleration
     b: float  # velocity of the impulses A f,
     db: float  # and its rate of change
@@ -155,10 +156,11 @@ def pay(n, p, h, kinks, slow, lossy, s, clock):
         c = s[i].kink
         a = s[c]
         move, left, right = a.move, a.w, s[c + 1].w
+        # Its force is in proportion to d, with losses to d and `early` moves: `now` and `was`.
         d, loss, now, was = a.d, 0.0, a.d, a.d - move
         if lossy:
-            d, loss, now, was = a.y, a.loss, a.y + a.loss * p / h * move, a.push
-        if a.f == 0.0:  # what its force is in proportion to was above zero at the node before
+            d, loss, now, was = a.y, a.loss, a.y + a.loss * p / h * move, a.before
+        if a.f == 0.0:
             clock.ended = clock.time - h * now / (now - was)
         j = x = 0.0
         if a.f > 0.0 and d > move and loss > 0.0:
