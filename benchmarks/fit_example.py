@@ -35,17 +35,14 @@ def swing(velocity, times):
     def rate(y):
         return np.array([y[1], -GRAVITY / LENGTH * np.sin(y[0])])
 
-    positions = np.empty(times.size)
-    for k, time in enumerate(times):
-        steps = 16
-        h, y = time / steps, np.array([0.0, velocity / LENGTH])
-        for _ in range(steps):
-            a = rate(y)
-            b = rate(y + h / 2 * a)
-            c = rate(y + h / 2 * b)
-            y = y + h / 6 * (a + 2 * b + 2 * c + rate(y + h * c))
-        positions[k] = LENGTH * np.sin(y[0])
-    return positions
+    steps = 16
+    h, y = times / steps, np.stack([0.0 * times, np.full(times.size, velocity / LENGTH)])
+    for _ in range(steps):
+        a = rate(y)
+        b = rate(y + h / 2 * a)
+        c = rate(y + h / 2 * b)
+        y = y + h / 6 * (a + 2 * b + 2 * c + rate(y + h * c))
+    return LENGTH * np.sin(y[0])
 
 
 def film(name, speed, random):

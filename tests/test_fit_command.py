@@ -8,7 +8,6 @@ from test_command import call
 
 from cradle.command.solve import main
 from cradle.fit import ratio, read_shots, restitution
-from cradle.runtime import compile as runtime
 from cradle.tables import data_folder
 
 
@@ -28,7 +27,6 @@ def shots(tmp_path, monkeypatch):
     for name, kept in tables.items():
         (tmp_path / name).write_text("\n".join(kept) + "\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv(runtime.VARIABLE, "plain")
     return tmp_path
 
 
