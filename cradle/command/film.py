@@ -51,7 +51,7 @@ def film(
       cradle film film.txt --set BAC --masses 0.053,0.045,0.053 --period 2.2 --slower 2
     """
     from cradle.fit.parameters import parameter_key
-    from cradle.fit.shots import COLUMNS, OPTIONAL
+    from cradle.fit.shots import COLUMNS
 
     if shot is not None and len(files) > 1:
         raise click.UsageError("--shot names one film; several have the names of their files")
@@ -59,7 +59,7 @@ def film(
     found = [_velocities(file, types, masses, **options) for file in files]
     writer = csv.writer(sys.stdout, lineterminator="\n")
     if header:
-        writer.writerow([*COLUMNS, *OPTIONAL])
+        writer.writerow(COLUMNS)
     for file, one in zip(files, found, strict=True):
         for k, kind in enumerate(types):
             velocities = (x[k] for x in (one.before, one.after, one.sigma, one.sigma_before))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.fit.parameters import (
     Key,
+    Uncertain,
     chi_squares,
     fitted_keys,
     label,
@@ -18,7 +20,7 @@ from cradle.fit.parameters import (
     ratio_keys,
 )
 from cradle.fit.result import Estimate, Fit, Group
-from cradle.fit.search import Scan, refine, scan
+from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
 from cradle.input.values import Vector, checked, one_number
 from cradle.kernel.state import LIMITS
@@ -50,7 +52,7 @@ def restitution(shots: Shots) -> Fit:
     if not sets:
         raise ValueError("no set has two balls; restitution comes from pairs")
     bounds = dict.fromkeys(sorted(pair_keys(one.types)[0] for one in sets), 1.0)
-    found, _, lowest, freedom = _estimates("restitution", sets, bounds, set(bounds), {}, {})
+    found, _, lowest, freedom = _estimates("restitution", sets, bounds, set(bounds), {}, [])
     return Fit(shots, found, {}, (), lowest, freedom)
 
 
@@ -132,33 +134,34 @@ def ratio(
     sets = [one for one in shots.sets if len(one.types) > 2]
     if not sets and known is None:
         raise ValueError("no set has three balls or more; ratios come from triplets")
-    values, errors = _restitution_values(restitution, sets)
+    given = _restitution_values(restitution, sets)
     fixed = _known_ratios(known or {}, shots.masses)
+    values = {**{key: value for key, (value, _) in given.items()}, **fixed}
+    uncertain = [(key, error) for key, (_, error) in sorted(given.items()) if error]
     bounds = {key: _bound(key, shots.masses)
               for one in sets for key in ratio_keys(one.types) if key not in fixed}  # fmt: skip
-    acting = set[Key]().union(*(_acting(one, bounds, {**values, **fixed}) for one in sets))
-    taken = {**dict.fromkeys(bounds, 0.0), **values, **fixed}  # without effect: any value
-    found, groups, lowest, freedom = _estimates("ratio", sets, bounds, acting, taken, errors)
-    given = {label(key): (value, errors.get(key, 0.0)) for key, value in values.items()}
+    acting = set[Key]().union(*(_acting(one, bounds, values) for one in sets))
+    values = {**dict.fromkeys(bounds, 0.0), **values}  # without effect: any value
+    found, groups, lowest, freedom = _estimates("ratio", sets, bounds, acting, values, uncertain)
+    named = {label(key): value for key, value in given.items()}
     known = {label(key): value for key, value in fixed.items()}
-    return Fit(shots, found, given, groups, lowest, freedom, known)
+    return Fit(shots, found, named, groups, lowest, freedom, known)
 
 
 def _restitution_values(
     given: Fit | Known, sets: Sequence[ShotSet]
-) -> tuple[dict[Key, float], dict[Key, float]]:
+) -> dict[Key, tuple[float, float]]:
     """Return the coefficients and their errors by pair; all that the sets need are there."""
-    values, errors = {}, {}
+    values = {}
     for pair, value in (given.values() if isinstance(given, Fit) else given).items():
         key, name = tuple(sorted(parameter_key(pair))), f"restitution[{pair!r}]"
         numbers = np.atleast_1d(checked(name, value)).tolist()
         if len(numbers) not in (1, 2):
             raise ValueError(f"{name} = {value!r}; must be a number, or a number and its error")
-        values[key] = one_number(name, numbers[0], "must lie in [0, 1]", 0.0, 1.0)
-        if numbers[1:] and numbers[1] < 0:
-            raise ValueError(f"{name}[1] = {numbers[1]!r}; a standard error must be at least 0")
-        if any(numbers[1:]):
-            errors[key] = numbers[1]
+        e, error = (*numbers, 0.0)[:2]
+        values[key] = one_number(name, e, "must lie in [0, 1]", 0.0, 1.0), error
+        if error < 0:
+            raise ValueError(f"{name}[1] = {error!r}; a standard error must be at least 0")
     for one in sets:
         for key in pair_keys(one.types):
             if key not in values:
@@ -166,7 +169,7 @@ def _restitution_values(
                     f"restitution has no {label(key)!r}, which set {one.name} needs; "
                     f"it has {', '.join(map(label, values)) or 'nothing'}"
                 )
-    return values, errors
+    return values
 
 
 def _known_ratios(known: Mapping[str, float], masses: Mapping[str, float]) -> dict[Key, float]:
@@ -217,34 +220,23 @@ def _together(acting: Iterable[set[Key]]) -> list[list[Key]]:
 
 def _estimates(
     kind: str, sets: Sequence[ShotSet], bounds: Mapping[Key, float], acting: set[Key],
-    given: Mapping[Key, float], errors: Mapping[Key, float],
+    given: Mapping[Key, float], uncertain: Uncertain,
 ) -> tuple[dict[str, Estimate], tuple[Group, ...], float, int]:  # fmt: skip
     """Fit what acts in the sets; return it by name, its groups, chi-square, degrees of freedom."""
+
+    def chi(keys: list[Key], members: list[ShotSet], points: Vector) -> Vector:
+        values = {**given, **dict(zip(keys, points.T, strict=True))}
+        return chi_squares(members, values, uncertain)
+
     found = {label(key): Estimate.of(kind, key, bound, None) for key, bound in bounds.items()}
     groups, chi_square, freedom = [], 0.0, 0
     for keys in _together(fitted_keys(one.types) & acting for one in sets):
         members = [one for one in sets if fitted_keys(one.types) & {*keys}]
-        group, scans, lowest = _searched(keys, members, bounds, given, errors)
-        groups.append(group)
+        search, upper = refine if len(keys) > 1 else scan, np.array([bounds[key] for key in keys])
+        scans, points, density, lowest = search(partial(chi, keys, members), upper)
+        groups.append(Group(tuple(keys), points, density))
         for key, one in zip(keys, scans, strict=True):
             found[label(key)] = Estimate.of(kind, key, bounds[key], one)
         chi_square += lowest
         freedom += sum(one.after.size for one in members) - len(keys)
     return found, tuple(groups), chi_square, freedom
-
-
-def _searched(
-    keys: list[Key], sets: Sequence[ShotSet], bounds: Mapping[Key, float],
-    given: Mapping[Key, float], errors: Mapping[Key, float],
-) -> tuple[Group, list[Scan], float]:  # fmt: skip
-    """Search the parameters that act together."""
-    needed = {key for one in sets for key in pair_keys(one.types)}
-    uncertain = [(key, sigma) for key, sigma in sorted(errors.items()) if key in needed]
-
-    def chi(points: Vector) -> Vector:
-        columns = zip(keys, points.T, strict=True)
-        return chi_squares(sets, {**given, **dict(columns)}, uncertain)
-
-    search = refine if len(keys) > 1 else scan
-    scans, points, density, lowest = search(chi, np.array([bounds[key] for key in keys]))
-    return Group(tuple(keys), points, density), scans, lowest

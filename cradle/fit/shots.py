@@ -11,7 +11,7 @@ import numpy as np
 from cradle.input.csv import table_lines
 from cradle.input.values import Vector, one_number, one_of
 
-#: Columns that every table of shots has, and what they hold.
+#: Columns of a table of shots, and what they hold.
 COLUMNS = {
     "set": "name of the arrangement; all shots of a set have the same balls in the same order",
     "shot": "number or name of the shot within its set",
@@ -21,10 +21,7 @@ COLUMNS = {
     "before": "velocity just before the impact, m/s, positive to the right",
     "after": "velocity after the impact, m/s",
     "sigma": "standard error of `after`, m/s",
-}
-#: One more column that may be there.
-OPTIONAL = {
-    "sigma_before": "standard error of `before`; if left out, sigma for a moving ball, 0 at rest",
+    "sigma_before": "of `before`; may be left out: sigma for a moving ball, 0 at rest",
 }
 
 # Units, the first if none is told; what no ball of a cradle is likely to exceed; another unit that
@@ -175,7 +172,7 @@ def read_shots(
     ----------
     source : path, binary file, DataFrame or mapping of columns
         A CSV file (UTF-8, comma, one header line; lines that begin with # and empty rows are
-        skipped), a pandas DataFrame, or columns by name: `COLUMNS` and `OPTIONAL`.
+        skipped), a pandas DataFrame, or columns by name; see `COLUMNS`.
     mass_unit : {"kg", "g"}, optional
     velocity_unit : {"m/s", "cm/s", "mm/s"}, optional
         Of velocities and their errors.  Left out, units are kg and m/s, and numbers that look like
@@ -201,8 +198,9 @@ def read_shots(
     if not lines:
         raise ValueError("the table has no rows")
     there = list(lines[0][1])
+    optional = ("sigma_before", "sigma") if sigma is not None else ("sigma_before",)
     for name in COLUMNS:
-        if name not in there and (name != "sigma" or sigma is None):
+        if name not in (*there, *optional):
             other = "; or give sigma=" if name == "sigma" else ""
             alike = [one for one in there if one.lower() == name]
             hint = "".join(f": write {one} in small letters" for one in alike)

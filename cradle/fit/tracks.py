@@ -70,14 +70,14 @@ def read_tracker(
     one_number("unit", unit, "must be above 0", 0.0, open_low=True)
     file = Path(path) if isinstance(path, str) else path
     rows = text_rows(file.name, file.read_bytes(), comments=True)
-    titles, above, block = list[_Title](), list[str](), ""
+    titles, above, block = list[tuple[str, str]](), list[str](), ""
     marks: dict[str, list[tuple[float, float]]] = {}
     for number, (first, *others) in rows.items():
         cells = [first.lstrip("# "), *others]
-        if cells[0] and _title(cells[0]).text.casefold() in ("t", "time"):
+        if cells[0] and _title(cells[0])[0].casefold() in ("t", "time"):
             titles = [_title(cell) for cell in cells]
         elif titles and {*map(str.strip, cells)} <= _UNITS.keys() and any(cells):
-            titles = [one._replace(unit=cell) for one, cell in zip(titles, cells, strict=False)]
+            titles = [(text, cell) for (text, _), cell in zip(titles, cells, strict=False)]
         elif titles and not first.startswith("#"):
             where = f"{file.name}, line {number}"
             for at, name in _owners(titles, column, above, block).items():
@@ -108,29 +108,26 @@ def read_tracker(
     return tracks
 
 
-class _Title(NamedTuple):
-    text: str
-    unit: str
-
-
-def _title(cell: str) -> _Title:
+def _title(cell: str) -> tuple[str, str]:
     """Return the title of a column without run and unit, and its unit."""
-    ((text, unit),) = _TITLE.findall(cell)
-    return _Title(text, unit)
+    (found,) = _TITLE.findall(cell)
+    return found[0], found[1]
 
 
-def _owners(titles: list[_Title], column: str, above: list[str], block: str) -> dict[int, str]:
+def _owners(
+    titles: list[tuple[str, str]], column: str, above: list[str], block: str
+) -> dict[int, str]:
     """Return the ball of each column of positions."""
     form = re.compile(rf"(?:(.+?)/.*)?(?:{re.escape(column)}|position)(?:\W*(?:ch )?\d+)?", re.I)
-    found = {at: match for at, one in enumerate(titles) if (match := form.fullmatch(one.text))}
-    names = {titles[at].text.casefold() for at in found}
+    found = {at: match for at, (text, _) in enumerate(titles) if (match := form.fullmatch(text))}
+    names = {titles[at][0].casefold() for at in found}
     owners, name = {}, ""
     over = [*above, *[""] * len(titles)]
     for at, match in found.items():
         if match[1]:  # Kinovea: the ball's name, and that of its point
             name = match[1]
         elif len(names) == len(found) > 1:
-            name = titles[at].text
+            name = titles[at][0]
         elif len(found) > 1:  # the name stands above the first of its columns
             name = next(filter(None, over[at : at + 1] + over[at - 1 : 0 : -1]), name)
         else:
@@ -139,15 +136,15 @@ def _owners(titles: list[_Title], column: str, above: list[str], block: str) -> 
     return owners
 
 
-def _number(where: str, cell: str, title: _Title, told: float = 1.0) -> float:
+def _number(where: str, cell: str, title: tuple[str, str], told: float = 1.0) -> float:
     """Return a time in s or a position in m; `told` is the unit where the title has none."""
-    where = f"{where}, column {title.text}"
-    if title.unit not in _UNITS:
-        raise ValueError(f"{where}: unit {title.unit!r}; must be in s, ms, m, cm, mm or px")
-    if title.unit == "px" and told == 1.0:
+    where, unit = f"{where}, column {title[0]}", title[1]
+    if unit not in _UNITS:
+        raise ValueError(f"{where}: unit {unit!r}; must be in s, ms, m, cm, mm or px")
+    if unit == "px" and told == 1.0:
         raise ValueError(f"{where}: px; say how large a pixel is, in m: unit")
     try:
         value = float(cell)
     except ValueError:
         raise ValueError(f"{where}: {cell!r}; must be a number") from None
-    return value * (told if title.unit in ("", "px") else _UNITS[title.unit])
+    return value * (told if unit in ("", "px") else _UNITS[unit])
