@@ -45,8 +45,10 @@ def restitution(shots: Shots) -> Fit:
     --------
     >>> from cradle.fit import read_shots
     >>> from cradle.tables import data_folder
-    >>> restitution(read_shots(data_folder() / "shots_template.csv"))
-    Fit(restitution AB = 0.5270 [0.5113, 0.5429]; chi-square 0.8 of 3)
+    >>> print(restitution(read_shots(data_folder() / "shots_template.csv")).summary())
+    restitution AB = 0.5270 [0.5113, 0.5429], standard error 0.0081
+    chi-square 0.8, degrees of freedom 3, chance 0.85
+    residuals of AB: 0.4 standard errors, the largest 0.6 (shot 1, ball 1)
     """
     sets = [one for one in shots.sets if len(one.types) == 2]
     if not sets:
@@ -128,8 +130,11 @@ def ratio(
     >>> from cradle.fit import read_shots
     >>> from cradle.tables import data_folder
     >>> shots = read_shots(data_folder() / "shots_template.csv")
-    >>> ratio(shots, {"AB": (0.53, 0.01)})
+    >>> fit = ratio(shots, {"AB": (0.53, 0.01)})
+    >>> fit
     Fit(ratio ABA = 0.109 [0.071, 0.146]; chi-square 0.2 of 2)
+    >>> fit.predict("ABA")
+    Prediction(ABA: 0.129 [0.110, 0.148], 0.243 [0.230, 0.256], 0.585 [0.571, 0.600] m/s)
     """
     sets = [one for one in shots.sets if len(one.types) > 2]
     if not sets and known is None:
@@ -232,7 +237,8 @@ def _estimates(
     groups, chi_square, freedom = [], 0.0, 0
     for keys in _together(fitted_keys(one.types) & acting for one in sets):
         members = [one for one in sets if fitted_keys(one.types) & {*keys}]
-        search, upper = refine if len(keys) > 1 else scan, np.array([bounds[key] for key in keys])
+        search = refine if len(keys) > 1 else scan
+        upper = np.array([bounds[key] for key in keys])
         scans, points, density, lowest = search(partial(chi, keys, members), upper)
         groups.append(Group(tuple(keys), points, density))
         for key, one in zip(keys, scans, strict=True):

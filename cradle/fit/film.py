@@ -64,13 +64,9 @@ def speeds_from_heights(
 
 
 def velocities_from_tracks(
-    tracks: Mapping[str, Track],
-    *,
-    length: float | None = None,
-    window: float | None = None,
-    striker: int = 0,
-    scatter: float | None = None,
-) -> Velocities:
+    tracks: Mapping[str, Track], *, length: float | None = None, window: float | None = None,
+    striker: int = 0, scatter: float | None = None,
+) -> Velocities:  # fmt: skip
     """Find the impact in the tracks, and the velocities just before and just after it.
 
     First the moment at which all tracks bend, then on either side of it the velocity of each ball
@@ -107,9 +103,10 @@ def velocities_from_tracks(
     balls = list(tracks.values())
     if len(balls) < 2 or not 0 <= striker < len(balls):
         raise ValueError(f"{len(balls)} tracks, striker = {striker}; needs two balls and a striker")
-    for what, value in (("length", length), ("window", window), ("scatter", scatter)):
-        if value is not None:
-            one_number(what, value, "must be above 0", 0.0, open_low=True)
+    length, window, scatter = (
+        None if value is None else one_number(name, value, "must be above 0", 0.0, open_low=True)
+        for name, value in (("length", length), ("window", window), ("scatter", scatter))
+    )
     for name, ball in tracks.items():
         if length is not None and (span := float(np.ptp(ball.positions))) > 2.0 * length:
             raise ValueError(

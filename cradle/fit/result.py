@@ -147,20 +147,7 @@ class Prediction:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """All estimates of a fit.
-
-    Examples
-    --------
-    >>> from cradle.fit import ratio, read_shots, restitution
-    >>> from cradle.tables import data_folder
-    >>> shots = read_shots(data_folder() / "shots_template.csv")
-    >>> print(restitution(shots).summary())
-    restitution AB = 0.5270 [0.5113, 0.5429], standard error 0.0081
-    chi-square 0.8, degrees of freedom 3, chance 0.85
-    residuals of AB: 0.4 standard errors, the largest 0.6 (shot 1, ball 1)
-    >>> ratio(shots, restitution(shots)).predict("ABA")
-    Prediction(ABA: 0.130 [0.112, 0.148], 0.244 [0.231, 0.257], 0.583 [0.571, 0.595] m/s)
-    """
+    """All estimates of a fit."""
 
     shots: Shots  #: The data.
     estimates: Mapping[str, Estimate]

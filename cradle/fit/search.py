@@ -56,10 +56,8 @@ def scan(function: Function, upper: Vector) -> Found:
     points = upper * (1.0 - np.linspace(1.0, 0.0, _GRID)[:, None] ** 2)
     grid, values = points[:, 0], function(points)
     padded = np.pad(values, 1, constant_values=np.inf)
-    # The first point of a level stretch stands for it, unless its steps are those of rounding.
+    # The first point of a level stretch stands for it.
     lows = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
-    rises = np.array([values[max(k - 3, 0) : k + 4].max() - values[k] for k in lows])
-    lows = lows[(values[lows] == values.min()) | (rises > 1e-9 * np.maximum(1.0, values[lows]))]
     cells = np.gradient(grid)
     best, minima, lowest = _walked(function, points[lows], cells[lows, None], upper)
     modes = tuple(Mode(float(x), y) for x, y in zip(best[:, 0], minima, strict=True))

@@ -69,14 +69,6 @@ class ShotSet:
         ------
         ValueError
             If a shot begins otherwise than with the first ball striking the others at rest.
-
-        Examples
-        --------
-        >>> from cradle.fit import read_shots
-        >>> from cradle.tables import data_folder
-        >>> mean, error = read_shots(data_folder() / "shots_template.csv")["AB"].mean_after()
-        >>> mean.round(3).tolist(), error.round(3).tolist()
-        ([0.176, 0.7], [0.006, 0.007])
         """
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
         striker = self.before[:, :1]
@@ -92,18 +84,7 @@ class ShotSet:
 
 @dataclass(frozen=True, eq=False)
 class Shots:
-    """Measured shots of one or several arrangements: `sets`, in the order of the table.
-
-    Examples
-    --------
-    >>> from cradle.fit import read_shots
-    >>> from cradle.tables import data_folder
-    >>> shots = read_shots(data_folder() / "shots_template.csv")
-    >>> shots
-    Shots(AB: 2 shots of 2 balls, ABA: 1 shot of 3 balls)
-    >>> shots["AB"].types, shots.without("ABA"), shots.momentum_check()[1]
-    (('A', 'B'), Shots(AB: 2 shots of 2 balls), 3)
-    """
+    """Measured shots of one or several arrangements: `sets`, in the order of the table."""
 
     sets: tuple[ShotSet, ...]
 
@@ -160,12 +141,9 @@ def chance(chi_square: float, degrees_of_freedom: int) -> float:
 
 
 def read_shots(
-    source: str | Path | Any,
-    *,
-    mass_unit: str | None = None,
-    velocity_unit: str | None = None,
+    source: str | Path | Any, *, mass_unit: str | None = None, velocity_unit: str | None = None,
     sigma: float | None = None,
-) -> Shots:
+) -> Shots:  # fmt: skip
     """Read a table of shots and check it; in the result all is in kg and m/s.
 
     Parameters
@@ -191,8 +169,9 @@ def read_shots(
     --------
     >>> table = {"set": ["AB", "AB"], "shot": [1, 1], "ball": [1, 2], "type": ["A", "B"],
     ...          "mass": [45, 53], "before": [1.0, 0.0], "after": [0.17, 0.70]}
-    >>> read_shots(table, mass_unit="g", sigma=0.01)["AB"].masses
-    array([0.045, 0.053])
+    >>> shots = read_shots(table, mass_unit="g", sigma=0.01)
+    >>> shots, shots["AB"].masses
+    (Shots(AB: 1 shot of 2 balls), array([0.045, 0.053]))
     """
     lines = table_lines(source)
     if not lines:

@@ -39,15 +39,7 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
 
 
 def draw_likelihood(estimate: Estimate, ax: Axes) -> Axes:
-    """Draw chi-square above its lowest value, the confidence set and all minima, and return `ax`.
-
-    Examples
-    --------
-    >>> from cradle.fit import restitution_from_heights
-    >>> fit = restitution_from_heights("AA", [1.0, 1.0], [0.88, 0.90], 0.01)
-    >>> draw_likelihood(fit["AA"], plt.figure().subplots()).get_title()
-    'likelihood of restitution AA'
-    """
+    """Draw chi-square above its lowest value, the confidence set and all minima; return `ax`."""
     x, y = estimate.grid, estimate.excess
     cloud = x.size > 2 and bool((np.diff(x) <= 0).any())  # of several parameters
     ax.plot(x, y, "." if cloud else "-", ms=2, lw=2, color=PALETTE[0])
