@@ -20,10 +20,10 @@ class Velocities(NamedTuple):
     """Velocities of N balls around an impact, from their tracks."""
 
     time: float  #: When the impact happened, s.
-    before: Vector  #: Shape (N,), m/s; so are the next three.
-    after: Vector
-    sigma: Vector  #: Standard errors of `after`.
-    sigma_before: Vector  #: Standard errors of `before`.
+    before: Vector  #: Velocities before the impact, shape (N,), m/s.
+    after: Vector  #: Velocities after the impact, shape (N,), m/s.
+    sigma: Vector  #: Standard errors of `after`, shape (N,), m/s.
+    sigma_before: Vector  #: Standard errors of `before`, shape (N,), m/s.
     scatter: float  #: Standard deviation of the marks about the motion fitted, m.
     window: float  #: How much time on either side was used, s.
     probability: float  #: Chance that marks bend at least as much if the motion fitted is right.

@@ -122,9 +122,9 @@ class Prediction:
     """
 
     types: tuple[str, ...]
-    median: Vector  #: Shape (N,), m/s; so are the ends.
-    lower: Vector
-    upper: Vector
+    median: Vector  #: Median velocities after the impact, shape (N,), m/s.
+    lower: Vector  #: Lower ends, shape (N,), m/s.
+    upper: Vector  #: Upper ends, shape (N,), m/s.
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one row per ball."""
@@ -150,7 +150,7 @@ class Fit:
     """All estimates of a fit."""
 
     shots: Shots  #: The data.
-    estimates: Mapping[str, Estimate]
+    estimates: Mapping[str, Estimate]  #: By the names of the parameters, such as "ABC".
     given: Mapping[str, tuple[float, float]]  #: Coefficients of restitution, with their errors.
     groups: tuple[Group, ...]  #: Ratios that were fitted together.
     chi_square: float  #: Its lowest value, all estimates together.

@@ -21,7 +21,7 @@ COLUMNS = {
     "before": "velocity just before the impact, m/s, positive to the right",
     "after": "velocity after the impact, m/s",
     "sigma": "standard error of `after`, m/s",
-    "sigma_before": "of `before`; may be left out: sigma for a moving ball, 0 at rest",
+    "sigma_before": "standard error of `before`; if left out, sigma for a moving ball, 0 at rest",
 }
 
 # Units, the first if none is told; what no ball of a cradle is likely to exceed; another unit that
@@ -48,10 +48,10 @@ class ShotSet:
     types: tuple[str, ...]  #: Of the N balls, left to right.
     shots: tuple[str, ...]  #: Names of the K shots.
     masses: Vector  #: Shape (N,), kg.
-    before: Vector  #: Velocities, shape (K, N), m/s; so are the next three.
-    after: Vector
-    sigma: Vector  #: Standard errors of `after`.
-    sigma_before: Vector  #: Standard errors of `before`.
+    before: Vector  #: Velocities before the impact, shape (K, N), m/s.
+    after: Vector  #: Velocities after the impact, shape (K, N), m/s.
+    sigma: Vector  #: Standard errors of `after`, shape (K, N), m/s.
+    sigma_before: Vector  #: Standard errors of `before`, shape (K, N), m/s.
 
     @property
     def momentum_residuals(self) -> Vector:
