@@ -271,6 +271,7 @@ def test_restitution_of_two_moving_balls():
 def test_heights():
     found = restitution_from_heights("AA", [1.0, 0.5], [0.81, 0.405], 0.002)
     assert found["AA"].value == pytest.approx(0.9, abs=1e-6)
+    assert found.degrees_of_freedom == 1
     with pytest.raises(ValueError, match=r"rise\[0\] = -1.0; must be above 0"):
         restitution_from_heights("AA", [1.0], [-1.0], 0.1)
     speed, sigma = speeds_from_heights([0.05, -0.05, 0.0], 0.001, 10.0)
@@ -600,6 +601,8 @@ def test_velocities_from_exact_tracks(length):
     assert found.time == pytest.approx(3.0, abs=2e-5)
     np.testing.assert_allclose(found.before, [1.2, 0, 0], atol=1e-4)
     np.testing.assert_allclose(found.after, 1.2 * after, atol=1e-4)
+    with pytest.raises(ValueError, match="1 tracks, striker = 0; needs two balls and a striker"):
+        velocities_from_tracks({"A": tracks["A"]}, length=length)
     with pytest.raises(ValueError, match="tracks must be in the order"):
         velocities_from_tracks({"C": tracks["C"], "A": tracks["A"]}, length=length, striker=1)
 
