@@ -40,16 +40,14 @@ _CHUNK = 2048  # chains at once
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class TimedTrace(CurvedTrace):
-    """The path of an impact that has a time; N balls, K events, S steps of the integration.
+    """The path of an impact that has a time, by curves; N balls, K events, S steps.
 
-    Its events are joined by smooth curves.  The outcome has the accuracy asked for; what happens on
-    the way is less exact near a closing or an opening.
+    The outcome has the accuracy asked for; the way is less exact near a closing or an opening.
 
     Attributes
     ----------
     times, forces : ndarray, shapes (K + 1,) and (K + 1, N - 1)
-        Time of each row of the path, s, the first is 0; and contact forces there, N, the largest of
-        a contact at a maximum compression.
+        Time of each row of the path, s, from 0 on; and contact forces there, N.
     durations : ndarray, shape (N - 1,)
         Time that each contact was closed, over all its collisions, s.
     step_times, step_forces, step_velocities, step_impulses : ndarray, (S,) and (S, N - 1 or N)
@@ -80,10 +78,9 @@ class TimedTrace(CurvedTrace):
         """Kinetic energy that the viscosity of the contacts has taken, in joules."""
         if not np.any(self.model.viscosity):
             return 0.0
-        m, v = self.chain.masses, self.chain.velocities
+        m, v, after = self.chain.masses, self.chain.velocities, self.velocities
         centre = self.chain.momentum / m.sum()
-        lost = m * (v - self.velocities) * (0.5 * (v - centre) + 0.5 * (self.velocities - centre))
-        return float(lost.sum())
+        return float(np.sum(m * (v - after) * (0.5 * (v - centre) + 0.5 * (after - centre))))
 
 
 @dataclass(frozen=True)
@@ -92,14 +89,12 @@ class SpringChain:
 
     `absorbed` is the energy stored at each maximum of a compression, less that at a minimum between
     two of them.  Speeds below a hundredth of the accuracy, times that of the fastest closing, are
-    too little to matter; so are collisions at such speeds: how often balls touch that a long chain
-    leaves behind depends on it.
+    too little to matter, and how often balls touch at them depends on it.
 
     Parameters
     ----------
     stiffness, exponent, viscosity, gaps, accuracy
-        As for `spring_velocities`; rows of one chain, length N - 1, or numbers.  With a stiffness
-        left out times and forces are no one's.
+        As for `spring_velocities`, of one chain; times and forces need the stiffness.
     max_steps : int
         Steps of one run after which the impact is given up.
 
@@ -131,8 +126,8 @@ class SpringChain:
             rule = f"must lie in [{low:g}, {high:g}]"
             object.__setattr__(self, name, one_number(name, getattr(self, name), rule, low, high))
         for name, rules in _RULES.items():
-            row = number_or_row(name, getattr(self, name), "N - 1", *rules)
-            object.__setattr__(self, name, row)
+            kept = number_or_row(name, getattr(self, name), "N - 1", *rules)
+            object.__setattr__(self, name, kept)
         whole_number("max_steps", self.max_steps)
 
     def solve(self, chain: Chain) -> TimedTrace:
@@ -141,7 +136,7 @@ class SpringChain:
         rule = "must be 1 for SpringChain, whose losses are its viscosity"
         refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
         fastest(chain)  # is within the range of floats
-        contacts = [row_of(name, getattr(self, name), n - 1, n) for name in _RULES]
+        contacts = (row_of(name, getattr(self, name), n - 1, n) for name in _RULES)
         rows = [row[None] for row in (chain.masses, chain.velocities, *contacts)]
         forces, *units = scaled(rows, self.exponent, self.accuracy)
         mass, speed, length = (float(unit[0, 0]) for unit in units)
@@ -181,17 +176,14 @@ class SpringChain:
         """Return the error of an impact that was given up at these velocities."""
         m, v = chain.masses, chain.velocities
         none, impulses = np.zeros(len(m) - 1), np.cumsum(m * (v - reached))[:-1]
-        c = int(np.argmax(np.broadcast_to(self.stiffness, none.shape) / np.minimum(m[:-1], m[1:])))
+        c = np.argmax(self.stiffness / np.minimum(m[:-1], m[1:]))
         held = "; or leans hold balls together" if np.min(self.gaps) < 0.0 else ""
+        paths = np.array([v, reached]), np.array([none, impulses])
         return ImpactNotFinished(
             f"the impact was not finished: contact {c}, the quickest of the springs, makes the "
-            "steps short; or balls that collide often amplify errors, and finer runs do not agree"
-            + held,
-            Trace(
-                chain, self, reached, impulses, none, none.astype(np.int64), np.array([v, reached]),
-                np.array([none, impulses]), (), left_out=1,
-            ),
-        )  # fmt: skip
+            f"steps short; or finer runs of balls that collide often do not agree{held}",
+            Trace(chain, self, reached, impulses, none, none.astype(int), *paths, (), left_out=1),
+        )
 
 
 def spring_velocities(
@@ -220,14 +212,12 @@ def spring_velocities(
     exponent : float
         p, from 1 to 10.
     viscosity : array_like, shape (..., N - 1) or ()
-        A, s; 0 for an elastic contact.  Two spheres lose the more the faster they collide.
+        A, s; 0 for an elastic contact.  The faster two spheres collide, the more they lose.
     gaps : array_like, shape (..., N - 1) or ()
-        Distance of two balls before the impact, m, which closes before the contact pushes.  Below
-        zero a lean: how far the strings press the two together at rest.  Their pull stays what it
-        is until the last contact has opened.
+        Distance of two balls before the impact, m.  Below zero a lean: how far the strings press
+        the two together at rest, with a pull that acts until the last contact has opened.
     accuracy : float
-        Largest error of a velocity, relative to the fastest closing; from 1e-12 to 0.02.  It is
-        estimated and met, not proven.
+        Largest estimated error of a velocity over the fastest closing speed, 1e-12 to 0.02.
     progress : bool
         Show a progress bar.
 
@@ -239,10 +229,10 @@ def spring_velocities(
     Raises
     ------
     ValueError
-        If a value or a shape is wrong, or too small or large beside the others to be resolved.
+        If a value or a shape is wrong, or a value too far from the others to be resolved.
     ImpactNotFinished, ImpactNotCertified
-        If an impact takes more than twenty million steps, finer and finer runs do not agree, or
-        leans hold balls together; if an outcome breaks momentum, energy or order.
+        If runs take more than twenty million steps or do not agree, or leans hold balls together;
+        if an outcome breaks momentum, energy or order.
 
     References
     ----------

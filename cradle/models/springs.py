@@ -55,10 +55,11 @@ def scaled(
     most = min(_WIDEST, _BLURRED * accuracy)
     far = ~((mass > 0.0) & (length >= _TINY) & (length <= 1.0 / _TINY)) | np.isnan(d)
     of, late = "the depth of the fastest closing", "contact times, depth over speed of the fastest"
+    light, soft = (part < _SMALLEST * part.max(axis=-1, keepdims=True) for part in (m, k))
     least = f"must be at least {_SMALLEST} of the"
     for name, values, wrong, rule in (
-        ("masses", m, _small(m), f"{least} heaviest ball of its chain"),
-        ("stiffness", k, _small(k), f"{least} stiffest contact of its chain"),
+        ("masses", m, light, f"{least} heaviest ball of its chain"),
+        ("stiffness", k, soft, f"{least} stiffest contact of its chain"),
         ("stiffness", k, far, "a contact's time is beyond floats: choose other units"),
         ("viscosity", lost, loss > _LONGEST, f"must be at most {_LONGEST} {late} closing"),
         ("gaps", gap, -d > most, f"must be at most {most:g} times {of} at this accuracy"),
@@ -70,10 +71,6 @@ def scaled(
             place = *map(int, np.unravel_index(begin + row, lead)), c
             raise refusal(name, place, f" = {float(values[row, c])!r}; {rule}")
     return Forces(w, v, k / k[at], loss, d, speed[:, 0]), mass, speed, length
-
-
-def _small(values: Vector) -> Any:
-    return values < _SMALLEST * values.max(axis=-1, keepdims=True)
 
 
 class Solved(NamedTuple):
@@ -161,10 +158,9 @@ def _defects(chains: Forces, law: Law, out: Solved) -> Any:
 
 
 def _highest(chains: Forces, p: float) -> Vector:
-    """Return a bound of the square of a ball's frequency, from the energy of its contacts.
+    """Return a bound of the square of a ball's frequency: two contacts store no more than all E.
 
-    Two contacts store at most all the energy E there is, so p (k d^(p - 1) + k' d'^(p - 1)) is at
-    most p (k + k')^(2 / (p + 1)) ((p + 1) E)^((p - 1) / (p + 1)), by Hoelder's inequality.
+    By Hoelder, k d^(p - 1) + k' d'^(p - 1) <= (k + k')^(2/(p + 1)) ((p + 1) E)^((p - 1)/(p + 1)).
     """
     energy = 0.5 * (chains.v * chains.v / chains.w).sum(axis=-1)
     if chains.d.any():
@@ -205,15 +201,13 @@ class Path:
         self.v, self.force = v, np.maximum(push + loss * rate, 0.0)
         self.a = self.driven(held + loss * rate)
 
-    def pushes(self, y: Vector) -> Vector:
+    def pushes(self, y: Vector) -> Any:
         """Return what closed contacts push with at rest."""
-        push: Vector = self.k * np.maximum(y, 0.0) ** self.p
-        return push
+        return self.k * np.maximum(y, 0.0) ** self.p
 
-    def driven(self, push: Vector) -> Vector:
+    def driven(self, push: Vector) -> Any:
         """Return what pushes of the contacts do to the balls."""
-        driven: Vector = -np.diff(np.pad(push, [(0, 0), (1, 1)])) * self.w
-        return driven
+        return -np.diff(np.pad(push, [(0, 0), (1, 1)])) * self.w
 
     def impulses(self, v: Vector) -> Vector:
         """Return the impulses of the contacts, from velocities; none of one that never closed."""
@@ -227,13 +221,11 @@ class Path:
         """
         from scipy.interpolate import CubicHermiteSpline  # slow to import
 
-        size, steps = len(self.k), len(self.t) - 1
         self.collisions = self.closed[0].astype(np.int64)
-        self.durations, self.absorbed = np.zeros((2, size))
-        if not steps:
+        self.durations, self.absorbed = np.zeros((2, len(self.k)))
+        if len(self.t) == 1:
             return self.t, (), self.v, self.force
         closing = np.diff(self.closed.astype(int), axis=0)
-        closing[-1][self.closed[-1]] = -1  # what is left is too little to matter
         u, grow = -np.diff(self.v), -np.diff(self.a)
         touching = np.minimum.accumulate(self.y, axis=0) >= -1e-12
         turned = ((u[:-1] > 0.0) != (u[1:] > 0.0)) & (self.closed[:-1] | self.closed[1:])

@@ -52,9 +52,9 @@ def solve(
     stop: threading.Event | None = None,
     record: list[Any] | None = None,
 ) -> tuple[int, int]:
-    """Run the chains; return the number of the next one, and how the one before it ended.
+    """Run the chains, until `stop` is set; return the next one's number, and how the last ended.
 
-    It ends when `stop` is set.  The steps of one chain are written to a `record`.
+    The pages of one chain are written to a `record`.
     """
     (rows, n), k, status = out.v.shape, 0, FINISHED
     compiled: bool | None = None
@@ -68,11 +68,10 @@ def solve(
             compiled, status = kernel is not plain, FINISHED
             area = _blank(Link, n, compiled), _blank(Clock, 1, compiled)
             given = chains if compiled else Forces(*(part.tolist() for part in chains))
-        call = kernel.springs if compiled else plain.springs
-        begun = time.perf_counter()
+        door = kernel.springs if compiled else plain.springs
         effort = _EFFORT[compiled] if record is None else _PAGES
-        started = status == PAUSED
-        k, status = runtime.call(call, k, started, n, given, law, out, *area, pages, effort)
+        fixed, begun = (n, given, law, out, *area, pages, effort), time.perf_counter()
+        k, status = runtime.call(door, k, status == PAUSED, *fixed)
         if not compiled:
             runtime.spend(time.perf_counter() - begun)
         if record is not None:
