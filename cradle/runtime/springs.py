@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Any, get_type_hints
+from typing import Any
 
 import numpy as np
 
@@ -12,31 +12,11 @@ from cradle import kernel as plain
 from cradle.kernel.kinks import Clock, Forces, Law, Link, Motions
 from cradle.kernel.state import PAUSED
 from cradle.runtime import compile as runtime
-from cradle.runtime.job import FINISHED, Stopped
+from cradle.runtime.job import FINISHED, Stopped, blank
 
-# Contacts times steps between two pauses, plain and compiled: some hundredths of a second.
-_EFFORT = {False: 5_000, True: 5_000_000}
-# The same with a record, of which each step is a page.
-_PAGES = 1024
-#: The fields of the kernel's records, all zero.
-_ZEROS: dict[type, dict[str, Any]] = {
-    kind: {field: number() for field, number in get_type_hints(kind).items()}
-    for kind in (Link, Clock)
-}
-_TYPES = {
-    kind: np.dtype([(field, np.array(zero).dtype) for field, zero in fields.items()])
-    for kind, fields in _ZEROS.items()
-}
-
-
-def _blank(kind: type, size: int, compiled: bool) -> Any:
-    """Return records, all zero: NumPy's for compiled code, Python objects for plain."""
-    if compiled:
-        return np.zeros(size, _TYPES[kind])
-    things = [kind() for _ in range(size)]
-    for thing in things:
-        vars(thing).update(_ZEROS[kind])
-    return things
+# Contacts times steps between two pauses, plain and compiled: some hundredths of a second; and with
+# a record, of which each step is a page.
+_EFFORT, _PAGES = {False: 5_000, True: 5_000_000}, 1024
 
 
 def room(rows: int, n: int) -> Motions:
@@ -66,7 +46,7 @@ def solve(
         if compiled is None or (compiled is not (kernel is not plain) and record is None):
             # A chain that has begun plain begins anew.
             compiled, status = kernel is not plain, FINISHED
-            area = _blank(Link, n, compiled), _blank(Clock, 1, compiled)
+            area = blank(Link, n, compiled), blank(Clock, 1, compiled)
             given = chains if compiled else Forces(*(part.tolist() for part in chains))
         door = kernel.springs if compiled else plain.springs
         effort = _EFFORT[compiled] if record is None else _PAGES
