@@ -94,24 +94,21 @@ def drift_lossy(p, h, low, high, s):
 
 @jit
 def kick_lossy(h, low, high, s):
-    """Move the nodes to where the forces have them, and the forces along their slopes; twice; kick.
-
-    The impulses of the losses move the nodes to come.
-    """
+    """Move nodes to where the forces have them, and the forces along their slopes; twice; kick."""
     part = h * h / 12.0
     for _ in range(2):
-        force = impulse = rate = 0.0
+        force = impulse = rate = dv = b = db = 0.0
         for c in range(low, high + 1):
-            a = s[c]
-            f, j, r = a.push, a.loss * a.push, a.loss * a.g * a.move / h
-            a.dv, a.b, a.db = (force - f) * a.w, (impulse - j) * a.w, (rate - r) * a.w
-            force, impulse, rate = f, j, r
-        for c in range(low, high):
-            a, z = s[c], s[c + 1]
-            grown, held = a.dv - z.dv, a.b - z.b
-            a.lag = 0.5 * h * held + part * (grown - (a.db - z.db))
-            a.push = a.f - a.pull + a.g * (a.d + a.lag - a.y)
-            a.move = h * (a.v - z.v + 0.5 * h * grown + held)
+            z = s[c]
+            f, j, r = z.push, z.loss * z.push, z.loss * z.g * z.move / h
+            gain, hold, more = (force - f) * z.w, (impulse - j) * z.w, (rate - r) * z.w
+            if c > low:
+                a = s[c - 1]
+                grown, held = dv - gain, b - hold
+                a.lag = 0.5 * h * held + part * (grown - (db - more))
+                a.push = a.f - a.pull + a.g * (a.d + a.lag - a.y)
+                a.move = h * (a.v - z.v + 0.5 * h * grown + held)
+            force, impulse, rate, dv, b, db = f, j, r, gain, hold, more
     force = impulse = moved = 0.0
     for c in range(low, high + 1):
         a = s[c]
@@ -157,15 +154,12 @@ def fly(h, low, high, s):
 
 @apart
 def begin(n, chain, law, s, clock):
-    """Write down chain and clock at the start.
-
-    Where contacts push from the start, the sums owe h^2/12 times the rates there.
-    """
+    """Write down chain and clock; at the start the sums owe h^2/12 times the rates of forces."""
     clock.low, clock.high, clock.steps, clock.kinks, clock.row = n, 0, 0, 0, 0
     clock.time = clock.top = clock.ended = 0.0
     clock.stiff = 1.0
     part = chain.h * chain.h / 12.0
-    force = impulse = 0.0
+    force = impulse = db = 0.0
     for i in range(n):
         a = s[i]
         a.w, a.v = chain.w[i], chain.v[i]
@@ -182,20 +176,17 @@ def begin(n, chain, law, s, clock):
                 clock.high = i + 1
         a.pull = a.f
         a.v += part * a.w * (force - f)
-        a.db = a.w * (impulse - a.loss * f)
+        more = a.w * (impulse - a.loss * f)
         if i > 0:
-            s[i - 1].d += part * (s[i - 1].db - a.db)
-        force, impulse = f, a.loss * f
+            s[i - 1].d += part * (db - more)
+        force, impulse, db = f, a.loss * f, more
     if law.leans and clock.high > 0:
         clock.low, clock.high = 0, n - 1
 
 
 @apart
 def put_down(n, lossy, s, clock, record):
-    """Write down a page, if there is a record: time; velocities, compressions, forces.
-
-    Balls of contacts that are not watched have flown freely since these were last looked at.
-    """
+    """Write a page, if there is a record: time, velocities, compressions, forces, of all balls."""
     if len(record) > 0:
         page = record[clock.row]
         clock.row += 1
@@ -211,9 +202,9 @@ def put_down(n, lossy, s, clock, record):
 
 @apart
 def leave(n, h, s, clock, v):
-    """Write velocities, when the last contact has opened and no balls approach.
+    """Write velocities as they were when the last contact opened, or no balls approached any more.
 
-    The pulls act until then, and what the losses still hold back of them is given back.
+    Pulls act until then, and what the losses still hold back of them is given back.
     """
     late = clock.time + 0.5 * h - clock.ended
     before = held = wait = 0.0
@@ -235,8 +226,7 @@ def leave(n, h, s, clock, v):
 def run(n, h, law, effort, s, clock, record):
     """Run until all contacts are idle, or `effort` is used up; return how it ended, and the rest.
 
-    A contact is watched from when its neighbour closes until it and its neighbour are idle: the
-    others' balls fly freely.
+    A contact is watched from when its neighbour closes until both are idle; other balls fly freely.
     """
     p, slow, lossy = law.p, law.slow, law.lossy
     low, high = clock.low, clock.high

@@ -30,9 +30,7 @@ class Link:
     trend: float  # and was a step before,
     push: float  # force less the pull, corrected; none if the contact is not watched
     before: float  # at the node before: what the force was in proportion to, see `pay`
-    dv: float  # acceleration
-    b: float  # velocity of the impulses A f,
-    db: float  # and its rate of change
+    dv: float  # in the end: acceleration
     seen: float  # time at which the contact was last looked at
     kink: int  # a contact that has closed or opened in this step
 
@@ -117,9 +115,8 @@ def zetas(p, theta):
 def crossing(p, h, k, loss, closes, theta, move):
     """Return the kick and the shift that a kink owes a contact: an impulse, and that times a time.
 
-    At the first node after it closes, theta steps later, or the first after it opens, when the last
-    before was theta steps from d = 0; it grows or shrinks by `move` in a step.  With losses the
-    force ends at d = `early` moves, and what A f still has to give back comes at once.
+    It closes theta steps before this node, or reaches d = 0 theta steps after the last one, by
+    `move` a step.  With losses its force ends at d = `early` moves, and the rest of A f at once.
     """
     early = loss * p / h
     unit = h * k * move * grade(p, move)
@@ -137,10 +134,7 @@ def crossing(p, h, k, loss, closes, theta, move):
 
 @apart
 def resumed(h, a, theta):
-    """Return the same for a contact that its losses had opened and that pushes again before d = 0.
-
-    It does so theta steps before the node.
-    """
+    """Return the same if losses had opened it and it pushes again, theta steps before the node."""
     rate = a.g * a.move
     first = a.f - theta * rate
     half, third = 0.5 - theta, 0.5 * (theta * (1.0 - theta) - 1.0 / 6.0)

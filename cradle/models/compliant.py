@@ -52,10 +52,8 @@ class TimedTrace(CurvedTrace):
         Time that each contact was closed, over all its collisions, s.
     step_times, step_forces, step_velocities, step_impulses : ndarray, (S,) and (S, N - 1 or N)
         The curves at the steps: s, N, m/s, and N s so far.
-    evaluations : int
-        How many steps were taken, in all runs.
-    error : float
-        Estimated error of a velocity, relative to the fastest closing.
+    evaluations, error : int and float
+        Steps of all runs; estimated error of a velocity, relative to the fastest closing.
 
     Examples
     --------
@@ -152,25 +150,14 @@ class SpringChain:
         joule = mass * speed * speed
         newton, second = joule / length, length / speed
         return TimedTrace(
-            chain=chain,
-            model=self,
-            velocities=start + speed * (v[-1] - v[0]),
-            impulses=mass * speed * path.impulses(v[-1]),
-            absorbed=joule * path.absorbed,
-            collisions=path.collisions,
-            path=start + speed * (v - v[0]),
-            path_impulses=mass * speed * path.impulses(v),
-            events=events,
-            step_velocities=start + speed * (path.v - v[0]),
+            chain, self, start + speed * (v[-1] - v[0]), mass * speed * path.impulses(v[-1]),
+            joule * path.absorbed, path.collisions, start + speed * (v - v[0]),
+            mass * speed * path.impulses(v), events, times=second * times, forces=newton * force,
+            durations=second * path.durations, step_times=second * path.t,
+            step_forces=newton * path.force, step_velocities=start + speed * (path.v - v[0]),
             step_impulses=mass * speed * path.impulses(path.v),
-            evaluations=int(found.steps[0]),
-            times=second * times,
-            forces=newton * force,
-            durations=second * path.durations,
-            step_times=second * path.t,
-            step_forces=newton * path.force,
-            error=float(found.error[0]),
-        )
+            evaluations=int(found.steps[0]), error=float(found.error[0]),
+        )  # fmt: skip
 
     def _unfinished(self, chain: Chain, reached: Vector) -> ImpactNotFinished:
         """Return the error of an impact that was given up at these velocities."""
@@ -207,15 +194,12 @@ def spring_velocities(
     ----------
     masses, velocities : array_like, shape (..., N)
         kg and m/s.
-    stiffness : array_like, shape (..., N - 1) or ()
-        k, N/m^p; above 0.
+    stiffness, viscosity, gaps : array_like, shape (..., N - 1) or ()
+        k, N/m^p, above 0; A, s, 0 for an elastic contact; and the distance of two balls before the
+        impact, m.  Below zero it is a lean: how far the strings press the two together at rest,
+        with a pull that acts until the last contact has opened.
     exponent : float
         p, from 1 to 10.
-    viscosity : array_like, shape (..., N - 1) or ()
-        A, s; 0 for an elastic contact.  The faster two spheres collide, the more they lose.
-    gaps : array_like, shape (..., N - 1) or ()
-        Distance of two balls before the impact, m.  Below zero a lean: how far the strings press
-        the two together at rest, with a pull that acts until the last contact has opened.
     accuracy : float
         Largest estimated error of a velocity over the fastest closing speed, 1e-12 to 0.02.
     progress : bool
