@@ -49,8 +49,9 @@ def step(p, h, low, high, s):
         a = s[c]
         there = s[c + 1].v
         move = h * (here - there)
-        a.d += move
-        f, g = push(p, a, a.d, move, 0.0)
+        d = a.d + move
+        a.d = d
+        f, g = push(p, a, d, move, 0.0)
         if (f > 0.0) != (a.f > 0.0):
             s[kinks].kink, a.move = c, move
             kinks += 1
@@ -244,13 +245,13 @@ def run(n, h, law, effort, s, clock, record):
         time = clock.time
         left, right = s[low].v, s[high].v
         if lossy:
-            kinks, clock.stiff = drift_lossy(p, h, low, high, s)
+            kinks, stiff = drift_lossy(p, h, low, high, s)
         else:
-            kinks, clock.stiff = step(p, h, low, high, s)
+            kinks, stiff = step(p, h, low, high, s)
         if kinks > 0:
             clock.kinks += kinks
             pay(n, p, h, kinks, slow, lossy, s, clock)
-        clock.top = max(clock.top, clock.stiff)
+        clock.top, clock.stiff = max(clock.top, stiff), stiff
         first, last = low, high - 1
         if high < n - 1 and s[last].f > 0.0 and s[last].d > slow:
             bring(s[high], time - s[high].seen, right - s[high + 1].v)
