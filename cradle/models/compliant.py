@@ -76,9 +76,10 @@ class TimedTrace(CurvedTrace):
         """Kinetic energy that the viscosity of the contacts has taken, in joules."""
         if not np.any(self.model.viscosity):
             return 0.0
-        m, v, after = self.chain.masses, self.chain.velocities, self.velocities
+        m, v = self.chain.masses, self.chain.velocities
         centre = self.chain.momentum / m.sum()
-        return float(np.sum(m * (v - after) * (0.5 * (v - centre) + 0.5 * (after - centre))))
+        lost = m * (v - self.velocities) * (0.5 * (v - centre) + 0.5 * (self.velocities - centre))
+        return float(lost.sum())
 
 
 @dataclass(frozen=True)
