@@ -169,7 +169,8 @@ class SpringChain:
         paths = np.array([v, reached]), np.array([none, impulses])
         return ImpactNotFinished(
             f"the impact was not finished: contact {c}, the quickest of the springs, makes the "
-            f"steps short; or finer runs of balls that collide often do not agree{held}",
+            "steps short; or balls that collide often amplify errors, and finer runs do not agree"
+            + held,
             Trace(chain, self, reached, impulses, none, none.astype(int), *paths, (), left_out=1),
         )
 
