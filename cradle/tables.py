@@ -134,9 +134,11 @@ def paper_chain(
     >>> model.forward, model.backward                         # CDA, DAB; ADC, BAD
     ((0.196, 0.09), (0.001, 0.05))
     """
-    if not isinstance(sequence, Iterable):
-        raise TypeError(f"sequence is {a(type(sequence).__name__)}; must be letters, as in 'ABC'")
-    masses, balls = ball_masses(), list(sequence)
+    try:
+        masses, balls = ball_masses(), list(sequence)
+    except TypeError:
+        words = f"sequence is {a(type(sequence).__name__)}; must be letters, as in 'ABC'"
+        raise TypeError(words) from None
     for position, ball in enumerate(balls):
         one_of(f"sequence[{position}]", ball, [*masses])
     if len(balls) < 2:

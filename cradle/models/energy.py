@@ -125,7 +125,7 @@ class EnergyDistribution:
         vars(self).update(
             stiffness=number_or_row("stiffness", self.stiffness, "N - 1", *positive),
             exponent=one_number("exponent", self.exponent, "must be at least 1", 1.0),
-            rtol=one_number("rtol", self.rtol, "must lie in [1e-13, 0.1]", 1e-13, 0.1),
+            rtol=one_number("rtol", self.rtol, "must lie in [3e-14, 0.1]", 3e-14, 0.1),
         )
         whole_number("max_evaluations", self.max_evaluations)
         if not isinstance(self.gaps, bool):
