@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 
 _Vector = NDArray[np.float64]
 
+# Of the picture of a chain, in pixels: a row for each state, the heaviest ball, the fastest ball's
+# arrow, and the room of balls that are left out.
+_ROW, _RADIUS, _ARROW, _OMITTED = 70, 18.0, 30.0, 28.0
+
 
 def as_text(values: _Vector) -> str:
     """Return a row of velocities or impulses as people write it, six digits of each."""
@@ -52,20 +56,20 @@ def as_html(
 def _picture(masses: _Vector, states: Mapping[str, _Vector], balls: list[int]) -> str:
     """Draw the chain once for each state, with an arrow above each ball that moves; in pixels."""
     # At least two pixels, or a light ball would not be seen.
-    radii = np.maximum(18.0 * np.cbrt(masses[balls] / masses.max()), 2.0)
-    omitted = 28.0 * (np.diff(balls, prepend=-1) > 1)
+    radii = np.maximum(_RADIUS * np.cbrt(masses[balls] / masses.max()), 2.0)
+    omitted = _OMITTED * (np.diff(balls, prepend=-1) > 1)
     centres = 8.0 * max(map(len, states)) + 20.0 + np.cumsum(2.0 * radii + omitted) - radii
-    width, height = centres[-1] + radii[-1] + 30.0, 70 * len(states)
+    width, height = centres[-1] + radii[-1] + 30.0, _ROW * len(states)
     fastest = max(float(np.abs(v).max()) for v in states.values()) or 1.0
     parts = []
-    for y, (name, velocities) in zip(range(46, height, 70), states.items(), strict=True):
+    for y, (name, velocities) in zip(range(46, height, _ROW), states.items(), strict=True):
         parts.append(f'<text x="2" y="{y + 4}" stroke="none">{escape(name)}</text>')
         for x, r, gap, v in zip(centres, radii, omitted, velocities[balls], strict=True):
             parts.append(f'<circle cx="{x:.1f}" cy="{y}" r="{r:.1f}" fill-opacity="0.12"/>')
             if gap:
                 parts.append(f'<text x="{x - r - 20:.1f}" y="{y + 4}" stroke="none">…</text>')
             # All arrows on one scale; shorter ones than a pixel tell nothing.
-            length = float(30.0 * (v / fastest))
+            length = float(_ARROW * (v / fastest))
             if abs(length) >= 1.0:
                 head = np.copysign(min(5.0, abs(length)), length)
                 parts.append(

@@ -183,8 +183,9 @@ def shaped(
             raise ValueError(
                 f"{name} has shape {arrays[k].shape}; must be () or (..., {size}) for {n} balls"
             )
+    leads = {array.shape[:-1] for array in arrays}
     try:
-        return arrays, np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+        return arrays, leads.pop() if len(leads) == 1 else np.broadcast_shapes(*leads)
     except ValueError:
         shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
         raise ValueError(f"leading axes do not broadcast: {shapes}") from None
@@ -199,7 +200,7 @@ def in_order(
 
         ended = in_order(solve, starts, progress=False)
         yield from tqdm(ended, total=len(starts), unit="chunk")
-    elif (workers := min(len(starts), os.cpu_count() or 1)) < 2:
+    elif len(starts) < 2 or (workers := min(len(starts), os.cpu_count() or 1)) < 2:
         yield from map(solve, starts)
     else:
         from concurrent.futures import ThreadPoolExecutor
@@ -214,12 +215,15 @@ def in_order(
 
 
 def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
-    """Return some rows of `array` broadcast to the leading shape, or the one row that all share.
-
-    They are copies: compiled code is made for arrays that may be written to.
-    """
+    """Return some rows of `array` broadcast to the leading shape, or the one row that all share."""
     size = array.shape[-1]
     if array.size == size:
-        return array.reshape(1, size).copy()
-    full = np.broadcast_to(array, (*lead, size))  # without making the others
-    return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
+        part = array.reshape(1, size)
+    elif array.shape[:-1] == lead and array.flags.c_contiguous:
+        part = array.reshape(-1, size)[rows]
+    else:
+        # Without making the others.
+        full = np.broadcast_to(array, (*lead, size))
+        return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
+    # Compiled code is made for arrays that may be written to; it writes to no input.
+    return part if part.flags.writeable and part.flags.c_contiguous else part.copy()
