@@ -96,6 +96,14 @@ NEEDED = {
     ),
     "contacts with next to nothing left": ({"exhausted": 1e-300}, EXHAUSTED, UNFINISHED),
     "exhausted collisions in a row": ({"repeats": math.inf}, HELD_FAST, UNFINISHED),
+    "dust between contacts that only chatter": (
+        {"dust": 0.0},
+        (
+            [0.284, 0.79, 1, 2.3350031089816268, 0.2, 1, 1, 5], [0.9, 0, 0.3, 0.87, 1, 1, 0.5, 0],
+            [1, 1, 1, 1, 1, 0, 0], [1, 0, 1, 0, 0, 0], [1, 0.1, 0.5, 0, 1, 1], 0.5,
+        ),
+        UNFINISHED,
+    ),
     "one exhausted collision, which is no row": ({"repeats": 1}, HELD_FAST, WRONG),
     "a cycle repeated up to its neighbour's event": (
         {"many": math.inf},
