@@ -21,7 +21,7 @@ from cradle.advice import Recommendation, recommend
 from cradle.chain import Chain
 from cradle.models import Model, collide
 from cradle.models.batch import Outcomes, outcomes, post_impact_velocities
-from cradle.models.compliant import SpringChain, TimedTrace, spring_velocities
+from cradle.models.compliant import SpringChain, TimedTrace, spring_velocities, viscosity_from
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
@@ -39,7 +39,7 @@ __all__ = [
     "Pendulums", "QuadraticDissipation", "Recommendation", "SequentialCollisions", "SpringChain",
     "Swing", "TimedTrace", "Trace", "collide", "outcomes", "paper_chain", "paper_sequences",
     "post_impact_velocities", "ratio_table", "recommend", "restitution_table", "spring_velocities",
-    "swing", "warm_up",
+    "swing", "viscosity_from", "warm_up",
 ]  # fmt: skip
 
 

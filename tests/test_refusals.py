@@ -20,6 +20,7 @@ from cradle import (
     post_impact_velocities,
     recommend,
     swing,
+    viscosity_from,
 )
 from cradle.closed_form import (
     back_impact_line,
@@ -66,6 +67,10 @@ def light(masses, door):
     if door == "batch":
         return post_impact_velocities(masses, velocities, 1, 0)
     return collide(Chain(masses, velocities), ImpulseCorrelation(0))
+
+
+def viscosity(masses, restitution, speed=1, stiffness=1):
+    return viscosity_from(restitution, speed=speed, masses=masses, stiffness=stiffness)
 
 
 LIGHT = "must be at least 1e-150 of the heaviest ball of its chain"
@@ -234,6 +239,13 @@ OTHERS = [
     (ratio_of, ([0, 0, 1],), "closing_speeds = [0.0, -1.0]; any ratio fits"),
     (paper_chain, ("ABC", [1, 2]), "speed = [1, 2]; must be one number"),
     (paper_chain, (3,), "sequence is an int; must be letters, as in 'ABC'"),
+    (paper_chain, (np.array("ABC"),), "sequence is a ndarray; must be letters, as in 'ABC'"),
+    (viscosity, ([1, 1, 1], 0.5), "restitution = 0.5; must lie in [0.624, 1]: a contact takes no"),
+    (viscosity, ([1, 1, 1], [0.9, 1.1]), "restitution[1] = 1.1; must lie in [0.624, 1]"),
+    (viscosity, ([1, 1, 1], [0.9] * 3), "restitution has 3 values; 3 balls need 2, or one number"),
+    (viscosity, ([1, 1], 0.9, 0), "speed = 0.0; must be above 0"),
+    (viscosity, (1, 0.9), "masses has shape (); must be (N,) with N >= 2"),
+    (viscosity, ([1, 1], 0.9, 1, 0), "stiffness = 0.0; must be above 0"),
     (post_impact_velocities, (MASKED, [1, 0, 0], 1, 0.1), "masses[1] = masked; must be a real"),
     (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
     (TRACE.plot, {"contact": 4}, "contact = 4; must be a whole number, 0 to 1"),

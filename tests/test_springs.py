@@ -21,6 +21,7 @@ from cradle import (
     SpringChain,
     collide,
     spring_velocities,
+    viscosity_from,
 )
 from cradle.kernel import kinks
 from cradle.models import springs
@@ -190,6 +191,25 @@ def test_viscoelastic_spheres_follow_their_expansion(loss):
     assert c1 == pytest.approx(1.15344, abs=1e-5)
     series = 1 - c1 * x + 0.6 * (c1 * x) ** 2 - 0.315119 * (c1 * x) ** 3 + 0.161167 * (c1 * x) ** 4
     assert v[1] - v[0] == pytest.approx(series + x**2.5 / 3.75, abs=x**3.5)
+
+
+def test_viscosity_from_a_restitution_at_a_speed():
+    """Each pair alone parts with it, by the loop and on linear springs by the closed form."""
+    e, speed, masses = [0.97, 0.7, 1.0], 0.3, np.array([0.045, 0.1, 0.02, 0.02])
+    stiffness = [1e10, 2e9, 1e10]
+    found = viscosity_from(e, speed=speed, masses=masses, stiffness=stiffness)
+    for c, wanted in enumerate(e):
+        law = {"stiffness": stiffness[c], "viscosity": found[c], "accuracy": 1e-9}
+        left, right = spring_velocities(masses[c : c + 2], [speed, 0], **law)
+        assert (right - left) / speed == pytest.approx(wanted, abs=1e-8)
+    # d'' + w^2 (d + A d') = 0 with z = A w / 2: d ~ exp(-z w t) sin(q w t), q = sqrt(1 - z^2).  The
+    # bracket is zero where tan(q w t) = -2 z q / (1 - 2 z^2), and there d' is -exp(-z w t).
+    m, k, wanted = 1.5, 7.0, 0.8
+    damping = viscosity_from(wanted, speed=2, masses=[2 * m] * 2, stiffness=k, exponent=1)[0]
+    zeta = 0.5 * damping * math.sqrt(k / m)
+    angle = math.pi - math.atan2(2 * zeta * math.sqrt(1 - zeta**2), 1 - 2 * zeta**2)
+    parting = math.exp(-zeta * angle / math.sqrt(1 - zeta**2))
+    assert parting == pytest.approx(wanted, abs=1e-9)
 
 
 @pytest.mark.parametrize("n", [10, 20, 40])

@@ -24,7 +24,7 @@ _OFTEN, _LONG = 2.4, 30.0
 _TRIALS = 16  # runs of a chain, each finer than the one before
 _DAMPED = 0.5  # step times A times the square of a frequency, at most
 _SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
-_LONGEST = 0.3  # A, in contact times
+LONGEST = 0.3  # A, in contact times
 _TINY = 1e-300  # the least depth, and one over the largest
 # The widest gap and the narrowest, in depths; the widest whose last digit is below this accuracy.
 _WIDEST, _NARROWEST, _BLURRED = 1e9, 1e-12, 1e13
@@ -61,7 +61,7 @@ def scaled(
         ("masses", m, light, f"{least} heaviest ball of its chain"),
         ("stiffness", k, soft, f"{least} stiffest contact of its chain"),
         ("stiffness", k, far, "a contact's time is beyond floats: choose other units"),
-        ("viscosity", lost, loss > _LONGEST, f"must be at most {_LONGEST} {late} closing"),
+        ("viscosity", lost, loss > LONGEST, f"must be at most {LONGEST} {late} closing"),
         ("gaps", gap, -d > most, f"must be at most {most:g} times {of} at this accuracy"),
         ("gaps", gap, (d != 0.0) & (abs(d) < _NARROWEST), f"must be 0, or {_NARROWEST} of {of}"),
         ("gaps", gap, d > 1.0, f"must be a lean of at most {of}"),
