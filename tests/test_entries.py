@@ -78,6 +78,7 @@ ENTRIES = {
     SpringChain: FORCES | {"max_steps": 10_000},
     EnergyDistribution: SPRINGS | {"rtol": 1e-6, "max_evaluations": 10_000, "gaps": True},
     cradle.spring_velocities: {"masses": [1, 1, 1], "velocities": [1, 0, 0]} | FORCES,
+    cradle.viscosity_from: {"restitution": 0.9, "speed": 1, "masses": [1, 1], "stiffness": 1},
     QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
     cradle.post_impact_velocities: SEVEN | {"max_events": 100},
     cradle.outcomes: SEVEN | {"max_events": 100},
