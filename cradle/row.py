@@ -73,8 +73,9 @@ class Row(Alone):
         Where the strings end, m, in the order of the row; a string takes the part of an impulse
         across the ball's arc.  Without pivots the balls are free.
     touching, resting : float, optional
-        Balls touch whose gap is at most this, m, and then go on together if they close no faster
-        than that, m/s; r / 1000 and sqrt(a r) / 100 if left out, with the smallest radius r.
+        Neighbours touch, and are struck together, whose gap is at most this, m, while they close or
+        part no faster than that, m/s; so do those that meet.  Slower than that they go on together.
+        r / 1000 and sqrt(a r) / 100 if left out, with the smallest radius r.
     acceleration : float
         The acceleration a of gravity, m/s^2, or what else draws neighbours together at most.
 

@@ -103,6 +103,20 @@ def test_a_row_swings_as_swing_does(pulled: int):
     assert row.impacts < 200
 
 
+def test_balls_that_fly_to_and_fro_between_others_are_struck_one_by_one():
+    """A light ball is near both neighbours, but touches one at a time."""
+    masses, angles = [1.0, 1.0, 0.1, 1.0, 1.0], [-0.5, 0.0, 0.0, 0.0, 0.0]
+    hanging = Pendulums(length=LENGTH, gravity=GRAVITY, angle="full")
+    model = SpringChain(accuracy=1e-5)
+    run = swing(Chain(masses, [0] * 5), model, angles, [2.0], pendulums=hanging)
+    after = 0.5 * run.velocities**2 + GRAVITY * (1 - np.cos(run.positions))
+    for rate in (240, 300, 500):
+        bodies = Hanging(angles, masses)
+        steps(hung(bodies, model=model), 2 * rate, 1 / rate)
+        off = np.abs(bodies.energy() - masses * after[0]).sum() / bodies.energy().sum()
+        assert off < 0.08
+
+
 class Plain(Hanging):
     """Pendulums as a game has them: one kick of gravity a step, on strings of 20 cm."""
 

@@ -68,6 +68,7 @@ class Alone:
         slow = 0.01 * math.sqrt(self.acceleration * least) if resting is None else resting
         self.touching = one_number("touching", near, *_ABOVE_ZERO)
         self.resting = one_number("resting", slow, *_ABOVE_ZERO)
+        self.met = 1e-3 * self.touching  # so near are balls that a flight has brought together
         at = self._plane("motion: positions", x)
         self._refuse_a_pack(at.tolist())
         overlaps = self.reach - np.abs(np.diff(at))
@@ -167,11 +168,10 @@ class Alone:
                 why = "the step is too long, or something else pushes them"
                 raise RuntimeError(f"balls {c} and {c + 1} overlap by {-gap:g} m; {why}")
             closing /= distance
-            if gap <= self.touching:
-                strike |= closing > self.resting
-                rest |= gap <= 0.0 and closing > 1e-3 * self.resting
-            elif closing > self.resting:
-                arrival = min(arrival, gap / closing)
+            if closing > self.resting:
+                strike |= gap <= self.met
+                arrival = min(arrival, max(gap, 0.0) / closing)
+            rest |= gap <= 0.0 and closing > 1e-3 * self.resting
             # The first t > 0 with room = closing t + speeding t^2 / 2; none if they part for good.
             room = gap if gap > self.touching else max(gap, 0.0) + self.touching
             root = math.sqrt(closing * closing + 2.0 * self.speeding * room)
@@ -186,7 +186,10 @@ class Alone:
         gained, ways = np.zeros(len(x), complex), self.ways(x)
         lines, v = np.diff(x), own * ways
         gaps = np.abs(lines) - self.reach
-        for first, last in stretches((gaps <= self.touching).tolist()):
+        # Balls that touch, and those so near to each other that hardly move against each other.
+        still = np.abs((np.diff(v) * lines.conj()).real) <= self.resting * np.abs(lines)
+        touch = (gaps <= self.met) | (still & (gaps <= self.touching))
+        for first, last in stretches(touch.tolist()):
             balls = slice(first, last)
             axis = lines[first : last - 1].sum()
             axis /= abs(axis)
