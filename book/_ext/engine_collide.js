@@ -36,8 +36,14 @@ function checkedRatios(name, ratios, inner) {
   return values;
 }
 
+const ASKED = [
+  "masses", "velocities", "restitution", "forward", "backward", "meeting", "saturate", "maxEvents", "record",
+];
+
 // Return a chain and its model as the event loop wants them, or throw.
 function checkedImpact(given) {
+  const unknown = Object.keys(given).find((name) => !ASKED.includes(name));
+  if (unknown) throw new Error(`${unknown} is no part of an impact; these are: ${ASKED.join(", ")}`);
   const m = checkedMasses(given.masses);
   const n = m.length;
   const heaviest = Math.max(...m);
@@ -69,10 +75,13 @@ function checkedImpact(given) {
         `have ${n === 2 ? "1 contact" : `${n - 1} contacts`}, restitution needs one number or ${n - 1}`,
     );
   }
-  const forward = checkedRatios("forward", given.forward, n - 2);
-  const backward = checkedRatios("backward", given.backward ?? given.forward, n - 2);
+  // Two balls have no ratio.
+  const forward = checkedRatios("forward", given.forward ?? (n === 2 ? [] : undefined), n - 2);
+  const backward = checkedRatios("backward", given.backward ?? forward, n - 2);
   const meeting = one("meeting", given.meeting ?? 0.5, "must lie in [0, 1]", 0, 1);
-  if (!(given.saturate ?? true)) refuseExcess(m, forward, backward);
+  const saturate = given.saturate ?? true;
+  if (typeof saturate !== "boolean") throw new Error(`saturate = ${shown(saturate)}; must be true or false`);
+  if (!saturate) refuseExcess(m, forward, backward);
   return { m, v, e, forward, backward, meeting };
 }
 
@@ -96,7 +105,7 @@ function refuseExcess(m, forward, backward) {
     throw new Error(
       `${name}[${at}] = ${shown(ratios[at])}; at ball ${at + 1}, counted from 0, it must not exceed ` +
         `${bound} (Eq. 53${mirrored}): a larger ratio would make a contact pull; ` +
-        "excess='saturate' holds the contact closed instead",
+        "saturate: true holds the contact closed instead",
     );
   }
 }
@@ -161,10 +170,11 @@ function solved(chain, maxEvents, recorded) {
 
 // Return the outcome of an impact, with `events`, `path` and `pathImpulses` if `record` is true.
 function collide(given) {
+  if (typeof given !== "object" || given === null) throw new Error(`an impact = ${given}; must be an object`);
   const recorded = given.record ?? true;
   const limit = given.maxEvents ?? MAX_EVENTS;
   if (!(Number.isInteger(limit) && limit >= 1)) {
-    throw new Error(`max_events = ${limit}; must be a whole number, at least 1 and below 2**63`);
+    throw new Error(`maxEvents = ${shown(limit)}; must be a whole number, at least 1`);
   }
   const { status, state, out } = solved(checkedImpact(given), limit, recorded);
   const tally = state.tally[0];

@@ -52,6 +52,8 @@ function ldexp(x, k) {
 
 // Return a number as Python prints it.
 function shown(x) {
+  if (typeof x === "string") return JSON.stringify(x);
+  if (typeof x !== "number") return typeof x === "bigint" ? `${x}n` : `${x}`;
   if (!Number.isFinite(x)) return Number.isNaN(x) ? "nan" : x > 0 ? "inf" : "-inf";
   if (Object.is(x, -0)) return "-0.0";
   const size = Math.abs(x);
@@ -69,7 +71,7 @@ function row(name, given, size, rule = "must be finite", low = -Infinity, high =
   const values = several ? Array.from(given) : [given];
   values.forEach((value, at) => {
     const here = several ? `${name}[${at}]` : name;
-    if (typeof value !== "number") throw new Error(`${here} = ${value}; must be a real number`);
+    if (typeof value !== "number") throw new Error(`${here} = ${shown(value)}; must be a real number`);
     if (!Number.isFinite(value)) throw new Error(`${here} = ${shown(value)}; must be finite`);
     if (!(value >= low && value <= high)) throw new Error(`${here} = ${shown(value)}; ${rule}`);
   });
@@ -84,6 +86,6 @@ function shape(given) {
 
 // Return one number within limits.
 function one(name, given, rule, low, high) {
-  if (typeof given !== "number") throw new Error(`${name} = ${given}; must be one number`);
+  if (typeof given !== "number") throw new Error(`${name} = ${shown(given)}; must be one number`);
   return row(name, given, undefined, rule, low, high)[0];
 }

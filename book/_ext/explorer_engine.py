@@ -20,15 +20,17 @@ import json
 import re
 from collections import Counter
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from explorer_pairs import equal_pairs
-from sphinx.application import Sphinx
 
 from cradle import kernel
 from cradle.kernel import state
 from cradle.runtime import compile as runtime
 from cradle.runtime import job as drive
+
+if TYPE_CHECKING:  # the npm package is built without it
+    from sphinx.application import Sphinx
 
 #: Hand-written parts, beside this file: before the event loop, and after it.
 PARTS = ("engine_numbers.js", "engine_collide.js")
@@ -357,7 +359,7 @@ def spheres() -> str:
     return room(f"{NUMBERS}\n{translate(source)}\n{after}")
 
 
-def write_engine(app: Sphinx, exception: Exception | None) -> None:
+def write_engine(app: "Sphinx", exception: Exception | None) -> None:
     """Put the script into the built book."""
     if exception is None and app.builder.format == "html":
         for name, script in ((SCRIPT, engine), (SPHERES_SCRIPT, spheres)):
@@ -366,7 +368,7 @@ def write_engine(app: Sphinx, exception: Exception | None) -> None:
             target.write_text(script(), encoding="utf-8")
 
 
-def setup(app: Sphinx) -> dict[str, Any]:
+def setup(app: "Sphinx") -> dict[str, Any]:
     """Register the callback."""
     app.connect("build-finished", write_engine)
     return {

@@ -9,16 +9,18 @@ export interface Impact {
   velocities: ArrayLike<number>;
   /** How much of what it takes a contact gives back: N - 1 numbers from 0 to 1. Default 1. */
   restitution?: Row;
-  /** The ratio at each inner ball, pushed from the left: N - 2 numbers from 0 to 1. */
-  forward: Row;
+  /** The ratio at each inner ball, pushed from the left: N - 2 numbers from 0 to 1. Two balls have none. */
+  forward?: Row;
   /** The same, pushed from the right. Default: as `forward`. */
   backward?: Row;
   /** Where two runs of contacts meet: the share of the left one, from 0 to 1. Default 0.5. */
   meeting?: number;
   /** Hold a contact whose ratio is above its largest value (true, the default), or throw. */
   saturate?: boolean;
-  /** Steps after which an impact is given up. Default 20000. */
+  /** Steps after which an impact is given up. Default 20000 (5 million in Python). */
   maxEvents?: number;
+  /** Whether to keep what happened: events and paths. Default true. */
+  record?: boolean;
 }
 
 export interface Outcome {
@@ -57,10 +59,11 @@ export interface Unsound {
   defect: string;
 }
 
-/** Solve an impact, with all that happened in it. Throws an Error that names a wrong input. */
-export function collide(impact: Impact): Recorded | Unsound;
-/** The same without a record, for sweeps. */
+/** Solve an impact, without a record, for sweeps. */
 export function collide(impact: Impact & { record: false }): Outcome | Unsound;
+/** Solve an impact, with all that happened in it. Throws an Error that names a wrong input. */
+export function collide(impact: Impact & { record?: true }): Recorded | Unsound;
+export function collide(impact: Impact): Recorded | Outcome | Unsound;
 
 /** Solve an impact without a record. */
 export function outcome(impact: Impact): Outcome | Unsound;
