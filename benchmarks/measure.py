@@ -7,8 +7,9 @@ import os
 import platform
 import statistics
 import time
-from dataclasses import dataclass, fields
+from dataclasses import make_dataclass
 from importlib import metadata
+from unittest import mock
 
 import numpy as np
 from scenes import random_chains
@@ -21,6 +22,17 @@ from cradle.runtime.job import warm_up
 REFERENCE = "one impact of three balls, in a batch of 2000 random chains"
 _BATCH = random_chains(3, 2000)
 
+#: data/README.md says what they are. `numerical_error` is the distance from the converged answer
+#: of the same model, `model_error` that from another model or from an exact result that the model
+#: does not use: the two are never mixed.
+COLUMNS = [
+    "group", "model", "setting", "chain", "parameter", "velocities", "numerical_error",
+    "numerical_reference", "model_error", "model_reference", "momentum_error", "energy_change",
+    "time_ratio", "microseconds", "repeats", "evaluations", "needs", "gives", "versions", "note",
+]  # fmt: skip
+#: One line of the table; an empty field does not apply.
+Row = make_dataclass("Row", [(name, object, "") for name in COLUMNS])
+
 
 def absent(engines):
     """Return the names of engines that are not installed, and what to do about each."""
@@ -29,50 +41,6 @@ def absent(engines):
         for engine in engines
         if importlib.util.find_spec(engine.module) is None
     }
-
-
-@dataclass
-class Row:
-    """One line of the table; an empty field does not apply.
-
-    The two errors are never mixed. `numerical_error` is the distance from the converged answer of
-    the same model; `model_error` that from another model or from an exact result that the model
-    does not use. Both are the largest over the balls, as a part of the striker's speed.
-    """
-
-    group: str
-    model: str
-    setting: str
-    chain: str
-    parameter: float | str = ""  #: the setting as a number, for the axis of a figure
-    velocities: str = ""  #: after the impact, over the striker's speed
-    numerical_error: float | str = ""
-    numerical_reference: str = ""
-    model_error: float | str = ""
-    model_reference: str = ""
-    momentum_error: float | str = ""  #: relative
-    energy_change: float | str = ""  #: of the kinetic energy, as a part of that before
-    time_ratio: float | str = ""  #: median of an impact's time over that of `REFERENCE` beside it
-    microseconds: float | str = ""  #: this ratio times the median of all those of `REFERENCE`
-    repeats: int | str = ""
-    evaluations: int | str = ""  #: events, steps or evaluations of the forces
-    needs: str = ""
-    gives: str = ""
-    versions: str = ""
-    note: str = ""
-
-    def as_text(self):
-        """Return the fields as they are stored: errors and times in four digits."""
-
-        def text(value):
-            if isinstance(value, (float, np.floating)):
-                return f"{value:.4g}"
-            return str(value)
-
-        return [text(getattr(self, field.name)) for field in fields(self)]
-
-
-COLUMNS = [field.name for field in fields(Row)]
 
 
 def distance(velocities, reference):
@@ -129,42 +97,32 @@ class Clock:
         def reference():
             post_impact_velocities(*_BATCH)
 
-        def measured():
+        def measured(calls):
             given = [prepare()] if prepare else []
-            return seconds(lambda: function(*given), calls)
+            with running(kernel):
+                return seconds(lambda: function(*given), calls)
 
         warm_up()  # else the reference, as small work, would run plain at first
-        calls = 1
-        with running(kernel):
-            measured()
-            once = measured()
-        if not prepare:
-            calls = max(1, math.ceil(1e-3 / once))  # a millisecond at least
+        measured(1)
+        once = measured(1)
+        # A millisecond at least.
+        calls = 1 if prepare else max(1, math.ceil(1e-3 / once))
         reference()
         # As long as the row itself, within limits: what interrupts one interrupts the other.
         units = min(20, max(2, math.ceil(once * calls / seconds(reference))))
         taken, beside = [], []
         for _ in range(self.repeats):
             beside.append(seconds(reference, units) / len(_BATCH[0]))
-            with running(kernel):
-                taken.append(measured() / impacts)
+            taken.append(measured(calls) / impacts)
         self.units += beside
         return {"time_ratio": quotient(taken, beside), "repeats": self.repeats}
 
 
-@contextlib.contextmanager
 def running(kernel):
     """Run with the kernel of that name ("plain"), or with the one in force if None."""
-    before = os.environ.get(runtime.VARIABLE)
-    if kernel is not None:
-        os.environ[runtime.VARIABLE] = kernel
-    try:
-        yield
-    finally:
-        if kernel is not None:
-            os.environ.pop(runtime.VARIABLE)
-            if before is not None:
-                os.environ[runtime.VARIABLE] = before
+    if kernel is None:
+        return contextlib.nullcontext()
+    return mock.patch.dict(os.environ, {runtime.VARIABLE: kernel})
 
 
 def versions(*packages):

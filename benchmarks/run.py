@@ -10,23 +10,11 @@ Numerical errors and errors of a model are separate columns. Engines that are no
 (``pip install -e ".[engines]"``) are skipped and named; their old rows are not kept.
 """
 
-import sys
-import time
-
 import engines
 import savings
 import solvers
 from measure import COLUMNS, REFERENCE, Clock, absent
-from stored import DATA, options, write
-
-
-def show(row):
-    """Print the little that fits on a line."""
-    error = row.numerical_error if row.numerical_error != "" else row.model_error
-    error = f"{error:9.1e}" if error != "" else " " * 9
-    time_ratio = f"{row.time_ratio:11.3g}" if row.time_ratio != "" else " " * 11
-    name = f"{row.group}: {row.model}, {row.setting}, {row.chain}"
-    print(f"{name:95.95} {time_ratio} {error}", flush=True)
+from stored import DATA, options, text, write
 
 
 def main(arguments=None):
@@ -37,12 +25,13 @@ def main(arguments=None):
     given = parser.parse_args(arguments)
     clock = Clock(repeats=3 if given.quick else 9)
     folder = given.output or (None if given.quick else DATA)
-    begin = time.perf_counter()
     print(f"times over: {REFERENCE}")
     rows = []
     for part in (solvers.rows, savings.rows, engines.rows):
         for row in part(clock, given.quick):
-            show(row)
+            name = f"{row.group}: {row.model}, {row.setting}, {row.chain}"
+            errors = row.numerical_error, row.model_error
+            print(f"{name:95.95}", *map(text, (row.time_ratio, *errors)), flush=True)
             rows.append(row)
     unit = 1e6 * clock.unit()
     for row in rows:
@@ -51,9 +40,8 @@ def main(arguments=None):
     for name, reason in absent(engines.ENGINES).items():
         print(f"skipped {name}: {reason}")
     if folder:
-        write("benchmarks.csv", COLUMNS, (row.as_text() for row in rows), folder)
-    print(f"{time.perf_counter() - begin:.0f} s", file=sys.stderr)
-    return rows
+        lines = (map(text, vars(row).values()) for row in rows)
+        write("benchmarks.csv", COLUMNS, lines, folder)
 
 
 if __name__ == "__main__":

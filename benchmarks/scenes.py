@@ -1,27 +1,23 @@
 """The chains of the benchmark: the first ball strikes the others, which rest and touch."""
 
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
-from chains import magnitudes, uniform
-from march import march
+from chains import ELASTIC, magnitudes, uniform
 from truth import in_fifty_digits
 
 from cradle import Chain, EnergyDistribution, ImpulseCorrelation, collide, paper_chain
 
-__all__ = ["SCENES", "Scene", "march", "random_chains", "random_truth"]
 
-
-@dataclass(frozen=True)
-class Scene:
+class Scene(NamedTuple):
     """A chain and its ratios."""
 
     name: str
-    masses: tuple[float, ...]
-    restitution: tuple[float, ...]
-    forward: tuple[float, ...]
-    backward: tuple[float, ...]
+    masses: tuple
+    restitution: tuple
+    forward: tuple
+    backward: tuple
     source: str
 
     @property
@@ -35,9 +31,14 @@ class Scene:
         return (1.0,) + (0.0,) * (len(self.masses) - 1)
 
     @property
+    def given(self):
+        """As every solver of the paper's model takes it."""
+        return self.masses, self.velocities, self.restitution, self.forward, self.backward
+
+    @property
     def chain(self):
         """As the package takes it."""
-        return Chain(self.masses, self.velocities, self.restitution)
+        return Chain(*self.given[:3])
 
     @property
     def model(self):
@@ -47,8 +48,7 @@ class Scene:
     @cache  # noqa: B019  (a handful of scenes)
     def truth(self):
         """Return the outcome of the paper's model from another solver, in fifty digits."""
-        parts = (self.masses, self.velocities, self.restitution, self.forward, self.backward)
-        return in_fifty_digits(*parts, excess="saturate")[0]
+        return in_fifty_digits(*self.given, excess="saturate")[0]
 
     @cache  # noqa: B019
     def springs(self, exponent=1.5):
@@ -58,28 +58,19 @@ class Scene:
         return collide(self.chain, model).velocities
 
 
-def _elastic(name, masses):
-    """Return an elastic scene with the ratio that the paper measured for three steel balls."""
-    balls = len(masses)
-    ratios = (0.167,) * (balls - 2)
-    return Scene(name, tuple(masses), (1.0,) * (balls - 1), ratios, ratios, "Table 2, AAA")
-
-
-def _measured(sequence):
-    chain, model = paper_chain(sequence, excess="saturate")
+def _scenes():
+    """Yield the elastic chains, with the ratio that the paper measured for steel balls; ABCCA."""
+    for name, masses in ELASTIC.items():
+        contacts = len(masses) - 1
+        ratios = (0.167,) * (contacts - 1)
+        balls = tuple(map(float, masses))
+        yield Scene(name, balls, (1.0,) * contacts, ratios, ratios, "Table 2, AAA")
+    chain, model = paper_chain("ABCCA", excess="saturate")
     parts = (chain.masses, chain.restitution, model.forward, model.backward)
-    return Scene(sequence, *(tuple(float(x) for x in part) for part in parts), "Tables 1 and 2")
+    yield Scene("ABCCA", *(tuple(map(float, part)) for part in parts), "Tables 1 and 2")
 
 
-SCENES = {
-    scene.name: scene
-    for scene in (
-        _elastic("three equal", [1.0] * 3),
-        _elastic("five equal", [1.0] * 5),
-        _elastic("light middle", [1.0, 0.01, 1.0]),
-        _measured("ABCCA"),
-    )
-}
+SCENES = {scene.name: scene for scene in _scenes()}
 
 
 def random_chains(balls, count):
@@ -94,9 +85,3 @@ def random_chains(balls, count):
     forward = part * masses[:, 2:] / (masses[:, 2:] + masses[:, 1:-1])
     backward = part * masses[:, :-2] / (masses[:, :-2] + masses[:, 1:-1])
     return masses, velocities, restitution, forward, backward
-
-
-def random_truth(chains, count):
-    """Return the outcomes of the first of these chains from another solver, in fifty digits."""
-    rows = zip(*(part[:count].tolist() for part in chains), strict=True)
-    return np.array([in_fifty_digits(*row, excess="saturate")[0] for row in rows])

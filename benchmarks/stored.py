@@ -21,6 +21,11 @@ def read(name, **equal):
         return [row for row in rows if all(row[key] == text for key, text in equal.items())]
 
 
+def text(value, digits=4):
+    """Return a value as it is stored: floats in so many digits."""
+    return f"{value:.{digits}g}" if isinstance(value, float) else value
+
+
 def write(name, columns, rows, folder=DATA, comment=""):
     """Write rows as they come, and say how many there were."""
     count = 0
