@@ -2,7 +2,8 @@
 
 Usage::
 
-    python benchmarks/cradle_scenes.py     # some minutes; writes data/scene_*.csv
+    python benchmarks/cradle_scenes.py           # some minutes; writes data/scene_*.csv
+    python benchmarks/cradle_scenes.py costs     # one part of it
 
 Five balls of radius .1 m hang on strings of 1 m, so that they touch or with gaps of a hundredth of
 a diameter; one or two are pulled back by 30 degrees.  The scenes are those of `examples/`.  Hertz
@@ -17,13 +18,13 @@ import math
 import statistics
 import sys
 import time
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import measure
 import numba
 import numpy as np
 from measure import absent, quotient, versions
-from stored import DATA, options, write
+from stored import DATA, options, text, write
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
 from cradle.runtime.job import warm_up
@@ -47,78 +48,82 @@ SPRINGS = {
     "half the step": {"steps_a_contact": 200},
     "ten times softer": {"contact": 10**0.4 * STEEL},
 }
-cpu = functools.partial(measure.seconds, clock=time.process_time)
 MODELS = {"ratio": ImpulseCorrelation(RATIO), "springs": SpringChain(1.0)}
+ENERGIES = [f"ball{i}" for i in range(1, BALLS + 1)]
 
 
-@dataclass(frozen=True)
-class Setting:
-    """A step and what else an engine is told; with the mend it may be another step."""
+class Engine(NamedTuple):
+    """An engine, its program in `examples/`, and its settings: the step, and what `cradle` takes.
 
-    step: float
-    options: dict
-    mended_step: float | None = None
-
-
-@dataclass(frozen=True)
-class Engine:
-    """An engine, its program in `examples/`, and its settings."""
+    With the mend the step may be another one, `mended_step`.
+    """
 
     name: str
     module: str
     distribution: str
     program: str
-    default: Setting
-    refined: Setting
+    default: dict
+    refined: dict
 
     @property
     def fine(self):
         """A step of a millisecond and nothing else: to compare costs."""
-        return Setting(1e-3, self.default.options)
+        return self.default | {"step": 1e-3}
 
 
 ENGINES = (
     Engine(
         "Chipmunk", "pymunk", "pymunk", "pymunk_cradle",
-        Setting(1 / 60, {"iterations": 10}),
-        Setting(1e-3, {"iterations": 100}),
+        {"step": 1 / 60, "iterations": 10},
+        {"step": 1e-3, "iterations": 100},
     ),
     Engine(
         "Box2D", "Box2D", "box2d", "box2d_cradle",
-        Setting(1 / 60, {"iterations": (8, 3)}),
-        Setting(1e-3, {"iterations": (100, 30)}),
+        {"step": 1 / 60, "iterations": (8, 3)},
+        {"step": 1e-3, "iterations": (100, 30)},
     ),
     Engine(
         "Bullet", "pybullet", "pybullet", "bullet_cradle",
-        Setting(1 / 240, {}),
-        Setting(
-            1e-3,
-            {
-                "numSolverIterations": 200, "restitutionVelocityThreshold": 0.0,
-                "contactSlop": 0.0, "contactERP": 0.0, "erp": 0.0,
-            },
-        ),
+        {"step": 1 / 240},
+        {
+            "step": 1e-3, "numSolverIterations": 200, "restitutionVelocityThreshold": 0.0,
+            "contactSlop": 0.0, "contactERP": 0.0, "erp": 0.0,
+        },
     ),
     Engine(
         "Rapier", "rapier3d", "rapier3d", "rapier_cradle",
-        Setting(1 / 60, {}),
-        Setting(
-            1e-3,
-            {
-                "num_internal_pgs_iterations": 50, "normalized_prediction_distance": 1e-6,
-                "contact_recycling": False,
-            },
-        ),
+        {"step": 1 / 60},
+        {
+            "step": 1e-3, "num_internal_pgs_iterations": 50,
+            "normalized_prediction_distance": 1e-6, "contact_recycling": False,
+        },
     ),
     Engine(
         "MuJoCo", "mujoco", "mujoco", "mujoco_cradle",
-        Setting(2e-3, {"contact": 0.02}),
-        Setting(1e-4, {"contact": 0.002}, mended_step=1e-3),
+        {"step": 2e-3, "contact": 0.02},
+        {"step": 1e-4, "mended_step": 1e-3, "contact": 0.002},
     ),
 )  # fmt: skip
 
 
 # One run: times, angles and rates of the balls, shape (T, N).
+
+
+def scene(engine, setting, pulled, *, mend, gap=0.0):
+    """Return a function that makes one step, the bodies, and the step."""
+    program = importlib.import_module(engine.program)
+    chosen = dict(getattr(engine, setting))
+    step = chosen.pop("step")
+    mended_step = chosen.pop("mended_step", step)
+    bodies = program.cradle(pulled, ANGLE, mend=mend, gap=gap, **chosen)
+    if mend:
+        return program.mended(bodies).step, bodies, mended_step
+    return bodies.advance, bodies, step
+
+
+def close(bodies):
+    """Give back what an engine holds."""
+    getattr(bodies, "close", lambda: None)()
 
 
 def in_engine(engine, setting, pulled, *, mend, gap=0.0, duration=MINUTE):
@@ -135,27 +140,11 @@ def in_engine(engine, setting, pulled, *, mend, gap=0.0, duration=MINUTE):
             advance(step)
             taken += 1
         x, v = (np.array(part, float) for part in bodies.motion())
-        x[:, 0] -= pivots
-        angle = np.arctan2(x[:, 0], -x[:, 1])
+        angle = np.arctan2(x[:, 0] - pivots, -x[:, 1])
         rate = (v[:, 0] * np.cos(angle) + v[:, 1] * np.sin(angle)) / LENGTH
         frames.append((taken * step, angle, rate))
     close(bodies)
     return tuple(np.array(part) for part in zip(*frames, strict=True))
-
-
-def scene(engine, setting, pulled, *, mend, gap=0.0):
-    """Return a function that makes one step, the bodies, and the step."""
-    program = importlib.import_module(engine.program)
-    chosen = getattr(engine, setting)
-    bodies = program.cradle(pulled, ANGLE, mend=mend, gap=gap, **chosen.options)
-    advance = program.mended(bodies).step if mend else bodies.advance
-    step = chosen.mended_step if mend and chosen.mended_step else chosen.step
-    return advance, bodies, step
-
-
-def close(bodies):
-    """Give back what an engine holds."""
-    getattr(bodies, "close", lambda: None)()
 
 
 def by_swing(pulled, duration=MINUTE, model=MODELS["ratio"]):
@@ -243,135 +232,126 @@ def strokes(angles, rates):
     return found[: wild[0] + 1] if wild.size else found
 
 
-def runs(missing):
+def strokes_and_film(engines):
+    """Run all scenes: what every ball has after each stroke, and how some of them look."""
+    table, film = [], []
+    for name, how, setting, gap, pulled, (times, angles, rates) in runs(engines):
+        found = strokes(angles, rates)
+        row = name, how, setting, f"{gap:g}", pulled
+        table += [(*row, k, *(f"{e:.4f}" for e in each)) for k, each in enumerate(found, start=1)]
+        if pulled == 1 and not gap and setting in FILMED:
+            film += [
+                (name, how, f"{t:.4f}", *(f"{a:.1f}" for a in each))
+                for t, each in zip(times, np.degrees(angles), strict=True)
+            ][: FILM * FRAMES + 1 : 2]
+        print(*row, f"{len(found)} strokes, kept {found[-1].sum():.4f}", flush=True)
+    return {
+        "strokes": (("run", "how", "setting", "gap", "pulled", "stroke", *ENERGIES), table),
+        "film": (("run", "how", "time", *ENERGIES), film),
+    }
+
+
+def runs(engines):
     """Yield who moves the balls and how, gap, how many balls were pulled back, and the run."""
     for pulled in (1, 2):
         for setting, given in SPRINGS.items():
             yield "Hertz springs", "alone", setting, 0.0, pulled, on_springs(pulled, **given)
         for setting, model in MODELS.items():
             yield "swing", "alone", setting, 0.0, pulled, by_swing(pulled, model=model)
-    for engine in ENGINES:
-        for setting in ("default", "refined") if engine.name not in missing else ():
-            for pulled in (1, 2):
-                for gap in (0.0, GAP):
-                    run = in_engine(engine, setting, pulled, mend=False, gap=gap)
-                    yield engine.name, "as it is", setting, gap, pulled, run
-                run = in_engine(engine, setting, pulled, mend=True)
-                yield engine.name, "mended", setting, 0.0, pulled, run
-            run = in_engine(engine, setting, BALLS, mend=True)
-            yield engine.name, "no impacts", setting, 0.0, BALLS, run
+    for engine, setting in itertools.product(engines, ("default", "refined")):
+        for pulled in (1, 2):
+            for gap in (0.0, GAP):
+                run = in_engine(engine, setting, pulled, mend=False, gap=gap)
+                yield engine.name, "as it is", setting, gap, pulled, run
+            run = in_engine(engine, setting, pulled, mend=True)
+            yield engine.name, "mended", setting, 0.0, pulled, run
+        run = in_engine(engine, setting, BALLS, mend=True)
+        yield engine.name, "no impacts", setting, 0.0, BALLS, run
 
 
-def costs(missing, repeats=5, seconds=5.0):
+def first_strokes_with_gaps(engines):
+    """Run engines as they are, with gaps, to the end of the first stroke."""
+    table = []
+    for case in itertools.product(engines, ("default", "refined"), GAPS, (1, 2)):
+        engine, setting, gap, pulled = case
+        _, angles, rates = in_engine(engine, setting, pulled, mend=False, gap=gap, duration=1.3)
+        first = strokes(angles, rates)[0]
+        table.append((engine.name, setting, f"{gap:g}", pulled, *(f"{e:.4f}" for e in first)))
+    return {"gaps": (("run", "setting", "gap", "pulled", *ENERGIES), table)}
+
+
+def costs(engines, repeats=5, seconds=5.0):
     """Yield what a simulated second costs: on springs, as an engine is, mended; at rest, swinging.
 
     Each time is taken beside that of `swing` and, if mended, of the engine as it is.
     """
     on_springs(1, 1 / FRAMES)  # compiles
-    choices = [
-        (engine, setting, pulled)
-        for engine in ENGINES
-        for setting in ("default", "fine", "refined")
-        for pulled in (0, 1)
-        if engine.name not in missing
-    ]
-    for choice in [None, *choices]:
-        kinds = {"alone": None} if choice is None else {"as it is": False, "mended": True}
-        reference, taken = [], {how: [] for how in kinds}
+    alone = {"alone": lambda: cpu(lambda: on_springs(1, seconds)) / seconds}
+    cases = [("Hertz springs", "steel", 1, "numba", alone)]
+    for engine, setting, pulled in itertools.product(
+        engines, ("default", "fine", "refined"), (0, 1)
+    ):
+        ways = {
+            how: functools.partial(_cost, engine, setting, pulled, how == "mended", seconds)
+            for how in ("as it is", "mended")
+        }
+        cases.append((engine.name, setting, pulled, engine.distribution, ways))
+    for name, setting, pulled, package, ways in cases:
+        reference, taken = [], {how: [] for how in ways}
         for _ in range(repeats):
             reference.append(cpu(lambda: by_swing(1, seconds)) / seconds)
-            for how, mend in kinds.items():
-                if choice is None:
-                    taken[how].append(cpu(lambda: on_springs(1, seconds)) / seconds)
-                else:
-                    taken[how].append(_cost(*choice, mend, seconds))
+            for how, way in ways.items():
+                taken[how].append(way())
         for how, times in taken.items():
-            first = next(iter(taken.values()))
             yield {
-                "run": "Hertz springs" if choice is None else choice[0].name,
+                "run": name,
                 "how": how,
-                "setting": "steel" if choice is None else choice[1],
-                "pulled": 1 if choice is None else choice[2],
+                "setting": setting,
+                "pulled": pulled,
                 "seconds": statistics.median(times),
                 "over_swing": quotient(times, reference),
-                "over_as_it_is": quotient(times, first),
+                "over_as_it_is": quotient(times, next(iter(taken.values()))),
                 "repeats": repeats,
-                "version": versions("numba" if choice is None else choice[0].distribution),
+                "version": versions(package),
             }
+
+
+def cpu(function):
+    """Return the processor time of a call."""
+    return measure.seconds(function, clock=time.process_time)
 
 
 def _cost(engine, setting, pulled, mend, seconds):
     """Return the processor time of a simulated second."""
     advance, bodies, step = scene(engine, setting, pulled, mend=mend)
     count = round(seconds / step)
-
-    def all_steps():
-        for _ in range(count):
-            advance(step)
-
-    taken = cpu(all_steps)
+    taken = cpu(lambda: [advance(step) for _ in range(count)])
     close(bodies)
     return taken / (count * step)
 
 
-def strokes_and_film(folder, missing):
-    """Run all scenes and write two tables."""
-    table, film = [], []
-    balls = [f"ball{i}" for i in range(1, BALLS + 1)]
-    for name, how, setting, gap, pulled, (times, angles, rates) in runs(missing):
-        found = strokes(angles, rates)
-        row = (name, how, setting, f"{gap:g}", pulled)
-        table += [(*row, k, *(f"{e:.4f}" for e in each)) for k, each in enumerate(found, start=1)]
-        if pulled == 1 and not gap and setting in FILMED:
-            film += [
-                (name, how, f"{t:.4f}", *(f"{math.degrees(a):.1f}" for a in each))
-                for t, each in list(zip(times, angles, strict=True))[: FILM * FRAMES + 1 : 2]
-            ]
-        print(
-            *row, f"{len(found)} strokes", found[-1].sum().round(4), found[-1].round(3), flush=True
-        )
-    columns = ("run", "how", "setting", "gap", "pulled", "stroke", *balls)
-    write("scene_strokes.csv", columns, table, folder)
-    write("scene_film.csv", ("run", "how", "time", *balls), film, folder)
+def table_of_costs(engines):
+    """Measure all costs."""
+    rows = list(costs(engines))
+    return {"costs": (rows[0].keys(), [map(text, row.values()) for row in rows])}
 
 
-def first_strokes_with_gaps(folder, missing):
-    """Write the energies after the first stroke of engines as they are, with gaps."""
-    table = []
-    cases = itertools.product(ENGINES, ("default", "refined"), GAPS, (1, 2))
-    for engine, setting, gap, pulled in cases:
-        if engine.name not in missing:
-            _, angles, rates = in_engine(engine, setting, pulled, mend=False, gap=gap, duration=1.3)
-            first = strokes(angles, rates)[0]
-            table.append((engine.name, setting, f"{gap:g}", pulled, *(f"{e:.4f}" for e in first)))
-    balls = [f"ball{i}" for i in range(1, BALLS + 1)]
-    write("scene_gaps.csv", ("run", "setting", "gap", "pulled", *balls), table, folder)
+PARTS = {"gaps": first_strokes_with_gaps, "strokes": strokes_and_film, "costs": table_of_costs}
 
 
 def main(arguments=None):
     """Run all and write four tables."""
     parser = options(__doc__)
-    parser.add_argument("--costs", action="store_true", help="measure the costs alone")
-    parser.add_argument("--gaps", action="store_true", help="first strokes with gaps alone")
+    parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}: all if none is named")
     given = parser.parse_args(arguments)
     missing = absent(ENGINES)
-    for name, reason in missing.items():
-        print(f"skipped {name}: {reason}")
+    for reason in missing.values():
+        print("skipped:", reason)
     warm_up()
-    begin = time.perf_counter()
-    if not given.costs:
-        first_strokes_with_gaps(given.output, missing)
-    if given.gaps:
-        return
-    if not given.costs:
-        strokes_and_film(given.output, missing)
-    measured = []
-    for row in costs(missing):
-        print(*row.values(), flush=True)
-        measured.append([f"{x:.4g}" if isinstance(x, float) else x for x in row.values()])
-        columns = tuple(row)
-    write("scene_costs.csv", columns, measured, given.output)
-    print(f"{time.perf_counter() - begin:.0f} s", file=sys.stderr)
+    for part in given.parts or PARTS:
+        found = PARTS[part]([engine for engine in ENGINES if engine.name not in missing])
+        for name, (columns, rows) in found.items():
+            write(f"scene_{name}.csv", columns, rows, given.output)
 
 
 if __name__ == "__main__":

@@ -13,8 +13,8 @@ restitution: its contact is a damped constraint, whose damping is found from two
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -33,19 +33,12 @@ CHECKS = {
 }
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """Balls on a line as an engine is given them."""
 
-    masses: tuple[float, ...]
-    restitution: tuple[float, ...]
+    masses: tuple
+    restitution: tuple
     placement: str
-
-    @property
-    def positions(self):
-        """Centres, m."""
-        pitch = 2.0 * RADIUS * (1.0 + PLACEMENTS[self.placement])
-        return [pitch * i for i in range(len(self.masses))]
 
     @property
     def velocities(self):
@@ -62,6 +55,12 @@ class Line:
         s = math.sqrt(max(factors[1::2]) / max(factors[::2]))
         return [x * s if i % 2 == 0 else x / s for i, x in enumerate(factors)]
 
+    def balls(self):
+        """Yield mass, place (m), velocity and factor of each ball."""
+        pitch = 2.0 * RADIUS * (1.0 + PLACEMENTS[self.placement])
+        places = [pitch * i for i in range(len(self.masses))]
+        return zip(self.masses, places, self.velocities, self.factors, strict=True)
+
 
 class World(NamedTuple):
     """A line of balls in an engine."""
@@ -69,6 +68,17 @@ class World(NamedTuple):
     advance: Callable  #: makes so many steps
     velocities: Callable  #: returns them, ball by ball, m/s
     close: Callable = lambda: None  #: gives back what the engine holds
+    kept: object = None  #: what the engine needs and does not keep
+
+
+def by_one(step):
+    """Return a function that makes so many steps, one by one."""
+
+    def advance(count):
+        for _ in range(count):
+            step()
+
+    return advance
 
 
 # Each engine: a function that makes the world.
@@ -81,21 +91,14 @@ def chipmunk(line, *, step, iterations):
     space = pymunk.Space()
     space.iterations = iterations
     bodies = []
-    for mass, x, v, factor in zip(
-        line.masses, line.positions, line.velocities, line.factors, strict=True
-    ):
+    for mass, x, v, factor in line.balls():
         body = pymunk.Body(mass, math.inf)
         body.position, body.velocity = (x, 0), (v, 0)
         ball = pymunk.Circle(body, RADIUS)
         ball.elasticity, ball.friction = factor, 0.0
         space.add(body, ball)
         bodies.append(body)
-
-    def advance(count):
-        for _ in range(count):
-            space.step(step)
-
-    return World(advance, lambda: [b.velocity.x for b in bodies])
+    return World(by_one(partial(space.step, step)), lambda: [b.velocity.x for b in bodies])
 
 
 def box2d(line, *, step, iterations, faster=1.0):
@@ -108,7 +111,6 @@ def box2d(line, *, step, iterations, faster=1.0):
             contact.restitution = line.restitution[min(pair)]
 
     world = b2World(gravity=(0, 0), doSleep=False)
-    # The world keeps no reference to its listener; without one it would be lost.
     world.contactListener = listener = Restitution()
     bodies = [
         world.CreateDynamicBody(
@@ -124,16 +126,14 @@ def box2d(line, *, step, iterations, faster=1.0):
                 restitution=1.0,
             ),
         )
-        for i, (mass, x, v) in enumerate(
-            zip(line.masses, line.positions, line.velocities, strict=True)
-        )
+        for i, (mass, x, v, _) in enumerate(line.balls())
     ]
 
-    def advance(count, _kept=listener):
-        for _ in range(count):
-            world.Step(step / faster, iterations, 3)
-
-    return World(advance, lambda: [b.linearVelocity.x / faster for b in bodies])
+    return World(
+        by_one(partial(world.Step, step / faster, iterations, 3)),
+        lambda: [b.linearVelocity.x / faster for b in bodies],
+        kept=listener,
+    )
 
 
 def bullet(line, *, step, iterations, **parameters):
@@ -148,9 +148,7 @@ def bullet(line, *, step, iterations, **parameters):
     )
     ball = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=RADIUS, **here)
     bodies = []
-    for mass, x, v, factor in zip(
-        line.masses, line.positions, line.velocities, line.factors, strict=True
-    ):
+    for mass, x, v, factor in line.balls():
         body = pybullet.createMultiBody(mass, ball, basePosition=(x, 0, 0), **here)
         pybullet.changeDynamics(
             body, -1, restitution=factor, lateralFriction=0, rollingFriction=0,
@@ -158,16 +156,11 @@ def bullet(line, *, step, iterations, **parameters):
         )  # fmt: skip
         pybullet.resetBaseVelocity(body, (v, 0, 0), **here)
         bodies.append(body)
-
-    def advance(count):
-        for _ in range(count):
-            pybullet.stepSimulation(**here)
-
-    def velocities():
-        return [pybullet.getBaseVelocity(b, **here)[0][0] for b in bodies]
-
-    # Bullet has room for about a thousand worlds.
-    return World(advance, velocities, lambda: pybullet.disconnect(world))
+    return World(
+        by_one(partial(pybullet.stepSimulation, **here)),
+        lambda: [pybullet.getBaseVelocity(b, **here)[0][0] for b in bodies],
+        partial(pybullet.disconnect, world),  # Bullet has room for about a thousand worlds
+    )
 
 
 def rapier(line, *, step, iterations, **parameters):
@@ -181,19 +174,13 @@ def rapier(line, *, step, iterations, **parameters):
         setattr(world.integration_parameters, name, value)
     product = rapier3d.CoefficientCombineRule.MULTIPLY
     bodies = []
-    for mass, x, v, factor in zip(
-        line.masses, line.positions, line.velocities, line.factors, strict=True
-    ):
+    for mass, x, v, factor in line.balls():
         body = rapier3d.RigidBody.dynamic().translation((x, 0, 0)).linvel((v, 0, 0))
         ball = rapier3d.Collider.ball(RADIUS).mass(mass).friction(0.0).restitution(factor)
         ball = ball.restitution_combine_rule(product)
         bodies.append(world.add_body(body.can_sleep(False), [ball]))
 
-    def advance(count):
-        for _ in range(count):
-            world.step()
-
-    return World(advance, lambda: [world.rigid_bodies[b].linvel.x for b in bodies])
+    return World(by_one(world.step), lambda: [world.rigid_bodies[b].linvel.x for b in bodies])
 
 
 def mujoco(line, *, step, steps_a_contact, damping=None):
@@ -209,7 +196,7 @@ def mujoco(line, *, step, steps_a_contact, damping=None):
         f'<body pos="{x!r} 0 0"><joint type="slide" axis="1 0 0"/>'
         f'<geom name="{i}" type="sphere" size="{RADIUS}" mass="{mass!r}" contype="0" '
         'conaffinity="0"/></body>'
-        for i, (mass, x) in enumerate(zip(line.masses, line.positions, strict=True))
+        for i, (mass, x, *_) in enumerate(line.balls())
     )
     # Negative numbers are stiffness and damping themselves; a constant impedance leaves them so.
     pairs = "".join(
@@ -223,7 +210,7 @@ def mujoco(line, *, step, steps_a_contact, damping=None):
     )
     data = engine.MjData(model)
     data.qvel[:] = line.velocities
-    return World(lambda count: engine.mj_step(model, data, count), lambda: data.qvel)
+    return World(partial(engine.mj_step, model, data), lambda: data.qvel)
 
 
 @cache
@@ -235,20 +222,19 @@ def damping_for(restitution, step, steps_a_contact):
 
     def excess(damping):
         made = mujoco(line, step=step, steps_a_contact=steps_a_contact, damping=[damping])
-        _, v = run(made, step, 3.0)
-        return (v[1] - v[0]) / SPEED - restitution
+        _, (v1, v2) = run(made, step, 3.0)
+        return (v2 - v1) / SPEED - restitution
 
     return brentq(excess, 0.0, 0.95, xtol=1e-6)
 
 
-@dataclass(frozen=True)
-class Engine:
+class Engine(NamedTuple):
     """An engine, its two settings, and what is to be known of them."""
 
     name: str
     module: str
     distribution: str
-    build: object
+    build: Callable
     default: dict
     refined: dict
     note: str
@@ -314,6 +300,12 @@ def run(world, step, longest):
     return taken, v
 
 
+def longest(setting, placement):
+    """Return the time after which balls that are not settled are left so, s."""
+    # Across gaps slow balls need long to meet; where all touch, what is left is jitter.
+    return 10.0 if placement == "apart" else 3.0 if setting == "default" else 1.0
+
+
 def solve(engine, scene, placement, setting):
     """Return steps and velocities over the striker's speed, of one engine on one scene."""
     options = getattr(engine, setting)
@@ -322,53 +314,45 @@ def solve(engine, scene, placement, setting):
     return steps, v / SPEED
 
 
-def longest(setting, placement):
-    """Return the time after which balls that are not settled are left so, s."""
-    # Across gaps slow balls need long to meet; where all touch, what is left is jitter.
-    return 10.0 if placement == "apart" else 3.0 if setting == "default" else 1.0
+def timed(clock, engine, scene, setting):
+    """Return the fields that tell the time of touching balls."""
+    options, line = getattr(engine, setting), Line(scene.masses, scene.restitution, "touching")
+
+    def to_the_end(made):
+        return run(made, options["step"], longest(setting, "touching"))
+
+    return clock(to_the_end, prepare=partial(engine.build, line, **options))
 
 
 def rows(clock, quick):
-    """Yield a row for each engine, setting, placement and scene."""
+    """Yield a row for each engine, setting, scene and placement."""
     missing = absent(ENGINES)
-    for engine in ENGINES:
-        if engine.name in missing:
-            continue
-        for setting in ("default",) if quick else ("default", "refined"):
-            options = getattr(engine, setting)
-            scenes = [*CHECKS.values(), *SCENES.values()]
-            for scene in scenes:
-                for placement in PLACEMENTS:
-                    line = Line(scene.masses, scene.restitution, placement)
-                    steps, after = solve(engine, scene, placement, setting)
-                    if scene.name in CHECKS:
-                        e = scene.restitution[0]
-                        error = {
-                            "model_error": distance(after, [(1 - e) / 2, (1 + e) / 2]),
-                            "model_reference": "two balls, exact",
-                        }
-                    else:
-                        error = model_error(scene, after)
-                    time = {}
-                    if placement == "touching" and scene.name not in CHECKS:
-                        time = clock(
-                            lambda made, o=options, s=setting: run(
-                                made, o["step"], longest(s, "touching")
-                            ),
-                            prepare=lambda line=line, e=engine, o=options: e.build(line, **o),
-                        )
-                    yield Row(
-                        "engine",
-                        engine.name,
-                        f"{setting}, {placement}",
-                        scene.name,
-                        parameter=options["step"],
-                        **outcome(scene.masses, scene.velocities, after),
-                        **error,
-                        evaluations=steps,
-                        needs="e",
-                        gives="velocities, path in time",
-                        versions=versions(engine.distribution),
-                        note=engine.note,
-                        **time,
-                    )
+    here = [engine for engine in ENGINES if engine.name not in missing]
+    scenes = [*CHECKS.values(), *SCENES.values()]
+    settings = ("default",) if quick else ("default", "refined")
+    for engine, setting, scene, placement in product(here, settings, scenes, PLACEMENTS):
+        steps, after = solve(engine, scene, placement, setting)
+        time = {}
+        if scene.name in CHECKS:
+            e = scene.restitution[0]
+            off = distance(after, [(1 - e) / 2, (1 + e) / 2])
+            error = {"model_error": off, "model_reference": "two balls, exact"}
+        else:
+            error = model_error(scene, after)
+            if placement == "touching":
+                time = timed(clock, engine, scene, setting)
+        yield Row(
+            "engine",
+            engine.name,
+            f"{setting}, {placement}",
+            scene.name,
+            parameter=getattr(engine, setting)["step"],
+            **outcome(scene.masses, scene.velocities, after),
+            **error,
+            evaluations=steps,
+            needs="e",
+            gives="velocities, path in time",
+            versions=versions(engine.distribution),
+            note=engine.note,
+            **time,
+        )
