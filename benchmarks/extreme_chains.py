@@ -5,9 +5,9 @@
 the change of the exact outcome when every input changes by its last digit.
 """
 
-import itertools
 import math
 from fractions import Fraction
+from itertools import pairwise
 from typing import NamedTuple
 
 import mpmath
@@ -16,31 +16,29 @@ from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
 from problem import Problem
 from truth import EventLimit, as_meant
 
-from cradle import (
-    ImpactNotFinished,
-    outcomes,
-    post_impact_velocities,
-)
+from cradle import ImpactNotFinished, outcomes, post_impact_velocities
 from cradle.measures import _events_at_balls as events_at_balls
 
 EPS = 2.0**-52
 TINIEST = 5e-324  # the smallest number above zero
 
-FIELDS = ("masses", "velocities", "restitution", "forward", "backward")
+#: The ranges of the inputs of a problem.
+RANGES = {
+    "masses": (TINIEST, math.inf),
+    "velocities": (-math.inf, math.inf),
+    "restitution": (0.0, 1.0),
+    "forward": (0.0, 1.0),
+    "backward": (0.0, 1.0),
+}
 
 
 def case(masses, velocities, restitution, forward, backward=None, meeting=0.5):
     """A problem from arrays or scalars."""
     n = len(masses)
     backward = forward if backward is None else backward
-    return Problem(
-        [float(m) for m in masses],
-        [float(v) for v in velocities],
-        np.broadcast_to(np.asarray(restitution, float), n - 1).tolist(),
-        np.broadcast_to(np.asarray(forward, float), n - 2).tolist(),
-        np.broadcast_to(np.asarray(backward, float), n - 2).tolist(),
-        meeting,
-    )
+    sizes = (n, n, n - 1, n - 2, n - 2)
+    parts = zip((masses, velocities, restitution, forward, backward), sizes)
+    return Problem(*(np.broadcast_to(np.float64(x), k).tolist() for x, k in parts), meeting)
 
 
 # --- what must hold ------------------------------------------------------------------------
@@ -53,29 +51,23 @@ def invariants(trace):
     of |m v|, before or after.  Energy gained and ledger: in units of eps times the larger sum of
     m v^2 / 2.  Both units contain one smallest number a ball, for results that underflow.
     """
-    m = [Fraction(x) for x in trace.chain.masses.tolist()]
-    v = [Fraction(x) for x in trace.chain.velocities.tolist()]
-    w = [Fraction(x) for x in trace.velocities.tolist()]
-    eps, tiniest, n = Fraction(EPS), Fraction(TINIEST), len(m)
+    chain = trace.chain
+    arrays = chain.masses, chain.velocities, trace.velocities, chain.restitution, trace.absorbed
+    m, v, w, e, absorbed = ([Fraction(x) for x in array.tolist()] for array in arrays)
     momentum = sum(a * (x - y) for a, x, y in zip(m, w, v))
-    unit = max(sum(a * abs(x) for a, x in zip(m, part)) for part in (v, w))
-    energy = [sum(a * x * x for a, x in zip(m, part)) / 2 for part in (v, w)]
-    work = max(energy)
-    loss = energy[0] - energy[1]
-    ledger = sum(
-        (1 - Fraction(e) ** 2) * Fraction(a)
-        for e, a in zip(trace.chain.restitution.tolist(), trace.absorbed.tolist())
-    )
-    speed = max(abs(x) for x in (*v, *w))
+    before, after = (sum(a * x * x for a, x in zip(m, part)) / 2 for part in (v, w))
+    loss = before - after
+    ledger = sum((1 - x * x) * a for x, a in zip(e, absorbed))
     # A velocity that underflows is off by up to half a smallest number.
-    lowest = tiniest * sum(m)
+    eps, tiniest = Fraction(EPS), Fraction(TINIEST)
+    speed, lowest = max(map(abs, (*v, *w))), tiniest * sum(m)
+    unit = eps * max(sum(a * abs(x) for a, x in zip(m, part)) for part in (v, w)) + lowest
+    work = eps * max(before, after) + lowest * speed + len(m) * tiniest
     return {
-        "momentum": float(abs(momentum) / (eps * unit + lowest)) if unit else 0.0,
-        "gain": float(-loss / (eps * work + lowest * speed + n * tiniest)) if work else 0.0,
-        "ledger": float(abs(loss - ledger) / (eps * work + lowest * speed + n * tiniest))
-        if work
-        else 0.0,
-        "overlap": float(max(a - b for a, b in zip(w, w[1:]))),
+        "momentum": float(abs(momentum) / unit),
+        "gain": float(-loss / work),
+        "ledger": float(abs(loss - ledger) / work),
+        "overlap": float(max(a - b for a, b in pairwise(w))),
     }
 
 
@@ -85,75 +77,62 @@ def faults(trace, finished=True, momentum=8.0, energy=8.0):
     `momentum` and `energy` are multiples of rounding that are granted per ball, and, for the
     energy, per square root of the number of events: so do rounding errors add up.
     """
-    n = len(trace.chain)
-    energy *= n * max(1.0, math.sqrt(len(trace.events)))
     arrays = (trace.velocities, trace.impulses, trace.absorbed, trace.path, trace.path_impulses)
     if not all(np.isfinite(array).all() for array in arrays):
         return ["not finite"]
-    found = []
-    defect = invariants(trace)
-    if defect["momentum"] > momentum * n:
-        found.append(f"momentum off by {defect['momentum']:.3g} roundings")
-    if defect["gain"] > energy:
-        found.append(f"energy gained: {defect['gain']:.3g} roundings")
-    if finished:
-        if defect["ledger"] > energy:
-            found.append(f"ledger open by {defect['ledger']:.3g} roundings")
-        if defect["overlap"] > 0:
-            found.append(f"balls overlap by {defect['overlap']:.3g}")
-    if (trace.impulses < 0).any() or (trace.absorbed < 0).any():
-        found.append("negative impulse or work")
-    return found
+    n, defect = len(trace.chain), invariants(trace)
+    energy *= n * max(1.0, math.sqrt(len(trace.events)))
+    wrong = {
+        f"momentum off by {defect['momentum']:.3g} roundings": defect["momentum"] > momentum * n,
+        f"energy gained: {defect['gain']:.3g} roundings": defect["gain"] > energy,
+        f"ledger open by {defect['ledger']:.3g} roundings": finished and defect["ledger"] > energy,
+        f"balls overlap by {defect['overlap']:.3g}": finished and defect["overlap"] > 0,
+        "negative impulse or work": (trace.impulses < 0).any() or (trace.absorbed < 0).any(),
+    }
+    return [words for words, so in wrong.items() if so]
 
 
 # --- error against fifty digits --------------------------------------------------------------
 
 
-def neighbours(value, low=-math.inf, high=math.inf):
-    """The numbers one last digit below and above, inside the range; none for zero."""
-    if value == 0:
-        return []
-    return [x for x in (math.nextafter(value, -math.inf), math.nextafter(value, math.inf))
-            if low <= x <= high and x != 0]  # fmt: skip
+def moved(problem, name, k, change):
+    """The case with one input changed, or None if that leaves its range."""
+    values = list(getattr(problem, name))
+    values[k] += change
+    low, high = RANGES[name]
+    return problem._replace(**{name: values}) if low <= values[k] <= high else None
 
 
-def ranges(part):
-    return {"masses": (TINIEST, math.inf), "velocities": (-math.inf, math.inf)}.get(part, (0, 1))
+def inputs(problem, names=tuple(RANGES)):
+    """Inputs of a case that are not zero, as (name, index, value)."""
+    return [(n, k, value) for n in names for k, value in enumerate(getattr(problem, n)) if value]
 
 
-def unavoidable(problem, exact, max_events=20_000):
+def unavoidable(problem, exact, names=tuple(RANGES), ulps=1, max_events=20_000):
     """Change of each exact velocity when all inputs change by their last digits, added up.
 
     An answer cannot be known better than that from rounded inputs: it is the conditioning, measured
     at the very distance that matters, so that square roots and jumps count at their true size.
     """
-    return change_by(problem, exact, FIELDS, 1, max_events)
-
-
-def slack_of_bound(problem, exact, max_events=20_000):
-    """The same for ratios and four ulps: so near to its bound a ratio counts as at its bound."""
-    return change_by(problem, exact, ("forward", "backward"), 4, max_events)
-
-
-def change_by(problem, exact, names, ulps, max_events):
-    """Change of each exact velocity, by so many ulps of each of these inputs, added up."""
-    total = [mpmath.mpf(0)] * len(problem.masses)
-    for name in names:
-        values = getattr(problem, name)
-        for k, value in enumerate(values):
-            worst = [mpmath.mpf(0)] * len(total)
-            for near in neighbours(value, *ranges(name)):
-                low, high = ranges(name)
-                moved = min(max(value + ulps * (near - value), low), high)
-                changed = problem._replace(**{name: [*values[:k], moved, *values[k + 1 :]]})
-                try:
-                    other = changed.exact(max_events)
-                except EventLimit:
-                    worst = [mpmath.inf] * len(total)
-                    break
-                moves = [abs(a - b) for a, b in zip(other.velocities, exact.velocities)]
-                worst = [max(a, b) for a, b in zip(worst, moves)]
-            total = [a + b for a, b in zip(total, worst)]
+    balls = range(len(problem.masses))
+    total = [mpmath.mpf(0) for _ in balls]
+    for name, k, value in inputs(problem, names):
+        low, high = RANGES[name]
+        worst = [mpmath.mpf(0) for _ in balls]
+        for end in (-math.inf, math.inf):
+            near = math.nextafter(value, end)
+            if not low <= near <= high or near == 0:
+                continue
+            values = list(getattr(problem, name))
+            values[k] = min(max(value + ulps * (near - value), low), high)
+            try:
+                other = problem._replace(**{name: values}).exact(max_events)
+            except EventLimit:
+                worst = [mpmath.inf for _ in balls]
+                break
+            moves = [abs(a - b) for a, b in zip(other.velocities, exact.velocities)]
+            worst = list(map(max, worst, moves))
+        total = [a + b for a, b in zip(total, worst)]
     return total
 
 
@@ -179,9 +158,8 @@ def compare(trace, known):
         if change is None:  # a limit at rest is at rest to half of the fifty digits
             largest = largest if largest > mpmath.mpf(10) ** -25 else mpmath.mpf(1)
             return Measured(float(max(off) / largest / EPS), math.nan, math.nan)
-        error = float(max(off) / largest / EPS)
         own = max(a / (EPS * abs(b) + c + TINIEST) for a, b, c in zip(off, velocities, change))
-        return Measured(error, float(max(change) / largest / EPS), float(own))
+        return Measured(*(float(max(x) / largest / EPS) for x in (off, change)), float(own))
 
 
 def measure(problem, trace):
@@ -189,6 +167,28 @@ def measure(problem, trace):
     with mpmath.workdps(50):
         exact = problem.exact()
         return compare(trace, (exact.velocities, unavoidable(problem, exact)))
+
+
+def truth(problem, trace, longest=400, conditioned=80):
+    """Exact velocities and their unavoidable change, or None if too long.
+
+    Three balls whose impacts have no end take their common velocity.
+    """
+    with mpmath.workdps(50):
+        try:
+            exact = problem.exact(longest)
+        except EventLimit:
+            if not trace.collapsed or len(trace.chain) > 3:
+                return None
+            m, v = ([as_meant(x) for x in part] for part in problem[:2])
+            common = sum(a * b for a, b in zip(m, v)) / sum(m)
+            return [common] * 3, None
+        if len(exact.events) > conditioned:
+            return exact.velocities, None
+        change = unavoidable(problem, exact, max_events=longest)
+        # So near to its bound a ratio counts as at its bound.
+        slack = unavoidable(problem, exact, ("forward", "backward"), 4, longest)
+        return exact.velocities, [a + b for a, b in zip(change, slack)]
 
 
 # --- the map of the error ----------------------------------------------------------------------
@@ -225,41 +225,22 @@ def map_case(shape, power, e, ratio, velocities):
     return case((m1, m2, m3), VELOCITIES[velocities], e, [forward], [backward])
 
 
-def truth(problem, trace, longest=400, conditioned=80):
-    """Exact velocities and their unavoidable change as floats with rests, or None if too long.
-
-    Three balls whose impacts have no end take their common velocity.
-    """
-    with mpmath.workdps(50):
-        try:
-            exact = problem.exact(longest)
-        except EventLimit:
-            if not trace.collapsed or len(trace.chain) > 3:
-                return None
-            m, v = ([as_meant(x) for x in part] for part in problem[:2])
-            common = sum(a * b for a, b in zip(m, v)) / sum(m)
-            return [common] * 3, None
-        change = None
-        if len(exact.events) <= conditioned:
-            parts = (part(problem, exact, longest) for part in (unavoidable, slack_of_bound))
-            change = [a + b for a, b in zip(*parts)]
-        return exact.velocities, change
-
-
 # --- growth of a perturbation ------------------------------------------------------------------
 
 
-def rows_of_balls(spread, n, e, size, chains=10, seed=2001):
-    """Chains of n balls, ratio .1, and copies in which every input is changed by the part `size`.
+def copies(rng, masses, e, ratio, size):
+    """Chains whose first balls strike, and the same with every input changed by the part `size`."""
+    chains, n = masses.shape
+    velocities = np.tile(np.eye(n)[0], (chains, 1))
+    parts = [masses, velocities, np.full((chains, n - 1), e), np.full((chains, n - 2), ratio)]
+    return parts, [part * (1 + size * rng.choice([-1, 1], part.shape)) for part in parts]
 
-    Masses are 1 but for the part `spread`.
-    """
+
+def rows_of_balls(spread, n, e, size, chains=10, seed=2001):
+    """Chains of n balls of 1 but for the part `spread`, ratio .1, and copies changed by `size`."""
     rng = np.random.default_rng([seed, n, round(1000 * e)])
     masses = uniform(rng, 1 - spread, 1 + spread, (chains, n))
-    velocities = np.zeros((chains, n))
-    velocities[:, 0] = 1.0
-    parts = [masses, velocities, np.full((chains, n - 1), e), np.full((chains, n - 2), 0.1)]
-    changed = [part * (1 + size * rng.choice([-1, 1], part.shape)) for part in parts]
+    parts, changed = copies(rng, masses, e, 0.1, size)
     changed[2] = np.minimum(changed[2], 1.0)
     return parts, changed
 
@@ -293,21 +274,14 @@ def unequal_jumps(family, n, ratio, chains=24, size=1e-12, e=0.9):
     masses, spread = UNEQUAL[family]
     rng = np.random.default_rng([2001, n, round(1000 * ratio)])
     masses = masses(n) * uniform(rng, 1 - spread, 1 + spread, (chains, n))
-    velocities = np.tile(np.eye(n)[0], (chains, 1))
-    parts = [masses, velocities, np.full((chains, n - 1), e), np.full((chains, n - 2), ratio)]
-    changed = [part * (1 + size * rng.choice([-1, 1], part.shape)) for part in parts]
-    return np.array([_moved(here, there) for here, there in zip(zip(*parts), zip(*changed))])
-
-
-def _moved(*chains):
-    try:
-        one, other = (
-            post_impact_velocities(*chain, excess="saturate", max_events=1_000_000)
-            for chain in chains
-        )
-    except ImpactNotFinished:
-        return math.nan
-    return np.abs(other - one).max()
+    options, found = {"excess": "saturate", "max_events": 1_000_000}, []
+    for pair in zip(*(zip(*parts) for parts in copies(rng, masses, e, ratio, size))):
+        try:
+            one, other = (post_impact_velocities(*chain, **options) for chain in pair)
+            found.append(np.abs(other - one).max())
+        except ImpactNotFinished:
+            found.append(math.nan)
+    return np.array(found)
 
 
 # --- a light ball between two heavy ones -------------------------------------------------------
@@ -344,8 +318,8 @@ def elastic_impacts(light, last=1.0, e=1.0):
     change = [mpmath.mpf(0)] * 3
     for k, value in enumerate(given):
         worst = [mpmath.mpf(0)] * 3
-        for x in neighbours(value, 0.0, 1.0 if k > 2 else math.inf):
-            changed = [*given[:k], x, *given[k + 1 :]]
+        for end in (0.0, math.inf if k < 3 else 1.0):
+            changed = [*given[:k], math.nextafter(value, end), *given[k + 1 :]]
             other = alternating(changed[:3], changed[3:])
             worst = [max(a, abs(b - c)) for a, b, c in zip(worst, other[1], after)]
         change = [a + b for a, b in zip(change, worst)]
@@ -374,24 +348,6 @@ def edge(e, ratio, low=1e-7, high=2.0):
 # --- distance to another sequence of events ----------------------------------------------------
 
 
-def inputs(problem):
-    """Inputs of a case that are not zero, as (name, index, value)."""
-    return [
-        (name, k, value)
-        for name in FIELDS
-        for k, value in enumerate(getattr(problem, name))
-        if value
-    ]
-
-
-def moved(problem, name, k, change):
-    """The case with one input changed, or None if that leaves its range."""
-    values = list(getattr(problem, name))
-    values[k] += change
-    low, high = ranges(name)
-    return problem._replace(**{name: values}) if low <= values[k] <= high else None
-
-
 def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
     """How far an input can move to one side before the events change, and the jump there.
 
@@ -401,21 +357,18 @@ def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
     base = events_at_balls(problem.attempt()[0])
 
     def at(distance):
+        """Velocities, and whether the events are the same; None outside the range."""
         changed = moved(problem, name, k, side * distance * scale)
         if changed is None:
             return None
         trace = changed.attempt()[0]
         return trace.velocities, events_at_balls(trace) == base
 
-    near, far = 0.0, 1e-12
-    while far <= farthest:
-        found = at(far)
-        if found is None:
-            return math.inf, 0.0
-        if not found[1]:
-            break
+    near, far, found = 0.0, 1e-12, at(1e-12)
+    while found and found[1] and far <= farthest:
         near, far = far, far * step
-    else:
+        found = at(far)
+    if not found or far > farthest:
         return math.inf, 0.0
     while far - near > max(1e-10 * far, 1e-15):
         middle = 0.5 * (near + far)
@@ -433,27 +386,23 @@ def jumps(problem, name, k, scale, least=1e-3, farthest=0.3, steps=6000):
     """
 
     def after(parts):
-        given = {field: np.tile(getattr(problem, field), (len(parts), 1)) for field in FIELDS}
+        given = {field: np.tile(getattr(problem, field), (len(parts), 1)) for field in RANGES}
         given[name][:, k] += parts * scale
         return post_impact_velocities(**given, meeting=problem.meeting, excess="saturate")
 
-    low, high = ranges(name)
+    low, high = RANGES[name]
     parts = np.linspace(-farthest, farthest, steps + 1)
     reached = getattr(problem, name)[k] + parts * scale
     parts = parts[(low <= reached) & (reached <= high)]
     velocities = after(parts)
     largest = np.abs(velocities).max(axis=1)
-
-    def size(begin, end):
-        return np.abs(end - begin).max() / largest.min()
-
     found = []
     for i in np.flatnonzero(np.abs(np.diff(velocities, axis=0)).max(axis=1) > least * largest[:-1]):
         (near, far), (begin, end) = parts[i : i + 2], velocities[i : i + 2]
         while far - near > 1e-12:
             half = 0.5 * (near + far)
             (middle,) = after(np.array([half]))
-            if size(begin, middle) > size(middle, end):
+            if np.abs(middle - begin).max() > np.abs(end - middle).max():
                 far, end = half, middle
             else:
                 near, begin = half, middle
@@ -482,11 +431,9 @@ def any_chain(family, decades, index):
     )[rng.integers(3)]
     part = with_ends(rng)
     e = part((n - 1,))
-    if family == "within":
-        forward, backward = within_bounds(masses, part)
-    else:
-        forward, backward = part((n - 2,)), part((n - 2,))
-    return case(masses, velocities, e, forward, backward)
+    within = family == "within"
+    ratios = within_bounds(masses, part) if within else [part((n - 2,)) for _ in range(2)]
+    return case(masses, velocities, e, *ratios)
 
 
 def longer_than(problem, steps):
@@ -498,6 +445,6 @@ def longer_than(problem, steps):
         found = outcomes(*problem[:5], excess="saturate", max_events=steps)
     except ImpactNotFinished as stopped:
         change = np.abs(stopped.bounds - stopped.trace.velocities).max()
-        closing = max(a - b for a, b in itertools.pairwise(problem.velocities))
+        closing = max(a - b for a, b in pairwise(problem.velocities))
         return int(stopped.trace.collisions.sum()), False, True, change / closing
     return int(found.collisions.sum()), bool(found.collapsed), False, 0.0
