@@ -19,6 +19,7 @@ import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from decimal import Decimal
+from itertools import islice
 from typing import NamedTuple
 
 import truth
@@ -39,43 +40,6 @@ LIMIT = 1e-6
 DOUBTFUL = ("wrong", "other reading", "open", "unfinished", "unlike them")
 #: Chains of one task of the pool.
 TASK = 50
-
-#: Wrong once, with clean certificates; masses of the first and the last are those of a search.
-NAMED = {
-    "a rounding ended an idle contact": Problem(
-        [0.9395274204242703, 0.13162874375217531, 0.8787652613133802,
-         8.666424460086086, 0.4642354568832623, 1.4071765793971693],
-        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [0.8, 0.95, 0.8, 0.8, 0.9],
-        [0.1, 0.0, 0.0, 0.0],
-        [0.1, 0.1, 0.0, 0.1],
-        1.0,
-    ),
-    "six equal, one round early": Problem(
-        [1.0] * 6,
-        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [0.8, 0.9, 0.8, 0.95, 0.9],
-        [0.0, 0.0, 0.0, 0.1],
-        [0.0, 0.0, 0.1, 0.0],
-    ),
-    "seven equal": Problem(
-        [1.0] * 7,
-        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [0.95, 0.9, 0.9, 0.9, 0.9, 0.8],
-        [0.0, 0.1, 0.0, 0.05, 0.0],
-        [0.1, 0.05, 0.1, 0.0, 0.0],
-    ),
-    "nine balls": Problem(
-        [4.3639302160559, 2.9120226348453953, 0.8581936094543515,
-         2.0061646045881667, 5.829783354676066, 2.236215035414757,
-         2.2556046634037394, 0.38269385236942605, 1.6450906384595456],
-        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [0.9] * 8,
-        [0.1, 0.0, 0.0, 0.0, 0.1, 0.1, 0.0],
-        [0.0, 0.05, 0.1, 0.0, 0.05, 0.05, 0.05],
-        1.0,
-    ),
-}  # fmt: skip
 
 
 # --- what is true ------------------------------------------------------------------------------
@@ -153,22 +117,24 @@ ENDLESS = ["as 50 digits", "unlike them", "as relations", "nobody knows", "given
 WORDS = ENDS + ENDLESS
 
 
+def answer(solve):
+    """What somebody answers, as a list; None if there is no answer."""
+    try:
+        return solve().tolist()
+    except (ImpactNotFinished, ImpactNotCertified):
+        return None
+
+
 def batch(problem):
     """The package's velocities, of a batch; None if it gives none."""
     *parts, meeting = problem
     options = {"meeting": meeting, "excess": "saturate", "max_events": LONGEST}
-    try:
-        return post_impact_velocities(*parts, **options).tolist()
-    except (ImpactNotFinished, ImpactNotCertified):
-        return None
+    return answer(lambda: post_impact_velocities(*parts, **options))
 
 
 def single(problem):
     """The same, of `collide`."""
-    try:
-        return problem.collide(max_events=LONGEST).velocities.tolist()
-    except (ImpactNotFinished, ImpactNotCertified):
-        return None
+    return answer(lambda: problem.collide(max_events=LONGEST).velocities)
 
 
 def judge(problem, *ask, events=EVENTS):
@@ -227,17 +193,7 @@ def seen_otherwise(problem):
 # --- wrong chains, shrunk ----------------------------------------------------------------------
 
 
-def without(problem, i):
-    """The chain with ball i taken out; its neighbours' ratios stay."""
-
-    def drop(values, k):
-        k = min(max(k, 0), len(values) - 1)
-        return values[:k] + values[k + 1 :]
-
-    m, v, e, f, b, meeting = problem
-    return Problem(drop(m, i), drop(v, i), drop(e, i), drop(f, i - 1), drop(b, i - 1), meeting)
-
-
+#: What stands first is simplest.
 SIMPLER = {
     "masses": (1.0, 2.0),
     "velocities": (0.0, 1.0),
@@ -248,46 +204,34 @@ SIMPLER = {
 
 
 def simpler(problem):
-    """Chains of fewer balls, or with one simpler number."""
+    """Chains without one of the balls, or with one simpler number."""
     if len(problem.masses) > 2:
-        yield from (without(problem, i) for i in range(len(problem.masses)))
-    if problem.meeting != 0.5:
-        yield problem._replace(meeting=0.5)
+        for i in range(len(problem.masses)):
+            lists = [list(part) for part in problem[:5]]
+            for part, k in zip(lists, (i, i, i, i - 1, i - 1)):
+                part.pop(min(max(k, 0), len(part) - 1))
+            yield Problem(*lists, problem.meeting)
     for name, values in SIMPLER.items():
         given = getattr(problem, name)
         for i, x in enumerate(given):
-            better = values[: values.index(x)] if x in values else values
-            rounded = [
-                y for y in (round(x, 1), round(x, 2), round(x, 3)) if len(repr(y)) < len(repr(x))
-            ]
-            for y in (*better, *rounded):
-                if y > 0 or name != "masses":
-                    yield problem._replace(**{name: [*given[:i], y, *given[i + 1 :]]})
+            for y in values[: values.index(x)] if x in values else values:
+                yield problem._replace(**{name: [*given[:i], y, *given[i + 1 :]]})
 
 
 def shrunk(problem, is_wrong, most=400):
     """A smallest chain near this one that is still wrong, after at most so many trials."""
-    trials = 0
-    found = True
-    while found:
-        found = False
-        for other in simpler(problem):
-            trials += 1
-            if trials > most:
-                return problem
+    while most > 0:
+        for other in islice(simpler(problem), most):
+            most -= 1
             if is_wrong(other):
-                problem, found = other, True
+                problem = other
                 break
+        else:
+            break
     return problem
 
 
 # --- many chains -------------------------------------------------------------------------------
-
-
-def chains(name, count, seed):
-    """Chains of a family in tasks, each with a seed of its own."""
-    for start in range(0, count, TASK):
-        yield name, min(TASK, count - start), seed * 1_000_003 + start
 
 
 def task(name, count, seed):
@@ -299,22 +243,28 @@ def task(name, count, seed):
             verdict = second_opinion(problem)
         counts[verdict.word] += 1
         if verdict.word in DOUBTFUL:
-            found.append((verdict, problem))
+            found.append((name, verdict, problem))
     return name, counts, found
 
 
 def run(names, count, seed, workers=2):
     """Judge so many chains of each family; counts by family, and those that are wrong."""
     counts, found = {name: Counter() for name in names}, []
-    tasks = [each for name in names for each in chains(name, count, seed)]
+    # Each task has a seed of its own.
+    tasks = [
+        (name, min(TASK, count - start), seed * 1_000_003 + start)
+        for name in names
+        for start in range(0, count, TASK)
+    ]
     with ProcessPoolExecutor(workers, initializer=os.nice, initargs=(10,)) as pool:
         for name, part, wrong in pool.map(task, *zip(*tasks, strict=True)):
             counts[name].update(part)
-            found.extend((name, *each) for each in wrong)
+            found += wrong
     return counts, found
 
 
 def main():
+    """Judge, print, and store if told so."""
     parser = options(__doc__)
     parser.add_argument("--family", choices=JUDGED, action="append")
     parser.add_argument("--count", type=int, default=100, help="chains of each family")

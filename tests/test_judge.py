@@ -8,17 +8,18 @@ from pathlib import Path
 
 import judge as court
 import pytest
+from delicate import CHAINS, chains_of
 from families import JUDGED, family
-from judge import NAMED, Verdict, exact, judge, meaning, off, on_bounds, second_opinion, shrunk
+from judge import Verdict, exact, judge, meaning, off, on_bounds, second_opinion, shrunk
 from problem import Problem
 
 # --- the package -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("name", chains_of("the judge"))
 def test_named_chain(name):
     """The outcome of `collide` and of the batch; both passed the certificate when wrong."""
-    assert judge(NAMED[name]).word == "right"
+    assert judge(CHAINS[name].problem).word == "right"
 
 
 STORED = Path(__file__).parents[1] / "data" / "judge.csv"
@@ -88,7 +89,7 @@ def test_meaning_of_a_float(x, means):
 
 def test_velocities_that_other_codes_gave():
     """Three programs that share no line agreed on the first of the named chains."""
-    right = exact(NAMED["a rounding ended an idle contact"])
+    right = exact(CHAINS["a rounding ended an idle contact"].problem)
     printed = [-0.38197548, -0.27627427, -0.03074706, 0.12760094, 0.13425148, 0.13759522]
     assert max(abs(float(v) - w) for v, w in zip(right, printed, strict=True)) < 5.1e-9
 
