@@ -171,7 +171,7 @@ def spring_rows(clock, quick):
     )  # fmt: skip
 
 
-@njit
+@njit(cache=True)
 def penalty(masses, velocities, stiffness, exponent, step, most=10_000_000):
     """March balls on springs with a fixed step until they part; return velocities and steps.
 
