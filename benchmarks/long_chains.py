@@ -10,13 +10,14 @@ springs, integrated beside it, so that a busy machine slows down both.  Seconds 
 times the median of all those times, so that they too are of one machine at one speed.
 """
 
-import functools
 import statistics
 import time
+from functools import partial
+from itertools import product
 
 import numpy as np
 from measure import quotient, seconds
-from stored import options, write
+from stored import options, text, write
 
 from cradle import Chain, SpringChain, collide, outcomes
 
@@ -42,10 +43,7 @@ LOSSES = {
     0.999: (20, 40, 80, 160, 320),
 }
 LOSSES_RATIOS = (0.0, 0.1, 0.3, 0.45)
-SPRINGS = {
-    1.5: (3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 60, 80, 100),
-    1.0: (3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 60, 80, 100),
-}
+SPRINGS = dict.fromkeys((1.5, 1.0), (3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 60, 80, 100))
 MAP_SIDE = 1000
 
 
@@ -56,19 +54,15 @@ def still_chain(balls):
     return np.ones(balls), velocities
 
 
-def three_on_springs():
-    """Solve the unit of time."""
-    return collide(Chain(*still_chain(3), 1.0), SpringChain(1.0))
-
-
 def cost(function, repeats):
     """Return the fields of a row that tell the processor time of `function`, and of the unit."""
-    cpu = functools.partial(seconds, clock=time.process_time)
+    cpu = partial(seconds, clock=time.process_time)
+    three_on_springs = partial(collide, Chain(*still_chain(3), 1.0), SpringChain(1.0))
     function()
     calls = max(1, round(0.02 / max(cpu(function), 1e-6)))
     pairs = [(cpu(function, calls), cpu(three_on_springs, 3)) for _ in range(repeats)]
     return {
-        "units": [unit for _, unit in pairs],  # for `add_seconds`
+        "units": [unit for _, unit in pairs],  # for `main`
         "time_ratio": quotient(*zip(*pairs, strict=True)),
         "repeats": repeats,
     }
@@ -76,20 +70,36 @@ def cost(function, repeats):
 
 def leaving(velocities):
     """Return the fields of a row that tell which balls fly off."""
+    names = {"first": 0, "third_last": -3, "second_last": -2, "last": -1}
     return {
         "fast": int((velocities > FAST).sum()),
         "back": int((velocities < -FAST).sum()),
-        "first": velocities[0],
-        "third_last": velocities[-3],
-        "second_last": velocities[-2],
-        "last": velocities[-1],
+        **{name: velocities[k] for name, k in names.items()},
     }
 
 
-def elastic(ratio, balls, repeats):
+def large_map(side, repeats):
+    """Return a row: collisions of three balls over the mass ratios m2/m1 and m2/m3 of Fig. 6."""
+    ratios = (np.arange(side) + 0.5) * 3.0 / side
+    masses = np.stack(np.broadcast_arrays(1.0 / ratios[:, None], 1.0, 1.0 / ratios), axis=-1)
+    solve = partial(outcomes, masses, [1.0, 0.0, 0.0], 0.5, 0.15)
+    found = solve()
+    return {
+        "group": "map",
+        "restitution": 0.5,
+        "ratio": 0.15,
+        "balls": 3,
+        "chains": side * side,
+        "collisions": int(found.collisions[~found.collapsed].sum()),
+        "collapsed": int(found.collapsed.sum()),
+        **cost(solve, repeats),
+    }
+
+
+def elastic(ratio, balls):
     """Return a row: no losses, so every contact collides once, at any length."""
-    chain = still_chain(balls)
-    found = outcomes(*chain, 1.0, ratio)
+    solve = partial(outcomes, *still_chain(balls), 1.0, ratio)
+    found = solve()
     return {
         "group": "elastic",
         "restitution": 1.0,
@@ -98,7 +108,7 @@ def elastic(ratio, balls, repeats):
         "collisions": int(found.collisions.sum()),
         "collapsed": int(found.collapsed),
         **leaving(found.velocities),
-        **cost(lambda: outcomes(*chain, 1.0, ratio), repeats),
+        **cost(solve, 9 if balls <= 10_000 else 5),
     }
 
 
@@ -113,20 +123,14 @@ def copies(restitution, balls):
     return masses, velocities, restitutions
 
 
-def kept_from_the_front(velocities):
-    """Return how many leading balls all copies agree on, and the leader's spread."""
-    off = np.abs(velocities - velocities[0]).max(axis=0)
-    agrees = (off <= KEPT * np.abs(velocities[0]))[::-1]
-    kept = len(agrees) if agrees.all() else int(np.argmin(agrees))
-    return kept, off[-1] / abs(velocities[0, -1])
-
-
 def losses(restitution, ratio, balls):
     """Return a row: with losses, balls collide again and again, in an order that may be chance."""
     found = outcomes(*copies(restitution, balls), ratio)
-    kept, spread = kept_from_the_front(found.velocities)
+    own = found.velocities[0]
+    off = np.abs(found.velocities - own).max(axis=0)
+    agrees = off <= KEPT * np.abs(own)
     fast = (found.velocities > FAST).sum(axis=-1)
-    return {
+    row = {
         "group": "losses",
         "restitution": restitution,
         "ratio": ratio,
@@ -136,86 +140,43 @@ def losses(restitution, ratio, balls):
         "collisions": int(np.median(found.collisions.sum(axis=-1))),
         "collapsed": int(found.collapsed.sum()),
         "orders": len(np.unique(found.collisions, axis=0)),
-        "kept": kept,
-        "spread": spread,
+        "kept": int(np.argmin([*agrees[::-1], False])),
+        "spread": off[-1] / abs(own[-1]),
         "fast_least": int(fast.min()),
         "fast_most": int(fast.max()),
-        **leaving(found.velocities[0]),
     }
+    return row | leaving(own)
 
 
 def springs(exponent, balls):
     """Return a row: the same chain on springs, without losses."""
     found = collide(Chain(*still_chain(balls), 1.0), SpringChain(1.0, exponent, accuracy=1e-10))
-    return {
-        "group": "springs",
-        "restitution": 1.0,
-        "exponent": exponent,
-        "balls": balls,
-        **leaving(found.velocities),
-    }
-
-
-def map_of_three(side):
-    """Return masses of three balls, m2 = 1, over the mass ratios m2/m1 and m2/m3 of Fig. 6."""
-    ratios = (np.arange(side) + 0.5) * 3.0 / side
-    return np.stack(np.broadcast_arrays(1.0 / ratios[:, None], 1.0, 1.0 / ratios), axis=-1)
-
-
-def large_map(side, repeats):
-    """Return a row: collisions of three balls over a square of mass ratios."""
-    masses = map_of_three(side)
-
-    def solve():
-        return outcomes(masses, [1.0, 0.0, 0.0], 0.5, 0.15)
-
-    found = solve()
-    return {
-        "group": "map",
-        "restitution": 0.5,
-        "ratio": 0.15,
-        "balls": 3,
-        "chains": side * side,
-        "collisions": int(found.collisions[~found.collapsed].sum()),
-        "collapsed": int(found.collapsed.sum()),
-        **cost(solve, repeats),
-    }
+    given = {"group": "springs", "restitution": 1.0, "exponent": exponent, "balls": balls}
+    return given | leaving(found.velocities)
 
 
 def rows():
     """Yield all rows, without seconds."""
     yield large_map(MAP_SIDE, 9)
-    for ratio in ELASTIC_RATIOS:
-        for balls in ELASTIC_BALLS:
-            yield elastic(ratio, balls, 9 if balls <= 10_000 else 5)
+    for ratio, balls in product(ELASTIC_RATIOS, ELASTIC_BALLS):
+        yield elastic(ratio, balls)
     for restitution, lengths in LOSSES.items():
-        for ratio in LOSSES_RATIOS:
-            for balls in lengths:
-                yield losses(restitution, ratio, balls)
+        for ratio, balls in product(LOSSES_RATIOS, lengths):
+            yield losses(restitution, ratio, balls)
     for exponent, lengths in SPRINGS.items():
         for balls in lengths:
             yield springs(exponent, balls)
-
-
-def add_seconds(found):
-    """Turn the ratios of all timed rows into seconds by the median of all their units."""
-    timed = [row for row in found if "units" in row]
-    unit = statistics.median(one for row in timed for one in row.pop("units"))
-    for row in timed:
-        row["cpu_seconds"] = row["time_ratio"] * unit
-
-
-def text(value):
-    """Return a field as it is stored."""
-    return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 def main(arguments=None):
     """Write the table."""
     folder = options(__doc__).parse_args(arguments).output
     found = list(rows())
-    add_seconds(found)
-    lines = ([text(row.get(name, "")) for name in COLUMNS] for row in found)
+    timed = [row for row in found if "units" in row]
+    unit = statistics.median(one for row in timed for one in row.pop("units"))
+    for row in timed:
+        row["cpu_seconds"] = row["time_ratio"] * unit
+    lines = ([text(row.get(name, ""), 10) for name in COLUMNS] for row in found)
     write("long_chains.csv", COLUMNS, lines, folder)
 
 
