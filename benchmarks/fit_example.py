@@ -12,6 +12,7 @@ amount.  The velocities of the table are found from the marks as a reader would 
 """
 
 import numpy as np
+from chains import runge_kutta
 from stored import options, write
 
 from cradle import collide, paper_chain
@@ -35,13 +36,9 @@ def swing(velocity, times):
     def rate(y):
         return np.array([y[1], -GRAVITY / LENGTH * np.sin(y[0])])
 
-    steps = 16
-    h, y = times / steps, np.stack([0.0 * times, np.full(times.size, velocity / LENGTH)])
-    for _ in range(steps):
-        a = rate(y)
-        b = rate(y + h / 2 * a)
-        c = rate(y + h / 2 * b)
-        y = y + h / 6 * (a + 2 * b + 2 * c + rate(y + h * c))
+    y = np.stack([0.0 * times, np.full(times.size, velocity / LENGTH)])
+    for _ in range(16):
+        y = runge_kutta(rate, y, times / 16)
     return LENGTH * np.sin(y[0])
 
 

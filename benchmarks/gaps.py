@@ -13,6 +13,7 @@ row, and v the striker's speed.
 """
 
 import numpy as np
+from chains import runge_kutta
 from scipy.optimize import least_squares
 from stored import options, write
 
@@ -56,38 +57,35 @@ def strike(masses, velocities, restitution, gaps, stiffness=1.0, step=0.02, long
     nothing pushes any more, goes on as pairs, one after the other.
     """
     m, v, e, s = (np.asarray(x, float) for x in (masses, velocities, restitution, gaps))
-    balls = m.shape[-1]
-    row = np.broadcast_shapes(m.shape, v.shape, *((*x.shape[:-1], balls) for x in (e, s)))
-    m, v = np.broadcast_to(m, row), np.array(np.broadcast_to(v, row))
-    s = -np.array(np.broadcast_to(s, (*row[:-1], row[-1] - 1)))
-    e = np.broadcast_to(e, s.shape)
-    held = stiffness * np.maximum(s, 0.0) ** 1.5
-    none = np.zeros((*row[:-1], 1))
+    n = m.shape[-1]
+    row = np.broadcast_shapes(m.shape, v.shape, *((*x.shape[:-1], n) for x in (e, s)))
+    contacts = (*row[:-1], n - 1)
+    m, e = np.broadcast_to(m, row), np.broadcast_to(e, contacts)
+    # The states of the contacts, then the velocities of the balls.
+    y = np.concatenate([-np.broadcast_to(s, contacts), np.broadcast_to(v, row)], -1)
+    held = stiffness * np.maximum(y[..., : n - 1], 0.0) ** 1.5
+    ends = [(0, 0)] * (len(row) - 1) + [(1, 1)]
 
-    def rate(s, v):
+    def rate(y):
+        s, v = y[..., : n - 1], y[..., n - 1 :]
         closing = v[..., :-1] - v[..., 1:]
-        push = stiffness * np.maximum(s, 0.0) ** 1.5 - held
-        force = np.concatenate([none, push], -1) - np.concatenate([push, none], -1)
+        push = np.pad(stiffness * np.maximum(s, 0.0) ** 1.5 - held, ends)
         slow = np.where((closing < 0) & (s > 0), closing / np.maximum(e, 1e-3) ** 2, closing)
-        return slow, force / m
+        return np.concatenate([slow, (push[..., :-1] - push[..., 1:]) / m], -1)
 
     left, time, out = np.ones(row[:-1], bool), 0.0, np.empty(row)
-    while time < longest:
-        a = rate(s, v)
-        b = rate(s + step / 2 * a[0], v + step / 2 * a[1])
-        c = rate(s + step / 2 * b[0], v + step / 2 * b[1])
-        d = rate(s + step * c[0], v + step * c[1])
-        s = s + step / 6 * (a[0] + 2 * b[0] + 2 * c[0] + d[0])
-        v = v + step / 6 * (a[1] + 2 * b[1] + 2 * c[1] + d[1])
+    while time < longest and left.any():
+        y = runge_kutta(rate, y, step)
         time += step
+        s, v = y[..., : n - 1], y[..., n - 1 :]
         done = left & (s <= 0).all(-1)
         done &= (v[..., :-1] <= v[..., 1:]).all(-1) | (held > 0).any(-1)
         out[done] = v[done]
         left &= ~done
-        if not left.any():
-            return out
-    out[left] = v[left]
-    return post_impact_velocities(m, out, e, np.zeros(row[-1] - 2))
+    if left.any():
+        out[left] = v[left]
+        out = post_impact_velocities(m, out, e, np.zeros(n - 2))
+    return out
 
 
 def five():
@@ -120,9 +118,8 @@ def shared(errors, keys):
 
 def by_pair(names, masses, e, listed):
     """Return outcomes with one stiffness a pair of kinds, fitted to all triplets."""
-    first, second = ([ordered(t[k : k + 2]) for t in names] for k in (0, 1))
-    kinds = sorted({*first, *second})
-    place = np.array([[kinds.index(a), kinds.index(b)] for a, b in zip(first, second, strict=True)])
+    pairs = [["".join(sorted(t[k : k + 2])) for k in (0, 1)] for t in names]
+    kinds, place = np.unique(pairs, return_inverse=True)
 
     def after(p):
         k = np.exp(np.append(p, 0.0)[place])
@@ -136,11 +133,6 @@ def by_pair(names, masses, e, listed):
     return after(min(fits, key=lambda fit: fit.cost).x)
 
 
-def ordered(pair):
-    """Return the pair of kinds without its order."""
-    return "".join(sorted(pair))
-
-
 def triplets():
     """Return columns: how far each law is from the outcome that Table 2 encodes."""
     names = list(ratio_table()["triplet"])
@@ -149,30 +141,29 @@ def triplets():
     for name, model in LAWS.items():
         chains = [Chain(m, [1, 0, 0], r) for m, r in zip(masses, e, strict=True)]
         columns[name] = off(np.array([collide(c, model).velocities for c in chains]), listed)
+    touching = [Chain(m, [1, 0, 0], 1) for m in masses]
     columns["implied"] = [
-        effective_ratio(collide(Chain(m, [1, 0, 0], 1), SpringChain(accuracy=1e-10)))
-        for m in masses
+        effective_ratio(collide(chain, SpringChain(accuracy=1e-10))) for chain in touching
     ]
-    every, m, r = np.arange(len(names)), masses[:, None], e[:, None]
-    one = off(post_impact_velocities(m, [1, 0, 0], r, ONE[:, None], excess="saturate"),
-              listed[:, None])  # fmt: skip
-    columns["one_ratio"] = one[every, shared(one, [""] * len(names))]
+    every, m, r, listed_too = np.arange(len(names)), masses[:, None], e[:, None], listed[:, None]
+    alike = [""] * len(names)
 
-    shift = np.zeros((len(names), len(SHIFTS), 2))
-    shift[..., 1] = SHIFTS
-    errors = off(strike(m, [1, 0, 0], r, shift), listed[:, None])
-    gaps = np.where(SHIFTS >= 0, errors, 9.0)
-    last = [ordered(t[1:]) for t in names]
-    for name, found in (("gap", gaps), ("shift", errors)):
-        columns[f"one_{name}"] = found[every, shared(found, [""] * len(names))]
+    after = post_impact_velocities(m, [1, 0, 0], r, ONE[:, None], excess="saturate")
+    one = off(after, listed_too)
+    columns["one_ratio"] = one[every, shared(one, alike)]
+
+    shift = np.stack(np.broadcast_arrays(0.0, SHIFTS), -1)
+    errors = off(strike(m, [1, 0, 0], r, shift), listed_too)
+    last = ["".join(sorted(t[1:])) for t in names]
+    for name, found in (("gap", np.where(SHIFTS >= 0, errors, 9.0)), ("shift", errors)):
+        columns[f"one_{name}"] = found[every, shared(found, alike)]
         columns[f"{name}_of_pair"] = found[every, shared(found, last)]
         own = shared(found, names)
         columns[f"own_{name}"] = SHIFTS[own]
         columns[f"with_own_{name}"] = found[every, own]
 
     k = np.stack([np.minimum(1, 1 / QUOTIENTS), np.minimum(1, QUOTIENTS)], -1)
-    zero = np.zeros((len(names), len(QUOTIENTS), 2))
-    errors = off(strike(m, [1, 0, 0], r, zero, k, longest=150.0), listed[:, None])
+    errors = off(strike(m, [1, 0, 0], r, 0.0 * k, k, longest=150.0), listed_too)
     own = shared(errors, names)
     columns["own_quotient"], columns["with_own_quotient"] = QUOTIENTS[own], errors[every, own]
     columns["stiffness_of_pair"] = off(by_pair(names, masses, e, listed), listed)

@@ -11,8 +11,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from chains import elastic_spheres
 from chapters import Chapter
+from gaps import strike
 from matplotlib.figure import Figure
 
 import cradle
@@ -45,7 +45,7 @@ def test_the_toy_by_a_second_route(root: Path):
     after = collide(TOY, SpringChain()).velocities
     assert (np.abs(after[::-1]) * 100).round().tolist() == [99, 13, 1, 3, 7]
     assert (after[:3] < 0).all()
-    np.testing.assert_allclose(elastic_spheres([1] * 5, 2e-3), after, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(strike([1] * 5, np.eye(5)[0], 1, 0), after, rtol=0, atol=1e-6)
     # Mass, size, stiffness and speed cancel.
     steel = collide(Chain([0.045] * 5, [0.3, 0, 0, 0, 0]), SpringChain(1.3e10))
     np.testing.assert_allclose(steel.velocities / 0.3, after, rtol=0, atol=1e-9)
@@ -53,13 +53,13 @@ def test_the_toy_by_a_second_route(root: Path):
 
 def test_the_ratio_of_three_spheres_on_five():
     """The landing page sets it beside five spheres: by our own integration, v1 = -a/(2 - a)."""
-    back, *_ = elastic_spheres([1] * 3, 2e-3)
+    back, *_ = strike([1] * 3, np.eye(3)[0], 1, 0)
     ratio, told = -2 * back / (1 - back), Chapter("intro").glued
     assert told["spheres"] == f"{ratio:.4f}"
     five = collide(TOY, ImpulseCorrelation(ratio)).velocities
     shown = re.findall(r"[-\d.]+", told["spheres-five"].replace("−", "-"))
     assert [float(x) for x in shown] == [round(float(v), 2) + 0.0 for v in five]
-    assert (elastic_spheres([1] * 5, 2e-3)[1:3] < -0.01).all()  # "spheres throw them back a little"
+    assert (strike([1] * 5, np.eye(5)[0], 1, 0)[1:3] < -0.01).all()  # "spheres throw them back a little"
     assert abs(five[1:3]).max() < 1e-12  # and the ratio leaves them at rest
 
 
