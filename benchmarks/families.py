@@ -7,8 +7,8 @@ round alike everywhere; printed, it is short.  Draws come from `random.Random`, 
 
 import random
 
+import chains
 import numpy as np
-from chains import one_way
 from problem import Problem
 
 PAPER_MASSES = [0.045, 0.053, 0.053, 0.166]
@@ -36,9 +36,15 @@ class Draw:
         return self.below(100) < percent
 
 
-def within_bounds(masses, parts):
-    """One way's ratios as parts of Eq. 53, for a chain driven to the right."""
-    return one_way(np.array(masses), np.array(parts)).tolist()
+def within_bounds(masses, part):
+    """Ratios, forward and backward, as parts of their bounds, which `part` gives one by one."""
+    ways = chains.within_bounds(masses, lambda shape: np.array([part() for _ in range(*shape)]))
+    return [way.tolist() for way in ways]
+
+
+def struck(n):
+    """Velocities: the first ball strikes."""
+    return [1.0] + [0.0] * (n - 1)
 
 
 def ties(draw, n):
@@ -49,8 +55,9 @@ def ties(draw, n):
         masses = [draw.choice(PAPER_MASSES) for _ in range(n)]
     elif kind == 2:
         masses = [draw.choice([1.0, 1.0, 1.0, 3.0, 0.3]) for _ in range(n)]
-    first = [1.0] + [0.0] * (n - 1)
-    velocities = first if draw.chance(40) else [draw.choice([-0.5, 0, 0.5, 1]) for _ in range(n)]
+    velocities = struck(n)
+    if not draw.chance(40):
+        velocities = [draw.choice([-0.5, 0, 0.5, 1]) for _ in range(n)]
     coefficients = draw.choice([[1], [1], [0, 0.5, 0.9, 1], [0.5, 0.9, 1], [0.9]])
     restitution = [float(draw.choice(coefficients)) for _ in range(n - 1)]
     values = draw.choice([[0.0, 1.0], [0.0, 0.1], [0.0, 0.1, 1.0]])
@@ -61,10 +68,8 @@ def ties(draw, n):
 def bounded_ties(draw, n):
     """The same, with no ratio above its bound."""
     given = ties(draw, n)
-    m, count = given.masses, len(given.forward)
-    forward = within_bounds(m, [draw.choice([0.0, 0.5]) for _ in range(count)])
-    backward = within_bounds(m[::-1], [draw.choice([0.0, 0.5]) for _ in range(count)])
-    return given._replace(forward=forward, backward=backward[::-1])
+    forward, backward = within_bounds(given.masses, lambda: draw.choice([0.0, 0.5]))
+    return given._replace(forward=forward, backward=backward)
 
 
 def tiny_ratios(draw, n):
@@ -89,20 +94,17 @@ def mixed_zeros(draw, n):
     def part():
         return 0.0 if draw.chance(zeros) else draw.decimal(0.05, 0.95, 2)
 
-    ways = []
-    for m in (masses, masses[::-1]):
-        bounds = within_bounds(m, [part() for _ in range(n - 2)])
-        ways.append([int(x * 100) / 100 for x in bounds])  # printed, and still within its bound
-    return Problem(masses, velocities, restitution, ways[0], ways[1][::-1])
+    # Printed, and still within their bounds.
+    ways = ([int(x * 100) / 100 for x in way] for way in within_bounds(masses, part))
+    return Problem(masses, velocities, restitution, *ways)
 
 
 def light_balls(draw, n):
     """Balls a thousand to a million times lighter among the others; elastic or nearly so."""
     masses = [draw.choice([1.0, 1.0, 1.7, 1e-3, 1e-6]) for _ in range(n)]
-    velocities = [1.0] + [0.0] * (n - 1)
     restitution = [draw.choice([1.0, 1.0, 0.99, 0.9]) for _ in range(n - 1)]
-    forward, backward = ([draw.choice([0.0, 0.05, 0.1]) for _ in range(n - 2)] for _ in range(2))
-    return Problem(masses, velocities, restitution, forward, backward)
+    ways = ([draw.choice([0.0, 0.05, 0.1]) for _ in range(n - 2)] for _ in range(2))
+    return Problem(masses, struck(n), restitution, *ways)
 
 
 def any_number(draw, low, high):
@@ -127,7 +129,7 @@ def any_masses(draw, n, decades=2):
 def few_velocities(draw, n):
     """The first ball strikes, or few different numbers, zeros and equal ones among them."""
     if draw.chance(50):
-        return [1.0] + [0.0] * (n - 1)
+        return struck(n)
     return [draw.choice([0.0, 1.0, 0.5, -0.5]) for _ in range(n)]
 
 
@@ -170,9 +172,8 @@ def generic(draw, n):
         return [low + (high - low) * draw.source.random() for _ in range(size)]
 
     m = numbers(0.2, 4, n)
-    ways = [within_bounds(masses, numbers(0, 1, n - 2)) for masses in (m, m[::-1])]
-    v, e = numbers(-1, 1, n), numbers(0.3, 1, n - 1)
-    return Problem(m, v, e, ways[0], ways[1][::-1], draw.source.random())
+    ways = within_bounds(m, draw.source.random)
+    return Problem(m, numbers(-1, 1, n), numbers(0.3, 1, n - 1), *ways, draw.source.random())
 
 
 def at_bounds(draw, n):
@@ -181,11 +182,11 @@ def at_bounds(draw, n):
     parts = [[draw.choice([0.0, 0.5, 1.0, 1.0]) for _ in range(n - 2)] for _ in range(2)]
     if draw.chance(60):  # no ratio beside another: all bounds are quotients of two masses
         parts = [[part * (i % 2) for i, part in enumerate(way)] for way in parts]
-    forward, backward = within_bounds(m, parts[0]), within_bounds(m[::-1], parts[1])[::-1]
+    ways = within_bounds(m, iter([*parts[0], *parts[1]]).__next__)
     coefficients = draw.choice([[1.0], [0.9], [0.5, 0.9, 1.0]])
     e = [draw.choice(coefficients) for _ in range(n - 1)]
     meeting = draw.choice([0.0, 0.5, 1.0])
-    return Problem(m, few_velocities(draw, n), e, forward, backward, meeting)
+    return Problem(m, few_velocities(draw, n), e, *ways, meeting)
 
 
 def extremes(draw, n):

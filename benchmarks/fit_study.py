@@ -33,35 +33,34 @@ PRECISION = ["triplet", "ratio", "bound", "backward_acts", "sensitivity", "third
 def truth(triplet):
     """Return chain, ratio, reverse ratio and bound of a triplet; no ratio is above its bound."""
     chain, model = paper_chain(triplet, excess="saturate")
-    left, middle, right = chain.masses
-    bound = float(right / (middle + right))
-    return (chain, min(model.forward[0], bound),
-            min(model.backward[0], float(left / (middle + left))), bound)  # fmt: skip
+    left, middle, right = map(float, chain.masses)
+    bounds = right / (middle + right), left / (middle + left)
+    return chain, min(model.forward[0], bounds[0]), min(model.backward[0], bounds[1]), bounds[0]
 
 
-def outcomes(chain, ratios, backward, restitution=None):
+def outcomes(chain, ratios, backward):
     """Return velocities after the impact at unit speed of the striker, for many ratios."""
-    e = chain.restitution if restitution is None else restitution
-    before = [1.0, 0.0, 0.0]
-    return post_impact_velocities(
-        chain.masses, before, e, np.asarray(ratios)[:, None], backward, excess="saturate"
-    )
+    given = chain.masses, [1.0, 0.0, 0.0], chain.restitution
+    return post_impact_velocities(*given, np.asarray(ratios)[:, None], backward, excess="saturate")
 
 
 def table(triplet, chain, after, noise, random):
     """Return the rows of an experiment as columns."""
-    columns = {name: [] for name in ("set", "shot", "ball", "type", "mass", "before", "after",
-                                     "sigma", "sigma_before")}  # fmt: skip
-    for shot, speed in enumerate(np.repeat(SPEEDS, REPEATS)):
-        errors = noise * speed * random.standard_normal(4)
-        for ball in range(3):
-            moving = ball == 0
-            row = (triplet, shot, ball + 1, triplet[ball], chain.masses[ball],
-                   speed + errors[3] if moving else 0.0, speed * after[ball] + errors[ball],
-                   noise * speed, noise * speed if moving else 0.0)  # fmt: skip
-            for name, value in zip(columns, row, strict=True):
-                columns[name].append(value)
-    return columns
+    speed = np.repeat(SPEEDS, REPEATS)[:, None]
+    shots, striking = len(speed), np.array([1, 0, 0])
+    errors = noise * speed * random.standard_normal((shots, 4))
+    columns = {
+        "set": np.full((shots, 3), triplet),
+        "shot": np.arange(shots)[:, None],
+        "ball": [1, 2, 3],
+        "type": list(triplet),
+        "mass": chain.masses,
+        "before": striking * (speed + errors[:, 3:]),
+        "after": speed * after + errors[:, :3],
+        "sigma": noise * speed,
+        "sigma_before": striking * noise * speed,
+    }
+    return {name: np.broadcast_to(x, (shots, 3)).ravel() for name, x in columns.items()}
 
 
 def wrong_minima(shots, chain, backward, bound, noise):
@@ -92,28 +91,29 @@ def study(triplet, noise):
     random = np.random.default_rng([letters, round(1e4 * noise)])
     after = outcomes(chain, [true], backward)[0]
     pairs = {"".join(key): e for key, e in zip(pair_keys(triplet), chain.restitution, strict=True)}
-    known = None if triplet == triplet[::-1] else {triplet[::-1]: backward}
-    covered, widths, errors, unknown, several, wrong = 0, [], [], 0, 0, np.zeros(3)
+    reverse = triplet[::-1]
+    tied = None if triplet == reverse else backward
+    found, errors, wrong = [], [], np.zeros(3, int)
     for _ in range(DATASETS):
         shots = read_shots(table(triplet, chain, after, noise, random))
         measured = {
             name: (float(np.clip(e + 0.5 * noise * random.standard_normal(), 0, 1)), 0.5 * noise)
             for name, e in pairs.items()
         }
-        found = ratio(shots, measured, known=known)[triplet]
-        covered += any(low - 1e-9 <= true <= high + 1e-9 for low, high in found.intervals)
-        widths.append(sum(high - low for low, high in found.intervals))
-        unknown += not found.identified
-        several += len(found.intervals) > 1
-        if found.value is not None:
-            errors.append(found.value - true)
+        known = None if tied is None else {reverse: backward}
+        found.append(ratio(shots, measured, known=known)[triplet])
+        if found[-1].value is not None:
+            errors.append(found[-1].value - true)
         if noise == NOISES[1]:
-            tied = backward if known else None
             wrong += wrong_minima(shots.sets[0], chain, tied, bound, noise)
-    counts = [f"{w:.0f}" if noise == NOISES[1] else "" for w in wrong]
-    return [triplet, noise, f"{true:.4f}", f"{bound:.4f}", DATASETS, covered,
-            f"{np.median(widths):.5f}", f"{np.mean(errors):.5f}" if errors else "", unknown,
-            several, *counts]  # fmt: skip
+    sets = [one.intervals for one in found]
+    covered = sum(any(low - 1e-9 <= true <= high + 1e-9 for low, high in one) for one in sets)
+    width = np.median([sum(high - low for low, high in one) for one in sets])
+    unknown, several = sum(not one.identified for one in found), sum(len(one) > 1 for one in sets)
+    bias = f"{np.mean(errors):.5f}" if errors else ""
+    counts = wrong if noise == NOISES[1] else [""] * 3
+    return [triplet, noise, f"{true:.4f}", f"{bound:.4f}", DATASETS, covered, f"{width:.5f}", bias,
+            unknown, several, *counts]  # fmt: skip
 
 
 def distances(unit):
@@ -131,39 +131,39 @@ def precision(triplet):
     chain, true, backward, bound = truth(triplet)
     tied = backward if triplet != triplet[::-1] else None
     ratios = np.union1d(bound * (1 - np.linspace(1, 0, GRID) ** 2), [true])
-    unit = outcomes(chain, ratios, tied)
-    seen = distances(unit)
-    at = int(np.searchsorted(ratios, true))
+    seen = distances(outcomes(chain, ratios, tied))
     # Where the distance is that of 20 shots with noise 1: the slope of outcomes per ratio.
     step = max(0.002, 0.01 * bound)
     ends = np.clip([true - step, true + step], 0, bound)
-    near = outcomes(chain, ends, tied)
-    sensitivity = float(np.sqrt(distances(near)[0, 1])) / float(ends[1] - ends[0])
-    excess = SHOTS / NOISES[1] ** 2 * seen[:, at]
-    others = [k for k in _minima(excess) if abs(ratios[k] - true) > 0.01]
-    second = min(others, key=lambda k: excess[k], default=None)
-    # True ratios for which the printed value is a minimum, but not the lowest.
-    traps, misfits = [], []
-    for j, other in enumerate(ratios):
-        for k in _minima(seen[:, j]):
-            if abs(other - true) > 0.02 and abs(ratios[k] - true) < 0.003:
-                traps.append(other)
-                misfits.append(np.sqrt(seen[k, j]))
-    acts = any(
-        (np.abs(outcomes(chain, ratios, b) - outcomes(chain, ratios, 0.0)) > 1e-9).any()
-        for b in (0.1, 0.25, 0.5)
-    )
+    off = distances(outcomes(chain, ends, tied))[0, 1]
+    sensitivity = float(np.sqrt(off)) / float(ends[1] - ends[0])
     error = NOISES[1] / (sensitivity * np.sqrt(10))
+    excess = SHOTS / NOISES[1] ** 2 * seen[:, int(np.searchsorted(ratios, true))]
+    others = [k for k in minima(excess) if abs(ratios[k] - true) > 0.01]
+    second = ["", ""]
+    if others:
+        k = min(others, key=lambda k: excess[k])
+        second = [f"{ratios[k]:.4f}", f"{excess[k]:.4g}"]
+    # True ratios for which the printed value is a minimum, but not the lowest.
+    traps = [
+        (other, np.sqrt(seen[k, j]))
+        for j, other in enumerate(ratios)
+        for k in minima(seen[:, j])
+        if abs(other - true) > 0.02 and abs(ratios[k] - true) < 0.003
+    ]
+    trap = ["", "", ""]
+    if traps:
+        others, misfits = zip(*traps)
+        trap = [f"{x:.4f}" for x in (min(others), max(others), min(misfits))]
+    none = outcomes(chain, ratios, 0.0)
+    acts = any(np.abs(outcomes(chain, ratios, b) - none).max() > 1e-9 for b in (0.1, 0.25, 0.5))
     return [triplet, f"{true:.4f}", f"{bound:.4f}", int(acts), f"{sensitivity:.4f}",
-            f"{0.0005 / 1.96 * sensitivity * np.sqrt(SHOTS):.3g}",
-            "" if second is None else f"{ratios[second]:.4f}",
-            "" if second is None else f"{excess[second]:.4g}",
-            *(f"{x:.4f}" if traps else ""
-              for x in (min(traps, default=0), max(traps, default=0), min(misfits, default=0))),
+            f"{0.0005 / 1.96 * sensitivity * np.sqrt(SHOTS):.3g}", *second, *trap,
             f"{(1.960 + 0.842) * np.sqrt(2) * error:.4f}"]  # fmt: skip
 
 
-def _minima(values):
+def minima(values):
+    """Return where the lowest of their neighbours are."""
     padded = np.concatenate([[np.inf], values, [np.inf]])
     return np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] < padded[2:]))
 

@@ -33,17 +33,6 @@ def no_record() -> Record:
     return Record([], [], [], [])
 
 
-def as_objects(state: Any, n: int) -> Any:
-    """The work area of compiled code as that of the plain loop."""
-    copy = drive._area(n, False, no_record())
-    pairs = [*zip(state[:4], copy[:4], strict=True), *zip(state.memory, copy.memory, strict=True)]
-    for records, things in [*pairs, (state.tally, copy.tally)]:
-        for record, thing in zip(records, things, strict=True):
-            for name in record.dtype.names:
-                setattr(thing, name, record[name].item())
-    return copy
-
-
 def solve(
     m, v, e, forward, backward=None, *, meeting=0.5, max_events=10**6, room=0, kernel=None,
     area=drive._area, **exchanged,
@@ -51,15 +40,10 @@ def solve(
     """Solve one impact by the plain event loop; return all that it leaves."""
     names = kernel or rooms(**exchanged)
     n = len(m)
-    chain = names["Inputs"](
-        *([float(x) for x in part] for part in (m, v)),
-        np.broadcast_to(np.asarray(e, float), n - 1).tolist(),
-        *(
-            np.broadcast_to(np.asarray(part, float), n - 2).tolist()
-            for part in (forward, forward if backward is None else backward)
-        ),
-    )
-    inputs = names["Inputs"](*([part] for part in chain))
+    ways = forward, forward if backward is None else backward
+    sizes = (m, n), (v, n), (e, n - 1), *((way, n - 2) for way in ways)
+    parts = (np.broadcast_to(np.asarray(x, float), size).tolist() for x, size in sizes)
+    inputs = names["Inputs"](*([part] for part in parts))
     record = Record(
         [0] * room, [0] * room, *([[0.0] * k for _ in range(room + 1)] for k in (n, n - 1))
     )

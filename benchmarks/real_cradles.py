@@ -17,13 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares, minimize_scalar
 from stored import read, write
 
-from cradle import (
-    Chain,
-    EnergyDistribution,
-    ImpulseCorrelation,
-    SequentialCollisions,
-    collide,
-)
+from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SequentialCollisions, collide
 
 READINGS = (1, 2, 3, 4)
 EQUAL = (1, 1, 1, 1, 1)
@@ -33,10 +27,8 @@ SLOWER = 0.766  # strikers of the second release over the one of the first, rela
 def table(name):
     """Return the columns of a file as arrays, empty fields as nan."""
     rows = read(name)
-    return {
-        key: np.array([float(r[key] or "nan") if key != "kind" else r[key] for r in rows])
-        for key in rows[0]
-    }
+    columns = {key: np.array([row[key] or "nan" for row in rows]) for key in rows[0]}
+    return {key: x if key == "kind" else x.astype(float) for key, x in columns.items()}
 
 
 def first_strikes(reading):
@@ -64,8 +56,7 @@ def spheres(speeds, gaps, loss, limit=400.0, masses=EQUAL):
         x, v = state[:n], state[n:]
         deep = np.maximum(x[:-1] - x[1:] - room, 0.0)
         push = deep**1.5 + loss * 1.5 * np.sqrt(deep) * (v[:-1] - v[1:])
-        push = np.maximum(push, 0.0)
-        return np.concatenate([v, (np.append(0, push) - np.append(push, 0)) / mass])
+        return np.concatenate([v, -np.diff(np.maximum(push, 0.0), prepend=0, append=0) / mass])
 
     state, time = np.concatenate([np.zeros(n), speeds]), 0.0
     while time < limit:
@@ -116,76 +107,54 @@ def by_spheres(p, release, apart=False, masses=EQUAL):
     return spheres(speeds, np.abs(gaps), abs(p[3]), masses=masses) / unit
 
 
-# Name: velocities from parameters, release and whether strikers are apart; starts; bounds; for
-# `OWN`, which number only the first release depends on if the strikers are apart.
 APART = 30.0  # Hertz units: far enough
 E, LOSS, THREE = (0.5, 1.0), (0.0, 0.1), list(itertools.product((0.04, 0.12), repeat=3))
+MASSES = [(0.95, 1.05)] * 4
+# Name: velocities from parameters, release and whether strikers are apart; starts; bounds.
 LAWS = {
     "pairs, e": (
         lambda p, r, a: by_law(lambda _: SequentialCollisions(), p[0], r, a),
-        [[0.98]],
-        [E],
-    ),
+        [[0.98]], [E]),
     "energy law (Hertz), e": (
         lambda p, r, a: by_law(lambda _: EnergyDistribution(1.0, 1.5), p[0], r, a),
-        [[0.98]],
-        [E],
-    ),
+        [[0.98]], [E]),
     "one ratio, e": (
         lambda p, r, a: ratios([p[0]] * 3, p[1], r, a),
-        [[0.05, 0.99], [0.12, 0.99], [0.3, 0.98]],
-        [(0, 0.5), E],
-    ),
+        [[0.05, 0.99], [0.12, 0.99], [0.3, 0.98]], [(0, 0.5), E]),
     "one ratio, e, four masses": (
         lambda p, r, a: ratios([p[0]] * 3, p[1], r, a, masses=[1, *p[2:]]),
-        [[s, 0.985, 1, 1, 1, 1] for s in (0.05, 0.1, 0.13)],
-        [(0, 0.45), E] + [(0.95, 1.05)] * 4,
-    ),
+        [[s, 0.985, 1, 1, 1, 1] for s in (0.05, 0.1, 0.13)], [(0, 0.45), E, *MASSES]),
     "three ratios, e": (
         lambda p, r, a: ratios(p[:3], p[3], r, a),
-        [[*s, 0.985] for s in THREE],
-        [(0, 0.5)] * 3 + [E],
-    ),
+        [[*s, 0.985] for s in THREE], [(0, 0.5)] * 3 + [E]),
     "three ratios, four e": (
         lambda p, r, a: ratios(p[:3], p[3:], r, a),
-        [[*s, *[0.985] * 4] for s in THREE],
-        [(0, 0.5)] * 3 + [E] * 4,
-    ),
+        [[*s, *[0.985] * 4] for s in THREE], [(0, 0.5)] * 3 + [E] * 4),
     "three ratios each way, e": (
         lambda p, r, a: ratios(p[:3], p[6], r, a, p[3:6]),
         [[*s, *t, 0.985] for s in THREE for t in ([0.1] * 3, [0.04, 0.12, 0.12])],
-        [(0, 0.5)] * 6 + [E],
-    ),
+        [(0, 0.5)] * 6 + [E]),
     "touching spheres, A": (
         lambda p, r, a: by_spheres([0, 0, 0, p[0], 0], r, a),
-        [[0.003], [0.02]],
-        [LOSS],
-    ),
+        [[0.003], [0.02]], [LOSS]),
     "touching spheres, A, four masses": (
         lambda p, r, a: by_spheres([0, 0, 0, p[0], 0], r, a, [1, *p[1:]]),
-        [[0.005, 1, 1, 1, 1]],
-        [LOSS] + [(0.95, 1.05)] * 4,
-    ),
+        [[0.005, 1, 1, 1, 1]], [LOSS, *MASSES]),
     "spheres, one gap, A": (
-        lambda p, r, a: by_spheres([*p[:1]] * 3 + [p[1], p[0]], r, a),
-        [[0.05, 0.005], [0.15, 0.005], [0.4, 0.005]],
-        [(0, 6), LOSS],
-    ),
+        lambda p, r, a: by_spheres([p[0]] * 3 + [p[1], p[0]], r, a),
+        [[0.05, 0.005], [0.15, 0.005], [0.4, 0.005]], [(0, 6), LOSS]),
     "spheres, three gaps, A": (
         by_spheres,
-        [[0.17, 0.03, 0.05, 0.007], [0.1, 0.05, 0.05, 0.007]],
-        [(0, 6)] * 3 + [LOSS],
-    ),
+        [[0.17, 0.03, 0.05, 0.007], [0.1, 0.05, 0.05, 0.007]], [(0, 6)] * 3 + [LOSS]),
     "spheres, four gaps, A": (  # the strikers' own
         lambda p, r, _: by_spheres(p, r),
         [[a, b, c, 0.007, g] for a, b, c in [(0.17, 0.03, 0.05), (0.1, 0.05, 0.05), (0.3,) * 3]
          for g in (1.0, 3.0)],
-        [(0, 6)] * 3 + [LOSS, (0, 6)],
-    ),
+        [(0, 6)] * 3 + [LOSS, (0, 6)]),
 }  # fmt: skip
 TOGETHER = [name for name in LAWS if name != "spheres, three gaps, A"]
-ONE_BY_ONE = [n for n in LAWS if n not in ("three ratios, four e", "three ratios each way, e",
-                                           "spheres, four gaps, A")]  # fmt: skip
+NOT_APART = ("three ratios, four e", "three ratios each way, e", "spheres, four gaps, A")
+ONE_BY_ONE = [name for name in LAWS if name not in NOT_APART]
 # The number that one release alone depends on: it is fitted to that release even where the others
 # were fitted to the other one.
 OWN = {
@@ -208,7 +177,8 @@ def misfits(velocities, data, releases):
 
 def chi_square(law, p, apart, data, releases):
     """Return the sum of squared residuals of a law at parameters p."""
-    return float((misfits(lambda r: LAWS[law][0](p, r, apart), data, releases) ** 2).sum())
+    off = misfits(lambda r: LAWS[law][0](p, r, apart), data, releases)
+    return float((off**2).sum())
 
 
 def fitted(law, apart, data, releases):
@@ -231,19 +201,15 @@ def fitted(law, apart, data, releases):
 def tuned(law, apart, p, index, data, release):
     """Return p with one number fitted to one release."""
 
-    def with_number(x):
-        q = np.array(p)
-        q[index] = x
-        return q
-
     def misfit(x):
-        return chi_square(law, with_number(x), apart, data, (release,))
+        return chi_square(law, [*p[:index], x, *p[index + 1 :]], apart, data, (release,))
 
     low, high = LAWS[law][2][index]
     grid = low + (high - low) * np.linspace(0, 1, 61) ** 2
     best = min(range(61), key=lambda i: misfit(grid[i]))
     around = grid[max(best - 1, 0)], grid[min(best + 1, 60)]
-    return with_number(minimize_scalar(misfit, bounds=around, method="bounded").x)
+    x = minimize_scalar(misfit, bounds=around, method="bounded").x
+    return [*p[:index], x, *p[index + 1 :]]
 
 
 def fits_of(reading, law, apart):

@@ -66,8 +66,7 @@ def common():
 def peaks():
     """Return ball (0 or 4), time, place and their uncertainties of every turning point."""
     t = table("cradle_peaks.csv")
-    use = t["ball"] * 0 == 0
-    use &= np.array([not kind.startswith("release") for kind in t["kind"]])
+    use = np.array([not kind.startswith("release") for kind in t["kind"]])
     return [t["ball"][use].astype(int) - 1, *(t[k][use] for k in ("t_s", "x_m", "u_t", "u_x"))]
 
 

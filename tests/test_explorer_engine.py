@@ -76,8 +76,7 @@ def generic(draw, n):
         velocities.sort(reverse=True)
     forward, backward = ([part() for _ in range(n - 2)] for _ in range(2))
     if draw.chance(50):
-        forward = within_bounds(masses, forward)
-        backward = within_bounds(masses[::-1], backward)[::-1]
+        forward, backward = within_bounds(masses, iter(forward + backward).__next__)
     restitution = [part() for _ in range(n - 1)]
     return Problem(masses, velocities, restitution, forward, backward, draw.choice([0.0, 0.5, 1.0]))
 

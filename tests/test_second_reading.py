@@ -59,7 +59,7 @@ def generic(count, seed):
             [draw.source.random() for _ in range(k)] for k in (n, n, n - 1, n - 2, n - 2)
         )
         m, e = [0.2 + 3 * x for x in m], [0.5 + x / 2 for x in e]
-        ways = within_bounds(m, forward), within_bounds(m[::-1], backward)[::-1]
+        ways = within_bounds(m, iter(forward + backward).__next__)
         yield Problem(m, v, e, *ways, draw.source.random())
 
 
