@@ -1,10 +1,6 @@
 """A minute of Newton's cradle: in engines as they are, with the mend, by `swing`, on Hertz springs.
 
-Usage::
-
-    python benchmarks/cradle_scenes.py           # some minutes; writes data/scene_*.csv
-    python benchmarks/cradle_scenes.py costs     # one part of it
-
+Writes `data/scene_*.csv` in some minutes, all or those that are named: `scene_costs` and so on.
 Five balls of radius .1 m hang on strings of 1 m, so that they touch or with gaps of a hundredth of
 a diameter; one or two are pulled back by 30 degrees.  The scenes are those of `examples/`.  Hertz
 springs are integrated here, independently of the package, and judge the others.  Every cost stands
@@ -24,7 +20,7 @@ import measure
 import numba
 import numpy as np
 from measure import absent, quotient, versions
-from stored import DATA, options, text, write
+from stored import DATA, make
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
 from cradle.runtime.job import warm_up
@@ -50,6 +46,10 @@ SPRINGS = {
 }
 MODELS = {"ratio": ImpulseCorrelation(RATIO), "springs": SpringChain(1.0)}
 ENERGIES = [f"ball{i}" for i in range(1, BALLS + 1)]
+COSTS = [
+    *("run", "how", "setting", "pulled"),
+    *("seconds", "over_swing", "over_as_it_is", "repeats", "version"),
+]
 
 
 class Engine(NamedTuple):
@@ -232,26 +232,29 @@ def strokes(angles, rates):
     return found[: wild[0] + 1] if wild.size else found
 
 
-def strokes_and_film(engines):
-    """Run all scenes: what every ball has after each stroke, and how some of them look."""
-    table, film = [], []
-    for name, how, setting, gap, pulled, (times, angles, rates) in runs(engines):
-        found = strokes(angles, rates)
-        row = name, how, setting, f"{gap:g}", pulled
-        table += [(*row, k, *(f"{e:.4f}" for e in each)) for k, each in enumerate(found, start=1)]
+@functools.cache
+def runs():
+    """Return all runs: who moves the balls and how, gap, balls pulled back, and the run."""
+    return list(each_run(present()))
+
+
+def all_strokes():
+    """Yield what every ball has after each stroke."""
+    for name, how, setting, gap, pulled, (_, angles, rates) in runs():
+        for k, each in enumerate(strokes(angles, rates), start=1):
+            yield name, how, setting, f"{gap:g}", pulled, k, *(f"{e:.4f}" for e in each)
+
+
+def film():
+    """Yield how some of them look, thirty times a second."""
+    for name, how, setting, gap, pulled, (times, angles, _) in runs():
         if pulled == 1 and not gap and setting in FILMED:
-            film += [
-                (name, how, f"{t:.4f}", *(f"{a:.1f}" for a in each))
-                for t, each in zip(times, np.degrees(angles), strict=True)
-            ][: FILM * FRAMES + 1 : 2]
-        print(*row, f"{len(found)} strokes, kept {found[-1].sum():.4f}", flush=True)
-    return {
-        "strokes": (("run", "how", "setting", "gap", "pulled", "stroke", *ENERGIES), table),
-        "film": (("run", "how", "time", *ENERGIES), film),
-    }
+            frames = list(zip(times, np.degrees(angles), strict=True))[: FILM * FRAMES + 1 : 2]
+            for t, each in frames:
+                yield name, how, f"{t:.4f}", *(f"{a:.1f}" for a in each)
 
 
-def runs(engines):
+def each_run(engines):
     """Yield who moves the balls and how, gap, how many balls were pulled back, and the run."""
     for pulled in (1, 2):
         for setting, given in SPRINGS.items():
@@ -269,15 +272,13 @@ def runs(engines):
         yield engine.name, "no impacts", setting, 0.0, BALLS, run
 
 
-def first_strokes_with_gaps(engines):
-    """Run engines as they are, with gaps, to the end of the first stroke."""
-    table = []
-    for case in itertools.product(engines, ("default", "refined"), GAPS, (1, 2)):
+def first_strokes_with_gaps():
+    """Yield energies after the first stroke of engines as they are, with gaps."""
+    for case in itertools.product(present(), ("default", "refined"), GAPS, (1, 2)):
         engine, setting, gap, pulled = case
         _, angles, rates = in_engine(engine, setting, pulled, mend=False, gap=gap, duration=1.3)
         first = strokes(angles, rates)[0]
-        table.append((engine.name, setting, f"{gap:g}", pulled, *(f"{e:.4f}" for e in first)))
-    return {"gaps": (("run", "setting", "gap", "pulled", *ENERGIES), table)}
+        yield engine.name, setting, f"{gap:g}", pulled, *(f"{e:.4f}" for e in first)
 
 
 def costs(engines, repeats=5, seconds=5.0):
@@ -303,17 +304,9 @@ def costs(engines, repeats=5, seconds=5.0):
             for how, way in ways.items():
                 taken[how].append(way())
         for how, times in taken.items():
-            yield {
-                "run": name,
-                "how": how,
-                "setting": setting,
-                "pulled": pulled,
-                "seconds": statistics.median(times),
-                "over_swing": quotient(times, reference),
-                "over_as_it_is": quotient(times, next(iter(taken.values()))),
-                "repeats": repeats,
-                "version": versions(package),
-            }
+            over = quotient(times, reference), quotient(times, next(iter(taken.values())))
+            row = name, how, setting, pulled, statistics.median(times), *over, repeats
+            yield dict(zip(COSTS, (*row, versions(package)), strict=True))
 
 
 def cpu(function):
@@ -330,29 +323,21 @@ def _cost(engine, setting, pulled, mend, seconds):
     return taken / (count * step)
 
 
-def table_of_costs(engines):
-    """Measure all costs."""
-    rows = list(costs(engines))
-    return {"costs": (rows[0].keys(), [map(text, row.values()) for row in rows])}
-
-
-PARTS = {"gaps": first_strokes_with_gaps, "strokes": strokes_and_film, "costs": table_of_costs}
-
-
-def main(arguments=None):
-    """Run all and write four tables."""
-    parser = options(__doc__)
-    parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}: all if none is named")
-    given = parser.parse_args(arguments)
+def present():
+    """Return the engines that are here."""
     missing = absent(ENGINES)
-    for reason in missing.values():
-        print("skipped:", reason)
-    warm_up()
-    for part in given.parts or PARTS:
-        found = PARTS[part]([engine for engine in ENGINES if engine.name not in missing])
-        for name, (columns, rows) in found.items():
-            write(f"scene_{name}.csv", columns, rows, given.output)
+    return [engine for engine in ENGINES if engine.name not in missing]
 
+
+TABLES = {
+    "scene_gaps": (("run", "setting", "gap", "pulled", *ENERGIES), first_strokes_with_gaps),
+    "scene_strokes": (("run", "how", "setting", "gap", "pulled", "stroke", *ENERGIES), all_strokes),
+    "scene_film": (("run", "how", "time", *ENERGIES), film),
+    "scene_costs": (COSTS, lambda: (row.values() for row in costs(present()))),
+}
 
 if __name__ == "__main__":
-    main()
+    for reason in absent(ENGINES).values():
+        print("skipped:", reason)
+    warm_up()
+    make(__doc__, TABLES)

@@ -1,12 +1,7 @@
 """Maps of the chapter on extremes: errors, edges, long and infinite sequences.
 
-Usage::
-
-    python benchmarks/extremes.py                 # all parts, about half an hour
-    python benchmarks/extremes.py map edges       # some of them
-
-Every part writes one small file `data/extremes_<part>.csv`.  The measuring functions are those of
-`benchmarks/extreme_chains.py`, and the tests compute a sample of the rows anew.
+Writes `data/extremes_*.csv` in half an hour, all or those that are named: `extremes_map` and so on.
+The measuring functions are in `extreme_chains.py`; the tests compute a sample of the rows anew.
 """
 
 import math
@@ -19,7 +14,7 @@ import extreme_chains as x
 import mpmath
 import numpy as np
 from chains import power_of_ten
-from stored import options, text, write
+from stored import make
 
 from cradle import outcomes, paper_chain
 from cradle.models.correlation import MAX_EVENTS
@@ -140,31 +135,27 @@ def finish():
                 yield (family, decades, n, *table[n].tolist())
 
 
-#: Name: rows, columns.
-PARTS = {
-    "map": (the_map, "shape power restitution ratio error condition own events compared faulty"
-                     " unfinished"),
-    "growth": (growth, "spread restitution size balls median largest leading"),
-    "unequal": (unequal, "family balls ratio least median largest jumps unfinished"),
-    "edges": (edges, "sequence input index side distance jump"),
-    "jumps": (jumps, "sequence input index change jump"),
-    "elastic": (elastic, "power ratio impacts theory error condition own gain collapsed"),
-    "finish": (finish, "family decades balls chains collapsed above_100 above_1000 above_10000"
-                       " unfinished left open_1e-6 open_1e-3 open_0.1 open_1"),
-    "limits": (limits, "restitution ratio edge theory half below above double"),
-}  # fmt: skip
-
-
-def main():
-    """Write the parts that were named, or all."""
-    parser = options(__doc__)
-    parser.add_argument("parts", nargs="*", default=list(PARTS), choices=[*PARTS, []])
-    given = parser.parse_args()
-    for part in given.parts or PARTS:
-        rows, header = PARTS[part]
-        lines = (map(text, row) for row in rows())
-        write(f"extremes_{part}.csv", header.split(), lines, given.output)
-
+#: Columns, rows.
+TABLES = {
+    "extremes_map": (
+        "shape power restitution ratio error condition own events compared faulty unfinished",
+        the_map,
+    ),
+    "extremes_growth": ("spread restitution size balls median largest leading", growth),
+    "extremes_unequal": ("family balls ratio least median largest jumps unfinished", unequal),
+    "extremes_edges": ("sequence input index side distance jump", edges),
+    "extremes_jumps": ("sequence input index change jump", jumps),
+    "extremes_elastic": (
+        "power ratio impacts theory error condition own gain collapsed",
+        elastic,
+    ),
+    "extremes_finish": (
+        "family decades balls chains collapsed above_100 above_1000 above_10000 unfinished left "
+        "open_1e-6 open_1e-3 open_0.1 open_1",
+        finish,
+    ),
+    "extremes_limits": ("restitution ratio edge theory half below above double", limits),
+}
 
 if __name__ == "__main__":
-    main()
+    make(__doc__, {name: (words.split(), rows) for name, (words, rows) in TABLES.items()})

@@ -1,10 +1,6 @@
 """A synthetic experiment with hanging balls, as a phone would film it: files for the example.
 
-Usage::
-
-    python benchmarks/fit_example.py            # writes data/video_synthetic.txt and
-                                                # data/shots_synthetic.csv, seconds
-
+Writes `data/video_synthetic.txt` and `data/shots_synthetic.csv` in seconds.
 Nothing here was measured.  Balls of the paper's types swing on pendulums; before and after the
 impact they follow the pendulum's own equation of motion, step by step, and the impact is solved
 with the values of Tables 1 and 2.  A phone takes 240 frames a second; each mark is off by a random

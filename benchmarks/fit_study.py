@@ -1,10 +1,6 @@
 """How well can a ratio be fitted?  Synthetic shots of all 64 triplets; tables as CSV.
 
-Usage::
-
-    python benchmarks/fit_study.py              # writes data/fit_study.csv and
-                                                # data/fit_precision.csv, minutes
-
+Writes `data/fit_precision.csv` and `data/fit_study.csv` in ten minutes.
 Nothing here was measured.  The true values are those of Tables 1 and 2 (three ratios above their
 bound are taken at it); the balls have the paper's masses, the first strikes at .5, 1, 1.5 and
 2 m/s, and every velocity is off by a random amount, `noise` times the striker's speed.
@@ -12,7 +8,7 @@ bound are taken at it); the balls have the paper's masses, the first strikes at 
 
 import numpy as np
 from scipy.optimize import least_squares, minimize_scalar
-from stored import options, write
+from stored import make
 
 from cradle import paper_chain, post_impact_velocities, ratio_table
 from cradle.fit import ratio, read_shots
@@ -168,14 +164,11 @@ def minima(values):
     return np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] < padded[2:]))
 
 
-def main(arguments=None):
-    """Write the tables."""
-    folder = options(__doc__).parse_args(arguments).output
-    triplets = list(ratio_table().triplet)
-    write("fit_precision.csv", PRECISION, map(precision, triplets), folder)
-    rows = (study(triplet, noise) for noise in NOISES for triplet in triplets)
-    write("fit_study.csv", STUDY, rows, folder)
-
-
 if __name__ == "__main__":
-    main()
+    names = list(ratio_table().triplet)
+    studies = (study(triplet, noise) for noise in NOISES for triplet in names)
+    tables = {
+        "fit_precision": (PRECISION, lambda: map(precision, names)),
+        "fit_study": (STUDY, lambda: studies),
+    }
+    make(__doc__, tables)

@@ -1,9 +1,6 @@
 """Gaps and leans: what a row of spheres does when its balls do not just touch.
 
-Usage::
-
-    python benchmarks/gaps.py            # writes data/gaps_five.csv and data/gaps_triplets.csv
-
+Writes `data/gaps_five.csv` and `data/gaps_triplets.csv` in two minutes.
 Spheres push with F = k s^1.5.  The state s of a contact changes with its closing speed u as
 ds = u dt, and while it gives back as ds = u dt / e^2: the energy law of Liu, Zhao and Brogliato, in
 time.  A gap starts at s = -gap, a lean at s > 0, balanced by constant forces, as inclined strings
@@ -15,7 +12,7 @@ row, and v the striker's speed.
 import numpy as np
 from chains import runge_kutta
 from scipy.optimize import least_squares
-from stored import options, write
+from stored import make
 
 from cradle import (
     Chain,
@@ -89,9 +86,10 @@ def strike(masses, velocities, restitution, gaps, stiffness=1.0, step=0.02, long
 
 
 def five():
-    """Return rows of gap and velocities: five equal elastic balls, the first striking."""
+    """Yield gap and velocities: five equal elastic balls, the first striking."""
     gaps = np.outer(GAPS, [0.0, 1.0, 1.0, 1.0])
-    return [[g, *v] for g, v in zip(GAPS, strike([1] * 5, np.eye(5)[0], 1.0, gaps), strict=True)]
+    after = strike([1] * 5, np.eye(5)[0], 1.0, gaps)
+    return (map(written, row) for row in np.column_stack([GAPS, after]))
 
 
 def of_triplets(names):
@@ -134,7 +132,7 @@ def by_pair(names, masses, e, listed):
 
 
 def triplets():
-    """Return columns: how far each law is from the outcome that Table 2 encodes."""
+    """Yield columns, then rows: how far each law is from the outcome that Table 2 encodes."""
     names = list(ratio_table()["triplet"])
     masses, e, listed = of_triplets(names)
     columns = {"triplet": names}
@@ -167,23 +165,16 @@ def triplets():
     own = shared(errors, names)
     columns["own_quotient"], columns["with_own_quotient"] = QUOTIENTS[own], errors[every, own]
     columns["stiffness_of_pair"] = off(by_pair(names, masses, e, listed), listed)
-    return columns
+    return zip(*([name, *map(written, column)] for name, column in columns.items()), strict=True)
 
 
-def written(line):
-    """Return numbers to four decimals, or four digits."""
-    return [x if isinstance(x, str) else f"{round(x, 4) + 0.0:.4f}" if abs(x) < 100 else f"{x:g}"
-            for x in line]  # fmt: skip
-
-
-def main(arguments=None):
-    """Write both files."""
-    folder = options(__doc__).parse_args(arguments).output
-    write("gaps_five.csv", ["gap", *(f"v{k}" for k in range(1, 6))], map(written, five()), folder)
-    columns = triplets()
-    rows = map(written, zip(*columns.values(), strict=True))
-    write("gaps_triplets.csv", list(columns), rows, folder)
+def written(x):
+    """Return a number to four decimals, or four digits."""
+    if isinstance(x, str):
+        return x
+    return f"{round(x, 4) + 0.0:.4f}" if abs(x) < 100 else f"{x:g}"
 
 
 if __name__ == "__main__":
-    main()
+    columns = ["gap", *(f"v{k}" for k in range(1, 6))]
+    make(__doc__, {"gaps_five": (columns, five), "gaps_triplets": (None, triplets)})

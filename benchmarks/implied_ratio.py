@@ -1,9 +1,6 @@
 """The ratio that springs imply: three elastic balls at rest, the first struck; a map as a CSV.
 
-Usage::
-
-    python benchmarks/implied_ratio.py            # writes data/implied_ratio.csv, minutes
-
+Writes `data/implied_ratio.csv` in minutes.
 For each row a spring chain (m1 = 1, ball 1 at speed 1, the others at rest) is integrated, and the
 constant ratio with the same outcome is looked for between 0 and its bound (Eq. 34).  Where there is
 none, the ratio is empty and the note has the one that comes nearest.  Near the bound v2 and v3 vary
@@ -13,7 +10,7 @@ like the square root of what is left to it, so all digits of the ratio count.
 import itertools
 
 import numpy as np
-from stored import options, write
+from stored import make
 
 from cradle import Chain, SpringChain, collide
 from cradle.measures import effective_ratio
@@ -47,12 +44,6 @@ def row(exponent, m2_over_m1, m3_over_m2, k2_over_k1):
     return [*(f"{x:.9g}" for x in numbers), *velocities, f"{bound:.9f}", ratio, note]
 
 
-def main(arguments=None):
-    """Write the map."""
-    folder = options(__doc__).parse_args(arguments).output
-    cases = itertools.product(EXPONENTS, MASS_RATIOS, MASS_RATIOS, STIFFNESS_RATIOS)
-    write("implied_ratio.csv", COLUMNS, (row(*case) for case in cases), folder)
-
-
 if __name__ == "__main__":
-    main()
+    cases = itertools.product(EXPONENTS, MASS_RATIOS, MASS_RATIOS, STIFFNESS_RATIOS)
+    make(__doc__, {"implied_ratio": (COLUMNS, lambda: itertools.starmap(row, cases))})

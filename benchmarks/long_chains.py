@@ -1,9 +1,6 @@
 """Long chains and large maps: work, speed, and what can be trusted, as a CSV.
 
-Usage::
-
-    python benchmarks/long_chains.py            # three minutes; writes data/long_chains.csv
-
+Writes `data/long_chains.csv` in three minutes.
 All balls are equal and touch, and the first one strikes the others at speed 1.  Times are
 processor times, and each is divided by the time of one impact of three equal balls on Hertz
 springs, integrated beside it, so that a busy machine slows down both.  Seconds are these ratios
@@ -17,7 +14,7 @@ from itertools import product
 
 import numpy as np
 from measure import quotient, seconds
-from stored import options, text, write
+from stored import make
 
 from cradle import Chain, SpringChain, collide, outcomes
 
@@ -62,7 +59,7 @@ def cost(function, repeats):
     calls = max(1, round(0.02 / max(cpu(function), 1e-6)))
     pairs = [(cpu(function, calls), cpu(three_on_springs, 3)) for _ in range(repeats)]
     return {
-        "units": [unit for _, unit in pairs],  # for `main`
+        "units": [unit for _, unit in pairs],  # for `rows`
         "time_ratio": quotient(*zip(*pairs, strict=True)),
         "repeats": repeats,
     }
@@ -155,7 +152,7 @@ def springs(exponent, balls):
     return given | leaving(found.velocities)
 
 
-def rows():
+def all_rows():
     """Yield all rows, without seconds."""
     yield large_map(MAP_SIDE, 9)
     for ratio, balls in product(ELASTIC_RATIOS, ELASTIC_BALLS):
@@ -168,17 +165,15 @@ def rows():
             yield springs(exponent, balls)
 
 
-def main(arguments=None):
-    """Write the table."""
-    folder = options(__doc__).parse_args(arguments).output
-    found = list(rows())
+def rows():
+    """Return all rows, their seconds by the median of all units."""
+    found = list(all_rows())
     timed = [row for row in found if "units" in row]
     unit = statistics.median(one for row in timed for one in row.pop("units"))
     for row in timed:
         row["cpu_seconds"] = row["time_ratio"] * unit
-    lines = ([text(row.get(name, ""), 10) for name in COLUMNS] for row in found)
-    write("long_chains.csv", COLUMNS, lines, folder)
+    return ([row.get(name, "") for name in COLUMNS] for row in found)
 
 
 if __name__ == "__main__":
-    main()
+    make(__doc__, {"long_chains": (COLUMNS, rows)}, digits=10)

@@ -1,9 +1,6 @@
 """The first strikes of a filmed cradle against the models.
 
-Usage::
-
-    python benchmarks/real_cradles.py            # some minutes; writes data/film_fits.csv
-
+Writes `data/film_fits.csv` in some minutes.
 Velocities relative to the row, over the striker's, the striking side first.  Lengths in
 Hertz units of the first release, (m v^2 / k)^(2/5); v its striker's speed.  The striker's speed was
 read in part from the sum of momentum: of the five numbers of a release one may not be free, so the
@@ -15,7 +12,7 @@ import itertools
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares, minimize_scalar
-from stored import read, write
+from stored import make, read
 
 from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SequentialCollisions, collide
 
@@ -229,17 +226,13 @@ def fits_of(reading, law, apart):
     return rows
 
 
-def main():
-    """Fit every law to readings 4 and 2."""
-    rows = [
-        row
-        for reading in (4, 2)
-        for apart, laws in ((False, TOGETHER), (True, ONE_BY_ONE))
-        for law in laws
-        for row in fits_of(reading, law, apart)
-    ]
-    write("film_fits.csv", COLUMNS, rows)
+def rows():
+    """Yield fits of every law to readings 4 and 2."""
+    for reading in (4, 2):
+        for apart, laws in ((False, TOGETHER), (True, ONE_BY_ONE)):
+            for law in laws:
+                yield from fits_of(reading, law, apart)
 
 
 if __name__ == "__main__":
-    main()
+    make(__doc__, {"film_fits": (COLUMNS, rows)})

@@ -1,9 +1,6 @@
 """Fit half a minute of a real cradle: its period and damping, then one gap and one law of loss.
 
-Usage::
-
-    python benchmarks/real_swing.py            # some minutes; writes data/cradle_fits.csv
-
+Writes `data/cradle_fits.csv` in some minutes.
 The mean of the five balls gives period and damping: no impact changes it.  Restitution or loss,
 the gap and the release of ball 1 are fitted to the turning points of the outer balls, places and
 times; where each of the two hangs at rest is subtracted.  Small angles: gaps are not computed with
@@ -15,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from real_cradles import table
 from scipy.optimize import least_squares
-from stored import write
+from stored import make
 
 from cradle import Chain, Pendulums, SequentialCollisions, swing
 
@@ -117,9 +114,9 @@ def fitted(law, start, steps, swing_of_mean, found):
     return p
 
 
-def main():
-    """Fit each law from several starts; write the best of each."""
-    mean, found, rows = common(), peaks(), []
+def rows():
+    """Yield the best fit of each law from several starts."""
+    mean, found = common(), peaks()
     print("mean of five:", mean)
     for law, (starts, steps) in STARTS.items():
         best = None
@@ -128,9 +125,8 @@ def main():
             chi = (misfits(swung(law, p, *mean[1:3]), p[3], found) ** 2).sum(axis=1)
             print(law, p, chi, flush=True)
             best = (chi, p) if best is None or chi.sum() < best[0].sum() else best
-        rows.append([law, *(f"{x:.6g}" for x in best[1]), *(f"{x:.4g}" for x in best[0])])
-    write("cradle_fits.csv", COLUMNS, rows)
+        yield [law, *(f"{x:.6g}" for x in best[1]), *(f"{x:.4g}" for x in best[0])]
 
 
 if __name__ == "__main__":
-    main()
+    make(__doc__, {"cradle_fits": (COLUMNS, rows)})

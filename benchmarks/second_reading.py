@@ -32,10 +32,8 @@ def stretches(contacts):
     """Runs of neighbouring contacts, as tuples."""
     found = []
     for c in sorted(contacts):
-        if found and found[-1][-1] == c - 1:
-            found[-1] += (c,)
-        else:
-            found.append((c,))
+        beside = found.pop() if found and found[-1][-1] == c - 1 else ()
+        found.append((*beside, c))
     return found
 
 

@@ -38,3 +38,17 @@ def write(name, columns, rows, folder=DATA, comment=""):
             writer.writerow(row)
             file.flush()
     print(f"{name}: {count} rows", flush=True)
+
+
+def make(document, tables, digits=4):
+    """Write tables, all or those that are named: {name: (columns, function that gives rows)}.
+
+    Where columns are None the first row has them.
+    """
+    parser = options(document)
+    parser.add_argument("tables", nargs="*", help=f"of {', '.join(tables)}; all if none is named")
+    given = parser.parse_args()
+    for name in given.tables or tables:
+        columns, rows = tables[name]
+        lines = ([text(value, digits) for value in row] for row in rows())
+        write(f"{name}.csv", columns or next(lines), lines, given.output)

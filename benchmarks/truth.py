@@ -139,19 +139,10 @@ def check_ratios(masses, forward, backward, slack):
 
 
 def solve(
-    masses,
-    velocities,
-    restitution,
-    forward,
-    backward=None,
-    *,
-    excess="raise",
-    number=as_meant,
-    max_events=1_000_000,
-    collapse_below=None,
-    impact=Impact,
+    masses, velocities, restitution, forward, backward=None, *,
+    excess="raise", number=as_meant, max_events=1_000_000, collapse_below=None, impact=Impact,
     **options,
-):
+):  # fmt: skip
     """Post-impact state by rules R1 to R9, with the digits of `number`.
 
     A float means what it prints as (`meaning`), a string such as "0.1" that decimal number.
