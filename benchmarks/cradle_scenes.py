@@ -19,7 +19,7 @@ from typing import NamedTuple
 import measure
 import numba
 import numpy as np
-from measure import absent, quotient, versions
+from measure import absent, present, quotient, versions
 from stored import DATA, make
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
@@ -235,7 +235,7 @@ def strokes(angles, rates):
 @functools.cache
 def runs():
     """Return all runs: who moves the balls and how, gap, balls pulled back, and the run."""
-    return list(each_run(present()))
+    return list(each_run(present(ENGINES)))
 
 
 def all_strokes():
@@ -274,7 +274,7 @@ def each_run(engines):
 
 def first_strokes_with_gaps():
     """Yield energies after the first stroke of engines as they are, with gaps."""
-    for case in itertools.product(present(), ("default", "refined"), GAPS, (1, 2)):
+    for case in itertools.product(present(ENGINES), ("default", "refined"), GAPS, (1, 2)):
         engine, setting, gap, pulled = case
         _, angles, rates = in_engine(engine, setting, pulled, mend=False, gap=gap, duration=1.3)
         first = strokes(angles, rates)[0]
@@ -323,17 +323,11 @@ def _cost(engine, setting, pulled, mend, seconds):
     return taken / (count * step)
 
 
-def present():
-    """Return the engines that are here."""
-    missing = absent(ENGINES)
-    return [engine for engine in ENGINES if engine.name not in missing]
-
-
 TABLES = {
     "scene_gaps": (("run", "setting", "gap", "pulled", *ENERGIES), first_strokes_with_gaps),
     "scene_strokes": (("run", "how", "setting", "gap", "pulled", "stroke", *ENERGIES), all_strokes),
     "scene_film": (("run", "how", "time", *ENERGIES), film),
-    "scene_costs": (COSTS, lambda: (row.values() for row in costs(present()))),
+    "scene_costs": (COSTS, lambda: (row.values() for row in costs(present(ENGINES)))),
 }
 
 if __name__ == "__main__":

@@ -100,11 +100,9 @@ def off(problem, one, other):
 
 
 class Verdict(NamedTuple):
-    """What was found out about a chain."""
+    """What was found out about a chain: one of `WORDS`, and its distance from the truth."""
 
-    #: One of `WORDS`.
     word: str
-    #: Distance from the truth.
     off: float = 0.0
 
 
@@ -191,7 +189,6 @@ def seen_otherwise(problem):
 
 
 # --- wrong chains, shrunk ----------------------------------------------------------------------
-
 
 #: What stands first is simplest.
 SIMPLER = {

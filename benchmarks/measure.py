@@ -43,6 +43,12 @@ def absent(engines):
     }
 
 
+def present(engines):
+    """Return the engines that are installed."""
+    missing = absent(engines)
+    return [engine for engine in engines if engine.name not in missing]
+
+
 def distance(velocities, reference):
     """Return the largest difference of two outcomes."""
     return float(np.max(np.abs(np.asarray(velocities, float) - np.asarray(reference, float))))
