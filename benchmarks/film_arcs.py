@@ -39,21 +39,24 @@ def arc(rows, ball, at, slope=0.06):
         return None
     t, x, y = rows[:, 0] - at, rows[:, 3] - REST[ball], rows[:, 4] - PIVOT[ball]
     sigma = 0.25 + slope * rows[:, 5]  # a fast ball is a smear
-    basis, start = np.column_stack([np.cos(RATE * t), np.sin(RATE * t) / RATE]), None
-    for a, b in zip(*np.triu_indices(len(t), 1)):  # the pair that most others agree with
-        if abs(np.linalg.det(basis[[a, b]])) > 0.3:
-            p = np.linalg.solve(basis[[a, b]], x[[a, b]] / LENGTH)
-            cost = np.minimum(np.abs(LENGTH * basis @ p - x), 6).sum()
-            start = (cost, p) if start is None or cost < start[0] else start
-    if start is None:
+    basis = np.column_stack([np.cos(RATE * t), np.sin(RATE * t) / RATE])
+    pairs = [[a, b] for a, b in zip(*np.triu_indices(len(t), 1))]
+    starts = [
+        np.linalg.solve(basis[pair], x[pair] / LENGTH)
+        for pair in pairs
+        if abs(np.linalg.det(basis[pair])) > 0.3
+    ]
+    if not starts:
         return None
+    # The pair that most others agree with.
+    start = min(starts, key=lambda p: np.minimum(np.abs(LENGTH * basis @ p - x), 6).sum())
 
     def residual(p):
         angle = pendulum(p, t)[0]
         across, down = LENGTH * np.sin(angle) - x, LENGTH * np.cos(angle) - y
         return np.concatenate([across / sigma, down / (3 * sigma)])
 
-    fit = least_squares(residual, start[1], x_scale=[0.01, 0.01], loss="soft_l1")
+    fit = least_squares(residual, start, x_scale=[0.01, 0.01], loss="soft_l1")
     off = np.abs(residual(fit.x)[: len(t)])
     if 2 <= (off < 4).sum() < len(t):
         return arc(rows[off < 4], ball, at, slope)
@@ -75,9 +78,9 @@ def strikes(table, release, times, window=12.5, slope=0.06, late=0.0):
         then = times[s + 1] if s + 1 < len(times) else np.inf
         for k in range(5):
             sides = ((max(at - window, last), at), (at, min(at + window, then)))
-            for side, (after, before) in enumerate(sides):
-                seen = 0.35 if s == 0 and side == 0 else 0.6
-                fit = arc(chosen(table, release, k, after, before, seen), k, at, slope)
+            for side, between in enumerate(sides):
+                seen = 0.35 if s == side == 0 else 0.6
+                fit = arc(chosen(table, release, k, *between, seen), k, at, slope)
                 if fit is not None:
                     out[s, k, side] = *fit[0], fit[1][1]
     return out

@@ -1,10 +1,7 @@
 """Read the velocities of a filmed Newton's cradle: every ball before and after every strike.
 
-Usage, in an environment with OpenCV (not a dependency of the package)::
-
-    python benchmarks/film_reading.py newtons_cradle.mp4 --output .     # minutes; film_reading.csv
-
-The film is not stored here; `data/README.md` says where it was found.  Steps: drift of the camera
+`python benchmarks/film_reading.py newtons_cradle.mp4` writes `film_reading.csv` in minutes, where
+OpenCV is installed.  `data/README.md` says where the film was found.  Steps: drift of the camera
 off (phase correlation of the frame's posts and base); where a ball may be (normalised correlation
 with a resting ball, sharp and blurred; five balls in their order); each ball drawn over the empty
 background, blurred along its path, and shifted until the picture fits (Gauss-Newton, Huber
@@ -26,10 +23,8 @@ X0, X1, Y0, Y1 = 330, 1120, 400, 600  # the strip where balls move
 POSTS = ((428, 487), (921, 975))  # hide balls
 REFERENCE, HALF = 60, 48
 FIXED = ((35, 600, 400, 520), (30, 180, 890, 985), (540, 615, 380, 860))
-COLUMNS = [
-    *("release", "strike", "ball", "striker", "speed"),
-    *("before", "sigma_before", "after", "sigma_after"),
-]
+COLUMNS = ["release", "strike", "ball", "striker", "speed"]
+COLUMNS += ["before", "sigma_before", "after", "sigma_after"]
 
 film = {}  # frames, drift, background, template: shared with the workers by fork
 
@@ -40,29 +35,27 @@ def read(path):
     while (got := capture.read())[0]:
         frames.append(got[1])
     film["frames"] = frames = np.array(frames)
-    film["drift"] = drift(frames)
-    film["background"] = background(frames)
-    film["template"] = template(frames)
+    for part in (drift, background, template):
+        film[part.__name__] = part(frames)
 
 
 def drift(frames):
     """Return how far the standing parts have moved since the reference frame, (K, 2)."""
-    shifts = np.zeros((len(FIXED), len(frames), 2))
-    for n, (top, bottom, left, right) in enumerate(FIXED):
-        grey = [
-            cv2.cvtColor(f[top:bottom, left:right], cv2.COLOR_BGR2GRAY).astype("f4") for f in frames
-        ]
+    shifts = []
+    for top, bottom, left, right in FIXED:
+        parts = (frame[top:bottom, left:right] for frame in frames)
+        grey = [cv2.cvtColor(part, cv2.COLOR_BGR2GRAY).astype("f4") for part in parts]
         window = cv2.createHanningWindow(grey[0].shape[::-1], cv2.CV_32F)
         first = grey[REFERENCE]  # copied, as OpenCV multiplies its arguments by the window in place
-        shifts[n] = [cv2.phaseCorrelate(first.copy(), g.copy(), window)[0] for g in grey]
-    shifts -= shifts[:, [REFERENCE]]
-    return median_filter(shifts.mean(0), (5, 1))
+        shifts.append([cv2.phaseCorrelate(first.copy(), g.copy(), window)[0] for g in grey])
+    shifts = np.array(shifts)
+    return median_filter((shifts - shifts[:, [REFERENCE]]).mean(0), (5, 1))
 
 
 def moved(picture, shift, back=False):
     """Return the picture shifted by some pixels."""
     flags = cv2.INTER_LINEAR | (cv2.WARP_INVERSE_MAP if back else 0)
-    matrix = np.float32([[1, 0, shift[0]], [0, 1, shift[1]]])
+    matrix = np.float32(np.column_stack([np.eye(2), shift]))
     size = picture.shape[1::-1]
     return cv2.warpAffine(picture, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
 
@@ -112,7 +105,7 @@ def blurred(blur, slope):
 
 def placed(ball, at, shape):
     """Return a ball at (x, y) of a window."""
-    matrix = np.float32([[1, 0, at[0] - HALF], [0, 1, at[1] - HALF]])
+    matrix = np.float32(np.column_stack([np.eye(2), np.subtract(at, HALF)]))
     return cv2.warpAffine(ball, matrix, shape[::-1], flags=cv2.INTER_CUBIC)
 
 
@@ -126,13 +119,15 @@ def refine(job):
     empty, image = moved(film["background"], shift), film["frames"][i][Y0:Y1, X0:X1].astype("f4")
     seen = np.ones(empty.shape[:2], bool)
     seen[149:] = False
-    for left, right in POSTS:
-        seen[:, int(left + shift[0] - X0) : int(right + shift[0] - X0) + 1] = False
+    for post in POSTS:
+        left, right = (int(side + shift[0] - X0) for side in post)
+        seen[:, left : right + 1] = False
     slopes = np.arcsin(np.clip((guess[:, 0] - shift[0] - REST) / LENGTH, -0.9, 0.9))
     balls = [blurred(b, s) if np.isfinite(s) else None for b, s in zip(guess[:, 2], slopes)]
     misfit, part = np.full(5, np.nan), np.zeros(5)
-    for k in [k for _ in range(3) for k in range(5) if balls[k] is not None]:
-        guess[k, :2], misfit[k], part[k] = fit_ball(k, guess, balls, (empty, image, seen))
+    for k in [*range(5)] * 3:
+        if balls[k] is not None:
+            guess[k, :2], misfit[k], part[k] = fit_ball(k, guess, balls, (empty, image, seen))
     table = np.column_stack([np.full(5, i), np.full(5, release), range(1, 6), guess, misfit, part])
     table[:, 3:5] -= shift
     return table
@@ -194,9 +189,9 @@ def detect(i, release):
         value = score[rows, (xs - 340)[:, None]].max(1)
         blur_of[value > best], best = blur, np.maximum(best, value)
     start, half, *_ = RELEASES[release]
-    out = np.floor((i - start) / half) % 2  # 1: to the right
+    to_the_right = np.floor((i - start) / half) % 2
     place = xs - shift[0]
-    best[place < 560 if out else place > 880] = -1
+    best[place < 560 if to_the_right else place > 880] = -1
     for left, right in POSTS:
         hidden = (place > left) & (place < right) & (best > -1)
         best[hidden] = np.minimum(best[hidden], 0.45)
@@ -217,11 +212,6 @@ def detect(i, release):
     return np.column_stack([np.where(best[at] > 0.15, xs[at], np.nan), y, blur_of[at]])
 
 
-def seen_at(i, guess):
-    """Return places in the frame from places without the drift."""
-    return guess + np.append(film["drift"][i], 0)
-
-
 def main(arguments=None):
     """Read the film, write a row per release, strike and ball."""
     parser, rows = options(__doc__), []
@@ -230,16 +220,17 @@ def main(arguments=None):
     read(given.film)
     for release, (start, half, first, last) in RELEASES.items():
         times, frames = np.arange(start, last, half)[:-1], range(first, last + 1)
+        guesses = [detect(i, release) for i in frames]
         with ProcessPoolExecutor() as pool:
-            table = np.concatenate(
-                [*pool.map(refine, [(i, release, detect(i, release)) for i in frames])]
-            )
-            for _ in range(2):
+            for _ in range(3):  # from what is detected, then twice from what the arcs predict
+                jobs = [(i, release, guess) for i, guess in zip(frames, guesses)]
+                table = np.concatenate([*pool.map(refine, jobs)])
                 times = crossing(table, release, times)
                 arcs = strikes(table, release, times)
-                jobs = [(i, release, seen_at(i, predict(i, release, times, arcs))) for i in frames]
-                table = np.concatenate([*pool.map(refine, jobs)])
-        times = crossing(table, release, times)
+                guesses = [
+                    predict(i, release, times, arcs) + np.append(film["drift"][i], 0)
+                    for i in frames
+                ]
         ways = ({}, {"window": 8}, {"slope": 0.02}, {"late": 0.04}, {"late": -0.04})
         reads = [LENGTH * strikes(table, release, times, **way)[..., 1:] for way in ways]
         rows += summary(release, np.array(reads))
