@@ -340,18 +340,9 @@ def rows(clock, quick):
             error = model_error(scene, after)
             if placement == "touching":
                 time = timed(clock, engine, scene, setting)
-        yield Row(
-            "engine",
-            engine.name,
-            f"{setting}, {placement}",
-            scene.name,
-            parameter=getattr(engine, setting)["step"],
-            **outcome(scene.masses, scene.velocities, after),
-            **error,
-            evaluations=steps,
-            needs="e",
-            gives="velocities, path in time",
-            versions=versions(engine.distribution),
-            note=engine.note,
-            **time,
-        )
+        about = {
+            "group": "engine", "model": engine.name, "note": engine.note, "needs": "e",
+            "gives": "velocities, path in time", "versions": versions(engine.distribution),
+            "parameter": getattr(engine, setting)["step"], "evaluations": steps,
+        } | outcome(scene.masses, scene.velocities, after)  # fmt: skip
+        yield Row(**about, setting=f"{setting}, {placement}", chain=scene.name, **error, **time)

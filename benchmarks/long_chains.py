@@ -81,32 +81,25 @@ def large_map(side, repeats):
     masses = np.stack(np.broadcast_arrays(1.0 / ratios[:, None], 1.0, 1.0 / ratios), axis=-1)
     solve = partial(outcomes, masses, [1.0, 0.0, 0.0], 0.5, 0.15)
     found = solve()
-    return {
-        "group": "map",
-        "restitution": 0.5,
-        "ratio": 0.15,
-        "balls": 3,
-        "chains": side * side,
+    given = {"group": "map", "restitution": 0.5, "ratio": 0.15, "balls": 3, "chains": side**2}
+    counts = {
         "collisions": int(found.collisions[~found.collapsed].sum()),
         "collapsed": int(found.collapsed.sum()),
-        **cost(solve, repeats),
     }
+    return given | counts | cost(solve, repeats)
 
 
 def elastic(ratio, balls):
     """Return a row: no losses, so every contact collides once, at any length."""
     solve = partial(outcomes, *still_chain(balls), 1.0, ratio)
     found = solve()
-    return {
-        "group": "elastic",
-        "restitution": 1.0,
-        "ratio": ratio,
-        "balls": balls,
+    given = {"group": "elastic", "restitution": 1.0, "ratio": ratio, "balls": balls}
+    counts = {
         "collisions": int(found.collisions.sum()),
         "collapsed": int(found.collapsed),
-        **leaving(found.velocities),
-        **cost(solve, 9 if balls <= 10_000 else 5),
     }
+    time = cost(solve, 9 if balls <= 10_000 else 5)
+    return given | counts | leaving(found.velocities) | time
 
 
 def copies(restitution, balls):
@@ -127,11 +120,8 @@ def losses(restitution, ratio, balls):
     off = np.abs(found.velocities - own).max(axis=0)
     agrees = off <= KEPT * np.abs(own)
     fast = (found.velocities > FAST).sum(axis=-1)
-    row = {
-        "group": "losses",
-        "restitution": restitution,
-        "ratio": ratio,
-        "balls": balls,
+    given = {"group": "losses", "restitution": restitution, "ratio": ratio, "balls": balls}
+    counts = {
         "chains": 1 + COPIES,
         # That of the unchanged chain alone is chance where the order is.
         "collisions": int(np.median(found.collisions.sum(axis=-1))),
@@ -142,7 +132,7 @@ def losses(restitution, ratio, balls):
         "fast_least": int(fast.min()),
         "fast_most": int(fast.max()),
     }
-    return row | leaving(own)
+    return given | counts | leaving(own)
 
 
 def springs(exponent, balls):

@@ -75,20 +75,12 @@ def rows(clock, quick):
     """Yield two rows a pair, each with the difference between the two."""
     for question, chain, impacts, *ways in pairs(quick):
         answers = [np.asarray(run(), float) for _, run, _ in ways]
-        more = {}
+        about = {
+            "group": "saving", "model": question, "chain": chain, "needs": "e, ratios",
+            "numerical_error": distance(*answers),
+            "numerical_reference": "the other row of the pair", "versions": ours(),
+        }  # fmt: skip
         if scene := SCENES.get(chain):
-            more = outcome(scene.masses, scene.velocities, answers[0])
+            about |= outcome(scene.masses, scene.velocities, answers[0])
         for whole, (name, run, gives) in zip(("all", "less"), ways, strict=True):
-            yield Row(
-                "saving",
-                question,
-                f"{whole}: {name}",
-                chain,
-                numerical_error=distance(*answers),
-                numerical_reference="the other row of the pair",
-                gives=gives,
-                needs="e, ratios",
-                versions=ours(),
-                **more,
-                **clock(run, impacts),
-            )
+            yield Row(**about, setting=f"{whole}: {name}", gives=gives, **clock(run, impacts))

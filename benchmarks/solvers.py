@@ -96,23 +96,18 @@ def random_rows(clock, quick, about, usual, balls):
     def single():
         return batch(*(np.float64(np.float32(part)) for part in chains)).astype(np.float32)
 
+    shared = about | {
+        "chain": f"{balls} balls, random", "numerical_reference": FIFTY, "gives": "velocities",
+        "versions": ours(),
+    }  # fmt: skip
     note = f"{count} chains, e from .3 to 1; error: worst of {some}"
     in_24_bits = "inputs and outcome rounded to 24 bits; solved in 53"
     for setting, run, words in (
         (usual, partial(post_impact_velocities, *chains), note),
         (f"{usual}, stored in float32", single, in_24_bits),
     ):
-        yield Row(
-            **about,
-            setting=setting,
-            chain=f"{balls} balls, random",
-            numerical_error=distance(run()[:some], truth),
-            numerical_reference=FIFTY,
-            gives="velocities",
-            versions=ours(),
-            note=words,
-            **clock(run, count),
-        )
+        error, time = distance(run()[:some], truth), clock(run, count)
+        yield Row(**shared, setting=setting, numerical_error=error, note=words, **time)
 
 
 def march_rows(clock, quick):
@@ -255,10 +250,7 @@ def energy_rows(clock, quick):
 def outcome_rows(clock, _):
     """Yield models that answer at once, against Hertz or against the paper's model."""
     for scene in SCENES.values():
-        models = [
-            (SequentialCollisions(), "e", PATH, ""),
-            (FusedChain(), "e", PATH, ""),
-        ]
+        models = [(SequentialCollisions(), "e", PATH, ""), (FusedChain(), "e", PATH, "")]
         if scene.elastic:  # a limit of the convex problem
             limit = QuadraticDissipation(1e9)
             models.append((limit, "e", "velocities, impulses", "coefficients 1e9"))
@@ -275,6 +267,10 @@ def outcome_rows(clock, _):
 def door_rows(clock, _):
     """Yield what surrounds an impact: a chain that is made, a strike of a swing to its end."""
     scene = SCENES["five equal"]
+    about = {
+        "group": "door", "model": "ImpulseCorrelation", "chain": scene.name, "needs": "e, ratios",
+        "versions": ours(),
+    }  # fmt: skip
     lists = [list(part) for part in scene.given[:3]]
     still = Chain(scene.masses, [0.0] * 5, scene.restitution)
     swings = partial(swing, still, scene.model, [-0.02, 0, 0, 0, 0], [0.0, 10.0])
@@ -283,16 +279,7 @@ def door_rows(clock, _):
         ("a chain of lists", partial(Chain, *lists), 1, "the chain"),
         ("one strike of a swing", swings, strikes, f"{PATH}, flights"),
     ):
-        yield Row(
-            group="door",
-            model="ImpulseCorrelation",
-            setting=setting,
-            chain=scene.name,
-            needs="e, ratios",
-            gives=gives,
-            versions=ours(),
-            **clock(function, count),
-        )
+        yield Row(**about, setting=setting, gives=gives, **clock(function, count))
 
 
 def rows(clock, quick):
