@@ -1,14 +1,12 @@
 """The paper's model behind its public names: input, record, batch, and how an impact gives up."""
 
-import pickle
 import re
 from functools import partial
 
 import numpy as np
 import pytest
-from chains import magnitudes, random_chains, uniform, with_ends
+from chains import magnitudes, random_chains, uniform, with_ends, within_bounds
 
-import cradle
 from cradle import (
     Chain,
     ImpactNotCertified,
@@ -23,15 +21,8 @@ from cradle import (
 
 MODEL = [
     ({"forward": -0.1}, "forward = -0.1; must lie in [0, 1]"),
-    ({"forward": [0.1, 1.5]}, "forward[1] = 1.5; must lie in [0, 1]"),
+    ({"forward": [0.1, 1 + 1e-9]}, "forward[1] = 1.000000001; must lie in [0, 1]"),
     ({"forward": [0.1, np.nan]}, "forward[1] = nan; must be finite"),
-    ({"forward": np.inf}, "forward = inf; must be finite"),
-    ({"forward": "0.1"}, "forward = '0.1'; must be real numbers, one shape"),
-    ({"forward": 0.1j}, "forward = 0.1j; must be real numbers, one shape"),
-    (
-        {"forward": [0.1, [0.2]]},
-        "forward[1] has shape (1,), forward[0] has (); must have one shape",
-    ),
     ({"forward": None}, "forward = None; must be real numbers"),
     ({"forward": [[0.1]]}, "forward has shape (1, 1); must be () or (N - 2,)"),
     ({"backward": [0.1, 2]}, "backward[1] = 2.0; must lie in [0, 1]"),
@@ -39,43 +30,26 @@ MODEL = [
     ({"backward": [[0.1]]}, "backward has shape (1, 1); must be () or (N - 2,)"),
     ({"meeting": -0.5}, "meeting = -0.5; must lie in [0, 1]"),
     ({"meeting": 1.5}, "meeting = 1.5; must lie in [0, 1]"),
-    ({"meeting": np.nan}, "meeting = nan; must be finite"),
-    ({"meeting": "middle"}, "meeting = 'middle'; must be real numbers, one shape"),
     ({"meeting": [0.5]}, "meeting = [0.5]; must be one number"),
     ({"excess": "ignore"}, "excess = 'ignore'; must be 'raise' or 'saturate'"),
-    ({"excess": None}, "excess = None; must be 'raise' or 'saturate'"),
-    (
-        {"excess": np.array(["raise"])},
-        "excess = array(['raise'], dtype='<U5'); must be 'raise' or 'saturate'",
-    ),
+    ({"excess": np.array(["raise"])}, "excess = array(['raise'], dtype='<U5'); must be 'raise' or"),
     ({"max_events": 0}, "max_events = 0; must be a whole number, at least 1"),
-    ({"max_events": -1}, "max_events = -1; must be a whole number, at least 1"),
     ({"max_events": 2**63}, f"max_events = {2**63}; must be a whole number, at least 1 and below"),
     ({"max_events": 1e6}, "max_events = 1000000.0; must be an int, at least 1 and below 2**63"),
     ({"max_events": True}, "max_events = True; must be a whole number"),
-    ({"max_events": "many"}, "max_events = 'many'; must be a whole number"),
 ]
 
 
 @pytest.mark.parametrize(("change", "message"), MODEL, ids=[message for _, message in MODEL])
 @pytest.mark.parametrize("batch", [False, True], ids=["model", "batch"])
 def test_bad_options_name_value_and_rule(change, message, batch):
-    options = {"forward": 0.1} | change
+    """Holding contacts at their bounds excuses no ratio outside 0 and 1."""
+    options = {"forward": 0.1, "excess": "saturate"} | change
     if batch and "has shape" in message:
         message = message.replace("(N - 2,)", "(..., 2) for 4 balls")
     made = partial(post_impact_velocities, np.ones(4), [1, 0, 0, 0], 1)
     with pytest.raises(ValueError, match="^" + re.escape(message)):
         (made if batch else ImpulseCorrelation)(**options)
-
-
-@pytest.mark.parametrize("ratio", [-1e-9, 1 + 1e-9])
-@pytest.mark.parametrize("name", ["forward", "backward"])
-def test_saturate_does_not_excuse_ratios_outside_0_and_1(name, ratio):
-    options = {"forward": 0.1, name: ratio, "excess": "saturate"}
-    with pytest.raises(ValueError, match=rf"^{name} = {re.escape(repr(ratio))}; must lie in \[0"):
-        ImpulseCorrelation(**options)
-    with pytest.raises(ValueError, match=rf"^{name} = {re.escape(repr(ratio))}; must lie in \[0"):
-        post_impact_velocities([1, 1, 1], [1, 0, 0], 1, **options)
 
 
 @pytest.mark.parametrize("name", ["forward", "backward"])
@@ -116,37 +90,20 @@ def test_ratios_beyond_their_bound(forward, backward, message):
     collide(chain, ImpulseCorrelation(forward, backward, excess="saturate"))
 
 
-def test_ratio_at_its_bound_is_admitted():
-    """To rounding: the bound as anybody computes it must not be refused."""
-    rng = np.random.default_rng(34)
-    for m in magnitudes(rng, 6, (200, 3)):
-        ahead, behind = m[2] / (m[1] + m[2]), 1 / (1 + m[1] / m[0])
-        collide(Chain(m, [1, 0, 0], 1), ImpulseCorrelation(ahead, behind))
-
-
 BATCH = [
     ({"masses": [1, -1, 1]}, "masses[1] = -1.0; must be above 0"),
     ({"masses": [[1, 1, 1], [1, 1, 0]]}, "masses[1, 2] = 0.0; must be above 0"),
     ({"masses": [1, 1e-151, 1]}, "masses[1] = 1e-151; must be at least 1e-150"),
     ({"masses": 1.0}, "masses has shape (); must be (..., N) with N >= 2"),
     ({"masses": [[1.0]]}, "masses has shape (1, 1); must be (..., N) with N >= 2"),
-    ({"masses": "ABC"}, "masses = 'ABC'; must be real numbers"),
-    ({"masses": [[1, 1, 1], [1, 1]]}, "masses[1] has shape (2,), masses[0] has (3,); must have"),
     ({"velocities": [1, 0]}, "velocities has shape (2,); must be (..., 3), as masses"),
-    ({"velocities": 1.0}, "velocities has shape (); must be (..., 3), as masses"),
     ({"velocities": [[1, 0, np.nan]]}, "velocities[0, 2] = nan; must be finite"),
-    ({"velocities": [1, 0, np.inf]}, "velocities[2] = inf; must be finite"),
-    ({"velocities": [1j, 0, 0]}, "velocities[0] = 1j; must be a real number"),
-    ({"velocities": [[1, 0, 0], [1, 0]]}, "velocities[1] has shape (2,), velocities[0] has (3,)"),
     ({"velocities": [[0, 0, 0], [1, 0, 1e200]]}, "velocities[1, 2] = 1e+200; kinetic energy"),
     ({"restitution": 1.5}, "restitution = 1.5; must lie in [0, 1]"),
     ({"restitution": [[1, 1], [1, -1]]}, "restitution[1, 1] = -1.0; must lie in [0, 1]"),
-    ({"restitution": [np.nan, 1]}, "restitution[0] = nan; must be finite"),
     ({"restitution": [1, 1, 1]}, "restitution has shape (3,); must be () or (..., 2) for 3 balls"),
     ({"forward": [[0.1], [7]]}, "forward[1, 0] = 7.0; must lie in [0, 1]"),
-    ({"forward": [0.1, 0.1]}, "forward has shape (2,); must be () or (..., 1) for 3 balls"),
     ({"backward": [[0.1], [7]]}, "backward[1, 0] = 7.0; must lie in [0, 1]"),
-    ({"backward": [0.1, 0.1]}, "backward has shape (2,); must be () or (..., 1) for 3 balls"),
     (
         {"masses": np.ones((2, 3)), "velocities": np.ones((3, 3))},
         "leading axes do not broadcast: masses (2, 3), velocities (3, 3)",
@@ -155,6 +112,9 @@ BATCH = [
         {"restitution": np.ones((2, 2)), "forward": np.zeros((3, 1))},
         "leading axes do not broadcast: masses (3,), velocities (3,), restitution (2, 2)",
     ),
+    # A batch without a chain is checked all the same.
+    ({"masses": np.ones((0, 3)), "velocities": [np.nan, 0, 0]}, "velocities[0] = nan; must be"),
+    ({"masses": np.ones((0, 3)), "forward": 2}, "forward = 2.0; must lie in [0, 1]"),
 ]
 
 
@@ -163,22 +123,6 @@ def test_bad_batches_name_value_and_rule(change, message):
     good = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "restitution": 1, "forward": 0.1}
     with pytest.raises(ValueError, match="^" + re.escape(message)):
         post_impact_velocities(**(good | change))
-
-
-def test_collide_refuses_other_objects():
-    with pytest.raises(TypeError, match="chain is a list; must be a Chain"):
-        collide([1, 1], ImpulseCorrelation(0.1))
-    with pytest.raises(TypeError, match="model is a float; must be an impact model"):
-        collide(Chain([1, 1], [1, 0], 1), 0.1)
-
-
-def test_public_names():
-    for name in cradle.__all__:
-        assert hasattr(cradle, name)
-    assert {
-        *("Chain", "collide", "Trace", "ImpactNotFinished", "ImpulseCorrelation"),
-        *("post_impact_velocities", "paper_chain", "restitution_table", "ratio_table"),
-    } <= set(cradle.__all__)
 
 
 def test_models_compare_by_value_and_their_repr_makes_them_again():
@@ -292,19 +236,6 @@ def test_between_two_rows_velocities_are_linear_in_the_impulses():
     np.testing.assert_allclose(released, 0.9**2 * absorbed, rtol=1e-12)
 
 
-def test_the_record_does_not_change_the_outcome():
-    """The batch records nothing, and runs the same loop, or where it may the closed form."""
-    for n in (2, 3, 5, 8):
-        for m, v, e, f, b in generous(n, 25, seed=40 + n):
-            trace = collide(Chain(m, v, e), ImpulseCorrelation(f, b))
-            alone = post_impact_velocities(m, v, e, f, b)
-            if len(trace.events) <= 2 * (n - 1) <= 4:
-                largest = np.abs(trace.velocities).max()
-                np.testing.assert_allclose(alone, trace.velocities, rtol=0, atol=2e-15 * largest)
-            else:
-                assert alone.tobytes() == trace.velocities.tobytes()
-
-
 def test_the_short_cut_decides_as_the_loop_does():
     """Two and three balls on both sides of Eq. 44: the same collisions, velocities to 1e-15."""
     rng = np.random.default_rng(44)
@@ -323,15 +254,6 @@ def test_the_short_cut_decides_as_the_loop_does():
             assert error <= 2e-15  # of the striker's speed
             taken += (trace.collisions == 1).all()
     assert 1500 < taken < 2900
-
-
-def test_long_records_are_whole():
-    """Several thousand events: every one is there."""
-    trace = collide(Chain([1, 1e-7, 1], [1, 0, 0], 1), ImpulseCorrelation(0.0))
-    assert len(trace.events) > 5000
-    kinds = [kind for kind, _ in trace.events]
-    assert kinds.count("end") == kinds.count("maximum_compression") == trace.collisions.sum()
-    assert trace.path[-1].tobytes() == trace.velocities.tobytes()
 
 
 # --- the batch -----------------------------------------------------------------------------
@@ -363,25 +285,6 @@ def test_batch_is_a_loop_of_single_impacts():
         assert batch[at].tobytes() == collide(chain, model).velocities.tobytes()
 
 
-@pytest.mark.parametrize("name", ["masses", "velocities", "restitution", "forward", "backward"])
-def test_each_argument_may_carry_the_leading_axes(name):
-    rng = np.random.default_rng(6)
-    base = {
-        "masses": uniform(rng, 1, 2, 3),
-        "velocities": np.array([1.0, 0.2, 0.0]),
-        "restitution": rng.random(2),
-        "forward": np.array([0.1]),
-        "backward": np.array([0.2]),
-    }
-    many = base[name] * uniform(rng, 0.5, 1, (2, 3, 1))
-    batch = post_impact_velocities(**(base | {name: many}))
-    assert batch.shape == (2, 3, 3)
-    for at in np.ndindex(2, 3):
-        one = post_impact_velocities(**(base | {name: many[at]}))
-        assert batch[at].tobytes() == one.tobytes()
-    assert len(np.unique(batch.reshape(6, 3), axis=0)) > 1  # it does matter
-
-
 def test_scalars_and_the_missing_backward_ratio():
     full = post_impact_velocities([1, 2, 1], [1, 0, 0], [0.5, 0.5], [0.1], [0.1])
     assert full.tobytes() == post_impact_velocities([1, 2, 1], [1, 0, 0], 0.5, 0.1).tobytes()
@@ -390,13 +293,10 @@ def test_scalars_and_the_missing_backward_ratio():
     assert post_impact_velocities(*light, 0.3).tobytes() != post_impact_velocities(*light).tobytes()
 
 
-def test_empty_batch():
+def test_small_batches():
     assert post_impact_velocities(np.ones((0, 3)), [1, 0, 0], 1, 0.1).shape == (0, 3)
-
-
-def test_integers_are_numbers_too():
-    after = post_impact_velocities(np.array([1, 1], np.int8), [1, 0], 1, 0)
-    assert after.tolist() == [0.0, 1.0]
+    whole = np.array([1, 1], np.int8)
+    assert post_impact_velocities(whole, [1, 0], 1, 0).tolist() == [0.0, 1.0]
 
 
 def test_inputs_are_left_alone():
@@ -409,19 +309,6 @@ def test_inputs_are_left_alone():
         [0.5, 0.5],
         [0.15],
     )
-
-
-# --- meeting -------------------------------------------------------------------------------
-
-
-def test_meeting_moves_only_chains_whose_runs_meet():
-    four = Chain([1] * 4, [1, 0.5, 0, 0], 1), Chain([1] * 3, [1, 0, 0], 1)
-    ends = [
-        [collide(c, ImpulseCorrelation(0.1, meeting=x)).velocities for x in (0, 0.5, 1)]
-        for c in four
-    ]
-    assert np.ptp(ends[0], axis=0).max() > 0.01
-    assert np.ptp(ends[1], axis=0).max() == 0
 
 
 # --- giving up -----------------------------------------------------------------------------
@@ -483,22 +370,6 @@ def test_long_unfinished_records_are_cut(monkeypatch):
     assert trace.velocities @ chain.masses == pytest.approx(1, rel=1e-14)
 
 
-def test_empty_batches_are_checked():
-    with pytest.raises(ValueError, match=r"velocities\[0\] = nan; must be finite"):
-        post_impact_velocities(np.ones((0, 3)), [np.nan, 0, 0], 1, 0.1)
-    with pytest.raises(ValueError, match=r"forward = 2.0; must lie in \[0, 1\]"):
-        post_impact_velocities(np.ones((0, 3)), [1, 0, 0], 1, 2)
-
-
-def test_the_error_of_a_worker_reaches_its_caller():
-    """Across processes: an unfinished impact is pickled with its trace."""
-    with pytest.raises(ImpactNotFinished) as stopped:
-        collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.1, max_events=1))
-    other = pickle.loads(pickle.dumps(stopped.value))
-    assert str(other) == str(stopped.value)
-    assert other.trace.velocities.tobytes() == stopped.value.trace.velocities.tobytes()
-
-
 def test_batch_and_single_draw_the_line_of_excess_alike():
     """A few roundings around Eq. 53: refused by both, in the same words, or by neither."""
     rng = np.random.default_rng(53)
@@ -506,7 +377,8 @@ def test_batch_and_single_draw_the_line_of_excess_alike():
     for _ in range(300):
         n = int(rng.integers(3, 6))
         m = magnitudes(rng, 4, n)
-        ratios = [part * (1 + rng.integers(0, 12) * 2.0**-53) for part in largest(m)]
+        bounds = within_bounds(m, np.ones)
+        ratios = [part * (1 + rng.integers(0, 12) * 2.0**-53) for part in bounds]
         f, b = np.minimum(ratios, 1.0)
         chain = Chain(m, np.eye(n)[0], 0.5)
         try:
@@ -520,36 +392,3 @@ def test_batch_and_single_draw_the_line_of_excess_alike():
             found = str(error).replace("[0, ", "[")
         assert found.partition(" = ")[0] == expected.partition(" = ")[0]
     assert 100 < refused < 250
-
-
-def largest(m):
-    """Ratios at their bounds, from the far end on, forward and backward."""
-    n = len(m)
-    forward, backward = np.zeros((2, n - 2))
-    for i in reversed(range(n - 2)):
-        onward = forward[i + 1] if i + 1 < n - 2 else 0.0
-        forward[i] = m[i + 2] / (m[i + 2] + m[i + 1] * (1 - onward))
-    for i in range(n - 2):
-        onward = backward[i - 1] if i else 0.0
-        backward[i] = m[i] / (m[i] + m[i + 1] * (1 - onward))
-    return forward, backward
-
-
-@pytest.mark.parametrize(
-    ("masses", "velocities", "forward", "backward", "expected"),
-    [
-        ([1] * 5, [0.5, 0.5, 0.5, -0.5, 0.25], [0.25, 0, 0], [0.2, 0.2, 0.1],
-         [-0.4882275, 0.2686158, 0.3585006, 0.5]),
-        ([1] * 6, [0, 0, -1, 0.25, 0, -0.5], [1, 0.5, 0.1, 0.12483687377646042],
-         [1e-300] + [0.20255585724249234] * 3, [None, None, -0.06691606]),
-    ],
-)  # fmt: skip
-def test_a_run_that_gets_to_its_event_at_a_meeting_does_it(
-    masses, velocities, forward, backward, expected
-):
-    """At meeting = 0 a run moves on to its own next event, exactly; 50 digits agree."""
-    model = ImpulseCorrelation(forward, backward, meeting=0, excess="saturate")
-    after = collide(Chain(masses, velocities, 1), model).velocities
-    for found, known in zip(after, expected):
-        if known is not None:
-            assert found == pytest.approx(known, abs=1e-7)
