@@ -1,7 +1,6 @@
 """The textbook's rules by themselves, against the package, and against a march by small steps."""
 
 import ast
-import decimal
 import functools
 import math
 import random
@@ -12,7 +11,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from chains import FIG_8, changes, local_orders, random_chains
+from chains import FIG_8, changes, local_orders
 from march import march
 from truth import EventLimit, as_meant, solve
 
@@ -33,31 +32,14 @@ def fifty_digits():
 # --- the text ----------------------------------------------------------------------------------
 
 
-def test_it_is_short():
+def test_it_is_short_and_every_rule_has_its_place():
     """A newcomer reads it at one sitting: 250 lines, no function above 25, few parameters."""
     assert len(SOURCE.splitlines()) <= 250
-    for node in ast.walk(ast.parse(SOURCE)):
-        if isinstance(node, ast.FunctionDef):
-            assert node.end_lineno - node.lineno < 25, node.name
-            assert len(node.args.args) <= 6 or node.name == "solve", node.name
-
-
-def test_it_needs_nothing_but_python():
-    imported = set()
-    for node in ast.walk(ast.parse(SOURCE)):
-        if isinstance(node, ast.Import):
-            imported |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            imported.add(node.module)
-    assert imported <= {"itertools", "math", "typing"}
-
-
-def test_every_rule_has_its_place():
-    docs = " ".join(
-        ast.get_docstring(node) or ""
-        for node in ast.walk(ast.parse(SOURCE))
-        if isinstance(node, ast.FunctionDef)
-    )
+    functions = [n for n in ast.walk(ast.parse(SOURCE)) if isinstance(n, ast.FunctionDef)]
+    for node in functions:
+        assert node.end_lineno - node.lineno < 25, node.name
+        assert len(node.args.args) <= 6 or node.name == "solve", node.name
+    docs = " ".join(ast.get_docstring(node) or "" for node in functions)
     for rule in ["R1", "R2", "R3", "R4", "R5", "R6", "R7", *(f"R8.{k}" for k in range(1, 7))]:
         assert rule in docs, rule
 
@@ -114,24 +96,6 @@ def test_momentum_and_energy_in_fractions():
         assert rounded.events == exact.events
         expected = [number(x.numerator) / x.denominator for x in after]
         assert max(abs(x - y) for x, y in zip(rounded.velocities, expected)) < error
-
-
-def test_decimal_numbers_do_as_well():
-    """Those of Python's own library, fifty digits of both, on generic chains."""
-    rng = np.random.default_rng(17)
-    with mpmath.workdps(50), decimal.localcontext(prec=50):
-        for n in (3, 5, 7):
-            for case in zip(*random_chains(rng, 4, n, decades=1), strict=True):
-                chain = [row.tolist() for row in case]
-                chain[3][0] = 0.0
-                one, other = (textbook.solve(*chain, number=x) for x in (mpmath.mpf, Decimal))
-                # A sequence without end goes on to the last digits, which are not the same.
-                if len(one.events) < 200:
-                    assert one.events == other.events
-                off = [
-                    abs(a - mpmath.mpf(str(b))) for a, b in zip(one.velocities, other.velocities)
-                ]
-                assert max(off) < 1e-38
 
 
 def test_a_scalar_stands_for_all_and_a_string_for_a_decimal():
@@ -277,38 +241,6 @@ def test_invariants_at_fifty_digits(bounded):
 # --- what is known otherwise -------------------------------------------------------------------
 
 
-def test_closed_form_of_three_balls():
-    """Eqs. 24, 30-33 for chains with one collision per contact, all but one ball at rest."""
-    rng = random.Random(24)
-    checked = 0
-    while checked < 40:
-        m1, m2, m3 = (mpmath.mpf(0.2 + (4 - 0.2) * rng.random()) for _ in range(3))
-        e2, e3 = (mpmath.mpf(0.3 + (1 - 0.3) * rng.random()) for _ in range(2))
-        a = rng.random() * m3 / (m2 + m3)
-        outcome = solve([m1, m2, m3], [1, 0, 0], [e2, e3], a, 0)
-        if outcome.collisions != [1, 1]:
-            continue
-        first = (1 + e2) * m1 * m2 / ((1 - a) * m1 + m2)
-        root = mpmath.sqrt(1 - a * (m2 / m3 + 1))
-        second = (1 + e3 * root) * (1 + e2) * m1 * m2 * m3 / (((1 - a) * m1 + m2) * (m2 + m3))
-        assert abs(outcome.impulses[0] - first) < 1e-45
-        assert abs(outcome.impulses[1] - second) < 1e-45
-        checked += 1
-
-
-@pytest.mark.parametrize("r2", ["0.3", "1", "2"])
-def test_equation_44_separates_one_collision_per_contact(r2):
-    a, e, r2 = mpmath.mpf("0.15"), mpmath.mpf("0.5"), mpmath.mpf(r2)
-    edge = (1 + e) * (1 + e * mpmath.sqrt(1 - a * (1 + r2))) / (e * (1 + r2)) - (1 + a / e)
-
-    def collisions(r1):
-        return solve([1, r1, r1 / r2], [1, 0, 0], e, a).collisions
-
-    step = mpmath.mpf(10) ** -20
-    assert collisions(edge + step) == [1, 1]
-    assert collisions(edge - step)[0] > 1
-
-
 def test_figures_5_7_and_8():
     five = solve([1, 1, 1], [1, "0.8", 0], "0.2", "0.1")
     assert changes(five.events) == [
@@ -323,26 +255,6 @@ def test_figures_5_7_and_8():
     eight = solve([1] * 4, [1, "0.5", 0, 0], 1, "0.1")
     assert changes(eight.events) == FIG_8
     assert eight.meetings == 1
-
-
-ABCCA = (
-    ["0.045", "0.053", "0.053", "0.053", "0.045"],
-    [1, 0, 0, 0, 0],
-    ["0.53", "0.28", "0.27", "0.31"],
-    ["0.111", "0.319", "0.462"],
-    ["0.435", "0.414", "0.262"],
-)
-
-
-def test_abcca_is_above_its_bound():
-    with pytest.raises(ValueError, match=r"forward\[2\] = 0\.462; bound at ball 3 is 0\.4591836"):
-        solve(*ABCCA)
-    mirrored = ABCCA[0][::-1], [0, 0, 0, 0, -1], ABCCA[2][::-1], ABCCA[4][::-1], ABCCA[3][::-1]
-    with pytest.raises(ValueError, match=r"backward\[0\] = 0\.462; bound at ball 1 is 0\.4591836"):
-        solve(*mirrored)
-    outcome = solve(*ABCCA, excess="saturate")
-    assert outcome.held == {3}
-    assert outcome.velocities[3] == pytest.approx(outcome.velocities[4], abs=1e-45)
 
 
 @pytest.mark.parametrize(
@@ -389,28 +301,7 @@ def test_ties_do_not_depend_on_the_digits():
 # --- R9, and limits ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("masses", "e", "ratio"), [([1, 1, 1], 0, 0), ([1, "0.01", 1], "0.5", "0.15")]
-)
-def test_infinite_sequences_end_with_the_common_velocity(masses, e, ratio):
-    outcome = solve(masses, [1, 0, 0], e, ratio)
-    common = 1 / sum(mpmath.mpf(m) for m in masses)
-    assert outcome.collapsed
-    assert max(abs(v - common) for v in outcome.velocities) < 1e-29
-
-
 CHATTER = ([2, "0.1", "0.2", 5], [1, "0.5", 0, 0], [0, "0.5", 0], ["0.8", "0.1"], ["0.8", 1])
-
-
-def test_chatter_beside_a_finite_closing_speed():
-    outcome = solve(*CHATTER, excess="saturate")
-    first = next(i for i, (kind, _) in enumerate(outcome.events) if kind == "collapse")
-    before = outcome.path[first]
-    assert outcome.events[first : first + 2] == [("collapse", 0), ("collapse", 1)]
-    assert abs(before[0] - before[1]) < 1e-29
-    assert before[2] - before[3] > 0.1
-    common = mpmath.mpf("2.05") / mpmath.mpf("7.3")
-    assert max(abs(v - common) for v in outcome.velocities) < 1e-29
 
 
 def test_threshold_is_a_limit():
@@ -421,34 +312,12 @@ def test_threshold_is_a_limit():
     assert max(abs(a - b) for a, b in zip(near.velocities, far.velocities)) < 1e-19
 
 
-def test_elastic_light_middle_ball_is_finite():
-    """Of the order of sqrt(heavy / light) impacts, none of them a collapse."""
-    counts = []
-    for light in ("1e-2", "1e-4"):
-        outcome = solve([1, light, 1], [1, 0, 0], 1, 0)
-        assert not outcome.collapsed
-        counts.append(sum(outcome.collisions))
-    assert 8 < counts[1] / counts[0] < 12
-
-
-def test_nothing_happens_without_approach():
-    outcome = textbook.solve([1, 1, 1], [0, 0, 1], 1, 0.1)
-    assert outcome.velocities == [0, 0, 1]
-    assert outcome.events == []
-
-
 def test_event_limit_reports_what_was_reached():
     with pytest.raises(EventLimit, match="max_events = 100") as caught:
         textbook.solve([1, 1e-6, 1], [1, 0, 0], 1, 0, max_events=100)
     state = caught.value.args[1]
     assert len(state.events) > 90
     assert sum(m * v for m, v in zip([1, 1e-6, 1], state.velocities)) == pytest.approx(1, rel=1e-12)
-
-
-@pytest.mark.parametrize("ratio", ["-0.1", "1.1"])
-def test_ratio_outside_its_range(ratio):
-    with pytest.raises(ValueError, match=r"\[0, 1\]"):
-        solve([1, 1, 1], [1, 0, 0], 1, ratio, excess="saturate")
 
 
 # --- the march ---------------------------------------------------------------------------------
@@ -481,7 +350,7 @@ def marched(kind):
     return found
 
 
-@pytest.mark.parametrize("kind", [2, 3, 4, 5, 6, "two runs meet", "held", "close many times"])
+@pytest.mark.parametrize("kind", [3, 6, "two runs meet", "held", "close many times"])
 def test_march_converges_to_the_textbook_at_first_order(kind):
     """The mean over chains: the error of one chain depends on where its steps fall."""
     chains = marched(kind)
