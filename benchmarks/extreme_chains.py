@@ -71,11 +71,12 @@ def invariants(trace):
     }
 
 
-def faults(trace, finished=True, momentum=8.0, energy=8.0):
+def faults(trace, finished=True, momentum=8.0, energy=8.0, overlap=0.0):
     """What is wrong with a trace, by itself; empty if nothing is.
 
     `momentum` and `energy` are multiples of rounding that are granted per ball, and, for the
-    energy, per square root of the number of events: so do rounding errors add up.
+    energy, per square root of the number of events: so do rounding errors add up.  Balls that come
+    to rest together may approach each other by `overlap`.
     """
     arrays = (trace.velocities, trace.impulses, trace.absorbed, trace.path, trace.path_impulses)
     if not all(np.isfinite(array).all() for array in arrays):
@@ -86,7 +87,7 @@ def faults(trace, finished=True, momentum=8.0, energy=8.0):
         f"momentum off by {defect['momentum']:.3g} roundings": defect["momentum"] > momentum * n,
         f"energy gained: {defect['gain']:.3g} roundings": defect["gain"] > energy,
         f"ledger open by {defect['ledger']:.3g} roundings": finished and defect["ledger"] > energy,
-        f"balls overlap by {defect['overlap']:.3g}": finished and defect["overlap"] > 0,
+        f"balls overlap by {defect['overlap']:.3g}": finished and defect["overlap"] > overlap,
         "negative impulse or work": (trace.impulses < 0).any() or (trace.absorbed < 0).any(),
     }
     return [words for words, so in wrong.items() if so]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from chains import uniform
 from delicate import CHAINS, chains_of, seen
-from extreme_chains import any_chain, invariants
+from extreme_chains import any_chain, faults, invariants
 from families import FAMILIES, family
 from problem import Problem
 
@@ -16,7 +16,6 @@ from cradle import (
     ImpactNotFinished,
     ImpulseCorrelation,
     collide,
-    post_impact_velocities,
     textbook,
 )
 
@@ -41,26 +40,6 @@ def difference(one, other):
     return max(abs(float(Decimal(a) - Decimal(b))) for a, b in zip(one, other))
 
 
-def check(problem, trace):
-    """Every ball's momentum, the order, the energy and its ledger, within rounding."""
-    m, before = (np.asarray(part, float) for part in (problem.masses, problem.velocities))
-    after = trace.velocities
-    # Rounding: of the largest momentum and energy there are, some hundred times.
-    speed, relative = np.abs(before).max(), np.ptp(before)
-    rounding = 2.0**-52 * 100 * len(m)
-    across = np.concatenate([[0.0], trace.impulses, [0.0]])
-    missing = m * (after - before) - (across[:-1] - across[1:])
-    assert np.abs(missing).max() <= rounding * m.max() * speed, "a ball's momentum"
-    assert abs(m @ (after - before)) <= rounding * m.max() * speed, "total momentum"
-    assert (after[:-1] - after[1:]).max() <= rounding * speed, "balls still approach"
-    assert trace.impulses.min() >= 0
-    centre = m @ before / m.sum()  # energies relative to the centre of mass, less rounding
-    loss = 0.5 * m @ ((before - centre) ** 2 - (after - centre) ** 2)
-    energy = m.sum() * relative**2
-    assert loss >= -rounding * energy, "energy grew"
-    assert abs(loss - trace.energy_loss) <= rounding * energy, "the ledger"
-
-
 # --- the named chains --------------------------------------------------------------------------
 
 
@@ -82,7 +61,8 @@ def test_at_fifty_digits(name, problem):
         assert trace.collisions.tolist() == truth.collisions
     if row.law == "a collapse":
         assert trace.collapsed
-        check(problem, trace)
+        assert faults(trace, overlap=1e-30) == []
+        assert trace.collisions.max() < 1000
     if row.law == "no light ball is thrown":
         assert len(trace.events) < 1000
 
@@ -106,30 +86,86 @@ def test_named_chain_in_moving_frames(name):
         assert difference(there - speed, here) < 1e-11
 
 
-def test_neighbours_of_the_seven_generic_balls():
-    """Its inputs changed by 1e-14 give its outcome, changed by little: no event is near."""
-    problem = CHAINS["seven generic balls"].problem
-    truth = [float(v) for v in exact(problem).velocities]
-    for k in range(7):
-        for sign in (-1, 1):
-            velocities = list(problem.velocities)
-            velocities[k] *= 1 + sign * 2.0**-46
-            nudged = problem._replace(velocities=velocities).collide().velocities
-            assert difference(nudged, truth) < 1e-11
+def common_velocity(problem):
+    """Where all balls end at one velocity, it and the impulses follow from momentum alone."""
+    m, v = ([Fraction(x) for x in part] for part in (problem.masses, problem.velocities))
+    common = sum(a * b for a, b in zip(m, v)) / sum(m)
+    passed = np.cumsum([a * (b - common) for a, b in zip(m, v)])[:-1]
+    return float(common), passed.astype(float)
 
 
-def test_impulses_after_a_collapse_beside_a_light_ball():
-    """All balls end at one velocity, so momentum alone fixes every impulse; and so mirrored."""
-    problem = Problem([1000.0, 1e-3, 1000.0, 1e-9], [0.4, 0.4, 0.1, 0.0], [0.0] * 3, [0, 0], [0, 0])
-    for one in (problem, problem.mirrored()):
+#: Chains of many collapses, and how many there are at least: momentum, energy or works went wrong.
+COLLAPSES = {
+    # A light ball at the end: its impulse is a difference of far larger ones.
+    "beside a light ball": (
+        Problem([1000.0, 1e-3, 1000.0, 1e-9], [0.4, 0.4, 0.1, 0.0], [0.0] * 3, [0, 0], [0, 0]), 1,
+    ),
+    # In neighbours of a cycle that are held at u = 0 together.
+    "held neighbours": (
+        Problem(
+            [103.26201559217535, 0.0029458428086861876, 42.037175144265106, 368.4592301173039,
+             3.6033248776606968, 65.02699676001548],
+            [0.9276574737082792, 0.8165336320559369, 0.40052381164752004, 0.014953379291987146,
+             -0.4139783545152895, -0.6060795393367171],
+            [0.7679012279991019, 0.6890388067102825, 0.1473848239015375, 0.007660307222551066,
+             0.6598850616412061],
+            [0.6051257401104178, 0.49275940669505214, 0.8906014267771414, 0.06722149860770721],
+            [1.0, 0.8961740848105425, 1.0, 0.4339624923694204],
+        ), 1,
+    ),
+    # In joined balls some of which were already parting.
+    "balls that part": (
+        Problem(
+            [0.007781671608169458, 963.1011207037445, 0.4059311376235678, 2.8556391008572826,
+             242.11331676336408, 89.2453415124181, 15.635726963231573, 3.9955644102813648],
+            at_rest(8),
+            [1.0, 0.0, 0.8907483257472151, 0.9957891338023604, 0.0, 0.7641101782622505,
+             0.6709302130469132],
+            [0.0, 0.3629097129890003, 0.0, 0.5470942843543211, 0.07847463601332183,
+             0.07316712531149228],
+            [1.0, 0.8928336729461167, 1.0, 0.0, 0.5327386222284957, 0.5046286714972666],
+        ), 1,
+    ),
+    # What a contact gives back of its store each time is below the last digit of the whole.
+    "portions of a store": (
+        Problem(
+            [4.502, 0.03639, 0.07819, 0.001342, 19.41], [0.8341, 0.4998, -0.3567, -0.4033, 0.4473],
+            [0.9901, 0.0, 0.8301, 0.5773], [0.9996, 0.0, 0.02237], [0.235, 2.678e-13, 0.6408],
+        ), 1,
+    ),
+    # Tiny cycles beside fast balls: what each limit costs is a difference of far larger energies.
+    "tiny cycles": (
+        Problem(
+            [1000, 3.6, 0.0056, 0.0036, 30, 0.036, 0.037, 0.11],
+            [0, -0.42, -0.41, -0.51, -0.54, -0.74, -1.3, -1.7],
+            [0, 0.71, 0, 0.7, 0.0049, 0.56, 0.69],
+            [0.22, 0, 0.54, 0.42, 0.28, 1], [0.47, 0.51, 0.34, 0.49, 0.55, 0.55],
+        ), 21,
+    ),
+    # Taken ten billion times at once, its neighbour's work was known to six digits.
+    "a cycle that grows far": (any_chain("saturate", 6, 9806), 1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", COLLAPSES)
+def test_momentum_and_energy_through_many_collapses(name):
+    problem, least = COLLAPSES[name]
+    for one in (problem, problem.mirrored()) if name == "beside a light ball" else (problem,):
         trace = one.collide()
-        assert trace.collapsed
-        m, v = [Fraction(x) for x in one.masses], [Fraction(x) for x in one.velocities]
-        common = sum(a * b for a, b in zip(m, v)) / sum(m)
-        np.testing.assert_allclose(trace.velocities, float(common), rtol=1e-13)
-        for c, impulse in enumerate(trace.impulses):
-            passed = sum(a * (b - common) for a, b in zip(m[: c + 1], v[: c + 1]))
-            assert impulse == pytest.approx(float(passed), rel=1e-9, abs=0), c
+        assert [event.kind for event in trace.events].count("collapse") >= least
+        assert invariants(trace)["ledger"] < 2
+        m, v, w = (
+            [Fraction(x) for x in part.tolist()]
+            for part in (trace.chain.masses, trace.chain.velocities, trace.velocities)
+        )
+        passed = [0, *map(Fraction, trace.impulses.tolist()), 0]
+        for mass, began, ended, before, after in zip(m, v, w, passed, passed[1:]):
+            missing = abs(mass * (ended - began) - (before - after))
+            assert missing <= 16 * Fraction(2) ** -52 * (before + after + mass * abs(began))
+        if name in ("beside a light ball", "tiny cycles"):
+            common, impulses = common_velocity(one)
+            np.testing.assert_allclose(trace.velocities, common, rtol=1e-13)
+            np.testing.assert_allclose(trace.impulses, impulses, rtol=1e-9)
 
 
 #: A light ball reaches a gap, and next to nothing is left of it: what rounding adds to the impulse
@@ -175,80 +211,6 @@ def test_no_contact_pulls_where_a_run_arrives_on_both_sides():
     np.testing.assert_allclose(trace.impulses, passed, rtol=0, atol=1e-15)
 
 
-#: Chains of many collapses, which made or lost momentum: in neighbours of a cycle that are held at
-#: u = 0 together, and in joined balls some of which were already parting.
-MANY_COLLAPSES = {
-    "held neighbours": Problem(
-        [103.26201559217535, 0.0029458428086861876, 42.037175144265106, 368.4592301173039,
-         3.6033248776606968, 65.02699676001548],
-        [0.9276574737082792, 0.8165336320559369, 0.40052381164752004, 0.014953379291987146,
-         -0.4139783545152895, -0.6060795393367171],
-        [0.7679012279991019, 0.6890388067102825, 0.1473848239015375, 0.007660307222551066,
-         0.6598850616412061],
-        [0.6051257401104178, 0.49275940669505214, 0.8906014267771414, 0.06722149860770721],
-        [1.0, 0.8961740848105425, 1.0, 0.4339624923694204],
-    ),
-    "balls that part": Problem(
-        [0.007781671608169458, 963.1011207037445, 0.4059311376235678, 2.8556391008572826,
-         242.11331676336408, 89.2453415124181, 15.635726963231573, 3.9955644102813648],
-        at_rest(8),
-        [1.0, 0.0, 0.8907483257472151, 0.9957891338023604, 0.0, 0.7641101782622505,
-         0.6709302130469132],
-        [0.0, 0.3629097129890003, 0.0, 0.5470942843543211, 0.07847463601332183,
-         0.07316712531149228],
-        [1.0, 0.8928336729461167, 1.0, 0.0, 0.5327386222284957, 0.5046286714972666],
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", MANY_COLLAPSES)
-def test_momentum_through_many_collapses(name):
-    trace = MANY_COLLAPSES[name].collide()
-    assert trace.collapsed
-    exact = [Fraction(m) * Fraction(x - v) for m, x, v in zip(
-        trace.chain.masses.tolist(), trace.velocities.tolist(), trace.chain.velocities.tolist()
-    )]  # fmt: skip
-    passed = [0, *map(Fraction, trace.impulses.tolist()), 0]
-    for change, before, after in zip(exact, passed, passed[1:]):
-        assert abs(change - (before - after)) <= 16 * Fraction(2) ** -52 * (before + after)
-
-
-#: The first contact has some 1e-13 of the impulses of thousands of collisions beside it: what it
-#: gives back of its store each time is below the last digit of the whole, and all of it was lost.
-PORTIONS = Problem(
-    [4.502, 0.03639, 0.07819, 0.001342, 19.41], [0.8341, 0.4998, -0.3567, -0.4033, 0.4473],
-    [0.9901, 0.0, 0.8301, 0.5773], [0.9996, 0.0, 0.02237], [0.235, 2.678e-13, 0.6408],
-)  # fmt: skip
-
-
-#: Thousands of tiny cycles are taken to their limits while the balls beside them move fast: what
-#: each limit costs was the difference of two far larger energies, and their last digits added up.
-TINY_CYCLES = Problem(
-    [1000, 3.6, 0.0056, 0.0036, 30, 0.036, 0.037, 0.11],
-    [0, -0.42, -0.41, -0.51, -0.54, -0.74, -1.3, -1.7],
-    [0, 0.71, 0, 0.7, 0.0049, 0.56, 0.69],
-    [0.22, 0, 0.54, 0.42, 0.28, 1], [0.47, 0.51, 0.34, 0.49, 0.55, 0.55],
-)  # fmt: skip
-
-
-def test_energies_of_tiny_cycles_beside_fast_balls():
-    """All balls end at one velocity: momentum alone fixes it, and every impulse."""
-    trace = TINY_CYCLES.collide()
-    assert [event.kind for event in trace.events].count("collapse") > 20
-    assert invariants(trace)["ledger"] < 2
-    m, v = ([Fraction(x) for x in part] for part in (TINY_CYCLES.masses, TINY_CYCLES.velocities))
-    common = sum(a * b for a, b in zip(m, v)) / sum(m)
-    np.testing.assert_allclose(trace.velocities, float(common), rtol=1e-14)
-    passed = np.cumsum([float(a * (b - common)) for a, b in zip(m, v)])[:-1]
-    np.testing.assert_allclose(trace.impulses, passed, rtol=1e-13)
-
-
-def test_a_store_released_in_portions_below_its_last_digit():
-    trace = PORTIONS.collide()
-    assert trace.collapsed
-    assert invariants(trace)["ledger"] < 2
-
-
 def squeezed(light):
     """Two pairs of heavy balls on a light one: which of them it leaves first is near a tie."""
     return Problem(
@@ -265,29 +227,6 @@ def test_masses_of_fifteen_decades_are_solved_and_of_more_refused():
         squeezed(9e-16).collide()
     with pytest.raises(ValueError, match=r"^masses\[1\] = 1e-26; "):
         collide(Chain([1e-8, 1e-26, 1e-9, 1], [0, 1, 0, 0], [0, 1, 1]), ImpulseCorrelation(0.3))
-
-
-def test_two_runs_with_one_limit():
-    """The sequence of the last three balls comes to its limit where contact 1 of the other ends."""
-    for _, problem in seen(["two runs with one limit"]):
-        assert problem.collide().collisions.max() < 100
-
-
-def test_works_of_a_cycle_that_grows_far():
-    """Ten billion times at once, its neighbour's work was known to six digits, and was refused."""
-    trace = any_chain("saturate", 6, 9806).collide()
-    assert trace.collapsed
-    assert invariants(trace)["ledger"] < 2
-
-
-def test_coefficients_whose_square_is_no_double():
-    """A contact that ends at -1e-300 m/s has opened, but no velocity says so: it is refused."""
-    with pytest.raises(
-        ValueError, match=r"^restitution\[1\] = 1e-300; must be 0 or at least 1e-30"
-    ):
-        Chain([0.5, 2.0, 2.86], at_rest(3), [0.5, 1e-300])
-    with pytest.raises(ValueError, match=r"^restitution\[1, 0\] = 1e-300; must be 0"):
-        post_impact_velocities([1, 1, 1, 1], at_rest(4), [[1, 1, 1], [1e-300, 1, 1]], 0)
 
 
 # --- families ----------------------------------------------------------------------------------
@@ -310,7 +249,7 @@ def finished(name, count, seed):
 @pytest.mark.parametrize("name", FAMILIES)
 def test_invariants(name):
     for problem, trace in finished(name, COUNT, seed=1):
-        check(problem, trace)
+        assert faults(trace, overlap=1e-30) == [], problem
 
 
 @pytest.mark.parametrize("name", ["ties", "ties within bounds"])
@@ -318,13 +257,3 @@ def test_boosts_by_exact_speeds(name):
     for problem, trace in finished(name, COUNT // 2, seed=3):
         boosted = problem.boosted(1.5).collide(max_events=100_000)
         assert difference(boosted.velocities - 1.5, trace.velocities) < 1e-8, problem
-
-
-def test_a_problem_is_what_it_says():
-    """The apparatus: the package is asked for the very chain."""
-    problem = next(family("mixed zeros", 1, seed=7))
-    model = ImpulseCorrelation(problem.forward, problem.backward)  # within its bounds: not refused
-    trace = collide(Chain(problem.masses, problem.velocities, problem.restitution), model)
-    assert trace.velocities.tolist() == problem.collide().velocities.tolist()
-    assert problem.mirrored().mirrored() == problem
-    assert repr(next(family("ties", 1, seed=8))) == repr(next(family("ties", 1, seed=8)))

@@ -1,7 +1,6 @@
 """Stable at the extremes: what holds for every chain, how many digits, where an answer jumps."""
 
 import csv
-import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -81,20 +80,6 @@ def test_a_fault_is_seen():
         assert any(word in fault for fault in found), (field, word, found)
 
 
-def test_measure_of_a_known_error():
-    """A velocity that is off by seven roundings is measured as such; so is the conditioning."""
-    problem = x.case([1, 1], [1, 0], 1, [])
-    trace, _ = problem.attempt()
-    assert x.measure(problem, trace).error == 0
-    off = replace(trace, velocities=trace.velocities + np.array([0, 7 * x.EPS]))
-    found = x.measure(problem, off)
-    assert found.error == pytest.approx(7)
-    # v2' = (1 + e) m1 v1 / (m1 + m2): 1/2 from each mass, 1 from v1, 1/4 from e downwards (by half
-    # an eps), in units of eps; ulps below 1 are half as large, those above count.
-    assert found.condition == pytest.approx(0.5 + 0.5 + 1 + 0.25, rel=1e-12)
-    assert found.own == pytest.approx(7 / (1 + found.condition), rel=1e-12)
-
-
 # --- the map -----------------------------------------------------------------------------------
 
 
@@ -105,18 +90,15 @@ def test_no_point_of_the_map_breaks_an_invariant():
     for row in rows:
         assert row["faulty"] == 0, row
         assert row["own"] <= 4, row
+        light = row["shape"] == "middle" and row["power"] < 0
         if row["condition"] == 0:  # too long to ask for the unavoidable: all digits all the same
             assert row["error"] <= THIRTEEN, row
         # Unfinished or too long to compare: elastic, or all but, with a very light middle ball.
-        light = row["shape"] == "middle" and row["power"] <= -3
         if row["unfinished"] or row["compared"] < len(x.VELOCITIES):
             assert light, row
             assert row["restitution"] >= 0.9, row
+        assert row["own"] < 4 or light, row  # no other chain loses digits of its own
     assert sum(row["unfinished"] for row in rows) < 100
-
-
-def test_digits_are_lost_only_by_a_light_ball_between_heavy_ones():
-    assert max(r["own"] for r in stored("map") if r["shape"] != "middle" or r["power"] >= 0) < 4
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -153,22 +135,10 @@ def test_speeds_of_any_size(size):
         np.testing.assert_allclose(trace.velocities, unit * size, rtol=0, atol=1e-13 * size)
 
 
-def test_subnormal_energies_and_speeds():
-    """Energies below the smallest number, then speeds there: to half of the smallest number."""
-    for power in (-165, -200, -300, -310, -320):
-        problem = x.case([1, 1.5, 0.7], [power_of_ten(4 * power), 0, 0], 0.8, 0.2)
-        trace, finished = problem.attempt()
-        assert x.faults(trace, finished) == []
-        exact = [float(v) for v in problem.exact().velocities]
-        atol = max(4 * x.EPS * max(exact), x.TINIEST)
-        np.testing.assert_allclose(trace.velocities, exact, rtol=0, atol=atol)
-
-
 def test_what_nothing_reaches_keeps_its_velocity():
     """To the last bit, also where the units that the loop counts in have no such small number."""
     for slow in (-5e-324, -1.1e-311):
-        problem = x.case([1, 1, 1], [slow, 3, 0], 0.5, 0.2)
-        trace, finished = problem.attempt()
+        trace, finished = x.case([1, 1, 1], [slow, 3, 0], 0.5, 0.2).attempt()
         assert finished
         assert (trace.path[:, 0] == slow).all()
         assert trace.velocities[0] == slow
@@ -305,15 +275,6 @@ def test_infinite_sequences_in_bounded_work(light, e):
             assert x.measure(problem, trace).own < 8, name
         if name in ("0", "1e-16"):
             assert trace.collapsed == (light <= x.infinite_below(e)), name
-
-
-@pytest.mark.parametrize("light", [1e-3, 1e-5, 1e-7])
-def test_elastic_sequences_are_finite(light):
-    for name, ratio in part_of_bound(light).items():
-        trace, finished = x.case([1, light, 1], [1, 0, 0], 1, ratio).attempt(500_000)
-        assert finished, name
-        assert not trace.collapsed, name
-        assert x.faults(trace) == [], name
 
 
 @pytest.mark.parametrize("e", [0.1, 0.3, 0.5, 0.7, 0.9])
@@ -538,12 +499,6 @@ def test_condition_number_agrees_with_fifty_digits():
         assert found.number == pytest.approx(exact, rel=1e-3)
 
 
-@pytest.mark.parametrize("step", [0.0, -1e-6, 1.0, math.nan, [1e-6], "small"])
-def test_condition_number_refuses_a_bad_step(step):
-    with pytest.raises(ValueError, match="step"):
-        condition_number(Chain([1, 1], [1, 0], 1), ImpulseCorrelation(0.0), step=step)
-
-
 def test_condition_number_at_the_ends_of_ranges():
     """e = 1 and a ratio at its bound can move to one side only; a chain at rest has none."""
     found = condition_number(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.5))
@@ -570,21 +525,8 @@ def test_edges_of_the_ten_sequences():
             assert (x.events_at_balls(near_trace) == base) == same, row
 
 
-def test_balls_at_rest_may_move_a_little():
-    """Touching or nearly touching: other events, the same outcome in the limit."""
-    for name in paper_sequences():
-        chain, model = paper_chain(name, excess="saturate")
-        base = collide(chain, model).velocities
-        for k, side in itertools.product(range(1, len(chain)), (-1, 1)):
-            velocities = chain.velocities.copy()
-            velocities[k] = side * 1e-9
-            other = collide(Chain(chain.masses, velocities, chain.restitution), model)
-            assert np.abs(other.velocities - base).max() < 1e-7
-
-
 # --- adversaries -------------------------------------------------------------------------------
 
-anything = st.floats(allow_subnormal=True)  # NaN and infinities too
 finite = st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=True)
 positive = st.one_of(
     st.floats(0, exclude_min=True, allow_infinity=False, allow_subnormal=True),
@@ -627,20 +569,6 @@ def test_any_finite_numbers(data):
         assert x.faults(trace, finished) == []
 
 
-@settings(max_examples=200)
-@given(
-    st.lists(anything, min_size=2, max_size=4), st.lists(anything, min_size=2, max_size=4), anything
-)
-def test_anything_at_all(masses, velocities, number):
-    try:
-        trace = collide(
-            Chain(masses, velocities, number), ImpulseCorrelation(number, max_events=500)
-        )
-    except (ValueError, ImpactNotFinished):
-        return
-    assert x.faults(trace) == []
-
-
 @pytest.mark.parametrize("plain", [False, True])
 @pytest.mark.parametrize("name", chains_of("found by fuzzing"))
 def test_found_by_fuzzing(name, plain, monkeypatch):
@@ -663,14 +591,6 @@ def test_found_by_fuzzing(name, plain, monkeypatch):
             # Each ball by its own measure, also the slow ones.
             for v, w in zip(trace.velocities.tolist(), exact.velocities):
                 assert abs(v - w) <= 32 * x.EPS * abs(w) + 2 * x.EPS**2
-
-
-@pytest.mark.parametrize("masses", [[1.7e308, 1e308, 1e308], [1e308, 1e308]])
-def test_overflow_is_refused(masses):
-    """Energy may be a number where momentum, or a sum of masses, is none."""
-    velocities = [1.0] + [0.0] * (len(masses) - 1)
-    with pytest.raises(ValueError, match="overflow"):
-        collide(Chain(masses, velocities, 1), ImpulseCorrelation(0.1))
 
 
 @needs_numba
