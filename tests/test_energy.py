@@ -25,52 +25,8 @@ def test_elastic_impacts_are_those_of_springs(masses, exponent, velocities, gaps
     np.testing.assert_allclose(trace.velocities, velocities, rtol=0, atol=1e-9)
 
 
-def by_small_steps(chain, k, p, steps):
-    """Impact in the law's own variables P, E and v, up to the end of contact 0 of three balls.
-
-    Midpoint steps of the sum of both impulses.  The first one is the limit: E = u P at contact 0,
-    so that P = k u^p t^q / q with q = p + 1, and x'' = k u^p t^p / m from rest at contact 1.
-    """
-    m, e, k = chain.masses, chain.restitution, np.asarray(k, float)
-
-    def rates(energy, v):
-        growth = k ** (1 / (1 + p)) * np.maximum(energy, 0) ** (p / (1 + p))
-        growth = growth / growth.sum()
-        u = v[:-1] - v[1:]
-        power = np.where(u > 0, u, u / e**2) * growth
-        passed = np.array([0.0, *growth, 0.0])
-        return power, (passed[:-1] - passed[1:]) / m
-
-    v, h = chain.velocities.copy(), steps
-    t = (h * (p + 1) / (k[0] * v[0] ** p)) ** (1 / (p + 1))
-    x1 = k[0] * v[0] ** p * t ** (p + 2) / (m[1] * (p + 1) * (p + 2))
-    energy = np.array([v[0] * h, k[1] * x1 ** (p + 1) / (p + 1)])
-    v = v + np.array([-h / m[0], h / m[1], 0])
-    rows = []
-    while energy[0] > 0:
-        rows.append((v, energy))
-        a = rates(energy, v)
-        middle = energy + h / 2 * a[0]
-        if middle[0] <= 0:
-            break
-        b = rates(middle, v + h / 2 * a[1])
-        energy, v = energy + h * b[0], v + h * b[1]
-    return rows[-1][0]
-
-
-@pytest.mark.parametrize(("k", "p", "e"), [([1, 1], 1.5, 0.8), ([1, 3], 1, 0.6), ([2, 1], 2, 1)])
-def test_against_the_law_as_it_is_written(k, p, e):
-    chain = striking([1, 1.5, 0.7], [e, 0.9])
-    v = by_small_steps(chain, k, p, 2e-4)
-    trace = collide(chain, EnergyDistribution(k, p, rtol=1e-10))
-    row = trace.events.index(("end", 0)) + 1
-    np.testing.assert_allclose(v, trace.path[row], rtol=0, atol=2e-3)
-    closer = by_small_steps(chain, k, p, 4e-5)
-    np.testing.assert_allclose(closer, trace.path[row], rtol=0, atol=4e-4)
-
-
 @pytest.mark.parametrize("exponent", [1, 1.5, 2.5])
-@pytest.mark.parametrize("e", [0, 1e-3, 0.1, 0.5, 0.9, 1])
+@pytest.mark.parametrize("e", [0, 1e-3, 0.5, 1])
 def test_two_balls(e, exponent):
     chain = Chain([2, 3], [1.7, 1], e)
     trace = collide(chain, EnergyDistribution(50.0, exponent))
@@ -199,16 +155,6 @@ def test_gaps_matter_where_a_contact_closes_again():
     rigid = collide(chain, EnergyDistribution(1.0, gaps=False)).velocities
     np.testing.assert_allclose(with_gap, springs, rtol=0, atol=1e-8)
     assert abs(rigid - springs).max() > 1e-3
-
-
-def test_recompression_counts_in_the_totals():
-    """A light ball between heavy ones: contacts are compressed again before they end."""
-    chain = striking([1, 0.01, 1], 0.9)
-    trace = collide(chain, EnergyDistribution(1.0))
-    maxima = [event.contact for event in trace.events if event.kind == "maximum_compression"]
-    assert len(maxima) > trace.collisions.sum()
-    lost = chain.kinetic_energy - 0.5 * chain.masses @ trace.velocities**2
-    assert trace.energy_loss == pytest.approx(lost, abs=1e-7)
 
 
 @pytest.mark.parametrize("gaps", [True, False])

@@ -180,12 +180,12 @@ class Strings(Free):
 @pytest.mark.parametrize(
     ("engine", "kind", "masses", "lag", "loss"),
     [
-        *((Plain, ("first",), masses, 1.0, 0.0) for masses in (FIVE, MIXED, LIGHT)),
-        *((Plain, ("last",), masses, 0.0, 0.0) for masses in (FIVE, MIXED)),
-        *((Plain, ("half",), masses, 0.5, 0.0) for masses in (FIVE, MIXED)),
+        *((Plain, ("first",), masses, 1.0, 0.0) for masses in (FIVE, LIGHT)),
+        (Plain, ("last",), MIXED, 0.0, 0.0),
+        (Plain, ("half",), MIXED, 0.5, 0.0),
         (Plain, ("first", 4), FIVE, 0.625, 0.0),
-        *((Strings, (1,), masses, 1.0, 0.5) for masses in (FIVE, LIGHT)),
-        *((Strings, (4,), masses, 0.625, 0.125) for masses in (FIVE, LIGHT)),
+        (Strings, (1,), LIGHT, 1.0, 0.5),
+        (Strings, (4,), FIVE, 0.625, 0.125),
     ],
 )
 def test_half_a_minute_at_60_hz_leaves_the_energy_that_one_pendulum_keeps(
@@ -210,27 +210,20 @@ def test_half_a_minute_at_60_hz_leaves_the_energy_that_one_pendulum_keeps(
     assert means[1] == pytest.approx(means[0], abs=0.014 if loss else 5e-3)
 
 
-def test_the_engine_makes_whole_steps():
-    bodies, taken = Hanging([-0.5, 0.0, 0.0]), []
-    advance = bodies.advance
-    bodies.advance = lambda step: taken.append(step) or advance(step)
-    row = hung(bodies)
-    steps(row, 100, 1 / 60)
-    assert row.impacts > 0
-    assert taken == [1 / 60] * 100
-
-
-def test_a_step_never_compiles(monkeypatch):
+def test_a_step_is_one_of_the_engine_and_never_compiles(monkeypatch):
     """However much plain work was done, and whatever is on disk."""
-    asked = []
+    asked, taken = [], []
     monkeypatch.setattr(runtime, "_spent", 1e9)
     monkeypatch.setattr(runtime, "available", lambda: True)
     monkeypatch.setattr(runtime, "loaded", lambda *_: False)
     monkeypatch.setattr(runtime, "compiled", lambda *_: asked.append("compiled"))
     bodies = Hanging([-0.5, 0.0, 0.0])
+    advance = bodies.advance
+    bodies.advance = lambda step: taken.append(step) or advance(step)
     row = hung(bodies)
     steps(row, 60, 1 / 60)
     assert row.impacts > 0
+    assert taken == [1 / 60] * 60
     assert asked == []
     # Elsewhere it would have been compiled by now.
     collide(Chain([1, 1], [1, 0]), ImpulseCorrelation([]))
@@ -502,12 +495,10 @@ def test_a_step_with_too_many_impacts_is_an_error(monkeypatch):
         row.step(0.1)
 
 
-@pytest.mark.parametrize("what", ["positions", "velocities"])
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-@pytest.mark.parametrize("hung_up", [True, False])
-def test_an_engine_that_tells_no_number_is_refused(what: str, value: float, hung_up: bool):
+@pytest.mark.parametrize("pivots", [None, [[0, 1], [0.2, 1], [0.4, 1]]])
+@pytest.mark.parametrize(("what", "value"), [("positions", math.nan), ("velocities", math.inf)])
+def test_an_engine_that_tells_no_number_is_refused(what, value, pivots):
     bodies = Free([[0, 0], [0.2, 0], [0.4, 0]], np.zeros((3, 2)), [1] * 3)
-    pivots = [[0, 1], [0.2, 1], [0.4, 1]] if hung_up else None
     row = Row(bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS, pivots)
     (bodies.x if what == "positions" else bodies.v)[2, 1] = value
     with pytest.raises(ValueError, match=rf"motion: {what}\[2, 1\] = {value}; must be finite"):

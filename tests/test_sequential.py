@@ -105,16 +105,6 @@ def test_right_is_the_mirror_image_of_left():
 
 
 @pytest.mark.parametrize("order", ["left", "right"])
-def test_trace_belongs_to_the_chain_and_the_model(order):
-    chain, model = Chain([1, 2, 3], [1, 0, -1], 0.9), SequentialCollisions(order)
-    trace = collide(chain, model)
-    assert trace.chain is chain
-    assert trace.model is model
-    np.testing.assert_array_equal(trace.path[0], chain.velocities)
-    np.testing.assert_array_equal(trace.path[-1], trace.velocities)
-
-
-@pytest.mark.parametrize("order", ["left", "right"])
 def test_endless_sequences_reach_their_limit(order):
     trace = collide(Chain([1, 1, 1], [2, 1, 0], 0), SequentialCollisions(order))
     assert trace.collapsed
@@ -151,6 +141,3 @@ def test_fused_bodies_collide_like_two_balls(n):
 def test_fused_masses_whose_sum_overflows():
     trace = collide(Chain([1.5e308] * 3, [1e-3, 0, 0], 1), FusedChain())
     np.testing.assert_allclose(trace.velocities, np.array([-1, 2, 2]) / 3e3, rtol=1e-14)
-
-
-# --- input ---------------------------------------------------------------------------------
