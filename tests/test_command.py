@@ -114,12 +114,6 @@ def test_solve_agrees_with_the_solver():
     )
 
 
-def test_solve_by_masses():
-    answer = json.loads(call("solve --masses 1,1,1 --velocities 1,0,-1 --ratio 0 --json"))
-    assert [row["after"] for row in answer["rows"]] == pytest.approx([-1, 0, 1], abs=1e-12)
-    assert answer["energy_lost"] == pytest.approx(0, abs=1e-12)
-
-
 # --- what is assumed ---------------------------------------------------------------------------
 
 LOSSY = "--restitution 0.9"
@@ -204,9 +198,8 @@ def test_gaps_and_damping_of_a_swing():
 
 @pytest.mark.parametrize(
     ("name", "begins"),
-    [("toy.gif", b"GIF89a"), ("toy.png", b"\x89PNG"), ("toy.svg", b"<svg"),
-     ("toy.html", b"<!doctype html>")],
-)  # fmt: skip
+    [("toy.gif", b"GIF89a"), ("toy.svg", b"<svg")],
+)
 def test_a_swing_is_drawn(folder, name, begins):
     said = call(f"swing 3 --pull 2 --seconds 0.4 --ratio 0.1 -o {name}")
     assert said.startswith(f"drawn to {name}; impacts: 1\nmodel: ")
@@ -498,65 +491,39 @@ def scaled(text, size):
     return "\n".join([*head, *("\t".join(row) for row in rows)]) + "\n"
 
 
-@pytest.mark.usefixtures("folder")
-def test_a_name_with_a_comma_stays_one_cell():
-    line = f"{BAC} --shot 'a,b'"
-    rows = list(csv.reader(io.StringIO(call(line))))
-    assert [row[:4] for row in rows] == [["BAC", "a,b", str(k + 1), "BAC"[k]] for k in range(3)]
-    assert {len(row) for row in rows} == {9}
-
-
 @pytest.mark.parametrize(
     ("line", "code", "message"),
     [
         ("solve ABXA", 1, "SEQUENCE, ball 3: 'X'; must be one of A, B, C, D"),
         ("solve ABCCA", 1, "--saturate holds the contact closed"),
         ("solve", 2, "give how many equal balls, such as 5, or a sequence of the paper's balls"),
-        ("solve ABA --masses 1,1", 2, "give how many equal balls"),
-        ("solve 3 --masses 1,1", 2, "give how many equal balls"),
         ("solve ABA --ratio 0.1", 2, "--ratio goes with --masses"),
-        ("solve ABA --unit g", 2, "--unit goes with --masses"),
         ("solve --masses 1,1 --velocities 1,0 --speed 3", 2, "give one of --speed and --velocit"),
         ("solve --masses 1,x", 2, "write numbers with commas"),
-        ("solve --masses 1,1 --json --csv", 2, "give one of --json and --csv"),
         ("solve --masses 1,-1", 1, "cradle: --masses, value 2: -1.0; must be above 0"),
         ("solve --masses 1,1 --restitution 1.2", 1, "cradle: --restitution = 1.2; must lie in"),
-        ("solve --masses 1,1,1 --restitution 1,1.2", 1, "cradle: --restitution, value 2: 1.2; mu"),
         ("solve --masses 1,1,1 --velocities 1,0", 1, "--velocities, 2 given: one velocity for ea"),
         ("solve --masses 1,1,1 --model ratio", 2, "ratios need --ratio, such as 0.1"),
-        ("solve --masses 1,1,1 --backward 0.1", 2, "ratios need --ratio"),
         ("solve --masses 1,1,1 --model spheres --ratio 0.1", 2, "--model spheres has no ratios"),
         ("solve ABCCA --model sequential --saturate", 2, "--model sequential has no ratios"),
         ("solve --masses 1,1,1 --ratio 0.6", 1, "--ratio, value 1: 0.6; at ball 2 it must"),
         ("solve --masses 1,1,1 --ratio 0 --backward 1", 1, "--backward, value 1: 1.0; at ball 2 "),
         ("solve --masses 1,1,1 --ratio 0.1,0.1", 1, "--ratio has 2 values; 3 balls need 1"),
         ("swing --masses 1,1,1 --by 5", 1, "--by = 5.0; must be above 0 and at most a quarter"),
-        ("swing --masses 1,1,1 --by -1", 1, "--by = -1.0; must be above 0 and at most a quar"),
-        ("swing --masses 1,1,1 --by 0", 1, "--by = 0.0; must be above 0 and at most a quarter"),
         (
             "swing 3 --pull 0.05",
             2,
             "--pull says how many of the 3 balls are pulled, 2 or 1,1; how ",
         ),
         ("swing 3 --pull 2,2", 2, "--pull says how many of the 3 balls are pulled"),
-        ("swing 3 --pull 0", 2, "--pull says how many of the 3 balls are pulled"),
-        ("swing 3 --pull 1,1,1", 2, "--pull says how many of the 3 balls are pulled"),
         ("swing 3 --length 1 --period 1", 2, "give one of --length and --period"),
-        ("swing 3 --period -1", 1, "--period = -1.0; must be above 0"),
         ("swing 3 --gaps 1,1,1", 1, "--gaps has 3 values; 3 balls need 2, or one number"),
-        ("swing 3 --damping -1", 1, "cradle: --damping = -1.0; must be at least 0"),
         ("swing 3 -o toy.bmp", 1, "'toy.bmp'; must end in .svg, .html, .gif, .mp4 or .png"),
         ("swing --masses 1,1,1 --length 0", 1, "cradle: --length 0.0; must be above 0"),
-        ("swing --masses 1,1,1 --seconds 0", 1, "--seconds = 0.0; must be above 0"),
-        ("swing --masses 1,1,1 --steps 0", 1, "--steps = 0; must be a whole number, at least 1"),
         ("recommend --masses 1,1,1", 1, "Give --stiffness 1 if all contacts are equal spheres"),
         ("recommend --masses 1,1,1 --wanted path,x", 1, "--wanted 'x'; must be one of"),
-        ("recommend --masses 1,1 --impacts 0", 1, "cradle: --impacts 0; must be a whole number"),
-        ("solve --masses 1,1 --speed nan", 1, "cradle: --speed nan; must be finite"),
         ("swing ABA --speed 2", 2, "leave --speed and --velocities out: the first ball is pulled"),
-        ("swing --masses 1,1 --velocities 2,0", 2, "leave --speed and --velocities out"),
         ("plot ABA --output -", 2, "'-'; a picture goes to a file: give its name"),
-        ("fit shots.csv --plot -", 2, "'-'; a picture goes to a file: give its name"),
         (f"{BAC} --slower 0", 1, "--slower = 0.0; must be above 0"),
         (f"{BAC} --window 0", 1, "cradle: --window 0.0; must be above 0"),
         (f"{BAC} --level", 2, "give --length or --period of the pendulums, or --level: one"),
@@ -567,44 +534,31 @@ def test_a_name_with_a_comma_stays_one_cell():
             2,
             "--position-unit px and --scale, pixels in a metre, go to",
         ),
-        (
-            f"{BAC} --scale 1000",
-            2,
-            "--position-unit px and --scale, pixels in a metre, go together",
-        ),
         (f"{BAC} wide.txt --shot 1", 2, "--shot names one film; several have the names of their f"),
         (BAC.replace("BAC", "CAB"), 1, "track 1 is named B, --set CAB has C there"),
         (BAC.replace("film.txt", "wide.txt"), 1, "wide.txt is no UTF-8 text (byte 0); save"),
         (BAC.replace("BAC", "BA"), 1, "has 3 tracks, --set 2 types"),
         ("recommend --masses 1,1,1 --model spheres", 2, "leave --model out"),
-        ("recommend --masses 1,1,1 --wanted speed", 1, "--wanted 'speed'; must be one of velo"),
         ("fit nothing.csv", 2, "does not exist"),
         ("fit shots.csv --mass-unit g --restitution AB", 2, "write NAME=NUMBER"),
-        ("fit grams.csv", 1, "column mass: 45 kg is unlikely"),
         ("fit grams.csv", 1, "grams: say --mass-unit g (or in kg indeed: say --mass-unit kg)"),
         ("fit fast.csv", 1, "cm/s: say --velocity-unit cm/s (or in m/s indeed: say --velocity-un"),
         ("fit shots.csv --without AC --predict ABX", 1, "set BAC needs the restitution of AC: sh"),
         ("fit shots.csv --without AC", 1, "give --restitution AC=E:ERROR (there are: AB)"),
         ("fit shots.csv --without ABX", 1, "no set 'ABX' to leave out; there are AB, AC, ABA, B"),
         ("fit shots.csv --without AB,AC,ABA,BAC,CAB,ACA", 1, "no set is left without AB, AC, AB"),
-        ("fit shots.csv --without AB --restitution AB=1.2", 1, "--restitution AB: 1.2; must lie"),
         ("fit shots.csv --without AB --restitution AB=1:-1", 1, "--restitution AB: -1.0; a stand"),
-        ("fit shots.csv --without AB --restitution AB=nan", 1, "--restitution AB: nan; must be"),
         ("fit shots.csv --known ABX=0.1", 2, "--known ABX: no chain has this triplet; there are"),
-        ("fit pairs.csv --known AAA=0.1", 2, "--known AAA: no chain has this triplet; there are"),
         ("fit pairs.csv --restitution AX=1", 2, "--restitution AX: no chain has this pair; there "),
         ("fit shots.csv --known ABA=1.2", 1, "cradle: --known ABA: 1.2; must lie in [0, 1]"),
         ("fit shots.csv --predict ABA --csv", 2, "--csv prints the fitted values alone"),
         ("fit shots.csv --speed 2", 2, "--speed is that of the chain to --predict; give both"),
         ("fit shots.csv --sigma 0.01", 1, "--sigma 0.01; the table has a column sigma: leave out"),
-        ("fit shots.csv --sigma 0", 1, "cradle: --sigma 0.0; must be above 0"),
         ("fit shots.csv --known ABA=0.6 --predict ABA", 1, "--known ABA: 0.6; must not exceed"),
         ("fit shots.csv --known ABA=0.1:0.2", 2, "write TRIPLET=RATIO; a known ratio has no error"),
         ("fit shots.csv --known ABA=0.1 --known ABA=0.2", 2, "--known ABA: given twice"),
         ("fit shots.csv --restitution BA=0.2", 2, "--restitution BA: set AB is fitted for it; lea"),
         ("fit pairs.csv --predict ABA", 1, "the ratio of ABA is not known (--known ABA=RATIO)"),
-        ("fit shots.csv --predict A", 1, "cradle: --predict 'A'; must name at least 2 balls"),
-        ("fit shots.csv --predict ''", 1, "cradle: --predict ''; must name at least 2 balls"),
         ("frobnicate", 2, "No such command"),
     ],
 )
@@ -648,10 +602,6 @@ def test_first_answer_within_a_second(tmp_path):
     assert float(seconds) < 1
     assert loaded == "set()"
     assert "0.2782" in result.stdout
-
-
-def test_balls_at_rest_lose_nothing():
-    assert json.loads(call("solve AAAAA --speed 0 --json"))["energy_lost"] == 0
 
 
 def test_a_swing_that_ends_early_says_so(monkeypatch):
