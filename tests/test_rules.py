@@ -215,6 +215,12 @@ def test_long_elastic_chains_near_the_bound_are_no_collapse(n, part):
 # --- one chain for one line, and for each case of a rule ----------------------------------
 
 
+def test_simultaneous_events_of_one_run():
+    """Ends and closings that fall together happen together, ends first, left to right."""
+    trace = CHAINS["simultaneous events of one run"].problem.collide()
+    assert trace.collisions.tolist() == agrees(trace).collisions
+
+
 @pytest.mark.parametrize(("name", "problem"), seen(chains_of("one line of the solver")))
 def test_delicate_chains(name, problem):
     """Collapsed ones against the sum of a great many impacts: the reference knows no cycles."""

@@ -113,38 +113,14 @@ def window(ratio):
     return math.ceil(math.log(LIMITS.cut) / math.log(ratio) - 1e-9)
 
 
-def efforts(ratio, **limits):
-    """What each ball adds to the effort of a long elastic chain; before and behind 300 balls."""
-    few, some, many = (solve(*struck(n), 1.0, ratio, **limits).effort for n in (200, 300, 400))
-    return (some - few) / 100, (many - some) / 100
-
-
-def grows_in_proportion(ratio, **limits):
-    before, behind = efforts(ratio, **limits)
-    # Both ends of the window, and one more as masses are counted in half of their largest.
-    return before == behind <= window(ratio) + 3
-
-
-@pytest.mark.parametrize("ratio", [0.1, 0.3, 0.45, 0.5])
+@pytest.mark.parametrize("ratio", [0.1, 0.5])
 def test_work_grows_in_proportion_to_a_long_chain(ratio):
-    assert grows_in_proportion(ratio)
-
-
-def test_quadratic_work_is_seen():
-    assert not grows_in_proportion(0.45, cut=0.0)
-
-
-@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.45])
-@pytest.mark.parametrize("n", [50, 100, 200, 400])
-def test_elastic_chain_at_any_length(n, ratio):
     """One collision a contact, a bounded number of contacts a collision, one and the same end."""
-    found = solve(*struck(n), 1.0, ratio)
-    assert found.collisions == [1] * (n - 1)
-    reach = 3 if ratio == 0.0 else window(ratio) + 3
-    assert found.effort <= (n - 1) * reach
-    short = solve(*struck(50), 1.0, ratio)
-    assert found.velocities[-5:] == short.velocities[-5:]
-    assert found.velocities[0] == short.velocities[0]
+    few, some, many = (solve(*struck(n), 1.0, ratio) for n in (200, 300, 400))
+    # Both ends of the window, and one more as masses are counted in half of their largest.
+    assert some.effort - few.effort == many.effort - some.effort <= 100 * (window(ratio) + 3)
+    assert many.collisions == [1] * 399
+    assert many.velocities[-5:] == few.velocities[-5:]
 
 
 def test_an_event_of_a_long_lossy_row_costs_no_more_than_of_a_short_one():
@@ -154,38 +130,15 @@ def test_an_event_of_a_long_lossy_row_costs_no_more_than_of_a_short_one():
     assert long.effort / long.events < 1.5 * short.effort / short.events
 
 
-@pytest.mark.parametrize("ratio", [0.1, 0.3, 0.45])
-def test_what_is_cut_is_below_rounding(ratio):
-    """The same bits for every cut, and for none; a coarse one is seen."""
-    stored = solve(*struck(150), 1.0, ratio).velocities
-    for cut in (2.0**-110, 2.0**-140, 2.0**-200, 0.0):
-        assert solve(*struck(150), 1.0, ratio, cut=cut).velocities == stored, cut
-    assert solve(*struck(150), 1.0, ratio, cut=2.0**-30).velocities != stored
-
-
-def test_what_is_cut_is_below_rounding_for_random_chains():
-    """Unequal balls and losses: all balls of the same bits as long as the order is no chance."""
+def test_what_is_cut_is_below_rounding():
+    """The same bits for other cuts, and for none; a coarse one is seen."""
     rng = np.random.default_rng(7)
-    for n in (20, 40, 150):
-        m = magnitudes(rng, 1, n)
-        forward = uniform(rng, 0.0, 0.2, n - 2)
-        backward = uniform(rng, 0.0, 0.2, n - 2)
-        e = uniform(rng, 0.9, 1.0, n - 1) if n == 20 else 1.0
-        chain = m.tolist(), struck(n)[1], e, forward, backward
-        stored, uncut = solve(*chain), solve(*chain, cut=0.0)
-        assert stored.collisions == uncut.collisions
-        leading = slice(None) if n == 20 else slice(-5, None)
-        assert stored.velocities[leading] == uncut.velocities[leading]
-
-
-@pytest.mark.parametrize("balls", [40, 80, 160])
-def test_collisions_with_losses_grow_with_the_square(balls):
-    """At ratio zero every two balls meet once, so to speak; with a ratio it is nearly as many."""
-    pairs = balls * (balls - 1) // 2
-    chain = struck(balls)
-    assert outcomes(*chain, 0.99, 0.0).collisions.sum() == pairs
-    for ratio in (0.1, 0.3, 0.45):
-        assert 0.7 * pairs < outcomes(*chain, 0.99, ratio).collisions.sum() < 1.4 * pairs
+    lossy = magnitudes(rng, 1, 20).tolist(), struck(20)[1], uniform(rng, 0.9, 1.0, 19), 0.15
+    for chain in ((*struck(100), 1.0, 0.1), (*struck(100), 1.0, 0.45), lossy):
+        stored = solve(*chain).velocities
+        for cut in (2.0**-100, 2.0**-200, 0.0):
+            assert solve(*chain, cut=cut).velocities == stored, cut
+        assert solve(*chain, cut=2.0**-30).velocities != stored
 
 
 def batch_of_three(first, second):
@@ -196,8 +149,8 @@ def batch_of_three(first, second):
 
 
 @needs_numba
-@pytest.mark.parametrize("shape", [(500, 200), (1000, 400)], ids=str)
-def test_a_batch_needs_inputs_outputs_and_a_small_work_area(shape):
+def test_a_batch_needs_inputs_outputs_and_a_small_work_area():
+    shape = 1000, 400
     chains = batch_of_three(*shape)
     outcomes(*batch_of_three(100, 100))  # compiled, and threads' areas made
     tracemalloc.start()
@@ -244,7 +197,7 @@ def within(seconds, function):
 
 
 @needs_numba
-def test_threads_do_not_change_a_bit():
+def test_threads_do_not_change_a_bit(monkeypatch):
     rows = batch.CHUNK[4]
     chains = mixed_batch(5 * rows + 77)
     whole = outcomes(*chains)
@@ -253,17 +206,9 @@ def test_threads_do_not_change_a_bit():
         alone = outcomes(*(x[part] for x in chains))
         for one, other in zip(whole, alone, strict=True):
             assert one[part].tobytes() == other.tobytes()
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
     shown = outcomes(*chains, progress=True)
     assert shown.velocities.tobytes() == whole.velocities.tobytes()
-
-
-@needs_numba
-@pytest.mark.parametrize("workers", [1, 2, 7])
-def test_any_number_of_threads(workers, monkeypatch):
-    chains = mixed_batch(4 * batch.CHUNK[4] + 5)
-    expected = post_impact_velocities(*chains)
-    monkeypatch.setattr(os, "cpu_count", lambda: workers)
-    assert post_impact_velocities(*chains).tobytes() == expected.tobytes()
 
 
 @needs_numba
