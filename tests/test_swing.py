@@ -17,7 +17,6 @@ from cradle import (
     ImpulseCorrelation,
     Pendulums,
     SequentialCollisions,
-    SpringChain,
     swing,
     textbook,
 )
@@ -45,18 +44,6 @@ def energy(m, x, v, length, gravity=9.81):
 
 
 # Periods
-
-
-def test_period_small_angle():
-    """One ball out, one ball out: each swing of 2 pi sqrt(l/g) has two impacts."""
-    length = 0.3
-    period = 2 * math.pi * math.sqrt(length / 9.81)
-    run = swing(balls(5), SequentialCollisions(), pulled(5), [20 * period],
-                pendulums=Pendulums(length))  # fmt: skip
-    times = [impact.time for impact in run.impacts]
-    np.testing.assert_allclose(times, period * (0.25 + 0.5 * np.arange(40)), rtol=1e-14)
-    # After whole periods the first ball is back where it was let go.
-    np.testing.assert_allclose(run.positions[-1], pulled(5), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("amplitude", [0.1, 1.0, 2.5])
@@ -175,19 +162,12 @@ def test_damping_between_impacts():
 
 
 def test_drift_of_five_balls():
-    """All energy but that of the common swing dies out, at the pace of the independent solver."""
-    e, n, ratio = 0.9, 5, 0.15
-    run = swing(balls(n, e), ImpulseCorrelation(ratio), pulled(n), [60.0], pendulums=ONE_HERTZ)
-    v = np.array([0.02 * 2 * math.pi, 0, 0, 0, 0])
-    expected, found = [], []
-    for impact in run.impacts[:30]:
-        v = np.array([float(a) for a in solve([1.0] * n, list(v), [e] * 4, ratio).velocities])
-        expected.append(np.var(v))
-        found.append(np.var(impact.after))
-        v = -v
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
-    assert found[29] < 1e-2 * found[0]
-    # In the end the balls swing together, for ever: no more impacts, energy of the mean velocity.
+    """All energy but that of the common swing dies out; in the end the balls swing together."""
+    n = 5
+    run = swing(balls(n, 0.9), ImpulseCorrelation(0.15), pulled(n), [60.0], pendulums=ONE_HERTZ)
+    relative = [np.var(impact.after) for impact in run.impacts]
+    assert relative[29] < 1e-2 * relative[0]
+    # No more impacts, energy of the mean velocity.
     assert run.together == (0, 1, 2, 3)
     assert run.impacts[-1].time < 59
     assert run.energy[-1] == pytest.approx(0.5 * n * (0.02 * 2 * math.pi / n) ** 2, rel=1e-12)
@@ -237,13 +217,6 @@ def test_two_balls_at_a_time_are_the_limit_of_stiff_springs(m, x, pendulums):
     assert apart[2] < 0.005
     for coarse, fine in zip(apart, apart[1:]):
         assert 0.5 < math.log(coarse / fine) / math.log(100**0.4) < 1.5
-
-
-def test_first_stroke_of_three_touching_balls_is_that_of_springs():
-    half = np.array([0.5])
-    run = swing(balls(3), SpringChain(1.0), pulled(3), half, pendulums=ONE_HERTZ)
-    stiff = springs([1] * 3, pulled(3), 0.5, half, 1e10, ONE_HERTZ)
-    np.testing.assert_allclose(stiff[0], run.positions[0], rtol=0, atol=0.003 * 0.02)
 
 
 # Resting contacts

@@ -68,16 +68,6 @@ for _name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv"
 Rational.__abs__ = _closed("__abs__")
 
 
-def test_figure_4_in_fractions():
-    """Han and Gilmore's two answers, as fractions: no rounding anywhere."""
-    rest = [1, 0, 0], 1
-    assert textbook.solve([1, 1, 1], *rest, 0, number=Rational).velocities == [0, 0, 1]
-    third = Fraction(1, 3)
-    together = textbook.solve([1, 1, 1], *rest, "1/2", number=Rational)
-    assert together.velocities == [-third, 2 * third, 2 * third]
-    assert all(isinstance(v, Fraction) for v in together.velocities)
-
-
 def test_momentum_and_energy_in_fractions():
     """Ratio zero: one collision after the other, and between elastic balls no root but a square."""
     m, v = [3, 1, 2, "1.5", 1], [1, "0.5", 0, 0, "-0.25"]
