@@ -25,7 +25,6 @@ from cradle import (
     collide,
     outcomes,
     paper_chain,
-    post_impact_velocities,
 )
 from cradle.kernel.state import LIMITS
 from cradle.measures import condition_number
@@ -101,7 +100,7 @@ def test_no_point_of_the_map_breaks_an_invariant():
     assert sum(row["unfinished"] for row in rows) < 100
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_rows_of_the_map(seed):
     short = [row for row in stored("map") if row["events"] <= 80]
     for row in sample(short, 8, seed):
@@ -120,21 +119,6 @@ def test_rows_of_the_map(seed):
         assert own <= 2 * row["own"] + 2, row
 
 
-@pytest.mark.parametrize("size", [1e-150, 1e-40, 3e-7, 7e12, 1e150])
-def test_speeds_of_any_size(size):
-    """Powers of ten are no powers of two: the last digit may change, the thirteenth may not."""
-    for masses, e, ratio in (
-        ([1, 2, 0.5, 1], 0.8, 0.2),
-        ([1, 1e-3, 1, 1e3], 1, 0),
-        ([1] * 4, 0, 0.4),
-    ):
-        unit = post_impact_velocities(masses, [1, 0.3, 0, 0], e, ratio, excess="saturate")
-        problem = x.case(masses, np.array([1, 0.3, 0, 0]) * size, e, ratio)
-        trace, finished = problem.attempt()
-        assert x.faults(trace, finished) == []
-        np.testing.assert_allclose(trace.velocities, unit * size, rtol=0, atol=1e-13 * size)
-
-
 def test_what_nothing_reaches_keeps_its_velocity():
     """To the last bit, also where the units that the loop counts in have no such small number."""
     for slow in (-5e-324, -1.1e-311):
@@ -144,7 +128,7 @@ def test_what_nothing_reaches_keeps_its_velocity():
         assert trace.velocities[0] == slow
 
 
-@pytest.mark.parametrize("gap", [0.0, 2.0**-52, 1e-15, 1e-14, 1e-12, 1e-9, 1e-6])
+@pytest.mark.parametrize("gap", [0.0, 2.0**-52, 1e-14, 1e-9])
 def test_nearly_simultaneous_events(gap):
     """Two runs meet on one ball, two gaps are reached together, contacts end at once."""
     for masses, velocities, e, ratio in (
@@ -243,7 +227,7 @@ def test_no_digit_is_lost_at_ratio_zero(light, last, e):
 
 
 LIGHT = (1e-3, 1e-6, 1e-12)
-LOSSY = (0.0, 1e-16, 0.3, 0.7, 0.9, 0.99)
+LOSSY = (0.0, 1e-16, 0.3, 0.9, 0.99)
 
 
 def part_of_bound(light):
@@ -277,7 +261,7 @@ def test_infinite_sequences_in_bounded_work(light, e):
             assert trace.collapsed == (light <= x.infinite_below(e)), name
 
 
-@pytest.mark.parametrize("e", [0.1, 0.3, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
 def test_both_sides_of_the_edge_between_finite_and_infinite(e):
     """Ratio 0: where the eigenvalues of the cycle turn complex; the limit from both sides.
 
@@ -412,6 +396,7 @@ def test_eight_hundred_thousand_events():
 
 
 @needs_numba
+@pytest.mark.exhaustive
 def test_a_row_of_heavy_and_light_balls_is_long_but_not_endless(monkeypatch):
     """More steps than the default limit allows."""
     monkeypatch.setenv(runtime.VARIABLE, "compiled")
@@ -538,7 +523,7 @@ unit = st.one_of(
 )
 
 
-@settings(max_examples=400)
+@settings(max_examples=250)
 @given(st.data())
 def test_any_finite_numbers(data):
     """An outcome without a fault, or a documented refusal."""
