@@ -43,8 +43,8 @@ def difference(one, other):
 # --- the named chains --------------------------------------------------------------------------
 
 
-#: Asked in `test_rules.py` and `test_extremes.py`.
-ELSEWHERE = ("one line of the solver", "found by fuzzing")
+#: Asked in `test_rules.py`, `test_extremes.py` and `test_safeguards.py`.
+ELSEWHERE = ("one line of the solver", "found by fuzzing", "a safeguard")
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-import truth
-from delicate import CHAINS
+from delicate import CHAINS, chains_of
 from plain import rooms, solve
 
 from cradle.kernel import cycles
@@ -60,116 +59,42 @@ def changed(room, name, part, other):
 
 
 LIGHT_BETWEEN = ([1e-6, 1e-9, 1e-6, 1], [1, 0, 0, 0], [0.3, 0.1, 0.99], [0.3, 0.1], [0.5, 1], 1.0)
+HELD_FAST = "two balls that chatter between balls held fast"
 
-#: A light ball is squeezed between two heavy ones; before they are at one velocity, one of them
-#: falls back on a third.
-BEFORE_A_LIMIT = ([1, 1, 1e-7, 3], [0.5, 1, -1, 0], [1e-3, 0.9, 0.3], [1, 0], [0, 0.1], 1.0)
-
-#: Its last collisions are far below the last digit of its velocities.
-EXHAUSTED = ([0.07, 4, 0.08, 70], [0.8, 0.8, 0.6, -1], [1, 1, 0], [0.2, 0.9], [0.009, 0.8], 0.5)
-
-TURNS_FAR = (
-    [1.7, 1e-3, 1, 1], [1, 0, 0, 0], [0.9, 0.99, 0.9], [0.05, 0.1], [0.1, 0.05], 0.5,
-)  # fmt: skip
-
-AT_ONCE = (
-    [1.94, 2.65, 1.39, 2.14, 1.98, 1.73, 1.82, 1.75, 1.36],
-    [0.9, 0.63, 0.55, 0.55, 0.51, 0.43, 0.21, 0.17, 0.05],
-    [0.62, 0.63, 0.77, 0.74, 0.7, 0.55, 0.69, 0.83],
-    [0.37, 0.4, 0, 0, 0.1, 0.08, 0.1], [0.32, 0.21, 0.06, 0.2, 0, 0.41, 0.52], 0.5,
-)  # fmt: skip
-
-HELD_FAST = CHAINS["two balls that chatter between balls held fast"].problem
-
-#: What is exchanged; the chain with its ratios and `meeting`; what becomes of it.
-NEEDED = {
-    "gaps reached at once": ({"tie": 0.0}, AT_ONCE, UNSOUND),
-    "closing speeds that are zero but for rounding": (
-        {"tie": 0.0},
-        ([1] * 9, [1] + [0] * 8, 1, [0.1, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0.1, 0.1], 0.5),
-        WRONG,
-    ),
-    "ratios of zero are far below all others": (
-        {"vanishing": 2},
-        ([1, 1, 1, 1], [1, 0.5, 1, -0.5], 1, [0, 1], [0.1, 0.1], 0.0),
-        WRONG,
-    ),
-    "contacts with next to nothing left": ({"exhausted": 1e-300}, EXHAUSTED, UNFINISHED),
-    "exhausted collisions in a row": ({"repeats": math.inf}, HELD_FAST, UNFINISHED),
-    "dust between contacts that only chatter": (
-        {"dust": 0.0},
-        (
-            [0.284, 0.79, 1, 2.3350031089816268, 0.2, 1, 1, 5], [0.9, 0, 0.3, 0.87, 1, 1, 0.5, 0],
-            [1, 1, 1, 1, 1, 0, 0], [1, 0, 1, 0, 0, 0], [1, 0.1, 0.5, 0, 1, 1], 0.5,
-        ),
-        UNFINISHED,
-    ),
-    "one exhausted collision, which is no row": ({"repeats": 1}, HELD_FAST, WRONG),
-    "a cycle repeated up to its neighbour's event": (
-        {"many": math.inf},
-        BEFORE_A_LIMIT,
-        UNFINISHED,
-    ),
-    "a cycle that repeats itself but for rounding": (
-        {"self_similar": 0.0},
-        (
-            [1, 1, 1e-12, 1, 1e-3, 1e-9], [1, 1, 0.3, -0.5, 0.3, -1], [0.99, 0.99, 0, 0.9, 0],
-            [0.05, 0, 0.5, 0.3], [0.1, 0.1, 0.1, 0], 0.0,
-        ),
-        UNFINISHED,
-    ),
-    "a cycle that does not repeat itself": ({"self_similar": math.inf}, TURNS_FAR, WRONG),
-    "a cycle that still turns": (
-        {"bend": 0.0},
-        (
-            [1.7, 1e-3, 1e-3, 1, 1e-6], [1, 0, 0, 0, 0], [1, 0.9, 0.9, 0.9],
-            [0.1, 0.05, 0.05], [0, 0.1, 0], 0.5,
-        ),
-        UNFINISHED,
-    ),
-    "a cycle that turns too far": ({"bend": math.inf}, TURNS_FAR, WRONG),
-    "contacts that a snapshot holds": ({"window": 1}, BEFORE_A_LIMIT, UNFINISHED),
-    "what a sum may be off": ({"sound": 0.0}, ([1000, 1], [1, 0], 0.3, [], [], 0.5), UNSOUND),
-    "a gap further on that is passed": (
-        {"part_beyond": first_room_only},
-        (
-            [1.47, 2.46, 3, 2.22, 1.04, 0.68, 2.27], [0.75, 0.74, 0.74, 0.5, 0.46, 0.31, 0.16],
-            [0.63, 0.56, 0.61, 0.66, 0.72, 0.94],
-            [0.38, 0.24, 0, 0.1, 0], [0.28, 0, 0.43, 0.37, 0.27], 0.5,
-        ),
-        UNSOUND,
-    ),
-    "neighbours that come to their own event in a cycle": (
+#: A chain of `delicate_chains.csv`, what is exchanged, and what becomes of the chain.
+NEEDED = [
+    ("gaps reached at once", {"tie": 0.0}, UNSOUND),
+    ("closing speeds that are zero but for rounding", {"tie": 0.0}, WRONG),
+    ("ratios of zero are far below all others", {"vanishing": 2}, WRONG),
+    ("contacts with next to nothing left", {"exhausted": 1e-300}, UNFINISHED),
+    (HELD_FAST, {"repeats": math.inf}, UNFINISHED),
+    ("dust between contacts that only chatter", {"dust": 0.0}, UNFINISHED),
+    (HELD_FAST, {"repeats": 1}, WRONG),  # one exhausted collision is no row of them
+    ("a light ball squeezed until another falls back", {"many": math.inf}, UNFINISHED),
+    ("a light ball squeezed until another falls back", {"window": 1}, UNFINISHED),
+    ("a cycle that repeats itself but for rounding", {"self_similar": 0.0}, UNFINISHED),
+    ("a cycle that turns far", {"self_similar": math.inf}, WRONG),
+    ("a cycle that turns far", {"bend": math.inf}, WRONG),
+    ("a cycle that still turns", {"bend": 0.0}, UNFINISHED),
+    ("what a sum may be off", {"sound": 0.0}, UNSOUND),
+    ("a gap further on that is passed", {"part_beyond": first_room_only}, UNSOUND),
+    (
+        "neighbours that come to their own event in a cycle",
         {"neighbours_stay": any_neighbours},
-        (
-            [1e-3, 1, 1, 1e-3, 1e-6, 1], [1, 0, 0, 0, 0, 0], [0.99, 1, 0.3, 0.5, 0.5],
-            [0, 0, 0.05, 0.5], [0.05, 0.1, 1, 0.3], 1.0,
-        ),
         UNSOUND,
     ),
-    "balls held together that go together in a cycle": (
+    (
+        "balls held together that go together in a cycle",
         {"stays_at_zero": lambda _: lambda *_: False},
-        (
-            [630, 27, 0.003, 51, 170, 13, 0.0034, 0.0052], [1, 0, 0, 0, 0, 0, 0, 0],
-            [1, 0.047, 0, 0.88, 0.47, 0, 0.74],
-            [0.39, 1, 0.3, 1, 0.72, 0], [0.22, 0.9, 1, 0.15, 1, 0.11], 0.5,
-        ),
         UNSOUND,
     ),
-    "cycles that contain collapses": (
-        {"look": lower_level_only},
-        (
-            [15, 0.25, 0.071, 16, 12], [1, 0, 0, 0, 0], [0.75, 0.55, 0, 0.53],
-            [0.084, 0.8, 1], [0.8, 1, 0.86], 0.5,
-        ),
-        UNFINISHED,
-    ),
-    "a cycle that grows": (
+    ("cycles that contain collapses", {"look": lower_level_only}, UNFINISHED),
+    (
+        "a cycle that grows",
         {"limit": changed(cycles, "limit", "-1.0 <= total <= 0.0", "total <= 0.0")},
-        ([1, 1, 1e-9, 1], [1, 0.5, 0, 0], 0, 0.1, 0.1, 0.5),
         UNFINISHED,
     ),
-}  # fmt: skip
+]
 
 
 def run(chain, **exchanged):
@@ -177,9 +102,9 @@ def run(chain, **exchanged):
     return solve(*chain, meeting=meeting, max_events=3000, **exchanged)
 
 
-@pytest.mark.parametrize("name", NEEDED)
-def test_without_it_a_chain_goes_wrong(name):
-    exchange, chain, becomes = NEEDED[name]
+@pytest.mark.parametrize(("name", "exchange", "becomes"), NEEDED)
+def test_without_it_a_chain_goes_wrong(name, exchange, becomes):
+    chain = CHAINS[name].problem
     real, other = run(chain), run(chain, **exchange)
     assert real.status == FINISHED
     if becomes == WRONG:
@@ -192,20 +117,17 @@ def test_without_it_a_chain_goes_wrong(name):
 # The others take fifty digits minutes.
 SHORT = [
     name
-    for name, (_, chain, _) in NEEDED.items()
-    if min(chain[0]) > 0.01 and name != "cycles that contain collapses" and chain != HELD_FAST
+    for name in chains_of("a safeguard")
+    if min(CHAINS[name].problem.masses) > 0.01 and name != "cycles that contain collapses"
 ]
 
 
 @pytest.mark.parametrize("name", SHORT)
 def test_with_it_the_answer_is_that_of_fifty_digits(name):
-    *chain, meeting = NEEDED[name][1]
+    problem = CHAINS[name].problem
     with mpmath.workdps(50):
-        exact = truth.solve(
-            *[list(map(float, x)) if np.ndim(x) else float(x) for x in chain],
-            meeting=meeting, excess="saturate", max_events=2000,
-        )  # fmt: skip
-        off = max(abs(a - b) for a, b in zip(run(NEEDED[name][1]).velocities, exact.velocities))
+        exact = problem.exact(2000)
+        off = max(abs(a - b) for a, b in zip(run(problem).velocities, exact.velocities))
     assert off < 1e-13
 
 
@@ -223,9 +145,9 @@ def test_cycles_that_still_change_leave_digits_in_doubt():
 
 def test_a_part_that_is_kept_is_never_zero():
     """A ball beside a steady neighbour that hands all on is one of infinite mass: it divides."""
-    assert run(HELD_FAST).status == FINISHED
+    assert run(CHAINS[HELD_FAST].problem).status == FINISHED
     with pytest.raises(ZeroDivisionError):
-        run(HELD_FAST, kept=0.0)
+        run(CHAINS[HELD_FAST].problem, kept=0.0)
 
 
 def test_balls_lighter_than_digits_can_tell_are_refused():
