@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from chains import uniform
 from delicate import CHAINS, chains_of, seen
-from extreme_chains import any_chain, faults, invariants
+from extreme_chains import faults, invariants
 from families import FAMILIES, family
 from problem import Problem
 
@@ -43,8 +43,11 @@ def difference(one, other):
 # --- the named chains --------------------------------------------------------------------------
 
 
-#: Asked in `test_rules.py`, `test_extremes.py` and `test_safeguards.py`.
-ELSEWHERE = ("one line of the solver", "found by fuzzing", "a safeguard")
+#: Not asked of fifty digits here, but below and in other files.
+ELSEWHERE = (
+    "one line of the solver", "found by fuzzing", "a safeguard", "many collapses",
+    "cycles taken at once", "slow to its limit",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -94,78 +97,24 @@ def common_velocity(problem):
     return float(common), passed.astype(float)
 
 
-#: Chains of many collapses, and how many there are at least: momentum, energy or works went wrong.
-COLLAPSES = {
-    # A light ball at the end: its impulse is a difference of far larger ones.
-    "beside a light ball": (
-        Problem([1000.0, 1e-3, 1000.0, 1e-9], [0.4, 0.4, 0.1, 0.0], [0.0] * 3, [0, 0], [0, 0]), 1,
-    ),
-    # In neighbours of a cycle that are held at u = 0 together.
-    "held neighbours": (
-        Problem(
-            [103.26201559217535, 0.0029458428086861876, 42.037175144265106, 368.4592301173039,
-             3.6033248776606968, 65.02699676001548],
-            [0.9276574737082792, 0.8165336320559369, 0.40052381164752004, 0.014953379291987146,
-             -0.4139783545152895, -0.6060795393367171],
-            [0.7679012279991019, 0.6890388067102825, 0.1473848239015375, 0.007660307222551066,
-             0.6598850616412061],
-            [0.6051257401104178, 0.49275940669505214, 0.8906014267771414, 0.06722149860770721],
-            [1.0, 0.8961740848105425, 1.0, 0.4339624923694204],
-        ), 1,
-    ),
-    # In joined balls some of which were already parting.
-    "balls that part": (
-        Problem(
-            [0.007781671608169458, 963.1011207037445, 0.4059311376235678, 2.8556391008572826,
-             242.11331676336408, 89.2453415124181, 15.635726963231573, 3.9955644102813648],
-            at_rest(8),
-            [1.0, 0.0, 0.8907483257472151, 0.9957891338023604, 0.0, 0.7641101782622505,
-             0.6709302130469132],
-            [0.0, 0.3629097129890003, 0.0, 0.5470942843543211, 0.07847463601332183,
-             0.07316712531149228],
-            [1.0, 0.8928336729461167, 1.0, 0.0, 0.5327386222284957, 0.5046286714972666],
-        ), 1,
-    ),
-    # What a contact gives back of its store each time is below the last digit of the whole.
-    "portions of a store": (
-        Problem(
-            [4.502, 0.03639, 0.07819, 0.001342, 19.41], [0.8341, 0.4998, -0.3567, -0.4033, 0.4473],
-            [0.9901, 0.0, 0.8301, 0.5773], [0.9996, 0.0, 0.02237], [0.235, 2.678e-13, 0.6408],
-        ), 1,
-    ),
-    # Tiny cycles beside fast balls: what each limit costs is a difference of far larger energies.
-    "tiny cycles": (
-        Problem(
-            [1000, 3.6, 0.0056, 0.0036, 30, 0.036, 0.037, 0.11],
-            [0, -0.42, -0.41, -0.51, -0.54, -0.74, -1.3, -1.7],
-            [0, 0.71, 0, 0.7, 0.0049, 0.56, 0.69],
-            [0.22, 0, 0.54, 0.42, 0.28, 1], [0.47, 0.51, 0.34, 0.49, 0.55, 0.55],
-        ), 21,
-    ),
-    # Taken ten billion times at once, its neighbour's work was known to six digits.
-    "a cycle that grows far": (any_chain("saturate", 6, 9806), 1),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", COLLAPSES)
-def test_momentum_and_energy_through_many_collapses(name):
-    problem, least = COLLAPSES[name]
-    for one in (problem, problem.mirrored()) if name == "beside a light ball" else (problem,):
-        trace = one.collide()
-        assert [event.kind for event in trace.events].count("collapse") >= least
-        assert invariants(trace)["ledger"] < 2
-        m, v, w = (
-            [Fraction(x) for x in part.tolist()]
-            for part in (trace.chain.masses, trace.chain.velocities, trace.velocities)
-        )
-        passed = [0, *map(Fraction, trace.impulses.tolist()), 0]
-        for mass, began, ended, before, after in zip(m, v, w, passed, passed[1:]):
-            missing = abs(mass * (ended - began) - (before - after))
-            assert missing <= 16 * Fraction(2) ** -52 * (before + after + mass * abs(began))
-        if name in ("beside a light ball", "tiny cycles"):
-            common, impulses = common_velocity(one)
-            np.testing.assert_allclose(trace.velocities, common, rtol=1e-13)
-            np.testing.assert_allclose(trace.impulses, impulses, rtol=1e-9)
+@pytest.mark.parametrize(("name", "problem"), seen(chains_of("many collapses")))
+def test_momentum_and_energy_through_many_collapses(name, problem):
+    trace = problem.collide()
+    collapses = [event.kind for event in trace.events].count("collapse")
+    assert collapses > (20 if name == "tiny cycles" else 0)
+    assert invariants(trace)["ledger"] < 2
+    m, v, w = (
+        [Fraction(x) for x in part.tolist()]
+        for part in (trace.chain.masses, trace.chain.velocities, trace.velocities)
+    )
+    passed = [0, *map(Fraction, trace.impulses.tolist()), 0]
+    for mass, began, ended, before, after in zip(m, v, w, passed, passed[1:]):
+        missing = abs(mass * (ended - began) - (before - after))
+        assert missing <= 16 * Fraction(2) ** -52 * (before + after + mass * abs(began))
+    if name.startswith(("beside a light ball", "tiny cycles")):
+        common, impulses = common_velocity(problem)
+        np.testing.assert_allclose(trace.velocities, common, rtol=1e-13)
+        np.testing.assert_allclose(trace.impulses, impulses, rtol=1e-9)
 
 
 #: A light ball reaches a gap, and next to nothing is left of it: what rounding adds to the impulse

@@ -12,6 +12,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
+from delicate import CHAINS, chains_of
 from plain import solve as solved
 from test_kernel import needs_numba
 
@@ -75,27 +76,10 @@ def test_no_more_work_than_measured(name):
     np.testing.assert_allclose(after.velocities, found.velocities, rtol=0, atol=1e-14)
 
 
-#: Light balls between heavy ones that meet a third, or are driven by one meanwhile.
-REPEATED = {
-    "before a third ball is met": (
-        [0.5, 1, 1e-4, 2], [0.3, 0, 0.5, -0.5], [0.5, 0.1, 0.5], [0, 0.5],
-    ),
-    "while a heavy contact compresses": ([1, 1, 1e-4, 1], [1, 0.5, 0, 0], 0, 0.1),
-    "two light balls side by side": (
-        [1, 1e-4, 1e-4, 3, 1], [1, 0, 0.3, 0.3, 0], [0.1, 1, 0.9, 0.1], [0.1, 0.5, 0.1],
-    ),
-    "two pairs of heavy ones": (
-        [1, 1, 1e-3, 2, 1e-3], [1, -1, 0.5, -0.5, 0.5], [0.1, 0, 0.5, 0], [0.5, 0.01, 1],
-    ),
-    "six balls": (
-        [0.5, 1e-3, 3, 3, 1, 3], [1, 0.3, 0.3, 1, 0, 0.3], [0, 0, 0.1, 0.9, 0.5], [0.5, 1, 1, 0],
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", REPEATED)
+@pytest.mark.parametrize("name", chains_of("cycles taken at once"))
 def test_cycles_taken_at_once_are_those_made_one_by_one(name):
-    chain = REPEATED[name]
+    """Light balls between heavy ones that meet a third, or are driven by one meanwhile."""
+    chain = CHAINS[name].problem[:5]
     fast, slow = solve(*chain), solve(*chain, many=math.inf)
     assert fast.rounds < 0.5 * slow.rounds
     # All that were taken at once are counted; how many come after, before the limit, is chance:
