@@ -1,8 +1,6 @@
 """The package before the judge: the rules over decimals of 100 digits; and the judge himself."""
 
 import csv
-import decimal
-import sys
 from decimal import Decimal
 from pathlib import Path
 
@@ -10,7 +8,7 @@ import judge as court
 import pytest
 from delicate import CHAINS, chains_of
 from families import JUDGED, family
-from judge import Verdict, exact, judge, meaning, off, on_bounds, second_opinion, shrunk
+from judge import exact, judge, meaning, off, on_bounds, second_opinion
 from problem import Problem
 
 # --- the package -------------------------------------------------------------------------------
@@ -25,8 +23,8 @@ def test_named_chain(name):
 STORED = Path(__file__).parents[1] / "data" / "judge.csv"
 #: Chains of each family in the tests: as many as some seconds allow.
 SAMPLE = {
-    "losses": 250, "wide": 150, "generic": 400, "at bounds": 300, "extremes": 80, "ties": 120,
-    "ties within bounds": 120, "tiny ratios": 15, "mixed zeros": 120, "light balls": 120,
+    "losses": 125, "wide": 75, "generic": 200, "at bounds": 150, "extremes": 40, "ties": 60,
+    "ties within bounds": 60, "tiny ratios": 10, "mixed zeros": 60, "light balls": 60,
 }  # fmt: skip
 #: Begins with fifty chains of "losses" of which one was wrong by .1 when first judged.
 SEED = 2026007778
@@ -50,7 +48,7 @@ def test_sample_of_a_family(name):
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("name", JUDGED)
 def test_many_of_a_family(name):
-    no_wrong_chain(name, 25 * SAMPLE[name], seed=31)
+    no_wrong_chain(name, 50 * SAMPLE[name], seed=31)
 
 
 def test_no_family_is_left_out():
@@ -113,18 +111,6 @@ def test_it_can_say_no():
     assert judge(beside, lambda _: exact(on_bounds(beside))).word == "right"
 
 
-@pytest.mark.parametrize("name", ["losses", "wide", "at bounds", "ties"])
-def test_twice_the_digits_say_the_same(name):
-    """No decision is left to the last digits; an infinite sequence may take longer to fade."""
-    compared = 0
-    for problem in family(name, 15, seed=32):
-        one, other = exact(problem), exact(problem, twice=True)
-        if one and other:
-            assert off(problem, one, other) < 1e-55, problem
-            compared += 1
-    assert compared > 10
-
-
 def test_a_gap_that_closes_at_once():
     """It lay at zero: no rounding is absorbed by contact 2 of e = 0, which would end it."""
     problem = Problem(
@@ -138,19 +124,6 @@ def test_a_gap_that_closes_at_once():
     assert off(problem, exact(problem), exact(problem, twice=True)) < 1e-60
 
 
-def test_relations():
-    """The exact outcome of a single striker seen from elsewhere."""
-    for problem in family("generic", 20, seed=33):
-        at_rest = [0.0] * (len(problem.masses) - 1)
-        single = problem._replace(velocities=[1.0, *at_rest], meeting=0.25)
-        if here := exact(single, Decimal):
-            there = exact(single.mirrored(), Decimal)
-            other = exact(single.in_units(0.25, 2.0).boosted(1.0), Decimal)
-            with decimal.localcontext(prec=100):
-                assert off(single, here, [-v for v in reversed(there)]) < 1e-60
-                assert off(single, here, [(v - 1) / 2 for v in other]) < 1e-60
-
-
 def test_a_sequence_without_end():
     """Two balls press a light one; and a light ball that goes to and fro some thousand times."""
     pressed = Problem([1.0, 0.04, 1.0], [1.0, 0.0, 0.0], [0.5, 0.5], [0.15], [0.15])
@@ -159,30 +132,3 @@ def test_a_sequence_without_end():
     long = Problem([1.0, 1e-7, 1.0], [1.0, 0.0, 0.0], [1.0, 1.0], [0.0], [0.0])
     assert judge(long).word == "endless"
     assert second_opinion(long).word == "as relations"
-
-
-def test_wrong_chains_are_shrunk():
-    """To the least that shows the fault: here, a loss beside a heavy ball."""
-
-    def is_wrong(problem):
-        pairs = zip(problem.masses[1:], problem.restitution)
-        return any(m > 2 and e < 1 for m, e in pairs)
-
-    problem = next(p for p in family("wide", 100, seed=34) if len(p.masses) > 6 and is_wrong(p))
-    small = shrunk(problem, is_wrong)
-    assert len(small.masses) == 2
-    assert small.velocities == [0.0] * 2
-    assert small.forward == small.backward == []
-
-
-def test_command(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["judge.py", "--family", "generic", "--count", "60"])
-    court.main()
-    head, row = capsys.readouterr().out.splitlines()[:2]
-    assert head.split()[:2] == ["right", "wrong"]
-    assert sum(map(int, row.split()[1:])) == 60
-
-
-def test_verdicts_are_those_of_the_table():
-    assert Verdict("right").word in court.WORDS
-    assert set(court.DOUBTFUL) <= set(court.WORDS)

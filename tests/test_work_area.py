@@ -92,15 +92,7 @@ def strict(seed):
     return area
 
 
-def test_a_strict_sequence_refuses_an_index_below_zero():
-    state = strict(1)(3, False, plain.no_record())
-    for part in (state.ball, state.contact, state.run, state.level, state.memory, *state.memory):
-        assert part[0] is not None
-        with pytest.raises(AssertionError):
-            part[-1]
-
-
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", FAMILIES)
 def test_what_was_there_and_a_record_change_no_outcome(name, seed, kernel):
     """Every index lies inside; compressions are worked out in room that other functions use too."""
