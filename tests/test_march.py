@@ -53,5 +53,3 @@ def test_two_runs_that_meet():
     assert abs(order - 1) < 0.2
     assert errors[-1] < 5e-4
     assert march(*chain).collisions == [1, 1, 1]
-
-
