@@ -275,19 +275,6 @@ def test_infinite_bounces_of_pressed_balls_have_the_limit_of_an_independent_run(
     assert run.positions[2, 1] > run.positions[2, 0] + 0.01
 
 
-def test_where_slow_begins_does_not_matter(monkeypatch):
-    arguments = Chain([1, 2, 1], [0] * 3, 0.6), ImpulseCorrelation(0.1), [-0.03, 0, 0.01]
-    found, counts = [], []
-    for least in (1e-10, 1e-8, 1e-6):
-        monkeypatch.setattr("cradle.swinging.swing.RESTING", least)
-        run = swing(*arguments, [5.0], pendulums=Pendulums([0.1, 0.12, 0.11]))
-        found.append(run.positions[-1] / 0.03)
-        counts.append(len(run.impacts))
-    assert counts[0] > counts[1] > counts[2] > 20
-    assert np.abs(found[1] - found[0]).max() < 1e-6
-    assert np.abs(found[2] - found[0]).max() < 1e-4
-
-
 def test_struck_balls_that_touch_collide_as_one_chain():
     """Balls that hang still and touch take part although nothing moves them."""
     run = swing(balls(4), ImpulseCorrelation(0.15), pulled(4), [0.3], pendulums=ONE_HERTZ)
