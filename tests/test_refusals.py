@@ -84,16 +84,10 @@ CHAINS = [
     ({"masses": [1.0]}, "masses has shape (1,); a chain needs (N,) with N >= 2: one row of two or"),
     ({"masses": [[1, 1, 1]]}, "masses has shape (1, 3); a chain needs (N,) with N >= 2"),
     ({"masses": [1, 1]}, "velocities has shape (3,); 2 masses need (2,)"),
-    (
-        {"velocities": [1, 0]},
-        "velocities has shape (2,); 3 masses need (3,): one velocity for each",
-    ),
+    ({"velocities": [1, 0]}, "velocities has shape (2,); 3 masses need (3,): one velocity for eac"),
     ({"velocities": [1, NAN, 0]}, "velocities[1] = nan; must be finite"),
     ({"velocities": [0, 1e200, 0]}, "velocities[1] = 1e+200; kinetic energy overflows: choose lar"),
-    (
-        {"masses": [1e200] * 3, "velocities": [1e70, 0, 0]},
-        "velocities[0] = 1e+70; kinetic energy overflows",
-    ),
+    ({"masses": [1e200] * 3, "velocities": [1e70, 0, 0]}, "velocities[0] = 1e+70; kinetic energy"),
     ({"masses": [1.7e308, 1e308, 1e308], "velocities": [1, 0, 0]}, "velocities[0] = 1.0; momentum"),
     ({"restitution": [0.5, 1.2]}, "restitution[1] = 1.2; must lie in [0, 1]"),
     ({"restitution": 1 + 2**-52}, "restitution = 1.0000000000000002; must lie in [0, 1]"),
@@ -120,10 +114,7 @@ SHAPES = [
     ((ONES, [1, 0, 0], 1, 0), "restitution has shape (); must be (..., 2)"),
     ((ONES, [1, 0, 0], ONES, 0), "restitution has shape (3,); must be (..., 2)"),
     ((ONES, [1, 0, 0], [1, 1], "a"), "ratio = 'a'; must be real numbers"),
-    (
-        (np.ones((4, 3)), [1, 0, 0], [1, 1], [0, 0.1]),
-        "leading axes do not broadcast: masses (4, 3), velocities (3,), restitution (2,), ratio (2",
-    ),
+    ((np.ones((4, 3)), [1, 0, 0], [1, 1], [0, 0.1]), "leading axes do not broadcast: masses (4, 3"),
 ]
 
 BOUNDS = [
@@ -158,11 +149,7 @@ ADVICE = [
     (THREE, {"accuracy": 2e-15, "stiffness": 1}, "accuracy = 2e-15; the least numerical error of"),
     (LOSSY, {"accuracy": 1e-15, "stiffness": 1}, "accuracy = 1e-15; the least numerical error of"),
     (THREE, {"model_error": 1e-6}, "model_error = 1e-06; that of SequentialCollisions is 0."),
-    (
-        THREE,
-        {"model_error": 1e-6, "ratios": 0.2, "accuracy": 1e-15},
-        "model_error = 1e-06; that of",
-    ),
+    (THREE, {"model_error": 1e-6, "ratios": 0.2, "accuracy": 1e-15}, "model_error = 1e-06; that o"),
     (THREE, {"model_error": -1}, "model_error = -1.0; must lie in [0, 1]"),
     (THREE, {"wanted": "speed"}, "wanted = 'speed'; must be one of velocities, impulses"),
     (THREE, {"wanted": ["path", 3]}, "wanted = 3; must be one of"),
@@ -185,10 +172,7 @@ OTHERS = [
     (bouncing_pattern, ([-3.0, -2.0, -1.0],), "velocities of ball 3 = -1.0; must be at least 0"),
     (bouncing_pattern, ([[0, 0, 1], [-2, -2, -1]],), "velocities of ball 3[1] = -1.0"),
     (conserving_outcomes, ([1, 1], [1, 0]), "masses has shape (2,); must be (3,)"),
-    (
-        conserving_outcomes, ([1, 1, 1], [1, 0, 0], [0.1, 1.5]),
-        "angles[1] = 1.5; must lie in [0, 1.0472]",
-    ),
+    (conserving_outcomes, ([1, 1, 1], [1, 0, 0], [0.1, 1.5]), "angles[1] = 1.5; must lie in [0, 1"),
     (condition_number, (THREE, ImpulseCorrelation([0.1] * 3)), "forward has 3 values"),
     (ratio_of, ([1, 0, 0, 0],), "trace has 4 balls; an effective ratio is that of three"),
     (ratio_of, ([0, 0, 1],), "closing_speeds = [0.0, -1.0]; any ratio fits"),
