@@ -102,9 +102,8 @@ def test_units_that_are_powers_of_two_change_no_bit(impact, powers):
     m, v = np.ldexp(chain.masses, masses), np.ldexp(chain.velocities, speeds)
     try:
         chain = Chain(m, v, chain.restitution)
-    except ValueError as refused:
-        assert "kinetic energy" in str(refused)
-        assert 2 * speeds + masses > 900  # there the kinetic energy itself overflows
+    except ValueError:  # the kinetic energy itself overflows
+        assert 2 * speeds + masses > 900
         return
     scaled = outcome(chain, *ratios)
     if trace is None:
