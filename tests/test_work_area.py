@@ -104,14 +104,14 @@ def test_what_was_there_and_a_record_change_no_outcome(name, seed, kernel):
 @pytest.mark.parametrize("way", ["within", "saturate"])
 def test_no_index_lies_outside_the_work_area_where_sequences_are_infinite(way, kernel):
     collapsed = 0
-    for index in range(60):
+    for index in range(30):
         masses, velocities, e, forward, backward, *_ = any_chain(way, 3, index)
         found = plain.solve(
             masses, velocities, e, forward, backward, max_events=2000, room=200, kernel=kernel,
             area=strict(1),
         )  # fmt: skip
         collapsed += found.collapsed
-    assert collapsed > 10
+    assert collapsed > 5
 
 
 def test_an_impact_forgets_the_one_before(kernel):
