@@ -1,7 +1,8 @@
-"""The table of chains that went wrong once, or would without one line: `delicate_chains.csv`.
+"""The table of chains that each need something of the event loop: `delicate_chains.csv`.
 
-`once` says what went wrong; velocities and impulses are asked for within these of fifty digits,
-after at most so many events, and in the mirror too.
+They went wrong once, or would without one line, or show one case of a rule: `once` says which.
+Velocities and impulses are asked for within these of fifty digits, after at most so many events,
+and in the mirror too.  `law` says which test asks.
 """
 
 import csv
