@@ -5,9 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 from chains import ELASTIC, magnitudes, uniform
+from dop853 import integrated
 from truth import in_fifty_digits
 
-from cradle import Chain, EnergyDistribution, ImpulseCorrelation, collide, paper_chain
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpulseCorrelation,
+    collide,
+    paper_chain,
+    viscosity_from,
+)
 
 
 class Scene(NamedTuple):
@@ -50,9 +58,15 @@ class Scene(NamedTuple):
         """Return the outcome of the paper's model from another solver, in fifty digits."""
         return in_fifty_digits(*self.given, excess="saturate")[0]
 
+    def viscosity(self):
+        """Return that of spheres with this restitution at the striker's speed."""
+        return viscosity_from(self.restitution, speed=1.0, masses=self.masses)
+
     @cache  # noqa: B019
     def springs(self, exponent=1.5):
-        """Return the converged outcome of elastic springs, equal stiffness; 3/2 is Hertz."""
+        """Return the converged outcome of springs of equal stiffness; 3/2 is Hertz."""
+        if not self.elastic:
+            return integrated(self.masses, self.velocities, loss=self.viscosity())
         # Without losses the energy law is the spring chain, in SciPy's hands.
         model = EnergyDistribution(1.0, exponent, rtol=3e-14)
         return collide(self.chain, model).velocities
@@ -71,6 +85,11 @@ def _scenes():
 
 
 SCENES = {scene.name: scene for scene in _scenes()}
+#: Equal balls for viscous springs: those of least restitution that these have, nearly, and others.
+LOSSY = {
+    name: Scene(name, (1.0,) * n, (e,) * (n - 1), (), (), "")
+    for name, n, e in (("three lossy", 3, 0.9), ("five lossy", 5, 0.7))
+}
 
 
 def random_chains(balls, count):

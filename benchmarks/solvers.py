@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 from march import march, njit
 from measure import Row, distance, ours, outcome
-from scenes import SCENES, random_chains
+from scenes import LOSSY, SCENES, random_chains
 from truth import in_fifty_digits
 
 from cradle import (
@@ -19,6 +19,7 @@ from cradle import (
     SpringChain,
     collide,
     post_impact_velocities,
+    spring_velocities,
     swing,
 )
 from cradle.closed_form import three_balls
@@ -145,19 +146,26 @@ def closed_form_rows(clock, _):
 
 
 def spring_rows(clock, quick):
-    """Yield springs followed in time to an accuracy."""
+    """Yield springs followed in time to an accuracy, elastic and lossy; one call and a batch."""
     about = {
-        "group": "springs", "model": "SpringChain, Hertz", "needs": "stiffness, e = 1",
-        "gives": TIMED, "note": "velocity Verlet with two corrections, compiled",
+        "group": "springs", "model": "SpringChain, Hertz", "gives": TIMED,
+        "note": "velocity Verlet with two corrections, compiled",
     }  # fmt: skip
+    many = {"group": "many springs", "model": "spring_velocities, Hertz", "gives": "velocities"}
     accuracies = (1e-3, 1e-6, 1e-9) if quick else [1e-2, *(10.0**-k for k in range(3, 13))]
-    names = "three equal", "five equal", "light middle"
-    for scene, accuracy in product(map(SCENES.get, names), accuracies):
-        run = partial(collide, scene.chain, SpringChain(1.0, accuracy=accuracy))
-        yield row(
-            clock, about, scene, f"accuracy {accuracy:.0e}", run, (scene.springs(), CONVERGED),
-            parameter=accuracy, evaluations=run().evaluations,
-        )  # fmt: skip
+    names = "three equal", "five equal", "light middle", *LOSSY
+    for scene, accuracy in product(((SCENES | LOSSY)[name] for name in names), accuracies):
+        how = CONVERGED if scene.elastic else "same springs, DOP853 with rtol 1e-12"
+        lost, exact = scene.viscosity(), (scene.springs(), how)
+        common = {"parameter": accuracy, "needs": "stiffness" + ", viscosity" * (not scene.elastic)}
+        elastic = Chain(scene.masses, scene.velocities)
+        run = partial(collide, elastic, SpringChain(1.0, viscosity=lost, accuracy=accuracy))
+        setting = f"accuracy {accuracy:.0e}"
+        yield row(clock, about, scene, setting, run, exact, evaluations=run().evaluations, **common)
+        copies = [np.tile(part, (2000, 1)) for part in (scene.masses, scene.velocities)]
+        run = partial(spring_velocities, *copies, viscosity=lost, accuracy=accuracy)
+        if accuracy > 1e-9:
+            yield row(clock, about | many, scene, f"batch, {setting}", run, exact, 2000, **common)
     scene = SCENES["three equal"]
     run = partial(collide, scene.chain, SpringChain(1.0, 1, accuracy=1e-9))
     yield row(

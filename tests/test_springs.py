@@ -7,10 +7,11 @@ import re
 import numpy as np
 import pytest
 from chains import SPRINGS, magnitudes, striking, uniform
+from dop853 import integrated
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import zeta
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import quad
 from scipy.special import gamma
 
 from cradle import (
@@ -33,48 +34,6 @@ needs_numba = pytest.mark.skipif(not runtime.available(), reason="numba is not i
 
 def struck(n):
     return [1.0] + [0.0] * (n - 1)
-
-
-# --- a second route: SciPy's DOP853, from event to event ------------------------------------
-
-
-def integrated(m, v, k=1.0, p=1.5, loss=0.0, gaps=0.0):
-    """Velocities after the impact; the force is that of the law, as it is written down."""
-    m, v, n = np.asarray(m, float), np.asarray(v, float), len(m)
-    k, loss, gaps = (np.broadcast_to(np.asarray(x, float), n - 1) for x in (k, loss, gaps))
-    pull = k * np.maximum(-gaps, 0.0) ** p
-
-    def push(d, u):
-        viscous = np.where(d > 0, np.maximum(d, 1e-300) ** (p - 1), 0.0) * p * loss * u
-        return np.maximum(k * (np.maximum(d, 0.0) ** p + viscous), 0.0)
-
-    def rate(_, y):
-        u = -np.diff(y[:n])
-        return np.append(-np.diff(push(y[n:], u) - pull, prepend=0, append=0) / m, u)
-
-    def kink(c, early):
-        """Tell where the force ends, also where its losses outweigh it."""
-        found = lambda _, y: y[n + c] + early * p * (y[c] - y[c + 1]) or 1.0  # noqa: E731
-        found.terminal = True
-        return found
-
-    kinks = [kink(c, 0.0) for c in range(n - 1)] + [kink(c, loss[c]) for c in np.flatnonzero(loss)]
-    y, speed = np.concatenate([v, -gaps]), max(v[:-1] - v[1:])
-    options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14 * speed}
-    for _ in range(5000):
-        v, d, u = y[:n], y[n:], -np.diff(y[:n])
-        still = (abs(u) <= 1e-9 * speed) & (abs(push(d, u) - pull) <= 1e-9)
-        if (still | (push(d, u) == 0) & (u <= 1e-9 * speed)).all():
-            return v
-        if (d <= 0).all() and not pull.any():  # all fly to the next closing
-            ahead = (u > 0) & (d < 0)
-            if ahead.any() and not ((u > 0) & (d == 0)).any():
-                y[n:] += u * (-d[ahead] / u[ahead]).min()
-        y = solve_ivp(rate, (0, 1.0), y, events=kinks, **options).y[:, -1]
-        after = (push(y[n:], -np.diff(y[:n])) == 0) & (np.diff(y[:n]) > 0)
-        if not (pull.any() and after.all()):
-            y = solve_ivp(rate, (0, 1e-4), y, **options).y[:, -1]  # beyond the kink
-    raise AssertionError("the reference is not finished")
 
 
 UNEQUAL = [1, 2, 0.5, 1], [1, 0.3, 0, -0.5], [1, 2, 0.5]

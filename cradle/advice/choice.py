@@ -14,7 +14,7 @@ from cradle.advice.measured import LAWS, Measured, evidence, measured_chain, row
 from cradle.chain import Chain
 from cradle.input.values import must_be, one_number, one_of, whole_number
 from cradle.models import Model
-from cradle.models.compliant import SpringChain
+from cradle.models.compliant import SpringChain, viscosity_from
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.energy import EnergyDistribution
 from cradle.models.sequential import SequentialCollisions
@@ -23,7 +23,12 @@ WANTED = ("velocities", "impulses", "path", "forces", "times", "fastest ball")
 
 # Two measurements of a time differ by less than this factor: so it does not decide between models.
 _NOISE = 1.5
-_BATCH = "post_impact_velocities(masses, velocities, restitution, forward, backward)"
+#: What solves a batch.
+_BATCH = {
+    "event": "post_impact_velocities(masses, velocities, restitution, forward, backward)",
+    "many springs": "spring_velocities(masses, velocities, model.stiffness, "
+    "viscosity=model.viscosity, accuracy=model.accuracy)",
+}
 
 # By the group of the table.
 _REASONS = {
@@ -32,8 +37,11 @@ _REASONS = {
     "springs": "Elastic balls push each other as springs do. Velocities depend on ratios of "
     "stiffnesses alone: for equal contacts any stiffness will do.",
     "timed": "Forces and times come from springs alone; they are those of the stiffness given.",
-    "energy": "There are losses and no ratios: the energy law is what springs become with losses. "
-    "How near it comes to real balls was not measured.",
+    "lossy": "The balls push each other as viscous spheres do. Their viscosity is that with which "
+    "two of them, closing as fast as here, part with the restitution given; for another speed make "
+    "the model anew. It takes the losses: the chain that is solved has restitution 1.",
+    "energy": "The restitution is too low for viscous springs; the energy law shares losses out by "
+    "the energy that contacts store. How near it comes to real balls was not measured.",
     "outcome": "Restitution alone does not determine the impact; of the models that need no more, "
     "this one is nearest to Hertz springs. On the elastic chains measured it has the right fastest "
     "ball; on others it can be wrong.",
@@ -210,14 +218,11 @@ def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
     refused = {
         f"velocities = {chain.velocities.tolist()}; no balls approach: no impact":
             not (chain.closing_speeds > 0.0).any(),
-        f"wanted = {timed!r}, {loss}; must be 1: forces and times come from springs, which lose "
-        "nothing; with losses, ask for impulses":
-            timed and not elastic,
         f"wanted = {timed!r}; needs stiffness: rigid models have impulses alone; give that of the "
         "contacts in N/m^(3/2), for two steel balls of radius 1 cm stiffness=1e10":
             timed and stiffness is None,
-        f"model_error = {model_error!r}, {loss}; must be left out unless all are 1: there is no "
-        "theory of balls with losses to measure against":
+        f"model_error = {model_error!r}, {loss}; must be left out unless all are 1: models were "
+        "not measured against balls with losses":
             model_error is not None and not elastic,
         f"wanted = {wanted[0]!r}; needs ratios or stiffness: restitution alone does not determine "
         f"the impact of {len(chain)} balls.  Give stiffness=1 if all contacts are equal spheres, "
@@ -232,13 +237,27 @@ def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
     models: dict[str, Callable[[Measured], Model]] = {}
     if ratios is not None or len(chain) == 2:
         models["event"] = lambda _: ratios or ImpulseCorrelation(0.0)
-    if stiffness is not None and elastic:
-        models["springs"] = lambda row: SpringChain(stiffness, accuracy=row.parameter)
-    elif stiffness is not None:
-        models["energy"] = lambda row: EnergyDistribution(stiffness, rtol=row.parameter)
+    if stiffness is not None:
+        try:
+            lost = 0.0 if elastic else _viscosity(chain, stiffness)
+        except ValueError:  # the restitution is too low for springs
+            if timed:
+                raise
+            models["energy"] = lambda row: EnergyDistribution(stiffness, rtol=row.parameter)
+        else:
+            models["springs"] = models["many springs"] = lambda row: SpringChain(
+                stiffness, viscosity=lost, accuracy=row.parameter
+            )
     if modest and (bare or (elastic and like and measured_chain(chain))):
         models["outcome"] = lambda _: SequentialCollisions()
     return models
+
+
+def _viscosity(chain: Chain, stiffness: float | Sequence[float]) -> float | tuple[float, ...]:
+    """Return the viscosity that belongs to a chain's restitution at its own speed."""
+    speed, masses = float(chain.closing_speeds.max()), chain.masses
+    found = viscosity_from(chain.restitution, speed=speed, masses=masses, stiffness=stiffness)
+    return float(found[0]) if len({*found}) == 1 else tuple(found.tolist())
 
 
 def _best(
@@ -254,7 +273,9 @@ def _best(
     if not found:
         raise _Unfit(f"wanted = {wish.wanted!r}", f"{name} has no {' and '.join(sorted(gives))}")
     # What a model refuses it refuses now: the same balls at rest cost it no work.
-    make(found[0]).solve(Chain(chain.masses, 0.0 * chain.velocities, chain.restitution))
+    springs = group in ("springs", "many springs")
+    e = 1.0 if springs else chain.restitution  # springs have their viscosity
+    make(found[0]).solve(Chain(chain.masses, 0.0 * chain.velocities, e))
     where, settings = evidence(found, wish.like, wish.ratios if group == "event" else None)
     # A chain among the measured ones can be worse than each of them, by a few times.
     margin = 1.0 if where == "here" else 10.0
@@ -272,17 +293,22 @@ def _best(
     row = min(fit, key=lambda row: row.seconds)
     apart = row.model_error if where == "here" else None
     two = len(chain) == 2
-    if group == "springs" or (two and chain.restitution[0] == 1.0):
+    lossy = bool((chain.restitution < 1.0).any())
+    if not lossy and (springs or two):
         apart = 0.0
     if wish.model_error is not None and (apart is None or apart > wish.model_error):
         known = "was not measured here" if apart is None else f"is {apart:.2g}"
         raise _Unfit(f"model_error = {wish.model_error!r}", f"that of {name} {known}")
     measured = where != "elsewhere"
-    kind = "timed" if group == "springs" and {"forces", "times"} & set(wish.wanted) else group
+    kind, own = group, "chain"
+    if springs:
+        kind = "timed" if {"forces", "times"} & set(wish.wanted) else "springs"
+    if springs and lossy:
+        kind, own = "lossy", "Chain(masses, velocities)"
     return (not measured, row.seconds), Recommendation(
         model=make(row),
         setting=row.setting,
-        call=_BATCH if "batch" in row.setting else "collide(chain, model)",
+        call=_BATCH[group] if "batch" in row.setting else f"collide({own}, model)",
         numerical_error=row.numerical_error if measured else None,
         model_error=apart,
         seconds=row.seconds if measured else None,
