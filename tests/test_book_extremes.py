@@ -41,8 +41,34 @@ def exactly(problem, which, k, value):
     return floats(x.moved(problem, which, k, value).exact().velocities)
 
 
-CHAPTER, APPENDIX = Chapter("extremes"), Chapter("extremes_inventory")
-glued, inventory = CHAPTER.glued, APPENDIX.glued
+CHAPTER, MAPS = Chapter("extremes"), Chapter("extremes_maps")
+glued = MAPS.glued
+
+
+def test_the_chapter_says_what_its_appendix_says():
+    """And what the decision table says of long rows, from the rows themselves."""
+    shared = CHAPTER.glued.keys() & glued.keys()
+    assert {"first-jump", "largest-jump", "most", "lightest"} <= shared
+    assert all(CHAPTER.glued[name] == glued[name] for name in shared)
+    growth = [row for row in stored("growth", size="1e-12") if float(row["largest"]) > 1e-6]
+    assert {float(row["restitution"]) < 1 and float(row["spread"]) == 0 for row in growth} == {True}
+    uneven = [row for row in stored("unequal") if float(row["largest"]) > 1e-6]
+    largest = max(float(row["largest"]) for row in growth + uneven)
+    calm = [
+        float(row["largest"])
+        for row in [*stored("growth", size="1e-12"), *stored("unequal")]
+        if int(row["balls"]) <= 20 and float(row.get("ratio", 0)) <= 0.3
+    ]
+    CHAPTER.tells(
+        {
+            "breaks": min(int(row["balls"]) for row in growth),
+            "break-size": max(float(row["largest"]) for row in growth),
+            "uneven-balls": min(int(row["balls"]) for row in uneven if int(row["jumps"])),
+            "uneven-ratio": min(float(row["ratio"]) for row in uneven if int(row["jumps"])),
+            "few": math.floor(-math.log10(largest)),
+            "calm": max(calm) / 1e-12,
+        }
+    )
 
 
 def test_jumps_behind_the_first_edge():
@@ -138,7 +164,7 @@ def test_fig_extremes_edge():
 def test_fig_extremes_unequal_as_drawn():
     rows = stored("unequal")
     families = list(dict.fromkeys(r["family"] for r in rows))
-    for ax, family in zip(CHAPTER.figures["fig-extremes-unequal"].axes, families, strict=True):
+    for ax, family in zip(MAPS.figures["fig-maps-unequal"].axes, families, strict=True):
         shown = np.concatenate([np.asarray(b.lines[0].get_ydata(), float) for b in ax.containers])
         expected = floats(r["median"] for r in rows if r["family"] == family)
         np.testing.assert_allclose(np.sort(shown), np.sort(expected))
@@ -156,7 +182,8 @@ def test_exercises():
 
 def test_fig_extremes_growth_as_drawn():
     rows = stored("growth")
-    for ax, spread in zip(CHAPTER.figures["fig-extremes-growth"].axes, (0.0, 0.1), strict=True):
+    drawn = []
+    for ax, spread in zip(MAPS.figures["fig-maps-growth"].axes, (0.0, 0.1), strict=True):
         lines = {}
         for r in rows:
             if float(r["spread"]) == spread:
@@ -164,11 +191,43 @@ def test_fig_extremes_growth_as_drawn():
                 line.append((float(r["balls"]), max(float(r["largest"]), 1e-15)))
         for line, key in zip(points(ax), sorted(lines), strict=True):
             np.testing.assert_allclose(line, lines[key], rtol=1e-12)
+        drawn += [lines[key] for key in lines if key[1] == 1e-12]
+    (ax,) = CHAPTER.figures["fig-extremes-growth"].axes
+    shown = np.concatenate([line for line in points(ax) if len(line) > 2])
+    expected = sorted(map(tuple, np.concatenate(drawn)))
+    np.testing.assert_allclose(sorted(map(tuple, shown)), expected)
+
+
+def admissible(three):
+    """Whether three balls are in range, no ratio above its bound, Eq. 34."""
+    m1, m2, m3 = three.masses if three else (math.nan,) * 3
+    return three and three.forward[0] * (m2 + m3) <= m3 and three.backward[0] * (m1 + m2) <= m1
+
+
+def test_fig_extremes_digits_and_condition_as_drawn():
+    """Digits from the stored errors; the number by fifty digits, below the bound and near it."""
+    (ax,) = CHAPTER.figures["fig-extremes-digits"].axes
+    rows = [r for r in stored("map") if int(r["compared"]) and float(r["condition"]) <= 1e12]
+    for kind, marks in zip(dict.fromkeys(r["ratio"] for r in stored("map")), points(ax)):
+        errors = floats(r["error"] for r in rows if r["ratio"] == kind)
+        expected = np.clip(-np.log10(errors * x.EPS + x.EPS / 2), 0, 16)
+        np.testing.assert_allclose(np.sort(marks[:, 0]), np.sort(expected))
+    (ax,) = CHAPTER.figures["fig-extremes-condition"].axes
+    for line, step in zip(points(ax), (1e-2, 1e-4, 1e-8), strict=True):
+        for part, value in (line[0], line[9], line[-1]):
+            problem = x.case([1] * 3, [1, 0, 0], 1, 0.5 * (1 - part))
+            base, total = floats(problem.exact().velocities), 0.0
+            for which in x.FIELDS:
+                for k, given in enumerate(getattr(problem, which)):
+                    near = (x.moved(problem, which, k, side * given) for side in (-step, step))
+                    sides = [floats(p.exact().velocities) for p in near if admissible(p)]
+                    total += max([0.0, *(np.abs(side - base).max() for side in sides)])
+            assert value == pytest.approx(total / np.abs(base).max() / step, rel=1e-3)
 
 
 def test_fig_extremes_map_as_drawn():
     """Each cell of the right column is the worst excess of its rows; left: the digits."""
-    axes = CHAPTER.figures["fig-extremes-map"].axes[:8]
+    axes = MAPS.figures["fig-maps-digits"].axes[:8]
     assert not any(int(row["faulty"]) for row in stored("map"))
     cells = {}
     for row in stored("map"):
@@ -192,7 +251,7 @@ def test_fig_extremes_map_as_drawn():
 
 
 def test_fig_extremes_edges_as_drawn():
-    (ax,) = CHAPTER.figures["fig-extremes-edges"].axes
+    (ax,) = MAPS.figures["fig-maps-edges"].axes
     near = [row for row in stored("edges") if math.isfinite(float(row["distance"]))]
     names = [label.get_text() for label in ax.get_yticklabels()]
     harmless, jumps = (line for line in points(ax) if len(line) > 2)
@@ -221,7 +280,7 @@ def test_fig_extremes_jump_as_drawn():
 
 
 def test_fig_extremes_count_and_edge_as_drawn():
-    (ax,) = CHAPTER.figures["fig-extremes-count"].axes
+    (ax,) = MAPS.figures["fig-maps-count"].axes
     rows = [r for r in stored("elastic") if float(r["ratio"]) == 0]
     wedge, counted, _ = points(ax)
     for row, at, one in zip(rows, wedge, counted, strict=True):
