@@ -58,7 +58,7 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 #: Files that take longest, in this order: begun first, so that no process is left alone with one.
 LONG = (
     "tests/test_book_parameters.py", "tests/test_explorer_reading.py", "tests/test_layout.py",
-    "book/reading.ipynb", "tests/test_extremes.py", "tests/test_book_figures.py",
+    "book/reading_patterns.ipynb", "tests/test_extremes.py", "tests/test_book_figures.py",
     "tests/test_explorer_page.py", "tests/test_kernel.py", "tests/test_speed.py",
     "tests/test_command.py", "tests/test_work_area.py", "tests/test_judge.py",
     "tests/test_scene.py", "tests/test_explorer_engine.py", "tests/test_explorer_touch.py",

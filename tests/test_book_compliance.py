@@ -18,7 +18,7 @@ from cradle import Chain, ImpulseCorrelation, collide, ratio_table
 
 GAMMAS = (0.05, 0.5, 1.0, 2.0, 7.0, 60.0)
 THREE = Chain([1, 1, 1], [1, 0, 0], 1)
-CHAPTER, READING = Chapter("compliance"), Chapter("reading")
+CHAPTER, READING = Chapter("compliance"), Chapter("reading_compliance")
 
 
 def springs(*stiffness, pull=False, until=None):

@@ -22,7 +22,12 @@ CHAPTERS = [
     "multiple_impacts",
     "patterns",
     "n_balls",
-    "reading",
+    "reading_problem",
+    "reading_compliance",
+    "reading_three_balls",
+    "reading_multiple_impacts",
+    "reading_patterns",
+    "reading_n_balls",
     "notation",
 ]
 EQUAL = [1, 1, 1], [1, 0, 0], 1
@@ -80,8 +85,8 @@ def test_opening_figures(chapter, figure, chain, ratio):
     [
         ("three_balls", "fig-p3", 0, 0, THREE, 0.15),
         ("three_balls", "fig-p3", 1, 1, THREE, 0.15),
-        ("reading", "fig-p5", 0, 0, FIVE, 0.15),
-        ("reading", "fig-p5", 1, 1, FIVE, 0.15),
+        ("reading_multiple_impacts", "fig-p5", 0, 0, FIVE, 0.15),
+        ("reading_multiple_impacts", "fig-p5", 1, 1, FIVE, 0.15),
         ("patterns", "fig-p7", 0, 0, LIGHT, 0.15),
         ("patterns", "fig-p7", 1, 1, LIGHT, 0.15),
     ],
@@ -143,7 +148,7 @@ def test_fig_problem_family():
 @pytest.mark.parametrize(
     ("chapter", "figure", "formulas", "tolerance"),
     [
-        ("reading", "fig-own-problem-definitions", {
+        ("reading_problem", "fig-own-problem-definitions", {
             "Poisson: impulses": lambda a: (4 + a**2) / (2 - a) ** 2,
             "Stronge: work": lambda a: 1 + 0 * a,
             "Newton: speeds": lambda a: (2 + a**2) / (2 - a) ** 2,
@@ -153,7 +158,7 @@ def test_fig_problem_family():
             "$v_2^+$": lambda a: 2 * (1 - np.sqrt(1 - 2 * a)) / (4 - 2 * a),
             "$v_3^+$": lambda a: 2 * (1 + np.sqrt(1 - 2 * a)) / (4 - 2 * a),
         }, {"rtol": 0, "atol": 1e-7}),
-        ("reading", "fig-own-three-ranges", {
+        ("reading_three_balls", "fig-own-three-ranges", {
             "Eq. 34": lambda x: 1 + 0 * x,
             "$1+X$": lambda x: 1 + x,
             "$1+(1+e_3)X$": lambda x: 1 + 1.5 * x,
@@ -169,7 +174,10 @@ def test_curves_with_a_formula(chapter, figure, formulas, tolerance):
 
 
 def test_fig_compliance_ratio():
-    figures = ("compliance", "fig-own-compliance-ratio"), ("reading", "fig-own-compliance-soft")
+    figures = (
+        ("compliance", "fig-own-compliance-ratio"),
+        ("reading_compliance", "fig-own-compliance-soft"),
+    )
     for number, figure in enumerate(figures):
         shown = panel(*figure)
         for name, line in shown.items():
@@ -188,7 +196,7 @@ def test_fig_compliance_ratio():
 
 
 def test_fig_compliance_effective():
-    shown = panel("reading", "fig-own-compliance-effective")
+    shown = panel("reading_compliance", "fig-own-compliance-effective")
     (at_end, at_loss, effective, law, eq_14, eq_15, dot) = shown.values()
     gammas = effective[:, 0]
     np.testing.assert_allclose(eq_14, np.column_stack([gammas, gammas]))
@@ -231,7 +239,7 @@ def test_fig_4_ends():
 
 
 def test_fig_three_ranges():
-    shown = panel("reading", "fig-own-three-ranges")
+    shown = panel("reading_three_balls", "fig-own-three-ranges")
     for state, low, high in (
         ("still closes", 0, 1), ("already opens", 1, 1.5), ("ends first", 1.5, math.inf),
     ):  # fmt: skip
@@ -242,7 +250,7 @@ def test_fig_three_ranges():
 
 def test_fig_three_ratio():
     for number, (masses, e) in enumerate((([1, 1, 1], 0.5), ([2, 1, 1], 1))):
-        shown = panel("reading", "fig-own-three-ratio", number)
+        shown = panel("reading_three_balls", "fig-own-three-ratio", number)
         for k in (0, 137, 900, 1500, 1900):
             v = after((masses, [1, 0, 0], e), shown["$v_1^+$"][k, 0])
             values = [shown[f"$v_{i}^+$"][k, 1] for i in (1, 2, 3)]

@@ -78,7 +78,7 @@ def test_fig_6_drawn():
 
 
 def test_fig_patterns_turns():
-    for name, line in panel("reading", "fig-patterns-turns").items():
+    for name, line in panel("reading_patterns", "fig-patterns-turns").items():
         r = float(re.search(r"r = ([\d.]+)", name)[1])
         if "border" in name:
             r = edge_on_diagonal()
@@ -96,7 +96,7 @@ def edge_on_diagonal():
 
 
 def test_fig_patterns_corner():
-    left, right = drawn("reading")["fig-patterns-corner"].axes[:2]
+    left, right = drawn("reading_patterns")["fig-patterns-corner"].axes[:2]
     log = np.geomspace(0.005, 3, 241)
     log = np.sqrt(log[1:] * log[:-1])
     (mesh,) = [x for x in left.collections if hasattr(x, "get_coordinates")]
@@ -119,7 +119,7 @@ def test_fig_patterns_corner():
 def test_fig_patterns_parameters():
     cases = [(0.0, 0.15), (0.1, 0.15), (1.0, 0.15), (0.5, 0.0), (0.4, 0.5), (1.0, 0.5)]
     coarse = np.linspace(0, 3, 151)[1:] - 0.01
-    for ax, (e, a) in zip(drawn("reading")["fig-patterns-parameters"].axes, cases):
+    for ax, (e, a) in zip(drawn("reading_patterns")["fig-patterns-parameters"].axes, cases):
         some = coarse[coarse <= (1 / a - 1 if a else np.inf)]
         mesh = ax.collections[0]
         field = np.ma.getdata(mesh.get_array()).reshape(some.size, some.size)
@@ -162,7 +162,7 @@ def test_fig_8_drawn():
     right = math.hypot(v[2] - v[3], math.sqrt(4 * contact_work(trace, 2, start)))
     ends = [v[0] + v[1] - left, v[0] + v[1] + left, v[2] + v[3] - right, v[2] + v[3] + right]
     for contact in range(3):
-        both, apart = (panel("reading", "fig-p8", 2 * contact + row) for row in (1, 0))
+        both, apart = (panel("reading_n_balls", "fig-p8", 2 * contact + row) for row in (1, 0))
         for ball in (contact, contact + 1):
             name = f"$v_{ball + 1}$"
             expected = np.column_stack([impulses[:, contact], path[:, ball]])
@@ -193,7 +193,7 @@ def test_works_are_areas(chapter, figure, chain, ratio):
 def test_fig_overlap():
     """Each bar ends where its run, left alone, would: by the works of the two pairs (Fig. 8)."""
     trace = collide(FIG_8, ImpulseCorrelation(0.1))
-    apart = panel("reading", "fig-p8", 2)  # part (a), contact 2-3
+    apart = panel("reading_n_balls", "fig-p8", 2)  # part (a), contact 2-3
     start = trace.path[trace.events.index(("end", 1)) + 1]
     for ball in (2, 3):
         bar = panel("n_balls", "fig-own-overlap")[f"ball {ball}"][:, 0]
@@ -213,7 +213,7 @@ def test_fig_overlap():
 
 def test_fig_experiments_swap_as_drawn():
     table = ratio_table().set_index("triplet").ratio
-    (ax,) = drawn("reading")["fig-experiments-swap"].axes
+    (ax,) = drawn("reading_table_2")["fig-experiments-swap"].axes
     shown = {tuple(np.round(line[0], 9)) for line in points(ax, 1)}
     printed = {(table[x + "C" + z], table[x + "B" + z]) for x in "ABCD" for z in "ABCD"}
     put_back = {(table[t[0] + "C" + t[2]], table[t[::-1]]) for t in ("DBB", "BBD", "DBC", "CBD")}

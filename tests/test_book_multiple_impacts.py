@@ -14,7 +14,7 @@ from cradle import Chain, ImpulseCorrelation, collide
 
 SEQUENCE = [("end", 0), ("close", 0), ("end", 1), ("close", 1), ("end", 0), ("end", 1)]
 VELOCITIES = (1, "0.8", 0)
-CHAPTER, READING = Chapter("multiple_impacts"), Chapter("reading")
+CHAPTER, READING = Chapter("multiple_impacts"), Chapter("reading_multiple_impacts")
 # The chapter's example and others with the same sequence: masses, e2, e3, forward, backward.
 EXAMPLES = [
     ((1, 1, 1), "0.25", "0.25", "0.15", "0.15"),

@@ -15,7 +15,7 @@ from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequen
 from cradle.closed_form import largest_ratios
 
 FIG_8 = Chain([1] * 4, [1, 0.5, 0, 0], 1)
-CHAPTER, READING = Chapter("n_balls"), Chapter("reading")
+CHAPTER, READING = Chapter("n_balls"), Chapter("reading_n_balls")
 
 
 def random_chain(seed, n):

@@ -13,7 +13,7 @@ from truth import solve
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequences
 
 EQUAL = Chain([1, 1, 1], [1, 0, 0], 1)
-CHAPTER, READING = Chapter("problem"), Chapter("reading")
+CHAPTER, READING = Chapter("problem"), Chapter("reading_problem")
 
 
 def elastic(m1, v1, m2, v2):

@@ -20,7 +20,7 @@ from truth import solve
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 from cradle.closed_form import final_impulses, one_collision_each, three_balls
 
-CHAPTER, READING = Chapter("three_balls"), Chapter("reading")
+CHAPTER, READING = Chapter("three_balls"), Chapter("reading_three_balls")
 # The chapter's example.
 EXAMPLE = ([1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.9, 0.8], 0.15)
 CLOSE = {"rtol": 1e-12, "atol": 1e-13}
