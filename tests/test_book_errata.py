@@ -22,6 +22,8 @@ from cradle import (
 from cradle.closed_form import back_impact_line
 
 TESTS = Path(__file__).parent
+BOOK = TESTS.parent / "book"
+ENDINGS = (".ipynb", ".md")
 CHAPTER = Chapter("errata")
 TEXT = "\n".join(cell.source for cell in CHAPTER.cells.values() if cell.cell_type == "markdown")
 GLUED = CHAPTER.glued
@@ -52,21 +54,42 @@ def test_every_number_is_shown_and_every_test_exists():
     assert named <= defined
 
 
-def test_entries_are_numbered_and_short():
-    """Each number once, six of them first; no entry is a table's cell or a page."""
-    entries = re.findall(r"^\*\*(\d+)\*\* · \*(\w+)\* · (.+)$", TEXT, flags=re.MULTILINE)
-    numbers = sorted(int(number) for number, *_ in entries)
-    assert numbers == list(range(1, len(numbers) + 1))
+#: An entry: its label, number, kind and line. A reference to one, from any page.
+ENTRY = re.compile(r"\(erratum-([\w-]+)\)=(\\n\",\s+\"|\n)\*\*(\d*)\*\*")
+REFERENCE = re.compile(r"\{ref\}`(\d*) <erratum-([\w-]+)>`")
+
+
+def numbered() -> dict[Path, str]:
+    """The pages with entries and references numbered in the order of the page of errata."""
+    pages = {p: p.read_text(encoding="utf-8") for p in BOOK.glob("*.*") if p.suffix in ENDINGS}
+    names = [found[1] for found in ENTRY.finditer(pages[BOOK / "errata.ipynb"])]
+    order = {name: number for number, name in enumerate(names, start=1)}
+    assert len(order) == len(names)
+    return {
+        path: ENTRY.sub(
+            lambda m: f"(erratum-{m[1]})={m[2]}**{order[m[1]]}**",
+            REFERENCE.sub(lambda m: f"{{ref}}`{order[m[2]]} <erratum-{m[2]}>`", text),
+        )
+        for path, text in pages.items()
+    }
+
+
+def test_entries_are_numbered_as_they_stand_and_short():
+    """`python tests/test_book_errata.py` numbers them and all references to them anew."""
+    for path, text in numbered().items():
+        assert path.read_text(encoding="utf-8") == text, path.name
+    line = r"^\(erratum-[\w-]+\)=\n\*\*(\d+)\*\* · \*(\w+)\* · (.+)$"
+    entries = re.findall(line, TEXT, flags=re.MULTILINE)
+    assert [int(number) for number, *_ in entries] == list(range(1, len(entries) + 1))
+    assert len(entries) == len(re.findall(r"^\*\*\d", TEXT, flags=re.MULTILINE))
     assert {kind for _, kind, _ in entries} == {"slip", "error", "unsaid", "open"}
-    assert TEXT.index("## Part 1") < TEXT.index("**1** ·")
-    first = TEXT[TEXT.index("## The six that matter") : TEXT.index("## Part 1")]
+    first = TEXT[TEXT.index("## The six that matter") : TEXT.index("## What a program needs")]
     assert len(re.findall(r"^\*\*\d+\*\* · ", first, flags=re.MULTILINE)) == 6
-    assert "| **" not in TEXT
-    assert max(len(words.split()) for *_, words in entries) < 140
+    assert max(len(words.split()) for *_, words in entries) <= 40
 
 
 def test_different_parameters_with_one_outcome():
-    """Entry 42: the closed form of three balls, and the reference solver."""
+    """Several parameters, one outcome: the closed form of three balls, and the reference solver."""
     shared = [-0.027027, 0.169805, 0.857222]
     for text in ("(0.9, 0.8, 0.15)", "(0.951351, 0.748331, 0.10)", "(0.848649, 0.864099, 0.20)"):
         assert text in TEXT
@@ -80,7 +103,7 @@ def test_different_parameters_with_one_outcome():
     assert abs(one - other).max() < 1e-7
 
 
-def test_counts_of_entries_38_to_41():
+def test_counts_of_triplets_and_sequences():
     assert number(GLUED["without-d"]) == sum("D" not in name for name in paper_sequences()) == 8
     several = 0
     for triplet in ratio_table().triplet:
@@ -188,3 +211,8 @@ def test_simultaneous_within_rounding():
     heavier = exact([1, 1, 1, "1.00000000001", 1, 1], *rest)
     assert float(GLUED["tie-broken"]) == pytest.approx(abs(tied - lighter).max(), rel=0.01)
     assert abs(tied - heavier).max() < 1e-9
+
+
+if __name__ == "__main__":
+    for path, text in numbered().items():
+        path.write_text(text, encoding="utf-8")
