@@ -158,6 +158,19 @@ def test_figures_of_the_appendices_carry_a_letter(html: Path, chapters):
         assert re.findall(r'caption-number">Fig\. ([\w.]+) ', text) == numbers
 
 
+def test_own_equations_are_numbered_without_holes(html: Path, root: Path, chapters):
+    """In each chapter, and with a letter through all appendices, in the order of the contents."""
+    toc = (root / "_toc.yml").read_text(encoding="utf-8")
+    found: dict[str, list[int]] = {}
+    for page in re.findall(r"file:\s*(\S+)", toc):
+        text = chapters[html / f"{page}.html"]
+        for part, number in re.findall(r'class="eqno">\((\w+)\.(\d+)\)', text):
+            found.setdefault(part, []).append(int(number))
+    assert {"3", "A"} <= set(found)
+    for part, numbers in found.items():
+        assert numbers == list(range(1, len(numbers) + 1)), part
+
+
 def test_two_clicks_from_the_landing_page_to_any_item(html: Path, root: Path, chapters):
     """Landing page, ledger, item: the verdict on the way, the code within two cells of the item."""
     book = html / "book"

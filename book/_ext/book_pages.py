@@ -236,6 +236,27 @@ def break_code_in_tables(
                 literal += nodes.inline("", piece, classes=["nowrap"])
 
 
+def number_equations(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    r"""Count only equations that show a number of ours: Sphinx counts the paper's, too.
+
+    An equation of the paper has a place to which links lead, and its own number in a `\tag`.
+    """
+    changed = []
+    for page, kinds in env.toc_fignumbers.items():
+        numbers = kinds.get("displaymath", {})
+        ours = {name for name in numbers if name.startswith("equation-")}
+        if len(ours) < len(numbers):
+            places = sorted(numbers.items(), key=lambda item: item[1])
+            first = min(numbers.values())
+            kept = [name for name, _ in places if name in ours]
+            kinds["displaymath"] = {
+                name: (*first[:-1], first[-1] + k)
+                for k, name in enumerate(kept)
+            }
+            changed.append(page)
+    return changed
+
+
 def letter_figures(app: Sphinx, env: BuildEnvironment) -> list[str]:
     """Give figures and equations of the appendices the numbers A.1, A.2, ..., through all pages."""
     appendices = [
@@ -307,6 +328,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("doctree-resolved", join_header_rows)
     app.connect("doctree-resolved", break_code_in_tables)
     # After Sphinx has numbered all figures.
+    app.connect("env-get-updated", number_equations, priority=890)
     app.connect("env-get-updated", letter_figures, priority=900)
     app.connect("build-finished", copy_mathjax)
     return {
