@@ -17,7 +17,7 @@ from cradle import (
     ratio_table,
 )
 
-CHAPTER = Chapter("experiments")
+CHAPTER = Chapter("table_2")
 
 
 def test_touching_spheres_are_the_energy_law_and_wide_gaps_are_pairs():
