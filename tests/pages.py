@@ -21,13 +21,22 @@ MISFITS = """() => {
   // Code and messages: every line is seen as a whole, without scrolling.
   for (const node of document.querySelectorAll(".bd-content pre"))
     if (wide(node)) say("code", node, node.clientWidth, node.scrollWidth);
-  // Equations on a line of their own: whole, or in a box that scrolls and starts at its left end.
+  // What scrolls sideways looks like it.
+  for (const node of document.querySelectorAll(".bd-content *"))
+    if (wide(node) && ["auto", "scroll"].includes(getComputedStyle(node).overflowX)
+      && getComputedStyle(node).maskImage === "none")
+      say("no sign of more", node, node.clientWidth, node.scrollWidth);
+  // Equations on a line of their own: whole, or in a box that scrolls and starts at its left end
+  // because their letters would be less than half of those of the text.
   for (const node of document.querySelectorAll('.bd-content mjx-container[display="true"]')) {
     for (const box of [node, node.parentElement]) {
       if (!wide(box)) continue;
       const scrolls = ["auto", "scroll"].includes(getComputedStyle(box).overflowX);
       const left = node.querySelector("svg").getBoundingClientRect().left;
-      if (innerWidth > 600 || !scrolls || left < box.getBoundingClientRect().left - 1)
+      const [size, full] = [node, node.parentElement]
+        .map((of) => parseFloat(getComputedStyle(of).fontSize));
+      const cut = !scrolls || left < box.getBoundingClientRect().left - 1;
+      if (innerWidth > 600 || cut || size > 0.6 * full)
         say("equation", node, box.clientWidth, box.scrollWidth);
     }
     const number = node.parentElement.querySelector(".eqno");

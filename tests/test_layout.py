@@ -9,7 +9,18 @@ from pathlib import Path
 import book_figures
 import pytest
 from explorer import EXPLORER, drawn, later, still
-from pages import ALL_SET, MISFITS, PATIENCE, code, contrast, listened, luminance, shape, show
+from pages import (
+    ALL_SET,
+    FRAMES,
+    MISFITS,
+    PATIENCE,
+    code,
+    contrast,
+    listened,
+    luminance,
+    shape,
+    show,
+)
 
 #: Widths and modes of the window.  Widths decide what fits, modes which pictures are shown; pages
 #: take long to load, and the weekly tests look at the other pairs.
@@ -87,6 +98,9 @@ SKIPPED = """() => {
 STOPS = """[...document.querySelectorAll('mjx-container[tabindex], mjx-container [tabindex="0"]')]
   .map((node) => node.textContent)"""
 
+# Misfits that no change of the window may mend.
+AS_IT_CAME = "equation", "no sign of more"
+
 STILL = "*, *::before { transition: none !important; animation: none !important; }"
 FOUND = "/found \\d+ page/.test(document.body.innerText)"
 
@@ -102,8 +116,11 @@ def looked_at(tab, page: Path, views) -> dict[str, list]:
         assert tab.locator("#search-results li").count() > 10
     tab.add_style_tag(content=STILL)
     tab.evaluate(ALL_SET)
+    tab.evaluate(FRAMES)
     wide = tab.evaluate("document.scrollingElement.scrollWidth")
     found = {"wide": [wide] * (wide > SMALLEST), "misfits": [], "numbers": [], "pale": []}
+    # As the page came, before any change of the window.
+    found["misfits"] += [cut for cut in tab.evaluate(MISFITS) if cut[0] in AS_IT_CAME]
     found["headings"], found["stops"] = tab.evaluate(SKIPPED), tab.evaluate(STOPS)
     tagged = re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8"))
     sights = {**dict.fromkeys(views), (1280, "light"): None, (1280, "dark"): None}
@@ -176,6 +193,10 @@ def test_numbers_of_equations_on_a_phone(seen):
             "<span class='figure-box' data-letters='12'><img class='map' width='100' "
             "style='width: 100px; height: 9px; filter: invert(0.93)'></span>",
             "turned map",
+        ),
+        (
+            "<p style='overflow: auto'><span style='display: block; width: 500px'>more",
+            "no sign of more",
         ),
         ("<table><td style='width: 2em'>" + 40 * "word " + "</td></table>", "squeezed column"),
         (

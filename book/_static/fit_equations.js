@@ -25,10 +25,10 @@
     document.querySelectorAll(EQUATIONS).forEach(fit);
   }
 
-  // Equations are set when they are about to be seen.
+  // Equations are set when they are about to be seen: each is put anew into its place.
   function fitNew(changes) {
-    const found = changes.map(({ target }) => target.closest(EQUATIONS));
-    new Set(found.filter(Boolean)).forEach(fit);
+    for (const node of changes.flatMap(({ addedNodes }) => [...addedNodes]))
+      if (node.matches?.(EQUATIONS)) fit(node);
   }
 
   window.addEventListener("load", () => {
