@@ -51,6 +51,19 @@ def test_the_first_page_is_guessed(visit, page):
     assert bars(tab) == np.round(after, 2).tolist()
 
 
+@pytest.mark.parametrize("name", ["intro", "compliance", "explorer"])
+def test_the_guess_comes_before_the_button(visit, page, name):
+    """On a phone; on a desk it stands beside them."""
+    address = page.replace("explorer.html", f"{name}.html")
+    tab = still(visit, address=address, width=390)
+    if name == "explorer":
+        press(tab, "Guess first")
+    drawn(tab)
+    last = tab.locator(".handles input").last.bounding_box()
+    button = tab.get_by_role("button", name="Let go").bounding_box()
+    assert last["y"] + last["height"] < button["y"] < last["y"] + 300
+
+
 def test_the_balls_wait_after_a_hit_that_was_guessed(visit, page):
     """So that the guess can be compared; the next hits go on by themselves."""
     address = page.replace("explorer.html", "intro.html")
@@ -181,7 +194,7 @@ def test_two_cradles_side_by_side(visit):
 
 
 def test_a_speed_is_typed_and_a_hit_is_heard(visit):
-    tab = still(visit, stopped=True)
+    tab = still(visit, "#scene=one", stopped=True)
     later(tab, 50)
     tab.evaluate(
         """() => {

@@ -123,7 +123,7 @@ def test_paper_chains_by_their_letters(visit):
 
 
 def test_a_ball_is_dragged_and_let_go(visit):
-    tab = visit(stopped=True)
+    tab = visit("#scene=one", stopped=True)
     tab.clock.run_for(1500)  # half a second of rest, then a swing
     press(tab, "Pause")
     press(tab, "Pull back")
@@ -163,7 +163,7 @@ def test_pull_back_where_it_has_an_effect(visit):
 
 def test_only_a_drag_moves_a_ball(visit):
     """A tap on a ball leaves the swing as it is, and a ball taken at its edge does not jump."""
-    tab = visit(stopped=True)
+    tab = visit("#scene=one", stopped=True)
     time, ball = f"{EXPLORER}.state.clock.time", ".ball[data-ball='4'] .disc"
     tab.clock.run_for(1500)
     before = tab.evaluate(time)
@@ -188,7 +188,7 @@ def pulled(tab, ball: str, way: int, from_edge: int = 0) -> float:
 
 
 def test_balls_in_the_way_come_along(visit):
-    tab = still(visit)
+    tab = still(visit, "#scene=one")
     x, y = grab(tab, ".ball[data-ball='2'] .disc")
     tab.mouse.move(x - 60, y, steps=6)
     taken = drawn(tab)["speeds"]

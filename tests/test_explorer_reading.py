@@ -170,7 +170,7 @@ def test_outcome_is_said_in_words(visit):
 
 
 def test_everything_by_keyboard(visit):
-    tab = still(visit)
+    tab = still(visit, "#scene=one")
     tab.evaluate("document.querySelector('.walk button').focus()")
     reached = []
     for _ in range(40):
@@ -210,10 +210,10 @@ def test_full_screen_for_a_lecture(visit):
     tab = still(visit, width=1366, height=768)
     press(tab, "Full screen")
     tab.wait_for_function("document.fullscreenElement")
-    for count in range(1, 19):
+    for count in range(1, 20):
         tab.keyboard.press("PageDown")
         drawn(tab)
-        assert tab.inner_text(".place") == f"{count + 1} of 19"
+        assert tab.inner_text(".place") == f"{count + 1} of 20"
         scrolls = tab.evaluate("[document.fullscreenElement.scrollHeight, innerHeight]")
         assert scrolls[0] <= scrolls[1] + 1, tab.locator(".walk select").input_value()
     letters = tab.evaluate(
@@ -279,7 +279,7 @@ def test_space_after_a_click_on_full_screen(visit):
     tab = full_screen(visit)
     assert tab.evaluate("document.activeElement.matches('.cradle-explorer')")  # for Enter, too
     tab.keyboard.press("Space")
-    assert tab.evaluate(STATE) == ["one", True, False]
+    assert tab.evaluate(STATE) == ["example", True, False]
     later(tab, 50)
     assert tab.evaluate(FULL)
     assert tab.inner_text(".full") == "Leave full screen"
@@ -448,7 +448,7 @@ def test_motion_is_asked_for(visit):
 
 def test_motion_by_the_frames_of_the_browser(visit):
     """With the true clock, at whatever pace the machine has."""
-    tab = visit()
+    tab = visit("#scene=one")
     tab.wait_for_function(f"{EXPLORER}.state.clock.time > 0.8")
     places = tab.evaluate(f"{EXPLORER}.state.swing.positions({EXPLORER}.state.clock.time)")
     assert places[0] == 0 != places[4]  # one comes, one goes
@@ -682,9 +682,10 @@ def test_scenes_do_what_their_texts_say(visit):
     # Steel balls: in percent; of all rows of five with one ball pulled back "small" is nearest,
     # and at no ratio of the slider balls 2 and 3 come back. Above one half it holds contacts.
     steel = collide(Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain()).velocities
-    text = scenes["one"]["text"].replace("\N{MINUS SIGN}", "-")
-    said = re.search(r"leave with (.*) and (.*) %", text)
-    assert [*map(int, said[1].split(", ")), int(said[2])] == np.rint(100 * steel).tolist()
+    for key, shares in (("one", steel), ("example", after["example"])):
+        text = scenes[key]["text"].replace("\N{MINUS SIGN}", "-")
+        said = re.search(r"leave with (.*) and (.*) %", text)
+        assert [*map(int, said[1].split(", ")), int(said[2])] == np.rint(100 * shares).tolist()
     rows = {
         key: np.abs(after[key] - steel).max()
         for key, scene in scenes.items()
@@ -713,8 +714,9 @@ def test_scenes_do_what_their_texts_say(visit):
     middle_ball, together = tab.evaluate(
         """() => {
           const { withRatio, pulled, data, Swing } = cradleExplorer;
-          const three = new Swing(pulled(data.scenes[0].setting, 2, 1));
-          const losses = data.scenes.find((scene) => scene.key === "losses").setting;
+          const [one, losses] = ["one", "losses"].map(
+            (name) => data.scenes.find(({ key }) => key === name).setting);
+          const three = new Swing(pulled(one, 2, 1));
           return [[0, 1, 2, 3].map((k) => Math.abs(three.hit(k).after[2])),
             new Swing(losses).hit(400)];
         }"""

@@ -84,7 +84,7 @@ def test_two_fingers_pull_two_balls(phone):
 
 def test_a_ball_follows_the_finger_as_the_mouse(visit, phone):
     """The page does not scroll under it; what is pressed is large enough (WCAG 2.2, 2.5.8)."""
-    mouse, tab = still(visit, width=390), phone()
+    mouse, tab = still(visit, "#scene=one", width=390), phone("#scene=one")
     x, y = middle(tab, ball(4))
     mouse.mouse.move(x, y)
     mouse.mouse.down()
@@ -172,7 +172,7 @@ def test_a_tap_and_a_finger_to_the_side_do_their_work(phone, place, row):
 
 def test_another_setting_while_a_ball_is_held(visit):
     """Typed, or followed as a link: balls that are gone are let go, the others stay in the hand."""
-    tab = still(visit)
+    tab = still(visit, "#scene=one")
     x, y = grab(tab, ball(4))
     tab.mouse.move(x + 40, y, steps=4)
     held = drawn(tab)["speeds"]

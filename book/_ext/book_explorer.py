@@ -62,15 +62,15 @@ def equal(
 
 
 @cache
-def steel_balls() -> str:
-    """Return what five balls like those of steel get of the striker's speed, in percent."""
-    from cradle import Chain, SpringChain, collide
+def shares(count: int, ratio: float | None = None) -> str:
+    """Return what equal balls get of the striker's speed, in percent. No ratio: steel."""
+    from cradle import Chain, ImpulseCorrelation, SpringChain, collide
 
-    after = collide(
-        Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain()
-    ).velocities
+    model = SpringChain() if ratio is None else ImpulseCorrelation(ratio)
+    chain = Chain([1] * count, [1] + [0] * (count - 1))
     *others, last = (
-        f"{100 * v:.0f}".replace("-", "\N{MINUS SIGN}") for v in after
+        f"{100 * v:.0f}".replace("-", "\N{MINUS SIGN}")
+        for v in collide(chain, model).velocities
     )
     return f"{', '.join(others)} and {last} %"
 
@@ -89,12 +89,18 @@ def story() -> list[dict[str, Any]]:
     meeting = equal(4, 0.1)
     meeting["speeds"] = [1.0, 0.5, 0.0, 0.0]
     told = [
+        ("example", "The example of this book", equal(3, 0.15), "inside",
+         "One ball strikes two that touch. While ball 2 is being pushed, it passes a part of the "
+         "push on: this part is the ratio, here 0.15. The balls leave with "
+         f"{shares(3, 0.15)} of the striker's speed. Move the ratio: at 0 ball 3 leaves alone; at "
+         "0.5 balls 2 and 3 leave together, and ball 1 comes back faster."),
         ("one", "Pull back one ball", equal(5, 0.0), "inside",
-         "One ball strikes, and one leaves at the other end. This is the toy of the textbooks: "
-         "the balls collide one pair after the other. In the paper's terms, the ratio is 0. "
+         "Now five balls. One strikes, and one leaves at the other end. This is the toy of the "
+         "textbooks: the balls collide one pair after the other. In the paper's terms, the ratio "
+         "is 0. "
          "Steel balls that touch do not do this: "
          "if contacts push by Hertz's law and lose no energy, balls 1 to 5 leave with "
-         f"{steel_balls()} of the striker's speed."),
+         f"{shares(5)} of the striker's speed."),
         ("two", "Pull back two balls", equal(5, 0.0, 2), "inside",
          "Two balls strike, and two leave. The ratio is still 0. Pull back three, and one of them "
          "never stops."),

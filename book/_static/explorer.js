@@ -77,9 +77,12 @@
       const node = (name) => this.panels[name]?.node ?? "";
       const cradle = make("div", { class: "cradle" });
       const stages = make("div", { class: "stages" }, cradle, beside?.place ?? "");
-      const left = make("div", { class: "left" }, stages, node("run"), node("words"));
+      // What is to be guessed comes before the button that shows it.
+      const guessed = "guess" in this.host.dataset;
+      const outcome = (here) => (here ? node("outcome") : "");
+      const left = make("div", { class: "left" }, stages, outcome(guessed), node("run"), node("words"));
       this.panels.settings.node.append(node("beside"));
-      const right = make("div", { class: "right" }, node("outcome"), node("pictures"));
+      const right = make("div", { class: "right" }, outcome(!guessed), node("pictures"));
       this.link = make("a", { href: "explorer.html" }, "Open in the full explorer");
       this.host.replaceChildren(
         node("question"),
@@ -343,6 +346,7 @@
       if (pictures) pictures.node.hidden = scenery.covered;
       // Who chooses an answer draws no bars.
       outcome.node.hidden = scenery.covered && "answers" in this.host.dataset;
+      this.host.classList.toggle("guesses", Boolean(scenery.guessing));
       for (const panel of Object.values(this.panels))
         if (!panel?.node.hidden) panel?.show({ ...scenery, loud: this.audio }, this.box, this.stageBox);
       this.stage.lay(scenery.setting, this.stageBox());
