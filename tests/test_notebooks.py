@@ -206,6 +206,27 @@ def test_a_typed_number_is_seen():
     assert not decimals("It is {glue:text}`patterns-0.1`, `0.2`, section 2.5, $$ 0.3 $$")
 
 
+def test_letters_of_the_chapters_have_one_line_on_the_notation_page():
+    """Greek ones of chapters 1 to 7; a letter without index has one meaning."""
+    words = {
+        name: "".join(
+            cell.source
+            for cell in nbformat.read(BOOK / f"{name}.ipynb", as_version=4).cells
+            if cell.cell_type == "markdown"
+        )
+        for name in ("problem", "compliance", "three_balls", "multiple_impacts", "patterns",
+                     "n_balls", "experiments", "notation")
+    }  # fmt: skip
+    rows = re.findall(r"(?m)^\| ([^|]*\$[^|]*) \|", words.pop("notation"))
+    symbols = [symbol.strip() for row in rows for symbol in re.split(r",|\$", row)]
+    symbols = [symbol.removeprefix("\\ ") for symbol in symbols if symbol]
+    assert len(symbols) == len(set(symbols)) > 40
+    greek = "alpha|gamma|delta|theta|kappa|lambda|mu|rho|sigma|tau|(?:var)?phi|omega|Delta|beta|eta"
+    used = set(re.findall(rf"\\(?:{greek})(?![a-z])", "".join(words.values())))
+    assert used == {letter for letter in used if any(letter in symbol for symbol in symbols)}
+    assert len(used) > 8
+
+
 def test_one_changed_digit_fails(tmp_path: Path, root: Path):
     """The project's own options compare stored outputs; a lax option would pass both."""
     for name, stored in (("right", "42\n"), ("wrong", "43\n")):
