@@ -232,25 +232,34 @@ def number_events(
     numbers: Iterable[int],
     most: int = 12,
 ) -> None:
-    """Write the numbers of events above the axes, at most `most`, with a dotted line down."""
+    """Write the numbers of events above the axes, at most `most`, with dotted lines down.
+
+    Events that are too near for two numbers share one: 5, 6 or 3–6.
+    """
     left, right = ax.get_xlim()
-    names: dict[float, list[str]] = {}  # events at one place share a line
+    digit = 0.015 * (right - left)
+    groups: list[tuple[list[float], list[int]]] = []
     for at, number in list(zip(places, numbers, strict=True))[:most]:
-        names.setdefault(float(at), []).append(f"{number}")
-    last = left - right
-    for at, together in names.items():
         ax.axvline(at, color="0.7", lw=0.8, ls=":", zorder=0)
-        last = max(at, last + 0.035 * (right - left))
+        group = ([float(at)], [number])
+        if groups:
+            before, found = groups[-1]
+            reach = digit * (2 if len(found) == 1 else 3)
+            if at - (before[0] + before[-1]) / 2 < reach:
+                group = (before + group[0], found + group[1])
+                groups.pop()
+        groups.append(group)
+    for where, together in groups:
+        dash = ", " if len(together) == 2 else "–"
         ax.annotate(
-            ", ".join(together),
-            (last, 1),
+            dash.join(map(str, dict.fromkeys((together[0], together[-1])))),
+            ((where[0] + where[-1]) / 2, 1),
             (0, 3),
             xycoords=("data", "axes fraction"),
             textcoords="offset points",
             ha="center",
             fontsize=9,
         )
-        last += 0.03 * (right - left) * (len(together) - 1)
 
 
 def inside(trace: Trace) -> None:
