@@ -139,6 +139,9 @@
 
     // Move the balls; `held` says that they wait to be let go; `pressed` marks contacts.
     show(positions, { held = false, speeds = [], pressed = [] } = {}) {
+      // Balls that are pulled together have one number, below the one nearest to the others.
+      const told = (k) => held && speeds[k] && speeds[k] !== speeds[k + Math.sign(speeds[k])];
+      const near = (j, k) => Math.abs(this.pivots[j] - this.pivots[k]) < 5 * this.em;
       positions.forEach((s, k) => {
         const angle = Math.min(Math.max((this.size * s) / LENGTH, -MOST), MOST);
         const x = px(this.pivots[k] + this.length * Math.sin(angle));
@@ -147,10 +150,9 @@
         set(string, "x2", x);
         set(string, "y2", y);
         set(group, "transform", `translate(${x} ${y})`);
-        // Balls that are pulled together have one number, below the one nearest to the others.
-        const next = speeds[k] > 0 ? speeds[k + 1] : speeds[k - 1];
-        const told = held && speeds[k] && speeds[k] !== next;
-        const words = told ? `${fixed(Math.abs(speeds[k]))} m/s` : "";
+        const crowded = [k - 1, k + 1].some((j) => told(j) && near(j, k));
+        const number = `${fixed(Math.abs(speeds[k]))}${crowded ? "" : " m/s"}`;
+        const words = told(k) ? number : "";
         if (pull.textContent !== words) pull.textContent = words;
         // It stays within the picture.
         const half = 2.6 * this.em;
