@@ -1,0 +1,327 @@
+"""Period, damping, restitution and gap of a cradle, from the places of its balls in a film."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cradle.chain import Chain
+from cradle.fit.result import Estimate
+from cradle.fit.search import LEVEL, RISE, Mode, Scan
+from cradle.fit.shots import chance
+from cradle.input.values import Vector, checked, numbers, one_number, one_of, refuse_where
+from cradle.models import Model
+from cradle.swinging.pendulums import Pendulums
+from cradle.swinging.record import Swing
+from cradle.swinging.swing import swing
+
+#: What can be fitted, with its unit.
+UNITS = {"period": " s", "damping": " 1/s", "restitution": "", "gaps": " m"}
+# A law does not fit if chi-square has a chance below the one, or residuals are alike by so many
+# standard errors; then parts of the film are compared, for these numbers of parts.
+_CHANCE, _FAR, _PARTS = 1e-3, 3.3, (4, 6, 8, 12, 16, 24, 32)
+_GRAVITY = 9.81
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SwingFit:
+    """What a film of K frames says of a cradle of N balls."""
+
+    values: Mapping[str, float | None]  #: Of each number, the best; None if the film tells none.
+    intervals: Mapping[str, tuple[float, float]]  #: 95 % of each number.
+    estimates: Mapping[str, Estimate]  #: The same with profiles of chi-square.
+    swing: Swing  #: What fits best; its times begin with the first frame.
+    residuals: Vector  #: Filmed less computed, less the mean of each ball, shape (K, N), m.
+    reading: float  #: Standard error of a reading, m: as given, or that of the residuals.
+    chi_square: float  #: Sum of squares of the residuals over `reading`.
+    degrees_of_freedom: int  #: Readings less what was fitted to them.
+    correlation: float  #: Of a ball's residuals in successive frames: about 0 if the law fits.
+    widened: Mapping[str, float]  #: How many times wider each interval is made: 1 if the law fits.
+    poor: bool  #: Whether the law does not fit.
+
+    def summary(self) -> str:
+        """Return all that the fit says, as text."""
+        lines = [f"{one}{UNITS[name] * one.identified}" for name, one in self.estimates.items()]
+        lines.append(
+            f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}, "
+            f"reading {self.reading:.2g} m, correlation of residuals {self.correlation:.2f}"
+        )
+        if self.poor:
+            wide = ", ".join(f"{name} {times:.1f}" for name, times in self.widened.items())
+            lines.append(f"poor fit: intervals are too short, though widened: {wide} times")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        """Return the summary in one line."""
+        return f"SwingFit({'; '.join(self.summary().splitlines())})"
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw film and swing, and the residuals, on two `axes` or on new ones."""
+        from cradle.pictures.fits import draw_swing
+
+        return draw_swing(self, axes)
+
+
+def fit_swing(
+    times: ArrayLike, positions: ArrayLike, model: Model, *, seen: ArrayLike | None = None,
+    reading: float | None = None, free: Collection[str] = tuple(UNITS),
+    known: Mapping[str, float] | None = None,
+) -> SwingFit:  # fmt: skip
+    """Fit `swing` to a film of equal balls, with one restitution and one gap for all contacts.
+
+    At the first frame some balls, let go at one moment, are on their way; the others are at rest.
+    Places and velocities there are fitted too, as is where each ball hangs.
+
+    Parameters
+    ----------
+    times, positions : array_like, shapes (K,) and (K, N)
+        Of the frames, s; of each ball from where it hangs, m, nan where it was not seen.
+    model : Model
+        The impact law.
+    seen : array_like of bool, shape (K, N) or (N,), optional
+        Which readings count.
+    reading : float, optional
+        Standard error of a reading, m; if left out, that of the residuals.
+    free : collection of str
+        What is fitted: "period" of small swings, s; "damping", 1/s; "restitution"; "gaps", m.
+    known : mapping of str to float, optional
+        What is not fitted; left out, no damping, restitution 1, no gaps.
+
+    Returns
+    -------
+    SwingFit
+        Values and 95 % intervals, by profiles of chi-square.  Where the law does not fit, by
+        chi-square or because residuals are alike from frame to frame, intervals are widened by how
+        much parts of the film differ.
+
+    Raises
+    ------
+    ValueError
+        If a value is wrong, no ball is seen on its way at first, or there are too few readings.
+
+    Examples
+    --------
+    >>> from cradle import ImpulseCorrelation
+    >>> times, law = np.arange(0, 2.5, 0.05), ImpulseCorrelation(0)
+    >>> film = swing(Chain([1, 1], [0, 0], 0.9), law, [-0.05, 0], times).positions
+    >>> found = fit_swing(times, film, law, free=["restitution"], known={"period": 0.634374})
+    >>> round(found.values["restitution"], 4)
+    0.9
+    """
+    film = _Film(times, positions, model, seen, reading, free, known or {})
+    p, fit = film.begin(), None
+    while fit is None:  # a profile may find a lower minimum
+        p, fit = film.judged(*film.descend(p, len(film.times)))
+    return fit
+
+
+class _Film:
+    """Readings, and swings by numbers p: of `names`, places of balls on their way, their v / x."""
+
+    def __init__(
+        self, times: ArrayLike, positions: ArrayLike, model: Model, seen: ArrayLike | None,
+        reading: float | None, free: Collection[str], known: Mapping[str, float],
+    ) -> None:  # fmt: skip
+        t, x, self.model = checked("times", times), numbers("positions", positions), model
+        mask = np.ones(x.shape[1:], bool) if seen is None else np.asarray(seen, bool)
+        shapes = t.shape, x.shape, mask.shape
+        fit = x.ndim == 2 and t.shape == x.shape[:1] and mask.shape in (x.shape, x.shape[1:])
+        if not fit or x.shape[1] < 2:
+            told = "times, positions and seen have shapes {}, {} and {}".format(*shapes)
+            raise ValueError(f"{told}; must be (K,), (K, N) and (K, N) or (N,), N at least 2")
+        refuse_where("times", t, np.diff(t, prepend=-np.inf) <= 0.0, "must rise")
+        self.times, self.seen = t - t[0], mask & np.isfinite(x)
+        self.positions = np.where(self.seen, x, np.nan)
+        above = "must be above 0", 0.0, np.inf, True
+        self.reading = None if reading is None else one_number("reading", reading, *above)
+        for name in (*free, *known):
+            one_of("free or known", name, tuple(UNITS))
+        self.names = [name for name in UNITS if name in free and name not in known]
+        self.fixed = {"damping": 0.0, "restitution": 1.0, "gaps": 0.0, **known}
+        one_number("known['period']", self.fixed.get("period", 1.0), *above)
+        if "period" not in {*self.names, *known}:
+            raise ValueError("period is neither free nor known; must be one of them")
+
+    def begin(self) -> Vector:
+        """Search from nothing, in ever longer parts of the film."""
+        from scipy.signal import lombscargle
+
+        t, often = self.times, self.seen.sum(axis=0)
+        # No impact changes the mean of the balls.
+        mean = self.positions[:, often >= 0.5 * often.max()].mean(axis=1)
+        mean, at = mean[np.isfinite(mean)], t[np.isfinite(mean)]
+        if min(at.size, often.sum() // 3) < 10:
+            raise ValueError(f"{often.sum()} readings, {at.size} frames with all balls; too few")
+        rates = np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
+        rate = rates[lombscargle(at, mean - mean.mean(), rates).argmax()]
+        self.period = period = self.fixed.get("period", 2.0 * np.pi / rate)
+        size, early = np.nanmax(np.abs(self.positions)), max(period / 16.0, t[3])
+        states = np.zeros((self.positions.shape[1], 2))
+        for state, seen, x in zip(
+            states, self.seen.T & (t <= early), self.positions.T, strict=True
+        ):
+            state[:] = np.polyfit(t[seen], x[seen], 1)[::-1] if seen.sum() > 2 else 0.0
+        self.movers = np.flatnonzero(np.abs(states[:, 0]) > 0.1 * size)
+        if not self.movers.size:
+            raise ValueError("no ball is seen on its way at first; begin soon after the release")
+        # Limits, first steps, and where to begin.
+        most, e = np.pi / period, 1.0 - np.array([0.003, 0.01, 0.03, 0.1, 0.3])
+        gaps = size * np.append(0.0, np.geomspace(1e-4, 0.1, 13))
+        rows = {
+            "period": (0.5 * period, 2.0 * period, 1e-4 * period, [period]),
+            "damping": (0.0, most, 1e-2 / period, [0.0]),
+            "restitution": (0.0, 1.0, 1e-3, e), "gaps": (0.0, size, 1e-3 * size, gaps),
+        }  # fmt: skip
+        used = [rows[name] for name in self.names]
+        used += [(-np.inf, np.inf, 1e-3 * size, [x]) for x in states[self.movers, 0]]
+        x, v = states[self.movers].T
+        used.append((-np.inf, np.inf, 1e-2 / period, [x @ v / (x @ x)]))
+        self.low, self.high, self.steps = np.array([row[:3] for row in used]).T
+        self.least, count = 1e-4 * self.steps, int(np.searchsorted(t, 2.2 * period))
+        nodes = [np.array(node) for node in product(*(row[3] for row in used))]
+        nodes.sort(key=lambda node: float((self.left(node, count) ** 2).sum()))
+        held = [k for k, name in enumerate(self.names) if name in ("period", "damping")]
+        found = [self.descend(node, count, held) for node in nodes[:3]]
+        self.half = min(found, key=lambda one: float(one[1] @ one[1]))[0]
+        for some in [len(t) >> k for k in range(20, 0, -1) if len(t) >> k > 1.5 * count]:
+            self.half = self.descend(self.half, some)[0]
+        return self.half
+
+    def swung(self, p: Vector, count: int) -> Swing:
+        """Return the swing by numbers, in the first frames."""
+        now = {**self.fixed, **dict(zip(self.names, p.tolist(), strict=False))}
+        balls = np.arange(self.positions.shape[1])
+        x = np.zeros(balls.size)
+        x[self.movers] = p[len(self.names) : -1]
+        v = p[-1] * x
+        x = np.maximum.accumulate(x + now["gaps"] * balls) - now["gaps"] * balls  # none overlap
+        length = _GRAVITY * (now["period"] / (2.0 * np.pi)) ** 2
+        hanging = Pendulums(length, gaps=now["gaps"], damping=now["damping"])
+        chain = Chain(np.ones(balls.size), v, now["restitution"])
+        return swing(chain, self.model, x, self.times[:count], pendulums=hanging)
+
+    def left(self, p: Vector, count: int) -> Vector:
+        """Return what the swing by numbers leaves of the readings in the first frames."""
+        seen = self.seen[:count]
+        left = np.where(seen, self.positions[:count] - self.swung(p, count).positions, 0.0)
+        return np.asarray((left - left.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))[seen])
+
+    def descend(
+        self, p: Vector, count: int, held: Collection[int] = ()
+    ) -> tuple[Vector, Vector, Vector]:
+        """Return a minimum, what is left there, and its slopes.
+
+        Steps are about as wide as the errors, and so go over what is rough.
+        """
+        from scipy.optimize import least_squares
+
+        # Touching balls stay so: what they do is no limit of small gaps.
+        touch = [k for k, name in enumerate(self.names) if name == "gaps" and not p[k]]
+        free, size = np.setdiff1d(np.arange(p.size), [*held, *touch]), self.seen[:count].sum()
+
+        def slopes(q: Vector) -> Vector:
+            left, out = self.left(q, count), np.zeros((size, p.size))
+            for k in free:
+                trial = q.copy()
+                trial[k] += self.steps[k] * (1 if q[k] + self.steps[k] < self.high[k] else -1)
+                out[:, k] = (self.left(trial, count) - left) / (trial[k] - q[k])
+                error = np.sqrt(left @ left / (out[:, k] @ out[:, k] + 1e-300) / size)
+                most = min(100.0 * self.steps[k], 0.4 * (self.high[k] - self.low[k]))
+                self.steps[k] = np.clip(error, self.least[k], most)
+            return out
+
+        found = least_squares(
+            lambda q: self.left(q, count), p, slopes, (self.low, self.high), "dogbox",
+            ftol=0.01 / size, xtol=None, gtol=None, x_scale="jac", max_nfev=15,
+        )  # fmt: skip
+        return found.x, found.fun, found.jac
+
+    def judged(self, p: Vector, left: Vector, slopes: Vector) -> tuple[Vector, SwingFit | None]:
+        """Return the fit; or, if a profile finds a lower minimum, that and None."""
+        count, freedom = len(self.times), left.size - int(self.seen.any(axis=0).sum()) - p.size
+        total, grid = float(left @ left), np.full(self.seen.shape, np.nan)
+        grid[self.seen] = left
+        spread = total / freedom
+        reading = self.reading or float(np.sqrt(spread))
+        chi, exact = total / reading**2, spread < (1e-6 * np.nanmax(np.abs(self.positions))) ** 2
+        # Residuals of a ball that are some frames apart, up to a quarter of a swing.
+        most = 2 + int(0.25 * self.period / self.times[-1] * count)
+        alike = [x[np.isfinite(x)] for x in (grid[k:] * grid[:-k] for k in range(1, most))]
+        far = [np.concatenate(some).sum() / np.sqrt(sum(map(len, some)))
+               for some in (alike[:1], alike)]  # fmt: skip
+        solver, wide = _solver(slopes), np.ones(p.size)
+        inverse = solver @ solver.T
+        self.variance = reading**2
+        poor = not exact and bool(max(far) > _FAR * spread or chance(chi, freedom) < _CHANCE)
+        if poor:
+            self.variance = max(reading**2, spread)
+            wide = self.widened(grid, slopes, inverse, (self.half - p) / np.sqrt(RISE))
+        estimates, errors = {}, wide * np.sqrt(self.variance * np.diag(inverse))
+        for k, name in enumerate(self.names):
+            found = self.profile(p, k, left, slopes, errors[k], RISE * self.variance * wide[k] ** 2)
+            if not isinstance(found, Scan):
+                return found, None
+            estimates[name] = Estimate.of("swing", (name,), float(self.high[k]), found)
+        widened = dict(zip(self.names, wide.tolist(), strict=False))
+        correlation = float(alike[0].mean() / spread)
+        run = self.swung(p, count)
+        values = {name: one.value for name, one in estimates.items()}
+        intervals = {name: one.intervals[0] for name, one in estimates.items()}
+        return p, SwingFit(values, intervals, estimates, run, grid, reading, chi, freedom,
+                           correlation, widened, poor)  # fmt: skip
+
+    def widened(self, grid: Vector, slopes: Vector, inverse: Vector, drift: Vector) -> Vector:
+        """Return errors by the differences between parts of the film, over those of readings."""
+        from scipy.special import stdtrit
+
+        usual = np.sqrt(self.variance * np.diag(inverse))
+        pulls, wide = np.zeros((*grid.shape, drift.size)), [np.ones(drift.size)]
+        pulls[self.seen] = slopes * grid[self.seen][:, None]
+        for parts in _PARTS:
+            cuts = np.arange(parts) * len(grid) // parts
+            moved = np.add.reduceat(pulls.sum(axis=1), cuts) @ inverse
+            wide.append(np.sqrt((moved**2).sum(axis=0) * parts / (parts - 1)) / usual)
+            wide[-1] *= stdtrit(parts - 1, 0.5 + 0.5 * LEVEL) / np.sqrt(RISE)
+        return np.asarray(np.hypot(np.max(wide, axis=0), drift / usual))
+
+    def profile(
+        self, p: Vector, k: int, left: Vector, slopes: Vector, error: float, rise: float
+    ) -> Scan | Vector:
+        """Return the profile of a number; or, if it finds a lower minimum, that."""
+        others = np.where(np.arange(p.size) == k, 0.0, slopes)
+        solver, lowest = _solver(others), float(left @ left)
+        points, ends = [(float(p[k]), 0.0)], []
+        for side, limit in ((-1.0, self.low[k]), (1.0, self.high[k])):
+            way = np.sqrt(RISE) * error or self.steps[k]
+            for _ in range(20):
+                q = p.copy()
+                q[k] = np.clip(p[k] + side * way, self.low[k], self.high[k])
+                rest, gain = self.left(q, len(self.times)), np.inf
+                while gain > 0.01 * self.variance:
+                    trial = np.clip(q - solver @ rest, self.low, self.high)
+                    closer = self.left(trial, len(self.times))
+                    gain = float(rest @ rest - closer @ closer)
+                    q, rest = (trial, closer) if gain > 0.0 else (q, rest)
+                excess = float(rest @ rest) - lowest
+                if excess < -0.5 * self.variance:
+                    return q
+                points.append((float(q[k]), excess))
+                near = np.sqrt(max(excess, 0.0) / rise)
+                if abs(near - 1.0) < 0.02 or (q[k] == limit and near < 1.0):
+                    break
+                way = abs(q[k] - p[k]) / np.clip(near, 0.3, 3.0)
+            ends.append(float(q[k]))
+        grid, excess = np.array(sorted(points)).T
+        return Scan((Mode(float(p[k]), 0.0),), ((ends[0], ends[1]),), grid, excess * RISE / rise)
+
+
+def _solver(slopes: Vector) -> Vector:
+    """Return what makes of residuals the change of numbers that leaves least of them."""
+    scale = np.linalg.norm(slopes, axis=0)
+    scale[scale == 0.0] = 1.0
+    return np.asarray(np.linalg.pinv(slopes / scale) / scale[:, None])

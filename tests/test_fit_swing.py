@@ -1,0 +1,217 @@
+"""Fits to the film of a swing: by closed form, against the truth, where a law or a film fails."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from chains import uniform
+from real_cradles import table
+from real_swing import ConstantLoss
+from stored import read
+
+from cradle import Chain, ImpulseCorrelation, Pendulums, SequentialCollisions, swing
+from cradle.fit import fit_swing
+
+LAW = ImpulseCorrelation(0.1)
+NUMBERS = ("period", "damping", "restitution", "gaps")
+TRUE = dict(zip(NUMBERS, (0.8, 0.02, 0.98, 1e-4)))
+
+
+def filmed(true, pulled, seconds, rate, noise=0.0, seed=0, law=LAW):
+    """Times and places of a swing, each place moved at random."""
+    hanging = Pendulums(
+        9.81 * (true["period"] / 2 / np.pi) ** 2, gaps=true["gaps"], damping=true["damping"]
+    )
+    times, n = np.arange(0, seconds, 1 / rate), len(pulled)
+    run = swing(Chain([1] * n, [0] * n, true["restitution"]), law, pulled, times, pendulums=hanging)
+    moved = np.random.default_rng(seed).standard_normal((len(times), n))
+    return times, run.positions + noise * moved
+
+
+def wander(shape, size, rate, seed):
+    """Errors of a tracker that last for a tenth of a second."""
+    kept, moved = np.exp(-10 / rate), np.zeros(shape)
+    steps = np.random.default_rng(seed).standard_normal(shape)
+    for k in range(1, len(moved)):
+        moved[k] = kept * moved[k - 1] + size * np.sqrt(1 - kept**2) * steps[k]
+    return moved
+
+
+def held(fit, true, times=1.0):
+    """Names of the numbers whose intervals, made so many times wider, hold the true ones."""
+    ends = fit.intervals.items()
+    return {k for k, (a, b) in ends if abs(true[k] - (a + b) / 2) <= times * (b - a) / 2}
+
+
+@pytest.fixture(scope="module")
+def two_balls():
+    """A film of two balls with its fit."""
+    film = filmed(TRUE, [-0.03, 0], 4, 60, 2e-4)
+    return *film, fit_swing(*film, LAW)
+
+
+def test_two_balls_by_closed_form():
+    """Touching balls: the mean is a cosine, and the distance shrinks by e each half swing."""
+    e, period, size = 0.9, 1.1, 0.04
+    times = np.arange(0, 5, 0.03)
+    wave = size * np.cos(2 * np.pi * times / period)
+    apart = e ** np.floor(2 * times / period + 0.5) * np.abs(wave)
+    places = np.stack([-wave - apart, -wave + apart], axis=1) / 2
+    fit = fit_swing(times, places, LAW)
+    assert fit.values["period"] == pytest.approx(period, rel=1e-6)
+    assert fit.values["restitution"] == pytest.approx(e, rel=1e-6)
+    assert max(fit.values["damping"], fit.values["gaps"] / size) < 1e-5
+
+
+def test_two_balls_and_what_is_said(two_balls):
+    _, places, fit = two_balls
+    assert held(fit, TRUE, 2) == {*NUMBERS}
+    assert not fit.poor
+    assert set(fit.widened.values()) == {1.0}
+    assert fit.reading == pytest.approx(2e-4, rel=0.1)
+    assert np.nanmax(np.abs(fit.residuals.mean(axis=0))) < 1e-12
+    offset = places - fit.swing.positions - fit.residuals
+    assert np.ptp(offset, axis=0).max() < 1e-12  # one number for each ball
+    lines = fit.summary().splitlines()
+    assert [line.split()[1] for line in lines[:4]] == [*NUMBERS]
+    assert lines[3].endswith(" m")
+    assert "poor" not in fit.summary()
+    assert str(fit) == f"SwingFit({'; '.join(lines)})"
+
+
+def test_errors_by_the_slopes(two_balls):
+    """Where all is smooth the profile is that of a parabola: errors by the inverse matrix."""
+    times, _, fit = two_balls
+    place, rate = fit.swing.positions[0, 0], 0.0
+    best, columns = np.array([*fit.values.values(), place, rate]), []
+    for step in np.diag([1e-5, 1e-4, 1e-4, 1e-6, 1e-5, 1e-3]):
+        sides = []
+        for period, damping, e, gap, start, rate in (best + step, best - step):
+            hanging = Pendulums(9.81 * (period / 2 / np.pi) ** 2, gaps=gap, damping=damping)
+            chain = Chain([1, 1], [rate * start, 0], e)
+            places = swing(chain, LAW, [start, 0], times, pendulums=hanging).positions
+            sides.append(places - places.mean(axis=0))
+        columns.append((sides[0] - sides[1]).ravel() / (2 * step.sum()))
+    slopes = np.stack(columns, axis=1)
+    errors = fit.reading * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    for error, (low, high) in zip(errors, fit.intervals.values()):
+        assert (high - low) / 3.92 == pytest.approx(error, rel=0.1)
+
+
+def test_a_given_reading(two_balls):
+    times, places, fit = two_balls
+    same = fit_swing(times, places, LAW, reading=2e-4)
+    assert not same.poor
+    assert same.chi_square == pytest.approx((np.array(same.residuals) ** 2).sum() / 2e-4**2)
+    wrong = fit_swing(times, places, LAW, reading=1e-4)
+    assert wrong.poor
+    assert wrong.chi_square == pytest.approx(4 * same.chi_square, rel=1e-3)
+    for name, (low, high) in wrong.intervals.items():
+        assert high - low > 0.9 * np.ptp(fit.intervals[name])
+
+
+def test_five_balls_of_which_some_are_hidden():
+    times, places = filmed(TRUE, [-0.03, -0.03, 0, 0, 0], 3, 60, 2e-4, seed=1)
+    seen = np.random.default_rng(2).random(places.shape) < 0.9
+    fit = fit_swing(times, np.where(seen, places, np.nan), LAW)
+    assert held(fit, TRUE, 2) == {*NUMBERS}
+    other = fit_swing(times, np.where(seen, places, 9.0), LAW, seen=seen)
+    assert other.intervals == fit.intervals
+    assert (np.isfinite(fit.residuals) == seen).all()
+
+
+def test_outer_balls_alone():
+    times, places = filmed(TRUE, [-0.03, 0, 0, 0, 0], 4, 60, 2e-4, seed=1)
+    fit = fit_swing(times, places, LAW, seen=[1, 0, 0, 0, 1], known={"damping": 0.02})
+    assert held(fit, TRUE, 2) == {"period", "restitution", "gaps"}
+
+
+def test_film_without_an_impact_tells_no_restitution():
+    times, places = filmed(TRUE, [-0.03, 0], 0.19, 240, 2e-4)
+    fit = fit_swing(times, places, LAW, known={"period": 0.8, "gaps": 1e-4, "damping": 0.02})
+    assert fit.intervals["restitution"] == (0.0, 1.0)
+    assert fit.values["restitution"] is None
+    assert "restitution: not identified" in fit.summary()
+
+
+def test_a_law_that_does_not_fit_is_said_and_intervals_grow():
+    """A constant loss of speed, and a tracker that wanders."""
+    true = TRUE | {"restitution": 1.0}
+    times, places = filmed(true, [-0.03, 0, 0, 0, 0], 6, 60, 2e-4, 3, ConstantLoss(lost=1e-3))
+    fit = fit_swing(times, places + wander(places.shape, 3e-4, 60, 3), LAW)
+    assert fit.poor
+    assert fit.correlation > 0.3
+    assert "poor fit: intervals are too short" in fit.summary()
+    assert min(fit.widened.values()) > 1.5
+    assert held(fit, true) >= {"period", "damping", "gaps"}
+
+
+def test_twelve_seconds_of_the_real_cradle():
+    """Intervals hold what the whole film gives: by turning points, and by others."""
+    film = table("cradle_trace.csv")
+    use = (film["t_s"] > 0.82) & (film["t_s"] < 12.82)
+    places = np.stack([film[f"x{k}_m"][use] for k in range(1, 6)], axis=1)
+    fit = fit_swing(film["t_s"][use], places, LAW)
+    assert fit.poor
+    laws = {one["law"]: one for one in read("cradle_fits.csv")}
+    low, high = fit.intervals["restitution"]
+    assert low < float(laws["constant restitution"]["loss"]) < high
+    low, high = fit.intervals["gaps"]
+    assert low < 81e-6 < high  # of half a minute, by this fit
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("misfit", [False, True])
+def test_forty_films(misfit):
+    """Each interval holds the truth; a constant loss of speed has no true restitution."""
+    count = dict.fromkeys(NUMBERS, 0)
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        ends = ((0.6, 0.9), (0.01, 0.04), (0.94, 0.997), (2e-5, 2e-4))
+        true = {name: uniform(rng, *two) for name, two in zip(NUMBERS, ends)}
+        true["restitution"] = 1.0 if misfit else true["restitution"]
+        law = ConstantLoss(lost=1e-3) if misfit else SequentialCollisions()
+        pulled = [-uniform(rng, 0.02, 0.03), 0, 0, 0, 0]
+        times, places = filmed(true, pulled, 10, 60, 2e-4, seed, law)
+        fit = fit_swing(times, places + misfit * wander(places.shape, 3e-4, 60, seed), LAW)
+        assert fit.poor == misfit
+        for name in held(fit, true):
+            count[name] += 1
+    if misfit:
+        del count["restitution"]
+    assert min(count.values()) >= 35
+
+
+def test_what_is_drawn(two_balls):
+    *_, fit = two_balls
+    film, left = fit.plot()
+    dots, line = film.lines[:2]
+    assert dots.get_ydata() - line.get_ydata() == pytest.approx(1000 * fit.residuals[:, 0])
+    assert left.lines[1].get_ydata() == pytest.approx(1000 * fit.residuals[:, 1])
+    plt.close("all")
+
+
+WAYS = np.linspace(0, 3, 90)
+PLACES = np.stack([-0.03 * np.cos(8 * WAYS), 0 * WAYS], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"times": WAYS[:-1]}, r"shapes \(89,\), \(90, 2\)"),
+        ({"times": WAYS[::-1]}, r"times\[1\] = .*; must rise"),
+        ({"positions": PLACES[:, :1]}, "N at least 2"),
+        ({"seen": [True]}, r"and \(1,\); must be"),
+        ({"seen": [False, False]}, "0 readings"),
+        ({"reading": 0.0}, r"reading = 0.0; must be above 0"),
+        ({"free": ["gap"]}, "free or known = 'gap'; must be one of period"),
+        ({"free": ["gaps"]}, "period is neither free nor known"),
+        ({"known": {"period": -1.0}}, "must be above 0"),
+        ({"known": {"restitution": 1.5}}, r"restitution\b.* = 1.5; must lie in \[0, 1\]"),
+        ({"positions": PLACES[::-1] * 0.0}, "no ball is seen on its way"),
+        ({"positions": 100 * PLACES}, "pendulums of this length reach a quarter of a circle"),
+    ],
+)  # fmt: skip
+def test_refused(changes, words):
+    given = {"times": WAYS, "positions": PLACES, "model": LAW} | changes
+    with pytest.raises(ValueError, match=words):
+        fit_swing(**given)
