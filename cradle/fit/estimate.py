@@ -18,7 +18,7 @@ from cradle.fit.parameters import (
     pair_keys,
     parameter_key,
     ratio_keys,
-)
+)  # fmt: skip
 from cradle.fit.result import Estimate, Fit, Group
 from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
@@ -34,12 +34,8 @@ Known = Mapping[str, "float | tuple[float, float]"]
 def restitution(shots: Shots) -> Fit:
     """Fit the coefficient of restitution of every pair of balls that was shot alone.
 
-    One estimate a pair, named by its types in alphabetical order; longer sets are left aside.
-
-    Raises
-    ------
-    ValueError
-        If no set has two balls.
+    One estimate a pair, named by its types in alphabetical order; longer sets are left aside, and
+    without a set of two balls a ValueError is raised.
 
     Examples
     --------
@@ -102,28 +98,24 @@ def ratio(
     """Fit the Impulse Correlation Ratio of every triplet in shots of three balls and more.
 
     One estimate for each triplet and direction that is not known, between 0 and the bound of three
-    balls (Eq. 34).  Those that act in the same shots are fitted together.
+    balls (Eq. 34).  Those that act in the same shots are fitted together; Ceanga and Hurmuzlu fit
+    one at a time (section 4.2).
 
     Parameters
     ----------
     shots : Shots
         Sets of two balls are left aside.
     restitution : Fit or mapping
-        The result of `restitution`, or a mapping from the name of each pair of neighbours to the
-        coefficient or to (coefficient, standard error).
+        The result of `restitution`, or by the name of each pair of neighbours the coefficient or
+        (coefficient, standard error).
     known : mapping, optional
-        Ratios that are not to be fitted, by the names of triplets.  With it no set needs three
-        balls: what is known predicts, and nothing is fitted.
+        Ratios not to be fitted, by triplets; with it no set needs three balls.
 
     Raises
     ------
     ValueError
         If no set has three balls and nothing is known, a coefficient of restitution is missing, a
         known ratio is above its bound, or more than six ratios act together.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, section 4.2, fits one ratio at a time.
 
     Examples
     --------
@@ -218,8 +210,8 @@ def _together(acting: Iterable[set[Key]]) -> list[list[Key]]:
     """Join the ratios that act in the same sets."""
     groups: list[set[Key]] = []
     for keys in filter(None, acting):
-        apart = [group for group in groups if not group & keys]
-        groups = [*apart, keys.union(*(group for group in groups if group & keys))]
+        joined = keys.union(*(group for group in groups if group & keys))
+        groups = [*(group for group in groups if not group & keys), joined]
     return [sorted(group) for group in groups]
 
 

@@ -76,15 +76,14 @@ def velocities_from_tracks(
     ----------
     tracks : mapping of str to Track
         One track a ball, left to right.
-    length : float, optional
-        Length of the pendulums, m; left out, the balls roll on a level track.
+    length, scatter : float, optional
+        Of the pendulums, m (left out, the balls roll on a level track); standard deviation of a
+        mark, m, known from many shots (left out, that of these tracks).
     window : float, optional
         How much time before and after the impact is used, s.  Left out, it is the longest one that
         the marks agree with: at most a quarter of a swing, or a quarter of a second on a track.
     striker : int
         Index of the ball that moves before.
-    scatter : float, optional
-        Standard deviation of a mark, m, known from many shots; left out, that of these tracks.
 
     Raises
     ------
@@ -171,8 +170,8 @@ def _rest(columns: Sequence[Vector], x: Vector) -> float:
 def _way(t: Vector, velocity: float, length: float | None) -> Vector:
     """Return the way from the place of the impact, for each m/s of the velocity v there.
 
-    Along the row a pendulum goes (v/w) sn(w t) dn(w t), with Jacobi's functions of modulus
-    k = v/(2 w l), w^2 = g/l, if it passes its lowest point at time 0.
+    Along the row a pendulum goes (v/w) sn(w t) dn(w t) from its lowest point, with Jacobi's
+    functions of modulus k = v/(2 w l), w^2 = g/l.
     """
     if length is None:
         return t
@@ -231,10 +230,7 @@ def _moment(
 def _velocities(
     balls: list[Track], time: float, length: float | None, striker: int, window: float
 ) -> Velocities:
-    """Fit the velocity of every ball on its own, on either side of the impact.
-
-    The place is free, so that the velocities of different balls and sides have independent errors.
-    """
+    """Fit the velocity of every ball on its own, place free, on either side of the impact."""
     from scipy.special import fdtrc
 
     velocities, variances = np.zeros((2, 2, len(balls)))

@@ -17,7 +17,7 @@ from cradle.fit.parameters import (
     pair_keys,
     triplet_keys,
     types_in_a_row,
-)
+)  # fmt: skip
 from cradle.fit.search import LEVEL, RISE, Mode, Scan
 from cradle.fit.shots import Shots, ShotSet, chance
 from cradle.input.values import Vector, one_number
@@ -27,9 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 #: Columns of the table of a fit.
-RESULT_COLUMNS = (
-    "name", "kind", "value", "intervals", "minima", "identified", "at_bound", "bound",
-)  # fmt: skip
+RESULT_COLUMNS = ("name", "kind", "value", "intervals", "minima", "identified", "at_bound",
+                  "bound")  # fmt: skip
 # Draws from the fitted parameters for a prediction.
 _DRAWS = 4000
 # A set that is so much longer on one side than on the other is no bell curve's; what is said then.
@@ -61,15 +60,12 @@ class Estimate:
     @classmethod
     def of(cls, kind: str, key: Key, bound: float, found: Scan | None) -> Estimate:
         """Make an estimate of what a search found; of a parameter that acts in no shot, of None."""
-        if found is None:
-            found = Scan((), ((0.0, bound),), np.array([0.0, bound]), np.zeros(2))
-        modes, intervals, grid, excess = found
+        nothing = Scan((), ((0.0, bound),), np.array([0.0, bound]), np.zeros(2))
+        modes, intervals, grid, excess = found or nothing
         identified = sum(high - low for low, high in intervals) < _ALL * bound
-        value, at_bound = modes[0].value if identified else None, ""
-        if value is not None and value <= 1e-6 * bound:
-            at_bound = "lower"
-        elif value is not None and value >= (1.0 - 1e-6) * bound:
-            at_bound = "upper"
+        value = modes[0].value if identified else None
+        part = 0.5 if value is None else value / bound
+        at_bound = "lower" * (part <= 1e-6) + "upper" * (part >= 1.0 - 1e-6)
         return cls(kind, key, value, intervals, modes, identified, at_bound, bound, grid, excess)
 
     @property
@@ -117,8 +113,8 @@ class Group(NamedTuple):
 class Prediction:
     """Velocities predicted for N balls, with what the errors of the parameters leave open.
 
-    `lower` to `upper` holds the central 95 % of the predictions.  Where a ratio has a confidence
-    set of several pieces, these may come in groups; what lies between the groups is inside too.
+    `lower` to `upper` holds the central 95 % of the predictions, and what lies between groups of
+    them, as a confidence set of several pieces may give.
     """
 
     types: tuple[str, ...]
@@ -192,10 +188,7 @@ class Fit:
         return outcomes(shots.types, shots.masses, shots.before[:, None], values)[:, 0]
 
     def correlations(self) -> dict[tuple[str, str], float]:
-        """Return how the errors of two ratios that were fitted together go with one another.
-
-        In [-1, 1], by their names; of parameters fitted apart there is none.
-        """
+        """Return the correlation of the errors of two ratios that were fitted together."""
         found = {}
         for group in self.groups:
             for (i, one), (j, other) in combinations(enumerate(map(label, group.keys)), 2):
@@ -204,10 +197,9 @@ class Fit:
         return found
 
     def summary(self) -> str:
-        """Return all that the fit says, as text: values and errors, how well they fit, residuals.
+        """Return all that the fit says, as text.
 
-        Residuals are over their standard errors: root of the mean square (about 1 for a good fit)
-        and the largest one, of each set.
+        Residuals are over their errors: of each set the root mean square, and the largest.
         """
         lines = []
         for one in self.estimates.values():
@@ -236,10 +228,8 @@ class Fit:
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one row per estimate; `intervals` is its confidence set, as in `Estimate`."""
-        rows = [
-            (name, e.kind, e.value, e.intervals, len(e.modes), e.identified, e.at_bound, e.bound)
-            for name, e in self.estimates.items()
-        ]
+        rows = ((name, e.kind, e.value, e.intervals, len(e.modes), e.identified, e.at_bound,
+                 e.bound) for name, e in self.estimates.items())  # fmt: skip
         return [dict(zip(RESULT_COLUMNS, row, strict=True)) for row in rows]
 
     def table(self) -> pd.DataFrame:
@@ -249,14 +239,9 @@ class Fit:
         return pd.DataFrame(self.rows(), columns=RESULT_COLUMNS).set_index("name")
 
     def plot(self, name: str | None = None, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
-        """Draw the likelihood of one estimate, and its data with what is predicted of them.
+        """Draw the likelihood of one estimate, its data and what is predicted, on two `axes`.
 
-        The first identified one if `name` is left out; on two `axes`, or on new ones.
-
-        Raises
-        ------
-        ValueError
-            If nothing was fitted.
+        The first identified one if `name` is left out; if nothing was fitted, a ValueError.
         """
         from cradle.pictures.fits import draw_fit
 
@@ -265,9 +250,8 @@ class Fit:
     def predict(self, types: str | Sequence[str], speed: float = 1.0) -> Prediction:
         """Predict a longer chain, the first ball striking the others at rest.
 
-        The errors of ratios and coefficients of restitution are drawn independently of each other;
-        ratios fitted together are drawn together, and one that the data left open takes all values
-        up to its bound.
+        Errors are drawn independently; ratios fitted together are drawn together, and one that the
+        data left open takes all values up to its bound.
 
         Parameters
         ----------
@@ -279,16 +263,13 @@ class Fit:
         Raises
         ------
         ValueError
-            If fewer than 2 balls are named, or the mass of a type, the coefficient of restitution
-            of a pair or the ratio of a triplet (or of its reverse) is neither fitted nor given.
+            If fewer than 2 balls are named, or a mass, restitution or ratio is not known.
         """
         row = types_in_a_row(types)
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
         masses = self.shots.masses
-        for kind in row:
-            if kind not in masses:
-                there = ", ".join(masses)
-                raise ValueError(f"no mass is known of type {kind!r}; there are {there}")
+        for kind in (kind for kind in row if kind not in masses):
+            raise ValueError(f"no mass is known of type {kind!r}; there are {', '.join(masses)}")
         balls, before = np.array([masses[kind] for kind in row]), speed * np.eye(1, len(row))
         velocities = outcomes(row, balls, before, self._draws(row))
         ends = [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2]
@@ -310,12 +291,9 @@ class Fit:
             drawn = np.searchsorted(total, random.random(_DRAWS) * total[-1], side="right")
             values.update(zip(group.keys, group.points[drawn].T, strict=True))
         for key in (key for keys in triplet_keys(types) for key in keys if key not in values):
-            name = label(key)
-            if name in self.known:
-                values[key] = np.full(_DRAWS, self.known[name])
-            elif name in self.estimates:
-                values[key] = self.estimates[name].bound * random.random(_DRAWS)
-            else:
+            if (name := label(key)) not in {**self.known, **self.estimates}:
                 there = ", ".join(n for n, e in self.estimates.items() if e.kind == "ratio")
                 raise ValueError(f"the ratio of {name} is not known; fitted: {there or 'none'}")
+            values[key] = (np.full(_DRAWS, self.known[name]) if name in self.known
+                           else self.estimates[name].bound * random.random(_DRAWS))  # fmt: skip
         return values

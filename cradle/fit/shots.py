@@ -63,12 +63,8 @@ class ShotSet:
     def mean_after(self, speed: float = 1.0) -> tuple[Vector, Vector]:
         """Return means of the velocities after the impact, with their errors: each shape (N,), m/s.
 
-        Each shot is scaled to one `speed` of the first ball, m/s.
-
-        Raises
-        ------
-        ValueError
-            If a shot begins otherwise than with the first ball striking the others at rest.
+        Each shot is scaled to one `speed` of the first ball, m/s; a ValueError is raised if a shot
+        begins otherwise than with that ball striking the others at rest.
         """
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
         striker = self.before[:, :1]
@@ -90,10 +86,10 @@ class Shots:
 
     def __getitem__(self, name: str) -> ShotSet:
         """Return the set of that name."""
-        for one in self.sets:
-            if one.name == name:
-                return one
-        raise KeyError(f"no set {name!r}; there are {', '.join(s.name for s in self.sets)}")
+        there = {one.name: one for one in self.sets}
+        if name not in there:
+            raise KeyError(f"no set {name!r}; there are {', '.join(there)}")
+        return there[name]
 
     def __repr__(self) -> str:
         """Return the sets with their sizes."""
@@ -107,13 +103,7 @@ class Shots:
         return {t: float(m) for s in self.sets for t, m in zip(s.types, s.masses, strict=True)}
 
     def without(self, *names: str) -> Shots:
-        """Return the shots less some sets: what is not to be fitted, but to be predicted.
-
-        Raises
-        ------
-        ValueError
-            If there is no set of that name, or no set is left.
-        """
+        """Return the shots less some sets, not all of them: those are to be predicted."""
         there = [one.name for one in self.sets]
         for name in names:
             if name not in there:
@@ -124,10 +114,9 @@ class Shots:
         return Shots(kept)
 
     def momentum_check(self) -> tuple[float, int]:
-        """Return the sum of squares of all `ShotSet.momentum_residuals`, and the number of shots.
+        """Return chi-square of the momentum gained, and the number of shots.
 
-        Chi-square of the momentum gained: far above the number of shots it says that masses,
-        velocities or their errors are wrong, whatever the model.
+        Far above that number it says that masses, velocities or their errors are wrong.
         """
         residuals = np.concatenate([s.momentum_residuals for s in self.sets])
         return float(residuals @ residuals), residuals.size
@@ -151,19 +140,16 @@ def read_shots(
     source : path, binary file, DataFrame or mapping of columns
         A CSV file (UTF-8, comma, one header line; lines that begin with # and empty rows are
         skipped), a pandas DataFrame, or columns by name; see `COLUMNS`.
-    mass_unit : {"kg", "g"}, optional
-    velocity_unit : {"m/s", "cm/s", "mm/s"}, optional
-        Of velocities and their errors.  Left out, units are kg and m/s, and numbers that look like
-        others are refused.
+    mass_unit, velocity_unit : {"kg", "g"}, {"m/s", "cm/s", "mm/s"}, optional
+        Left out, units are kg and m/s, and numbers that look like others are refused.
     sigma : float, optional
         Standard error of all velocities, in their unit, for a table without it.
 
     Raises
     ------
     ValueError
-        If a column is missing or there twice, sigma is given twice, a value is wrong, balls pass
-        through each other, or a shot gains more energy than its errors allow; the message names row
-        and column.
+        If a column is missing or there twice, a value is wrong, balls pass through each other, or
+        a shot gains more energy than its errors allow; the message names row and column.
 
     Examples
     --------
@@ -181,8 +167,7 @@ def read_shots(
     for name in COLUMNS:
         if name not in (*there, *optional):
             other = "; or give sigma=" if name == "sigma" else ""
-            alike = [one for one in there if one.lower() == name]
-            hint = "".join(f": write {one} in small letters" for one in alike)
+            hint = "".join(f": write {x} in small letters" for x in there if x.lower() == name)
             raise ValueError(
                 f"column {name!r} is missing ({COLUMNS[name]}{other}); "
                 f"there are {', '.join(there)}{hint}"
@@ -190,8 +175,9 @@ def read_shots(
     if sigma is not None:
         one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
         if "sigma" in there:
-            rule = "the table has a column sigma: leave out one of them"
-            raise ValueError(f"sigma = {sigma!r}; {rule}")
+            raise ValueError(
+                f"sigma = {sigma!r}; the table has a column sigma: leave out one of them"
+            )
     units = {"mass_unit": mass_unit, "velocity_unit": velocity_unit}
     for option, unit in units.items():
         one_of(option, unit or next(iter(_UNITS[option][0])), list(_UNITS[option][0]))

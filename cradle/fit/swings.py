@@ -22,8 +22,8 @@ from cradle.swinging.swing import swing
 
 #: What can be fitted, with its unit.
 UNITS = {"period": " s", "damping": " 1/s", "restitution": "", "gaps": " m"}
-# A law does not fit if chi-square has a chance below the one, or residuals are alike by so many
-# standard errors; then parts of the film are compared, for these numbers of parts.
+# A law fails if chi-square has a chance below the one, or residuals are alike by so many standard
+# errors; then parts of the film are compared, for these numbers of parts.
 _CHANCE, _FAR, _PARTS = 1e-3, 3.3, (4, 6, 8, 12, 16, 24, 32)
 _GRAVITY = 9.81
 
@@ -41,20 +41,18 @@ class SwingFit:
     chi_square: float  #: Sum of squares of the residuals over `reading`.
     degrees_of_freedom: int  #: Readings less what was fitted to them.
     correlation: float  #: Of a ball's residuals in successive frames: about 0 if the law fits.
-    widened: Mapping[str, float]  #: How many times wider each interval is made: 1 if the law fits.
     poor: bool  #: Whether the law does not fit.
+    widened: Mapping[str, float]  #: By what each interval is then widened, else 1.
 
     def summary(self) -> str:
         """Return all that the fit says, as text."""
-        lines = [f"{one}{UNITS[name] * one.identified}" for name, one in self.estimates.items()]
-        lines.append(
+        wide = ", ".join(f"{name} {times:.1f}" for name, times in self.widened.items())
+        return "\n".join([
+            *(f"{one}{UNITS[name] * one.identified}" for name, one in self.estimates.items()),
             f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}, "
-            f"reading {self.reading:.2g} m, correlation of residuals {self.correlation:.2f}"
-        )
-        if self.poor:
-            wide = ", ".join(f"{name} {times:.1f}" for name, times in self.widened.items())
-            lines.append(f"poor fit: intervals are too short, though widened: {wide} times")
-        return "\n".join(lines)
+            f"reading {self.reading:.2g} m, correlation of residuals {self.correlation:.2f}",
+            *[f"poor fit: intervals are too short, though widened: {wide} times"] * self.poor,
+        ])  # fmt: skip
 
     def __repr__(self) -> str:
         """Return the summary in one line."""
@@ -95,9 +93,9 @@ def fit_swing(
     Returns
     -------
     SwingFit
-        Values and 95 % intervals, by profiles of chi-square.  Where the law does not fit, by
-        chi-square or because residuals are alike from frame to frame, intervals are widened by how
-        much parts of the film differ.
+        Values and 95 % intervals, by profiles of chi-square.  Where the law fails, by chi-square or
+        as residuals are alike from frame to frame, they are widened by how much parts of the film
+        differ.
 
     Raises
     ------
@@ -129,23 +127,23 @@ class _Film:
     ) -> None:  # fmt: skip
         t, x, self.model = checked("times", times), numbers("positions", positions), model
         mask = np.ones(x.shape[1:], bool) if seen is None else np.asarray(seen, bool)
-        shapes = t.shape, x.shape, mask.shape
         fit = x.ndim == 2 and t.shape == x.shape[:1] and mask.shape in (x.shape, x.shape[1:])
         if not fit or x.shape[1] < 2:
-            told = "times, positions and seen have shapes {}, {} and {}".format(*shapes)
+            told = f"times, positions and seen have shapes {t.shape}, {x.shape} and {mask.shape}"
             raise ValueError(f"{told}; must be (K,), (K, N) and (K, N) or (N,), N at least 2")
         refuse_where("times", t, np.diff(t, prepend=-np.inf) <= 0.0, "must rise")
         self.times, self.seen = t - t[0], mask & np.isfinite(x)
-        self.positions = np.where(self.seen, x, np.nan)
-        above = "must be above 0", 0.0, np.inf, True
-        self.reading = None if reading is None else one_number("reading", reading, *above)
+        self.x = np.where(self.seen, x, np.nan)
         for name in (*free, *known):
             one_of("free or known", name, tuple(UNITS))
         self.names = [name for name in UNITS if name in free and name not in known]
         self.fixed = {"damping": 0.0, "restitution": 1.0, "gaps": 0.0, **known}
-        one_number("known['period']", self.fixed.get("period", 1.0), *above)
         if "period" not in {*self.names, *known}:
             raise ValueError("period is neither free nor known; must be one of them")
+        for name, value in (("reading", reading), ("known['period']", known.get("period"))):
+            if value is not None:
+                one_number(name, value, "must be above 0", 0.0, open_low=True)
+        self.reading = reading
 
     def begin(self) -> Vector:
         """Search from nothing, in ever longer parts of the film."""
@@ -153,33 +151,31 @@ class _Film:
 
         t, often = self.times, self.seen.sum(axis=0)
         # No impact changes the mean of the balls.
-        mean = self.positions[:, often >= 0.5 * often.max()].mean(axis=1)
+        mean = self.x[:, often >= 0.5 * often.max()].mean(axis=1)
         mean, at = mean[np.isfinite(mean)], t[np.isfinite(mean)]
         if min(at.size, often.sum() // 3) < 10:
             raise ValueError(f"{often.sum()} readings, {at.size} frames with all balls; too few")
         rates = np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
         rate = rates[lombscargle(at, mean - mean.mean(), rates).argmax()]
         self.period = period = self.fixed.get("period", 2.0 * np.pi / rate)
-        size, early = np.nanmax(np.abs(self.positions)), max(period / 16.0, t[3])
-        states = np.zeros((self.positions.shape[1], 2))
-        for state, seen, x in zip(
-            states, self.seen.T & (t <= early), self.positions.T, strict=True
-        ):
-            state[:] = np.polyfit(t[seen], x[seen], 1)[::-1] if seen.sum() > 2 else 0.0
-        self.movers = np.flatnonzero(np.abs(states[:, 0]) > 0.1 * size)
+        self.size = size = float(np.nanmax(np.abs(self.x)))
+        early = self.seen & (t <= max(period / 16.0, t[3]))[:, None]
+        lines = [np.polyfit(t[some], x[some], 1) if some.sum() > 2 else np.zeros(2)
+                 for some, x in zip(early.T, self.x.T, strict=True)]  # fmt: skip
+        v, x = np.transpose(lines)
+        self.movers = np.flatnonzero(np.abs(x) > 0.1 * size)
         if not self.movers.size:
             raise ValueError("no ball is seen on its way at first; begin soon after the release")
+        v, x = v[self.movers], x[self.movers]
         # Limits, first steps, and where to begin.
-        most, e = np.pi / period, 1.0 - np.array([0.003, 0.01, 0.03, 0.1, 0.3])
-        gaps = size * np.append(0.0, np.geomspace(1e-4, 0.1, 13))
-        rows = {
+        rows: dict[str, tuple[float, float, float, Any]] = {
             "period": (0.5 * period, 2.0 * period, 1e-4 * period, [period]),
-            "damping": (0.0, most, 1e-2 / period, [0.0]),
-            "restitution": (0.0, 1.0, 1e-3, e), "gaps": (0.0, size, 1e-3 * size, gaps),
+            "damping": (0.0, np.pi / period, 1e-2 / period, [0.0]),
+            "restitution": (0.0, 1.0, 1e-3, [0.997, 0.99, 0.97, 0.9, 0.7]),
+            "gaps": (0.0, size, 1e-3 * size, size * np.append(0.0, np.geomspace(1e-4, 0.1, 13))),
         }  # fmt: skip
         used = [rows[name] for name in self.names]
-        used += [(-np.inf, np.inf, 1e-3 * size, [x]) for x in states[self.movers, 0]]
-        x, v = states[self.movers].T
+        used += [(-np.inf, np.inf, 1e-3 * size, [place]) for place in x]
         used.append((-np.inf, np.inf, 1e-2 / period, [x @ v / (x @ x)]))
         self.low, self.high, self.steps = np.array([row[:3] for row in used]).T
         self.least, count = 1e-4 * self.steps, int(np.searchsorted(t, 2.2 * period))
@@ -187,15 +183,16 @@ class _Film:
         nodes.sort(key=lambda node: float((self.left(node, count) ** 2).sum()))
         held = [k for k, name in enumerate(self.names) if name in ("period", "damping")]
         found = [self.descend(node, count, held) for node in nodes[:3]]
-        self.half = min(found, key=lambda one: float(one[1] @ one[1]))[0]
+        p = min(found, key=lambda one: float(one[1] @ one[1]))[0]
         for some in [len(t) >> k for k in range(20, 0, -1) if len(t) >> k > 1.5 * count]:
-            self.half = self.descend(self.half, some)[0]
-        return self.half
+            p = self.descend(p, some)[0]
+        self.half = p
+        return p
 
     def swung(self, p: Vector, count: int) -> Swing:
         """Return the swing by numbers, in the first frames."""
         now = {**self.fixed, **dict(zip(self.names, p.tolist(), strict=False))}
-        balls = np.arange(self.positions.shape[1])
+        balls = np.arange(self.x.shape[1])
         x = np.zeros(balls.size)
         x[self.movers] = p[len(self.names) : -1]
         v = p[-1] * x
@@ -208,7 +205,7 @@ class _Film:
     def left(self, p: Vector, count: int) -> Vector:
         """Return what the swing by numbers leaves of the readings in the first frames."""
         seen = self.seen[:count]
-        left = np.where(seen, self.positions[:count] - self.swung(p, count).positions, 0.0)
+        left = np.where(seen, self.x[:count] - self.swung(p, count).positions, 0.0)
         return np.asarray((left - left.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))[seen])
 
     def descend(
@@ -243,21 +240,22 @@ class _Film:
 
     def judged(self, p: Vector, left: Vector, slopes: Vector) -> tuple[Vector, SwingFit | None]:
         """Return the fit; or, if a profile finds a lower minimum, that and None."""
-        count, freedom = len(self.times), left.size - int(self.seen.any(axis=0).sum()) - p.size
+        freedom = left.size - int(self.seen.any(axis=0).sum()) - p.size
         total, grid = float(left @ left), np.full(self.seen.shape, np.nan)
         grid[self.seen] = left
         spread = total / freedom
         reading = self.reading or float(np.sqrt(spread))
-        chi, exact = total / reading**2, spread < (1e-6 * np.nanmax(np.abs(self.positions))) ** 2
-        # Residuals of a ball that are some frames apart, up to a quarter of a swing.
-        most = 2 + int(0.25 * self.period / self.times[-1] * count)
-        alike = [x[np.isfinite(x)] for x in (grid[k:] * grid[:-k] for k in range(1, most))]
-        far = [np.concatenate(some).sum() / np.sqrt(sum(map(len, some)))
-               for some in (alike[:1], alike)]  # fmt: skip
+        # Products of residuals of a ball some frames apart, up to a quarter of a swing.
+        most = 2 + int(0.25 * self.period / self.times[-1] * len(grid))
+        products = [x[np.isfinite(x)] for x in (grid[k:] * grid[:-k] for k in range(1, most))]
+        far = [np.concatenate(some).sum() / np.sqrt(sum(map(len, some))) / spread
+               for some in (products[:1], products)]  # fmt: skip
+        alike = float(products[0].mean() / spread)
         solver, wide = _solver(slopes), np.ones(p.size)
         inverse = solver @ solver.T
-        self.variance = reading**2
-        poor = not exact and bool(max(far) > _FAR * spread or chance(chi, freedom) < _CHANCE)
+        self.variance, chi = reading**2, total / reading**2
+        exact = spread < (1e-6 * self.size) ** 2  # rounding alone is left
+        poor = not exact and bool(max(far) > _FAR or chance(chi, freedom) < _CHANCE)
         if poor:
             self.variance = max(reading**2, spread)
             wide = self.widened(grid, slopes, inverse, (self.half - p) / np.sqrt(RISE))
@@ -267,19 +265,19 @@ class _Film:
             if not isinstance(found, Scan):
                 return found, None
             estimates[name] = Estimate.of("swing", (name,), float(self.high[k]), found)
-        widened = dict(zip(self.names, wide.tolist(), strict=False))
-        correlation = float(alike[0].mean() / spread)
-        run = self.swung(p, count)
-        values = {name: one.value for name, one in estimates.items()}
-        intervals = {name: one.intervals[0] for name, one in estimates.items()}
-        return p, SwingFit(values, intervals, estimates, run, grid, reading, chi, freedom,
-                           correlation, widened, poor)  # fmt: skip
+        return p, SwingFit(
+            {name: one.value for name, one in estimates.items()},
+            {name: one.intervals[0] for name, one in estimates.items()},
+            estimates, self.swung(p, len(grid)), grid, reading, chi, freedom, alike, poor,
+            dict(zip(self.names, wide.tolist(), strict=False)),
+        )  # fmt: skip
 
     def widened(self, grid: Vector, slopes: Vector, inverse: Vector, drift: Vector) -> Vector:
         """Return errors by the differences between parts of the film, over those of readings."""
         from scipy.special import stdtrit
 
         usual = np.sqrt(self.variance * np.diag(inverse))
+        usual[usual == 0.0] = 1.0
         pulls, wide = np.zeros((*grid.shape, drift.size)), [np.ones(drift.size)]
         pulls[self.seen] = slopes * grid[self.seen][:, None]
         for parts in _PARTS:
