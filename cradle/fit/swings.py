@@ -27,6 +27,9 @@ UNITS = {"period": " s", "damping": " 1/s", "restitution": "", "gaps": " m"}
 _CHANCE, _FAR, _PARTS = 1e-3, 3.3, (4, 6, 8, 12, 16, 24, 32)
 _GRAVITY = 9.81
 
+# Numbers, what their swing leaves of the readings, and its slopes.
+_Place = tuple[Vector, Vector, Vector]
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SwingFit:
@@ -183,11 +186,10 @@ class _Film:
         nodes.sort(key=lambda node: float((self.left(node, count) ** 2).sum()))
         held = [k for k, name in enumerate(self.names) if name in ("period", "damping")]
         found = [self.descend(node, count, held) for node in nodes[:3]]
-        p = min(found, key=lambda one: float(one[1] @ one[1]))[0]
+        self.half = min(found, key=lambda one: float(one[1] @ one[1]))[0]
         for some in [len(t) >> k for k in range(20, 0, -1) if len(t) >> k > 1.5 * count]:
-            p = self.descend(p, some)[0]
-        self.half = p
-        return p
+            self.half = self.descend(self.half, some)[0]
+        return self.half
 
     def swung(self, p: Vector, count: int) -> Swing:
         """Return the swing by numbers, in the first frames."""
@@ -195,11 +197,10 @@ class _Film:
         balls = np.arange(self.x.shape[1])
         x = np.zeros(balls.size)
         x[self.movers] = p[len(self.names) : -1]
-        v = p[-1] * x
         x = np.maximum.accumulate(x + now["gaps"] * balls) - now["gaps"] * balls  # none overlap
+        chain = Chain(np.ones(balls.size), p[-1] * x, now["restitution"])
         length = _GRAVITY * (now["period"] / (2.0 * np.pi)) ** 2
         hanging = Pendulums(length, gaps=now["gaps"], damping=now["damping"])
-        chain = Chain(np.ones(balls.size), v, now["restitution"])
         return swing(chain, self.model, x, self.times[:count], pendulums=hanging)
 
     def left(self, p: Vector, count: int) -> Vector:
@@ -208,13 +209,8 @@ class _Film:
         left = np.where(seen, self.x[:count] - self.swung(p, count).positions, 0.0)
         return np.asarray((left - left.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))[seen])
 
-    def descend(
-        self, p: Vector, count: int, held: Collection[int] = ()
-    ) -> tuple[Vector, Vector, Vector]:
-        """Return a minimum, what is left there, and its slopes.
-
-        Steps are about as wide as the errors, and so go over what is rough.
-        """
+    def descend(self, p: Vector, count: int, held: Collection[int] = ()) -> _Place:
+        """Return a minimum; steps are about as wide as the errors, and so go over what is rough."""
         from scipy.optimize import least_squares
 
         # Touching balls stay so: what they do is no limit of small gaps.
@@ -261,7 +257,8 @@ class _Film:
             wide = self.widened(grid, slopes, inverse, (self.half - p) / np.sqrt(RISE))
         estimates, errors = {}, wide * np.sqrt(self.variance * np.diag(inverse))
         for k, name in enumerate(self.names):
-            found = self.profile(p, k, left, slopes, errors[k], RISE * self.variance * wide[k] ** 2)
+            rise = RISE * self.variance * wide[k] ** 2
+            found = self.profile((p, left, slopes), k, float(errors[k]), rise)
             if not isinstance(found, Scan):
                 return found, None
             estimates[name] = Estimate.of("swing", (name,), float(self.high[k]), found)
@@ -287,10 +284,9 @@ class _Film:
             wide[-1] *= stdtrit(parts - 1, 0.5 + 0.5 * LEVEL) / np.sqrt(RISE)
         return np.asarray(np.hypot(np.max(wide, axis=0), drift / usual))
 
-    def profile(
-        self, p: Vector, k: int, left: Vector, slopes: Vector, error: float, rise: float
-    ) -> Scan | Vector:
+    def profile(self, best: _Place, k: int, error: float, rise: float) -> Scan | Vector:
         """Return the profile of a number; or, if it finds a lower minimum, that."""
+        p, left, slopes = best
         others = np.where(np.arange(p.size) == k, 0.0, slopes)
         solver, lowest = _solver(others), float(left @ left)
         points, ends = [(float(p[k]), 0.0)], []
