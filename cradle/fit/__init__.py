@@ -4,6 +4,7 @@
 
 Measured are `shots`; `tracks` and `film` make velocities of positions.  `parameters` says how well
 values explain shots, `search` finds all that do, `estimate` fits, and `result` is what comes back.
+`swings` fits a whole swing to its film.
 """
 
 from cradle.fit.estimate import ratio, restitution, restitution_from_heights

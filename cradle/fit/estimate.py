@@ -64,12 +64,8 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
     drop, rise : array_like, shape (K,)
         Heights above the point of contact before and after, in one unit: e^2 = rise / drop.
     sigma : float
-        Standard error of each height, in that unit.
-
-    Raises
-    ------
-    ValueError
-        If a height or the error is not above 0, or the lengths differ.
+        Standard error of each height, in that unit; it and heights must be above 0, or a ValueError
+        is raised.
 
     Examples
     --------

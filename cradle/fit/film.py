@@ -39,17 +39,12 @@ def speeds_from_heights(
     heights : array_like
         Above the lowest point, m; negative for a ball that swings to the left.
     sigma, gravity : float
-        Standard error of a height, m; m/s^2.  Above 0.
+        Standard error of a height, m; m/s^2.  Above 0, else a ValueError is raised.
 
     Returns
     -------
     velocities, sigma : ndarray
         m/s, shapes of `heights`; the error is that towards larger speeds, and so finite at rest.
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite, or the error or gravity not above 0.
 
     Examples
     --------
@@ -153,8 +148,7 @@ def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
             earlier, later = np.minimum(t, 0.0), np.maximum(t, 0.0)
             bent = [later, later**2] + [earlier, earlier**2] * (k == striker)
             gain += _rest([t, t**2], x) - _rest(bent, x)
-        if gain > most:
-            best, most = float(moment), gain
+        best, most = (float(moment), gain) if gain > most else (best, most)
     if best is None:
         raise ValueError(f"no moment has 4 marks of every ball within {window:g} s on either side")
     return best

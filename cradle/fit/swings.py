@@ -96,9 +96,8 @@ def fit_swing(
     Returns
     -------
     SwingFit
-        Values and 95 % intervals, by profiles of chi-square.  Where the law fails, by chi-square or
-        as residuals are alike from frame to frame, they are widened by how much parts of the film
-        differ.
+        Values and 95 % intervals, by profiles of chi-square.  Where the law fails (by chi-square,
+        or residuals alike from frame to frame) they are widened by how parts of the film differ.
 
     Raises
     ------
