@@ -516,6 +516,11 @@ EXPORTS = {
         "#multi:\n,A,,B,,\nt,x,y,x,y,\n0.00,0.10,0.5,0.20,0.5,\n0.03,0.12,0.5,,,\n",
         {"A": [0.1, 0.12], "B": [0.2]},
     ),
+    "Tracker, times for each ball": (
+        "#multi:\nA\t\t\tB\nt\tx\ty\tt\tx\ty\n0\t0.1\t0\t\t\t\n\t\t\t0\t0.2\t0\n"
+        "0.03\t0.3\t0\t0.03\t0.4\t0\n",
+        {"A": [0.1, 0.3], "B": [0.2, 0.4]},
+    ),
     "Kinovea, text": (
         "#Kinovea Trajectory data export\n#T X Y\n\n# left ball\n0 0.1 2\n0.03 0.2 2\n\n"
         "# B\n0 0.5 2\n0.03 0.6 2\n\n",
@@ -562,13 +567,29 @@ def test_exports_of_video_programs(tmp_path, program):
         np.testing.assert_allclose(slow[name].positions, np.multiply(scale, places), rtol=1e-14)
 
 
+def test_balls_are_in_the_order_of_the_titles(tmp_path):
+    """Whichever is marked first; NaN is no mark."""
+    text = "#multi:\n,A,,B,,\nt,x,y,x,y,\n0,,,0.2,0.5,\n0.03,NaN,NaN,0.22,0,\n0.06,0.1,0,,,\n"
+    (tmp_path / "export.txt").write_text(text, encoding="utf-8")
+    tracks = read_tracker(tmp_path / "export.txt")
+    marks = {name: [part.tolist() for part in track] for name, track in tracks.items()}
+    assert list(marks.items()) == [("A", [[0.06], [0.1]]), ("B", [[0, 0.03], [0.2, 0.22]])]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("a,b\n1,2\n3,4\n", "export.txt has no column of positions: a line of titles must begin"),
         ("", "export.txt has no column of positions"),
         ("t,y\n0,1\n", "export.txt has no column of positions"),
+        (
+            "t,A,B\n0,1,2\n",
+            "t or Time and name x too, as Tracker, Kinovea, Logger Pro "
+            "and Capstone do; if each column is a ball, write A/x, B/x",
+        ),
+        ("t,x\n0,1\n0,1000,-0,05\n", "line 3: 4 values under 2 titles (between commas, decimals n"),
         ("A\nt\tx\n0\t1\n1\there\n", "export.txt, line 4, column x: 'here'; must be a number"),
+        ("A\nt\tx\n0\t1\n1\tinf\n", "export.txt, line 4, column x: 'inf'; must be a number"),
         ("#T X Y\n0:00:00:03 1.0 2.0\n", "line 2, column T: '0:00:00:03'; must be a number"),
         ("t,x\n0,1\n0,2\n", "the times of track do not rise; where one ball follows the other"),
         ("t,x (px)\n0,1\n", "line 2, column x: px; say how large a pixel is, in m: unit"),

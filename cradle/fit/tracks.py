@@ -32,6 +32,7 @@ Tracks = dict[str, Track]
 # Capstone       ``Time (s) Run #1``, ``Position (m) Run #1``
 # A title less what stands before a colon, its unit in brackets and its run.
 _TITLE = re.compile(r"^(?:.*:)?\s*(.*?)\s*(?:\(([^)]*)\))?\s*(?:Run.*)?$", re.IGNORECASE)
+_CLOCKS = ("t", "time")
 _UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "s": 1.0, "ms": 1e-3, "px": 1.0, "": 1.0}
 
 
@@ -40,7 +41,8 @@ def read_tracker(
 ) -> Tracks:
     """Read a text file exported by Tracker, Kinovea, Logger Pro or Capstone.
 
-    Frames where a ball was not marked are left out of its track.
+    Frames where a ball was not marked (no number, or NaN) are left out of its track; the tracks are
+    in the order of the titles.
 
     Parameters
     ----------
@@ -74,25 +76,32 @@ def read_tracker(
     marks: dict[str, list[tuple[float, float]]] = {}
     for number, (first, *others) in rows.items():
         cells = [first.lstrip("# "), *others]
-        if cells[0] and _title(cells[0])[0].casefold() in ("t", "time"):
+        if cells[0] and _title(cells[0])[0].casefold() in _CLOCKS:
             titles = [_title(cell) for cell in cells]
         elif titles and {*map(str.strip, cells)} <= _UNITS.keys() and any(cells):
             titles = [(text, cell) for (text, _), cell in zip(titles, cells, strict=False)]
         elif titles and not first.startswith("#"):
             where = f"{file.name}, line {number}"
-            for at, name in _owners(titles, column, above, block).items():
-                if at < len(cells) and cells[at]:
-                    time = time_scale * _number(where, cells[0], titles[0])
-                    place = _number(where, cells[at], titles[at], unit)
-                    marks.setdefault(name, []).append((time, place))
+            if any(cells[len(titles) :]):
+                raise ValueError(
+                    f"{where}: {len(cells)} values under {len(titles)} titles (between commas, "
+                    "decimals need a point)"
+                )
+            for at, (name, clock) in _owners(titles, column, above, block).items():
+                found = marks.setdefault(name, [])  # of a ball that is marked later only, too
+                if "".join(cells[at : at + 1]).casefold() not in ("", "nan"):
+                    time = time_scale * _number(where, cells[clock], titles[clock])
+                    found.append((time, _number(where, cells[at], titles[at], unit)))
         else:
             above, block = cells, " ".join(cells).strip()
-    if not marks:
+    tracks = {name: Track(*np.array(found).T) for name, found in marks.items() if found}
+    if not tracks:
+        balls = [text for text, _ in titles[1:] if text]
+        hint = f"; if each column is a ball, write {'/x, '.join(balls)}/x" if balls else ""
         raise ValueError(
             f"{file.name} has no column of positions: a line of titles must begin with t or Time "
-            f"and name {column} too, as in the exports of Tracker, Kinovea, Logger Pro or Capstone"
+            f"and name {column} too, as Tracker, Kinovea, Logger Pro and Capstone do{hint}"
         )
-    tracks = {name: Track(*np.array(found).T) for name, found in marks.items()}
     for name, (times, _) in tracks.items():
         if (np.diff(times) <= 0.0).any():
             raise ValueError(
@@ -102,8 +111,8 @@ def read_tracker(
     apart = max(float(np.median(np.diff(t))) if t.size > 1 else 0.0 for t, _ in tracks.values())
     if apart > 0.5:
         raise ValueError(
-            f"{file.name} has marks {apart:g} s apart; if the times are in ms, divide time_scale "
-            "by 1000"
+            f"{file.name} has marks {apart:g} s apart; if the times are in ms, "
+            "divide time_scale by 1000"
         )
     return tracks
 
@@ -116,8 +125,8 @@ def _title(cell: str) -> tuple[str, str]:
 
 def _owners(
     titles: list[tuple[str, str]], column: str, above: list[str], block: str
-) -> dict[int, str]:
-    """Return the ball of each column of positions."""
+) -> dict[int, tuple[str, int]]:
+    """Return the ball of each column of positions, and the column of its times."""
     form = re.compile(rf"(?:(.+?)/.*)?(?:{re.escape(column)}|position)(?:\W*(?:ch )?\d+)?", re.I)
     found = {at: match for at, (text, _) in enumerate(titles) if (match := form.fullmatch(text))}
     names = {titles[at][0].casefold() for at in found}
@@ -129,10 +138,11 @@ def _owners(
         elif len(names) == len(found) > 1:
             name = titles[at][0]
         elif len(found) > 1:  # the name stands above the first of its columns
-            name = next(filter(None, over[at : at + 1] + over[at - 1 : 0 : -1]), name)
+            name = next(filter(None, over[at::-1]), name)
         else:
             name = block.replace("_", " ") or "track"
-        owners[at] = name
+        clock = max(k for k in range(at) if titles[k][0].casefold() in _CLOCKS)
+        owners[at] = name, clock
     return owners
 
 
@@ -146,5 +156,7 @@ def _number(where: str, cell: str, title: tuple[str, str], told: float = 1.0) ->
     try:
         value = float(cell)
     except ValueError:
-        raise ValueError(f"{where}: {cell!r}; must be a number") from None
+        value = np.nan
+    if not np.isfinite(value):
+        raise ValueError(f"{where}: {cell!r}; must be a number")
     return value * (told if unit in ("", "px") else _UNITS[unit])
