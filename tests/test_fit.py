@@ -604,9 +604,10 @@ def test_exports_that_are_refused(tmp_path, text, message):
         read_tracker(tmp_path / "export.txt")
 
 
-@pytest.mark.parametrize("length", [None, 0.3])
-def test_velocities_from_exact_tracks(length):
+@pytest.mark.parametrize("length", [None, 0.3, 0.1])
+def test_velocities_from_exact_tracks(monkeypatch, length):
     """Positions on a rail, or of pendulums by Runge-Kutta; the impact between two frames."""
+    monkeypatch.setattr(fit_example, "LENGTH", length)
     after, times = outcome("ABC"), (np.arange(49) - 24.3) / 240
     tracks = {}
     for k in range(3):

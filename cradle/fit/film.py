@@ -162,18 +162,18 @@ def _rest(columns: Sequence[Vector], x: Vector) -> float:
 
 
 def _way(t: Vector, velocity: float, length: float | None) -> Vector:
-    """Return the way from the place of the impact, for each m/s of the velocity v there.
+    """Return the way from the place of the impact, of a ball with the velocity v there.
 
     Along the row a pendulum goes (v/w) sn(w t) dn(w t) from its lowest point, with Jacobi's
     functions of modulus k = v/(2 w l), w^2 = g/l.
     """
     if length is None:
-        return t
+        return velocity * t
     from scipy.special import ellipj
 
     w = np.sqrt(_GRAVITY / length)
     sn, _, dn, _ = ellipj(w * t, min(1.0, (0.5 * velocity / (w * length)) ** 2))
-    return np.asarray(sn * dn / w)
+    return np.asarray(velocity * sn * dn / w)
 
 
 def _around(
@@ -208,10 +208,10 @@ def _moment(
 
     def residuals(p: Vector) -> Vector:  # moment, velocity before, then after and place of each
         left = [
-            x - place - v * _way(np.maximum(t - p[0], 0.0), v, length)
+            x - place - _way(np.maximum(t - p[0], 0.0), v, length)
             for (t, x), v, place in zip(balls, p[2::2], p[3::2], strict=True)
         ]
-        left[striker] -= p[1] * _way(np.minimum(balls[striker].times - p[0], 0.0), p[1], length)
+        left[striker] -= _way(np.minimum(balls[striker].times - p[0], 0.0), p[1], length)
         return np.concatenate(left)
 
     lines = [np.polyfit(t[t >= time] - time, x[t >= time], 1) for t, x in balls]
@@ -235,15 +235,16 @@ def _velocities(
         # either side, and is left out.
         near = 0.5 * float(np.median(np.diff(t)))
         for side, some in enumerate([t > near, t < -near][: 1 + (k == striker)]):
-            times, x = t[some], ball.positions[some]
-            for _ in range(4):  # the way depends a little on the velocity itself
-                way = _way(times, velocities[side, k], length)
-                off = way - way.mean()
-                velocities[side, k] = off @ x / (off @ off)
-            variances[side, k] = 1.0 / (off @ off)
-            squares, freedom = squares + _rest([way], x), freedom + x.size - 2
+            times, x, v = t[some], ball.positions[some], 0.0
+            for _ in range(12):  # Newton's steps: a wide swing bends with its velocity
+                left = x - _way(times, v, length)
+                change = _way(times, v + 1e-4, length) - _way(times, v - 1e-4, length)
+                off = (change - change.mean()) / 2e-4
+                v += off @ left / (off @ off)
+            velocities[side, k], variances[side, k] = v, 1.0 / (off @ off)
+            squares, freedom = squares + _rest([off], left), freedom + x.size - 2
             # What would be left if the way could bend otherwise too.
-            bent, bends = bent + _rest([way, times**2, times**3], x), bends + 2
+            bent, bends = bent + _rest([off, times**2, times**3], left), bends + 2
     scatter = float(np.sqrt(squares / freedom))
     gain, spare = (squares - bent) / bends, bent / (freedom - bends) if freedom > bends else 0.0
     # Marks without scatter, as of a computed motion, leave rounding alone, and no question.
