@@ -14,6 +14,8 @@ from cradle.input.values import Vector, checked, one_number
 _GRAVITY = 9.81
 # Marks that each side of the impact needs; the longest window on a level track, s.
 _LEAST, _LONGEST = 5, 0.25
+# Right films of which one is refused, because its marks happen to bend.
+_CHANCE = 1e-4
 
 
 class Velocities(NamedTuple):
@@ -84,7 +86,7 @@ def velocities_from_tracks(
     ------
     ValueError
         If there are fewer than two balls, too few marks on either side, or the marks do not lie on
-        such a motion (`Velocities.probability` below 0.001).
+        such a motion: one film in ten thousand bends as much by chance.
 
     Examples
     --------
@@ -112,25 +114,34 @@ def velocities_from_tracks(
     coarse = _coarse_time(balls, striker, least)
     longest = _LONGEST if length is None else 0.5 * np.pi * float(np.sqrt(length / _GRAVITY))
     tried = [window or max(longest, least)]
+    for away in (ball.times - coarse for ball in balls):  # frames may be missing
+        for side in (-away[away < 0], away[away >= 0]):
+            least = max(least, float(np.sort(side)[:_LEAST][-1]) + 0.5 * frame)
     while 0.8 * tried[-1] >= least:
         tried.append(0.8 * tried[-1])
-    for k, wide in enumerate(tried):
-        found = _around(tracks, coarse, wide, length, striker)
-        if found.probability > (0.2 if k else 0.01):
+    fits = list[Velocities]()
+    for wide in tried:
+        fits.append(_around(tracks, coarse, wide, length, striker))
+        if fits[-1].probability > (0.2 if fits[1:] else 0.01):
             break
-    if k and k + 3 < len(tried):
-        # What bends the marks is not yet seen there; a bias falls as the window to the power 3.5.
-        found = _around(tracks, coarse, tried[k + 3], length, striker)
-    elif k or found.probability < 1e-3:
-        rather = "is it the right length, and one impact" if length else "give their length"
+    first, found, k = fits[0], fits[-1], len(fits) - 1
+    # Three windows on, what bends the marks is not yet seen: a bias falls as the window to the
+    # power 3.5.  Without so many the shortest will do if chance may have bent the longest.
+    safe = not k or k + 3 < len(tried)
+    if k and found.window > (wide := tried[k + 3] if safe else tried[-1]):
+        found = _around(tracks, coarse, wide, length, striker)
+    if found.probability < _CHANCE or not (safe or first.probability >= _CHANCE):
+        rather = "are length and frame rate right, and is there one impact"
         raise ValueError(
-            f"window = {found.window:.3g} s; the marks bend otherwise than by such a motion: if "
-            f"the balls hang, {rather}; else give a shorter window"
+            f"window = {tried[0]:.3g} s; the marks bend otherwise than by such a motion: if the "
+            f"balls hang, {rather if length else 'give their length'}; else give a shorter window"
         )
-    if scatter is None:
-        return found
-    ratio = scatter / found.scatter
-    return found._replace(sigma=ratio * found.sigma, sigma_before=ratio * found.sigma_before)
+    ratio = 1.0 if scatter is None else scatter / found.scatter
+    errors = ratio * found.sigma, ratio * found.sigma_before
+    if not safe:  # what the window changes is added
+        changes = found.after - first.after, found.before - first.before
+        errors = np.hypot(errors, changes)
+    return found._replace(sigma=errors[0], sigma_before=errors[1])
 
 
 def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
