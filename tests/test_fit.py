@@ -625,8 +625,12 @@ def test_velocities_from_exact_tracks(monkeypatch, length):
     np.testing.assert_allclose(found.after, 1.2 * after, atol=1e-4)
     with pytest.raises(ValueError, match="1 tracks, striker = 0; needs two balls and a striker"):
         velocities_from_tracks({"A": tracks["A"]}, length=length)
-    with pytest.raises(ValueError, match="tracks must be in the order"):
+    with pytest.raises(ValueError, match=r"tracks must be in the order .* all from one origin"):
         velocities_from_tracks({"C": tracks["C"], "A": tracks["A"]}, length=length, striker=1)
+    mirrored = {name: Track(t, -x) for name, (t, x) in reversed(tracks.items())}
+    from_right = velocities_from_tracks(mirrored, length=length)
+    np.testing.assert_allclose(from_right.before, -found.before[::-1], atol=1e-9)
+    np.testing.assert_allclose(from_right.after, -found.after[::-1], atol=1e-9)
 
 
 @pytest.mark.parametrize(("rate", "count"), [(30, 20), (60, 20), (240, 40)])

@@ -62,25 +62,26 @@ def speeds_from_heights(
 
 def velocities_from_tracks(
     tracks: Mapping[str, Track], *, length: float | None = None, window: float | None = None,
-    striker: int = 0, scatter: float | None = None,
+    striker: int | None = None, scatter: float | None = None,
 ) -> Velocities:  # fmt: skip
     """Find the impact in the tracks, and the velocities just before and just after it.
 
     First the moment at which all tracks bend, then on either side of it the velocity of each ball
-    by itself, so that the errors are independent.  The balls but the striker rest before.
+    by itself, so that the errors are independent.  The balls but the striker rest before.  A mark
+    that lies farther off than chance allows is named in a warning.
 
     Parameters
     ----------
     tracks : mapping of str to Track
-        One track a ball, left to right.
+        One track a ball, left to right, from one origin.
     length, scatter : float, optional
         Of the pendulums, m (left out, the balls roll on a level track); standard deviation of a
         mark, m, known from many shots (left out, that of these tracks).
     window : float, optional
         How much time before and after the impact is used, s.  Left out, it is the longest one that
         the marks agree with: at most a quarter of a swing, or a quarter of a second on a track.
-    striker : int
-        Index of the ball that moves before.
+    striker : int, optional
+        Index of the ball that moves before; left out, the one whose marks move most.
 
     Raises
     ------
@@ -97,8 +98,10 @@ def velocities_from_tracks(
     [0.009, 0.009, 0.009]
     """
     balls = list(tracks.values())
-    if len(balls) < 2 or not 0 <= striker < len(balls):
-        raise ValueError(f"{len(balls)} tracks, striker = {striker}; needs two balls and a striker")
+    if len(balls) < 2 or not 0 <= (striker or 0) < len(balls):
+        raise ValueError(
+            f"{len(balls)} tracks, striker = {striker or 0}; needs two balls and a striker"
+        )
     length, window, scatter = (
         None if value is None else one_number(name, value, "must be above 0", 0.0, open_low=True)
         for name, value in (("length", length), ("window", window), ("scatter", scatter))
@@ -111,7 +114,7 @@ def velocities_from_tracks(
             )
     frame = max(float(np.median(np.diff(ball.times))) for ball in balls if ball.times.size > 1)
     least = window or max(0.05, (_LEAST + 0.5) * frame)
-    coarse = _coarse_time(balls, striker, least)
+    coarse, striker = _coarse(balls, striker, least)
     longest = _LONGEST if length is None else 0.5 * np.pi * float(np.sqrt(length / _GRAVITY))
     tried = [window or max(longest, least)]
     for away in (ball.times - coarse for ball in balls):  # frames may be missing
@@ -144,8 +147,8 @@ def velocities_from_tracks(
     return found._replace(sigma=errors[0], sigma_before=errors[1])
 
 
-def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
-    """Return the moment at which a bend in all tracks explains most."""
+def _coarse(balls: list[Track], striker: int | None, window: float) -> tuple[float, int]:
+    """Return the moment at which a bend in all tracks explains most, and the ball moving before."""
     moments = np.unique(np.concatenate([ball.times for ball in balls]))
     best, most = None, -np.inf
     for moment in 0.5 * (moments[:-1] + moments[1:]):
@@ -154,12 +157,15 @@ def _coarse_time(balls: list[Track], striker: int, window: float) -> float:
                  for ball, some in zip(balls, near, strict=True)]  # fmt: skip
         if any(min((t < 0).sum(), (t >= 0).sum()) < 4 for t, _ in marks):
             continue
-        gain = 0.0
-        for k, (t, x) in enumerate(marks):
+        gain, moved = 0.0, []
+        for t, x in marks:
             earlier, later = np.minimum(t, 0.0), np.maximum(t, 0.0)
-            bent = [later, later**2] + [earlier, earlier**2] * (k == striker)
-            gain += _rest([t, t**2], x) - _rest(bent, x)
-        best, most = (float(moment), gain) if gain > most else (best, most)
+            still = _rest([later, later**2], x)
+            gain += _rest([t, t**2], x) - still
+            moved.append(still - _rest([later, later**2, earlier, earlier**2], x))
+        first = int(np.argmax(moved)) if striker is None else striker
+        if gain + moved[first] > most:
+            best, most = (float(moment), first), gain + moved[first]
     if best is None:
         raise ValueError(f"no moment has 4 marks of every ball within {window:g} s on either side")
     return best
@@ -205,8 +211,8 @@ def _around(
         time, places = _moment(used, time, length, striker)
     if (np.diff(places) <= 0).any():
         raise ValueError(
-            f"the balls meet at {places.round(4).tolist()} m; the tracks must be in the order of "
-            "the balls, left to right"
+            f"the balls meet at {(0.0 + places.round(4)).tolist()} m; the tracks must be in the "
+            "order of the balls, left to right, all from one origin, x to the right"
         )
     return _velocities(used, time, length, striker, window)
 
