@@ -140,10 +140,9 @@ def velocities_from_tracks(
             f"balls hang, {rather if length else 'give their length'}; else give a shorter window"
         )
     ratio = 1.0 if scatter is None else scatter / found.scatter
-    errors = ratio * found.sigma, ratio * found.sigma_before
+    errors = ratio * np.array([found.sigma, found.sigma_before])
     if not safe:  # what the window changes is added
-        changes = found.after - first.after, found.before - first.before
-        errors = np.hypot(errors, changes)
+        errors = np.hypot(errors, [found.after - first.after, found.before - first.before])
     return found._replace(sigma=errors[0], sigma_before=errors[1])
 
 
