@@ -33,7 +33,7 @@ def test_every_group_has_rows_with_times(rows):
     groups = {row.group for row in rows}
     assert groups == {
         "event", "march", "closed form", "springs", "penalty", "stiffness", "energy", "outcome",
-        "saving", "door",
+        "saving", "door", "many springs",
     }  # fmt: skip
     assert all(row.time_ratio > 0 for row in rows)
     assert all(row.gives and row.needs and row.versions for row in rows)
