@@ -2,12 +2,12 @@
 
     python benchmarks/forces.py              # a minute; writes data/forces.csv
 
-Both are compiled and run on one thread, in turns; each time is the least of many.  Ours is asked
-for an accuracy; what it takes to scale its chains, to find its steps and to check its answers is in
-its time.  Verlet has the largest of many steps from which on all smaller ones keep the error, found
-beforehand.  Errors are total: the largest distance of a velocity from converged elastic (or lossy)
-spheres, over the striker's speed.  The last rows are the paper's rule, which has an error and no
-step: one ratio, fitted to three spheres.
+Both are compiled and run on one thread, in turns; each time is the least of many. Ours is asked for
+an accuracy; what it takes to check and scale its chains, to find its steps and to check its answers
+is in its time. Verlet has the largest of many steps from which on all smaller ones keep the error,
+found beforehand. Errors are total: the largest distance of a velocity from converged elastic (or
+lossy) spheres, over the striker's speed. The last rows are the paper's rule, which has an error and
+no step: one ratio, fitted to three spheres.
 """
 
 import os
@@ -20,7 +20,9 @@ from verlet import verlet
 
 os.environ["CRADLE_KERNEL"] = "compiled"
 from cradle import post_impact_velocities
-from cradle.models.springs import law_of, run, scaled
+from cradle.kernel.kinks import Law, Springs
+from cradle.kernel.state import FINISHED
+from cradle.runtime.springs import room, solve
 
 #: Compressions and speeds, relative to the first, at which Verlet stops.
 FAINT = 1e-6
@@ -48,19 +50,18 @@ def cases():
 
 
 class Ours:
-    """The batch, as one thread calls it: units, runs, certificate."""
+    """The batch, as one thread calls it: checks, units, runs, certificate."""
 
     def __init__(self, masses, loss, accuracy):
         rows, n = masses.shape
         ones = np.ones((rows, n - 1))
         v = np.tile(struck(n), (rows, 1))
-        self.given, self.accuracy = (masses, v, ones, loss * ones, 0.0 * ones), accuracy
+        self.given = Springs(masses, v, ones, loss * ones, 0.0 * ones), Law(1.5, accuracy, 1e7)
+        self.out = room(rows, n)
 
     def run(self):
-        forces, _, speed, _ = scaled(self.given, 1.5, self.accuracy)
-        found = run(forces, law_of(forces, 1.5, self.accuracy), True)
-        assert not found.defect.any()
-        return self.given[1] + speed * (found.v - forces.v)
+        assert solve(*self.given, self.out, True)[:2] == (len(self.out.v), FINISHED)
+        return self.out.v
 
 
 class Verlet:
@@ -106,7 +107,7 @@ def rows():
         # Enough rows for one call from Python not to count.
         count = max(len(masses), 10_000 // masses.shape[1] ** 2 + 20)
         many = np.ascontiguousarray(np.resize(masses, (count, masses.shape[1])), float)
-        exact = Ours(many, loss, 1e-9).run()
+        exact = Ours(many, loss, 1e-9).run().copy()
         for accuracy in accuracies:
             ours = Ours(many, loss, accuracy)
             error = abs(ours.run() - exact).max()

@@ -244,7 +244,7 @@ def test_threads_share_what_is_compiled(monkeypatch):
 @pytest.mark.usefixtures("plain")
 def test_warm_up_compiles():
     drive.warm_up.__wrapped__()
-    for door in ("batch", "springs"):
+    for door in ("batch", "follow"):
         assert runtime.loaded(door)
         assert runtime.chosen(door=door) is runtime.compiled()
 

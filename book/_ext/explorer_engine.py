@@ -36,6 +36,10 @@ if TYPE_CHECKING:  # the npm package is built without it
 PARTS = ("engine_numbers.js", "engine_collide.js")
 #: The part after the contact forces, and all that these need before.
 SPHERES = "engine_spheres.js"
+CODES = (
+    "FINISHED", "UNFINISHED", "REFUSED", "PAUSED", "UNSOUND",
+    "MOMENTUM", "ORDER", "ENERGY", "LEDGER",
+)  # fmt: skip
 NUMBERS = """const max = (a, b) => (b > a ? b : a);
 const min = (a, b) => (b < a ? b : a);"""
 #: The scripts in the built book.
@@ -58,7 +62,7 @@ RESERVED = {
 #: Functions without an effect, and their names in the script.
 PURE = {
     "abs": "Math.abs", "max": "max", "min": "min", "sqrt": "Math.sqrt", "log": "Math.log",
-    "frexp": "frexp", "ldexp": "ldexp", "pow": "Math.pow",
+    "frexp": "frexp", "ldexp": "ldexp",
 }  # fmt: skip
 
 
@@ -114,6 +118,10 @@ def expression(node: ast.expr) -> str:
             return f"[{', '.join(map(expression, parts))}]"
         case ast.BinOp(left, ast.FloorDiv(), right):
             return f"Math.floor({expression(left)} / {expression(right)})"
+        case ast.BinOp(left, ast.Pow(), right) if not isinstance(
+            getattr(right, "value", None), int
+        ):  # a power's last bit may differ, a square's must not
+            return f"Math.pow({expression(left)}, {expression(right)})"
         case ast.BinOp(left, op, right) if type(op) in OPERATORS:
             return f"({expression(left)} {OPERATORS[type(op)]} {expression(right)})"
         case ast.UnaryOp(op, operand) if type(op) in OPERATORS:
@@ -349,13 +357,8 @@ def room(inside: str) -> str:
 def spheres() -> str:
     """Return the script of the contact forces, which adds `cradle.spheres` to the page."""
     after = (Path(__file__).parent / SPHERES).read_text(encoding="utf-8")
-    codes = [
-        f"{name} = {getattr(state, name)}"
-        for name in ("FINISHED", "PAUSED", "UNFINISHED")
-    ]
-    source = "\n".join([*codes, runtime.unit(("kinks", "forces"))])
-    # Powers other than those of spheres, which are roots, need not have the same bits.
-    source = source.replace("x ** (p - 1.0)", "pow(x, p - 1.0)")
+    codes = [f"{name} = {getattr(state, name)}" for name in CODES]
+    source = "\n".join([*codes, runtime.unit(kernel.CONTACT_FORCES)])
     return room(f"{NUMBERS}\n{translate(source)}\n{after}")
 
 

@@ -13,19 +13,23 @@
 and contact forces in time, with a door of their own:
 
     kinks     the records, the law of force; what a contact that closes or opens owes
-    forces    steps, runs; the door
+    forces    steps, one run
+    accuracy  units, the length of steps, runs that are compared; the certificate; the door
 
 The rooms are plain: numbers, loops, sequences, tuples of arrays and `math`.  They run as they
 stand, and compiled as one unit (`cradle.runtime`), with the same bits.
 """
 
-from cradle.kernel.forces import springs
+from cradle.kernel.accuracy import follow
 from cradle.kernel.loop import Inputs, Options, Outputs, batch
 
 #: The rooms of the event loop, and all, in an order in which each uses only those before it.
 EVENT_LOOP = (
     "state", "numbers", "rules", "record", "events", "collapse", "cycles", "progress", "loop",
 )  # fmt: skip
-ROOMS = (*EVENT_LOOP, "kinks", "forces")
+CONTACT_FORCES = ("kinks", "forces", "accuracy")
+ROOMS = (*EVENT_LOOP, *CONTACT_FORCES)
 
-__all__ = ["EVENT_LOOP", "ROOMS", "Inputs", "Options", "Outputs", "batch", "springs"]
+__all__ = [
+    "CONTACT_FORCES", "EVENT_LOOP", "ROOMS", "Inputs", "Options", "Outputs", "batch", "follow"
+]  # fmt: skip

@@ -12,8 +12,8 @@ after the impact exact to h^4, at very small steps to h^3.5:
 Takahashi and Imada, J. Phys. Soc. Jpn. 53 (1984) 3765; Rowlands, J. Comput. Phys. 97 (1991) 235.
 """
 
-from cradle.kernel.kinks import Forces, grade, pay
-from cradle.kernel.state import FINISHED, PAUSED, UNFINISHED, apart, door, jit
+from cradle.kernel.kinks import FAINT, grade, pay
+from cradle.kernel.state import FINISHED, PAUSED, UNFINISHED, apart, jit
 
 
 @jit
@@ -154,35 +154,33 @@ def fly(h, low, high, s):
 
 
 @apart
-def begin(n, chain, law, s, clock):
-    """Write down chain and clock; at the start the sums owe h^2/12 times the rates of forces."""
+def begin(n, p, s, clock, record):
+    """Go back to the start; there the sums owe h^2/12 times the rates of forces."""
     clock.low, clock.high, clock.steps, clock.kinks, clock.row = n, 0, 0, 0, 0
     clock.time = clock.top = clock.ended = 0.0
     clock.stiff = 1.0
-    part = chain.h * chain.h / 12.0
+    for i in range(n):
+        a = s[i]
+        a.v, a.d, a.y = a.start, a.lean, a.lean
+        a.push = a.move = a.lag = a.trend = a.seen = 0.0
+        a.f, a.g = push(p, a, a.d, 1.0, 0.0)
+        a.pull = a.f
+        if i < n - 1 and a.v > s[i + 1].start:
+            clock.low = min(clock.low, i)
+            clock.high = i + 1
+    if clock.leans and clock.high > 0:
+        clock.low, clock.high = 0, n - 1
+    put_down(n, clock.lossy, s, clock, record)
+    part = clock.h * clock.h / 12.0
     force = impulse = db = 0.0
     for i in range(n):
         a = s[i]
-        a.w, a.v = chain.w[i], chain.v[i]
-        a.k = a.loss = a.d = a.y = a.f = a.g = a.push = a.move = a.lag = a.trend = a.seen = 0.0
-        f = 0.0
-        if i < n - 1:
-            a.k, a.loss, a.d = chain.k[i], chain.loss[i], chain.d[i]
-            a.y = a.d
-            u = chain.v[i] - chain.v[i + 1]
-            a.f, a.g = push(law.p, a, a.d, 1.0, 0.0)
-            f = a.g * u
-            if u > 0.0:
-                clock.low = min(clock.low, i)
-                clock.high = i + 1
-        a.pull = a.f
+        f = a.g * (a.start - s[i + 1].start) if a.f > 0.0 else 0.0
         a.v += part * a.w * (force - f)
         more = a.w * (impulse - a.loss * f)
         if i > 0:
             s[i - 1].d += part * (db - more)
         force, impulse, db = f, a.loss * f, more
-    if law.leans and clock.high > 0:
-        clock.low, clock.high = 0, n - 1
 
 
 @apart
@@ -195,15 +193,15 @@ def put_down(n, lossy, s, clock, record):
         v, y, f = page[1], page[2], page[3]
         for c in range(n):
             a = s[c]
-            v[c], y[c], f[c] = a.v, a.y if lossy else a.d, a.f
+            v[c], y[c], f[c] = a.v, a.y if lossy > 0 else a.d, a.f
             if c < n - 1 and not clock.low <= c < clock.high:
                 y[c] += (clock.time - a.seen) * (a.v - s[c + 1].v)
                 f[c] = 0.0
 
 
 @apart
-def leave(n, h, s, clock, v):
-    """Write velocities as they were when the last contact opened, or no balls approached any more.
+def leave(n, h, s, clock):
+    """Go back to when the last contact opened, or no balls approached any more.
 
     Pulls act until then, and what the losses still hold back of them is given back.
     """
@@ -213,27 +211,28 @@ def leave(n, h, s, clock, v):
         a = s[i]
         push = a.f - a.pull if a.pull > 0.0 else 0.0
         a.dv = a.w * (before - push)
-        v[i] = a.v + a.w * (held - a.loss * push) - late * a.dv
+        a.v += a.w * (held - a.loss * push) - late * a.dv
         before, held = push, a.loss * push
     for c in range(n - 1):
-        u, gain = v[c] - v[c + 1], s[c].dv - s[c + 1].dv
+        u, gain = s[c].v - s[c + 1].v, s[c].dv - s[c + 1].dv
         if u > 0.0 and gain < 0.0:
             wait = max(wait, -u / gain)
     for i in range(n):
-        v[i] += wait * s[i].dv
+        s[i].v += wait * s[i].dv
 
 
 @apart
-def run(n, h, law, effort, s, clock, record):
+def run(n, law, effort, s, clock, record):
     """Run until all contacts are idle, or `effort` is used up; return how it ended, and the rest.
 
     A contact is watched from when its neighbour closes until both are idle; other balls fly freely.
     """
-    p, slow, lossy = law.p, law.slow, law.lossy
+    p, slow, h = law.p, FAINT * law.accuracy, clock.h
+    lossy, leans = clock.lossy > 0, clock.leans > 0
     low, high = clock.low, clock.high
-    while low < high and clock.steps < law.most and effort > 0:
+    while low < high and clock.steps < clock.most and effort > 0:
         effort -= high - low
-        if clock.stiff == 0.0 and not law.leans:
+        if clock.stiff == 0.0 and not leans:
             clock.stiff = 1.0
             flown = fly(h, low, high, s)
             clock.time += flown
@@ -272,32 +271,11 @@ def run(n, h, law, effort, s, clock, record):
         while low < high and idle(high - 1, slow, s) and idle(high - 2, slow, s):
             high -= 1
             rest(s[high], time)
-        if law.leans and low < high:
+        if leans and low < high:
             low, high = 0, n - 1
         clock.low, clock.high = low, high
         put_down(n, lossy, s, clock, record)
-    if low < high:
-        return (UNFINISHED if clock.steps >= law.most else PAUSED), effort
-    return FINISHED, effort
-
-
-@door
-def springs(begun, resumed, n, chains, law, out, s, clocks, record, effort):
-    """Run the chains of `out` from number `begun` on; return the next one's number, and status.
-
-    It stops at the first chain whose status is not FINISHED: PAUSED, when `effort` (contacts times
-    steps) is used up, to be `resumed` there.  A record has room for as many rows as effort.
-    """
-    clock = clocks[0]
-    for k in range(begun, len(out.v)):
-        h = chains.h[k]
-        if not resumed:
-            row = Forces(chains.w[k], chains.v[k], chains.k[k], chains.loss[k], chains.d[k], h)
-            begin(n, row, law, s, clock)
-        status, effort = run(n, h, law, effort, s, clock, record)
-        resumed = False
-        leave(n, h, s, clock, out.v[k])
-        out.top[k], out.steps[k], out.kinks[k] = clock.top, clock.steps, clock.kinks
-        if status != FINISHED:
-            return k, status
-    return len(out.v), FINISHED
+    if low < high and clock.steps < clock.most:
+        return PAUSED, effort
+    leave(n, h, s, clock)
+    return (UNFINISHED if low < high else FINISHED), effort

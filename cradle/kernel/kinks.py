@@ -17,6 +17,9 @@ class Link:
     """One ball and the contact on its right, in the chain's own units."""
 
     w: float  # 1 / mass
+    start: float  # velocity before the impact,
+    after: float  # and after the last run
+    lean: float  # compression before the impact
     v: float  # velocity between two nodes; with losses, less that of the impulses A f
     k: float  # stiffness
     loss: float  # A
@@ -35,38 +38,35 @@ class Link:
     kink: int  # a contact that has closed or opened in this step
 
 
-class Forces(NamedTuple):
-    """Chains on springs, a row for each, in their own units: what `Link` says of n and of n - 1."""
+class Springs(NamedTuple):
+    """Chains on springs, a row for each, or one for all."""
 
-    w: Any
+    m: Any
     v: Any
     k: Any
     loss: Any
-    d: Any
-    h: Any  # step, one for each chain
+    gap: Any
 
 
 class Motions(NamedTuple):
-    """What the chains come to, a row for each."""
+    """What they come to, a row for each."""
 
     v: Any
-    top: Any  # as in `Clock`
-    steps: Any
-    kinks: Any
+    error: Any  # estimate, relative to the fastest closing
+    h: Any  # the last step, in the chain's own units
+    steps: Any  # of all runs
 
 
 class Law(NamedTuple):
-    """The law of force, and when to stop."""
+    """The law of force, and what is asked for."""
 
     p: float
-    slow: float  # a closing speed that is too little to matter
-    most: int  # steps
-    lossy: bool
-    leans: bool  # contacts are pressed together at rest: all are watched, all the time
+    accuracy: float
+    most: float  # steps of a run
 
 
 class Clock:
-    """Where a run is: contacts low..high - 1 are watched, the others fly or rest."""
+    """Where a run is: contacts low..high - 1 are watched, the others fly or rest; and its chain."""
 
     low: int
     high: int
@@ -77,6 +77,28 @@ class Clock:
     top: float  # and so far
     ended: float  # when the last contact opened
     row: int  # of the record, to be written next
+    h: float  # step,
+    eta: float  # what it times a frequency may be, at most,
+    damped: float  # and times the square of a frequency, for the losses
+    most: float  # steps of a run
+    trial: int  # number of the run,
+    known: int  # whether that before it was fine enough,
+    told: float  # what its change from another told of the error, over the accuracy,
+    error: float  # and the estimate so far
+    effort: int  # steps of all runs before
+    lossy: int
+    leans: int  # contacts are pressed together at rest: all are watched, all the time
+    fastest: int  # the contact that closes fastest, which gives the units:
+    mass: float
+    speed: float
+    length: float
+    stiffness: float
+    rule: int  # why the chain is refused, 0 for nothing,
+    place: int  # and where
+    defect: int  # what the outcome breaks
+
+
+FAINT = 0.01  # what is too little to matter, over the accuracy
 
 
 @jit

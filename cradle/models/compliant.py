@@ -25,19 +25,13 @@ from cradle.input.values import (
     row_of,
     whole_number,
 )
+from cradle.kernel.accuracy import LONGEST
+from cradle.kernel.kinks import Law, Springs
 from cradle.models.batch import in_order, rows_of, shaped
-from cradle.models.energy import CurvedTrace, fastest
-from cradle.models.springs import (
-    COARSEST,
-    FINEST,
-    LONGEST,
-    MOST_STEPS,
-    Path,
-    law_of,
-    run,
-    scaled,
-)
-from cradle.runtime.job import DEFECTS, FINISHED, LARGE
+from cradle.models.energy import fastest
+from cradle.models.springs import COARSEST, FINEST, MOST_STEPS, TimedTrace, refused
+from cradle.runtime.job import DEFECTS, FINISHED, LARGE, REFUSED, UNFINISHED, UNSOUND
+from cradle.runtime.springs import room, solve
 from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
 
 # What is asked of the parameters of contacts: a rule, limits, whether the lower one is excluded.
@@ -46,51 +40,8 @@ _RULES = {
     "viscosity": ("must be at least 0", 0.0, np.inf, False),
     "gaps": ("must be finite", -np.inf, np.inf, False),
 }
+_LIMITS = ("exponent", 1.0, 10.0), ("accuracy", FINEST, COARSEST)
 _CHUNK = 2048  # chains at once
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class TimedTrace(CurvedTrace):
-    """The path of an impact that has a time, by curves; N balls, K events, S steps.
-
-    The outcome has the accuracy asked for; the way is less exact near a closing or an opening.
-
-    Attributes
-    ----------
-    times, forces : ndarray, shapes (K + 1,) and (K + 1, N - 1)
-        Time of each row of the path, s, from 0 on; and contact forces there, N.
-    durations : ndarray, shape (N - 1,)
-        Time that each contact was closed, over all its collisions, s.
-    step_times, step_forces, step_velocities, step_impulses : ndarray, (S,) and (S, N - 1 or N)
-        The curves at the steps: s, N, m/s, and N s so far.
-    evaluations, error : int and float
-        Steps of all runs; estimated error of a velocity, relative to the fastest closing.
-
-    Examples
-    --------
-    The duration of a contact of two balls on a linear spring is pi sqrt(mu / k):
-
-    >>> from cradle import Chain, collide
-    >>> collide(Chain([2, 2], [1, 0]), SpringChain(1.0, exponent=1)).durations.round(6)
-    array([3.141593])
-    """
-
-    times: Vector
-    forces: Vector
-    durations: Vector
-    step_times: Vector
-    step_forces: Vector
-    error: float
-
-    @property
-    def energy_loss(self) -> float:
-        """Kinetic energy that the viscosity of the contacts has taken, in joules."""
-        if not np.any(self.model.viscosity):
-            return 0.0
-        m, v = self.chain.masses, self.chain.velocities
-        centre = self.chain.momentum / m.sum()
-        lost = m * (v - self.velocities) * (0.5 * (v - centre) + 0.5 * (self.velocities - centre))
-        return float(lost.sum())
 
 
 @dataclass(frozen=True)
@@ -132,12 +83,10 @@ class SpringChain:
     max_steps: int = field(default=MOST_STEPS, kw_only=True)
 
     def __post_init__(self) -> None:
-        for name, low, high in ("exponent", 1.0, 10.0), ("accuracy", FINEST, COARSEST):
-            rule = f"must lie in [{low:g}, {high:g}]"
-            object.__setattr__(self, name, one_number(name, getattr(self, name), rule, low, high))
+        for name, low, high in _LIMITS:
+            vars(self)[name] = asked(name, getattr(self, name), low, high)
         for name, rules in _RULES.items():
-            kept = number_or_row(name, getattr(self, name), "N - 1", *rules)
-            object.__setattr__(self, name, kept)
+            vars(self)[name] = number_or_row(name, getattr(self, name), "N - 1", *rules)
         whole_number("max_steps", self.max_steps)
 
     def solve(self, chain: Chain) -> TimedTrace:
@@ -147,29 +96,20 @@ class SpringChain:
         refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
         fastest(chain)  # is within the range of floats
         contacts = (row_of(name, getattr(self, name), n - 1, n) for name in _RULES)
-        rows = [row[None] for row in (chain.masses, chain.velocities, *contacts)]
-        forces, *units = scaled(rows, self.exponent, self.accuracy)
-        mass, speed, length = (float(unit[0, 0]) for unit in units)
-        law = law_of(forces, self.exponent, self.accuracy, self.max_steps)
-        found, start = run(forces, law), chain.velocities
-        defect = int(found.defect[0])
-        if defect > 0:
-            raise ImpactNotCertified(chain, self, DEFECTS[defect])
-        if defect:
-            raise self._unfinished(chain, start + speed * (found.v[0] - forces.v[0]))
-        path = Path(forces, law, found.h)
-        times, events, v, force = path.events(found.v[0])
-        joule = mass * speed * speed
-        newton, second = joule / length, length / speed
-        return TimedTrace(
-            chain, self, start + speed * (v[-1] - v[0]), mass * speed * path.impulses(v[-1]),
-            joule * path.absorbed, path.collisions, start + speed * (v - v[0]),
-            mass * speed * path.impulses(v), events, times=second * times, forces=newton * force,
-            durations=second * path.durations, step_times=second * path.t,
-            step_forces=newton * path.force, step_velocities=start + speed * (path.v - v[0]),
-            step_impulses=mass * speed * path.impulses(path.v),
-            evaluations=int(found.steps[0]), error=float(found.error[0]),
-        )  # fmt: skip
+        row = Springs(*(row[None] for row in (chain.masses, chain.velocities, *contacts)))
+        out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps))
+        _, status, clock = solve(row, law, out)
+        if status == REFUSED:
+            raise refused(int(clock["rule"]), self.accuracy, [clock["place"]], row)
+        if status == UNSOUND:
+            raise ImpactNotCertified(chain, self, DEFECTS[int(clock["defect"])])
+        if status == UNFINISHED:
+            raise self._unfinished(chain, out.v[0])
+        trace = object.__new__(TimedTrace)
+        motion = {"evaluations": int(out.steps[0]), "error": float(out.error[0])}
+        vars(trace).update(chain=chain, model=self, velocities=out.v[0], **motion)
+        vars(trace)["_ran"] = row, law, out
+        return trace
 
     def _unfinished(self, chain: Chain, reached: Vector) -> ImpactNotFinished:
         """Return the error of an impact that was given up at these velocities."""
@@ -245,36 +185,51 @@ def spring_velocities(
     array([-0.07, -0.03, -0.01,  0.13,  0.99])
     array([-0.  ,  0.02,  0.03,  0.1 ,  0.85])
     """
-    law = SpringChain(exponent=exponent, accuracy=accuracy)
-    p, accuracy = law.exponent, law.accuracy
+    values = exponent, accuracy
+    p, accuracy = (asked(name, x, *ends) for (name, *ends), x in zip(_LIMITS, values, strict=True))
     given = {"masses": masses, "velocities": velocities, "stiffness": stiffness}
     given |= {"viscosity": viscosity, "gaps": gaps}
     arrays, lead = shaped(given, (0, 0, 1, 1, 1))
+    n, count = arrays[0].shape[-1], math.prod(lead)
+    if count == 0:
+        check_rows(arrays)
+    law, out = Law(p, accuracy, float(MOST_STEPS)), np.empty((count, n))
+
+    def run_chunk(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
+        """Solve the chunk of chains that begins there; return how it ended, and where."""
+        rows = slice(begin, min(begin + _CHUNK, count))
+        part = Springs(*(rows_of(array, lead, rows) for array in arrays))
+        found = room(rows.stop - begin, n)._replace(v=out[rows])
+        at, status, _ = solve(part, law, found, count * n >= LARGE, stop)
+        return status, begin + at
+
+    for status, at in in_order(run_chunk, range(0, count, _CHUNK), progress):
+        if status == FINISHED:
+            continue
+        check_rows(arrays)
+        row = Springs(*(rows_of(array, lead, slice(at, at + 1)) for array in arrays))
+        place = [int(k) for k in np.unravel_index(at, lead)]
+        _, status, clock = solve(row, law, room(1, n))
+        if status == REFUSED:
+            raise refused(int(clock["rule"]), accuracy, [*place, clock["place"]], row)
+        # Alone, it stops where it stopped here, and raises.
+        m, v, k, loss, gap = (values[0] for values in row)
+        model, chain = SpringChain(k, p, viscosity=loss, gaps=gap, accuracy=accuracy), Chain(m, v)
+        model.solve(chain)
+        raise ImpactNotCertified(chain, model, "among others it fails, alone it does not")
+    return out.reshape(*lead, n)
+
+
+def asked(name: str, value: ArrayLike, low: float, high: float) -> float:
+    """Return a number that must lie in these limits."""
+    return one_number(name, value, f"must lie in [{low:g}, {high:g}]", low, high)
+
+
+def check_rows(arrays: Sequence[Vector]) -> None:
+    """Raise at the first value that has no meaning."""
     refuse_overflow(checked("velocities", arrays[1]), checked_masses(arrays[0]))
     for (name, rules), values in zip(_RULES.items(), arrays[2:], strict=True):
         checked(name, values, *rules)
-    n, count = arrays[0].shape[-1], math.prod(lead)
-    out = np.empty((count, n))
-
-    def run_chunk(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
-        """Solve the chunk of chains that begins there; the first that fails alone, to raise."""
-        rows = slice(begin, min(begin + _CHUNK, count))
-        part = [rows_of(array, lead, rows) for array in arrays]
-        forces, _, speed, _ = scaled(part, p, accuracy, lead, begin)
-        found = run(forces, law_of(forces, p, accuracy), count * n >= LARGE, stop)
-        out[rows] = part[1] + speed * (found.v - forces.v)
-        if found.defect.any():
-            at = begin + int((found.defect != 0).argmax())
-            m, v, k, loss, gap = (rows_of(array, lead, slice(at, at + 1))[0] for array in arrays)
-            model = SpringChain(k, p, viscosity=loss, gaps=gap, accuracy=accuracy)
-            chain = Chain(m, v)
-            model.solve(chain)
-            raise ImpactNotCertified(chain, model, "among others it fails, alone it does not")
-        return FINISHED, begin
-
-    for _ in in_order(run_chunk, range(0, count, _CHUNK), progress):
-        pass
-    return out.reshape(*lead, n)
 
 
 def viscosity_from(

@@ -1,175 +1,111 @@
-"""Contact forces: chains of springs in their own units, each followed as finely as is asked for."""
+"""Contact forces: why a chain of springs is refused, and what happens on its way."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from cradle.input.values import Vector, first, refusal
-from cradle.kernel.kinks import Forces, Law
-from cradle.kernel.state import ENERGY, FINISHED, LEDGER, MOMENTUM, ORDER, UNFINISHED
-from cradle.runtime.springs import room, solve
+from cradle.input.values import Vector, refusal
+from cradle.kernel import accuracy as limits
+from cradle.kernel.kinks import Law, Motions, Springs
+from cradle.models.energy import CurvedTrace
+from cradle.runtime.springs import solve
 from cradle.trace import Event
 
 #: Least and largest error that can be asked for; steps of one run after which it is given up.
 FINEST, COARSEST, MOST_STEPS = 1e-12, 0.02, 20_000_000
-_FAINT = 0.01  # what is too little to matter, over the accuracy
-# A step times the largest frequency from which on a run shows whether it was short enough; a
-# coarser one that only measures the frequency; and what it may measure too little.
-_ENOUGH, _COARSE, _SPARE = 0.2, 0.5, 1.05
-# Kinks of a contact and radians of the quickest ball, on average, from which on runs are compared.
-_OFTEN, _LONG = 2.4, 30.0
-_TRIALS = 16  # runs of a chain, each finer than the one before
-_DAMPED = 0.5  # step times A times the square of a frequency, at most
-_SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
-LONGEST = 0.3  # A, in contact times
-_TINY = 1e-300  # the least depth, and one over the largest
-# The widest gap and the narrowest, in depths; the widest whose last digit is below this accuracy.
-_WIDEST, _NARROWEST, _BLURRED = 1e9, 1e-12, 1e13
 
 
-def scaled(
-    given: Sequence[Vector], p: float, accuracy: float, lead: tuple[int, ...] = (), begin: int = 0
-) -> tuple[Forces, Vector, Vector, Vector]:
-    """Return chains in their own units; and the mass, speed and length of these, (rows, 1).
-
-    `given` are masses, velocities, stiffnesses, viscosities and gaps, a row for each or one for
-    all: those from number `begin` on of chains with these leading axes.  The units are those of the
-    contact that closes fastest, the speed is 1 if none closes; all the balls together are at rest.
-    What is too small or large beside the rest of its chain to be resolved is refused.
-    """
-    rows, n = max(map(len, given)), given[0].shape[1]
-    m, v = (np.broadcast_to(part, (rows, n)) for part in given[:2])
-    k, lost, gap = (np.broadcast_to(part, (rows, n - 1)) for part in given[2:])
-    u = v[:, :-1] - v[:, 1:]
-    at = np.arange(rows)[:, None], u.argmax(axis=-1)[:, None]
-    left, right = m[at], m[:, 1:][at]
-    with np.errstate(all="ignore"):  # what is beyond floats is refused
-        mass, speed = left / (left + right) * right, np.where(u[at] > 0.0, u[at], 1.0)
-        energy = np.log(mass) + 2.0 * np.log(speed) - np.log(k[at])
-        length = np.exp(energy / (p + 1.0))
-        w, v, loss, d = mass / m, (v - v[at]) / speed, lost * (speed / length), -gap / length
-        v -= (m * v).sum(axis=-1, keepdims=True) / m.sum(axis=-1, keepdims=True)
-    most = min(_WIDEST, _BLURRED * accuracy)
-    far = ~((mass > 0.0) & (length >= _TINY) & (length <= 1.0 / _TINY)) | np.isnan(d)
+def refused(rule: int, accuracy: float, place: Sequence[int], chain: Springs) -> ValueError:
+    """Return the error that says why the kernel refuses a chain, one of a batch at this place."""
     of, late = "the depth of the fastest closing", "contact times, depth over speed of the fastest"
-    light, soft = (part < _SMALLEST * part.max(axis=-1, keepdims=True) for part in (m, k))
-    least = f"must be at least {_SMALLEST} of the"
-    for name, values, wrong, rule in (
-        ("masses", m, light, f"{least} heaviest ball of its chain"),
-        ("stiffness", k, soft, f"{least} stiffest contact of its chain"),
-        ("stiffness", k, far, "a contact's time is beyond floats: choose other units"),
-        ("viscosity", lost, loss > LONGEST, f"must be at most {LONGEST} {late} closing"),
-        ("gaps", gap, -d > most, f"must be at most {most:g} times {of} at this accuracy"),
-        ("gaps", gap, (d != 0.0) & (abs(d) < _NARROWEST), f"must be 0, or {_NARROWEST} of {of}"),
-        ("gaps", gap, d > 1.0, f"must be a lean of at most {of}"),
-    ):
-        if wrong.any():
-            row, c = first(wrong)
-            place = *map(int, np.unravel_index(begin + row, lead)), c
-            raise refusal(name, place, f" = {float(values[row, c])!r}; {rule}")
-    return Forces(w, v, k / k[at], loss, d, speed[:, 0]), mass, speed, length
+    widest = min(limits.WIDEST, limits.BLURRED * accuracy)
+    least = f"must be at least {limits.SMALLEST} of the"
+    name, values, words = {
+        limits.LIGHT: ("masses", chain.m, f"{least} heaviest ball of its chain"),
+        limits.SOFT: ("stiffness", chain.k, f"{least} stiffest contact of its chain"),
+        limits.QUICK: (
+            "stiffness", chain.k, "a contact's time is beyond floats: choose other units"
+        ),
+        limits.LATE: ("viscosity", chain.loss, f"must be at most {limits.LONGEST} {late} closing"),
+        limits.WIDE: ("gaps", chain.gap, f"must be at most {widest:g} times {of} at this accuracy"),
+        limits.NARROW: ("gaps", chain.gap, f"must be 0, or {limits.NARROWEST} of {of}"),
+        limits.DEEP: ("gaps", chain.gap, f"must be a lean of at most {of}"),
+    }[rule]  # fmt: skip
+    return refusal(name, tuple(place), f" = {float(values[0, place[-1]])!r}; {words}")
 
 
-class Solved(NamedTuple):
-    """What chains come to, in their own units, and how."""
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class TimedTrace(CurvedTrace):
+    """The path of an impact that has a time, by curves; N balls, K events, S steps.
 
-    v: Vector
-    error: Vector  # estimate, relative to the fastest closing
-    h: Vector  # the last step
-    steps: Any  # of all runs
-    defect: Any  # what an outcome breaks, 0 for nothing; or, below zero, why it was not reached
+    The outcome has the accuracy asked for; the way is less exact near a closing or an opening.
 
+    Attributes
+    ----------
+    times, forces : ndarray, shapes (K + 1,) and (K + 1, N - 1)
+        Time of each row of the path, s, from 0 on; and contact forces there, N.
+    durations : ndarray, shape (N - 1,)
+        Time that each contact was closed, over all its collisions, s.
+    step_times, step_forces, step_velocities, step_impulses : ndarray, (S,) and (S, N - 1 or N)
+        The curves at the steps: s, N, m/s, and N s so far.
+    evaluations, error : int and float
+        Steps of all runs; estimated error of a velocity, relative to the fastest closing.
 
-def law_of(chains: Forces, p: float, accuracy: float, most: int = MOST_STEPS) -> Law:
-    """Return how chains are to be run."""
-    lossy, leans = bool(chains.loss.any()), bool((chains.d > 0.0).any())
-    if leans:  # balls that strings hold together after all swing for ever
-        most = min(most, int(2e4 / accuracy**0.25))
-    return Law(p, accuracy * _FAINT, most, lossy, leans)
+    Examples
+    --------
+    The duration of a contact of two balls on a linear spring is pi sqrt(mu / k):
 
-
-def run(chains: Forces, law: Law, large: bool = False, stop: Any = None) -> Solved:
-    """Run chains, each as finely as needed.
-
-    The step bounds the error where a contact collides about once and loses nothing: measured on
-    random chains, it was C (h omega)^4, at very small steps K (h omega)^3.5.  Balls that collide
-    again and again amplify it, losses and leans add to it: then finer and finer runs tell.
+    >>> from cradle import Chain, SpringChain, collide
+    >>> collide(Chain([2, 2], [1, 0]), SpringChain(1.0, exponent=1)).durations.round(6)
+    array([3.141593])
     """
-    (count, n), lossy, accuracy = chains.v.shape, law.lossy, law.slow / _FAINT
-    c = 0.03 + 0.94 * max(0.0, 1.5 - law.p)
-    eta = min((accuracy / c) ** 0.25, (4.0 * accuracy / c) ** (1.0 / 3.5), 0.6)
-    eta = min(1.6 * eta, 0.6) if lossy else eta
-    # Near by luck, two runs can agree: with losses it takes three.
-    finer, doubt = (2.0**0.5, 6.0) if lossy else (2.0, 0.5)
-    top = _highest(chains, law.p)
-    damped = _DAMPED / np.maximum(chains.loss.max(axis=-1), 1e-300)
-    h = np.minimum((eta if eta >= _ENOUGH else _COARSE) / np.sqrt(top), damped / top)
-    out = Solved(chains.v.copy(), np.zeros(count), h, *np.zeros((2, count), np.int64))
-    # Of the run before, if it was fine enough: its outcome counts, and its change from another.
-    known, changes = np.zeros(count, bool), np.full(count, np.inf if lossy else 0.0)
-    todo = np.flatnonzero((chains.v[:, :-1] > chains.v[:, 1:]).any(axis=-1))
-    for _ in range(_TRIALS):
-        if not todo.size:
-            return out._replace(defect=_defects(chains, law, out))
-        part = chains if todo.size == count else Forces(*(array[todo] for array in chains))
-        moved, h = room(todo.size, n), out.h[todo]
-        at, status = solve(part._replace(h=h), law, moved, large, stop)
-        out.steps[todo] += moved.steps
-        change = abs(moved.v - out.v[todo]).max(axis=-1)
-        out.v[todo] = moved.v
-        if status != FINISHED:
-            todo = todo[at:]
-            break
-        phase = h * np.sqrt(moved.top)
-        off = phase / eta
-        fine = off <= 1.0
-        many = (moved.kinks > _OFTEN * (n - 1)) | (moved.steps * phase > _LONG * (n - 1))
-        compare = fine & (many | lossy | law.leans)
-        told = np.where(known[todo], doubt * change / accuracy, np.inf)
-        changed = np.maximum(told, 0.25 * changes[todo])
-        error = np.maximum(off**4, np.where(compare, changed, 0.0))
-        changes[todo] = np.where(known[todo] | lossy, told, 0.0)
-        out.error[todo] = accuracy * error
-        again = error > 1.0
-        known[todo] = fine
-        h = np.where(fine, h / finer, h / (off * _SPARE))
-        todo, h, top = todo[again], h[again], moved.top[again]
-        out.h[todo] = np.minimum(h, damped[todo] / top)
-    out.defect[todo[0]] = -UNFINISHED
-    return out
 
+    times: Vector
+    forces: Vector
+    durations: Vector
+    step_times: Vector
+    step_forces: Vector
+    error: float
 
-def _defects(chains: Forces, law: Law, out: Solved) -> Any:
-    """Return what each outcome breaks, or 0: momentum, order, energy."""
-    m, rounding = 1.0 / chains.w, 2.0**-52 * (64.0 + out.steps)
-    change = out.v - chains.v
-    size = (m * (abs(out.v) + abs(chains.v))).sum(axis=-1)
-    gained = (m * change * 0.5 * (out.v + chains.v)).sum(axis=-1)
-    slack = law.slow / _FAINT * size + rounding * (m * chains.v * chains.v).sum(axis=-1)
-    defect = np.where(gained <= slack, 0, ENERGY)
-    if not (law.lossy or law.leans):
-        defect[~(gained >= -slack)] = LEDGER
-    defect[~(abs((m * change).sum(axis=-1)) <= rounding * size)] = MOMENTUM
-    defect[~(np.diff(out.v) >= -law.slow).all(axis=-1)] = ORDER
-    return defect
+    def __getattr__(self, name: str) -> Any:
+        """Follow the way, when something of it is asked for the first time."""
+        if name.startswith("_") or "_ran" not in vars(self):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        way = self._way(*vars(self)["_ran"])
+        vars(self).clear()
+        vars(self).update(vars(way))
+        return object.__getattribute__(self, name)
 
+    def _way(self, row: Springs, law: Law, out: Motions) -> TimedTrace:
+        """Return this trace with all that belongs to it."""
+        path, start = Path(row, law, out), self.chain.velocities
+        mass, speed, length = path.mass, path.speed, path.length
+        times, events, v, force = path.events()
+        joule = mass * speed * speed
+        newton, second = joule / length, length / speed
+        return TimedTrace(
+            self.chain, self.model, self.velocities, mass * speed * path.impulses(v[-1]),
+            joule * path.absorbed, path.collisions, start + speed * (v - v[0]),
+            mass * speed * path.impulses(v), events, times=second * times, forces=newton * force,
+            durations=second * path.durations, step_times=second * path.t,
+            step_forces=newton * path.force, step_velocities=start + speed * (path.v - v[0]),
+            step_impulses=mass * speed * path.impulses(path.v),
+            evaluations=self.evaluations, error=self.error,
+        )  # fmt: skip
 
-def _highest(chains: Forces, p: float) -> Vector:
-    """Return a bound of the square of a ball's frequency: two contacts store no more than all E.
-
-    By Hoelder, k d^(p - 1) + k' d'^(p - 1) <= (k + k')^(2/(p + 1)) ((p + 1) E)^((p - 1)/(p + 1)).
-    """
-    energy = 0.5 * (chains.v * chains.v / chains.w).sum(axis=-1)
-    if chains.d.any():
-        energy += (chains.k * np.maximum(chains.d, 0.0) ** (p + 1.0)).sum(axis=-1) / (p + 1.0)
-    both = np.pad(chains.k, [(0, 0), (0, 1)])
-    both[:, 1:] += chains.k
-    part = (both ** (2.0 / (p + 1.0)) * chains.w).max(axis=-1)
-    most = p * part * ((p + 1.0) * energy) ** ((p - 1.0) / (p + 1.0))
-    return np.where(most > 0.0, most, 1.0)
+    @property
+    def energy_loss(self) -> float:
+        """Kinetic energy that the viscosity of the contacts has taken, in joules."""
+        if not np.any(self.model.viscosity):
+            return 0.0
+        m, v = self.chain.masses, self.chain.velocities
+        centre = self.chain.momentum / m.sum()
+        lost = m * (v - self.velocities) * (0.5 * (v - centre) + 0.5 * (self.velocities - centre))
+        return float(lost.sum())
 
 
 class Path:
@@ -179,22 +115,28 @@ class Path:
     node before, half a step and a twelfth of its square of the rates later.
     """
 
-    def __init__(self, chain: Forces, law: Law, h: Vector) -> None:
+    def __init__(self, chain: Springs, law: Law, out: Motions) -> None:
         record: list[Any] = []
-        solve(chain._replace(h=h), law, room(*chain.v.shape), record=record)
-        pages, loss = np.concatenate(record), chain.loss[0]
-        self.p, self.w, self.k, self.early = law.p, chain.w[0], chain.k[0], law.p * loss
+        clock = solve(chain, law, out, record=record)[2]
+        pages = np.concatenate(record)
+        #: The units.
+        self.mass, self.speed, self.length = (float(clock[x]) for x in ("mass", "speed", "length"))
+        h, loss = clock["h"], chain.loss[0] * (self.speed / self.length)
+        self.p, self.w, self.early = law.p, self.mass / chain.m[0], law.p * loss
+        self.k = chain.k[0] / clock["stiffness"]
+        #: Velocities after the impact.
+        self.last, pages = pages[-1, 1], pages[:-1]
         v, y, f = pages[:, 1], pages[:, 2, :-1], pages[:, 3, :-1]
-        pull = self.pushes(chain.d[0])
-        if not law.lossy:
-            y = y - h**2 / 12.0 * np.diff(self.driven(f - pull))
         #: Times, compressions, and whether contacts are closed, at the start and at the nodes.
-        self.t, self.y = np.append(0.0, pages[:, 0, 0]), np.vstack([chain.d, y])
-        self.closed = np.vstack([chain.d > 0.0, f > 0.0])
+        self.t, self.y, self.closed = pages[:, 0, 0], y, f > 0.0
+        pull = self.pushes(y[0])
+        if not clock["lossy"]:
+            self.y[1:] -= h**2 / 12.0 * np.diff(self.driven(f - pull))[1:]
         push = np.where(self.closed, self.pushes(self.y), 0.0)
         slope = self.p * push / np.where(push > 0.0, self.y, 1.0)
         held = push - pull
-        v = np.vstack([chain.v, v - 0.5 * h * self.driven(held[1:])]) + self.driven(loss * held)
+        v[1:] -= 0.5 * h * self.driven(held[1:])
+        v = v + self.driven(loss * held)
         rate = slope * (v[:, :-1] - v[:, 1:])
         v[1:] -= h**2 / 12.0 * self.driven(rate)[1:]
         #: Velocities, accelerations, forces.
@@ -214,10 +156,10 @@ class Path:
         passed = np.cumsum((self.v[0] - v) / self.w, axis=-1)[..., :-1]
         return np.where(self.collisions > 0, passed, 0.0)
 
-    def events(self, last: Vector) -> tuple[Vector, tuple[Event, ...], Vector, Vector]:
+    def events(self) -> tuple[Vector, tuple[Event, ...], Vector, Vector]:
         """Return times, events, velocities and forces, these and the times from the start on.
 
-        At the end the velocities are `last`.  Collisions, durations and works are booked beside.
+        Collisions, durations and works are booked beside.
         """
         from scipy.interpolate import CubicHermiteSpline  # slow to import
 
@@ -257,7 +199,7 @@ class Path:
             if shown:
                 found.append((t, Event(kind, c), v, push))
         at, events, path, force = map(list, zip(*found, strict=True))
-        path[-1] = last
+        path[-1] = self.last
         return np.array(at), tuple(events[1:]), np.array(path), np.array(force)
 
 

@@ -186,11 +186,10 @@ def warm_up() -> None:
     --------
     >>> warm_up()
     """
-    from cradle.kernel.kinks import Forces, Law
+    from cradle.kernel.kinks import Law, Springs
     from cradle.runtime.springs import room, solve
 
     one, still, apart, none = np.ones((1, 2)), np.zeros((1, 2)), np.ones((1, 1)), np.zeros((1, 1))
     inputs = plain.Inputs(one, still, apart, *[np.ones((1, 0))] * 2)
     Job(inputs, outputs(1, 2), plain.Options(0.5, 1000, True), large=True).run()
-    chain = Forces(one, still, apart, none, none, np.ones(1))
-    solve(chain, Law(1.5, 1e-5, 1000, False, False), room(1, 2), large=True)
+    solve(Springs(one, still, apart, none, none), Law(1.5, 1e-3, 1e3), room(1, 2), large=True)

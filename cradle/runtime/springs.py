@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cradle import kernel as plain
-from cradle.kernel.kinks import Clock, Forces, Law, Link, Motions
+from cradle.kernel.kinks import Clock, Law, Link, Motions, Springs
 from cradle.kernel.state import PAUSED
 from cradle.runtime import compile as runtime
 from cradle.runtime.job import FINISHED, Stopped, blank
@@ -21,41 +21,42 @@ _EFFORT, _PAGES = {False: 5_000, True: 5_000_000}, 1024
 
 def room(rows: int, n: int) -> Motions:
     """Return room for what so many chains come to."""
-    return Motions(np.empty((rows, n)), np.zeros(rows), *np.zeros((2, rows), np.int64))
+    return Motions(np.empty((rows, n)), np.zeros(rows), np.zeros(rows), np.zeros(rows, np.int64))
 
 
 def solve(
-    chains: Forces,
+    chains: Springs,
     law: Law,
     out: Motions,
     large: bool = False,
     stop: threading.Event | None = None,
     record: list[Any] | None = None,
-) -> tuple[int, int]:
-    """Run the chains, until `stop` is set; return the next one's number, and how the last ended.
+) -> tuple[int, int, Any]:
+    """Follow the chains, until `stop` is set; return the next one's number, how the last ended.
 
-    The pages of one chain are written to a `record`.
+    And its clock.  The pages of one chain are written to a `record`, at the step in `out`.
     """
     (rows, n), k, status = out.v.shape, 0, FINISHED
     compiled: bool | None = None
-    pages = np.empty((0 if record is None else _PAGES, 4, n))
+    pages = np.empty((0 if record is None else _PAGES + 2, 4, n))
+    clock: Any = None
     while k < rows and status in (FINISHED, PAUSED):
         if stop is not None and stop.is_set():
             raise Stopped
-        kernel = runtime.chosen(large, "springs")
+        kernel = runtime.chosen(large, "follow")
         if compiled is None or (compiled is not (kernel is not plain) and record is None):
             # A chain that has begun plain begins anew.
             compiled, status = kernel is not plain, FINISHED
             area = blank(Link, n, compiled), blank(Clock, 1, compiled)
-            given = chains if compiled else Forces(*(part.tolist() for part in chains))
-        door = kernel.springs if compiled else plain.springs
+            clock = area[1][0] if compiled else vars(area[1][0])
+            given = chains if compiled else Springs(*(part.tolist() for part in chains))
+        door = kernel.follow if compiled else plain.follow
         effort = _EFFORT[compiled] if record is None else _PAGES
         fixed, begun = (n, given, law, out, *area, pages, effort), time.perf_counter()
         k, status = runtime.call(door, k, status == PAUSED, *fixed)
         if not compiled:
             runtime.spend(time.perf_counter() - begun)
         if record is not None:
-            clock = area[1][0] if compiled else vars(area[1][0])
             record.append(pages[: clock["row"]].copy())
             clock["row"] = 0
-    return k, status
+    return k, status, clock
