@@ -67,7 +67,7 @@ function story(masses, viscosity, { mass, speed, length, h }, pages) {
     for (let c = 0; c < loss.length; c += 1) {
       const turned = before[c] > before[c + 1] && now[c] <= now[c + 1];
       if (turned && (closed[c] || force[c] > 0)) events.push({ kind: "maximum_compression", contact: c, row });
-      touching[c] &&= d[c] >= -1e-12;
+      touching[c] &&= d[c] >= -h * h; // the loop counts depths to h^2 / 12 of a rate
       if (force[c] > 0 === closed[c]) continue;
       const kind = closed[c] ? "end" : "close";
       if (closed[c] || !touching[c]) events.push({ kind, contact: c, row });

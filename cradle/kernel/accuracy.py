@@ -9,7 +9,7 @@ again amplify it, losses and leans add to it: then finer and finer runs tell.
 import math
 
 from cradle.kernel.forces import begin, put_down, run
-from cradle.kernel.kinks import FAINT, Springs
+from cradle.kernel.kinks import FAINT, Springs, grade
 from cradle.kernel.state import (
     ENERGY,
     FINISHED,
@@ -30,8 +30,10 @@ VALUE, QUICK, LIGHT, SOFT, LATE, WIDE, NARROW, DEEP = 1, 2, 3, 4, 5, 6, 7, 8
 # A step times the largest frequency from which on a run shows whether it was short enough; a
 # coarser one that only measures the frequency; and what it may measure too little.
 ENOUGH, COARSE, SPARE = 0.2, 0.5, 1.05
-# Kinks of a contact and radians of the quickest ball, on average, from which on runs are compared.
-OFTEN, LONG = 2.4, 30.0
+# C, at least and for each radian of the quickest ball, on average; the largest step, in radians.
+HARD, SWING, WHOLE = 0.01, 0.0022, 0.8
+# Kinks of a contact and radians, on average, from which on runs are compared.
+OFTEN, LONG = 4.0, 30.0
 TRIALS = 16  # runs of a chain, each finer than the one before
 DAMPED = 0.5  # step times A times the square of a frequency, at most
 SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
@@ -118,26 +120,29 @@ def highest(n, p, s):
     energy = part = left = 0.0
     for i in range(n):
         a = s[i]
-        energy += 0.5 * a.start * a.start / a.w
+        energy += 0.5 * (p + 1.0) * a.start * a.start / a.w
         if a.lean > 0.0:
-            energy += a.k * a.lean ** (p + 1.0) / (p + 1.0)
-        part = max(part, (left + a.k) ** (2.0 / (p + 1.0)) * a.w)
+            energy += a.k * a.lean * a.lean * grade(p, a.lean)
+        both = (left + a.k) * a.w
+        part = max(part, both * both * grade(p, a.w))
         left = a.k
-    bound = p * part * ((p + 1.0) * energy) ** ((p - 1.0) / (p + 1.0))
+    # Where powers would overflow the runs tell.
+    bound = p * (part * grade(p, min(energy, 1e15))) ** (1.0 / (p + 1.0))
     return bound if bound > 0.0 else 1.0
 
 
 @apart
 def aim(n, law, s, clock):
     """Choose the first step, and the largest part of a radian that a step may be."""
-    p, accuracy, loss = law.p, law.accuracy, 1e-300
-    bound = accuracy / (0.03 + 0.94 * max(0.0, 1.5 - p))
-    eta = min(bound**0.25, (4.0 * bound) ** (1.0 / 3.5), 0.6)
+    accuracy, loss, spread = law.accuracy, 1e-300, max(0.0, 1.5 - law.p)
+    clock.hard, clock.often = HARD + spread, OFTEN - 3.2 * spread
+    part = accuracy / clock.hard
+    eta = min(part**0.25, (4.0 * part) ** (1.0 / 3.5), WHOLE)
     if clock.lossy:
-        eta = min(1.6 * eta, 0.6)
+        eta = min(1.25 * eta, 0.6)
     for c in range(n - 1):
         loss = max(loss, s[c].loss)
-    top = highest(n, p, s)
+    top = highest(n, law.p, s)
     h = (eta if eta >= ENOUGH else COARSE) / math.sqrt(top)
     clock.eta, clock.damped = eta, DAMPED / loss
     # Half its digits, rounded down: the last ones of a power may depend on the machine.
@@ -145,8 +150,9 @@ def aim(n, law, s, clock):
     clock.h = h * 134217729.0 - (h * 134217729.0 - h)
     # Balls that strings hold together after all swing for ever.
     clock.most = min(law.most, 2e4 / accuracy**0.25) if clock.leans else law.most
-    clock.trial = clock.known = clock.effort = 0
-    clock.error, clock.told = 0.0, math.inf if clock.lossy else 0.0
+    clock.trial = clock.effort = 0
+    clock.error = clock.coarser = 0.0
+    clock.told = math.inf if clock.lossy else 0.0
 
 
 @apart
@@ -157,22 +163,30 @@ def judge(n, law, change, clock):
     by luck, two runs can agree, so that with losses it takes three.
     """
     phase = clock.h * math.sqrt(clock.top)
+    radians = clock.steps * phase / (n - 1)
     off = phase / clock.eta
-    often = clock.kinks > OFTEN * (n - 1) or clock.steps * phase > LONG * (n - 1)
-    told = math.inf
-    if clock.known:
-        told = (6.0 if clock.lossy else 0.5) * change / law.accuracy
+    if not clock.lossy:
+        off *= math.sqrt(math.sqrt(max(1.0, SWING * radians / clock.hard)))
+    often = clock.kinks > clock.often * (n - 1) or radians > LONG
+    compare = often or clock.lossy > 0 or clock.leans > 0
+    told, ratio = math.inf, clock.coarser / clock.h
+    if ratio > 0.0:
+        told = 6.0 if clock.lossy else 7.5 / (ratio * ratio * ratio * ratio - 1.0)
+        told *= change / law.accuracy
     error = off * off * off * off
-    if off <= 1.0 and (often or clock.lossy or clock.leans):
+    if off <= 1.0 and compare:
         error = max(error, told, 0.25 * clock.told)
-    clock.told = told if clock.known or clock.lossy else 0.0
+    clock.told = told if ratio > 0.0 or clock.lossy else 0.0
     clock.error = law.accuracy * error
     if not error > 1.0:
         return False
-    clock.known = 1 if off <= 1.0 else 0
-    finer = math.sqrt(2.0) if clock.lossy else 2.0
-    h = clock.h / finer if clock.known else clock.h / (off * SPARE)
-    clock.h = min(h, clock.damped / clock.top)
+    finer = off * SPARE
+    if compare:
+        finer = max(finer, 1.5)
+    if off <= 1.0:
+        finer = math.sqrt(2.0) if clock.lossy else 2.0
+    clock.coarser = clock.h if off <= (1.0 if clock.lossy or clock.leans else 2.0) else 0.0
+    clock.h = min(clock.h / finer, clock.damped / clock.top)
     clock.trial += 1
     return True
 
@@ -185,11 +199,11 @@ def defect_of(n, law, s, clock):
     ordered = True
     for i in range(n):
         a = s[i]
-        v, old = a.after, a.start
-        size += (abs(v) + abs(old)) / a.w
-        change += (v - old) / a.w
-        gained += (v - old) / a.w * 0.5 * (v + old)
-        energy += old * old / a.w
+        v, old, m = a.after, a.start, 1.0 / a.w
+        size += m * (abs(v) + abs(old))
+        change += m * (v - old)
+        gained += m * (v - old) * 0.5 * (v + old)
+        energy += m * old * old
         if i < n - 1:
             ordered = ordered and s[i + 1].after - v >= -FAINT * law.accuracy
     slack = law.accuracy * size + rounding * energy

@@ -194,6 +194,9 @@ class Path:
                 self.absorbed[c] += (1 if shown else -1) * push[c] * y[c] / (self.p + 1.0)
             else:
                 shown, push[c] = kind == "end" or t > 0.0, 0.0
+                if self.p == 1.0 and not self.early.any():  # a kink that no cubic has
+                    mean = 0.5 * (self.a[j] + self.driven((push - self.pushes(self.y[0]))[None])[0])
+                    v = self.v[j] + (t - self.t[j]) * mean
                 self.collisions[c] += kind == "close"
                 self.durations[c] += t if kind == "end" else -t
             if shown:
