@@ -21,11 +21,12 @@ from cradle.advice import Recommendation, recommend
 from cradle.chain import Chain
 from cradle.models import Model, collide
 from cradle.models.batch import Outcomes, outcomes, post_impact_velocities
-from cradle.models.compliant import SpringChain, TimedTrace, spring_velocities, viscosity_from
+from cradle.models.compliant import SpringChain, spring_velocities, viscosity_from
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
+from cradle.models.springs import TimedTrace
 from cradle.runtime.job import warm_up
 from cradle.swinging.pendulums import Pendulums
 from cradle.swinging.record import Impact, Swing

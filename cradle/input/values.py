@@ -104,6 +104,8 @@ def checked(
 
 def one_number(name: str, value: ArrayLike, *limits: Any, **more: Any) -> float:
     """Return `value` as a float, all that `checked` asks fulfilled."""
+    if type(value) is float and len(limits) == 3 and limits[1] < value < limits[2]:
+        return value
     number = checked(name, value, *limits, **more)
     if number.ndim:
         raise ValueError(f"{name} = {shown(value)}; must be one number")

@@ -62,9 +62,8 @@ def measure(n, chain, law, s, clock):
         momentum += 2.0 * m[i] * abs(v[i])
         heavy = max(heavy, m[i])
         if i < n - 1:
-            refuse(not 0.0 < chain.k[i] < math.inf, VALUE, i, clock)
-            refuse(not 0.0 <= chain.loss[i] < math.inf, VALUE, i, clock)
-            refuse(not abs(chain.gap[i]) < math.inf, VALUE, i, clock)
+            known = 0.0 < chain.k[i] < math.inf and 0.0 <= chain.loss[i] < math.inf
+            refuse(not (known and abs(chain.gap[i]) < math.inf), VALUE, i, clock)
             hard = max(hard, chain.k[i])
             if v[i] - v[i + 1] > fast or i == 0:
                 clock.fastest, fast = i, v[i] - v[i + 1]
