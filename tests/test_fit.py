@@ -689,6 +689,20 @@ def test_a_film_that_bends_by_chance(monkeypatch):
         assert (found.sigma > alone.sigma).all()
 
 
+@pytest.mark.parametrize("ball", ["A", "B"])
+@pytest.mark.parametrize("at", [12, 30])
+def test_a_wrong_mark_is_named(ball, at):
+    """By ball and time, on either side, of a ball that moves or rests; right marks are not."""
+    tracks, _ = fit_example.film("AB", 1.0, np.random.default_rng(8))
+    assert velocities_from_tracks(tracks, length=0.3).strays == ()
+    times, marks = tracks[ball]
+    wrong = tracks | {ball: Track(times, marks + 0.01 * (np.arange(times.size) == at))}
+    with pytest.warns(UserWarning, match=f"the mark of {ball} at {times[at]:.4g} s is off by 0.0"):
+        ((k, moment, off),) = velocities_from_tracks(wrong, length=0.3).strays
+    assert ("AB"[k], moment) == (ball, times[at])
+    assert off == pytest.approx(0.01, rel=0.2)
+
+
 @pytest.mark.parametrize("noise", [0.0, 1e-4])
 def test_a_ball_at_rest_before_and_after(noise):
     """Its velocity is zero, with an error of its own, whether its marks scatter or not."""

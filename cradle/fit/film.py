@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -29,6 +30,8 @@ class Velocities(NamedTuple):
     scatter: float  #: Standard deviation of the marks about the motion fitted, m.
     window: float  #: How much time on either side was used, s.
     probability: float  #: Chance that marks bend at least as much if the motion fitted is right.
+    #: Marks that are off by more than chance allows: ball, from 0; time, s; by how much, m.
+    strays: tuple[tuple[int, float, float], ...] = ()
 
 
 def speeds_from_heights(
@@ -99,9 +102,8 @@ def velocities_from_tracks(
     """
     balls = list(tracks.values())
     if len(balls) < 2 or not 0 <= (striker or 0) < len(balls):
-        raise ValueError(
-            f"{len(balls)} tracks, striker = {striker or 0}; needs two balls and a striker"
-        )
+        told = f"{len(balls)} tracks, striker = {striker or 0}"
+        raise ValueError(f"{told}; needs two balls and a striker")
     length, window, scatter = (
         None if value is None else one_number(name, value, "must be above 0", 0.0, open_low=True)
         for name, value in (("length", length), ("window", window), ("scatter", scatter))
@@ -133,17 +135,23 @@ def velocities_from_tracks(
     safe = not k or k + 3 < len(tried)
     if k and found.window > (wide := tried[k + 3] if safe else tried[-1]):
         found = _around(tracks, coarse, wide, length, striker)
+    wrong = "; ".join(f"the mark of {list(tracks)[ball]} at {moment:.4g} s is off by {off:.2g} m"
+                      for ball, moment, off in found.strays)  # fmt: skip
     if found.probability < _CHANCE or not (safe or first.probability >= _CHANCE):
         rather = "are length and frame rate right, and is there one impact"
         raise ValueError(
             f"window = {tried[0]:.3g} s; the marks bend otherwise than by such a motion: if the "
             f"balls hang, {rather if length else 'give their length'}; else give a shorter window"
+            f"{wrong and '; or '}{wrong}"
         )
+    if wrong:
+        warnings.warn(f"{wrong}: more than chance allows", stacklevel=2)
     ratio = 1.0 if scatter is None else scatter / found.scatter
-    errors = ratio * np.array([found.sigma, found.sigma_before])
+    sigma, sigma_before = ratio * found.sigma, ratio * found.sigma_before
     if not safe:  # what the window changes is added
-        errors = np.hypot(errors, [found.after - first.after, found.before - first.before])
-    return found._replace(sigma=errors[0], sigma_before=errors[1])
+        sigma = np.hypot(sigma, found.after - first.after)
+        sigma_before = np.hypot(sigma_before, found.before - first.before)
+    return found._replace(sigma=sigma, sigma_before=sigma_before)
 
 
 def _coarse(balls: list[Track], striker: int | None, window: float) -> tuple[float, int]:
@@ -244,19 +252,23 @@ def _velocities(
     from scipy.special import fdtrc
 
     velocities, variances = np.zeros((2, 2, len(balls)))
-    squares, freedom, bent, bends = 0.0, 0, 0.0, 0
+    squares, freedom, bent, bends, sides = 0.0, 0, 0.0, 0, []
     for k, ball in enumerate(balls):
         t = ball.times - time
         # The moment is known to a part of a frame: a mark nearer than half a frame may be of
         # either side, and is left out.
         near = 0.5 * float(np.median(np.diff(t)))
-        for side, some in enumerate([t > near, t < -near][: 1 + (k == striker)]):
+        for side, some in enumerate([t > near, t < -near]):
             times, x, v = t[some], ball.positions[some], 0.0
+            if side and k != striker:
+                sides.append((k, ball.times[some], times, x))
+                continue
             for _ in range(12):  # Newton's steps: a wide swing bends with its velocity
                 left = x - _way(times, v, length)
                 change = _way(times, v + 1e-4, length) - _way(times, v - 1e-4, length)
                 off = (change - change.mean()) / 2e-4
                 v += off @ left / (off @ off)
+            sides.append((k, ball.times[some], off, left))
             velocities[side, k], variances[side, k] = v, 1.0 / (off @ off)
             squares, freedom = squares + _rest([off], left), freedom + x.size - 2
             # What would be left if the way could bend otherwise too.
@@ -264,7 +276,35 @@ def _velocities(
     scatter = float(np.sqrt(squares / freedom))
     gain, spare = (squares - bent) / bends, bent / (freedom - bends) if freedom > bends else 0.0
     # Marks without scatter, as of a computed motion, leave rounding alone, and no question.
-    exact = scatter < 1e-5 * max(float(np.ptp(ball.positions)) for ball in balls)
-    chance = 1.0 if exact or not spare else float(fdtrc(bends, freedom - bends, gain / spare))
+    exact = 1e-5 * max(float(np.ptp(ball.positions)) for ball in balls)
+    chance = (
+        1.0 if scatter < exact or not spare else float(fdtrc(bends, freedom - bends, gain / spare))
+    )
     (after, before), (sigma, sigma_before) = velocities, scatter * np.sqrt(variances)
-    return Velocities(time, before, after, sigma, sigma_before, scatter, window, chance)
+    strays = _strays(sides, exact)
+    return Velocities(time, before, after, sigma, sigma_before, scatter, window, chance, strays)
+
+
+def _strays(
+    sides: list[tuple[int, Vector, Vector, Vector]], exact: float
+) -> tuple[tuple[int, float, float], ...]:
+    """Return the mark of each side that chance does not explain, if any; see `Velocities.strays`.
+
+    A side has its ball, times, and what bends with the velocity and is left of the positions.
+    """
+    from scipy.special import stdtr
+
+    worst = []
+    for k, times, column, left in sides:
+        q = np.linalg.qr(np.stack([np.ones_like(left), column], axis=-1))[0]
+        left, free = left - q @ (q.T @ left), 1.0 - (q**2).sum(axis=-1)
+        at = int(np.argmax(left**2 / free))  # without this mark the squares fall by so much
+        gain, spare = left[at] ** 2 / free[at], max(left.size - 3, 1)
+        others = max(left @ left - gain, 0.0) / spare
+        worst.append((k, times[at], abs(left[at] / free[at]), gain, others, spare))
+    balls, moments, off, gains, variances, freedom = map(np.array, zip(*worst, strict=True))
+    some = variances > exact**2  # marks of balls at rest may be equal
+    usual = np.average(variances[some], weights=freedom[some]) if some.any() else np.inf
+    beyond = np.sqrt(gains / np.maximum(usual, variances))
+    odd = 2 * sum(one[1].size for one in sides) * stdtr(freedom.sum(), -beyond) < _CHANCE
+    return tuple(zip(balls[odd].tolist(), moments[odd].tolist(), off[odd].tolist(), strict=True))
