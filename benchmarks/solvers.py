@@ -157,7 +157,8 @@ def spring_rows(clock, quick):
     for scene, accuracy in product(((SCENES | LOSSY)[name] for name in names), accuracies):
         how = CONVERGED if scene.elastic else "same springs, DOP853 with rtol 1e-12"
         lost, exact = scene.viscosity(), (scene.springs(), how)
-        common = {"parameter": accuracy, "needs": "stiffness" + ", viscosity" * (not scene.elastic)}
+        needs = "stiffness, e = 1" if scene.elastic else "stiffness, viscosity"
+        common = {"parameter": accuracy, "needs": needs}
         elastic = Chain(scene.masses, scene.velocities)
         run = partial(collide, elastic, SpringChain(1.0, viscosity=lost, accuracy=accuracy))
         setting = f"accuracy {accuracy:.0e}"
@@ -170,7 +171,8 @@ def spring_rows(clock, quick):
     run = partial(collide, scene.chain, SpringChain(1.0, 1, accuracy=1e-9))
     yield row(
         clock, about, scene, "accuracy 1e-09", run, (scene.springs(1), CONVERGED),
-        parameter=1e-9, model="SpringChain, linear", **model_error(scene, run().velocities),
+        parameter=1e-9, model="SpringChain, linear", needs="stiffness, e = 1",
+        **model_error(scene, run().velocities),
     )  # fmt: skip
 
 

@@ -85,7 +85,8 @@ class Recommendation:
             for error in (self.numerical_error, self.model_error)
         )  # fmt: skip
         time = "not measured" if self.seconds is None else lasting(self.seconds)
-        if self.seconds is not None and self.setting.startswith("compiled"):
+        slow = self.setting.startswith("plain") or isinstance(self.model, EnergyDistribution)
+        if self.seconds is not None and not slow:
             time += " once compiled; small work runs in plain Python, many times slower"
         return {
             "setting": self.setting,
@@ -257,7 +258,10 @@ def _viscosity(chain: Chain, stiffness: float | Sequence[float]) -> float | tupl
     """Return the viscosity that belongs to a chain's restitution at its own speed."""
     speed, masses = float(chain.closing_speeds.max()), chain.masses
     found = viscosity_from(chain.restitution, speed=speed, masses=masses, stiffness=stiffness)
-    return float(found[0]) if len({*found}) == 1 else tuple(found.tolist())
+    lost = float(found[0]) if len({*found}) == 1 else tuple(found.tolist())
+    # It may be more than springs can have beside the quickest of the chain.
+    SpringChain(stiffness, viscosity=lost, accuracy=0.02).solve(Chain(masses, chain.velocities))
+    return lost
 
 
 def _best(
@@ -266,9 +270,11 @@ def _best(
     """Return a model in its cheapest setting that fulfils a wish, after what orders models."""
     chain, name = wish.chain, LAWS[group].partition(",")[0]
     gives = {"velocities" if one == "fastest ball" else one for one in wish.wanted}
+    lossy = bool((chain.restitution < 1.0).any())
     found = tuple(
         row for row in rows(group)
         if gives <= row.gives and (wish.impacts > 1 or "batch" not in row.setting)
+        and (lossy or "lossy" not in row.chains[0])
     )  # fmt: skip
     if not found:
         raise _Unfit(f"wanted = {wish.wanted!r}", f"{name} has no {' and '.join(sorted(gives))}")
@@ -293,7 +299,6 @@ def _best(
     row = min(fit, key=lambda row: row.seconds)
     apart = row.model_error if where == "here" else None
     two = len(chain) == 2
-    lossy = bool((chain.restitution < 1.0).any())
     if not lossy and (springs or two):
         apart = 0.0
     if wish.model_error is not None and (apart is None or apart > wish.model_error):
