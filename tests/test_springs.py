@@ -417,7 +417,10 @@ def test_an_impact_that_is_given_up_shows_what_was_reached():
         ({"stiffness": [1, 1e-10]}, "stiffness[1] = 1e-10; must be at least 1e-09 of the stiffest"),
         ({"exponent": 0.9}, "exponent = 0.9; must lie in [1, 10]"),
         ({"viscosity": [0.1, -0.1]}, "viscosity[1] = -0.1; must be at least 0"),
-        ({"viscosity": 5.0}, "viscosity[0] = 5.0; must be at most 0.3 contact times"),
+        (
+            {"viscosity": 5.0},
+            "viscosity[0] = 5.0; must be at most 0.227 s, 0.3 of the depth over the speed of",
+        ),
         ({"gaps": 1e12}, "gaps[0] = 1000000000000.0; must be at most "),
         ({"gaps": [0, 1e-20]}, "gaps[1] = 1e-20; must be 0, or 1e-12 of the depth"),
         ({"gaps": [0, -3]}, "gaps[1] = -3.0; must be a lean of at most the depth"),

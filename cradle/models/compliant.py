@@ -100,7 +100,7 @@ class SpringChain:
         out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps))
         _, status, clock = solve(row, law, out)
         if status == REFUSED:
-            raise refused(int(clock["rule"]), self.accuracy, [clock["place"]], row)
+            raise refused(clock, self.accuracy, [], row)
         if status == UNSOUND:
             raise ImpactNotCertified(chain, self, DEFECTS[int(clock["defect"])])
         if status == UNFINISHED:
@@ -148,7 +148,8 @@ def spring_velocities(
     masses, velocities : array_like, shape (..., N)
         kg and m/s.
     stiffness, viscosity, gaps : array_like, shape (..., N - 1) or ()
-        k, N/m^p, above 0; A, s, 0 for an elastic contact; and the distance of two balls before the
+        k, N/m^p, above 0; A, s, 0 for an elastic contact and at most .3 of the time that the
+        fastest closing would take to its depth; and the distance of two balls before the
         impact, m.  Below zero it is a lean: how far the strings press the two together at rest,
         with a pull that acts until the last contact has opened.
     exponent : float
@@ -211,7 +212,7 @@ def spring_velocities(
         place = [int(k) for k in np.unravel_index(at, lead)]
         _, status, clock = solve(row, law, room(1, n))
         if status == REFUSED:
-            raise refused(int(clock["rule"]), accuracy, [*place, clock["place"]], row)
+            raise refused(clock, accuracy, place, row)
         # Alone, it stops where it stopped here, and raises.
         m, v, k, loss, gap = (values[0] for values in row)
         model, chain = SpringChain(k, p, viscosity=loss, gaps=gap, accuracy=accuracy), Chain(m, v)

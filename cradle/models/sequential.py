@@ -19,7 +19,8 @@ class SequentialCollisions:
 
     A contact gets no impulse while a neighbouring collision goes on: as with
     ``ImpulseCorrelation(0)``, which solves it.  When a collision ends, both neighbouring contacts
-    may collide next; one that waits between two collisions does so when both have ended.
+    may collide next; one that waits between two collisions does so when both have ended.  Those
+    apart from each other have no common clock: which ends first is rule R8 of the book's chapter 6.
 
     Parameters
     ----------

@@ -19,9 +19,10 @@ from cradle.trace import Event
 FINEST, COARSEST, MOST_STEPS = 1e-12, 0.02, 20_000_000
 
 
-def refused(rule: int, accuracy: float, place: Sequence[int], chain: Springs) -> ValueError:
+def refused(clock: Any, accuracy: float, place: Sequence[int], chain: Springs) -> ValueError:
     """Return the error that says why the kernel refuses a chain, one of a batch at this place."""
-    of, late = "the depth of the fastest closing", "contact times, depth over speed of the fastest"
+    of, most = "the depth of the fastest closing", limits.LONGEST * clock["length"] / clock["speed"]
+    late = f"must be at most {most:.3g} s, {limits.LONGEST} of the depth over the speed"
     widest = min(limits.WIDEST, limits.BLURRED * accuracy)
     least = f"must be at least {limits.SMALLEST} of the"
     name, values, words = {
@@ -30,12 +31,13 @@ def refused(rule: int, accuracy: float, place: Sequence[int], chain: Springs) ->
         limits.QUICK: (
             "stiffness", chain.k, "a contact's time is beyond floats: choose other units"
         ),
-        limits.LATE: ("viscosity", chain.loss, f"must be at most {limits.LONGEST} {late} closing"),
+        limits.LATE: ("viscosity", chain.loss, f"{late} of the fastest closing"),
         limits.WIDE: ("gaps", chain.gap, f"must be at most {widest:g} times {of} at this accuracy"),
         limits.NARROW: ("gaps", chain.gap, f"must be 0, or {limits.NARROWEST} of {of}"),
         limits.DEEP: ("gaps", chain.gap, f"must be a lean of at most {of}"),
-    }[rule]  # fmt: skip
-    return refusal(name, tuple(place), f" = {float(values[0, place[-1]])!r}; {words}")
+    }[int(clock["rule"])]  # fmt: skip
+    at = int(clock["place"])
+    return refusal(name, (*place, at), f" = {float(values[0, at])!r}; {words}")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -47,7 +49,8 @@ class TimedTrace(CurvedTrace):
     Attributes
     ----------
     times, forces : ndarray, shapes (K + 1,) and (K + 1, N - 1)
-        Time of each row of the path, s, from 0 on; and contact forces there, N.
+        Time of each row of the path, s, from 0 on; and contact forces there, N.  With losses a
+        force is largest before the compression is: `step_forces.max(axis=0)`.
     durations : ndarray, shape (N - 1,)
         Time that each contact was closed, over all its collisions, s.
     step_times, step_forces, step_velocities, step_impulses : ndarray, (S,) and (S, N - 1 or N)
