@@ -145,7 +145,7 @@ TASKS = (
     "speeds=1,0,0&masses=4,2,1&forward=0",
     "speeds=1,0,0,0,0&restitution=0.7&forward=0",
     "speeds=1,0,0&masses=1.12,1,1&forward=0.1",
-    "speeds=1,0,0&masses=1,0.05,2&forward=0.15",
+    "speeds=1,0,0,0&law=spheres&gap=0",
     "speeds=1,0,0&masses=1,0.02,10&forward=0.15",
 )
 

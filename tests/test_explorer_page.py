@@ -228,17 +228,19 @@ def test_sliders_change_the_outcome(visit, label: str, row: str):
 
 
 OUTSIDE = "mass must lie between 0.01 and 100 kg. In force: 1 kg."
+NO_NUMBER = "{} needs a number, such as 0.5. In force: {}."
 NO_RATIO = "ratio must lie between 0 and 1. In force: 0.15."
 REFUSED = [
     ("mass", "1000", OUTSIDE),
-    ("mass", "", OUTSIDE),
+    ("mass", "", NO_NUMBER.format("mass", "1 kg")),
     ("restitution", "1.5", "restitution must lie between 0 and 1. In force: 1."),
     ("ratio", "2", NO_RATIO),
     ("ratio", "-1", NO_RATIO),
-    ("ratio", "0;1", NO_RATIO),
-    ("mass", "1.000,5", OUTSIDE),
-    ("mass", "heavy", OUTSIDE),
+    ("ratio", "0;1", NO_NUMBER.format("ratio", 0.15)),
+    ("mass", "1.000,5", NO_NUMBER.format("mass", "1 kg")),
+    ("mass", "heavy", NO_NUMBER.format("mass", "1 kg")),
     ("mass", "1,000", "mass could be 1 or 1000: please write one of these. In force: 1 kg."),
+    ("comes in with", "-7", "speed must lie between \u22122 and 2 m/s. In force: 1 m/s."),
     ("ratio", "0.1234567", "ratio can have six digits after the point. In force: 0.15."),
 ]
 

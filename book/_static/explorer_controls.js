@@ -30,7 +30,7 @@
 
   // A slider with a box for exact numbers. A logarithmic one moves in equal factors. What the box
   // cannot take stays in it, marked, with a sentence below, until the setting changes.
-  function slider({ words, low, high, step, logarithmic = false, unit = "", input }) {
+  function slider({ words, called = words, low, high, step, logarithmic = false, unit = "", input }) {
     const name = `explorer-${(names += 1)}`;
     const place = (value) => (logarithmic ? Math.log10(value) : value);
     const value = (at) => (logarithmic ? +(10 ** at).toPrecision(2) : at);
@@ -72,13 +72,14 @@
         return `could be ${small} or ${large}: please write one of these`;
       }
       const number = typed(box.value);
+      if (Number.isNaN(number)) return "needs a number, such as 0.5";
       if (!(low <= number && number <= high))
         return `must lie between ${low} and ${measure(high)}`;
       return +number.toFixed(6) === number ? "" : "can have six digits after the point";
     }
     function refuse(why) {
       box.setAttribute("aria-invalid", why !== "");
-      refused.textContent = why && `${label.textContent} ${why}. In force: ${shown.text}.`;
+      refused.textContent = why && `${called} ${why}. In force: ${shown.text}.`.replaceAll(" -", " \u2212");
     }
     function give(number) {
       input(Math.min(Math.max(number, low), high));

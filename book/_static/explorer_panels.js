@@ -104,6 +104,7 @@
     return {
       speed: slider({
         words: "comes in with",
+        called: "speed",
         low: slowest,
         high: fastest,
         step: 0.05,

@@ -15,8 +15,8 @@
       ({ masses, before, v, last }) => kept(masses, before, v) < 0.5 && last > 0.5],
     [3, "Stop the striker dead, with every ratio at least 0.1.",
       ({ v, setting }) => explorer.law(setting) === "rule" && Math.abs(v[0]) < STILL && Math.min(...setting.forward, ...setting.backward) >= 0.1],
-    [3, "Lose no energy, and make two balls come back.",
-      ({ masses, before, v }) => kept(masses, before, v) > 1 - 1e-9 && back(v) === 2],
+    [3, "Lose no energy, and make exactly two balls come back.",
+      ({ masses, before, v }) => kept(masses, before, v) > 1 - 1e-4 && back(v) === 2],
     [3, "Make balls 1 and 2 collide ten times in one hit.", ({ record }) => record.collisions[0] >= 10],
   ]; // prettier-ignore
 
