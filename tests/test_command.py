@@ -491,6 +491,25 @@ def scaled(text, size):
     return "\n".join([*head, *("\t".join(row) for row in rows)]) + "\n"
 
 
+def test_one_wrong_film_of_several(folder, capsys):
+    """It is named, and so is a wrong mark; the others have their rows."""
+    text = (folder / "film.txt").read_text(encoding="utf-8")
+    (folder / "odd.txt").write_text(text.replace("0.03477", "0.04477"), encoding="utf-8")
+    (folder / "here.txt").write_text(text.replace("0.03477", "here"), encoding="utf-8")
+    (folder / "px.txt").write_text(scaled(text, 2000), encoding="utf-8")
+    with pytest.raises(SystemExit) as stopped:
+        run(shlex.split(f"{BAC} here.txt px.txt odd.txt --header"))
+    assert stopped.value.code == 1
+    printed = capsys.readouterr()
+    rows = printed.out.splitlines()
+    assert [row.split(",")[1] for row in rows] == ["shot"] + ["film"] * 3 + ["odd"] * 3
+    assert "here.txt, line 6, column x: 'here'; must be a number" in printed.err
+    assert re.search("px.txt: track 'B' spans .* say --position-unit cm .* --scale", printed.err)
+    assert "odd.txt: ball 1 strikes at" in printed.err
+    assert "the mark of A at 0.008333 s is off by 0.0" in printed.err
+    assert "assumed: masses in kg (--unit)" in printed.err
+
+
 @pytest.mark.parametrize(
     ("line", "code", "message"),
     [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,7 @@ _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 @click.option("--shot", help="Name of the shot [that of the file].")
 @click.option("--masses", required=True, callback=numbers_of,
               help="Masses, left to right: 53,45,53.")  # fmt: skip
-@click.option("--unit", type=click.Choice(list(UNITS)), default="kg", help="Of masses.")
+@click.option("--unit", type=click.Choice(list(UNITS)), help="Of masses [kg].")
 @swing_options("or --period, or --level")
 @click.option("--level", is_flag=True, help="The balls do not hang: they roll on a level track.")
 @click.option("--position-unit", type=click.Choice([*_SIZES, "px"]),
@@ -35,15 +36,16 @@ _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 @click.option("--slower", default=1.0, help="8 if 240 pictures a second play at 30 [1].")
 @click.option("--header", is_flag=True, help="Print the names of the columns too.")
 def film(
-    files: tuple[Path, ...], name: str, shot: str | None, masses: list[float], unit: str,
-    header: bool, **options: Any,
+    files: tuple[Path, ...], name: str, shot: str | None, masses: list[float], unit: str | None,
+    header: bool, length: float | None, period: float | None, level: bool,
+    position_unit: str | None, scale: float | None, slower: float, **options: Any,
 ) -> None:  # fmt: skip
     """Velocities from the marks in films, a film a shot.
 
     FILES are exported by Tracker, Kinovea, Logger Pro or Capstone, one track a ball, left to right;
-    tracks named by types are in the order of --set.  The first ball strikes the others at rest.
-    Prints rows for the table that `cradle fit` reads; what was used of each film goes to standard
-    error.
+    tracks named by types are in the order of --set.  One ball strikes the others at rest, from
+    either end.  Prints rows for the table that `cradle fit` reads; what was used of each film, and
+    what is wrong with one, goes to standard error.
 
     \b
     Examples:
@@ -52,46 +54,58 @@ def film(
     """
     from cradle.fit.parameters import parameter_key
     from cradle.fit.shots import COLUMNS
-
-    if shot is not None and len(files) > 1:
-        raise click.UsageError("--shot names one film; several have the names of their files")
-    types = parameter_key(name)
-    found = [_velocities(file, types, masses, **options) for file in files]
-    writer = csv.writer(sys.stdout, lineterminator="\n")
-    if header:
-        writer.writerow(COLUMNS)
-    for file, one in zip(files, found, strict=True):
-        for k, kind in enumerate(types):
-            velocities = (x[k] for x in (one.before, one.after, one.sigma, one.sigma_before))
-            numbers = (f"{x:.6g}" for x in (UNITS[unit] * masses[k], *velocities))
-            writer.writerow([name, shot or file.stem, k + 1, kind, *numbers])
-        click.echo(
-            f"{file.name}: impact at {one.time:.4g} s, window {one.window:.3g} s, marks scatter by "
-            f"{one.scatter:.2g} m; chance of such a fit {one.probability:.2g}", err=True,
-        )  # fmt: skip
-
-
-def _velocities(
-    file: Path, types: tuple[str, ...], masses: list[float], length: float | None,
-    period: float | None, level: bool, position_unit: str | None, scale: float | None,
-    window: float | None, slower: float,
-) -> Velocities:  # fmt: skip
-    """Return the velocities in one film, of balls of these types."""
-    import numpy as np
-
-    from cradle.fit import read_tracker, velocities_from_tracks
     from cradle.input.values import one_number
 
-    one_number("--slower", slower, "must be above 0", 0.0, open_low=True)
-    length = pendulum_length(length, period)
+    length, window = pendulum_length(length, period), options["window"]
+    given = {"length": length, "window": window, "--slower": slower, "--scale": scale}
+    for option, value in given.items():
+        if value is not None:
+            one_number(option, value, "must be above 0", 0.0, open_low=True)
+    if shot is not None and len(files) > 1:
+        raise click.UsageError("--shot names one film; several have the names of their files")
     if (length is None) != level:
         raise click.UsageError("give --length or --period of the pendulums, or --level: one")
     if (position_unit == "px") != (scale is not None):
         raise click.UsageError("--position-unit px and --scale, pixels in a metre, go together")
-    pixels = 1.0 if scale is None else scale
-    one_number("--scale", pixels, "must be above 0", 0.0, open_low=True)
-    size = _SIZES.get(position_unit or "m", 1.0 / pixels)
-    tracks = read_tracker(file, time_scale=1.0 / slower, unit=size)
+    size = _SIZES[position_unit or "m"] if scale is None else 1.0 / scale
+    types, kilograms = parameter_key(name), [UNITS[unit or "kg"] * mass for mass in masses]
+    writer, wrong = csv.writer(sys.stdout, lineterminator="\n"), []
+    for file in files:
+        try:
+            told, one = _velocities(file, types, masses, length, 1.0 / slower, size, **options)
+        except (ValueError, OSError) as reason:  # the other films may be right
+            named = str(reason).startswith(file.name)
+            wrong.append(str(reason) if named else f"{file.name}: {reason}")
+            continue
+        if header:
+            writer.writerow(COLUMNS)
+            header = False
+        for k, kind in enumerate(types):
+            velocities = (x[k] for x in (one.before, one.after, one.sigma, one.sigma_before))
+            numbers = (f"{x:.6g}" for x in (kilograms[k], *velocities))
+            writer.writerow([name, shot or file.stem, k + 1, kind, *numbers])
+        striker = max(range(len(types)), key=lambda k: abs(one.before[k])) + 1
+        click.echo(
+            f"{file.name}: ball {striker} strikes at {one.time:.4g} s, window {one.window:.3g} s, "
+            f"marks scatter by {one.scatter:.2g} m; chance of such a fit {one.probability:.2g}"
+            f"{told}", err=True,
+        )  # fmt: skip
+    if unit is None and len(wrong) < len(files):
+        click.echo("assumed: masses in kg (--unit)", err=True)
+    if wrong:
+        raise ValueError("\ncradle: ".join(wrong))
+
+
+def _velocities(
+    file: Path, types: tuple[str, ...], masses: list[float], length: float | None,
+    time_scale: float, size: float, window: float | None,
+) -> tuple[str, Velocities]:  # fmt: skip
+    """Return what was warned of, and the velocities in one film, of balls of these types."""
+    import numpy as np
+
+    from cradle.fit import read_tracker, velocities_from_tracks
+
+    tracks = read_tracker(file, time_scale=time_scale, unit=size)
     if not len(types) == len(masses) == len(tracks):
         raise ValueError(
             f"{file.name} has {len(tracks)} tracks, --set {len(types)} types and --masses "
@@ -100,12 +114,13 @@ def _velocities(
     for place, (kind, track) in enumerate(zip(types, tracks, strict=True), 1):
         if track in types and track != kind:
             raise ValueError(
-                f"{file.name}: track {place} is named {track}, --set {''.join(types)} has {kind} "
-                "there; both go from left to right"
+                f"track {place} is named {track}, --set {''.join(types)} has {kind} there; both go "
+                "from left to right"
             )
     fastest = max(float(np.ptp(x) / (np.ptp(t) or 1.0)) for t, x in tracks.values())
-    if level and fastest > 20.0:  # a pendulum's length tells by itself
-        raise ValueError(
-            f"{file.name}: {fastest:.3g} m/s is unlikely; say --position-unit cm, mm or px"
-        )
-    return velocities_from_tracks(tracks, length=length, window=window)
+    if length is None and fastest > 20.0:  # a pendulum's length tells by itself
+        raise ValueError(f"{fastest:.3g} m/s is unlikely; say the unit of the positions")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        found = velocities_from_tracks(tracks, length=length, window=window)
+    return "".join(f"; {one.message}" for one in told), found

@@ -16,7 +16,7 @@ _GRAVITY = 9.81
 # Marks that each side of the impact needs; the longest window on a level track, s.
 _LEAST, _LONGEST = 5, 0.25
 # Right films of which one is refused, because its marks happen to bend.
-_CHANCE = 1e-4
+_CHANCE = 1e-5
 
 
 class Velocities(NamedTuple):
@@ -90,7 +90,7 @@ def velocities_from_tracks(
     ------
     ValueError
         If there are fewer than two balls, too few marks on either side, or the marks do not lie on
-        such a motion: one film in ten thousand bends as much by chance.
+        such a motion: one in a hundred thousand bends as much by chance.
 
     Examples
     --------
