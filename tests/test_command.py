@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from tqdm import tqdm
 
 from cradle import (
     Chain,
@@ -582,6 +583,22 @@ def test_errors_end_in_one_line_and_a_code(capsys, line, code, message):
     assert message in captured.err.replace("\n", " ")
     assert not captured.out
     assert "Traceback" not in captured.err
+
+
+def test_a_long_fit_is_told_of(folder, monkeypatch, capsys):
+    """How many points were tried, from two seconds on; and at once that six ratios need minutes."""
+    bar = lambda delay, **options: tqdm(**options, mininterval=0.0, delay=delay - 2.0)  # noqa: E731
+    monkeypatch.setattr("tqdm.tqdm", bar)
+    with pytest.raises(SystemExit):
+        run(shlex.split("fit shots.csv"))
+    assert re.search(r"\d{4,} points", capsys.readouterr().err)
+    monkeypatch.setattr("cradle.fit.ratio", lambda *_, **__: run(["frobnicate"]))
+    rows = [f"ABCDE,1,{k + 1},{'ABCDE'[k]},0.03,{1 - min(k, 1)},{k / 5},0.1" for k in range(5)]
+    table = "\n".join(["set,shot,ball,type,mass,before,after,sigma", *rows])
+    (folder / "five.csv").write_text(table, encoding="utf-8")
+    with pytest.raises(SystemExit):
+        run(["fit", "five.csv"])
+    assert "6 ratios are fitted together, which takes minutes" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("wrong", ["--predict A", "--predict ABA --speed 0"])

@@ -63,7 +63,7 @@ def fit(
       cradle fit shots.csv --json --plot fit.png
     """
     from cradle.fit import ratio, read_shots, restitution
-    from cradle.fit.parameters import types_in_a_row
+    from cradle.fit.parameters import parameter_key, ratio_keys, types_in_a_row
     from cradle.fit.result import FOLDED, RESULT_COLUMNS
     from cradle.fit.shots import chance
     from cradle.input.values import one_number
@@ -87,7 +87,11 @@ def fit(
     _refuse_unused([name for name, _ in given], [name for name, _ in known], used, predict)
     pairs = [restitution(used)] if any(len(one.types) == 2 for one in used.sets) else []
     values = {**(pairs[0].values() if pairs else {}), **dict(given)}
-    last = ratio(used, values, known=dict(known))  # it predicts
+    free = [ratio_keys(one.types) - {parameter_key(name) for name, _ in known} for one in used.sets]
+    if (most := max(map(len, free))) > 4:
+        click.echo(f"cradle: {most} ratios are fitted together, which takes minutes; shots of "
+                   "fewer balls, or --known, would make it faster", err=True)  # fmt: skip
+    last = ratio(used, values, known=dict(known), progress=True)  # it predicts
     fits = [one for one in (*pairs, last) if one.estimates]
     momentum, count = shots.momentum_check()
     extra = {

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,8 +90,9 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
 
 
 def ratio(
-    shots: Shots, restitution: Fit | Known, *, known: Mapping[str, float] | None = None
-) -> Fit:
+    shots: Shots, restitution: Fit | Known, *, known: Mapping[str, float] | None = None,
+    progress: bool = False,
+) -> Fit:  # fmt: skip
     """Fit the Impulse Correlation Ratio of every triplet in shots of three balls and more.
 
     One estimate for each triplet and direction that is not known, between 0 and the bound of three
@@ -106,6 +108,8 @@ def ratio(
         (coefficient, standard error).
     known : mapping, optional
         Ratios not to be fitted, by triplets; with it no set needs three balls.
+    progress : bool
+        Show after two seconds how many points were tried; six ratios need a million.
 
     Raises
     ------
@@ -127,6 +131,8 @@ def ratio(
     sets = [one for one in shots.sets if len(one.types) > 2]
     if not sets and known is None:
         raise ValueError("no set has three balls or more; ratios come from triplets")
+    from tqdm import tqdm
+
     given = _restitution_values(restitution, sets)
     fixed = _known_ratios(known or {}, shots.masses)
     values = {**{key: value for key, (value, _) in given.items()}, **fixed}
@@ -135,7 +141,10 @@ def ratio(
               for one in sets for key in ratio_keys(one.types) if key not in fixed}  # fmt: skip
     acting = set[Key]().union(*(_acting(one, bounds, values) for one in sets))
     values = {**dict.fromkeys(bounds, 0.0), **values}  # without effect: any value
-    found, groups, lowest, freedom = _estimates("ratio", sets, bounds, acting, values, uncertain)
+    with tqdm(unit=" points", delay=2.0, disable=not progress) as bar:
+        found, groups, lowest, freedom = _estimates(
+            "ratio", sets, bounds, acting, values, uncertain, bar.update
+        )
     named = {label(key): value for key, value in given.items()}
     known = {label(key): value for key, value in fixed.items()}
     return Fit(shots, found, named, groups, lowest, freedom, known)
@@ -213,12 +222,13 @@ def _together(acting: Iterable[set[Key]]) -> list[list[Key]]:
 
 def _estimates(
     kind: str, sets: Sequence[ShotSet], bounds: Mapping[Key, float], acting: set[Key],
-    given: Mapping[Key, float], uncertain: Uncertain,
+    given: Mapping[Key, float], uncertain: Uncertain, tell: Callable[[int], Any] = int,
 ) -> tuple[dict[str, Estimate], tuple[Group, ...], float, int]:  # fmt: skip
     """Fit what acts in the sets; return it by name, its groups, chi-square, degrees of freedom."""
 
     def chi(keys: list[Key], members: list[ShotSet], points: Vector) -> Vector:
         values = {**given, **dict(zip(keys, points.T, strict=True))}
+        tell(len(points))
         return chi_squares(members, values, uncertain)
 
     found = {label(key): Estimate.of(kind, key, bound, None) for key, bound in bounds.items()}
