@@ -17,6 +17,7 @@ _GRAVITY = 9.81
 _LEAST, _LONGEST = 5, 0.25
 # Right films of which one is refused, because its marks happen to bend.
 _CHANCE = 1e-5
+_Stray = tuple[int, float, float]
 
 
 class Velocities(NamedTuple):
@@ -31,7 +32,7 @@ class Velocities(NamedTuple):
     window: float  #: How much time on either side was used, s.
     probability: float  #: Chance that marks bend at least as much if the motion fitted is right.
     #: Marks that are off by more than chance allows: ball, from 0; time, s; by how much, m.
-    strays: tuple[tuple[int, float, float], ...] = ()
+    strays: tuple[_Stray, ...] = ()
 
 
 def speeds_from_heights(
@@ -135,9 +136,10 @@ def velocities_from_tracks(
     safe = not k or k + 3 < len(tried)
     if k and found.window > (wide := tried[k + 3] if safe else tried[-1]):
         found = _around(tracks, coarse, wide, length, striker)
+    refused = found.probability < _CHANCE or not (safe or first.probability >= _CHANCE)
     wrong = "; ".join(f"the mark of {list(tracks)[ball]} at {moment:.4g} s is off by {off:.2g} m"
-                      for ball, moment, off in found.strays)  # fmt: skip
-    if found.probability < _CHANCE or not (safe or first.probability >= _CHANCE):
+                      for ball, moment, off in (first if refused else found).strays)  # fmt: skip
+    if refused:
         rather = "are length and frame rate right, and is there one impact"
         raise ValueError(
             f"window = {tried[0]:.3g} s; the marks bend otherwise than by such a motion: if the "
@@ -255,15 +257,14 @@ def _velocities(
     squares, freedom, bent, bends, sides = 0.0, 0, 0.0, 0, []
     for k, ball in enumerate(balls):
         t = ball.times - time
-        # The moment is known to a part of a frame: a mark nearer than half a frame may be of
-        # either side, and is left out.
+        # A mark nearer than half a frame may be of either side, and is left out.
         near = 0.5 * float(np.median(np.diff(t)))
         for side, some in enumerate([t > near, t < -near]):
             times, x, v = t[some], ball.positions[some], 0.0
             if side and k != striker:
                 sides.append((k, ball.times[some], times, x))
                 continue
-            for _ in range(12):  # Newton's steps: a wide swing bends with its velocity
+            for _ in range(12):  # Newton's steps: how a wide swing bends depends on its velocity
                 left = x - _way(times, v, length)
                 change = _way(times, v + 1e-4, length) - _way(times, v - 1e-4, length)
                 off = (change - change.mean()) / 2e-4
@@ -274,20 +275,16 @@ def _velocities(
             # What would be left if the way could bend otherwise too.
             bent, bends = bent + _rest([off, times**2, times**3], left), bends + 2
     scatter = float(np.sqrt(squares / freedom))
-    gain, spare = (squares - bent) / bends, bent / (freedom - bends) if freedom > bends else 0.0
     # Marks without scatter, as of a computed motion, leave rounding alone, and no question.
-    exact = 1e-5 * max(float(np.ptp(ball.positions)) for ball in balls)
-    chance = (
-        1.0 if scatter < exact or not spare else float(fdtrc(bends, freedom - bends, gain / spare))
-    )
+    exact, chance = 1e-5 * max(float(np.ptp(ball.positions)) for ball in balls), 1.0
+    if scatter >= exact and bent and (spare := freedom - bends) > 0:
+        chance = float(fdtrc(bends, spare, (squares - bent) / bends * spare / bent))
     (after, before), (sigma, sigma_before) = velocities, scatter * np.sqrt(variances)
     strays = _strays(sides, exact)
     return Velocities(time, before, after, sigma, sigma_before, scatter, window, chance, strays)
 
 
-def _strays(
-    sides: list[tuple[int, Vector, Vector, Vector]], exact: float
-) -> tuple[tuple[int, float, float], ...]:
+def _strays(sides: list[tuple[int, Vector, Vector, Vector]], exact: float) -> tuple[_Stray, ...]:
     """Return the mark of each side that chance does not explain, if any; see `Velocities.strays`.
 
     A side has its ball, times, and what bends with the velocity and is left of the positions.
