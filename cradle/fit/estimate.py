@@ -26,9 +26,7 @@ from cradle.fit.shots import Shots, ShotSet
 from cradle.input.values import Vector, checked, one_number
 from cradle.kernel.state import LIMITS
 
-# Points at which it is tried whether a ratio acts at all.
-_TRIALS = 513
-
+_TRIALS = 513  # points at which it is tried whether a ratio acts at all
 Known = Mapping[str, "float | tuple[float, float]"]
 
 

@@ -24,8 +24,7 @@ Key = tuple[str, ...]
 Values = Mapping[Key, Any]
 Uncertain = Sequence[tuple[Key, float]]
 
-# Parameter points evaluated at a time, to bound the memory.
-_CHUNK = 4096
+_CHUNK = 4096  # parameter points evaluated at a time, to bound the memory
 
 
 def label(key: Key) -> str:
@@ -79,11 +78,9 @@ def outcomes(types: Sequence[str], masses: Vector, velocities: Vector, values: V
 
 
 def responses(shots: ShotSet, values: Values, uncertain: Uncertain) -> tuple[Vector, Vector]:
-    """Return velocities after K shots at P points, shape (K, P, N), and what they change with.
-
-    That is one standard error of each of M measured velocities before, then each of E uncertain
-    coefficients of restitution: (K, P, N, M + E).
-    """
+    """Return velocities after K shots at P points, shape (K, P, N), and their changes."""
+    # These are by one standard error of each of M measured velocities before, then by each of E
+    # uncertain coefficients of restitution: (K, P, N, M + E).
     moving = np.flatnonzero((shots.before != 0).any(axis=0))
     at_rest_exactly = not np.delete(shots.sigma_before, moving, axis=1).any()
     single = moving.size == 1 and (shots.before[:, moving] > 0).all() and at_rest_exactly
@@ -114,10 +111,7 @@ def responses(shots: ShotSet, values: Values, uncertain: Uncertain) -> tuple[Vec
 def normal_equations(
     shots: ShotSet, values: Values, uncertain: Uncertain
 ) -> tuple[Vector, Vector, Vector]:
-    """Chi-square at the nominal restitution, its slope and curvature, profiled over `before`.
-
-    Of restitution changed by d it is chi_square - 2 slope d + d curvature d.
-    """
+    """Chi-square c - 2 s d + d k d of restitution changed by d, profiled over `before`: c, s, k."""
     outcome, changes = responses(shots, values, uncertain)
     measured = changes.shape[-1] - len(uncertain)
     movers, slopes = changes[..., :measured], changes[..., measured:]

@@ -29,15 +29,13 @@ if TYPE_CHECKING:
 #: Columns of the table of a fit.
 RESULT_COLUMNS = ("name", "kind", "value", "intervals", "minima", "identified", "at_bound",
                   "bound")  # fmt: skip
-# Draws from the fitted parameters for a prediction.
-_DRAWS = 4000
+_DRAWS = 4000  # from the fitted parameters, for a prediction
 # A set that is so much longer on one side than on the other is no bell curve's; what is said then.
 SKEW = 1.3
 FOLDED = (
     " (no bell curve, as near a fold: such sets held the true value in 90 of 100 trials, not 95)"
 )
-# A confidence set that covers more than this part of the range says nothing.
-_ALL = 0.999
+_ALL = 0.999  # a confidence set that covers more than this part of the range says nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +89,6 @@ class Estimate:
         return len(self.intervals) > 1 or max(sides) > SKEW * min(sides)
 
     def __str__(self) -> str:
-        """Return the estimate with its confidence set."""
         if self.value is None:
             return f"{self.kind} {self.name}: not identified"
         # Two digits of the error.
@@ -136,7 +133,6 @@ class Prediction:
         return pd.DataFrame(self.rows()).set_index("ball")
 
     def __repr__(self) -> str:
-        """Return the predictions in one line."""
         parts = [f"{r['velocity']:.3f} [{r['lower']:.3f}, {r['upper']:.3f}]" for r in self.rows()]
         return f"Prediction({label(self.types)}: {', '.join(parts)} m/s)"
 
@@ -154,7 +150,6 @@ class Fit:
     known: Mapping[str, float] = field(default_factory=dict)  #: Ratios that were not fitted.
 
     def __getitem__(self, name: str) -> Estimate:
-        """Return one estimate."""
         if name not in self.estimates:
             raise KeyError(f"no estimate {name!r}; there are {', '.join(self.estimates)}")
         return self.estimates[name]
@@ -170,7 +165,6 @@ class Fit:
         return {name: (e.value, e.standard_error) for name, e in found if e.value is not None}
 
     def __repr__(self) -> str:
-        """Return the estimates in one line, and how well they fit."""
         shown = ", ".join(map(str, self.estimates.values()))
         chi = f"chi-square {self.chi_square:.1f} of {self.degrees_of_freedom}"
         return f"Fit({shown}; {chi}{'' if self.probability > 1e-3 else ', a poor fit'})"
@@ -272,9 +266,8 @@ class Fit:
             raise ValueError(f"no mass is known of type {kind!r}; there are {', '.join(masses)}")
         balls, before = np.array([masses[kind] for kind in row]), speed * np.eye(1, len(row))
         velocities = outcomes(row, balls, before, self._draws(row))
-        ends = [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2]
-        lower, median, upper = np.quantile(velocities, ends, axis=0)
-        return Prediction(row, median, lower, upper)
+        parts = [0.5, (1 - LEVEL) / 2, (1 + LEVEL) / 2]
+        return Prediction(row, *np.quantile(velocities, parts, axis=0))
 
     def _draws(self, types: tuple[str, ...]) -> dict[Key, Vector]:
         """Draw coefficients of restitution and ratios of a chain from what was fitted."""

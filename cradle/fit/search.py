@@ -19,14 +19,10 @@ from cradle.input.values import Vector
 LEVEL = 0.95
 RISE = 3.841458820694124
 
-# Points of the grid in one dimension.
-_GRID = 2001
-# Points of a grid in several dimensions that go on to the next finer one.
-_KEPT = 600
-# Points inside the confidence set that make its ends known to a small part of its width.
-_ENOUGH = 400
-# Cells along each axis of the first grid, by the number of axes.
-_CELLS = {2: 61, 3: 21, 4: 11, 5: 7, 6: 5}
+_GRID = 2001  # points of the grid in one dimension
+_KEPT = 600  # points of a grid in several dimensions that go on to the next finer one
+_ENOUGH = 400  # points inside the confidence set that tell its ends well beside its width
+_CELLS = {2: 61, 3: 21, 4: 11, 5: 7, 6: 5}  # along each axis of the first grid, by their number
 
 Function = Callable[[Vector], Vector]
 Found = tuple[list["Scan"], Vector, Vector, float]
@@ -121,10 +117,7 @@ def refine(function: Function, upper: Vector) -> Found:
 def _walked(
     function: Function, points: Vector, steps: Vector, upper: Vector
 ) -> tuple[Vector, list[float], float]:
-    """Walk from each point to a minimum by the best of its neighbours, with smaller steps.
-
-    Returns the minima, lowest first, their excess, and the lowest value.
-    """
+    """Walk from points by the best neighbours to minima, lowest first; return the excess too."""
     moves = np.array(list(product((0.0, -1.0, 1.0), repeat=upper.size)))
     for _ in range(40):
         around = np.clip(points[:, None] + moves * steps[:, None], 0.0, upper)

@@ -33,11 +33,9 @@ _UNITS: dict[str, tuple[dict[str, float], float, str, str]] = {
 # What a number must be, and its lowest value.
 _RULES = {"mass": ("must be above 0", 0.0), "sigma": ("must be above 0", 0.0),
           "sigma_before": ("must be at least 0", 0.0)}  # fmt: skip
-# A defect of a measurement counts from so many standard errors on.
-_BEYOND = 5.0
-
-# A row: the cells by column, in kg and m/s, and under "where" its place in the source.
-_Row = dict[str, Any]
+_BEYOND = 5.0  # standard errors from which on a defect of a measurement counts
+_MEASURED = ("before", "after", "sigma", "sigma_before")
+_Row = dict[str, Any]  # cells by column, in kg and m/s, and under "where" the place in the source
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +67,8 @@ class ShotSet:
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)
         striker = self.before[:, :1]
         if (striker <= 0).any() or self.before[:, 1:].any():
-            raise ValueError(
-                f"set {self.name} has shots that do not begin with ball 1 striking the others at "
-                "rest"
-            )
+            rule = "do not begin with ball 1 striking the others at rest"
+            raise ValueError(f"set {self.name} has shots that {rule}")
         share = self.after / striker
         errors = np.hypot(self.sigma, share * self.sigma_before[:, :1]) / striker
         return speed * share.mean(axis=0), speed * np.sqrt((errors**2).sum(axis=0)) / len(striker)
@@ -85,14 +81,12 @@ class Shots:
     sets: tuple[ShotSet, ...]
 
     def __getitem__(self, name: str) -> ShotSet:
-        """Return the set of that name."""
         there = {one.name: one for one in self.sets}
         if name not in there:
             raise KeyError(f"no set {name!r}; there are {', '.join(there)}")
         return there[name]
 
     def __repr__(self) -> str:
-        """Return the sets with their sizes."""
         parts = [f"{s.name}: {len(s.shots)} shot{'s' * (len(s.shots) > 1)} of {len(s.types)} balls"
                  for s in self.sets]  # fmt: skip
         return f"Shots({', '.join(parts)})"
@@ -175,9 +169,8 @@ def read_shots(
     if sigma is not None:
         one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
         if "sigma" in there:
-            raise ValueError(
-                f"sigma = {sigma!r}; the table has a column sigma: leave out one of them"
-            )
+            rule = "the table has a column sigma: leave out one of them"
+            raise ValueError(f"sigma = {sigma!r}; {rule}")
     units = {"mass_unit": mass_unit, "velocity_unit": velocity_unit}
     for option, unit in units.items():
         one_of(option, unit or next(iter(_UNITS[option][0])), list(_UNITS[option][0]))
@@ -247,18 +240,15 @@ def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
     if rest != name and rest.isalpha() and rest.isupper():  # all other names are free
         _refuse(first[0]["where"], "set", f"set {name} has the balls {types} alone; is the row of "
                 f"ball {len(first) + 1} missing?  If not, give the set another name")  # fmt: skip
-    columns = (np.array([[row[column] for row in rows] for rows in table])
-               for column in ("before", "after", "sigma", "sigma_before"))  # fmt: skip
+    columns = (np.array([[row[name] for row in rows] for rows in table]) for name in _MEASURED)
     kinds, masses = zip(*((row["type"], row["mass"]) for row in first), strict=True)
     return ShotSet(name, kinds, tuple(shots), np.array(masses), *columns)
 
 
 def _check_physics(what: str, rows: list[_Row]) -> None:
     """Raise if no balls approach, balls pass through each other, or energy is gained."""
-    mass, before, after, sigma, earlier = np.array(
-        [[row[name] for name in ("mass", "before", "after", "sigma", "sigma_before")]
-         for row in rows]
-    ).T  # fmt: skip
+    columns = ("mass", *_MEASURED)
+    mass, before, after, sigma, earlier = np.array([[row[n] for row in rows] for n in columns])
     if (np.diff(before) >= 0).all():
         _refuse(rows[0]["where"], "before", f"{what}: no balls approach")
     through = -np.diff(after) > _BEYOND * np.hypot(sigma[:-1], sigma[1:])
@@ -269,8 +259,8 @@ def _check_physics(what: str, rows: list[_Row]) -> None:
     gain = 0.5 * (mass * (after**2 - before**2)).sum()
     error = np.sqrt((mass**2 * ((after * sigma) ** 2 + (before * earlier) ** 2)).sum())
     if gain > _BEYOND * error:
-        share = gain / (0.5 * mass * before**2).sum()
+        part = f"{100 * gain / (0.5 * mass * before**2).sum():.3g} % of its energy"
         raise ValueError(
-            f"{rows[0]['where']}, columns before and after: {what} gains {100 * share:.3g} % of "
-            f"its energy, {gain / error:.3g} standard errors; check units, signs and sigma"
+            f"{rows[0]['where']}, columns before and after: {what} gains {part}, "
+            f"{gain / error:.3g} standard errors; check units, signs and sigma"
         )

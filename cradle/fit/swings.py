@@ -58,7 +58,6 @@ class SwingFit:
         ])  # fmt: skip
 
     def __repr__(self) -> str:
-        """Return the summary in one line."""
         return f"SwingFit({'; '.join(self.summary().splitlines())})"
 
     def plot(self, axes: Any = None) -> Any:

@@ -7,6 +7,7 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -31,20 +32,13 @@ CHUNK = {2: 16_384, 3: 16_384, 4: 4096}
 
 
 def post_impact_velocities(
-    masses: ArrayLike,
-    velocities: ArrayLike,
-    restitution: ArrayLike,
-    forward: ArrayLike,
-    backward: ArrayLike | None = None,
-    *,
-    meeting: float = 0.5,
-    excess: str = "raise",
-    max_events: int = MAX_EVENTS,
-    progress: bool = False,
-) -> Vector:
+    masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, forward: ArrayLike,
+    backward: ArrayLike | None = None, *, meeting: float = 0.5, excess: str = "raise",
+    max_events: int = MAX_EVENTS, progress: bool = False,
+) -> Vector:  # fmt: skip
     """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
 
-    As `collide` with `ImpulseCorrelation`, without the path.
+    As `collide` with `ImpulseCorrelation`, without the path; references are there.
 
     Parameters
     ----------
@@ -72,10 +66,6 @@ def post_impact_velocities(
         If an impact takes more than `max_events` steps, or an outcome fails the check that every
         answer has to pass: for the first such chain.
 
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583.
-
     Examples
     --------
     The two ends of Fig. 4 in one call:
@@ -102,17 +92,10 @@ class Outcomes(NamedTuple):
 
 
 def outcomes(
-    masses: ArrayLike,
-    velocities: ArrayLike,
-    restitution: ArrayLike,
-    forward: ArrayLike,
-    backward: ArrayLike | None = None,
-    *,
-    meeting: float = 0.5,
-    excess: str = "raise",
-    max_events: int = MAX_EVENTS,
-    progress: bool = False,
-) -> Outcomes:
+    masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, forward: ArrayLike,
+    backward: ArrayLike | None = None, *, meeting: float = 0.5, excess: str = "raise",
+    max_events: int = MAX_EVENTS, progress: bool = False,
+) -> Outcomes:  # fmt: skip
     """Count the collisions of many chains too; all else as `post_impact_velocities`.
 
     Examples
@@ -124,8 +107,7 @@ def outcomes(
     check_options(meeting, excess, max_events)
     given = {"masses": masses, "velocities": velocities, "restitution": restitution}
     given |= {"forward": forward, "backward": forward if backward is None else backward}
-    # Whether these are in range is checked by the kernel.
-    arrays, lead = shaped(given, (0, 0, 1, 2, 2))
+    arrays, lead = shaped(given, (0, 0, 1, 2, 2))  # the kernel checks whether these are in range
     n, count = arrays[0].shape[-1], math.prod(lead)
     chunk = CHUNK[min(n, 4)]
     if count == 0:
@@ -152,10 +134,8 @@ def outcomes(
         if status != FINISHED:
             # Alone, with its record; it stops where it stopped here, and raises.
             m, v, e, f, b = (rows_of(array, lead, slice(failed, failed + 1))[0] for array in arrays)
-            model = ImpulseCorrelation(
-                f, b, meeting=meeting, excess="saturate", max_events=max_events
-            )
-            chain = Chain(m, v, e)
+            usual = ImpulseCorrelation(f, b, excess="saturate")
+            chain, model = Chain(m, v, e), replace(usual, meeting=meeting, max_events=max_events)
             model.solve(chain)
             raise ImpactNotCertified(chain, model, "among others it stops, alone it does not")
     v, hits, collapsed, *_ = whole
@@ -165,10 +145,7 @@ def outcomes(
 def shaped(
     given: dict[str, ArrayLike], missing: tuple[int, ...]
 ) -> tuple[list[Vector], tuple[int, ...]]:
-    """Return inputs as arrays, numbers as rows, and the shape of their leading axes.
-
-    Rows are shorter than the number of balls, that of the first one, by what is `missing`.
-    """
+    """Return inputs as rows, shorter than the balls by what is `missing`, and their other axes."""
     arrays = [numbers(name, values) for name, values in given.items()]
     n = arrays[0].shape[-1] if arrays[0].ndim else 0
     if n < 2:

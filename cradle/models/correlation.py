@@ -127,7 +127,10 @@ class ImpulseCorrelation:
         if job.status == UNFINISHED:
             steps = f"max_events = {self.max_events} steps, {job.tally('events')} events"
             told = f"the impact was not finished after {steps}"
-            raise ImpactNotFinished(told, trace, _over_largest(job, chain))
+            heaviest = np.ldexp(chain.masses.max(), -job.tally("mass_shift"))
+            fastest = np.ldexp(np.abs(chain.velocities).max(), -job.tally("shift"))
+            over_largest = float(job.stored() / (heaviest * fastest * fastest))
+            raise ImpactNotFinished(told, trace, over_largest)
         if job.status == UNSOUND:
             raise ImpactNotCertified(chain, self, DEFECTS[job.tally("defect")])
         return trace
@@ -140,27 +143,13 @@ class ImpulseCorrelation:
         kept = min(count, len(written.kinds))
         events = map(_event, written.kinds[:kept].tolist(), written.contacts[:kept].tolist())
         return Trace(
-            chain=chain,
-            model=self,
-            velocities=results.v[0],
-            impulses=results.p,
-            absorbed=results.a,
-            collisions=results.hits[0],
-            path=written.velocities[: kept + 1],
-            path_impulses=written.impulses[: kept + 1],
-            events=tuple(events),
+            chain, self, results.v[0], results.p, results.a, results.hits[0],
+            written.velocities[: kept + 1], written.impulses[: kept + 1], tuple(events),
             collapsed=bool(results.collapsed[0]),
-            saturated=tuple(c for c, held in enumerate(results.held.tolist()) if held),
+            saturated=tuple(np.flatnonzero(results.held).tolist()),
             margin=job.tally("margin"),
             left_out=count - kept if kept else 0,  # without a record not all are counted
-        )
-
-
-def _over_largest(job: Job, chain: Chain) -> float:
-    """Return what is stored, over the heaviest mass and the square of the largest speed."""
-    heaviest = np.ldexp(chain.masses.max(), -job.tally("mass_shift"))
-    fastest = np.ldexp(np.abs(chain.velocities).max(), -job.tally("shift"))
-    return float(job.stored() / (heaviest * fastest * fastest))
+        )  # fmt: skip
 
 
 def check_options(meeting: float, excess: str, max_events: int) -> None:
@@ -172,11 +161,9 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
     whole_number("max_events", max_events, "at least 1 and below 2**63", high=2**63 - 1)
 
 
-def check_values(
-    bounded: bool, masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike,
-    forward: ArrayLike, backward: ArrayLike,
-) -> None:  # fmt: skip
+def check_values(bounded: bool, *values: ArrayLike) -> None:
     """Raise if a value is outside its limits: what the kernel refuses, in words."""
+    masses, velocities, restitution, forward, backward = values
     m, v = checked_masses(masses), checked("velocities", velocities)
     checked_restitution(restitution)
     f, b = checked("forward", forward, *_RANGE), checked("backward", backward, *_RANGE)
@@ -193,8 +180,7 @@ def check_values(
     for name, given, bound in zip(("forward", "backward"), (f, b), bounds, strict=True):
         above = given > bound * LIMITS.rounded
         if above.any():
-            at = first(above)
-            mirrored = "" if name == "forward" else ", mirrored"
+            at, mirrored = first(above), ", mirrored" * (name == "backward")
             rule = (
                 f"at ball {at[-1] + 1}, counted from 0, it must not exceed {float(bound[at]):.6g} "
                 f"(Eq. 53{mirrored}): a larger ratio would make a contact pull; excess='saturate' "

@@ -16,7 +16,7 @@ from cradle.input.values import (
     refuse_where,
     row_of,
     whole_number,
-)
+)  # fmt: skip
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 # Beyond these the equations of one problem keep too few digits.
@@ -138,17 +138,11 @@ class QuadraticDissipation:
             events += [Event("end", c) for c in contacts]
             path += [v + change] * len(contacts)
             path_impulses += [impulses] * len(contacts)
+        collisions = np.bincount([event.contact for event in events], minlength=n - 1)
         trace = DissipationTrace(
-            chain=chain,
-            model=self,
-            velocities=path[-1],
-            impulses=impulses * unit,
-            absorbed=absorbed,
-            collisions=np.bincount([event.contact for event in events], minlength=n - 1),
-            path=np.array(path),
-            path_impulses=np.array(path_impulses) * unit,
-            events=tuple(events),
-        )
+            chain, self, path[-1], impulses * unit, absorbed, collisions,
+            np.array(path), np.array(path_impulses) * unit, tuple(events),
+        )  # fmt: skip
         if (u > rounding).any():
             told = f"the impact was not finished after max_problems = {self.max_problems}"
             raise ImpactNotFinished(told, trace, 0.0)  # between two problems nothing is stored
@@ -165,10 +159,7 @@ class QuadraticDissipation:
 
 
 def _parted(m: Vector, u: Vector, kappa: Vector, distance: float) -> tuple[Vector, Vector]:
-    """Return how the velocities of balls that touch change, and how fast the balls part after it.
-
-    u holds closing speeds, kappa the coefficients, `distance` that of the outer balls.
-    """
+    """Return how velocities of touching balls with closing speeds u change, and how they part."""
     from scipy.optimize import nnls
 
     # With w = - u+ >= 0 the problem is one of least squares: sum m dv^2 + sum kappa mu (u - w)^2,

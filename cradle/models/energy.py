@@ -8,14 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.input.values import (
-    Vector,
-    must_be,
-    number_or_row,
-    one_number,
-    row_of,
-    whole_number,
-)
+from cradle.input.values import Vector, must_be, number_or_row, one_number, row_of, whole_number
 from cradle.models.release import Process, Stopped
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -67,7 +60,8 @@ class EnergyTrace(CurvedTrace):
 class EnergyDistribution:
     """Impulses grow in proportions set by stored energies (Liu, Zhao and Brogliato).
 
-    While contacts i and j are closed, their impulses P grow by ::
+    While contacts i and j are closed, their impulses P grow by (Proc. R. Soc. A 464 (2008)
+    3193-3211) ::
 
         dP_j / dP_i = (k_j / k_i)^(1 / (1 + p)) (E_j / E_i)^(p / (1 + p))
 
@@ -89,7 +83,7 @@ class EnergyDistribution:
     gaps : bool
         Whether a contact that has ended leaves a gap that must close before it acts again, as
         between springs.  If not, it acts as soon as its balls approach, as in the authors' program
-        (OSNSMultipleImpact of Siconos).
+        (OSNSMultipleImpact of Siconos, https://siconos.org).
     rtol : float
         Relative tolerance of the integration.  An impact that goes on with speeds alone below rtol
         times that of the fastest closing is ended plastically.
@@ -102,10 +96,6 @@ class EnergyDistribution:
         If a value is outside its range; on solving, if the chain does not suit the values.
     ImpactNotFinished
         On solving, if `max_evaluations` is reached.
-
-    References
-    ----------
-    Liu, Zhao and Brogliato, Proc. R. Soc. A 464 (2008) 3193-3211; Siconos, https://siconos.org.
 
     Examples
     --------
@@ -141,9 +131,8 @@ class EnergyDistribution:
         try:
             process.run()
         except Stopped as stopped:
-            reason = (
-                f"the impact was not finished after {len(process.record) - 1} events: {stopped}"
-            )
+            count = len(process.record) - 1
+            reason = f"the impact was not finished after {count} events: {stopped}"
         kinds, contacts, states = zip(*process.record, strict=True)
         seen = []  # velocities and impulses in the chain's own units
         for y in (process.y, np.array(states).T, np.concatenate(process.steps, axis=1)):

@@ -31,11 +31,11 @@ class Process:
         # Absolute tolerance, in units of the first collision, but of each contact's own stiffness.
         own = np.concatenate([np.ones(n), k ** (-1 / (p + 1)), np.ones(n - 1)])
         self.atol = 0.1 * self.rtol * own
-        self.closed = np.zeros(n - 1, dtype=bool)
-        self.loading = np.zeros(n - 1, dtype=bool)  # closed, and its compression grows
-        self.weights = np.zeros(n - 1)  # dx / (u dt) of each contact, up to the next event
+        # Loading is what is closed, with a compression that grows.
+        self.closed, self.loading = np.zeros((2, n - 1), dtype=bool)
+        # Of each contact dx / (u dt), up to the next event, and the work absorbed.
+        self.weights, self.absorbed = np.zeros((2, n - 1))
         self.collisions = np.zeros(n - 1, dtype=np.int64)
-        self.absorbed = np.zeros(n - 1)
         self.collapsed = False
         #: Largest change of each velocity at an event so far: what rounding was left by.
         self.largest = np.zeros(n)
@@ -48,6 +48,10 @@ class Process:
         n = len(self.m)
         return y[:n], y[n : 2 * n - 1], y[2 * n - 1 :]
 
+    def depths(self, y: Vector) -> Vector:
+        """Return the compressions."""
+        return self.parts(y)[1]
+
     def speeds(self, y: Vector) -> Vector:
         """Return the closing speeds; what is no more than rounding is zero."""
         change = y[: len(self.m)]
@@ -57,20 +61,17 @@ class Process:
 
     def stored(self, y: Vector) -> Vector:
         """Return the energy that each contact stores."""
-        depth = np.maximum(self.parts(y)[1], 0.0)
-        energy: Vector = self.k * depth ** (self.p + 1.0) / (self.p + 1.0)
-        return energy
+        depth = np.maximum(self.depths(y), 0.0)
+        return np.asarray(self.k * depth ** (self.p + 1.0) / (self.p + 1.0))
 
     def rate(self, _: float, y: Vector) -> Vector:
-        """Return dy/dt while no contact opens, closes or turns.
-
-        A closed contact that a trial step draws apart pulls, so that the step sees no kink.
-        """
+        """Return dy/dt while no contact opens, closes or turns."""
         if self.evaluations == self.most:
             raise Stopped(f"max_evaluations = {self.most} reached")
         self.evaluations += 1
-        d, out = np.where(self.closed, self.parts(y)[1], 0.0), np.zeros_like(y)
+        d, out = np.where(self.closed, self.depths(y), 0.0), np.zeros_like(y)
         change, growth, force = self.parts(out)
+        # A closed contact that a trial step draws apart pulls, so that the step sees no kink.
         force[:] = self.k * np.copysign(np.abs(d) ** self.p, d)
         change[1:] = force
         change[:-1] -= force
@@ -93,8 +94,8 @@ class Process:
         released = np.divide(1.0, self.e**2, out=np.ones_like(self.e), where=self.e > 0.0)
         self.weights = np.where(self.closed & ~self.loading, released, self.closed | self.gaps)
         # Balls at rest together that nothing touches have no events.
-        d = self.parts(self.y)[1]
-        contacts = np.flatnonzero(self.closed | (d != 0.0) | (self.speeds(self.y) != 0.0)).tolist()
+        moving = (self.depths(self.y) != 0.0) | (self.speeds(self.y) != 0.0)
+        contacts = np.flatnonzero(self.closed | moving).tolist()
         crossings, extremes = zip(*map(self.watched, contacts), strict=True)
         options = {"rtol": self.rtol, "atol": self.atol, "events": crossings + extremes}
         side, end = np.where(self.closed, 1.0, -1.0), np.inf
@@ -108,7 +109,7 @@ class Process:
             turns = zip(contacts, found.t_events[half:], found.y_events[half:], strict=True)
             missed = [
                 t for c, ts, ys in turns for t, y in zip(ts, ys, strict=True)
-                if side[c] * self.parts(y)[1][c] < 0.0
+                if side[c] * self.depths(y)[c] < 0.0
             ]  # fmt: skip
             if not missed:
                 break
@@ -126,26 +127,19 @@ class Process:
 
     def watched(self, c: int) -> tuple[Any, Any]:
         """Return SciPy's events of contact c: it opens or closes; and it turns."""
-
-        def depth(y: Vector) -> float:
-            return float(self.parts(y)[1][c])
-
-        def speed(y: Vector) -> float:
-            return float(self.speeds(y)[c])
-
-        own = depth if self.closed[c] or self.gaps else speed
-        crossing = _leaving(1.0 if self.closed[c] else -1.0, own)
+        own = self.depths if self.closed[c] or self.gaps else self.speeds
+        crossing = _leaving(1.0 if self.closed[c] else -1.0, own, c)
         # Where a closed contact turns the rate has a kink, unless e = 1: no step may cross it.
         if self.closed[c]:
-            return crossing, _leaving(1.0 if self.loading[c] else -1.0, speed)
-        return crossing, lambda _, y: speed(y)
+            return crossing, _leaving(1.0 if self.loading[c] else -1.0, self.speeds, c)
+        return crossing, lambda _, y: self.speeds(y)[c]
 
     def turn(self, turned: list[int]) -> None:
         """Book extremes of compressions: the energy stored there, and maxima as events."""
         # Where several turn at one instant, only one has ended the integration.
         turning = self.loading == (self.speeds(self.y) < 0.0)
         turning[turned] = True
-        turning &= self.closed & (self.parts(self.y)[1] > 0.0)
+        turning &= self.closed & (self.depths(self.y) > 0.0)
         self.absorbed += np.where(turning, self.stored(self.y) * np.where(self.loading, 1, -1), 0.0)
         self.note("maximum_compression", turning & self.loading)
         self.loading ^= turning
@@ -210,11 +204,11 @@ class Process:
         self.record[-1] = (*self.record[-1][:2], self.y)
 
 
-def _leaving(side: float, value: Callable[[Vector], float]) -> Any:
-    """Return SciPy's event, an end, of a value leaving its side of zero; zero is still there."""
+def _leaving(side: float, values: Callable[[Vector], Vector], c: int) -> Any:
+    """Return SciPy's event, an end, of a contact's value leaving its side of zero, itself in."""
 
     def event(_: float, y: Vector) -> float:
-        return value(y) or side
+        return float(values(y)[c]) or side
 
     vars(event).update(terminal=True, direction=-side)
     return event

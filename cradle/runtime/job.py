@@ -35,13 +35,9 @@ __all__ = ["DEFECTS", "FINISHED", "LARGE", "REFUSED", "UNFINISHED", "UNSOUND", "
 
 # Contacts touched between two pauses, plain and compiled: some hundredths of a second.
 _EFFORT = {False: 5_000, True: 2_000_000}
-# Chains times balls from which on compiling is worth the wait at once.
-LARGE = 50_000
-# No limit.
-_ENDLESS = 2**62
-#: Events that one round may write: each contact may end, close, collapse, pass its maximum, and
-#: repeat itself.
-_ROUND = 5
+LARGE = 50_000  #: Chains times balls from which on compiling is worth the wait at once.
+_ENDLESS = 2**62  # no limit
+_ROUND = 5  # events of a contact in one round: end, close, collapse, maximum, repetition
 
 
 class Stopped(Exception):
