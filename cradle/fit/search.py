@@ -55,8 +55,7 @@ def scan(function: Function, upper: Vector) -> Found:
     # The first point of a level stretch stands for it.
     lows = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
     cells = np.gradient(grid)
-    best, minima, lowest = _walked(function, points[lows], cells[lows, None], upper)
-    modes = tuple(Mode(float(x), y) for x, y in zip(best[:, 0], minima, strict=True))
+    (modes,), lowest = _walked(function, points[lows], cells[lows, None], upper)
     # Minima narrower than a cell of the grid count too.
     extra = np.array([mode for mode in modes if mode.excess <= RISE])
     x, at = np.unique(np.concatenate([grid, extra[:, 0]]), return_index=True)
@@ -98,26 +97,25 @@ def refine(function: Function, upper: Vector) -> Found:
     near = np.all(np.abs(points[some, None] - points[None, some]) < 1.5 * step, axis=-1)
     lower = values[some][None, :] < values[some][:, None]
     lows = points[some[~np.any(near & lower, axis=1)]]
-    best, minima, lowest = _walked(function, lows, np.broadcast_to(step, lows.shape), upper)
+    each, lowest = _walked(function, lows, np.broadcast_to(step, lows.shape), upper)
     excess = values - lowest
     scans = []
-    for axis, bound in enumerate(upper.tolist()):
+    for axis, (bound, modes) in enumerate(zip(upper.tolist(), each, strict=True)):
         # The confidence set, to about a step.
         places, half = np.unique(points[excess <= RISE, axis]), 0.5 * step[axis]
-        places = places if places.size else best[:1, axis]
+        places = places if places.size else np.array([modes[0].value])
         parts = np.split(places, np.flatnonzero(np.diff(places) > 3.0 * half) + 1)
         ends = [(max(0.0, float(part[0] - half)), min(float(part[-1] + half), bound))
                 for part in parts]  # fmt: skip
         low = [k for k in np.argsort(points[:, axis]) if excess[k] <= 4 * RISE]
-        modes = tuple(Mode(float(x), y) for x, y in zip(best[:, axis], minima, strict=True))
         scans.append(Scan(modes, tuple(ends), points[low, axis], excess[low]))
     return scans, points, np.exp(-0.5 * excess), lowest
 
 
 def _walked(
     function: Function, points: Vector, steps: Vector, upper: Vector
-) -> tuple[Vector, list[float], float]:
-    """Walk from points by the best neighbours to minima, lowest first; return the excess too."""
+) -> tuple[list[tuple[Mode, ...]], float]:
+    """Walk from points by the best neighbours to minima; return them by axis, lowest first."""
     moves = np.array(list(product((0.0, -1.0, 1.0), repeat=upper.size)))
     for _ in range(40):
         around = np.clip(points[:, None] + moves * steps[:, None], 0.0, upper)
@@ -128,4 +126,5 @@ def _walked(
     minima = values.min(axis=1)
     order = np.argsort(minima, kind="stable")
     lowest = float(minima[order[0]])
-    return points[order], (minima[order] - lowest).tolist(), lowest
+    excess = (minima[order] - lowest).tolist()
+    return [tuple(map(Mode, axis, excess)) for axis in points[order].T.tolist()], lowest

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -99,9 +100,8 @@ class Shots:
     def without(self, *names: str) -> Shots:
         """Return the shots less some sets, not all of them: those are to be predicted."""
         there = [one.name for one in self.sets]
-        for name in names:
-            if name not in there:
-                raise ValueError(f"no set {name!r} to leave out; there are {', '.join(there)}")
+        for name in (name for name in names if name not in there):
+            raise ValueError(f"no set {name!r} to leave out; there are {', '.join(there)}")
         kept = tuple(one for one in self.sets if one.name not in names)
         if not kept:
             raise ValueError(f"no set is left without {', '.join(names)}")
@@ -221,19 +221,18 @@ def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
     """Put the rows of a set together; all its shots have the same balls."""
     table = [sorted(rows, key=lambda row: row["ball"]) for rows in shots.values()]
     first = table[0]
-    for (shot, given), rows in zip(shots.items(), table, strict=True):
+    for shot, rows in zip(shots, table, strict=True):
         places, what = [row["ball"] for row in rows], f"set {name}, shot {shot}"
         if len(rows) < 2 or places != list(range(1, len(rows) + 1)):
-            _refuse(given[0]["where"], "ball", f"{what} has balls {places}; each shot needs "
+            _refuse(shots[shot][0]["where"], "ball", f"{what} has balls {places}; each shot needs "
                     "1, 2, ... N, each once, N >= 2")  # fmt: skip
         if len(rows) != len(first):
             _refuse(rows[0]["where"], "ball", f"{what} has {len(rows)} balls; the first shot of "
                     f"the set has {len(first)}")  # fmt: skip
-        for row, usual in zip(rows, first, strict=True):
-            for column in ("type", "mass"):
-                if row[column] != usual[column]:
-                    _refuse(row["where"], column, f"{row[column]!r}; ball {row['ball']} of set "
-                            f"{name} has {usual[column]!r} elsewhere")  # fmt: skip
+        for (row, usual), column in product(zip(rows, first, strict=True), ("type", "mass")):
+            if row[column] != usual[column]:
+                _refuse(row["where"], column, f"{row[column]!r}; ball {row['ball']} of set "
+                        f"{name} has {usual[column]!r} elsewhere")  # fmt: skip
         _check_physics(what, rows)
     types = "".join(row["type"] for row in first)
     rest = name.removeprefix(types)

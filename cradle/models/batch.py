@@ -16,13 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from cradle.chain import Chain
 from cradle.input.values import Vector, numbers
 from cradle.kernel import Inputs, Options, Outputs
-from cradle.models.correlation import (
-    MAX_EVENTS,
-    ImpulseCorrelation,
-    check_options,
-    check_values,
-    raise_refused,
-)
+from cradle.models.correlation import MAX_EVENTS, ImpulseCorrelation, check_values, raise_refused
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
 from cradle.trace import ImpactNotCertified
 
@@ -104,17 +98,16 @@ def outcomes(
     >>> found.collisions[0].tolist(), found.collapsed.tolist()  # Fig. 6 is a map of such counts
     ([1, 1], [False, True])
     """
-    check_options(meeting, excess, max_events)
+    law = ImpulseCorrelation(0.0, meeting=meeting, excess=excess, max_events=max_events)
+    options = Options(law.meeting, law.max_events, law.excess == "raise")
     given = {"masses": masses, "velocities": velocities, "restitution": restitution}
     given |= {"forward": forward, "backward": forward if backward is None else backward}
     arrays, lead = shaped(given, (0, 0, 1, 2, 2))  # the kernel checks whether these are in range
     n, count = arrays[0].shape[-1], math.prod(lead)
     chunk = CHUNK[min(n, 4)]
     if count == 0:
-        check_values(excess == "raise", *given.values())
-    whole = outputs(count, n)
-    options = Options(float(meeting), int(max_events), excess == "raise")
-    large = count * n >= LARGE
+        check_values(options.bounded, *given.values())
+    whole, large = outputs(count, n), count * n >= LARGE
 
     def solve(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
         """Solve the chunk of chains that begins there; return how it ended, and where."""
@@ -134,8 +127,7 @@ def outcomes(
         if status != FINISHED:
             # Alone, with its record; it stops where it stopped here, and raises.
             m, v, e, f, b = (rows_of(array, lead, slice(failed, failed + 1))[0] for array in arrays)
-            usual = ImpulseCorrelation(f, b, excess="saturate")
-            chain, model = Chain(m, v, e), replace(usual, meeting=meeting, max_events=max_events)
+            chain, model = Chain(m, v, e), replace(law, forward=f, backward=b, excess="saturate")
             model.solve(chain)
             raise ImpactNotCertified(chain, model, "among others it stops, alone it does not")
     v, hits, collapsed, *_ = whole

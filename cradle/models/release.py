@@ -16,11 +16,10 @@ class Stopped(Exception):
 
 
 class Process:
-    """The motion of a chain's springs in its own units, and the record of it.
+    """The motion of a chain's springs in its own units, and the record of it."""
 
-    The state of N balls is one vector y: changes of velocity (N), the x of `EnergyDistribution`
-    (N - 1; below zero they are gaps) and impulses (N - 1).
-    """
+    # The state of N balls is one vector y: changes of velocity (N), the x of `EnergyDistribution`
+    # (N - 1; below zero they are gaps) and impulses (N - 1).
 
     def __init__(self, m: Vector, u: Vector, k: Vector, e: Vector, model: Any):
         n, p = len(m), model.exponent
