@@ -12,31 +12,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_Vector = NDArray[np.float64]
+from cradle.input.values import Vector
 
 # Of the picture of a chain, in pixels: a row for each state, the heaviest ball, the fastest ball's
 # arrow, and the room of balls that are left out.
 _ROW, _RADIUS, _ARROW, _OMITTED = 70, 18.0, 30.0, 28.0
 
 
-def as_text(values: _Vector) -> str:
+def as_text(values: Vector) -> str:
     """Return a row of velocities or impulses as people write it, six digits of each."""
     return f"[{', '.join(f'{value:.6g}' for value in without_rounding(values).tolist())}]"
 
 
-def without_rounding(values: _Vector) -> _Vector:
+def without_rounding(values: Vector) -> Vector:
     """Return velocities or impulses without what is left of sums that should be zero."""
     small = np.abs(values) < 1e-12 * np.abs(values).max(initial=0.0)
     return np.where(small, 0.0, values) + 0.0
 
 
 def as_html(
-    masses: _Vector, states: Mapping[str, _Vector], columns: Mapping[str, NDArray[Any]]
+    masses: Vector, states: Mapping[str, Vector], columns: Mapping[str, NDArray[Any]]
 ) -> str:
-    """Return a picture of a chain in one or several states, and a table below it.
-
-    Of a chain of more than 12 balls the first eight and the last four are shown.
-    """
+    """Return a picture of a chain in one or several states, and a table below it."""
     n = len(masses)
     balls = list(range(n)) if n <= 12 else [*range(8), *range(n - 4, n)]
     rows = [["ball", *columns]]
@@ -53,7 +50,7 @@ def as_html(
     return f"<div>{_picture(masses, states, balls)}{table}</div>"
 
 
-def _picture(masses: _Vector, states: Mapping[str, _Vector], balls: list[int]) -> str:
+def _picture(masses: Vector, states: Mapping[str, Vector], balls: list[int]) -> str:
     """Draw the chain once for each state, with an arrow above each ball that moves; in pixels."""
     # At least two pixels, or a light ball would not be seen.
     radii = np.maximum(_RADIUS * np.cbrt(masses[balls] / masses.max()), 2.0)

@@ -37,10 +37,8 @@ class CurvedTrace(Trace):
 
     def curve(self) -> tuple[Vector, Vector]:
         """Return impulses and velocities at the steps of the integration, and at the end."""
-        return (
-            np.vstack([self.step_impulses, self.impulses]),
-            np.vstack([self.step_velocities, self.velocities]),
-        )
+        impulses = np.vstack([self.step_impulses, self.impulses])
+        return impulses, np.vstack([self.step_velocities, self.velocities])
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -138,21 +136,13 @@ class EnergyDistribution:
         for y in (process.y, np.array(states).T, np.concatenate(process.steps, axis=1)):
             change, _, impulses = process.parts(y)
             seen += [chain.velocities + speed * change.T, mass * speed * impulses.T]
+        events = tuple(map(Event, kinds[1:], contacts[1:]))
+        v, impulses, path, path_impulses, step_v, step_impulses = seen
         trace = EnergyTrace(
-            chain=chain,
-            model=self,
-            velocities=seen[0],
-            impulses=seen[1],
-            absorbed=mass * speed * speed * process.absorbed,
-            collisions=process.collisions,
-            path=seen[2],
-            path_impulses=seen[3],
-            events=tuple(map(Event, kinds[1:], contacts[1:])),
-            step_velocities=seen[4],
-            step_impulses=seen[5],
-            evaluations=process.evaluations,
-            collapsed=process.collapsed,
-        )
+            chain, self, v, impulses, mass * speed * speed * process.absorbed, process.collisions,
+            path, path_impulses, events, process.collapsed, step_velocities=step_v,
+            step_impulses=step_impulses, evaluations=process.evaluations,
+        )  # fmt: skip
         if reason:
             raise ImpactNotFinished(reason, trace)
         return trace

@@ -59,27 +59,23 @@ _deciding = threading.Lock()
 def unit(rooms: tuple[str, ...] = plain.ROOMS) -> str:
     """Return rooms of the kernel as one source, without comments and docstrings."""
     body: list[ast.stmt] = []
+    documented = ast.Module | ast.ClassDef | ast.FunctionDef
     for room in rooms:
         tree = ast.parse(Path(plain.__file__).with_name(f"{room}.py").read_text(encoding="utf-8"))
         for node in ast.walk(tree):
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
-                first = node.body[0]
-                if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
-                    del node.body[0]
-        body += [
-            node
-            for node in tree.body
-            if not (isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cradle."))
-        ]
+            if isinstance(node, documented) and ast.get_docstring(node):
+                del node.body[0]
+        for part in tree.body:
+            if not (isinstance(part, ast.ImportFrom) and f"{part.module}".startswith("cradle.")):
+                body.append(part)
     return ast.unparse(ast.Module(body, [])) + "\n"
 
 
 class _Numba(ast.NodeTransformer):
-    """Write every index that is worked out as a number without a sign, and what is inlined.
+    """Write every index that is worked out as a number without a sign, and what is inlined."""
 
-    An index below zero would count from the end.  The kernel has none, but numba would ask at each
-    of them, which takes a quarter of an impact's time.
-    """
+    # An index below zero would count from the end.  The kernel has none, but numba would ask at
+    # each of them, which takes a quarter of an impact's time.
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         self.generic_visit(node)
@@ -159,8 +155,7 @@ def compiled() -> Any | None:
     vars(module)["unsigned"] = np.uint64
     sys.modules[name] = module
     exec(compile(_for_numba(unit()), module.__file__, "exec"), vars(module))
-    # numba compiles a function anew for each whole number that is written down in a call; not so
-    # for these.
+    # For numbers of its own numba does not compile a function anew at each call, as for Python's.
     for constant, value in vars(module).items():
         if type(value) is int:
             vars(module)[constant] = np.int64(value)
