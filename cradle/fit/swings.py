@@ -26,9 +26,7 @@ UNITS = {"period": " s", "damping": " 1/s", "restitution": "", "gaps": " m"}
 # errors; then parts of the film are compared, for these numbers of parts.
 _CHANCE, _FAR, _PARTS = 1e-3, 3.3, (4, 6, 8, 12, 16, 24, 32)
 _GRAVITY = 9.81
-
-# Numbers, what their swing leaves of the readings, and its slopes.
-_Place = tuple[Vector, Vector, Vector]
+_Place = tuple[Vector, Vector, Vector]  # numbers, what their swing leaves, and its slopes
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -190,8 +190,7 @@ def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
         part = array.reshape(1, size)
     elif array.shape[:-1] == lead and array.flags.c_contiguous:
         part = array.reshape(-1, size)[rows]
-    else:
-        # Without making the others.
+    else:  # without making the others
         full = np.broadcast_to(array, (*lead, size))
         return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
     # Compiled code is made for arrays that may be written to; it writes to no input.
