@@ -22,7 +22,7 @@ class Model(Protocol):
 def collide(
     chain: Chain, model: Model, *, record: bool | None = None, progress: bool = False
 ) -> Trace:
-    """Solve one impact.
+    """Solve one impact: return its path and outcome; if no balls approach, without any event.
 
     Parameters
     ----------
@@ -35,11 +35,6 @@ def collide(
         million numbers (2 N - 1 for each event) is cut, with a warning.
     progress : bool
         Show how many events `ImpulseCorrelation` has counted so far; other models ignore it.
-
-    Returns
-    -------
-    Trace
-        The path and the outcome.  If no balls approach, the path has no events.
 
     Raises
     ------

@@ -30,9 +30,9 @@ def post_impact_velocities(
     backward: ArrayLike | None = None, *, meeting: float = 0.5, excess: str = "raise",
     max_events: int = MAX_EVENTS, progress: bool = False,
 ) -> Vector:  # fmt: skip
-    """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
+    """Post-impact velocities of many chains of N balls at once, shape (..., N), m/s.
 
-    As `collide` with `ImpulseCorrelation`, without the path; references are there.
+    Leading axes broadcast.  As `collide` with `ImpulseCorrelation`, without the path.
 
     Parameters
     ----------
@@ -46,11 +46,6 @@ def post_impact_velocities(
         As for `ImpulseCorrelation`.
     progress : bool
         Show a progress bar.
-
-    Returns
-    -------
-    ndarray, shape (..., N)
-        Velocities after the impact, m/s.
 
     Raises
     ------
