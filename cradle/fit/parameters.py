@@ -9,7 +9,7 @@ coefficients of restitution they are taken as linear over one standard error.
 from __future__ import annotations
 
 from collections.abc import KeysView, Mapping, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -58,8 +58,7 @@ def triplet_keys(types: Sequence[str]) -> tuple[list[Key], list[Key]]:
 
 def ratio_keys(types: Sequence[str]) -> KeysView[Key]:
     """Return the ratio parameters of a chain, of both ways, each once."""
-    both = zip(*triplet_keys(types), strict=True)
-    return dict.fromkeys(key for keys in both for key in keys).keys()
+    return dict.fromkeys(chain.from_iterable(zip(*triplet_keys(types), strict=True))).keys()
 
 
 def fitted_keys(types: Sequence[str]) -> KeysView[Key]:

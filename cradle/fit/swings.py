@@ -73,7 +73,9 @@ def fit_swing(
     """Fit `swing` to a film of equal balls, with one restitution and one gap for all contacts.
 
     At the first frame some balls, let go at one moment, are on their way; the others are at rest.
-    Places and velocities there are fitted too, as is where each ball hangs.
+    Places and velocities there are fitted too, as is where each ball hangs.  What comes back are
+    values and 95 % intervals, by profiles of chi-square.  Where the law fails (by chi-square, or
+    residuals alike from frame to frame) they are widened by how parts of the film differ.
 
     Parameters
     ----------
@@ -89,12 +91,6 @@ def fit_swing(
         What is fitted: "period" of small swings, s; "damping", 1/s; "restitution"; "gaps", m.
     known : mapping of str to float, optional
         What is not fitted; left out, no damping, restitution 1, no gaps.
-
-    Returns
-    -------
-    SwingFit
-        Values and 95 % intervals, by profiles of chi-square.  Where the law fails (by chi-square,
-        or residuals alike from frame to frame) they are widened by how parts of the film differ.
 
     Raises
     ------

@@ -16,7 +16,6 @@ class Model(Protocol):
 
     def solve(self, chain: Chain) -> Trace:
         """Return the path of the impact of `chain`."""
-        ...
 
 
 def collide(

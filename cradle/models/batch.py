@@ -49,11 +49,9 @@ def post_impact_velocities(
 
     Raises
     ------
-    ValueError
-        If a value or a shape is wrong.
-    ImpactNotFinished, ImpactNotCertified
-        If an impact takes more than `max_events` steps, or an outcome fails the check that every
-        answer has to pass: for the first such chain.
+    ValueError, ImpactNotFinished, ImpactNotCertified
+        If a value or a shape is wrong; for the first chain whose impact takes more than
+        `max_events` steps, or whose outcome fails the check that every answer has to pass.
 
     Examples
     --------
