@@ -12,8 +12,7 @@ from cradle.chain import Chain
 from cradle.formatting import as_html, as_text, without_rounding
 from cradle.input.values import Vector, shown
 
-if TYPE_CHECKING:
-    # At run time pandas and matplotlib are imported by the methods that need them.
+if TYPE_CHECKING:  # at run time these are imported by the methods that need them
     import pandas as pd
     from matplotlib.axes import Axes
 
@@ -106,8 +105,7 @@ class Trace:
         steps, balls = self.path.shape
         kinds = ["before", *(event.kind for event in self.events)]
         contacts = pd.Series([None, *(event.contact for event in self.events)], dtype="Int64")
-        ends = np.zeros((steps, 1))
-        impulses = np.hstack([ends, self.path_impulses, ends])
+        impulses = np.pad(self.path_impulses, ((0, 0), (1, 1)))
         return pd.DataFrame(
             {
                 "step": np.repeat(np.arange(steps), balls),
@@ -149,10 +147,8 @@ class Trace:
         return as_html(self.chain.masses, states, columns)
 
     def __repr__(self) -> str:
-        return (
-            f"Trace(velocities={as_text(self.velocities)}, "
-            f"collisions={self.collisions.tolist()}, collapsed={self.collapsed})"
-        )
+        counts = f"collisions={self.collisions.tolist()}, collapsed={self.collapsed}"
+        return f"Trace(velocities={as_text(self.velocities)}, {counts})"
 
 
 class ImpactNotFinished(RuntimeError):

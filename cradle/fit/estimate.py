@@ -154,8 +154,7 @@ def _restitution_values(
             raise ValueError(f"{name} = {value!r}; must be a number, or a number and its error")
         e, error = (*numbers, 0.0)[:2]
         values[key] = one_number(name, e, "must lie in [0, 1]", 0.0, 1.0), error
-        if error < 0:
-            raise ValueError(f"{name}[1] = {error!r}; a standard error must be at least 0")
+        one_number(f"{name}[1]", error, "a standard error must be at least 0", 0.0)
     for one in sets:
         for key in pair_keys(one.types):
             if key not in values:

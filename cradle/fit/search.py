@@ -1,8 +1,8 @@
 """Exhaustive search: a grid over the whole range, then finer grids where it matters.
 
-Chi-square of an impact has several minima and flat stretches; a search from one start finds one of
-the minima.  A function takes points of shape (P, parameters), from 0 to `upper`, and both searches
-return what each axis shows, the points, how likely each is up to a factor, and the lowest value.
+Chi-square of an impact has several minima and flat stretches.  A function takes points of shape
+(P, parameters), from 0 to `upper`, and both searches return what each axis shows, the points, how
+likely each is up to a factor, and the lowest value.
 """
 
 from __future__ import annotations

@@ -31,14 +31,11 @@ from cradle.kernel.state import LIMITS
 from cradle.runtime.job import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job, outputs
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
-#: Steps after which an impact is given up, unless told otherwise.
-MAX_EVENTS = 5_000_000
+MAX_EVENTS = 5_000_000  #: Steps after which an impact is given up, unless told otherwise.
 
-# Numbers that a path may hold unless it is asked for in full: 80 MB.
-_MOST_NUMBERS = 10_000_000
+_MOST_NUMBERS = 10_000_000  # that a path may hold unless it is asked for in full: 80 MB
 _EVERY = 2**40
-#: What is asked of a ratio.
-_RANGE = ("must lie in [0, 1]", 0.0, 1.0)
+_RANGE = ("must lie in [0, 1]", 0.0, 1.0)  # what is asked of a ratio
 _KINDS = ("maximum_compression", "end", "close", "collapse", "repetition")
 # Each event once: the same ones come again and again.
 _event = functools.cache(lambda kind, contact: Event(_KINDS[kind], contact))

@@ -20,8 +20,7 @@ from cradle.input.values import (
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 # Beyond these the equations of one problem keep too few digits.
-_LARGEST = 1e9
-_LIGHTEST = 1e-6
+_LARGEST, _LIGHTEST = 1e9, 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)

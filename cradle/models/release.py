@@ -35,12 +35,9 @@ class Process:
         # Of each contact dx / (u dt), up to the next event, and the work absorbed.
         self.weights, self.absorbed = np.zeros((2, n - 1))
         self.collisions = np.zeros(n - 1, dtype=np.int64)
-        self.collapsed = False
-        #: Largest change of each velocity at an event so far: what rounding was left by.
-        self.largest = np.zeros(n)
-        self.record = [("", -1, self.y)]
-        self.steps = [self.y[:, None]]
-        self.evaluations = 0
+        self.evaluations, self.collapsed = 0, False
+        self.largest = np.zeros(n)  # change of each velocity at an event: what rounding was left by
+        self.record, self.steps = [("", -1, self.y)], [self.y[:, None]]
 
     def parts(self, y: Vector) -> tuple[Vector, Vector, Vector]:
         """Return changes of velocity, compressions and impulses, as views of y."""

@@ -2,8 +2,7 @@
 
 The rooms of `cradle.kernel` are joined to one source file, named after a hash of their text and of
 how they are compiled, and compiled as one unit, kept on disk by numba: an edit anywhere makes a new
-unit, where numba alone would ask of each function its own file only.  Compiling and loading take
-seconds, so small work runs plain until plain work has taken as long.
+unit, where numba alone would ask of each function its own file only.
 """
 
 from __future__ import annotations
@@ -27,11 +26,10 @@ import numpy as np
 from cradle import kernel as plain
 from cradle.input.values import one_of
 
-#: Set this environment variable to ``plain`` to run the kernel as it stands, to ``compiled`` to
-#: compile at the first call.
+#: Environment variable: ``plain`` runs the kernel as it stands, ``compiled`` compiles at once.
 VARIABLE = "CRADLE_KERNEL"
 #: Seconds of plain work after which compiling pays, and loading what is compiled already: about as
-#: long as these take.
+#: long as these take.  Until then work runs plain.
 PAYS_AFTER, LOADS_AFTER = 10.0, 0.5
 
 # The same arithmetic as Python's: no reordering, no contraction; a division by zero gives infinity,
