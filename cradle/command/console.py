@@ -6,9 +6,7 @@ import csv
 import io
 import json
 import math
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -90,17 +88,6 @@ def picture(_: click.Context, __: click.Parameter, path: str | None) -> str | No
 def image_format(path: str) -> str:
     """Return the format of a picture by the ending of its file; without one matplotlib adds one."""
     return Path(path).suffix[1:] or "png"
-
-
-@contextmanager
-def waiting(hint: str, after: float = 2.0) -> Iterator[None]:
-    """Say after some seconds that work goes on, and what would be faster."""
-    teller = threading.Timer(after, click.echo, [f"cradle: still working; {hint}"], {"err": True})
-    teller.start()
-    try:
-        yield
-    finally:
-        teller.cancel()
 
 
 def plot_fits(fits: Sequence[Any], path: str) -> None:

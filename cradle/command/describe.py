@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Literal, NamedTuple
 
 import click
 
 import cradle
 from cradle.advice.choice import made
-from cradle.command.console import waiting
 from cradle.input.values import one_number
 
 UNITS = {"kg": 1.0, "g": 1e-3}
@@ -72,13 +72,18 @@ class Described(NamedTuple):
     assumed: tuple[str, ...]
     letters: str = ""
 
-    def waiting(self) -> AbstractContextManager[None]:
-        """Return what says that long work goes on, and what would be faster."""
-        return waiting(
-            "--ratio 0.1 or --model sequential would take seconds"
-            if isinstance(self.model, (cradle.SpringChain, cradle.EnergyDistribution))
-            else "fewer balls would be faster"
-        )
+    @contextmanager
+    def waiting(self, after: float = 2.0) -> Iterator[None]:
+        """Say after some seconds that work goes on, and what would be faster."""
+        slow = isinstance(self.model, (cradle.SpringChain, cradle.EnergyDistribution))
+        quicker = "--ratio 0.1 or --model sequential would take seconds"
+        said = f"cradle: still working; {quicker if slow else 'fewer balls would be faster'}"
+        teller = threading.Timer(after, click.echo, [said], {"err": True})
+        teller.start()
+        try:
+            yield
+        finally:
+            teller.cancel()
 
     @property
     def note(self) -> str:

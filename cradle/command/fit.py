@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cradle.command.console import format_options, picture, plot_fits, show, text
+from cradle.input.values import one_number
+from cradle.tables import data_folder
 
 if TYPE_CHECKING:
     from cradle.fit import Fit, Shots
@@ -66,7 +68,6 @@ def fit(
     from cradle.fit.parameters import parameter_key, ratio_keys, types_in_a_row
     from cradle.fit.result import FOLDED, RESULT_COLUMNS
     from cradle.fit.shots import chance
-    from cradle.input.values import one_number
 
     if predict is not None and as_csv:
         raise click.UsageError("--csv prints the fitted values alone; with --predict give --json")
@@ -208,6 +209,4 @@ def template() -> None:
     Examples:
       cradle template
     """
-    from cradle.tables import data_folder
-
     click.echo((data_folder() / "shots_template.csv").read_text(encoding="utf-8"), nl=False)

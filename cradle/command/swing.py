@@ -7,24 +7,21 @@ from typing import Any
 
 import click
 
+import cradle
+from cradle.advice.choice import made
+from cradle.command import describe
 from cradle.command.console import format_options, picture, show
-from cradle.command.describe import (
-    chain_options,
-    described,
-    numbers_of,
-    one_or_all,
-    pendulum_length,
-    swing_options,
-)
+from cradle.command.describe import numbers_of, one_or_all
+from cradle.input.values import one_number, whole_number
 
 
 @click.command()
-@chain_options
+@describe.chain_options
 @click.option("--pull", callback=numbers_of, help="How many balls are pulled aside: 2 at the left "
               "end; 0,1 one at the right; 1,1 one at each [1].")  # fmt: skip
 @click.option("--by", default=0.05, help="How far, m along the arc, at most a quarter of a "
               "circle [0.05].")  # fmt: skip
-@swing_options("0.3")
+@describe.swing_options("0.3")
 @click.option("--gaps", callback=numbers_of, help="Between the balls at rest, m [0].")
 @click.option("--damping", callback=numbers_of, help="Of each swing's amplitude, 1/s [0].")
 @click.option("--seconds", default=2.0, help="How long it swings [2].")
@@ -48,20 +45,14 @@ def swing(
       cradle swing ABACA --by 0.03 --seconds 1
       cradle swing --masses 1,1,1,1,1 --csv
     """
-    from cradle.advice.choice import made
-    from cradle.chain import Chain
-    from cradle.input.values import one_number, whole_number
-    from cradle.swinging.pendulums import Pendulums
-    from cradle.swinging.swing import swing as swing_freely
-
     if (options["speed"], options["velocities"]) != (None, None):
         raise click.UsageError("leave --speed and --velocities out: the first ball is pulled aside "
                                "(--pull) and let go")  # fmt: skip
-    length = pendulum_length(options.pop("length"), options.pop("period"))
-    given = described(**options)
+    length = describe.pendulum_length(options.pop("length"), options.pop("period"))
+    given = describe.described(**options)
     chain = given.chain
-    hanging = Pendulums(0.3 if length is None else length, gaps=one_or_all(gaps or [0.0]),
-                        damping=one_or_all(damping or [0.0]))  # fmt: skip
+    hanging = cradle.Pendulums(0.3 if length is None else length, gaps=one_or_all(gaps or [0.0]),
+                               damping=one_or_all(damping or [0.0]))  # fmt: skip
     far = float(hanging.reach(len(chain))[0])
     rule = f"must be above 0 and at most a quarter of a circle of that --length, {far:.4g} m"
     one_number("--by", by, rule, 0.0, far, open_low=True)
@@ -71,10 +62,10 @@ def swing(
         steps = math.ceil(20 * seconds * hanging.natural_frequency(len(chain))[0] / math.tau)
     still = [0.0] * len(chain)
     places = _released(pull or [1.0], by, len(chain))
-    balls = Chain(chain.masses, still, chain.restitution)
+    balls = cradle.Chain(chain.masses, still, chain.restitution)
     times = [seconds * k / steps for k in range(steps + 1)]
     with given.waiting():
-        run = swing_freely(balls, given.model, places, times, pendulums=hanging)
+        run = cradle.swing(balls, given.model, places, times, pendulums=hanging)
     rows = [
         {"time": float(time), **{f"ball {k + 1}": float(x) + 0.0 for k, x in enumerate(places)}}
         for time, places in zip(run.times, run.positions, strict=True)
