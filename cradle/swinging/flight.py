@@ -28,11 +28,7 @@ _DEGREE = 14
 
 
 def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -> float:
-    """Return when ``level + sum Re(C exp(rate t))`` falls to zero; parting, it starts there.
-
-    One term without decay, or about the level zero, has a root in closed form; one with decay has
-    turning points in closed form, and its first minimum is the lowest.
-    """
+    """Return when ``level + sum Re(C exp(rate t))`` falls to zero; parting, it starts there."""
     waves = [(c, rate) for c, rate in waves if c != 0.0]
     if not waves:
         return math.inf
@@ -55,6 +51,7 @@ def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -
     def value(time: float) -> float:
         return level + (c * cmath.exp(rate * time)).real
 
+    # With decay the turning points have a closed form, and the first minimum is the lowest.
     low = (-0.5 * math.pi - cmath.phase(c * rate)) % (2.0 * math.pi) / rate.imag
     high = max(low - math.pi / rate.imag, 0.0)
     if value(low) >= -4e-16 * (abs(level) + abs(c)):
@@ -113,9 +110,9 @@ def _nodes() -> tuple[Vector, Vector]:
 class _Bodies(NamedTuple):
     """How balls swing at small angles that move together or alone."""
 
-    #: First ball of each body, the number of its balls, its lowest point and its rate.
-    each: list[tuple[int, int, float, complex]]
-    #: Of each ball, where it hangs, and its rate: it is at centre + Re(amplitude exp(rate t)).
+    #: Of each ball the first one of its body, where it hangs, and its rate: it is at
+    #: centre + Re(amplitude exp(rate t)).
+    first: list[int]
     centre: Vector
     rate: Vector
     #: Of each contact what falls to zero when its balls meet, or are drawn apart that move
@@ -128,14 +125,14 @@ def _bodies(hanging: Hanging, together: Marks) -> _Bodies:
     """Return the bodies: their frequencies, dampings and lowest points are means over the mass."""
     n, square = len(hanging.masses), hanging.gravity / hanging.length
     centre, rates = np.zeros(n), np.zeros(n, dtype=complex)
-    each, forces = [], {}
+    first, forces = list[int](), {}
     for a, b in pairwise([*_first_balls(together), n]):
         m, w2, d = (row[a:b] for row in (hanging.masses, square, hanging.damping))
         offset, pull, damping = -hanging.offsets(a, b), mean(w2, m), mean(d, m)
         lowest = -mean(w2 * offset, m) / pull
         rate = complex(-damping, math.sqrt(pull - damping * damping))
         centre[a:b], rates[a:b] = lowest + offset, rate
-        each.append((a, b - a, lowest, rate))
+        first += [a] * (b - a)
         for k in range(1, b - a):  # what stops the balls before k from moving as they would alone
             level, weight = -float(m[:k] @ (w2 * (lowest + offset))[:k]), float(m[:k] @ w2[:k])
             wave = -complex(m[:k] @ (w2 + 2.0 * d * rate + rate * rate)[:k])
@@ -145,7 +142,7 @@ def _bodies(hanging: Hanging, together: Marks) -> _Bodies:
             forces[a + k - 1] = (math.inf, 0j, 0j) if alike else (level, wave, 0j)
     gaps = (hanging.gaps + centre[1:] - centre[:-1]).tolist()
     falls = [forces.get(c, (gap, -1.0 + 0j, 1.0 + 0j)) for c, gap in enumerate(gaps)]
-    return _Bodies(each, centre, rates, falls)
+    return _Bodies(first, centre, rates, falls)
 
 
 def _first_balls(together: Marks) -> list[int]:
@@ -154,27 +151,22 @@ def _first_balls(together: Marks) -> list[int]:
 
 
 class SmallAngleFlight:
-    """Damped harmonic motion of bodies of one or more balls.
-
-    A ball swings alone as x'' = -w^2 x - 2 d x'.  Balls that rest against each other are one body.
-    """
+    """Damped harmonic motion of bodies of one or more balls: x'' = -w^2 x - 2 d x'."""
 
     def __init__(
         self, hanging: Hanging, x: Vector, v: Vector, together: Marks, parting: Marks
     ) -> None:
         self.together, self.parting, self.tie = together, parting, hanging.tie
-        self.bodies, x, v = _bodies(hanging, together), x.tolist(), v.tolist()
+        self.bodies = _bodies(hanging, together)
+        first, centre, rate, _ = self.bodies
+        start = (x - centre)[first]
         #: Of each ball.
-        self.amplitude: list[complex] = []
-        for first, count, lowest, rate in self.bodies.each:
-            start = x[first] - lowest
-            swings = complex(start, -(v[first] - rate.real * start) / rate.imag)
-            self.amplitude += [swings] * count
+        self.amplitude = start - 1j * ((v[first] - rate.real * start) / rate.imag)
 
     def next_meeting(self, horizon: float) -> Meeting:
         """Return the first event within `horizon` seconds."""
         times, first, rates = list[float](), math.inf, self.bodies.rate.tolist()
-        swings = zip(pairwise(self.amplitude), pairwise(rates), strict=True)
+        swings = zip(pairwise(self.amplitude.tolist()), pairwise(rates), strict=True)
         falls = zip(self.bodies.falls, swings, self.parting, strict=True)
         for (level, one, other), ((a, b), (rate, near)), parts in falls:
             waves = [(one * a + other * b, rate)]
@@ -191,23 +183,21 @@ class SmallAngleFlight:
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
         """Return positions and velocities at T times since the start, shapes (T, N)."""
-        wave = np.array(self.amplitude) * np.exp(np.multiply.outer(times, self.bodies.rate))
+        wave = self.amplitude * np.exp(np.multiply.outer(times, self.bodies.rate))
         return self.bodies.centre + wave.real + 0.0, (self.bodies.rate * wave).real + 0.0  # no -0.0
 
 
 class FullFlight:
-    """Equal pendulums of any angle, integrated by SciPy; bodies swing like single balls.
-
-    The difference f of two neighbours obeys f'' + 2 d f' + q f = 0 with q at most g/l, so by
-    Sturm's comparison its zeros are no closer than pi / sqrt(g/l - d^2), half a swing of the small
-    angle: steps of a quarter of that miss none, and balls that part do not meet before.
-    """
+    """Equal pendulums of any angle, integrated by SciPy; bodies swing like single balls."""
 
     def __init__(
         self, hanging: Hanging, x: Vector, v: Vector, together: Marks, parting: Marks
     ) -> None:
         self.gravity, self.tie = hanging.gravity, hanging.tie
         self.length, self.damping = float(hanging.length[0]), float(hanging.damping[0])
+        # The difference f of two neighbours obeys f'' + 2 d f' + q f = 0 with q at most g/l, so by
+        # Sturm's comparison its zeros are no closer than half a swing of the small angle: steps of
+        # a quarter of that miss none, and balls that part do not meet before.
         self.half = math.pi / math.sqrt(hanging.fastest**2 - self.damping**2)
         #: The number of each ball's body, the first ball of each, and until when none meets it.
         self.body = np.cumsum([0, *(not one for one in together)])
@@ -246,11 +236,8 @@ class FullFlight:
         return time, (self.first[1:][met] - 1).tolist(), []
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
-        """Return positions and velocities at T times since the start, shapes (T, N).
-
-        SciPy's interpolation is not exact enough.
-        """
-        found, begin, y = [], 0.0, self.start
+        """Return positions and velocities at T times since the start, shapes (T, N)."""
+        found, begin, y = [], 0.0, self.start  # SciPy's interpolation is not exact enough
         for time in times.tolist():
             if time > begin:
                 begin, y = time, self._integrate(begin, y, time).y[:, -1]

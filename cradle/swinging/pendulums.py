@@ -8,14 +8,7 @@ from dataclasses import KW_ONLY, dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.input.values import (
-    Vector,
-    number_or_row,
-    one_number,
-    one_of,
-    refuse_where,
-    row_of,
-)
+from cradle.input.values import Vector, number_or_row, one_number, one_of, refuse_where, row_of
 
 #: Events nearer than this part of a swing (over 2 pi) are one; so are lengths, of the amplitude.
 TIE = 1e-9

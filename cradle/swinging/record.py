@@ -29,7 +29,6 @@ class Impact(NamedTuple):
     traces: tuple[Trace, ...]  #: of each chain that collided; see `Trace.left_out` of long ones
 
     def __repr__(self) -> str:
-        """Return a short account."""
         speeds = f"before={as_text(self.before)}, after={as_text(self.after)}"
         return f"Impact(time={self.time:.6g}, contacts={self.contacts}, {speeds})"
 
@@ -103,7 +102,6 @@ class Swing:
         return pd.DataFrame(columns | {name: part.ravel() for name, part in parts.items()})
 
     def __repr__(self) -> str:
-        """Return a short account."""
         return (
             f"Swing({len(self.times)} times to {self.end:g} s, {len(self.impacts)} impacts, "
             f"ended by {self.ended})"

@@ -96,8 +96,7 @@ class Alone:
         """Return the directions in which balls at these places can move; 1 if they are free."""
         if self.pivots is None:
             return np.ones(len(x), complex)
-        arms = x - self.pivots
-        return 1j * arms / np.abs(arms)
+        return np.asarray(1j * (x - self.pivots) / self.arms(x))
 
     def own(self, v: Plane, x: Plane) -> Plane:
         """Return velocities in the balls' own ways."""
@@ -107,15 +106,13 @@ class Alone:
         """Return the own ways from places x to places y, m."""
         if self.pivots is None:
             return y - x
-        arms = x - self.pivots
-        return np.abs(arms) * np.angle((y - self.pivots) / arms) + 0j
+        return self.arms(x) * np.angle((y - self.pivots) / (x - self.pivots)) + 0j
 
     def moved(self, x: Plane, ways: Plane) -> Plane:
         """Return where balls are after such own ways."""
         if self.pivots is None:
             return x + ways
-        arms = x - self.pivots
-        return self.pivots + arms * np.exp(1j * ways.real / np.abs(arms))
+        return self.pivots + (x - self.pivots) * np.exp(1j * ways.real / self.arms(x))
 
     def arms(self, x: Plane) -> Vector:
         """Return how far balls are from their pivots; infinity if they are free."""
@@ -149,11 +146,7 @@ class Alone:
         )
 
     def look(self, x: list[complex], v: list[complex]) -> tuple[bool, float, float]:
-        """Tell whether something touches now, when the next contact arrives, how long is quiet.
-
-        The second goes by the present velocities, and is 0 with an impact: look again.  For the
-        third, neighbours may also be accelerated towards each other.
-        """
+        """Tell whether something touches now, when the next contact arrives, how long is quiet."""
         arrival, quiet = math.inf, _LONGEST
         strike = rest = False
         for c, reach in enumerate(self.reach):
@@ -179,7 +172,7 @@ class Alone:
                 quiet = min(quiet, 2.0 * room / (closing + root))
         if self.speeding:  # nothing else keeps the balls in order
             self._refuse_a_pack(x)
-        return strike or rest, 0.0 if strike else arrival, quiet
+        return strike or rest, 0.0 if strike else arrival, quiet  # after a strike look again
 
     def _solve(self, x: Plane, own: Plane, time: float, hits: list[Hit]) -> Plane:
         """Solve each cluster of touching balls; return what their own velocities gain."""

@@ -231,16 +231,12 @@ class _Run:
 
 
 def part(model: Any, n: int, first: int, last: int) -> Model:
-    """Return the model of a part of the chain: its rows, cut to that part.
-
-    A part may end where a ratio's bound counts on the next ball (Eq. 53), so ratios above the
-    part's own bounds are held there (rule of the largest admissible ratio), not refused.
-    """
+    """Return the model of a part of the chain: its rows, cut to that part."""
     changes: dict[str, Any] = {}
     if last - first < n and is_dataclass(model):
         for name in (field.name for field in fields(model)):
             value = getattr(model, name)
-            if name == "excess":
+            if name == "excess":  # a ratio's bound may count on the next ball (Eq. 53)
                 changes["excess"] = "saturate"
             elif isinstance(value, tuple | list) and len(value) in (n - 1, n - 2):
                 missing = n - len(value)  # 1: one for each contact; 2: one for each inner ball
