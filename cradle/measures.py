@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
 from cradle.closed_form import largest_ratios
-from cradle.input.values import Vector, checked, must_be, one_number, row_of
+from cradle.input.values import Vector, checked, must_be, one_number
 from cradle.models import Model, collide
 from cradle.models.batch import post_impact_velocities
 from cradle.models.correlation import ImpulseCorrelation
@@ -70,12 +70,11 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
     2.4e+03 forward[0] True
     """
     step = one_number("step", step, "must lie in [1e-12, 0.1]", 1e-12, 0.1)
-    base, n = collide(chain, model), len(chain)
+    base = collide(chain, model)
     own = {name: getattr(chain, name) for name in ("masses", "velocities", "restitution")}
     ratios: dict[str, Any] = {}
     if isinstance(model, ImpulseCorrelation):
-        both = model.forward, model.forward if model.backward is None else model.backward
-        ratios["forward"], ratios["backward"] = (row_of("ratios", x, n - 2, n) for x in both)
+        ratios["forward"], ratios["backward"] = model.ratios(len(chain))
     law: Any = model
     sequence, same, changes = _events_at_balls(base), True, dict[str, float]()
     for name, values in (own | ratios).items():
@@ -129,9 +128,8 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     if len(chain) != 3:
         raise ValueError(f"trace has {len(chain)} balls; an effective ratio is that of three")
     if not (u > 0.0).any():
-        raise ValueError(
-            f"closing_speeds = {u.tolist()}; any ratio fits balls that do not approach"
-        )
+        why = "any ratio fits balls that do not approach"
+        raise ValueError(f"closing_speeds = {u.tolist()}; {why}")
     # The leftmost approaching contact drives (forward), or the right one alone (backward).
     bounds = largest_ratios(chain.masses, np.zeros(1), np.zeros(1))
     bound = float(bounds[0 if u[0] > 0.0 else 1][0])
@@ -191,10 +189,8 @@ def conserving_outcomes(
     (m1, m2, m3), (s, w, pair), (one, other) = _relative(masses, velocities)
     first, second = m1 / (m1 + m2), m2 / (m1 + m2)
     full = float(np.arctan2(one, other * first))  # there v2 = v3
-    if angles is None:
-        angle = np.linspace(0.0, full, 181)
-    else:
-        angle = checked("angles", angles, f"must lie in [0, {full:.6g}]", 0.0, full)
+    every = np.linspace(0.0, full, 181) if angles is None else angles
+    angle = checked("angles", every, f"must lie in [0, {full:.6g}]", 0.0, full)
     radius = np.hypot(one * s, other * w)
     s_after = radius * np.sin(angle) / one
     # cos(angle) as what is missing to v2 = v3: near 90 degrees it has few digits itself.
@@ -221,11 +217,7 @@ def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
 
 
 def _relative(masses: ArrayLike, velocities: ArrayLike) -> tuple[list[float], list[float], Vector]:
-    """Return masses in units in which no sum overflows, relative velocities, and two roots.
-
-    Velocities are those of ball 2 from ball 1, of ball 3 from these two, and of these two; the
-    roots are of the reduced masses of the first two.
-    """
+    """Return masses whose sums do not overflow; s, w and the pair's velocity; roots of mu and M."""
     chain = Chain(masses, velocities)
     if len(chain) != 3:
         raise ValueError(f"masses has shape ({len(chain)},); must be (3,): three balls")

@@ -146,15 +146,9 @@ def paper_chain(
     triplets = ["".join(three) for three in zip(balls, balls[1:], balls[2:], strict=False)]
     table_1 = {row["ball"]: row for row in table_rows("restitution.csv")}
     table_2 = {row["triplet"]: float(row["ratio"]) for row in table_rows("ratios.csv")}
-    chain = Chain(
-        masses=[masses[ball] for ball in balls],
-        velocities=[one_number("speed", speed)] + [0.0] * (len(balls) - 1),
-        restitution=[float(table_1[ball][other]) for ball, other in pairwise(balls)],
-    )
-    model = ImpulseCorrelation(
-        forward=[table_2[triplet] for triplet in triplets],
-        backward=[table_2[triplet[::-1]] for triplet in triplets],
-        meeting=meeting,
-        excess=excess,
-    )
-    return chain, model
+    velocities = [one_number("speed", speed)] + [0.0] * (len(balls) - 1)
+    restitution = [float(table_1[ball][other]) for ball, other in pairwise(balls)]
+    forward = [table_2[triplet] for triplet in triplets]
+    backward = [table_2[triplet[::-1]] for triplet in triplets]
+    model = ImpulseCorrelation(forward, backward, meeting=meeting, excess=excess)
+    return Chain([masses[ball] for ball in balls], velocities, restitution), model

@@ -171,7 +171,8 @@ def recommend(
     several = isinstance(wanted, Collection) and not isinstance(wanted, (str, np.ndarray))
     wishes = tuple(one_of("wanted", x, WANTED) for x in (several and [*wanted]) or [wanted])
     like = chain if len({*np.ravel(stiffness or 1.0)}) == 1 else None
-    wish = _Wish(chain, wishes, accuracy, model_error, impacts, ratios, stiffness, like)
+    elastic = bool((chain.restitution == 1.0).all())
+    wish = _Wish(chain, wishes, accuracy, model_error, impacts, ratios, stiffness, like, elastic)
     found = []
     failures: dict[str, list[str]] = {}
     for group, make in _models(wish).items():
@@ -199,6 +200,7 @@ class _Wish(NamedTuple):
     ratios: ImpulseCorrelation | None
     stiffness: float | Sequence[float] | None
     like: Chain | None  # the chain, if its contacts are equal springs, as all that were measured
+    elastic: bool
 
 
 class _Unfit(Exception):
@@ -207,10 +209,9 @@ class _Unfit(Exception):
 
 def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
     """Return what is known allows, by group: how a row makes its model.  Or nothing can do it."""
-    chain, wanted, _, model_error, _, ratios, stiffness, like = wish
+    chain, wanted, _, model_error, _, ratios, stiffness, like, elastic = wish
     lossy = int(np.argmin(chain.restitution))
     loss = f"restitution[{lossy}] = {float(chain.restitution[lossy])!r}"
-    elastic = bool((chain.restitution == 1.0).all())
     timed = next((name for name in wanted if name in ("forces", "times")), "")
     # Nothing but restitution is known, and it is not enough; and where that may do all the same.
     bare = ratios is None and stiffness is None and len(chain) > 2
@@ -309,7 +310,7 @@ def _best(
     kind, own = group, "chain"
     if springs:
         kind = "timed" if {"forces", "times"} & set(wish.wanted) else "springs"
-    if springs and lossy:
+    if springs and not wish.elastic:
         kind, own = "lossy", "Chain(masses, velocities)"
     return (not measured, row.seconds), Recommendation(
         model=make(row),

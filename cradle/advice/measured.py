@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.input.values import Vector, row_of
+from cradle.input.values import Vector
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.runtime import compile as runtime
 from cradle.tables import paper_chain, table_rows
@@ -71,11 +71,7 @@ def rows(group: str) -> tuple[Measured, ...]:
 def evidence(
     rows: tuple[Measured, ...], chain: Chain | None, ratios: ImpulseCorrelation | None = None
 ) -> tuple[str, list[Measured]]:
-    """Return where the settings were measured, and what: "here", "around" a chain, "elsewhere".
-
-    Here is this very chain; around are chains among which it lies, at their worst.  What was
-    measured elsewhere, on the most chains, orders the settings and says nothing of this chain.
-    """
+    """Return where the settings were measured, and what: "here", "around" a chain, "elsewhere"."""
     settings: dict[str, list[Measured]] = {}
     for row in rows:
         settings.setdefault(row.setting, []).append(row)
@@ -86,6 +82,7 @@ def evidence(
             return "here", here
         if around := [_worst(found) for same in every if (found := _around(same, chain))]:
             return "around", around
+    # On the most chains: it orders the settings, and says nothing of this chain.
     return "elsewhere", [_worst(same) for same in every if len(same) == max(map(len, every))]
 
 
@@ -121,11 +118,8 @@ def measured_chain(chain: Chain, ratios: ImpulseCorrelation | None = None) -> st
 
 def _figures(chain: Chain, ratios: ImpulseCorrelation | None = None) -> Vector:
     """Return masses over the striker's, restitution, ratios of a row struck at one end; or none."""
-    m, e, u, n = chain.masses, chain.restitution, chain.closing_speeds, len(chain)
-    laws = []
-    if ratios is not None:
-        both = ratios.forward, ratios.forward if ratios.backward is None else ratios.backward
-        laws = [row_of("ratios", kept, n - 2, n) for kept in both]
+    m, e, u = chain.masses, chain.restitution, chain.closing_speeds
+    laws = [] if ratios is None else [*ratios.ratios(len(m))]
     if u[-1] > 0.0 and not u[:-1].any():
         m, e, u, laws = m[::-1], e[::-1], u[::-1], [part[::-1] for part in laws[::-1]]
     if not u[0] > 0.0 or u[1:].any():

@@ -42,17 +42,12 @@ def _once(names: list[str]) -> list[str]:
 
 
 def text_rows(name: str, content: bytes, comments: bool = False) -> dict[int, list[str]]:
-    """Return the cells of each filled line of a text file by its number, as points and ASCII.
-
-    Tabs, semicolons or commas stand between the columns, else spaces; decimals may have commas
-    where columns have none.
-    """
+    """Return the cells of each filled line of a text file by its number, as points and ASCII."""
     try:
         text = content.decode("utf-8-sig").replace("\N{MINUS SIGN}", "-")
     except UnicodeDecodeError as error:
-        raise ValueError(
-            f"{name} is no UTF-8 text (byte {error.start}); save it as CSV in UTF-8"
-        ) from None
+        told = f"{name} is no UTF-8 text (byte {error.start}); save it as CSV in UTF-8"
+        raise ValueError(told) from None
     lines = {
         number: line for number, line in enumerate(re.split("\r\n|\n|\r", text), 1)
         if line.strip(",; \t") and (comments or not line.lstrip().startswith("#"))

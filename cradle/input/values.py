@@ -28,11 +28,7 @@ _NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating)
 
 
 def numbers(name: str, values: ArrayLike | None, at: tuple[int, ...] = ()) -> Vector:
-    """Return `values` as floats of any size; an array of floats comes back as it is.
-
-    A number is whatever `float` takes: fractions and decimals too.  Not so text, truth values,
-    masked values, complex numbers, and numbers with an uncertainty.
-    """
+    """Return `values` as floats of any size; an array of floats comes back as it is."""
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
     if type(values) is float:

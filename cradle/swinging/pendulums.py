@@ -73,6 +73,18 @@ class Pendulums:
         part = 0.5 if self.angle == "small" else 1.0 - 2.0**-20
         return part * np.pi * self.row("length", size)
 
+    def released(self, x: Vector, size: int) -> Vector:
+        """Return where `size` balls are released, m, or refuse to pull them so far aside."""
+        if x.shape != (size,):
+            rule = f"{size} balls need ({size},): a place for each ball"
+            raise ValueError(f"positions has shape {x.shape}; {rule}")
+        reach = self.reach(size)
+        beyond = np.abs(x) > reach
+        most = "a quarter of a circle" if self.angle == "small" else "half a circle"
+        far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most}"
+        refuse_where("positions", x, beyond, f"must be within {far}")
+        return x
+
     def natural_frequency(self, size: int) -> Vector:
         """Return sqrt(g/l) of each of `size` balls, rad/s."""
         frequency: Vector = np.sqrt(self.gravity / self.row("length", size))

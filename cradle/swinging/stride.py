@@ -96,7 +96,7 @@ class Alone:
         """Return the directions in which balls at these places can move; 1 if they are free."""
         if self.pivots is None:
             return np.ones(len(x), complex)
-        return np.asarray(1j * (x - self.pivots) / self.arms(x))
+        return 1j * (x - self.pivots) / self.arms(x)
 
     def own(self, v: Plane, x: Plane) -> Plane:
         """Return velocities in the balls' own ways."""
@@ -112,7 +112,8 @@ class Alone:
         """Return where balls are after such own ways."""
         if self.pivots is None:
             return x + ways
-        return self.pivots + (x - self.pivots) * np.exp(1j * ways.real / self.arms(x))
+        turned: Plane = (x - self.pivots) * np.exp(1j * ways.real / self.arms(x))
+        return self.pivots + turned
 
     def arms(self, x: Plane) -> Vector:
         """Return how far balls are from their pivots; infinity if they are free."""

@@ -15,15 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.input.values import (
-    Vector,
-    checked,
-    must_be,
-    one_number,
-    refuse_where,
-    shown,
-    whole_number,
-)
+from cradle.input.values import Vector, checked, must_be, one_number, shown, whole_number
 from cradle.models import Model, collide
 from cradle.swinging.flight import FullFlight, SmallAngleFlight
 from cradle.swinging.pendulums import TIE, Hanging, Pendulums, mean
@@ -104,7 +96,7 @@ def swing(
         )
     most = whole_number("max_impacts", max_impacts)
     least = one_number("min_energy", min_energy, "must lie in [0, 1]", 0.0, 1.0)
-    run = _Run(chain, model, hanging, checked("positions", positions))
+    run = _Run(chain, model, hanging, hanging.released(checked("positions", positions), n))
     ended = run.to_the_end(at, most, least)
     x, v = (np.concatenate(parts) for parts in zip(*run.series, strict=True))
     at = at[: len(x)]
@@ -118,15 +110,6 @@ class _Run:
 
     def __init__(self, chain: Chain, model: Model, pendulums: Pendulums, x: Vector) -> None:
         n = len(chain)
-        if x.shape != (n,):
-            raise ValueError(
-                f"positions has shape {x.shape}; {n} balls need ({n},): a place for each ball"
-            )
-        reach = pendulums.reach(n)
-        most = "a quarter of a circle" if pendulums.angle == "small" else "half a circle"
-        beyond = np.abs(x) > reach
-        far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most}"
-        refuse_where("positions", x, beyond, f"must be within {far}")
         self.chain, self.hanging = chain, (hanging := Hanging(pendulums, chain.masses))
         self.model = functools.cache(functools.partial(part, model, n))
         self.offsets = functools.cache(hanging.offsets)
