@@ -98,9 +98,8 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
 def _events_at_balls(trace: Trace) -> list[list[Event]]:
     """Return ends, closings and collapses as each ball sees them: others have no common clock."""
     seen = [event for event in trace.events if event.kind != "maximum_compression"]
-    return [
-        [one for one in seen if ball - one.contact in (0, 1)] for ball in range(len(trace.chain))
-    ]
+    balls = range(len(trace.chain))
+    return [[one for one in seen if ball - one.contact in (0, 1)] for ball in balls]
 
 
 def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
@@ -120,8 +119,7 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     0.132503
     """
     tolerance = one_number("tolerance", tolerance, "must be at least 0", 0.0)
-    # SciPy is slow to import, and only this measure needs it.
-    from scipy.optimize import brentq
+    from scipy.optimize import brentq  # slow to import
 
     chain, target = must_be(Trace, "trace", trace).chain, trace.velocities
     u = chain.closing_speeds

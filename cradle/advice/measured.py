@@ -127,8 +127,7 @@ def _figures(chain: Chain, ratios: ImpulseCorrelation | None = None) -> Vector:
     return np.concatenate([m / m[0], e, *laws])
 
 
-# What places a chain, least and most: balls, spread of masses, restitution.  These are the random
-# ones, as `random_chains` in benchmarks/scenes.py draws them.
+# What places chains: balls, spread of masses, restitution; of `random_chains` in the benchmarks.
 _DRAWN = {f"{n} balls, random": [[n, 1.0, 0.3], [n, 16.0, 1.0]] for n in (2, 3, 6)}
 
 

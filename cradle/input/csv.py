@@ -26,10 +26,8 @@ def table_lines(source: Any) -> list[tuple[str, dict[str, Any]]]:
     names = _once(lines.pop(min(lines)) if lines else [])
     for number, cells in lines.items():
         if len(cells) != len(names):
-            raise ValueError(
-                f"line {number}: {len(cells)} values; the header has {len(names)} columns "
-                "(between commas, decimals need a point)"
-            )
+            told = f"line {number}: {len(cells)} values; the header has {len(names)} columns"
+            raise ValueError(f"{told} (between commas, decimals need a point)")
     return [(f"line {n}", dict(zip(names, cells, strict=True))) for n, cells in lines.items()]
 
 
@@ -57,10 +55,8 @@ def text_rows(name: str, content: bytes, comments: bool = False) -> dict[int, li
         comma = next((n for n, line in lines.items() if re.search(r",\d", line)), None)
         point = next((n for n, line in lines.items() if re.search(r"\d\.\d", line)), None)
         if comma and point:
-            raise ValueError(
-                f"{name} has decimals with a comma in line {comma} and with a point in line "
-                f"{point}; write all with a point"
-            )
+            told = f"decimals with a comma in line {comma} and with a point in line {point}"
+            raise ValueError(f"{name} has {told}; write all with a point")
         lines = {number: re.sub(r",(?=\d)", ".", line) for number, line in lines.items()}
     rows = csv.reader(lines.values(), delimiter=mark, skipinitialspace=True)
     return dict(zip(lines, ([cell.strip() for cell in row] for row in rows), strict=True))

@@ -126,7 +126,7 @@ def _bodies(hanging: Hanging, together: Marks) -> _Bodies:
     n, square = len(hanging.masses), hanging.gravity / hanging.length
     centre, rates = np.zeros(n), np.zeros(n, dtype=complex)
     first, forces = list[int](), {}
-    for a, b in pairwise([*_first_balls(together), n]):
+    for a, b in pairwise([0, *(c + 1 for c, one in enumerate(together) if not one), n]):
         m, w2, d = (row[a:b] for row in (hanging.masses, square, hanging.damping))
         offset, pull, damping = -hanging.offsets(a, b), mean(w2, m), mean(d, m)
         lowest = -mean(w2 * offset, m) / pull
@@ -143,11 +143,6 @@ def _bodies(hanging: Hanging, together: Marks) -> _Bodies:
     gaps = (hanging.gaps + centre[1:] - centre[:-1]).tolist()
     falls = [forces.get(c, (gap, -1.0 + 0j, 1.0 + 0j)) for c, gap in enumerate(gaps)]
     return _Bodies(first, centre, rates, falls)
-
-
-def _first_balls(together: Marks) -> list[int]:
-    """Return the first ball of each body: balls that move together are one."""
-    return [0, *(c + 1 for c, one in enumerate(together) if not one)]
 
 
 class SmallAngleFlight:
@@ -201,7 +196,7 @@ class FullFlight:
         self.half = math.pi / math.sqrt(hanging.fastest**2 - self.damping**2)
         #: The number of each ball's body, the first ball of each, and until when none meets it.
         self.body = np.cumsum([0, *(not one for one in together)])
-        self.first = np.array(_first_balls(together))
+        self.first = np.unique(self.body, return_index=True)[1]
         self.waits = self.half * (1.0 - TIE) * np.array(parting)[self.first[1:] - 1]
         self.start = np.concatenate([x[self.first], v[self.first]])
 

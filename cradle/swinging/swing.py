@@ -23,10 +23,7 @@ from cradle.swinging.record import Impact, Swing
 from cradle.swinging.resting import NEAR, RESTING, common_velocities, pressed, stretches
 from cradle.trace import Trace
 
-__all__ = ["swing"]
-
-#: Events without an impact that one instant can have, for each ball: each contact opens and closes
-#: a few times at most.
+#: Events without an impact that one instant can have, for each ball: a few for each contact.
 MOST_IDLE = 20
 
 
@@ -90,10 +87,8 @@ def swing(
     collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
     at = checked("times", times)
     if at.ndim != 1 or not at.size or at[0] < 0.0 or (np.diff(at) < 0.0).any():
-        raise ValueError(
-            f"times = {shown(times)}; must be a row of rising numbers, none below 0, "
-            "such as [0, 0.5, 1]"
-        )
+        rule = "must be a row of rising numbers, none below 0, such as [0, 0.5, 1]"
+        raise ValueError(f"times = {shown(times)}; {rule}")
     most = whole_number("max_impacts", max_impacts)
     least = one_number("min_energy", min_energy, "must lie in [0, 1]", 0.0, 1.0)
     run = _Run(chain, model, hanging, hanging.released(checked("positions", positions), n))
@@ -124,10 +119,9 @@ class _Run:
         distance = hanging.gaps + np.diff(x)
         if (distance < -TIE * self.size).any():
             c = int(np.argmin(distance))
-            raise ValueError(
-                f"positions = {x.tolist()}; balls {c} and {c + 1} overlap by {-distance[c]:g} m"
-            )
-        self.freed = [-math.inf] * (n - 1)  # when the force in each contact last fell to zero
+            told = f"balls {c} and {c + 1} overlap by {-distance[c]:g} m"
+            raise ValueError(f"positions = {x.tolist()}; {told}")
+        self.freed = np.full(n - 1, -math.inf)  # when the force in each contact last fell to zero
         self.settle([], [])
 
     def to_the_end(self, times: Vector, most: int, least: float) -> str:
@@ -154,10 +148,9 @@ class _Run:
             self.settle(closing, opening)
             idle = idle + 1 if wait <= self.hanging.tie and len(self.impacts) == known else 0
             if idle > MOST_IDLE * len(self.x):
-                raise RuntimeError(
-                    f"the swing does not get beyond t = {self.t} s: contacts {closing} close and "
-                    f"{opening} open there again and again without an impact"
-                )
+                told = f"contacts {closing} close and {opening} open there again and again"
+                why = f"{told} without an impact"
+                raise RuntimeError(f"the swing does not get beyond t = {self.t} s: {why}")
         # The instant at which the run ends is reported if it was asked for.
         count = int(np.searchsorted(times[done:], self.t, side="right"))
         self.series.append((np.tile(self.x, (count, 1)), np.tile(self.v, (count, 1))))
@@ -166,9 +159,8 @@ class _Run:
     def settle(self, closing: list[int], opening: list[int]) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
         hanging, x, v = self.hanging, self.x, self.v
-        touching = (hanging.gaps + (x[1:] - x[:-1]) <= NEAR * self.size).tolist()
-        for c in closing:
-            touching[c] = True
+        touching = hanging.gaps + np.diff(x) <= NEAR * self.size
+        touching[closing] = True
         self.x, self.v = x.copy(), v.copy()
         groups = stretches(touching)
         for first, last in groups:  # to where they touch but for rounding; their centre stays
@@ -177,18 +169,16 @@ class _Run:
         self.collide(groups, v)
         struck = self.v
         # What opens at this instant rests no more in it, whatever else happens.
-        for c in opening:
-            self.freed[c] = self.t
-        contacts = zip(touching, self.freed, strict=True)
-        kept = [touches and self.t - freed > hanging.tie for touches, freed in contacts]
+        self.freed[opening] = self.t
+        kept = touching & (self.t - self.freed > hanging.tie)
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
         self.instants.append((self.t, x, self.x, v, struck, self.v))
-        if any(resting):
+        if resting.any():
             alone = hanging.accelerations(self.x, self.v)
             least = 1e-12 * self.speed * hanging.fastest
             resting = pressed(hanging.masses, alone, resting, least)
-        self.together = tuple(resting)
-        self.parting = tuple(t and not one for t, one in zip(touching, resting, strict=True))
+        self.together = tuple(resting.tolist())
+        self.parting = tuple((touching & ~resting).tolist())
 
     def collide(self, groups: list[tuple[int, int]], before: Vector) -> None:
         """Solve the impacts of this instant and record them as one."""
