@@ -17,7 +17,7 @@ Read `cradle.textbook` first: the rules of an impact in 250 lines.  Then follow 
   asked of input, and the words of a refusal.
 """
 
-from cradle.advice import Recommendation, recommend
+from cradle.advice.choice import Recommendation, recommend
 from cradle.chain import Chain
 from cradle.models import Model, collide
 from cradle.models.batch import Outcomes, outcomes, post_impact_velocities

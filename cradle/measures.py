@@ -157,10 +157,9 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     near = np.abs(missed).max(axis=1).argmin()
     finer = np.linspace(grid[max(near - 1, 0)], grid[min(near + 1, 256)], 257)
     misses = np.abs(distances(finer)).max(axis=1)
-    raise ValueError(
-        f"no ratio in [0, {bound:.6g}] gives the velocities {target.tolist()}; the nearest, "
-        f"{finer[misses.argmin()]:.6g}, misses by {misses.min():.3g} of the fastest closing speed"
-    )
+    told = f"no ratio in [0, {bound:.6g}] gives the velocities {target.tolist()}; the nearest"
+    far = f"{misses.min():.3g} of the fastest closing speed"
+    raise ValueError(f"{told}, {finer[misses.argmin()]:.6g}, misses by {far}")
 
 
 def conserving_outcomes(

@@ -237,10 +237,9 @@ class Row(Alone):
             twice = (np.abs(mean[fast]) > 1.5 * speed[fast]).all()
             self._doubts = self._doubts + 1 if twice else 0
         if self._doubts > 2:
-            raise RuntimeError(
-                "the world moves on between the steps of this row; rows of one world are stepped "
-                "together, by cradle.row.step_rows, and by nobody else"
-            )
+            rule = "rows of one world are stepped together, by cradle.row.step_rows"
+            told = f"the world moves on between the steps of this row; {rule}"
+            raise RuntimeError(f"{told}, and by nobody else")
         # Near the turning points the lag is seen: the kicks are in proportion to the pulls.
         first, second = self._pull(was).real, self._pull(x).real
         seen = (gained > 0.05 * speed) & (np.abs(first) > 0.05 * self.acceleration)

@@ -272,11 +272,11 @@ def _best(
     """Return a model in its cheapest setting that fulfils a wish, after what orders models."""
     chain, name = wish.chain, LAWS[group].partition(",")[0]
     gives = {"velocities" if one == "fastest ball" else one for one in wish.wanted}
-    lossy = bool((chain.restitution < 1.0).any())
+    several = wish.impacts > 1
+    usable = (row for row in rows(group) if several or "batch" not in row.setting)
     found = tuple(
-        row for row in rows(group)
-        if gives <= row.gives and (wish.impacts > 1 or "batch" not in row.setting)
-        and (lossy or "lossy" not in row.chains[0])
+        row for row in usable
+        if gives <= row.gives and not (wish.elastic and "lossy" in row.chains[0])
     )  # fmt: skip
     if not found:
         raise _Unfit(f"wanted = {wish.wanted!r}", f"{name} has no {' and '.join(sorted(gives))}")
@@ -290,18 +290,15 @@ def _best(
     errors = [margin * (row.numerical_error or 0.0) for row in settings]
     if min(errors) > wish.accuracy:
         least = settings[int(np.argmin(errors))]
-        raise _Unfit(
-            f"accuracy = {wish.accuracy!r}",
-            f"the least numerical error of {name} measured is {least.numerical_error:.2g} "
-            f"({', '.join(least.chains)})"
-            + "; on other chains it must be 10 times better" * (where != "here")
-            + f": ask for {1.05 * min(errors):.1e} or more",
-        )
+        told = f"the least numerical error of {name} measured is {least.numerical_error:.2g}"
+        other = "; on other chains it must be 10 times better" * (where != "here")
+        on = f"({', '.join(least.chains)}){other}: ask for {1.05 * min(errors):.1e} or more"
+        raise _Unfit(f"accuracy = {wish.accuracy!r}", f"{told} {on}")
     fit = [row for row, error in zip(settings, errors, strict=True) if error <= wish.accuracy]
     row = min(fit, key=lambda row: row.seconds)
     apart = row.model_error if where == "here" else None
     two = len(chain) == 2
-    if not lossy and (springs or two):
+    if wish.elastic and (springs or two):
         apart = 0.0
     if wish.model_error is not None and (apart is None or apart > wish.model_error):
         known = "was not measured here" if apart is None else f"is {apart:.2g}"

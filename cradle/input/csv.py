@@ -19,10 +19,10 @@ def table_lines(source: Any) -> list[tuple[str, dict[str, Any]]]:
             raise ValueError(f"columns have different lengths: {sorted(lengths)}")
         rows = enumerate(zip(*columns, strict=True), 1)
         return [(f"row {k}", dict(zip(names, row, strict=True))) for k, row in rows]
-    if not (hasattr(source, "read_bytes") or hasattr(source, "read")):
+    read = getattr(source, "read_bytes", getattr(source, "read", None))
+    if read is None:
         raise TypeError(f"source is a {type(source).__name__}; must be a path or a table")
-    content = source.read_bytes() if hasattr(source, "read_bytes") else source.read()
-    lines = text_rows(getattr(source, "name", "the file"), content)
+    lines = text_rows(getattr(source, "name", "the file"), read())
     names = _once(lines.pop(min(lines)) if lines else [])
     for number, cells in lines.items():
         if len(cells) != len(names):

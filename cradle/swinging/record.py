@@ -100,7 +100,5 @@ class Swing:
         return pd.DataFrame(columns | {name: np.ravel(part) for name, part in parts.items()})
 
     def __repr__(self) -> str:
-        return (
-            f"Swing({len(self.times)} times to {self.end:g} s, {len(self.impacts)} impacts, "
-            f"ended by {self.ended})"
-        )
+        told = f"{len(self.times)} times to {self.end:g} s, {len(self.impacts)} impacts"
+        return f"Swing({told}, ended by {self.ended})"

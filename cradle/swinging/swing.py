@@ -1,7 +1,4 @@
-"""The swinging cradle: impacts by any model of the package, pendulums between them.
-
-The rules of touching and resting balls are told in `cradle.swinging.resting`.
-"""
+"""The swinging cradle: impacts by any model, pendulums between them, and the rules of `resting`."""
 
 from __future__ import annotations
 
@@ -107,7 +104,6 @@ class _Run:
         n = len(chain)
         self.chain, self.hanging = chain, (hanging := Hanging(pendulums, chain.masses))
         self.model = functools.cache(functools.partial(part, model, n))
-        self.offsets = functools.cache(hanging.offsets)
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
         self.released = float(hanging.energy(self.x, self.v))
         self.speed = float(np.sqrt(2.0 * self.released / chain.masses.sum()))
@@ -164,7 +160,7 @@ class _Run:
         self.x, self.v = x.copy(), v.copy()
         groups = stretches(touching)
         for first, last in groups:  # to where they touch but for rounding; their centre stays
-            offset = self.offsets(first, last)
+            offset = hanging.offsets(first, last)
             self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
         self.collide(groups, v)
         struck = self.v
