@@ -21,14 +21,14 @@ def _solved(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, ratio: ArrayLike
 ) -> tuple[Vector, Vector, tuple[Vector, ...], NDArray[np.bool_]]:
     """Return tau_2, tau_3, the velocities after, and where there is one collision per contact."""
-    values = {"masses": masses, "velocities": velocities, "restitution": restitution}
-    given = {name: numbers(name, value) for name, value in values.items()}
-    for name, size in zip(given, (3, 3, 2), strict=True):
+    names = "masses", "velocities", "restitution", "ratio"
+    values = zip(names, (masses, velocities, restitution, ratio), strict=True)
+    given = {name: numbers(name, value) for name, value in values}
+    for name, size in zip(names, (3, 3, 2), strict=False):
         if given[name].shape[-1:] != (size,):
             raise ValueError(f"{name} has shape {given[name].shape}; must be (..., {size})")
-    given["ratio"] = alpha = numbers("ratio", ratio)
-    balls = (tuple(np.moveaxis(array, -1, 0)) for array in list(given.values())[:3])
-    (m1, m2, m3), (v1, v2, v3), (e2, e3) = balls
+    *balls, alpha = given.values()
+    (m1, m2, m3), (v1, v2, v3), (e2, e3) = (np.moveaxis(array, -1, 0) for array in balls)
     try:
         np.broadcast_shapes(m1.shape, v1.shape, e2.shape, alpha.shape)
     except ValueError:

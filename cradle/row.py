@@ -119,17 +119,10 @@ class Row(Alone):
     """
 
     def __init__(
-        self,
-        bodies: Bodies,
-        chain: Chain,
-        model: Model,
-        radii: ArrayLike,
-        pivots: ArrayLike | None = None,
-        *,
-        touching: float | None = None,
-        resting: float | None = None,
-        acceleration: float = 9.81,
-    ) -> None:
+        self, bodies: Bodies, chain: Chain, model: Model, radii: ArrayLike,
+        pivots: ArrayLike | None = None, *, touching: float | None = None,
+        resting: float | None = None, acceleration: float = 9.81,
+    ) -> None:  # fmt: skip
         missing = [name for name in ("motion", "push", "advance") if not hasattr(bodies, name)]
         if missing:
             what = f"bodies is {a(type(bodies).__name__)} without {', '.join(missing)}"

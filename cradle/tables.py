@@ -107,12 +107,9 @@ def ratio_table() -> pd.DataFrame:
 
 
 def paper_chain(
-    sequence: str | Iterable[str],
-    speed: float = 1.0,
-    *,
-    excess: Literal["raise", "saturate"] = "raise",
-    meeting: float = 0.5,
-) -> tuple[Chain, ImpulseCorrelation]:
+    sequence: str | Iterable[str], speed: float = 1.0, *,
+    excess: Literal["raise", "saturate"] = "raise", meeting: float = 0.5,
+) -> tuple[Chain, ImpulseCorrelation]:  # fmt: skip
     """Build a chain of the paper's balls, the first one striking the others at rest.
 
     Pairs of neighbours have Table 1's restitution, and the ratios are those of Table 2: at ball Y

@@ -110,15 +110,11 @@ class Recommendation:
 
 
 def recommend(
-    chain: Chain,
-    wanted: str | Collection[str] = "velocities",
-    *,
-    accuracy: float = 1e-6,
-    model_error: float | None = None,
-    impacts: int = 1,
+    chain: Chain, wanted: str | Collection[str] = "velocities", *,
+    accuracy: float = 1e-6, model_error: float | None = None, impacts: int = 1,
     ratios: ImpulseCorrelation | ArrayLike | None = None,
     stiffness: float | Sequence[float] | None = None,
-) -> Recommendation:
+) -> Recommendation:  # fmt: skip
     """Recommend the cheapest model that gives what is wanted from what is known.
 
     Where a value is wrong or no model fits, the `ValueError` says what is missing.

@@ -206,19 +206,14 @@ class Alone:
                 impulses = np.cumsum(masses * (before - after))[:-1]
                 loudest = first + int(np.argmax(impulses)), float(impulses.max())
                 hits.append(Hit(time, range(first, last), before, after, *loudest))
-            after = self._rested(masses, after, gaps[first : last - 1])
+            # Those that touch and still approach come to rest; those that overlap by more than is
+            # unseen part, slower than what counts as an impact.
+            after, _ = common_velocities(masses, after, after[:-1] > after[1:], 0.0)
+            deep = gaps[first : last - 1] < -self.touching
+            ramp = np.append(0.0, np.cumsum(np.where(deep, 0.5 * self.resting, 0.0)))
+            after += ramp - masses @ ramp / masses.sum()
             gained[balls] = (after - before) * (axis if free else 1.0 / along)
         return gained
-
-    def _rested(self, masses: Vector, v: Vector, gaps: Vector) -> Vector:
-        """Return velocities after those that touch and still approach have come to rest."""
-        v, _ = common_velocities(masses, v, v[:-1] > v[1:], 0.0)
-        if (gaps < -self.touching).any():
-            # Balls that overlap by more than is unseen part, slower than what counts as an impact.
-            parting = np.where(gaps < -self.touching, 0.5 * self.resting, 0.0)
-            ramp = np.concatenate([[0.0], np.cumsum(parting)])
-            v += ramp - masses @ ramp / masses.sum()
-        return v
 
     def _plane(self, name: str, places: ArrayLike) -> Plane:
         """Return places in the plane as complex numbers."""
