@@ -132,11 +132,11 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     bounds = largest_ratios(chain.masses, np.zeros(1), np.zeros(1))
     bound = float(bounds[0 if u[0] > 0.0 else 1][0])
 
+    balls = chain.masses, chain.velocities, chain.restitution
+
     def distances(ratio: ArrayLike) -> Vector:
         ratios = np.asarray(ratio, dtype=np.float64)[..., None]
-        after = post_impact_velocities(
-            chain.masses, chain.velocities, chain.restitution, ratios, excess="saturate"
-        )
+        after = post_impact_velocities(*balls, ratios, excess="saturate")
         return np.asarray((after - target) / u.max())
 
     grid = np.linspace(0.0, bound, 257)

@@ -216,10 +216,9 @@ class FullFlight:
 
     def next_meeting(self, horizon: float) -> Meeting:
         """Return the first event within `horizon` seconds."""
-        size = len(self.waits) + 1
 
         def nearest(t: float, y: Vector) -> float:
-            return float(np.diff(y[:size])[t > self.waits].min(initial=1.0))
+            return float(np.diff(y[: len(y) // 2])[t > self.waits].min(initial=1.0))
 
         vars(nearest).update(terminal=True, direction=-1)
         found = self._integrate(0.0, self.start, horizon, events=nearest, max_step=self.half / 4.0)
