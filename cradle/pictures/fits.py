@@ -14,7 +14,6 @@ from cradle.fit.parameters import fitted_keys
 from cradle.fit.result import Estimate, Fit
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
-from cradle.fit.swings import SwingFit
 from cradle.pictures.impacts import PALETTE, ball_style
 
 # Beyond this a value of chi-square is of no interest.
@@ -80,19 +79,3 @@ def _draw_data(fit: Fit, shots: ShotSet, ax: Axes) -> None:
     ax.set(xlabel="speed of the striker (m/s)", ylabel="velocity after / striker's speed",
            title=f"data of set {shots.name}")  # fmt: skip
     ax.legend(ncols=len(shots.types), fontsize="small", **_LEGEND)
-
-
-def draw_swing(fit: SwingFit, axes: Sequence[Axes] | None) -> Sequence[Axes]:
-    """Draw a film with the swing fitted to it, and what is left; see `SwingFit.plot`."""
-    if axes is None:
-        _, axes = plt.subplots(2, 1, figsize=(5.6, 6), layout="constrained", sharex=True)
-    times, places = fit.swing.times, 1000 * fit.swing.positions
-    for k, (x, left) in enumerate(zip(places.T, 1000 * fit.residuals.T, strict=True)):
-        style = ball_style(k)
-        axes[0].plot(times, x + left, ".", ms=3, color=style["color"])
-        axes[0].plot(times, x, lw=1, label=f"ball {k + 1}", **style)
-        axes[1].plot(times, left, ".", ms=3, color=style["color"])
-    axes[0].set(ylabel="position (mm): film, fit")
-    axes[1].set(xlabel="time (s)", ylabel="film less fit (mm)")
-    axes[0].legend(ncols=len(places.T), fontsize="small", **_LEGEND | {"bbox_to_anchor": (0.5, 1)})
-    return axes

@@ -1,4 +1,7 @@
-"""Period, damping, restitution and gap of a cradle, from the places of its balls in a film."""
+"""Period, damping, restitution and gap of a cradle, from the places of its balls in a film.
+
+A program of the chapter on measuring, beside its page; it uses `swing` and the fits of `cradle`.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,14 @@ from cradle.chain import Chain
 from cradle.fit.result import Estimate
 from cradle.fit.search import LEVEL, RISE, Mode, Scan
 from cradle.fit.shots import chance
-from cradle.input.values import Vector, checked, numbers, one_number, one_of, refuse_where
+from cradle.input.values import (
+    Vector,
+    checked,
+    numbers,
+    one_number,
+    one_of,
+    refuse_where,
+)
 from cradle.models import Model
 from cradle.swinging.pendulums import Pendulums
 from cradle.swinging.record import Swing
@@ -26,16 +36,22 @@ UNITS = {"period": " s", "damping": " 1/s", "restitution": "", "gaps": " m"}
 # errors; then parts of the film are compared, for these numbers of parts.
 _CHANCE, _FAR, _PARTS = 1e-3, 3.3, (4, 6, 8, 12, 16, 24, 32)
 _GRAVITY = 9.81
-_Place = tuple[Vector, Vector, Vector]  # numbers, what their swing leaves, and its slopes
+_Place = tuple[
+    Vector, Vector, Vector
+]  # numbers, what their swing leaves, and its slopes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SwingFit:
     """What a film of K frames says of a cradle of N balls."""
 
-    values: Mapping[str, float | None]  #: Of each number, the best; None if the film tells none.
+    values: Mapping[
+        str, float | None
+    ]  #: Of each number, the best; None if the film tells none.
     intervals: Mapping[str, tuple[float, float]]  #: 95 % of each number.
-    estimates: Mapping[str, Estimate]  #: The same with profiles of chi-square.
+    estimates: Mapping[
+        str, Estimate
+    ]  #: The same with profiles of chi-square.
     swing: Swing  #: What fits best; its times begin with the first frame.
     residuals: Vector  #: Filmed less computed, less the mean of each ball, shape (K, N), m.
     reading: float  #: Standard error of a reading, m: as given, or that of the residuals.
@@ -43,11 +59,15 @@ class SwingFit:
     degrees_of_freedom: int  #: Readings less what was fitted to them.
     correlation: float  #: Of a ball's residuals in successive frames: about 0 if the law fits.
     poor: bool  #: Whether the law does not fit.
-    widened: Mapping[str, float]  #: By what each interval is then widened, else 1.
+    widened: Mapping[
+        str, float
+    ]  #: By what each interval is then widened, else 1.
 
     def summary(self) -> str:
         """Return all that the fit says, as text."""
-        wide = ", ".join(f"{name} {times:.1f}" for name, times in self.widened.items())
+        wide = ", ".join(
+            f"{name} {times:.1f}" for name, times in self.widened.items()
+        )
         return "\n".join([
             *(f"{one}{UNITS[name] * one.identified}" for name, one in self.estimates.items()),
             f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}, "
@@ -60,9 +80,27 @@ class SwingFit:
 
     def plot(self, axes: Any = None) -> Any:
         """Draw film and swing, and the residuals, on two `axes` or on new ones."""
-        from cradle.pictures.fits import draw_swing
+        import matplotlib.pyplot as plt
 
-        return draw_swing(self, axes)
+        from cradle.pictures.impacts import ball_style
+
+        if axes is None:
+            _, axes = plt.subplots(
+                2, 1, figsize=(5.6, 6), layout="constrained", sharex=True
+            )
+        times, places = self.swing.times, 1000 * self.swing.positions
+        for k, (x, left) in enumerate(
+            zip(places.T, 1000 * self.residuals.T, strict=True)
+        ):
+            style = ball_style(k)
+            axes[0].plot(times, x + left, ".", ms=3, color=style["color"])
+            axes[0].plot(times, x, lw=1, label=f"ball {k + 1}", **style)
+            axes[1].plot(times, left, ".", ms=3, color=style["color"])
+        axes[0].set(ylabel="position (mm): film, fit")
+        axes[1].set(xlabel="time (s)", ylabel="film less fit (mm)")
+        axes[0].legend(ncols=len(places.T), fontsize="small", loc="lower center",
+                       bbox_to_anchor=(0.5, 1), frameon=False)  # fmt: skip
+        return axes
 
 
 def fit_swing(
@@ -120,24 +158,54 @@ class _Film:
         self, times: ArrayLike, positions: ArrayLike, model: Model, seen: ArrayLike | None,
         reading: float | None, free: Collection[str], known: Mapping[str, float],
     ) -> None:  # fmt: skip
-        t, x, self.model = checked("times", times), numbers("positions", positions), model
-        mask = np.ones(x.shape[1:], bool) if seen is None else np.asarray(seen, bool)
-        fit = x.ndim == 2 and t.shape == x.shape[:1] and mask.shape in (x.shape, x.shape[1:])
+        t, x, self.model = (
+            checked("times", times),
+            numbers("positions", positions),
+            model,
+        )
+        mask = (
+            np.ones(x.shape[1:], bool)
+            if seen is None
+            else np.asarray(seen, bool)
+        )
+        fit = (
+            x.ndim == 2
+            and t.shape == x.shape[:1]
+            and mask.shape in (x.shape, x.shape[1:])
+        )
         if not fit or x.shape[1] < 2:
             told = f"times, positions and seen have shapes {t.shape}, {x.shape} and {mask.shape}"
-            raise ValueError(f"{told}; must be (K,), (K, N) and (K, N) or (N,), N at least 2")
-        refuse_where("times", t, np.diff(t, prepend=-np.inf) <= 0.0, "must rise")
+            raise ValueError(
+                f"{told}; must be (K,), (K, N) and (K, N) or (N,), N at least 2"
+            )
+        refuse_where(
+            "times", t, np.diff(t, prepend=-np.inf) <= 0.0, "must rise"
+        )
         self.times, self.seen = t - t[0], mask & np.isfinite(x)
         self.x = np.where(self.seen, x, np.nan)
         for name in (*free, *known):
             one_of("free or known", name, tuple(UNITS))
-        self.names = [name for name in UNITS if name in free and name not in known]
-        self.fixed = {"damping": 0.0, "restitution": 1.0, "gaps": 0.0, **known}
+        self.names = [
+            name for name in UNITS if name in free and name not in known
+        ]
+        self.fixed = {
+            "damping": 0.0,
+            "restitution": 1.0,
+            "gaps": 0.0,
+            **known,
+        }
         if "period" not in {*self.names, *known}:
-            raise ValueError("period is neither free nor known; must be one of them")
-        for name, value in (("reading", reading), ("known['period']", known.get("period"))):
+            raise ValueError(
+                "period is neither free nor known; must be one of them"
+            )
+        for name, value in (
+            ("reading", reading),
+            ("known['period']", known.get("period")),
+        ):
             if value is not None:
-                one_number(name, value, "must be above 0", 0.0, open_low=True)
+                one_number(
+                    name, value, "must be above 0", 0.0, open_low=True
+                )
         self.reading = reading
 
     def begin(self) -> Vector:
@@ -149,8 +217,12 @@ class _Film:
         mean = self.x[:, often >= 0.5 * often.max()].mean(axis=1)
         mean, at = mean[np.isfinite(mean)], t[np.isfinite(mean)]
         if min(at.size, often.sum() // 3) < 10:
-            raise ValueError(f"{often.sum()} readings, {at.size} frames with all balls; too few")
-        rates = np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
+            raise ValueError(
+                f"{often.sum()} readings, {at.size} frames with all balls; too few"
+            )
+        rates = (
+            np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
+        )
         rate = rates[lombscargle(at, mean - mean.mean(), rates).argmax()]
         self.period = period = self.fixed.get("period", 2.0 * np.pi / rate)
         self.size = size = float(np.nanmax(np.abs(self.x)))
@@ -160,7 +232,9 @@ class _Film:
         v, x = np.transpose(lines)
         self.movers = np.flatnonzero(np.abs(x) > 0.1 * size)
         if not self.movers.size:
-            raise ValueError("no ball is seen on its way at first; begin soon after the release")
+            raise ValueError(
+                "no ball is seen on its way at first; begin soon after the release"
+            )
         v, x = v[self.movers], x[self.movers]
         # Limits, first steps, and where to begin.
         rows: dict[str, tuple[float, float, float, Any]] = {
@@ -172,51 +246,102 @@ class _Film:
         used = [rows[name] for name in self.names]
         used += [(-np.inf, np.inf, 1e-3 * size, [place]) for place in x]
         used.append((-np.inf, np.inf, 1e-2 / period, [x @ v / (x @ x)]))
-        self.low, self.high, self.steps = np.array([row[:3] for row in used]).T
-        self.least, count = 1e-4 * self.steps, int(np.searchsorted(t, 2.2 * period))
-        nodes = [np.array(node) for node in product(*(row[3] for row in used))]
-        nodes.sort(key=lambda node: float((self.left(node, count) ** 2).sum()))
-        held = [k for k, name in enumerate(self.names) if name in ("period", "damping")]
+        self.low, self.high, self.steps = np.array(
+            [row[:3] for row in used]
+        ).T
+        self.least, count = (
+            1e-4 * self.steps,
+            int(np.searchsorted(t, 2.2 * period)),
+        )
+        nodes = [
+            np.array(node) for node in product(*(row[3] for row in used))
+        ]
+        nodes.sort(
+            key=lambda node: float((self.left(node, count) ** 2).sum())
+        )
+        held = [
+            k
+            for k, name in enumerate(self.names)
+            if name in ("period", "damping")
+        ]
         found = [self.descend(node, count, held) for node in nodes[:3]]
         self.half = min(found, key=lambda one: float(one[1] @ one[1]))[0]
-        for some in [len(t) >> k for k in range(20, 0, -1) if len(t) >> k > 1.5 * count]:
+        for some in [
+            len(t) >> k
+            for k in range(20, 0, -1)
+            if len(t) >> k > 1.5 * count
+        ]:
             self.half = self.descend(self.half, some)[0]
         return self.half
 
     def swung(self, p: Vector, count: int) -> Swing:
         """Return the swing by numbers, in the first frames."""
-        now = {**self.fixed, **dict(zip(self.names, p.tolist(), strict=False))}
+        now = {
+            **self.fixed,
+            **dict(zip(self.names, p.tolist(), strict=False)),
+        }
         balls = np.arange(self.x.shape[1])
         x = np.zeros(balls.size)
         x[self.movers] = p[len(self.names) : -1]
-        x = np.maximum.accumulate(x + now["gaps"] * balls) - now["gaps"] * balls  # none overlap
+        x = (
+            np.maximum.accumulate(x + now["gaps"] * balls)
+            - now["gaps"] * balls
+        )  # none overlap
         chain = Chain(np.ones(balls.size), p[-1] * x, now["restitution"])
         length = _GRAVITY * (now["period"] / (2.0 * np.pi)) ** 2
-        hanging = Pendulums(length, gaps=now["gaps"], damping=now["damping"])
-        return swing(chain, self.model, x, self.times[:count], pendulums=hanging)
+        hanging = Pendulums(
+            length, gaps=now["gaps"], damping=now["damping"]
+        )
+        return swing(
+            chain, self.model, x, self.times[:count], pendulums=hanging
+        )
 
     def left(self, p: Vector, count: int) -> Vector:
         """Return what the swing by numbers leaves of the readings in the first frames."""
         seen = self.seen[:count]
-        left = np.where(seen, self.x[:count] - self.swung(p, count).positions, 0.0)
-        return np.asarray((left - left.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))[seen])
+        left = np.where(
+            seen, self.x[:count] - self.swung(p, count).positions, 0.0
+        )
+        return np.asarray(
+            (left - left.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))[
+                seen
+            ]
+        )
 
-    def descend(self, p: Vector, count: int, held: Collection[int] = ()) -> _Place:
+    def descend(
+        self, p: Vector, count: int, held: Collection[int] = ()
+    ) -> _Place:
         """Return a minimum; steps are about as wide as the errors, and so go over what is rough."""
         from scipy.optimize import least_squares
 
         # Touching balls stay so: what they do is no limit of small gaps.
-        touch = [k for k, name in enumerate(self.names) if name == "gaps" and not p[k]]
-        free, size = np.setdiff1d(np.arange(p.size), [*held, *touch]), self.seen[:count].sum()
+        touch = [
+            k
+            for k, name in enumerate(self.names)
+            if name == "gaps" and not p[k]
+        ]
+        free, size = (
+            np.setdiff1d(np.arange(p.size), [*held, *touch]),
+            self.seen[:count].sum(),
+        )
 
         def slopes(q: Vector) -> Vector:
             left, out = self.left(q, count), np.zeros((size, p.size))
             for k in free:
                 trial = q.copy()
-                trial[k] += self.steps[k] * (1 if q[k] + self.steps[k] < self.high[k] else -1)
-                out[:, k] = (self.left(trial, count) - left) / (trial[k] - q[k])
-                error = np.sqrt(left @ left / (out[:, k] @ out[:, k] + 1e-300) / size)
-                most = min(100.0 * self.steps[k], 0.4 * (self.high[k] - self.low[k]))
+                trial[k] += self.steps[k] * (
+                    1 if q[k] + self.steps[k] < self.high[k] else -1
+                )
+                out[:, k] = (self.left(trial, count) - left) / (
+                    trial[k] - q[k]
+                )
+                error = np.sqrt(
+                    left @ left / (out[:, k] @ out[:, k] + 1e-300) / size
+                )
+                most = min(
+                    100.0 * self.steps[k],
+                    0.4 * (self.high[k] - self.low[k]),
+                )
                 self.steps[k] = np.clip(error, self.least[k], most)
             return out
 
@@ -226,7 +351,9 @@ class _Film:
         )  # fmt: skip
         return found.x, found.fun, found.jac
 
-    def judged(self, p: Vector, left: Vector, slopes: Vector) -> tuple[Vector, SwingFit | None]:
+    def judged(
+        self, p: Vector, left: Vector, slopes: Vector
+    ) -> tuple[Vector, SwingFit | None]:
         """Return the fit; or, if a profile finds a lower minimum, that and None."""
         freedom = left.size - int(self.seen.any(axis=0).sum()) - p.size
         total, grid = float(left @ left), np.full(self.seen.shape, np.nan)
@@ -235,7 +362,10 @@ class _Film:
         reading = self.reading or float(np.sqrt(spread))
         # Products of residuals of a ball some frames apart, up to a quarter of a swing.
         most = 2 + int(0.25 * self.period / self.times[-1] * len(grid))
-        products = [x[np.isfinite(x)] for x in (grid[k:] * grid[:-k] for k in range(1, most))]
+        products = [
+            x[np.isfinite(x)]
+            for x in (grid[k:] * grid[:-k] for k in range(1, most))
+        ]
         far = [np.concatenate(some).sum() / np.sqrt(sum(map(len, some))) / spread
                for some in (products[:1], products)]  # fmt: skip
         alike = float(products[0].mean() / spread)
@@ -243,17 +373,28 @@ class _Film:
         inverse = solver @ solver.T
         self.variance, chi = reading**2, total / reading**2
         exact = spread < (1e-6 * self.size) ** 2  # rounding alone is left
-        poor = not exact and bool(max(far) > _FAR or chance(chi, freedom) < _CHANCE)
+        poor = not exact and bool(
+            max(far) > _FAR or chance(chi, freedom) < _CHANCE
+        )
         if poor:
             self.variance = max(reading**2, spread)
-            wide = self.widened(grid, slopes, inverse, (self.half - p) / np.sqrt(RISE))
-        estimates, errors = {}, wide * np.sqrt(self.variance * np.diag(inverse))
+            wide = self.widened(
+                grid, slopes, inverse, (self.half - p) / np.sqrt(RISE)
+            )
+        estimates, errors = (
+            {},
+            wide * np.sqrt(self.variance * np.diag(inverse)),
+        )
         for k, name in enumerate(self.names):
             rise = RISE * self.variance * wide[k] ** 2
-            found = self.profile((p, left, slopes), k, float(errors[k]), rise)
+            found = self.profile(
+                (p, left, slopes), k, float(errors[k]), rise
+            )
             if not isinstance(found, Scan):
                 return found, None
-            estimates[name] = Estimate.of("swing", (name,), float(self.high[k]), found)
+            estimates[name] = Estimate.of(
+                "swing", (name,), float(self.high[k]), found
+            )
         return p, SwingFit(
             {name: one.value for name, one in estimates.items()},
             {name: one.intervals[0] for name, one in estimates.items()},
@@ -261,22 +402,34 @@ class _Film:
             dict(zip(self.names, wide.tolist(), strict=False)),
         )  # fmt: skip
 
-    def widened(self, grid: Vector, slopes: Vector, inverse: Vector, drift: Vector) -> Vector:
+    def widened(
+        self, grid: Vector, slopes: Vector, inverse: Vector, drift: Vector
+    ) -> Vector:
         """Return errors by the differences between parts of the film, over those of readings."""
         from scipy.special import stdtrit
 
         usual = np.sqrt(self.variance * np.diag(inverse))
         usual[usual == 0.0] = 1.0
-        pulls, wide = np.zeros((*grid.shape, drift.size)), [np.ones(drift.size)]
+        pulls, wide = (
+            np.zeros((*grid.shape, drift.size)),
+            [np.ones(drift.size)],
+        )
         pulls[self.seen] = slopes * grid[self.seen][:, None]
         for parts in _PARTS:
             cuts = np.arange(parts) * len(grid) // parts
             moved = np.add.reduceat(pulls.sum(axis=1), cuts) @ inverse
-            wide.append(np.sqrt((moved**2).sum(axis=0) * parts / (parts - 1)) / usual)
-            wide[-1] *= stdtrit(parts - 1, 0.5 + 0.5 * LEVEL) / np.sqrt(RISE)
+            wide.append(
+                np.sqrt((moved**2).sum(axis=0) * parts / (parts - 1))
+                / usual
+            )
+            wide[-1] *= stdtrit(parts - 1, 0.5 + 0.5 * LEVEL) / np.sqrt(
+                RISE
+            )
         return np.asarray(np.hypot(np.max(wide, axis=0), drift / usual))
 
-    def profile(self, best: _Place, k: int, error: float, rise: float) -> Scan | Vector:
+    def profile(
+        self, best: _Place, k: int, error: float, rise: float
+    ) -> Scan | Vector:
         """Return the profile of a number; or, if it finds a lower minimum, that."""
         p, left, slopes = best
         others = np.where(np.arange(p.size) == k, 0.0, slopes)
@@ -303,7 +456,12 @@ class _Film:
                 way = abs(q[k] - p[k]) / np.clip(near, 0.3, 3.0)
             ends.append(float(q[k]))
         grid, excess = np.array(sorted(points)).T
-        return Scan((Mode(float(p[k]), 0.0),), ((ends[0], ends[1]),), grid, excess * RISE / rise)
+        return Scan(
+            (Mode(float(p[k]), 0.0),),
+            ((ends[0], ends[1]),),
+            grid,
+            excess * RISE / rise,
+        )
 
 
 def _solver(slopes: Vector) -> Vector:
