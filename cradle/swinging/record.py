@@ -85,20 +85,24 @@ class Swing:
 
     def impacts_to_frame(self) -> pd.DataFrame:
         """Return a row for each impact and ball: impact, time, ball, before, after."""
-        times = [one.time for one in self.impacts]
-        before, after = [one.before for one in self.impacts], [one.after for one in self.impacts]
+        times, before, after = (
+            np.array([getattr(one, name) for one in self.impacts])
+            for name in ("time", "before", "after")
+        )
         rows = {"impact": np.arange(len(times)), "time": times}
         return self._by_ball(rows, {"before": before, "after": after})
 
-    def _by_ball(self, rows: dict[str, Any], parts: dict[str, Any]) -> pd.DataFrame:
+    def _by_ball(self, rows: dict[str, Any], parts: dict[str, Vector]) -> pd.DataFrame:
         """Return a row for each of these rows and each ball."""
         import pandas as pd
 
         n, count = len(self.chain), len(next(iter(rows.values())))
         columns = {name: np.repeat(values, n) for name, values in rows.items()}
         columns["ball"] = np.tile(np.arange(n), count)
-        return pd.DataFrame(columns | {name: np.ravel(part) for name, part in parts.items()})
+        return pd.DataFrame(columns | {name: part.ravel() for name, part in parts.items()})
 
     def __repr__(self) -> str:
-        told = f"{len(self.times)} times to {self.end:g} s, {len(self.impacts)} impacts"
-        return f"Swing({told}, ended by {self.ended})"
+        return (
+            f"Swing({len(self.times)} times to {self.end:g} s, {len(self.impacts)} impacts, "
+            f"ended by {self.ended})"
+        )

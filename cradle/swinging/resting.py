@@ -18,8 +18,10 @@ The rules, in the order in which `swing` applies them at every event:
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
 import numpy as np
-from numpy.typing import NDArray
 
 from cradle.input.values import Vector
 from cradle.swinging.pendulums import mean
@@ -29,24 +31,23 @@ RESTING = 1e-10
 #: Gaps below this part of the swing's size are none.
 NEAR = 1e-12
 
-#: A truth of each contact.
-Flags = NDArray[np.bool_]
 
-
-def stretches(contacts: Flags) -> list[tuple[int, int]]:
+def stretches(contacts: Iterable[bool]) -> list[tuple[int, int]]:
     """Return the first ball of each stretch of marked contacts, and the one after its last."""
     edges = np.flatnonzero(np.diff([False, *contacts, False])).tolist()
     return [(first, end + 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def common_velocities(
-    masses: Vector, velocities: Vector, touching: Flags, least: float
-) -> tuple[Vector, Flags]:
+    masses: Vector, velocities: Vector, touching: Sequence[bool], least: float
+) -> tuple[Vector, list[bool]]:
     """Give touching balls that hardly move against each other their common velocity (rule 2)."""
-    v, resting = velocities.copy(), np.zeros_like(touching)
+    v, resting = velocities.copy(), [False] * len(touching)
     while True:
-        found = resting | (touching & (np.diff(v) <= least))
-        if (found == resting).all():
+        slow = [b - a <= least for a, b in pairwise(v.tolist())]
+        marks = zip(resting, touching, slow, strict=True)
+        found = [rests or (touches and now) for rests, touches, now in marks]
+        if found == resting:
             return v, resting
         # The common velocity may be as slow against the next ball: look again.
         resting = found
@@ -54,9 +55,11 @@ def common_velocities(
             v[body] = mean(v[body], masses[body])
 
 
-def pressed(masses: Vector, accelerations: Vector, resting: Flags, least: float) -> Flags:
+def pressed(
+    masses: Vector, accelerations: Vector, resting: Sequence[bool], least: float
+) -> list[bool]:
     """Return the resting contacts whose balls, left alone, would not separate (rule 3)."""
-    kept, m, a = np.zeros_like(resting), masses.tolist(), accelerations.tolist()
+    kept, m, a = [False] * len(resting), masses.tolist(), accelerations.tolist()
     for first, last in stretches(resting):
         pools: list[tuple[float, float, int]] = []  # mass, acceleration, number of balls
         for ball in range(first, last):
@@ -65,6 +68,6 @@ def pressed(masses: Vector, accelerations: Vector, resting: Flags, least: float)
                 (m1, a1, n1), (m2, a2, n2) = pools.pop(-2), pools.pop(-1)
                 pools.append((m1 + m2, (m1 * a1 + m2 * a2) / (m1 + m2), n1 + n2))
         for _, _, count in pools:
-            kept[first : first + count - 1] = True
+            kept[first : first + count - 1] = [True] * (count - 1)
             first += count
     return kept

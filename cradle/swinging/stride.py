@@ -141,8 +141,10 @@ class Alone:
                 self.quiet -= left
                 return (change, early, hits) if touched else None
             x, left = self.moved(x, passed * own), left - passed
-        why = f"the balls are squeezed between others, or `resting` = {self.resting!r} is too low"
-        raise RuntimeError(f"more than {_MOST_IMPACTS} impacts in a step of {duration!r} s; {why}")
+        raise RuntimeError(
+            f"more than {_MOST_IMPACTS} impacts in a step of {duration!r} s; the balls are "
+            f"squeezed between others, or `resting` = {self.resting!r} is too low"
+        )
 
     def look(self, x: list[complex], v: list[complex]) -> tuple[bool, float, float]:
         """Tell whether something touches now, when the next contact arrives, how long is quiet."""
@@ -181,16 +183,17 @@ class Alone:
         # Balls that touch, and those so near to each other that hardly move against each other.
         still = np.abs((np.diff(v) * lines.conj()).real) <= self.resting * np.abs(lines)
         touch = (gaps <= self.met) | (still & (gaps <= self.touching))
-        for first, last in stretches(touch):
+        for first, last in stretches(touch.tolist()):
             balls = slice(first, last)
             axis = lines[first : last - 1].sum()
             axis /= abs(axis)
             off = np.abs(np.angle(lines[first : last - 1] / axis)).max()
             if off > _BEND:
-                told = f"balls {first} to {last - 1} touch, but not in a straight row"
-                bend, most = math.degrees(off), math.degrees(_BEND)
-                rule = f"is {bend:.0f} degrees off; at most {most:.0f} are allowed"
-                raise ValueError(f"{told}: a line of centres {rule}")
+                raise ValueError(
+                    f"balls {first} to {last - 1} touch, but not in a straight row: a line of "
+                    f"centres is {math.degrees(off):.0f} degrees off; at most "
+                    f"{math.degrees(_BEND):.0f} are allowed"
+                )
             # How a ball's own way lies to the axis; a free ball's is the axis.
             free = self.pivots is None
             along = np.ones(last - first) if free else (ways[balls] / axis).real
@@ -206,14 +209,19 @@ class Alone:
                 impulses = np.cumsum(masses * (before - after))[:-1]
                 loudest = first + int(np.argmax(impulses)), float(impulses.max())
                 hits.append(Hit(time, range(first, last), before, after, *loudest))
-            # Those that touch and still approach come to rest; those that overlap by more than is
-            # unseen part, slower than what counts as an impact.
-            after, _ = common_velocities(masses, after, after[:-1] > after[1:], 0.0)
-            deep = gaps[first : last - 1] < -self.touching
-            ramp = np.append(0.0, np.cumsum(np.where(deep, 0.5 * self.resting, 0.0)))
-            after += ramp - masses @ ramp / masses.sum()
+            after = self._rested(masses, after, gaps[first : last - 1])
             gained[balls] = (after - before) * (axis if free else 1.0 / along)
         return gained
+
+    def _rested(self, masses: Vector, v: Vector, gaps: Vector) -> Vector:
+        """Return velocities after those that touch and still approach have come to rest."""
+        v, _ = common_velocities(masses, v, (v[:-1] > v[1:]).tolist(), 0.0)
+        if (gaps < -self.touching).any():
+            # Balls that overlap by more than is unseen part, slower than what counts as an impact.
+            parting = np.where(gaps < -self.touching, 0.5 * self.resting, 0.0)
+            ramp = np.concatenate([[0.0], np.cumsum(parting)])
+            v += ramp - masses @ ramp / masses.sum()
+        return v
 
     def _plane(self, name: str, places: ArrayLike) -> Plane:
         """Return places in the plane as complex numbers."""
@@ -224,7 +232,8 @@ class Alone:
 
     def _refuse_a_pack(self, x: list[complex]) -> None:
         for i, j in combinations(range(len(x)), 2):
-            gap = abs(x[j] - x[i]) - (self.radii[i] + self.radii[j])
+            line = x[j] - x[i]
+            gap = math.hypot(line.real, line.imag) - (self.radii[i] + self.radii[j])
             if j > i + 1 and gap <= self.touching:
                 rule = "a row alone can be solved, no pack"
                 raise ValueError(f"balls {i} and {j} touch and are no neighbours; {rule}")

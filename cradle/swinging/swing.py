@@ -1,4 +1,7 @@
-"""The swinging cradle: impacts by any model, pendulums between them, and the rules of `resting`."""
+"""The swinging cradle: impacts by any model of the package, pendulums between them.
+
+The rules of touching and resting balls are told in `cradle.swinging.resting`.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +23,23 @@ from cradle.swinging.record import Impact, Swing
 from cradle.swinging.resting import NEAR, RESTING, common_velocities, pressed, stretches
 from cradle.trace import Trace
 
-#: Events without an impact that one instant can have, for each ball: a few for each contact.
+__all__ = ["swing"]
+
+#: Events without an impact that one instant can have, for each ball: each contact opens and closes
+#: a few times at most.
 MOST_IDLE = 20
 
 
 def swing(
-    chain: Chain, model: Model, positions: ArrayLike, times: ArrayLike, *,
-    pendulums: Pendulums | None = None, max_impacts: int = 100_000, min_energy: float = 0.0,
-) -> Swing:  # fmt: skip
+    chain: Chain,
+    model: Model,
+    positions: ArrayLike,
+    times: ArrayLike,
+    *,
+    pendulums: Pendulums | None = None,
+    max_impacts: int = 100_000,
+    min_energy: float = 0.0,
+) -> Swing:
     """Let a cradle swing.
 
     Parameters
@@ -78,8 +90,10 @@ def swing(
     collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
     at = checked("times", times)
     if at.ndim != 1 or not at.size or at[0] < 0.0 or (np.diff(at) < 0.0).any():
-        rule = "must be a row of rising numbers, none below 0, such as [0, 0.5, 1]"
-        raise ValueError(f"times = {shown(times)}; {rule}")
+        raise ValueError(
+            f"times = {shown(times)}; must be a row of rising numbers, none below 0, "
+            "such as [0, 0.5, 1]"
+        )
     most = whole_number("max_impacts", max_impacts)
     least = one_number("min_energy", min_energy, "must lie in [0, 1]", 0.0, 1.0)
     run = _Run(chain, model, hanging, hanging.released(checked("positions", positions), n))
@@ -98,6 +112,7 @@ class _Run:
         n = len(chain)
         self.chain, self.hanging = chain, (hanging := Hanging(pendulums, chain.masses))
         self.model = functools.cache(functools.partial(part, model, n))
+        self.offsets = functools.cache(hanging.offsets)
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
         self.released = float(hanging.energy(self.x, self.v))
         self.speed = float(np.sqrt(2.0 * self.released / chain.masses.sum()))
@@ -109,9 +124,10 @@ class _Run:
         distance = hanging.gaps + np.diff(x)
         if (distance < -TIE * self.size).any():
             c = int(np.argmin(distance))
-            told = f"balls {c} and {c + 1} overlap by {-distance[c]:g} m"
-            raise ValueError(f"positions = {x.tolist()}; {told}")
-        self.freed = np.full(n - 1, -math.inf)  # when the force in each contact last fell to zero
+            raise ValueError(
+                f"positions = {x.tolist()}; balls {c} and {c + 1} overlap by {-distance[c]:g} m"
+            )
+        self.freed = [-math.inf] * (n - 1)  # when the force in each contact last fell to zero
         self.settle([], [])
 
     def to_the_end(self, times: Vector, most: int, least: float) -> str:
@@ -138,9 +154,10 @@ class _Run:
             self.settle(closing, opening)
             idle = idle + 1 if wait <= self.hanging.tie and len(self.impacts) == known else 0
             if idle > MOST_IDLE * len(self.x):
-                told = f"contacts {closing} close and {opening} open there again and again"
-                why = f"{told} without an impact"
-                raise RuntimeError(f"the swing does not get beyond t = {self.t} s: {why}")
+                raise RuntimeError(
+                    f"the swing does not get beyond t = {self.t} s: contacts {closing} close and "
+                    f"{opening} open there again and again without an impact"
+                )
         # The instant at which the run ends is reported if it was asked for.
         count = int(np.searchsorted(times[done:], self.t, side="right"))
         self.series.append((np.tile(self.x, (count, 1)), np.tile(self.v, (count, 1))))
@@ -149,26 +166,29 @@ class _Run:
     def settle(self, closing: list[int], opening: list[int]) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
         hanging, x, v = self.hanging, self.x, self.v
-        touching = hanging.gaps + np.diff(x) <= NEAR * self.size
-        touching[closing] = True
+        touching = (hanging.gaps + (x[1:] - x[:-1]) <= NEAR * self.size).tolist()
+        for c in closing:
+            touching[c] = True
         self.x, self.v = x.copy(), v.copy()
         groups = stretches(touching)
         for first, last in groups:  # to where they touch but for rounding; their centre stays
-            offset = hanging.offsets(first, last)
+            offset = self.offsets(first, last)
             self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
         self.collide(groups, v)
         struck = self.v
         # What opens at this instant rests no more in it, whatever else happens.
-        self.freed[opening] = self.t
-        kept = touching & (self.t - self.freed > hanging.tie)
+        for c in opening:
+            self.freed[c] = self.t
+        contacts = zip(touching, self.freed, strict=True)
+        kept = [touches and self.t - freed > hanging.tie for touches, freed in contacts]
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
         self.instants.append((self.t, x, self.x, v, struck, self.v))
-        if resting.any():
+        if any(resting):
             alone = hanging.accelerations(self.x, self.v)
             least = 1e-12 * self.speed * hanging.fastest
             resting = pressed(hanging.masses, alone, resting, least)
-        self.together = tuple(resting.tolist())
-        self.parting = tuple((touching & ~resting).tolist())
+        self.together = tuple(resting)
+        self.parting = tuple(t and not one for t, one in zip(touching, resting, strict=True))
 
     def collide(self, groups: list[tuple[int, int]], before: Vector) -> None:
         """Solve the impacts of this instant and record them as one."""
