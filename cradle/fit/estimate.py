@@ -56,9 +56,15 @@ def restitution(shots: Shots) -> Fit:
 def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma: float) -> Fit:
     """Fit the coefficient of restitution of a ball that bounces on something very heavy.
 
-    The `name` is that of the pair, such as "AB"; `drop` and `rise`, shape (K,), are heights above
-    the point of contact before and after, so that e^2 = rise / drop; `sigma` is the standard error
-    of each, in the same unit.  They must be above 0, or a ValueError is raised.
+    Parameters
+    ----------
+    name : str
+        Name of the pair, such as "AB".
+    drop, rise : array_like, shape (K,)
+        Heights above the point of contact before and after, in one unit: e^2 = rise / drop.
+    sigma : float
+        Standard error of each height, in that unit; it and heights must be above 0, or a ValueError
+        is raised.
 
     Examples
     --------

@@ -244,11 +244,20 @@ class Fit:
     def predict(self, types: str | Sequence[str], speed: float = 1.0) -> Prediction:
         """Predict a longer chain, the first ball striking the others at rest.
 
-        The `types` of N balls, left to right, are names, or one string such as "ABA" or
-        "steel-brass-steel"; `speed` is that of the first ball, m/s.  Errors are drawn
-        independently; ratios fitted together are drawn together, and one that the data left open
-        takes all values up to its bound.  Fewer than 2 balls, and a mass, restitution or ratio that
-        is not known, are a ValueError.
+        Errors are drawn independently; ratios fitted together are drawn together, and one that the
+        data left open takes all values up to its bound.
+
+        Parameters
+        ----------
+        types : str or sequence of str, length N
+            Types of the balls, left to right; in one string such as "ABA" or "steel-brass-steel".
+        speed : float
+            Of the first ball, m/s.
+
+        Raises
+        ------
+        ValueError
+            If fewer than 2 balls are named, or a mass, restitution or ratio is not known.
         """
         row = types_in_a_row(types)
         one_number("speed", speed, "must be above 0", 0.0, open_low=True)

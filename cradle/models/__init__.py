@@ -21,7 +21,7 @@ class Model(Protocol):
 def collide(
     chain: Chain, model: Model, *, record: bool | None = None, progress: bool = False
 ) -> Trace:
-    """Solve one impact: return its path and outcome; if no balls approach, without any event.
+    """Solve one impact.
 
     Parameters
     ----------
@@ -34,6 +34,11 @@ def collide(
         million numbers (2 N - 1 for each event) is cut, with a warning.
     progress : bool
         Show how many events `ImpulseCorrelation` has counted so far; other models ignore it.
+
+    Returns
+    -------
+    Trace
+        The path and the outcome.  If no balls approach, the path has no events.
 
     Raises
     ------

@@ -30,9 +30,9 @@ def post_impact_velocities(
     backward: ArrayLike | None = None, *, meeting: float = 0.5, excess: str = "raise",
     max_events: int = MAX_EVENTS, progress: bool = False,
 ) -> Vector:  # fmt: skip
-    """Post-impact velocities of many chains of N balls at once, shape (..., N), m/s.
+    """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
 
-    Leading axes broadcast.  As `collide` with `ImpulseCorrelation`, without the path.
+    As `collide` with `ImpulseCorrelation`, without the path; references are there.
 
     Parameters
     ----------
@@ -46,6 +46,11 @@ def post_impact_velocities(
         As for `ImpulseCorrelation`.
     progress : bool
         Show a progress bar.
+
+    Returns
+    -------
+    ndarray, shape (..., N)
+        Velocities after the impact, m/s.
 
     Raises
     ------
@@ -183,7 +188,8 @@ def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
         part = array.reshape(1, size)
     elif array.shape[:-1] == lead and array.flags.c_contiguous:
         part = array.reshape(-1, size)[rows]
-    else:  # without making the others
+    else:
+        # Without making the others.
         full = np.broadcast_to(array, (*lead, size))
         return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
     # Compiled code is made for arrays that may be written to; it writes to no input.

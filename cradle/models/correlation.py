@@ -64,8 +64,12 @@ class ImpulseCorrelation:
         What to do with a ratio above its bound (Eq. 53): refuse it, or hold the contact closed
         while the ratio would open it.
     max_events : int
-        Number of steps after which the impact is given up.  This and all other values outside their
-        range are a `ValueError`.
+        Number of steps after which the impact is given up.
+
+    Raises
+    ------
+    ValueError
+        If a value is outside its range.
 
     References
     ----------

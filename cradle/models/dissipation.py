@@ -16,7 +16,7 @@ from cradle.input.values import (
     refuse_where,
     row_of,
     whole_number,
-)
+)  # fmt: skip
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 # Beyond these the equations of one problem keep too few digits.

@@ -45,8 +45,12 @@ class CurvedTrace(Trace):
 class EnergyTrace(CurvedTrace):
     """The path of an impact whose ratios of impulses change all the time; N balls, S steps.
 
-    At each step of the integration it has `step_velocities`, m/s, and `step_impulses` so far, N s,
-    shapes (S, N) and (S, N - 1); `evaluations` is how often the ratios were evaluated.
+    Attributes
+    ----------
+    step_velocities, step_impulses : ndarray, shapes (S, N) and (S, N - 1)
+        Velocities, m/s, and impulses so far, N s, at each step of the integration.
+    evaluations : int
+        How often the ratios were evaluated.
     """
 
 

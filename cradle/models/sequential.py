@@ -28,8 +28,12 @@ class SequentialCollisions:
         The end of a stretch of touching balls whose approaching contact collides first; the
         outcome can depend on it.
     max_events : int
-        Number of steps after which the impact is given up; another value is a `ValueError`, as
-        another order is.
+        Number of steps after which the impact is given up.
+
+    Raises
+    ------
+    ValueError
+        If a value is outside its range.
 
     References
     ----------
@@ -84,8 +88,12 @@ class FusedChain:
 
     The balls on the left of the one approaching contact and those on its right collide like two
     balls, with the restitution of that contact.  That is the largest admissible ratio at every ball
-    (Eq. 53), and so ``ImpulseCorrelation(1, excess="saturate")`` solves it.  On solving, a second
-    contact that approaches, or one that opens, is a `ValueError`: which balls are one body?
+    (Eq. 53), and so ``ImpulseCorrelation(1, excess="saturate")`` solves it.
+
+    Raises
+    ------
+    ValueError
+        On solving, if a second contact approaches, or one opens: which balls are one body?
 
     References
     ----------
