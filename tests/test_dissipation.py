@@ -215,3 +215,10 @@ def test_heavy_balls_come_to_rest_by_impulses_below_their_last_digit():
     common = sum(map(Fraction, np.multiply(m, v))) / sum(map(Fraction, m))
     np.testing.assert_allclose(trace.velocities, float(common), rtol=2e-15)
     assert len(trace.events) < 1000
+
+
+def test_a_light_striker_keeps_its_momentum():
+    """Heavy balls gain next to no velocity, and all of the momentum: no difference tells it."""
+    for masses in ([1e-5, 1e5, 1e5, 1.0], [1e-5, 1.0, 1e3, 1e5]):
+        trace = collide(Chain(masses, [1, 0, 0, 0], 0.5), QuadraticDissipation())
+        assert np.dot(masses, trace.velocities) == pytest.approx(masses[0], rel=1e-14)

@@ -162,9 +162,10 @@ def _parted(m: Vector, u: Vector, kappa: Vector, distance: float) -> tuple[Vecto
     from scipy.optimize import nnls
 
     # With w = - u+ >= 0 the problem is one of least squares: sum m dv^2 + sum kappa mu (u - w)^2,
-    # where dv grows by u + w from ball to ball and moves no centre of mass.
-    parted = np.tri(len(m), len(u), -1)
-    parted -= m @ parted / m.sum()
+    # where dv grows by u + w from ball to ball and moves no centre of mass: a contact parts what is
+    # on its left from what is on its right, in proportion to the mass on the other side.
+    left, right = np.cumsum(m)[:-1], np.cumsum(m[::-1])[-2::-1]
+    parted = np.where(np.tri(len(m), len(u), -1) > 0.0, left, -right) / m.sum()
     rows = np.vstack([np.eye(len(u)), np.ones(len(u))])
     mu = np.append(m[:-1] / (m[:-1] + m[1:]) * m[1:], m[0] / (m[0] + m[-1]) * m[-1])
     inertia = np.sqrt(m)[:, None] * parted
