@@ -207,6 +207,10 @@ def test_a_speed_is_typed_and_a_hit_is_heard(visit):
     tab.get_by_title("ball 1", exact=True).click()
     later(tab, 50)
     box = tab.get_by_label("comes in with, as a number")
+    box.fill("-7")
+    box.press("Enter")
+    said = tab.locator(".refused", has_text="speed")
+    assert said.inner_text() == "speed must lie between \u22122 and 2 m/s. In force: 1 m/s."
     box.fill("0.5")
     box.press("Enter")
     assert later(tab, 50)["speeds"] == [0.5, 0, 0, 0, 0]
