@@ -225,6 +225,14 @@ def test_scan_finds_minima_narrower_than_a_cell():
     assert high - low == pytest.approx(2 * np.sqrt(RISE * 1e-10), rel=1e-3)
 
 
+def test_refine_where_the_grid_is_far_above_the_minimum():
+    """Parameters that do not matter have the whole range, the one that does a cell or two."""
+    found, *_ = refine(lambda x: ((x[:, 0] - 0.3137) / 0.002) ** 2, np.full(3, 0.5))
+    (low, high), *others = [scan.intervals[0] for scan in found]
+    assert 0.28 < low < 0.3137 < high < 0.35
+    np.testing.assert_allclose(others, [(0, 0.5)] * 2, atol=1e-15)
+
+
 def test_refine_against_an_ellipse():
     matrix = 1e5 * np.array([[2.0, 1.5], [1.5, 2.0]])
     centre = np.array([0.21, 0.33])

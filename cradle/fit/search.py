@@ -87,7 +87,9 @@ def refine(function: Function, upper: Vector) -> Found:
     while True:
         values = function(points)
         order = np.argsort(values, kind="stable")
-        inside = values - values.min() <= RISE
+        # The grid can be far above the minimum in its best cell, from where the set is counted.
+        *_, lowest = _walked(function, points[order[:1]], step[None], upper)
+        inside = values - lowest <= RISE
         if np.count_nonzero(inside) >= _ENOUGH or (step < 1e-6 * upper).all():
             break
         points = (points[order[:_KEPT], None, :] + halves * step).reshape(-1, size)
