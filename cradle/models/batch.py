@@ -7,7 +7,6 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from cradle.chain import Chain
 from cradle.input.values import Vector, numbers
 from cradle.kernel import Inputs, Options, Outputs
-from cradle.models.correlation import MAX_EVENTS, ImpulseCorrelation, check_values, raise_refused
+from cradle.models.correlation import (
+    MAX_EVENTS,
+    ImpulseCorrelation,
+    check_options,
+    check_values,
+    raise_refused,
+)
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
 from cradle.trace import ImpactNotCertified
 
@@ -32,7 +37,7 @@ def post_impact_velocities(
 ) -> Vector:  # fmt: skip
     """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
 
-    As `collide` with `ImpulseCorrelation`, without the path; references are there.
+    As `collide` with `ImpulseCorrelation`, without the path.
 
     Parameters
     ----------
@@ -57,6 +62,10 @@ def post_impact_velocities(
     ValueError, ImpactNotFinished, ImpactNotCertified
         If a value or a shape is wrong; for the first chain whose impact takes more than
         `max_events` steps, or whose outcome fails the check that every answer has to pass.
+
+    References
+    ----------
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583.
 
     Examples
     --------
@@ -96,8 +105,8 @@ def outcomes(
     >>> found.collisions[0].tolist(), found.collapsed.tolist()  # Fig. 6 is a map of such counts
     ([1, 1], [False, True])
     """
-    law = ImpulseCorrelation(0.0, meeting=meeting, excess=excess, max_events=max_events)
-    options = Options(law.meeting, law.max_events, law.excess == "raise")
+    check_options(meeting, excess, max_events)
+    options = Options(float(meeting), int(max_events), excess == "raise")
     given = {"masses": masses, "velocities": velocities, "restitution": restitution}
     given |= {"forward": forward, "backward": forward if backward is None else backward}
     arrays, lead = shaped(given, (0, 0, 1, 2, 2))  # the kernel checks whether these are in range
@@ -125,7 +134,10 @@ def outcomes(
         if status != FINISHED:
             # Alone, with its record; it stops where it stopped here, and raises.
             m, v, e, f, b = (rows_of(array, lead, slice(failed, failed + 1))[0] for array in arrays)
-            chain, model = Chain(m, v, e), replace(law, forward=f, backward=b, excess="saturate")
+            model = ImpulseCorrelation(
+                f, b, meeting=meeting, excess="saturate", max_events=max_events
+            )
+            chain = Chain(m, v, e)
             model.solve(chain)
             raise ImpactNotCertified(chain, model, "among others it stops, alone it does not")
     v, hits, collapsed, *_ = whole

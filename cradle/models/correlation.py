@@ -90,15 +90,11 @@ class ImpulseCorrelation:
     max_events: int = field(default=MAX_EVENTS, kw_only=True)
 
     def __post_init__(self) -> None:
-        rule = "at least 1 and below 2**63"
-        vars(self).update(
-            meeting=one_number("meeting", self.meeting, *_RANGE),
-            excess=one_of("excess", self.excess, ("raise", "saturate")),
-            max_events=whole_number("max_events", self.max_events, rule, high=2**63 - 1),
-        )
+        check_options(self.meeting, self.excess, self.max_events)
         for name in ("forward", "backward"):
             if (given := getattr(self, name)) is not None or name == "forward":
                 vars(self)[name] = number_or_row(name, given, "N - 2", *_RANGE)
+        vars(self).update(meeting=float(self.meeting), max_events=int(self.max_events))
 
     def ratios(self, n: int) -> tuple[Vector, Vector]:
         """Return the ratios forward and backward at the interior balls of a chain of n balls."""
@@ -151,6 +147,15 @@ class ImpulseCorrelation:
             margin=job.tally("margin"),
             left_out=count - kept if kept else 0,  # without a record not all are counted
         )  # fmt: skip
+
+
+def check_options(meeting: float, excess: str, max_events: int) -> None:
+    """Raise if an option is outside its range."""
+    # The usual options first: they cost a call for one chain less than the checks in full.
+    if not (type(meeting) is float and 0.0 <= meeting <= 1.0):
+        one_number("meeting", meeting, *_RANGE)
+    one_of("excess", excess, ("raise", "saturate"))
+    whole_number("max_events", max_events, "at least 1 and below 2**63", high=2**63 - 1)
 
 
 def check_values(bounded: bool, *values: ArrayLike) -> None:

@@ -58,8 +58,7 @@ class EnergyTrace(CurvedTrace):
 class EnergyDistribution:
     """Impulses grow in proportions set by stored energies (Liu, Zhao and Brogliato).
 
-    While contacts i and j are closed, their impulses P grow by (Proc. R. Soc. A 464 (2008)
-    3193-3211) ::
+    While contacts i and j are closed, their impulses P grow by ::
 
         dP_j / dP_i = (k_j / k_i)^(1 / (1 + p)) (E_j / E_i)^(p / (1 + p))
 
@@ -81,7 +80,7 @@ class EnergyDistribution:
     gaps : bool
         Whether a contact that has ended leaves a gap that must close before it acts again, as
         between springs.  If not, it acts as soon as its balls approach, as in the authors' program
-        (OSNSMultipleImpact of Siconos, https://siconos.org).
+        (OSNSMultipleImpact of Siconos).
     rtol : float
         Relative tolerance of the integration.  An impact that goes on with speeds alone below rtol
         times that of the fastest closing is ended plastically.
@@ -94,6 +93,10 @@ class EnergyDistribution:
         If a value is outside its range; on solving, if the chain does not suit the values.
     ImpactNotFinished
         On solving, if `max_evaluations` is reached.
+
+    References
+    ----------
+    Liu, Zhao and Brogliato, Proc. R. Soc. A 464 (2008) 3193-3211; Siconos, https://siconos.org.
 
     Examples
     --------

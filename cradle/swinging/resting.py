@@ -9,9 +9,8 @@ The rules, in the order in which `swing` applies them at every event:
    their common velocity.  Without this rule balls that are pressed against each other would
    collide for ever, ever more softly, in a finite time.
 3. *Pressing.* Resting balls that, left alone, would not separate move on as one body: neighbours
-   are pooled while the left one would accelerate no less than the right one.  For a row that is
-   Gauss's principle of least constraint, exactly (isotonic regression).  Equal pendulums without
-   gaps swing alike, so they keep together, without a force, until a ball strikes them.
+   are pooled while the left one would accelerate no less than the right one.  Equal pendulums
+   without gaps swing alike, so they keep together, without a force, until a ball strikes them.
 4. *Pulling apart.* When the force in a contact of a body falls to zero, the contact opens, and
    stays open for this instant, whatever else happens in it.
 """
@@ -20,8 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-
-import numpy as np
 
 from cradle.input.values import Vector
 from cradle.swinging.pendulums import mean
@@ -34,7 +31,9 @@ NEAR = 1e-12
 
 def stretches(contacts: Iterable[bool]) -> list[tuple[int, int]]:
     """Return the first ball of each stretch of marked contacts, and the one after its last."""
-    edges = np.flatnonzero(np.diff([False, *contacts, False])).tolist()
+    edges = [
+        c for c, (one, other) in enumerate(pairwise([False, *contacts, False])) if one != other
+    ]
     return [(first, end + 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
@@ -58,7 +57,12 @@ def common_velocities(
 def pressed(
     masses: Vector, accelerations: Vector, resting: Sequence[bool], least: float
 ) -> list[bool]:
-    """Return the resting contacts whose balls, left alone, would not separate (rule 3)."""
+    """Return the resting contacts whose balls, left alone, would not separate (rule 3).
+
+    Of all accelerations without passing, contacts that push and do not pull give those nearest to
+    the balls left alone, in the mean square by mass (Gauss's principle of least constraint).  For
+    a row that is isotonic regression, which pooling solves exactly.
+    """
     kept, m, a = [False] * len(resting), masses.tolist(), accelerations.tolist()
     for first, last in stretches(resting):
         pools: list[tuple[float, float, int]] = []  # mass, acceleration, number of balls
