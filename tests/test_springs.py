@@ -307,6 +307,13 @@ def test_what_every_trace_keeps(data):
     assert trace.energy_loss == 0
 
 
+def test_what_was_handed_out_is_not_written_to_when_the_way_is_followed():
+    trace = collide(Chain([1, 1], [1, 0]), SpringChain())
+    trace.velocities[:] = 7.0
+    assert len(trace.path) == 3
+    assert trace.velocities.tolist() == [7.0, 7.0]
+
+
 def test_events_forces_and_works():
     trace = collide(striking(), SpringChain(1.0))
     maximum = "maximum_compression"

@@ -243,10 +243,11 @@ def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
                 raise
             models["energy"] = lambda row: EnergyDistribution(stiffness, rtol=row.parameter)
         else:
-            for group in ["springs", "many springs"][: 1 + (wish.impacts > 1)]:
-                models[group] = lambda row: SpringChain(
-                    stiffness, viscosity=lost, accuracy=row.parameter
-                )
+            models["springs"] = lambda row: SpringChain(
+                stiffness, viscosity=lost, accuracy=row.parameter
+            )
+            if wish.impacts > 1:
+                models["many springs"] = models["springs"]
     if modest and (bare or (elastic and like and measured_chain(chain))):
         models["outcome"] = lambda _: SequentialCollisions()
     return models

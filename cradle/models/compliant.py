@@ -107,7 +107,8 @@ class SpringChain:
             raise self._unfinished(chain, out.v[0])
         trace = object.__new__(TimedTrace)
         motion = {"evaluations": int(out.steps[0]), "error": float(out.error[0])}
-        vars(trace).update(chain=chain, model=self, velocities=out.v[0], **motion)
+        # The run that follows the way writes to the same room.
+        vars(trace).update(chain=chain, model=self, velocities=out.v[0].copy(), **motion)
         vars(trace)["_ran"] = row, law, out
         return trace
 

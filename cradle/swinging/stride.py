@@ -180,7 +180,7 @@ class Alone:
         gained, ways = np.zeros(len(x), complex), self.ways(x)
         lines, v = np.diff(x), own * ways
         gaps = np.abs(lines) - self.reach
-        # Balls that touch, and those so near to each other that hardly move against each other.
+        # Neighbours that have met, and those near each other that hardly move against each other.
         still = np.abs((np.diff(v) * lines.conj()).real) <= self.resting * np.abs(lines)
         touch = (gaps <= self.met) | (still & (gaps <= self.touching))
         for first, last in stretches(touch.tolist()):
