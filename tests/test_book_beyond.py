@@ -7,6 +7,7 @@ forms, by the independent solver in truth.py, and by another integrator.
 from functools import cache
 from pathlib import Path
 
+import judge
 import long_chains
 import mpmath
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 import xarray as xr
 from chains import HERTZ, uniform
 from chapters import Chapter, floats, number, points
+from problem import Problem
 from stored import read
 from truth import solve
 
@@ -202,6 +204,17 @@ def test_fig_inventory_time():
     assert LIMITS.cut == 2.0**-120  # as the text has it
 
 
+def test_copies_are_told_apart_by_decimals():
+    """Where copies come out differently, so they do over numbers of a hundred digits."""
+    masses, velocities, restitutions = long_chains.copies(0.9, 20)
+    found = outcomes(masses, velocities, restitutions, 0.3).velocities
+    for k in (1, 2):
+        given = masses[k], velocities, restitutions[k], np.full(18, 0.3), np.full(18, 0.3)
+        problem = Problem(*(x.tolist() for x in given))
+        assert judge.off(problem, judge.exact(problem), found[k]) < 1e-15
+    assert abs(found[1, -1] / found[2, -1] - 1.0) > 5e-6
+
+
 def test_fig_beyond_stability():
     """The count of collisions, the point where the order becomes chance, and the front."""
     upper, lower = CHAPTER.figures["fig-beyond-stability"].axes
@@ -228,7 +241,8 @@ def test_fig_beyond_stability():
             assert rows[-1]["orders"] == rows[-1]["chains"]
             assert rows[-1]["kept"] <= 2
     finite = find("losses", collapsed=0.0)
-    assert column(finite, "spread").max() < 1e-4  # the leader to four digits
+    assert column(finite, "spread").max() < 2e-3
+    assert column([row for row in finite if row["restitution"] > 0.9], "spread").max() < 2e-5
     assert (column(finite, "fast_least") == column(finite, "fast_most")).all()
     assert CHAPTER.glued["fast-same"] == "all"
     # A change of masses that is not a rounding error: the leader stays, others do not.
