@@ -145,8 +145,9 @@ class Row(Alone):
         ------
         ValueError, RuntimeError
             If the duration or what `motion` tells is wrong, balls that touch are not in a row, have
-            passed through each other or collide without end, or the world is seen to move on
-            between the steps of this row: see `step_rows`.
+            passed through each other or collide without end, a push shows that a mass is not the
+            engine's, or the world is seen to move on between the steps of this row: see
+            `step_rows`.
         """
         if type(duration) is float and 0.0 < duration <= self.quiet:  # the usual case, and fast
             self.quiet -= duration
@@ -206,7 +207,10 @@ class Row(Alone):
         bent = self._pull(x) - self._pull(now)
         speeds += self.lag * (1.0 - self.lag) * duration * bent
         change, _, hits = self.fly(x, speeds, duration) or (-taken, early, [])
-        self._push(change - early + taken, now)
+        asked = change - early + taken
+        self._push(asked, now)
+        if self.impacts < _LESSONS:
+            self._weigh(asked, self.own(v, now))
         self.impacts += len(hits)
         for hit in hits:
             if self.on_hit is not None:
@@ -215,6 +219,20 @@ class Row(Alone):
     def _pull(self, x: Plane) -> Plane:
         """Return what gravity gives along the arcs, m/s^2; 0 if balls are free."""
         return -self.acceleration * self.ways(x).imag + 0j
+
+    def _weigh(self, asked: Plane, before: Plane) -> None:
+        """Refuse masses that are not the engine's: a push tells, where it acts at once."""
+        x, v = map(np.array, self._motion())
+        gained = self.own(v, x) - before
+        # A body answers at once as if it were free, on an arm of its own with up to a quarter less.
+        wrong = (np.abs(gained - asked) > 0.4 * np.abs(asked)) & (np.abs(asked) > self.resting)
+        for ball in np.flatnonzero(wrong & (gained != 0.0)).tolist():
+            mass, got = self.chain.masses[ball], gained[ball] / asked[ball]
+            why = "`push` must be in the axes and the sense of `motion`"
+            if got.real > 0.0:
+                why = f"its mass is {mass / abs(got):.3g} where masses[{ball}] is {mass:g}"
+            told = f"ball {ball} gains {abs(got):.3g} times the velocity that a push should give"
+            raise RuntimeError(f"{told}; {why}")
 
     def _learn(self, x: Plane, own: Plane, duration: float) -> None:
         """Compare the ways of the last step with the velocities before and after it."""

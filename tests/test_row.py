@@ -234,6 +234,35 @@ def test_two_rows_of_one_world_that_step_it_twice_are_refused():
         each()
 
 
+@pytest.mark.parametrize(
+    ("told", "factor", "words"),
+    [
+        (2.0, 1.0, r"ball 4 gains 2 times .*; its mass is 1 where masses\[4\] is 2"),
+        (0.5, 1.0, r"ball 4 gains 0\.5 times .*; its mass is 1 where masses\[4\] is 0\.5"),
+        (1.0, -1.0, "must be in the axes and the sense of `motion`"),
+        (1.0, 0.75, None),  # a body in one piece with its arm, before the joint has acted
+    ],
+)
+def test_masses_that_are_not_the_engines_are_seen_at_the_first_impacts(told, factor, words):
+    bodies = Hanging([-0.5, 0.0, 0.0, 0.0, 0.0])
+    push = bodies.push
+    bodies.push = lambda ball, impulse: push(ball, tuple(factor * part for part in impulse))
+    row = Row(bodies, Chain([1, 1, 1, 1, told], [0] * 5), MODEL, RADIUS, bodies.pivots)
+    if words is None:
+        return steps(row, 70, 1 / 120)
+    with pytest.raises(RuntimeError, match=words):
+        steps(row, 240, 1 / 120)
+
+
+def test_pushes_that_an_engine_keeps_for_its_next_step_tell_nothing_of_masses():
+    bodies, kept = Hanging([-0.5, 0.0, 0.0, 0.0, 0.0]), []
+    push, advance = bodies.push, bodies.advance
+    bodies.push = lambda *one: kept.append(one)
+    bodies.advance = lambda step: ([push(*one) for one in kept], kept.clear(), advance(step))
+    steps(hung(bodies), 70, 1 / 120)
+    assert bodies.angles[-1] > 0.05
+
+
 def test_two_rows_of_one_world_are_stepped_together():
     together = two_rows()
     for _ in range(120):
