@@ -3,6 +3,7 @@
 import ast
 import inspect
 import json
+import re
 import textwrap
 from collections.abc import Iterable
 from pathlib import Path
@@ -42,11 +43,13 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def tell(chapter: str, **values: object) -> None:
-    """Hand values to the text: `name` becomes the label `chapter-name`, with - for _."""
+    """Hand values to the text: `name` becomes the label `chapter-name`, with - for _.
+
+    A minus is one there: −0.027.
+    """
     for name, value in values.items():
-        glue(
-            f"{chapter}-{name.replace('_', '-')}", str(value), display=False
-        )
+        text = re.sub(r"(?<!\w)-(?=[\d.])", "−", str(value))
+        glue(f"{chapter}-{name.replace('_', '-')}", text, display=False)
 
 
 def borrow(chapter: str, names: str, into: dict[str, Any]) -> list[Any]:

@@ -98,7 +98,7 @@ def test_different_parameters_with_one_outcome():
         tau_3 = gain / 2 * (1 + float(e3) * math.sqrt(1 - 2 * float(a)))
         assert [1 - gain, gain - tau_3, tau_3] == pytest.approx(shared, abs=1e-6)
         assert exact([1, 1, 1], [1, 0, 0], [e2, e3], a) == pytest.approx(shared, abs=1e-6)
-    assert GLUED["ambiguous"] == "(-0.027027, 0.169805, 0.857222)"
+    assert GLUED["ambiguous"] == "(−0.027027, 0.169805, 0.857222)"
     one, other = (exact([45, 45, 53], [1, 0, 0], 1, a) for a in ("0.018", "0.1354936"))
     assert abs(one - other).max() < 1e-7
 
@@ -152,9 +152,9 @@ def test_r2_source_on_the_other_side():
 
 def test_r7_hold_that_drives_on():
     held = exact([1] * 4, [1, 0, 0, 0], 1, ["0.8", "0.3"])
-    assert GLUED["hold"] == "(" + ", ".join(f"{v:.4f}" for v in held) + ")"
+    assert GLUED["hold"] == "(" + ", ".join(f"{v:.4f}" for v in held).replace("-", "−") + ")"
     # What small steps tend to without the rule (tests/test_march.py): balls 2 to 4 as one body.
-    assert GLUED["chatter"] == f"({(1 - 3) / 4}, {2 / 4}, {2 / 4}, {2 / 4})"
+    assert GLUED["chatter"] == f"(−{(3 - 1) / 4}, {2 / 4}, {2 / 4}, {2 / 4})"
 
 
 def test_r7_square_root_at_the_bound():

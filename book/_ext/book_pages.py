@@ -10,6 +10,7 @@ r"""Sphinx extension: what Jupyter Book leaves to be put right in the pages.
   carries the paper's number. Such an equation is passed on as it is.
 - A line does not break between a formula and the comma behind it, nor behind the bracket before it.
 - A table of pandas names its row labels in a row of their own; they go into that of column names.
+- In such a table numbers and their heads stand at the right, words at the left, and a minus is one.
 - In a table a name of the code breaks after a point, a bracket or a comma, and nowhere else.
 - Figures of the appendices carry a letter: Fig. A.1.
 - The summary of what is folded is read as it is written, and a notebook is kept, not shown.
@@ -51,6 +52,17 @@ NOTEBOOK = re.compile(
 #: The head of a table of pandas, and one of its cells.
 HEAD = re.compile(r"<thead>.*?</thead>", re.DOTALL)
 HEAD_CELL = re.compile(r"<th([^>]*)>(.*?)</th>", re.DOTALL)
+#: Its rows, their cells, and what is a number in one.
+ROW = re.compile(r"<tr.*?</tr>", re.DOTALL)
+CELL = re.compile(
+    r'<(t[hd])((?: colspan="(\d+)")?[^>]*)>(.*?)</\1>', re.DOTALL
+)
+NUMBER = re.compile(
+    r"(?:&[lg]t; ?|[≤≥±≈] ?)?[-−+]?\.?\d[\d.,\s·±e⁻⁰¹²³⁴⁵⁶⁷⁸⁹+-]*"
+    r"(?:%|million|billion|[kmµn]?[smg]|m/s|J)?"
+)
+#: What a column of numbers may hold as well.
+NEITHER = ("", "NaN", "none")
 #: Code up to where it may break: behind a point, an opening bracket or a comma.
 JOINTS = re.compile(r"[^.(\[,]*[.(\[,]+\s*|[^.(\[,]+")
 
@@ -190,14 +202,52 @@ def _end_of(node: nodes.Node | None, pattern: re.Pattern[str]) -> str:
     return found[0] if found else ""
 
 
-def join_header_rows(
+def mend_tables_of_pandas(
     app: Sphinx, doctree: nodes.document, page: str
 ) -> None:
-    """Move the names of a table's row labels into the row of its column names."""
+    """Give a table one row of heads, and each of its columns a side."""
     for raw in list(doctree.findall(nodes.raw)):
         if 'class="dataframe' in raw.astext():
-            joined = HEAD.sub(_one_row_less, raw.astext())
-            raw.replace_self(nodes.raw("", joined, **raw.attributes))
+            table = line_up(HEAD.sub(_one_row_less, raw.astext()))
+            raw.replace_self(nodes.raw("", table, **raw.attributes))
+
+
+def line_up(table: str) -> str:
+    """Mark the columns of numbers, heads and all, and write their minus as one.
+
+    >>> line_up("<tr><th>v</th></tr><tr><td>-1</td></tr>")
+    '<tr><th class="number">v</th></tr><tr><td class="number">−1</td></tr>'
+    """
+    words: set[int] = set()
+    numbers: set[int] = set()
+    for row in ROW.findall(table):
+        cells = CELL.findall(row)
+        for column, (_, _, _, text) in zip(
+            _columns(cells), cells, strict=True
+        ):
+            if "<td" in row and text.strip(" -–—") not in NEITHER:
+                (numbers if NUMBER.fullmatch(text) else words).add(column)
+
+    def mended(row: re.Match[str]) -> str:
+        columns = iter(_columns(CELL.findall(row[0])))
+
+        def cell(found: re.Match[str]) -> str:
+            kind, other, span, text = found.groups()
+            if NUMBER.fullmatch(text):
+                text = re.sub(r"(?<!\d)-", "−", text)
+            right = next(columns) in numbers - words and not span
+            side = ' class="number"' * right
+            return f"<{kind}{other}{side}>{text}</{kind}>"
+
+        return CELL.sub(cell, row[0])
+
+    return ROW.sub(mended, table)
+
+
+def _columns(cells: list[tuple[str, ...]]) -> list[int]:
+    """Count the columns of a row from its end: a label may reach down over the next rows."""
+    spans = [int(span or 1) for _, _, span, _ in cells]
+    return [-sum(spans[k:]) for k in range(len(spans))]
 
 
 def _one_row_less(head: re.Match[str]) -> str:
@@ -325,7 +375,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("builder-inited", set_all_for_print)
     app.connect("doctree-resolved", keep_tags)
     app.connect("doctree-resolved", keep_punctuation)
-    app.connect("doctree-resolved", join_header_rows)
+    app.connect("doctree-resolved", mend_tables_of_pandas)
     app.connect("doctree-resolved", break_code_in_tables)
     # After Sphinx has numbered all figures.
     app.connect("env-get-updated", number_equations, priority=890)
