@@ -39,6 +39,8 @@ GIVEN_BACK = {
     "alpha": 0.55,
     "lw": 0,
 }
+#: Inches of a figure whose letters, of nine points or more, can be read on a phone without scrolling.
+WIDTH = 3.97
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -240,7 +242,7 @@ def number_events(
     Events that are too near for two numbers share one: 5, 6 or 3–6.
     """
     left, right = ax.get_xlim()
-    digit = 0.015 * (right - left)
+    digit = 0.084 / ax.figure.get_figwidth() * (right - left)
     groups: list[tuple[list[float], list[int]]] = []
     for at, number in list(zip(places, numbers, strict=True))[:most]:
         ax.axvline(at, color="0.7", lw=0.8, ls=":", zorder=0)
@@ -271,7 +273,7 @@ def inside(trace: Trace) -> None:
     _, (ax, below) = plt.subplots(
         2,
         1,
-        figsize=(5.6, 3.9 + 0.22 * contacts),
+        figsize=(WIDTH, 3.5 + 0.22 * contacts),
         sharex=True,
         layout="constrained",
         height_ratios=(10, 1 + 0.6 * contacts),
@@ -292,7 +294,7 @@ def inside(trace: Trace) -> None:
         ]
         below.broken_barh(spans, (contact - 0.35, 0.7), color="0.35")
     below.set_yticks(
-        range(contacts), [rf"$\tau_{c + 2}$ acts" for c in range(contacts)]
+        range(contacts), [f"{c + 1}-{c + 2} acts" for c in range(contacts)]
     )
     below.invert_yaxis()
     below.set(xlabel="sum of all impulses (N s)", xlim=along[[0, -1]])
@@ -302,10 +304,8 @@ def inside(trace: Trace) -> None:
     below.tick_params(axis="y", length=0)
 
 
-def works(
-    trace: Trace, contact: int, ax: Axes, *, numbered: bool = True
-) -> None:
-    """Draw work as areas: the closing speed of a contact over its impulse, events numbered."""
+def works(trace: Trace, contact: int, ax: Axes, *, most: int = 12) -> None:
+    """Draw work as areas: the closing speed of a contact over its impulse, its events numbered."""
     tau = trace.path_impulses[:, contact]
     u = trace.path[:, contact] - trace.path[:, contact + 1]
     ax.axhline(0, color="0.3", lw=0.8)
@@ -317,6 +317,9 @@ def works(
         ylabel=rf"closing speed $u_{contact + 2}$ (m/s)",
     )
     ax.margins(x=0.02)
-    rows = turns(trace) if numbered else []
-    shown = [(tau[row], k) for k, row in enumerate(rows, 1) if tau[row] > 0]
-    number_events(ax, [at for at, _ in shown], [k for _, k in shown])
+    own = {
+        number: tau[row]
+        for number, row in enumerate(turns(trace), start=1)
+        if trace.events[row - 1].contact == contact and tau[row] > 0
+    }
+    number_events(ax, own.values(), own, most)
