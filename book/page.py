@@ -39,7 +39,7 @@ GIVEN_BACK = {
     "alpha": 0.55,
     "lw": 0,
 }
-#: Inches of a figure whose letters, of nine points or more, can be read on a phone without scrolling.
+#: Inches of a figure that fits a phone, with letters of nine points or more.
 WIDTH = 3.97
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

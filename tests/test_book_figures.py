@@ -130,7 +130,7 @@ def test_fig_problem_family():
     shown = panel("problem", "fig-own-problem-family")
     u2, u3 = shown["momentum and energy conserved"].T
     np.testing.assert_allclose(u2**2 + u2 * u3 + u3**2, 1, rtol=1e-13)
-    arc = shown["and no ball passes through another"]
+    arc = shown["possible outcomes"]
     np.testing.assert_allclose((arc**2).sum(axis=1) + arc.prod(axis=1), 1, rtol=1e-13)
     assert arc.max() < 1e-12
     np.testing.assert_allclose(arc[[0, -1]], [[-1, 0], [0, -1]], atol=1e-12)
