@@ -10,8 +10,8 @@ them, and its scale of colours is read from pale to strong. Turned round it woul
 else. So a map is one picture, which stands on its own white in both modes.
 
 The box around a figure knows how wide the figure has to be for its smallest letters to be read. On
-a narrow screen the style sheet lets a wider one scroll in this box. On a desk it gives the smallest
-letters of all figures one size.
+a narrow screen the style sheet lets a wider one scroll in this box. On a desk small letters of all
+figures have one size.
 """
 
 import colorsys
@@ -39,7 +39,7 @@ NAMED = {"white": "#ffffff", "black": "#000000"}
 
 #: Pixels that the smallest letters of a figure have on a phone, at least. (Indices are smaller.)
 LEGIBLE = 11
-#: Their size on a desk, where the column has room for it.
+#: Their size on a desk, at least, where the column has room for it.
 EASY = 14
 #: Sizes of letters: Matplotlib draws them as curves in units of a hundredth of a point.
 LETTERS = re.compile(r"\bscale\((0\.\d+) -0\.\d+\)")
@@ -141,7 +141,7 @@ def pair_images(
         return (
             f'<span class="figure-box" data-letters="{smallest}"'
             f' style="--legible: {round(width * LEGIBLE / smallest)}px;'
-            f' --easy: {round(width * EASY / smallest)}px">'
+            f' --easy: {round(width * max(1, EASY / smallest))}px">'
             f"{''.join(images)}</span>"
         )
 

@@ -58,7 +58,7 @@ CELL = re.compile(
     r'<(t[hd])((?: colspan="(\d+)")?[^>]*)>(.*?)</\1>', re.DOTALL
 )
 NUMBER = re.compile(
-    r"(?:&[lg]t; ?|[≤≥±≈] ?)?[-−+]?\.?\d[\d.,\s·±e⁻⁰¹²³⁴⁵⁶⁷⁸⁹+-]*"
+    r"(?:&[lg]t; ?|[≤≥±≈] ?)?[-−+]?\.?\d[\d.,\s·±⁻⁰¹²³⁴⁵⁶⁷⁸⁹]*(?:e[-+]?\d+)?"
     r"(?:%|million|billion|[kmµn]?[smg]|m/s|J)?"
 )
 #: What a column of numbers may hold as well.
