@@ -10,6 +10,7 @@ from explorer import (
     bars,
     chain_of,
     drawn,
+    grab,
     later,
     press,
     still,
@@ -45,10 +46,24 @@ def test_the_first_page_is_guessed(visit, page):
     words = f"off by at most {off.max():.2f} m/s, at ball {off.argmax() + 1}"
     assert words in host.inner_text()
     assert tab.locator(".question p").last.is_visible()
-    # From here on nothing is covered any more.
+    # One may guess again, from the last guess; a ball that is pulled now spends none.
+    press(tab, "Guess again")
+    drawn(tab)
+    assert tab.evaluate(f"{EXPLORER}.state.view.guess.values") == pytest.approx(guess)
+    tab.evaluate("matchMedia = () => ({ matches: false })")  # from here on a reader of all motion
+    x, y = grab(tab, ".ball[data-ball='0'] .disc")
+    tab.mouse.move(x + 5, y, steps=4)
+    tab.mouse.up()
+    drawn(tab)
+    tab.get_by_label("your guess for ball 5, m/s").press("ArrowLeft")
+    assert drawn(tab)["speeds"][0] < 1
+    assert tab.get_by_role("button", name="Let go").is_visible()
+    press(tab, "Next hit")
+    # From here on nothing is covered until one asks for it.
     tab.get_by_label("ratio", exact=True).press("ArrowLeft")
     after = drawn(tab)["after"]
     assert bars(tab) == np.round(after, 2).tolist()
+    assert tab.get_by_role("button", name="Guess again").is_enabled()
 
 
 @pytest.mark.parametrize("name", ["intro", "compliance", "explorer"])
@@ -191,6 +206,24 @@ def test_two_cradles_side_by_side(visit):
     tab.get_by_label("nothing", exact=True).check(force=True)
     drawn(tab)
     assert tab.locator(".other").is_hidden()
+
+
+def test_what_a_typed_speed_takes_along_goes_back(visit):
+    """By keys, too: a ball takes those in its way along, and gives back what was there."""
+    tab = still(visit, "#scene=one")
+    tab.get_by_title("ball 3", exact=True).click()
+    drawn(tab)
+    box = tab.get_by_label("comes in with, as a number")
+    for speed, row in (("1.5", [1.5, 1.5, 1.5, 0, 0]), ("0.5", [1, 0.5, 0.5, 0, 0])):
+        box.fill(speed)
+        box.press("Enter")
+        assert drawn(tab)["speeds"] == row
+    box.fill("0")
+    box.press("Enter")
+    assert drawn(tab)["speeds"] == [1, 0, 0, 0, 0]
+    for key in ("ArrowLeft", "ArrowRight", "ArrowRight", "ArrowLeft"):
+        tab.locator(".ball[data-ball='2']").press(key)
+    assert drawn(tab)["speeds"] == [1, 0, 0, 0, 0]
 
 
 def test_a_speed_is_typed_and_a_hit_is_heard(visit):

@@ -1,5 +1,6 @@
 """The live explorer under fingers: two at once, and those that only scroll the page."""
 
+import numpy as np
 import pytest
 from explorer import (
     EXPLORER,
@@ -8,6 +9,7 @@ from explorer import (
     go_to,
     grab,
     middle,
+    press,
     same_outcome,
     still,
 )
@@ -83,11 +85,9 @@ def test_two_fingers_pull_two_balls(phone):
 
 
 def test_a_ball_follows_the_finger_as_the_mouse(visit, phone):
-    """The page does not scroll under it; what is pressed is large enough (WCAG 2.2, 2.5.8)."""
+    """The page does not scroll under it."""
     mouse, tab = still(visit, "#scene=one", width=390), phone("#scene=one")
-    x, y = middle(tab, ball(4))
-    mouse.mouse.move(x, y)
-    mouse.mouse.down()
+    x, y = grab(mouse, ball(4))
     mouse.mouse.move(x + 80, y, steps=20)
     by_mouse = drawn(mouse)["speeds"][4]
     assert by_mouse < -0.5
@@ -96,23 +96,64 @@ def test_a_ball_follows_the_finger_as_the_mouse(visit, phone):
         "document.querySelector('.stage')"
         ".addEventListener('pointercancel', () => (globalThis.lost = true))"
     )
-    hand = Hand(tab)
-    hand.down(1, (x, y))
+    show_middle(tab, ball(4))
+    scrolled, hand = tab.evaluate("scrollY"), Hand(tab)
+    hand.down(1, middle(tab, ball(4)))
     hand.move(1, 80, 0, steps=20)
     shown = drawn(tab)
     hand.up(1)
     assert tab.evaluate("globalThis.lost") is None
     assert shown["speeds"][4] == pytest.approx(by_mouse, abs=0.15)  # a finger is still at first
-    assert tab.evaluate("window.scrollY") == 0
-    sizes = tab.evaluate(
-        """(() => {
-          const kinds = ':is(button, select, .choice label, .ball .reach)';
-          return [...document.querySelectorAll(`.cradle-explorer ${kinds}`)]
-            .filter((node) => node.checkVisibility())
-            .map((node) => node.getBoundingClientRect().height);
-        })()"""
-    )
-    assert min(sizes) >= 24
+    assert tab.evaluate("scrollY") == scrolled
+
+
+# What is pressed, and how much room it has: height, and the width or the way to its neighbour.
+TARGETS = """(kinds) => [...document.querySelectorAll(kinds)]
+  .filter((node) => node.checkVisibility())
+  .map((node) => {
+    const { left, width, height } = node.getBoundingClientRect();
+    return [node.outerHTML.slice(0, 80), left, width, height];
+  })"""
+
+
+@pytest.mark.parametrize("size", [(375, 667), (375, 812), (812, 375)])
+@pytest.mark.parametrize("name", ["explorer", "intro"])
+def test_a_phone_shows_balls_and_bars_at_once(visit, page, name, size):
+    """And the button that lets go, below the bar of the page; what is pressed is large enough."""
+    address = page.replace("explorer.html", f"{name}.html")
+    options = {"width": size[0], "height": size[1], "has_touch": True, "is_mobile": True}
+    tab = still(visit, "#speeds=1,0,0,0,0,0,0" * (name == "explorer"), address=address, **options)
+    drawn(tab)
+    tab.evaluate("document.querySelector('.stage').scrollIntoView({ behavior: 'instant' })")
+    covered = tab.locator(".bd-header-article").first.bounding_box()
+    tab.evaluate(f"scrollBy({{ top: -{covered['height']}, behavior: 'instant' }})")
+    for button in ("Next hit", "Guess first", "Let go"):
+        if tab.get_by_role("button", name=button).count():
+            press(tab, button)
+        drawn(tab)
+        for part in (".stage", ".outcome .drawn", ".run .main"):
+            box = tab.locator(part).first.bounding_box()
+            assert covered["height"] - 1 <= box["y"] <= size[1] - box["height"], (button, part)
+    host = ".cradle-explorer "
+    kinds = "button, summary, select, input:not(.choice input, .handles input), .choice label"
+    for node, _, width, height in tab.evaluate(TARGETS, f"{host}:is({kinds})"):
+        assert min(width, height) >= 43.9, node
+    balls = tab.evaluate(TARGETS, f"{host}.ball .disc")
+    for (_, left, *_), (_, right, *_) in zip(balls[1:], balls[2:], strict=False):
+        assert right - left >= 24
+    for node, _, width, height in tab.evaluate(TARGETS, f"{host}.handles input"):
+        assert min(width, height) >= 24, node
+
+
+def test_a_finger_takes_the_nearest_ball(phone):
+    """Where places to touch overlap."""
+    tab = phone("#speeds=0,0,0,0,0,0,0")
+    drawn(tab)
+    show_middle(tab, ball(3))
+    hand, (x, y) = Hand(tab), middle(tab, ball(3))
+    hand.down(1, (x + 6, y))
+    hand.move(1, -60, 0)
+    assert np.sign(drawn(tab)["speeds"]).tolist() == [1, 1, 1, 1, 0, 0, 0]
 
 
 def test_a_second_finger_on_the_same_ball_is_none(phone):

@@ -253,6 +253,7 @@ def test_every_figure_has_both_colourings(html: Path):
         path for path in (html / "_images").glob("*.svg") if not path.stem.endswith("-dark")
     ]
     assert len(drawings) > 40
+    assert all(path.stem.startswith("fig-") for path in drawings)  # who saves one finds it again
     maps = [path for path in drawings if "<image" in path.read_text(encoding="utf-8")]
     assert 5 < len(maps) < 15  # these stay as they are
     for path in set(drawings) - set(maps):
@@ -348,6 +349,19 @@ def test_print_from_dark_mode(visit):
     later(tab, 50)
     assert tab.evaluate(f"[{ground}, {ink}]") == dark
     assert tab.evaluate(painted)[1] < 0.5
+
+
+def test_a_question_fits_on_the_first_sheet(visit, page):
+    """A part that is too high for what is left of it leaves a blank there."""
+    sheet = {"width": 718, "height": 1047}  # A4 less the margins that Chromium gives it, pixels
+    tab = still(visit, address=page.replace("explorer.html", "intro.html"), **sheet)
+    drawn(tab)
+    tab.emulate_media(media="print")
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert tab.locator(".outcome .drawn").is_visible()
+    for part in (".stage", ".outcome", ".settings"):
+        box = tab.locator(part).bounding_box()
+        assert box["y"] + box["height"] < sheet["height"], part
 
 
 # --- the live cradle's pictures -------------------------------------------------------------------

@@ -102,6 +102,17 @@ def letters(svg: str) -> float:
     return round(min((*curves, *map(float, FONT_SIZE.findall(svg)))), 2)
 
 
+def name_images(app: Sphinx, doctree: nodes.document) -> None:
+    """Give each picture the name of its figure: a reader may save it."""
+    images = app.env.images
+    for figure in doctree.findall(nodes.figure):
+        for image in figure.findall(nodes.image):
+            path = image.get("candidates", {}).get("*")
+            if figure["ids"] and path in images:
+                name = figure["ids"][0] + Path(path).suffix
+                images[path] = images[path][0], name
+
+
 def pair_images(
     app: Sphinx,
     page: str,
@@ -162,6 +173,7 @@ def write_dark(app: Sphinx, exception: Exception | None) -> None:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the callbacks."""
+    app.connect("doctree-read", name_images, priority=900)
     app.connect("html-page-context", pair_images)
     app.connect("build-finished", write_dark)
     return {

@@ -39,11 +39,13 @@
     // A host without `data-parts` has a page of its own: all parts, the address, the wall.
     constructor(host) {
       this.host = host;
-      const { scene, parts, picture, guess } = host.dataset;
+      const { scene, parts, picture, guess, answers } = host.dataset;
       this.page = parts === undefined;
       this.parts = new Set((parts ?? ALL_PARTS).split(" "));
       const guessing = guess === undefined ? "" : guess || "once";
-      this.state = new State({ scene, picture, guessing, playing: this.page && !less() });
+      // An answer of a few is known once it is told; speeds can be guessed again.
+      const again = answers ? "" : guessing;
+      this.state = new State({ scene, picture, guessing, again });
       this.visible = true;
       this.pointed = false; // whether a pointer has chosen what has the focus
       this.box = this.box.bind(this);
@@ -147,7 +149,7 @@
         fullScreen: () => this.fullScreen(),
         play: on(() => state.play()),
         step: on(() => state.step()),
-        back: on(() => state.restart(false)),
+        back: on(() => state.pullBack()),
         slow: on(() => Object.assign(clock, { slow: !clock.slow, inside: null })),
         guess: on((ball, value) => state.guess(ball, value)),
         answer: on((answer) => (view.guess.answer = answer)),
@@ -158,7 +160,7 @@
         }),
         sound: on(() => (this.audio = this.audio ? null : new AudioContext())),
         beside: on((chosen) => state.beside(chosen)),
-        speed: setting((old, speed) => explorer.pulled(old, concerned().balls[0], speed)),
+        speed: on((speed) => state.pull([[concerned().balls[0], speed]])),
         scope: on((scope) => (view.scope = scope)),
         picture: on((picture) => (view.picture = picture)),
         contact: on((contact) => (view.contact = contact === "all" ? "all" : +contact)),
@@ -204,7 +206,7 @@
         grab: (ball) => {
           if (!held.size) {
             const { setting, clock } = state;
-            ({ speeds } = clock.time <= 0 ? setting : explorer.atRest(setting));
+            speeds = clock.time <= 0 ? state.origin(ball) : explorer.atRest(setting).speeds;
             restore = state.snapshot();
           }
           held.set(ball, null);
@@ -214,16 +216,14 @@
           if (speeds.length !== state.setting.speeds.length) return; // there are other balls now
           held.delete(ball);
           held.set(ball, speed);
-          const pulls = [...held].filter((pull) => pull[1] !== null);
-          const start = { ...state.setting, speeds };
-          state.set(pulls.reduce((setting, pull) => explorer.pulled(setting, ...pull), start));
+          state.pull([...held].filter((pull) => pull[1] !== null), speeds);
           state.clock.time = 0;
           this.changed();
         },
         letGo: (ball, moved) => {
           held.delete(ball);
           ({ speeds } = state.setting);
-          if (moved && !held.size && !less()) state.clock.playing = true;
+          if (moved && !held.size && !less() && !state.covered) state.clock.playing = true;
           this.changed();
         },
         giveUp: (undo = false) => {
@@ -346,7 +346,7 @@
       if (pictures) pictures.node.hidden = scenery.covered;
       // Who chooses an answer draws no bars.
       outcome.node.hidden = scenery.covered && "answers" in this.host.dataset;
-      this.host.classList.toggle("guesses", Boolean(scenery.guessing));
+      this.host.classList.toggle("covered", scenery.covered);
       for (const panel of Object.values(this.panels))
         if (!panel?.node.hidden) panel?.show({ ...scenery, loud: this.audio }, this.box, this.stageBox);
       this.stage.lay(scenery.setting, this.stageBox());
@@ -395,7 +395,9 @@
       const others = this.panels.run.node.offsetHeight + this.panels.words.node.offsetHeight;
       const wall = Math.max(this.below(host) - others - 2 * em, 12 * em);
       const most = (this.page ? 24 : 15) * em;
-      return { width, em, height: this.wall ? wall : Math.min(most, 0.72 * width) };
+      // On a phone that lies on its side the button below is seen, too.
+      const seen = Math.max(0.55 * innerHeight, 10 * em);
+      return { width, em, height: this.wall ? wall : Math.min(most, 0.72 * width, seen) };
     }
 
     // On the wall: the height from the top of an element down to the settings.

@@ -42,7 +42,7 @@
         );
       }
       const { row, x } = explorer.barPlaces(box, span);
-      const half = 0.55 * box.em; // of the handle, in explorer_controls.css
+      const half = 0.75 * box.em; // of the handle, in explorer_controls.css
       [...node.children].forEach((range, ball) => {
         Object.assign(range, { min: span[0], max: span[1], step: STEP * fastest });
         range.value = guess.values[ball];

@@ -65,10 +65,12 @@
           button("Sound", act.sound, { title: "a click at each hit, as loud as it is hard" }),
         ]
       : [];
-    function show({ clock, guessing, loud }) {
+    function show({ again, clock, guessing, loud }) {
       const words = clock.playing ? "Pause" : clock.time > 0 ? "Go on" : "Let go";
       if (play.textContent !== words) play.textContent = words;
-      back.disabled = clock.time <= 0 && !clock.playing;
+      const name = again ? "Guess again" : "Pull back";
+      if (back.textContent !== name) back.textContent = name;
+      back.disabled = clock.time <= 0 && !clock.playing && !again;
       slow.setAttribute("aria-pressed", clock.slow);
       [Boolean(guessing), Boolean(loud)].forEach((on, k) => more[k]?.setAttribute("aria-pressed", on));
     }
@@ -245,6 +247,7 @@
     const told = make("p", { class: "note guessed" });
     const second = make(level, {});
     const caption = make("p", { class: "note" });
+    const balance = make("div", { class: "balance" }, second, momentum, energy, caption);
     const node = make(
       "div",
       { class: "outcome" },
@@ -252,10 +255,7 @@
       make("div", { class: "drawn" }, bars, handles.node),
       told,
       other ?? "",
-      second,
-      momentum,
-      energy,
-      caption,
+      balance,
     );
     function show(state, box) {
       const { setting, hit, number, now, part, guess, covered } = state;
@@ -268,7 +268,7 @@
         "Momentum: ball by ball, up to the dashed line; balls that go back take some off. Energy: 100\u00a0% is " +
         `what there was before the hit; grey is ${covered ? "what you have not given away" : "lost, or stored in the contacts"}.`;
       const ghost = guess?.open && guess.touched && number === 0 ? { guess: guess.values } : {};
-      const drawn = covered ? { span: explorer.guessReach(setting).span, gap: 0.9 } : ghost;
+      const drawn = covered ? { span: explorer.guessReach(setting).span, gap: 1.1 } : ghost;
       // The numbers of a guess stand where the outlines of the velocities before would be.
       const before = covered ? hit.before.map(() => 0) : hit.before;
       bars.innerHTML = now ? explorer.bars(box(bars), setting, before, now, drawn) : "";

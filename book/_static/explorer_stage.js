@@ -49,7 +49,7 @@
       const heaviest = Math.max(...masses);
       const relative = masses.map((m) => Math.cbrt(m / heaviest));
       const whole = relative.reduce((total, r) => total + 2 * r, 0);
-      const unit = Math.min(2.2 * em, (0.46 * width) / whole);
+      const unit = Math.min(2.2 * em, (0.5 * width) / whole);
       this.radii = relative.map((r) => Math.max(r * unit, 3));
       const row = this.radii.reduce((total, r) => total + 2 * r, 0);
       const reach = Math.sin(ROOM * LENGTH);
@@ -165,12 +165,16 @@
     // --- pulling ------------------------------------------------------------------------------
 
     grab(event) {
-      const group = event.target.closest(".ball");
-      if (!group || event.button) return;
-      const ball = +group.dataset.ball;
+      if (!event.target.closest(".ball") || event.button) return;
+      // Places to touch may overlap: the nearest ball is meant.
+      const away = this.balls.map(({ disc }) => {
+        const { left, right, top, bottom } = disc.getBoundingClientRect();
+        return Math.hypot(event.clientX - (left + right) / 2, event.clientY - (top + bottom) / 2);
+      });
+      const ball = away.indexOf(Math.min(...away));
       if ([...this.drags.values()].some((drag) => drag.ball === ball)) return;
       event.preventDefault();
-      group.focus({ preventScroll: true });
+      this.balls[ball].group.focus({ preventScroll: true });
       this.svg.setPointerCapture(event.pointerId);
       // A ball that is taken at its edge does not jump to the pointer.
       const offset = this.place(event) - this.balls[ball].string.x2.baseVal.value;

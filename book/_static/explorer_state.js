@@ -6,18 +6,19 @@
   const SLOW = 0.25; // of the true speed
   const INSIDE = 3.5; // seconds that a hit takes in slow motion
   const REST = 0.5; // seconds before the balls are let go again
-  const GUESS = "Nothing is shown before the hit. Guess, then let the balls go.";
+  const GUESS = "Nothing is shown before the hit. Guess, then press Let go.";
 
   const { chapters, scenes } = explorer.data;
   const named = (key) => [...scenes, ...chapters].find((scene) => scene.key === key);
 
   class State {
     // `picture`: which one to show instead of that of a scene; `guessing`: whether the outcome is
-    // covered until the reader has seen the balls move, this "once", "always", or not at all ("").
-    constructor({ scene, playing, picture, guessing = "" }) {
+    // covered until the reader has seen the balls move, this "once", "always", or not at all ("");
+    // `again`: what it is once the balls are pulled back.
+    constructor({ scene, picture, guessing = "", again = "" }) {
       this.picture = picture;
-      this.guessing = guessing;
-      this.clock = { time: 0, playing, slow: false, inside: null, guessed: false };
+      Object.assign(this, { guessing, again });
+      this.clock = { time: 0, playing: false, slow: false, inside: null, guessed: false };
       this.view = {
         scene: "", // a key, or none for a setting of the reader's own
         scope: "all", // or the number of a ball
@@ -43,12 +44,23 @@
       view.scene = scenes.find((scene) => explorer.equal(scene.setting, setting))?.key ?? "";
       this.lastScene = view.scene || this.lastScene;
       view.notice = "";
-      const old = view.guess;
-      const same = old && !old.open && old.values.length === count;
-      const fresh = { values: setting.speeds.map(() => 0), answer: "", touched: false, open: false };
-      view.guess = this.guessing ? (same ? old : fresh) : null;
+      if (!this.guessing) view.guess = null;
+      else if (!this.covered || view.guess.values.length !== count) this.cover();
       this.lay();
       this.restart(this.clock.playing);
+    }
+
+    // Pull balls, [ball, speed] each, from where all of them hang. What has come along with one ball
+    // goes back with it, until the balls have moved.
+    pull(pulls, from = this.origin(pulls[0][0])) {
+      const start = { ...this.setting, speeds: from };
+      this.set(pulls.reduce((setting, pull) => explorer.pulled(setting, ...pull), start));
+      this.pulled = { ball: pulls.length === 1 ? pulls[0][0] : null, from, to: this.setting.speeds };
+    }
+
+    origin(ball) {
+      const { speeds } = this.setting;
+      return this.pulled?.ball === ball && this.pulled.to === speeds ? this.pulled.from : speeds;
     }
 
     // What swings below: the same setting with another ratio, or one that was kept.
@@ -78,9 +90,24 @@
       guess.touched = true;
     }
 
+    cover() {
+      const values = this.setting.speeds.map(() => 0);
+      this.view.guess = { values, answer: "", touched: false, open: false };
+    }
+
+    // Hold the balls again. Who has guessed may do so again, from the last guess.
+    pullBack() {
+      const { guess } = this.view;
+      this.guessing ||= this.again;
+      if (guess && this.guessing) guess.open = false;
+      else if (this.guessing) this.cover();
+      this.restart(false);
+    }
+
     // The balls have moved; return whether the outcome was covered until now.
     open() {
       const { guess } = this.view;
+      this.pulled = null;
       if (!guess || guess.open) return false;
       guess.open = true;
       if (this.guessing === "once") this.guessing = "";
@@ -106,6 +133,7 @@
         scope: "all",
         contact: "all",
       });
+      this.clock.playing = false; // a lecturer speaks first
       this.set(scene.setting);
       this.own = false;
     }
@@ -196,10 +224,13 @@
 
     // --- what is to be seen -----------------------------------------------------------------------
 
+    get covered() {
+      return this.view.guess?.open === false;
+    }
+
     // Velocities of all balls at the part of the hit that is shown; null if it has no answer.
     now(hit) {
-      const { guess } = this.view;
-      if (guess && !guess.open) return guess.values;
+      if (this.covered) return this.view.guess.values;
       if (hit.status !== "finished") return null;
       return this.record ? explorer.during(this.record, this.view.part).velocities : hit.after;
     }
@@ -208,12 +239,12 @@
       const { setting, clock, view, swing, record } = this;
       const hit = swing.hit(view.number);
       const firstAfter = swing.hit(0).after;
-      const covered = Boolean(view.guess && !view.guess.open);
+      const { covered, guessing, other, own } = this;
+      const again = !covered && Boolean(this.again || guessing);
       const words =
         view.notice ||
         (covered ? GUESS : explorer.outcomeInWords(setting, hit, view.number, record));
-      const { guessing, other, own } = this;
-      const seen = { guessing, covered, other, own, words, now: this.now(hit) };
+      const seen = { again, guessing, covered, other, own, words, now: this.now(hit) };
       return { ...view, setting, clock, hit, record, firstAfter, ...seen };
     }
   }
