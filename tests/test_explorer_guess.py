@@ -74,6 +74,7 @@ def test_the_guess_comes_before_the_button(visit, page, name):
     if name == "explorer":
         press(tab, "Guess first")
     drawn(tab)
+    assert not tab.locator(".scene-text:visible").count()  # it tells the answer
     last = tab.locator(".handles input").last.bounding_box()
     button = tab.get_by_role("button", name="Let go").bounding_box()
     assert last["y"] + last["height"] < button["y"] < last["y"] + 300

@@ -261,7 +261,7 @@
       const { setting, hit, number, now, part, guess, covered } = state;
       const name = explorer.hitName(number);
       title.textContent = covered
-        ? `Your guess: after ${name} (m/s)`
+        ? "Your guess (m/s)"
         : `${part < 1 ? "During" : "After"} ${name} (m/s)`;
       second.textContent = covered ? "Momentum and energy of your guess" : "Momentum and energy";
       caption.textContent =
