@@ -20,6 +20,20 @@ def test_named_chain(name):
     assert judge(CHAINS[name].problem).word == "right"
 
 
+def test_a_tie_decided_by_products_of_tiny_ratios_is_told_by_the_margin():
+    """Beyond 32 digits, so the answer is wrong; it does not claim to be far from another one."""
+    problem = Problem(
+        [1.0] * 8, [1.0, 0.5, 1.0, 0.5, 0.0, 1.0, 0.0, 0.0], [0.9, 1.0, 0.9, 1.0, 1.0, 0.9, 1.0],
+        [1e-20, 0.0, 1e-20, 0.0, 0.0, 0.0], [0.0, 1e-20, 0.0, 0.0, 0.0, 0.0],
+    )  # fmt: skip
+    assert judge(problem).word == "wrong"
+    assert problem.collide().margin == 0.0
+    clear = [[1e-4 if x == 1e-20 else x for x in side] for side in problem[3:5]]
+    clear = problem._replace(forward=clear[0], backward=clear[1])
+    assert judge(clear).word == "right"
+    assert clear.collide().margin > 0.0
+
+
 STORED = Path(__file__).parents[1] / "data" / "judge.csv"
 #: Chains of each family in the tests: as many as some seconds allow.
 SAMPLE = {

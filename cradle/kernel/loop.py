@@ -122,6 +122,8 @@ def prepare(n, chain, meeting, state):
         k.square = times(k.e, k.e)
         if c < n - 2:
             k.forward, k.backward = read(chain.forward[c]), read(chain.backward[c])
+            if 0.0 < chain.forward[c] < LIMITS.faint or 0.0 < chain.backward[c] < LIMITS.faint:
+                tally.margin = 0.0
         k.u = minus(ball[c].start, ball[c + 1].start)
         k.made = abs(ball[c].start.real) + abs(ball[c + 1].start.real)
         k.before = negative(k.u)
