@@ -9,14 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.formatting import as_html
-from cradle.input.values import (
-    Vector,
-    checked,
-    checked_masses,
-    checked_restitution,
-    numbers,
-    refuse_overflow,
-)
+from cradle.input import values as asked
+from cradle.input.values import Vector
 from cradle.kernel.state import LIMITS
 
 
@@ -53,12 +47,13 @@ class Chain:
     def __init__(
         self, masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike = 1.0
     ) -> None:
-        m, v = numbers("masses", masses), numbers("velocities", velocities)
-        e = numbers("restitution", restitution)
+        m, v = asked.numbers("masses", masses), asked.numbers("velocities", velocities)
+        e = asked.numbers("restitution", restitution)
         # Of usual values nothing more need be asked.
         usual = _within(m, 1e-70, 1e70) and _within(v, -1e70, 1e70)
         if not (usual and _within(e, LIMITS.least_restitution, 1.0)):
-            m, v, e = checked_masses(m), checked("velocities", v), checked_restitution(e)
+            m, v = asked.checked_masses(m), asked.checked("velocities", v)
+            e = asked.checked_restitution(e)
         if m.ndim != 1 or m.size < 2:
             rule = "a chain needs (N,) with N >= 2: one row of two or more numbers"
             raise ValueError(f"masses has shape {m.shape}; {rule}")
@@ -72,7 +67,7 @@ class Chain:
                 f"{m.size} balls have {contacts}, restitution needs one number or {m.size - 1}"
             )
         if not usual:
-            refuse_overflow(v, m)
+            asked.refuse_overflow(v, m)
         self._keep(np.array(m), np.array(v), np.full(m.size - 1, e))
 
     @classmethod

@@ -9,10 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.input.values import Vector, checked, numbers, one_number
+from cradle.input.values import ABOVE_ZERO, PART, Vector, checked, numbers, one_number
 from cradle.kernel.state import LIMITS
 
-_UNIT = ("must lie in [0, 1]", 0.0, 1.0)
 #: What is asked of a restitution that divides.
 _NO_ZERO = (f"must lie in [{LIMITS.least_restitution}, 1]", LIMITS.least_restitution, 1.0)
 
@@ -124,10 +123,10 @@ def largest_ratios(
     >>> [bound.tolist() for bound in largest_ratios([1, 1, 1, 1], [0.5, 0.5], [0.5, 0.5])]
     [[0.6666666666666666, 0.5], [0.5, 0.6666666666666666]]
     """
-    m = checked("masses", masses, "must be above 0", 0.0, open_low=True)
+    m = checked("masses", masses, *ABOVE_ZERO)
     if m.shape[-1:] < (2,):
         raise ValueError(f"masses has shape {m.shape}; must be (..., N) with N >= 2")
-    f, b = checked("forward", forward, *_UNIT), checked("backward", backward, *_UNIT)
+    f, b = checked("forward", forward, *PART), checked("backward", backward, *PART)
     size = m.shape[-1] - 2
     for name, ratio in (("forward", f), ("backward", b)):
         if ratio.shape[-1:] != (size,):
@@ -156,7 +155,7 @@ def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLi
     0.8275
     """
     r2, e2 = checked("r2", r2, "must be at least 0", 0.0), checked("e2", e2, *_NO_ZERO)
-    e3, ratio = checked("e3", e3, *_UNIT), checked("ratio", ratio, *_UNIT)
+    e3, ratio = checked("e3", e3, *PART), checked("ratio", ratio, *PART)
     with np.errstate(invalid="ignore"):
         root = np.sqrt(1.0 - ratio * (1.0 + r2))
     return np.asarray((1.0 + e2) * (1.0 + e3 * root) / (e2 * (1.0 + r2)) - (1.0 + ratio / e2))
@@ -172,7 +171,7 @@ def first_ball_stops(e2: float, ratio: float) -> float:
     >>> first_ball_stops(0.5, 0.15)
     1.7
     """
-    return (1.0 - one_number("ratio", ratio, *_UNIT)) / one_number("e2", e2, *_NO_ZERO)
+    return (1.0 - one_number("ratio", ratio, *PART)) / one_number("e2", e2, *_NO_ZERO)
 
 
 def middle_ball_stops(e3: float, ratio: float) -> float:
@@ -185,6 +184,6 @@ def middle_ball_stops(e3: float, ratio: float) -> float:
     >>> round(middle_ball_stops(0.5, 0.15), 6)
     0.442608
     """
-    e3, ratio = one_number("e3", e3, *_UNIT), one_number("ratio", ratio, *_UNIT)
+    e3, ratio = one_number("e3", e3, *PART), one_number("ratio", ratio, *PART)
     half = 0.5 * ratio * e3
     return float(e3 * np.sqrt(1.0 - ratio + half * half) - half * e3)

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.input.values import a, one_number
+from cradle.input.values import ABOVE_ZERO, a, one_number
 from cradle.models import Model
 from cradle.swinging.stride import Alone, Flight, Hit, Plane
 
@@ -283,7 +283,7 @@ def step_rows(rows: Sequence[Row], duration: float) -> None:
         As `Row.step` does.
     """
     if not (type(duration) is float and 0.0 < duration < math.inf):  # one comparison a step
-        duration = one_number("duration", duration, "must be above 0", 0.0, open_low=True)
+        duration = one_number("duration", duration, *ABOVE_ZERO)
     begun = [row._before(duration) for row in rows]
     rows[0].bodies.advance(duration)
     for row, push in zip(rows, begun, strict=True):

@@ -13,7 +13,7 @@ import click
 
 import cradle
 from cradle.advice.choice import made
-from cradle.input.values import one_number
+from cradle.input.values import ABOVE_ZERO, one_number
 
 UNITS = {"kg": 1.0, "g": 1e-3}
 
@@ -60,7 +60,7 @@ def pendulum_length(length: float | None, period: float | None) -> float | None:
         raise click.UsageError("give one of --length and --period")
     if period is None:
         return length
-    one_number("--period", period, "must be above 0", 0.0, open_low=True)
+    one_number("--period", period, *ABOVE_ZERO)
     return 9.81 * (0.5 * period / math.pi) ** 2
 
 

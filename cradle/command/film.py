@@ -54,13 +54,13 @@ def film(
     """
     from cradle.fit.parameters import parameter_key
     from cradle.fit.shots import COLUMNS
-    from cradle.input.values import one_number
+    from cradle.input.values import ABOVE_ZERO, one_number
 
     length, window = pendulum_length(length, period), options["window"]
     given = {"length": length, "window": window, "--slower": slower, "--scale": scale}
     for option, value in given.items():
         if value is not None:
-            one_number(option, value, "must be above 0", 0.0, open_low=True)
+            one_number(option, value, *ABOVE_ZERO)
     if shot is not None and len(files) > 1:
         raise click.UsageError("--shot names one film; several have the names of their files")
     if (length is None) != level:

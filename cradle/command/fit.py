@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cradle.command.console import format_options, picture, plot_fits, show, text
-from cradle.input.values import one_number
+from cradle.input.values import ABOVE_ZERO, one_number
 from cradle.tables import data_folder
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def fit(
     striker = 1.0 if speed is None else speed
     if predict is not None:  # what is wrong is said before the fit, not after it
         types_in_a_row(predict)
-        one_number("speed", striker, "must be above 0", 0.0, open_low=True)
+        one_number("speed", striker, *ABOVE_ZERO)
     given = [_named(one) for one in options.pop("given")]
     known = [(name, value) for name, (value, _) in map(_named, options["known"])]
     if wrong := [one for one in options.pop("known") if ":" in one]:

@@ -12,7 +12,7 @@ from cradle.advice.choice import made
 from cradle.command import describe
 from cradle.command.console import format_options, picture, show
 from cradle.command.describe import numbers_of, one_or_all
-from cradle.input.values import one_number, whole_number
+from cradle.input.values import ABOVE_ZERO, one_number, whole_number
 
 
 @click.command()
@@ -56,7 +56,7 @@ def swing(
     far = float(hanging.reach(len(chain))[0])
     rule = f"must be above 0 and at most a quarter of a circle of that --length, {far:.4g} m"
     one_number("--by", by, rule, 0.0, far, open_low=True)
-    one_number("--seconds", seconds, "must be above 0", 0.0, open_low=True)
+    one_number("--seconds", seconds, *ABOVE_ZERO)
     whole_number("--steps", steps)
     if output:  # twenty keyframes a swing
         steps = math.ceil(20 * seconds * hanging.natural_frequency(len(chain))[0] / math.tau)

@@ -23,7 +23,7 @@ from cradle.fit.parameters import (
 from cradle.fit.result import Estimate, Fit, Group
 from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
-from cradle.input.values import Vector, checked, one_number
+from cradle.input.values import ABOVE_ZERO, Vector, checked, one_number
 from cradle.kernel.state import LIMITS
 
 _TRIALS = 513  # points at which it is tried whether a ratio acts at all
@@ -71,9 +71,9 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
     >>> restitution_from_heights("AA", [1.0, 1.0], [0.88, 0.90], 0.01)
     Fit(restitution AA = 0.9434 [0.9336, 0.9533]; chi-square 1.1 of 1)
     """
-    high = checked("drop", drop, "must be above 0", 0.0, open_low=True)
-    low = checked("rise", rise, "must be above 0", 0.0, open_low=True)
-    error = one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
+    high = checked("drop", drop, *ABOVE_ZERO)
+    low = checked("rise", rise, *ABOVE_ZERO)
+    error = one_number("sigma", sigma, *ABOVE_ZERO)
     if high.ndim != 1 or high.shape != low.shape:
         raise ValueError(f"drop has shape {high.shape}, rise {low.shape}; must be alike, (K,)")
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.fit.tracks import Track
-from cradle.input.values import Vector, checked, one_number
+from cradle.input.values import ABOVE_ZERO, Vector, checked, one_number
 
 _GRAVITY = 9.81
 # Marks that each side of the impact needs; the longest window on a level track, s.
@@ -58,8 +58,8 @@ def speeds_from_heights(
     [[1.0, 0.0], [0.01, 0.14]]
     """
     h = checked("heights", heights)
-    error = one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
-    g = one_number("gravity", gravity, "must be above 0", 0.0, open_low=True)
+    error = one_number("sigma", sigma, *ABOVE_ZERO)
+    g = one_number("gravity", gravity, *ABOVE_ZERO)
     speed = np.sqrt(2 * g * np.abs(h))
     return np.sign(h) * speed, np.sqrt(2 * g * (np.abs(h) + error)) - speed
 
@@ -106,7 +106,7 @@ def velocities_from_tracks(
         told = f"{len(balls)} tracks, striker = {striker or 0}"
         raise ValueError(f"{told}; needs two balls and a striker")
     length, window, scatter = (
-        None if value is None else one_number(name, value, "must be above 0", 0.0, open_low=True)
+        None if value is None else one_number(name, value, *ABOVE_ZERO)
         for name, value in (("length", length), ("window", window), ("scatter", scatter))
     )
     for name, ball in tracks.items():

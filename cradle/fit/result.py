@@ -20,7 +20,7 @@ from cradle.fit.parameters import (
 )  # fmt: skip
 from cradle.fit.search import LEVEL, RISE, Mode, Scan
 from cradle.fit.shots import Shots, ShotSet, chance
-from cradle.input.values import Vector, one_number
+from cradle.input.values import ABOVE_ZERO, Vector, one_number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -260,7 +260,7 @@ class Fit:
             If fewer than 2 balls are named, or a mass, restitution or ratio is not known.
         """
         row = types_in_a_row(types)
-        one_number("speed", speed, "must be above 0", 0.0, open_low=True)
+        one_number("speed", speed, *ABOVE_ZERO)
         masses = self.shots.masses
         for kind in (kind for kind in row if kind not in masses):
             raise ValueError(f"no mass is known of type {kind!r}; there are {', '.join(masses)}")

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from cradle.input.csv import table_lines
-from cradle.input.values import Vector, one_number, one_of
+from cradle.input.values import ABOVE_ZERO, Vector, one_number, one_of
 
 #: Columns of a table of shots, and what they hold.
 COLUMNS = {
@@ -65,7 +65,7 @@ class ShotSet:
         Each shot is scaled to one `speed` of the first ball, m/s; a ValueError is raised if a shot
         begins otherwise than with that ball striking the others at rest.
         """
-        one_number("speed", speed, "must be above 0", 0.0, open_low=True)
+        one_number("speed", speed, *ABOVE_ZERO)
         striker = self.before[:, :1]
         if (striker <= 0).any() or self.before[:, 1:].any():
             rule = "do not begin with ball 1 striking the others at rest"
@@ -167,7 +167,7 @@ def read_shots(
                 f"there are {', '.join(there)}{hint}"
             )
     if sigma is not None:
-        one_number("sigma", sigma, "must be above 0", 0.0, open_low=True)
+        one_number("sigma", sigma, *ABOVE_ZERO)
         if "sigma" in there:
             rule = "the table has a column sigma: leave out one of them"
             raise ValueError(f"sigma = {sigma!r}; {rule}")

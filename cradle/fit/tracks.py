@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cradle.input.csv import text_rows
-from cradle.input.values import Vector, one_number
+from cradle.input.values import ABOVE_ZERO, Vector, one_number
 
 
 class Track(NamedTuple):
@@ -68,8 +68,8 @@ def read_tracker(
     >>> {name: track.times.size for name, track in tracks.items()}
     {'B': 49, 'A': 49, 'C': 49}
     """
-    one_number("time_scale", time_scale, "must be above 0", 0.0, open_low=True)
-    one_number("unit", unit, "must be above 0", 0.0, open_low=True)
+    one_number("time_scale", time_scale, *ABOVE_ZERO)
+    one_number("unit", unit, *ABOVE_ZERO)
     file = Path(path) if isinstance(path, str) else path
     rows = text_rows(file.name, file.read_bytes(), comments=True)
     titles, above, block = list[tuple[str, str]](), list[str](), ""

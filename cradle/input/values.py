@@ -21,6 +21,9 @@ _Thing = TypeVar("_Thing")
 
 #: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
 LIGHTEST = 1e-150
+#: A rule, its limits, and whether the lower one is excluded: of numbers above 0, and of parts.
+ABOVE_ZERO: tuple[str, float, float, bool] = ("must be above 0", 0.0, math.inf, True)
+PART: tuple[str, float, float] = ("must lie in [0, 1]", 0.0, 1.0)
 _SHOWN = 80  # characters of a value that an error repeats
 _USUAL = {float, int, np.float64}
 # Python would turn these into floats, or NumPy with a warning, but they are no real numbers.
@@ -127,7 +130,7 @@ def row_of(name: str, kept: Any, size: int, balls: int) -> Vector:
 
 def checked_masses(masses: ArrayLike) -> Vector:
     """Return masses as floats: positive, and none too light beside the heaviest of its chain."""
-    array = checked("masses", masses, "must be above 0", 0.0, open_low=True)
+    array = checked("masses", masses, *ABOVE_ZERO)
     if array.size and array.ndim:
         small = array < LIGHTEST * array.max(axis=-1, keepdims=True)
         rule = f"must be at least {LIGHTEST} of the heaviest ball of its chain"

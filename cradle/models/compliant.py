@@ -13,18 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.input.values import (
-    Vector,
-    checked,
-    checked_masses,
-    must_be,
-    number_or_row,
-    one_number,
-    refuse_overflow,
-    refuse_where,
-    row_of,
-    whole_number,
-)
+from cradle.input import values as asked
+from cradle.input.values import Vector
 from cradle.kernel.accuracy import LONGEST
 from cradle.kernel.kinks import Law, Springs
 from cradle.models.batch import in_order, rows_of, shaped
@@ -34,13 +24,15 @@ from cradle.runtime.job import DEFECTS, FINISHED, LARGE, REFUSED, UNFINISHED, UN
 from cradle.runtime.springs import room, solve
 from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
 
-# What is asked of the parameters of contacts: a rule, limits, whether the lower one is excluded.
+# What is asked of the parameters: a rule, limits, whether the lower one is excluded; of contacts,
 _RULES = {
-    "stiffness": ("must be above 0", 0.0, np.inf, True),
+    "stiffness": asked.ABOVE_ZERO,
     "viscosity": ("must be at least 0", 0.0, np.inf, False),
     "gaps": ("must be finite", -np.inf, np.inf, False),
 }
-_LIMITS = ("exponent", 1.0, 10.0), ("accuracy", FINEST, COARSEST)
+# and of the whole chain.
+_EXPONENT = "must lie in [1, 10]", 1.0, 10.0
+_ACCURACY = f"must lie in [{FINEST:g}, {COARSEST:g}]", FINEST, COARSEST
 _CHUNK = 2048  # chains at once
 
 
@@ -83,19 +75,19 @@ class SpringChain:
     max_steps: int = field(default=MOST_STEPS, kw_only=True)
 
     def __post_init__(self) -> None:
-        for name, low, high in _LIMITS:
-            vars(self)[name] = asked(name, getattr(self, name), low, high)
+        vars(self)["exponent"] = asked.one_number("exponent", self.exponent, *_EXPONENT)
+        vars(self)["accuracy"] = asked.one_number("accuracy", self.accuracy, *_ACCURACY)
         for name, rules in _RULES.items():
-            vars(self)[name] = number_or_row(name, getattr(self, name), "N - 1", *rules)
-        whole_number("max_steps", self.max_steps)
+            vars(self)[name] = asked.number_or_row(name, getattr(self, name), "N - 1", *rules)
+        asked.whole_number("max_steps", self.max_steps)
 
     def solve(self, chain: Chain) -> TimedTrace:
         """Solve the impact of `chain`; see `collide`."""
-        n = len(must_be(Chain, "chain", chain))
+        n = len(asked.must_be(Chain, "chain", chain))
         rule = "must be 1 for SpringChain, whose losses are its viscosity"
-        refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
+        asked.refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
         fastest(chain)  # is within the range of floats
-        contacts = (row_of(name, getattr(self, name), n - 1, n) for name in _RULES)
+        contacts = (asked.row_of(name, getattr(self, name), n - 1, n) for name in _RULES)
         row = Springs(*(row[None] for row in (chain.masses, chain.velocities, *contacts)))
         out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps))
         _, status, clock = solve(row, law, out)
@@ -187,8 +179,8 @@ def spring_velocities(
     array([-0.07, -0.03, -0.01,  0.13,  0.99])
     array([-0.  ,  0.02,  0.03,  0.1 ,  0.85])
     """
-    values = exponent, accuracy
-    p, accuracy = (asked(name, x, *ends) for (name, *ends), x in zip(_LIMITS, values, strict=True))
+    p = asked.one_number("exponent", exponent, *_EXPONENT)
+    accuracy = asked.one_number("accuracy", accuracy, *_ACCURACY)
     given = {"masses": masses, "velocities": velocities, "stiffness": stiffness}
     given |= {"viscosity": viscosity, "gaps": gaps}
     arrays, lead = shaped(given, (0, 0, 1, 1, 1))
@@ -222,16 +214,11 @@ def spring_velocities(
     return out.reshape(*lead, n)
 
 
-def asked(name: str, value: ArrayLike, low: float, high: float) -> float:
-    """Return a number that must lie in these limits."""
-    return one_number(name, value, f"must lie in [{low:g}, {high:g}]", low, high)
-
-
 def check_rows(arrays: Sequence[Vector]) -> None:
     """Raise at the first value that has no meaning."""
-    refuse_overflow(checked("velocities", arrays[1]), checked_masses(arrays[0]))
+    asked.refuse_overflow(asked.checked("velocities", arrays[1]), asked.checked_masses(arrays[0]))
     for (name, rules), values in zip(_RULES.items(), arrays[2:], strict=True):
-        checked(name, values, *rules)
+        asked.checked(name, values, *rules)
 
 
 def viscosity_from(
@@ -282,15 +269,16 @@ def viscosity_from(
     """
     from scipy.optimize import brentq
 
-    m, law = checked_masses(masses), SpringChain(stiffness, exponent)
+    m, law = asked.checked_masses(masses), SpringChain(stiffness, exponent)
     if m.ndim != 1 or len(m) < 2:
         raise ValueError(f"masses has shape {m.shape}; must be (N,) with N >= 2")
-    u = one_number("speed", speed, "must be above 0", 0.0, open_low=True)
+    u = asked.one_number("speed", speed, *asked.ABOVE_ZERO)
     p, n = law.exponent, len(m)
     least = _parting(LONGEST, p)
     rule = f"must lie in [{least:.3f}, 1]: a contact takes no more viscosity than that"
-    kept = number_or_row("restitution", restitution, "N - 1", rule, least, 1.0)
-    e, k = row_of("restitution", kept, n - 1, n), row_of("stiffness", law.stiffness, n - 1, n)
+    kept = asked.number_or_row("restitution", restitution, "N - 1", rule, least, 1.0)
+    e = asked.row_of("restitution", kept, n - 1, n)
+    k = asked.row_of("stiffness", law.stiffness, n - 1, n)
     own = [
         brentq(lambda a, x=x: _parting(a, p) - x, 0.0, LONGEST, xtol=1e-12)
         for x in np.minimum(e, _parting(0.0, p))  # which is 1, but for rounding

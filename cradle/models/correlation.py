@@ -11,21 +11,8 @@ from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
 from cradle.closed_form import largest_ratios
-from cradle.input.values import (
-    Vector,
-    checked,
-    checked_masses,
-    checked_restitution,
-    first,
-    must_be,
-    number_or_row,
-    one_number,
-    one_of,
-    refuse_overflow,
-    refuse_where,
-    row_of,
-    whole_number,
-)
+from cradle.input import values as asked
+from cradle.input.values import Vector
 from cradle.kernel import Inputs, Options
 from cradle.kernel.state import LIMITS
 from cradle.runtime.job import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job, outputs
@@ -35,7 +22,6 @@ MAX_EVENTS = 5_000_000  #: Steps after which an impact is given up, unless told 
 
 _MOST_NUMBERS = 10_000_000  # that a path may hold unless it is asked for in full: 80 MB
 _EVERY = 2**40
-_RANGE = ("must lie in [0, 1]", 0.0, 1.0)  # what is asked of a ratio
 _KINDS = ("maximum_compression", "end", "close", "collapse", "repetition")
 # Each event once: the same ones come again and again.
 _event = functools.cache(lambda kind, contact: Event(_KINDS[kind], contact))
@@ -93,17 +79,19 @@ class ImpulseCorrelation:
         check_options(self.meeting, self.excess, self.max_events)
         for name in ("forward", "backward"):
             if (given := getattr(self, name)) is not None or name == "forward":
-                vars(self)[name] = number_or_row(name, given, "N - 2", *_RANGE)
+                vars(self)[name] = asked.number_or_row(name, given, "N - 2", *asked.PART)
         vars(self).update(meeting=float(self.meeting), max_events=int(self.max_events))
 
     def ratios(self, n: int) -> tuple[Vector, Vector]:
         """Return the ratios forward and backward at the interior balls of a chain of n balls."""
         backward = self.forward if self.backward is None else self.backward
-        return row_of("forward", self.forward, n - 2, n), row_of("backward", backward, n - 2, n)
+        both = {"forward": self.forward, "backward": backward}
+        forward, backward = (asked.row_of(name, row, n - 2, n) for name, row in both.items())
+        return forward, backward
 
     def solve(self, chain: Chain, *, record: bool | None = None, progress: bool = False) -> Trace:
         """Solve the impact of `chain`; see `collide`."""
-        n = len(must_be(Chain, "chain", chain))
+        n = len(asked.must_be(Chain, "chain", chain))
         own = chain.masses, chain.velocities, chain.restitution, *self.ratios(n)
         # Copies: compiled code is made for arrays that may be written to.
         inputs = Inputs(*(part[None].copy() for part in own))
@@ -153,23 +141,24 @@ def check_options(meeting: float, excess: str, max_events: int) -> None:
     """Raise if an option is outside its range."""
     # The usual options first: they cost a call for one chain less than the checks in full.
     if not (type(meeting) is float and 0.0 <= meeting <= 1.0):
-        one_number("meeting", meeting, *_RANGE)
-    one_of("excess", excess, ("raise", "saturate"))
-    whole_number("max_events", max_events, "at least 1 and below 2**63", high=2**63 - 1)
+        asked.one_number("meeting", meeting, *asked.PART)
+    asked.one_of("excess", excess, ("raise", "saturate"))
+    asked.whole_number("max_events", max_events, "at least 1 and below 2**63", high=2**63 - 1)
 
 
 def check_values(bounded: bool, *values: ArrayLike) -> None:
     """Raise if a value is outside its limits: what the kernel refuses, in words."""
     masses, velocities, restitution, forward, backward = values
-    m, v = checked_masses(masses), checked("velocities", velocities)
-    checked_restitution(restitution)
-    f, b = checked("forward", forward, *_RANGE), checked("backward", backward, *_RANGE)
-    refuse_overflow(v, m)
+    m, v = asked.checked_masses(masses), asked.checked("velocities", velocities)
+    asked.checked_restitution(restitution)
+    f = asked.checked("forward", forward, *asked.PART)
+    b = asked.checked("backward", backward, *asked.PART)
+    asked.refuse_overflow(v, m)
     if m.size:
         # How a ball as light as that parts the heavy ones is below rounding.
         small = m < LIMITS.lightest * m.max(axis=-1, keepdims=True)
         least = f"at least {LIMITS.lightest} of the heaviest ball of its chain"
-        refuse_where("masses", m, small, f"for this model it must be {least}")
+        asked.refuse_where("masses", m, small, f"for this model it must be {least}")
     if not bounded:
         return
     f, b = (np.broadcast_to(x, (m.shape[-1] - 2,)) if x.ndim == 0 else x for x in (f, b))
@@ -177,13 +166,13 @@ def check_values(bounded: bool, *values: ArrayLike) -> None:
     for name, given, bound in zip(("forward", "backward"), (f, b), bounds, strict=True):
         above = given > bound * LIMITS.rounded
         if above.any():
-            at, mirrored = first(above), ", mirrored" * (name == "backward")
+            at, mirrored = asked.first(above), ", mirrored" * (name == "backward")
             rule = (
                 f"at ball {at[-1] + 1}, counted from 0, it must not exceed {float(bound[at]):.6g} "
                 f"(Eq. 53{mirrored}): a larger ratio would make a contact pull; excess='saturate' "
                 "holds the contact closed instead"
             )
-            refuse_where(name, given, above, rule)
+            asked.refuse_where(name, given, above, rule)
 
 
 def raise_refused(bounded: bool, *values: ArrayLike) -> NoReturn:

@@ -8,15 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.input.values import (
-    Vector,
-    must_be,
-    number_or_row,
-    one_number,
-    refuse_where,
-    row_of,
-    whole_number,
-)  # fmt: skip
+from cradle.input import values as asked
+from cradle.input.values import Vector
 from cradle.trace import Event, ImpactNotFinished, Trace
 
 # Beyond these the equations of one problem keep too few digits.
@@ -94,16 +87,16 @@ class QuadraticDissipation:
     def __post_init__(self) -> None:
         rule, given = f"must lie in [0, {_LARGEST:g}]", self.coefficients
         if given is not None:
-            given = number_or_row("coefficients", given, "N - 1", rule, 0.0, _LARGEST)
+            given = asked.number_or_row("coefficients", given, "N - 1", rule, 0.0, _LARGEST)
         vars(self).update(
             coefficients=given,
-            distance=one_number("distance", self.distance, rule, 0.0, _LARGEST),
-            max_problems=whole_number("max_problems", self.max_problems),
+            distance=asked.one_number("distance", self.distance, rule, 0.0, _LARGEST),
+            max_problems=asked.whole_number("max_problems", self.max_problems),
         )
 
     def solve(self, chain: Chain) -> DissipationTrace:
         """Solve the impact of `chain`; see `collide`."""
-        n, v = len(must_be(Chain, "chain", chain)), chain.velocities
+        n, v = len(asked.must_be(Chain, "chain", chain)), chain.velocities
         # In units in which no product of masses is beyond the range of floats.
         unit = np.ldexp(1.0, int(np.frexp(chain.masses.max())[1]) - 1)
         m = chain.masses / unit
@@ -113,7 +106,7 @@ class QuadraticDissipation:
         left, right = np.maximum.accumulate(m), np.maximum.accumulate(m[::-1])[::-1]
         light = m < _LIGHTEST * np.minimum(left, right)
         rule = f"must be at least {_LIGHTEST} of the heaviest ball on one of its sides for this law"
-        refuse_where("masses", chain.masses, light, rule)
+        asked.refuse_where("masses", chain.masses, light, rule)
         change, impulses, absorbed = np.zeros(n), *np.zeros((2, n - 1))
         path, path_impulses, events = [v], [impulses], []
         # Closing speeds are known no better than the velocities that they are differences of.
@@ -152,9 +145,9 @@ class QuadraticDissipation:
         if self.coefficients is None:
             e, least = chain.restitution, 2.0 / _LARGEST
             rule = f"must be below 1 - {least:g} for QuadraticDissipation: e = 1 is a limit only"
-            refuse_where("restitution", e, 1.0 - e < least, rule)
+            asked.refuse_where("restitution", e, 1.0 - e < least, rule)
             return (1.0 + e) / (1.0 - e)
-        return row_of("coefficients", self.coefficients, len(chain) - 1, len(chain))
+        return asked.row_of("coefficients", self.coefficients, len(chain) - 1, len(chain))
 
 
 def _parted(m: Vector, u: Vector, kappa: Vector, distance: float) -> tuple[Vector, Vector]:

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.input.values import Vector, must_be, number_or_row, one_number, row_of, whole_number
+from cradle.input import values as asked
+from cradle.input.values import Vector
 from cradle.models.release import Process, Stopped
 from cradle.trace import Event, ImpactNotFinished, Trace
 
@@ -112,20 +113,19 @@ class EnergyDistribution:
     max_evaluations: int = field(default=1_000_000, kw_only=True)
 
     def __post_init__(self) -> None:
-        positive = "must be above 0", 0.0, np.inf, True
         vars(self).update(
-            stiffness=number_or_row("stiffness", self.stiffness, "N - 1", *positive),
-            exponent=one_number("exponent", self.exponent, "must be at least 1", 1.0),
-            rtol=one_number("rtol", self.rtol, "must lie in [3e-14, 0.1]", 3e-14, 0.1),
+            stiffness=asked.number_or_row("stiffness", self.stiffness, "N - 1", *asked.ABOVE_ZERO),
+            exponent=asked.one_number("exponent", self.exponent, "must be at least 1", 1.0),
+            rtol=asked.one_number("rtol", self.rtol, "must lie in [3e-14, 0.1]", 3e-14, 0.1),
         )
-        whole_number("max_evaluations", self.max_evaluations)
+        asked.whole_number("max_evaluations", self.max_evaluations)
         if not isinstance(self.gaps, bool):
             raise ValueError(f"gaps = {self.gaps!r}; must be True or False")
 
     def solve(self, chain: Chain) -> EnergyTrace:
         """Solve the impact of `chain`; see `collide`."""
-        n = len(must_be(Chain, "chain", chain))
-        k = row_of("stiffness", self.stiffness, n - 1, n)
+        n = len(asked.must_be(Chain, "chain", chain))
+        k = asked.row_of("stiffness", self.stiffness, n - 1, n)
         c, mass, speed = fastest(chain)
         scaled = chain.masses / mass, chain.closing_speeds / speed, k / k[c]
         process, reason = Process(*scaled, chain.restitution, self), ""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.input.values import Vector, number_or_row, one_number, one_of, refuse_where, row_of
+from cradle.input import values as asked
+from cradle.input.values import Vector
 
 #: Events nearer than this part of a swing (over 2 pi) are one; so are lengths, of the amplitude.
 TIE = 1e-9
@@ -49,14 +49,14 @@ class Pendulums:
     angle: str = "small"
 
     def __post_init__(self) -> None:
-        above, least = ("must be above 0", 0.0, math.inf, True), ("must be at least 0", 0.0)
-        g = one_number("gravity", self.gravity, *above)
+        least = "must be at least 0", 0.0
+        g = asked.one_number("gravity", self.gravity, *asked.ABOVE_ZERO)
         values = {
-            "length": number_or_row("length", self.length, "N", *above),
-            "gaps": number_or_row("gaps", self.gaps, "N - 1", *least),
-            "damping": number_or_row("damping", self.damping, "N", *least),
+            "length": asked.number_or_row("length", self.length, "N", *asked.ABOVE_ZERO),
+            "gaps": asked.number_or_row("gaps", self.gaps, "N - 1", *least),
+            "damping": asked.number_or_row("damping", self.damping, "N", *least),
         }
-        one_of("angle", self.angle, ("small", "full"))
+        asked.one_of("angle", self.angle, ("small", "full"))
         for name, value in values.items() if self.angle == "full" else ():
             if len(set(np.ravel(value))) > 1 or (name == "gaps" and np.any(value)):
                 rule = "must be 0" if name == "gaps" else "must be equal"
@@ -65,7 +65,7 @@ class Pendulums:
 
     def row(self, name: str, size: int) -> Vector:
         """Return `length`, `gaps` or `damping` for each of `size` balls or contacts."""
-        return row_of(name, getattr(self, name), size, size + (name == "gaps"))
+        return asked.row_of(name, getattr(self, name), size, size + (name == "gaps"))
 
     def reach(self, size: int) -> Vector:
         """Return how far each of `size` balls may be pulled aside, m along its arc."""
@@ -82,7 +82,7 @@ class Pendulums:
         beyond = np.abs(x) > reach
         most = "a quarter of a circle" if self.angle == "small" else "half a circle"
         far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most}"
-        refuse_where("positions", x, beyond, f"must be within {far}")
+        asked.refuse_where("positions", x, beyond, f"must be within {far}")
         return x
 
     def natural_frequency(self, size: int) -> Vector:
@@ -92,7 +92,7 @@ class Pendulums:
         slow = damping >= frequency
         least = float(frequency[slow.argmax()])
         rule = f"must be below the natural frequency sqrt(g/l) = {least!r}"
-        refuse_where("damping", damping, slow, rule)
+        asked.refuse_where("damping", damping, slow, rule)
         return frequency
 
 

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.input.values import Vector, checked, must_be, one_number
+from cradle.input.values import ABOVE_ZERO, Vector, checked, must_be, one_number
 from cradle.models import Model, collide
 from cradle.runtime.compile import without_waiting
 from cradle.swinging.resting import common_velocities, stretches
 from cradle.swinging.swing import part
 
-_ABOVE_ZERO: Any = "must be above 0", 0.0, math.inf, True
 # Contact lines of one cluster may differ by this angle, rad: beyond it the balls are no row.
 _BEND = 0.1
 # Somebody looks at the balls at least that often, s.
@@ -57,17 +56,17 @@ class Alone:
         n = len(must_be(Chain, "chain", chain))
         with without_waiting():
             collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
-        size = checked("radii", radii, *_ABOVE_ZERO)
+        size = checked("radii", radii, *ABOVE_ZERO)
         if size.shape not in ((), (n,)):
             raise ValueError(f"radii has shape {size.shape}; {n} balls need () or ({n},)")
         self.chain, self.model = chain, model
         self.radii: list[float] = np.broadcast_to(size, (n,)).tolist()
         self.reach, least = [a + b for a, b in pairwise(self.radii)], min(self.radii)
-        self.acceleration = one_number("acceleration", acceleration, *_ABOVE_ZERO)
+        self.acceleration = one_number("acceleration", acceleration, *ABOVE_ZERO)
         near = 1e-3 * least if touching is None else touching
         slow = 0.01 * math.sqrt(self.acceleration * least) if resting is None else resting
-        self.touching = one_number("touching", near, *_ABOVE_ZERO)
-        self.resting = one_number("resting", slow, *_ABOVE_ZERO)
+        self.touching = one_number("touching", near, *ABOVE_ZERO)
+        self.resting = one_number("resting", slow, *ABOVE_ZERO)
         self.met = 1e-3 * self.touching  # so near are balls that a flight has brought together
         at = self._plane("motion: positions", x)
         self._refuse_a_pack(at.tolist())
