@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cradle.chain import Chain
-from cradle.formatting import as_html, as_text, without_rounding
+from cradle.formatting import as_html, as_text, by_ball, without_rounding
 from cradle.input.values import Vector, shown
 
 if TYPE_CHECKING:  # at run time these are imported by the methods that need them
@@ -104,22 +104,15 @@ class Trace:
         """
         import pandas as pd
 
-        steps, balls = self.path.shape
-        kinds = ["before", *(event.kind for event in self.events)]
-        contacts = pd.Series([None, *(event.contact for event in self.events)], dtype="Int64")
+        rows: dict[str, Any] = {"step": np.arange(len(self.path))}
+        if hasattr(self, "times"):
+            rows["time"] = self.times
+        rows["event"] = ["before", *(event.kind for event in self.events)]
+        contacts = [None, *(event.contact for event in self.events)]
+        rows["contact"] = pd.array(contacts, dtype="Int64")
         impulses = np.pad(self.path_impulses, ((0, 0), (1, 1)))
-        return pd.DataFrame(
-            {
-                "step": np.repeat(np.arange(steps), balls),
-                **({"time": self.times.repeat(balls)} if hasattr(self, "times") else {}),
-                "event": np.repeat(kinds, balls),
-                "contact": contacts.repeat(balls).array,
-                "ball": np.tile(np.arange(balls), steps),
-                "velocity": self.path.ravel(),
-                "left": impulses[:, :-1].ravel(),
-                "right": impulses[:, 1:].ravel(),
-            }
-        )
+        parts = {"velocity": self.path, "left": impulses[:, :-1], "right": impulses[:, 1:]}
+        return by_ball(len(self.chain), rows, parts)
 
     def curve(self) -> tuple[Vector, Vector]:
         """Return impulses (N s) and velocities (m/s) that straight lines join in a picture."""

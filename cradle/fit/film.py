@@ -188,11 +188,9 @@ def _rest(columns: Sequence[Vector], x: Vector) -> float:
 
 
 def _way(t: Vector, velocity: float, length: float | None) -> Vector:
-    """Return the way from the place of the impact, of a ball with the velocity v there.
-
-    Along the row a pendulum goes (v/w) sn(w t) dn(w t) from its lowest point, with Jacobi's
-    functions of modulus k = v/(2 w l), w^2 = g/l.
-    """
+    """Return the way from the place of the impact, of a ball with the velocity v there."""
+    # Along the row a pendulum goes (v/w) sn(w t) dn(w t) from its lowest point, with Jacobi's
+    # functions of modulus k = v/(2 w l), w^2 = g/l.
     if length is None:
         return velocity * t
     from scipy.special import ellipj
@@ -285,10 +283,8 @@ def _velocities(
 
 
 def _strays(sides: list[tuple[int, Vector, Vector, Vector]], exact: float) -> tuple[_Stray, ...]:
-    """Return the mark of each side that chance does not explain, if any; see `Velocities.strays`.
-
-    A side has its ball, times, and what bends with the velocity and is left of the positions.
-    """
+    """Return the mark of each side that chance does not explain, if any: `Velocities.strays`."""
+    # A side has its ball, times, and what bends with the velocity and is left of the positions.
     from scipy.special import stdtr
 
     worst = []

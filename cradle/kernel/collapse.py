@@ -37,11 +37,9 @@ def change_of(c, low, high, ball, contact):
 
 @apart
 def common_velocity(first, last, left_part, right_part, ball, contact):
-    """Leave in x of contacts first..last the impulses that bring all their balls to one velocity.
-
-    A steady neighbour with h times the impulse of the contact beside it makes the ball between act
-    as one of mass m / (1 - h); the parts are these 1 - h.
-    """
+    """Leave in x of contacts first..last the impulses that bring their balls to one velocity."""
+    # A steady neighbour with h times the impulse of the contact beside it makes the ball between
+    # act as one of mass m / (1 - h); the parts are these 1 - h.
     mass = momentum = speed = ZERO  # velocities count from that of the first ball
     for i in range(first, last + 2):
         b = ball[i]
@@ -63,10 +61,8 @@ def common_velocity(first, last, left_part, right_part, ball, contact):
 
 
 def last_chatter(c, step, n, state):
-    """Return the last contact from c on that only chatters, with nothing but zeros between.
-
-    It is or was in an exhausted collision, or in one at a speed far below that: dust.
-    """
+    """Return the last contact from c on that only chatters, with nothing but zeros between."""
+    # It is or was in an exhausted collision, or in one at a speed far below that: dust.
     tally, last, j = state.tally[0], c, c + step
     while 0 <= j < n - 1:
         k = state.contact[j]
@@ -83,10 +79,8 @@ def last_chatter(c, step, n, state):
 
 @apart
 def merge(first, last, n, state):
-    """Bring the balls of contacts first..last to one velocity; return what has ended, first..last.
-
-    Balls joined to theirs by zeros go with them; idle neighbours that this makes approach join.
-    """
+    """Bring the balls of first..last to one velocity; return what has ended, first..last."""
+    # Balls joined to theirs by zeros go with them; idle neighbours that this makes approach join.
     ball, contact = state.ball, state.contact
     while True:
         low, high = first, last
@@ -113,10 +107,8 @@ def merge(first, last, n, state):
 
 @apart
 def merge_exhausted(c, n, state):
-    """Merge the contacts around c that only chatter; return (first, last), empty if none are.
-
-    One must lose energy, unless all are dust: elastic sequences are finite, or hand it all on.
-    """
+    """Merge the contacts around c that only chatter; return (first, last), empty if none are."""
+    # One must lose energy, unless all are dust: elastic sequences are finite, or hand it all on.
     contact = state.contact
     first, last = last_chatter(c, -1, n, state), last_chatter(c, 1, n, state)
     loses = False

@@ -39,10 +39,8 @@ def code(c, state):
 
 @apart
 def remember(number, c, n, state):
-    """Take a snapshot of the contacts around c.
-
-    It is kept for 1, 1, 2, 1, 1, 2, 4, ... times the least distance: short cycles are found soon.
-    """
+    """Take a snapshot of the contacts around c."""
+    # It is kept for 1, 1, 2, 1, 1, 2, 4, ... times the least distance: short cycles are found soon.
     level, contact, memory = state.level[number], state.contact, state.memory[number]
     level.mark = c
     level.taken += 1
@@ -63,12 +61,10 @@ def since(c, contact, memory):
 
 @apart
 def cluster_around(c, number, n, state):
-    """Return the contacts of a possible cycle around contact c; empty (last < first) if none.
-
-    Contacts left..right had an impulse since the snapshot; of these first..last collided anew and
-    the others, steady neighbours, stayed active.  All are active and driven as they were then, and
-    one that collided loses energy.
-    """
+    """Return the contacts of a possible cycle around contact c; empty (last < first) if none."""
+    # Contacts left..right had an impulse since the snapshot; of these first..last collided anew and
+    # the others, steady neighbours, stayed active.  All are active and driven as they were then,
+    # and one that collided loses energy.
     contact, run, memory = state.contact, state.run, state.memory[number]
     low, high = max(c - LIMITS.window, 0), min(c + LIMITS.window, n - 2)
     left = right = c
@@ -114,12 +110,10 @@ def kept_part(neighbour, edge, exists, contact, memory):
 
 @apart
 def limit(cluster, number, state):
-    """Leave in x the impulses to the limit: the balls first..last + 1 come to one velocity.
-
-    Returns T = L / (1 - L), all cycles to come over the last one; how far the state is from its
-    snapshot scaled by L, relative to its own size; and this size.  T is 0 if there is no limit, and
-    below -1 if the cycles come from there and grow, driven by steady neighbours.
-    """
+    """Leave in x the impulses to the limit: the balls first..last + 1 come to one velocity."""
+    # Returns T = L / (1 - L), all cycles to come over the last one; how far the state is from its
+    # snapshot scaled by L, relative to its own size; and this size.  T is 0 if there is no limit,
+    # and below -1 if the cycles come from there and grow, driven by steady neighbours.
     ball, contact, memory = state.ball, state.contact, state.memory[number]
     left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
     left_part = kept_part(first - 1, first, first > left, contact, memory)
@@ -162,12 +156,11 @@ def stays_at_zero(c, contact, memory):
 
 @apart
 def neighbours_stay(cluster, total, part, number, n, state):
-    """Leave in y what the neighbours of a cycle absorb; tell whether none comes to its own event.
-
-    Impulse and closing speed of a neighbour go the same part of their ways, so its work is that of
-    the straight line between, but for what it was more in the last cycle, times the sum of L^2,
-    L^4, ...  A cycle that grows goes on while these are below the energy of the first closing.
-    """
+    """Leave in y what neighbours of a cycle absorb; tell whether none comes to its own event."""
+    # Impulse and closing speed of a neighbour go the same part of their ways, so its work is that
+    # of the straight line between, but for what it was more in the last cycle, times the sum of
+    # L^2, L^4, ...  A cycle that grows goes on while these are below the energy of the first
+    # closing.
     ball, contact, memory = state.ball, state.contact, state.memory[number]
     left, right = cluster.left, cluster.right
     squares = part * (2.0 - part) * total * (total / (1.0 + 2.0 * total))
@@ -196,10 +189,8 @@ def neighbours_stay(cluster, total, part, number, n, state):
 
 @apart
 def jump(cluster, part, number, n, state):
-    """Go a part of the way to the limit: impulses by x, neighbours' works by y.
-
-    (1 - e^2) of the works of the cycle itself is what disappears of motion and stores.
-    """
+    """Go a part of the way to the limit: impulses by x, neighbours' works by y."""
+    # (1 - e^2) of the works of the cycle itself is what disappears of motion and stores.
     ball, contact, memory = state.ball, state.contact, state.memory[number]
     left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
     lost = loss = 0.0
@@ -237,11 +228,9 @@ def jump(cluster, part, number, n, state):
 
 @apart
 def go_on(c, cluster, total, n, state):
-    """Repeat the cycle that contact c ends 2, 4, 8 ... times, before a neighbour has its event.
-
-    After k cycles the balls have gone the part 1 - L^k of the way to the limit, L = T / (1 + T):
-    half of it at most, as a neighbour's event may be at the limit itself.
-    """
+    """Repeat the cycle that contact c ends 2, 4, 8 ... times, before a neighbour has its event."""
+    # After k cycles the balls have gone the part 1 - L^k of the way to the limit, L = T / (1 + T):
+    # half of it at most, as a neighbour's event may be at the limit itself.
     contact, run, memory = state.contact, state.run, state.memory[LOWER]
     cycles, part = 1, 1.0 / (1.0 + total)
     while True:
@@ -277,15 +266,12 @@ def is_in_doubt(cluster, bent, state):
 
 @apart
 def cycle(number, c, n, state):
-    """If the neighbourhood of contact c repeats itself on another scale, go to the limit.
-
-    Light balls need many cycles to settle on one factor.  It is enough that the bend, how far the
-    state will turn by the time that it is exhausted, is below its limit; and that it leaves nothing
-    in doubt.  Where there is no limit, or a neighbour comes to its event before it, the cycle is
-    repeated as often as it surely repeats itself.
-
-    Returns (first, last) of the contacts that have collapsed, empty if none have.
-    """
+    """If the neighbourhood of contact c repeats itself on another scale, go to the limit."""
+    # Light balls need many cycles to settle on one factor.  It is enough that the bend, how far the
+    # state will turn by the time that it is exhausted, is below its limit; and that it leaves
+    # nothing in doubt.  Where there is no limit, or a neighbour comes to its event before it, the
+    # cycle is repeated as often as it surely repeats itself.
+    # Returns (first, last) of the contacts that have collapsed, empty if none have.
     cluster = cluster_around(c, number, n, state)
     if cluster.last < cluster.first:
         return c, c - 1

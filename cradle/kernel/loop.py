@@ -165,11 +165,9 @@ def impact(n, max_rounds, state):
 
 @apart
 def settle(n, v, ball, contact, unit):
-    """Leave changes of velocity in `x`, and velocities in `v`, these in the caller's units.
-
-    Balls that move as one, or whose order is lost in the last digits, have one velocity: that of
-    the ball which impulses have changed least.
-    """
+    """Leave changes of velocity in `x`, and velocities in `v`, these in the caller's units."""
+    # Balls that move as one, or whose order is lost in the last digits, have one velocity: that of
+    # the ball which impulses have changed least.
     before = ZERO
     for i in range(n):
         after = contact[i].p if i < n - 1 else ZERO
@@ -193,11 +191,9 @@ def settle(n, v, ball, contact, unit):
 
 @apart
 def certify(n, v, ball, contact, tally):
-    """Return what a settled outcome breaks, or 0; each sum within the rounding of its terms.
-
-    Velocities come from impulses alone: they must part as the closing speeds say, and the energy
-    lost, impulse times mean closing speed, must be (1 - e^2) of the contacts' works.
-    """
+    """Return what a settled outcome breaks, or 0; each sum within the rounding of its terms."""
+    # Velocities come from impulses alone: they must part as the closing speeds say, and the energy
+    # lost, impulse times mean closing speed, must be (1 - e^2) of the contacts' works.
     unit = tally.unit
     momentum = terms = grain = 0.0
     lost = kept = absorbed = energy = 0.0
@@ -243,11 +239,9 @@ def certify(n, v, ball, contact, tally):
 
 @door
 def batch(begin, resumed, n, inputs, options, out, state, effort):
-    """Solve the chains of `out` from number `begin` on; return the next one's number, and status.
-
-    It stops at the first chain whose status is not FINISHED: PAUSED, when `effort` (contacts
-    touched) is used up, to be `resumed` there.
-    """
+    """Solve the chains of `out` from number `begin` on; return the next one's number and status."""
+    # It stops at the first chain whose status is not FINISHED: PAUSED, when `effort` (contacts
+    # touched) is used up, to be `resumed` there.
     ball, contact, tally = state.ball, state.contact, state.tally[0]
     tally.effort = effort
     for k in range(begin, len(out.v)):

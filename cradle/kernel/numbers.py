@@ -103,10 +103,8 @@ def most(a, b):
 
 
 def read(x):
-    """Return what a float means: the decimal of up to 15 digits that it prints as, or its bits.
-
-    So .9 is nine tenths.  From 1e-7 to 1e15 the powers of ten in the way are floats themselves.
-    """
+    """Return what a float means: the decimal of up to 15 digits that it prints as, or its bits."""
+    # So .9 is nine tenths.  From 1e-7 to 1e15 the powers of ten in the way are floats themselves.
     size = abs(x)
     if not 1e-7 <= size < 1e15 or (x + ROUND) - ROUND == x:
         return complex(x, 0.0)

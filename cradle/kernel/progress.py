@@ -10,10 +10,8 @@ from cradle.kernel.state import CLOSE, LIMITS, NEVER, NO_EVENT, ONE, PASSED, ZER
 
 
 def parts_to_meeting(one, other, gap, ball, contact, tally):
-    """R8.3: work out at what parts of their segments two runs must meet in a gap, if they must.
-
-    Velocities count from that of the gap's left ball, which only rises; the other only falls.
-    """
+    """R8.3: work out at what parts of their segments two runs must meet in a gap, if they must."""
+    # Velocities count from that of the gap's left ball, which only rises; the other only falls.
     wide, made = negative(contact[gap].u), contact[gap].made
     rise = times(ball[gap].pull, one.reach) if one.high == gap - 1 else ZERO
     fall = negative(times(ball[gap + 1].pull, other.reach)) if other.low == gap + 1 else ZERO
@@ -72,10 +70,8 @@ def is_reached_sooner(one, other, tally):
 
 
 def part_beyond(first, part, outward, c, n, state):
-    """R8.4: part of its segment at which run `first` reaches the gap c beyond, if sooner, or NEVER.
-
-    `outward` is the pull of its ball there, towards the gap.
-    """
+    """R8.4: part of its segment at which run `first` reaches gap c beyond, if sooner, or NEVER."""
+    # `outward` is the pull of its ball there, towards the gap.
     if active_beside(c, n, state.contact) < 2:
         return NEVER
     whole = times(outward, state.run[first].reach)
@@ -88,11 +84,9 @@ def part_beyond(first, part, outward, c, n, state):
 
 
 def who_goes(one, n, state):
-    """R8.4 to R8.6: say what part of its segment each run goes; return the gap that closes, or -1.
-
-    Run `one` and the next meet; but if one of them reaches the gap at its far side on the way, this
-    closes first, and only that run goes.  If `one` is -1, all go on to their own next events.
-    """
+    """R8.4 to R8.6: say what part of its segment each run goes; return the gap to close, or -1."""
+    # Run `one` and the next meet; but if one of them reaches the gap at its far side on the way,
+    # this closes first, and only that run goes.  If `one` is -1, all go to their own next events.
     ball, run = state.ball, state.run
     first = run[n - 1].onward
     while first < n - 1:
@@ -137,10 +131,8 @@ def book_work(k, impulse, now):
 
 
 def advance(one, n, state):
-    """Take a run straight on its way; what is zero but for its last digits is zero.
-
-    An idle contact that has passed zero is a defect.
-    """
+    """Take a run straight on its way; what is zero but for its last digits is zero."""
+    # An idle contact that has passed zero is a defect.
     ball, contact, tally = state.ball, state.contact, state.tally[0]
     low, high = one.low, one.high
     for c in range(max(low - 1, 0), min(high + 1, n - 2) + 1):

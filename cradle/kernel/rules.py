@@ -44,10 +44,8 @@ def reached(first, run, smallest, ball, contact):
 
 
 def keep_closed(i, low, high, ball, contact, tally):
-    """R7: lower the ratio at ball i to its bound (Eq. 53) if the contact driven would open at once.
-
-    It is held at u = 0 there.  One that is driven from both sides cannot open.
-    """
+    """R7: lower the ratio at ball i to its bound (Eq. 53) if the contact driven would open now."""
+    # It is held at u = 0 there.  One that is driven from both sides cannot open.
     b, far = ball[i], i + ball[i].turn
     k = contact[min(i, far)]
     if ball[far].turn == -b.turn or k.u.real != 0.0 or k.w != 0.0:
@@ -79,10 +77,8 @@ def ratios_in_force(low, high, ball, contact, tally):
 
 @apart
 def several_sources(low, high, smallest, ball, contact):
-    """R1, R6: rates of a run with more than one source, where products of ratios are divided.
-
-    Each is x * 2**k: long products do not overflow, and a ratio of zero is one vanishing factor.
-    """
+    """R1, R6: rates of a run with more than one source, where products of ratios are divided."""
+    # Each is x * 2**k: long products do not overflow, and a ratio of zero is one vanishing factor.
     x = ONE
     k = top = 0
     for c in range(low, high + 1):
@@ -141,10 +137,9 @@ def is_clear(difference, size, tally):
 
 
 def is_over(c, at_zero, ball, contact):
-    """R3: tell whether contact c ends: it opens, or has e = 0 and no longer closes.
-
-    `at_zero`: it is about to open; if nobody drives it, by its own push, even a vanishing one (R6).
-    """
+    """R3: tell whether contact c ends: it opens, or has e = 0 and no longer closes."""
+    # `at_zero`: it is about to open; if nobody drives it, by its own push, even a vanishing one
+    # (R6).
     k = contact[c]
     if k.q.real > 0.0:
         return False
@@ -155,11 +150,10 @@ def is_over(c, at_zero, ball, contact):
 
 
 def way_to_end(k, tally):
-    """R3: progress until contact k has released all, and its closing speed then; or NEVER.
-
-    While it opens, Q + rate (u s + slope s^2 / 2) is zero where u^2 is u^2 - 2 slope Q / rate.  If
-    it closes first, Q gains e^2 of rate u^2 / (2 |slope|): it ends at e^2 u^2 - 2 slope Q / rate.
-    """
+    """R3: progress until contact k has released all, and its closing speed then; or NEVER."""
+    # While it opens, Q + rate (u s + slope s^2 / 2) is zero where u^2 is u^2 - 2 slope Q / rate.
+    # If it closes first, Q gains e^2 of rate u^2 / (2 |slope|): it ends at e^2 u^2 - 2 slope Q /
+    # rate.
     closes = k.u.real > 0.0
     if k.rate.real == 0.0 or (k.slope.real >= 0.0 and k.u.real >= 0.0):
         return NEVER, ZERO
@@ -196,10 +190,8 @@ def course(c, low, high, ball, contact):
 
 
 def segment(first, n, run, ball, contact, tally):
-    """R8.2: progress of a run to its own next event, and which contacts have it then.
-
-    Two events are one if they are closer than what their closing speeds are known to.
-    """
+    """R8.2: progress of a run to its own next event, and which contacts have it then."""
+    # Two events are one if they are closer than what their closing speeds are known to.
     low, high = run[first].low, run[first].high
     left = low - 1 if low > 0 and contact[low - 1].active == 0 else low
     right = high + 1 if high < n - 2 and contact[high + 1].active == 0 else high

@@ -120,16 +120,10 @@ class SpringChain:
 
 
 def spring_velocities(
-    masses: ArrayLike,
-    velocities: ArrayLike,
-    stiffness: ArrayLike = 1.0,
-    *,
-    exponent: float = 1.5,
-    viscosity: ArrayLike = 0.0,
-    gaps: ArrayLike = 0.0,
-    accuracy: float = 1e-3,
-    progress: bool = False,
-) -> Vector:
+    masses: ArrayLike, velocities: ArrayLike, stiffness: ArrayLike = 1.0, *,
+    exponent: float = 1.5, viscosity: ArrayLike = 0.0, gaps: ArrayLike = 0.0,
+    accuracy: float = 1e-3, progress: bool = False,
+) -> Vector:  # fmt: skip
     """Post-impact velocities of many chains of balls on springs; leading axes broadcast.
 
     Each contact pushes with k (d^p + A d(d^p)/dt) while that is above zero, d its compression:
@@ -222,13 +216,9 @@ def check_rows(arrays: Sequence[Vector]) -> None:
 
 
 def viscosity_from(
-    restitution: ArrayLike,
-    *,
-    speed: float,
-    masses: ArrayLike,
-    stiffness: float | Sequence[float] = 1.0,
-    exponent: float = 1.5,
-) -> Vector:
+    restitution: ArrayLike, *, speed: float, masses: ArrayLike,
+    stiffness: float | Sequence[float] = 1.0, exponent: float = 1.5,
+) -> Vector:  # fmt: skip
     """Viscosity of contacts whose pairs of balls, alone, have a restitution at a stated speed.
 
     Viscous balls lose more the faster they close (unless p = 1), so a restitution belongs to one
@@ -290,10 +280,8 @@ def viscosity_from(
 
 @functools.cache
 def _parting(viscosity: float, exponent: float) -> float:
-    """Return the speed at which two balls part that close with 1, in their own units.
-
-    Their compression d has d'' = -d**(p - 1) (d + A p d'), until that would pull.
-    """
+    """Return the speed at which two balls part that close with 1, in their own units."""
+    # Their compression d has d'' = -d**(p - 1) (d + A p d'), until that would pull.
     from scipy.integrate import solve_ivp
 
     def opens(_: float, state: Any) -> float:

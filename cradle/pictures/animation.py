@@ -63,10 +63,8 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
 
 
 def _balls(trace: Trace, ax: Axes, times: Vector, impulses: Vector, path: Vector) -> Iterator[Move]:
-    """Draw the balls as they touch, their velocities as bars, and a star on each contact.
-
-    The balls move in the flights alone; bars are in diameters of the largest one.
-    """
+    """Draw the balls as they touch, their velocities as bars, and a star on each contact."""
+    # The balls move in the flights alone; bars are in diameters of the largest one.
     radii = 0.5 * np.cbrt(trace.chain.masses / trace.chain.masses.max())
     centres = np.cumsum(2 * radii) - radii
     ax.set(xlim=(-2.6, centres[-1] + radii[-1] + 2.6), ylim=(-0.6, 0.95), aspect="equal")
@@ -120,14 +118,9 @@ def _diagram(
 
 
 def animate_swing(
-    runs: Swing | Sequence[Swing],
-    labels: Sequence[str] = (),
-    *,
-    speed: float = 1.0,
-    still: float = 0.0,
-    columns: int = 1,
-    alt: str = "",
-) -> Animation:
+    runs: Swing | Sequence[Swing], labels: Sequence[str] = (), *,
+    speed: float = 1.0, still: float = 0.0, columns: int = 1, alt: str = "",
+) -> Animation:  # fmt: skip
     """Show one swing or several, one below the other or in columns, by the same clock.
 
     Parameters

@@ -59,10 +59,8 @@ def draw_likelihood(estimate: Estimate, ax: Axes) -> Axes:
 
 
 def _draw_data(fit: Fit, shots: ShotSet, ax: Axes) -> None:
-    """Draw measured velocities over the striker's against the striker's, and what is predicted.
-
-    Shots that begin alike are predicted by lines, others by a dash each.
-    """
+    """Draw measured velocities over the striker's against the striker's, and what is predicted."""
+    # Shots that begin alike are predicted by lines, others by a dash each.
     speed = np.abs(shots.before).max(axis=1)
     begins = shots.before / speed[:, np.newaxis]
     predicted = fit.expected(replace(shots, before=begins))

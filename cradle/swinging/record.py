@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.formatting import as_text
+from cradle.formatting import as_text, by_ball
 from cradle.input.values import Vector
 from cradle.swinging.pendulums import Hanging, Pendulums
 from cradle.trace import Trace
@@ -81,7 +81,7 @@ class Swing:
     def to_frame(self) -> pd.DataFrame:
         """Return a row for each time and ball: time, ball, position, velocity."""
         parts = {"position": self.positions, "velocity": self.velocities}
-        return self._by_ball({"time": self.times}, parts)
+        return by_ball(len(self.chain), {"time": self.times}, parts)
 
     def impacts_to_frame(self) -> pd.DataFrame:
         """Return a row for each impact and ball: impact, time, ball, before, after."""
@@ -90,16 +90,7 @@ class Swing:
             for name in ("time", "before", "after")
         )
         rows = {"impact": np.arange(len(times)), "time": times}
-        return self._by_ball(rows, {"before": before, "after": after})
-
-    def _by_ball(self, rows: dict[str, Any], parts: dict[str, Vector]) -> pd.DataFrame:
-        """Return a row for each of these rows and each ball."""
-        import pandas as pd
-
-        n, count = len(self.chain), len(next(iter(rows.values())))
-        columns = {name: np.repeat(values, n) for name, values in rows.items()}
-        columns["ball"] = np.tile(np.arange(n), count)
-        return pd.DataFrame(columns | {name: part.ravel() for name, part in parts.items()})
+        return by_ball(len(self.chain), rows, {"before": before, "after": after})
 
     def __repr__(self) -> str:
         return (

@@ -57,12 +57,10 @@ def common_velocities(
 def pressed(
     masses: Vector, accelerations: Vector, resting: Sequence[bool], least: float
 ) -> list[bool]:
-    """Return the resting contacts whose balls, left alone, would not separate (rule 3).
-
-    Of all accelerations without passing, contacts that push and do not pull give those nearest to
-    the balls left alone, in the mean square by mass (Gauss's principle of least constraint).  For
-    a row that is isotonic regression, which pooling solves exactly.
-    """
+    """Return the resting contacts whose balls, left alone, would not separate (rule 3)."""
+    # Of all accelerations without passing, contacts that push and do not pull give those nearest to
+    # the balls left alone, in the mean square by mass (Gauss's principle of least constraint).  For
+    # a row that is isotonic regression, which pooling solves exactly.
     kept, m, a = [False] * len(resting), masses.tolist(), accelerations.tolist()
     for first, last in stretches(resting):
         pools: list[tuple[float, float, int]] = []  # mass, acceleration, number of balls

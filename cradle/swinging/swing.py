@@ -31,15 +31,9 @@ MOST_IDLE = 20
 
 
 def swing(
-    chain: Chain,
-    model: Model,
-    positions: ArrayLike,
-    times: ArrayLike,
-    *,
-    pendulums: Pendulums | None = None,
-    max_impacts: int = 100_000,
-    min_energy: float = 0.0,
-) -> Swing:
+    chain: Chain, model: Model, positions: ArrayLike, times: ArrayLike, *,
+    pendulums: Pendulums | None = None, max_impacts: int = 100_000, min_energy: float = 0.0,
+) -> Swing:  # fmt: skip
     """Let a cradle swing.
 
     Parameters
