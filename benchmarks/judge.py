@@ -8,8 +8,8 @@ Usage::
 
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
 within 600 events.  A float means what it prints as if that is short, see `meaning`: ties of an
-exact run are those of the decimals that a reader sees.  Wrong chains are shrunk and printed as
-they can be pasted.  Where the exact run has no end, see `second_opinion`.
+exact run are those of the decimals that a reader sees.  Wrong chains are printed as they can be
+pasted.  Where the exact run has no end, see `second_opinion`.
 
 Every chain counted as right or wrong was judged by the exact run, at some hundred chains a second.
 """
@@ -19,12 +19,10 @@ import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from decimal import Decimal
-from itertools import islice
 from typing import NamedTuple
 
 import truth
 from families import JUDGED, family
-from problem import Problem
 from stored import options, write
 from truth import meaning
 
@@ -188,46 +186,6 @@ def seen_otherwise(problem):
             yield back(given)
 
 
-# --- wrong chains, shrunk ----------------------------------------------------------------------
-
-#: What stands first is simplest.
-SIMPLER = {
-    "masses": (1.0, 2.0),
-    "velocities": (0.0, 1.0),
-    "restitution": (1.0, 0.9, 0.5),
-    "forward": (0.0, 0.1, 0.5),
-    "backward": (0.0, 0.1, 0.5),
-}
-
-
-def simpler(problem):
-    """Chains without one of the balls, or with one simpler number."""
-    if len(problem.masses) > 2:
-        for i in range(len(problem.masses)):
-            lists = [list(part) for part in problem[:5]]
-            for part, k in zip(lists, (i, i, i, i - 1, i - 1)):
-                part.pop(min(max(k, 0), len(part) - 1))
-            yield Problem(*lists, problem.meeting)
-    for name, values in SIMPLER.items():
-        given = getattr(problem, name)
-        for i, x in enumerate(given):
-            for y in values[: values.index(x)] if x in values else values:
-                yield problem._replace(**{name: [*given[:i], y, *given[i + 1 :]]})
-
-
-def shrunk(problem, is_wrong, most=400):
-    """A smallest chain near this one that is still wrong, after at most so many trials."""
-    while most > 0:
-        for other in islice(simpler(problem), most):
-            most -= 1
-            if is_wrong(other):
-                problem = other
-                break
-        else:
-            break
-    return problem
-
-
 # --- many chains -------------------------------------------------------------------------------
 
 
@@ -266,7 +224,6 @@ def main():
     parser.add_argument("--family", choices=JUDGED, action="append")
     parser.add_argument("--count", type=int, default=100, help="chains of each family")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--shrink", type=int, default=5, help="how many wrong chains to shrink")
     parser.add_argument("--write", action="store_true", help="write the counts as judge.csv")
     given = parser.parse_args()
     counts, found = run(given.family or list(JUDGED), given.count, given.seed)
@@ -278,8 +235,6 @@ def main():
         write("judge.csv", ["family", *WORDS], lines, given.output)
     for name, verdict, problem in found:
         print(f"\n{name}: {verdict.word}, off by {verdict.off:.1e}\n{problem!r}")
-    for _, _, problem in [each for each in found if each[1].word == "wrong"][: given.shrink]:
-        print("\nshrunk:", shrunk(problem, lambda p: judge(p).word == "wrong"))
 
 
 if __name__ == "__main__":

@@ -20,9 +20,7 @@ from cradle import (
     collide,
     post_impact_velocities,
     spring_velocities,
-    swing,
 )
-from cradle.closed_form import three_balls
 from cradle.runtime import compile as runtime
 
 FIFTY = "same rules, event loop of the tests in fifty digits"
@@ -130,21 +128,6 @@ def march_rows(clock, quick):
         yield row(clock, about, scene, setting, run, (scene.truth(), FIFTY), parameter=1 / steps)
 
 
-def closed_form_rows(clock, _):
-    """Yield Eqs. 22 to 33, for three balls that collide once per contact."""
-    about = {
-        "group": "closed form", "model": "three_balls", "evaluations": 1, "needs": "e, ratio",
-        "gives": "velocities, impulses", "note": "three balls, one collision per contact",
-    }  # fmt: skip
-    scene = SCENES["three equal"]
-    one = *scene.given[:3], RATIO
-    many = *(np.tile(part, (2000, 1)) for part in one[:3]), np.full(2000, RATIO)
-    for setting, given, impacts in (("one call", one, 1), ("2000 chains in one call", many, 2000)):
-        run = partial(three_balls, *given)
-        errors = model_error(scene, np.atleast_2d(run())[0])
-        yield row(clock, about, scene, setting, run, (scene.truth(), FIFTY), impacts, **errors)
-
-
 def spring_rows(clock, quick):
     """Yield springs followed in time to an accuracy, elastic and lossy; one call and a batch."""
     about = {
@@ -167,13 +150,6 @@ def spring_rows(clock, quick):
         run = partial(spring_velocities, *copies, viscosity=lost, accuracy=accuracy)
         if accuracy > 1e-9:
             yield row(clock, about | many, scene, f"batch, {setting}", run, exact, 2000, **common)
-    scene = SCENES["three equal"]
-    run = partial(collide, scene.chain, SpringChain(1.0, 1, accuracy=1e-9))
-    yield row(
-        clock, about, scene, "accuracy 1e-09", run, (scene.springs(1), CONVERGED),
-        parameter=1e-9, model="SpringChain, linear", needs="stiffness, e = 1",
-        **model_error(scene, run().velocities),
-    )  # fmt: skip
 
 
 @njit(cache=True)
@@ -274,28 +250,9 @@ def outcome_rows(clock, _):
             yield row(clock, about, scene, "one call", run, needs=needs, gives=gives)
 
 
-def door_rows(clock, _):
-    """Yield what surrounds an impact: a chain that is made, a strike of a swing to its end."""
-    scene = SCENES["five equal"]
-    about = {
-        "group": "door", "model": "ImpulseCorrelation", "chain": scene.name, "needs": "e, ratios",
-        "versions": ours(),
-    }  # fmt: skip
-    lists = [list(part) for part in scene.given[:3]]
-    still = Chain(scene.masses, [0.0] * 5, scene.restitution)
-    swings = partial(swing, still, scene.model, [-0.02, 0, 0, 0, 0], [0.0, 10.0])
-    strikes = len(swings().impacts)
-    for setting, function, count, gives in (
-        ("a chain of lists", partial(Chain, *lists), 1, "the chain"),
-        ("one strike of a swing", swings, strikes, f"{PATH}, flights"),
-    ):
-        yield Row(**about, setting=setting, gives=gives, **clock(function, count))
-
-
 def rows(clock, quick):
     """Yield the rows of all families."""
     for family in (
-        event_rows, march_rows, closed_form_rows, spring_rows, penalty_rows, energy_rows,
-        outcome_rows, door_rows,
+        event_rows, march_rows, spring_rows, penalty_rows, energy_rows, outcome_rows,
     ):  # fmt: skip
         yield from family(clock, quick)
