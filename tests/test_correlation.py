@@ -137,23 +137,6 @@ def test_models_compare_by_value_and_their_repr_makes_them_again():
 # --- no impact -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("velocities", [[0.1, 0.2, 0.3], [0.1, 0.1, 0.1], [-0.3, -0.3, 1e-300]])
-def test_balls_that_do_not_approach_keep_their_velocities_to_the_last_bit(velocities):
-    chain = Chain([1 / 3, 0.7, 1e-9], velocities, 0.4)
-    trace = collide(chain, ImpulseCorrelation(0.0))
-    assert trace.velocities.tobytes() == chain.velocities.tobytes()
-    assert trace.path.tobytes() == chain.velocities.tobytes()
-    assert trace.path_impulses.tolist() == [[0, 0]]
-    assert trace.events == ()
-    assert trace.collisions.tolist() == [0, 0]
-    assert trace.impulses.tolist() == trace.absorbed.tolist() == [0, 0]
-    assert trace.energy_loss == 0
-    assert not trace.collapsed
-    assert trace.saturated == ()
-    after = post_impact_velocities(chain.masses, velocities, 0.4, 0.0)
-    assert after.tobytes() == chain.velocities.tobytes()
-
-
 def test_a_ball_that_no_impulse_reaches_keeps_its_velocity_to_the_last_bit():
     velocities = [0.1, 1 / 3, 0.2, 5.7]
     after = collide(Chain([0.3, 1 / 7, 1, 1], velocities, 1), ImpulseCorrelation(0.1)).velocities

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from laws import keeps
 
 from cradle import (
     Chain,
@@ -15,25 +16,10 @@ from cradle import (
 )
 
 
-@pytest.mark.parametrize("e", [0, 0.1, 0.5, 0.9, 0.999])
-@pytest.mark.parametrize("masses", [[1, 1], [2, 3], [1e-3, 1e3]])
-def test_two_balls(masses, e):
-    """From the restitution of the chain, and from the coefficient that belongs to it."""
-    chain = Chain(masses, [1.7, 1], e)
-    kappa = (1 + e) / (1 - e)
-    for model in (QuadraticDissipation(), QuadraticDissipation(kappa)):
-        trace = collide(chain, model)
-        closing = trace.velocities[0] - trace.velocities[1]
-        assert closing == pytest.approx(-0.7 * e, abs=1e-12)
-        lost = chain.kinetic_energy - 0.5 * chain.masses @ trace.velocities**2
-        assert trace.energy_loss == pytest.approx(lost, rel=1e-10, abs=1e-12)
-        assert trace.events == (("end", 0),)
-
-
-@pytest.mark.parametrize("kappa", [0, 0.3, 1])
-def test_coefficient_below_one_is_plastic(kappa):
-    trace = collide(Chain([1, 3], [1, 0], 1), QuadraticDissipation(kappa))
-    np.testing.assert_allclose(trace.velocities, 0.25, rtol=0, atol=1e-15)
+@pytest.mark.parametrize(("kappa", "e"), [(0, 0), (0.3, 0), (1, 0), (3, 0.5), (1999, 0.999)])
+def test_a_coefficient_is_a_restitution(kappa, e):
+    after = collide(Chain([1, 3], [1, 0], 1), QuadraticDissipation(kappa)).velocities
+    assert after[1] - after[0] == pytest.approx(e, abs=1e-12)
 
 
 @st.composite
@@ -59,24 +45,7 @@ def part(chain):
 @given(cases())
 def test_laws(case):
     chain, kappa, distance = case
-    trace = collide(chain, QuadraticDissipation(kappa, distance=distance))
-    m, before, after = chain.masses, chain.velocities, trace.velocities
-    if not (chain.closing_speeds > 0).any():
-        assert after.tolist() == before.tolist()
-        assert not trace.events
-    lost = chain.kinetic_energy - 0.5 * m @ after**2
-    assert lost > -1e-11 * m.sum()
-    assert trace.energy_loss == pytest.approx(lost, abs=1e-11 * m.sum())
-    assert (after[:-1] - after[1:]).max() < 1e-13
-    passed = np.concatenate([[0], trace.impulses, [0]])
-    np.testing.assert_allclose(
-        m * (after - before), passed[:-1] - passed[1:], rtol=0, atol=1e-12 * m.sum()
-    )
-    np.testing.assert_array_equal(trace.path[-1], after)
-    assert len(trace.path) == len(trace.path_impulses) == len(trace.events) + 1
-    assert np.bincount([c for _, c in trace.events], minlength=len(m) - 1).tolist() == (
-        trace.collisions.tolist()
-    )
+    keeps(collide(chain, QuadraticDissipation(kappa, distance=distance)), energy=1e-10)
 
 
 def solved(matrix, right):

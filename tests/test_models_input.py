@@ -133,13 +133,39 @@ def test_the_repr_is_the_call(caption):
 
 
 @pytest.mark.parametrize("model", LAWS, ids=repr)
-def test_balls_that_do_not_approach(model):
-    trace = collide(Chain([1, 2, 3], [-1, 0, 0], 1), model)
-    assert trace.velocities.tolist() == [-1, 0, 0]
-    assert trace.path.tolist() == [[-1, 0, 0]]
+@pytest.mark.parametrize("velocities", [[0.1, 0.2, 0.3], [0.1] * 3, [-0.3, -0.3, 1e-300]])
+def test_balls_that_do_not_approach_keep_their_velocities_to_the_last_bit(model, velocities):
+    trace = collide(Chain([1 / 3, 0.7, 0.2], velocities, 1), model)
+    assert trace.path.tolist() == [trace.velocities.tolist()] == [velocities]
+    assert trace.path_impulses.tolist() == [[0, 0]]
+    assert trace.impulses.tolist() == trace.absorbed.tolist() == [0, 0]
+    assert trace.collisions.tolist() == [0, 0]
     assert not trace.events
-    assert not trace.collisions.any()
+    assert (trace.energy_loss, trace.collapsed, trace.saturated) == (0, False, ())
     assert getattr(trace, "evaluations", 0) == 0
+
+
+@pytest.mark.parametrize("e", [0, 1e-3, 0.5, 0.9, 1])
+@pytest.mark.parametrize("masses", [[2, 3], [1e-3, 1e3]])
+@pytest.mark.parametrize(
+    "model",
+    [*(EnergyDistribution(50.0, p) for p in (1, 1.5, 2.5)), DISSIPATION(), *LAWS[3:]],
+    ids=repr,
+)
+def test_two_balls(model, masses, e):
+    """Newton's restitution, by every law that takes it."""
+    e = min(e, 0.999) if isinstance(model, DISSIPATION) else e
+    trace = collide(Chain(masses, [1.7, 1], e), model)
+    exact = not isinstance(model, EnergyDistribution)  # the adaptive error of a speed is 1e-9
+    close = partial(pytest.approx, rel=1e-11 if exact else 1e-8, abs=1e-12 if exact else 1e-8)
+    mu = np.prod(masses) / np.sum(masses)
+    assert trace.velocities[0] - trace.velocities[1] == close(-0.7 * e)
+    assert trace.impulses[0] == close((1 + e) * mu * 0.7)
+    assert trace.energy_loss == close((1 - e * e) * mu * 0.49 / 2)
+    assert trace.events[-1] == ("end", 0)
+    if len(trace.events) > 1:
+        assert trace.events[0] == ("maximum_compression", 0)
+        assert trace.absorbed[0] == close(mu * 0.49 / 2)
 
 
 @pytest.mark.parametrize(
