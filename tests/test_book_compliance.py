@@ -203,14 +203,6 @@ def test_eq_16_is_what_the_model_does():
         np.testing.assert_allclose(steps[first, 1], ratio * steps[first, 0], rtol=1e-13)
 
 
-def test_fig_2_is_drawn_and_described():
-    cell = CHAPTER.cells["draw-springs"]
-    assert any("image/svg+xml" in output.get("data", {}) for output in cell.outputs)
-    assert cell.metadata["mystnb"]["figure"]["name"] == "fig-p2"
-    alt = cell.metadata["mystnb"]["image"]["alt"]
-    assert all(word in alt for word in ("Three balls", "spring named k", "gamma k", "q1, q2, q3"))
-
-
 def test_table_of_limits():
     heads, *lines = READING.printed("compliance-table-limits").splitlines()
     assert " ".join(heads.split()) == "γ opens first τ₃/τ₂ then off Eq. 14 off Eq. 15"

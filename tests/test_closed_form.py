@@ -1,7 +1,6 @@
 """Eqs. 17-34 and 43-46 against the event solver, which knows none of them."""
 
 import numpy as np
-import pytest
 from chains import magnitudes, uniform
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
@@ -65,36 +64,6 @@ def test_where_the_closed_form_does_not_apply_the_solver_finds_more_collisions()
         assert once == apply[i], i
         more += not once
     assert more > 300
-
-
-@pytest.mark.parametrize(("e2", "e3", "ratio"), [(0.5, 0.5, 0.15), (0.9, 0.6, 0.05)])
-def test_eq_44_on_a_map_of_both_mass_ratios(e2, e3, ratio):
-    """Fig. 6 as a map: 900 chains, each on the side of the line that Eq. 44 says."""
-    r1, r2 = np.meshgrid(np.geomspace(0.01, 10, 30), np.geomspace(0.01, 5.6, 30))
-    above = r1 > back_impact_line(r2, e2, e3, ratio)
-    assert 200 < above.sum() < 700
-    for x, y, single in zip(r1.flat, r2.flat, above.flat):
-        masses = [1, x, x / y]
-        trace = collide(
-            Chain(masses, [1, 0, 0], [e2, e3]), ImpulseCorrelation(ratio, excess="saturate")
-        )
-        assert (trace.collisions.tolist() == [1, 1]) == single
-        assert one_collision_each(masses, [1, 0, 0], [e2, e3], ratio) == single
-
-
-def test_largest_ratios_give_zero_closing_acceleration():
-    """Eqs. 34 and 53 by what they mean, from Eqs. 47-48 and not from their own formula."""
-    rng = np.random.default_rng(53)
-    for n in range(3, 9):
-        m, ratios = magnitudes(rng, 2, n), rng.random(n - 2)
-        forward, backward = largest_ratios(m, ratios, ratios)
-        for i in range(1, n - 1):
-            onward = ratios[i] if i < n - 2 else 0.0
-            a = forward[i - 1]  # impulse 1 into ball i, a out of it into ball i + 1, onward * a on
-            assert (1 - a) / m[i] == pytest.approx(a * (1 - onward) / m[i + 1], rel=1e-13)
-            onward = ratios[i - 2] if i > 1 else 0.0
-            b = backward[i - 1]
-            assert (1 - b) / m[i] == pytest.approx(b * (1 - onward) / m[i - 1], rel=1e-13)
 
 
 def test_largest_ratios_broadcast():

@@ -166,7 +166,7 @@ def test_row(row):
         assert row["difference"] != "none"
 
 
-def test_fig_9_and_all_schematics_are_drawn_and_described():
+def test_figs_1_2_and_9_and_all_schematics_are_drawn_and_described():
     """A schematic has no numbers to check: it must be drawn by its cell, with words beside it."""
     for row in ROWS:
         if row["status"] != "schematic":

@@ -10,13 +10,12 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from chains import FIG_8, changes, local_orders
+from chains import local_orders
 from march import march
 from truth import EventLimit, solve
 
-from cradle import Chain, ImpulseCorrelation, collide, paper_chain, textbook
+from cradle import Chain, ImpulseCorrelation, collide, textbook
 from cradle.closed_form import largest_ratios
-from cradle.tables import paper_sequences
 
 SOURCE = Path(textbook.__file__).read_text(encoding="utf-8")
 in_floats = functools.partial(solve, number=float)
@@ -55,25 +54,6 @@ def test_a_scalar_stands_for_all_and_a_string_for_a_decimal():
 
 
 # --- the package -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("speed", [0.5, 1.0, 1.5, 2.0])
-def test_the_papers_ten_chains_in_every_event(speed):
-    """Events in order; velocities and impulses at each of them, held contacts, collisions."""
-    sequences = paper_sequences()
-    assert len(sequences) == 10
-    for sequence in sequences:
-        chain, model = paper_chain(sequence, speed=speed, excess="saturate")
-        trace = collide(chain, model)
-        parts = chain.masses, chain.velocities, chain.restitution, model.forward, model.backward
-        plain = textbook.solve(*parts)
-        assert [tuple(event) for event in trace.events] == plain.events, sequence
-        close = functools.partial(np.testing.assert_allclose, rtol=0)
-        close(trace.path, plain.path, atol=2e-15 * speed)
-        close(trace.path_impulses, plain.path_impulses, atol=2e-16 * speed)
-        close(trace.absorbed, plain.absorbed, atol=2e-16 * speed**2)
-        assert trace.collisions.tolist() == plain.collisions
-        assert trace.saturated == tuple(sorted(plain.held))
 
 
 def generic(seed, n, bounded=True, light=0.3):
@@ -139,22 +119,6 @@ def test_generic_chains_in_every_event(n, bounded):
 
 
 # --- what is known otherwise -------------------------------------------------------------------
-
-
-def test_figures_5_7_and_8():
-    five = solve([1, 1, 1], [1, "0.8", 0], "0.2", "0.1")
-    assert changes(five.events) == [
-        *(("end", 0), ("close", 0), ("end", 1)),
-        *(("close", 1), ("end", 0), ("end", 1)),
-    ]
-    seven = solve([1, "0.01", 1], [1, 0, 0], 1, "0.15")
-    assert [mpmath.nstr(v, 3) for v in seven.velocities] == ["-0.00287", "0.347", "0.999"]
-    # The middle ball hangs on the last digits of the input: 6e-5 more ratio give the printed .348.
-    nudged = solve([1, "0.01", 1], [1, 0, 0], 1, "0.15006")
-    assert mpmath.nstr(nudged.velocities[1], 3) == "0.348"
-    eight = solve([1] * 4, [1, "0.5", 0, 0], 1, "0.1")
-    assert changes(eight.events) == FIG_8
-    assert eight.meetings == 1
 
 
 @pytest.mark.parametrize(
