@@ -21,6 +21,19 @@ def read(name, **equal):
         return [row for row in rows if all(row[key] == text for key, text in equal.items())]
 
 
+def numbers(name, *labels, **equal):
+    """Return the same with numbers as numbers, empty fields as None; the columns `labels` stay."""
+
+    def value(column, text):
+        try:
+            return text if column in labels else float(text) if text else None
+        except ValueError:
+            return text
+
+    rows = [{key: value(key, x) for key, x in row.items()} for row in read(name)]
+    return [row for row in rows if all(row[key] == given for key, given in equal.items())]
+
+
 def text(value, digits=4):
     """Return a value as it is stored: floats in so many digits."""
     return f"{value:.{digits}g}" if isinstance(value, float) else value

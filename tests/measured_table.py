@@ -5,23 +5,16 @@ from functools import cache
 import numpy as np
 from chains import ELASTIC
 from chapters import points
-from stored import read
+from stored import numbers
 from truth import solve
 
 from cradle import paper_chain
 
-NUMBERS = (
-    "parameter", "numerical_error", "model_error", "momentum_error", "energy_change",
-    "microseconds", "time_ratio", "repeats", "evaluations",
-)  # fmt: skip
-
 
 @cache
 def table():
-    rows = read("benchmarks.csv")
+    rows = numbers("benchmarks.csv", "velocities", "versions")
     for row in rows:
-        for name in NUMBERS:
-            row[name] = float(row[name]) if row[name] else None
         row["velocities"] = np.array([float(v) for v in row["velocities"].split()])
     return rows
 

@@ -4,7 +4,7 @@ The table is measured (benchmarks/long_chains.py); its outcomes are computed aga
 forms, by the independent solver in truth.py, and by another integrator.
 """
 
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import judge
@@ -16,7 +16,7 @@ import xarray as xr
 from chains import HERTZ, uniform
 from chapters import Chapter, floats, number, points
 from problem import Problem
-from stored import read
+from stored import numbers
 from truth import solve
 
 from cradle import Chain, SpringChain, collide, outcomes, post_impact_velocities
@@ -31,22 +31,11 @@ CHAPTER = Chapter("beyond")
 needs_numba = pytest.mark.skipif(runtime.compiled() is None, reason="too long without numba")
 
 
-@cache
-def table():
-    rows = read("long_chains.csv")
-    for row in rows:
-        for name, value in row.items():
-            if name != "group":
-                row[name] = float(value) if value else None
-    return rows
+table = cache(partial(numbers, "long_chains.csv"))
 
 
 def find(group, **equal):
-    return [
-        row
-        for row in table()
-        if row["group"] == group and all(row[name] == value for name, value in equal.items())
-    ]
+    return [row for row in table() if row.items() >= {"group": group, **equal}.items()]
 
 
 def column(rows, *names):

@@ -1,9 +1,7 @@
 """Stable at the extremes: what holds for every chain, how many digits, where an answer jumps."""
 
-import csv
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import extreme_chains as x
 import mpmath
@@ -15,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from judge import on_bounds
 from problem import Problem
+from stored import numbers
 from test_kernel import needs_numba
 
 from cradle import (
@@ -32,25 +31,13 @@ from cradle.models.correlation import MAX_EVENTS
 from cradle.runtime import compile as runtime
 from cradle.tables import paper_sequences
 
-DATA = Path(__file__).parents[1] / "data"
 #: 13 digits, in units of eps.
 THIRTEEN = 1e-13 / x.EPS
 
 
 def stored(part):
-    """Rows of a map, numbers as numbers."""
-
-    def number(text):
-        try:
-            return float(text)
-        except ValueError:
-            return text
-
-    with (DATA / f"extremes_{part}.csv").open(encoding="utf-8", newline="") as file:
-        return [
-            {k: v if (part, k) == ("map", "ratio") else number(v) for k, v in row.items()}
-            for row in csv.DictReader(file)
-        ]
+    """Rows of a map; the ratios of that of errors are labels."""
+    return numbers(f"extremes_{part}.csv", *["ratio"] * (part == "map"))
 
 
 def sample(rows, count, seed=9):
