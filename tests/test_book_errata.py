@@ -148,7 +148,7 @@ def test_r2_source_on_the_other_side():
 def test_r7_hold_that_drives_on():
     held = exact([1] * 4, [1, 0, 0, 0], 1, ["0.8", "0.3"])
     assert GLUED["hold"] == "(" + ", ".join(f"{v:.4f}" for v in held).replace("-", "−") + ")"
-    # What small steps tend to without the rule (tests/test_march.py): balls 2 to 4 as one body.
+    # What small steps tend to without the rule (tests/test_textbook.py): balls 2 to 4 as one body.
     assert GLUED["chatter"] == f"(−{(3 - 1) / 4}, {2 / 4}, {2 / 4}, {2 / 4})"
 
 

@@ -134,15 +134,6 @@ def test_figures_of_the_strikes_show_how_far_laws_are_from_what_was_read():
             assert np.ptp(ends[:, 0]) == pytest.approx(2 * sigma[ball])
 
 
-def test_later_strikes():
-    lines = CHAPTER.printed("later-code").splitlines()
-    shown = {line[:40].strip(): float(line[40:]) for line in lines}
-    wrong = {"three ratios; all five meet at once", "spheres, touching, with loss"}
-    assert len(shown) == 6
-    assert {name for name, value in shown.items() if value > 0.03} == wrong
-    assert max(value for name, value in shown.items() if name not in wrong) < 0.01
-
-
 def test_swing_of_the_mean():
     size, damping, period, _ = real_swing.common()
     assert (

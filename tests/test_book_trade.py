@@ -44,14 +44,6 @@ def test_times_are_medians_and_say_what_the_text_says():
     assert calls["plain"] > calls["compiled"] > 3  # a call costs more than its impact
 
 
-def test_fig_trade_cost_events_are_exact_at_a_fixed_price():
-    exact = [row for row in find("event") if "float32" not in row["setting"]]
-    stored = find("event", "float32")
-    assert max(row["numerical_error"] for row in exact) < 1e-13
-    assert 1e-9 < max(row["numerical_error"] for row in stored) < 1e-6
-    assert cost(find("march", chain="three equal"), 1e-3) > 50
-
-
 def test_fig_trade_cost_springs():
     verlet = find("penalty", model="penalty, Hertz")
     one_call = find("event", "compiled, one call", chain="three equal")

@@ -15,8 +15,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from click.testing import CliRunner
+from test_fit import columns, outcome
 from tqdm import tqdm
 
 from cradle import (
@@ -218,12 +220,6 @@ def test_long_work_is_told_of_after_a_while(monkeypatch):
     assert said.empty()
 
 
-def test_the_toy_of_the_readme():
-    text = call("solve --masses 1,1,1,1,1")
-    after = [float(line.split()[-1]) for line in text.splitlines()[1:6]]
-    assert np.round(after, 2).tolist() == [-0.07, -0.03, -0.01, 0.13, 0.99]
-
-
 def test_the_papers_balls_by_another_law():
     answer = json.loads(call("solve AAAAA --model sequential --json"))
     chain, _ = paper_chain("AAAAA")
@@ -311,30 +307,15 @@ def test_fit_finds_what_the_example_was_made_with():
     assert len(answer["chi_square"]) == 2
 
 
-def two_piece_shots():
-    """Return shots of DAA that two ranges of ratios explain; each velocity is off by 0 to 5 mm/s.
-
-    Rows of two parts: the names and the mass, the velocities and their error.
-    """
-    masses = [0.166, 0.045, 0.045]
-    after = textbook.solve(masses, [1.0, 0.0, 0.0], [0.94, 0.97], [0.215], [0.131]).velocities
-    rows = []
-    for shot, speed in enumerate((0.75, 1.0, 1.25, 1.5)):
-        for ball in range(3):
-            error = ((7 * shot + 5 * ball) % 11 - 5) * 1e-3
-            rows.append([("DAA", shot + 1, ball + 1, "DAA"[ball], masses[ball]),
-                         (0.0 if ball else speed, speed * after[ball] + error, 0.02)])  # fmt: skip
-    return rows
-
-
-def pieces_by_the_textbook(rows, grid):
+def pieces_by_the_textbook(table, grid):
     """Confidence set of the ratio of DAA: the textbook's impact at each ratio of a grid.
 
     Outcomes are as the striker's speed, so that the best speed of a shot is a weighted mean.
     """
-    masses = [row[0][4] for row in rows[:3]]
-    table = np.array([row[1] for row in rows]).reshape(-1, 3, 3)
-    struck, after, sigma = table[:, 0, 0], table[:, :, 1], table[:, :, 2]
+    masses = table["mass"][:3]
+    given = (np.reshape(table[name], (-1, 3)) for name in ("before", "after", "sigma"))
+    before, after, sigma = given
+    struck = before[:, 0]
     chi_square = []
     for a in grid:
         unit = np.array(
@@ -354,12 +335,10 @@ def pieces_by_the_textbook(rows, grid):
 def test_a_confidence_set_of_two_pieces_is_shown_in_two_pieces(tmp_path, monkeypatch):
     """Table, CSV and JSON of the command, against the textbook's likelihood on a fine grid."""
     monkeypatch.chdir(tmp_path)
-    rows = two_piece_shots()
-    lines = ["set,shot,ball,type,mass,before,after,sigma"]
-    lines += [",".join(map(repr, [*names, *numbers])) for names, numbers in rows]
-    (tmp_path / "two.csv").write_text("\n".join(lines).replace("'", ""), encoding="utf-8")
+    table = columns("DAA", [0.75, 1.0, 1.25, 1.5], outcome("DAA"), 0.02)
+    pd.DataFrame(table).to_csv("two.csv", index=False)
     step = 5e-4
-    expected = pieces_by_the_textbook(rows, np.arange(0.0, 0.5, step))
+    expected = pieces_by_the_textbook(table, np.arange(0.0, 0.5, step))
     assert len(expected) == 2
     # A hull would hold more than is outside of it.
     assert expected[1][0] - expected[0][1] > 2 * sum(high - low for low, high in expected)

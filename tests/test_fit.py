@@ -480,16 +480,6 @@ def test_data_of_the_bound_end_there(name):
     assert "at its upper bound" in str(one)
 
 
-def test_joint_fit_of_four_balls():
-    shots = read_shots(columns("BABC", [1.0, 1.5, 2.0], outcome("BABC"), 0.002))
-    truth = paper_chain("BABC")[1]
-    found = ratio(shots, pairs_of("BABC", 0.0),
-                  known={"BAB": truth.forward[0], "CBA": truth.backward[1]})  # fmt: skip
-    one = found["ABC"]
-    assert one.identified
-    assert any(low <= truth.forward[1] <= high for low, high in one.intervals)
-
-
 @pytest.mark.parametrize(
     ("given", "known", "message"),
     [

@@ -6,6 +6,7 @@ from decimal import Decimal
 import numpy as np
 import pytest
 from chains import magnitudes, uniform, within_bounds
+from extreme_chains import faults
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from truth import meaning
@@ -56,32 +57,12 @@ def outcome(chain, forward, backward, meeting, limit=20_000):
         return None
 
 
-def relative_energy(chain, velocities):
-    """Kinetic energy of the motion relative to the centre of mass."""
-    centre = chain.masses @ velocities / chain.masses.sum()
-    return 0.5 * chain.masses @ (velocities - centre) ** 2
-
-
 @settings(max_examples=400)
 @given(impacts())
-def test_momentum_energy_and_order(impact):
+def test_momentum_energy_order_and_ledger(impact):
+    """In exact arithmetic, as far as rounding allows."""
     trace = outcome(*impact)
-    if trace is None:
-        return
-    chain, after = trace.chain, trace.velocities
-    assert np.isfinite(after).all()
-    assert (np.diff(after) >= 0).all()  # exact
-    total = chain.masses @ np.abs(chain.velocities)
-    assert abs(chain.masses @ after - chain.momentum) <= 4e-15 * len(chain) * total
-    assert (trace.impulses >= 0).all()
-    assert (trace.absorbed >= 0).all()
-    # The ledger: loss = sum (1 - e^2) absorbed.  Its measure is the energy that the impact can
-    # touch: that of the relative motion.
-    before = relative_energy(chain, chain.velocities)
-    loss = before - relative_energy(chain, after)
-    rounding = 8 * np.finfo(float).eps * len(chain) * before * max(1.0, np.sqrt(len(trace.events)))
-    assert loss >= -rounding
-    assert abs(loss - trace.energy_loss) <= rounding
+    assert trace is None or faults(trace) == []
 
 
 #: Small powers of two, and those that bring velocities around 1e-135 or 1e135 m/s, masses around
