@@ -16,7 +16,7 @@ from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
 from problem import Problem
 from truth import EventLimit, as_meant
 
-from cradle import ImpactNotFinished, outcomes, post_impact_velocities
+from cradle import ImpactNotFinished, outcomes, paper_chain, post_impact_velocities
 from cradle.measures import _events_at_balls as events_at_balls
 
 EPS = 2.0**-52
@@ -39,6 +39,13 @@ def case(masses, velocities, restitution, forward, backward=None, meeting=0.5):
     sizes = (n, n, n - 1, n - 2, n - 2)
     parts = zip((masses, velocities, restitution, forward, backward), sizes)
     return Problem(*(np.broadcast_to(np.float64(x), k).tolist() for x, k in parts), meeting)
+
+
+def sequence(name):
+    """One of the paper's chains, its ratios held at their bounds."""
+    chain, model = paper_chain(name, excess="saturate")
+    own = chain.masses, chain.velocities, chain.restitution
+    return case(*own, model.forward, model.backward)
 
 
 # --- what must hold ------------------------------------------------------------------------

@@ -16,7 +16,7 @@ import numpy as np
 from chains import power_of_ten
 from stored import make
 
-from cradle import outcomes, paper_chain
+from cradle import outcomes
 from cradle.models.correlation import MAX_EVENTS
 from cradle.tables import paper_sequences
 
@@ -58,9 +58,7 @@ def unequal():
 def each_input():
     """Yield the inputs of the ten chains of the paper's test."""
     for name in paper_sequences():
-        chain, model = paper_chain(name, excess="saturate")
-        own = chain.masses, chain.velocities, chain.restitution
-        problem = x.case(*own, model.forward, model.backward)
+        problem = x.sequence(name)
         for part, k, scale in x.inputs(problem):
             yield name, problem, part, k, scale
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from chapters import Chapter, after, drawn, lines, panel, points, solved
 from test_book_n_balls import FIG_8, contact_work
-from test_book_patterns import by_turns, edge, turn
+from test_book_patterns import by_turns, edge, last_with, turn
 
 from cradle import ImpulseCorrelation, collide, ratio_table, textbook
 from cradle.measures import bouncing_pattern
@@ -85,18 +85,10 @@ def test_fig_patterns_turns():
     for name, line in panel("reading_patterns", "fig-patterns-turns").items():
         r = float(re.search(r"r = ([\d.]+)", name)[1])
         if "border" in name:
-            r = edge_on_diagonal()
+            r, _ = last_with(lambda r: edge(r, 0.5, 0.15) > r, 0.03, 0.08)
         for zeta, drawn_value in line[::50]:
             x, _, y, a = turn(zeta, r, 0.5, 0.15)
             assert drawn_value == pytest.approx(a * y / (y - x), rel=1e-9)
-
-
-def edge_on_diagonal():
-    low, high = 0.03, 0.08
-    while high - low > 1e-14:
-        middle = (low + high) / 2
-        low, high = (middle, high) if edge(middle, 0.5, 0.15) > middle else (low, middle)
-    return low
 
 
 def test_fig_patterns_corner():

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 import sympy
 
-from cradle import Chain, ImpulseCorrelation, SpringChain, collide, post_impact_velocities
+from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 from cradle.input.values import (
     must_be,
     number_or_row,
@@ -125,14 +125,6 @@ def test_fractions_and_decimals_go_through():
     ratios = [Fraction(1, 8)]
     several = post_impact_velocities([Fraction(1), Decimal("0.5"), 2], [1, 0, 0], 0.9, ratios)
     assert several.tolist() == after.tolist()
-
-
-@pytest.mark.parametrize(
-    "make", [ImpulseCorrelation, SpringChain, lambda e: Chain([1] * 2, [0] * 2, e)]
-)
-def test_true_is_no_number(make):
-    with pytest.raises(ValueError, match=r"^(forward|stiffness|restitution) = True; must be real"):
-        make(True)
 
 
 def test_types_are_named():

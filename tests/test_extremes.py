@@ -284,6 +284,7 @@ def test_edges_of_the_map_of_limits():
     """By bisection on the solver, and from the eigenvalues: equal as far as can be seen."""
     for row in stored("limits"):
         if row["ratio"] == 0:
+            assert row["theory"] == pytest.approx(x.infinite_below(row["restitution"]), rel=1e-3)
             assert row["theory"] <= row["edge"] * (1 + 1e-3)
             assert row["edge"] == pytest.approx(row["theory"], rel=0.02), row
         assert max(row["half"], row["below"], row["above"], row["double"]) < 20_000
@@ -422,9 +423,7 @@ def test_condition_number_sees_a_jump():
     assert condition_number(chain, model).same_events
     assert condition_number(chain, model, step=1e-6).number < 100
     row = max((r for r in stored("edges") if r["sequence"] == "ABCCAB"), key=lambda r: r["jump"])
-    problem = x.case(
-        chain.masses, chain.velocities, chain.restitution, model.forward, model.backward
-    )
+    problem = x.sequence("ABCCAB")
     name, k = row["input"], int(row["index"])
     value = getattr(problem, name)[k]
     near = x.moved(problem, name, k, row["side"] * row["distance"] * value * (1 - 1e-3))
@@ -446,9 +445,7 @@ def test_edges_of_the_ten_sequences():
     assert min(row["distance"] for row in near) > 1e-4
     assert {row["sequence"] for row in near if row["jump"] > 1e-8} == {"ABCCAB", "BCACBA"}
     for row in sample(near, 6):
-        chain, model = paper_chain(row["sequence"], excess="saturate")
-        own = chain.masses, chain.velocities, chain.restitution
-        problem = x.case(*own, model.forward, model.backward)
+        problem = x.sequence(row["sequence"])
         value = getattr(problem, row["input"])[int(row["index"])]
         base = x.events_at_balls(problem.attempt()[0])
         for part, same in ((1 - 1e-3, True), (1 + 1e-3, False)):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from extreme_chains import events_at_balls
+from extreme_chains import events_at_balls, moved, sequence
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain
 
@@ -17,19 +17,8 @@ EDGES = {
 
 def changed(name, part, k, change):
     """The chain with one input changed by that part of it."""
-    chain, model = paper_chain(name, excess="saturate")
-    given = {
-        "masses": chain.masses,
-        "restitution": chain.restitution,
-        "forward": np.array(model.forward),
-        "backward": np.array(model.forward if model.backward is None else model.backward),
-    }
-    given[part] = given[part].copy()
-    given[part][k] *= 1 + change
-    return collide(
-        Chain(given["masses"], chain.velocities, given["restitution"]),
-        ImpulseCorrelation(given["forward"], given["backward"], excess="saturate"),
-    )
+    problem = sequence(name)
+    return moved(problem, part, k, change * getattr(problem, part)[k]).collide()
 
 
 @pytest.mark.parametrize("name", EDGES)

@@ -12,7 +12,6 @@ import types
 from collections import namedtuple
 from pathlib import Path
 
-import numpy as np
 import pytest
 from chapters import numbers
 from script import Script
@@ -53,11 +52,6 @@ def test_every_block_is_run_here():
     kinds = {title: " ".join(kind for kind, _ in parts) for title, parts in BLOCKS.items()}
     plain = "python text"
     assert list(kinds.values()) == [plain] * 3 + ["sh html text", "sh python text python text sh"]
-
-
-def test_three_balls_by_the_textbook():
-    found = textbook.solve([1, 1, 1], [1, 0, 0], [0.95, 0.95], [0.15]).path[-1]
-    assert numbers(BLOCKS[ONE][1][1]) == np.round(found, 3).tolist()
 
 
 def test_the_best_ball_between_two_others():

@@ -183,20 +183,6 @@ def test_a_row_at_rest_costs_at_most_as_much_again():
     assert len(rows) == 5 * 3 * 2
 
 
-def test_absent_engines_are_named_and_skipped(monkeypatch):
-    find = importlib.util.find_spec
-    hidden = {engine.module for engine in scenes.ENGINES}
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name, *a: None if name in hidden else find(name, *a)
-    )
-    missing = absent(scenes.ENGINES)
-    assert list(missing) == ENGINES
-    assert all("is not installed" in reason for reason in missing.values())
-    rows = list(scenes.costs([], repeats=1, seconds=0.1))
-    assert [row["run"] for row in rows] == ["Hertz springs"]
-    assert rows[0]["over_swing"] > 0
-
-
 # What the chapters say.
 
 
