@@ -137,14 +137,6 @@ def test_models_compare_by_value_and_their_repr_makes_them_again():
 # --- no impact -----------------------------------------------------------------------------
 
 
-def test_a_ball_that_no_impulse_reaches_keeps_its_velocity_to_the_last_bit():
-    velocities = [0.1, 1 / 3, 0.2, 5.7]
-    after = collide(Chain([0.3, 1 / 7, 1, 1], velocities, 1), ImpulseCorrelation(0.1)).velocities
-    assert after[0] == velocities[0]
-    assert after[3] == velocities[3]
-    assert after[1] != velocities[1]
-
-
 # --- the record ----------------------------------------------------------------------------
 
 
@@ -173,50 +165,6 @@ def test_rows_of_the_path(n):
         np.testing.assert_allclose(gained, -np.diff(impulses, axis=1), atol=1e-13 * scale * m.max())
         assert (np.diff(trace.path_impulses, axis=0) >= -1e-15 * scale * m.max()).all()
     assert longest > (64 if n > 3 else 1)  # beyond the room that the solver starts with
-
-
-@pytest.mark.parametrize("n", [2, 3, 5])
-def test_events_alternate_as_they_must(n):
-    """Closing, maximum compression, end: in this order for each contact; counts and works agree."""
-    for m, v, e, f, b in generous(n, 60, seed=20 + n):
-        trace = collide(Chain(m, v, e), ImpulseCorrelation(f, b))
-        u = -np.diff(trace.path, axis=1)
-        scale = np.abs(v).max()
-        for c in range(n - 1):
-            mine = [(row, kind) for row, (kind, other) in enumerate(trace.events, 1) if other == c]
-            kinds = [kind for _, kind in mine]
-            closings = kinds.count("close")
-            ends = kinds.count("end") + kinds.count("collapse")
-            assert trace.collisions[c] - closings in (0, 1)  # 1: it touched from the start
-            if not trace.collapsed:
-                assert ends == trace.collisions[c]
-            active = trace.collisions[c] > closings
-            for row, kind in mine:
-                if kind == "close":
-                    assert not active
-                    active = True
-                elif kind == "end":
-                    assert active
-                    active = False
-                    assert u[row, c] <= 1e-15 * scale
-                elif kind == "maximum_compression":
-                    assert active
-                else:  # "collapse": the contact may just have ended by itself
-                    active = False
-                if kind != "end":
-                    assert abs(u[row, c]) <= 1e-14 * scale
-            assert not active
-
-
-def test_between_two_rows_velocities_are_linear_in_the_impulses():
-    """Fig. 7's path: the works from straight lines between the rows are those of the result."""
-    trace = collide(Chain([1, 0.01, 1], [1, 0, 0], 0.9), ImpulseCorrelation(0.15))
-    u, p = -np.diff(trace.path, axis=1), trace.path_impulses
-    work = 0.5 * (u[1:] + u[:-1]) * np.diff(p, axis=0)
-    absorbed = np.where(work > 0, work, 0).sum(axis=0)
-    np.testing.assert_allclose(trace.absorbed, absorbed, rtol=1e-12)
-    released = -np.where(work < 0, work, 0).sum(axis=0)
-    np.testing.assert_allclose(released, 0.9**2 * absorbed, rtol=1e-12)
 
 
 def test_the_short_cut_decides_as_the_loop_does():
