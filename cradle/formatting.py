@@ -7,15 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cradle.input.values import Vector
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 # Of the picture of a chain, in pixels: a row for each state, the heaviest ball, the fastest ball's
 # arrow, and the room of balls that are left out.
@@ -31,15 +28,6 @@ def without_rounding(values: Vector) -> Vector:
     """Return velocities or impulses without what is left of sums that should be zero."""
     small = np.abs(values) < 1e-12 * np.abs(values).max(initial=0.0)
     return np.where(small, 0.0, values) + 0.0
-
-
-def by_ball(balls: int, rows: dict[str, Any], parts: dict[str, Vector]) -> pd.DataFrame:
-    """Return a table with each of these rows once for each ball, and the ball's part of it."""
-    import pandas as pd
-
-    columns = {name: np.repeat(values, balls) for name, values in rows.items()}
-    columns["ball"] = np.tile(np.arange(balls), len(next(iter(rows.values()))))
-    return pd.DataFrame(columns | {name: part.ravel() for name, part in parts.items()})
 
 
 def as_html(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cradle.chain import Chain
-from cradle.formatting import as_html, as_text, by_ball, without_rounding
+from cradle.formatting import as_html, as_text, without_rounding
 from cradle.input.values import Vector, shown
 
 if TYPE_CHECKING:  # at run time these are imported by the methods that need them
@@ -144,6 +144,15 @@ class Trace:
     def __repr__(self) -> str:
         counts = f"collisions={self.collisions.tolist()}, collapsed={self.collapsed}"
         return f"Trace(velocities={as_text(self.velocities)}, {counts})"
+
+
+def by_ball(balls: int, rows: dict[str, Any], parts: dict[str, Vector]) -> pd.DataFrame:
+    """Return a table with each of these rows once for each ball, and the ball's part of it."""
+    import pandas as pd
+
+    columns = {name: np.repeat(values, balls) for name, values in rows.items()}
+    columns["ball"] = np.tile(np.arange(balls), len(next(iter(rows.values()))))
+    return pd.DataFrame(columns | {name: part.ravel() for name, part in parts.items()})
 
 
 class ImpactNotFinished(RuntimeError):

@@ -106,11 +106,9 @@ class Contact:
 
 
 class Run:
-    """One run, under the number of its first contact.
+    """One run, under the number of its first contact."""
 
-    Runs are linked from left to right in a ring that begins and ends at n - 1, which is no contact.
-    """
-
+    # Runs are linked from left to right in a ring that begins and ends at n - 1, no contact.
     last: int  # last contact
     first: int  # under the number of a run's last contact: its first
     source: int  # the contact that drives all others, -1 if there are several

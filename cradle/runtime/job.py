@@ -106,10 +106,8 @@ class Job:
     def run(
         self, stop: threading.Event | None = None, pause: Callable[[], object] | None = None
     ) -> Job:
-        """Solve the chains, up to the first whose status is not FINISHED.
-
-        It ends when `stop` is set, and calls `pause` whenever the event loop pauses.
-        """
+        """Solve the chains, up to the first that is not FINISHED, or until `stop` is set."""
+        # It calls `pause` whenever the event loop pauses.
         resumed, rows = False, len(self.outputs.v)
         while self.next < rows:
             if stop is not None and stop.is_set():

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.formatting import as_text, by_ball
+from cradle.formatting import as_text
 from cradle.input.values import Vector
 from cradle.swinging.pendulums import Hanging, Pendulums
-from cradle.trace import Trace
+from cradle.trace import Trace, by_ball
 
 if TYPE_CHECKING:
     import pandas as pd
