@@ -11,17 +11,7 @@ from cradle.kernel.collapse import change_of, common_velocity, end_plastically, 
 from cradle.kernel.events import reduced_mass
 from cradle.kernel.numbers import minus, over, plus, scaled, times
 from cradle.kernel.record import record
-from cradle.kernel.state import (
-    COLLAPSE,
-    LIMITS,
-    LOWER,
-    ONE,
-    REPEAT,
-    UPPER,
-    ZERO,
-    Cluster,
-    apart,
-)
+from cradle.kernel.state import COLLAPSE, LIMITS, LOWER, ONE, REPEAT, UPPER, ZERO, Cluster, apart
 
 
 def forget(number, levels):
