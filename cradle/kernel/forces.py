@@ -12,6 +12,8 @@ after the impact exact to h^4, at very small steps to h^3.5:
 Takahashi and Imada, J. Phys. Soc. Jpn. 53 (1984) 3765; Rowlands, J. Comput. Phys. 97 (1991) 235.
 """
 
+import math
+
 from cradle.kernel.kinks import FAINT, grade, pay
 from cradle.kernel.state import FINISHED, PAUSED, UNFINISHED, apart, jit
 
@@ -211,25 +213,45 @@ def put_down(n, lossy, s, clock, record):
 
 
 @apart
-def leave(n, h, s, clock):
-    """Go back to when the last contact opened, or no balls approached any more.
+def parted(n, p, slow, s, clock):
+    """Tell whether in this step all contacts were open or at rest, and none closing; go back there.
 
-    Pulls act until then, and what the losses still hold back of them is given back.
+    Then the pulls end.  Until then they alone act, so that balls fly at constant accelerations.
     """
-    late = clock.time + 0.5 * h - clock.ended
-    before = held = wait = 0.0
+    h, late = clock.h, min(clock.h, clock.time - clock.ended)
+    before = held = 0.0
     for i in range(n):
         a = s[i]
-        push = a.f - a.pull if a.pull > 0.0 else 0.0
+        if a.f > 0.0 and not idle(i, slow, s):
+            return False
+        push = a.f - a.pull
         a.dv = a.w * (before - push)
-        a.v += a.w * (held - a.loss * push) - late * a.dv
+        a.free = a.v + a.w * (held - a.loss * push) - 0.5 * h * a.dv
         before, held = push, a.loss * push
+    # The last opening, where d + p A u is 0; then the least time since, and the longest.
     for c in range(n - 1):
-        u, gain = s[c].v - s[c + 1].v, s[c].dv - s[c + 1].dv
-        if u > 0.0 and gain < 0.0:
-            wait = max(wait, -u / gain)
+        a = s[c]
+        u, gain = a.free - s[c + 1].free, a.dv - s[c + 1].dv
+        y = a.y if clock.lossy else a.d + h * h / 12.0 * gain
+        y, rate = y + p * a.loss * u, u + p * a.loss * gain
+        root = rate * rate - 2.0 * gain * y
+        if a.f == 0.0 and rate < 0.0 and root > 0.0 and y < 0.0:
+            late = min(late, -2.0 * y / (math.sqrt(root) - rate))
+    soon = 0.0
+    for c in range(n - 1):
+        u, gain = s[c].free - s[c + 1].free, s[c].dv - s[c + 1].dv
+        if s[c].f == 0.0:
+            if u > 0.0:
+                if gain <= 0.0:
+                    return False
+                soon = max(soon, u / gain)
+            elif gain < 0.0:
+                late = min(late, u / gain)
+    if soon > late:
+        return False
     for i in range(n):
-        s[i].v += wait * s[i].dv
+        s[i].v = s[i].free - late * s[i].dv
+    return True
 
 
 @apart
@@ -276,18 +298,17 @@ def run(n, law, effort, s, clock, record):
                 c = s[i].kink
                 for near in range(max(c - 1, low), min(c + 2, high)):
                     s[near].trend = s[near].lag
-        while low < high and idle(low, slow, s) and (low + 1 == high or idle(low + 1, slow, s)):
+        while not leans and low < high and idle(low, slow, s) and (low + 1 == high or idle(low + 1, slow, s)):
             rest(s[low], time)
             low += 1
-        while low < high and idle(high - 1, slow, s) and idle(high - 2, slow, s):
+        while not leans and low < high and idle(high - 1, slow, s) and idle(high - 2, slow, s):
             high -= 1
             rest(s[high], time)
-        if leans and low < high:
-            low, high = 0, n - 1
+        if leans:
+            low, high = (0, 0) if parted(n, p, slow, s, clock) else (0, n - 1)
         clock.low, clock.high = low, high
         if len(record) > 0:
             put_down(n, lossy, s, clock, record)
     if low < high and clock.steps < clock.most:
         return PAUSED, effort
-    leave(n, h, s, clock)
     return (UNFINISHED if low < high else FINISHED), effort

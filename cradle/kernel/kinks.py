@@ -33,7 +33,8 @@ class Link:
     trend: float  # and was a step before,
     push: float  # force less the pull, corrected; none if the contact is not watched
     before: float  # at the node before: what the force was in proportion to, see `pay`
-    dv: float  # in the end: acceleration
+    dv: float  # if pulls alone act: acceleration,
+    free: float  # and velocity at the node
     seen: float  # time at which the contact was last looked at
     kink: int  # a contact that has closed or opened in this step
 
