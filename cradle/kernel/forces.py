@@ -164,7 +164,7 @@ def fly(h, low, high, s):
 def begin(n, p, s, clock, record):
     """Go back to the start; there the sums owe h^2/12 times the rates of forces."""
     clock.low, clock.high, clock.steps, clock.kinks, clock.row = n, 0, 0, 0, 0
-    clock.top = clock.ended = clock.time = 0.0
+    clock.top = clock.time = 0.0
     clock.stiff = 1.0
     for i in range(n):
         a = s[i]
@@ -218,7 +218,7 @@ def parted(n, p, slow, s, clock):
 
     Then the pulls end.  Until then they alone act, so that balls fly at constant accelerations.
     """
-    h, late = clock.h, min(clock.h, clock.time - clock.ended)
+    h = late = clock.h
     before = held = 0.0
     for i in range(n):
         a = s[i]
@@ -235,7 +235,7 @@ def parted(n, p, slow, s, clock):
         y = a.y if clock.lossy else a.d + h * h / 12.0 * gain
         y, rate = y + p * a.loss * u, u + p * a.loss * gain
         root = rate * rate - 2.0 * gain * y
-        if a.f == 0.0 and rate < 0.0 and root > 0.0 and y < 0.0:
+        if a.f == 0.0 and rate < 0.0 and root > 0.0:
             late = min(late, -2.0 * y / (math.sqrt(root) - rate))
     soon = 0.0
     for c in range(n - 1):
@@ -282,7 +282,7 @@ def run(n, law, effort, s, clock, record):
             kinks, stiff = step(p, h, low, high, s)
         if kinks > 0:
             clock.kinks += kinks
-            pay(n, p, h, kinks, slow, lossy, s, clock)
+            pay(n, p, h, kinks, slow, lossy, s)
         clock.top, clock.stiff = max(clock.top, stiff), stiff
         first, last = low, high - 1
         if high < n - 1 and s[last].f > 0.0 and s[last].d > slow:

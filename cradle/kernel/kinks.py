@@ -76,7 +76,6 @@ class Clock:
     time: float
     stiff: float  # largest square of a frequency at the last node, 0 if all contacts are open,
     top: float  # and so far
-    ended: float  # when the last contact opened
     row: int  # of the record, to be written next
     h: float  # step,
     eta: float  # what it times a frequency may be, at most,
@@ -182,7 +181,7 @@ def resumed(h, a, theta):
 
 
 @apart
-def pay(n, p, h, kinks, slow, lossy, s, clock):
+def pay(n, p, h, kinks, slow, lossy, s):
     """Give back what the kinks of this step owe, where it can be noticed: kick and shift apart."""
     for i in range(kinks):
         c = s[i].kink
@@ -192,8 +191,6 @@ def pay(n, p, h, kinks, slow, lossy, s, clock):
         d, loss, now, was = a.d, 0.0, a.d, a.d - move
         if lossy:
             d, loss, now, was = a.y, a.loss, a.y + a.loss * p / h * move, a.before
-        if a.f == 0.0:
-            clock.ended = clock.time - h * now / (now - was)
         j = x = 0.0
         if a.f > 0.0 and d > move and loss > 0.0:
             j, x = resumed(h, a, min(max(now / (now - was), 0.0), 1.0) if now > was else 0.5)
