@@ -235,7 +235,9 @@ def parted(n, p, slow, s, clock):
         y = a.y if clock.lossy else a.d + h * h / 12.0 * gain
         y, rate = y + p * a.loss * u, u + p * a.loss * gain
         root = rate * rate - 2.0 * gain * y
-        if a.f == 0.0 and rate < 0.0 and root > 0.0:
+        if a.f == 0.0 and y > 0.0:
+            return False
+        if a.f == 0.0 and root > 0.0 and math.sqrt(root) > rate:
             late = min(late, -2.0 * y / (math.sqrt(root) - rate))
     soon = 0.0
     for c in range(n - 1):
