@@ -175,7 +175,7 @@ def judge(n, law, change, clock):
     error = off * off * off * off
     if off <= 1.0 and compare:
         error = max(error, told, 0.25 * clock.told)
-    clock.told = told if ratio > 0.0 or clock.lossy else 0.0
+    clock.told = told if ratio > 0.0 or clock.lossy or (clock.leans and often) else 0.0
     clock.error = law.accuracy * error
     if not error > 1.0:
         return False

@@ -220,11 +220,14 @@ def parted(n, p, slow, s, clock):
     """
     h = late = clock.h
     before = held = 0.0
+    swings = False
     for i in range(n):
         a = s[i]
-        if a.f > 0.0 and not idle(i, slow, s):
-            return False
         push = a.f - a.pull
+        if a.f > 0.0 and (push != 0.0 or a.v != s[i + 1].v):
+            swings = True
+            if not idle(i, slow, s):
+                return False
         a.dv = a.w * (before - push)
         a.free = a.v + a.w * (held - a.loss * push) - 0.5 * h * a.dv
         before, held = push, a.loss * push
@@ -243,6 +246,9 @@ def parted(n, p, slow, s, clock):
     for c in range(n - 1):
         u, gain = s[c].free - s[c + 1].free, s[c].dv - s[c + 1].dv
         if s[c].f == 0.0:
+            # What still swings does so for long, while this one comes back.
+            if swings and gain > 0.0:
+                return False
             if u > 0.0:
                 if gain <= 0.0:
                     return False
