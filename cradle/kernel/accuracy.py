@@ -1,9 +1,9 @@
 """Contact forces as finely as is asked for: units, steps, runs that are compared, the certificate.
 
 A chain is followed in the units of the contact that closes fastest, all the balls together at rest.
-The step bounds the error where a contact collides about once and loses nothing: measured on random
-chains, it was C (h omega)^4, at very small steps K (h omega)^3.5.  Balls that collide again and
-again amplify it, losses and leans add to it: then finer and finer runs tell.
+The step bounds the error where most contacts collide once: measured on random chains, it was
+C (h omega)^4, at very small steps C / 1.5 (h omega)^3.5.  Balls that collide again and again
+amplify it, those that strings pull swing long: then finer and finer runs tell.
 """
 
 import math
@@ -30,9 +30,10 @@ VALUE, QUICK, LIGHT, SOFT, LATE, WIDE, NARROW, DEEP = 1, 2, 3, 4, 5, 6, 7, 8
 # A step times the largest frequency from which on a run shows whether it was short enough; a
 # coarser one that only measures the frequency; and what it may measure too little.
 ENOUGH, COARSE, SPARE = 0.2, 0.5, 1.05
-# C, at least and for each radian of the quickest ball, on average; the largest step, in radians.
-HARD, SWING, WHOLE = 0.01, 0.0022, 0.8
-# Kinks of a contact and radians, on average, from which on runs are compared.
+# C, at least, without losses and with them, and for each radian of a ball, on average; the largest
+# step, in radians.
+HARD, LOST, SWING, WHOLE = 0.01, 0.022, 0.0027, 0.8
+# Kinks beyond the first two of each contact, and radians, from which on runs are compared.
 OFTEN, LONG = 4.0, 30.0
 TRIALS = 16  # runs of a chain, each finer than the one before
 DAMPED = 0.5  # step times A times the square of a frequency, at most
@@ -134,57 +135,56 @@ def highest(n, p, s):
 def aim(n, law, s, clock):
     """Choose the first step, and the largest part of a radian that a step may be."""
     accuracy, loss, spread = law.accuracy, 1e-300, max(0.0, 1.5 - law.p)
-    clock.hard, clock.often = HARD + spread, OFTEN - 3.2 * spread
+    clock.hard, clock.often = (LOST if clock.lossy else HARD) + spread, OFTEN - 8.0 * spread
     part = accuracy / clock.hard
-    eta = min(part**0.25, (4.0 * part) ** (1.0 / 3.5), WHOLE)
-    if clock.lossy:
-        eta = min(1.25 * eta, 0.6)
+    clock.eta = min(part**0.25, (1.5 * part) ** (1.0 / 3.5))
+    eta = min(clock.eta, WHOLE)
     for c in range(n - 1):
         loss = max(loss, s[c].loss)
     top = highest(n, law.p, s)
     h = (eta if eta >= ENOUGH else COARSE) / math.sqrt(top)
-    clock.eta, clock.damped = eta, DAMPED / loss
+    clock.damped = DAMPED / loss
     # Half its digits, rounded down: the last ones of a power may depend on the machine.
     h = min(h, clock.damped / top) * (1.0 - 1e-8)
     clock.h = h * 134217729.0 - (h * 134217729.0 - h)
-    # Balls that strings hold together after all swing for ever.
-    clock.most = min(law.most, 2e4 / accuracy**0.25) if clock.leans else law.most
+    # Balls that strings hold together after all swing for ever, or with losses long.
+    most = (6e4 if clock.lossy else 2e4) / accuracy**0.25
+    clock.most = min(law.most, most) if clock.leans else law.most
     clock.trial = clock.effort = 0
-    clock.error = clock.coarser = 0.0
-    clock.told = math.inf if clock.lossy else 0.0
+    clock.error = clock.coarser = clock.told = 0.0
 
 
 @apart
-def judge(n, law, change, clock):
+def judge(n, law, change, s, clock):
     """Estimate the error of a run, by its steps and by the run before; tell if it is to be finer.
 
     Of the run before, if it was fine enough, the outcome counts, and its change from another: near
-    by luck, two runs can agree, so that with losses it takes three.
+    by luck, two runs can agree, so that it takes three where balls that strings pull swing long.
     """
+    many = used = 0
+    for c in range(n - 1):
+        many += max(s[c].kinks - 2, 0)
+        used += min(s[c].kinks, 1)
     phase = clock.h * math.sqrt(clock.top)
-    radians = clock.steps * phase / (n - 1)
-    off = phase / clock.eta
-    if not clock.lossy:
-        off *= math.sqrt(math.sqrt(max(1.0, SWING * radians / clock.hard)))
-    often = clock.kinks > clock.often * (n - 1) or radians > LONG
-    compare = often or clock.lossy > 0 or clock.leans > 0
+    radians = clock.steps * phase / max(used, 1)
+    swung = max(1.0, (0.75 if clock.lossy else 1.0) * SWING * radians / clock.hard)
+    off = phase / clock.eta * math.sqrt(math.sqrt(swung))
+    often = many > clock.often or radians > LONG
+    compare = often or clock.leans > 0
     told, ratio = math.inf, clock.coarser / clock.h
     if ratio > 0.0:
-        told = 6.0 if clock.lossy else 7.5 / (ratio * ratio * ratio * ratio - 1.0)
-        told *= change / law.accuracy
-    error = off * off * off * off
+        told = 7.5 * change / law.accuracy / (ratio * ratio * ratio * ratio - 1.0)
+    error = off * off * off * math.sqrt(off)
     if off <= 1.0 and compare:
         error = max(error, told, 0.25 * clock.told)
-    clock.told = told if ratio > 0.0 or clock.lossy or (clock.leans and often) else 0.0
+    clock.told = told if ratio > 0.0 or (clock.leans and often) else 0.0
     clock.error = law.accuracy * error
     if not error > 1.0:
         return False
-    finer = off * SPARE
-    if compare:
-        finer = max(finer, 1.5)
+    finer = max(off * SPARE, 1.5) if compare else off * SPARE
     if off <= 1.0:
-        finer = math.sqrt(2.0) if clock.lossy else 2.0
-    clock.coarser = clock.h if off <= (1.0 if clock.lossy or clock.leans else 2.0) else 0.0
+        finer = math.sqrt(2.0) if clock.lossy or (ratio == 0.0 and not clock.leans) else 2.0
+    clock.coarser = clock.h if off <= (1.0 if clock.leans else 2.0) else 0.0
     clock.h = min(clock.h / finer, clock.damped / clock.top)
     clock.trial += 1
     return True
@@ -251,7 +251,7 @@ def follow(begun, resumed, n, chains, law, out, s, clocks, record, effort):
                 change = max(change, abs(s[i].after - s[i].v))
                 s[i].after = s[i].v
             clock.effort += clock.steps
-            more = status == FINISHED and len(record) == 0 and judge(n, law, change, clock)
+            more = status == FINISHED and len(record) == 0 and judge(n, law, change, s, clock)
             if more and clock.trial == TRIALS:
                 status, more = UNFINISHED, False
             if more:

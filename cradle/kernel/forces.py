@@ -7,7 +7,8 @@ after the impact exact to h^4, at very small steps to h^3.5:
                  follow x = y - h^2/12 dv/dt: so the force is that at x + h^2/12 dv/dt, by its slope
     the kink     what a contact that closes or opens owes to the sum is given back (`kinks`)
     the losses   A df/dt has the impulse A f, whatever happens on the way: a velocity v + b, b that
-                 of the impulses A f, feels f alone, and y has the sum of b as well
+                 of the impulses A f, feels f alone, and y has the sum of b as well; a cubic through
+                 the last nodes tells where f + A df/dt begins and ends
 
 Takahashi and Imada, J. Phys. Soc. Jpn. 53 (1984) 3765; Rowlands, J. Comput. Phys. 97 (1991) 235.
 """
@@ -20,6 +21,8 @@ from cradle.kernel.state import FINISHED, PAUSED, UNFINISHED, apart, jit
 # A run begins, and a flight ends, so many steps before the first node that is to find a contact
 # closed: there a closing owes least to the next order.
 AHEAD = 0.8
+# Speed below which a contact rests while others are pulled back, whatever the accuracy.
+REST = 1e-7
 
 
 @jit
@@ -79,21 +82,22 @@ def step(p, h, low, high, s):
 
 @jit
 def drift_lossy(p, h, low, high, s):
-    """Drift with losses, to where extrapolation has the node; return as `step`."""
+    """Drift with losses, to where a cubic has the node; return as `step`."""
     kinks = 0
     top = steep = 0.0
     for c in range(low, high):
         a = s[c]
         a.d += h * (a.v - s[c + 1].v)
-        new = a.d + (2.0 * a.lag - a.trend)
-        move = new - a.y
         early = a.loss * p / h
-        a.before = a.y + early * a.move
-        f, g = push(p, a, new, move, early)
+        a.before, a.jerk = a.y - a.last + (2.0 * a.bend + a.bent) / 6.0, a.bend - a.bent
+        a.last, a.bent = a.y, a.bend
+        move = a.before + a.bend + 0.5 * a.jerk
+        new = a.y + a.before + 0.5 * a.bend + a.jerk / 6.0
+        f, g = push(p, a, new, new - a.y if a.f == 0.0 and early < 1.0 else move, early)
         if (f > 0.0) != (a.f > 0.0):
             s[kinks].kink = c
             kinks += 1
-        a.f, a.g, a.push, a.move, a.y, a.trend = f, g, f - a.pull, move, new, a.lag
+        a.f, a.g, a.push, a.move, a.y = f, g, f - a.pull, move, new
         top = max(top, (steep + g) * a.w)
         steep = g
     return kinks, max(top, steep * s[high].w)
@@ -115,6 +119,7 @@ def kick_lossy(h, low, high, s):
                 a.lag = 0.5 * h * held + part * (grown - (db - more))
                 a.push = a.f - a.pull + a.g * (a.d + a.lag - a.y)
                 a.move = h * (a.v - z.v + 0.5 * h * grown + held)
+                a.bend = h * h * (grown + db - more)
             force, impulse, rate, dv, b, db = f, j, r, gain, hold, more
     force = impulse = moved = 0.0
     for c in range(low, high + 1):
@@ -128,11 +133,11 @@ def kick_lossy(h, low, high, s):
 
 
 @jit
-def bring(a, time, u):
+def bring(a, time, u, h):
     """Let the balls of an open contact fly freely for this time, at this closing speed."""
     a.d += time * u
-    a.f = a.g = a.push = a.lag = a.trend = 0.0
-    a.y = a.d
+    a.f = a.g = a.push = a.lag = a.bend = a.bent = 0.0
+    a.y, a.last = a.d, a.d - h * u
 
 
 @jit
@@ -155,7 +160,7 @@ def fly(h, low, high, s):
         return 0.0
     before = (1.0 - AHEAD) * h
     for c in range(low, high):
-        bring(s[c], soonest - before, s[c].v - s[c + 1].v)
+        bring(s[c], soonest - before, s[c].v - s[c + 1].v, h)
     s[first].d = s[first].y = before * (s[first + 1].v - s[first].v)
     return soonest - before
 
@@ -163,15 +168,15 @@ def fly(h, low, high, s):
 @apart
 def begin(n, p, s, clock, record):
     """Go back to the start; there the sums owe h^2/12 times the rates of forces."""
-    clock.low, clock.high, clock.steps, clock.kinks, clock.row = n, 0, 0, 0, 0
+    clock.low, clock.high, clock.steps, clock.row = n, 0, 0, 0
     clock.top = clock.time = 0.0
     clock.stiff = 1.0
     for i in range(n):
         a = s[i]
         a.v, a.d, a.y = a.start, a.lean, a.lean
-        a.push = a.move = a.lag = a.trend = a.seen = 0.0
+        a.push = a.move = a.lag = a.seen = a.bend = a.bent = 0.0
         a.f, a.g = push(p, a, a.d, 1.0, 0.0)
-        a.pull = a.f
+        a.pull, a.kinks = a.f, 0
         if i < n - 1 and a.v > s[i + 1].start:
             clock.low = min(clock.low, i)
             clock.high = i + 1
@@ -181,14 +186,15 @@ def begin(n, p, s, clock, record):
     if clock.leans == 0:
         clock.time = (AHEAD - 1.0) * clock.h  # before all touch, they fly
     part = clock.h * clock.h / 12.0
-    force = impulse = db = 0.0
+    force = impulse = db = u = 0.0
     for i in range(n):
         a = s[i]
         a.seen = clock.time
         if i < n - 1:
-            a.d += clock.time * (a.start - s[i + 1].start)
-            a.y = a.d
-        f = a.g * (a.start - s[i + 1].start) if a.f > 0.0 else 0.0
+            u = a.start - s[i + 1].start
+            a.d += clock.time * u
+            a.y, a.last = a.d, a.d - clock.h * u
+        f = a.g * u if a.f > 0.0 else 0.0
         a.v += part * a.w * (force - f)
         more = a.w * (impulse - a.loss * f)
         if i > 0:
@@ -219,47 +225,37 @@ def parted(n, p, slow, s, clock):
     Then the pulls end.  Until then they alone act, so that balls fly at constant accelerations.
     """
     h = late = clock.h
-    before = held = 0.0
+    soon = before = held = 0.0
     swings = False
     for i in range(n):
         a = s[i]
+        if a.f > 0.0 and not idle(i, slow, s):
+            return False
+        swings = swings or (a.f > 0.0 and not idle(i, min(slow, REST), s))
         push = a.f - a.pull
-        if a.f > 0.0 and (push != 0.0 or a.v != s[i + 1].v):
-            swings = True
-            if not idle(i, slow, s):
-                return False
         a.dv = a.w * (before - push)
         a.free = a.v + a.w * (held - a.loss * push) - 0.5 * h * a.dv
         before, held = push, a.loss * push
-    # The last opening, where d + p A u is 0; then the least time since, and the longest.
     for c in range(n - 1):
         a = s[c]
+        if a.f > 0.0:
+            continue
         u, gain = a.free - s[c + 1].free, a.dv - s[c + 1].dv
         y = a.y if clock.lossy else a.d + h * h / 12.0 * gain
         y, rate = y + p * a.loss * u, u + p * a.loss * gain
-        root = rate * rate - 2.0 * gain * y
-        if a.f == 0.0 and y > 0.0:
+        # What still swings goes on, while one that is pulled comes back.
+        if y > 0.0 or (u > 0.0 and gain <= 0.0) or (swings and gain > 0.0):
             return False
-        if a.f == 0.0 and root > 0.0 and math.sqrt(root) > rate:
+        root = rate * rate - 2.0 * gain * y
+        if root > 0.0 and math.sqrt(root) > rate:  # it opened where d + p A u was 0
             late = min(late, -2.0 * y / (math.sqrt(root) - rate))
-    soon = 0.0
-    for c in range(n - 1):
-        u, gain = s[c].free - s[c + 1].free, s[c].dv - s[c + 1].dv
-        if s[c].f == 0.0:
-            # What still swings does so for long, while this one comes back.
-            if swings and gain > 0.0:
-                return False
-            if u > 0.0:
-                if gain <= 0.0:
-                    return False
-                soon = max(soon, u / gain)
-            elif gain < 0.0:
-                late = min(late, u / gain)
-    if soon > late:
-        return False
-    for i in range(n):
+        if u > 0.0:
+            soon = max(soon, u / gain)
+        elif gain < 0.0:
+            late = min(late, u / gain)
+    for i in range(n if soon <= late else 0):
         s[i].v = s[i].free - late * s[i].dv
-    return True
+    return soon <= late
 
 
 @apart
@@ -289,31 +285,32 @@ def run(n, law, effort, s, clock, record):
         else:
             kinks, stiff = step(p, h, low, high, s)
         if kinks > 0:
-            clock.kinks += kinks
             pay(n, p, h, kinks, slow, lossy, s)
         clock.top, clock.stiff = max(clock.top, stiff), stiff
-        first, last = low, high - 1
-        if high < n - 1 and s[last].f > 0.0 and s[last].d > slow:
-            bring(s[high], time - s[high].seen, right - s[high + 1].v)
+        a, z = s[low], s[high - 1]
+        if high < n - 1 and z.f > 0.0 and (z.y if lossy else z.d) > slow:
+            bring(s[high], time - s[high].seen, right - s[high + 1].v, h)
             high += 1
-        if low > 0 and s[first].f > 0.0 and s[first].d > slow:
+        if low > 0 and a.f > 0.0 and (a.y if lossy else a.d) > slow:
             low -= 1
-            bring(s[low], time - s[low].seen, s[low].v - left)
+            bring(s[low], time - s[low].seen, s[low].v - left, h)
         if lossy:
             kick_lossy(h, low, high, s)
             # What was before a kink tells nothing of what follows.
             for i in range(kinks):
                 c = s[i].kink
                 for near in range(max(c - 1, low), min(c + 2, high)):
-                    s[near].trend = s[near].lag
-        while not leans and low < high and idle(low, slow, s) and (low + 1 == high or idle(low + 1, slow, s)):
-            rest(s[low], time)
-            low += 1
-        while not leans and low < high and idle(high - 1, slow, s) and idle(high - 2, slow, s):
-            high -= 1
-            rest(s[high], time)
+                    a = s[near]
+                    a.bent, a.last = a.bend, a.y - a.move + 0.5 * a.bend
         if leans:
             low, high = (0, 0) if parted(n, p, slow, s, clock) else (0, n - 1)
+        else:
+            while low < high and idle(low, slow, s) and idle(min(low + 1, high - 1), slow, s):
+                rest(s[low], time)
+                low += 1
+            while low < high and idle(high - 1, slow, s) and idle(high - 2, slow, s):
+                high -= 1
+                rest(s[high], time)
         clock.low, clock.high = low, high
         if len(record) > 0:
             put_down(n, lossy, s, clock, record)

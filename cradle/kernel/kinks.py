@@ -27,15 +27,19 @@ class Link:
     d: float  # compression at a node, as the drifts have it; below zero a gap
     f: float  # force at the node,
     g: float  # its slope df/dd,
-    move: float  # and how much d has grown in the step before it; without losses, at a kink alone
+    move: float  # how much d grows in a step: at a kink, in that step; with losses at the node
     y: float  # with losses: compression at the node, as it is,
-    lag: float  # what it is more than `d`,
-    trend: float  # and was a step before,
+    last: float  # and at the node before,
+    before: float  # `move` there,
+    bend: float  # how much that grows in a step,
+    bent: float  # and did a step before,
+    jerk: float  # and what is between the two
+    lag: float  # what y is more than `d`,
     push: float  # force less the pull, corrected; none if the contact is not watched
-    before: float  # at the node before: what the force was in proportion to, see `pay`
     dv: float  # if pulls alone act: acceleration,
     free: float  # and velocity at the node
     seen: float  # time at which the contact was last looked at
+    kinks: int  # how often the contact has closed and opened so far
     kink: int  # a contact that has closed or opened in this step
 
 
@@ -72,7 +76,6 @@ class Clock:
     low: int
     high: int
     steps: int
-    kinks: int  # how often contacts closed and opened so far
     time: float
     stiff: float  # largest square of a frequency at the last node, 0 if all contacts are open,
     top: float  # and so far
@@ -169,15 +172,36 @@ def echo(p, x):
     return 0.0
 
 
+@jit
+def turning(a, early):
+    """Return when, in steps from the last node on, d and `early` moves are 0, by Newton's method.
+
+    There the force with losses begins or ends.  And d there, its move, and how that grows.
+    """
+    at, change = 0.5, 0.0
+    d = move = bend = 0.0
+    for _ in range(5):
+        at = min(max(at - change, -0.25), 1.25)
+        bend = a.bend + at * a.jerk
+        move = a.before + at * (a.bend + 0.5 * at * a.jerk)
+        d = a.last + at * (a.before + at * (0.5 * a.bend + at * a.jerk / 6.0))
+        slope = move + early * bend
+        change = (d + early * move) / slope if slope != 0.0 else 0.0
+    return at, d, move, bend
+
+
 @apart
-def resumed(h, a, theta):
-    """Return the same if losses had opened it and it pushes again, theta steps before the node."""
-    rate = a.g * a.move
-    first = a.f - theta * rate
-    half, third = 0.5 - theta, 0.5 * (theta * (1.0 - theta) - 1.0 / 6.0)
-    owed = h * (first * half + rate * third)
+def resumed(p, h, a, at, d, move, bend):
+    """Return the same if losses had opened it and it pushes again there, `at` of this step."""
+    theta, g = 1.0 - at, a.k * grade(p, d)
+    first, rate = g * d, p * g * move
+    curve = p * g * (bend + (p - 1.0) * move * move / d)
+    # Hurwitz's zeta(0, theta), zeta(-1, theta), zeta(-2, theta)
+    zero, one = 0.5 - theta, 0.5 * (theta * at - 1.0 / 6.0)
+    two = -theta * zero * at / 3.0
+    owed = h * (first * zero + rate * one + 0.5 * curve * two)
     kick = -owed - a.loss * first
-    return kick, h * h * first * third - a.loss * owed + theta * h * kick
+    return kick, h * h * (first * one + rate * two) - a.loss * owed + theta * h * kick
 
 
 @apart
@@ -186,16 +210,24 @@ def pay(n, p, h, kinks, slow, lossy, s):
     for i in range(kinks):
         c = s[i].kink
         a = s[c]
+        a.kinks += 1
         move, left, right = a.move, a.w, s[c + 1].w
-        # Its force is in proportion to d, with losses to d and `early` moves: `now` and `was`.
-        d, loss, now, was = a.d, 0.0, a.d, a.d - move
+        d, loss, early, at, end, slant, bend = a.d, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        again = False
         if lossy:
-            d, loss, now, was = a.y, a.loss, a.y + a.loss * p / h * move, a.before
+            d, move, loss, early = a.y, a.y - a.last, a.loss, a.loss * p / h
+            again = a.f > 0.0 and a.last > 0.0 and a.before < 0.0 and loss > 0.0
+            if again or (a.f == 0.0 and loss > 0.0):
+                at, end, slant, bend = turning(a, early)
         j = x = 0.0
-        if a.f > 0.0 and d > move and loss > 0.0:
-            j, x = resumed(h, a, min(max(now / (now - was), 0.0), 1.0) if now > was else 0.5)
+        if again and end > 0.0:
+            j, x = resumed(p, h, a, at, end, slant, bend)
         elif loss == 0.0 and h * a.k * abs(move) * grade(p, abs(move)) * (left + right) <= slow:
             continue
+        elif a.f == 0.0 and end > 0.0 and slant < 0.0:
+            j, x = crossing(p, h, a.k, loss, False, max(at - end / slant, 0.0), -slant)
+            # For it moves on a parabola: zeta(-2, at).
+            j += h * a.k * p * grade(p, end) * bend * at * (at - 1.0) * (at - 0.5) / 6.0
         elif a.f == 0.0 and move < 0.0:
             j, x = crossing(p, h, a.k, loss, False, max(1.0 - d / move, 0.0), -move)
         elif a.f > 0.0 and move > 0.0:

@@ -152,7 +152,11 @@ class Path:
 
     def driven(self, push: Vector) -> Any:
         """Return what pushes of the contacts do to the balls."""
-        return -np.diff(np.pad(push, [(0, 0), (1, 1)])) * self.w
+        gain = np.zeros((len(push), len(self.w)))
+        gain[:, 1:] = push
+        gain[:, :-1] -= push
+        gain *= self.w
+        return gain
 
     def impulses(self, v: Vector) -> Vector:
         """Return the impulses of the contacts, from velocities; none of one that never closed."""
@@ -164,8 +168,6 @@ class Path:
 
         Collisions, durations and works are booked beside.
         """
-        from scipy.interpolate import CubicHermiteSpline  # slow to import
-
         self.collisions = self.closed[0].astype(np.int64)
         self.durations, self.absorbed = np.zeros((2, len(self.k)))
         if len(self.t) == 1:
@@ -180,17 +182,20 @@ class Path:
             ("end", closing < 0, self.y + self.early * u, u + self.early * grow),
             ("close", closing > 0, self.y, u),
         ):
-            pieces = CubicHermiteSpline(self.t, x, rate).c
             for j, c in np.argwhere(wanted).tolist():
+                h, two = self.t[j + 1] - self.t[j], slice(j, j + 2)
                 began = kind == "close" and touching[j, c]
-                t = 0.0 if began else self.t[j] + _zero(pieces[:, j, c], self.t[j + 1] - self.t[j])
+                t = 0.0 if began else self.t[j] + _zero(_cubic(h, x[two, c], rate[two, c]), h)
                 where.append((t, kind, j, c))
         where.sort(key=lambda event: (event[0], event[1] != "maximum_compression"))
         found: list[Any] = [(0.0, None, self.v[0], self.force[0])]
-        times = [t for t, *_ in where]
-        depths = CubicHermiteSpline(self.t, self.y, u)(times)
-        velocities = CubicHermiteSpline(self.t, self.v, self.a)(times)
-        for (t, kind, j, c), y, v in zip(where, depths, velocities, strict=True):
+        for t, kind, j, c in where:
+            h, two = self.t[j + 1] - self.t[j], slice(j, j + 2)
+            powers = (t - self.t[j]) ** np.arange(3, -1, -1)
+            y, v = (
+                powers @ _cubic(h, self.y[two], u[two]),
+                powers @ _cubic(h, self.v[two], self.a[two]),
+            )
             push = np.where(self.closed[j] | self.closed[j + 1], self.pushes(y), 0.0)
             if kind == "maximum_compression":
                 shown = bool(u[j, c] > 0.0)  # between two maxima is a minimum
@@ -207,6 +212,13 @@ class Path:
         at, events, path, force = map(list, zip(*found, strict=True))
         path[-1] = self.last
         return np.array(at), tuple(events[1:]), np.array(path), np.array(force)
+
+
+def _cubic(h: float, x: Vector, rate: Vector) -> Vector:
+    """Return the cubics, highest power first, that go through values with rates, h apart."""
+    slope = (x[1] - x[0]) / h
+    bend = (rate[0] + rate[1] - 2.0 * slope) / h
+    return np.array([bend / h, (slope - rate[0]) / h - bend, rate[0], x[0]])
 
 
 def _zero(cubic: Vector, h: float) -> float:
