@@ -173,7 +173,8 @@ def judge(n, law, change, s, clock):
     compare = often or clock.leans > 0
     told, ratio = math.inf, clock.coarser / clock.h
     if ratio > 0.0:
-        told = 7.5 * change / law.accuracy / (ratio * ratio * ratio * ratio - 1.0)
+        told = (20.0 if clock.leans else 7.5) / (ratio * ratio * ratio * ratio - 1.0)
+        told *= change / law.accuracy
     error = off * off * off * math.sqrt(off)
     if off <= 1.0 and compare:
         error = max(error, told, 0.25 * clock.told)

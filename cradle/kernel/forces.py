@@ -243,11 +243,16 @@ def parted(n, p, slow, s, clock):
         u, gain = a.free - s[c + 1].free, a.dv - s[c + 1].dv
         y = a.y if clock.lossy else a.d + h * h / 12.0 * gain
         y, rate = y + p * a.loss * u, u + p * a.loss * gain
-        # What still swings goes on, while one that is pulled comes back.
-        if y > 0.0 or (u > 0.0 and gain <= 0.0) or (swings and gain > 0.0):
-            return False
         root = rate * rate - 2.0 * gain * y
-        if root > 0.0 and math.sqrt(root) > rate:  # it opened where d + p A u was 0
+        # What still swings goes on, while one that is pulled comes back.
+        if (u > 0.0 and gain <= 0.0) or (swings and gain > 0.0):
+            return False
+        if y > 0.0 and not (root > 0.0 and rate > 0.0):
+            return False
+        # It opened where d + p A u was 0, and may by now be closed again.
+        if root > 0.0 and gain > 0.0:
+            late = min(late, (rate + math.sqrt(root)) / gain)
+        elif root > 0.0 and math.sqrt(root) > rate:
             late = min(late, -2.0 * y / (math.sqrt(root) - rate))
         if u > 0.0:
             soon = max(soon, u / gain)
