@@ -223,6 +223,82 @@ def test_accuracy_is_kept_on_random_chains(monkeypatch, p, loss, n):
         assert (np.diff(found, axis=1) >= -0.01 * accuracy * speed[:, None]).all()
 
 
+# What once missed its accuracy: masses, velocities, stiffnesses, gaps.
+MISSED = {
+    # All contacts are open and none closing for less than a step, or between two nodes.
+    "a short end": ([0.133, 5.23, 2], [1, -0.00351, 0.864], [0.755, 3.05], [0, -0.423]),
+    "opened and closed within a step": (
+        [0.172, 0.295, 2.5, 0.134, 4.46, 0.13],
+        [1, -0.861, 0.254, -0.182, -0.18, 0.437],
+        [2.47, 2.77, 0.376, 1.7, 2.26],
+        [-0.0118, -0.368, -0.0938, 0.127, 0.0124],
+    ),
+    "opened and turned within a step": (
+        [1] * 7,
+        [1, -0.515, 0.308, 0.00625, -0.128, 0.726, -0.456],
+        [1] * 6,
+        [0.111, -0.553, 0.217, 0.283, 0.117, 0.0523],
+    ),
+    # Contacts collide a second time: that amplifies errors.
+    "again": (
+        [2.48, 0.434, 2.92, 0.737, 0.594, 0.463, 0.471, 0.822],
+        [1, 0.5, -0.411, -0.43, -0.668, 0.015, -0.433, 0.736],
+        [0.428, 0.692, 2.76, 0.458, 0.606, 1.46, 0.642],
+        0,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", MISSED.values(), ids=MISSED)
+def test_what_once_missed_its_accuracy(case):
+    m, v, k, gaps = case
+    exact, scale = integrated(m, v, k, gaps=gaps), max(a - b for a, b in itertools.pairwise(v))
+    for accuracy in (1e-2, 1e-3, 1e-4, 1e-5):
+        found = spring_velocities(m, v, k, gaps=gaps, accuracy=accuracy)
+        assert abs(found - exact).max() <= accuracy * scale
+
+
+def test_what_still_swings_is_not_at_rest_while_another_contact_comes_back():
+    m, gaps = [0.157, 1.43, 0.452, 0.125], [0, -0.221, -0.000739]
+    law = {"stiffness": [0.902, 0.356, 1.95], "viscosity": 0.0654, "gaps": gaps}
+    rough, fine = (spring_velocities(m, struck(4), **law, accuracy=x) for x in (1e-2, 1e-4))
+    assert abs(rough - fine).max() <= 1e-2
+
+
+LOSSY = {
+    "two": ([1, 1], [1, 0], [1], [0.2], [0]),
+    "three": ([1] * 3, struck(3), [1, 1], [0.2, 0.2], [0, 0.3]),
+    # Its losses open a contact for about a step, or do not quite.
+    "open for a step": ([2.78, 0.139, 0.395], [1, -0.619, -0.356], [0.521, 2.06], [0.05, 0.00588],
+                        [0, 0.935]),
+    # A contact that closes just before a node, and a touching one behind it.
+    "closed just now": ([1] * 6, struck(6), [0.471, 3.03, 2.56, 1.57, 1.16],
+                        [0.0297, 0.0764, 0.0678, 0.117, 0.0613], [0, 0, 0.21, 0, 0]),
+}  # fmt: skip
+
+
+@needs_numba
+@pytest.mark.parametrize("case", LOSSY.values(), ids=LOSSY)
+def test_losses_leave_the_fourth_order(monkeypatch, case):
+    """Of the largest error of runs that meet their kinks at any part of a step."""
+    monkeypatch.setenv(runtime.VARIABLE, "compiled")
+    m, v, k, loss, gaps = case
+    exact = np.diff(integrated(m, v, k, 1.5, loss, gaps))
+    row = kinks.Springs(*(np.array([x], float) for x in (m, v, k, loss, gaps)))
+    largest = []
+    for radians in (0.16, 0.04):
+        errors, out = [], job.room(1, len(m))
+        for part in np.linspace(0.95, 1.05, 41):
+            pages, out.h[0] = [], radians * part
+            top = job.solve(row, kinks.Law(1.5, 1e-7, 1e6), out, record=pages)[2]["top"]
+            out.h[0], pages = radians * part / math.sqrt(top), []
+            clock = job.solve(row, kinks.Law(1.5, 1e-7, 1e6), out, record=pages)[2]
+            errors.append(abs(clock["speed"] * np.diff(pages[-1][-1, 1]) - exact).max())
+        largest.append(max(errors))
+    assert largest[0] <= 0.05 * 0.16**4
+    assert largest[1] <= largest[0] / 4**3.3
+
+
 @pytest.mark.parametrize("light", [1e-3, 1e-4])
 def test_a_light_ball_that_swings_often_amplifies_no_error(light):
     """Each swing adds to the error: from some on two runs are compared."""

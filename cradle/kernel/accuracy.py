@@ -138,7 +138,7 @@ def aim(n, law, s, clock):
     clock.hard, clock.often = (LOST if clock.lossy else HARD) + spread, OFTEN - 8.0 * spread
     part = accuracy / clock.hard
     clock.eta = min(part**0.25, (1.5 * part) ** (1.0 / 3.5))
-    eta = min(clock.eta, WHOLE)
+    eta = min(clock.eta, 0.7 if clock.lossy else WHOLE)
     for c in range(n - 1):
         loss = max(loss, s[c].loss)
     top = highest(n, law.p, s)
