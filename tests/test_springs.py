@@ -265,6 +265,10 @@ def test_what_still_swings_is_not_at_rest_while_another_contact_comes_back():
     assert abs(rough - fine).max() <= 1e-2
 
 
+def elastic(m, v, k, gaps):
+    return m, v, k, [0.0] * len(k), np.broadcast_to(gaps, len(k))
+
+
 LOSSY = {
     "two": ([1, 1], [1, 0], [1], [0.2], [0]),
     "three": ([1] * 3, struck(3), [1, 1], [0.2, 0.2], [0, 0.3]),
@@ -278,11 +282,11 @@ LOSSY = {
 
 
 @needs_numba
-@pytest.mark.parametrize("case", LOSSY.values(), ids=LOSSY)
-def test_losses_leave_the_fourth_order(monkeypatch, case):
+@pytest.mark.parametrize("name", [*LOSSY, *MISSED])
+def test_losses_and_leans_leave_the_fourth_order(monkeypatch, name):
     """Of the largest error of runs that meet their kinks at any part of a step."""
     monkeypatch.setenv(runtime.VARIABLE, "compiled")
-    m, v, k, loss, gaps = case
+    m, v, k, loss, gaps = LOSSY[name] if name in LOSSY else elastic(*MISSED[name])
     exact = np.diff(integrated(m, v, k, 1.5, loss, gaps))
     row = kinks.Springs(*(np.array([x], float) for x in (m, v, k, loss, gaps)))
     largest = []
@@ -295,7 +299,7 @@ def test_losses_leave_the_fourth_order(monkeypatch, case):
             clock = job.solve(row, kinks.Law(1.5, 1e-7, 1e6), out, record=pages)[2]
             errors.append(abs(clock["speed"] * np.diff(pages[-1][-1, 1]) - exact).max())
         largest.append(max(errors))
-    assert largest[0] <= 0.05 * 0.16**4
+    assert largest[0] <= (0.05 if name in LOSSY else 1.2) * 0.16**4
     assert largest[1] <= largest[0] / 4**3.3
 
 
