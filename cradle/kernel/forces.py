@@ -93,7 +93,7 @@ def drift_lossy(p, h, low, high, s):
         a.last, a.bent = a.y, a.bend
         move = a.before + a.bend + 0.5 * a.jerk
         new = a.y + a.before + 0.5 * a.bend + a.jerk / 6.0
-        f, g = push(p, a, new, new - a.y if a.f == 0.0 and early < 1.0 else move, early)
+        f, g = push(p, a, new, move, early)
         if (f > 0.0) != (a.f > 0.0):
             s[kinks].kink = c
             kinks += 1
@@ -301,12 +301,6 @@ def run(n, law, effort, s, clock, record):
             bring(s[low], time - s[low].seen, s[low].v - left, h)
         if lossy:
             kick_lossy(h, low, high, s)
-            # What was before a kink tells nothing of what follows.
-            for i in range(kinks):
-                c = s[i].kink
-                for near in range(max(c - 1, low), min(c + 2, high)):
-                    a = s[near]
-                    a.bent, a.last = a.bend, a.y - a.move + 0.5 * a.bend
         if leans:
             low, high = (0, 0) if parted(n, p, slow, s, clock) else (0, n - 1)
         else:

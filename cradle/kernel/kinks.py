@@ -174,34 +174,29 @@ def echo(p, x):
 
 @jit
 def turning(a, early):
-    """Return when, in steps from the last node on, d and `early` moves are 0, by Newton's method.
+    """Return when, in steps from the last node on, d and `early` moves are 0; d there, its move.
 
-    There the force with losses begins or ends.  And d there, its move, and how that grows.
+    There the force with losses begins or ends; by Newton's method.
     """
     at, change = 0.5, 0.0
-    d = move = bend = 0.0
+    d = move = 0.0
     for _ in range(5):
         at = min(max(at - change, -0.25), 1.25)
-        bend = a.bend + at * a.jerk
         move = a.before + at * (a.bend + 0.5 * at * a.jerk)
         d = a.last + at * (a.before + at * (0.5 * a.bend + at * a.jerk / 6.0))
-        slope = move + early * bend
+        slope = move + early * (a.bend + at * a.jerk)
         change = (d + early * move) / slope if slope != 0.0 else 0.0
-    return at, d, move, bend
+    return at, d, move
 
 
 @apart
-def resumed(p, h, a, at, d, move, bend):
-    """Return the same if losses had opened it and it pushes again there, `at` of this step."""
-    theta, g = 1.0 - at, a.k * grade(p, d)
-    first, rate = g * d, p * g * move
-    curve = p * g * (bend + (p - 1.0) * move * move / d)
-    # Hurwitz's zeta(0, theta), zeta(-1, theta), zeta(-2, theta)
-    zero, one = 0.5 - theta, 0.5 * (theta * at - 1.0 / 6.0)
-    two = -theta * zero * at / 3.0
-    owed = h * (first * zero + rate * one + 0.5 * curve * two)
+def resumed(p, h, a, theta, d, move):
+    """Return the same if losses had opened it and it pushes again, theta steps before the node."""
+    first = a.k * d * grade(p, d)
+    half, third = 0.5 - theta, 0.5 * (theta * (1.0 - theta) - 1.0 / 6.0)
+    owed = h * first * (half + p * move / d * third)
     kick = -owed - a.loss * first
-    return kick, h * h * (first * one + rate * two) - a.loss * owed + theta * h * kick
+    return kick, h * h * first * third - a.loss * owed + theta * h * kick
 
 
 @apart
@@ -212,22 +207,20 @@ def pay(n, p, h, kinks, slow, lossy, s):
         a = s[c]
         a.kinks += 1
         move, left, right = a.move, a.w, s[c + 1].w
-        d, loss, early, at, end, slant, bend = a.d, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        d, loss, early, at, end, slant = a.d, 0.0, 0.0, 0.0, 0.0, 0.0
         again = False
         if lossy:
             d, move, loss, early = a.y, a.y - a.last, a.loss, a.loss * p / h
             again = a.f > 0.0 and a.last > 0.0 and a.before < 0.0 and loss > 0.0
             if again or (a.f == 0.0 and loss > 0.0):
-                at, end, slant, bend = turning(a, early)
+                at, end, slant = turning(a, early)
         j = x = 0.0
         if again and end > 0.0:
-            j, x = resumed(p, h, a, at, end, slant, bend)
+            j, x = resumed(p, h, a, 1.0 - at, end, slant)
         elif loss == 0.0 and h * a.k * abs(move) * grade(p, abs(move)) * (left + right) <= slow:
             continue
         elif a.f == 0.0 and end > 0.0 and slant < 0.0:
             j, x = crossing(p, h, a.k, loss, False, max(at - end / slant, 0.0), -slant)
-            # For it moves on a parabola: zeta(-2, at).
-            j += h * a.k * p * grade(p, end) * bend * at * (at - 1.0) * (at - 0.5) / 6.0
         elif a.f == 0.0 and move < 0.0:
             j, x = crossing(p, h, a.k, loss, False, max(1.0 - d / move, 0.0), -move)
         elif a.f > 0.0 and move > 0.0:
