@@ -85,7 +85,7 @@ def measure(n, chain, law, s, clock):
     widest = min(WIDEST, BLURRED * law.accuracy)
     rate = clock.speed / clock.length
     total = mean = 0.0
-    clock.lossy = clock.leans = 0
+    clock.lossy = clock.leans = 0.0
     for i in range(n):
         a = s[i]
         refuse(m[i] < SMALLEST * heavy, LIGHT, i, clock)
@@ -101,10 +101,7 @@ def measure(n, chain, law, s, clock):
             refuse(-a.lean > widest, WIDE, i, clock)
             refuse(a.lean != 0.0 and abs(a.lean) < NARROWEST, NARROW, i, clock)
             refuse(a.lean > 1.0, DEEP, i, clock)
-            if a.loss > 0.0:
-                clock.lossy = 1
-            if a.lean > 0.0:
-                clock.leans = 1
+            clock.lossy, clock.leans = max(clock.lossy, a.loss), max(clock.leans, a.lean)
     for i in range(n):
         a = s[i]
         a.start -= mean / total
@@ -134,16 +131,14 @@ def highest(n, p, s):
 @apart
 def aim(n, law, s, clock):
     """Choose the first step, and the largest part of a radian that a step may be."""
-    accuracy, loss, spread = law.accuracy, 1e-300, max(0.0, 1.5 - law.p)
+    accuracy, spread = law.accuracy, max(0.0, 1.5 - law.p)
     clock.hard, clock.often = (LOST if clock.lossy else HARD) + spread, OFTEN - 8.0 * spread
     part = accuracy / clock.hard
     clock.eta = min(part**0.25, (1.5 * part) ** (1.0 / 3.5))
     eta = min(clock.eta, 0.7 if clock.lossy else WHOLE)
-    for c in range(n - 1):
-        loss = max(loss, s[c].loss)
     top = highest(n, law.p, s)
     h = (eta if eta >= ENOUGH else COARSE) / math.sqrt(top)
-    clock.damped = DAMPED / loss
+    clock.damped = DAMPED / max(clock.lossy, 1e-300)
     # Half its digits, rounded down: the last ones of a power may depend on the machine.
     h = min(h, clock.damped / top) * (1.0 - 1e-8)
     clock.h = h * 134217729.0 - (h * 134217729.0 - h)
@@ -173,7 +168,7 @@ def judge(n, law, change, s, clock):
     compare = often or clock.leans > 0
     told, ratio = math.inf, clock.coarser / clock.h
     if ratio > 0.0:
-        told = (20.0 if clock.leans else 7.5) / (ratio * ratio * ratio * ratio - 1.0)
+        told = (60.0 if clock.leans else 7.5) / (ratio * ratio * ratio * ratio - 1.0)
         told *= change / law.accuracy
     error = off * off * off * math.sqrt(off)
     if off <= 1.0 and compare:
@@ -255,10 +250,10 @@ def follow(begun, resumed, n, chains, law, out, s, clocks, record, effort):
             more = status == FINISHED and len(record) == 0 and judge(n, law, change, s, clock)
             if more and clock.trial == TRIALS:
                 status, more = UNFINISHED, False
-            if more:
+            elif more:
                 begin(n, law.p, s, clock, record)
         resumed = False
-        put_down(n, clock.lossy, s, clock, record)
+        put_down(n, s, clock, record)
         for i in range(n):
             out.v[k][i] = v[i] + clock.speed * (s[i].after - s[i].start)
         out.error[k], out.h[k], out.steps[k] = clock.error, clock.h, clock.effort

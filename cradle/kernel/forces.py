@@ -141,13 +141,6 @@ def bring(a, time, u, h):
 
 
 @jit
-def rest(a, time):
-    """Watch a contact no longer."""
-    a.seen = time
-    a.g = a.push = 0.0
-
-
-@jit
 def fly(h, low, high, s):
     """Fly, with all contacts open, to the next closing if it is not near; return how long."""
     soonest = 0.0
@@ -182,7 +175,7 @@ def begin(n, p, s, clock, record):
             clock.high = i + 1
     if clock.leans and clock.high > 0:
         clock.low, clock.high = 0, n - 1
-    put_down(n, clock.lossy, s, clock, record)
+    put_down(n, s, clock, record)
     if clock.leans == 0:
         clock.time = (AHEAD - 1.0) * clock.h  # before all touch, they fly
     part = clock.h * clock.h / 12.0
@@ -203,7 +196,7 @@ def begin(n, p, s, clock, record):
 
 
 @apart
-def put_down(n, lossy, s, clock, record):
+def put_down(n, s, clock, record):
     """Write a page, if there is a record: time, velocities, compressions, forces, of all balls."""
     if len(record) > 0:
         page = record[clock.row]
@@ -212,7 +205,7 @@ def put_down(n, lossy, s, clock, record):
         v, y, f = page[1], page[2], page[3]
         for c in range(n):
             a = s[c]
-            v[c], y[c], f[c] = a.v, a.y if lossy > 0 else a.d, a.f
+            v[c], y[c], f[c] = a.v, a.y if clock.lossy > 0.0 else a.d, a.f
             if c < n - 1 and not clock.low <= c < clock.high:
                 y[c] += (clock.time - a.seen) * (a.v - s[c + 1].v)
                 f[c] = 0.0
@@ -245,9 +238,8 @@ def parted(n, p, slow, s, clock):
         y, rate = y + p * a.loss * u, u + p * a.loss * gain
         root = rate * rate - 2.0 * gain * y
         # What still swings goes on, while one that is pulled comes back.
-        if (u > 0.0 and gain <= 0.0) or (swings and gain > 0.0):
-            return False
-        if y > 0.0 and not (root > 0.0 and rate > 0.0):
+        shut = y > 0.0 and not (root > 0.0 and rate > 0.0)
+        if shut or (u > 0.0 and gain <= 0.0) or (swings and gain > 0.0):
             return False
         # It opened where d + p A u was 0, and may by now be closed again.
         if root > 0.0 and gain > 0.0:
@@ -270,7 +262,7 @@ def run(n, law, effort, s, clock, record):
     A contact is watched from when its neighbour closes until both are idle; other balls fly freely.
     """
     p, slow, h = law.p, FAINT * law.accuracy, clock.h
-    lossy, leans = clock.lossy > 0, clock.leans > 0
+    lossy, leans = clock.lossy > 0.0, clock.leans > 0.0
     low, high = clock.low, clock.high
     while low < high and clock.steps < clock.most and effort > 0:
         effort -= high - low
@@ -279,7 +271,7 @@ def run(n, law, effort, s, clock, record):
             flown = fly(h, low, high, s)
             clock.time += flown
             if flown > 0.0:
-                put_down(n, lossy, s, clock, record)
+                put_down(n, s, clock, record)
             continue
         clock.steps += 1
         clock.time += h
@@ -305,14 +297,14 @@ def run(n, law, effort, s, clock, record):
             low, high = (0, 0) if parted(n, p, slow, s, clock) else (0, n - 1)
         else:
             while low < high and idle(low, slow, s) and idle(min(low + 1, high - 1), slow, s):
-                rest(s[low], time)
+                s[low].seen, s[low].g, s[low].push = time, 0.0, 0.0
                 low += 1
             while low < high and idle(high - 1, slow, s) and idle(high - 2, slow, s):
                 high -= 1
-                rest(s[high], time)
+                s[high].seen, s[high].g, s[high].push = time, 0.0, 0.0
         clock.low, clock.high = low, high
         if len(record) > 0:
-            put_down(n, lossy, s, clock, record)
+            put_down(n, s, clock, record)
     if low < high and clock.steps < clock.most:
         return PAUSED, effort
     return (UNFINISHED if low < high else FINISHED), effort

@@ -91,8 +91,8 @@ class Clock:
     told: float  # what its change from another told of the error, over the accuracy,
     error: float  # and the estimate so far
     effort: int  # steps of all runs before
-    lossy: int
-    leans: int  # contacts are pressed together at rest: all are watched, all the time
+    lossy: float  # largest A, and deepest lean: with leans all contacts are watched, all the time
+    leans: float
     fastest: int  # the contact that closes fastest, which gives the units:
     mass: float
     speed: float
@@ -207,8 +207,7 @@ def pay(n, p, h, kinks, slow, lossy, s):
         a = s[c]
         a.kinks += 1
         move, left, right = a.move, a.w, s[c + 1].w
-        d, loss, early, at, end, slant = a.d, 0.0, 0.0, 0.0, 0.0, 0.0
-        again = False
+        again, d, loss, early, at, end, slant = False, a.d, 0.0, 0.0, 0.0, 0.0, 0.0
         if lossy:
             d, move, loss, early = a.y, a.y - a.last, a.loss, a.loss * p / h
             again = a.f > 0.0 and a.last > 0.0 and a.before < 0.0 and loss > 0.0

@@ -152,11 +152,7 @@ class Path:
 
     def driven(self, push: Vector) -> Any:
         """Return what pushes of the contacts do to the balls."""
-        gain = np.zeros((len(push), len(self.w)))
-        gain[:, 1:] = push
-        gain[:, :-1] -= push
-        gain *= self.w
-        return gain
+        return -np.diff(np.pad(push, [(0, 0), (1, 1)])) * self.w
 
     def impulses(self, v: Vector) -> Vector:
         """Return the impulses of the contacts, from velocities; none of one that never closed."""
@@ -225,8 +221,7 @@ def _zero(cubic: Vector, h: float) -> float:
     """Return where a cubic is zero between 0 and h; at the end that is nearer to it, if nowhere."""
     from scipy.optimize import brentq
 
-    a, b, c, d = cubic.tolist()
-    end = ((a * h + b) * h + c) * h + d
-    if d * end >= 0.0:
-        return h if abs(end) < abs(d) else 0.0
-    return float(brentq(lambda s: ((a * s + b) * s + c) * s + d, 0.0, h, xtol=1e-300, rtol=1e-15))
+    start, end = cubic[3], np.polyval(cubic, h)
+    if start * end >= 0.0:
+        return h if abs(end) < abs(start) else 0.0
+    return float(brentq(lambda s: np.polyval(cubic, s), 0.0, h, xtol=1e-300, rtol=1e-15))
