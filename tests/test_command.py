@@ -569,7 +569,7 @@ def test_a_long_fit_is_told_of(folder, monkeypatch, capsys):
     bar = lambda delay, **options: tqdm(**options, mininterval=0.0, delay=delay - 2.0)  # noqa: E731
     monkeypatch.setattr("tqdm.tqdm", bar)
     with pytest.raises(SystemExit):
-        run(shlex.split("fit shots.csv"))
+        run(shlex.split("fit shots.csv --without BAC,CAB,ACA"))
     assert re.search(r"\d{4,} points", capsys.readouterr().err)
     monkeypatch.setattr("cradle.fit.ratio", lambda *_, **__: run(["frobnicate"]))
     rows = [f"ABCDE,1,{k + 1},{'ABCDE'[k]},0.03,{1 - min(k, 1)},{k / 5},0.1" for k in range(5)]
