@@ -116,14 +116,13 @@ def test_eq_43_impulse_of_the_back_impact():
 def test_eq_44_separates_one_collision_each():
     """Both solvers, just above and just below the curve."""
     tried = 0
-    for _, r2, e, alpha in zip(*random_cases(44, 200)):
-        r1 = float(back_impact_line(r2, e, e, alpha))
+    for _, r2, e2, alpha in zip(*random_cases(44, 200)):
+        e = [e2, 1.3 - e2]
+        r1 = float(back_impact_line(r2, *e, alpha))
         if 0.01 < r1 < 1 / alpha - 1:
-            above, below = r1 * (1 + 1e-9), r1 * (1 - 1e-9)
-            assert solved(above, r2, e, alpha).collisions.tolist() == [1, 1]
-            assert solved(below, r2, e, alpha).collisions.tolist() == [2, 1]
-            assert reference(above, r2, e, alpha).collisions == [1, 1]
-            assert reference(below, r2, e, alpha).collisions == [2, 1]
+            for side, collisions in ((1 + 1e-9, [1, 1]), (1 - 1e-9, [2, 1])):
+                assert solved(r1 * side, r2, e, alpha).collisions.tolist() == collisions
+                assert reference(r1 * side, r2, e, alpha).collisions == collisions
             tried += 1
     assert tried > 50
 
