@@ -239,6 +239,13 @@ MISSED = {
         [1] * 6,
         [0.111, -0.553, 0.217, 0.283, 0.117, 0.0523],
     ),
+    # It swings long: two runs agree, and both end late.
+    "swings long": (
+        [1] * 7,
+        [1, -0.551833, 0.715247, -0.26442, -0.444797, 0.394693, -0.573671],
+        [0.836128, 0.596145, 1.20383, 1.41881, 2.5677, 2.00896],
+        [-0.00412331, -0.012817, -0.224945, 0, -0.0303047, 0],
+    ),
     # Contacts collide a second time: that amplifies errors.
     "again": (
         [2.48, 0.434, 2.92, 0.737, 0.594, 0.463, 0.471, 0.822],
@@ -258,6 +265,16 @@ def test_what_once_missed_its_accuracy(case):
         assert abs(found - exact).max() <= accuracy * scale
 
 
+@needs_numba
+def test_runs_that_hardly_agree_are_no_answer_where_balls_swing_long(monkeypatch):
+    """With a margin as without leans the answer was off by 2.8 thousandths."""
+    monkeypatch.setenv(runtime.VARIABLE, "compiled")
+    k = [0.97221032, 0.78741852, 0.51519862, 0.69822231, 1.6037132, 0.40883794, 0.57152675]
+    gaps = [0, 0.11185776, 0.2203687, -0.019546423, -0.22297702, 0.092287725, 0]
+    with pytest.raises(ImpactNotFinished, match="or leans hold balls together"):
+        spring_velocities([1] * 8, struck(8), k, gaps=gaps, accuracy=1e-3)
+
+
 def test_what_still_swings_is_not_at_rest_while_another_contact_comes_back():
     m, gaps = [0.157, 1.43, 0.452, 0.125], [0, -0.221, -0.000739]
     law = {"stiffness": [0.902, 0.356, 1.95], "viscosity": 0.0654, "gaps": gaps}
@@ -275,6 +292,9 @@ LOSSY = {
     # Its losses open a contact for about a step, or do not quite.
     "open for a step": ([2.78, 0.139, 0.395], [1, -0.619, -0.356], [0.521, 2.06], [0.05, 0.00588],
                         [0, 0.935]),
+    # Its losses open a contact, and later it pushes again.
+    "pushes again": ([3.91, 0.2098, 3.056], [1, -0.02121, 0.6049], [0.752, 0.4625], [0.1093] * 2,
+                     [0, 0]),
     # A contact that closes just before a node, and a touching one behind it.
     "closed just now": ([1] * 6, struck(6), [0.471, 3.03, 2.56, 1.57, 1.16],
                         [0.0297, 0.0764, 0.0678, 0.117, 0.0613], [0, 0, 0.21, 0, 0]),
@@ -282,7 +302,7 @@ LOSSY = {
 
 
 @needs_numba
-@pytest.mark.parametrize("name", [*LOSSY, *MISSED])
+@pytest.mark.parametrize("name", [*LOSSY, *(n for n in MISSED if n != "swings long")])
 def test_losses_and_leans_leave_the_fourth_order(monkeypatch, name):
     """Of the largest error of runs that meet their kinks at any part of a step."""
     monkeypatch.setenv(runtime.VARIABLE, "compiled")
