@@ -150,7 +150,7 @@ class Impact:
         if p - r <= self.last_digits and q:
             return []
         at = (1 - self.meeting) * max(self.zero, r) + self.meeting * min(p, q)
-        ways = (left, at, p), (right, q - at, q - r)
+        ways = (left, at, p), (right, min(q - at, q - r), q - r)  # no farther than it goes
         parts = [(run, x / whole if x > self.last_digits else self.zero) for run, x, whole in ways]
         return [1 if (1 - x) * run.length <= run.instant else x for run, x in parts]
 

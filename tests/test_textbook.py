@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from chains import local_orders
 from march import march
-from truth import EventLimit, solve
+from truth import EventLimit, meaning, solve
 
 from cradle import Chain, ImpulseCorrelation, collide, textbook
 from cradle.closed_form import largest_ratios
@@ -175,6 +175,13 @@ def test_threshold_is_a_limit():
     far = solve(*CHATTER, excess="saturate")
     assert len(near.events) < len(far.events)
     assert max(abs(a - b) for a, b in zip(near.velocities, far.velocities)) < 1e-19
+
+
+def test_a_run_whose_ball_does_not_move_goes_no_way_to_a_meeting():
+    """Light balls are fast: what rounding left of that way was divided by zero."""
+    chain = [1, 1e-6, 1e-6, 1, 1], [1, 0, 0, 0, 0], [0.99, 1, 1, 0.9], [0.1, 0, 0.1], [0.1, 0.1, 0]
+    with pytest.raises(textbook.EventLimit):  # it goes on without end
+        textbook.solve(*chain, number=meaning, max_events=300)
 
 
 def test_event_limit_reports_what_was_reached():
