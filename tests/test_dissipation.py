@@ -45,7 +45,7 @@ def part(chain):
 @given(cases())
 def test_laws(case):
     chain, kappa, distance = case
-    keeps(collide(chain, QuadraticDissipation(kappa, distance=distance)), energy=1e-10)
+    keeps(collide(chain, QuadraticDissipation(kappa, distance=distance)), energy=1e-10, order=1e-13)
 
 
 def solved(matrix, right):
