@@ -30,7 +30,8 @@ from cradle.swinging.stride import Alone, Flight, Hit, Plane
 
 __all__ = ["Bodies", "Hit", "Row", "step_rows"]
 
-# From so many looks at moving balls the row learns how the engine steps.
+# From so many looks at moving balls the row learns how the engine steps; at so many impacts it
+# looks what pushes did.
 _LESSONS = 200
 
 Pairs = Sequence[Sequence[float]]

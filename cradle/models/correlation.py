@@ -85,9 +85,8 @@ class ImpulseCorrelation:
     def ratios(self, n: int) -> tuple[Vector, Vector]:
         """Return the ratios forward and backward at the interior balls of a chain of n balls."""
         backward = self.forward if self.backward is None else self.backward
-        both = {"forward": self.forward, "backward": backward}
-        forward, backward = (asked.row_of(name, row, n - 2, n) for name, row in both.items())
-        return forward, backward
+        row = asked.row_of
+        return row("forward", self.forward, n - 2, n), row("backward", backward, n - 2, n)
 
     def solve(self, chain: Chain, *, record: bool | None = None, progress: bool = False) -> Trace:
         """Solve the impact of `chain`; see `collide`."""

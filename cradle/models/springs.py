@@ -164,6 +164,8 @@ class Path:
 
         Collisions, durations and works are booked beside.
         """
+        from scipy.interpolate import CubicHermiteSpline as Cubic  # slow to import
+
         self.collisions = self.closed[0].astype(np.int64)
         self.durations, self.absorbed = np.zeros((2, len(self.k)))
         if len(self.t) == 1:
@@ -179,19 +181,16 @@ class Path:
             ("close", closing > 0, self.y, u),
         ):
             for j, c in np.argwhere(wanted).tolist():
-                h, two = self.t[j + 1] - self.t[j], slice(j, j + 2)
-                began = kind == "close" and touching[j, c]
-                t = 0.0 if began else self.t[j] + _zero(_cubic(h, x[two, c], rate[two, c]), h)
+                two, began = slice(j, j + 2), kind == "close" and touching[j, c]
+                piece = Cubic(self.t[two], x[two, c], rate[two, c]).c[:, 0]
+                t = 0.0 if began else self.t[j] + _zero(piece, self.t[j + 1] - self.t[j])
                 where.append((t, kind, j, c))
         where.sort(key=lambda event: (event[0], event[1] != "maximum_compression"))
         found: list[Any] = [(0.0, None, self.v[0], self.force[0])]
         for t, kind, j, c in where:
-            h, two = self.t[j + 1] - self.t[j], slice(j, j + 2)
-            powers = (t - self.t[j]) ** np.arange(3, -1, -1)
-            y, v = (
-                powers @ _cubic(h, self.y[two], u[two]),
-                powers @ _cubic(h, self.v[two], self.a[two]),
-            )
+            two = slice(j, j + 2)
+            y = Cubic(self.t[two], self.y[two], u[two])(t)
+            v = Cubic(self.t[two], self.v[two], self.a[two])(t)
             push = np.where(self.closed[j] | self.closed[j + 1], self.pushes(y), 0.0)
             if kind == "maximum_compression":
                 shown = bool(u[j, c] > 0.0)  # between two maxima is a minimum
@@ -208,13 +207,6 @@ class Path:
         at, events, path, force = map(list, zip(*found, strict=True))
         path[-1] = self.last
         return np.array(at), tuple(events[1:]), np.array(path), np.array(force)
-
-
-def _cubic(h: float, x: Vector, rate: Vector) -> Vector:
-    """Return the cubics, highest power first, that go through values with rates, h apart."""
-    slope = (x[1] - x[0]) / h
-    bend = (rate[0] + rate[1] - 2.0 * slope) / h
-    return np.array([bend / h, (slope - rate[0]) / h - bend, rate[0], x[0]])
 
 
 def _zero(cubic: Vector, h: float) -> float:
