@@ -34,7 +34,9 @@ def test_the_work_for_an_error():
     ):  # fmt: skip
         points = shown[which].tolist()
         while points[-1][1] <= error:
-            work = points.pop()[0]
+            work, within = points.pop()
+        more, beyond = points[-1]
+        work *= (more / work) ** (np.log(error / within) / np.log(beyond / within))
         assert CHAPTER.glued[name.replace("_", "-")] == f"{work:.0f}"
 
 
