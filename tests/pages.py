@@ -70,9 +70,9 @@ MISFITS = """() => {
       const share = image.getBoundingClientRect().width / image.getAttribute("width");
       const letters = share * box.dataset.letters;
       if (!(letters > 10.9)) say("small letters", image, letters, 10.9);
-      // Colours of a map are a scale, and mean the same in both modes.
+      // Colours of a map are a scale, and mean the same in both modes: none is turned.
       const filters = [];
-      for (let node = image; node && image.matches(".map"); node = node.parentElement)
+      for (let node = image; node; node = node.parentElement)
         filters.push(getComputedStyle(node).filter);
       if (filters.some((filter) => filter !== "none")) say("turned map", image, filters, "none");
     }

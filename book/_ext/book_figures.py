@@ -7,7 +7,7 @@ both; the theme's classes `only-light` and `only-dark` show one of them.
 
 A map, a figure that contains a picture of points, has colours all over, with letters and lines on
 them, and its scale of colours is read from pale to strong. Turned round it would say something
-else. So a map is one picture, which stands on its own white in both modes.
+else. So these stay, and what is around them follows the theme.
 
 The box around a figure knows how wide the figure has to be for its smallest letters to be read. On
 a narrow screen the style sheet lets a wider one scroll in this box. On a desk small letters of all
@@ -36,6 +36,19 @@ COLOUR = re.compile(
     r"#(?:[0-9a-fA-F]{6}|[0-9a-fA-F]{3})\b|(?<=[\"' :])(?:white|black)(?=[\"';])"
 )
 NAMED = {"white": "#ffffff", "black": "#000000"}
+
+#: Matplotlib's axes, their ground, and in a map what lies on it: all but ticks and frame.
+AXES = re.compile(r'^  <g id="axes_\d+">\n.*?^  </g>\n', re.M | re.S)
+GROUND_OF_AXES = re.compile(
+    r"M ([\d.]+) ([\d.]+) \nL ([\d.]+) [\d.]+ \nL [\d.]+ ([\d.]+)"
+)
+ON_MAP = re.compile(
+    r'^   <g id="(line2d|QuadContourSet|QuadMesh|LineCollection|text)_\d+">\n.*?^   </g>\n',
+    re.M | re.S,
+)
+#: A colour of a map in its legend.
+SWATCH = re.compile(r"fill: #\w+; stroke: #666666")
+PLACE = re.compile(r"translate\(([\d.]+) ([\d.]+)\)")
 
 #: Pixels that the smallest letters of a figure have on a phone, at least. (Indices are smaller.)
 LEGIBLE = 11
@@ -69,8 +82,41 @@ def dark(colour: str) -> str:
 
 
 def darkened(svg: str) -> str:
-    """Return a drawing in the colours of dark mode."""
+    """Return a drawing in the colours of dark mode; a map and what lies on it stay."""
+    kept: list[str] = []
+
+    def keep(part: str) -> str:
+        kept.append(part)
+        return f"<kept {len(kept) - 1}>"
+
+    def keep_map(match: re.Match[str]) -> str:
+        axes = match[0]
+        if not is_map(axes) and "QuadMesh" not in axes:
+            return axes
+        left, low, right, high = map(
+            float, GROUND_OF_AXES.search(axes).groups()
+        )
+
+        def on_map(part: re.Match[str]) -> str:
+            if part[1] == "text":
+                x, y = map(float, PLACE.search(part[0]).groups())
+                if not (left < x < right and high < y < low):
+                    return part[0]  # a title
+            return keep(part[0].replace("<g ", '<g fill="#010101" ', 1))
+
+        # Without a value the ground of a map is seen.
+        return ON_MAP.sub(
+            on_map, axes.replace("fill: #ffffff", "fill: #fefefe", 1)
+        )
+
+    if is_map(svg):
+        svg = SWATCH.sub(
+            lambda match: keep(match[0]), AXES.sub(keep_map, svg)
+        )
     drawing = COLOUR.sub(lambda match: dark(match[0]), svg)
+    drawing = re.sub(
+        r"<kept (\d+)>", lambda match: kept[int(match[1])], drawing
+    )
     # What names no colour, such as black letters, is black.
     return drawing.replace("<svg ", f'<svg fill="{dark("black")}" ', 1)
 
@@ -133,11 +179,7 @@ def pair_images(
             return match[0]
         svg = original.read_text(encoding="utf-8")
         (width, height), smallest = drawn_size(svg), letters(svg)
-        colourings = (
-            {"map": ""}
-            if is_map(svg)
-            else {"only-light": "", "only-dark": "-dark"}
-        )
+        colourings = {"only-light": "", "only-dark": "-dark"}
         # With its size given, a figure that is not loaded yet keeps its place.
         images = [
             f'<img class="{name}" width="{width}" height="{height}"'
@@ -165,7 +207,7 @@ def write_dark(app: Sphinx, exception: Exception | None) -> None:
     if exception is None and app.builder.format == "html":
         for path in Path(app.outdir, "_images").glob("*.svg"):
             drawing = path.read_text(encoding="utf-8")
-            if not path.stem.endswith("-dark") and not is_map(drawing):
+            if not path.stem.endswith("-dark"):
                 path.with_name(f"{path.stem}-dark.svg").write_text(
                     darkened(drawing), encoding="utf-8"
                 )
