@@ -179,11 +179,9 @@ def test_two_clicks_from_the_landing_page_to_any_item(html: Path, root: Path, ch
     with (root / "data" / "ledger.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     for row in rows:
-        line = (
-            f'<td data-name="item"><a href="{row["cell"]}">{row["item"]}</a></td>'
-            f'<td data-name="verdict">{row["status"]}</td>'
-        )
-        assert line in chapters[book / "ledger.html"], row["item"]
+        link = f'<a href="{row["cell"]}">{row["item"]}</a>'
+        (line,) = (one for one in chapters[book / "ledger.html"].split("<tr>") if link in one)
+        assert f'<td data-name="verdict">{row["status"]}</td>' in line, row["item"]
         page, _, label = row["cell"].partition("#")
         assert f'id="{label}"' in chapters[book / page], row["item"]
         notebook = root / "book" / page.replace(".html", ".ipynb")
