@@ -62,8 +62,8 @@ def test_fig_6_drawn():
     r2, r1 = shown["Eq. (44): back impact"].T
     np.testing.assert_allclose(r1, eq_44(r2), rtol=1e-13)
     rest_2 = 0.5 * math.sqrt(0.85 + 0.0375**2) - 0.01875  # Eq. 46
-    np.testing.assert_allclose(shown["Eq. (45): $v_1^+ = 0$"], [(rest_2, 1.7), (3, 1.7)])
-    np.testing.assert_allclose(shown["Eq. (46): $v_2^+ = 0$"], [(rest_2, 1.7), (rest_2, 3)])
+    np.testing.assert_allclose(shown["Eq. (45): $v_1^+ = 0$"], [(rest_2, 1.7), (3.2, 1.7)])
+    np.testing.assert_allclose(shown["Eq. (46): $v_2^+ = 0$"], [(rest_2, 1.7), (rest_2, 3.2)])
     np.testing.assert_allclose(shown["all three meet"], [(rest_2, 1.7)])
     # The thin borders, from the fourth collision on: the map of turns counts one more below.
     thin = [x.get_xydata() for x in ax.get_lines() if x.get_color() == "0.35"]
@@ -72,13 +72,14 @@ def test_fig_6_drawn():
         for r2, r1 in line[~np.isnan(line[:, 1])][20::60]:
             assert by_turns(r1 * (1 - 1e-7), r2, 0.5, 0.15)[0] == number
             assert by_turns(r1 * (1 + 1e-7), r2, 0.5, 0.15)[0] == number - 1
-    (mesh,) = [x for x in ax.collections if hasattr(x, "get_coordinates")]
-    field = np.ma.getdata(mesh.get_array()).reshape(400, 400)
-    grid = np.linspace(0, 3, 401)[1:] - 3 / 800
-    for row in range(20, 400, 54):
-        for column in range(20, 400, 54):
-            v = by_turns(grid[row], grid[column], 0.5, 0.15)[1]
-            assert field[row, column] == bouncing_pattern(np.array(v))
+    # Shaded: where balls 1 and 2 go back.
+    shades = [x.get_paths()[0] for x in ax.collections if getattr(x, "filled", False)]
+    assert len(shades) == 2
+    for r1 in np.linspace(0.15, 3.05, 8):
+        for r2 in np.linspace(0.15, 3.05, 8):
+            v = by_turns(r1, r2, 0.5, 0.15)[1]
+            shown = [path.contains_point((r2, r1)) for path in shades]
+            assert shown == [v[0] < 0, v[1] < 0], (r1, r2)
 
 
 def test_fig_patterns_turns():
@@ -134,13 +135,16 @@ def test_fig_patterns_parameters():
 
 def test_fig_patterns_micro():
     top, low = (panel("patterns", "fig-patterns-micro", k) for k in (0, 1))
-    r = low["$v_1^+$"][:, 0]
+    r, first = low["$v_1^+$"][:, 0], 4000 - len(low["$v_2^+$"])
+    low["$v_2^+$"] = np.vstack([np.full((first, 2), np.nan), low["$v_2^+$"]])
     np.testing.assert_allclose(top["estimate"][:, 1], np.pi * np.sqrt(1 / (2 * r)), rtol=1e-12)
     for k in range(100, 4000, 350):
         for a in (0, 0.15, 0.5):
             assert top[f"$a$ = {a:g}"][k, 1] == by_turns(r[k], r[k], 1, a)[0]
         v = by_turns(r[k], r[k], 1, 0.15)[1]
-        assert [low[f"$v_{i}^+$"][k, 1] for i in (1, 2, 3)] == pytest.approx(v, abs=1e-10)
+        for ball in range(3) if k >= first else (0, 2):
+            assert low[f"$v_{ball + 1}^+$"][k, 1] == pytest.approx(v[ball], abs=1e-10)
+    assert r[first] < 0.01
     assert low["Fig. 7"][0] == pytest.approx([0.01, by_turns(0.01, 0.01, 1, 0.15)[1][1]], abs=1e-9)
 
 
