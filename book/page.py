@@ -284,15 +284,19 @@ def inside(trace: Trace) -> None:
     along = trace.path_impulses.sum(axis=1)
     number_events(ax, along[rows], range(1, len(rows) + 1))
     grows = np.diff(trace.path_impulses, axis=0) > 0
-    for contact in range(contacts):
-        spans = [
-            (start, end - start)
-            for start, end, acts in zip(
-                along, along[1:], grows[:, contact], strict=False
-            )
-            if acts
-        ]
-        below.broken_barh(spans, (contact - 0.35, 0.7), color="0.35")
+    # A contact between its start and its end waits while another run is drawn.
+    waits, active = np.zeros_like(grows), np.zeros(contacts, dtype=bool)
+    for piece, (kind, contact) in enumerate(trace.events):
+        active |= grows[piece]
+        waits[piece] = active & ~grows[piece]
+        active[contact] = kind not in ("end", "collapse")
+    for pieces, look in (
+        (grows, {"color": "0.35"}),
+        (waits, {"fc": "none", "ec": "0.35", "hatch": "////", "lw": 0}),
+    ):
+        for contact, acts in enumerate(pieces.T):
+            spans = np.column_stack([along[:-1], np.diff(along)])[acts]
+            below.broken_barh(spans, (contact - 0.35, 0.7), **look)
     below.set_yticks(
         range(contacts), [f"{c + 1}-{c + 2} acts" for c in range(contacts)]
     )
