@@ -161,7 +161,19 @@ def test_engines_energy_from_nowhere():
 
 def test_fig_trade_engines_drawn():
     """The striker's velocity of every row of the table, in the line of its engine."""
-    axes = CHAPTER.figures["fig-trade-engines"].axes
+    (ax,) = CHAPTER.figures["fig-trade-engines"].axes
+    names = [label.get_text() for label in ax.get_yticklabels()]
+    rows = dict(zip(ax.get_yticks(), zip(names, np.repeat(("apart", "touching", "pressed"), 5))))
+    for x, y in marks(ax):
+        engine, placement = rows[y]
+        setting = f"refined, {placement}"
+        (row,) = find("engine", setting, model=engine, chain="three equal")
+        assert x == row["velocities"][0]
+    assert len(set(map(tuple, marks(ax)))) == len(rows) == 15
+    lines = sorted({line[0, 0] for line in points(ax, 2)})
+    three = fused("three equal")[0], HERTZ["three equal"][0], sequential("three equal")[0]
+    assert lines == pytest.approx(three, abs=1e-8)
+    axes = CHAPTER.figures["fig-trade-engines-all"].axes
     for ax, scene in zip(axes, (*ELASTIC, "ABCCA"), strict=True):
         expected = sorted(
             (row["velocities"][0], ENGINES.index(row["model"]) + 0.22 * at)
