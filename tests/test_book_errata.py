@@ -150,6 +150,9 @@ def test_r7_hold_that_drives_on():
     assert GLUED["hold"] == "(" + ", ".join(f"{v:.4f}" for v in held).replace("-", "−") + ")"
     # What small steps tend to without the rule (tests/test_textbook.py): balls 2 to 4 as one body.
     assert GLUED["chatter"] == f"(−{(3 - 1) / 4}, {2 / 4}, {2 / 4}, {2 / 4})"
+    chatter = np.array([-0.5, 0.5, 0.5, 0.5])
+    assert GLUED["hold-apart"] == f"{abs(held - chatter).max():.2f}"
+    assert GLUED["readings"] == Chapter("n_balls").glued["n-balls-spread"]
 
 
 def test_r7_square_root_at_the_bound():
