@@ -62,12 +62,16 @@ def main(target: Path) -> None:
 
 
 def show_link(target: Path) -> None:
-    """Show the link to the file in the book that it was put into, if there is one."""
+    """Write the link to the file into the book that it was put into, if there is one."""
     page = target.parent / "book" / "cite.html"
     if page.is_file() and target.name == DEFAULT.name:
         text = page.read_text(encoding="utf-8")
         page.write_text(
-            text.replace('<p id="pdf" hidden', '<p id="pdf"'),
+            text.replace(
+                '<p id="pdf" hidden></p>',
+                '<p id="pdf">The whole book in one file: '
+                f'<a href="../{target.name}">PDF of all pages</a>.</p>',
+            ),
             encoding="utf-8",
         )
 
