@@ -476,6 +476,21 @@ def test_plain_and_compiled_agree_to_the_last_bit(monkeypatch, p, loss):
     assert found[1:] == found[:-1]
 
 
+@needs_numba
+def test_a_way_that_is_begun_plain_goes_on_compiled(monkeypatch):
+    monkeypatch.setenv(runtime.VARIABLE, "compiled")
+    chain, compiled = Chain([1, 2, 1], struck(3)), runtime.chosen(False, "follow")
+    whole = collide(chain, SpringChain())
+    monkeypatch.setattr(job, "_PAGES", 20)
+    trace = collide(chain, SpringChain())
+    kernels = itertools.chain([job.plain] * 3, itertools.repeat(compiled))
+    monkeypatch.setattr(runtime, "chosen", lambda *_: next(kernels))
+    plain = []
+    monkeypatch.setattr(runtime, "spend", plain.append)
+    assert trace.step_forces.tobytes() == whole.step_forces.tobytes()
+    assert len(plain) == 3
+
+
 @pytest.mark.parametrize("kernel", ["plain", pytest.param("compiled", marks=needs_numba)])
 def test_nan_ends_and_is_no_answer(monkeypatch, kernel):
     """No check of input stands before the loop here: it must refuse, and end at any step."""

@@ -44,9 +44,11 @@ def solve(
         if stop is not None and stop.is_set():
             raise Stopped
         kernel = runtime.chosen(large, "follow")
-        if compiled is None or (compiled is not (kernel is not plain) and record is None):
+        if compiled is not (kernel is not plain):
             # A chain that has begun plain begins anew.
             compiled, status = kernel is not plain, FINISHED
+            if record is not None:
+                record.clear()
             area = blank(Link, n, compiled), blank(Clock, 1, compiled)
             clock = area[1][0] if compiled else vars(area[1][0])
             given = chains if compiled else Springs(*(part.tolist() for part in chains))
