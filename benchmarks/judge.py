@@ -8,8 +8,8 @@ Usage::
 
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
 within 600 events.  A float means what it prints as if that is short, see `meaning`: ties of an
-exact run are those of the decimals that a reader sees.  Wrong chains are printed as they can be
-pasted.  Where the exact run has no end, see `second_opinion`.
+exact run are those of the decimals that a reader sees.  Wrong chains are made as small and plain as
+they stay wrong, and printed to be pasted.  Where the exact run has no end, see `second_opinion`.
 
 Every chain counted as right or wrong was judged by the exact run, at some hundred chains a second.
 """
@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 import truth
 from families import JUDGED, family
+from problem import Problem
 from stored import options, write
 from truth import meaning
 
@@ -186,6 +187,25 @@ def seen_otherwise(problem):
             yield back(given)
 
 
+def shrunk(problem, word, *ask):
+    """The chain with as few balls, and then as plain numbers, as leave the verdict what it is."""
+
+    def smaller(given):
+        if len(given.masses) > 2:
+            for part in slice(1, None), slice(None, -1):
+                yield Problem(*(values[part] for values in given[:5]), given.meeting)
+        for k, plain in enumerate([1.0, 0.0, 1.0, 0.0, 0.0]):
+            for i, x in enumerate(given[k]):
+                if x != plain:
+                    values = [*given[k][:i], plain, *given[k][i + 1 :]]
+                    yield given._replace(**{given._fields[k]: values})
+
+    for other in smaller(problem):
+        if judge(other, *ask).word == word:
+            return shrunk(other, word, *ask)
+    return problem
+
+
 # --- many chains -------------------------------------------------------------------------------
 
 
@@ -198,7 +218,8 @@ def task(name, count, seed):
             verdict = second_opinion(problem)
         counts[verdict.word] += 1
         if verdict.word in DOUBTFUL:
-            found.append((name, verdict, problem))
+            least = shrunk(problem, verdict.word) if verdict.word in ENDS else problem
+            found.append((name, verdict, least))
     return name, counts, found
 
 

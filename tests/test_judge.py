@@ -8,7 +8,7 @@ import judge as court
 import pytest
 from delicate import CHAINS, chains_of
 from families import JUDGED, family
-from judge import exact, judge, meaning, off, on_bounds, second_opinion
+from judge import exact, judge, meaning, off, on_bounds, second_opinion, shrunk
 from problem import Problem
 
 # --- the package -------------------------------------------------------------------------------
@@ -123,6 +123,17 @@ def test_it_can_say_no():
     beside = Problem([1.0, 3.0, 4.0], [1.0, 0.0, 0.0], [1.0, 1.0], [4 / 7], [0.0])
     assert exact(beside) != exact(on_bounds(beside))
     assert judge(beside, lambda _: exact(on_bounds(beside))).word == "right"
+
+
+def test_a_wrong_chain_is_shrunk():
+    """To what an answer is wrong for: here two light balls beside each other."""
+    long = Problem([1.0, 3.0, 0.3, 0.3, 1.0], [1.0, 0, 0, 0.5, 0], [0.9] * 4, [0.1] * 3, [0.1] * 3)
+
+    def wrong(problem):
+        return answering(0.1 * (problem.masses[-3:-1] == [0.3, 0.3]))(problem)
+
+    least = shrunk(long, "wrong", wrong)
+    assert least == Problem([0.3, 0.3, 1.0], [0.0] * 3, [1.0, 1.0], [0.0], [0.0])
 
 
 def test_a_gap_that_closes_at_once():
