@@ -34,6 +34,19 @@ def test_a_tie_decided_by_products_of_tiny_ratios_is_told_by_the_margin():
     assert clear.collide().margin > 0.0
 
 
+def test_an_outcome_that_hangs_on_when_a_chatter_ends_is_told_by_the_margin():
+    """Two groups chatter, and all runs go on in each round: the last rounds decide by .002."""
+    problem = Problem(
+        [0.053] * 4 + [0.166] * 2 + [0.053] * 7 + [0.045] + [0.053] * 4 + [0.045, 0.166],
+        [1, 1, 0.5, -0.5, 0, 0.5, -0.5, -0.5, 1, -0.5, 1, 0.5, 0, 1, 1, 0.5, -0.5, 1, 1, -0.5],
+        [0.9, 0.5, 0.5, 0.9, 0.9, 0.5, 0.5, 1, 0.5, 0, 0.9, 1, 1, 0, 0.9, 1, 0, 0.5, 1],
+        [1, 1, 1, 1, 1, 0.1, 0, 0, 1, 0.1, 0, 0.1, 0.1, 0.1, 0, 1, 1, 0],
+        [0.1, 1, 0, 0.1, 1, 0, 0, 0.1, 0, 1, 0, 1, 1, 0.1, 1, 0, 0.1, 1],
+    )
+    assert off(problem, problem.collide().velocities.tolist(), exact(problem)) > 1e-3
+    assert problem.collide().margin == 0.0
+
+
 STORED = Path(__file__).parents[1] / "data" / "judge.csv"
 #: Chains of each family in the tests: as many as some seconds allow.
 SAMPLE = {

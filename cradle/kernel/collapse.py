@@ -109,13 +109,17 @@ def merge(first, last, n, state):
 def merge_exhausted(c, n, state):
     """Merge the contacts around c that only chatter; return (first, last), empty if none are."""
     # One must lose energy, unless all are dust: elastic sequences are finite, or hand it all on.
-    contact = state.contact
+    contact, run, tally = state.contact, state.run, state.tally[0]
     first, last = last_chatter(c, -1, n, state), last_chatter(c, 1, n, state)
     loses = False
     fastest = 0.0
     for k in range(first, last + 1):
         loses = loses or contact[k].e.real < 1.0
         fastest = max(fastest, abs(contact[k].u.real))
-    if loses or fastest < LIMITS.dust * state.tally[0].fastest:
+    if loses or fastest < LIMITS.dust * tally.fastest:
+        begin, end = run[n - 1].onward, run[n - 1].back
+        if begin < first or run[end].last > last:
+            # All runs go on in each round: how many rounds were left decides where others are then.
+            tally.margin = 0.0
         return merge(first, last, n, state)
     return c, c - 1
