@@ -63,6 +63,14 @@ def above_bound(ratio, m, driven, onward):
     return ratio > 1.0 / (1.0 + m / driven * (1.0 - onward)) * LIMITS.rounded
 
 
+def meant(ratio, m, driven, onward):
+    """R7: the ratio, or its bound (Eq. 53) if nothing but rounding keeps it from that."""
+    bound = driven.real / (driven.real + m.real * (1.0 - onward.real))
+    if bound < ratio.real * LIMITS.rounded and ratio.real < bound * LIMITS.rounded:
+        return over(driven, plus(driven, times(m, minus(ONE, onward))))
+    return ratio
+
+
 @apart
 def admissible(n, chain, bounded):
     """Tell whether all inputs are within their limits, ratios within Eq. 53 too if `bounded`."""
@@ -133,6 +141,12 @@ def prepare(n, chain, meeting, state):
         if k.u.real > 0.0:
             tally.fastest = max(tally.fastest, k.u.real)
             tally.energy = max(tally.energy, reduced_mass(c, ball) * k.u.real * k.u.real)
+    for c in range(n - 3, -1, -1):
+        onward = contact[c + 1].forward if c < n - 3 else ZERO
+        contact[c].forward = meant(contact[c].forward, ball[c + 1].m, ball[c + 2].m, onward)
+    for c in range(n - 2):
+        onward = contact[c - 1].backward if c > 0 else ZERO
+        contact[c].backward = meant(contact[c].backward, ball[c + 1].m, ball[c].m, onward)
     forget(LOWER, state.level)
     forget(UPPER, state.level)
     start(n, state)
