@@ -9,11 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from laws import keeps
 
-from cradle import (
-    Chain,
-    QuadraticDissipation,
-    collide,
-)
+from cradle import Chain, QuadraticDissipation, collide
 
 
 @pytest.mark.parametrize(("kappa", "e"), [(0, 0), (0.3, 0), (1, 0), (3, 0.5), (1999, 0.999)])

@@ -8,14 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from laws import keeps
 
-from cradle import (
-    Chain,
-    EnergyDistribution,
-    EnergyTrace,
-    ImpactNotFinished,
-    SpringChain,
-    collide,
-)
+from cradle import Chain, EnergyDistribution, EnergyTrace, ImpactNotFinished, SpringChain, collide
 
 
 @pytest.mark.parametrize(("masses", "exponent", "velocities"), SPRINGS)

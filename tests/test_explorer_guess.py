@@ -5,16 +5,7 @@ import re
 import numpy as np
 import pytest
 from chapters import Chapter
-from explorer import (
-    EXPLORER,
-    bars,
-    chain_of,
-    drawn,
-    grab,
-    later,
-    press,
-    still,
-)
+from explorer import EXPLORER, bars, chain_of, drawn, grab, later, press, still
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide
 

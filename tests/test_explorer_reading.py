@@ -21,13 +21,7 @@ from explorer import (
 )
 from pages import MISFITS, colour, contrast, show
 
-from cradle import (
-    Chain,
-    SpringChain,
-    collide,
-    paper_chain,
-    post_impact_velocities,
-)
+from cradle import Chain, SpringChain, collide, paper_chain, post_impact_velocities
 from cradle.measures import bouncing_pattern
 
 # --- the address ------------------------------------------------------------------------------

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
-from explorer import (
-    EXPLORER,
-    SETTING,
-    drawn,
-    press,
-    still,
-)
+from explorer import EXPLORER, SETTING, drawn, press, still
 from script import Script
 
 from cradle import Chain, SpringChain, collide, spring_velocities

@@ -2,17 +2,7 @@
 
 import numpy as np
 import pytest
-from explorer import (
-    EXPLORER,
-    SETTING,
-    drawn,
-    go_to,
-    grab,
-    middle,
-    press,
-    same_outcome,
-    still,
-)
+from explorer import EXPLORER, SETTING, drawn, go_to, grab, middle, press, same_outcome, still
 
 TIME = f"{EXPLORER}.state.clock.time"
 

@@ -12,14 +12,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from cradle import (
-    Chain,
-    EnergyDistribution,
-    ImpulseCorrelation,
-    SpringChain,
-    collide,
-    paper_chain,
-)
+from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, paper_chain
 from cradle.pictures import impacts as figures
 from cradle.pictures.animation import animate
 from cradle.pictures.balls import chain_sketch, outcome_by_ball

@@ -31,12 +31,7 @@ from cradle.closed_form import (
     one_collision_each,
     three_balls,
 )
-from cradle.measures import (
-    bouncing_pattern,
-    condition_number,
-    conserving_outcomes,
-    effective_ratio,
-)
+from cradle.measures import bouncing_pattern, condition_number, conserving_outcomes, effective_ratio
 from cradle.pictures.animation import animate_swing
 from cradle.pictures.balls import outcome_by_ball
 

@@ -9,13 +9,7 @@ import numpy as np
 import pytest
 
 from cradle import tables
-from cradle.tables import (
-    ball_masses,
-    paper_chain,
-    paper_sequences,
-    ratio_table,
-    restitution_table,
-)
+from cradle.tables import ball_masses, paper_chain, paper_sequences, ratio_table, restitution_table
 
 # Table 2 in the order in which the paper prints it: first two balls down, last ball across.
 # A second reading of the source, independent of data/ratios.csv.
