@@ -272,3 +272,9 @@ def points(ax, size=None):
     """Points of the lines of some axes, in rows of x and y; of lines of so many points alone."""
     lines = [np.column_stack(line.get_data()) for line in ax.get_lines()]
     return [np.asarray(xy, float) for xy in lines if size is None or len(xy) == size]
+
+
+def shows(axes, values) -> bool:
+    """Whether all of these numbers are among those of the lines drawn in some axes."""
+    shown = np.concatenate([line.ravel() for ax in axes for line in points(ax)])
+    return all(np.isclose(shown, value, rtol=1e-9, atol=0).any() for value in values)
