@@ -12,7 +12,6 @@ import long_chains
 import mpmath
 import numpy as np
 import pytest
-import xarray as xr
 from chains import HERTZ, uniform
 from chapters import Chapter, floats, number, points
 from problem import Problem
@@ -304,42 +303,3 @@ def test_a_leader_predicted_from_shorter_rows():
     assert guess == pytest.approx(more * kept**120, abs=5e-3)
     assert solved == pytest.approx(outcomes(*struck(160), 0.99, 0.3).velocities[-1], abs=6e-4)
     assert solved == pytest.approx(guess, abs=2e-3)
-
-
-# Sweeps in pieces
-
-
-def sweep(n=4):
-    rng = np.random.default_rng(2)
-    return (
-        uniform(rng, 0.5, 2, (12, 1, n)),
-        -np.sort(uniform(rng, -1, 1, (12, 1, n))),
-        uniform(rng, 0.2, 1, (9, n - 1)),
-        uniform(rng, 0, 0.2, (12, 1, n - 2)),
-        uniform(rng, 0, 0.2, (9, n - 2)),
-    )
-
-
-@pytest.mark.parametrize("chunks", [None, {"case": 5, "loss": 4}])
-def test_xarray_gives_the_same_bits(chunks):
-    m, v, e, f, b = sweep()
-    data = xr.Dataset(
-        {
-            "m": (("case", "ball"), m[:, 0]),
-            "v": (("case", "ball"), v[:, 0]),
-            "e": (("loss", "contact"), e),
-            "f": (("case", "inner"), f[:, 0]),
-            "b": (("loss", "inner"), b),
-        }
-    )
-    if chunks:
-        data = data.chunk(chunks)
-    after = xr.apply_ufunc(
-        post_impact_velocities,
-        *(data[name] for name in "mvefb"),
-        input_core_dims=[["ball"], ["ball"], ["contact"], ["inner"], ["inner"]],
-        output_core_dims=[["ball"]],
-        dask="parallelized",
-        output_dtypes=[float],
-    ).transpose("case", "loss", "ball")
-    assert after.values.tobytes() == post_impact_velocities(m, v, e, f, b).tobytes()

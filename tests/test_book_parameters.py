@@ -126,24 +126,16 @@ def test_chapter_runs_with_other_numbers(chapter: str, changes: dict):
         run_again(cells, changes, reached(cells), kept)
 
 
-@pytest.mark.parametrize(
-    ("source", "hit"),
-    [
-        ("twice = 2 * ratio", True),
-        ("def outcome(x): return x * ratio", True),
-        ("total = 0\ntotal += ratio", True),
-        ("[ratio for ratio in (1, 2)]", False),
-        ("def outcome(ratio): return 2 * ratio", False),
-        ("ratio = 3\nratio", False),
-    ],
-)
-def test_cells_that_a_change_reaches(source: str, hit: bool):
-    cells = [nbformat.v4.new_code_cell(text) for text in ("ratio = 1", source, "last = outcome(1)")]
-    cells[0].metadata["tags"] = ["parameters"]
-    assert reached(cells) == [True, hit, hit and "outcome" in source]
-
-
-def test_cells_that_a_written_ratio_reaches():
+def test_cells_that_a_change_or_a_written_ratio_reaches():
+    """Directly and by others; not where a name of its own hides the parameter."""
+    for source, hit in (
+        ("twice = 2 * ratio", True), ("def outcome(x): return x * ratio", True),
+        ("total = 0\ntotal += ratio", True), ("[ratio for ratio in (1, 2)]", False),
+        ("def outcome(ratio): return 2 * ratio", False), ("ratio = 3\nratio", False),
+    ):  # fmt: skip
+        cells = [nbformat.v4.new_code_cell(x) for x in ("ratio = 1", source, "last = outcome(1)")]
+        cells[0].metadata["tags"] = ["parameters"]
+        assert reached(cells) == [True, hit, hit and "outcome" in source]
     lines = "ratio = 1", "alpha = 0.2", "beta = 0.2", "last = alpha", "other = beta"
     cells = [nbformat.v4.new_code_cell(line) for line in lines]
     assert reached(cells) == [False] * 5

@@ -43,29 +43,6 @@ def test_address_keeps_the_setting(visit):
     assert drawn(still(visit, unquote(address))) == before
 
 
-def test_a_link_is_followed_while_an_address_is_due(visit):
-    """The address is written late, and maybe just before the page hears of a new one."""
-    tab = still(visit)
-    drawn(tab)
-    tab.get_by_label("ratio", exact=True).press("ArrowRight")
-    drawn(tab)
-    tab.evaluate(
-        f"""(fragment) => new Promise((done) => {{
-          const later = setTimeout;
-          let write;
-          globalThis.setTimeout = (act) => (write = act);
-          {EXPLORER}.written = "";
-          {EXPLORER}.writeAddress();
-          globalThis.setTimeout = later;
-          addEventListener("hashchange", () => done(), {{ once: true }});
-          location.hash = fragment;
-          write();
-        }})""",
-        "speeds=1,0,0",
-    )
-    assert drawn(tab)["speeds"] == [1, 0, 0]
-
-
 WRONG_ADDRESSES = {
     "restitution=1.2": "restitution[0] = 1.2; must lie in [0, 1]",
     "masses=1,2&speeds=1,0,0": "speeds has 3 values; 2 balls need 2",
@@ -422,15 +399,6 @@ def test_motion_is_asked_for(visit):
     lively.wait_for_function(f"{EXPLORER}.visible")
     lively.clock.run_for(500)
     assert lively.evaluate(time) == pytest.approx(before + 0.5, abs=0.05)
-
-
-def test_motion_by_the_frames_of_the_browser(visit):
-    """With the true clock, at whatever pace the machine has."""
-    tab = visit("#scene=one")
-    press(tab, "Let go")
-    tab.wait_for_function(f"{EXPLORER}.state.clock.time > 0.8")
-    places = tab.evaluate(f"{EXPLORER}.state.swing.positions({EXPLORER}.state.clock.time)")
-    assert places[0] == 0 != places[4]  # one comes, one goes
 
 
 # Count what is done: impacts solved, panels drawn anew, attributes set and elements made.
