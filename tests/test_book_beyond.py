@@ -9,11 +9,10 @@ from pathlib import Path
 
 import judge
 import long_chains
-import mpmath
 import numpy as np
 import pytest
 from chains import HERTZ, uniform
-from chapters import Chapter, floats, number, points
+from chapters import Chapter, number, points
 from problem import Problem
 from stored import numbers
 from truth import solve
@@ -88,28 +87,6 @@ def test_longest_rows_again(ratio):
     np.testing.assert_allclose(found.velocities[[0, -2, -1]], ends(ratio), rtol=0, atol=1e-13)
     assert np.abs(found.velocities[1:-2]).max() < 1e-14
     assert (found.collisions == 1).all()
-
-
-@pytest.mark.parametrize("ratio", ["0.05", "0.2", "0.35", "0.5"])
-@pytest.mark.parametrize("balls", [3, 4, 7])
-def test_closed_form_of_a_row_at_fifty_digits(balls, ratio):
-    with mpmath.workdps(50):
-        after = solve([1] * balls, [1] + [0] * (balls - 1), 1, ratio).velocities
-        a = mpmath.mpf(ratio)
-        root = mpmath.sqrt(1 - 2 * a)
-        expected = [-a, *[0] * (balls - 3), 1 - root, 1 + root]
-        off = [abs(v - x / (2 - a)) for v, x in zip(after, expected, strict=True)]
-        assert max(off) < mpmath.mpf(10) ** -48
-
-
-@pytest.mark.parametrize(("balls", "restitution"), [(20, 0.99), (12, 0.9)])
-@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.45])
-def test_rows_with_losses_at_fifty_digits(balls, restitution, ratio):
-    with mpmath.workdps(50):
-        expected = solve([1] * balls, [1] + [0] * (balls - 1), restitution, ratio)
-    after = outcomes(*struck(balls), restitution, ratio)
-    assert list(expected.collisions) == after.collisions.tolist()
-    np.testing.assert_allclose(after.velocities, floats(expected.velocities), rtol=0, atol=1e-13)
 
 
 def test_rows_of_linear_springs_by_their_modes():

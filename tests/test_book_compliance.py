@@ -290,14 +290,3 @@ def test_exercises():
     # No single ratio has the outcome of the springs: each leaves ball 2 at rest.
     assert rows[0][1] < -0.05
     assert max(abs(v[1]) for v in by_ratio.values()) < 1e-14
-
-
-@pytest.mark.parametrize("gamma", GAMMAS)
-def test_each_mode_alone_has_a_constant_quotient_of_impulses(gamma: float):
-    """The eigenvectors by NumPy: a mode's share of the speeds of balls 3 and 1."""
-    stiffness = np.array([[1, -1, 0], [-1, 1 + gamma, -gamma], [0, -gamma, gamma]])
-    squares, modes = np.linalg.eigh(stiffness)
-    assert squares[1:] == pytest.approx(eigenvalues(gamma)[::-1], rel=1e-12)
-    for lam, (first, _, third) in zip(squares[1:], modes.T[1:]):
-        # tau_2 = 1 - v1 and tau_3 = v3: a mode that takes from ball 1 gives to tau_2.
-        assert third / -first == pytest.approx(gamma / (2 * gamma - lam), rel=1e-9)

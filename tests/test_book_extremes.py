@@ -13,8 +13,6 @@ from cradle import (
     collide,
     outcomes,
     paper_chain,
-    paper_sequences,
-    post_impact_velocities,
 )
 
 
@@ -62,45 +60,6 @@ def test_jumps_behind_the_first_edge():
     assert len(again) == len(here) > 1
     expected = [(float(r["change"]), float(r["jump"])) for r in here]
     np.testing.assert_allclose(again, expected, rtol=2e-3)
-
-
-@pytest.mark.parametrize("light", [0.1, 0.25, 1.0, 2.3])
-def test_the_path_in_the_wedge(light):
-    """Parallel to the second wall at the start, at the wedge's angle to the first one."""
-    m = np.array([1, light, 1])
-    start = np.sqrt(m) * (np.array([1, 0, 0]) - m[0] / m.sum())
-    walls = np.array([[1, -1, 0], [0, 1, -1]]) / np.sqrt(m)
-    sines = walls @ start / np.linalg.norm(walls, axis=1) / np.linalg.norm(start)
-    theta = math.atan(math.sqrt(light * (2 + light)))
-    np.testing.assert_allclose(sines, [math.sin(theta), 0], atol=1e-15)
-    # Reflected at the walls in turn, it stops to approach one after ceil(pi / theta) - 1 of them.
-    count, path = 0, start
-    while True:
-        wall = walls[count % 2]
-        if wall @ path <= 1e-12:
-            break
-        path = path - 2 * (wall @ path) / (wall @ wall) * wall
-        count += 1
-    assert count == math.ceil(math.pi / theta - 1e-9) - 1
-
-
-def test_no_jump_lies_within_the_last_digit_of_a_ratio():
-    """Half a unit of the third decimal of each ratio of the ten chains, one at a time."""
-    parts = np.linspace(-5e-4, 5e-4, 1001)
-    most = 0.0
-    for name in paper_sequences():
-        chain, model = paper_chain(name, excess="saturate")
-        count = len(model.forward)
-        ratios = np.tile([*model.forward, *model.backward], (2 * count, len(parts), 1))
-        for k in range(2 * count):
-            ratios[k, :, k] += parts
-        after = post_impact_velocities(
-            chain.masses, chain.velocities, chain.restitution,
-            ratios[..., :count], ratios[..., count:], excess="saturate",
-        )  # fmt: skip
-        assert np.abs(np.diff(after, axis=1)).max() < 1e-5  # each step is a part in 1000
-        most = max(most, np.abs(after - after[:, 500:501]).max())
-    assert 0.002 < most < 0.003  # the text: some thousandths, near a bound (DAD in CDADB)
 
 
 def test_fig_extremes_edge():

@@ -129,17 +129,6 @@ def test_fig_laws_paths_of_the_energy_law_and_of_the_ratio():
     assert number(CHAPTER.glued["apart"]) > 0.01
 
 
-@pytest.mark.parametrize("p", [1.0, 1.5])
-def test_how_the_ratio_begins(p):
-    """Small steps of the springs, beside the power found by hand."""
-    h, v, x, impulse = 2e-5, np.array([1.0, 0, 0]), np.zeros(2), np.zeros(2)
-    while impulse[0] < 1e-3:
-        x = x + h * (v[:-1] - v[1:])
-        push = h * np.maximum(x, 0.0) ** p
-        v, impulse = v - np.diff(push, prepend=0, append=0), impulse + push
-    assert impulse[1] == pytest.approx(impulse[0] ** (p + 1) / ((p + 1) * (p + 2) ** p), rel=0.01)
-
-
 def test_convex_dissipation_keeps_the_struck_balls_together():
     """The least sum of squares, searched for among velocities in order."""
     before = np.array([1.0, 0, 0])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from chains import uniform
 from chapters import Chapter, floats, number
-from scipy.optimize import brentq
 from test_book_n_balls import READINGS, outcome
 from truth import solve
 
@@ -74,33 +73,6 @@ def test_eq_6_sequential():
     for velocities in both_solvers(0):
         np.testing.assert_allclose(velocities, floats((v1, v2, v3)), rtol=0, atol=1e-14)
     assert f"({v1}, {v2}, {v3})" in CHAPTER.printed("sympy-answers")
-
-
-def test_a_light_middle_ball_meets_outcomes_more_than_once():
-    """Masses 1, 1/2, 1: ratio 1/2 is one end of the arc, 2/3 the other; on the way some return."""
-
-    def after(ratio):
-        return [float(v) for v in solve([1, 0.5, 1], [1, 0, 0], 1, ratio).velocities]
-
-    assert after(0.5) == pytest.approx([0, 0, 1], abs=1e-7)  # balls 1 and 2 together
-    assert after(2 / 3) == pytest.approx([-0.2, 0.8, 0.8], abs=1e-7)  # balls 2 and 3
-    same = brentq(lambda ratio: after(ratio)[0] - after(0.6)[0], 0.0, 0.5, xtol=1e-14)
-    assert after(same) == pytest.approx(after(0.6), abs=1e-12)
-    assert 0.6 - same > 0.3
-
-
-def test_the_two_lines_of_the_second_closing_speed():
-    """Equal balls: it rises to 2(1 - 2a)/(2 - a), and this line has the part 2a of compression."""
-    for a in (0.1, 0.15, 0.25, 0.4):
-        exact = solve([1, 1, 1], [1, 0, 0], 1, a)
-        bend, turn = (1 + exact.events.index(k) for k in (("end", 0), ("maximum_compression", 1)))
-        closing = [float(row[1] - row[2]) for row in exact.path]
-        assert closing[0] == 0
-        assert closing[bend] == pytest.approx(2 * (1 - 2 * a) / (2 - a), rel=1e-12)
-        assert closing[turn] == pytest.approx(0, abs=1e-12)
-        assert closing[-1] < 0
-        impulses = [float(row[1]) for row in exact.path_impulses]
-        assert impulses[bend] / impulses[turn] == pytest.approx(2 * a, rel=1e-12)
 
 
 def test_energy_left_by_three_definitions():

@@ -55,20 +55,6 @@ def test_several():
     CHAPTER.tells(dict(zip(("two-third", "two-fourth", "two-fifth"), expected[2:])))
 
 
-def test_what_ratio_zero_and_the_others_do():
-    """At 0 as many fly off as were pulled back, at every stroke; else an inner ball moves."""
-    for pulled in range(1, 5):
-        start = [1.0] * pulled + [0.0] * (5 - pulled)
-        for k, after in enumerate(strokes(6, start, ratio=0.0)):
-            side = 1 if k % 2 == 0 else -1
-            assert (side * after[::side]).tolist() == pytest.approx(start[::-1], abs=1e-12)
-    for ratio in (0.01, 0.1, 0.3, 0.49, 0.5):
-        assert np.abs(strokes(1, [1, 0, 0, 0, 0], ratio=ratio)[0, 1:4]).max() > 1e-3
-    # With two pulled back that is not so: the largest ratio gives the story, too.
-    two = strokes(1, [1, 1, 0, 0, 0], ratio=0.5)[0]
-    assert two.tolist() == pytest.approx([0, 0, 0, 1, 1], abs=1e-7)
-
-
 def test_strokes_and_fig_toy_models():
     """Twenty strokes and many more; then one body of four, and the end of a lossy one."""
     after = strokes(172, [1, 0, 0, 0, 0])

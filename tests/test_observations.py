@@ -7,7 +7,6 @@ import gaps
 import numpy as np
 import pytest
 from chapters import Chapter
-from scipy.integrate import solve_ivp
 
 PAGE = Chapter("observations")
 BOOK = Path(__file__).parents[1] / "book"
@@ -64,17 +63,6 @@ def test_a_gap_decides():
     assert [r for r, row in verdicts().items() if row["pairs"] == "yes"] == [
         "2 and leaves the middle ball", "4 with a gap it goes on",
     ]  # fmt: skip
-
-
-def test_a_force_that_hardly_grows_fuses_the_row():
-    """What "Related work" says we computed: F = x^p with a small p, three equal balls."""
-
-    def motion(_, y):
-        force = np.maximum(y[:2] - y[1:3], 0) ** 0.05 * (y[:2] > y[1:3])
-        return np.concatenate([y[3:], -np.diff(force, prepend=0, append=0)])
-
-    way = solve_ivp(motion, (0, 4), [0, 0, 0, 1, 0, 0], rtol=1e-8, atol=1e-10, max_step=0.01)
-    np.testing.assert_allclose(way.y[3:, -1], np.array([-1, 2, 2]) / 3, atol=1e-3)
 
 
 def test_common_motion_of_spheres():
