@@ -44,13 +44,12 @@ CHANGES = {
         {"ratio": 1, "sequence": "BCACBA", "triplet": "CAC"},
     ],
 }
-#: Chapters that take long: all but their first run belong to the weekly tests.
-LONG = ("multiple_impacts", "patterns", "toy", "trade", "laws")
+#: Of each chapter all but the first run belong to the weekly tests.
 RUNS = [
     pytest.param(
         chapter, changes,
         id=f"{chapter}-{changes}",
-        marks=[pytest.mark.exhaustive] * (chapter in LONG and changes is not runs[0]),
+        marks=[pytest.mark.exhaustive] * (changes is not runs[0]),
     )
     for chapter, runs in CHANGES.items()
     for changes in runs

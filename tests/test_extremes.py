@@ -248,38 +248,6 @@ def test_infinite_sequences_in_bounded_work(light, e):
             assert trace.collapsed == (light <= x.infinite_below(e)), name
 
 
-@pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
-def test_both_sides_of_the_edge_between_finite_and_infinite(e):
-    """Ratio 0: where the eigenvalues of the cycle turn complex; the limit from both sides.
-
-    A finite sequence beside the edge shrinks by e^(pi / phi) on its way, cos phi = trace / 2e.
-    Nothing that can be seen tells one that falls below the smallest speed from an infinite one.
-    """
-    at = x.infinite_below(e)
-    for part in (0.5, 0.9, 0.999, 1 - 1e-6):
-        found = outcomes([1, at * part, 1], [1, 0, 0], e, 0)
-        assert found.collapsed
-        np.testing.assert_allclose(found.velocities, 1 / (2 + at * part), rtol=4 * x.EPS)
-        assert found.collisions.sum() < 5000
-    for part in (1.0 + 1e-6, 1.001, 1.02, 1.1, 2.0):
-        light = at * part
-        trace = (1 + e) ** 2 / (1 + light) ** 2 - 2 * e
-        turn = math.acos(trace / (2 * e))
-        shrunk = e ** (math.pi / turn)
-        found = outcomes([1, light, 1], [1, 0, 0], e, 0)
-        if shrunk > 1e-12:
-            assert not found.collapsed, part
-            with mpmath.workdps(50):
-                problem = x.case([1, light, 1], [1, 0, 0], e, 0)
-                exact = problem.exact(5000)
-                assert found.collisions.tolist() == exact.collisions
-                off = max(abs(a - b) for a, b in zip(found.velocities.tolist(), exact.velocities))
-            assert off < 1e-14
-        elif shrunk < 1e-24:
-            assert found.collapsed, part
-            np.testing.assert_allclose(found.velocities, 1 / (2 + light), rtol=0, atol=1e-14)
-
-
 def test_edges_of_the_map_of_limits():
     """By bisection on the solver, and from the eigenvalues: equal as far as can be seen."""
     for row in stored("limits"):

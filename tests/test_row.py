@@ -363,7 +363,7 @@ def count(bodies):
     return looks
 
 
-@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("e", [0.0, 1.0])
 @pytest.mark.parametrize("step", [1 / 60, 1e-3])
 def test_balls_that_press_each_other_rest(e: float, step: float):
     """Pivots nearer than two radii: every ball leans on its neighbour for ever."""
