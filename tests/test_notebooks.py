@@ -119,7 +119,6 @@ def change(path, value):
 @pytest.mark.parametrize(
     ("spoil", "fault"),
     [
-        (change([1, "execution_count"], None), "not run once"),
         (change([2, "execution_count"], 3), "not run once"),
         (change([1, "outputs", 0], new_output("error", ename="E", evalue="")), "an error"),
         (change([1, "outputs", 0, "name"], "stderr"), "stderr"),
@@ -129,7 +128,6 @@ def change(path, value):
         (change([1, "source"], "# NBVAL_SKIP\nprint(42)"), "not run"),
         (change([2, "metadata", "mystnb", "image", "alt"], " "), "without alt text"),
         (change([2, "metadata", "mystnb", "figure"], {}), "without caption"),
-        (change([2, "metadata"], {}), "without alt text"),
         (change([0, "source"], "![](ball.svg)"), "no alt text"),
         (lambda notebook: notebook.metadata.update(widgets={}), "widget state"),
     ],
