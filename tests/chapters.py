@@ -122,52 +122,6 @@ def run(
     return names
 
 
-def names_of(cell) -> tuple[set[str], set[str]]:
-    """Names that a code cell takes from the cells before it, and names that it gives."""
-    taken, given = set(), set()
-    for statement in parsed(cell).body:
-        inner, loaded, stored = set(), set(), set()
-        for node in ast.walk(statement):
-            match node:
-                case ast.Name(id=name, ctx=ast.Load()):
-                    loaded.add(name)
-                case ast.Name(id=name):
-                    stored.add(name)
-                case ast.alias():
-                    stored.add((node.asname or node.name).partition(".")[0])
-                case ast.For(target=target) | ast.comprehension(target=target):
-                    inner |= {part.id for part in ast.walk(target) if isinstance(part, ast.Name)}
-                case ast.arg(arg=name):
-                    inner.add(name)
-                case ast.AugAssign(target=ast.Name(id=name)):
-                    loaded.add(name)
-        if isinstance(statement, ast.FunctionDef | ast.ClassDef):
-            inner, stored = inner | stored, {statement.name}  # what is stored inside stays there
-        taken |= loaded - inner - given
-        given |= stored
-    return taken, given
-
-
-def kept_of(cell, names: dict[str, object]) -> dict[str, object]:
-    """Return what a code cell has given, once it has run."""
-    return {name: names[name] for name in names_of(cell)[1] & names.keys()}
-
-
-def reached(cells: list, *, written: bool = False) -> list[bool]:
-    """Tell for each code cell whether a change of the parameters reaches it, by others as well.
-
-    With `written`, whether one of the other ratios that the code writes as numbers does so too.
-    """
-    found, changed = [], set()
-    for cell in cells:
-        taken, given = names_of(cell)
-        hit = bool(changed & taken) or "parameters" in cell.metadata.get("tags", [])
-        hit = hit or (written and any(written_ratios(parsed(cell))))
-        changed = changed | given if hit else changed - given
-        found.append(hit)
-    return found
-
-
 @contextlib.contextmanager
 def in_memory(show):
     """Draw without a screen and let `show` take the place of plt.show; undo everything after."""
@@ -184,9 +138,15 @@ def in_memory(show):
 
 
 @functools.cache
-def stored_run(chapter: str) -> tuple[dict[str, Figure], list[dict]]:
-    """Run a chapter as it is stored: its figures by their names, and what each cell gives."""
-    figures, names, given = {}, {}, []
+def drawn(chapter: str) -> dict[str, Figure]:
+    """Run a chapter as it is stored and return its figures by their names.
+
+    The first process of a session that runs it leaves them to the others.
+    """
+    shared = os.environ.get(SHARED)
+    if shared and Path(shared, f"{chapter}.figures").exists():
+        return pickle.loads(Path(shared, f"{chapter}.figures").read_bytes())
+    figures, names = {}, {}
 
     def keep():
         settings = names["__cell__"].metadata.get("mystnb", {})
@@ -195,27 +155,12 @@ def stored_run(chapter: str) -> tuple[dict[str, Figure], list[dict]]:
         plt.close(plt.gcf())
 
     with in_memory(keep), contextlib.redirect_stdout(io.StringIO()):
-        for cell in code(chapter):
-            run([cell], {}, names=names)
-            given.append(kept_of(cell, names))
-    shared = os.environ.get(SHARED)
+        run(code(chapter), {}, names=names)
     if shared:
         part = Path(shared, f"{chapter}.{os.getpid()}")
         part.write_bytes(pickle.dumps(figures))
         part.replace(Path(shared, f"{chapter}.figures"))
-    return figures, given
-
-
-@functools.cache
-def drawn(chapter: str) -> dict[str, Figure]:
-    """Return the figures of a chapter as it is stored, by their names.
-
-    The first process of a session that runs it leaves them to the others.
-    """
-    shared = os.environ.get(SHARED)
-    if shared and Path(shared, f"{chapter}.figures").exists():
-        return pickle.loads(Path(shared, f"{chapter}.figures").read_bytes())
-    return stored_run(chapter)[0]
+    return figures
 
 
 def lines(ax) -> dict[str, np.ndarray]:

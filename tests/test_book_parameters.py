@@ -3,17 +3,15 @@
 A cell tagged `parameters` holds nothing but plain numbers that a reader may change. The stored
 outputs are those of the stored numbers, and nbval compares them; here other numbers take their
 place, and no cell may fail. All other ratios that the code writes as numbers become smaller too.
-Cells that the change does not reach keep what they gave in the run before.
 """
 
 import ast
-import functools
 import itertools
 
 import matplotlib.pyplot as plt
 import nbformat
 import pytest
-from chapters import code, in_memory, kept_of, reached, run, stored_run
+from chapters import code, in_memory, run
 
 # Chapter -> other admissible values: each line is one run of the whole chapter.
 CHANGES = {
@@ -95,50 +93,10 @@ def test_every_parameter_is_changed(chapter: str):
     assert {"intro", *numbered.split()} <= set(CHANGES)
 
 
-def run_again(cells: list, changes: dict, hits: list[bool], kept: list[dict]) -> list[dict]:
-    """Run the cells that a change reaches; the others gave `kept`.  Return what each gives."""
-    names, given = {}, []
-    for cell, hit, old in zip(cells, hits, kept):
-        if hit:
-            run([cell], changes, FACTOR, names)
-            given.append(kept_of(cell, names))
-        else:
-            names.update(old)
-            given.append(old)
-    return given
-
-
-@functools.cache
-def first_run(chapter: str) -> list[dict]:
-    """Run a chapter with its first other numbers; return what each cell gives."""
-    cells = code(chapter)
-    hits = reached(cells, written=True)
-    return run_again(cells, CHANGES[chapter][0], hits, stored_run(chapter)[1])
-
-
 @pytest.mark.usefixtures("pictures_in_memory")
 @pytest.mark.parametrize(("chapter", "changes"), RUNS)
 def test_chapter_runs_with_other_numbers(chapter: str, changes: dict):
-    kept = first_run(chapter)
-    if changes is not CHANGES[chapter][0]:
-        cells = code(chapter)
-        run_again(cells, changes, reached(cells), kept)
-
-
-def test_cells_that_a_change_or_a_written_ratio_reaches():
-    """Directly and by others; not where a name of its own hides the parameter."""
-    for source, hit in (
-        ("twice = 2 * ratio", True), ("def outcome(x): return x * ratio", True),
-        ("total = 0\ntotal += ratio", True), ("[ratio for ratio in (1, 2)]", False),
-        ("def outcome(ratio): return 2 * ratio", False), ("ratio = 3\nratio", False),
-    ):  # fmt: skip
-        cells = [nbformat.v4.new_code_cell(x) for x in ("ratio = 1", source, "last = outcome(1)")]
-        cells[0].metadata["tags"] = ["parameters"]
-        assert reached(cells) == [True, hit, hit and "outcome" in source]
-    lines = "ratio = 1", "alpha = 0.2", "beta = 0.2", "last = alpha", "other = beta"
-    cells = [nbformat.v4.new_code_cell(line) for line in lines]
-    assert reached(cells) == [False] * 5
-    assert reached(cells, written=True) == [False, True, False, True, False]
+    run(code(chapter), changes, FACTOR)
 
 
 @pytest.mark.usefixtures("pictures_in_memory")
