@@ -147,6 +147,19 @@ def test_a_ball_is_dragged_and_let_go(visit):
     assert second - first > 60  # the hit has sent ball 1 to the left; at rest they touch
 
 
+def test_pull_back_where_it_has_an_effect(visit):
+    """Balls that are held already cannot be pulled back; once let go they can."""
+    tab = visit(stopped=True)
+    tab.clock.run_for(100)
+    for button, wait, enabled in (
+        ("Let go", 1000, True), ("Pause", 50, True), ("Pull back", 1000, False)
+    ):  # fmt: skip
+        press(tab, button)
+        tab.clock.run_for(wait)
+        assert tab.get_by_role("button", name="Pull back").is_enabled() is enabled
+    assert tab.evaluate(f"{EXPLORER}.state.clock.time") == 0
+
+
 def test_only_a_drag_moves_a_ball(visit):
     """A tap on a ball leaves the swing as it is, and a ball taken at its edge does not jump."""
     tab = visit("#scene=one", stopped=True)
@@ -300,6 +313,22 @@ def test_number_material_and_sweep(visit):
     moved = drawn(tab)
     assert moved["forward"] == moved["backward"] != setting["forward"]
     assert same_outcome(moved)
+
+
+def test_keys_that_come_within_one_frame_count_each(visit):
+    """A browser may pass on several before it draws; no step is lost."""
+    twice = """(node) => {
+      for (let k = 0; k < 2; k += 1)
+        node.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true }));
+    }"""
+    tab = still(visit, "#scene=small")
+    tab.locator(".ball[data-ball='4']").evaluate(twice)
+    assert drawn(tab)["speeds"] == [1, 0, 0, 0, -0.2]
+    go_to(tab, "scene=map")
+    before = drawn(tab)["masses"]
+    assert before == [1, 1, 1]
+    tab.locator(".point").evaluate(twice)
+    assert drawn(tab)["masses"] == [1, 1, pytest.approx(1 / 1.2, rel=1e-3)]
 
 
 def test_a_browser_that_does_not_allow_copying(visit):

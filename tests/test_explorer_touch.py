@@ -146,6 +146,18 @@ def test_a_finger_takes_the_nearest_ball(phone):
     assert np.sign(drawn(tab)["speeds"]).tolist() == [1, 1, 1, 1, 0, 0, 0]
 
 
+def test_a_second_finger_on_the_same_ball_is_none(phone):
+    tab = phone("#speeds=0,0,0,0,0&forward=0.1")
+    drawn(tab)
+    hand, (x, y) = Hand(tab), middle(tab, ball(0))
+    hand.down(1, (x - 3, y))
+    hand.down(2, (x + 3, y))
+    hand.move(2, -60, 0)
+    assert drawn(tab)["speeds"] == [0] * 5
+    hand.move(1, -60, 0)
+    assert drawn(tab)["speeds"][0] > 0.4
+
+
 def show_middle(tab, place: str):
     tab.locator(place).evaluate(
         "(node) => node.scrollIntoView({ block: 'center', behavior: 'instant' })"
