@@ -1,7 +1,5 @@
 """The chain before the impact: masses, velocities, restitution; checked once, then frozen."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,7 +69,7 @@ class Chain:
         self._keep(np.array(m), np.array(v), np.full(m.size - 1, e))
 
     @classmethod
-    def _of(cls, masses: Vector, velocities: Vector, restitution: Vector) -> Chain:
+    def _of(cls, masses: Vector, velocities: Vector, restitution: Vector) -> "Chain":
         """Return the chain of new arrays, or parts of a chain's, without asking them again."""
         chain = object.__new__(cls)
         chain._keep(masses, velocities, restitution)

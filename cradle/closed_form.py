@@ -4,8 +4,6 @@ Balls 1, 2, 3 have masses m1, m2, m3, contacts 1-2 and 2-3 the impulses tau_2 an
 restitution e2 and e3; alpha is the forward ratio at ball 2.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

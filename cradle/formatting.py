@@ -3,8 +3,6 @@
 They have the colour of the text around them, for light pages and dark ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from html import escape
 from typing import Any

@@ -1,7 +1,5 @@
 """What is read off outcomes: bouncing patterns, conditioning, effective ratios, conservation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple

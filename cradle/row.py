@@ -14,8 +14,6 @@ A solver that puts balls back onto their strings takes the part q (h w / l)^2 of
 1/2.  The row learns q too; then each part of a divided side loses what it would lose alone.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Protocol

@@ -3,8 +3,6 @@
 They are read from ``data/``, whose README gives their origin, units and doubtful readings.
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def data_folder() -> Traversable:
+def data_folder() -> "Traversable":
     """Return the folder of the data files: inside the installed package, or beside it."""
     from importlib.resources import files
 
@@ -66,7 +64,7 @@ def paper_sequences() -> Mapping[str, int]:
     return MappingProxyType({row["sequence"]: int(row["figure"]) for row in rows})
 
 
-def restitution_table() -> pd.DataFrame:
+def restitution_table() -> "pd.DataFrame":
     """Return Table 1, the coefficients of restitution of all pairs of ball types, as a DataFrame.
 
     Examples
@@ -84,7 +82,7 @@ def restitution_table() -> pd.DataFrame:
     return pd.DataFrame(table_rows("restitution.csv")).set_index("ball").astype(float)
 
 
-def ratio_table() -> pd.DataFrame:
+def ratio_table() -> "pd.DataFrame":
     """Return Table 2, the Impulse Correlation Ratios of all triplets, as a DataFrame of 64 rows.
 
     The bound is that of three balls (Eq. 34); in longer chains the next triplet raises it (Eq. 53).

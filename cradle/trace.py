@@ -1,7 +1,5 @@
 """What happened: the path of an impact from the first touch to the last separation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -88,7 +86,7 @@ class Trace:
         """Kinetic energy lost, in joules; each contact keeps back (1 - e^2) of what it absorbed."""
         return float(np.sum((1.0 - self.chain.restitution**2) * self.absorbed))
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """Return the path as a table, a row for each ball at each row of the path.
 
         Velocities are in m/s; ``left`` and ``right`` are the impulses so far of the ball's two
@@ -119,7 +117,7 @@ class Trace:
         """Return impulses (N s) and velocities (m/s) that straight lines join in a picture."""
         return self.path_impulses, self.path
 
-    def plot(self, ax: Axes | None = None, *, contact: int | None = None) -> Axes:
+    def plot(self, ax: "Axes | None" = None, *, contact: int | None = None) -> "Axes":
         """Draw the velocities over the impact, or the velocity-impulse diagram of a contact.
 
         As `velocities` and `velocity_impulse` of `cradle.pictures.impacts`, into new axes if `ax`
@@ -147,7 +145,7 @@ class Trace:
         return f"Trace(velocities={as_text(self.velocities)}, {counts})"
 
 
-def by_ball(balls: int, rows: dict[str, Any], parts: dict[str, Vector]) -> pd.DataFrame:
+def by_ball(balls: int, rows: dict[str, Any], parts: dict[str, Vector]) -> "pd.DataFrame":
     """Return a table with each of these rows once for each ball, and the ball's part of it."""
     import pandas as pd
 

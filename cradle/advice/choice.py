@@ -1,7 +1,5 @@
 """Choose the model: refuse what is impossible, then take the cheapest that does what is wanted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, fields
 from html import escape

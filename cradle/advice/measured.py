@@ -4,8 +4,6 @@ No number is an estimate: it was measured on this very chain, or is the worst of
 chains around it, or there is none.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """What the command line shows: tables as text, CSV or JSON, and figures in files."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

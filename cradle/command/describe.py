@@ -1,7 +1,5 @@
 """What a command is told of a chain: options, the chain and model they mean, what is assumed."""
 
-from __future__ import annotations
-
 import functools
 import math
 import threading

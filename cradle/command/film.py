@@ -1,7 +1,5 @@
 """`cradle film`: from marks in films to rows of the table of shots."""
 
-from __future__ import annotations
-
 import csv
 import sys
 import warnings
@@ -99,7 +97,7 @@ def film(
 def _velocities(
     file: Path, types: tuple[str, ...], masses: list[float], length: float | None,
     time_scale: float, size: float, window: float | None,
-) -> tuple[str, Velocities]:  # fmt: skip
+) -> "tuple[str, Velocities]":  # fmt: skip
     """Return what was warned of, and the velocities in one film, of balls of these types."""
     import numpy as np
 

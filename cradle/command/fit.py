@@ -1,7 +1,5 @@
 """`cradle fit`: restitution and ratios from a table of shots; `cradle template`: such a table."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -138,7 +136,7 @@ def _named(given: str) -> tuple[str, tuple[float, float]]:
 
 
 def _refuse_unused(
-    given: Iterable[str], known: Iterable[str], shots: Shots, predict: str | None
+    given: Iterable[str], known: Iterable[str], shots: "Shots", predict: str | None
 ) -> None:
     """Refuse a value that no chain needs (its name may be misspelt), and one that is there."""
     from cradle.fit.parameters import label, pair_keys, parameter_key, ratio_keys
@@ -161,7 +159,7 @@ def _refuse_unused(
 
 
 def _predicted(
-    found: Fit, shots: Shots, sequence: str, speed: float
+    found: "Fit", shots: "Shots", sequence: str, speed: float
 ) -> tuple[dict[str, Any], list[str]]:
     """Return a prediction and what was measured of such chains: for JSON, and as lines."""
     from cradle.fit.parameters import ratio_keys

@@ -1,7 +1,5 @@
 """`cradle recommend`: which impact law to use."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ Answers go to standard output, errors to standard error.  Exit codes: 0 for an a
 that is wrong or an impact that did not finish, 2 for a command that was not understood.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 import time

@@ -1,7 +1,5 @@
 """`cradle swing`: a swinging cradle, as a table or a film."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

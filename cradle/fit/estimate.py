@@ -1,7 +1,5 @@
 """Coefficients of restitution and Impulse Correlation Ratios from measured shots."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any

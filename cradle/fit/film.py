@@ -1,7 +1,5 @@
 """Velocities of balls around an impact, from their positions or from heights."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple

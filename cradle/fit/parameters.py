@@ -6,8 +6,6 @@ linear in the velocity of a single striker, so that the profile over it is exact
 coefficients of restitution they are taken as linear over one standard error.
 """
 
-from __future__ import annotations
-
 from collections.abc import KeysView, Mapping, Sequence
 from itertools import chain, pairwise
 from typing import Any

@@ -5,8 +5,6 @@ Chi-square of an impact has several minima and flat stretches.  A function takes
 likely each is up to a factor, and the lowest value.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import product
 from typing import NamedTuple

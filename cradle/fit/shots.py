@@ -1,7 +1,5 @@
 """What is measured: shots, velocities before and after impacts, read from tables and checked."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -97,7 +95,7 @@ class Shots:
         """Mass of each type of ball, kg."""
         return {t: float(m) for s in self.sets for t, m in zip(s.types, s.masses, strict=True)}
 
-    def without(self, *names: str) -> Shots:
+    def without(self, *names: str) -> "Shots":
         """Return the shots less some sets, not all of them: those are to be predicted."""
         there = [one.name for one in self.sets]
         for name in (name for name in names if name not in there):

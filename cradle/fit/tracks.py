@@ -1,7 +1,5 @@
 """Positions of balls in a film: text exported by Tracker, Kinovea, Logger Pro or Capstone."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Tables of measurements; what is wrong with one is named by its line and column."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Mapping

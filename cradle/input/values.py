@@ -3,8 +3,6 @@
 A refusal names the value, its place and the rule: `masses[1] = -1.0; must be above 0`.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Sequence

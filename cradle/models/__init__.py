@@ -1,7 +1,5 @@
 """The impact models, one file each, and the verb they share: `collide`."""
 
-from __future__ import annotations
-
 import warnings
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Many chains at once by the paper's model: the outcome alone, on all processors."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import os

@@ -1,7 +1,5 @@
 """The paper's model: one Impulse Correlation Ratio at each interior ball and direction."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass, field
 from typing import NoReturn

@@ -1,7 +1,5 @@
 """One convex problem for the whole impact: Moreau, Frémond and Cholet's quadratic dissipation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

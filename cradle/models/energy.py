@@ -1,7 +1,5 @@
 """Impulses shared out by the energy that the contacts store: Liu, Zhao and Brogliato's model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """The motion of springs that give back only a part of what they absorb, for `energy`."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """The two answers that came before the ratio: one collision after another, or one solid body."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Moving pictures of an impact and of swings."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any

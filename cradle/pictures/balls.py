@@ -1,7 +1,5 @@
 """Drawings of chains, and of outcomes ball by ball; axes, numbers and colours as in `impacts`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

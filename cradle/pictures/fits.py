@@ -1,7 +1,5 @@
 """Figures of fits: the likelihood of a parameter, the data with their predictions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

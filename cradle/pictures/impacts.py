@@ -4,8 +4,6 @@ Balls and impulses carry the paper's numbers here: ball i is B(i + 1) with veloc
 the impulse of contact c is tau(c + 2). With a colour always goes a dash, a marker or a letter.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib.pyplot as plt

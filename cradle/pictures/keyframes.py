@@ -5,8 +5,6 @@ velocities go: the motion is exact, sharp at any size, and a few kilobytes long.
 unlike SMIL, also gives the still to paper and to readers who ask for less motion.
 """
 
-from __future__ import annotations
-
 import io
 import zlib
 from bisect import insort
@@ -54,7 +52,7 @@ class Animation:
 
     svg: str
     figure: Figure = field(repr=False, compare=False)
-    moves: tuple[Move, ...] = field(repr=False, compare=False)
+    moves: "tuple[Move, ...]" = field(repr=False, compare=False)
 
     def _repr_html_(self) -> str:
         key = f"p{zlib.crc32(self.svg.encode()):08x}"

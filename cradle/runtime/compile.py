@@ -5,8 +5,6 @@ how they are compiled, and compiled as one unit, kept on disk by numba: an edit 
 unit, where numba alone would ask of each function its own file only.
 """
 
-from __future__ import annotations
-
 import ast
 import contextlib
 import contextvars

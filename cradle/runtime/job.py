@@ -4,8 +4,6 @@ The loop stops by itself after some effort and is called again: so Ctrl-C works,
 and small work can begin plain and go on compiled.
 """
 
-from __future__ import annotations
-
 import functools
 import threading
 import time
@@ -105,7 +103,7 @@ class Job:
 
     def run(
         self, stop: threading.Event | None = None, pause: Callable[[], object] | None = None
-    ) -> Job:
+    ) -> "Job":
         """Solve the chains, up to the first that is not FINISHED, or until `stop` is set."""
         # It calls `pause` whenever the event loop pauses.
         resumed, rows = False, len(self.outputs.v)

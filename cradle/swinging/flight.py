@@ -1,7 +1,5 @@
 """Pendulums between impacts: motion in closed form or by SciPy, and when balls next meet."""
 
-from __future__ import annotations
-
 import cmath
 import functools
 import math

@@ -1,7 +1,5 @@
 """How the balls hang."""
 
-from __future__ import annotations
-
 from dataclasses import KW_ONLY, dataclass
 
 import numpy as np

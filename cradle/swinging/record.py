@@ -1,7 +1,5 @@
 """What happened in a swing: positions and velocities in time, and every impact."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -78,12 +76,12 @@ class Swing:
         """Kinetic and potential energy of all balls at each time, shape (T,), J."""
         return Hanging(self.pendulums, self.chain.masses).energy(self.positions, self.velocities)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """Return a row for each time and ball: time, ball, position, velocity."""
         parts = {"position": self.positions, "velocity": self.velocities}
         return by_ball(len(self.chain), {"time": self.times}, parts)
 
-    def impacts_to_frame(self) -> pd.DataFrame:
+    def impacts_to_frame(self) -> "pd.DataFrame":
         """Return a row for each impact and ball: impact, time, ball, before, after."""
         times, before, after = (
             np.array([getattr(one, name) for one in self.impacts])

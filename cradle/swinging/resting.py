@@ -15,8 +15,6 @@ The rules, in the order in which `swing` applies them at every event:
    stays open for this instant, whatever else happens in it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 

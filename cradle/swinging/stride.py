@@ -4,8 +4,6 @@ Places and velocities are complex numbers, x + i y in the plane of the row.  A b
 is that in its own way: along its arc, a real number, where it hangs; where it is free, all of it.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import combinations, pairwise
 from typing import Any, NamedTuple

@@ -3,8 +3,6 @@
 The rules of touching and resting balls are told in `cradle.swinging.resting`.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import fields, is_dataclass, replace
