@@ -7,9 +7,9 @@ from chains import uniform
 from real_cradles import table
 from real_swing import ConstantLoss
 from stored import read
-from swing_fit import fit_swing
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SequentialCollisions, swing
+from cradle.fit import fit_swing
 
 LAW = ImpulseCorrelation(0.1)
 NUMBERS = ("period", "damping", "restitution", "gaps")

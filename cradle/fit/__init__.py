@@ -4,7 +4,7 @@
 
 Measured are `shots`; `tracks` and `film` make velocities of positions.  `parameters` says how well
 values explain shots, `search` finds all that do, `estimate` fits, and `result` is what comes back.
-`swings` fits a whole swing to its film.
+`swings` fits a whole swing to its film: period, damping, restitution, gap.
 """
 
 from cradle.fit.estimate import ratio, restitution, restitution_from_heights
@@ -12,10 +12,11 @@ from cradle.fit.film import Velocities, speeds_from_heights, velocities_from_tra
 from cradle.fit.result import Estimate, Fit, Prediction
 from cradle.fit.search import Mode
 from cradle.fit.shots import Shots, ShotSet, read_shots
+from cradle.fit.swings import SwingFit, fit_swing
 from cradle.fit.tracks import Tracks, read_tracker
 
 __all__ = [
-    "Estimate", "Fit", "Mode", "Prediction", "ShotSet", "Shots", "Tracks", "Velocities",
-    "ratio", "read_shots", "read_tracker", "restitution", "restitution_from_heights",
-    "speeds_from_heights", "velocities_from_tracks",
+    "Estimate", "Fit", "Mode", "Prediction", "ShotSet", "Shots", "SwingFit", "Tracks",
+    "Velocities", "fit_swing", "ratio", "read_shots", "read_tracker", "restitution",
+    "restitution_from_heights", "speeds_from_heights", "velocities_from_tracks",
 ]  # fmt: skip

@@ -12,7 +12,9 @@ from cradle.fit.parameters import fitted_keys
 from cradle.fit.result import Estimate, Fit
 from cradle.fit.search import RISE
 from cradle.fit.shots import ShotSet
+from cradle.input.values import Vector
 from cradle.pictures.impacts import PALETTE, ball_style
+from cradle.swinging.record import Swing
 
 # Beyond this a value of chi-square is of no interest.
 _TOP = 25.0
@@ -75,3 +77,19 @@ def _draw_data(fit: Fit, shots: ShotSet, ax: Axes) -> None:
     ax.set(xlabel="speed of the striker (m/s)", ylabel="velocity after / striker's speed",
            title=f"data of set {shots.name}")  # fmt: skip
     ax.legend(ncols=len(shots.types), fontsize="small", **_LEGEND)
+
+
+def draw_swing(run: Swing, residuals: Vector, axes: Sequence[Axes] | None) -> Sequence[Axes]:
+    """Draw film and swing, and the residuals; see `SwingFit.plot`."""
+    if axes is None:
+        _, axes = plt.subplots(2, 1, figsize=(5.6, 6), layout="constrained", sharex=True)
+    times, places, rest = run.times, 1000 * run.positions, 1000 * residuals
+    for k in range(len(run.chain)):
+        style, x, left = ball_style(k), places[:, k], rest[:, k]
+        axes[0].plot(times, x + left, ".", ms=3, color=style["color"])
+        axes[0].plot(times, x, lw=1, label=f"ball {k + 1}", **style)
+        axes[1].plot(times, left, ".", ms=3, color=style["color"])
+    axes[0].set(ylabel="position (mm): film, fit")
+    axes[1].set(xlabel="time (s)", ylabel="film less fit (mm)")
+    axes[0].legend(ncols=len(run.chain), fontsize="small", **_LEGEND | {"bbox_to_anchor": (0.5, 1)})
+    return axes

@@ -1,0 +1,316 @@
+"""Period, damping, restitution and gap of a cradle, from the places of its balls in a film."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cradle.chain import Chain
+from cradle.fit.result import Estimate
+from cradle.fit.search import LEVEL, RISE, Mode, Scan
+from cradle.fit.shots import chance
+from cradle.input import values as asked
+from cradle.input.values import Vector
+from cradle.models import Model
+from cradle.swinging.pendulums import Pendulums
+from cradle.swinging.record import Swing
+from cradle.swinging.swing import swing
+
+#: What can be fitted, with its unit.
+UNITS = {"period": " s", "damping": " 1/s", "restitution": "", "gaps": " m"}
+# A law fails if chi-square has a chance below the one, or residuals are alike by so many standard
+# errors; then parts of the film are compared, for these numbers of parts.
+_CHANCE, _FAR, _PARTS = 1e-3, 3.3, (4, 6, 8, 12, 16, 24, 32)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SwingFit:
+    """What a film of K frames says of a cradle of N balls."""
+
+    values: Mapping[str, float | None]  #: Of each number, the best; None if the film tells none.
+    intervals: Mapping[str, tuple[float, float]]  #: 95 % of each number.
+    estimates: Mapping[str, Estimate]  #: The same with profiles of chi-square.
+    swing: Swing  #: What fits best; its times begin with the first frame.
+    residuals: Vector  #: Filmed less computed, less the mean of each ball, shape (K, N), m.
+    reading: float  #: Standard error of a reading, m: as given, or that of the residuals.
+    chi_square: float  #: Sum of squares of the residuals over `reading`.
+    degrees_of_freedom: int  #: Readings less what was fitted to them.
+    correlation: float  #: Of a ball's residuals in successive frames: about 0 if the law fits.
+    poor: bool  #: Whether the law does not fit.
+    widened: Mapping[str, float]  #: By what each interval is then widened, else 1.
+
+    def summary(self) -> str:
+        """Return all that the fit says, as text."""
+        wide = ", ".join(f"{name} {times:.1f}" for name, times in self.widened.items())
+        return "\n".join([
+            *(f"{one}{UNITS[name] * one.identified}" for name, one in self.estimates.items()),
+            f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}, "
+            f"reading {self.reading:.2g} m, correlation of residuals {self.correlation:.2f}",
+            *[f"poor fit: intervals are too short, though widened: {wide} times"] * self.poor,
+        ])  # fmt: skip
+
+    def __repr__(self) -> str:
+        return f"SwingFit({'; '.join(self.summary().splitlines())})"
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw film and swing, and the residuals, on two `axes` or on new ones; return them."""
+        from cradle.pictures.fits import draw_swing
+
+        return draw_swing(self.swing, self.residuals, axes)
+
+
+def fit_swing(
+    times: ArrayLike, positions: ArrayLike, model: Model, *, seen: ArrayLike | None = None,
+    reading: float | None = None, free: Collection[str] = tuple(UNITS),
+    known: Mapping[str, float] | None = None, masses: ArrayLike | None = None,
+) -> SwingFit:  # fmt: skip
+    """Fit `swing` to a film, with one restitution and one gap for all contacts.
+
+    At the first frame some balls, let go at one moment, are on their way; the others are at rest.
+    Places and velocities there are fitted too, as is where each ball hangs.  Intervals hold 95 %,
+    by profiles of chi-square [1]_.  Where the law fails (by chi-square, or residuals alike from
+    frame to frame) they are widened by how parts of the film differ [2]_.
+
+    Parameters
+    ----------
+    times, positions : array_like, shapes (K,) and (K, N)
+        Of the frames, s; of each ball from where it hangs, m, nan where it was not seen.
+    model : Model
+        The impact law.
+    seen : array_like of bool, shape (K, N) or (N,), optional
+        Which readings count.
+    reading : float, optional
+        Standard error of a reading, m; if left out, that of the residuals.
+    free : collection of str
+        What is fitted: "period" of small swings, s; "damping", 1/s; "restitution"; "gaps", m.
+    known : mapping of str to float, optional
+        What is not fitted; left out, no damping, restitution 1, no gaps.
+    masses : array_like, shape (N,), optional
+        Of the balls, in any unit; if left out, they are equal.
+
+    Raises
+    ------
+    ValueError
+        If a value is wrong, no ball is seen on its way at first, or there are too few readings.
+
+    References
+    ----------
+    .. [1] D. J. Venzon and S. H. Moolgavkar, Applied Statistics 37 (1988), 87-94.
+    .. [2] K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986), 13-22: errors by clusters.
+
+    Examples
+    --------
+    >>> from cradle import ImpulseCorrelation
+    >>> times, law = np.arange(0, 2.5, 0.05), ImpulseCorrelation(0)
+    >>> film = swing(Chain([1, 1], [0, 0], 0.9), law, [-0.05, 0], times).positions
+    >>> found = fit_swing(times, film, law, free=["restitution"], known={"period": 0.634374})
+    >>> round(found.values["restitution"], 4)
+    0.9
+    """
+    film = _Film(times, positions, model, seen, reading, free, known or {}, masses)
+    found: SwingFit | Vector = film.begin()
+    while not isinstance(found, SwingFit):
+        found = film.judged(*film.descend(found))
+    return found
+
+
+class _Film:
+    """Readings, and swings by numbers p: of `names`, places of balls on their way, their v / x."""
+
+    def __init__(
+        self, times: ArrayLike, positions: ArrayLike, model: Model, seen: ArrayLike | None,
+        reading: float | None, free: Collection[str], known: Mapping[str, float],
+        masses: ArrayLike | None,
+    ) -> None:  # fmt: skip
+        t, x = asked.checked("times", times), asked.numbers("positions", positions)
+        mask = np.ones(x.shape[1:], bool) if seen is None else np.asarray(seen, bool)
+        fit = x.ndim == 2 and t.shape == x.shape[:1] and mask.shape in (x.shape, x.shape[1:])
+        if not fit or x.shape[1] < 2:
+            told = f"times, positions and seen have shapes {t.shape}, {x.shape} and {mask.shape}"
+            raise ValueError(f"{told}; must be (K,), (K, N) and (K, N) or (N,), N at least 2")
+        asked.refuse_where("times", t, np.diff(t, prepend=-np.inf) <= 0.0, "must rise")
+        rest = np.zeros(x.shape[1])
+        self.model, self.balls = model, Chain(rest + 1.0 if masses is None else masses, rest, 1.0)
+        self.times, self.seen = t - t[0], mask & np.isfinite(x)
+        self.x = np.where(self.seen, x, np.nan)
+        for name in (*free, *known):
+            asked.one_of("free or known", name, tuple(UNITS))
+        self.names = [name for name in UNITS if name in free and name not in known]
+        self.fixed = {"damping": 0.0, "restitution": 1.0, "gaps": 0.0, **known}
+        if "period" not in {*self.names, *known}:
+            raise ValueError("period is neither free nor known; must be one of them")
+        asked.one_number("known['period']", known.get("period", 1.0), *asked.ABOVE_ZERO)
+        asked.one_number("reading", 1.0 if reading is None else reading, *asked.ABOVE_ZERO)
+        self.reading = reading
+
+    def begin(self) -> Vector:
+        """Search from nothing, in ever longer parts of the film."""
+        from scipy.signal import lombscargle
+
+        t, often = self.times, self.seen.sum(axis=0)
+        # No impact changes the place of the centre of mass.
+        some = often >= 0.5 * often.max()
+        mean = np.average(self.x[:, some], axis=1, weights=self.balls.masses[some])
+        mean, at = mean[np.isfinite(mean)], t[np.isfinite(mean)]
+        if min(at.size, often.sum() // 3) < 10:
+            raise ValueError(f"{often.sum()} readings, {at.size} frames with all balls; too few")
+        rates = np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
+        rate = rates[lombscargle(at, mean - mean.mean(), rates).argmax()]
+        self.period = period = self.fixed.get("period", 2.0 * np.pi / rate)
+        self.size = size = float(np.nanmax(np.abs(self.x)))
+        early = self.seen & (t <= max(period / 16.0, t[3]))[:, None]
+        lines = [np.polyfit(t[some], x[some], 1) if some.sum() > 2 else np.zeros(2)
+                 for some, x in zip(early.T, self.x.T, strict=True)]  # fmt: skip
+        v, x = np.transpose(lines)
+        self.movers = np.flatnonzero(np.abs(x) > 0.1 * size)
+        if not self.movers.size:
+            raise ValueError("no ball is seen on its way at first; begin soon after the release")
+        v, x = v[self.movers], x[self.movers]
+        rows: dict[str, tuple[float, float, float, Any]] = {
+            "period": (0.5 * period, 2.0 * period, 1e-4 * period, [period]),
+            "damping": (0.0, np.pi / period, 1e-2 / period, [0.0]),
+            "restitution": (0.0, 1.0, 1e-3, [0.997, 0.99, 0.97, 0.9, 0.7]),
+            "gaps": (0.0, size, 1e-3 * size, size * np.append(0.0, np.geomspace(1e-4, 0.1, 13))),
+        }  # limits, first steps, and where to begin  # fmt: skip
+        used = [rows[name] for name in self.names]
+        used += [(-np.inf, np.inf, 1e-3 * size, [place]) for place in x]
+        used.append((-np.inf, np.inf, 1e-2 / period, [x @ v / (x @ x)]))
+        self.low, self.high, self.steps = np.array([row[:3] for row in used]).T
+        self.least, count = 1e-4 * self.steps, int(np.searchsorted(t, 2.2 * period))
+        nodes = [np.array(node) for node in product(*(row[3] for row in used))]
+        nodes.sort(key=lambda node: float((self.left(node, count) ** 2).sum()))
+        held = [k for k, name in enumerate(self.names) if name in ("period", "damping")]
+        found = [self.descend(node, count, held) for node in nodes[:3]]
+        self.half = min(found, key=lambda one: float(one[1] @ one[1]))[0]
+        for part in [len(t) >> k for k in range(20, 0, -1) if len(t) >> k > 1.5 * count]:
+            self.half = self.descend(self.half, part)[0]
+        return self.half
+
+    def swung(self, p: Vector, count: int | None = None) -> Swing:
+        """Return the swing by numbers, in all frames or the first ones."""
+        now = self.fixed | dict(zip(self.names, p.tolist(), strict=False))
+        x, hung = np.zeros(len(self.balls)), now["gaps"] * np.arange(len(self.balls))
+        x[self.movers] = p[len(self.names) : -1]
+        x = np.maximum.accumulate(x + hung) - hung  # none overlap
+        chain = Chain(self.balls.masses, p[-1] * x, now["restitution"])
+        length = Pendulums.gravity * (now["period"] / (2.0 * np.pi)) ** 2
+        pendulums = Pendulums(length, gaps=now["gaps"], damping=now["damping"])
+        return swing(chain, self.model, x, self.times[:count], pendulums=pendulums)
+
+    def left(self, p: Vector, count: int | None = None) -> Vector:
+        """Return what the swing by numbers leaves of the readings in these frames."""
+        seen = self.seen[:count]
+        left = np.where(seen, self.x[:count] - self.swung(p, count).positions, 0.0)
+        return np.asarray((left - left.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))[seen])
+
+    def descend(
+        self, p: Vector, count: int | None = None, held: Collection[int] = ()
+    ) -> tuple[Vector, Vector, Vector]:
+        """Return a minimum: numbers, what their swing leaves, and the slopes of that."""
+        from scipy.optimize import least_squares
+
+        # Touching balls stay so: what they do is no limit of small gaps.
+        touch = [k for k, name in enumerate(self.names) if name == "gaps" and not p[k]]
+        free, size = np.setdiff1d(np.arange(p.size), [*held, *touch]), self.seen[:count].sum()
+
+        def slopes(q: Vector) -> Vector:
+            left, out = self.left(q, count), np.zeros((size, p.size))
+            for k in free:
+                trial, step = q.copy(), self.steps[k]
+                trial[k] += step if q[k] + step < self.high[k] else -step
+                out[:, k] = (self.left(trial, count) - left) / (trial[k] - q[k])
+                # The next step is about as wide as the error, and so goes over what is rough.
+                error = np.sqrt(left @ left / (out[:, k] @ out[:, k] + 1e-300) / size)
+                most = min(100.0 * step, 0.4 * (self.high[k] - self.low[k]))
+                self.steps[k] = np.clip(error, self.least[k], most)
+            return out
+
+        found = least_squares(
+            lambda q: self.left(q, count), p, slopes, (self.low, self.high), "dogbox",
+            ftol=0.01 / size, xtol=None, gtol=None, x_scale="jac", max_nfev=15,
+        )  # fmt: skip
+        return found.x, found.fun, found.jac
+
+    def judged(self, p: Vector, left: Vector, slopes: Vector) -> SwingFit | Vector:
+        """Return the fit; or, if a profile finds a lower minimum, that."""
+        freedom = left.size - int(self.seen.any(axis=0).sum()) - p.size
+        total, grid = float(left @ left), np.full(self.seen.shape, np.nan)
+        grid[self.seen] = left
+        spread = total / freedom
+        reading = self.reading or float(np.sqrt(spread))
+        # Products of residuals of a ball some frames apart, up to a quarter of a swing.
+        most = 2 + int(0.25 * self.period / self.times[-1] * len(grid))
+        apart = [grid[k:] * grid[:-k] for k in range(1, most)]
+        alike = [np.nansum(both) / np.sqrt(np.isfinite(both).sum()) / spread
+                 for both in (apart[0], np.concatenate(apart))]  # fmt: skip
+        chi, wide = total / reading**2, np.ones(p.size)
+        exact = spread < (1e-6 * self.size) ** 2  # rounding alone is left
+        poor = not exact and bool(max(alike) > _FAR or chance(chi, freedom) < _CHANCE)
+        self.variance = max(reading**2, spread * poor)
+        inverse = (solver := np.linalg.pinv(slopes)) @ solver.T
+        usual, told = np.sqrt(self.variance * np.diag(inverse)), slopes.any(axis=0)
+        errors = np.where(told, usual, self.steps / np.sqrt(RISE))
+        if poor:
+            drift = (self.half - p) / np.sqrt(RISE) / errors
+            wide = np.hypot(self.widened(left, slopes @ inverse / errors), drift)
+        estimates = {}
+        for k, name in enumerate(self.names):
+            rise = RISE * self.variance * wide[k] ** 2
+            found = self.profile(p, left, slopes, k, float(wide[k] * errors[k]), rise)
+            if not isinstance(found, Scan):
+                return found
+            estimates[name] = Estimate.of("swing", (name,), float(self.high[k]), found)
+        return SwingFit(
+            {name: one.value for name, one in estimates.items()},
+            {name: one.intervals[0] for name, one in estimates.items()},
+            estimates, self.swung(p), grid, reading, chi, freedom,
+            float(np.nanmean(apart[0]) / spread), poor,
+            dict(zip(self.names, wide.tolist(), strict=False)),
+        )  # fmt: skip
+
+    def widened(self, left: Vector, pull: Vector) -> Vector:
+        """Return errors by differences of parts of the film; `pull`: change of p, in errors."""
+        from scipy.special import stdtrit
+
+        pulls = np.zeros((*self.seen.shape, pull.shape[1]))
+        pulls[self.seen] = pull * left[:, None]
+        wide = [np.ones(pull.shape[1])]
+        for parts in _PARTS:
+            cuts = np.arange(parts) * len(pulls) // parts
+            moved = np.add.reduceat(pulls.sum(axis=1), cuts)
+            times = stdtrit(parts - 1, 0.5 + 0.5 * LEVEL) / np.sqrt(RISE)
+            wide.append(times * np.sqrt((moved**2).sum(axis=0) * parts / (parts - 1)))
+        return np.asarray(np.max(wide, axis=0))
+
+    def profile(
+        self, p: Vector, left: Vector, slopes: Vector, k: int, error: float, rise: float
+    ) -> Scan | Vector:
+        """Return the profile of a number; or, if it finds a lower minimum, that."""
+        solver = np.linalg.pinv(np.where(np.arange(p.size) == k, 0.0, slopes))
+        points, ends = [(float(p[k]), 0.0)], []
+        for side, limit in ((-1.0, self.low[k]), (1.0, self.high[k])):
+            way = np.sqrt(RISE) * error
+            for _ in range(20):
+                q = p.copy()
+                q[k] = np.clip(p[k] + side * way, self.low[k], self.high[k])
+                rest, gain = self.left(q), np.inf
+                while gain > 0.01 * self.variance:
+                    trial = np.clip(q - solver @ rest, self.low, self.high)
+                    closer = self.left(trial)
+                    gain = float(rest @ rest - closer @ closer)
+                    q, rest = (trial, closer) if gain > 0.0 else (q, rest)
+                excess = float(rest @ rest - left @ left)
+                if excess < -0.5 * self.variance:
+                    return q
+                points.append((float(q[k]), excess))
+                near = np.sqrt(max(excess, 0.0) / rise)
+                if abs(near - 1.0) < 0.02 or (q[k] == limit and near < 1.0):
+                    break
+                way = abs(q[k] - p[k]) / np.clip(near, 0.3, 3.0)
+            ends.append(float(q[k]))
+        grid, excess = np.array(sorted(points)).T
+        mode = Mode(float(p[k]), 0.0)
+        return Scan((mode,), ((ends[0], ends[1]),), grid, excess * RISE / rise)
