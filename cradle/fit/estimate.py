@@ -7,17 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cradle.fit.parameters import (
-    Key,
-    Uncertain,
-    chi_squares,
-    fitted_keys,
-    label,
-    outcomes,
-    pair_keys,
-    parameter_key,
-    ratio_keys,
-)  # fmt: skip
+from cradle.fit import parameters
+from cradle.fit.parameters import Key, fitted_keys, label, pair_keys, parameter_key, ratio_keys
 from cradle.fit.result import Estimate, Fit, Group
 from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
@@ -43,12 +34,10 @@ def restitution(shots: Shots) -> Fit:
     chi-square 0.8, degrees of freedom 3, chance 0.85
     residuals of AB: 0.4 standard errors, the largest 0.6 (shot 1, ball 1)
     """
-    sets = [one for one in shots.sets if len(one.types) == 2]
-    if not sets:
+    pairs = sorted(pair_keys(one.types)[0] for one in shots.sets if len(one.types) == 2)
+    if not pairs:
         raise ValueError("no set has two balls; restitution comes from pairs")
-    bounds = dict.fromkeys(sorted(pair_keys(one.types)[0] for one in sets), 1.0)
-    found, _, lowest, freedom = _estimates("restitution", sets, bounds, set(bounds), {}, [])
-    return Fit(shots, found, {}, (), lowest, freedom)
+    return _fitted(shots, "restitution", dict.fromkeys(pairs, 1.0), {}, {}, int)
 
 
 def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma: float) -> Fit:
@@ -131,19 +120,10 @@ def ratio(
 
     given = _restitution_values(restitution, sets)
     fixed = _known_ratios(known or {}, shots.masses)
-    values = {**{key: value for key, (value, _) in given.items()}, **fixed}
-    uncertain = [(key, error) for key, (_, error) in sorted(given.items()) if error]
     bounds = {key: _bound(key, shots.masses)
               for one in sets for key in ratio_keys(one.types) if key not in fixed}  # fmt: skip
-    acting = set[Key]().union(*(_acting(one, bounds, values) for one in sets))
-    values = {**dict.fromkeys(bounds, 0.0), **values}  # without effect: any value
     with tqdm(unit=" points", delay=2.0, disable=not progress) as bar:
-        found, groups, lowest, freedom = _estimates(
-            "ratio", sets, bounds, acting, values, uncertain, bar.update
-        )
-    named = {label(key): value for key, value in given.items()}
-    known = {label(key): value for key, value in fixed.items()}
-    return Fit(shots, found, named, groups, lowest, freedom, known)
+        return _fitted(shots, "ratio", bounds, given, fixed, bar.update)
 
 
 def _restitution_values(
@@ -162,10 +142,9 @@ def _restitution_values(
     for one in sets:
         for key in pair_keys(one.types):
             if key not in values:
-                raise ValueError(
-                    f"restitution has no {label(key)!r}, which set {one.name} needs; "
-                    f"it has {', '.join(map(label, values)) or 'nothing'}"
-                )
+                there = ", ".join(map(label, values)) or "nothing"
+                needs = f"{label(key)!r}, which set {one.name} needs"
+                raise ValueError(f"restitution has no {needs}; it has {there}")
     return values
 
 
@@ -199,7 +178,7 @@ def _acting(one: ShotSet, bounds: Mapping[Key, float], given: Mapping[Key, float
     before = np.unique(one.before / speeds, axis=0)[:, None, :]
 
     def solved(changed: Mapping[Key, float]) -> Vector:
-        return outcomes(one.types, one.masses, before, {**values, **changed})
+        return parameters.outcomes(one.types, one.masses, before, {**values, **changed})
 
     base = solved({})
     return {key for key in keys for share in (0.0, 0.5, 1.0)
@@ -215,16 +194,21 @@ def _together(acting: Iterable[set[Key]]) -> list[list[Key]]:
     return [sorted(group) for group in groups]
 
 
-def _estimates(
-    kind: str, sets: Sequence[ShotSet], bounds: Mapping[Key, float], acting: set[Key],
-    given: Mapping[Key, float], uncertain: Uncertain, tell: Callable[[int], Any] = int,
-) -> tuple[dict[str, Estimate], tuple[Group, ...], float, int]:  # fmt: skip
-    """Fit what acts in the sets; return it by name, its groups, chi-square, degrees of freedom."""
+def _fitted(
+    shots: Shots, kind: str, bounds: Mapping[Key, float], given: Mapping[Key, tuple[float, float]],
+    fixed: Mapping[Key, float], tell: Callable[[int], Any],
+) -> Fit:  # fmt: skip
+    """Fit those of the parameters with these bounds that act in the shots."""
+    uncertain = [(key, error) for key, (_, error) in sorted(given.items()) if error]
+    known = {**{key: value for key, (value, _) in given.items()}, **fixed}
+    sets = [one for one in shots.sets if fitted_keys(one.types) & bounds.keys()]
+    acting = set[Key]().union(*(_acting(one, bounds, known) for one in sets))
+    known = {**dict.fromkeys(bounds, 0.0), **known}  # without effect: any value
 
     def chi(keys: list[Key], members: list[ShotSet], points: Vector) -> Vector:
-        values = {**given, **dict(zip(keys, points.T, strict=True))}
+        values = {**known, **dict(zip(keys, points.T, strict=True))}
         tell(len(points))
-        return chi_squares(members, values, uncertain)
+        return parameters.chi_squares(members, values, uncertain)
 
     found = {label(key): Estimate.of(kind, key, bound, None) for key, bound in bounds.items()}
     groups, chi_square, freedom = [], 0.0, 0
@@ -238,4 +222,7 @@ def _estimates(
             found[label(key)] = Estimate.of(kind, key, bounds[key], one)
         chi_square += lowest
         freedom += sum(one.after.size for one in members) - len(keys)
-    return found, tuple(groups), chi_square, freedom
+    together = tuple(groups) if kind == "ratio" else ()
+    named = {label(key): value for key, value in given.items()}
+    held = {label(key): value for key, value in fixed.items()}
+    return Fit(shots, found, named, together, chi_square, freedom, held)

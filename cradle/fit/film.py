@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from cradle.fit.tracks import Track
@@ -103,16 +104,13 @@ def velocities_from_tracks(
     if len(balls) < 2 or not 0 <= (striker or 0) < len(balls):
         told = f"{len(balls)} tracks, striker = {striker or 0}"
         raise ValueError(f"{told}; needs two balls and a striker")
-    length, window, scatter = (
-        None if value is None else one_number(name, value, *ABOVE_ZERO)
-        for name, value in (("length", length), ("window", window), ("scatter", scatter))
-    )
+    given = {"length": length, "window": window, "scatter": scatter}
+    length, window, scatter = (None if value is None else one_number(name, value, *ABOVE_ZERO)
+                               for name, value in given.items())  # fmt: skip
     for name, ball in tracks.items():
         if length is not None and (span := float(np.ptp(ball.positions))) > 2.0 * length:
-            raise ValueError(
-                f"track {name!r} spans {span:.3g} m, more than a pendulum of {length:g} m; say "
-                "the unit of the positions"
-            )
+            told = f"track {name!r} spans {span:.3g} m, more than a pendulum of {length:g} m"
+            raise ValueError(f"{told}; say the unit of the positions")
     frame = max(float(np.median(np.diff(ball.times))) for ball in balls if ball.times.size > 1)
     least = window or max(0.05, (_LEAST + 0.5) * frame)
     coarse, striker = _coarse(balls, striker, least)
@@ -139,11 +137,9 @@ def velocities_from_tracks(
                       for ball, moment, off in (first if refused else found).strays)  # fmt: skip
     if refused:
         rather = "are length and frame rate right, and is there one impact"
-        raise ValueError(
-            f"window = {tried[0]:.3g} s; the marks bend otherwise than by such a motion: if the "
-            f"balls hang, {rather if length else 'give their length'}; else give a shorter window"
-            f"{wrong and '; or '}{wrong}"
-        )
+        told = f"window = {tried[0]:.3g} s; the marks bend otherwise than by such a motion: if the "
+        told += f"balls hang, {rather if length else 'give their length'}; else give a shorter"
+        raise ValueError(f"{told} window{wrong and '; or '}{wrong}")
     if wrong:
         warnings.warn(f"{wrong}: more than chance allows", stacklevel=2)
     ratio = 1.0 if scatter is None else scatter / found.scatter
@@ -191,10 +187,8 @@ def _way(t: Vector, velocity: float, length: float | None) -> Vector:
     # functions of modulus k = v/(2 w l), w^2 = g/l.
     if length is None:
         return velocity * t
-    from scipy.special import ellipj
-
     w = np.sqrt(_GRAVITY / length)
-    sn, _, dn, _ = ellipj(w * t, min(1.0, (0.5 * velocity / (w * length)) ** 2))
+    sn, _, dn, _ = scipy.special.ellipj(w * t, min(1.0, (0.5 * velocity / (w * length)) ** 2))
     return np.asarray(velocity * sn * dn / w)
 
 
@@ -208,17 +202,15 @@ def _around(
             near = np.abs(t - time) <= window
             sides = int((near & (t < time)).sum()), int((near & (t >= time)).sum())
             if min(sides) < _LEAST:
-                raise ValueError(
-                    f"track {name!r} has {sides[0]} marks before and {sides[1]} after the impact "
-                    f"at {time:.4g} s within window = {window:g} s; needs {_LEAST} on each side"
-                )
+                told = f"{sides[0]} marks before and {sides[1]} after the impact at {time:.4g} s"
+                told += f" within window = {window:g} s; needs {_LEAST} on each side"
+                raise ValueError(f"track {name!r} has {told}")
             used.append(Track(t[near], x[near]))
         time, places = _moment(used, time, length, striker)
     if (np.diff(places) <= 0).any():
-        raise ValueError(
-            f"the balls meet at {(0.0 + places.round(4)).tolist()} m; the tracks must be in the "
-            "order of the balls, left to right, all from one origin, x to the right"
-        )
+        rule = "in the order of the balls, left to right, all from one origin, x to the right"
+        told = f"the balls meet at {(0.0 + places.round(4)).tolist()} m"
+        raise ValueError(f"{told}; the tracks must be {rule}")
     return _velocities(used, time, length, striker, window)
 
 
@@ -226,7 +218,6 @@ def _moment(
     balls: list[Track], time: float, length: float | None, striker: int
 ) -> tuple[float, Vector]:
     """Return the moment of the impact and the balls' places then: all tracks meet there."""
-    from scipy.optimize import least_squares
 
     def residuals(p: Vector) -> Vector:  # moment, velocity before, then after and place of each
         left = [
@@ -238,8 +229,8 @@ def _moment(
 
     lines = [np.polyfit(t[t >= time] - time, x[t >= time], 1) for t, x in balls]
     t, x = balls[striker]
-    before = np.polyfit(t[t < time] - time, x[t < time], 1)[0]
-    found = least_squares(residuals, [time, before, *np.ravel(lines)], x_scale="jac").x
+    begin = [time, np.polyfit(t[t < time] - time, x[t < time], 1)[0], *np.ravel(lines)]
+    found = scipy.optimize.least_squares(residuals, begin, x_scale="jac").x
     return float(found[0]), found[3::2]
 
 
@@ -247,8 +238,6 @@ def _velocities(
     balls: list[Track], time: float, length: float | None, striker: int, window: float
 ) -> Velocities:
     """Fit the velocity of every ball on its own, place free, on either side of the impact."""
-    from scipy.special import fdtrc
-
     velocities, variances = np.zeros((2, 2, len(balls)))
     squares, freedom, bent, bends, sides = 0.0, 0, 0.0, 0, []
     for k, ball in enumerate(balls):
@@ -274,7 +263,7 @@ def _velocities(
     # Marks without scatter, as of a computed motion, leave rounding alone, and no question.
     exact, chance = 1e-5 * max(float(np.ptp(ball.positions)) for ball in balls), 1.0
     if scatter >= exact and bent and (spare := freedom - bends) > 0:
-        chance = float(fdtrc(bends, spare, (squares - bent) / bends * spare / bent))
+        chance = float(scipy.special.fdtrc(bends, spare, (squares - bent) / bends * spare / bent))
     (after, before), (sigma, sigma_before) = velocities, scatter * np.sqrt(variances)
     strays = _strays(sides, exact)
     return Velocities(time, before, after, sigma, sigma_before, scatter, window, chance, strays)
@@ -283,8 +272,6 @@ def _velocities(
 def _strays(sides: list[tuple[int, Vector, Vector, Vector]], exact: float) -> tuple[_Stray, ...]:
     """Return the mark of each side that chance does not explain, if any: `Velocities.strays`."""
     # A side has its ball, times, and what bends with the velocity and is left of the positions.
-    from scipy.special import stdtr
-
     worst = []
     for k, times, column, left in sides:
         q = np.linalg.qr(np.stack([np.ones_like(left), column], axis=-1))[0]
@@ -297,5 +284,6 @@ def _strays(sides: list[tuple[int, Vector, Vector, Vector]], exact: float) -> tu
     some = variances > exact**2  # marks of balls at rest may be equal
     usual = np.average(variances[some], weights=freedom[some]) if some.any() else np.inf
     beyond = np.sqrt(gains / np.maximum(usual, variances))
-    odd = 2 * sum(one[1].size for one in sides) * stdtr(freedom.sum(), -beyond) < _CHANCE
+    chance = 2 * sum(one[1].size for one in sides) * scipy.special.stdtr(freedom.sum(), -beyond)
+    odd = chance < _CHANCE
     return tuple(zip(balls[odd].tolist(), moments[odd].tolist(), off[odd].tolist(), strict=True))

@@ -9,15 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cradle.fit.parameters import (
-    Key,
-    fitted_keys,
-    label,
-    outcomes,
-    pair_keys,
-    triplet_keys,
-    types_in_a_row,
-)  # fmt: skip
+from cradle.fit import parameters
+from cradle.fit.parameters import Key, fitted_keys, label, outcomes, pair_keys
 from cradle.fit.search import LEVEL, RISE, Mode, Scan
 from cradle.fit.shots import Shots, ShotSet, chance
 from cradle.input.values import ABOVE_ZERO, Vector, one_number
@@ -214,10 +207,9 @@ class Fit:
             error = np.hypot(shots.sigma, np.abs(expected) * share.max(axis=1, keepdims=True))
             left = (shots.after - expected) / error
             shot, ball = np.unravel_index(np.argmax(np.abs(left)), left.shape)
-            lines.append(
-                f"residuals of {shots.name}: {np.sqrt((left**2).mean()):.1f} standard errors, the "
-                f"largest {left[shot, ball]:.1f} (shot {shots.shots[shot]}, ball {ball + 1})"
-            )
+            usual, largest = np.sqrt((left**2).mean()), f"largest {left[shot, ball]:.1f}"
+            lines.append(f"residuals of {shots.name}: {usual:.1f} standard errors, the {largest} "
+                         f"(shot {shots.shots[shot]}, ball {ball + 1})")  # fmt: skip
         return "\n".join(lines)
 
     def rows(self) -> list[dict[str, Any]]:
@@ -259,7 +251,7 @@ class Fit:
         ValueError
             If fewer than 2 balls are named, or a mass, restitution or ratio is not known.
         """
-        row = types_in_a_row(types)
+        row = parameters.types_in_a_row(types)
         one_number("speed", speed, *ABOVE_ZERO)
         masses = self.shots.masses
         for kind in (kind for kind in row if kind not in masses):
@@ -269,10 +261,10 @@ class Fit:
         parts = [0.5, (1 - LEVEL) / 2, (1 + LEVEL) / 2]
         return Prediction(row, *np.quantile(velocities, parts, axis=0))
 
-    def _draws(self, types: tuple[str, ...]) -> dict[Key, Vector]:
+    def _draws(self, types: tuple[str, ...]) -> dict[Key, Any]:
         """Draw coefficients of restitution and ratios of a chain from what was fitted."""
         random = np.random.default_rng(0)
-        values: dict[Key, Vector] = {}
+        values: dict[Key, Any] = {}
         given = {**self.given, **self.values()}
         for key in dict.fromkeys(pair_keys(types)):
             if label(key) not in given:
@@ -283,10 +275,11 @@ class Fit:
             total = np.cumsum(group.density)
             drawn = np.searchsorted(total, random.random(_DRAWS) * total[-1], side="right")
             values.update(zip(group.keys, group.points[drawn].T, strict=True))
-        for key in (key for keys in triplet_keys(types) for key in keys if key not in values):
+        ratios = [key for keys in parameters.triplet_keys(types) for key in keys]
+        for key in (key for key in ratios if key not in values):
             if (name := label(key)) not in {**self.known, **self.estimates}:
                 there = ", ".join(n for n, e in self.estimates.items() if e.kind == "ratio")
                 raise ValueError(f"the ratio of {name} is not known; fitted: {there or 'none'}")
-            values[key] = (np.full(_DRAWS, self.known[name]) if name in self.known
-                           else self.estimates[name].bound * random.random(_DRAWS))  # fmt: skip
+            values[key] = (self.known[name] if name in self.known else
+                           self.estimates[name].bound * random.random(_DRAWS))  # fmt: skip
         return values

@@ -10,6 +10,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from cradle.input.values import Vector
 
@@ -44,8 +45,6 @@ class Scan(NamedTuple):
 
 def scan(function: Function, upper: Vector) -> Found:
     """Search one dimension: a grid, then walk to each minimum and each end of the set."""
-    from scipy.optimize import brentq
-
     # Near the bound the outcome goes like the square root of what is left to it.
     points = upper * (1.0 - np.linspace(1.0, 0.0, _GRID)[:, None] ** 2)
     grid, values = points[:, 0], function(points)
@@ -64,7 +63,8 @@ def scan(function: Function, upper: Vector) -> Found:
         return float(function(np.array([[at]]))[0]) - lowest - RISE
 
     def end(k: int) -> float:
-        return float(x[k - (k > 0)] if k in (0, x.size) else brentq(over, x[k - 1], x[k]))
+        root = scipy.optimize.brentq
+        return float(x[k - (k > 0)] if k in (0, x.size) else root(over, x[k - 1], x[k]))
 
     ends = [end(k) for k in np.flatnonzero(np.diff(inside)).tolist()]
     found = Scan(modes, tuple(zip(ends[::2], ends[1::2], strict=True)), grid, excess)
@@ -75,10 +75,9 @@ def refine(function: Function, upper: Vector) -> Found:
     """Search several dimensions: a grid of cells, then the best cells divided."""
     size = upper.size
     if size not in _CELLS:
-        raise ValueError(
-            f"{size} ratios act together in these shots; at most {max(_CELLS)} can be searched "
-            "at a time: add shots of fewer balls, or fix some by known="
-        )
+        most = f"at most {max(_CELLS)} can be searched at a time"
+        told = f"{size} ratios act together in these shots; {most}"
+        raise ValueError(f"{told}: add shots of fewer balls, or fix some by known=")
     step = upper / _CELLS[size]
     points = np.array(list(product(*(s * (np.arange(_CELLS[size]) + 0.5) for s in step))))
     halves = np.array(list(product((-0.25, 0.25), repeat=size)))

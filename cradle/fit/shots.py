@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+import scipy
 
 from cradle.input.csv import table_lines
 from cradle.input.values import ABOVE_ZERO, Vector, one_number, one_of
@@ -116,9 +117,7 @@ class Shots:
 
 def chance(chi_square: float, degrees_of_freedom: int) -> float:
     """Return the chance of a chi-square at least as large if model and errors are right."""
-    from scipy.special import chdtrc
-
-    return float(chdtrc(max(degrees_of_freedom, 1), chi_square))
+    return float(scipy.special.chdtrc(max(degrees_of_freedom, 1), chi_square))
 
 
 def read_shots(
@@ -160,10 +159,8 @@ def read_shots(
         if name not in (*there, *optional):
             other = "; or give sigma=" if name == "sigma" else ""
             hint = "".join(f": write {x} in small letters" for x in there if x.lower() == name)
-            raise ValueError(
-                f"column {name!r} is missing ({COLUMNS[name]}{other}); "
-                f"there are {', '.join(there)}{hint}"
-            )
+            told = f"column {name!r} is missing ({COLUMNS[name]}{other})"
+            raise ValueError(f"{told}; there are {', '.join(there)}{hint}")
     if sigma is not None:
         one_number("sigma", sigma, *ABOVE_ZERO)
         if "sigma" in there:
@@ -257,7 +254,6 @@ def _check_physics(what: str, rows: list[_Row]) -> None:
     error = np.sqrt((mass**2 * ((after * sigma) ** 2 + (before * earlier) ** 2)).sum())
     if gain > _BEYOND * error:
         part = f"{100 * gain / (0.5 * mass * before**2).sum():.3g} % of its energy"
-        raise ValueError(
-            f"{rows[0]['where']}, columns before and after: {what} gains {part}, "
-            f"{gain / error:.3g} standard errors; check units, signs and sigma"
-        )
+        told = f"{what} gains {part}, {gain / error:.3g} standard errors"
+        place = f"{rows[0]['where']}, columns before and after"
+        raise ValueError(f"{place}: {told}; check units, signs and sigma")

@@ -6,6 +6,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
@@ -148,8 +149,6 @@ class _Film:
 
     def begin(self) -> Vector:
         """Search from nothing, in ever longer parts of the film."""
-        from scipy.signal import lombscargle
-
         t, often = self.times, self.seen.sum(axis=0)
         # No impact changes the place of the centre of mass.
         some = often >= 0.5 * often.max()
@@ -158,7 +157,7 @@ class _Film:
         if min(at.size, often.sum() // 3) < 10:
             raise ValueError(f"{often.sum()} readings, {at.size} frames with all balls; too few")
         rates = np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
-        rate = rates[lombscargle(at, mean - mean.mean(), rates).argmax()]
+        rate = rates[scipy.signal.lombscargle(at, mean - mean.mean(), rates).argmax()]
         self.period = period = self.fixed.get("period", 2.0 * np.pi / rate)
         self.size = size = float(np.nanmax(np.abs(self.x)))
         early = self.seen & (t <= max(period / 16.0, t[3]))[:, None]
@@ -182,8 +181,7 @@ class _Film:
         self.least, count = 1e-4 * self.steps, int(np.searchsorted(t, 2.2 * period))
         nodes = [np.array(node) for node in product(*(row[3] for row in used))]
         nodes.sort(key=lambda node: float((self.left(node, count) ** 2).sum()))
-        held = [k for k, name in enumerate(self.names) if name in ("period", "damping")]
-        found = [self.descend(node, count, held) for node in nodes[:3]]
+        found = [self.descend(node, count) for node in nodes[:3]]
         self.half = min(found, key=lambda one: float(one[1] @ one[1]))[0]
         for part in [len(t) >> k for k in range(20, 0, -1) if len(t) >> k > 1.5 * count]:
             self.half = self.descend(self.half, part)[0]
@@ -206,19 +204,13 @@ class _Film:
         left = np.where(seen, self.x[:count] - self.swung(p, count).positions, 0.0)
         return np.asarray((left - left.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))[seen])
 
-    def descend(
-        self, p: Vector, count: int | None = None, held: Collection[int] = ()
-    ) -> tuple[Vector, Vector, Vector]:
+    def descend(self, p: Vector, count: int | None = None) -> tuple[Vector, Vector, Vector]:
         """Return a minimum: numbers, what their swing leaves, and the slopes of that."""
-        from scipy.optimize import least_squares
-
-        # Touching balls stay so: what they do is no limit of small gaps.
-        touch = [k for k, name in enumerate(self.names) if name == "gaps" and not p[k]]
-        free, size = np.setdiff1d(np.arange(p.size), [*held, *touch]), self.seen[:count].sum()
+        size = self.seen[:count].sum()
 
         def slopes(q: Vector) -> Vector:
             left, out = self.left(q, count), np.zeros((size, p.size))
-            for k in free:
+            for k in range(p.size):
                 trial, step = q.copy(), self.steps[k]
                 trial[k] += step if q[k] + step < self.high[k] else -step
                 out[:, k] = (self.left(trial, count) - left) / (trial[k] - q[k])
@@ -228,7 +220,7 @@ class _Film:
                 self.steps[k] = np.clip(error, self.least[k], most)
             return out
 
-        found = least_squares(
+        found = scipy.optimize.least_squares(
             lambda q: self.left(q, count), p, slopes, (self.low, self.high), "dogbox",
             ftol=0.01 / size, xtol=None, gtol=None, x_scale="jac", max_nfev=15,
         )  # fmt: skip
@@ -251,8 +243,8 @@ class _Film:
         poor = not exact and bool(max(alike) > _FAR or chance(chi, freedom) < _CHANCE)
         self.variance = max(reading**2, spread * poor)
         inverse = (solver := np.linalg.pinv(slopes)) @ solver.T
-        usual, told = np.sqrt(self.variance * np.diag(inverse)), slopes.any(axis=0)
-        errors = np.where(told, usual, self.steps / np.sqrt(RISE))
+        errors = np.sqrt(self.variance * np.diag(inverse))
+        errors = np.where(slopes.any(axis=0), errors, self.steps / np.sqrt(RISE))
         if poor:
             drift = (self.half - p) / np.sqrt(RISE) / errors
             wide = np.hypot(self.widened(left, slopes @ inverse / errors), drift)
@@ -273,15 +265,13 @@ class _Film:
 
     def widened(self, left: Vector, pull: Vector) -> Vector:
         """Return errors by differences of parts of the film; `pull`: change of p, in errors."""
-        from scipy.special import stdtrit
-
         pulls = np.zeros((*self.seen.shape, pull.shape[1]))
         pulls[self.seen] = pull * left[:, None]
         wide = [np.ones(pull.shape[1])]
         for parts in _PARTS:
             cuts = np.arange(parts) * len(pulls) // parts
             moved = np.add.reduceat(pulls.sum(axis=1), cuts)
-            times = stdtrit(parts - 1, 0.5 + 0.5 * LEVEL) / np.sqrt(RISE)
+            times = scipy.special.stdtrit(parts - 1, 0.5 + 0.5 * LEVEL) / np.sqrt(RISE)
             wide.append(times * np.sqrt((moved**2).sum(axis=0) * parts / (parts - 1)))
         return np.asarray(np.max(wide, axis=0))
 

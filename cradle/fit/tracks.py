@@ -81,10 +81,8 @@ def read_tracker(
         elif titles and not first.startswith("#"):
             where = f"{file.name}, line {number}"
             if any(cells[len(titles) :]):
-                raise ValueError(
-                    f"{where}: {len(cells)} values under {len(titles)} titles (between commas, "
-                    "decimals need a point)"
-                )
+                told = f"{where}: {len(cells)} values under {len(titles)} titles"
+                raise ValueError(f"{told} (between commas, decimals need a point)")
             for at, (name, clock) in _owners(titles, column, above, block).items():
                 found = marks.setdefault(name, [])  # of a ball that is marked later only, too
                 if "".join(cells[at : at + 1]).casefold() not in ("", "nan"):
@@ -96,22 +94,17 @@ def read_tracker(
     if not tracks:
         balls = [text for text, _ in titles[1:] if text]
         hint = f"; if each column is a ball, write {'/x, '.join(balls)}/x" if balls else ""
-        raise ValueError(
-            f"{file.name} has no column of positions: a line of titles must begin with t or Time "
-            f"and name {column} too, as Tracker, Kinovea, Logger Pro and Capstone do{hint}"
-        )
+        rule = f"a line of titles must begin with t or Time and name {column} too"
+        told = f"{file.name} has no column of positions: {rule}"
+        raise ValueError(f"{told}, as Tracker, Kinovea, Logger Pro and Capstone do{hint}")
     for name, (times, _) in tracks.items():
         if (np.diff(times) <= 0.0).any():
-            raise ValueError(
-                f"{file.name}: the times of {name} do not rise; where one ball follows the other, "
-                "each needs a line with its name, '# A', above"
-            )
+            told = f"{file.name}: the times of {name} do not rise; where one ball follows the other"
+            raise ValueError(f"{told}, each needs a line with its name, '# A', above")
     apart = max(float(np.median(np.diff(t))) if t.size > 1 else 0.0 for t, _ in tracks.values())
     if apart > 0.5:
-        raise ValueError(
-            f"{file.name} has marks {apart:g} s apart; if the times are in ms, "
-            "divide time_scale by 1000"
-        )
+        told = f"{file.name} has marks {apart:g} s apart"
+        raise ValueError(f"{told}; if the times are in ms, divide time_scale by 1000")
     return tracks
 
 
