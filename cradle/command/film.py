@@ -4,14 +4,11 @@ import csv
 import sys
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from cradle.command.describe import UNITS, numbers_of, pendulum_length, swing_options
-
-if TYPE_CHECKING:
-    from cradle.fit import Velocities
 
 _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
@@ -97,7 +94,7 @@ def film(
 def _velocities(
     file: Path, types: tuple[str, ...], masses: list[float], length: float | None,
     time_scale: float, size: float, window: float | None,
-) -> "tuple[str, Velocities]":  # fmt: skip
+) -> tuple[str, Any]:  # fmt: skip
     """Return what was warned of, and the velocities in one film, of balls of these types."""
     import numpy as np
 
@@ -105,16 +102,12 @@ def _velocities(
 
     tracks = read_tracker(file, time_scale=time_scale, unit=size)
     if not len(types) == len(masses) == len(tracks):
-        raise ValueError(
-            f"{file.name} has {len(tracks)} tracks, --set {len(types)} types and --masses "
-            f"{len(masses)} masses; must be as many"
-        )
+        there = f"{file.name} has {len(tracks)} tracks, --set {len(types)} types and --masses"
+        raise ValueError(f"{there} {len(masses)} masses; must be as many")
     for place, (kind, track) in enumerate(zip(types, tracks, strict=True), 1):
         if track in types and track != kind:
-            raise ValueError(
-                f"track {place} is named {track}, --set {''.join(types)} has {kind} there; both go "
-                "from left to right"
-            )
+            there = f"track {place} is named {track}, --set {''.join(types)} has {kind} there"
+            raise ValueError(f"{there}; both go from left to right")
     fastest = max(float(np.ptp(x) / (np.ptp(t) or 1.0)) for t, x in tracks.values())
     if length is None and fastest > 20.0:  # a pendulum's length tells by itself
         raise ValueError(f"{fastest:.3g} m/s is unlikely; say the unit of the positions")

@@ -4,16 +4,13 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from cradle.command.console import format_options, picture, plot_fits, show, text
 from cradle.input.values import ABOVE_ZERO, one_number
 from cradle.tables import data_folder
-
-if TYPE_CHECKING:
-    from cradle.fit import Fit, Shots
 
 # What a command needs is imported in the command: the first answer comes within a second.
 
@@ -93,27 +90,21 @@ def fit(
     last = ratio(used, values, known=dict(known), progress=True)  # it predicts
     fits = [one for one in (*pairs, last) if one.estimates]
     momentum, count = shots.momentum_check()
-    extra = {
-        "chi_square": [one.chi_square for one in fits],
-        "degrees_of_freedom": [one.degrees_of_freedom for one in fits],
-        "momentum_chi_square": momentum,
-        "shots": count,
-        "without": [one.name for one in shots.sets if one not in used.sets],
-    }
-    quality = [
-        f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}"
-        + " (a poor fit: the errors do not explain the differences)" * (one.probability <= 1e-3)
-        for one in fits
-    ]
+    extra: dict[str, Any] = {name: [getattr(one, name) for one in fits]
+                             for name in ("chi_square", "degrees_of_freedom")}  # fmt: skip
+    left = [one.name for one in shots.sets if one not in used.sets]
+    extra |= {"momentum_chi_square": momentum, "shots": count, "without": left}
+    poor = " (a poor fit: the errors do not explain the differences)"
+    quality = [f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}"
+               f"{poor * (one.probability <= 1e-3)}" for one in fits]  # fmt: skip
     notes = ["fit: no ratio is fitted; those of --known are taken as they are"]
     notes *= bool(known and not last.estimates)
-    whole = " (all of the file)" if extra["without"] else ""
+    whole = " (all of the file)" * bool(left)
     lost = "; masses, velocities or their errors are wrong" * (chance(momentum, count) <= 1e-3)
     notes.append(f"momentum: chi-square {momentum:.1f} of {count} shots{whole}{lost}")
     if predict is not None:
         more, lines = _predicted(last, shots, predict, striker)
-        extra.update(more)
-        notes += lines
+        extra, notes = extra | more, notes + lines
     if plot is not None:
         plot_fits(fits, plot)
     if summary:
@@ -136,7 +127,7 @@ def _named(given: str) -> tuple[str, tuple[float, float]]:
 
 
 def _refuse_unused(
-    given: Iterable[str], known: Iterable[str], shots: "Shots", predict: str | None
+    given: Iterable[str], known: Iterable[str], shots: Any, predict: str | None
 ) -> None:
     """Refuse a value that no chain needs (its name may be misspelt), and one that is there."""
     from cradle.fit.parameters import label, pair_keys, parameter_key, ratio_keys
@@ -159,7 +150,7 @@ def _refuse_unused(
 
 
 def _predicted(
-    found: "Fit", shots: "Shots", sequence: str, speed: float
+    found: Any, shots: Any, sequence: str, speed: float
 ) -> tuple[dict[str, Any], list[str]]:
     """Return a prediction and what was measured of such chains: for JSON, and as lines."""
     from cradle.fit.parameters import ratio_keys
@@ -181,21 +172,18 @@ def _predicted(
                          "measured": mean, "error": error})  # fmt: skip
         tables.append([{**row, "measured": m, "error": e}
                        for row, m, e in zip(rows, mean, error, strict=True)])  # fmt: skip
-        part = "left out of the fit"
-        if used and not taught:
-            part = "not fitted: it changes no ratio"
-        elif used:  # without a triplet's own set its ratio is known no longer
-            hint = f" (for one: --without {quote(one.name)})" if len(one.types) > 3 else ""
-            part = f"part of the fit: this is no check{hint}"
+        # Without a triplet's own set its ratio is known no longer.
+        hint = f" (for one: --without {quote(one.name)})" * (len(one.types) > 3)
+        part = f"part of the fit: this is no check{hint}"
+        part = part if taught else "not fitted: it changes no ratio"
+        part = part if used else "left out of the fit"
         remarks.append(f"measured: mean of {len(one.shots)} shots of set {one.name}, each scaled "
                        f"to {speed:g} m/s; the set was {part}")  # fmt: skip
     lines = ["", f"{sequence} at {speed:g} m/s; lower to upper: the central 95 % of predictions"]
     lines += [*map(text, tables or [rows]), *remarks]
-    if several := [one.name for one in ratios if len(one.intervals) > 1]:
-        lines.append(
-            f"intervals in pieces: {', '.join(several)}; the predictions may come in groups, and "
-            "lower to upper holds what lies between the groups too"
-        )
+    if several := ", ".join(one.name for one in ratios if len(one.intervals) > 1):
+        groups = "come in groups, and lower to upper holds what lies between the groups too"
+        lines.append(f"intervals in pieces: {several}; the predictions may {groups}")
     return {"prediction": rows, "measured": measured}, lines
 
 

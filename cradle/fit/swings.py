@@ -72,8 +72,9 @@ def fit_swing(
 
     At the first frame some balls, let go at one moment, are on their way; the others are at rest.
     Places and velocities there are fitted too, as is where each ball hangs.  Intervals hold 95 %,
-    by profiles of chi-square [1]_.  Where the law fails (by chi-square, or residuals alike from
-    frame to frame) they are widened by how parts of the film differ [2]_.
+    by profiles of chi-square (Venzon and Moolgavkar, Applied Statistics 37, 1988, 87-94).  Where
+    the law fails, by chi-square or residuals alike from frame to frame, they are widened by how
+    parts of the film differ (clusters of Liang and Zeger, Biometrika 73, 1986, 13-22).
 
     Parameters
     ----------
@@ -96,11 +97,6 @@ def fit_swing(
     ------
     ValueError
         If a value is wrong, no ball is seen on its way at first, or there are too few readings.
-
-    References
-    ----------
-    .. [1] D. J. Venzon and S. H. Moolgavkar, Applied Statistics 37 (1988), 87-94.
-    .. [2] K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986), 13-22: errors by clusters.
 
     Examples
     --------
@@ -180,10 +176,9 @@ class _Film:
         self.low, self.high, self.steps = np.array([row[:3] for row in used]).T
         self.least, count = 1e-4 * self.steps, int(np.searchsorted(t, 2.2 * period))
         nodes = [np.array(node) for node in product(*(row[3] for row in used))]
-        nodes.sort(key=lambda node: float((self.left(node, count) ** 2).sum()))
-        found = [self.descend(node, count) for node in nodes[:3]]
-        self.half = min(found, key=lambda one: float(one[1] @ one[1]))[0]
-        for part in [len(t) >> k for k in range(20, 0, -1) if len(t) >> k > 1.5 * count]:
+        self.half = min(nodes, key=lambda node: float((self.left(node, count) ** 2).sum()))
+        parts = [len(t) >> k for k in range(20, 0, -1)]
+        for part in [count, *(part for part in parts if part > 1.5 * count)]:
             self.half = self.descend(self.half, part)[0]
         return self.half
 
@@ -216,8 +211,7 @@ class _Film:
                 out[:, k] = (self.left(trial, count) - left) / (trial[k] - q[k])
                 # The next step is about as wide as the error, and so goes over what is rough.
                 error = np.sqrt(left @ left / (out[:, k] @ out[:, k] + 1e-300) / size)
-                most = min(100.0 * step, 0.4 * (self.high[k] - self.low[k]))
-                self.steps[k] = np.clip(error, self.least[k], most)
+                self.steps[k] = np.clip(error, self.least[k], 0.4 * (self.high[k] - self.low[k]))
             return out
 
         found = scipy.optimize.least_squares(
@@ -229,16 +223,15 @@ class _Film:
     def judged(self, p: Vector, left: Vector, slopes: Vector) -> SwingFit | Vector:
         """Return the fit; or, if a profile finds a lower minimum, that."""
         freedom = left.size - int(self.seen.any(axis=0).sum()) - p.size
-        total, grid = float(left @ left), np.full(self.seen.shape, np.nan)
+        grid, spread = np.full(self.seen.shape, np.nan), float(left @ left) / freedom
         grid[self.seen] = left
-        spread = total / freedom
         reading = self.reading or float(np.sqrt(spread))
         # Products of residuals of a ball some frames apart, up to a quarter of a swing.
         most = 2 + int(0.25 * self.period / self.times[-1] * len(grid))
         apart = [grid[k:] * grid[:-k] for k in range(1, most)]
         alike = [np.nansum(both) / np.sqrt(np.isfinite(both).sum()) / spread
                  for both in (apart[0], np.concatenate(apart))]  # fmt: skip
-        chi, wide = total / reading**2, np.ones(p.size)
+        chi, wide = float(left @ left) / reading**2, np.ones(p.size)
         exact = spread < (1e-6 * self.size) ** 2  # rounding alone is left
         poor = not exact and bool(max(alike) > _FAR or chance(chi, freedom) < _CHANCE)
         self.variance = max(reading**2, spread * poor)
@@ -247,7 +240,7 @@ class _Film:
         errors = np.where(slopes.any(axis=0), errors, self.steps / np.sqrt(RISE))
         if poor:
             drift = (self.half - p) / np.sqrt(RISE) / errors
-            wide = np.hypot(self.widened(left, slopes @ inverse / errors), drift)
+            wide = np.hypot(self.widened((solver * left).T / errors), drift)
         estimates = {}
         for k, name in enumerate(self.names):
             rise = RISE * self.variance * wide[k] ** 2
@@ -263,11 +256,10 @@ class _Film:
             dict(zip(self.names, wide.tolist(), strict=False)),
         )  # fmt: skip
 
-    def widened(self, left: Vector, pull: Vector) -> Vector:
-        """Return errors by differences of parts of the film; `pull`: change of p, in errors."""
-        pulls = np.zeros((*self.seen.shape, pull.shape[1]))
-        pulls[self.seen] = pull * left[:, None]
-        wide = [np.ones(pull.shape[1])]
+    def widened(self, pull: Vector) -> Vector:
+        """Return errors by differences of parts of the film, of how each reading moves p."""
+        pulls, wide = np.zeros((*self.seen.shape, pull.shape[1])), [np.ones(pull.shape[1])]
+        pulls[self.seen] = pull
         for parts in _PARTS:
             cuts = np.arange(parts) * len(pulls) // parts
             moved = np.add.reduceat(pulls.sum(axis=1), cuts)
