@@ -12,7 +12,7 @@ from cradle.fit.parameters import Key, fitted_keys, label, pair_keys, parameter_
 from cradle.fit.result import Estimate, Fit, Group
 from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
-from cradle.input.values import ABOVE_ZERO, Vector, checked, one_number
+from cradle.input.values import ABOVE_ZERO, PART, Vector, checked, one_number
 from cradle.kernel.state import LIMITS
 
 _TRIALS = 513  # points at which it is tried whether a ratio acts at all
@@ -118,9 +118,15 @@ def ratio(
         raise ValueError("no set has three balls or more; ratios come from triplets")
     from tqdm import tqdm
 
-    given = _restitution_values(restitution, sets)
-    fixed = _known_ratios(known or {}, shots.masses)
-    bounds = {key: _bound(key, shots.masses)
+    given, fixed, masses = _restitution_values(restitution, sets), dict[Key, float](), shots.masses
+    for triplet, value in (known or {}).items():
+        key, name = parameter_key(triplet), f"known[{triplet!r}]"
+        fixed[key] = one_number(name, value, *PART)
+        if len(key) == 3 and masses.keys() >= set(key):  # it is to be held
+            bound = _bound(key, masses)
+            rule = f"must not exceed the bound of these balls, {bound:.6g} (Eq. 34)"
+            one_number(name, value, rule, high=bound * LIMITS.rounded)
+    bounds = {key: _bound(key, masses)
               for one in sets for key in ratio_keys(one.types) if key not in fixed}  # fmt: skip
     with tqdm(unit=" points", delay=2.0, disable=not progress) as bar:
         return _fitted(shots, "ratio", bounds, given, fixed, bar.update)
@@ -137,7 +143,7 @@ def _restitution_values(
         if len(numbers) not in (1, 2):
             raise ValueError(f"{name} = {value!r}; must be a number, or a number and its error")
         e, error = (*numbers, 0.0)[:2]
-        values[key] = one_number(name, e, "must lie in [0, 1]", 0.0, 1.0), error
+        values[key] = one_number(name, e, *PART), error
         one_number(f"{name}[1]", error, "a standard error must be at least 0", 0.0)
     for one in sets:
         for key in pair_keys(one.types):
@@ -146,19 +152,6 @@ def _restitution_values(
                 needs = f"{label(key)!r}, which set {one.name} needs"
                 raise ValueError(f"restitution has no {needs}; it has {there}")
     return values
-
-
-def _known_ratios(known: Mapping[str, float], masses: Mapping[str, float]) -> dict[Key, float]:
-    """Return the ratios that are not fitted; none is above the bound of its balls, to be held."""
-    fixed = {}
-    for given, value in known.items():
-        key, name = parameter_key(given), f"known[{given!r}]"
-        fixed[key] = one_number(name, value, "must lie in [0, 1]", 0.0, 1.0)
-        if len(key) == 3 and masses.keys() >= set(key):
-            bound = _bound(key, masses)
-            rule = f"must not exceed the bound of these balls, {bound:.6g} (Eq. 34)"
-            one_number(name, value, rule, high=bound * LIMITS.rounded)
-    return fixed
 
 
 def _bound(key: Key, masses: Mapping[str, float]) -> float:

@@ -195,14 +195,14 @@ def _way(t: Vector, velocity: float, length: float | None) -> Vector:
 def _around(
     tracks: Mapping[str, Track], time: float, window: float, length: float | None, striker: int
 ) -> Velocities:
-    """Fit the moment in a window, then every ball on its own on either side of it."""
+    """Fit the moment in a window, then every ball on its own, place free, on either side of it."""
     for _ in range(3):  # the window moves with the moment that is found in it
         used = []
         for name, (t, x) in tracks.items():
             near = np.abs(t - time) <= window
-            sides = int((near & (t < time)).sum()), int((near & (t >= time)).sum())
-            if min(sides) < _LEAST:
-                told = f"{sides[0]} marks before and {sides[1]} after the impact at {time:.4g} s"
+            marks = int((near & (t < time)).sum()), int((near & (t >= time)).sum())
+            if min(marks) < _LEAST:
+                told = f"{marks[0]} marks before and {marks[1]} after the impact at {time:.4g} s"
                 told += f" within window = {window:g} s; needs {_LEAST} on each side"
                 raise ValueError(f"track {name!r} has {told}")
             used.append(Track(t[near], x[near]))
@@ -211,40 +211,13 @@ def _around(
         rule = "in the order of the balls, left to right, all from one origin, x to the right"
         told = f"the balls meet at {(0.0 + places.round(4)).tolist()} m"
         raise ValueError(f"{told}; the tracks must be {rule}")
-    return _velocities(used, time, length, striker, window)
-
-
-def _moment(
-    balls: list[Track], time: float, length: float | None, striker: int
-) -> tuple[float, Vector]:
-    """Return the moment of the impact and the balls' places then: all tracks meet there."""
-
-    def residuals(p: Vector) -> Vector:  # moment, velocity before, then after and place of each
-        left = [
-            x - place - _way(np.maximum(t - p[0], 0.0), v, length)
-            for (t, x), v, place in zip(balls, p[2::2], p[3::2], strict=True)
-        ]
-        left[striker] -= _way(np.minimum(balls[striker].times - p[0], 0.0), p[1], length)
-        return np.concatenate(left)
-
-    lines = [np.polyfit(t[t >= time] - time, x[t >= time], 1) for t, x in balls]
-    t, x = balls[striker]
-    begin = [time, np.polyfit(t[t < time] - time, x[t < time], 1)[0], *np.ravel(lines)]
-    found = scipy.optimize.least_squares(residuals, begin, x_scale="jac").x
-    return float(found[0]), found[3::2]
-
-
-def _velocities(
-    balls: list[Track], time: float, length: float | None, striker: int, window: float
-) -> Velocities:
-    """Fit the velocity of every ball on its own, place free, on either side of the impact."""
-    velocities, variances = np.zeros((2, 2, len(balls)))
+    velocities, variances = np.zeros((2, 2, len(used)))
     squares, freedom, bent, bends, sides = 0.0, 0, 0.0, 0, []
-    for k, ball in enumerate(balls):
+    for k, ball in enumerate(used):
         t = ball.times - time
         # A mark nearer than half a frame may be of either side, and is left out.
-        near = 0.5 * float(np.median(np.diff(t)))
-        for side, some in enumerate([t > near, t < -near]):
+        half = 0.5 * float(np.median(np.diff(t)))
+        for side, some in enumerate([t > half, t < -half]):
             times, x, v = t[some], ball.positions[some], 0.0
             if side and k != striker:
                 sides.append((k, ball.times[some], times, x))
@@ -261,12 +234,30 @@ def _velocities(
             bent, bends = bent + _rest([off, times**2, times**3], left), bends + 2
     scatter = float(np.sqrt(squares / freedom))
     # Marks without scatter, as of a computed motion, leave rounding alone, and no question.
-    exact, chance = 1e-5 * max(float(np.ptp(ball.positions)) for ball in balls), 1.0
+    exact, chance = 1e-5 * max(float(np.ptp(ball.positions)) for ball in used), 1.0
     if scatter >= exact and bent and (spare := freedom - bends) > 0:
         chance = float(scipy.special.fdtrc(bends, spare, (squares - bent) / bends * spare / bent))
     (after, before), (sigma, sigma_before) = velocities, scatter * np.sqrt(variances)
     strays = _strays(sides, exact)
     return Velocities(time, before, after, sigma, sigma_before, scatter, window, chance, strays)
+
+
+def _moment(
+    balls: list[Track], time: float, length: float | None, striker: int
+) -> tuple[float, Vector]:
+    """Return the moment of the impact and the balls' places then: all tracks meet there."""
+
+    def residuals(p: Vector) -> Vector:  # moment, velocity before, then after and place of each
+        left = [x - place - _way(np.maximum(t - p[0], 0.0), v, length)
+                for (t, x), v, place in zip(balls, p[2::2], p[3::2], strict=True)]  # fmt: skip
+        left[striker] -= _way(np.minimum(balls[striker].times - p[0], 0.0), p[1], length)
+        return np.concatenate(left)
+
+    lines = [np.polyfit(t[t >= time] - time, x[t >= time], 1) for t, x in balls]
+    t, x = balls[striker]
+    begin = [time, np.polyfit(t[t < time] - time, x[t < time], 1)[0], *np.ravel(lines)]
+    found = scipy.optimize.least_squares(residuals, begin, x_scale="jac").x
+    return float(found[0]), found[3::2]
 
 
 def _strays(sides: list[tuple[int, Vector, Vector, Vector]], exact: float) -> tuple[_Stray, ...]:

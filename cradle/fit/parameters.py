@@ -74,10 +74,12 @@ def outcomes(types: Sequence[str], masses: Vector, velocities: Vector, values: V
     return post_impact_velocities(masses, velocities, e, forward, backward, excess="saturate")
 
 
-def responses(shots: ShotSet, values: Values, uncertain: Uncertain) -> tuple[Vector, Vector]:
-    """Return velocities after K shots at P points, shape (K, P, N), and their changes."""
-    # These are by one standard error of each of M measured velocities before, then by each of E
-    # uncertain coefficients of restitution: (K, P, N, M + E).
+def normal_equations(
+    shots: ShotSet, values: Values, uncertain: Uncertain
+) -> tuple[Vector, Vector, Vector]:
+    """Chi-square c - 2 s d + d k d of restitution changed by d, profiled over `before`: c, s, k."""
+    # Velocities after K shots at P points, (K, P, N), and lists of their changes: by one standard
+    # error of each of M measured velocities before, and of each uncertain restitution.
     moving = np.flatnonzero((shots.before != 0).any(axis=0))
     at_rest_exactly = not np.delete(shots.sigma_before, moving, axis=1).any()
     single = moving.size == 1 and (shots.before[:, moving] > 0).all() and at_rest_exactly
@@ -87,7 +89,7 @@ def responses(shots: ShotSet, values: Values, uncertain: Uncertain) -> tuple[Vec
     def solve(changed: Values, change: Vector | float = 0.0) -> Vector:
         return outcomes(shots.types, shots.masses, before + change, {**values, **changed})
 
-    outcome = solve({})
+    outcome, movers = solve({}), []
     slopes = [np.zeros_like(outcome)] * len(uncertain)
     for k, (key, sigma) in enumerate(uncertain):
         if key in pair_keys(shots.types):
@@ -96,28 +98,17 @@ def responses(shots: ShotSet, values: Values, uncertain: Uncertain) -> tuple[Vec
     if single:
         # Homogeneous of degree one: the slope with the striker's velocity is the outcome itself.
         speed, error = (v[:, moving, None] for v in (shots.before, shots.sigma_before))
-        return outcome * speed, np.stack([outcome * error, *(s * speed for s in slopes)], axis=-1)
-    movers = []
-    for ball in np.flatnonzero((shots.sigma_before > 0).any(axis=0)):
+        slopes, movers, outcome = [s * speed for s in slopes], [outcome * error], outcome * speed
+    for ball in np.flatnonzero((shots.sigma_before > 0).any(axis=0)) if not single else ():
         error = shots.sigma_before[:, ball, None, None]
         step = unit[ball] * error.max()
         movers.append((solve({}, step) - solve({}, -step)) / (2 * error.max()) * error)
-    return outcome, np.stack([*movers, *slopes, outcome], axis=-1)[..., :-1]
-
-
-def normal_equations(
-    shots: ShotSet, values: Values, uncertain: Uncertain
-) -> tuple[Vector, Vector, Vector]:
-    """Chi-square c - 2 s d + d k d of restitution changed by d, profiled over `before`: c, s, k."""
-    outcome, changes = responses(shots, values, uncertain)
-    measured = changes.shape[-1] - len(uncertain)
-    movers, slopes = changes[..., :measured], changes[..., measured:]
-    residual = shots.after[:, None, :] - outcome
-    columns = np.concatenate([residual[..., None], slopes], axis=-1)
+    columns = np.stack([shots.after[:, None, :] - outcome, *slopes], axis=-1)
+    moved = np.stack([*movers, outcome], axis=-1)[..., :-1]  # M may be 0
     weight = (1.0 / shots.sigma**2)[:, None, :, None]
     products = np.einsum("kpni,kpnj->pij", columns, columns * weight)
-    weighted = movers * weight
-    inner = np.einsum("kpnm,kpnl->kpml", movers, weighted) + np.eye(measured)
+    weighted = moved * weight
+    inner = np.einsum("kpnm,kpnl->kpml", moved, weighted) + np.eye(len(movers))
     cross = np.einsum("kpnm,kpni->kpmi", weighted, columns)
     products -= np.einsum("kpmi,kpmj->pij", cross, np.linalg.solve(inner, cross))
     return products[:, 0, 0], products[:, 0, 1:], products[:, 1:, 1:]

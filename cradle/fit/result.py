@@ -25,9 +25,8 @@ RESULT_COLUMNS = ("name", "kind", "value", "intervals", "minima", "identified", 
 _DRAWS = 4000  # from the fitted parameters, for a prediction
 # A set that is so much longer on one side than on the other is no bell curve's; what is said then.
 SKEW = 1.3
-FOLDED = (
-    " (no bell curve, as near a fold: such sets held the true value in 90 of 100 trials, not 95)"
-)
+FOLDED = " (no bell curve, as near a fold: such sets held the true value in 90 of 100 trials"
+FOLDED += ", not 95)"
 _ALL = 0.999  # a confidence set that covers more than this part of the range says nothing
 
 
@@ -256,17 +255,9 @@ class Fit:
         masses = self.shots.masses
         for kind in (kind for kind in row if kind not in masses):
             raise ValueError(f"no mass is known of type {kind!r}; there are {', '.join(masses)}")
-        balls, before = np.array([masses[kind] for kind in row]), speed * np.eye(1, len(row))
-        velocities = outcomes(row, balls, before, self._draws(row))
-        parts = [0.5, (1 - LEVEL) / 2, (1 + LEVEL) / 2]
-        return Prediction(row, *np.quantile(velocities, parts, axis=0))
-
-    def _draws(self, types: tuple[str, ...]) -> dict[Key, Any]:
-        """Draw coefficients of restitution and ratios of a chain from what was fitted."""
-        random = np.random.default_rng(0)
-        values: dict[Key, Any] = {}
+        random, values = np.random.default_rng(0), dict[Key, Any]()
         given = {**self.given, **self.values()}
-        for key in dict.fromkeys(pair_keys(types)):
+        for key in dict.fromkeys(pair_keys(row)):
             if label(key) not in given:
                 raise ValueError(f"the coefficient of restitution of {label(key)} is not known")
             value, error = given[label(key)]
@@ -275,11 +266,14 @@ class Fit:
             total = np.cumsum(group.density)
             drawn = np.searchsorted(total, random.random(_DRAWS) * total[-1], side="right")
             values.update(zip(group.keys, group.points[drawn].T, strict=True))
-        ratios = [key for keys in parameters.triplet_keys(types) for key in keys]
+        ratios = [key for keys in parameters.triplet_keys(row) for key in keys]
         for key in (key for key in ratios if key not in values):
             if (name := label(key)) not in {**self.known, **self.estimates}:
                 there = ", ".join(n for n, e in self.estimates.items() if e.kind == "ratio")
                 raise ValueError(f"the ratio of {name} is not known; fitted: {there or 'none'}")
             values[key] = (self.known[name] if name in self.known else
                            self.estimates[name].bound * random.random(_DRAWS))  # fmt: skip
-        return values
+        balls, before = np.array([masses[kind] for kind in row]), speed * np.eye(1, len(row))
+        velocities = outcomes(row, balls, before, values)
+        parts = [0.5, (1 - LEVEL) / 2, (1 + LEVEL) / 2]
+        return Prediction(row, *np.quantile(velocities, parts, axis=0))
