@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cradle.formatting import as_html
 from cradle.input import values as asked
-from cradle.input.values import Vector
+from cradle.input.values import ArrayLike, Vector
 from cradle.kernel.state import LIMITS
 
 

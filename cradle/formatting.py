@@ -8,9 +8,8 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cradle.input.values import Vector
+from cradle.input.values import NDArray, Vector
 
 # Of the picture of a chain, in pixels: a row for each state, the heaviest ball, the fastest ball's
 # arrow, and the room of balls that are left out.

@@ -5,11 +5,10 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
 from cradle.closed_form import largest_ratios
-from cradle.input.values import Vector, checked, must_be, one_number
+from cradle.input.values import ArrayLike, NDArray, Vector, checked, must_be, one_number
 from cradle.models import Model, collide
 from cradle.models.batch import post_impact_velocities
 from cradle.models.correlation import ImpulseCorrelation

@@ -19,10 +19,9 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.input.values import ABOVE_ZERO, a, one_number
+from cradle.input.values import ABOVE_ZERO, ArrayLike, a, one_number
 from cradle.models import Model
 from cradle.swinging.stride import Alone, Flight, Hit, Plane
 

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cradle.chain import Chain
 from cradle.formatting import as_html, as_text, without_rounding
-from cradle.input.values import Vector, shown
+from cradle.input.values import NDArray, Vector, shown
 
 if TYPE_CHECKING:  # at run time these are imported by the methods that need them
     import pandas as pd

@@ -10,19 +10,21 @@ from stored import read
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SequentialCollisions, swing
 from cradle.fit import fit_swing
+from cradle.fit.swings import _Film
 
 LAW = ImpulseCorrelation(0.1)
 NUMBERS = ("period", "damping", "restitution", "gaps")
 TRUE = dict(zip(NUMBERS, (0.8, 0.02, 0.98, 1e-4)))
 
 
-def filmed(true, pulled, seconds, rate, noise=0.0, seed=0, law=LAW):
+def filmed(true, pulled, seconds, rate, noise=0.0, seed=0, law=LAW, masses=None):
     """Times and places of a swing, each place moved at random."""
     hanging = Pendulums(
         9.81 * (true["period"] / 2 / np.pi) ** 2, gaps=true["gaps"], damping=true["damping"]
     )
     times, n = np.arange(0, seconds, 1 / rate), len(pulled)
-    run = swing(Chain([1] * n, [0] * n, true["restitution"]), law, pulled, times, pendulums=hanging)
+    chain = Chain(masses or [1] * n, [0] * n, true["restitution"])
+    run = swing(chain, law, pulled, times, pendulums=hanging)
     moved = np.random.default_rng(seed).standard_normal((len(times), n))
     return times, run.positions + noise * moved
 
@@ -60,6 +62,7 @@ def test_two_balls_by_closed_form():
     assert fit.values["period"] == pytest.approx(period, rel=1e-6)
     assert fit.values["restitution"] == pytest.approx(e, rel=1e-6)
     assert max(fit.values["damping"], fit.values["gaps"] / size) < 1e-5
+    assert not fit.poor  # rounding alone is left
 
 
 def test_two_balls_and_what_is_said(two_balls):
@@ -97,6 +100,14 @@ def test_errors_by_the_slopes(two_balls):
         assert (high - low) / 3.92 == pytest.approx(error, rel=0.1)
 
 
+def test_from_a_wrong_minimum(two_balls, monkeypatch):
+    """Gaps of 6 mm fit better than any near them; the profiles find what fits best."""
+    times, places, fit = two_balls
+    begin, far = _Film.begin, np.array([0.8, 0.02, 0.9, 6e-3, -0.03, 0])
+    monkeypatch.setattr(_Film, "begin", lambda film: 0 * begin(film) + far)
+    assert fit_swing(times, places, LAW).values == pytest.approx(fit.values, rel=1e-4)
+
+
 def test_a_given_reading(two_balls):
     times, places, fit = two_balls
     same = fit_swing(times, places, LAW, reading=2e-4)
@@ -123,6 +134,15 @@ def test_outer_balls_alone():
     times, places = filmed(TRUE, [-0.03, 0, 0, 0, 0], 4, 60, 2e-4, seed=1)
     fit = fit_swing(times, places, LAW, seen=[1, 0, 0, 0, 1], known={"damping": 0.02})
     assert held(fit, TRUE, 2) == {"period", "restitution", "gaps"}
+
+
+def test_unequal_balls():
+    """Without their masses the law fails."""
+    film = filmed(TRUE, [-0.03, 0], 4, 60, 2e-4, masses=[2, 1])
+    fit = fit_swing(*film, LAW, masses=[2, 1])
+    assert held(fit, TRUE, 2) == {*NUMBERS}
+    assert not fit.poor
+    assert fit_swing(*film, LAW).poor
 
 
 def test_film_without_an_impact_tells_no_restitution():
@@ -203,6 +223,8 @@ PLACES = np.stack([-0.03 * np.cos(8 * WAYS), 0 * WAYS], axis=1)
         ({"seen": [True]}, r"and \(1,\); must be"),
         ({"seen": [False, False]}, "0 readings"),
         ({"reading": 0.0}, r"reading = 0.0; must be above 0"),
+        ({"masses": [1, 0]}, r"masses\[1\] = 0.0; must be above 0"),
+        ({"masses": [1]}, "masses"),
         ({"free": ["gap"]}, "free or known = 'gap'; must be one of period"),
         ({"free": ["gaps"]}, "period is neither free nor known"),
         ({"known": {"period": -1.0}}, "must be above 0"),

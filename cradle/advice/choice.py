@@ -6,11 +6,10 @@ from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cradle.advice.measured import LAWS, Measured, evidence, measured_chain, rows
 from cradle.chain import Chain
-from cradle.input.values import must_be, one_number, one_of, whole_number
+from cradle.input.values import ArrayLike, must_be, one_number, one_of, whole_number
 from cradle.models import Model
 from cradle.models.compliant import SpringChain, viscosity_from
 from cradle.models.correlation import ImpulseCorrelation

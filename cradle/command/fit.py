@@ -1,7 +1,7 @@
 """`cradle fit`: restitution and ratios from a table of shots; `cradle template`: such a table."""
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -126,9 +126,7 @@ def _named(given: str) -> tuple[str, tuple[float, float]]:
         raise click.UsageError(f"{given!r}: write NAME=NUMBER or NAME=NUMBER:ERROR") from None
 
 
-def _refuse_unused(
-    given: Iterable[str], known: Iterable[str], shots: Any, predict: str | None
-) -> None:
+def _refuse_unused(given: list[str], known: list[str], shots: Any, predict: str | None) -> None:
     """Refuse a value that no chain needs (its name may be misspelt), and one that is there."""
     from cradle.fit.parameters import label, pair_keys, parameter_key, ratio_keys
 
@@ -149,9 +147,7 @@ def _refuse_unused(
                                    f"{', '.join(sorted(needed)) or 'none'}")  # fmt: skip
 
 
-def _predicted(
-    found: Any, shots: Any, sequence: str, speed: float
-) -> tuple[dict[str, Any], list[str]]:
+def _predicted(found: Any, shots: Any, sequence: str, speed: float) -> tuple[Any, list[str]]:
     """Return a prediction and what was measured of such chains: for JSON, and as lines."""
     from cradle.fit.parameters import ratio_keys
 

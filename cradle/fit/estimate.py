@@ -5,14 +5,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cradle.fit import parameters
 from cradle.fit.parameters import Key, fitted_keys, label, pair_keys, parameter_key, ratio_keys
 from cradle.fit.result import Estimate, Fit, Group
 from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
-from cradle.input.values import ABOVE_ZERO, PART, Vector, checked, one_number
+from cradle.input.values import ABOVE_ZERO, PART, ArrayLike, Vector, checked, one_number
 from cradle.kernel.state import LIMITS
 
 _TRIALS = 513  # points at which it is tried whether a ratio acts at all

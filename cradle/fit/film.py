@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
 from cradle.fit.tracks import Track
-from cradle.input.values import ABOVE_ZERO, Vector, checked, one_number
+from cradle.input.values import ABOVE_ZERO, ArrayLike, Vector, checked, one_number
 
 _GRAVITY = 9.81
 # Marks that each side of the impact needs; the longest window on a level track, s.
@@ -155,9 +154,8 @@ def _coarse(balls: list[Track], striker: int | None, window: float) -> tuple[flo
     moments = np.unique(np.concatenate([ball.times for ball in balls]))
     best, most = None, -np.inf
     for moment in 0.5 * (moments[:-1] + moments[1:]):
-        near = [np.abs(ball.times - moment) <= window for ball in balls]
-        marks = [(ball.times[some] - moment, ball.positions[some])
-                 for ball, some in zip(balls, near, strict=True)]  # fmt: skip
+        near = (np.abs(ball.times - moment) <= window for ball in balls)
+        marks = [(t[some] - moment, x[some]) for (t, x), some in zip(balls, near, strict=True)]
         if any(min((t < 0).sum(), (t >= 0).sum()) < 4 for t, _ in marks):
             continue
         gain, moved = 0.0, []

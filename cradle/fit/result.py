@@ -1,7 +1,5 @@
 """What a fit found: estimates with their confidence sets, a table, a plot, predictions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -17,7 +15,6 @@ from cradle.input.values import ABOVE_ZERO, Vector, one_number
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 #: Columns of the table of a fit.
 RESULT_COLUMNS = ("name", "kind", "value", "intervals", "minima", "identified", "at_bound",
@@ -48,7 +45,7 @@ class Estimate:
     excess: Vector  #: Chi-square there above its lowest value, shape (P,).
 
     @classmethod
-    def of(cls, kind: str, key: Key, bound: float, found: Scan | None) -> Estimate:
+    def of(cls, kind: str, key: Key, bound: float, found: Scan | None) -> "Estimate":
         """Make an estimate of what a search found; of a parameter that acts in no shot, of None."""
         nothing = Scan((), ((0.0, bound),), np.array([0.0, bound]), np.zeros(2))
         modes, intervals, grid, excess = found or nothing
@@ -114,11 +111,10 @@ class Prediction:
     def rows(self) -> list[dict[str, Any]]:
         """Return one row per ball."""
         columns = (x.tolist() for x in (self.median, self.lower, self.upper))
-        return [{"ball": ball, "type": kind, "velocity": v, "lower": lower, "upper": upper}
-                for ball, (kind, v, lower, upper)
-                in enumerate(zip(self.types, *columns, strict=True), 1)]  # fmt: skip
+        rows, names = zip(self.types, *columns, strict=True), ("type", "velocity", "lower", "upper")
+        return [{"ball": k, **dict(zip(names, row, strict=True))} for k, row in enumerate(rows, 1)]
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """Return the rows as a table."""
         import pandas as pd
 
@@ -187,14 +183,10 @@ class Fit:
 
         Residuals are over their errors: of each set the root mean square, and the largest.
         """
-        lines = []
-        for one in self.estimates.values():
-            error = "" if one.value is None else f", standard error {one.standard_error:.2g}"
-            lines.append(f"{one}{error}{FOLDED if one.folded else ''}")
-        lines.append(
-            f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}, "
-            f"chance {self.probability:.2g}"
-        )
+        lines = [f"{one}{'' if one.value is None else f', standard error {one.standard_error:.2g}'}"
+                 f"{FOLDED * one.folded}" for one in self.estimates.values()]  # fmt: skip
+        chi = f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}"
+        lines.append(f"{chi}, chance {self.probability:.2g}")
         lines += [f"correlation of {a} and {b}: {value:.2f}"
                   for (a, b), value in self.correlations().items()]  # fmt: skip
         fitted = {one.key for one in self.estimates.values()}
@@ -217,13 +209,13 @@ class Fit:
                  e.bound) for name, e in self.estimates.items())  # fmt: skip
         return [dict(zip(RESULT_COLUMNS, row, strict=True)) for row in rows]
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """Return the rows as a table; where nothing was identified the value is missing."""
         import pandas as pd
 
         return pd.DataFrame(self.rows(), columns=RESULT_COLUMNS).set_index("name")
 
-    def plot(self, name: str | None = None, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
+    def plot(self, name: str | None = None, axes: Any = None) -> Any:
         """Draw the likelihood of one estimate, its data and what is predicted, on two `axes`.
 
         The first identified one if `name` is left out; if nothing was fitted, a ValueError.

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
 from cradle.fit.result import Estimate
 from cradle.fit.search import LEVEL, RISE, Mode, Scan
 from cradle.fit.shots import chance
 from cradle.input import values as asked
-from cradle.input.values import Vector
+from cradle.input.values import ArrayLike, Vector
 from cradle.models import Model
 from cradle.swinging.pendulums import Pendulums
 from cradle.swinging.record import Swing
@@ -239,8 +238,14 @@ class _Film:
         errors = np.sqrt(self.variance * np.diag(inverse))
         errors = np.where(slopes.any(axis=0), errors, self.steps / np.sqrt(RISE))
         if poor:
-            drift = (self.half - p) / np.sqrt(RISE) / errors
-            wide = np.hypot(self.widened((solver * left).T / errors), drift)
+            # By how parts of the film differ: each reading has moved p by so much.
+            moved, spreads = np.zeros((*grid.shape, p.size)), [np.ones(p.size)]
+            moved[self.seen] = (solver * left).T / errors
+            for parts in _PARTS:
+                sums = np.add.reduceat(moved.sum(axis=1), np.arange(parts) * len(grid) // parts)
+                times = scipy.special.stdtrit(parts - 1, 0.5 + 0.5 * LEVEL) / np.sqrt(RISE)
+                spreads.append(times * np.sqrt((sums**2).sum(axis=0) * parts / (parts - 1)))
+            wide = np.hypot(np.max(spreads, axis=0), (self.half - p) / np.sqrt(RISE) / errors)
         estimates = {}
         for k, name in enumerate(self.names):
             rise = RISE * self.variance * wide[k] ** 2
@@ -255,17 +260,6 @@ class _Film:
             float(np.nanmean(apart[0]) / spread), poor,
             dict(zip(self.names, wide.tolist(), strict=False)),
         )  # fmt: skip
-
-    def widened(self, pull: Vector) -> Vector:
-        """Return errors by differences of parts of the film, of how each reading moves p."""
-        pulls, wide = np.zeros((*self.seen.shape, pull.shape[1])), [np.ones(pull.shape[1])]
-        pulls[self.seen] = pull
-        for parts in _PARTS:
-            cuts = np.arange(parts) * len(pulls) // parts
-            moved = np.add.reduceat(pulls.sum(axis=1), cuts)
-            times = scipy.special.stdtrit(parts - 1, 0.5 + 0.5 * LEVEL) / np.sqrt(RISE)
-            wide.append(times * np.sqrt((moved**2).sum(axis=0) * parts / (parts - 1)))
-        return np.asarray(np.max(wide, axis=0))
 
     def profile(
         self, p: Vector, left: Vector, slopes: Vector, k: int, error: float, rise: float

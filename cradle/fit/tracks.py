@@ -74,8 +74,8 @@ def read_tracker(
     marks: dict[str, list[tuple[float, float]]] = {}
     for number, (first, *others) in rows.items():
         cells = [first.lstrip("# "), *others]
-        if cells[0] and _title(cells[0])[0].casefold() in _CLOCKS:
-            titles = [_title(cell) for cell in cells]
+        if cells[0] and _TITLE.findall(cells[0])[0][0].casefold() in _CLOCKS:
+            titles = [_TITLE.findall(cell)[0] for cell in cells]
         elif titles and {*map(str.strip, cells)} <= _UNITS.keys() and any(cells):
             titles = [(text, cell) for (text, _), cell in zip(titles, cells, strict=False)]
         elif titles and not first.startswith("#"):
@@ -106,12 +106,6 @@ def read_tracker(
         told = f"{file.name} has marks {apart:g} s apart"
         raise ValueError(f"{told}; if the times are in ms, divide time_scale by 1000")
     return tracks
-
-
-def _title(cell: str) -> tuple[str, str]:
-    """Return the title of a column without run and unit, and its unit."""
-    (found,) = _TITLE.findall(cell)
-    return found[0], found[1]
 
 
 def _owners(

@@ -8,18 +8,12 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.input.values import Vector, numbers
+from cradle.input.values import ArrayLike, NDArray, Vector, numbers
 from cradle.kernel import Inputs, Options, Outputs
-from cradle.models.correlation import (
-    MAX_EVENTS,
-    ImpulseCorrelation,
-    check_options,
-    check_values,
-    raise_refused,
-)
+from cradle.models import correlation as paper
+from cradle.models.correlation import MAX_EVENTS, ImpulseCorrelation
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
 from cradle.trace import ImpactNotCertified
 
@@ -103,7 +97,7 @@ def outcomes(
     >>> found.collisions[0].tolist(), found.collapsed.tolist()  # Fig. 6 is a map of such counts
     ([1, 1], [False, True])
     """
-    check_options(meeting, excess, max_events)
+    paper.check_options(meeting, excess, max_events)
     options = Options(float(meeting), int(max_events), excess == "raise")
     given = {"masses": masses, "velocities": velocities, "restitution": restitution}
     given |= {"forward": forward, "backward": forward if backward is None else backward}
@@ -111,7 +105,7 @@ def outcomes(
     n, count = arrays[0].shape[-1], math.prod(lead)
     chunk = CHUNK[min(n, 4)]
     if count == 0:
-        check_values(options.bounded, *given.values())
+        paper.check_values(options.bounded, *given.values())
     whole, large = outputs(count, n), count * n >= LARGE
 
     def solve(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
@@ -128,7 +122,7 @@ def outcomes(
     # At the first failure in the order of the chains; none has been returned before.
     for status, failed in in_order(solve, starts, progress):
         if status == REFUSED:
-            raise_refused(options.bounded, *given.values())
+            paper.raise_refused(options.bounded, *given.values())
         if status != FINISHED:
             # Alone, with its record; it stops where it stopped here, and raises.
             m, v, e, f, b = (rows_of(array, lead, slice(failed, failed + 1))[0] for array in arrays)

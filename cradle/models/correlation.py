@@ -5,12 +5,11 @@ from dataclasses import dataclass, field
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
 from cradle.closed_form import largest_ratios
 from cradle.input import values as asked
-from cradle.input.values import Vector
+from cradle.input.values import ArrayLike, Vector
 from cradle.kernel import Inputs, Options
 from cradle.kernel.state import LIMITS
 from cradle.runtime.job import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job, outputs

@@ -10,9 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike
 
-from cradle.input.values import Vector, must_be, whole_number
+from cradle.input.values import ArrayLike, Vector, must_be, whole_number
 from cradle.trace import Trace
 
 __all__ = [

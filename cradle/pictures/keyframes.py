@@ -19,9 +19,8 @@ import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D
-from numpy.typing import ArrayLike, NDArray
 
-from cradle.input.values import Vector
+from cradle.input.values import ArrayLike, NDArray, Vector
 
 #: Pictures a second of a film; a GIF counts hundredths of a second.
 RATE = 25

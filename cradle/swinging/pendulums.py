@@ -3,10 +3,9 @@
 from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cradle.input import values as asked
-from cradle.input.values import Vector
+from cradle.input.values import ArrayLike, Vector
 
 #: Events nearer than this part of a swing (over 2 pi) are one; so are lengths, of the amplitude.
 TIE = 1e-9

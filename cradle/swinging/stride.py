@@ -9,10 +9,9 @@ from itertools import combinations, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from cradle.chain import Chain
-from cradle.input.values import ABOVE_ZERO, Vector, checked, must_be, one_number
+from cradle.input.values import ABOVE_ZERO, ArrayLike, NDArray, Vector, checked, must_be, one_number
 from cradle.models import Model, collide
 from cradle.runtime.compile import without_waiting
 from cradle.swinging.resting import common_velocities, stretches

@@ -10,10 +10,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
-from cradle.input.values import Vector, checked, must_be, one_number, shown, whole_number
+from cradle.input.values import ArrayLike, Vector, checked, must_be, one_number, shown, whole_number
 from cradle.models import Model, collide
 from cradle.swinging.flight import FullFlight, SmallAngleFlight
 from cradle.swinging.pendulums import TIE, Hanging, Pendulums, mean
