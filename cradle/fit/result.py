@@ -34,8 +34,7 @@ class Estimate:
     kind: str  #: "restitution" or "ratio".
     key: Key  #: Types of the balls.
     value: float | None  #: Where chi-square is lowest; None if the data tell nothing.
-    #: The 95 % confidence set, by profile likelihood; several (lower, upper) if several ranges of
-    #: values explain the data.
+    #: The 95 % confidence set, (lower, upper), by profile likelihood; or several that explain all.
     intervals: tuple[tuple[float, float], ...]
     modes: tuple[Mode, ...]  #: All minima of chi-square that were found, lowest first.
     identified: bool  #: False if the confidence set covers the whole range.

@@ -33,8 +33,7 @@ ENOUGH, COARSE, SPARE = 0.2, 0.5, 1.05
 # C, at least, without losses and with them, and for each radian of a ball, on average; the largest
 # step, in radians.
 HARD, LOST, SWING, WHOLE = 0.01, 0.022, 0.0027, 0.8
-# Kinks beyond the first two of each contact, and radians, from which on runs are compared; in a row
-# of many balls more.
+# Kinks beyond two of each contact, and radians, from which runs are compared; in long rows more.
 OFTEN, LONG = 4.0, 30.0
 TRIALS = 16  # runs of a chain, each finer than the one before
 DAMPED = 0.5  # step times A times the square of a frequency, at most

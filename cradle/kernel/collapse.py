@@ -119,7 +119,6 @@ def merge_exhausted(c, n, state):
     if loses or fastest < LIMITS.dust * tally.fastest:
         begin, end = run[n - 1].onward, run[n - 1].back
         if begin < first or run[end].last > last:
-            # All runs go on in each round: how many rounds were left decides where others are then.
-            tally.margin = 0.0
+            tally.margin = 0.0  # others go on in each round, and how many were left decides
         return merge(first, last, n, state)
     return c, c - 1

@@ -149,8 +149,7 @@ def neighbours_stay(cluster, total, part, number, n, state):
     """Leave in y what neighbours of a cycle absorb; tell whether none comes to its own event."""
     # Impulse and closing speed of a neighbour go the same part of their ways, so its work is that
     # of the straight line between, but for what it was more in the last cycle, times the sum of
-    # L^2, L^4, ...  A cycle that grows goes on while these are below the energy of the first
-    # closing.
+    # L^2, L^4, ...  A cycle that grows goes on while these are below the first closing's energy.
     ball, contact, memory = state.ball, state.contact, state.memory[number]
     left, right = cluster.left, cluster.right
     squares = part * (2.0 - part) * total * (total / (1.0 + 2.0 * total))

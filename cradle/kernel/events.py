@@ -111,10 +111,9 @@ def reduced_mass(c, ball):
 
 def exhausted(c, work, ball, contact, tally):
     """R9: tell whether next to nothing is left of contact c, neither closing speed nor `work`."""
-    threshold = LIMITS.exhausted * tally.fastest
-    if abs(contact[c].u.real) >= threshold:
-        return False
-    return 2.0 * work < reduced_mass(c, ball) * threshold * threshold
+    least = LIMITS.exhausted * tally.fastest
+    slow = abs(contact[c].u.real) < least
+    return slow and 2.0 * work < reduced_mass(c, ball) * least * least
 
 
 def count_exhausted(c, n, ball, contact, tally):

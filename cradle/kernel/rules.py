@@ -138,8 +138,7 @@ def is_clear(difference, size, tally):
 
 def is_over(c, at_zero, ball, contact):
     """R3: tell whether contact c ends: it opens, or has e = 0 and no longer closes."""
-    # `at_zero`: it is about to open; if nobody drives it, by its own push, even a vanishing one
-    # (R6).
+    # `at_zero`: it is about to open; if nobody drives it, by its own push, vanishing or not (R6).
     k = contact[c]
     if k.q.real > 0.0:
         return False
@@ -152,8 +151,7 @@ def is_over(c, at_zero, ball, contact):
 def way_to_end(k, tally):
     """R3: progress until contact k has released all, and its closing speed then; or NEVER."""
     # While it opens, Q + rate (u s + slope s^2 / 2) is zero where u^2 is u^2 - 2 slope Q / rate.
-    # If it closes first, Q gains e^2 of rate u^2 / (2 |slope|): it ends at e^2 u^2 - 2 slope Q /
-    # rate.
+    # If it closes first, Q gains e^2 rate u^2 / (2 |slope|): it ends at e^2 u^2 - 2 slope Q / rate.
     closes = k.u.real > 0.0
     if k.rate.real == 0.0 or (k.slope.real >= 0.0 and k.u.real >= 0.0):
         return NEVER, ZERO

@@ -17,8 +17,7 @@ from cradle.models.correlation import MAX_EVENTS, ImpulseCorrelation
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
 from cradle.trace import ImpactNotCertified
 
-#: Chains solved at a time, more where short cuts are likely; so much memory is needed beyond inputs
-#: and outputs.
+#: Chains solved at a time, more where short cuts are likely: memory beyond inputs and outputs.
 CHUNK = {2: 16_384, 3: 16_384, 4: 4096}
 
 

@@ -1,7 +1,5 @@
 """Chains of springs: the contact forces, and the one model here that has a time."""
 
-from __future__ import annotations
-
 import functools
 import math
 import threading

@@ -1,7 +1,5 @@
 """Contact forces: why a chain of springs is refused, and what happens on its way."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -83,7 +81,7 @@ class TimedTrace(CurvedTrace):
         vars(self).update(vars(way))
         return object.__getattribute__(self, name)
 
-    def _way(self, row: Springs, law: Law, out: Motions) -> TimedTrace:
+    def _way(self, row: Springs, law: Law, out: Motions) -> "TimedTrace":
         """Return this trace with all that belongs to it."""
         path, start = Path(row, law, out), self.chain.velocities
         mass, speed, length = path.mass, path.speed, path.length

@@ -1,7 +1,5 @@
 """From arrays to the loop of the contact forces and back: work area, pauses, plain or compiled."""
 
-from __future__ import annotations
-
 import threading
 import time
 from typing import Any

@@ -22,8 +22,7 @@ from cradle.trace import Trace
 
 __all__ = ["swing"]
 
-#: Events without an impact that one instant can have, for each ball: each contact opens and closes
-#: a few times at most.
+#: Events without an impact that one instant can have, for each ball: a contact has a few at most.
 MOST_IDLE = 20
 
 
