@@ -160,7 +160,8 @@ def neighbours_stay(cluster, total, part, number, n, state):
         if cluster.first <= c <= cluster.last or stays_at_zero(c, contact, memory):
             continue
         speed = plus(k.u, times(change_of(c, left, right, ball, contact), share))
-        if k.u.real * then.u.real < 0.0 or k.u.real * speed.real < 0.0:
+        closes = k.active == 0 and speed.real > 0.0  # from zero, too
+        if closes or k.u.real * then.u.real < 0.0 or k.u.real * speed.real < 0.0:
             return False
         if c < left or c > right:
             continue

@@ -23,13 +23,9 @@ def room(rows: int, n: int) -> Motions:
 
 
 def solve(
-    chains: Springs,
-    law: Law,
-    out: Motions,
-    large: bool = False,
-    stop: threading.Event | None = None,
-    record: list[Any] | None = None,
-) -> tuple[int, int, Any]:
+    chains: Springs, law: Law, out: Motions, large: bool = False,
+    stop: threading.Event | None = None, record: list[Any] | None = None,
+) -> tuple[int, int, Any]:  # fmt: skip
     """Follow the chains, until `stop` is set; return the next one's number, how the last ended.
 
     And its clock.  The pages of one chain are written to a `record`, at the step in `out`.
