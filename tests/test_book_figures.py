@@ -48,6 +48,7 @@ def test_every_figure_is_checked():
         ("intro", "fig-inside", EQUAL, 0.15),
         ("three_balls", "fig-own-three-opening", THREE, 0.15),
         ("multiple_impacts", "fig-own-multiple-opening", FIVE, 0.15),
+        ("n_balls", "fig-own-n-balls-toy", ([1] * 5, [1, 0, 0, 0, 0], 1), 0.15),
         ("n_balls", "fig-own-n-balls-opening", ([1] * 4, [1, 0.5, 0, 0], 1), 0.1),
     ],
 )
