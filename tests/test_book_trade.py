@@ -1,4 +1,4 @@
-"""What the text of book/trade.ipynb says, from the stored table and by second routes.
+"""What the pages trade and engines of the book say, from the stored table and by second routes.
 
 The table is measured (benchmarks/run.py); its velocities are compared with answers from the
 independent solver in truth.py, with closed formulas, and with converged springs from elsewhere.
@@ -17,7 +17,7 @@ from truth import solve
 from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide
 
 ROOT = Path(__file__).parents[1]
-CHAPTER = Chapter("trade")
+CHAPTER, ENGINES_PAGE = Chapter("trade"), Chapter("engines")
 IMPULSE_ENGINES = ("Chipmunk", "Box2D", "Bullet", "Rapier")
 ENGINES = (*IMPULSE_ENGINES, "MuJoCo")
 
@@ -169,7 +169,8 @@ def test_figures_show_the_table(figure):
     rows = [row for row in rows if not row["chain"].startswith("two")]
     values = [row[column][0] if column == "velocities" else row[column] for row in rows]
     assert len(values) > 5
-    assert shows(CHAPTER.figures[figure].axes, values)
+    figures = {**CHAPTER.figures, **ENGINES_PAGE.figures}
+    assert shows(figures[figure].axes, values)
 
 
 def test_fig_trade_models():
