@@ -128,6 +128,10 @@ def test_fig_5_region_of_the_sequence():
         assert sequence_occurs(e, 0.15) == occurs
     for e in (lower - step, upper + step):
         assert not sequence_occurs(e, 0.15)[0]
+    end = float(READING.glued["multiple-backward-end"])
+    for backward, occurs in ((end - 0.001, True), (end + 0.001, False)):
+        outcome = truth.solve((1, 1, 1), VELOCITIES, 0.25, 0.15, backward, number=float)
+        assert (changes(outcome.events) == SEQUENCE) == occurs
 
 
 def test_fig_5_middle_ball_turns_round():
