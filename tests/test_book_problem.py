@@ -88,7 +88,7 @@ def test_energy_left_by_three_definitions():
         ):
             found = (1 - left) ** 2 + (left - pushed) ** 2 + pushed**2
             assert found == pytest.approx(energy, rel=1e-13)
-    READING.tells({"problem-poisson-most": (4 + 1 / 4) / (2 - 1 / 2) ** 2, "problem-newton-least": 2 / 4})
+    READING.tells({"problem-poisson-most": 17 / 9, "problem-newton-least": 2 / 4})  # a = 1/2, 0
 
 
 def test_exercise_2_heavy_middle():

@@ -14,7 +14,8 @@
 
   // The parts of a traceback that lie in the reader's lines.
   function told(error) {
-    const trace = $B.error_trace($B.exception(error)).split("\n");
+    const raised = $B.exception(error);
+    const trace = $B.error_trace(raised).split("\n");
     const place = /^ {2}File "([^"]*)", line (\d+)/;
     let own = true;
     let line = null;
@@ -24,6 +25,7 @@
       if (file && own) line = +number;
       return own || /^\S/.test(row);
     });
+    line ??= raised.lineno ?? null; // some errors of syntax have no place in their trace
     return { error: kept.join("\n").replace(/File "[^"]*", line/g, "Line"), line };
   }
 
