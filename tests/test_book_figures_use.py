@@ -45,16 +45,16 @@ def dots(ax, count):
 
 def test_fig_toy_models():
     axes = drawn("toy")["fig-toy-models"].axes[:5]
-    shown = [ax.images[0].get_array() for ax in axes]
-    assert {image.shape[0] for image in shown} == {5}
-    sequential, ratio, springs, solid, lossy = shown
-    for image, e, a in ((sequential, 1, 0), (ratio, 1, 0.15), (lossy, 0.97, 0.15)):
-        expected = np.abs(strokes(20, STRUCK, e, a)).T
-        np.testing.assert_allclose(image[:, :20], expected, rtol=0, atol=1e-9)
+    shown = [[lines(ax)[f"ball {k}"] for k in range(1, 6)] for ax in axes]
+    assert all(line[:3, 0].tolist() == [1, 3, 5] for panel in shown for line in panel)
+    sequential, ratio, springs, solid, lossy = np.array(shown)[..., 1]
+    for drawn_by, e, a in ((sequential, 1, 0), (ratio, 1, 0.15), (lossy, 0.97, 0.15)):
+        expected = strokes(20, STRUCK, e, a)[::2].T
+        np.testing.assert_allclose(drawn_by[:, :10], expected, rtol=0, atol=1e-9)
     # One stroke of five Hertz springs, integrated elsewhere, and a body of four by momentum.
-    hertz = [0.071085017, 0.030273764, 0.014463629, 0.127044986, 0.988777424]
+    hertz = [-0.071085017, -0.030273764, -0.014463629, 0.127044986, 0.988777424]
     np.testing.assert_allclose(springs[:, 0], hertz, atol=1e-7)
-    np.testing.assert_allclose(solid[:, :2].T, [[0.6] + [0.4] * 4, [1, 0, 0, 0, 0]], atol=1e-9)
+    np.testing.assert_allclose(solid.T, [[-0.6] + [0.4] * 4] * solid.shape[1], atol=1e-9)
 
 
 def test_fig_toy_drift():

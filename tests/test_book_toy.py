@@ -64,7 +64,7 @@ def test_strokes_and_fig_toy_models():
     CHAPTER.tells({
         "inner-first": inner[0], "inner-twenty": inner[19], "inner-most": inner.max(),
         "second-first": -after[1, 0], "second-next": -after[1, 1],
-        "late-first": -after[171, 0], "late-second": -after[171, 1],
+        "late-fifth": after[170, 4], "late-fourth": after[170, 3],
         "solid-first": (1 - 4) / 5, "solid-rest": 2 / 5, "lossy-last": 1 / 5,
     })  # fmt: skip
 
