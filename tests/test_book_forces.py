@@ -23,7 +23,9 @@ def test_zeta_is_hurwitzs():
 
 def test_the_curves_have_their_orders():
     shown = panel("forces", "fig-own-forces")
-    for label, order, name in zip(shown, (2, 2.5, 3.5), ("verlet", "better", "paid"), strict=True):
+    for label, order, name in zip(
+        shown, (2, 2.5, 3.5), ("verlet", "better", "corrected"), strict=True
+    ):
         work, error = np.log(shown[label]).T
         assert -np.polyfit(work, error, 1)[0] == pytest.approx(order, abs=0.25)
         assert label.endswith(f": {CHAPTER.glued[name]}")
@@ -34,7 +36,7 @@ def test_the_work_for_an_error():
     shown = list(panel("forces", "fig-own-forces").values())
     for name, which, error in (
         ("verlet_work", 0, 1e-3), ("better_work", 1, 1e-3),
-        ("paid_work", 2, 1e-3), ("paid_fine", 2, 1e-5),
+        ("corrected_work", 2, 1e-3), ("corrected_fine", 2, 1e-5),
     ):  # fmt: skip
         points = shown[which].tolist()
         while points[-1][1] <= error:

@@ -257,7 +257,7 @@ def test_the_figures_draw_the_tables():
             assert shows([axis], run(name, *key).sum(axis=1))
     spheres, *_, mended = figures["fig-scene-who"].axes[:4]
     for axis, key in ((spheres, HERTZ), (mended, ("Chipmunk", "mended", "default"))):
-        np.testing.assert_allclose(axis.images[0].get_array() ** 2, run(*key).T, atol=1e-12)
+        np.testing.assert_allclose(axis.images[0].get_array() ** 2, run(*key)[::2].T, atol=1e-12)
 
 
 def speeds_of(row):
