@@ -234,17 +234,16 @@ def test_the_recipe_tells_where_the_energy_is():
     (output,) = chapter.cells["recipe-table"].outputs
     lines = re.findall(r"<tr>(.*?)</tr>", output.data["text/html"], flags=re.S)
     cells = [re.findall(r"<t[hd]>(.*?)</t[hd]>", line) for line in lines]
-    table = {name: told for name, *told in filter(None, cells) if name in ENGINES}
-    assert list(table) == ENGINES
-    for name, told in table.items():
-        assert len(told) == 6
-        for setting, (own, row, alone) in zip(("default", "refined"), (told[:3], told[3:])):
-            for how, cell in (("as it is", own), ("mended", row)):
-                end = run(name, how, setting)[-1]
-                most = end.max() / end.sum()
-                assert cell == f"{100 * end.sum():.0f}\u00a0({100 * most:.0f})"
-                assert (most > 0.95) if how == "mended" else (most < 0.6), (name, setting)
-            assert alone == f"{100 * run(name, 'no impacts', setting, 5)[-1].sum():.0f}"
+    rows = [row[-4:] for row in cells if len(row) >= 4 and row[-4] in ENGINES]
+    assert [name for name, *_ in rows] == ENGINES * 2
+    for k, (name, own, row, alone) in enumerate(rows):
+        setting = ("default", "refined")[k // len(ENGINES)]
+        for how, cell in (("as it is", own), ("mended", row)):
+            end = run(name, how, setting)[-1]
+            most = end.max() / end.sum()
+            assert cell == f"{100 * end.sum():.0f}\u00a0({100 * most:.0f})"
+            assert (most > 0.95) if how == "mended" else (most < 0.6), (name, setting)
+        assert alone == f"{100 * run(name, 'no impacts', setting, 5)[-1].sum():.0f}"
     end = run(*HERTZ)[-1]
     assert chapter.glued["one"] == f"{100 * end.max() / end.sum():.0f}"
 
