@@ -97,8 +97,8 @@ def paths_drawn():
     """The arc, and for each law its paths without and with losses."""
     ax = CHAPTER.figures["fig-laws-paths"].axes[0]
     arc, *rest = points(ax)
-    names = [text.get_text() for text in ax.get_legend().get_texts()][1:]
-    return arc, {name: (rest[5 * k], rest[5 * k + 2]) for k, name in enumerate(names)}
+    names = [line.get_label() for line in ax.get_lines() if line.get_label()[0] != "_"][1:]
+    return arc, {name: (rest[4 * k], rest[4 * k + 2]) for k, name in enumerate(names)}
 
 
 def test_fig_laws_paths_of_the_energy_law_and_of_the_ratio():
