@@ -292,6 +292,22 @@ def unequal_jumps(family, n, ratio, chains=24, size=1e-12, e=0.9):
     return np.array(found)
 
 
+def changes_of_rows(spread, n, e, ratio, chains=4, size=1e-12):
+    """Largest change of a velocity, over the largest speed, and of the last ball's, one a setting.
+
+    Settings are arrays of `e` and `ratio`; inputs change by the part `size`, in so many rows each.
+    """
+    rng, cases = np.random.default_rng([2001, n]), len(e)
+    masses = uniform(rng, 1 - spread, 1 + spread, (chains, cases, n))
+    inputs = masses, np.eye(n)[0], np.tile(e, (n - 1, 1)).T, np.tile(ratio, (n - 2, 1)).T
+    shapes = [(chains, cases, x.shape[-1]) for x in inputs]
+    other = [x * (1 + size * rng.choice([-1, 1], s)) for x, s in zip(inputs, shapes, strict=True)]
+    other[2] = np.minimum(other[2], 1.0)
+    one, other = (post_impact_velocities(*row, excess="saturate") for row in (inputs, other))
+    off = np.abs(other - one) / np.abs(one).max(axis=-1, keepdims=True)
+    return off.max(axis=(0, 2)), off[..., -1].max(axis=0)
+
+
 # --- a light ball between two heavy ones -------------------------------------------------------
 
 

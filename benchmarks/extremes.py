@@ -55,6 +55,22 @@ def unequal():
         yield *case, *map(float, np.nanquantile(change, [0, 0.5, 1])), *counts
 
 
+def shortest():
+    """Yield the shortest row that jumps, and largest changes, of equal and of unequal balls."""
+    ratios = 0, 1, 2, 4, 6, 8, 10, 12, 15, 20, 30, 40  # in hundredths
+    for spread, step in ((0.0, 2), (0.1, 10)):
+        cases = [*product(range(40, 101, step), ratios)]
+        e, ratio = np.array(cases).T / 100
+        least, (short, largest, last) = np.zeros(len(e), dtype=int), np.zeros((3, len(e)))
+        for n in range(3, 21):
+            any_ball, last_ball = x.changes_of_rows(spread, n, e, ratio)
+            least = np.where((least == 0) & (any_ball > 1e-6), n, least)
+            largest, last = np.maximum(largest, any_ball), np.maximum(last, last_ball)
+            short = largest if n <= 7 else short
+        columns = (column.tolist() for column in (e, ratio, least, short, largest, last))
+        yield from ((spread, *row) for row in zip(*columns, strict=True))
+
+
 def each_input():
     """Yield the inputs of the ten chains of the paper's test."""
     for name in paper_sequences():
@@ -141,6 +157,7 @@ TABLES = {
     ),
     "extremes_growth": ("spread restitution size balls median largest leading", growth),
     "extremes_unequal": ("family balls ratio least median largest jumps unfinished", unequal),
+    "extremes_shortest": ("spread restitution ratio balls short largest last", shortest),
     "extremes_edges": ("sequence input index side distance jump", edges),
     "extremes_jumps": ("sequence input index change jump", jumps),
     "extremes_elastic": (

@@ -3,6 +3,7 @@
 import math
 
 import extreme_chains as x
+import mpmath
 import numpy as np
 import pytest
 from chapters import Chapter, floats, number, points, shows
@@ -14,6 +15,7 @@ from cradle import (
     outcomes,
     paper_chain,
 )
+from cradle.textbook import solve
 
 
 def stored(part, **equal):
@@ -101,13 +103,13 @@ def test_exercises():
         ("fig-maps-growth", "growth", "largest"),
         ("fig-maps-edges", "edges", "distance"),
         ("fig-maps-count", "elastic", "impacts"),
-        ("fig-extremes-growth", "growth", "largest"),
         ("fig-extremes-edge", "limits", "edge"),
     ],
 )
 def test_figures_show_their_column_of_a_table(figure, part, column):
-    """What is infinite or below 1e-15 is not drawn as it stands; the first page has one spread."""
-    some = {"elastic": {"ratio": "0"}, "growth": {"size": "1e-12"}}.get(part, {})
+    """What is infinite or below 1e-15 is not drawn as it stands, and of some tables only a part."""
+    equal = {"size": "1e-12", "spread": "0"}
+    some = {"elastic": {"ratio": "0"}, "limits": {"ratio": "0"}, "growth": equal}.get(part, {})
     values = floats(row[column] for row in stored(part, **some))
     values = values[np.isfinite(values) & (values > 1e-15)]
     assert len(values) > 5
@@ -131,6 +133,26 @@ def test_fig_extremes_count_by_the_wedge_and_edge_by_the_eigenvalues():
     theory, *_ = points(CHAPTER.figures["fig-extremes-edge"].axes[0])
     for e, border in theory[::30]:
         assert border == pytest.approx(x.infinite_below(e), rel=1e-9)
+
+
+def test_fig_extremes_shortest_as_drawn():
+    """The least of all ratios; the textbook's outcome jumps there, too."""
+    rows = [r for r in stored("shortest", spread="0") if int(r["balls"])]
+    (ax,) = CHAPTER.figures["fig-extremes-shortest"].axes
+    for line, ratios in zip(points(ax), ((0.1, 0.2), (0.0, 0.4))):
+        least = {}
+        for r in rows:
+            e, balls = float(r["restitution"]), int(r["balls"])
+            if ratios[0] <= float(r["ratio"]) <= ratios[1]:
+                least[e] = min(least.get(e, 99), balls)
+        np.testing.assert_array_equal(line, sorted(least.items()))
+    one, other = x.copies(np.random.default_rng(1), np.ones((6, 8)), 0.42, 0.2, 1e-12)
+    with mpmath.workdps(50):
+        off = [
+            np.subtract(*(floats(solve(*row, number=mpmath.mpf).velocities) for row in pair))
+            for pair in zip(zip(*one), zip(*other))
+        ]
+    assert np.abs(off).max() > 1e-4
 
 
 def admissible(three):

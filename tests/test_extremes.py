@@ -156,6 +156,19 @@ def test_growth_of_a_perturbation():
             assert leading.min() == row["leading"]
 
 
+def test_the_shortest_rows_that_jump():
+    """Equal balls with losses jump from 8 balls on; of the others none of up to 20."""
+    rows = stored("shortest")
+    for row in rows:
+        assert (row["largest"] > 1e-6) == (row["balls"] > 0)
+        assert row["balls"] == 0 or (row["spread"] == 0 and row["restitution"] < 1)
+        assert row["short"] < 1e-11
+    assert min(row["balls"] for row in rows if row["balls"]) == 8
+    e, ratio = np.array([0.42, 0.9]), np.array([0.2, 0.2])
+    for n, jumps in ((7, [False, False]), (8, [True, False])):
+        assert ((x.changes_of_rows(0.0, n, e, ratio)[0] > 1e-6) == jumps).all()
+
+
 def test_unequal_rows_jump_at_large_ratios():
     """Where nothing jumps the numbers come again; where all do, they do so again."""
     rows = {(r["family"], r["balls"], r["ratio"]): r for r in stored("unequal")}

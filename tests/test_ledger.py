@@ -22,7 +22,6 @@ VERDICTS = {
     "reproduced in part",
     "schematic",
     "hypothesis",
-    "not reproducible",
 }
 with (ROOT / "data" / "ledger.csv").open(encoding="utf-8", newline="") as file:
     ROWS = list(csv.DictReader(file))

@@ -41,8 +41,8 @@ DIGESTS = {
     "scenes": "13088f12c81b4e35",
     "long_chains": "eef8777637e3f854",
     "implied_ratio": "617f9eed01d94458",
-    "batch": "9ff8b084f52dd96d",
-    "one by one": "2cfe995a01ce4e49",
+    "batch": "086260db1d0ed7a7",
+    "one by one": "41e58e3715381950",
 }
 
 
