@@ -237,20 +237,24 @@ def map_case(shape, power, e, ratio, velocities):
 
 
 def copies(rng, masses, e, ratio, size):
-    """Chains whose first balls strike, and the same with every input changed by the part `size`."""
-    chains, n = masses.shape
-    velocities = np.tile(np.eye(n)[0], (chains, 1))
-    parts = [masses, velocities, np.full((chains, n - 1), e), np.full((chains, n - 2), ratio)]
-    return parts, [part * (1 + size * rng.choice([-1, 1], part.shape)) for part in parts]
+    """Chains whose first balls strike, and the same with every input changed by the part `size`.
+
+    Masses have a shape (..., n); `e` and `ratio` are numbers, or one for each of the last chains.
+    """
+    *chains, n = masses.shape
+    e, ratio = (np.atleast_1d(x)[:, None] for x in (e, ratio))
+    rows = (np.eye(n)[0], n), (e, n - 1), (ratio, n - 2)
+    parts = [masses, *(np.broadcast_to(row, (*chains, length)) for row, length in rows)]
+    changed = [part * (1 + size * rng.choice([-1, 1], part.shape)) for part in parts]
+    changed[2] = np.minimum(changed[2], 1.0)
+    return parts, changed
 
 
 def rows_of_balls(spread, n, e, size, chains=10, seed=2001):
     """Chains of n balls of 1 but for the part `spread`, ratio .1, and copies changed by `size`."""
     rng = np.random.default_rng([seed, n, round(1000 * e)])
     masses = uniform(rng, 1 - spread, 1 + spread, (chains, n))
-    parts, changed = copies(rng, masses, e, 0.1, size)
-    changed[2] = np.minimum(changed[2], 1.0)
-    return parts, changed
+    return copies(rng, masses, e, 0.1, size)
 
 
 def perturbed(spread, n, e, size):
@@ -297,13 +301,10 @@ def changes_of_rows(spread, n, e, ratio, chains=4, size=1e-12):
 
     Settings are arrays of `e` and `ratio`; inputs change by the part `size`, in so many rows each.
     """
-    rng, cases = np.random.default_rng([2001, n]), len(e)
-    masses = uniform(rng, 1 - spread, 1 + spread, (chains, cases, n))
-    inputs = masses, np.eye(n)[0], np.tile(e, (n - 1, 1)).T, np.tile(ratio, (n - 2, 1)).T
-    shapes = [(chains, cases, x.shape[-1]) for x in inputs]
-    other = [x * (1 + size * rng.choice([-1, 1], s)) for x, s in zip(inputs, shapes, strict=True)]
-    other[2] = np.minimum(other[2], 1.0)
-    one, other = (post_impact_velocities(*row, excess="saturate") for row in (inputs, other))
+    rng = np.random.default_rng([2001, n])
+    masses = uniform(rng, 1 - spread, 1 + spread, (chains, len(e), n))
+    pair = copies(rng, masses, e, ratio, size)
+    one, other = (post_impact_velocities(*row, excess="saturate") for row in pair)
     off = np.abs(other - one) / np.abs(one).max(axis=-1, keepdims=True)
     return off.max(axis=(0, 2)), off[..., -1].max(axis=0)
 

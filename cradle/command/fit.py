@@ -168,11 +168,13 @@ def _predicted(found: Any, shots: Any, sequence: str, speed: float) -> tuple[Any
                          "measured": mean, "error": error})  # fmt: skip
         tables.append([{**row, "measured": m, "error": e}
                        for row, m, e in zip(rows, mean, error, strict=True)])  # fmt: skip
-        # Without a triplet's own set its ratio is known no longer.
-        hint = f" (for one: --without {quote(one.name)})" * (len(one.types) > 3)
-        part = f"part of the fit: this is no check{hint}"
-        part = part if taught else "not fitted: it changes no ratio"
-        part = part if used else "left out of the fit"
+        if not used:
+            part = "left out of the fit"
+        elif not taught:
+            part = "not fitted: it changes no ratio"
+        else:  # without a triplet's own set its ratio is known no longer
+            hint = f" (for one: --without {quote(one.name)})" if len(one.types) > 3 else ""
+            part = f"part of the fit: this is no check{hint}"
         remarks.append(f"measured: mean of {len(one.shots)} shots of set {one.name}, each scaled "
                        f"to {speed:g} m/s; the set was {part}")  # fmt: skip
     lines = ["", f"{sequence} at {speed:g} m/s; lower to upper: the central 95 % of predictions"]

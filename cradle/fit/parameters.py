@@ -89,7 +89,7 @@ def normal_equations(
     def solve(changed: Values, change: Vector | float = 0.0) -> Vector:
         return outcomes(shots.types, shots.masses, before + change, {**values, **changed})
 
-    outcome, movers = solve({}), []
+    outcome, moved = solve({}), []
     slopes = [np.zeros_like(outcome)] * len(uncertain)
     for k, (key, sigma) in enumerate(uncertain):
         if key in pair_keys(shots.types):
@@ -98,17 +98,18 @@ def normal_equations(
     if single:
         # Homogeneous of degree one: the slope with the striker's velocity is the outcome itself.
         speed, error = (v[:, moving, None] for v in (shots.before, shots.sigma_before))
-        slopes, movers, outcome = [s * speed for s in slopes], [outcome * error], outcome * speed
-    for ball in np.flatnonzero((shots.sigma_before > 0).any(axis=0)) if not single else ():
-        error = shots.sigma_before[:, ball, None, None]
-        step = unit[ball] * error.max()
-        movers.append((solve({}, step) - solve({}, -step)) / (2 * error.max()) * error)
+        slopes, moved, outcome = [s * speed for s in slopes], [outcome * error], outcome * speed
+    else:
+        for ball in np.flatnonzero((shots.sigma_before > 0).any(axis=0)):
+            error = shots.sigma_before[:, ball, None, None]
+            step = unit[ball] * error.max()
+            moved.append((solve({}, step) - solve({}, -step)) / (2 * error.max()) * error)
     columns = np.stack([shots.after[:, None, :] - outcome, *slopes], axis=-1)
-    moved = np.stack([*movers, outcome], axis=-1)[..., :-1]  # M may be 0
+    movers = np.stack([*moved, outcome], axis=-1)[..., :-1]  # M may be 0
     weight = (1.0 / shots.sigma**2)[:, None, :, None]
     products = np.einsum("kpni,kpnj->pij", columns, columns * weight)
-    weighted = moved * weight
-    inner = np.einsum("kpnm,kpnl->kpml", moved, weighted) + np.eye(len(movers))
+    weighted = movers * weight
+    inner = np.einsum("kpnm,kpnl->kpml", movers, weighted) + np.eye(len(moved))
     cross = np.einsum("kpnm,kpni->kpmi", weighted, columns)
     products -= np.einsum("kpmi,kpmj->pij", cross, np.linalg.solve(inner, cross))
     return products[:, 0, 0], products[:, 0, 1:], products[:, 1:, 1:]

@@ -58,14 +58,14 @@ class Outputs(NamedTuple):
     held: Any
 
 
-def above_bound(ratio, m, driven, onward):
-    """R7: tell whether a ratio is above its bound, as `closed_form.largest_ratios` draws it."""
-    return ratio > 1.0 / (1.0 + m / driven * (1.0 - onward)) * LIMITS.rounded
+def largest_ratio(m, driven, onward):
+    """R7: the bound of a ratio (Eq. 53), as `closed_form.largest_ratios` draws it."""
+    return 1.0 / (1.0 + m / driven * (1.0 - onward))
 
 
 def meant(ratio, m, driven, onward):
     """R7: the ratio, or its bound (Eq. 53) if nothing but rounding keeps it from that."""
-    bound = driven.real / (driven.real + m.real * (1.0 - onward.real))
+    bound = largest_ratio(m.real, driven.real, onward.real)
     if bound < ratio.real * LIMITS.rounded and ratio.real < bound * LIMITS.rounded:
         return over(driven, plus(driven, times(m, minus(ONE, onward))))
     return ratio
@@ -93,8 +93,8 @@ def admissible(n, chain, bounded):
             return False
         onward, back = forward[i + 1] if i < n - 3 else 0.0, backward[i - 1] if i > 0 else 0.0
         if bounded and (
-            above_bound(forward[i], m[i + 1], m[i + 2], onward)
-            or above_bound(backward[i], m[i + 1], m[i], back)
+            forward[i] > largest_ratio(m[i + 1], m[i + 2], onward) * LIMITS.rounded
+            or backward[i] > largest_ratio(m[i + 1], m[i], back) * LIMITS.rounded
         ):
             return False
     return True
@@ -129,7 +129,9 @@ def prepare(n, chain, meeting, state):
         k.e = read(chain.e[c])
         k.square = times(k.e, k.e)
         if c < n - 2:
-            k.forward, k.backward = read(chain.forward[c]), read(chain.backward[c])
+            back = contact[c - 1].backward if c > 0 else ZERO
+            k.forward = read(chain.forward[c])
+            k.backward = meant(read(chain.backward[c]), ball[c + 1].m, ball[c].m, back)
             if 0.0 < chain.forward[c] < LIMITS.faint or 0.0 < chain.backward[c] < LIMITS.faint:
                 tally.margin = 0.0
         k.u = minus(ball[c].start, ball[c + 1].start)
@@ -144,9 +146,6 @@ def prepare(n, chain, meeting, state):
     for c in range(n - 3, -1, -1):
         onward = contact[c + 1].forward if c < n - 3 else ZERO
         contact[c].forward = meant(contact[c].forward, ball[c + 1].m, ball[c + 2].m, onward)
-    for c in range(n - 2):
-        onward = contact[c - 1].backward if c > 0 else ZERO
-        contact[c].backward = meant(contact[c].backward, ball[c + 1].m, ball[c].m, onward)
     forget(LOWER, state.level)
     forget(UPPER, state.level)
     start(n, state)

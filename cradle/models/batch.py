@@ -13,18 +13,17 @@ from cradle.chain import Chain
 from cradle.input.values import ArrayLike, NDArray, Vector, numbers
 from cradle.kernel import Inputs, Options, Outputs
 from cradle.models import correlation as paper
-from cradle.models.correlation import MAX_EVENTS, ImpulseCorrelation
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
 from cradle.trace import ImpactNotCertified
 
-#: Chains solved at a time, more where short cuts are likely: memory beyond inputs and outputs.
+#: Chains solved at a time, which bounds the memory; more where short cuts are likely.
 CHUNK = {2: 16_384, 3: 16_384, 4: 4096}
 
 
 def post_impact_velocities(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, forward: ArrayLike,
     backward: ArrayLike | None = None, *, meeting: float = 0.5, excess: str = "raise",
-    max_events: int = MAX_EVENTS, progress: bool = False,
+    max_events: int = paper.MAX_EVENTS, progress: bool = False,
 ) -> Vector:  # fmt: skip
     """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
 
@@ -86,7 +85,7 @@ class Outcomes(NamedTuple):
 def outcomes(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, forward: ArrayLike,
     backward: ArrayLike | None = None, *, meeting: float = 0.5, excess: str = "raise",
-    max_events: int = MAX_EVENTS, progress: bool = False,
+    max_events: int = paper.MAX_EVENTS, progress: bool = False,
 ) -> Outcomes:  # fmt: skip
     """Count the collisions of many chains too; all else as `post_impact_velocities`.
 
@@ -125,7 +124,7 @@ def outcomes(
         if status != FINISHED:
             # Alone, with its record; it stops where it stopped here, and raises.
             m, v, e, f, b = (rows_of(array, lead, slice(failed, failed + 1))[0] for array in arrays)
-            model = ImpulseCorrelation(
+            model = paper.ImpulseCorrelation(
                 f, b, meeting=meeting, excess="saturate", max_events=max_events
             )
             chain = Chain(m, v, e)
