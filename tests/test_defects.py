@@ -11,7 +11,13 @@ from extreme_chains import faults, invariants
 from families import FAMILIES, family
 from problem import Problem
 
-from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide, textbook
+from cradle import (
+    Chain,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    collide,
+    textbook,
+)
 
 
 def at_rest(n):
@@ -71,6 +77,16 @@ def test_named_chain_has_one_answer(name):
     truth = exact(problem)
     assert difference(truth.velocities, exact(problem, 90).velocities) < 1e-40
     assert difference(truth.velocities, problem.solve(textbook.solve).velocities) < 1e-12
+
+
+@named
+def test_named_chain_in_moving_frames(name):
+    """Invariance under boosts, where rounding of the boosted input is the only difference."""
+    problem = CHAINS[name].problem
+    here = problem.collide().velocities
+    for speed in (1.0, -0.5):
+        there = problem.boosted(speed).collide().velocities
+        assert difference(there - speed, here) < 1e-11
 
 
 def common_velocity(problem):
@@ -183,3 +199,10 @@ def finished(name, count, seed):
 def test_invariants(name):
     for problem, trace in finished(name, COUNT, seed=1):
         assert faults(trace, overlap=1e-30) == [], problem
+
+
+@pytest.mark.parametrize("name", ["ties", "ties within bounds"])
+def test_boosts_by_exact_speeds(name):
+    for problem, trace in finished(name, COUNT // 2, seed=3):
+        boosted = problem.boosted(1.5).collide(max_events=100_000)
+        assert difference(boosted.velocities - 1.5, trace.velocities) < 1e-8, problem

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, collide, swing
+from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, swing
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 PROGRAMS = {
@@ -125,6 +125,47 @@ def test_ten_strokes(program, pulled):
     assert row.impacts < 20 * 10
     closed(bodies)
     closed(alone)
+
+
+def test_springs_in_the_row_are_elastic_spheres(program):
+    """Two balls pulled back, where one ratio is not quite Hertz, and springs are."""
+    pytest.importorskip("numba", reason="the judge of the scene is compiled by numba")
+    scenes = importlib.import_module("cradle_scenes")
+    bodies = program.cradle(pulled=2)
+    row = program.mended(bodies)
+    row.model = SpringChain(1.0)
+    for _ in range(4600):
+        row.step(STEP)
+    kept = energies(program, bodies)
+    _, angles, rates = scenes.on_springs(2, 4.6)
+    judge = scenes.energies(angles, rates)[-1]
+    np.testing.assert_allclose(kept / kept.sum(), judge, atol=0.01)
+    closed(bodies)
+
+
+def test_an_engine_alone_moves_its_balls_otherwise(program):
+    """Without the mend the engine's own contacts act: with the mend they are off."""
+    own, mended = program.cradle(mend=False), program.cradle()
+    for _ in range(1000):
+        own.advance(STEP)
+        mended.advance(STEP)  # by the engine alone: the balls pass through each other
+    assert energies(program, own)[1:].sum() > 0.1
+    assert energies(program, mended)[1:].sum() < 1e-6
+    closed(own)
+    closed(mended)
+
+
+def test_hanging_balls_are_looked_at_every_hundredth_of_a_second(program):
+    """A step with the row then costs little more than one of the engine."""
+    bodies = program.cradle(pulled=0)
+    row = program.mended(bodies)
+    looks, motion = [], bodies.motion
+    bodies.motion = lambda: looks.append(1) or motion()
+    for _ in range(1000):
+        row.step(STEP)
+    assert len(looks) <= 101
+    assert row.impacts == 0
+    closed(bodies)
 
 
 def test_the_program_runs_as_it_stands(program, capsys):

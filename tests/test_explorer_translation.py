@@ -3,6 +3,7 @@
 import math
 import random
 import struct
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -56,6 +57,68 @@ def test_numbers_as_python_prints_them(source):
 
 
 # Translation
+
+ALIKE = {
+    "a loop keeps its own count": """
+def f(n):
+    total = 0
+    for i in range(n):
+        total = 10 * total + i
+        i += 5
+        n -= 1
+    return total, i, n
+""",
+    "the counter stays at its last value": """
+def f(n):
+    for i in range(n):
+        for j in range(n - 1, -1, -1):
+            if j == 1:
+                break
+    return i, j
+""",
+    "a shift beyond 32 bits, divisions, powers": """
+def f(n):
+    return (1 << 40) - n, -n // 2, n / 2, 2.0 ** -53 * n, -(1 << 40) // 3
+""",
+    "the first of equals": """
+def f(n):
+    return max(0.0, -0.0 * n), max(-0.0 * n, 0.0), min(0.0, -0.0 * n), max(1, n, 2), min(1, n, 2)
+""",
+    "chains of comparisons": """
+def f(n):
+    return [0 < n < 9 == (n > 3), 0 < n != 1 * n, not 1 <= n < 3 <= n][0 if n > 1 else 1]
+""".replace("[0 < n", "(0 < n").replace("][0 if n > 1 else 1]", ")"),
+    "a tuple is made before its parts are stored": """
+def f(n):
+    a, b = n, n + 1
+    a, b = b, a
+    _, c = a, b
+    return a, b, c
+""",
+    "truth values are numbers": """
+def f(n):
+    known = n > 1
+    x = y = 7 if known and n != 0 or n == 2 else 8
+    for k in (n - 1, n + 1):
+        if k == (n > 1):
+            continue
+        x += k
+    return x, y, known == 1
+""",
+}
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_what_looks_alike_means_the_same(name):
+    code = ALIKE[name].replace("math.", "")
+    names = {}
+    exec(code, names)
+    helpers = (Path(explorer_engine.__file__).parent / "engine_numbers.js").read_text("utf-8")
+    script = Script(f'"use strict";\n{helpers}\n{explorer_engine.translate(code)}')
+    for n in (1, 2, 3, 5, 8):
+        assert bits(script("f", n)) == bits(names["f"](n)), n
+    script.context.close()
+
 
 REFUSED = [
     "x[-1] = 2", "y = x[n:]", "y = x % n", "y = n ** 2", "y = 0 < f(x, n) < 2",

@@ -261,6 +261,38 @@ def test_infinite_sequences_in_bounded_work(light, e):
             assert trace.collapsed == (light <= x.infinite_below(e)), name
 
 
+@pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
+def test_both_sides_of_the_edge_between_finite_and_infinite(e):
+    """Ratio 0: where the eigenvalues of the cycle turn complex; the limit from both sides.
+
+    A finite sequence beside the edge shrinks by e^(pi / phi) on its way, cos phi = trace / 2e.
+    Nothing that can be seen tells one that falls below the smallest speed from an infinite one.
+    """
+    at = x.infinite_below(e)
+    for part in (0.5, 0.9, 0.999, 1 - 1e-6):
+        found = outcomes([1, at * part, 1], [1, 0, 0], e, 0)
+        assert found.collapsed
+        np.testing.assert_allclose(found.velocities, 1 / (2 + at * part), rtol=4 * x.EPS)
+        assert found.collisions.sum() < 5000
+    for part in (1.0 + 1e-6, 1.001, 1.02, 1.1, 2.0):
+        light = at * part
+        trace = (1 + e) ** 2 / (1 + light) ** 2 - 2 * e
+        turn = math.acos(trace / (2 * e))
+        shrunk = e ** (math.pi / turn)
+        found = outcomes([1, light, 1], [1, 0, 0], e, 0)
+        if shrunk > 1e-12:
+            assert not found.collapsed, part
+            with mpmath.workdps(50):
+                problem = x.case([1, light, 1], [1, 0, 0], e, 0)
+                exact = problem.exact(5000)
+                assert found.collisions.tolist() == exact.collisions
+                off = max(abs(a - b) for a, b in zip(found.velocities.tolist(), exact.velocities))
+            assert off < 1e-14
+        elif shrunk < 1e-24:
+            assert found.collapsed, part
+            np.testing.assert_allclose(found.velocities, 1 / (2 + light), rtol=0, atol=1e-14)
+
+
 def test_edges_of_the_map_of_limits():
     """By bisection on the solver, and from the eigenvalues: equal as far as can be seen."""
     for row in stored("limits"):
@@ -501,3 +533,27 @@ def test_found_by_fuzzing(name, plain, monkeypatch):
             # Each ball by its own measure, also the slow ones.
             for v, w in zip(trace.velocities.tolist(), exact.velocities):
                 assert abs(v - w) <= 32 * x.EPS * abs(w) + 2 * x.EPS**2
+
+
+@needs_numba
+@pytest.mark.exhaustive
+@pytest.mark.parametrize(("family", "least", "most"), [("within", 0, 0), ("saturate", 1, 30)])
+def test_how_many_chains_amplify_a_last_digit_by_1e8(family, least, most, monkeypatch):
+    """About one in a thousand where ratios exceed their bounds; `Trace.margin` warns of none."""
+    monkeypatch.setenv(runtime.VARIABLE, "compiled")
+    model = {"excess": "saturate", "max_events": 4000}
+    found = []
+    for index in range(8000):
+        problem = x.any_chain(family, 3, index)
+        chain = Chain(problem.masses, problem.velocities, problem.restitution)
+        law = ImpulseCorrelation(problem.forward, problem.backward, **model)
+        moved = problem.velocities * (1 + 1e-14 * np.cos(np.arange(chain.masses.size)))
+        try:
+            trace = collide(chain, law, record=False)
+            other = collide(Chain(chain.masses, moved, chain.restitution), law, record=False)
+        except ImpactNotFinished:
+            continue
+        if np.abs(other.velocities - trace.velocities).max() > 1e-6:
+            found.append(trace.margin)
+    assert least <= len(found) <= most
+    assert all(margin > 1e-9 for margin in found)

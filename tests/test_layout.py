@@ -28,10 +28,23 @@ VIEWS = ((1280, "dark"), (360, "light"))
 OTHER_VIEWS = ((1280, "light"), (360, "dark"), (390, "light"), (390, "dark"))
 #: The window is low: only what is in it is painted.
 HEIGHT = 200
-#: Of phones.
-SMALLEST = 320
+#: Widths of phones; the smallest.
+PHONES, SMALLEST = (390, 360), 320
 #: Contrast that letters need, and lines and marks (WCAG 2.1: 1.4.3, 1.4.6 and 1.4.11).
 READABLE, LETTERS, LINES = 4.5, 7.0, 3.0
+
+# Numbers of equations: [number, its right end, that of the column], and how large its letters are.
+NUMBERS = """() => [...document.querySelectorAll('.bd-content mjx-container[display="true"]')]
+  .flatMap((node) => {
+    const box = node.parentElement;
+    const number = node.querySelector('g[id^="mjx-eqn"]') ?? box.querySelector(".eqno");
+    if (!number || !node.checkVisibility()) return [];
+    const { right } = number.getBoundingClientRect();
+    const column = Math.min(...[node, box].map((edge) => edge.getBoundingClientRect().right));
+    const end = number.matches(".eqno") ? box.getBoundingClientRect().right : column;
+    const letters = parseFloat(getComputedStyle(node).fontSize);
+    return [[number.id || number.textContent, right, end, letters]];
+  })"""
 
 # Letters whose contrast with their ground is below what is asked: [contrast, its colours, words].
 # Pictures have a ground of their own that no style names; they are looked at elsewhere.
@@ -93,7 +106,7 @@ FOUND = "/found \\d+ page/.test(document.body.innerText)"
 
 
 def looked_at(tab, page: Path, views) -> dict[str, list]:
-    """Open a page; list its faults by kind."""
+    """Open a page; list its faults by kind, and the numbers of its equations on phones."""
     tab.goto("about:blank")
     shape(tab, SMALLEST, "light")
     searched = page.stem == "search"
@@ -105,16 +118,20 @@ def looked_at(tab, page: Path, views) -> dict[str, list]:
     tab.evaluate(ALL_SET)
     tab.evaluate(FRAMES)
     wide = tab.evaluate("document.scrollingElement.scrollWidth")
-    found = {"wide": [wide] * (wide > SMALLEST), "misfits": [], "pale": []}
+    found = {"wide": [wide] * (wide > SMALLEST), "misfits": [], "numbers": [], "pale": []}
     # As the page came, before any change of the window.
     found["misfits"] += [cut for cut in tab.evaluate(MISFITS) if cut[0] in AS_IT_CAME]
     found["headings"], found["stops"] = tab.evaluate(SKIPPED), tab.evaluate(STOPS)
-    for width, mode in dict.fromkeys([*views, (1280, "light"), (1280, "dark")]):
+    tagged = re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8"))
+    sights = {**dict.fromkeys(views), (1280, "light"): None, (1280, "dark"): None}
+    for width, mode in sights | dict.fromkeys((width, "light") for width in PHONES if tagged):
         show(tab, width, mode)
         if (width, mode) in views and page.parent.name == "book":
             found["misfits"] += [[width, mode, *misfit] for misfit in tab.evaluate(MISFITS)]
         if width == 1280:
             found["pale"] += [[mode, *pale] for pale in tab.evaluate(PALE, READABLE)]
+        elif tagged and mode == "light":
+            found["numbers"] += [(width, *number) for number in tab.evaluate(NUMBERS)]
     return found
 
 
@@ -154,33 +171,65 @@ def test_pages(seen, kind: str):
     assert not faults, "\n".join(faults)
 
 
-#: What does not fit, by kind.
-BODIES = {
-    "page": "<p style='width: 500px'>wide</p>",
-    "code": f"<div style='overflow: hidden'><pre style='overflow: auto'>{90 * 'x'}</pre></div>",
-    "turned map": "<span class='figure-box' data-letters='12'><img class='map' width='100' "
-    "style='width: 100px; height: 9px; filter: invert(0.93)'></span>",
-    "no sign of more": "<p style='overflow: auto'><span style='display: block; width: 500px'>more",
-    "squeezed column": f"<table><td style='width: 2em'>{40 * 'word '}</td></table>",
-    "broken word": "<table style='width: 1px'><td><p style='overflow-wrap: anywhere'>R1</table>",
-    "formula over its column": "<table style='table-layout: fixed; width: 4em'><td><mjx-container "
-    "display='true'><svg style='width: 20em'></svg></mjx-container></td></table>",
-}
+def test_numbers_of_equations_on_a_phone(seen):
+    """None is cut, and none needs letters that are smaller than those of figures."""
+    numbers = [(page, *number) for page, view in seen.items() for number in view["numbers"]]
+    assert len(numbers) >= 53 * len(PHONES)  # of the paper alone
+    cut = [number for number in numbers if number[3] > number[4] + 0.5 or number[5] < 7.8]
+    assert not cut, "\n".join(map(str, cut))
 
 
-def test_what_is_looked_for_is_seen(browser):
-    """The lists above are not empty because they cannot find anything."""
+@pytest.mark.parametrize(
+    ("body", "kind"),
+    [
+        ("<p style='width: 500px'>wide</p>", "page"),
+        (
+            "<div style='overflow: hidden'><pre style='overflow: auto'>"
+            + 90 * "x"
+            + "</pre></div>",
+            "code",
+        ),
+        (
+            "<span class='figure-box' data-letters='12'><img class='map' width='100' "
+            "style='width: 100px; height: 9px; filter: invert(0.93)'></span>",
+            "turned map",
+        ),
+        (
+            "<p style='overflow: auto'><span style='display: block; width: 500px'>more",
+            "no sign of more",
+        ),
+        ("<table><td style='width: 2em'>" + 40 * "word " + "</td></table>", "squeezed column"),
+        (
+            "<table style='width: 1px'><td><p style='overflow-wrap: anywhere'>R1</table>",
+            "broken word",
+        ),
+        (
+            "<table style='table-layout: fixed; width: 4em'><td><mjx-container display='true'>"
+            "<svg style='width: 20em'></svg></mjx-container></td></table>",
+            "formula over its column",
+        ),
+    ],
+)
+def test_a_misfit_is_seen(browser, body: str, kind: str):
+    """The list above is not empty because it cannot find anything."""
     tab = browser.new_page(viewport={"width": 390, "height": 900})
-    for kind, body in BODIES.items():
-        inside = f"<main class='bd-content' style='line-height: 20px'>{body}</main>"
-        tab.set_content(f"<!DOCTYPE html><h1>page</h1>{inside}")
-        assert kind in [misfit[0] for misfit in tab.evaluate(MISFITS)]
-    for style, pale in (
-        ("color: #777", True), ("color: #767676", False), ("background: #176de8", True),
-        ("opacity: 1; color: rgb(0 0 0 / 50%)", True), ("color: color(srgb 0.5 0.5 0.5)", True),
-    ):  # fmt: skip
-        tab.set_content(f"<!DOCTYPE html><p style='color: #000; {style}'>words</p>")
-        assert bool(tab.evaluate(PALE, READABLE)) is pale
+    tab.set_content(
+        "<!DOCTYPE html><h1>page</h1>"
+        f"<main class='bd-content' style='line-height: 20px'>{body}</main>"
+    )
+    assert kind in [misfit[0] for misfit in tab.evaluate(MISFITS)]
+    tab.close()
+
+
+@pytest.mark.parametrize(
+    ("style", "pale"),
+    [("color: #777", True), ("color: #767676", False), ("background: #176de8", True),
+     ("opacity: 1; color: rgb(0 0 0 / 50%)", True), ("color: color(srgb 0.5 0.5 0.5)", True)],
+)  # fmt: skip
+def test_pale_letters_are_seen(browser, style, pale):
+    tab = browser.new_page()
+    tab.set_content(f"<!DOCTYPE html><p style='color: #000; {style}'>words</p>")
+    assert bool(tab.evaluate(PALE, READABLE)) is pale
     tab.close()
 
 
@@ -257,7 +306,7 @@ SHIFTS = """
 """
 
 
-@pytest.mark.parametrize("width", [320, 1400])
+@pytest.mark.parametrize("width", [320, 390, 1400])
 @pytest.mark.parametrize("name", ["explorer", "intro", "patterns"])
 def test_a_page_does_not_jump(browser, html: Path, name: str, width: int):
     """The live cradle comes late, into its own place. Below .1 a shift counts as good."""
@@ -352,3 +401,12 @@ def test_numbers_in_colours_can_be_read(visit):
         assert len(names) == len(set(names)) == len(bars) == 7
         assert min(contrast(code(name), ground) for name in names) >= READABLE
         assert min(contrast(*map(code, pair)) for pair in bars) >= READABLE
+
+
+def test_notes_and_places_can_be_read(visit):
+    """The soft colour of notes, places and small letters."""
+    tab = still(visit, "#scene=ABCCAB")
+    drawn(tab)
+    for mode in ("light", "dark"):
+        show(tab, 1400, mode)
+        assert tab.evaluate(PALE, READABLE) == []

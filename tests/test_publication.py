@@ -151,6 +151,22 @@ def test_every_python_is_tested(project):
     assert said in text("requirements-lock.txt").splitlines()[0]
 
 
+def test_one_bot_renews_the_lock():
+    """Its command is the one that is explained, and nothing else writes the lock."""
+    workflow = yaml.safe_load(text(".github/workflows/lock.yml"))
+    script = "\n".join(step.get("run", "") for step in workflow["jobs"]["renew"]["steps"])
+    (command,) = re.findall(r"uv pip compile .*", script)
+    explained = " ".join(text("environment-notes.md").split())
+    assert command.removesuffix(" --upgrade") in explained
+    may = workflow["jobs"]["renew"]["permissions"]
+    assert may == dict.fromkeys(("contents", "pull-requests"), "write")
+    updates = yaml.safe_load(text(".github/dependabot.yml"))["updates"]
+    assert [one["package-ecosystem"] for one in updates] == ["github-actions"]
+    workflows = (ROOT / ".github/workflows").glob("*.yml")
+    compiling = [one.name for one in workflows if "pip compile" in one.read_text(encoding="utf-8")]
+    assert compiling == ["lock.yml"]
+
+
 def test_readme_on_pypi_has_no_relative_link():
     shown = release.absolute(text("README.md"))
     assert re.search(r"!\[[^\]]+\]\(https://[^)]+/cradle\.png\)", shown)

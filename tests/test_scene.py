@@ -161,6 +161,18 @@ def test_swing_repeats_what_is_stored():
     np.testing.assert_allclose(found, run("swing", "alone", "ratio")[:5], atol=1e-4)
 
 
+def test_the_film_shows_what_the_table_says():
+    for name, how in (("Chipmunk", "as it is"), ("Rapier", "mended"), ("Hertz springs", "alone")):
+        rows = [row for row in stored("film") if (row["run"], row["how"]) == (name, how)]
+        angles = np.radians([[float(row[f"ball{k}"]) for k in range(1, 6)] for row in rows])
+        times = np.array([float(row["time"]) for row in rows])
+        assert times[-1] >= 11
+        np.testing.assert_allclose(np.diff(times), 1 / 30, atol=0.02)
+        setting = "steel" if how == "alone" else "default"
+        found = scenes.strokes(angles, np.gradient(angles, times, axis=0))
+        np.testing.assert_allclose(found[:9], run(name, how, setting)[:9], atol=0.03)
+
+
 def test_a_row_at_rest_costs_at_most_as_much_again():
     """Measured with steps of a millisecond, nothing refined: within twice the engine's own cost."""
     rows = [row for row in stored("costs") if row["how"] == "mended"]
@@ -219,6 +231,13 @@ def test_what_the_engines_do_alone():
     assert end["Rapier"] < 0.2 + 0.01
     # One fifth: all balls swing together, with the momentum of one.
     assert run("Box2D", "as it is", "refined")[-1] == pytest.approx(0.2 * 0.2, abs=2e-3)
+
+
+def test_gaps_give_the_school_book_first_and_not_for_ever():
+    for name in ("Chipmunk", "Box2D", "Bullet"):
+        found = run(name, "as it is", "refined", 1, "0.01")
+        assert found[0, 4] > 0.97, name
+        assert (found[:, [0, 4]].sum(axis=1) / found.sum(axis=1)).min() < 0.95, name
 
 
 @pytest.mark.parametrize("name", ["pymunk", "box2d", "bullet", "rapier", "mujoco"])

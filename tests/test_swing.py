@@ -458,6 +458,20 @@ def test_periods_that_hardly_differ_are_followed_in_few_steps(looked, begin, dif
     assert len(looked) < 10
 
 
+def test_bodies_whose_periods_differ_by_rounding():
+    """Lengths 12, 12, 15, 10 as one body swing like 12 alone, but for the last digit."""
+    run = swing(
+        Chain([1, 1, 1, 1, 0.5, 0.5], [-5e-6, -5e-6, 5e-6, 5e-6, -5e-6, 0],
+              [0.903096997790845, 0.5413840171222394, 0.01415760983467218, 0.1682179539137848,
+               0.9091342920361836]),
+        ImpulseCorrelation(0.1, excess="saturate"),
+        [-8.879757196714637e-07, -8.747119221197388e-07, -6.101770535442485e-07,
+         -5.839284452524474e-07, -1.2872856406189447e-07, 1.6491342754953653e-07],
+        np.linspace(0, 6, 40), pendulums=Pendulums([0.12, 0.12, 0.15, 0.1, 0.1, 0.12]),
+    )  # fmt: skip
+    assert run.ended == "times"
+
+
 def test_grazing_is_no_endless_loop():
     """The gap just closes, at no speed."""
     pendulums = Pendulums(9.81, gaps=0.02)
