@@ -22,6 +22,8 @@ from pages import (
     show,
 )
 
+from cradle.pictures.impacts import PALETTE
+
 #: Widths and modes of the window.  Widths decide what fits, modes which pictures are shown; pages
 #: take long to load, and the weekly tests look at the other pairs.
 VIEWS = ((1280, "dark"), (360, "light"))
@@ -234,8 +236,6 @@ def test_pale_letters_are_seen(browser, style, pale):
 
 
 def test_colours_of_dark_mode_can_be_seen():
-    from cradle.pictures.impacts import PALETTE
-
     ground = book_figures.dark("white")
     assert contrast(book_figures.dark("black"), ground) > LETTERS
     for colour in PALETTE:
@@ -273,6 +273,33 @@ def test_every_figure_has_both_colourings(html: Path):
         dark = shown.count(f"{path.stem}-dark.svg")
         assert shown.count(path.name) > 0, path
         assert dark == shown.count(path.name), path
+
+
+def test_a_ball_of_a_film_looks_as_in_the_figures(browser, html: Path):
+    """Both modes: its own colour, on the ground of the page; on a phone its letters can be read."""
+    for mode, ground in (("light", "#ffffff"), ("dark", book_figures.dark("white"))):
+        tab = browser.new_page(viewport={"width": 375, "height": HEIGHT}, color_scheme=mode)
+        tab.goto((html / "book" / "toy.html").as_uri())
+        assert tab.locator(".animation svg").count() == 2
+        painted, filters, sizes = tab.evaluate("""(() => {
+          const films = [...document.querySelectorAll(".animation svg")];
+          const style = (query) => getComputedStyle(document.querySelector(".animation " + query));
+          const rims = [0, 1, 2, 3, 4].map((k) => style(`[id$="-ball${k}-0"] path`).stroke);
+          const sizes = films.flatMap((svg) => {
+            const unit = svg.getBoundingClientRect().width / svg.viewBox.baseVal.width;
+            return [...svg.querySelectorAll("g[transform*=scale]")].map((node) =>
+              100 * unit * /scale\\(([\\d.]+)/.exec(node.getAttribute("transform"))[1]);
+          });
+          const filters = films.map((svg) => getComputedStyle(svg).filter);
+          return [[...rims, style("#patch_1 path").fill], filters, sizes];
+        })()""")
+        tab.close()
+        rgb = [re.findall(r"\d+", one) for one in painted]
+        hexes = ["#" + "".join(f"{int(part):02x}" for part in one) for one in rgb]
+        assert hexes == [*map(str.lower, PALETTE[:5]), ground]
+        assert set(filters) == {"none"}
+        assert len(sizes) > 20
+        assert min(sizes) > book_figures.LEGIBLE
 
 
 # --- a slow phone ---

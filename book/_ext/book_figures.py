@@ -9,6 +9,8 @@ A map, a figure that contains a picture of points, has colours all over, with le
 them, and its scale of colours is read from pale to strong. Turned round it would say something
 else. So these stay, and what is around them follows the theme.
 
+A moving picture is part of its page. A style sheet gives it the same colours as figures have.
+
 The box around a figure knows how wide the figure has to be for its smallest letters to be read. On
 a narrow screen the style sheet lets a wider one scroll in this box. On a desk small letters of all
 figures have one size.
@@ -24,6 +26,9 @@ from sphinx.application import Sphinx
 
 #: Ground and text of the theme's dark mode.
 GROUND, TEXT = 0x12 / 255, 0xE0 / 255
+#: A moving picture in its page, and what the style of a part of it says of colours.
+MOVING = re.compile(r'<div class="animation">.*?</div>', re.S)
+PAINT = re.compile(r"\b(fill|stroke): (#\w{6})\b")
 #: Black and white that stay: letters and lines on a coloured ground.
 KEPT = {"#010101", "#fefefe"}
 #: From this difference of its channels on, a colour is one that tells lines apart.
@@ -121,6 +126,29 @@ def darkened(svg: str) -> str:
     return drawing.replace("<svg ", f'<svg fill="{dark("black")}" ', 1)
 
 
+def repainted(page: str) -> str:
+    """Return the style sheet of a page's moving pictures: their colours in dark mode.
+
+    >>> print(repainted('<div class="animation"><path style="fill: #ffffff"/></div>'))
+    <style>
+    html[data-theme="dark"] .animation svg { fill: #e0e0e0 }
+    html[data-theme="dark"] .animation [style*="fill: #ffffff"] { fill: #121212 !important }
+    </style>
+    """
+    paints = {
+        found
+        for film in MOVING.findall(page)
+        for found in PAINT.findall(film)
+    }
+    in_dark = 'html[data-theme="dark"] .animation'
+    rules = [f"{in_dark} svg {{ fill: {dark('black')} }}"]
+    for what, colour in sorted(paints):
+        if dark(colour) != colour:
+            part = f'{in_dark} [style*="{what}: {colour}"]'
+            rules.append(f"{part} {{ {what}: {dark(colour)} !important }}")
+    return "\n".join(["<style>", *rules, "</style>"]) if paints else ""
+
+
 def drawn_size(svg: str) -> tuple[int, int]:
     """Return width and height of a drawing in pixels."""
     tag = re.search(r"<svg[^>]*>", svg)[0]
@@ -199,7 +227,8 @@ def pair_images(
         )
 
     if "body" in context:
-        context["body"] = IMAGE.sub(box, context["body"])
+        body = context["body"]
+        context["body"] = IMAGE.sub(box, body) + repainted(body)
 
 
 def write_dark(app: Sphinx, exception: Exception | None) -> None:

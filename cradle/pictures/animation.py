@@ -21,7 +21,7 @@ __all__ = ["Animation", "animate", "animate_swing"]
 _END = 6.5  # of an impact in slow motion, s; the instant of the still
 
 
-@mpl.rc_context({"font.size": 10})
+@mpl.rc_context({"font.size": 12, "legend.columnspacing": 1, "legend.handletextpad": 0.5})
 def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Animation:
     """Show an impact in slow motion: the balls, and their velocities being drawn.
 
@@ -45,7 +45,7 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
     """
     must_be(Trace, "trace", trace)
     must_be(str, "alt", alt)
-    figure = Figure(figsize=(6.4, 5.4), dpi=72, layout="constrained", facecolor="white")
+    figure = Figure(figsize=(4.8, 4.8), dpi=72, layout="constrained", facecolor="white")
     row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.6])
     impulses, path = trace.curve()
     done = impulses.sum(axis=1)
@@ -87,7 +87,7 @@ def _balls(trace: Trace, ax: Axes, times: Vector, impulses: Vector, path: Vector
     # A star is seen while the impulse of its contact grows.
     lit = np.diff(impulses, axis=0, append=impulses[-1:]) > 0.0
     for contact, x in enumerate((centres + radii)[:-1].tolist()):
-        star = ax.plot(x, 0, "*", ms=15, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
+        star = ax.plot(x, 0, "*", ms=13, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
         yield Move(f"star{contact}", star, times, lit[:, [contact]].astype(float), SEEN, _END)
 
 
@@ -171,9 +171,8 @@ def animate_swing(
     moves: list[Move] = []
     for k, run in enumerate(several):
         left, top = k % beside * cell, k // beside * high
-        if lines:  # larger where a page shows the whole smaller
-            size = 15 if beside == 1 else 20
-            ax.text(left + 12, top + 20, lines[k], size=size, parse_math=False)
+        if lines:
+            ax.text(left + 12, top + 20, lines[k], size=min(wide / 29, 26), parse_math=False)
         for move in _swing(run, f"s{k}b", ax, (left + cell / 2, top + 34), duration):
             moves.append(move._replace(times=move.times / speed, still=still / speed))
     return moving(figure, moves, alt, "px")
@@ -203,13 +202,13 @@ def _swing(
     lengths = run.pendulums.row("length", len(run.chain))
     angles = -np.degrees(places / lengths)  # positive turns what hangs to the left
     metre, radii, pivots, _ = _hung(run)
-    middle, beam = place
+    (middle, beam), size = place, min(ax.get_xlim()[1] / 29, 21)
     look: dict[str, Any] = {"marker": "o", "markevery": [1], "mfc": "#f2f2f2", "mew": 2.5}
     for ball, x in enumerate((middle + pivots).tolist()):
         y = beam + lengths[ball] * metre
         look |= {"mec": PALETTE[ball % len(PALETTE)], "ms": 2 * radii[ball] - 2.5}
         hanging = ax.plot([x, x], [beam, y], "#555", lw=1, clip_on=False, **look)
-        parts = [*hanging, ax.text(x, y + 5, f"{ball + 1}", size=14, ha="center")]
+        parts = [*hanging, ax.text(x, y + size / 3, f"{ball + 1}", size=size, ha="center")]
         yield Move(f"{name}{ball}", parts, times[rows], angles[:, [ball]], TURN, 0.0, (x, beam))
     ends = middle + pivots[[0, -1]] + [-30, 30]
     ax.plot(ends, [beam, beam], "#333", lw=4, solid_capstyle="butt", clip_on=False)

@@ -164,7 +164,8 @@ def _mark_events(trace: Trace, contact: int, ax: Axes) -> None:
             style: dict[str, Any] = {"marker": marker, "label": f"{letter}: {name}"}
             handles.append(Line2D([], [], ls="none", mfc="white", mec="black", **style))
     # Below the axes, where it hides no line.
-    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3,
+    beside = 3 if ax.figure.bbox.width > 5 * ax.figure.dpi else 1
+    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=beside,
               frameon=False)  # fmt: skip
 
 
