@@ -15,6 +15,7 @@ A solver that puts balls back onto their strings takes the part q (h w / l)^2 of
 """
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -42,15 +43,12 @@ class Bodies(Protocol):
 
     def motion(self) -> tuple[Pairs, Pairs]:
         """Return the positions and the velocities of the N centres, m and m/s."""
-        ...
 
     def push(self, ball: int, impulse: tuple[float, float]) -> None:
         """Give one ball an impulse at its centre, N s."""
-        ...
 
     def advance(self, step: float) -> None:
         """Let the engine make one step of so many seconds."""
-        ...
 
 
 class Row(Alone):
@@ -134,7 +132,7 @@ class Row(Alone):
         self.lag = 0.5
         self._samples, self._losses = list[float](), list[float]()
         self._last: tuple[Plane, Plane, float] | None = None
-        self._lessons = self._doubts = 0
+        self._lessons = self._doubts = self._driven = 0
 
     def step(self, duration: float) -> None:
         """Move the scene on by one step, which the engine makes as a whole.
@@ -197,8 +195,10 @@ class Row(Alone):
         started, self.time = self.time, self.time + duration
         if begun is None:
             return
-        x, own, (_, early, _) = begun
+        x, own, (_, early, hits) = begun
         now, v = map(np.array, self._motion())
+        if hits and self.impacts < _LESSONS and self._driven < 2:
+            self._watch(own + early, x, v, hits, duration)
         # The speed of the step, whether its kick comes first, last, or half and half.
         taken = self.taken(x, own + early, duration)
         speeds = own + self.lag * (self.own(v, now) + taken - early - own)
@@ -217,6 +217,20 @@ class Row(Alone):
     def _pull(self, x: Plane) -> Plane:
         """Return what gravity gives along the arcs, m/s^2; 0 if balls are free."""
         return -self.acceleration * self.ways(x).imag + 0j
+
+    def _watch(self, own: Plane, x: Plane, v: Plane, hits: list[Hit], duration: float) -> None:
+        """Warn where balls part by more than they were pushed: the engine collides them too."""
+        gained, lines = v - own * self.ways(x), np.diff(x)
+        parted = (np.diff(gained) * lines.conj()).real / np.abs(lines)
+        pushed = self.chain.masses * gained
+        # Gravity and what else moves a row pushes to one side; contacts push to both.
+        if abs(pushed.sum()) < 0.3 * np.abs(pushed).sum():
+            c, closing = int(parted.argmax()), max(-np.diff(hit.before).min() for hit in hits)
+            self._driven += bool(parted[c] > 0.5 * closing + self.acceleration * duration)
+            if self._driven == 2:
+                told = f"balls {c} and {c + 1} part by {parted[c]:.3g} m/s more than pushed"
+                rule = "the engine must not collide the balls of a row with each other"
+                warnings.warn(f"{told}; {rule}", stacklevel=5)
 
     def _weigh(self, asked: Plane, before: Plane) -> None:
         """Refuse masses that are not the engine's: a push tells, where it acts at once."""

@@ -169,6 +169,7 @@ CASES = [
 ]
 
 
+@pytest.mark.filterwarnings("ignore:radii")  # no row hangs so far apart
 @pytest.mark.parametrize(("call", "arguments", "name"), CASES)
 def test_what_is_wrong_is_refused_in_words(call, arguments, name, monkeypatch):
     monkeypatch.setenv("CRADLE_KERNEL", "plain")

@@ -1,6 +1,7 @@
 """A row in an engine: against `swing`, its energy, its rests, what it tells and refuses."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -429,7 +430,7 @@ TRIANGLE = [[0, 0], [0.2, 0], [0.1, 0.17320508]]
     [
         ({"x": TRIANGLE}, "balls 0 and 2 touch and are no neighbours; a row alone"),
         ({"x": [[0, 0], [0.2, 0]]}, r"positions has shape \(2, 2\); 3 balls need \(3, 2\)"),
-        ({"radii": [0.1, 0.1]}, r"radii has shape \(2,\); 3 balls need \(\) or \(3,\)"),
+        ({"radii": [0.1, 0.1]}, "radii has 2 values; 3 balls need 3, or one number"),
         ({"radii": [0.1, -0.1, 0.1]}, r"radii\[1\] = -0.1; must be above 0"),
         ({"pivots": [[0, 0]]}, r"pivots has shape \(1, 2\); 3 balls need \(3, 2\)"),
         ({"pivots": [[0, 1], [0.5, 1], [0.25, 1]]}, r"pivots\[2\] lies behind pivots\[1\]"),
@@ -455,6 +456,59 @@ def test_what_is_no_row_is_refused(change: dict, message: str):
         Row(bodies, Chain([1] * 3, [0] * 3), given.pop("model"), given.pop("radii"), **given)
 
 
+@pytest.mark.parametrize("hung", [0.95, 1.05, 0.85, 1.2, 2.0])
+def test_radii_that_do_not_fit_the_places_of_the_balls_are_told(hung: float):
+    """Leans and gaps of a twentieth are usual; radii for diameters, or of other balls, are not."""
+    bodies = Hanging([-0.5, -0.3, 0.1], spacing=2 * RADIUS * hung)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        Row(bodies, Chain([1] * 3, [0] * 3), MODEL, RADIUS, bodies.pivots)
+    words = [str(one.message) for one in told]
+    rule = f"should be within a tenth of {0.2 * hung:g}, as far as these balls hang apart"
+    wrong = abs(hung - 1) > 0.1
+    assert words == [f"radii[{c}] + radii[{c + 1}] = 0.2; {rule}" for c in range(2)][:wrong]
+    assert all(one.filename == __file__ for one in told)
+
+
+class Colliding(Hanging):
+    """An engine that foresees contacts, as Rapier does, and collides the balls of the row too."""
+
+    def advance(self, step):
+        kick = step * GRAVITY / self.length
+        self.rates -= kick * np.sin(self.angles)
+        before = self.length * self.rates
+        near = np.array(gaps(self)) < 0.01
+        for c in np.flatnonzero(near & (np.diff(before) < -1e-3)):
+            self.rates[[c, c + 1]] = self.rates[[c + 1, c]]
+        self.angles += step * self.rates
+
+
+def test_an_engine_that_collides_the_balls_too_is_told_once():
+    bodies = Colliding([-0.5, 0.0, 0.0])
+    row = hung(bodies)
+    words = r"balls \d and \d part by [\d.]+ m/s more than pushed; the engine must not collide"
+    with pytest.warns(UserWarning, match=words) as told:
+        steps(row, 1200, 1 / 120)
+    assert len(told) == 1
+    assert told[0].filename == __file__
+
+
+def test_a_hand_that_pulls_a_ball_away_is_no_contact():
+    """It acts within the step of a contact, as an engine would, but on one ball alone."""
+    bodies = Hanging([-0.5, 0.0, 0.0])
+    row, advance, pulled = hung(bodies), bodies.advance, []
+
+    def driven(step):
+        if 0 < gaps(bodies)[0] < 0.02 and bodies.rates[0] > 0.1:
+            pulled.append(row.time)
+            bodies.rates[0] -= 2.0
+        advance(step)
+
+    bodies.advance = driven
+    steps(row, 1200, 1 / 120)
+    assert len(pulled) > 5
+
+
 STILL = [0, 0]
 #: Places, velocities, pivots, the step, and the words in which a step of a hundred is refused.
 REFUSED = [
@@ -467,6 +521,7 @@ REFUSED = [
 ]  # fmt: skip
 
 
+@pytest.mark.filterwarnings("ignore:radii")  # no row hangs like the last of them
 @pytest.mark.parametrize(("x", "v", "pivots", "step", "words"), REFUSED)
 def test_what_is_seen_to_be_no_row_in_a_step_is_refused(x, v, pivots, step, words):
     row = Row(Free(x, v, [1] * len(x)), Chain([1] * len(x), [0] * len(x)), MODEL, RADIUS, pivots)

@@ -52,9 +52,7 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
     progress = done / done[-1] if done[-1] else np.linspace(0, 1, len(done))
     # A flight of 1.5 s, the impact, a flight of 2 s, and a rest.
     times = np.concatenate([[0.0], 1.5 + (_END - 1.5) * progress, [_END + 2.0, _END + 3.5]])
-    impulses, path = (
-        np.vstack([rows[:1], rows, rows[-1:], rows[-1:]]) for rows in (impulses, path)
-    )
+    impulses, path = (np.pad(rows, ((1, 2), (0, 0)), "edge") for rows in (impulses, path))
     moves = [*_balls(trace, row, times, impulses, path)]
     moves += _diagram(trace, contact, diagram, times, impulses, path)
     return moving(figure, moves, alt)

@@ -91,8 +91,7 @@ class Animation:
         elif kind != ".mp4":
             raise ValueError(f"path = {str(path)!r}; must end in .svg, .html, .gif, .mp4 or .png")
         elif not FFMpegWriter.isAvailable():
-            need = "the program ffmpeg, which is not here; .gif needs nothing"
-            raise ValueError(f"{file} needs {need}")
+            raise ValueError(f"{file} needs the program ffmpeg, which is not here; .gif does not")
         else:
             self._film(FFMpegWriter(RATE), file, 144)
 

@@ -83,15 +83,11 @@ class Swing:
 
     def impacts_to_frame(self) -> "pd.DataFrame":
         """Return a row for each impact and ball: impact, time, ball, before, after."""
-        times, before, after = (
-            np.array([getattr(one, name) for one in self.impacts])
-            for name in ("time", "before", "after")
-        )
-        rows = {"impact": np.arange(len(times)), "time": times}
-        return by_ball(len(self.chain), rows, {"before": before, "after": after})
+        hits, names = self.impacts, ("before", "after")
+        rows = {"impact": np.arange(len(hits)), "time": np.array([hit.time for hit in hits])}
+        parts = {name: np.array([getattr(hit, name) for hit in hits]) for name in names}
+        return by_ball(len(self.chain), rows, parts)
 
     def __repr__(self) -> str:
-        return (
-            f"Swing({len(self.times)} times to {self.end:g} s, {len(self.impacts)} impacts, "
-            f"ended by {self.ended})"
-        )
+        told = f"{len(self.times)} times to {self.end:g} s, {len(self.impacts)} impacts"
+        return f"Swing({told}, ended by {self.ended})"

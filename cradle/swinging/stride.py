@@ -5,18 +5,22 @@ is that in its own way: along its arc, a real number, where it hangs; where it i
 """
 
 import math
+import warnings
 from itertools import combinations, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.input.values import ABOVE_ZERO, ArrayLike, NDArray, Vector, checked, must_be, one_number
+from cradle.input import values as asked
+from cradle.input.values import ArrayLike, NDArray, Vector
 from cradle.models import Model, collide
 from cradle.runtime.compile import without_waiting
 from cradle.swinging.resting import common_velocities, stretches
 from cradle.swinging.swing import part
 
+# By this part of two radii the balls may hang apart or overlap: gaps and leans are smaller.
+_MISFIT = 0.1
 # Contact lines of one cluster may differ by this angle, rad: beyond it the balls are no row.
 _BEND = 0.1
 # Somebody looks at the balls at least that often, s.
@@ -50,20 +54,18 @@ class Alone:
         self, x: ArrayLike, chain: Chain, model: Model, radii: ArrayLike, pivots: ArrayLike | None,
         touching: float | None, resting: float | None, acceleration: float,
     ) -> None:  # fmt: skip
-        n = len(must_be(Chain, "chain", chain))
+        n = len(asked.must_be(Chain, "chain", chain))
         with without_waiting():
             collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
-        size = checked("radii", radii, *ABOVE_ZERO)
-        if size.shape not in ((), (n,)):
-            raise ValueError(f"radii has shape {size.shape}; {n} balls need () or ({n},)")
         self.chain, self.model = chain, model
-        self.radii: list[float] = np.broadcast_to(size, (n,)).tolist()
+        size = asked.number_or_row("radii", radii, "N", *asked.ABOVE_ZERO)
+        self.radii: list[float] = asked.row_of("radii", size, n, n).tolist()
         self.reach, least = [a + b for a, b in pairwise(self.radii)], min(self.radii)
-        self.acceleration = one_number("acceleration", acceleration, *ABOVE_ZERO)
+        self.acceleration = asked.one_number("acceleration", acceleration, *asked.ABOVE_ZERO)
         near = 1e-3 * least if touching is None else touching
         slow = 0.01 * math.sqrt(self.acceleration * least) if resting is None else resting
-        self.touching = one_number("touching", near, *ABOVE_ZERO)
-        self.resting = one_number("resting", slow, *ABOVE_ZERO)
+        self.touching = asked.one_number("touching", near, *asked.ABOVE_ZERO)
+        self.resting = asked.one_number("resting", slow, *asked.ABOVE_ZERO)
         self.met = 1e-3 * self.touching  # so near are balls that a flight has brought together
         at = self._plane("motion: positions", x)
         self._refuse_a_pack(at.tolist())
@@ -83,6 +85,11 @@ class Alone:
                 raise ValueError(f"pivots[{ball}] lies behind pivots[{ball - 1}] {rule}")
             lengths = self.arms(at)
             self.speeding *= np.ptp(lengths) > 1e-3 * lengths.min()
+            apart = np.abs(np.diff(self.pivots - 1j * lengths))
+            for c in np.flatnonzero(np.abs(apart - self.reach) > _MISFIT * apart)[:1].tolist():
+                sizes = f"radii[{c}] + radii[{c + 1}] = {self.reach[c]:g}"
+                rule = f"should be within a tenth of {apart[c]:g}, as far as these balls hang apart"
+                warnings.warn(f"{sizes}; {rule}", stacklevel=3)
         #: Part of a velocity that a step takes, over the square of the angle by which it turns.
         self.loss = 0.0
         #: For how long nothing can happen, s.
@@ -137,10 +144,8 @@ class Alone:
                 self.quiet -= left
                 return (change, early, hits) if touched else None
             x, left = self.moved(x, passed * own), left - passed
-        raise RuntimeError(
-            f"more than {_MOST_IMPACTS} impacts in a step of {duration!r} s; the balls are "
-            f"squeezed between others, or `resting` = {self.resting!r} is too low"
-        )
+        why = f"balls are squeezed between others, or `resting` = {self.resting!r} is too low"
+        raise RuntimeError(f"more than {_MOST_IMPACTS} impacts in a step of {duration!r} s; {why}")
 
     def look(self, x: list[complex], v: list[complex]) -> tuple[bool, float, float]:
         """Tell whether something touches now, when the next contact arrives, how long is quiet."""
@@ -153,7 +158,7 @@ class Alone:
             closing = ((v[c] - v[c + 1]) * line.conjugate()).real
             if not math.isfinite(gap + closing):
                 for name, told in (("positions", x), ("velocities", v)):
-                    checked(f"motion: {name}", [(one.real, one.imag) for one in told])
+                    asked.checked(f"motion: {name}", [(one.real, one.imag) for one in told])
             if not gap > -0.5 * reach:
                 why = "the step is too long, or something else pushes them"
                 raise RuntimeError(f"balls {c} and {c + 1} overlap by {-gap:g} m; {why}")
@@ -185,11 +190,9 @@ class Alone:
             axis /= abs(axis)
             off = np.abs(np.angle(lines[first : last - 1] / axis)).max()
             if off > _BEND:
-                raise ValueError(
-                    f"balls {first} to {last - 1} touch, but not in a straight row: a line of "
-                    f"centres is {math.degrees(off):.0f} degrees off; at most "
-                    f"{math.degrees(_BEND):.0f} are allowed"
-                )
+                row = f"balls {first} to {last - 1} touch, but not in a straight row"
+                told = f"{math.degrees(off):.0f} degrees off; at most {math.degrees(_BEND):.0f}"
+                raise ValueError(f"{row}: a line of centres is {told} are allowed")
             # How a ball's own way lies to the axis; a free ball's is the axis.
             free = self.pivots is None
             along = np.ones(last - first) if free else (ways[balls] / axis).real
@@ -212,24 +215,20 @@ class Alone:
     def _rested(self, masses: Vector, v: Vector, gaps: Vector) -> Vector:
         """Return velocities after those that touch and still approach have come to rest."""
         v, _ = common_velocities(masses, v, (v[:-1] > v[1:]).tolist(), 0.0)
-        if (gaps < -self.touching).any():
-            # Balls that overlap by more than is unseen part, slower than what counts as an impact.
-            parting = np.where(gaps < -self.touching, 0.5 * self.resting, 0.0)
-            ramp = np.concatenate([[0.0], np.cumsum(parting)])
-            v += ramp - masses @ ramp / masses.sum()
-        return v
+        # Balls that overlap by more than is unseen part, slower than what counts as an impact.
+        ramp = np.append(0.0, np.cumsum(0.5 * self.resting * (gaps < -self.touching)))
+        return np.asarray(v + (ramp - masses @ ramp / masses.sum()))
 
     def _plane(self, name: str, places: ArrayLike) -> Plane:
         """Return places in the plane as complex numbers."""
-        x, n = checked(name, places), len(self.chain)
+        x, n = asked.checked(name, places), len(self.chain)
         if x.shape != (n, 2):
             raise ValueError(f"{name} has shape {x.shape}; {n} balls need ({n}, 2)")
         return x[:, 0] + 1j * x[:, 1]
 
     def _refuse_a_pack(self, x: list[complex]) -> None:
         for i, j in combinations(range(len(x)), 2):
-            line = x[j] - x[i]
-            gap = math.hypot(line.real, line.imag) - (self.radii[i] + self.radii[j])
+            gap = abs(x[j] - x[i]) - (self.radii[i] + self.radii[j])
             if j > i + 1 and gap <= self.touching:
                 rule = "a row alone can be solved, no pack"
                 raise ValueError(f"balls {i} and {j} touch and are no neighbours; {rule}")

@@ -80,10 +80,8 @@ def swing(
     collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
     at = checked("times", times)
     if at.ndim != 1 or not at.size or at[0] < 0.0 or (np.diff(at) < 0.0).any():
-        raise ValueError(
-            f"times = {shown(times)}; must be a row of rising numbers, none below 0, "
-            "such as [0, 0.5, 1]"
-        )
+        rule = "must be a row of rising numbers, none below 0, such as [0, 0.5, 1]"
+        raise ValueError(f"times = {shown(times)}; {rule}")
     most = whole_number("max_impacts", max_impacts)
     least = one_number("min_energy", min_energy, "must lie in [0, 1]", 0.0, 1.0)
     run = _Run(chain, model, hanging, hanging.released(checked("positions", positions), n))
@@ -102,7 +100,6 @@ class _Run:
         n = len(chain)
         self.chain, self.hanging = chain, (hanging := Hanging(pendulums, chain.masses))
         self.model = functools.cache(functools.partial(part, model, n))
-        self.offsets = functools.cache(hanging.offsets)
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
         self.released = float(hanging.energy(self.x, self.v))
         self.speed = float(np.sqrt(2.0 * self.released / chain.masses.sum()))
@@ -114,9 +111,8 @@ class _Run:
         distance = hanging.gaps + np.diff(x)
         if (distance < -TIE * self.size).any():
             c = int(np.argmin(distance))
-            raise ValueError(
-                f"positions = {x.tolist()}; balls {c} and {c + 1} overlap by {-distance[c]:g} m"
-            )
+            told = f"balls {c} and {c + 1} overlap by {-distance[c]:g} m"
+            raise ValueError(f"positions = {x.tolist()}; {told}")
         self.freed = [-math.inf] * (n - 1)  # when the force in each contact last fell to zero
         self.settle([], [])
 
@@ -144,10 +140,8 @@ class _Run:
             self.settle(closing, opening)
             idle = idle + 1 if wait <= self.hanging.tie and len(self.impacts) == known else 0
             if idle > MOST_IDLE * len(self.x):
-                raise RuntimeError(
-                    f"the swing does not get beyond t = {self.t} s: contacts {closing} close and "
-                    f"{opening} open there again and again without an impact"
-                )
+                why = f"contacts {closing} close and {opening} open there, and none has an impact"
+                raise RuntimeError(f"the swing does not get beyond t = {self.t} s: {why}")
         # The instant at which the run ends is reported if it was asked for.
         count = int(np.searchsorted(times[done:], self.t, side="right"))
         self.series.append((np.tile(self.x, (count, 1)), np.tile(self.v, (count, 1))))
@@ -162,7 +156,7 @@ class _Run:
         self.x, self.v = x.copy(), v.copy()
         groups = stretches(touching)
         for first, last in groups:  # to where they touch but for rounding; their centre stays
-            offset = self.offsets(first, last)
+            offset = hanging.offsets(first, last)
             self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
         self.collide(groups, v)
         struck = self.v
