@@ -58,11 +58,8 @@ class Chain:
             rule = f"{m.size} masses need ({m.size},): one velocity for each of {m.size} balls"
             raise ValueError(f"velocities has shape {v.shape}; {rule}")
         if e.shape not in ((), (m.size - 1,)):
-            contacts = "1 contact" if m.size == 2 else f"{m.size - 1} contacts"
-            raise ValueError(
-                f"restitution has shape {e.shape}; {m.size} balls need () or ({m.size - 1},): "
-                f"{m.size} balls have {contacts}, restitution needs one number or {m.size - 1}"
-            )
+            rule = f"need () or ({m.size - 1},): one number, or one for each contact"
+            raise ValueError(f"restitution has shape {e.shape}; {m.size} balls {rule}")
         if not usual:
             asked.refuse_overflow(v, m)
         self._keep(np.array(m), np.array(v), np.full(m.size - 1, e))

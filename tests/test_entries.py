@@ -184,6 +184,28 @@ def test_what_is_wrong_is_refused_in_words(call, arguments, name, monkeypatch):
     assert not faults
 
 
+def own(thing):
+    """The objects of the package's own classes in what a call returns."""
+    if isinstance(thing, (tuple, list, dict)):
+        for part in thing.values() if isinstance(thing, dict) else thing:
+            yield from own(part)
+    if type(thing).__module__.startswith("cradle"):
+        yield thing
+        yield from (one for field in getattr(thing, "__dict__", {}).values() for one in own(field))
+
+
+@pytest.mark.filterwarnings("ignore:radii")
+@pytest.mark.parametrize("call", ENTRIES)
+def test_what_is_returned_can_be_compared(call):
+    """By its values or as an object, but never by arrays, whose truth is ambiguous."""
+    with matplotlib.rc_context({"figure.max_open_warning": 0}):
+        found = [list(own(call(**ENTRIES[call]))) for _ in range(2)]
+        matplotlib.pyplot.close("all")
+    for one, other in zip(*found, strict=True):
+        assert one in [one]
+        assert (one == other) is not (one != other)
+
+
 def test_no_entry_point_is_missing():
     """All that `cradle` exports is called here, but for results and what takes no argument."""
     results = {

@@ -9,6 +9,7 @@ import scipy
 
 from cradle.fit.tracks import Track
 from cradle.input.values import ABOVE_ZERO, ArrayLike, Vector, checked, one_number
+from cradle.trace import compared_as_objects
 
 _GRAVITY = 9.81
 # Marks that each side of the impact needs; the longest window on a level track, s.
@@ -18,6 +19,7 @@ _CHANCE = 1e-5
 _Stray = tuple[int, float, float]
 
 
+@compared_as_objects
 class Velocities(NamedTuple):
     """Velocities of N balls around an impact, from their tracks."""
 

@@ -14,7 +14,7 @@ from cradle.input.values import ArrayLike, NDArray, Vector, numbers
 from cradle.kernel import Inputs, Options, Outputs
 from cradle.models import correlation as paper
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
-from cradle.trace import ImpactNotCertified
+from cradle.trace import ImpactNotCertified, compared_as_objects
 
 #: Chains solved at a time, which bounds the memory; more where short cuts are likely.
 CHUNK = {2: 16_384, 3: 16_384, 4: 4096}
@@ -71,15 +71,13 @@ def post_impact_velocities(
     ).velocities  # fmt: skip
 
 
+@compared_as_objects
 class Outcomes(NamedTuple):
-    """What a batch of impacts leaves; see `outcomes`."""
+    """What a batch of impacts leaves; collapsed ones count the collisions before the limit."""
 
-    #: Velocities after the impact, shape (..., N), m/s.
-    velocities: Vector
-    #: How often each contact became active, shape (..., N - 1); before the limit, if collapsed.
-    collisions: NDArray[np.int64]
-    #: Whether an infinite sequence of impacts was taken to its limit, shape (...).
-    collapsed: NDArray[np.bool_]
+    velocities: Vector  #: after the impact, shape (..., N), m/s
+    collisions: NDArray[np.int64]  #: how often each contact became active, shape (..., N - 1)
+    collapsed: NDArray[np.bool_]  #: whether an infinite sequence was taken to its limit, (...)
 
 
 def outcomes(
@@ -149,9 +147,8 @@ def shaped(
         if arrays[k].ndim == 0:
             arrays[k] = np.full(size, arrays[k])
         elif arrays[k].shape[-1] != size:
-            raise ValueError(
-                f"{name} has shape {arrays[k].shape}; must be () or (..., {size}) for {n} balls"
-            )
+            rule = f"must be () or (..., {size}) for {n} balls"
+            raise ValueError(f"{name} has shape {arrays[k].shape}; {rule}")
     leads = {array.shape[:-1] for array in arrays}
     try:
         return arrays, leads.pop() if len(leads) == 1 else np.broadcast_shapes(*leads)

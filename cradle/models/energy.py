@@ -19,10 +19,9 @@ def fastest(chain: Chain) -> tuple[int, float, float]:
     with np.errstate(over="ignore"):
         mass = float(m[c] / (m[c] + m[c + 1]) * m[c + 1])
     if not np.finfo(np.float64).tiny <= mass:
-        raise ValueError(
-            f"masses[{c}] = {float(m[c])!r}; its reduced mass with masses[{c + 1}] = "
-            f"{float(m[c + 1])!r} is beyond the range of floats: choose other units"
-        )
+        other = f"masses[{c + 1}] = {float(m[c + 1])!r}"
+        rule = f"its reduced mass with {other} is beyond the range of floats: choose other units"
+        raise ValueError(f"masses[{c}] = {float(m[c])!r}; {rule}")
     return c, mass, abs(float(u[c])) or 1.0
 
 

@@ -111,10 +111,9 @@ class FusedChain:
         approaching, opening = (np.flatnonzero(where).tolist() for where in (u > 0.0, u < 0.0))
         if len(approaching) > 1 or (approaching and opening):
             what = f"contacts {approaching} approach" + (f" and {opening} open" if opening else "")
-            raise ValueError(
-                f"velocities leave it undefined which balls move as one body: {what}; FusedChain "
-                "needs one approaching contact and equal velocities on either side of it"
-            )
+            told = f"velocities leave it undefined which balls move as one body: {what}"
+            rule = "needs one approaching contact and equal velocities on either side of it"
+            raise ValueError(f"{told}; FusedChain {rule}")
         return replace(_LARGEST.solve(chain), model=self)
 
 

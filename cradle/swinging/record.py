@@ -9,12 +9,13 @@ from cradle.chain import Chain
 from cradle.formatting import as_text
 from cradle.input.values import Vector
 from cradle.swinging.pendulums import Hanging, Pendulums
-from cradle.trace import Trace, by_ball
+from cradle.trace import Trace, by_ball, compared_as_objects
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
+@compared_as_objects
 class Impact(NamedTuple):
     """One impact of a swing."""
 

@@ -18,6 +18,7 @@ from cradle.models import Model, collide
 from cradle.runtime.compile import without_waiting
 from cradle.swinging.resting import common_velocities, stretches
 from cradle.swinging.swing import part
+from cradle.trace import compared_as_objects
 
 # By this part of two radii the balls may hang apart or overlap: gaps and leans are smaller.
 _MISFIT = 0.1
@@ -31,6 +32,7 @@ _MOST_IMPACTS = 10_000
 Plane = NDArray[np.complexfloating[Any, Any]]
 
 
+@compared_as_objects
 class Hit(NamedTuple):
     """One impact of a row, as `Row.on_hit` is told of it."""
 
