@@ -7,9 +7,10 @@ Usage::
     python benchmarks/judge.py --count 1000 --seed 2026 --write     # data/judge.csv, ten minutes
 
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
-within 600 events.  A float means what it prints as if that is short, see `meaning`: ties of an
-exact run are those of the decimals that a reader sees.  Wrong chains are made as small and plain as
-they stay wrong, and printed to be pasted.  Where the exact run has no end, see `second_opinion`.
+within 600 events, and after no more of them at twice the digits.  A float means what it prints as
+if that is short, see `meaning`: ties of an exact run are those of the decimals that a reader sees.
+Wrong chains are made as small and plain as they stay wrong, and printed to be pasted.  Where the
+exact run has no end, see `second_opinion`.
 
 Every chain counted as right or wrong was judged by the exact run, at some hundred chains a second.
 """
@@ -57,7 +58,7 @@ class Exact(textbook.Impact):
 
 
 def exact(problem, read=meaning, *, events=EVENTS, twice=False):
-    """Velocities by the rules alone; None if the sequence does not end within so many events.
+    """The impact by the rules alone; None if the sequence does not end within so many events.
 
     100 digits; four times as many where a ratio is so small that products of several matter; twice
     as many if asked.
@@ -66,7 +67,7 @@ def exact(problem, read=meaning, *, events=EVENTS, twice=False):
     with decimal.localcontext(prec=DIGITS * (4 if tiny else 1) * (2 if twice else 1)):
         options = {"number": read, "max_events": events, "impact": Exact}
         try:
-            return problem.solve(textbook.solve, **options).velocities
+            return problem.solve(textbook.solve, **options)
         except textbook.EventLimit:
             return None
 
@@ -143,14 +144,16 @@ def judge(problem, *ask, events=EVENTS):
         return Verdict("endless")
     if None in given:
         return Verdict("unfinished")
-    far = max(off(problem, one, right) for one in given)
+    far = max(off(problem, one, right.velocities) for one in given)
     if far <= WRONG:
         return Verdict("right", far)
     again = exact(meant, twice=True)
-    if again is None or off(problem, again, right) > WRONG:
+    if again is None or len(again.events) > len(right.events):
+        return Verdict("endless")  # it ended where its digits did
+    if off(problem, again.velocities, right.velocities) > WRONG:
         return Verdict("open", far)
     for other in exact(problem, Decimal), exact(problem):
-        if other and max(off(problem, one, other) for one in given) <= WRONG:
+        if other and max(off(problem, one, other.velocities) for one in given) <= WRONG:
             return Verdict("other reading", far)
     return Verdict("wrong", far)
 

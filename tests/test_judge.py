@@ -8,7 +8,7 @@ import judge as court
 import pytest
 from delicate import CHAINS, chains_of
 from families import JUDGED, family
-from judge import exact, judge, meaning, off, on_bounds, second_opinion, shrunk
+from judge import batch, exact, judge, meaning, off, on_bounds, second_opinion, shrunk
 from problem import Problem
 
 # --- the package -------------------------------------------------------------------------------
@@ -43,7 +43,7 @@ def test_an_outcome_that_hangs_on_when_a_chatter_ends_is_told_by_the_margin():
         [1, 1, 1, 1, 1, 0.1, 0, 0, 1, 0.1, 0, 0.1, 0.1, 0.1, 0, 1, 1, 0],
         [0.1, 1, 0, 0.1, 1, 0, 0, 0.1, 0, 1, 0, 1, 1, 0.1, 1, 0, 0.1, 1],
     )
-    assert off(problem, problem.collide().velocities.tolist(), exact(problem)) > 1e-3
+    assert off(problem, problem.collide().velocities.tolist(), exact(problem).velocities) > 1e-3
     assert problem.collide().margin == 0.0
 
 
@@ -114,7 +114,7 @@ def test_meaning_of_a_float(x, means):
 
 def test_velocities_that_other_codes_gave():
     """Three programs that share no line agreed on the first of the named chains."""
-    right = exact(CHAINS["a rounding ended an idle contact"].problem)
+    right = exact(CHAINS["a rounding ended an idle contact"].problem).velocities
     printed = [-0.38197548, -0.27627427, -0.03074706, 0.12760094, 0.13425148, 0.13759522]
     assert max(abs(float(v) - w) for v, w in zip(right, printed, strict=True)) < 5.1e-9
 
@@ -125,7 +125,7 @@ TIE = Problem([1.0] * 5, [1.0, 0.1, 0.2, 0.3, -1.0], [1.0] * 4, [0.1] * 3, [0.1]
 
 def answering(by=0.0, read=meaning):
     """Somebody who is off by so much, or reads the inputs in this way."""
-    return lambda problem: [float(v) + by for v in exact(problem, read)]
+    return lambda problem: [float(v) + by for v in exact(problem, read).velocities]
 
 
 def test_it_can_say_no():
@@ -134,8 +134,9 @@ def test_it_can_say_no():
     assert judge(TIE, answering(), lambda _: None).word == "unfinished"
     assert judge(TIE, answering(read=Decimal)).word == "other reading"
     beside = Problem([1.0, 3.0, 4.0], [1.0, 0.0, 0.0], [1.0, 1.0], [4 / 7], [0.0])
-    assert exact(beside) != exact(on_bounds(beside))
-    assert judge(beside, lambda _: exact(on_bounds(beside))).word == "right"
+    bound = exact(on_bounds(beside)).velocities
+    assert exact(beside).velocities != bound
+    assert judge(beside, lambda _: bound).word == "right"
 
 
 def test_a_wrong_chain_is_shrunk():
@@ -159,7 +160,8 @@ def test_a_gap_that_closes_at_once():
         [0.0, 0.25, 0.2857142857142857, 0.15445462114904246, 0.27092262576133547],
         meeting=0.0,
     )
-    assert off(problem, exact(problem), exact(problem, twice=True)) < 1e-60
+    one, other = exact(problem), exact(problem, twice=True)
+    assert off(problem, one.velocities, other.velocities) < 1e-60
 
 
 def test_a_sequence_without_end():
@@ -170,3 +172,14 @@ def test_a_sequence_without_end():
     long = Problem([1.0, 1e-7, 1.0], [1.0, 0.0, 0.0], [1.0, 1.0], [0.0], [0.0])
     assert judge(long).word == "endless"
     assert second_opinion(long).word == "as relations"
+
+
+def test_a_run_that_ends_where_its_digits_do():
+    """A light ball is pressed for ever, until a last speed counts as zero; R9 goes on elsewhere."""
+    problem = Problem(
+        [1.0, 1.0, 0.01, 0.1, 1.0], [1.0, 0.5, 0.0, 0.0, 0.0], [1.0, 1.0, 0.9, 1.0],
+        [0.9, 0.9, 0.0], [0.0, 1.0, 1.0], meeting=0.3,
+    )  # fmt: skip
+    assert off(problem, batch(problem), exact(on_bounds(problem)).velocities) > 0.1
+    assert judge(problem).word == "endless"
+    assert second_opinion(problem).word == "as 50 digits"
