@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from stored import read
 
 from cradle import Chain, ImpulseCorrelation, collide, ratio_table
+from cradle.pictures.impacts import ball_style
 
 CHAPTER = Chapter("real_cradles")
 GLUED = CHAPTER.glued
@@ -49,16 +50,16 @@ def test_velocities_of_the_models_by_the_fitting_script():
     assert three == parameters("three ratios, e", "together", "one")
     expected = {
         "spheres, touching": real_cradles.by_spheres([0] * 5, 2),
-        "three ratios, strikers together": real_cradles.ratios(three[:3], three[3], 2, False),
+        "three ratios, together": real_cradles.ratios(three[:3], three[3], 2, False),
         "three ratios, one by one": real_cradles.ratios(three[:3], three[3], 2, True),
-        "spheres, gaps, strikers' own gap": real_cradles.by_spheres(gapped, 2),
+        "spheres, gaps": real_cradles.by_spheres(gapped, 2),
     }
     shown = rows("spheres")
     assert shown.keys() == expected.keys()
     for name, v in expected.items():
         assert shown[name][2:] == pytest.approx(100 * v, abs=6e-3)
-    # Strikers at their own gap were fitted to two balls, all else to one.
-    assert shown["three ratios, one by one"][0] < 10 < shown["three ratios, strikers together"][0]
+    # The gap of the strikers was fitted to two balls, all else to one.
+    assert shown["three ratios, one by one"][0] < 10 < shown["three ratios, together"][0]
 
 
 def chi_square(row):
@@ -82,16 +83,16 @@ def test_the_third_release_lies_between_two_predictions():
     use = (t["reading"] == 4) & (t["release"] == 3) & (t["strike"] == 1)
     after, before = t["after"][use][::-1], t["before"][use][::-1]
     row = before[3:].mean()
-    shown = rows("third-code")
-    assert shown["measured"] == pytest.approx(100 * (after - row) / (1 - row), abs=6e-3)
+    film, ratios, gaps = np.array(
+        re.findall(r"(\S+) ± \S+ +(\S+) +(\S+)\n", CHAPTER.printed("third-code").replace("−", "-")),
+        float,
+    ).T
+    assert film == pytest.approx(100 * (after - row) / (1 - row), abs=6e-3)
     p = parameters("spheres, four gaps, A", "own gap", "both")
-    assert shown["spheres, gaps, one by one"] == pytest.approx(
-        100 * real_cradles.by_spheres(p, 3, apart=True), abs=6e-2
-    )
-    striker = [
-        shown[k][0] for k in ("three ratios, one by one", "measured", "spheres, gaps, one by one")
-    ]
-    assert striker == sorted(striker)
+    assert gaps == pytest.approx(100 * real_cradles.by_spheres(p, 3, apart=True), abs=6e-2)
+    p = parameters("three ratios, e", "apart", "both")
+    assert ratios == pytest.approx(100 * real_cradles.ratios(p[:3], p[3], 3, True), abs=6e-3)
+    assert ratios[0] < film[0] < gaps[0]
 
 
 def implied(gap):
@@ -119,20 +120,27 @@ def test_fig_gaps():
     assert GLUED["above"] == {3: "three"}[above]
 
 
-def test_figures_of_the_strikes_show_how_far_laws_are_from_what_was_read():
-    """Ball by ball, in the order of the laws: computed less measured, and its standard error."""
+def test_figures_of_the_strikes_show_balls_where_energy_lets_them_turn():
+    """Discs of the film and of each law, rings of the film: height by energy, on a circle."""
     for name, release, cell in (("fig-real-one", 1, "laws"), ("fig-real-two", 2, "spheres")):
-        v, sigma = first_strikes(4)[release]
-        (ax,) = CHAPTER.figures[name].axes
+        seen = 100 * first_strikes(4)[release][0]
         laws = [row[2:] for row in rows(cell).values()]
-        bars = list(ax.containers)
-        assert len(bars) == 5 * len(laws)
-        for k, bar in enumerate(bars):
-            law, ball = divmod(k, 5)
-            off = laws[law][ball] - 100 * v[ball]
-            assert bar.lines[0].get_xdata()[0] == pytest.approx(off, abs=6e-3)
-            (ends,) = bar.lines[2][0].get_segments()
-            assert np.ptp(ends[:, 0]) == pytest.approx(200 * sigma[ball])
+        across = None
+        for ax, law in zip(CHAPTER.figures[name].axes, [seen, *laws], strict=True):
+            discs, rings = ([x for x in ax.patches if x.get_fill() is way] for way in (True, False))
+            assert [float(x.get_text().replace("−", "-")) for x in ax.texts[:5]] == pytest.approx(
+                law, abs=0.0501
+            )
+            for shapes, v in (discs, law), (rings, seen if rings else []):
+                for k, (shape, speed) in enumerate(zip(shapes, v, strict=True)):
+                    across = across or 2 * shape.radius
+                    x, height = np.array(shape.center) - [k * across, 0]
+                    length = (x**2 + height**2) / (2 * height) if height > 1e-9 else 0.177
+                    assert length == pytest.approx(0.177, rel=0.02)
+                    assert np.sign(x) == np.sign(speed)
+                    pushed = 0.69 * (1 if release == 1 else 0.766) * abs(speed) / 100
+                    assert np.sqrt(2 * 9.81 * height) == pytest.approx(pushed, rel=0.03, abs=1e-4)
+        assert across == pytest.approx(0.022, rel=0.02)
 
 
 def test_swing_of_the_mean():
@@ -146,18 +154,29 @@ def test_swing_of_the_mean():
 
 
 def test_fig_half():
-    top, low = CHAPTER.figures["fig-real-half"].axes
+    *windows, top = CHAPTER.figures["fig-real-half"].axes
     ball, time, place, *_ = real_swing.peaks()
     for k, marker in ((0, "o"), (4, "s")):
         own = ball == k
         assert points(top, marker) == pytest.approx(
             np.column_stack([time[own], 1000 * np.abs(place[own])])
         )
-    stored = {row["law"]: row for row in read("cradle_fits.csv")}
-    for law, marker in (("constant loss", "o"), ("constant restitution", "^")):
-        drawn = points(low, marker)
-        assert (drawn[:, 1] ** 2).sum() == pytest.approx(float(stored[law]["chi_places"]), rel=0.02)
     assert len(time) == int(GLUED["turns"])
+    shown = rows("runs")
+    for row in read("cradle_fits.csv"):
+        expected = [float(row["chi_places"]), float(row["chi_times"])]
+        assert shown[row["law"]][1:] == pytest.approx(expected, rel=0.02)
+    # Where an outer ball turns within a window, the curve in its colour has that place.
+    colours = [ball_style(k)["color"] for k in range(5)]
+    for ax in windows:
+        curves = {colours.index(line.get_color()): line.get_xydata() for line in ax.get_lines()}
+        assert sorted(curves) == list(range(5))
+        low, high = ax.get_xlim()
+        inside = (time > low + 0.1) & (time < high - 0.1)
+        assert inside.sum() >= 4
+        for k, t, x in zip(ball[inside], time[inside], place[inside]):
+            near = curves[k][np.abs(curves[k][:, 0] - t) < 0.06, 1]
+            assert near[np.nanargmax(np.abs(near))] == pytest.approx(1000 * x, abs=1)
 
 
 def test_a_line_and_not_an_exponential():
