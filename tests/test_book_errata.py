@@ -157,7 +157,7 @@ def test_r7_hold_that_drives_on():
 
 def test_r7_square_root_at_the_bound():
     """Equal elastic balls at ratio a: v3 = 2 (1 + s) / (3 + s^2), s^2 = 1 - 2 a, and so on."""
-    for digits in (6, 8, 12):
+    for digits in (6, 12):
         s = math.sqrt(2 * 10.0**-digits)
         after = np.array([s**2 - 1, 2 * (1 - s), 2 * (1 + s)]) / (3 + s**2)
         moved = abs(after - np.array([-1, 2, 2]) / 3).max()
@@ -166,10 +166,16 @@ def test_r7_square_root_at_the_bound():
 
 def test_r8_ties_go_to_the_left():
     tie = exact([1] * 5, [1, "-0.1", 0, "0.1", -1], 1, "0.1")
-    masses, v = ["1.185", "0.439", "1.470", "1.043", "1.045"], [1, "-0.1", 0, "0.1", "-0.7"]
-    here = exact(masses, v, "0.7", "0.1")
-    there = -exact(masses[::-1], ["0.7", "-0.1", 0, "0.1", -1], "0.7", "0.1")[::-1]
-    CHAPTER.tells({"tie": abs(tie + tie[::-1]).max(), "tie-generic": abs(here - there).max()})
+    CHAPTER.tells({"tie": abs(tie + tie[::-1]).max()})
+    # A generic chain and its mirror image, with a tie and without.
+    masses = [1.185, 0.439, 1.470, 1.043, 1.045]
+    for faster, differ in (0, True), (1e-9, False):
+        v = np.array([1, -0.1, 0, 0.1 + faster, -0.7])
+        here, there = (
+            collide(Chain(m, u, 0.7), ImpulseCorrelation(0.1)).velocities
+            for m, u in ((masses, v), (masses[::-1], -v[::-1]))
+        )
+        assert (abs(here + there[::-1]).max() > 0.1) == differ
 
 
 class OneByOne(truth.Impact):
@@ -201,13 +207,13 @@ def test_closings_that_are_due_together():
 
 
 def test_simultaneous_within_rounding():
-    """The chain of the entry: its tie, undone in one direction and in the other."""
+    """Where events tie: the tie undone in one direction makes a jump, in the other it does not."""
     rest = [1, 0, 0, 0, 0, 0], [1, "0.5", "0.25", 1, "0.75"], ["0.1", 0, 0, "0.1"]
     rest = *rest, ["0.1", "0.25", "0.25", 0]
     tied = exact([1] * 6, *rest)
     lighter = exact([1, 1, 1, "0.99999999999", 1, 1], *rest)
     heavier = exact([1, 1, 1, "1.00000000001", 1, 1], *rest)
-    assert float(GLUED["tie-broken"]) == pytest.approx(abs(tied - lighter).max(), rel=0.01)
+    assert abs(tied - lighter).max() > 0.005
     assert abs(tied - heavier).max() < 1e-9
 
 
