@@ -46,7 +46,7 @@ def _solved(
 def three_balls(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, ratio: ArrayLike
 ) -> Vector:
-    """Return the velocities after one collision per contact of three balls, m/s (Eqs. 22-33).
+    """Return velocities after one collision per contact of three balls (equations 22 to 33), m/s.
 
     The result, shape (..., 3), is NaN where the radical of Eq. 30 is not real, and
     `one_collision_each` tells where it applies.  What is no number or has a wrong shape is a
@@ -103,7 +103,7 @@ def one_collision_each(
 def largest_ratios(
     masses: ArrayLike, forward: ArrayLike, backward: ArrayLike
 ) -> tuple[Vector, Vector]:
-    """Largest admissible ratios of a chain, forward (Eqs. 34, 53) and backward (mirrored).
+    """Largest admissible ratios of a chain, forward (equations 34 and 53) and backward (mirrored).
 
     A larger ratio would open a driven contact that has absorbed nothing, but a contact cannot pull.
     The bound at a ball needs the ratio of the next ball in the direction of the drive; there is

@@ -31,7 +31,7 @@ class Velocities(NamedTuple):
     scatter: float  #: Standard deviation of the marks about the motion fitted, m.
     window: float  #: How much time on either side was used, s.
     probability: float  #: Chance that marks bend at least as much if the motion fitted is right.
-    #: Marks that are off by more than chance allows: ball, from 0; time, s; by how much, m.
+    #: Marks off by more than chance allows, each as (ball from 0, time in s, by how much in m).
     strays: tuple[_Stray, ...] = ()
 
 

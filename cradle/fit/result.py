@@ -67,7 +67,7 @@ class Estimate:
 
     @property
     def folded(self) -> bool:
-        """Whether chi-square is no parabola over the confidence set: it may cover but 90 %.
+        """Whether chi-square is no parabola over the confidence set, which may then cover but 90 %.
 
         So it is near a fold, a ratio at which the order of the impact's events changes.
         """

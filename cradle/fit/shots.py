@@ -53,7 +53,7 @@ class ShotSet:
 
     @property
     def momentum_residuals(self) -> Vector:
-        """Momentum gained in each shot over its standard error, shape (K,): about 1 in size."""
+        """Momentum gained in each shot over its standard error, about 1 in size; shape (K,)."""
         gain = (self.after - self.before) @ self.masses
         error = np.sqrt((self.sigma**2 + self.sigma_before**2) @ self.masses**2)
         return np.asarray(gain / error)

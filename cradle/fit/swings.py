@@ -35,10 +35,10 @@ class SwingFit:
     estimates: Mapping[str, Estimate]  #: The same with profiles of chi-square.
     swing: Swing  #: What fits best; its times begin with the first frame.
     residuals: Vector  #: Filmed less computed, less the mean of each ball, shape (K, N), m.
-    reading: float  #: Standard error of a reading, m: as given, or that of the residuals.
+    reading: float  #: Standard error of a reading, m, as given or that of the residuals.
     chi_square: float  #: Sum of squares of the residuals over `reading`.
     degrees_of_freedom: int  #: Readings less what was fitted to them.
-    correlation: float  #: Of a ball's residuals in successive frames: about 0 if the law fits.
+    correlation: float  #: Of a ball's residuals in successive frames, about 0 if the law fits.
     poor: bool  #: Whether the law does not fit.
     widened: Mapping[str, float]  #: By what each interval is then widened, else 1.
 

@@ -85,7 +85,9 @@ def outcomes(
     backward: ArrayLike | None = None, *, meeting: float = 0.5, excess: str = "raise",
     max_events: int = paper.MAX_EVENTS, progress: bool = False,
 ) -> Outcomes:  # fmt: skip
-    """Count the collisions of many chains too; all else as `post_impact_velocities`.
+    """Velocities and numbers of collisions of many chains of N balls; leading axes broadcast.
+
+    Arguments and errors are those of `post_impact_velocities`.
 
     Examples
     --------

@@ -2,12 +2,10 @@
 
 The rules, in the order in which `swing` applies them at every event:
 
-1. *Touching.* Those contacts touch that close at this instant (within `TIE`), and those whose gap
-   is a rounding error (`NEAR`).  Each stretch of touching contacts with one that approaches faster
-   than `RESTING` of the swing's speed is a chain of its own, solved by `collide`.
-2. *Resting.* Touching balls whose relative speed is then below `RESTING` of the swing's speed take
-   their common velocity.  Without this rule balls that are pressed against each other would
-   collide for ever, ever more softly, in a finite time.
+1. *Touching.* Contacts touch that close at this instant or have a gap below `NEAR`.  Each stretch
+   of them with one that approaches faster than `RESTING` is a chain, solved by `collide`.
+2. *Resting.* Touching balls whose relative speed is then below `RESTING` take their common
+   velocity.  Otherwise balls pressed against each other would collide for ever in a finite time.
 3. *Pressing.* Resting balls that, left alone, would not separate move on as one body: neighbours
    are pooled while the left one would accelerate no less than the right one.  Equal pendulums
    without gaps swing alike, so they keep together, without a force, until a ball strikes them.
@@ -21,7 +19,7 @@ from itertools import pairwise
 from cradle.input.values import Vector
 from cradle.swinging.pendulums import mean
 
-#: Speeds below this part of the swing's speed are none: they carry 1e-20 of its energy.
+#: Speeds below this part of the swing's speed are none, as they carry 1e-20 of its energy.
 RESTING = 1e-10
 #: Gaps below this part of the swing's size are none.
 NEAR = 1e-12
