@@ -126,7 +126,7 @@ def test_second_stroke_of_springs_by_another_integrator():
     found = solve_ivp(
         rate, (0, 2 * np.pi), [-1, 0, 0, 0, 0, 0], "RK45", rtol=1e-9, atol=1e-12, max_step=0.02
     )  # fmt: skip
-    lines = [line.split("|")[1].split() for line in CHAPTER.printed("springs").splitlines()]
+    lines = [line.split(":")[-1].split() for line in CHAPTER.printed("springs").splitlines()]
     stiff, touching = map(floats, lines[-2:])
     np.testing.assert_allclose(found.y[:3, -1], stiff, rtol=0, atol=2e-3)
     assert glued("second-off") == pytest.approx(np.abs(stiff - touching).max(), abs=6e-3)
