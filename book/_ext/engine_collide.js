@@ -71,8 +71,8 @@ function checkedImpact(given) {
   }
   if (e.length !== n - 1) {
     throw new Error(
-      `restitution has shape ${shape(given.restitution)}; ${n} balls need () or (${n - 1},): ${n} balls ` +
-        `have ${n === 2 ? "1 contact" : `${n - 1} contacts`}, restitution needs one number or ${n - 1}`,
+      `restitution has shape ${shape(given.restitution)}; ${n} balls need () or (${n - 1},): ` +
+        "one number, or one for each contact",
     );
   }
   // Two balls have no ratio.
