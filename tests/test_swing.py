@@ -566,6 +566,21 @@ def test_no_ball_is_released_beyond_its_reach(angle, part):
             swung(positions=[beyond, 0, 0], pendulums=hanging)()
 
 
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+def test_no_ball_swings_over_the_top(damping):
+    """It would pass its pivot and strike the row from behind."""
+    hanging = Pendulums(0.3, angle="full", damping=damping)
+    top = 2.0 * math.sqrt(9.81 * 0.3)
+    for speed, falls in ((0.99 * top, True), (1.2 * top, False)):
+        run = swung(chain=Chain([1] * 3, [-speed, 0, 0]), positions=[0] * 3, times=[0, 4],
+                    pendulums=hanging)  # fmt: skip
+        if falls:
+            assert run().impacts
+            continue
+        with pytest.raises(RuntimeError, match=r"not certified: at t = 4\.0 s a ball that swung o"):
+            run()
+
+
 def test_ends():
     arguments = balls(2, 0.9), ImpulseCorrelation(0), [-0.02, 0.02], np.linspace(0, 5, 51)
     by_time = swing(*arguments, pendulums=ONE_HERTZ)

@@ -62,8 +62,8 @@ def swing(
     ValueError
         If a value is wrong, balls overlap, or the model cannot treat an impact.
     RuntimeError
-        If contacts open and close without end at one instant, balls pass each other, or energy or
-        momentum come from nothing or are lost: every flight and every instant is checked.
+        If contacts open and close without end at one instant, balls pass each other or swing over
+        the top, or energy or momentum are made or lost: all flights and instants are checked.
 
     Examples
     --------
@@ -169,8 +169,7 @@ class _Run:
         self.instants.append((self.t, x, self.x, v, struck, self.v))
         if any(resting):
             alone = hanging.accelerations(self.x, self.v)
-            least = 1e-12 * self.speed * hanging.fastest
-            resting = pressed(hanging.masses, alone, resting, least)
+            resting = pressed(hanging.masses, alone, resting, 1e-12 * self.speed * hanging.fastest)
         self.together = tuple(resting)
         self.parting = tuple(t and not one for t, one in zip(touching, resting, strict=True))
 
@@ -227,17 +226,18 @@ def certify(run: _Run, times: Vector, seen_x: Vector, seen_v: Vector) -> None:
     before, kept = hanging.energy(placed, struck), hanging.energy(placed, left)
     work = INSTANT * np.maximum(before, kept)
     # Flights: to where they end, and to where they are looked at.
-    begun = instants.searchsorted(times, side="right") - 1
-    begun = np.concatenate([np.arange(len(instants) - 1), begun])
+    begun = np.r_[: len(instants) - 1, instants.searchsorted(times, side="right") - 1]
     until = np.concatenate([instants[1:], times])
     x = np.concatenate([came[1:], seen_x])
     gain = hanging.energy(x, np.concatenate([v[1:], seen_v])) - kept[begun]
     most = RADIAN * (1.0 + (until - instants[begun]) * hanging.fastest) * kept[begun]
     least = -math.inf if hanging.damping.any() else -most
     overlap = (x[:, :-1] - x[:, 1:] - hanging.gaps).max(axis=-1)
+    top, far = np.pi * (math.inf if hanging.small else hanging.length[0]), np.abs(x).max(axis=-1)
     for what, at, value, low, high in (
         ("impacts have made or lost {:g} kg m/s", instants, (left - v) @ m, -push, push),
         ("{:g} J are made or lost beside the impacts", instants, kept - before, -work, work),
+        ("a ball that swung over the top is {:g} m along its circle", until, far, 0.0, top),
         ("balls overlap by {:g} m", until, overlap, -math.inf, TIE * run.size),
         ("a flight has made or lost {:g} J", until, gain, least, most),
     ):
