@@ -69,6 +69,7 @@ def viscosity(masses, restitution, speed=1, stiffness=1):
 
 
 LIGHT = "must be at least 1e-150 of the heaviest ball of its chain"
+SECONDS = np.array([1, 2, 3], "m8[ns]")  # NumPy makes floats of nanoseconds, of seconds none
 MASKED = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
 
 CHAINS = [
@@ -96,6 +97,7 @@ CHAINS = [
         "restitution has shape (2,); 2 balls need () or (1,): one number, or one for each contact",
     ),
     ({"masses": [1, [2, 3], 4]}, "masses[1] has shape (2,), masses[0] has (); must have one shape"),
+    ({"masses": SECONDS}, "masses[0] = np.timedelta64(1,'ns'); must be a real number"),
     ({"masses": MASKED}, "masses[1] = masked; must be a real number"),
     ({"velocities": [1j, 0, 0]}, "velocities[0] = 1j; must be a real number"),
     ({"restitution": "1"}, "restitution = '1'; must be real numbers, one shape"),

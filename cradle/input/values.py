@@ -26,7 +26,7 @@ PART: tuple[str, float, float] = ("must lie in [0, 1]", 0.0, 1.0)
 _SHOWN = 80  # characters of a value that an error repeats
 _USUAL = {float, int, np.float64}
 # Python would turn these into floats, or NumPy with a warning, but they are no real numbers.
-_NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating)
+_NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating, np.timedelta64)
 
 
 def numbers(name: str, values: ArrayLike | None, at: tuple[int, ...] = ()) -> Vector:
@@ -171,8 +171,7 @@ def whole_number(
 def one_of(name: str, value: object, choices: Sequence[str]) -> str:
     """Return `value` if it is one of some words."""
     if not isinstance(value, str) or value not in choices:
-        two = len(choices) == 2
-        rule = " or ".join(map(repr, choices)) if two else f"one of {', '.join(choices)}"
+        rule = f"one of {', '.join(choices)}" if choices[2:] else " or ".join(map(repr, choices))
         raise ValueError(f"{name} = {shown(value)}; must be {rule}")
     return value
 
