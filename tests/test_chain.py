@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from cradle import Chain, ImpulseCorrelation, SequentialCollisions, collide
+from cradle import Chain, ImpulseCorrelation, Pendulums, SequentialCollisions, collide
 
 GOOD = {"masses": [1, 2, 3], "velocities": [1, 0, -1], "restitution": [0.5, 1]}
 
@@ -53,6 +53,8 @@ def test_lightest_and_smallest_masses(mass):
 def test_copies_are_frozen_too():
     chain = Chain([0.045, 1 / 3], [0.1, -2], 0.7)
     copies = copy.copy(chain), copy.deepcopy(chain), pickle.loads(pickle.dumps(chain))
+    hanging = Pendulums([0.1, 0.2], gaps=1e-3)
+    assert hanging == copy.deepcopy(hanging) == eval(repr(hanging)) != Pendulums([0.1, 0.3])
     for other in (*copies, eval(repr(chain))):
         assert other == chain
         with pytest.raises(ValueError, match="read-only"):

@@ -11,7 +11,7 @@ from cradle.input.values import ArrayLike, Vector
 TIE = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Pendulums:
     """How the balls hang: strings, gravity, gaps, and the damping of the swing.
 
@@ -87,8 +87,7 @@ class Pendulums:
         frequency: Vector = np.sqrt(self.gravity / self.row("length", size))
         damping = self.row("damping", size)
         slow = damping >= frequency
-        least = float(frequency[slow.argmax()])
-        rule = f"must be below the natural frequency sqrt(g/l) = {least!r}"
+        rule = f"must be below the natural frequency sqrt(g/l) = {float(frequency[slow.argmax()])}"
         asked.refuse_where("damping", damping, slow, rule)
         return frequency
 
