@@ -1,6 +1,7 @@
 """Fits to measured shots: data read and refused, searches, confidence sets, predictions."""
 
 import csv
+import io
 import re
 from functools import cache
 from pathlib import Path
@@ -282,6 +283,8 @@ def test_heights():
     assert found.degrees_of_freedom == 1
     with pytest.raises(ValueError, match=r"rise\[0\] = -1.0; must be above 0"):
         restitution_from_heights("AA", [1.0], [-1.0], 0.1)
+    with pytest.raises(ValueError, match=r"rise \(0,\); must be \(K,\), K >= 1"):
+        restitution_from_heights("AA", [], [], 0.1)
     speed, sigma = speeds_from_heights([0.05, -0.05, 0.0], 0.001, 10.0)
     np.testing.assert_allclose(speed, [1, -1, 0])
     np.testing.assert_allclose(sigma, [np.sqrt(1.02) - 1] * 2 + [np.sqrt(0.02)])
@@ -875,6 +878,7 @@ def test_files_that_are_no_table_of_ours(tmp_path):
         text = "\n".join(lines).translate(str.maketrans(",.-", f"{marks}{MINUS}"))
         path.write_text(text, encoding="utf-8-sig")
         assert repr(read_shots(path).sets[1].after) == same
+        assert repr(read_shots(io.StringIO(text)).sets[1].after) == same
     path.write_text("\n".join(lines), encoding="utf-16")
     with pytest.raises(ValueError, match=r"2.csv is no UTF-8 text \(byte 0\); save it as CSV in"):
         read_shots(path)

@@ -49,8 +49,7 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
     drop, rise : array_like, shape (K,)
         Heights above the point of contact before and after, in one unit: e^2 = rise / drop.
     sigma : float
-        Standard error of each height, in that unit; it and heights must be above 0, or a ValueError
-        is raised.
+        Standard error of each height, in that unit.  What is not above 0 is a ValueError.
 
     Examples
     --------
@@ -60,8 +59,8 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
     high = checked("drop", drop, *ABOVE_ZERO)
     low = checked("rise", rise, *ABOVE_ZERO)
     error = one_number("sigma", sigma, *ABOVE_ZERO)
-    if high.ndim != 1 or high.shape != low.shape:
-        raise ValueError(f"drop has shape {high.shape}, rise {low.shape}; must be alike, (K,)")
+    if high.ndim != 1 or high.shape != low.shape or not high.size:
+        raise ValueError(f"drop has shape {high.shape}, rise {low.shape}; must be (K,), K >= 1")
 
     def chi(e: Vector) -> Vector:
         square = e**2

@@ -128,7 +128,7 @@ def read_shots(
 
     Parameters
     ----------
-    source : path, binary file, DataFrame or mapping of columns
+    source : path, open file, DataFrame or mapping of columns
         A CSV file (UTF-8, comma, one header line; lines that begin with # and empty rows are
         skipped), a pandas DataFrame, or columns by name; see `COLUMNS`.
     mass_unit, velocity_unit : {"kg", "g"}, {"m/s", "cm/s", "mm/s"}, optional

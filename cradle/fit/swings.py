@@ -128,10 +128,11 @@ class _Film:
             told = f"times, positions and seen have shapes {t.shape}, {x.shape} and {mask.shape}"
             raise ValueError(f"{told}; must be (K,), (K, N) and (K, N) or (N,), N at least 2")
         asked.refuse_where("times", t, np.diff(t, prepend=-np.inf) <= 0.0, "must rise")
-        rest = np.zeros(x.shape[1])
-        self.model, self.balls = model, Chain(rest + 1.0 if masses is None else masses, rest, 1.0)
+        n, m = x.shape[1], asked.number_or_row("masses", 1.0 if masses is None else masses, "N")
+        self.model, self.balls = model, Chain(asked.row_of("masses", m, n, n), np.zeros(n), 1.0)
         self.times, self.seen = t - t[0], mask & np.isfinite(x)
         self.x = np.where(self.seen, x, np.nan)
+        free = (free,) if isinstance(free, str) else free
         for name in (*free, *known):
             asked.one_of("free or known", name, tuple(UNITS))
         self.names = [name for name in UNITS if name in free and name not in known]

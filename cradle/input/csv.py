@@ -19,7 +19,7 @@ def table_lines(source: Any) -> list[tuple[str, dict[str, Any]]]:
         return [(f"row {k}", dict(zip(names, row, strict=True))) for k, row in rows]
     read = getattr(source, "read_bytes", getattr(source, "read", None))
     if read is None:
-        raise TypeError(f"source is a {type(source).__name__}; must be a path or a table")
+        raise TypeError(f"source has the type {type(source).__name__}; must be a path or a table")
     lines = text_rows(getattr(source, "name", "the file"), read())
     names = _once(lines.pop(min(lines)) if lines else [])
     for number, cells in lines.items():
@@ -37,9 +37,10 @@ def _once(names: list[str]) -> list[str]:
     return names
 
 
-def text_rows(name: str, content: bytes, comments: bool = False) -> dict[int, list[str]]:
+def text_rows(name: str, content: bytes | str, comments: bool = False) -> dict[int, list[str]]:
     """Return the cells of each filled line of a text file by its number, as points and ASCII."""
     try:
+        content = content.encode() if isinstance(content, str) else content
         text = content.decode("utf-8-sig").replace("\N{MINUS SIGN}", "-")
     except UnicodeDecodeError as error:
         told = f"{name} is no UTF-8 text (byte {error.start}); save it as CSV in UTF-8"
