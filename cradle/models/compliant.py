@@ -110,9 +110,9 @@ class SpringChain:
         held = "; or leans hold balls together" if np.min(self.gaps) < 0.0 else ""
         paths = np.array([v, reached]), np.array([none, impulses])
         return ImpactNotFinished(
-            f"the impact was not finished: contact {c}, the quickest of the springs, makes the "
-            "steps short; or balls that collide often amplify errors, and finer runs do not agree"
-            + held,
+            f"the impact was not finished (max_steps = {self.max_steps}): contact {c}, the "
+            "quickest of the springs, makes the steps short; or balls that collide often amplify "
+            "errors, and finer runs do not agree" + held,
             Trace(chain, self, reached, impulses, none, none.astype(int), *paths, (), left_out=1),
         )
 
