@@ -11,7 +11,7 @@ import click
 
 import cradle
 from cradle.advice.choice import made
-from cradle.input.values import ABOVE_ZERO, one_number
+from cradle.input.values import ABOVE_ZERO, one_number, whole_number
 
 UNITS = {"kg": 1.0, "g": 1e-3}
 
@@ -19,8 +19,7 @@ UNITS = {"kg": 1.0, "g": 1e-3}
 def numbers_of(_: click.Context, __: click.Parameter, value: str | None) -> list[float] | None:
     """Read numbers with commas between them; a minus sign may be the typographic one."""
     try:
-        given = (value or "").replace("\N{MINUS SIGN}", "-").split(",")
-        return None if value is None else [float(part) for part in given]
+        return None if value is None else [*map(float, value.replace("\u2212", "-").split(","))]
     except ValueError:
         raise click.BadParameter(f"{value!r}; write numbers with commas between") from None
 
@@ -100,7 +99,8 @@ def described(
     """Return the chain and the model that the options describe."""
     assumed = []
     if sequence is not None and sequence.isdecimal() and masses is None:
-        masses, sequence = [1.0] * int(sequence), None
+        count = whole_number("SEQUENCE", int(sequence[:9]), "2 to 1000000 balls", 2, 1_000_000)
+        masses, sequence = [1.0] * count, None
         assumed.append(f"equal balls of 1 {unit or 'kg'}")
     if (sequence is None) == (masses is None):
         need = "how many equal balls, such as 5, or a sequence of the paper's balls, such as ABCCA"

@@ -64,6 +64,8 @@ def fit(
     from cradle.fit.result import FOLDED, RESULT_COLUMNS
     from cradle.fit.shots import chance
 
+    if summary and (as_json or as_csv):
+        raise click.UsageError("give one of --summary, --json and --csv")
     if predict is not None and as_csv:
         raise click.UsageError("--csv prints the fitted values alone; with --predict give --json")
     if predict is None and speed is not None:

@@ -46,6 +46,8 @@ def swing(
     if (options["speed"], options["velocities"]) != (None, None):
         raise click.UsageError("leave --speed and --velocities out: the first ball is pulled aside "
                                "(--pull) and let go")  # fmt: skip
+    if output and (as_json or as_csv):
+        raise click.UsageError("give one of --output, --json and --csv")
     length = describe.pendulum_length(options.pop("length"), options.pop("period"))
     given = describe.described(**options)
     chain = given.chain
@@ -58,9 +60,8 @@ def swing(
     whole_number("--steps", steps)
     if output:  # twenty keyframes a swing
         steps = math.ceil(20 * seconds * hanging.natural_frequency(len(chain))[0] / math.tau)
-    still = [0.0] * len(chain)
     places = _released(pull or [1.0], by, len(chain))
-    balls = cradle.Chain(chain.masses, still, chain.restitution)
+    balls = cradle.Chain(chain.masses, [0.0] * len(chain), chain.restitution)
     times = [seconds * k / steps for k in range(steps + 1)]
     with given.waiting():
         run = cradle.swing(balls, given.model, places, times, pendulums=hanging)
@@ -83,8 +84,7 @@ def swing(
     else:
         note = f"impacts: {len(impacts)}; positions in m, times in s\n{told.note}"
         show(rows, extra, note, as_json, as_csv)
-    if run.ended != "times":
-        # Also where the table goes to a file.
+    if run.ended != "times":  # also where the table goes to a file
         click.echo(f"cradle: ended at {run.end:g} s, after {len(impacts)} impacts", err=True)
 
 
@@ -93,7 +93,6 @@ def _released(pull: list[float], by: float, size: int) -> list[float]:
     left, right = [*pull, 0.0][:2]
     wrong = len(pull) > 2 or any(one < 0.0 or not one.is_integer() for one in pull)
     if wrong or not 0 < left + right <= size:
-        raise click.UsageError(
-            f"--pull says how many of the {size} balls are pulled, 2 or 1,1; how far is --by"
-        )
+        raise click.UsageError(f"--pull says how many of the {size} balls are pulled, 2 or 1,1; "
+                               "how far is --by")  # fmt: skip
     return [-by] * int(left) + [0.0] * int(size - left - right) + [by] * int(right)
