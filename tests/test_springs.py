@@ -525,6 +525,16 @@ def test_the_certificate_breaks(monkeypatch, change, defect):
         spring_velocities([1, 1, 1], [1, 0, 0])
 
 
+def test_the_way_of_a_trace_is_there_for_all_who_read_it():
+    """Its names are listed before it is followed; a thread that comes second finds it too."""
+    trace = collide(Chain([1, 1, 1], struck(3)), SpringChain())
+    assert {"times", "forces", "path", "impulses", "durations"} <= set(dir(trace))
+    assert not hasattr(trace, "time")
+    assert trace.times is not None
+    # The second thread has looked for it in vain, and asks here when the first one is done.
+    np.testing.assert_array_equal(trace.__getattr__("times"), trace.times)
+
+
 def test_an_impact_that_is_given_up_shows_what_was_reached():
     with pytest.raises(ImpactNotFinished, match=r"\(max_steps = 20\): contact 0, th") as stopped:
         collide(Chain([1, 0.01, 1], struck(3)), SpringChain(max_steps=20))

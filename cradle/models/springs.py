@@ -74,20 +74,20 @@ class TimedTrace(CurvedTrace):
 
     def __getattr__(self, name: str) -> Any:
         """Follow the way, when something of it is asked for the first time."""
-        if name.startswith("_") or "_ran" not in vars(self):
+        if name not in self.__dataclass_fields__ or "_ran" not in vars(self):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        way = self._way(*vars(self)["_ran"])
-        vars(self).clear()
-        vars(self).update(vars(way))
-        return object.__getattribute__(self, name)
+        vars(self).update(vars(self._way(*vars(self)["_ran"])))  # at once: threads may read it
+        return vars(self)[name]
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self.__dataclass_fields__})
 
     def _way(self, row: Springs, law: Law, out: Motions) -> "TimedTrace":
         """Return this trace with all that belongs to it."""
         path, start = Path(row, law, out), self.chain.velocities
         mass, speed, length = path.mass, path.speed, path.length
         times, events, v, force = path.events()
-        joule = mass * speed * speed
-        newton, second = joule / length, length / speed
+        newton, second = (joule := mass * speed * speed) / length, length / speed
         return TimedTrace(
             self.chain, self.model, self.velocities, mass * speed * path.impulses(v[-1]),
             joule * path.absorbed, path.collisions, start + speed * (v - v[0]),
