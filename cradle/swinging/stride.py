@@ -217,9 +217,10 @@ class Alone:
     def _rested(self, masses: Vector, v: Vector, gaps: Vector) -> Vector:
         """Return velocities after those that touch and still approach have come to rest."""
         v, _ = common_velocities(masses, v, (v[:-1] > v[1:]).tolist(), 0.0)
-        # Balls that overlap by more than is unseen part, slower than what counts as an impact.
-        ramp = np.append(0.0, np.cumsum(0.5 * self.resting * (gaps < -self.touching)))
-        return np.asarray(v + (ramp - masses @ ramp / masses.sum()))
+        if (deep := gaps < -self.touching).any():  # these part, slower than what is an impact
+            ramp = np.append(0.0, np.cumsum(0.5 * self.resting * deep))
+            v += ramp - masses @ ramp / masses.sum()
+        return v
 
     def _plane(self, name: str, places: ArrayLike) -> Plane:
         """Return places in the plane as complex numbers."""
@@ -230,7 +231,6 @@ class Alone:
 
     def _refuse_a_pack(self, x: list[complex]) -> None:
         for i, j in combinations(range(len(x)), 2):
-            gap = abs(x[j] - x[i]) - (self.radii[i] + self.radii[j])
-            if j > i + 1 and gap <= self.touching:
+            if j > i + 1 and abs(x[j] - x[i]) <= self.radii[i] + self.radii[j] + self.touching:
                 rule = "a row alone can be solved, no pack"
                 raise ValueError(f"balls {i} and {j} touch and are no neighbours; {rule}")
