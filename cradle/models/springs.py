@@ -87,15 +87,15 @@ class TimedTrace(CurvedTrace):
         path, start = Path(row, law, out), self.chain.velocities
         mass, speed, length = path.mass, path.speed, path.length
         times, events, v, force = path.events()
-        newton, second = (joule := mass * speed * speed) / length, length / speed
+        joule, second = mass * speed * speed, length / speed
         return TimedTrace(
             self.chain, self.model, self.velocities, mass * speed * path.impulses(v[-1]),
             joule * path.absorbed, path.collisions, start + speed * (v - v[0]),
-            mass * speed * path.impulses(v), events, times=second * times, forces=newton * force,
-            durations=second * path.durations, step_times=second * path.t,
-            step_forces=newton * path.force, step_velocities=start + speed * (path.v - v[0]),
-            step_impulses=mass * speed * path.impulses(path.v),
-            evaluations=self.evaluations, error=self.error,
+            mass * speed * path.impulses(v), events, times=second * times,
+            forces=joule / length * force, durations=second * path.durations,
+            step_times=second * path.t, step_forces=joule / length * path.force,
+            step_velocities=start + speed * (path.v - v[0]), error=self.error,
+            step_impulses=mass * speed * path.impulses(path.v), evaluations=self.evaluations,
         )  # fmt: skip
 
     @property
