@@ -1,6 +1,7 @@
 """The chapter on extremes: the numbers in its text and figures, from the maps and anew."""
 
 import math
+from decimal import Decimal, localcontext
 
 import extreme_chains as x
 import mpmath
@@ -196,3 +197,17 @@ def test_fig_extremes_jump_as_drawn():
     step = abs(second[0, 1] - first[-1, 1])
     largest = max(collide(*paper_chain(name, excess="saturate")).velocities)
     assert step / largest == pytest.approx(float(edge["jump"]), rel=0.1)
+
+
+def test_rule_nine_says_who_drives_after_a_sequence_without_end():
+    """Without it the digits end the sequence, with one contact or the other, and so the outcome."""
+    row = [1, 1, "0.01", "0.1", 1], [1, "0.5", 0, 0, 0], [1, 1, "0.9", 1]
+    ratios = ["0.9", "0.9", 0], [0, 1, 1]
+    told = Chapter("extremes_inventory").printed("b5c1e0a3")
+    for digits, last in ((30, 2), (40, 1), (60, 2), (100, 1)):
+        with localcontext(prec=digits):
+            end = solve(*row, *ratios, meeting="0.3", number=Decimal)
+        # The next event is the greatest compression of the contact that pushes from behind.
+        closed = end.events.index(("maximum_compression", 0)) - 1
+        assert end.events[closed] == ("close", last)
+        assert f"{digits} digits: {end.velocities[-1]:.4f} m/s" in told
