@@ -202,7 +202,7 @@ def defect_of(n, law, s, clock):
         if i < n - 1:
             ordered = ordered and s[i + 1].after - v >= -FAINT * law.accuracy
     slack = law.accuracy * size + rounding * energy
-    if not ordered:
+    if not (ordered or law.once):
         return ORDER
     if not abs(change) <= rounding * size:
         return MOMENTUM

@@ -267,6 +267,9 @@ def run(n, law, effort, s, clock, record):
     while low < high and clock.steps < clock.most and effort > 0:
         effort -= high - low
         if clock.stiff == 0.0 and not leans:
+            if law.once and clock.top > 0.0:
+                low = high
+                break
             clock.stiff = 1.0
             flown = fly(h, low, high, s)
             clock.time += flown

@@ -68,6 +68,7 @@ class Law(NamedTuple):
     p: float
     accuracy: float
     most: float  # steps of a run
+    once: bool = False  # stop when all contacts are open that were not
 
 
 class Clock:

@@ -79,15 +79,15 @@ class SpringChain:
             vars(self)[name] = asked.number_or_row(name, getattr(self, name), "N - 1", *rules)
         asked.whole_number("max_steps", self.max_steps)
 
-    def solve(self, chain: Chain) -> TimedTrace:
-        """Solve the impact of `chain`; see `collide`."""
+    def solve(self, chain: Chain, *, once: bool = False) -> TimedTrace:
+        """Solve the impact of `chain`; see `collide`.  `once`: until all contacts have opened."""
         n = len(asked.must_be(Chain, "chain", chain))
         rule = "must be 1 for SpringChain, whose losses are its viscosity"
         asked.refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
         fastest(chain)  # is within the range of floats
         contacts = (asked.row_of(name, getattr(self, name), n - 1, n) for name in _RULES)
         row = Springs(*(row[None] for row in (chain.masses, chain.velocities, *contacts)))
-        out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps))
+        out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps), once)
         _, status, clock = solve(row, law, out)
         if status == REFUSED:
             raise refused(clock, self.accuracy, [], row)

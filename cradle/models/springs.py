@@ -98,6 +98,21 @@ class TimedTrace(CurvedTrace):
             step_impulses=mass * speed * path.impulses(path.v), evaluations=self.evaluations,
         )  # fmt: skip
 
+    def parted(self) -> tuple[float, Vector]:
+        """Return how long it takes until no balls overlap, s, and how far each goes until then, m.
+
+        What is left of a compression that does not open in as much time again is too little to matter.
+        """
+        record: list[Any] = []
+        clock = solve(*vars(self)["_ran"], record=record)[2]
+        begun, ended = record[0][0], record[-1][-1]
+        time, y, u = ended[0, 0], ended[2, :-1], -np.diff(ended[1])  # u: closing speeds
+        late = np.divide(y, -u, out=np.zeros_like(u), where=(y > 0.0) & (y < -u * time)).max()
+        length, time = clock["length"], time + late
+        way = np.append(0.0, length * np.cumsum(begun[2, :-1] - y - late * u))
+        m, seconds = self.chain.masses, float(length / clock["speed"] * time)
+        return seconds, way + (seconds * self.chain.momentum - m @ way) / m.sum()
+
     @property
     def energy_loss(self) -> float:
         """Kinetic energy that the viscosity of the contacts has taken, in joules."""

@@ -14,6 +14,7 @@ import numpy as np
 from cradle.chain import Chain
 from cradle.input.values import ArrayLike, Vector, checked, must_be, one_number, shown, whole_number
 from cradle.models import Model, collide
+from cradle.models.compliant import SpringChain
 from cradle.swinging.flight import FullFlight, SmallAngleFlight
 from cradle.swinging.pendulums import TIE, Hanging, Pendulums, mean
 from cradle.swinging.record import Impact, Swing
@@ -22,6 +23,9 @@ from cradle.trace import Trace
 
 __all__ = ["swing"]
 
+#: Contact forces take their time if a contact lasts less than about so much of a radian; a softer
+#: one cannot be meant as it is given: then, as with all other laws, an impact takes no time.
+SHORT = 0.03
 #: Events without an impact that one instant can have, for each ball: a contact has a few at most.
 MOST_IDLE = 20
 
@@ -106,14 +110,21 @@ class _Run:
         self.impacts: list[Impact] = []
         self.series: list[tuple[Vector, Vector]] = []
         self.size = max(float(np.abs(x).max()), self.speed / float(hanging.frequency.min()))
-        #: When, where balls came to be and were put, their velocities before, struck, and at last.
-        self.instants: list[tuple[float, Vector, Vector, Vector, Vector, Vector]] = []
+        #: When, where balls came to be and were put, their velocities before, struck, and at last,
+        #: and how long it takes, until the next of these instants.
+        self.instants: list[tuple[float, Vector, Vector, Vector, Vector, Vector, float]] = []
         distance = hanging.gaps + np.diff(x)
         if (distance < -TIE * self.size).any():
             c = int(np.argmin(distance))
             told = f"balls {c} and {c + 1} overlap by {-distance[c]:g} m"
             raise ValueError(f"positions = {x.tolist()}; {told}")
         self.freed = [-math.inf] * (n - 1)  # when the force in each contact last fell to zero
+        self.lasting = False
+        if isinstance(model, SpringChain) and self.speed > 0.0:
+            m, p = chain.masses, model.exponent
+            depth = m[:-1] / (m[:-1] + m[1:]) * m[1:] / model.stiffness * self.speed**2
+            time = float(depth.max() ** (1.0 / (p + 1.0))) / self.speed
+            self.lasting = time * hanging.fastest < SHORT
         self.settle([], [])
 
     def to_the_end(self, times: Vector, most: int, least: float) -> str:
@@ -125,11 +136,11 @@ class _Run:
                 ended = "energy"
                 break
             flight = kind(self.hanging, self.x, self.v, self.together, self.parting)
-            wait, closing, opening = flight.next_meeting(end - self.t)
+            wait, closing, opening = flight.next_meeting(max(end - self.t, 0.0))
             later = self.t + wait
             here = int(times.searchsorted(later, side="left"))
             if here > done or later > end:
-                self.series.append(flight.at(times[done:here] - self.t))
+                self.series.append(flight.at(np.maximum(times[done:here] - self.t, 0.0)))
             done = here
             if later > end:
                 self.t = end
@@ -150,50 +161,89 @@ class _Run:
     def settle(self, closing: list[int], opening: list[int]) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
         hanging, x, v = self.hanging, self.x, self.v
-        touching = (hanging.gaps + (x[1:] - x[:-1]) <= NEAR * self.size).tolist()
-        for c in closing:
-            touching[c] = True
+        touching = self.gaps() == 0.0
+        touching[closing] = True
         self.x, self.v = x.copy(), v.copy()
-        groups = stretches(touching)
+        groups = stretches(touching.tolist())
         for first, last in groups:  # to where they touch but for rounding; their centre stays
             offset = hanging.offsets(first, last)
             self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
-        self.collide(groups, v)
+        duration, way = self.collide(groups, v)
+        if duration:
+            self.instants.append((self.t, x, self.x, v, self.v, self.v, duration))
+            # What is left of a compression when all contacts are open is too little to count.
+            x = hanging.apart(self.x + way)
+            pull = hanging.accelerations(self.x, v) + hanging.accelerations(x, self.v)
+            self.t, self.x, self.v = self.t + duration, x, self.v + 0.5 * duration * pull
+            v = self.v
+            touching = (self.gaps() == 0.0) & (np.diff(v) >= -RESTING * self.speed)
         struck = self.v
         # What opens at this instant rests no more in it, whatever else happens.
         for c in opening:
             self.freed[c] = self.t
-        contacts = zip(touching, self.freed, strict=True)
+        contacts = zip(touching.tolist(), self.freed, strict=True)
         kept = [touches and self.t - freed > hanging.tie for touches, freed in contacts]
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
-        self.instants.append((self.t, x, self.x, v, struck, self.v))
+        self.instants.append((self.t, x, self.x, v, struck, self.v, 0.0))
         if any(resting):
             alone = hanging.accelerations(self.x, self.v)
             resting = pressed(hanging.masses, alone, resting, 1e-12 * self.speed * hanging.fastest)
         self.together = tuple(resting)
-        self.parting = tuple(t and not one for t, one in zip(touching, resting, strict=True))
+        self.parting = tuple(t and not one for t, one in zip(touching.tolist(), resting, strict=True))
 
-    def collide(self, groups: list[tuple[int, int]], before: Vector) -> None:
-        """Solve the impacts of this instant and record them as one."""
-        contacts, traces = list[int](), list[Trace]()
-        speeds, slow = before.tolist(), RESTING * self.speed
-        for first, last in groups:
-            if all(a - b <= slow for a, b in pairwise(speeds[first:last])):
-                continue
-            m, e = self.chain.masses[first:last], self.chain.restitution[first : last - 1]
-            balls = Chain._of(m, before[first:last].copy(), e)
-            try:
-                # Not by `collide`, whose advice on a long path cannot be taken here.
-                trace = self.model(first, last).solve(balls)
-            except ValueError as refused:
-                refused.add_note(f"at the impact at t = {self.t} s, balls {first} to {last - 1}")
-                raise
+    def gaps(self) -> Vector:
+        """Return the gaps of the contacts, m; 0 where balls touch."""
+        gaps = self.hanging.gaps + np.diff(self.x)
+        return np.where(gaps > NEAR * self.size, gaps, 0.0)
+
+    def collide(self, groups: list[tuple[int, int]], before: Vector) -> tuple[float, Vector]:
+        """Solve the impacts of this instant as one; return how long, and how far the balls go."""
+        speeds, slow, duration, way = before.tolist(), RESTING * self.speed, 0.0, 0.0 * before
+        struck = [
+            (first, last) for first, last in groups
+            if any(a - b > slow for a, b in pairwise(speeds[first:last]))
+        ]  # fmt: skip
+        if not struck:
+            return duration, way
+        traces = tuple(self.solved(*balls, before) for balls in struck if not self.lasting)
+        if self.lasting:
+            duration, way, struck, traces = self.followed(struck[0][0], struck[-1][1], before)
+        for (first, last), trace in zip(struck, traces, strict=True):
             self.v[first:last] = trace.velocities
-            contacts += range(first, last - 1)
-            traces.append(trace)
-        if traces:
-            told = sum(trace.energy_loss for trace in traces), tuple(traces)
-            self.impacts.append(Impact(self.t, tuple(contacts), self.x, before, self.v, *told))
+        contacts = tuple(c for first, last in struck for c in range(first, last - 1))
+        loss = sum(trace.energy_loss for trace in traces)
+        self.impacts.append(Impact(self.t, contacts, self.x, before, self.v, loss, traces))
+        return duration, way
+
+    def followed(self, first: int, last: int, before: Vector) -> tuple[float, Vector, Any, Any]:
+        """Follow contact forces until all contacts are open: how long, how far, of whom, the path.
+
+        Balls between those that are struck take part, and those whose gaps close meanwhile.
+        """
+        while True:
+            trace: Any = self.solved(first, last, before)
+            duration, own = trace.parted()
+            way = duration * before
+            way[first:last] = own
+            met = np.flatnonzero(self.gaps() + np.diff(way) < 0.0).tolist()
+            begin, end = min([first, *met]), max([last, *(c + 2 for c in met)])
+            if (begin, end) == (first, last):
+                return duration, way, [(first, last)], (trace,)
+            first, last = begin, end
+
+    def solved(self, first: int, last: int, before: Vector) -> Trace:
+        """Solve the impact of a part of the chain; contact forces with the gaps that it has now."""
+        m, e = self.chain.masses[first:last], self.chain.restitution[first : last - 1]
+        law: Any = self.model(first, last)
+        solve = law.solve  # not by `collide`, whose advice on a long path cannot be taken here
+        if self.lasting:
+            gaps = self.gaps()[first : last - 1] + law.gaps
+            solve = functools.partial(replace(law, gaps=tuple(gaps.tolist())).solve, once=True)
+        try:
+            return solve(Chain._of(m, before[first:last].copy(), e))
+        except ValueError as refused:
+            refused.add_note(f"at the impact at t = {self.t} s, balls {first} to {last - 1}")
+            raise
 
 
 def part(model: Any, n: int, first: int, last: int) -> Model:
@@ -221,7 +271,7 @@ RADIAN = 1e-11
 def certify(run: _Run, times: Vector, seen_x: Vector, seen_v: Vector) -> None:
     """Demand order, momentum and energy of flights and instants; impacts are certified already."""
     hanging, m = run.hanging, run.hanging.masses
-    instants, came, placed, v, struck, left = map(np.array, zip(*run.instants, strict=True))
+    instants, came, placed, v, struck, left, lasts = map(np.array, zip(*run.instants, strict=True))
     push = INSTANT * ((np.abs(left) + np.abs(v)) @ m)
     before, kept = hanging.energy(placed, struck), hanging.energy(placed, left)
     work = INSTANT * np.maximum(before, kept)
@@ -231,6 +281,7 @@ def certify(run: _Run, times: Vector, seen_x: Vector, seen_v: Vector) -> None:
     x = np.concatenate([came[1:], seen_x])
     gain = hanging.energy(x, np.concatenate([v[1:], seen_v])) - kept[begun]
     most = RADIAN * (1.0 + (until - instants[begun]) * hanging.fastest) * kept[begun]
+    most += lasts[begun] * hanging.fastest * kept[begun]  # of a strike, where strings are one kick
     least = -math.inf if hanging.damping.any() else -most
     overlap = (x[:, :-1] - x[:, 1:] - hanging.gaps).max(axis=-1)
     top, far = np.pi * (math.inf if hanging.small else hanging.length[0]), np.abs(x).max(axis=-1)
