@@ -22,7 +22,7 @@ from click.testing import CliRunner
 import cradle
 from cradle import fit
 from cradle.command.solve import main
-from cradle.pictures import animation, balls, impacts
+from cradle.pictures import animation, impacts
 
 sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ("benchmarks", "tests")]
 from chains import random_chains, uniform  # noqa: E402
@@ -122,9 +122,8 @@ def shown() -> Iterator[bytes]:
     scenes = [(chain, MODELS["springs"][0]), cradle.paper_chain("AAAA"), cradle.paper_chain("BAB")]
     for trace in (cradle.collide(*scene) for scene in scenes):
         yield told([trace, trace.chain, trace.to_frame().to_json(double_precision=15)])
-        yield told(impacts.velocities(trace)) + told(balls.chain_sketch(trace.chain))
+        yield told(impacts.velocities(trace))
         yield told(impacts.velocity_impulse(trace, 1, other=0)) + told(animation.animate(trace))
-        yield told(balls.outcome_by_ball(trace, letters="ABCD"[: len(trace.chain)]))
     still, times = cradle.Chain([1] * 3, [0] * 3), np.linspace(0, 2, 21)
     run = cradle.swing(still, MODELS["sequential"][0], [-0.02, 0, 0], times)
     yield told([run, run.impacts, run.to_frame().to_json(), run.impacts_to_frame().to_json()])

@@ -32,7 +32,7 @@ from cradle import (
     fit,
     measures,
 )
-from cradle.pictures import animation, balls
+from cradle.pictures import animation
 from cradle.pictures import impacts as figures
 from cradle.row import Row
 
@@ -117,7 +117,6 @@ ENTRIES = {
     },
     figures.velocities: {"trace": TRACE, "ax": Figure().subplots()},
     figures.velocity_impulse: {"trace": TRACE, "contact": 0, "ax": Figure().subplots()},
-    balls.chain_sketch: {"chain": THREE, "ax": Figure().subplots(), "letters": "ABA"},
 }  # fmt: skip
 
 #: Formulas as they stand in the paper; their documentation says that ranges are not checked.

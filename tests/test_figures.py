@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
-from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, paper_chain
+from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide
 from cradle.pictures import impacts as figures
 from cradle.pictures.animation import animate
-from cradle.pictures.balls import chain_sketch, outcome_by_ball
 
 
 @pytest.fixture
@@ -125,33 +123,6 @@ def test_upper_axis_keeps_both_ends_and_does_not_crowd(ax, trace):
     assert upper.get_xticklabels()[-1].get_text().endswith(f"{trace.impulses[1]:.3g}")
 
 
-def test_outcome_by_ball_normalises_by_the_striker(ax):
-    traces = [collide(*paper_chain("CDAB", speed=speed)) for speed in (0.5, 2.0)]
-    outcome_by_ball(traces, ax, letters="CDAB")
-    points = [line for line in ax.get_lines() if line.get_linestyle() == "None"]
-    assert len(points) == len(traces)
-    for line, trace in zip(points, traces):
-        np.testing.assert_array_equal(line.get_xdata(), [1, 2, 3, 4])
-        np.testing.assert_allclose(line.get_ydata(), trace.velocities / trace.chain.velocities[0])
-
-
-def test_chain_sketch_touches_and_scales_by_volume(ax):
-    chain_sketch(Chain([1, 8, 0.001], [1, 0, -2], 1), ax)
-    balls = [patch for patch in ax.patches if isinstance(patch, Circle)]
-    radii = np.array([ball.get_radius() for ball in balls])
-    places = np.array([ball.get_center()[0] for ball in balls])
-    np.testing.assert_allclose(radii**3 / radii[1] ** 3, [1 / 8, 1, 0.001 / 8])
-    np.testing.assert_allclose(np.diff(places), radii[:-1] + radii[1:])
-    arrows = [text for text in ax.texts if text.get_text() == ""]
-    lengths = [arrow.xy[0] - arrow.xyann[0] for arrow in arrows]
-    np.testing.assert_allclose(lengths, [0.45, -0.9])  # in proportion, and in direction
-
-
-def test_chain_sketch_of_balls_at_rest(ax):
-    chain_sketch(Chain([1, 1], [0, 0], 1), ax)
-    assert not [text for text in ax.texts if text.get_text() == ""]
-
-
 def test_balls_differ_in_colour_and_in_dash():
     styles = [figures.ball_style(ball) for ball in range(7)]
     assert len({style["color"] for style in styles}) == 7
@@ -196,8 +167,7 @@ def test_two_digits_are_one_index():
     trace = collide(Chain([1] * 12, np.eye(12)[0]), ImpulseCorrelation(0.1))
     words = drawn(lambda ax: figures.velocities(trace, ax))
     words |= drawn(lambda ax: figures.velocity_impulse(trace, 10, ax, other=9))
-    words |= drawn(lambda ax: chain_sketch(trace.chain, ax))
-    assert words >= {"$v_9$", "$v_{12}$", "$B_{10}$", "$m_{12}$", r"$\tau_{12}$"}
+    assert words >= {"$v_9$", "$v_{12}$"}
     assert words >= {r"impulse $\tau_{12}$ (N s)", r"impulse $\tau_{11}$ (N s)"}
     assert not [word for word in words if re.search(r"_\d\d", word)]
 

@@ -9,7 +9,6 @@ import re
 import numpy as np
 import pytest
 from chains import striking
-from matplotlib.figure import Figure
 
 from cradle import (
     Chain,
@@ -33,7 +32,6 @@ from cradle.closed_form import (
 )
 from cradle.measures import bouncing_pattern, condition_number, conserving_outcomes, effective_ratio
 from cradle.pictures.animation import animate_swing
-from cradle.pictures.balls import outcome_by_ball
 
 NAN, INF, ONES = np.nan, np.inf, np.ones(3)
 THREE, LOSSY = striking(), striking(e=0.9)
@@ -43,12 +41,6 @@ RUN = swing(Chain([1, 1], [0, 0]), SequentialCollisions(), [-0.03, 0], [0.0, 0.1
 
 def chain(**change):
     return Chain(**({"masses": [1, 2, 3], "velocities": [1, 0, -1], "restitution": 1} | change))
-
-
-def drawn(velocities, letters=""):
-    """Outcomes of several chains of equal balls, one picture."""
-    traces = [collide(Chain(np.ones(len(v)), v), ImpulseCorrelation(0.0)) for v in velocities]
-    return outcome_by_ball(traces, Figure().subplots(), letters=letters)
 
 
 def ratio_of(velocities):
@@ -183,10 +175,6 @@ OTHERS = [
     (post_impact_velocities, (MASKED, [1, 0, 0], 1, 0.1), "masses[1] = masked; must be a real"),
     (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
     (TRACE.plot, {"contact": 4}, "contact = 4; must be a whole number, 0 to 1"),
-    (drawn, ([],), "traces has chains of [] balls; must be of one length"),
-    (drawn, ([[1, 0], [1, 0, 0]],), "traces has chains of [2, 3] balls"),
-    (drawn, ([[1, 0], [0, -1]],), "traces has a first ball at rest"),
-    (drawn, ([[1, 0]], "ABC"), "letters = 'ABC'; 2 balls need as many"),
     (animate_swing, ([],), "runs has no swing, or one without a duration"),
     (animate_swing, (RUN, ["a", "b"]), "labels has 2 lines; 1 swings need as many"),
 ]  # fmt: skip

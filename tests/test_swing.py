@@ -17,6 +17,7 @@ from cradle import (
     ImpulseCorrelation,
     Pendulums,
     SequentialCollisions,
+    SpringChain,
     swing,
     textbook,
 )
@@ -217,6 +218,57 @@ def test_two_balls_at_a_time_are_the_limit_of_stiff_springs(m, x, pendulums):
     assert apart[2] < 0.005
     for coarse, fine in zip(apart, apart[1:]):
         assert 0.5 < math.log(coarse / fine) / math.log(100**0.4) < 1.5
+
+
+# Contact forces
+
+#: Viscosity, s, gaps, m, and which balls are pulled to which side.
+FORCES = {
+    "touching": (0.0, 0.0, [-1, 0, 0, 0, 0]),
+    "gaps that close while others push": (0.0, 1e-6, [-1, 0, 0, 0, 0]),
+    "losses": (4e-7, 0.0, [-1, 0, 0, 0, 0]),
+    "losses and gaps": (4e-7, 1e-6, [-1, -1, 0, 0, 0]),
+    "two strikes at once": (4e-7, 3e-6, [-1, 0, 0, 0, 1]),
+}
+
+
+@pytest.mark.parametrize(("viscosity", "gaps", "side"), FORCES.values(), ids=FORCES)
+def test_contact_forces_move_the_balls_as_their_equations_of_motion_do(viscosity, gaps, side):
+    """By SciPy, in three strikes a micrometre of 3 cm apart; a strike in no time is 1 mm off."""
+    stiffness, period, x0 = 1e10, 2 * math.pi / math.sqrt(9.81 / 0.14), 0.03 * np.array(side)
+    chain = Chain([0.045] * 5, [0] * 5)
+
+    def rate(_, y):
+        x, v = np.split(y, 2)
+        deep = np.maximum(x[:-1] - x[1:] - gaps, 0.0)
+        slope = 1.5 * viscosity * (v[:-1] - v[1:])
+        force = np.maximum(stiffness * np.sqrt(deep) * (deep + slope), 0.0)
+        return np.concatenate([v, -9.81 / 0.14 * x - np.diff(force, prepend=0, append=0) / 0.045])
+
+    # Pendulums of one length swing alike: all meet near the middle of each stroke, and only there.
+    times, y, found = period * np.array([0.248, 0.256, 0.748, 0.756, 1.248, 1.256, 1.5]), None, []
+    y = np.concatenate([x0, np.zeros(5)])
+    for strike, (begin, end) in enumerate(zip([0.0, *times], times)):
+        if strike % 2:
+            y = solve_ivp(rate, (begin, end), y, "DOP853", max_step=2e-5, rtol=1e-9, atol=1e-12)
+            y = y.y[:, -1]
+        else:
+            turn, (x, v), w = 2 * math.pi * (end - begin) / period, np.split(y, 2), 2 * math.pi
+            w /= period
+            y = np.concatenate([x * math.cos(turn) + v / w * math.sin(turn),
+                                v * math.cos(turn) - w * x * math.sin(turn)])  # fmt: skip
+        found.append(y[:5])
+    law = SpringChain(stiffness, viscosity=viscosity, accuracy=1e-7)
+    run = swing(chain, law, x0, times, pendulums=Pendulums(0.14, gaps=gaps))
+    assert len(run.impacts) >= 3
+    np.testing.assert_allclose(run.positions, found, atol=2e-6)
+
+
+def test_springs_too_soft_for_a_strike_collide_in_no_time():
+    """Then ratios of stiffness alone count, as in `collide`."""
+    runs = [swing(balls(3), SpringChain(k), pulled(3), [0.3, 0.9]) for k in (1.0, 2.0)]
+    assert len(runs[0].impacts) == len(runs[1].impacts) > 1
+    np.testing.assert_allclose(runs[0].positions, runs[1].positions, rtol=1e-8)
 
 
 # Resting contacts
@@ -531,6 +583,7 @@ REFUSED = [
     (swung(times=[1, 0]), "times = [1, 0]; must be a row of rising"),
     (swung(times=[]), "times = []; must be a row of rising"),
     (swung(max_impacts=0), "max_impacts = 0"),
+    (swung(model=SpringChain(gaps=1e-6)), "model.gaps = 1e-06; must be 0: those of a swing are"),
     (swung(min_energy=2), "min_energy = 2.0; must lie in"),
     (swung(model=ImpulseCorrelation([0.1] * 4)), "forward has 4 values; 3 balls need 1"),
     (swung(pendulums=Pendulums(1, damping=4)),

@@ -221,7 +221,6 @@ def draw(setting: dict[str, Any], path: Path) -> None:
 
     from cradle import Chain, ImpulseCorrelation, SpringChain, collide
     from cradle.pictures import impacts as figures
-    from cradle.pictures.balls import chain_sketch
 
     chain = Chain(
         setting["masses"], setting["speeds"], setting["restitution"]
@@ -237,9 +236,34 @@ def draw(setting: dict[str, Any], path: Path) -> None:
     )
     row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.2])
     letters = setting["letters"].replace("-", "")
-    chain_sketch(chain, row, letters=letters)
+    sketch(chain, row, letters)
     figures.velocities(collide(chain, model), diagram)
     figure.savefig(path, metadata={"Date": None})
+
+
+def sketch(chain: Any, ax: Any, letters: str) -> None:
+    """Draw a chain as a row of balls: radii as for one density, arrows for velocities."""
+    from matplotlib.patches import Circle
+
+    from cradle.pictures.impacts import ball_style
+
+    radii = 0.5 * np.cbrt(chain.masses / np.max(chain.masses))
+    centres = np.cumsum(2 * radii) - radii
+    speeds = chain.velocities / (np.abs(chain.velocities).max() or 1.0)
+    for k, (x, radius) in enumerate(zip(centres, radii, strict=True)):
+        colour = ball_style(k)["color"]
+        ax.add_patch(Circle((x, 0), radius, fc="0.93", ec=colour, lw=2))
+        name = letters[k] if letters else str(k + 1)
+        # A name that does not fit in its ball stands above it.
+        height = 0 if radius > 0.2 else radius + 0.12
+        ax.text(x, height, name, ha="center", va="center")
+        if speeds[k]:
+            ends = [(x + way * 0.45 * speeds[k], 0.68) for way in (1, -1)]
+            arrow = {"arrowstyle": "-|>", "color": "black"}
+            ax.annotate("", *ends, arrowprops=arrow)
+    right = centres[-1] + radii[-1] + 0.2
+    ax.set(xlim=(-0.2, right), ylim=(-0.7, 0.9), aspect="equal")
+    ax.set_axis_off()
 
 
 def add_scripts(

@@ -13,7 +13,6 @@ def end_plastically(first, last, n, state):
     """End those contacts of first..last that are active; their balls have one velocity."""
     contact, run = state.contact, state.run
     for c in range(first, last + 1):
-        contact[c].u = ZERO
         contact[c].made = 0.0
         contact[c].tiny = 0
         if contact[c].active == 1:

@@ -26,21 +26,7 @@ def fastest(chain: Chain) -> tuple[int, float, float]:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class CurvedTrace(Trace):
-    """The path of an impact whose events are joined by smooth curves; N balls, S steps."""
-
-    step_velocities: Vector
-    step_impulses: Vector
-    evaluations: int
-
-    def curve(self) -> tuple[Vector, Vector]:
-        """Return impulses and velocities at the steps of the integration, and at the end."""
-        impulses = np.vstack([self.step_impulses, self.impulses])
-        return impulses, np.vstack([self.step_velocities, self.velocities])
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class EnergyTrace(CurvedTrace):
+class EnergyTrace(Trace):
     """The path of an impact whose ratios of impulses change all the time; N balls, S steps.
 
     Attributes
@@ -50,6 +36,15 @@ class EnergyTrace(CurvedTrace):
     evaluations : int
         How often the ratios were evaluated.
     """
+
+    step_velocities: Vector
+    step_impulses: Vector
+    evaluations: int
+
+    def curve(self) -> tuple[Vector, Vector]:
+        """Return impulses and velocities at the steps of the integration, and at the end."""
+        impulses = np.vstack([self.step_impulses, self.impulses])
+        return impulses, np.vstack([self.step_velocities, self.velocities])
 
 
 @dataclass(frozen=True)

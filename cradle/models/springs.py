@@ -9,7 +9,7 @@ import numpy as np
 from cradle.input.values import Vector, refusal
 from cradle.kernel import accuracy as limits
 from cradle.kernel.kinks import Law, Motions, Springs
-from cradle.models.energy import CurvedTrace
+from cradle.models.energy import EnergyTrace
 from cradle.runtime.springs import solve
 from cradle.trace import Event
 
@@ -39,7 +39,7 @@ def refused(clock: Any, accuracy: float, place: Sequence[int], chain: Springs) -
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class TimedTrace(CurvedTrace):
+class TimedTrace(EnergyTrace):
     """The path of an impact that has a time, by curves; N balls, K events, S steps.
 
     The outcome has the accuracy asked for; the way is less exact near a closing or an opening.
@@ -101,10 +101,11 @@ class TimedTrace(CurvedTrace):
     def parted(self) -> tuple[float, Vector]:
         """Return how long it takes until no balls overlap, s, and how far each goes until then, m.
 
-        What is left of a compression that does not open in as much time again is too little to matter.
+        A compression that is left and would take as long again to open is too little to matter.
         """
         record: list[Any] = []
-        clock = solve(*vars(self)["_ran"], record=record)[2]
+        row, law, out = vars(self)["_ran"]
+        clock = solve(row, law, out, record=record)[2]
         begun, ended = record[0][0], record[-1][-1]
         time, y, u = ended[0, 0], ended[2, :-1], -np.diff(ended[1])  # u: closing speeds
         late = np.divide(y, -u, out=np.zeros_like(u), where=(y > 0.0) & (y < -u * time)).max()

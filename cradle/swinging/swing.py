@@ -43,6 +43,8 @@ def swing(
     model : Model
         The impact law, such as `ImpulseCorrelation`.  Where a part of the chain collides alone, it
         has its part of the values, with ``excess="saturate"`` if the law has that field.
+        `SpringChain` takes its time and sees the gaps that close meanwhile, unless its stiffness is
+        so low that a contact would last some .1 rad of the swing; other impacts take no time.
     positions : array_like, shape (N,)
         Where the balls are released, along their arcs from their lowest points, m; positive to the
         right.  At most a quarter of a circle, or half a circle with ``angle="full"``.
@@ -82,6 +84,8 @@ def swing(
     n = len(must_be(Chain, "chain", chain))
     hanging = Pendulums() if pendulums is None else must_be(Pendulums, "pendulums", pendulums)
     collide(Chain(chain.masses, np.zeros(n), chain.restitution), model)  # do they fit?
+    if isinstance(model, SpringChain) and np.any(model.gaps):
+        raise ValueError(f"model.gaps = {model.gaps!r}; must be 0: those of a swing are Pendulums'")
     at = checked("times", times)
     if at.ndim != 1 or not at.size or at[0] < 0.0 or (np.diff(at) < 0.0).any():
         rule = "must be a row of rising numbers, none below 0, such as [0, 0.5, 1]"
@@ -120,11 +124,12 @@ class _Run:
             raise ValueError(f"positions = {x.tolist()}; {told}")
         self.freed = [-math.inf] * (n - 1)  # when the force in each contact last fell to zero
         self.lasting = False
-        if isinstance(model, SpringChain) and self.speed > 0.0:
-            m, p = chain.masses, model.exponent
-            depth = m[:-1] / (m[:-1] + m[1:]) * m[1:] / model.stiffness * self.speed**2
-            time = float(depth.max() ** (1.0 / (p + 1.0))) / self.speed
-            self.lasting = time * hanging.fastest < SHORT
+        self.lasting = False
+        if isinstance(model, SpringChain):
+            m, power = chain.masses, 1.0 / (model.exponent + 1.0)
+            energy = m[:-1] / (m[:-1] + m[1:]) * m[1:] * self.speed**2
+            deepest = float(np.max(energy / model.stiffness)) ** power
+            self.lasting = deepest * hanging.fastest < SHORT * self.speed
         self.settle([], [])
 
     def to_the_end(self, times: Vector, most: int, least: float) -> str:
@@ -181,15 +186,16 @@ class _Run:
         # What opens at this instant rests no more in it, whatever else happens.
         for c in opening:
             self.freed[c] = self.t
-        contacts = zip(touching.tolist(), self.freed, strict=True)
-        kept = [touches and self.t - freed > hanging.tie for touches, freed in contacts]
+        near = touching.tolist()
+        known = zip(near, self.freed, strict=True)
+        kept = [touches and self.t - freed > hanging.tie for touches, freed in known]
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
         self.instants.append((self.t, x, self.x, v, struck, self.v, 0.0))
         if any(resting):
             alone = hanging.accelerations(self.x, self.v)
             resting = pressed(hanging.masses, alone, resting, 1e-12 * self.speed * hanging.fastest)
         self.together = tuple(resting)
-        self.parting = tuple(t and not one for t, one in zip(touching.tolist(), resting, strict=True))
+        self.parting = tuple(t and not one for t, one in zip(near, resting, strict=True))
 
     def gaps(self) -> Vector:
         """Return the gaps of the contacts, m; 0 where balls touch."""
@@ -235,15 +241,16 @@ class _Run:
         """Solve the impact of a part of the chain; contact forces with the gaps that it has now."""
         m, e = self.chain.masses[first:last], self.chain.restitution[first : last - 1]
         law: Any = self.model(first, last)
-        solve = law.solve  # not by `collide`, whose advice on a long path cannot be taken here
+        more: dict[str, Any] = {"once": True} if self.lasting else {}
         if self.lasting:
-            gaps = self.gaps()[first : last - 1] + law.gaps
-            solve = functools.partial(replace(law, gaps=tuple(gaps.tolist())).solve, once=True)
+            law = replace(law, gaps=tuple(self.gaps()[first : last - 1].tolist()))
         try:
-            return solve(Chain._of(m, before[first:last].copy(), e))
+            # Not by `collide`, whose advice on a long path cannot be taken here.
+            trace: Trace = law.solve(Chain._of(m, before[first:last].copy(), e), **more)
         except ValueError as refused:
             refused.add_note(f"at the impact at t = {self.t} s, balls {first} to {last - 1}")
             raise
+        return trace
 
 
 def part(model: Any, n: int, first: int, last: int) -> Model:
