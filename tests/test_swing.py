@@ -18,6 +18,7 @@ from cradle import (
     Pendulums,
     SequentialCollisions,
     SpringChain,
+    collide,
     swing,
     textbook,
 )
@@ -617,6 +618,39 @@ def test_no_ball_is_released_beyond_its_reach(angle, part):
         words = f"positions[0] = {beyond!r}; must be within {end:.4g} m: "
         with pytest.raises(ValueError, match="^" + re.escape(words)):
             swung(positions=[beyond, 0, 0], pendulums=hanging)()
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.5])
+@pytest.mark.parametrize(("masses", "ball"), [([1, 1], 1), ([1, 0.1], 1), ([1, 100], 0)])
+def test_no_ball_swings_beyond_its_reach(masses, ball, damping):
+    """Small angles: what an impact at the lowest point throws turns between two of the times."""
+    rate = math.sqrt(9.81 - damping**2)
+    turn = math.atan2(rate, damping) / rate
+    chain = Chain(masses, [1, 0])
+    after = collide(chain, SequentialCollisions()).velocities[ball]
+    far = after * math.exp(-damping * turn) * math.sin(rate * turn) / rate
+    for part, at in ((1 - 1e-6, None), (1 + 1e-6, "0"), (1.5, "0")):
+        speed = part * 0.5 * math.pi / abs(far)
+        run = swung(chain=Chain(masses, [speed, 0]), model=SequentialCollisions(),
+                    positions=[0, 0], times=[0.3 * turn, 1.8 * turn],
+                    pendulums=Pendulums(1, damping=damping))  # fmt: skip
+        if at is None:
+            assert np.abs(run().positions).max() < 0.5 * math.pi
+            continue
+        words = (
+            rf"^after t = 0 s positions\[{ball}\] = (.+); must be within 1\.571 m: pendulums of "
+        )
+        with pytest.raises(ValueError, match=words) as refused:
+            run()
+        found = float(re.match(words, str(refused.value))[1])
+        assert found == pytest.approx(speed * far, rel=1e-9)
+
+
+def test_a_ball_that_an_impact_throws_beyond_its_reach_is_refused_with_the_time():
+    run = swung(chain=Chain([1, 0.1], [0, 0]), model=SequentialCollisions(), positions=[-1, 0],
+                pendulums=Pendulums(1))  # fmt: skip
+    with pytest.raises(ValueError, match=r"^after t = 0\.5015 s positions\[1\] = 1\.818"):
+        run()
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.1])

@@ -174,6 +174,13 @@ class SmallAngleFlight:
         closing = [c for c in met if not self.together[c]]
         return first, closing, [c for c in met if self.together[c] and times[c] == first]
 
+    def turning(self, duration: float) -> Vector:
+        """Return where each ball first turns, or is after that time, shape (N,)."""
+        rate, wave = self.bodies.rate, self.amplitude
+        wait = (0.5 * np.pi - np.angle(rate * wave)) % np.pi / rate.imag
+        last: Vector = (wave * np.exp(rate * np.minimum(wait, duration))).real
+        return self.bodies.centre + last
+
     def at(self, times: Vector) -> tuple[Vector, Vector]:
         """Return positions and velocities at T times since the start, shapes (T, N)."""
         wave = self.amplitude * np.exp(np.multiply.outer(times, self.bodies.rate))

@@ -75,11 +75,15 @@ class Pendulums:
         if x.shape != (size,):
             rule = f"{size} balls need ({size},): a place for each ball"
             raise ValueError(f"positions has shape {x.shape}; {rule}")
-        reach = self.reach(size)
+        return self.within_reach(x)
+
+    def within_reach(self, x: Vector, when: str = "") -> Vector:
+        """Return where the balls are, m, or refuse that one is so far aside."""
+        reach = self.reach(len(x))
         beyond = np.abs(x) > reach
         most = "a quarter of a circle" if self.angle == "small" else "half a circle"
         far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most}"
-        asked.refuse_where("positions", x, beyond, f"must be within {far}")
+        asked.refuse_where(f"{when}positions", x, beyond, f"must be within {far}")
         return x
 
     def natural_frequency(self, size: int) -> Vector:

@@ -66,7 +66,8 @@ def swing(
     TypeError, ImpactNotFinished
         As `collide`.
     ValueError
-        If a value is wrong, balls overlap, or the model cannot treat an impact.
+        If a value is wrong, balls overlap, one swings farther aside at small angles than it may be
+        released, or the model cannot treat an impact.
     RuntimeError
         If contacts open and close without end at one instant, balls pass each other or swing over
         the top, or energy or momentum are made or lost: all flights and instants are checked.
@@ -106,7 +107,8 @@ class _Run:
 
     def __init__(self, chain: Chain, model: Model, pendulums: Pendulums, x: Vector) -> None:
         n = len(chain)
-        self.chain, self.hanging = chain, (hanging := Hanging(pendulums, chain.masses))
+        self.chain, self.pendulums = chain, pendulums
+        self.hanging = hanging = Hanging(pendulums, chain.masses)
         self.model = functools.cache(functools.partial(part, model, n))
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
         self.released = float(hanging.energy(self.x, self.v))
@@ -141,7 +143,10 @@ class _Run:
                 ended = "energy"
                 break
             flight = kind(self.hanging, self.x, self.v, self.together, self.parting)
-            wait, closing, opening = flight.next_meeting(max(end - self.t, 0.0))
+            wait, closing, opening = flight.next_meeting(left := max(end - self.t, 0.0))
+            if isinstance(flight, SmallAngleFlight):  # others are certified not to go over the top
+                far = (1.0 - INSTANT) * flight.turning(min(wait, left))
+                self.pendulums.within_reach(far, f"after t = {self.t:.4g} s ")
             later = self.t + wait
             here = int(times.searchsorted(later, side="left"))
             if here > done or later > end:
