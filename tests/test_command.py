@@ -168,6 +168,7 @@ def test_what_is_not_given_is_said(options, model, assumed):
             "solve --masses 1,1 --velocities 0,-1",
         ),
         ("swing 3 --pull 1 --csv", "swing --masses 1,1,1 --csv"),
+        ("swing --ratio 0.1 --steps 3", "swing 5 --ratio 0.1 --steps 3"),
         ("swing 2 --period 2 --steps 3", f"swing 2 --length {9.81 / math.pi**2} --steps 3"),
         ("swing 2 --gaps 0.001 --csv", "swing 2 --gaps 0.001 --damping 0 --csv"),
     ],
@@ -520,6 +521,8 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("swing 3 --length 1 --period 1", 2, "give one of --length and --period"),
         ("swing 3 --gaps 1,1,1", 1, "--gaps has 3 values; 3 balls need 2, or one number"),
         ("swing 3 -o toy.bmp", 1, "'toy.bmp'; must end in .svg, .html, .gif, .mp4 or .png"),
+        ("swing 3 -o toy", 1, "'toy'; must end in .svg, .html, .gif, .mp4 or .png"),
+        ("swing --masses 1,0.1 --by 0.3 --length 0.2", 1, "after t = 0.2243 s ball 2 at 0.545"),
         ("swing --masses 1,1,1 --length 0", 1, "cradle: --length 0.0; must be above 0"),
         ("recommend --masses 1,1,1", 1, "Give --stiffness 1 if all contacts are equal spheres"),
         ("recommend --masses 1,1,1 --wanted path,x", 1, "--wanted 'x'; must be one of"),
@@ -616,6 +619,25 @@ def test_first_answer_within_a_second(tmp_path):
     assert float(seconds) < 1
     assert loaded == "set()"
     assert "0.2782" in result.stdout
+
+
+def test_a_picture_without_matplotlib_is_refused_in_words(tmp_path):
+    code = (
+        "import sys\n"
+        "class Nowhere:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name.startswith('matplotlib'):\n"
+        "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
+        "sys.meta_path.insert(0, Nowhere())\n"
+        "from cradle.command.solve import run\n"
+        "for line in ('plot 3 -o a.png', 'swing 3 -o a.gif --seconds 1e6'):\n"
+        "    try:\n        run(line.split())\n"
+        "    except SystemExit as stopped:\n        assert stopped.code == 1\n"
+    )
+    result = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True,
+                            text=True, check=True, timeout=100)  # fmt: skip
+    words = "cradle: needs matplotlib, which is not installed: pip install matplotlib\n"
+    assert (result.stdout, result.stderr) == ("", 2 * words)
 
 
 def test_a_swing_that_ends_early_says_so(monkeypatch):

@@ -102,7 +102,7 @@ def described(
         size = int(sequence) if len(sequence) < 10 else sequence  # Python reads no longest numbers
         masses = [1.0] * whole_number("SEQUENCE", size, "2 to 1000000 balls", 2, 1_000_000)
         sequence = None
-        assumed.append(f"equal balls of 1 {unit or 'kg'}")
+        assumed.append(f"{len(masses)} equal balls of 1 {unit or 'kg'}")
     if (sequence is None) == (masses is None):
         need = "how many equal balls, such as 5, or a sequence of the paper's balls, such as ABCCA"
         raise click.UsageError(f"give {need}, or --masses")

@@ -12,8 +12,7 @@ from cradle.command.describe import chain_options, described, numbers_of, one_or
 @click.command()
 @chain_options
 @click.option("--wanted", multiple=True, default=["velocities"], help="velocities, impulses, path, "
-              "forces, times or fastest ball, or several with commas between "
-              "[velocities].")  # fmt: skip
+              "forces, times, fastest ball; with commas between [velocities].")  # fmt: skip
 @click.option("--accuracy", default=1e-6, help="Largest numerical error, as a part of the closing "
               "speed [1e-6].")  # fmt: skip
 @click.option("--model-error", type=float, help="Largest distance from elastic spheres [any].")

@@ -27,6 +27,7 @@ from cradle.runtime import job as drive
 _ROW = r"\b(masses|velocities|restitution|ratio|backward|stiffness|gaps|damping)"
 _SHOOT = r"shoot these two balls alone, or give --restitution \1=E:ERROR"
 _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
+    r"^No module named '(?!cradle)(\w+).*": r"needs \1, which is not installed: pip install \1",
     r"excess='saturate'": "--saturate",
     r"(mass|velocity)_unit='(\S+)'": r"--\1-unit \2",
     r"\bstiffness=": "--stiffness ",
@@ -46,6 +47,7 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     _ROW + r"\[(\d+)\] = ": lambda found: f"--{found[1]}, value {int(found[2]) + 1}: ",
     _ROW + r" has shape \((\d+),\);[^:]*: ": r"--\1, \2 given: ",
     _ROW + "(?= = | has)": r"--\1",
+    r"positions\[(\d+)\] = ": lambda found: f"ball {int(found[1]) + 1} at ",
     r"sequence\[(\d+)\] = ": lambda found: f"SEQUENCE, ball {int(found[1]) + 1}: ",
     r"at ball (\d+), counted from 0,": lambda found: f"at ball {int(found[1]) + 1}",
 }
@@ -152,10 +154,7 @@ def warm_up() -> None:
     drive.warm_up()
     seconds = time.perf_counter() - begun
     if not runtime.loaded():
-        told = (
-            f"not compiled: numba is missing or switched off, or {runtime.VARIABLE}=plain is set; "
-            "the event loop runs plain"
-        )
+        told = f"not compiled: numba is missing or switched off, or {runtime.VARIABLE}=plain is set"
     elif there:
         told = f"compiled already; loaded in {seconds:.1f} s"
     elif runtime.on_disk():
@@ -169,7 +168,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit; wrong input ends in one line on standard error."""
     try:
         main(arguments, prog_name="cradle")
-    except (ValueError, OSError, ImpactNotFinished, ImpactNotCertified) as error:
+    except (ValueError, OSError, ImportError, ImpactNotFinished, ImpactNotCertified) as error:
         message = str(error)
         for python, option in _OPTIONS.items():
             message = re.sub(python, option, message)

@@ -34,7 +34,8 @@ def swing(
 ) -> None:  # fmt: skip
     """Positions of a swinging cradle, impact after impact.
 
-    The balls that are pulled aside are let go: --speed and --velocities are refused.
+    Five equal balls, if none are named.  Those that are pulled aside are let go: --speed and
+    --velocities are refused.
 
     \b
     Examples:
@@ -48,6 +49,8 @@ def swing(
                                "(--pull) and let go")  # fmt: skip
     if output and (as_json or as_csv):
         raise click.UsageError("give one of --output, --json and --csv")
+    if options["masses"] is None:
+        options["sequence"] = options["sequence"] or "5"
     length = describe.pendulum_length(options.pop("length"), options.pop("period"))
     given = describe.described(**options)
     chain = given.chain
@@ -58,7 +61,10 @@ def swing(
     one_number("--by", by, rule, 0.0, far, open_low=True)
     one_number("--seconds", seconds, *ABOVE_ZERO)
     whole_number("--steps", steps)
-    if output:  # twenty keyframes a swing
+    if output:
+        from cradle.pictures.animation import animate_swing  # what is missing is said before work
+
+        # Twenty keyframes a swing.
         steps = math.ceil(20 * seconds * hanging.natural_frequency(len(chain))[0] / math.tau)
     places = _released(pull or [1.0], by, len(chain))
     balls = cradle.Chain(chain.masses, [0.0] * len(chain), chain.restitution)
@@ -77,8 +83,6 @@ def swing(
     told = given._replace(assumed=tuple(one for one in given.assumed if "strikes" not in one))
     extra = {"model": made(given.model), "assumed": told.assumed, "impacts": impacts}
     if output:
-        from cradle.pictures.animation import animate_swing
-
         animate_swing(run).save(output)
         click.echo(f"drawn to {output}; impacts: {len(impacts)}\n{told.note}")
     else:

@@ -80,7 +80,7 @@ class Animation:
         """
         file = Path(path)
         kind = file.suffix.lower()
-        if kind in (".svg", ".html", ""):
+        if kind in (".svg", ".html"):
             page = f"<!doctype html>\n<meta charset='utf-8'>\n{self._repr_html_()}\n"
             file.write_text(page if kind == ".html" else self.svg, encoding="utf-8")
         elif kind == ".png":
