@@ -14,7 +14,6 @@ A solver that puts balls back onto their strings takes the part q (h w / l)^2 of
 1/2.  The row learns q too; then each part of a divided side loses what it would lose alone.
 """
 
-import math
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -22,7 +21,7 @@ from typing import Protocol
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.input.values import ABOVE_ZERO, ArrayLike, a, one_number
+from cradle.input.values import ABOVE_ZERO, ArrayLike, a, one_number, shown
 from cradle.models import Model
 from cradle.swinging.stride import Alone, Flight, Hit, Plane
 
@@ -294,8 +293,9 @@ def step_rows(rows: Sequence[Row], duration: float) -> None:
     ValueError, RuntimeError
         As `Row.step` does.
     """
-    if not (type(duration) is float and 0.0 < duration < math.inf):  # one comparison a step
-        duration = one_number("duration", duration, *ABOVE_ZERO)
+    if not (isinstance(rows, Sequence) and rows and all(isinstance(one, Row) for one in rows)):
+        raise ValueError(f"rows = {shown(rows)}; must be one Row or more: the first has the engine")
+    duration = one_number("duration", duration, *ABOVE_ZERO)
     begun = [row._before(duration) for row in rows]
     rows[0].bodies.advance(duration)
     for row, push in zip(rows, begun, strict=True):

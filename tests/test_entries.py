@@ -34,7 +34,7 @@ from cradle import (
 )
 from cradle.pictures import animation
 from cradle.pictures import impacts as figures
-from cradle.row import Row
+from cradle.row import Row, step_rows
 
 PACKAGE = Path(cradle.__file__).parent
 DATA = Path(__file__).parents[1] / "data"
@@ -69,7 +69,7 @@ SHOTS = fit.read_shots(DATA / "shots_synthetic.csv", velocity_unit="m/s")
 #: Entry points and arguments that they can take.
 ENTRIES = {
     Chain: BALLS,
-    collide: {"chain": THREE, "model": MODEL},
+    collide: {"chain": THREE, "model": MODEL, "record": True, "progress": False},
     ImpulseCorrelation: {
         "forward": 0.1, "backward": 0.1, "meeting": 0.5, "excess": "raise", "max_events": 100,
     },
@@ -77,11 +77,13 @@ ENTRIES = {
     FusedChain: {},
     SpringChain: FORCES | {"max_steps": 10_000},
     EnergyDistribution: SPRINGS | {"rtol": 1e-6, "max_evaluations": 10_000, "gaps": True},
-    cradle.spring_velocities: {"masses": [1, 1, 1], "velocities": [1, 0, 0]} | FORCES,
+    cradle.spring_velocities: {
+        "masses": [1, 1, 1], "velocities": [1, 0, 0], "progress": False,
+    } | FORCES,
     cradle.viscosity_from: {"restitution": 0.9, "speed": 1, "masses": [1, 1], "stiffness": 1},
     QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
-    cradle.post_impact_velocities: SEVEN | {"max_events": 100},
-    cradle.outcomes: SEVEN | {"max_events": 100},
+    cradle.post_impact_velocities: SEVEN | {"max_events": 100, "progress": False},
+    cradle.outcomes: SEVEN | {"max_events": 100, "progress": False},
     cradle.paper_chain: {"sequence": "ABC", "speed": 1.0, "excess": "saturate"},
     cradle.recommend: {
         "chain": THREE, "wanted": "velocities", "accuracy": 1e-3, "model_error": 0.5, "impacts": 1,
@@ -98,6 +100,7 @@ ENTRIES = {
         "acceleration": 9.81,
     },
     Row(Still(), THREE, MODEL, 0.1).step: {"duration": 0.01},
+    step_rows: {"rows": [Row(Still(), THREE, MODEL, 0.1)], "duration": 0.01},
     TRACE.plot: {"ax": Figure().subplots(), "contact": 0},
     measures.bouncing_pattern: {"velocities": [0, 0, 1]},
     measures.condition_number: {"chain": THREE, "model": MODEL, "step": 1e-6},

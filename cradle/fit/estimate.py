@@ -11,7 +11,7 @@ from cradle.fit.parameters import Key, fitted_keys, label, pair_keys, parameter_
 from cradle.fit.result import Estimate, Fit, Group
 from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
-from cradle.input.values import ABOVE_ZERO, PART, ArrayLike, Vector, checked, one_number
+from cradle.input.values import ABOVE_ZERO, PART, ArrayLike, Vector, checked, flag, one_number
 from cradle.kernel.state import LIMITS
 
 _TRIALS = 513  # points at which it is tried whether a ratio acts at all
@@ -126,7 +126,7 @@ def ratio(
             one_number(name, value, rule, high=bound * LIMITS.rounded)
     bounds = {key: _bound(key, masses)
               for one in sets for key in ratio_keys(one.types) if key not in fixed}  # fmt: skip
-    with tqdm(unit=" points", delay=2.0, disable=not progress) as bar:
+    with tqdm(unit=" points", delay=2.0, disable=not flag("progress", progress)) as bar:
         return _fitted(shots, "ratio", bounds, given, fixed, bar.update)
 
 

@@ -102,7 +102,7 @@ def checked(
 
 def one_number(name: str, value: ArrayLike, *limits: Any, **more: Any) -> float:
     """Return `value` as a float, all that `checked` asks fulfilled."""
-    if type(value) is float and len(limits) == 3 and limits[1] < value < limits[2]:
+    if type(value) is float and len(limits) > 2 and limits[1] < value < limits[2]:
         return value
     number = checked(name, value, *limits, **more)
     if number.ndim:
@@ -174,6 +174,13 @@ def one_of(name: str, value: object, choices: Sequence[str]) -> str:
         rule = f"one of {', '.join(choices)}" if choices[2:] else " or ".join(map(repr, choices))
         raise ValueError(f"{name} = {shown(value)}; must be {rule}")
     return value
+
+
+def flag(name: str, value: object) -> bool:
+    """Return a switch that is on or off: a bool, or NumPy's."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} = {shown(value)}; must be True or False")
+    return bool(value)
 
 
 def must_be(kind: type[_Thing], name: str, thing: object) -> _Thing:

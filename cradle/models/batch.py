@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.input.values import ArrayLike, NDArray, Vector, numbers
+from cradle.input.values import ArrayLike, NDArray, Vector, flag, numbers
 from cradle.kernel import Inputs, Options, Outputs
 from cradle.models import correlation as paper
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
@@ -163,7 +163,7 @@ def in_order(
     solve: Callable[..., tuple[int, int]], starts: range, progress: bool
 ) -> Iterable[tuple[int, int]]:
     """Yield the results of `solve` in order, made by as many threads as there are processors."""
-    if progress:
+    if flag("progress", progress):
         from tqdm import tqdm
 
         ended = in_order(solve, starts, progress=False)

@@ -92,10 +92,10 @@ class ImpulseCorrelation:
         # Copies: compiled code is made for arrays that may be written to.
         inputs = Inputs(*(part[None].copy() for part in own))
         most = max(_MOST_NUMBERS // (2 * n - 1), 1)  # N velocities and N - 1 impulses each
-        room = most if record is None else _EVERY if record else 0
+        room = most if record is None else _EVERY if asked.flag("record", record) else 0
         options = Options(self.meeting, self.max_events, self.excess == "raise")
         job = Job(inputs, outputs(1, n, last=True), options, room)
-        if progress:
+        if asked.flag("progress", progress):
             from tqdm import tqdm
 
             with tqdm(unit=" events") as bar:

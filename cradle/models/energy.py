@@ -109,10 +109,9 @@ class EnergyDistribution:
             stiffness=asked.number_or_row("stiffness", self.stiffness, "N - 1", *asked.ABOVE_ZERO),
             exponent=asked.one_number("exponent", self.exponent, "must be at least 1", 1.0),
             rtol=asked.one_number("rtol", self.rtol, "must lie in [3e-14, 0.1]", 3e-14, 0.1),
+            gaps=asked.flag("gaps", self.gaps),
         )
         asked.whole_number("max_evaluations", self.max_evaluations)
-        if not isinstance(self.gaps, bool):
-            raise ValueError(f"gaps = {self.gaps!r}; must be True or False")
 
     def solve(self, chain: Chain) -> EnergyTrace:
         """Solve the impact of `chain`; see `collide`."""
