@@ -283,15 +283,12 @@ class Row(Alone):
 def step_rows(rows: Sequence[Row], duration: float) -> None:
     """Move a world with several rows on by one step, made by the first row's engine.
 
+    Errors are those of `Row.step`.
+
     Parameters
     ----------
     rows, duration : sequence of Row, float
         All rows of the world, and how long the step lasts, s.
-
-    Raises
-    ------
-    ValueError, RuntimeError
-        As `Row.step` does.
     """
     if not (isinstance(rows, Sequence) and rows and all(isinstance(one, Row) for one in rows)):
         raise ValueError(f"rows = {shown(rows)}; must be one Row or more: the first has the engine")

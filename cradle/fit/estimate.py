@@ -56,8 +56,7 @@ def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma:
     >>> restitution_from_heights("AA", [1.0, 1.0], [0.88, 0.90], 0.01)
     Fit(restitution AA = 0.9434 [0.9336, 0.9533]; chi-square 1.1 of 1)
     """
-    high = checked("drop", drop, *ABOVE_ZERO)
-    low = checked("rise", rise, *ABOVE_ZERO)
+    high, low = checked("drop", drop, *ABOVE_ZERO), checked("rise", rise, *ABOVE_ZERO)
     error = one_number("sigma", sigma, *ABOVE_ZERO)
     if high.ndim != 1 or high.shape != low.shape or not high.size:
         raise ValueError(f"drop has shape {high.shape}, rise {low.shape}; must be (K,), K >= 1")

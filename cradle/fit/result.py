@@ -22,9 +22,7 @@ RESULT_COLUMNS = ("name", "kind", "value", "intervals", "minima", "identified", 
 _DRAWS = 4000  # from the fitted parameters, for a prediction
 # A set that is so much longer on one side than on the other is no bell curve's; what is said then.
 SKEW = 1.3
-FOLDED = (
-    " (no bell curve, as near a fold: such sets held the true value in 90 of 100 trials, not 95)"
-)
+FOLDED = " (no bell curve, as near a fold: such sets held the true value 90 times of 100, not 95)"
 _ALL = 0.999  # a confidence set that covers more than this part of the range says nothing
 
 

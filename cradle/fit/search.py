@@ -75,8 +75,7 @@ def refine(function: Function, upper: Vector) -> Found:
     """Search several dimensions: a grid of cells, then the best cells divided."""
     size = upper.size
     if size not in _CELLS:
-        most = f"at most {max(_CELLS)} can be searched at a time"
-        told = f"{size} ratios act together in these shots; {most}"
+        told = f"{size} ratios act together in these shots; at most {max(_CELLS)} can be searched"
         raise ValueError(f"{told}: add shots of fewer balls, or fix some by known=")
     step = upper / _CELLS[size]
     points = np.array(list(product(*(s * (np.arange(_CELLS[size]) + 0.5) for s in step))))

@@ -30,7 +30,8 @@ class ImpulseCorrelation:
 
     At an interior ball the impulse of the driven contact grows in proportion to that of the
     contact that drives it.  Every contact ends when it has given back the part e^2 of the work it
-    absorbed.  Velocities are linear in the impulses between events, so no step size is needed.
+    absorbed.  Velocities are linear in the impulses between events, so no step size is needed.  A
+    value outside its range is a `ValueError`.
 
     Where several contacts of a touching stretch approach, the leftmost one drives all the others,
     so balls that are struck from both sides do not end as their mirror image does.
@@ -48,11 +49,6 @@ class ImpulseCorrelation:
         while the ratio would open it.
     max_events : int
         Number of steps after which the impact is given up.
-
-    Raises
-    ------
-    ValueError
-        If a value is outside its range.
 
     References
     ----------

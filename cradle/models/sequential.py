@@ -19,6 +19,7 @@ class SequentialCollisions:
     ``ImpulseCorrelation(0)``, which solves it.  When a collision ends, both neighbouring contacts
     may collide next; one that waits between two collisions does so when both have ended.  Those
     apart from each other have no common clock: which ends first is rule R8 of the book's chapter 6.
+    A value outside its range is a `ValueError`.
 
     Parameters
     ----------
@@ -27,11 +28,6 @@ class SequentialCollisions:
         outcome can depend on it.
     max_events : int
         Number of steps after which the impact is given up.
-
-    Raises
-    ------
-    ValueError
-        If a value is outside its range.
 
     References
     ----------

@@ -26,9 +26,7 @@ def refused(clock: Any, accuracy: float, place: Sequence[int], chain: Springs) -
     name, values, words = {
         limits.LIGHT: ("masses", chain.m, f"{least} heaviest ball of its chain"),
         limits.SOFT: ("stiffness", chain.k, f"{least} stiffest contact of its chain"),
-        limits.QUICK: (
-            "stiffness", chain.k, "a contact's time is beyond floats: choose other units"
-        ),
+        limits.QUICK: ("stiffness", chain.k, "its time is beyond floats: choose other units"),
         limits.LATE: ("viscosity", chain.loss, f"{late} of the fastest closing"),
         limits.WIDE: ("gaps", chain.gap, f"must be at most {widest:g} times {of} at this accuracy"),
         limits.NARROW: ("gaps", chain.gap, f"must be 0, or {limits.NARROWEST} of {of}"),

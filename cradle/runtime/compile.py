@@ -232,7 +232,6 @@ def chosen(large: bool = False, door: str = "batch") -> Any:
 
 @functools.cache
 def _announce() -> None:
-    where = "once on this machine"
-    if _stored() is None:
-        where = "in this process, as no folder for it is writable (set NUMBA_CACHE_DIR)"
+    alone = "in this process, as no folder for it is writable (set NUMBA_CACHE_DIR)"
+    where = "once on this machine" if _stored() else alone
     logger.warning("compiling the event loop, %s: up to a minute", where)

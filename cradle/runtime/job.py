@@ -74,10 +74,8 @@ def _area(n: int, compiled: bool, record: rooms.Record) -> rooms.State:
 
 def _record(room: int, n: int) -> rooms.Record:
     """Return room for that many events."""
-    return rooms.Record(
-        np.zeros(room, np.int64), np.zeros(room, np.int64),
-        np.zeros((room + 1, n)), np.zeros((room + 1, n - 1)),
-    )  # fmt: skip
+    kinds, contacts = np.zeros((2, room), np.int64)
+    return rooms.Record(kinds, contacts, np.zeros((room + 1, n)), np.zeros((room + 1, n - 1)))
 
 
 def outputs(rows: int, n: int, last: bool = False) -> plain.Outputs:
@@ -141,12 +139,13 @@ class Job:
         if compiled not in areas or len(areas[compiled].ball) != self.n:
             areas[compiled] = _area(self.n, compiled, _record(0, self.n))
         self.state = areas[compiled]
+        counts = self.state.tally[0]
+        self.counts = counts if compiled else vars(counts)
         self._make_room(64 + _ROUND * self.n)
 
     def tally(self, name: str) -> Any:
         """Return a count of the impact at hand."""
-        tally = self.state.tally
-        return tally[name].item() if self.compiled else getattr(tally[0], name)
+        return self.counts[name].item() if self.compiled else self.counts[name]
 
     def stored(self) -> float:
         """Return the work that contacts can still release, in the kernel's own units."""
@@ -161,11 +160,7 @@ class Job:
             for part, written in zip(record, old, strict=True):
                 part[: len(written)] = written
         self.state = rooms.State(*self.state[:-1], record)
-        limit = _ENDLESS if room == self.room else room - _ROUND * self.n
-        if self.compiled:
-            self.state.tally["room"] = limit
-        else:
-            self.state.tally[0].room = limit
+        self.counts["room"] = _ENDLESS if room == self.room else room - _ROUND * self.n
 
 
 @functools.cache

@@ -15,6 +15,8 @@ TIE = 1e-9
 class Pendulums:
     """How the balls hang: strings, gravity, gaps, and the damping of the swing.
 
+    A value outside its range is a `ValueError`.
+
     Parameters
     ----------
     length, gravity : float or (length) array_like of shape (N,)
@@ -26,11 +28,6 @@ class Pendulums:
     angle : {"small", "full"}
         Pendulums of any angle need equal lengths, no gaps and one damping: then contacts stay
         horizontal.  Small-angle ones swing too fast: by 1 % at 0.4 rad, by 7 % at 1 rad.
-
-    Raises
-    ------
-    ValueError
-        If a value is outside its range.
 
     Examples
     --------
