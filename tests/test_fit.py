@@ -545,6 +545,7 @@ EXPORTS = {
         "s\tcm\tcm\n\n0\t1\t2\n0.03\t2\t2\n",
         {"Run 1": [0.01, 0.02]},
     ),
+    "Logger Pro, units in brackets": ("t\tx\n(s)\t(cm)\n0\t1\n0.03\t2\n", {"track": [0.01, 0.02]}),
     "Capstone, byte-order mark": (
         "\ufeffTime (s) Run #1;Position (m) Run #1;Position, Ch 2 (m) Run #1;Velocity (m/s) Run #1"
         "\n0;0,1;0,5;0\n0,03;0,2;0,6;0\n",
@@ -592,6 +593,12 @@ def test_balls_are_in_the_order_of_the_titles(tmp_path):
         ("A\nt\tx\n0\t1\n1\there\n", "export.txt, line 4, column x: 'here'; must be a number"),
         ("A\nt\tx\n0\t1\n1\tinf\n", "export.txt, line 4, column x: 'inf'; must be a number"),
         ("#T X Y\n0:00:00:03 1.0 2.0\n", "line 2, column T: '0:00:00:03'; must be a number"),
+        ('t,x\n"0,0",1\n', "line 2, column t: '0,0'; must be a number, its decimals after a point"),
+        (
+            "Time (s) Run #1,Position (m) Run #1,Time (s) Run #2,Position (m) Run #2\n0,1,0,2\n",
+            "the times of Position do not rise; where one ball follows the other, write its name, "
+            "'# A', above; or columns named A/x, B/x",
+        ),
         ("t,x\n0,1\n0,2\n", "the times of track do not rise; where one ball follows the other"),
         ("t,x (px)\n0,1\n", "line 2, column x: px; say how large a pixel is, in m: unit"),
         ("t (frames),x\n0,1\n", "column t: unit 'frames'; must be in s, ms, m, cm, mm or px"),

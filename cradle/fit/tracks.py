@@ -74,10 +74,11 @@ def read_tracker(
     marks: dict[str, list[tuple[float, float]]] = {}
     for number, (first, *others) in rows.items():
         cells = [first.lstrip("# "), *others]
+        bare = [cell.strip("() ") for cell in cells]
         if cells[0] and _TITLE.findall(cells[0])[0][0].casefold() in _CLOCKS:
             titles = [_TITLE.findall(cell)[0] for cell in cells]
-        elif titles and {*map(str.strip, cells)} <= _UNITS.keys() and any(cells):
-            titles = [(text, cell) for (text, _), cell in zip(titles, cells, strict=False)]
+        elif titles and {*bare} <= _UNITS.keys() and any(bare):
+            titles = [(text, unit) for (text, _), unit in zip(titles, bare, strict=False)]
         elif titles and not first.startswith("#"):
             where = f"{file.name}, line {number}"
             if any(cells[len(titles) :]):
@@ -100,7 +101,7 @@ def read_tracker(
     for name, (times, _) in tracks.items():
         if (np.diff(times) <= 0.0).any():
             told = f"{file.name}: the times of {name} do not rise; where one ball follows the other"
-            raise ValueError(f"{told}, each needs a line with its name, '# A', above")
+            raise ValueError(f"{told}, write its name, '# A', above; or columns named A/x, B/x")
     apart = max(float(np.median(np.diff(t))) if t.size > 1 else 0.0 for t, _ in tracks.values())
     if apart > 0.5:
         told = f"{file.name} has marks {apart:g} s apart"
@@ -123,7 +124,7 @@ def _owners(
         elif len(names) == len(found) > 1:
             name = titles[at][0]
         elif len(found) > 1:  # the name stands above the first of its columns
-            name = next(filter(None, over[at::-1]), name)
+            name = next(filter(None, over[at::-1]), name or titles[at][0])
         else:
             name = block.replace("_", " ") or "track"
         clock = max(k for k in range(at) if titles[k][0].casefold() in _CLOCKS)
@@ -143,5 +144,5 @@ def _number(where: str, cell: str, title: tuple[str, str], told: float = 1.0) ->
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise ValueError(f"{where}: {cell!r}; must be a number")
+        raise ValueError(f"{where}: {cell!r}; must be a number, its decimals after a point")
     return value * (told if unit in ("", "px") else _UNITS[unit])
