@@ -228,6 +228,17 @@ def test_swings_side_by_side_are_the_same_swings():
     assert left.tolist() == [150, 450, 150]
 
 
+def test_letters_of_two_columns_can_be_read_on_a_phone():
+    """The widest film of the book, on the 327 pixels that a phone has for it: cells of 379."""
+    run = swing(Chain([1] * 5, [0] * 5), SequentialCollisions(), [-0.113, 0, 0, 0, 0], TIMES)
+    figure = animate_swing([run] * 2, ["a", "b"], columns=2).figure
+    width = figure.bbox.width
+    assert 750 < width < 780
+    sizes = [words.get_size() for words in figure.axes[0].texts]
+    assert len(sizes) == 12
+    assert min(sizes) * 327 / width >= 11
+
+
 # --- pixels: what is drawn at an instant is where the solver has it then ------------------------
 
 TIMES = np.arange(RATE + 1) / RATE

@@ -200,7 +200,7 @@ def _swing(
     lengths = run.pendulums.row("length", len(run.chain))
     angles = -np.degrees(places / lengths)  # positive turns what hangs to the left
     metre, radii, pivots, _ = _hung(run)
-    (middle, beam), size = place, min(ax.get_xlim()[1] / 29, 21)
+    (middle, beam), size = place, min(ax.get_xlim()[1] / 29, 26)
     look: dict[str, Any] = {"marker": "o", "markevery": [1], "mfc": "#f2f2f2", "mew": 2.5}
     for ball, x in enumerate((middle + pivots).tolist()):
         y = beam + lengths[ball] * metre
