@@ -133,6 +133,10 @@ def test_a_phone_shows_balls_and_bars_at_once(visit, page, name, size):
         assert right - left >= 24
     for node, _, width, height in tab.evaluate(TARGETS, f"{host}.handles input"):
         assert min(width, height) >= 24, node
+    # Numbers of balls: all in one line, none below the others.
+    counts = tab.locator(".choice", has_text="number of balls").locator("label").all()
+    tops = [round(count.bounding_box()["y"]) for count in counts]
+    assert tops == tops[:1] * (6 if name == "explorer" else 0)
 
 
 def test_a_finger_takes_the_nearest_ball(phone):

@@ -108,10 +108,13 @@
     const name = `explorer-${(names += 1)}`;
     // No fieldset: engines do not agree where its legend goes in a row.
     const legend = make("span", { class: hidden ? "unseen" : "legend", id: `${name}-legend` }, words);
+    // A group of their own: where it does not fit beside the words it goes below them as a whole.
+    const group = make("span", { class: "options" });
     const node = make(
       "div",
       { class: "choice", role: "radiogroup", "aria-labelledby": legend.id },
       legend,
+      group,
     );
     let inputs = [];
     function offer(list) {
@@ -124,7 +127,7 @@
           input,
           make("span", colour ? { class: "coloured", style: `--ball: ${colour}` } : {}, text),
         );
-        node.append(label);
+        group.append(label);
         return { input, label, value };
       });
     }
