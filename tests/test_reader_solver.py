@@ -132,6 +132,28 @@ def test_right_wrong_and_endless(editor, solver):
     assert told(editor(nothing), "0 of 5") == (0, 5)
 
 
+def test_a_browser_without_a_language(editor):
+    """WebKit without a locale says "c", for which browsers have no calendar."""
+    assert told(editor(), "An error in line") == (0, 0)  # Python is loaded
+    answers = editor.tab.evaluate(
+        """async () => {
+          const prelude = 'Object.defineProperty(navigator, "language", { value: "c" });\\n';
+          const code = new Blob([prelude, globalThis.cradlePython], { type: "text/javascript" });
+          const worker = new Worker(URL.createObjectURL(code));
+          const heard = [];
+          await new Promise((done) => {
+            worker.onerror = ({ message }) => done(heard.push(message));
+            worker.onmessage = ({ data }) => heard.push(data) && data.done && done();
+            worker.postMessage({ code: "print(6 * 7)", checks: [] });
+          });
+          worker.terminate();
+          return heard;
+        }"""
+    )
+    assert [answer.get("printed", "").strip() for answer in answers[:-1]] == ["42"]
+    assert answers[-1] == {"done": True}
+
+
 def test_each_piece_keeps_what_was_written(editor):
     tab = editor.tab
     area = tab.locator(".reader-solver textarea")
