@@ -133,11 +133,11 @@ def test_right_wrong_and_endless(editor, solver):
 
 
 def test_a_browser_without_a_language(editor):
-    """WebKit without a locale says "c", for which browsers have no calendar."""
+    """WebKit without a locale says "C", for which browsers have no calendar."""
     assert told(editor(), "An error in line") == (0, 0)  # Python is loaded
     answers = editor.tab.evaluate(
         """async () => {
-          const prelude = 'Object.defineProperty(navigator, "language", { value: "c" });\\n';
+          const prelude = 'Object.defineProperty(navigator, "language", { value: "C" });\\n';
           const code = new Blob([prelude, globalThis.cradlePython], { type: "text/javascript" });
           const worker = new Worker(URL.createObjectURL(code));
           const heard = [];

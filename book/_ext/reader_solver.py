@@ -130,7 +130,7 @@ def interpreter() -> str:
     worker = (HERE / "solver_worker.js").read_text(encoding="utf-8")
     return (
         # A worker made from a text has no address, for which Brython asks. It asks for a language
-        # too, and stops if that is none, as WebKit's "c" without a locale; this one comes first.
+        # too, and stops if that is none, as WebKit's "C" without a locale; this one comes first.
         'globalThis.__BRYTHON__ = {brython_path: "file:///"};\n'
         'navigator.userLanguage = "en";\n'
         f"{core}\n;globalThis.modules = {json.dumps(kept)};\n{worker}"
