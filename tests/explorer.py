@@ -4,6 +4,8 @@ No test depends on how fast the machine is. Where time matters, the page gets a 
 still until the test moves it; elsewhere tests wait for a state.
 """
 
+import re
+
 import numpy as np
 from chains import random_chains, uniform
 
@@ -57,6 +59,11 @@ def go_to(tab, fragment: str):
 
 def press(tab, name: str):
     tab.get_by_role("button", name=name, exact=True).click()
+
+
+def choose(tab, words: str):
+    """Click on one of several, by its words: when it stands still, and where it is seen."""
+    tab.locator(".choice label", has_text=re.compile(f"^{re.escape(words)}$")).click()
 
 
 def chain_of(setting) -> tuple[Chain, ImpulseCorrelation]:

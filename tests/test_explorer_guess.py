@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from chapters import Chapter
-from explorer import EXPLORER, bars, chain_of, drawn, grab, later, press, still
+from explorer import EXPLORER, bars, chain_of, choose, drawn, grab, later, press, still
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide
 
@@ -105,7 +105,7 @@ def test_a_question_of_a_chapter(visit, page, name, said, words):
     assert right != "none" or min(trace.velocities) > 0
     assert tab.locator(".pictures").is_hidden()
     assert tab.locator(".outcome").is_hidden()
-    tab.get_by_label(said, exact=True).check(force=True)
+    choose(tab, said)
     press(tab, "Next hit")
     drawn(tab)
     assert tab.inner_text(".question .told") == words
@@ -188,14 +188,14 @@ def test_two_cradles_side_by_side(visit):
         ("spheres that touch", collide(three, SpringChain()).velocities),
         ("this setting, kept as it is", kept),
     ):
-        tab.get_by_label(label, exact=True).check(force=True)
+        choose(tab, label)
         drawn(tab)
         assert bars(tab, other) == np.round(expected, 2).tolist()
     tab.get_by_label("ratio", exact=True).press("Home")
     drawn(tab)
     assert bars(tab, other) == np.round(kept, 2).tolist()
     assert bars(tab) == [0, 0, 1]
-    tab.get_by_label("nothing", exact=True).check(force=True)
+    choose(tab, "nothing")
     drawn(tab)
     assert tab.locator(".other").is_hidden()
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
-from explorer import EXPLORER, SETTING, drawn, press, still
+from explorer import EXPLORER, SETTING, choose, drawn, press, still
 from script import Script
 
 from cradle import Chain, SpringChain, collide, spring_velocities
@@ -98,7 +98,7 @@ def test_a_reader_chooses_spheres(visit):
     """By hand and by an address; the ratio goes, the gaps come; the map and the words follow."""
     tab = still(visit, "#speeds=1,0,0&restitution=0.9")
     assert tab.get_by_label("gaps", exact=True).is_hidden()
-    tab.get_by_label("spheres", exact=True).check(force=True)
+    choose(tab, "spheres")
     touching = drawn(tab)["after"]
     assert tab.get_by_label("ratio", exact=True).is_hidden()
     tab.get_by_label("gaps, as a number").fill("3,5")
@@ -107,7 +107,7 @@ def test_a_reader_chooses_spheres(visit):
     assert apart[2] != touching[2]
     setting = tab.evaluate(SETTING)
     assert (setting["law"], setting["gap"]) == ("spheres", 3.5)
-    tab.get_by_label("All ratios", exact=True).check(force=True)
+    choose(tab, "All ratios")
     drawn(tab)
     assert "There is no ratio here" in tab.inner_text(".pictures")
     again = still(visit, f"#{tab.evaluate(f'{EXPLORER}.state.fragment()')}")
