@@ -640,6 +640,13 @@ def test_a_picture_without_matplotlib_is_refused_in_words(tmp_path):
     assert (result.stdout, result.stderr) == ("", 2 * words)
 
 
+def test_collisions_of_many_contacts_are_told_in_short():
+    line = "solve --ratio 0.02 --masses 1,0.05" + ",1" * 20
+    collisions = json.loads(call(f"{line} --json"))["collisions"]
+    assert len(collisions) == 21
+    assert f"contacts: {min(collisions)} to {max(collisions)}\n" in call(line)
+
+
 def test_a_swing_that_ends_early_says_so(monkeypatch):
     """Of rows that are left out the table itself tells nothing."""
     few = functools.partial(swing.swing, max_impacts=3)

@@ -102,6 +102,8 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
         "collisions": collisions, "collapsed": trace.collapsed, "held_contacts": held,
     }  # fmt: skip
     counts, contacts = (", ".join(map(str, counted)) for counted in (collisions, held))
+    if len(collisions) > 20:  # they would fill the screen; --json has them
+        counts = f"{min(collisions)} to {max(collisions)}"
     told = {
         "no balls approach: no impact": not (chain.closing_speeds > 0.0).any(),
         f"energy lost: {100 * lost:z.2f} %; collisions of the contacts: {counts}": True,
