@@ -98,7 +98,7 @@ def good():
         (lambda t: t.update(after=[17.0, 70, 26, 105]), "row 2, column after: 70 m/s is unlikely"),
         (lambda t: t["after"].__setitem__(0, 0.9), "row 2, column after: set AB, shot 0: ball 1"),
         (lambda t: t["after"].__setitem__(1, 1.2), "gains .* % of its energy"),
-        (lambda t: t["after"].__setitem__(3, "x"), "row 4, column after = 'x'; must be a number"),
+        (lambda t: t["after"].__setitem__(3, "x"), "column after = 'x'; must be a number, its"),
         (lambda t: t["after"].__setitem__(3, np.nan), "row 4, column after = nan; must be finite"),
         (lambda t: t["ball"].__setitem__(1, 3), r"row 1, column ball: set AB, shot 0 has balls"),
         (lambda t: t["ball"].__setitem__(1, 1.5), "row 2, column ball: 1.5; must be 1, 2"),
@@ -883,6 +883,7 @@ def test_files_that_are_no_table_of_ours(tmp_path):
     same = repr(read_shots(data_folder() / "shots_template.csv").sets[1].after)
     for marks in (",.", ";.", ";,", "\t.", "\t,"):
         text = "\n".join(lines).translate(str.maketrans(",.-", f"{marks}{MINUS}"))
+        text = f"sep={marks[0]}\n{text}"  # as some spreadsheets want to be told
         path.write_text(text, encoding="utf-8-sig")
         assert repr(read_shots(path).sets[1].after) == same
         assert repr(read_shots(io.StringIO(text)).sets[1].after) == same

@@ -186,7 +186,8 @@ def _number(where: str, line: dict[str, Any], name: str, units: dict[str, str | 
     try:
         value = float(line[name])
     except (TypeError, ValueError):
-        raise ValueError(f"{place} = {line[name]!r}; must be a number") from None
+        words = f"{line[name]!r}; must be a number, its decimals after a point"
+        raise ValueError(f"{place} = {words}") from None
     rule, low = _RULES.get(name, ("must be finite", -np.inf))
     value = one_number(place, value, rule, low, open_low="above" in rule)
     if name == "ball":

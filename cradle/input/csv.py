@@ -47,7 +47,8 @@ def text_rows(name: str, content: bytes | str, comments: bool = False) -> dict[i
         raise ValueError(told) from None
     lines = {
         number: line for number, line in enumerate(re.split("\r\n|\n|\r", text), 1)
-        if line.strip(",; \t") and (comments or not line.lstrip().startswith("#"))
+        if line.strip(",; \t") and not line.startswith("sep=")  # for a spreadsheet
+        and (comments or not line.lstrip().startswith("#"))
     }  # fmt: skip
     mark = next((one for one in "\t;," if any(one in line for line in lines.values())), " ")
     if mark != ",":
