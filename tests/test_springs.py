@@ -445,6 +445,18 @@ def test_balls_that_part_meet_after_a_flight():
     assert kinds.count("close") == 3  # it opens first
 
 
+def test_once_ends_when_all_contacts_have_opened():
+    """As in a swing: though others close later; a gap closes before."""
+    law = SpringChain(gaps=[0.1, 3.0])
+    first = law.solve(Chain([1, 1, 1], [1, 0, 0]), once=True)
+    np.testing.assert_allclose(first.velocities, [0, 1, 0], atol=1e-9)
+    np.testing.assert_allclose(law.solve(first.chain).velocities, [0, 0, 1], atol=1e-9)
+    seconds, way = first.parted()
+    late = seconds - (0.1 + first.durations[0])  # the first node after it
+    assert 0.0 <= late < 0.01
+    assert way[0] - way[1] == pytest.approx(0.1 - late, abs=1e-6)
+
+
 # --- the kernel -----------------------------------------------------------------------------
 
 

@@ -18,6 +18,7 @@ from cradle import (
     Pendulums,
     SequentialCollisions,
     SpringChain,
+    TimedTrace,
     collide,
     swing,
     textbook,
@@ -263,6 +264,35 @@ def test_contact_forces_move_the_balls_as_their_equations_of_motion_do(viscosity
     run = swing(chain, law, x0, times, pendulums=Pendulums(0.14, gaps=gaps))
     assert len(run.impacts) >= 3
     np.testing.assert_allclose(run.positions, found, atol=2e-6)
+
+
+def test_strings_pull_while_contacts_push():
+    """Else half a millisecond of each stroke is lost: in ten seconds 3 % of energy and beat."""
+    chain, law = Chain([0.045] * 5, [0] * 5), SpringChain(1e10, accuracy=1e-6)
+    hanging = Pendulums(0.12, gaps=1e-6)
+    run = swing(chain, law, pulled(5, by=0.04), [0, 10.0], pendulums=hanging)
+    before, after = run.energy
+    assert after == pytest.approx(before, rel=1e-3)
+    beat = math.cos(10.0 * math.sqrt(9.81 / 0.12))
+    assert run.positions[-1].sum() == pytest.approx(-0.04 * beat, rel=1e-3)
+
+
+def test_balls_whose_losses_opened_a_contact_may_close_it_at_once():
+    """A contact that is open, pressed and closing again when all others open is no resting one."""
+    chain, law = Chain([0.05] * 4, [0] * 4), SpringChain(1e9, viscosity=1e-6, accuracy=1e-4)
+    hanging = Pendulums([0.14, 0.16, 0.12, 0.12])
+    run = swing(chain, law, pulled(4, 3, 0.03), [0.5], pendulums=hanging)
+    assert run.ended == "times"
+
+
+@pytest.mark.parametrize("angle", ["small", "full"])
+def test_what_is_asked_for_within_a_strike_is_told_as_at_its_end(angle):
+    chain, law, hanging = balls(2), SpringChain(1e10), Pendulums(0.1, angle=angle)
+    strike = swing(chain, law, [-0.01, 0], [0.5], pendulums=hanging).impacts[0].time
+    run = swing(chain, law, [-0.01, 0], strike + np.array([1e-5, 2e-5]), pendulums=hanging)
+    assert run.ended == "times"
+    assert (run.positions[0] == run.positions[1]).all()
+    assert run.velocities[0] == pytest.approx([0.0, run.impacts[0].after[1]], abs=1e-5)
 
 
 def test_springs_too_soft_for_a_strike_collide_in_no_time():
@@ -567,6 +597,15 @@ def test_an_unsound_swing_is_refused(monkeypatch, where, name, how, words, hangi
     with pytest.raises(RuntimeError, match=f"not certified: at t = .* {words}"):
         swing(balls(3), ImpulseCorrelation(0.2), [-0.02, 0, 0], [0.1, 1.0],
               pendulums=Pendulums(**hanging))  # fmt: skip
+
+
+def test_a_strike_that_makes_energy_is_refused(monkeypatch):
+    """The balls are left where no contact force can have brought them."""
+    parted = TimedTrace.parted
+    far = np.array([-0.01, 0.01])
+    monkeypatch.setattr(TimedTrace, "parted", lambda trace: (parted(trace)[0], far))
+    with pytest.raises(RuntimeError, match=f"not certified: at t = .* {LOST}"):
+        swing(balls(2), SpringChain(1e10), [-0.02, 0], [0.5])
 
 
 # Ends and errors

@@ -181,8 +181,7 @@ class _Run:
         duration, way = self.collide(groups, v)
         if duration:
             self.instants.append((self.t, x, self.x, v, self.v, self.v, duration))
-            # What is left of a compression when all contacts are open is too little to count.
-            x = hanging.apart(self.x + way)
+            x = self.x + way
             pull = hanging.accelerations(self.x, v) + hanging.accelerations(x, self.v)
             self.t, self.x, self.v = self.t + duration, x, self.v + 0.5 * duration * pull
             v = self.v
@@ -218,7 +217,7 @@ class _Run:
             return duration, way
         traces = tuple(self.solved(*balls, before) for balls in struck if not self.lasting)
         if self.lasting:
-            duration, way, struck, traces = self.followed(struck[0][0], struck[-1][1], before)
+            duration, way, struck, traces = self.followed(*struck[0], before)
         for (first, last), trace in zip(struck, traces, strict=True):
             self.v[first:last] = trace.velocities
         contacts = tuple(c for first, last in struck for c in range(first, last - 1))
