@@ -11,10 +11,17 @@ import itertools
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import least_squares, minimize_scalar
+from scipy.optimize import least_squares
 from stored import make, read
 
-from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SequentialCollisions, collide
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    collide,
+    spring_velocities,
+)
 
 READINGS = (1, 2, 3, 4)
 EQUAL = (1, 1, 1, 1, 1)
@@ -31,7 +38,7 @@ def table(name):
 def first_strikes(reading):
     """Return {release: (velocities, errors)} relative to the row, over the striker's speed."""
     t, found = table("film_strikes.csv"), {}
-    for release in (1, 2):
+    for release in (1, 2, 3) if reading > 2 else (1, 2):
         use = (t["reading"] == reading) & (t["release"] == release) & (t["strike"] == 1)
         v, sigma, before = (t[key][use][::-1] for key in ("after", "sigma_after", "before"))
         if reading > 2:  # in the room: the row drifts
@@ -95,17 +102,25 @@ def ratios(p, e, release, apart, backward=None, masses=EQUAL):
     return by_law(model, e, release, apart, masses)
 
 
-def by_spheres(p, release, apart=False, masses=EQUAL):
+def quick(speeds, gaps, loss, masses=EQUAL):
+    """Return the same by the package, within a millionth."""
+    gaps = np.where(np.less(gaps, 1e-9), 0.0, gaps)
+    return spring_velocities(masses, speeds, viscosity=loss, gaps=gaps, accuracy=1e-6)
+
+
+def by_spheres(p, release, apart=False, masses=EQUAL, solve=spheres):
     """Return velocities: p = gaps of contacts 2, 3, 4, A, and the gap of the strikers."""
     unit = 1.0 if release == 1 else SLOWER
     between = APART if apart else p[4]
     gaps = [between] * (release - 1) + [0.0] + list(p[release - 1 : 3])
     speeds = [unit] * release + [0.0] * (5 - release)
-    return spheres(speeds, np.abs(gaps), abs(p[3]), masses=masses) / unit
+    return solve(speeds, np.abs(gaps), abs(p[3]), masses=masses) / unit
 
 
 APART = 30.0  # Hertz units: far enough
 E, LOSS, THREE = (0.5, 1.0), (0.0, 0.1), list(itertools.product((0.04, 0.12), repeat=3))
+FINE = itertools.product((0.02, 0.05, 0.08, 0.11), (0.07, 0.1, 0.13), (0.1, 0.14))
+GAPS = list(itertools.product((0.08, 0.17, 0.33), (0.04, 0.08, 0.12, 0.16), (0.02, 0.05)))
 MASSES = [(0.95, 1.05)] * 4
 # Name: velocities from parameters, release and whether strikers are apart; starts; bounds.
 LAWS = {
@@ -123,7 +138,7 @@ LAWS = {
         [[s, 0.985, 1, 1, 1, 1] for s in (0.05, 0.1, 0.13)], [(0, 0.45), E, *MASSES]),
     "three ratios, e": (
         lambda p, r, a: ratios(p[:3], p[3], r, a),
-        [[*s, 0.985] for s in THREE], [(0, 0.5)] * 3 + [E]),
+        [[*s, 0.985] for s in FINE], [(0, 0.5)] * 3 + [E]),
     "three ratios, four e": (
         lambda p, r, a: ratios(p[:3], p[3:], r, a),
         [[*s, *[0.985] * 4] for s in THREE], [(0, 0.5)] * 3 + [E] * 4),
@@ -132,34 +147,27 @@ LAWS = {
         [[*s, *t, 0.985] for s in THREE for t in ([0.1] * 3, [0.04, 0.12, 0.12])],
         [(0, 0.5)] * 6 + [E]),
     "touching spheres, A": (
-        lambda p, r, a: by_spheres([0, 0, 0, p[0], 0], r, a),
+        lambda p, r, a: by_spheres([0, 0, 0, p[0], 0], r, a, solve=quick),
         [[0.003], [0.02]], [LOSS]),
     "touching spheres, A, four masses": (
-        lambda p, r, a: by_spheres([0, 0, 0, p[0], 0], r, a, [1, *p[1:]]),
+        lambda p, r, a: by_spheres([0, 0, 0, p[0], 0], r, a, [1, *p[1:]], quick),
         [[0.005, 1, 1, 1, 1]], [LOSS, *MASSES]),
     "spheres, one gap, A": (
-        lambda p, r, a: by_spheres([p[0]] * 3 + [p[1], p[0]], r, a),
+        lambda p, r, a: by_spheres([p[0]] * 3 + [p[1], p[0]], r, a, solve=quick),
         [[0.05, 0.005], [0.15, 0.005], [0.4, 0.005]], [(0, 6), LOSS]),
     "spheres, three gaps, A": (
-        by_spheres,
-        [[0.17, 0.03, 0.05, 0.007], [0.1, 0.05, 0.05, 0.007]], [(0, 6)] * 3 + [LOSS]),
+        lambda p, r, a: by_spheres(p, r, a, solve=quick),
+        [[*s, 0.007] for s in GAPS], [(0, 6)] * 3 + [LOSS]),
     "spheres, four gaps, A": (  # the strikers' own
-        lambda p, r, _: by_spheres(p, r),
-        [[a, b, c, 0.007, g] for a, b, c in [(0.17, 0.03, 0.05), (0.1, 0.05, 0.05), (0.3,) * 3]
-         for g in (1.0, 3.0)],
+        lambda p, r, _: by_spheres(p, r, solve=quick),
+        [[*s, 0.007, own] for s in GAPS for own in (1.0, 3.0, 5.0)],
         [(0, 6)] * 3 + [LOSS, (0, 6)]),
 }  # fmt: skip
 TOGETHER = [name for name in LAWS if name != "spheres, three gaps, A"]
 NOT_APART = ("three ratios, four e", "three ratios each way, e", "spheres, four gaps, A")
 ONE_BY_ONE = [name for name in LAWS if name not in NOT_APART]
-# The number that one release alone depends on: it is fitted to that release even where the others
-# were fitted to the other one.
-OWN = {
-    ("three ratios, e", True): {1: 0},
-    ("spheres, three gaps, A", True): {1: 0},
-    ("spheres, four gaps, A", False): {1: 0, 2: 4},
-}
-COLUMNS = ["reading", "law", "strikers", "fitted", "freedom", "chi_one", "chi_two", "parameters"]
+SUMS = ("chi_one", "chi_two", "chi_three")
+COLUMNS = ["reading", "law", "strikers", "fitted", "freedom", *SUMS, "parameters"]
 
 
 def misfits(velocities, data, releases):
@@ -173,55 +181,55 @@ def misfits(velocities, data, releases):
 
 
 def chi_square(law, p, apart, data, releases):
-    """Return the sum of squared residuals of a law at parameters p."""
-    off = misfits(lambda r: LAWS[law][0](p, r, apart), data, releases)
+    """Return the sum of squared residuals of a law; the three strikers come one by one."""
+    off = misfits(lambda r: LAWS[law][0](p, r, apart or r == 3), data, releases)
     return float((off**2).sum())
 
 
 def fitted(law, apart, data, releases):
-    """Return the parameters of the best of several fits."""
+    """Return the parameters of the best fit, and of other minima that are nearly as deep."""
     solve, starts, bounds = LAWS[law]
     fits = [
         least_squares(
-            lambda p: misfits(lambda r: solve(p, r, apart), data, releases),
+            lambda p: misfits(lambda r: solve(p, r, apart or r == 3), data, releases),
             start,
             bounds=np.transpose(bounds),
             diff_step=3e-3,  # well above the noise of the integration
             x_scale=np.maximum(np.abs(start), 0.01),
-            max_nfev=25,
+            max_nfev=40,
         )
         for start in starts
     ]
-    return min(fits, key=lambda fit: fit.cost).x
-
-
-def tuned(law, apart, p, index, data, release):
-    """Return p with one number fitted to one release."""
-
-    def misfit(x):
-        return chi_square(law, [*p[:index], x, *p[index + 1 :]], apart, data, (release,))
-
-    low, high = LAWS[law][2][index]
-    grid = low + (high - low) * np.linspace(0, 1, 61) ** 2
-    best = min(range(61), key=lambda i: misfit(grid[i]))
-    around = grid[max(best - 1, 0)], grid[min(best + 1, 60)]
-    x = minimize_scalar(misfit, bounds=around, method="bounded").x
-    return [*p[:index], x, *p[index + 1 :]]
+    minima = []
+    for fit in sorted(fits, key=lambda fit: fit.cost):
+        near = 2 * (fit.cost - (minima or [fit])[0].cost) < 3.84  # 95 % of one number
+        if near and all(abs(fit.x - one.x)[:3].max() > 0.02 for one in minima):
+            minima.append(fit)
+    return [fit.x for fit in minima]
 
 
 def fits_of(reading, law, apart):
-    """Return rows of a law fitted to both releases, and to one that predicts the other."""
+    """Return rows of a law fitted to the releases of one and two, to one alone, and to all.
+
+    Laws of three and more numbers fit the five velocities of one release in several ways.
+    """
     data, rows = first_strikes(reading), []
-    count, own = len(LAWS[law][2]), OWN.get((law, apart), {})
+    count = len(LAWS[law][2])
     how = "own gap" if "four gaps" in law else "apart" if apart else "together"
-    for fit, releases in (("both", (1, 2)), ("one", (1,)), ("two", (2,))):
-        p, other = fitted(law, apart, data, releases), 3 - releases[0]
-        free = 10 - count if fit == "both" else 5 - (other in own)
-        if fit != "both" and other in own:
-            p = tuned(law, apart, p, own[other], data, other)
+    minima = fitted(law, apart, data, (1, 2))
+    names = ("both", "both, second", "both, third") if count < 6 else ("both",)
+    found = [(name, 10 - count, p) for name, p in zip(names, minima, strict=False)]
+    if count < 3 or (apart and count == 4):
+        minima = sorted(map(tuple, fitted(law, apart, data, (1,))))
+        found += [("one" if count < 3 else f"one, {k}", 5, p) for k, p in enumerate(minima, 1)]
+    if apart and 3 in data:
+        found.append(("all", 15 - count, fitted(law, apart, data, (1, 2, 3))[0]))
+    for name, free, p in found:
         p = [float(f"{x:.5g}") for x in p]  # as stored
-        chi = [f"{chi_square(law, p, apart, data, (r,)):.4g}" for r in (1, 2)]
-        rows.append([reading, law, how, fit, free, *chi, " ".join(f"{x:.5g}" for x in p)])
+        chi = [
+            f"{chi_square(law, p, apart, data, (r,)):.4g}" if r in data else "" for r in (1, 2, 3)
+        ]
+        rows.append([reading, law, how, name, free, *chi, " ".join(f"{x:.5g}" for x in p)])
         print(*rows[-1], sep=", ", flush=True)
     return rows
 
