@@ -82,13 +82,19 @@ def test_what_the_chapter_says():
     assert told == pytest.approx(0.1**1.5 * k**0.4 * 0.045**0.6, abs=0.5)
 
 
-def test_ratio_of_touching_spheres():
-    """ADD by another integration: 51 entries of Table 2 lie above what elastic spheres imply."""
-    rows = {r["triplet"]: float(r["implied"]) for r in read("gaps_triplets.csv")}
+def test_ratios_of_touching_spheres():
+    """The largest of each triplet: every contact collides once, so Eqs. 24 and 31 tell it."""
     listed = ratio_table().set_index("triplet")["ratio"]
-    above = sum(listed[t] > ratio for t, ratio in rows.items())
-    assert int(CHAPTER.glued["scored-above-spheres"]) == above
-    masses = gaps.of_triplets(["ADD"])[0]
+    masses = gaps.of_triplets(list(listed.index))[0]
     after = gaps.strike(masses, [1, 0, 0], 1.0, [[0, 0]])
-    held = collide(Chain(masses[0], [1, 0, 0], 1), ImpulseCorrelation(rows["ADD"])).velocities
-    np.testing.assert_allclose(after[0], held, atol=5e-4)
+    once = 1 - (2 / (1 - after[:, 0]) - 1) * masses[:, 1] / masses[:, 0]
+    assert int(CHAPTER.glued["scored-above-spheres"]) == (listed > once).sum()
+    largest = dict(zip(listed.index, once))
+    assert CHAPTER.glued["dad-spheres"].endswith(f" and {largest['DAD']:.3f}")
+    assert abs(largest["DAD"] - listed["DAD"]) < 0.004
+    for told in CHAPTER.glued["dad-spheres"].replace(" and", ",").split(", "):
+        row = masses[list(listed.index).index("DAD")]
+        held = collide(Chain(row, [1, 0, 0], 1), ImpulseCorrelation(float(told))).velocities
+        assert held == pytest.approx(after[list(listed.index).index("DAD")], abs=0.01)
+    smallest = {r["triplet"]: float(r["implied"]) for r in read("gaps_triplets.csv")}
+    assert all(smallest[t] < a + 1e-3 for t, a in largest.items())
