@@ -14,7 +14,14 @@ from measured_table import find, fused, sequential, table
 from stored import read
 from truth import solve
 
-from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpulseCorrelation,
+    SpringChain,
+    collide,
+    post_impact_velocities,
+)
 
 ROOT = Path(__file__).parents[1]
 CHAPTER, ENGINES_PAGE = Chapter("trade"), Chapter("engines")
@@ -220,3 +227,20 @@ def test_fig_trade_total_drawn():
     (error,) = [row[3] for row in rows if row[:2] == (names[0], methods[2])]
     exact = floats(solve([1] * 5, [1, 0, 0, 0, 0], 1, 0.132503287).velocities)
     assert error == pytest.approx(np.abs(exact - HERTZ["five equal"]).max(), rel=1e-2)
+
+
+def test_the_rule_with_the_ratios_of_each_triplet():
+    """Three balls struck from either end by scanning all ratios; the five by another program."""
+    light, ratios = [1, 1, 0.1, 1, 1], []
+    for way in (1, -1):
+        for k in range(3):
+            masses = light[k : k + 3][::way]
+            target = collide(Chain(masses, [1, 0, 0]), EnergyDistribution()).velocities
+            ratio = np.linspace(0, masses[2] / (masses[1] + masses[2]), 20_001)[:, None]
+            v = post_impact_velocities(masses, [1, 0, 0], 1.0, ratio, excess="saturate")
+            ratios.append(ratio[np.abs(v - target).max(axis=1).argmin(), 0])
+    model = ImpulseCorrelation(ratios[:3], ratios[3:], excess="saturate")
+    chain = Chain(light, [1, 0, 0, 0, 0])
+    spheres = collide(chain, EnergyDistribution()).velocities
+    missed = np.abs(collide(chain, model).velocities - spheres).max()
+    assert CHAPTER.glued["total-own"] == f"{100 * missed:.0f} %"
