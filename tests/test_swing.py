@@ -285,6 +285,13 @@ def test_balls_whose_losses_opened_a_contact_may_close_it_at_once():
     assert run.ended == "times"
 
 
+def test_what_is_left_of_a_compression_is_no_overlap():
+    """A contact that losses have opened early may take long to come apart."""
+    chain, law = Chain([0.05] * 4, [0] * 4), SpringChain(1e10, viscosity=2e-6, accuracy=1e-4)
+    run = swing(chain, law, pulled(4, by=0.03), [1.5], pendulums=Pendulums(0.14, gaps=1e-6))
+    assert run.ended == "times"
+
+
 @pytest.mark.parametrize("angle", ["small", "full"])
 def test_what_is_asked_for_within_a_strike_is_told_as_at_its_end(angle):
     chain, law, hanging = balls(2), SpringChain(1e10), Pendulums(0.1, angle=angle)

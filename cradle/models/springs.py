@@ -97,9 +97,18 @@ class TimedTrace(EnergyTrace):
         )  # fmt: skip
 
     def parted(self) -> tuple[float, Vector]:
-        """Return how long it takes until no balls overlap, s, and how far each goes until then, m.
+        """Return how long it takes until no balls overlap, s, and how far each goes, m, shape (N,).
 
         A compression that is left and would take as long again to open is too little to matter.
+
+        Examples
+        --------
+        Two equal balls go half of the way each, the second one with what the first one loses:
+
+        >>> from cradle import Chain, SpringChain, collide
+        >>> seconds, way = collide(Chain([1, 1], [1, 0]), SpringChain(1e6)).parted()
+        >>> (way / seconds).round(2)
+        array([0.5, 0.5])
         """
         record: list[Any] = []
         row, law, out = vars(self)["_ran"]

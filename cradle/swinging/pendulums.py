@@ -115,6 +115,13 @@ class Hanging:
         """Return how far the balls of a body hang from its first one, where they touch, m."""
         return np.concatenate([[0.0], np.cumsum(self.gaps[first : last - 1])])
 
+    def apart(self, x: Vector) -> Vector:
+        """Return the nearest places at which no balls overlap, m; their centre stays."""
+        from scipy.optimize import isotonic_regression  # slow to import
+
+        hung = self.offsets(0, len(x))
+        return np.asarray(isotonic_regression(x + hung, weights=self.masses).x - hung)
+
     def accelerations(self, positions: Vector, velocities: Vector) -> Vector:
         """Return the acceleration of each ball if it swung alone, m/s^2."""
         angle = positions / self.length

@@ -126,7 +126,6 @@ class _Run:
             raise ValueError(f"positions = {x.tolist()}; {told}")
         self.freed = [-math.inf] * (n - 1)  # when the force in each contact last fell to zero
         self.lasting = False
-        self.lasting = False
         if isinstance(model, SpringChain):
             m, power = chain.masses, 1.0 / (model.exponent + 1.0)
             energy = m[:-1] / (m[:-1] + m[1:]) * m[1:] * self.speed**2
@@ -179,9 +178,9 @@ class _Run:
             offset = hanging.offsets(first, last)
             self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
         duration, way = self.collide(groups, v)
-        if duration:
+        if duration:  # of contact forces; what the strings pull meanwhile is one kick at its end
             self.instants.append((self.t, x, self.x, v, self.v, self.v, duration))
-            x = self.x + way
+            x = hanging.apart(self.x + way)  # but for what is left of a compression, far too little
             pull = hanging.accelerations(self.x, v) + hanging.accelerations(x, self.v)
             self.t, self.x, self.v = self.t + duration, x, self.v + 0.5 * duration * pull
             v = self.v
@@ -215,21 +214,22 @@ class _Run:
         ]  # fmt: skip
         if not struck:
             return duration, way
-        traces = tuple(self.solved(*balls, before) for balls in struck if not self.lasting)
         if self.lasting:
-            duration, way, struck, traces = self.followed(*struck[0], before)
+            balls, trace, duration, way = self.followed(*struck[0], before)
+            struck, traces = [balls], [trace]
+        else:
+            traces = [self.solved(*balls, before) for balls in struck]
         for (first, last), trace in zip(struck, traces, strict=True):
             self.v[first:last] = trace.velocities
         contacts = tuple(c for first, last in struck for c in range(first, last - 1))
         loss = sum(trace.energy_loss for trace in traces)
-        self.impacts.append(Impact(self.t, contacts, self.x, before, self.v, loss, traces))
+        self.impacts.append(Impact(self.t, contacts, self.x, before, self.v, loss, tuple(traces)))
         return duration, way
 
-    def followed(self, first: int, last: int, before: Vector) -> tuple[float, Vector, Any, Any]:
-        """Follow contact forces until all contacts are open: how long, how far, of whom, the path.
-
-        Balls between those that are struck take part, and those whose gaps close meanwhile.
-        """
+    def followed(
+        self, first: int, last: int, before: Vector
+    ) -> tuple[tuple[int, int], Trace, float, Vector]:
+        """Follow contact forces, of these balls and all that they meet, until contacts are open."""
         while True:
             trace: Any = self.solved(first, last, before)
             duration, own = trace.parted()
@@ -238,16 +238,17 @@ class _Run:
             met = np.flatnonzero(self.gaps() + np.diff(way) < 0.0).tolist()
             begin, end = min([first, *met]), max([last, *(c + 2 for c in met)])
             if (begin, end) == (first, last):
-                return duration, way, [(first, last)], (trace,)
+                return (first, last), trace, duration, way
             first, last = begin, end
 
     def solved(self, first: int, last: int, before: Vector) -> Trace:
         """Solve the impact of a part of the chain; contact forces with the gaps that it has now."""
         m, e = self.chain.masses[first:last], self.chain.restitution[first : last - 1]
         law: Any = self.model(first, last)
-        more: dict[str, Any] = {"once": True} if self.lasting else {}
+        more: dict[str, Any] = {}
         if self.lasting:
-            law = replace(law, gaps=tuple(self.gaps()[first : last - 1].tolist()))
+            gaps, more = self.gaps()[first : last - 1], {"once": True}
+            law = replace(law, gaps=tuple(gaps.tolist()))
         try:
             # Not by `collide`, whose advice on a long path cannot be taken here.
             trace: Trace = law.solve(Chain._of(m, before[first:last].copy(), e), **more)
