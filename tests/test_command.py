@@ -199,10 +199,7 @@ def test_gaps_and_damping_of_a_swing():
     np.testing.assert_allclose([row["ball 1"] for row in rows], x, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("name", "begins"),
-    [("toy.gif", b"GIF89a"), ("toy.svg", b"<svg")],
-)
+@pytest.mark.parametrize(("name", "begins"), [("toy.gif", b"GIF89a"), ("toy.svg", b"<svg")])
 def test_a_swing_is_drawn(folder, name, begins):
     said = call(f"swing 3 --pull 2 --seconds 0.4 --ratio 0.1 -o {name}")
     assert said.startswith(f"drawn to {name}; impacts: 1\nmodel: ")

@@ -11,13 +11,7 @@ from extreme_chains import faults, invariants
 from families import FAMILIES, family
 from problem import Problem
 
-from cradle import (
-    Chain,
-    ImpactNotFinished,
-    ImpulseCorrelation,
-    collide,
-    textbook,
-)
+from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide, textbook
 
 
 def at_rest(n):

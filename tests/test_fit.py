@@ -395,8 +395,7 @@ RIGHT, LEFT, SLOW = [1, 0, 0], [0, 0, -1], [0, 0, -0.7]
 
 
 @pytest.mark.parametrize(
-    "before",
-    [[LEFT], [LEFT, SLOW], [RIGHT, LEFT, SLOW], [LEFT, RIGHT, SLOW], [LEFT, SLOW, RIGHT]],
+    "before", [[LEFT], [LEFT, SLOW], [RIGHT, LEFT, SLOW], [LEFT, RIGHT, SLOW], [LEFT, SLOW, RIGHT]]
 )
 def test_each_shot_tells_the_ratio_of_its_way(before):
     """Shots to the right tell one ratio, those to the left the other, whichever comes first."""

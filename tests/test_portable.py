@@ -121,11 +121,7 @@ def without_vector_code():
         ),
     }
     run = subprocess.run(
-        [sys.executable, __file__],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, __file__], env=environment, capture_output=True, text=True, check=False
     )
     assert run.returncode == 0, run.stderr
     return json.loads(run.stdout)
