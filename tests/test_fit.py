@@ -1,10 +1,7 @@
 """Fits to measured shots: data read and refused, searches, confidence sets, predictions."""
 
-import csv
 import io
 import re
-from functools import cache
-from pathlib import Path
 
 import fit_example
 import fit_study
@@ -13,6 +10,7 @@ import pandas as pd
 import pytest
 from scipy.optimize import brentq, least_squares, minimize
 from scipy.stats import binom, chi2
+from stored import DATA, read
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain, ratio_table
 from cradle.closed_form import three_balls
@@ -31,16 +29,8 @@ from cradle.fit.parameters import chi_squares
 from cradle.fit.result import FOLDED, Group
 from cradle.fit.search import RISE, refine, scan
 from cradle.fit.tracks import Track
-from cradle.tables import data_folder
 
-ROOT = Path(__file__).parents[1]
 MASS = {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}
-
-
-@cache
-def stored(name):
-    with (ROOT / "data" / name).open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def columns(name, speeds, after, sigma, errors=None):
@@ -269,14 +259,6 @@ def test_restitution_of_exact_data_and_its_error():
     assert (high - low) / (2 * np.sqrt(RISE)) == pytest.approx(error, rel=1e-3)
 
 
-def test_restitution_of_two_moving_balls():
-    table = columns("AB", [1.0], outcome("AB"), 0.01)
-    chain = Chain([0.045, 0.053], [1.0, -0.5], 0.53)
-    table["before"] = [1.0, -0.5]
-    table["after"] = collide(chain, ImpulseCorrelation(0)).velocities.tolist()
-    assert restitution(read_shots(table))["AB"].value == pytest.approx(0.53, abs=1e-7)
-
-
 def test_heights():
     found = restitution_from_heights("AA", [1.0, 0.5], [0.81, 0.405], 0.002)
     assert found["AA"].value == pytest.approx(0.9, abs=1e-6)
@@ -427,13 +409,15 @@ def test_shots_from_both_ends_are_drawn(before):
         np.testing.assert_allclose(predicted, after, atol=1e-4)
 
 
-def test_prediction_of_two_moving_balls_is_drawn():
-    """Elastic equal balls exchange their velocities."""
-    table = columns("AA", [1.0] * 3, [-0.2, 1.0], 0.001)
+def test_two_moving_balls():
+    """They part with half of the speed at which they meet; so is the prediction that is drawn."""
+    table = columns("AA", [1.0] * 3, [0.1, 0.7], 0.001)
     table["before"] = [1.0, -0.2] * 3
-    _, data = restitution(read_shots(table)).plot("AA")
+    found = restitution(read_shots(table))
+    assert found["AA"].value == pytest.approx(0.5, abs=1e-7)
+    _, data = found.plot("AA")
     lines = [line.get_ydata() for line in data.lines if line.get_label() == "_predicted"]
-    np.testing.assert_allclose(lines, [[-0.2] * 2, [1.0] * 2], atol=1e-6)
+    np.testing.assert_allclose(lines, [[0.1] * 2, [0.7] * 2], atol=1e-6)
 
 
 def test_errors_of_restitution_widen_the_interval():
@@ -461,7 +445,7 @@ def test_what_the_data_do_not_tell():
 
 def test_two_ratios_explain_one_outcome():
     """DAA: outcomes at .215 and near .398 are a hundredth apart."""
-    row = next(r for r in stored("fit_precision.csv") if r["triplet"] == "DAA")
+    (row,) = read("fit_precision.csv", triplet="DAA")
     shots = read_shots(columns("DAA", [1.0] * 5, outcome("DAA"), 0.02))
     fit = ratio(shots, pairs_of("DAA", 0.0), known={"AAD": 0.131})
     one = fit["DAA"]
@@ -792,8 +776,8 @@ def test_synthetic_example_is_what_the_script_makes(monkeypatch):
     monkeypatch.setattr(fit_example, "SETS", {"BAC": 1})
     monkeypatch.setattr(fit_example, "SPEEDS", fit_example.SPEEDS[:1])
     rows, text = fit_example.experiment()
-    assert text == (ROOT / "data" / "video_synthetic.txt").read_text(encoding="utf-8")
-    lines = (ROOT / "data" / "shots_synthetic.csv").read_text(encoding="utf-8").splitlines()
+    assert text == (DATA / "video_synthetic.txt").read_text(encoding="utf-8")
+    lines = (DATA / "shots_synthetic.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0].startswith("# SYNTHETIC")
     kept = [line.split(",") for line in lines if line.startswith("BAC,1,")]
     for made, line in zip(rows, kept, strict=True):
@@ -803,7 +787,7 @@ def test_synthetic_example_is_what_the_script_makes(monkeypatch):
 
 
 def test_example_ends_in_the_values_it_was_made_with():
-    shots = read_shots(ROOT / "data" / "shots_synthetic.csv")
+    shots = read_shots(DATA / "shots_synthetic.csv")
     squares, count = shots.momentum_check()
     assert abs(squares - count) < 4 * np.sqrt(2 * count)
     e = restitution(shots)
@@ -830,7 +814,7 @@ def test_example_ends_in_the_values_it_was_made_with():
 
 def test_study_covers_as_often_as_it_says():
     """95 of 100, over all triplets, at each noise: within what chance allows."""
-    rows = stored("fit_study.csv")
+    rows = read("fit_study.csv")
     assert len(rows) == 3 * 64
     assert {row["triplet"] for row in rows} == set(ratio_table().triplet)
     for noise in ("0.003", "0.01", "0.03"):
@@ -844,17 +828,14 @@ def test_study_covers_as_often_as_it_says():
 @pytest.mark.parametrize(("triplet", "noise"), [("ABA", 0.03), ("CCA", 0.003), ("ACC", 0.003)])
 def test_study_is_what_the_script_makes(triplet, noise):
     made = fit_study.study(triplet, noise)
-    row = next(
-        r for r in stored("fit_study.csv")
-        if r["triplet"] == triplet and float(r["noise"]) == noise
-    )  # fmt: skip
+    (row,) = read("fit_study.csv", triplet=triplet, noise=str(noise))
     assert int(row["covered"]) == made[5]
     np.testing.assert_allclose(float(row["width"]), float(made[6]), rtol=0.02)
 
 
 @pytest.mark.parametrize("triplet", ["AAA", "BBD", "CBD", "DAA"])
 def test_precision_is_what_the_script_makes(triplet):
-    row = next(r for r in stored("fit_precision.csv") if r["triplet"] == triplet)
+    (row,) = read("fit_precision.csv", triplet=triplet)
     for name, value in zip(fit_study.PRECISION[1:], fit_study.precision(triplet)[1:], strict=True):
         assert bool(row[name]) == bool(value) or value == 0
         if row[name] and float(row[name]) > 1e-4:
@@ -863,7 +844,7 @@ def test_precision_is_what_the_script_makes(triplet):
 
 def test_files_that_are_no_table_of_ours(tmp_path):
     """As spreadsheets save them: each says what to do."""
-    lines = (ROOT / "data" / "shots_template.csv").read_text(encoding="utf-8").splitlines()
+    lines = (DATA / "shots_template.csv").read_text(encoding="utf-8").splitlines()
     cases = {
         "decimals with a comma in line 4 and with a point in line 5": [
             line.replace(",", ";").replace(".", "," if n == 3 else ".")
@@ -879,7 +860,7 @@ def test_files_that_are_no_table_of_ours(tmp_path):
         path.write_text("\n".join(table) + "\n", encoding="utf-8")
         with pytest.raises(ValueError, match=words):
             read_shots(path)
-    same = repr(read_shots(data_folder() / "shots_template.csv").sets[1].after)
+    same = repr(read_shots(DATA / "shots_template.csv").sets[1].after)
     for marks in (",.", ";.", ";,", "\t.", "\t,"):
         text = "\n".join(lines).translate(str.maketrans(",.-", f"{marks}{MINUS}"))
         text = f"sep={marks[0]}\n{text}"  # as some spreadsheets want to be told
