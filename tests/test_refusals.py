@@ -14,10 +14,12 @@ from cradle import (
     Chain,
     ImpulseCorrelation,
     SequentialCollisions,
+    SpringChain,
     collide,
     paper_chain,
     post_impact_velocities,
     recommend,
+    spring_velocities,
     swing,
     viscosity_from,
 )
@@ -58,6 +60,10 @@ def light(masses, door):
 
 def viscosity(masses, restitution, speed=1, stiffness=1):
     return viscosity_from(restitution, speed=speed, masses=masses, stiffness=stiffness)
+
+
+def springs(**options):
+    return collide(THREE, SpringChain(**options))
 
 
 LIGHT = "must be at least 1e-150 of the heaviest ball of its chain"
@@ -122,6 +128,20 @@ LETTERS = [
     ("ABC" * 99 + "ABx", "sequence[299] = 'x'; must be one of A, B, C, D"),
 ]
 
+#: Of a `SpringChain`, and of `spring_velocities` but for the last one.
+SPRINGS = [
+    ({"stiffness": [1, 0]}, "stiffness[1] = 0.0; must be above 0"),
+    ({"stiffness": [1, 1e-10]}, "stiffness[1] = 1e-10; must be at least 1e-09 of the stiffest"),
+    ({"exponent": 0.9}, "exponent = 0.9; must lie in [1, 10]"),
+    ({"viscosity": [0.1, -0.1]}, "viscosity[1] = -0.1; must be at least 0"),
+    ({"viscosity": 5.0}, "viscosity[0] = 5.0; must be at most 0.227 s, 0.3 of the depth over the"),
+    ({"gaps": 1e12}, "gaps[0] = 1000000000000.0; must be at most "),
+    ({"gaps": [0, 1e-20]}, "gaps[1] = 1e-20; must be 0, or 1e-12 of the depth"),
+    ({"gaps": [0, -3]}, "gaps[1] = -3.0; must be a lean of at most the depth"),
+    ({"accuracy": 1e-13}, "accuracy = 1e-13; must lie in [1e-12, 0.02]"),
+    ({"max_steps": 0}, "max_steps = 0; must be a whole number, at least 1"),
+]
+
 TOLERANCES = [
     (-1e-9, "tolerance = -1e-09; must be at least 0"),
     ([1e-6], "tolerance = [1e-06]; must be one number"),
@@ -173,6 +193,10 @@ OTHERS = [
     (viscosity, (1, 0.9), "masses has shape (); must be (N,) with N >= 2"),
     (viscosity, ([1, 1], 0.9, 1, 0), "stiffness = 0.0; must be above 0"),
     (post_impact_velocities, (MASKED, [1, 0, 0], 1, 0.1), "masses[1] = masked; must be a real"),
+    (spring_velocities, (ONES, [1, 0, 0], ONES), "stiffness has shape (3,); must be () or (..., 2"),
+    (collide, (THREE, SpringChain(ONES)), "stiffness has 3 values; 3 balls need 2"),
+    (collide, (Chain(ONES, [1, 0, 0], [1, 0.5]), SpringChain()), "restitution[1] = 0.5; must be"),
+    (collide, (Chain([1, 1e-10], [1, 0]), SpringChain()), "masses[1] = 1e-10; must be at least 1e"),
     (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
     (TRACE.plot, {"contact": 4}, "contact = 4; must be a whole number, 0 to 1"),
     (animate_swing, ([],), "runs has no swing, or one without a duration"),
@@ -187,6 +211,10 @@ def rows():
         yield from ((function, given, words) for given, words in SHAPES)
     yield from ((largest_ratios, given, words) for given, words in BOUNDS)
     yield from ((paper_chain, (given,), words) for given, words in LETTERS)
+    yield from ((springs, options, words) for options, words in SPRINGS)
+    leans = {"gaps": [[0, 0], [0, -3]]}, "gaps[1, 1] = -3.0; must be a lean"
+    for options, words in (*SPRINGS[:-1], leans):
+        yield spring_velocities, {"masses": ONES, "velocities": [1, 0, 0], **options}, words
     yield from ((effective_ratio, {"trace": TRACE, "tolerance": x}, say) for x, say in TOLERANCES)
     yield from ((recommend, {"chain": one, **asked}, words) for one, asked, words in ADVICE)
     for masses in ([1, 1e-20], [1e-20, 1], [1, 1, 1e-20], [1, 1e-16, 1]):
