@@ -18,7 +18,6 @@ from cradle import (
     SpringChain,
     collide,
 )
-from cradle.measures import condition_number, effective_ratio
 
 SPRINGS = [SpringChain(), EnergyDistribution()]
 DISSIPATION = QuadraticDissipation
@@ -31,35 +30,12 @@ LAWS = [
 # --- types ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("model", "sentence"),
-    [
-        (ImpulseCorrelation, "model is the class ImpulseCorrelation; must be made: ImpulseCorre"),
-        (0.5, "model is a float; must be an impact model"),
-        ([0.1], "model is a list; must be an impact model"),
-        (None, "model is a NoneType; must be an impact model"),
-    ],
-)
-def test_what_is_no_model(model, sentence):
-    chain = Chain([1, 1, 1], [1, 0, 0])
-    for call in (collide, condition_number):
-        with pytest.raises(TypeError, match="^" + sentence):
-            call(chain, model)
-
-
 @pytest.mark.parametrize("model", LAWS, ids=repr)
 def test_what_is_no_chain(model):
     for thing, words in (([1, 0, 0], "a list"), (Chain, "the class Chain"), (None, "a NoneType")):
         for call in (lambda chain: collide(chain, model), model.solve):
             with pytest.raises(TypeError, match=f"^chain is {words}; must be a Chain$"):
                 call(thing)
-
-
-def test_what_is_no_trace():
-    chain = Chain([1, 1, 1], [1, 0, 0])
-    for thing, words in ((chain, "a Chain"), ([1, 0, 0], "a list"), (cradle.Trace, "the class Tr")):
-        with pytest.raises(TypeError, match=f"^trace is {words}.*; must be a Trace$"):
-            effective_ratio(thing)
 
 
 # --- values --------------------------------------------------------------------------------

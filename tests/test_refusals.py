@@ -15,6 +15,7 @@ from cradle import (
     ImpulseCorrelation,
     SequentialCollisions,
     SpringChain,
+    Trace,
     collide,
     paper_chain,
     post_impact_velocities,
@@ -147,6 +148,13 @@ TOLERANCES = [
     ([1e-6], "tolerance = [1e-06]; must be one number"),
 ]
 
+NO_MODELS = [
+    (ImpulseCorrelation, "model is the class ImpulseCorrelation; must be made: ImpulseCorre"),
+    (0.5, "model is a float; must be an impact model"),
+    ([0.1], "model is a list; must be an impact model"),
+    (None, "model is a NoneType; must be an impact model"),
+]
+
 ADVICE = [
     (THREE, {}, "wanted = 'velocities'; needs ratios or stiffness: restitution alone does not det"),
     (THREE, {"wanted": "forces"}, "wanted = 'forces'; needs stiffness"),
@@ -181,6 +189,9 @@ OTHERS = [
     (conserving_outcomes, ([1, 1], [1, 0]), "masses has shape (2,); must be (3,)"),
     (conserving_outcomes, ([1, 1, 1], [1, 0, 0], [0.1, 1.5]), "angles[1] = 1.5; must lie in [0, 1"),
     (condition_number, (THREE, ImpulseCorrelation([0.1] * 3)), "forward has 3 values"),
+    (effective_ratio, (THREE,), "trace is a Chain; must be a Trace"),
+    (effective_ratio, ([1, 0, 0],), "trace is a list; must be a Trace"),
+    (effective_ratio, (Trace,), "trace is the class Trace; must be a Trace"),
     (ratio_of, ([1, 0, 0, 0],), "trace has 4 balls; an effective ratio is that of three"),
     (ratio_of, ([0, 0, 1],), "closing_speeds = [0.0, -1.0]; any ratio fits"),
     (paper_chain, ("ABC", [1, 2]), "speed = [1, 2]; must be one number"),
@@ -215,6 +226,8 @@ def rows():
     leans = {"gaps": [[0, 0], [0, -3]]}, "gaps[1, 1] = -3.0; must be a lean"
     for options, words in (*SPRINGS[:-1], leans):
         yield spring_velocities, {"masses": ONES, "velocities": [1, 0, 0], **options}, words
+    for call in (collide, condition_number):
+        yield from ((call, (THREE, thing), words) for thing, words in NO_MODELS)
     yield from ((effective_ratio, {"trace": TRACE, "tolerance": x}, say) for x, say in TOLERANCES)
     yield from ((recommend, {"chain": one, **asked}, words) for one, asked, words in ADVICE)
     for masses in ([1, 1e-20], [1e-20, 1], [1, 1, 1e-20], [1, 1e-16, 1]):
@@ -231,6 +244,7 @@ def rows():
     [pytest.param(*row, id=f"{row[0].__name__}: {row[2]}") for row in rows()],
 )
 def test_refused_in_these_words(function, given, words):
-    named, kind = isinstance(given, dict), TypeError if " is a" in words else ValueError
+    named, no_such = isinstance(given, dict), re.match(r"\w+ is (an?|the) ", words)
+    kind = TypeError if no_such else ValueError
     with pytest.raises(kind, match="^" + re.escape(words)):
         function(**given) if named else function(*given)
