@@ -1,6 +1,5 @@
 """What the models and measures ask of chains, masses and types, in sentences."""
 
-import re
 from functools import partial
 
 import numpy as np
@@ -39,59 +38,6 @@ def test_what_is_no_chain(model):
 
 
 # --- values --------------------------------------------------------------------------------
-
-
-def impact(model, masses=(1, 1, 1), velocities=(1, 0, 0), e=1.0):
-    return lambda: collide(Chain(masses, velocities, e), model)
-
-
-ENERGY = partial(EnergyDistribution, 1.0)
-UNDEFINED = "velocities leave it undefined which balls move as one body: contacts "
-#: Calls, and the words in which they are refused.
-REFUSED = [
-    (partial(SequentialCollisions, "first"), "order = 'first'; must be 'left' or 'right'"),
-    (partial(SequentialCollisions, max_events=0), "max_events = 0; must be a whole number, at"),
-    *(
-        (impact(FusedChain(), [1] * 4, v), f"{UNDEFINED}{what} FusedChain needs")
-        for v, what in (
-            ([2, 1, 0, 0], "[0, 1] approach;"),
-            ([1, 0, 0, 0.5], "[0] approach and [2] open;"),
-            ([0, 1, 0, 0], "[1] approach and [0] open;"),
-        )
-    ),
-    (partial(EnergyDistribution, -1), "stiffness = -1.0; must be above 0"),
-    (partial(ENERGY, 0.5), "exponent = 0.5; must be at least 1"),
-    (partial(ENERGY, gaps=1), "gaps = 1; must be True or False"),
-    (partial(ENERGY, rtol=0), "rtol = 0.0; must lie in"),
-    (partial(ENERGY, max_evaluations=0), "max_evaluations = 0; must be a whole number, at least 1"),
-    (impact(EnergyDistribution([1, 2, 3])), "stiffness has 3 values; 3 balls need 2"),
-    *(
-        (impact(model, [mass] * 3, [1e-10, 0, 0]), f"masses[0] = {mass!r}; its reduced mass with "
-         f"masses[1] = {mass!r} is beyond the range")
-        for model in SPRINGS for mass in (5e-324, 1e-309, 1.2e308)
-    ),
-    (partial(DISSIPATION, -1), "coefficients = -1.0; must lie in [0, 1e+09]"),
-    (partial(DISSIPATION, [1, np.inf]), "coefficients[1] = inf; must be finite"),
-    (partial(DISSIPATION, distance=-1), "distance = -1.0; must lie in [0, 1e+09]"),
-    (partial(DISSIPATION, distance=[1]), "distance = [1]; must be one number"),
-    (partial(DISSIPATION, max_problems=0), "max_problems = 0; must be a whole number, at least 1"),
-    (impact(DISSIPATION(), e=[0.5, 1]),
-     "restitution[1] = 1.0; must be below 1 - 2e-09 for QuadraticDissipation: e = 1 is a limit"),
-    (impact(DISSIPATION([1, 2, 3])), "coefficients has 3 values; 3 balls need 2, or one"),
-    (impact(DISSIPATION(1, distance=1), [1, 1], [1, 0]),
-     "distance = 1.0; needs three balls, the chain has 2"),
-    (impact(DISSIPATION(), [1, 1e-100, 1], e=0.5),
-     "masses[1] = 1e-100; must be at least 1e-06 of the he"),
-    # A group: each is near a neighbour, but the group is far from both its sides.
-    (impact(DISSIPATION(), [1e4, 1e-15, 2e-15, 1e13, 1e4], [1, 0, 0, 0, 0], 0.5),
-     "masses[1] = 1e-15; must be at least 1e-06 of the he"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("call", "words"), REFUSED, ids=[words for _, words in REFUSED])
-def test_refusals_name_value_and_rule(call, words):
-    with pytest.raises(ValueError, match="^" + re.escape(words)):
-        call()
 
 
 @pytest.mark.parametrize(
@@ -153,7 +99,7 @@ def test_two_balls(model, masses, e):
          lambda trace: np.argmax(trace.collisions) == 0),
         (SequentialCollisions("right", max_events=3), [100, 1, 100], [1, 0, -1], "3 steps",
          lambda trace: np.argmax(trace.collisions) == 1),
-        (ENERGY(max_evaluations=50), [1, 1, 1], [1, 0, 0], "50 reached",
+        (EnergyDistribution(max_evaluations=50), [1, 1, 1], [1, 0, 0], "50 reached",
          lambda trace: trace.evaluations == 50 and trace.step_impulses[-1, 0] >= 0),
         (DISSIPATION(9.0, max_problems=2), [10, 0.1, 10], [0, 1, 0], "2;",
          lambda trace: trace.collisions.tolist() == [1, 1]),

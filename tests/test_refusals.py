@@ -12,7 +12,10 @@ from chains import striking
 
 from cradle import (
     Chain,
+    EnergyDistribution,
+    FusedChain,
     ImpulseCorrelation,
+    QuadraticDissipation,
     SequentialCollisions,
     SpringChain,
     Trace,
@@ -63,10 +66,15 @@ def viscosity(masses, restitution, speed=1, stiffness=1):
     return viscosity_from(restitution, speed=speed, masses=masses, stiffness=stiffness)
 
 
+def struck(model, masses=ONES, velocities=(1, 0, 0), e=1.0):
+    return collide(Chain(masses, velocities, e), model)
+
+
 def springs(**options):
     return collide(THREE, SpringChain(**options))
 
 
+UNDEFINED = "velocities leave it undefined which balls move as one body: contacts "
 LIGHT = "must be at least 1e-150 of the heaviest ball of its chain"
 SECONDS = np.array([1, 2, 3], "m8[ns]")  # NumPy makes floats of nanoseconds, of seconds none
 MASKED = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
@@ -142,6 +150,45 @@ SPRINGS = [
     ({"accuracy": 1e-13}, "accuracy = 1e-13; must lie in [1e-12, 0.02]"),
     ({"max_steps": 0}, "max_steps = 0; must be a whole number, at least 1"),
 ]
+
+LAWS = [
+    (SequentialCollisions, ("first",), "order = 'first'; must be 'left' or 'right'"),
+    (SequentialCollisions, {"max_events": 0}, "max_events = 0; must be a whole number, at"),
+    *(
+        (struck, (FusedChain(), [1] * 4, v), f"{UNDEFINED}{what} FusedChain needs")
+        for v, what in (
+            ([2, 1, 0, 0], "[0, 1] approach;"),
+            ([1, 0, 0, 0.5], "[0] approach and [2] open;"),
+            ([0, 1, 0, 0], "[1] approach and [0] open;"),
+        )
+    ),
+    (EnergyDistribution, (-1,), "stiffness = -1.0; must be above 0"),
+    (EnergyDistribution, (1, 0.5), "exponent = 0.5; must be at least 1"),
+    (EnergyDistribution, {"gaps": 1}, "gaps = 1; must be True or False"),
+    (EnergyDistribution, {"rtol": 0}, "rtol = 0.0; must lie in"),
+    (EnergyDistribution, {"max_evaluations": 0}, "max_evaluations = 0; must be a whole number, at"),
+    (struck, (EnergyDistribution([1, 2, 3]),), "stiffness has 3 values; 3 balls need 2"),
+    *(
+        (struck, (model, [mass] * 3, [1e-10, 0, 0]), f"masses[0] = {mass!r}; its reduced mass with "
+         f"masses[1] = {mass!r} is beyond the range")
+        for model in (SpringChain(), EnergyDistribution()) for mass in (5e-324, 1e-309, 1.2e308)
+    ),
+    (QuadraticDissipation, (-1,), "coefficients = -1.0; must lie in [0, 1e+09]"),
+    (QuadraticDissipation, ([1, np.inf],), "coefficients[1] = inf; must be finite"),
+    (QuadraticDissipation, {"distance": -1}, "distance = -1.0; must lie in [0, 1e+09]"),
+    (QuadraticDissipation, {"distance": [1]}, "distance = [1]; must be one number"),
+    (QuadraticDissipation, {"max_problems": 0}, "max_problems = 0; must be a whole number, at le"),
+    (struck, (QuadraticDissipation(), ONES, [1, 0, 0], [0.5, 1]),
+     "restitution[1] = 1.0; must be below 1 - 2e-09 for QuadraticDissipation: e = 1 is a limit"),
+    (struck, (QuadraticDissipation([1, 2, 3]),), "coefficients has 3 values; 3 balls need 2, or o"),
+    (struck, (QuadraticDissipation(1, distance=1), [1, 1], [1, 0]),
+     "distance = 1.0; needs three balls, the chain has 2"),
+    (struck, (QuadraticDissipation(), [1, 1e-100, 1], [1, 0, 0], 0.5),
+     "masses[1] = 1e-100; must be at least 1e-06 of the he"),
+    # A group: each is near a neighbour, but the group is far from both its sides.
+    (struck, (QuadraticDissipation(), [1e4, 1e-15, 2e-15, 1e13, 1e4], [1, 0, 0, 0, 0], 0.5),
+     "masses[1] = 1e-15; must be at least 1e-06 of the he"),
+]  # fmt: skip
 
 TOLERANCES = [
     (-1e-9, "tolerance = -1e-09; must be at least 0"),
@@ -236,7 +283,7 @@ def rows():
     for number in (0, -1, 1.5):
         given = {"runs": RUN, "columns": number}
         yield animate_swing, given, f"columns = {number}; must be a whole number, at least 1"
-    yield from OTHERS
+    yield from LAWS + OTHERS
 
 
 @pytest.mark.parametrize(
