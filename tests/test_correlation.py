@@ -134,9 +134,6 @@ def test_models_compare_by_value_and_their_repr_makes_them_again():
     assert model != ImpulseCorrelation([0.1, 0.2], 0.3)
 
 
-# --- no impact -----------------------------------------------------------------------------
-
-
 # --- the record ----------------------------------------------------------------------------
 
 
@@ -231,15 +228,10 @@ def test_small_batches():
 
 
 def test_inputs_are_left_alone():
-    m, v = np.array([1.0, 0.01, 1.0]), np.array([1.0, 0.0, 0.0])
-    e, f = np.array([0.5, 0.5]), np.array([0.15])
-    post_impact_velocities(m, v, e, f)
-    assert (m.tolist(), v.tolist(), e.tolist(), f.tolist()) == (
-        [1.0, 0.01, 1.0],
-        [1.0, 0.0, 0.0],
-        [0.5, 0.5],
-        [0.15],
-    )
+    given = [np.array(x) for x in ([1.0, 0.01, 1.0], [1.0, 0.0, 0.0], [0.5, 0.5], [0.15])]
+    before = [part.tolist() for part in given]
+    post_impact_velocities(*given)
+    assert [part.tolist() for part in given] == before
 
 
 # --- giving up -----------------------------------------------------------------------------

@@ -316,17 +316,10 @@ def test_code_on_disk_that_cannot_be_read_is_removed_once(monkeypatch, tmp_path,
 @pytest.mark.exhaustive
 @needs_numba
 def test_half_a_file_of_compiled_code_is_compiled_anew(tmp_path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-
-    def warm_up():
-        return subprocess.run(
-            [sys.executable, "-W", "error", "-m", "cradle", "warm-up"],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-
+    command = [sys.executable, "-W", "error", "-m", "cradle", "warm-up"]
+    options = {"capture_output": True, "text": True, "check": True}
+    own = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    warm_up = functools.partial(subprocess.run, command, env=own, **options)
     warm_up()
     for pattern in ("*batch-*.nbc", "*batch-*.nbi"):
         (file,) = tmp_path.rglob(pattern)

@@ -1,19 +1,18 @@
 """A minute of a cradle: the judge, the stored tables, and what two chapters say of them."""
 
-import csv
 import importlib.util
 import math
 import re
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from chapters import Chapter, shows
+from stored import DATA, read
 
 from cradle import Chain, SpringChain, collide
 
-ROOT = Path(__file__).parents[1]
+EXAMPLES = DATA.parent / "examples"
 pytest.importorskip("numba", reason="the judge of the scene is compiled by numba")
 import cradle_scenes as scenes  # noqa: E402
 from measure import absent, versions  # noqa: E402
@@ -28,8 +27,12 @@ AT = (1, 5, 20, 50)
 
 @cache
 def stored(name):
-    with (ROOT / "data" / f"scene_{name}.csv").open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    return read(f"scene_{name}.csv")
+
+
+def balls(row):
+    """What a row says of each ball: its energy, or its angle."""
+    return np.array([float(row[f"ball{k}"]) for k in range(1, 6)])
 
 
 @cache
@@ -39,7 +42,7 @@ def run(name, how, setting, pulled=1, gap="0"):
     names = ("run", "how", "setting", "pulled", "gap")
     rows = [row for row in stored("strokes") if tuple(row[k] for k in names) == key]
     assert [int(row["stroke"]) for row in rows] == list(range(1, len(rows) + 1)), key
-    return np.array([[float(row[f"ball{k}"]) for k in range(1, 6)] for row in rows])
+    return np.array([balls(row) for row in rows])
 
 
 def misplaced(found, pulled):
@@ -111,7 +114,7 @@ def test_the_tables_are_complete():
                     assert len(found) in (58, 59) or found[-1].sum() > scenes.WILD
             assert len(run(name, "no impacts", setting, 5)) in (58, 59)
     assert len(run("swing", "alone", "ratio")) == len(run(*HERTZ)) == 58
-    numbers = np.array([[float(row[f"ball{k}"]) for k in range(1, 6)] for row in stored("strokes")])
+    numbers = np.array([balls(row) for row in stored("strokes")])
     assert np.isfinite(numbers).all()
     assert numbers.min() >= 0
 
@@ -164,7 +167,7 @@ def test_swing_repeats_what_is_stored():
 def test_the_film_shows_what_the_table_says():
     for name, how in (("Chipmunk", "as it is"), ("Rapier", "mended"), ("Hertz springs", "alone")):
         rows = [row for row in stored("film") if (row["run"], row["how"]) == (name, how)]
-        angles = np.radians([[float(row[f"ball{k}"]) for k in range(1, 6)] for row in rows])
+        angles = np.radians([balls(row) for row in rows])
         times = np.array([float(row["time"]) for row in rows])
         assert times[-1] >= 11
         np.testing.assert_allclose(np.diff(times), 1 / 30, atol=0.02)
@@ -187,11 +190,11 @@ def test_a_row_at_rest_costs_at_most_as_much_again():
 
 
 def test_the_ratio_is_that_of_elastic_spheres():
-    with (ROOT / "data" / "implied_ratio.csv").open(encoding="utf-8") as file:
-        (row,) = [row for row in csv.DictReader(file) if list(row.values())[:4] == ["1.5", *"111"]]
+    same = dict.fromkeys(("m2_over_m1", "m3_over_m2", "k2_over_k1"), "1")
+    (row,) = read("implied_ratio.csv", exponent="1.5", **same)
     assert pytest.approx(float(row["ratio"]), abs=5e-5) == scenes.RATIO
     assert Chapter("recipe").glued["ratio"] == f"{scenes.RATIO:.2f}"
-    for path in (ROOT / "examples").glob("*.py"):
+    for path in EXAMPLES.glob("*.py"):
         assert f"ImpulseCorrelation({scenes.RATIO})" in path.read_text(encoding="utf-8")
 
 
@@ -243,7 +246,7 @@ def test_gaps_give_the_school_book_first_and_not_for_ever():
 @pytest.mark.parametrize("name", ["pymunk", "box2d", "bullet", "rapier", "mujoco"])
 def test_the_recipe_shows_the_tested_programs(name: str):
     (output,) = Chapter("recipe").cells[f"recipe-{name}"].outputs
-    text = (ROOT / "examples" / f"{name}_cradle.py").read_text(encoding="utf-8")
+    text = (EXAMPLES / f"{name}_cradle.py").read_text(encoding="utf-8")
     assert output.data["text/markdown"] == f"```python\n{text}```"
 
 
@@ -281,8 +284,7 @@ def test_the_figures_draw_the_tables():
 
 def speeds_of(row):
     """Speeds over the strikers', from energies over that of all."""
-    energies = np.array([float(row[f"ball{k}"]) for k in range(1, 6)])
-    return np.sqrt(float(row["pulled"]) * energies)
+    return np.sqrt(float(row["pulled"]) * balls(row))
 
 
 def test_judged_by_the_film():
@@ -313,7 +315,7 @@ def test_stored_first_strokes_with_gaps(engine):
     rows = [row for row in stored("gaps") if row["run"] == engine.name]
     assert len(rows) == 16
     for row in rows:
-        own = np.array([float(row[f"ball{k}"]) for k in range(1, 6)])
+        own = balls(row)
         if row["gap"] in ("0", "0.01"):
             known = run(engine.name, "as it is", row["setting"], row["pulled"], row["gap"])[0]
             np.testing.assert_allclose(own, known, atol=0.05)
