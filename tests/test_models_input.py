@@ -1,4 +1,4 @@
-"""What the models and measures ask of chains, masses and types, in sentences."""
+"""What all models have in common: types, two balls, ends, units, defaults."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""What is refused, in which words: chains, closed forms, measures, tables, pictures, advice.
+"""What is refused, in which words: chains, models, swings, measures, tables, pictures, advice.
 
 A row is a call and the beginning of what it says.  `test_entries.py` asks every argument of every
 entry point for whatever is no such value at all.
@@ -15,6 +15,7 @@ from cradle import (
     EnergyDistribution,
     FusedChain,
     ImpulseCorrelation,
+    Pendulums,
     QuadraticDissipation,
     SequentialCollisions,
     SpringChain,
@@ -190,6 +191,31 @@ LAWS = [
      "masses[1] = 1e-15; must be at least 1e-06 of the he"),
 ]  # fmt: skip
 
+SWINGS = [
+    ({"positions": [0.01, 0, 0]}, "positions = [0.01, 0.0, 0.0]; balls 0 and 1 overlap by 0.01"),
+    ({"positions": [0, 0]}, "positions has shape (2,); 3 balls need (3,)"),
+    ({"times": [1, 0]}, "times = [1, 0]; must be a row of rising"),
+    ({"times": []}, "times = []; must be a row of rising"),
+    ({"max_impacts": 0}, "max_impacts = 0"),
+    ({"model": SpringChain(gaps=1e-6)}, "model.gaps = 1e-06; must be 0: those of a swing are"),
+    ({"min_energy": 2}, "min_energy = 2.0; must lie in"),
+    ({"model": ImpulseCorrelation([0.1] * 4)}, "forward has 4 values; 3 balls need 1"),
+    ({"pendulums": Pendulums(1, damping=4)},
+     "damping[0] = 4.0; must be below the natural frequency sqrt(g/l) = 3.13"),
+    ({"positions": [0, 0, 0.2], "pendulums": Pendulums([1, 1, 0.1])},
+     "positions[2] = 0.2; must be within 0.1571 m: "),
+]  # fmt: skip
+
+PENDULUMS = [
+    ({"length": 0}, "length = 0.0; must be above 0"),
+    ({"gaps": [0, -1]}, "gaps[1] = -1.0; must be at least 0"),
+    ({"damping": -1}, "damping = -1.0"),
+    ({"gravity": 0}, "gravity = 0.0"),
+    ({"angle": "large"}, "angle = 'large'"),
+    ({"angle": "full", "gaps": 1e-3}, "gaps = 0.001; must be 0 with angle='full'"),
+    ({"angle": "full", "length": [1, 2]}, "length = (1.0, 2.0); must be equal with angle='full'"),
+]
+
 TOLERANCES = [
     (-1e-9, "tolerance = -1e-09; must be at least 0"),
     ([1e-6], "tolerance = [1e-06]; must be one number"),
@@ -269,6 +295,9 @@ def rows():
         yield from ((function, given, words) for given, words in SHAPES)
     yield from ((largest_ratios, given, words) for given, words in BOUNDS)
     yield from ((paper_chain, (given,), words) for given, words in LETTERS)
+    swung = {"chain": THREE, "model": ImpulseCorrelation(0.1), "positions": ONES * 0, "times": [1]}
+    yield from ((swing, swung | change, words) for change, words in SWINGS)
+    yield from ((Pendulums, given, words) for given, words in PENDULUMS)
     yield from ((springs, options, words) for options, words in SPRINGS)
     leans = {"gaps": [[0, 0], [0, -3]]}, "gaps[1, 1] = -3.0; must be a lean"
     for options, words in (*SPRINGS[:-1], leans):
