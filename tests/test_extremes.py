@@ -497,14 +497,13 @@ def test_any_finite_numbers(data):
         or any(0 < c < LIMITS.least_restitution for c in e)
         or any(mass * speed * speed > 1e300 for mass, speed in zip(m, v))
     ):
+        refused = "masses["
         try:
             problem.attempt(2000)
         except ImpactNotCertified:
-            refused = "masses["
+            pass
         except ValueError as error:
             refused = str(error)
-        else:
-            refused = "masses["
         assert refused.startswith(("masses[", "velocities[", "restitution["))
     else:
         trace, finished = problem.attempt(2000)

@@ -158,32 +158,28 @@ def test_exact_zeros():
 
 # --- R9: infinite sequences ----------------------------------------------------------------
 
-#: What a case of R9 may cost: far from `MAX_EVENTS`, and about what it costs today.
-BOUNDED = {"plastic": 400, "chatter": 1500, "nested": 20_000}
+# What a case may cost: far from `MAX_EVENTS`, and about what it costs today.
 
 
 def test_three_equal_plastic_balls_at_ratio_zero():
-    trace = solved([1, 1, 1], [1, 0, 0], 0, 0, max_events=BOUNDED["plastic"])
+    trace = solved([1, 1, 1], [1, 0, 0], 0, 0, max_events=400)
     np.testing.assert_allclose(trace.velocities, [1 / 3] * 3, rtol=0, atol=1e-15)
     assert trace.collapsed
     assert trace.events[-1].kind == "collapse"
-    assert len(trace.events) < BOUNDED["plastic"]
     assert trace.energy_loss == pytest.approx(0.5 - 1 / 6, rel=1e-12)
 
 
 def test_chatter_beside_a_finite_closing_speed():
     """Contacts 0 and 1 collapse while contact 2 is still closing at a finite speed."""
     trace = solved(
-        [2, 0.1, 0.2, 5], [1, 0.5, 0, 0], [0, 0.5, 0], [0.8, 0.1], [0.8, 1],
-        max_events=BOUNDED["chatter"],
-    )  # fmt: skip
+        [2, 0.1, 0.2, 5], [1, 0.5, 0, 0], [0, 0.5, 0], [0.8, 0.1], [0.8, 1], max_events=1500
+    )
     assert trace.collapsed
     first = next(row for row, event in enumerate(trace.events, 1) if event.kind == "collapse")
     assert {trace.events[first - 1].contact, trace.events[first].contact} == {0, 1}
     assert np.ptp(trace.path[first + 1, :3]) < 1e-12
     assert trace.path[first, 2] - trace.path[first, 3] > 0.1
     np.testing.assert_allclose(trace.velocities, common_velocity(trace), rtol=0, atol=1e-13)
-    assert len(trace.events) < BOUNDED["chatter"]
 
 
 def test_nested_infinite_sequences():
@@ -194,7 +190,7 @@ def test_nested_infinite_sequences():
         0,
         [0.967963550258582, 0.04515107491767867, 0.23414204067392064, 0.40810942738654143],
         [0.20344454463172412, 0.5687905977876264, 0.927494733732026, 0.17420000215542086],
-        max_events=BOUNDED["nested"],
+        max_events=20_000,
     )
     assert trace.collapsed
     np.testing.assert_allclose(trace.velocities, [1 / 6] * 6, rtol=0, atol=1e-12)

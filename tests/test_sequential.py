@@ -34,14 +34,6 @@ def by_rounds(chain, first):
     return v, impulses
 
 
-def test_equations_5_and_6():
-    """Han and Gilmore's two answers for three equal elastic balls."""
-    chain = Chain([1, 1, 1], [1, 0, 0], 1)
-    fused = collide(chain, FusedChain()).velocities
-    np.testing.assert_allclose(fused, [-1 / 3, 2 / 3, 2 / 3], rtol=0, atol=2e-16)
-    assert collide(chain, SequentialCollisions()).velocities.tolist() == [0, 0, 1]
-
-
 @pytest.mark.parametrize("n", range(2, 6))
 def test_one_striker_collides_pair_after_pair(n):
     rng = np.random.default_rng(n)

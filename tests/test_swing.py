@@ -36,15 +36,6 @@ def pulled(n, k=1, by=0.02):
     return [-by] * k + [0] * (n - k)
 
 
-def lost(run):
-    return sum(impact.energy_loss for impact in run.impacts)
-
-
-def energy(m, x, v, length, gravity=9.81):
-    """Small-angle energy, written out again."""
-    return 0.5 * (m * v**2).sum() + 0.5 * (m * gravity / length * x**2).sum()
-
-
 # Periods
 
 
@@ -130,8 +121,8 @@ def test_energy_ledger(how, e):
     assert len(run.impacts) > 10
     start = run.energy[0]
     if how != "any angle":
-        m, length = chain.masses, pendulums.row("length", 4)
-        assert start == pytest.approx(energy(m, run.positions[0], chain.velocities, length))
+        raised = 9.81 / pendulums.row("length", 4) * run.positions[0] ** 2
+        assert start == pytest.approx(0.5 * chain.masses @ (chain.velocities**2 + raised))
     losses = np.array([[impact.time, impact.energy_loss] for impact in run.impacts])
     booked = np.array([losses[losses[:, 0] <= t, 1].sum() for t in times])
     tolerance = 1e-10 if how == "any angle" else 1e-13
@@ -139,7 +130,7 @@ def test_energy_ledger(how, e):
     for impact in run.impacts:
         kinetic = 0.5 * chain.masses @ (impact.before**2 - impact.after**2)
         assert kinetic == pytest.approx(impact.energy_loss, abs=1e-14 * start)
-    assert (lost(run) == 0) == (e == 1)
+    assert (losses[:, 1] != 0).any() == (e < 1)
     # Nobody passes: neighbours overlap by no more than rounding.
     distance = pendulums.row("gaps", 3) + np.diff(run.positions, axis=1)
     assert distance.min() > -1e-12

@@ -19,7 +19,6 @@ from cradle import Chain, ImpulseCorrelation, collide, textbook
 from cradle.closed_form import largest_ratios
 
 SOURCE = Path(textbook.__file__).read_text(encoding="utf-8")
-in_floats = functools.partial(solve, number=float)
 
 
 @pytest.fixture(autouse=True)
@@ -206,7 +205,7 @@ def marched(kind):
         n = kind if isinstance(kind, int) else 3 + seed % 4
         chain, meeting = generic(seed, n, bounded=kind != "held")
         try:
-            plain = in_floats(*chain, meeting=meeting, excess="saturate", max_events=40)
+            plain = solve(*chain, meeting=meeting, excess="saturate", max_events=40, number=float)
         except EventLimit:
             continue
         # The march has no rule R9, and needs a step far smaller than the last of many collisions.
