@@ -102,6 +102,7 @@ def test_solve_agrees_with_the_solver():
     after = collide(chain, model).velocities
     answer = json.loads(call("solve ABACA --speed 1.5 --json"))
     assert [row["after"] for row in answer["rows"]] == pytest.approx(after.tolist(), abs=1e-15)
+    assert [(row["ball"], row["type"]) for row in answer["rows"]] == list(enumerate("ABACA", 1))
     assert answer["collisions"] == collide(chain, model).collisions.tolist()
     rows = list(csv.DictReader(io.StringIO(call("solve ABACA --speed 1.5 --csv"))))
     assert [float(row["after"]) for row in rows] == pytest.approx(after.tolist(), abs=1e-15)
@@ -462,6 +463,7 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("swing 3 -o toy", 1, "'toy'; must end in .svg, .html, .gif, .mp4 or .png"),
         ("swing --masses 1,0.1 --by 0.3 --length 0.2", 1, "after t = 0.2243 s ball 2 at 0.545"),
         ("swing --masses 1,1,1 --length 0", 1, "cradle: --length 0.0; must be above 0"),
+        ("swing 3 --seconds 0", 1, "cradle: --seconds = 0.0; must be above 0"),
         ("recommend --masses 1,1,1", 1, "Give --stiffness 1 if all contacts are equal spheres"),
         ("recommend --masses 1,1,1 --wanted path,x", 1, "--wanted 'x'; must be one of"),
         ("swing ABA --speed 2", 2, "leave --speed and --velocities out: the first ball is pulled"),
