@@ -218,6 +218,10 @@ def test_the_papers_balls_by_another_law():
     assert json.loads(call("solve AAAAA --json"))["assumed"] == []
 
 
+def test_a_number_of_balls_says_what_one_weighs():
+    assert json.loads(call("solve 3 --unit g --json"))["assumed"][0] == "equal balls of 1 g"
+
+
 def test_balls_that_do_not_approach_are_named():
     assert "no balls approach: no impact" in call("solve --masses 1,1,1 --velocities -1,0,0")
     assert "no balls approach" not in call("solve --masses 1,1,1 --velocities 0,0,-1")

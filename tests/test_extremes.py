@@ -44,9 +44,6 @@ def sample(rows, count, seed=9):
     return [rows[k] for k in np.random.default_rng(seed).choice(len(rows), count, replace=False)]
 
 
-# --- the apparatus itself ----------------------------------------------------------------------
-
-
 def test_a_fault_is_seen():
     """Every kind of fault, put into a sound trace by hand."""
     trace, _ = x.case([1, 2, 1.5], [1, 0.25, 0], 0.5, 0.25).attempt()

@@ -26,9 +26,6 @@ LAWS = [
 ]  # fmt: skip
 
 
-# --- types ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("model", LAWS, ids=repr)
 def test_what_is_no_chain(model):
     for thing, words in (([1, 0, 0], "a list"), (Chain, "the class Chain"), (None, "a NoneType")):
@@ -152,9 +149,6 @@ def test_dissipation_takes_balls_that_grow_lighter_towards_an_end_and_just_heavy
         np.testing.assert_allclose(after, 1 / (2 + 1e-6), rtol=1e-9)
     else:
         assert (np.diff(after) > -1e-14).all()
-
-
-# --- defaults ------------------------------------------------------------------------------
 
 
 def test_one_stiffness_for_all_needs_no_value():

@@ -151,9 +151,6 @@ def test_damping_between_impacts():
         v = impact.after
 
 
-# Towards swinging together
-
-
 def test_drift_of_five_balls():
     """All energy but that of the common swing dies out; in the end the balls swing together."""
     n = 5
@@ -165,9 +162,6 @@ def test_drift_of_five_balls():
     assert run.impacts[-1].time < 59
     assert run.energy[-1] == pytest.approx(0.5 * n * (0.02 * 2 * math.pi / n) ** 2, rel=1e-12)
     assert np.ptp(run.positions[-1]) < 1e-13
-
-
-# Independent integrations
 
 
 def springs(m, x, end, times, k, pendulums, exponent=1.5):
@@ -558,9 +552,6 @@ def test_grazing_is_no_endless_loop():
     run = swing(balls(2), ImpulseCorrelation(0), [-0.02, 0], [20.0], pendulums=pendulums)
     assert len(run.impacts) <= 4
     assert run.energy[-1] == pytest.approx(run.energy[0], rel=1e-12)
-
-
-# The check of every flight and every instant
 
 
 def faster(by):

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 from chains import local_orders
 from march import march
+from problem import Problem
 from truth import EventLimit, meaning, solve
 
-from cradle import Chain, ImpulseCorrelation, collide, textbook
+from cradle import textbook
 from cradle.closed_form import largest_ratios
 
 SOURCE = Path(textbook.__file__).read_text(encoding="utf-8")
@@ -25,9 +26,6 @@ SOURCE = Path(textbook.__file__).read_text(encoding="utf-8")
 def fifty_digits():
     with mpmath.workdps(50):
         yield
-
-
-# --- the text ----------------------------------------------------------------------------------
 
 
 def test_it_is_short_and_every_rule_has_its_place():
@@ -42,18 +40,12 @@ def test_it_is_short_and_every_rule_has_its_place():
         assert rule in docs, rule
 
 
-# --- number types ------------------------------------------------------------------------------
-
-
 def test_a_scalar_stands_for_all_and_a_string_for_a_decimal():
     in_digits = functools.partial(textbook.solve, number=mpmath.mpf)
     tenth, third = mpmath.mpf(1) / 10, mpmath.mpf(3) / 10
     one = in_digits([1, 2, 1], ["0.3", 0, 0], "0.1", "0.1").velocities
     assert one == in_digits([1, 2, 1], [third, 0, 0], [tenth] * 2, [tenth], [tenth]).velocities
     assert one != in_digits([1, 2, 1], [0.3, 0, 0], 0.1, 0.1).velocities
-
-
-# --- the package -------------------------------------------------------------------------------
 
 
 def generic(seed, n, bounded=True, light=0.3):
@@ -80,12 +72,6 @@ def generic(seed, n, bounded=True, light=0.3):
     return (masses, velocities, restitution, forward, backward), meeting
 
 
-def packaged(chain, meeting=0.5, **options):
-    masses, velocities, restitution, forward, backward = chain
-    model = ImpulseCorrelation(forward, backward, meeting=meeting, excess="saturate", **options)
-    return collide(Chain(masses, velocities, restitution), model)
-
-
 @functools.cache
 def compared(n, bounded):
     """Generic chains that end soon, with what the package and the textbook make of them."""
@@ -96,7 +82,7 @@ def compared(n, bounded):
             plain = textbook.solve(*chain, meeting=meeting, max_events=40)
         except EventLimit:
             continue
-        trace = packaged(chain, meeting)
+        trace = Problem(*chain, meeting).collide()
         if not trace.collapsed and len(plain.events) < 60:
             found.append((chain, trace, plain))
     assert len(found) > 60
