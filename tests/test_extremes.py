@@ -529,27 +529,3 @@ def test_found_by_fuzzing(name, plain, monkeypatch):
             # Each ball by its own measure, also the slow ones.
             for v, w in zip(trace.velocities.tolist(), exact.velocities):
                 assert abs(v - w) <= 32 * x.EPS * abs(w) + 2 * x.EPS**2
-
-
-@needs_numba
-@pytest.mark.exhaustive
-@pytest.mark.parametrize(("family", "least", "most"), [("within", 0, 0), ("saturate", 1, 30)])
-def test_how_many_chains_amplify_a_last_digit_by_1e8(family, least, most, monkeypatch):
-    """About one in a thousand where ratios exceed their bounds; `Trace.margin` warns of none."""
-    monkeypatch.setenv(runtime.VARIABLE, "compiled")
-    model = {"excess": "saturate", "max_events": 4000}
-    found = []
-    for index in range(8000):
-        problem = x.any_chain(family, 3, index)
-        chain = Chain(problem.masses, problem.velocities, problem.restitution)
-        law = ImpulseCorrelation(problem.forward, problem.backward, **model)
-        moved = problem.velocities * (1 + 1e-14 * np.cos(np.arange(chain.masses.size)))
-        try:
-            trace = collide(chain, law, record=False)
-            other = collide(Chain(chain.masses, moved, chain.restitution), law, record=False)
-        except ImpactNotFinished:
-            continue
-        if np.abs(other.velocities - trace.velocities).max() > 1e-6:
-            found.append(trace.margin)
-    assert least <= len(found) <= most
-    assert all(margin > 1e-9 for margin in found)
