@@ -137,15 +137,11 @@ def test_models_compare_by_value_and_their_repr_makes_them_again():
 # --- the record ----------------------------------------------------------------------------
 
 
-def generous(n, count, seed):
-    """Random chains of moderate masses: long and short impacts, some collapsed."""
-    return zip(*random_chains(np.random.default_rng(seed), count, n, decades=2), strict=True)
-
-
 @pytest.mark.parametrize("n", [2, 3, 4, 6])
 def test_rows_of_the_path(n):
-    longest = 0
-    for m, v, e, f, b in generous(n, 60, seed=n):
+    """Long and short impacts, some collapsed."""
+    longest, chains = 0, random_chains(np.random.default_rng(n), 60, n, decades=2)
+    for m, v, e, f, b in zip(*chains, strict=True):
         trace = collide(Chain(m, v, e), ImpulseCorrelation(f, b))
         longest = max(longest, len(trace.events))
         rows = len(trace.events) + 1

@@ -13,12 +13,6 @@ from problem import Problem
 
 from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide, textbook
 
-
-def at_rest(n):
-    """The first ball strikes the others at 1 m/s."""
-    return [1.0] + [0.0] * (n - 1)
-
-
 #: Chains with one answer, the same by more digits and in floats.
 NAMED = chains_of("one answer")
 named = pytest.mark.parametrize("name", NAMED)
@@ -127,7 +121,7 @@ def test_corrections_of_rounding_do_work():
 def test_balls_equal_but_for_the_last_digit():
     """They collide again, at speeds of a last digit, and end as equal ones do."""
     rng = np.random.default_rng(0)
-    equal = Problem([1.0] * 20, at_rest(20), [1.0] * 19, [0.3] * 18, [0.3] * 18)
+    equal = Problem([1.0] * 20, [1.0] + [0.0] * 19, [1.0] * 19, [0.3] * 18, [0.3] * 18)
     assert equal.collide().collisions.tolist() == [1] * 19
     for _ in range(5):
         masses = 1 + 1e-15 * uniform(rng, -1, 1, 20)

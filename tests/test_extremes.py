@@ -223,39 +223,23 @@ def test_no_digit_is_lost_at_ratio_zero(light, last, e):
             assert x.compare(trace, known)[2] <= 0.3
 
 
-LIGHT = (1e-3, 1e-6, 1e-12)
-LOSSY = (0.0, 1e-16, 0.3, 0.9, 0.99)
-
-
-def part_of_bound(light):
-    bound = 1 / (1 + light)
-    return {
-        "0": 0.0,
-        "1e-16": 1e-16,
-        "0.15": 0.15,
-        "0.9 bound": 0.9 * bound,
-        "bound - ulp": math.nextafter(bound, 0),
-        "bound": bound,
-        "1": 1.0,
-    }
-
-
-@pytest.mark.parametrize("light", LIGHT)
-@pytest.mark.parametrize("e", LOSSY)
+@pytest.mark.parametrize("light", [1e-3, 1e-6, 1e-12])
+@pytest.mark.parametrize("e", [0.0, 1e-16, 0.3, 0.9, 0.99])
 def test_infinite_sequences_in_bounded_work(light, e):
     """The common velocity, to the last digits, after at most a few thousand impacts."""
-    for name, ratio in part_of_bound(light).items():
+    bound = 1 / (1 + light)
+    for ratio in (0.0, 1e-16, 0.15, 0.9 * bound, math.nextafter(bound, 0), bound, 1.0):
         problem = x.case([1, light, 1], [1, 0, 0], e, ratio)
         trace, finished = problem.attempt(40_000)
-        assert finished, name
-        assert x.faults(trace) == [], name
-        assert trace.collisions.sum() < 10_000, name
+        assert finished, ratio
+        assert x.faults(trace) == [], ratio
+        assert trace.collisions.sum() < 10_000, ratio
         if trace.collapsed:
             np.testing.assert_allclose(trace.velocities, 1 / (2 + light), rtol=4 * x.EPS)
         elif len(trace.events) < 300:
-            assert x.measure(problem, trace).own < 8, name
-        if name in ("0", "1e-16"):
-            assert trace.collapsed == (light <= x.infinite_below(e)), name
+            assert x.measure(problem, trace).own < 8, ratio
+        if ratio <= 1e-16:
+            assert trace.collapsed == (light <= x.infinite_below(e)), ratio
 
 
 @pytest.mark.parametrize("e", [0.1, 0.5, 0.9])

@@ -18,11 +18,10 @@ from cradle import (
     collide,
 )
 
-SPRINGS = [SpringChain(), EnergyDistribution()]
 DISSIPATION = QuadraticDissipation
 LAWS = [
-    *SPRINGS, DISSIPATION(3), SequentialCollisions("left"), SequentialCollisions("right"),
-    FusedChain(), ImpulseCorrelation(0.1),
+    SpringChain(), EnergyDistribution(), DISSIPATION(3), SequentialCollisions("left"),
+    SequentialCollisions("right"), FusedChain(), ImpulseCorrelation(0.1),
 ]  # fmt: skip
 
 

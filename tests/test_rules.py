@@ -46,10 +46,6 @@ def closings(trace):
     return [contact for kind, contact in trace.events if kind == "close"]
 
 
-def common_velocity(trace):
-    return trace.chain.momentum / trace.chain.masses.sum()
-
-
 # --- R2, R3: start, end, recompression -----------------------------------------------------
 
 
@@ -179,7 +175,8 @@ def test_chatter_beside_a_finite_closing_speed():
     assert {trace.events[first - 1].contact, trace.events[first].contact} == {0, 1}
     assert np.ptp(trace.path[first + 1, :3]) < 1e-12
     assert trace.path[first, 2] - trace.path[first, 3] > 0.1
-    np.testing.assert_allclose(trace.velocities, common_velocity(trace), rtol=0, atol=1e-13)
+    common = trace.chain.momentum / trace.chain.masses.sum()
+    np.testing.assert_allclose(trace.velocities, common, rtol=0, atol=1e-13)
 
 
 def test_nested_infinite_sequences():

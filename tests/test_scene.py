@@ -282,11 +282,6 @@ def test_the_figures_draw_the_tables():
         np.testing.assert_allclose(axis.images[0].get_array() ** 2, run(*key)[::2].T, atol=1e-12)
 
 
-def speeds_of(row):
-    """Speeds over the strikers', from energies over that of all."""
-    return np.sqrt(float(row["pulled"]) * balls(row))
-
-
 def test_judged_by_the_film():
     """Speeds after the first strike: the film, the row, and engines with tiny gaps."""
     glued = Chapter("scene").glued
@@ -296,8 +291,8 @@ def test_judged_by_the_film():
         # Read at the turning point; the page has the speeds at the strike.
         off = np.abs(row[back] - seen[back]).max()
         assert float(glued[f"film-row-{name}"]) == pytest.approx(off, abs=0.012)
-        small = [
-            np.abs(speeds_of(row) - seen[back])
+        small = [  # speeds over the strikers', from energies over that of all
+            np.abs(np.sqrt(back * balls(row)) - seen[back])
             for row in stored("gaps")
             if row["run"] in ("Chipmunk", "Box2D", "Bullet")
             and (row["gap"], row["pulled"]) == ("5e-05", str(back))

@@ -180,13 +180,12 @@ def test_event_limit_reports_what_was_reached():
 # --- the march ---------------------------------------------------------------------------------
 
 STEPS = (200, 800, 3200)
-ENOUGH = 16
 
 
 def marched(kind):
     """Generic chains of a kind: so many balls, or with something that must happen in them."""
     found, seed = [], 0
-    while len(found) < ENOUGH:
+    while len(found) < 16:
         seed += 1
         n = kind if isinstance(kind, int) else 3 + seed % 4
         chain, meeting = generic(seed, n, bounded=kind != "held")
