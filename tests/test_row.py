@@ -425,10 +425,7 @@ def test_free_balls_that_are_accelerated_are_seen_in_time():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (
-            {"x": [[0, 0], [0.2, 0], [0.1, 0.17320508]]},
-            "balls 0 and 2 touch and are no neighbours; a row alone",
-        ),
+        ({"x": [[0, 0], [0.2, 0], [0.1, 0.17320508]]}, "balls 0 and 2 touch and .*; a row alone"),
         ({"x": [[0, 0], [0.2, 0]]}, r"positions has shape \(2, 2\); 3 balls need \(3, 2\)"),
         ({"radii": [0.1, 0.1]}, "radii has 2 values; 3 balls need 3, or one number"),
         ({"radii": [0.1, -0.1, 0.1]}, r"radii\[1\] = -0.1; must be above 0"),
@@ -515,7 +512,7 @@ REFUSED = [
     ([[-0.3, 0], [0, 0], [0.2 * 0.8, 0.2 * 0.6]], [[1, 0], STILL, STILL], None, 0.2,
      "balls 0 to 2 touch, but not in a straight row"),
     ([[0, 0], [0.3, 0], [0.6, 0]], [[0.3, 1], STILL, [-0.3, 1]], None, 0.01,
-     "balls 0 and 2 touch and .*; a row alone"),
+     "balls 0 and 2 touch and are no neighbours"),
     ([[-0.2, 0], [0, 0]], [[1, 0], STILL], [[-0.2, 1], [1, 0]], 0.01,
      "ball 1 is struck along its string"),
 ]  # fmt: skip
