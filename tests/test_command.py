@@ -108,9 +108,8 @@ def test_solve_agrees_with_the_solver():
     assert [float(row["after"]) for row in rows] == pytest.approx(after.tolist(), abs=1e-15)
     text = call("solve ABACA --speed 1.5").splitlines()
     assert text[0].split() == ["ball", "type", "mass", "before", "after"]
-    assert [float(line.split()[-1]) for line in text[1:6]] == pytest.approx(
-        after.tolist(), abs=5.1e-5
-    )
+    ends = [float(line.split()[-1]) for line in text[1:6]]
+    assert ends == pytest.approx(after.tolist(), abs=5.1e-5)
 
 
 # --- what is assumed ---------------------------------------------------------------------------

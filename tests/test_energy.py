@@ -127,9 +127,7 @@ def test_short_releases_are_followed_or_said_not_to_be():
         ([1, 1e12, 1e10], [2, -1, -1], [0, 0], [3, 3 / 101]),
     ],
 )
-def test_impulses_of_a_common_velocity_beside_heavy_balls(
-    masses, velocities, restitution, impulses
-):
+def test_impulses_beside_heavy_balls(masses, velocities, restitution, impulses):
     """The end of a plastic impact: of a velocity's last digit, times 1e16 kg, nothing is seen."""
     trace = collide(Chain(masses, velocities, restitution), EnergyDistribution())
     np.testing.assert_allclose(trace.impulses, impulses, rtol=1e-7)

@@ -456,9 +456,7 @@ positive = st.one_of(
     st.floats(1e-12, 1e12),
     st.sampled_from([1.0, 2.0, 1e-12, 1e12]),
 )
-unit = st.one_of(
-    st.floats(0, 1, allow_subnormal=True), st.sampled_from([0.0, 1.0, 0.5, 1.0 - 2.0**-53])
-)
+unit = st.floats(0, 1, allow_subnormal=True) | st.sampled_from([0.0, 1.0, 0.5, 1.0 - 2.0**-53])
 
 
 @settings(max_examples=250)

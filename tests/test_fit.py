@@ -48,11 +48,9 @@ def columns(name, speeds, after, sigma, errors=None):
 
 def any_shots(before, sigma, errors=None, moved=None):
     """Shots of balls A, B, C whichever of them move; ratio 0.1 to the right, 0.2 to the left."""
-    rows = []
+    rows, model = [], ImpulseCorrelation([0.1], [0.2])
     for shot, v in enumerate(before):
-        after = collide(
-            Chain([0.045, 0.053, 0.06], v, [0.6, 0.7]), ImpulseCorrelation([0.1], [0.2])
-        )
+        after = collide(Chain([0.045, 0.053, 0.06], v, [0.6, 0.7]), model)
         for ball, letter in enumerate("ABC"):
             error = 0.0 if errors is None else errors[shot][ball]
             uncertain = sigma * (v[ball] != 0 if moved is None else ball in moved)
@@ -713,9 +711,8 @@ def test_correlations_are_those_of_the_ellipse():
     group = Group((tuple("ABC"), tuple("CBA")), points, np.exp(-excess / 2))
     found = Fit(Shots(()), {}, {}, (group,), 0.0, 1).correlations()
     spread = np.linalg.inv(matrix)
-    assert found == {
-        ("ABC", "CBA"): pytest.approx(spread[0, 1] / np.sqrt(spread[0, 0] * spread[1, 1]), abs=1e-4)
-    }
+    expected = spread[0, 1] / np.sqrt(spread[0, 0] * spread[1, 1])
+    assert found == {("ABC", "CBA"): pytest.approx(expected, abs=1e-4)}
 
 
 def test_summary_names_what_is_off():

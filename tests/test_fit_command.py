@@ -64,9 +64,8 @@ def test_pairs_with_what_is_known_predict_longer_chains():
     assert alone == predicted(f"fit shots.csv --without ABA {known}")
     assert alone == predicted(f"fit shots.csv {known}")
     # e = 0.9, and momentum.
-    assert predicted("fit pairs.csv --predict AA --restitution AA=0.9") == pytest.approx(
-        [0.05, 0.95], abs=1e-12
-    )
+    pair = predicted("fit pairs.csv --predict AA --restitution AA=0.9")
+    assert pair == pytest.approx([0.05, 0.95], abs=1e-12)
 
 
 @pytest.mark.usefixtures("shots")

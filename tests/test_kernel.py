@@ -253,9 +253,7 @@ def test_warm_up_compiles():
 def test_compiled_code_is_found_on_disk():
     """In a new process, and by the name that numba gives it."""
     drive.warm_up()
-    code = (
-        "from cradle.runtime import compile as runtime; print(runtime.loaded(), runtime.on_disk())"
-    )
+    code = "import cradle.runtime.compile as one; print(one.loaded(), one.on_disk())"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     if runtime._stored() is None:
         pytest.skip("no folder for compiled code")
@@ -460,9 +458,8 @@ def test_the_path_is_kept_if_asked_for_or_up_to_a_bound(plain, on, monkeypatch):
     chain, model = Chain(*LONG[:3]), ImpulseCorrelation(*LONG[3:])
     whole = collide(chain, model)
     monkeypatch.setattr("cradle.models.correlation._MOST_NUMBERS", 1000 * 59)
-    with pytest.warns(
-        UserWarning, match=f"the first 1000 of {len(whole.events)} events; record"
-    ) as seen:
+    words = f"the first 1000 of {len(whole.events)} events; record"
+    with pytest.warns(UserWarning, match=words) as seen:
         part = collide(chain, model)
     assert seen[0].filename == __file__
     asked = collide(chain, model, record=True)

@@ -85,9 +85,8 @@ def test_conserving_outcomes_conserve(seed):
     assert (np.diff(after, axis=1) > -1e-14).all()
     assert after[0, 0] == pytest.approx(after[0, 1], abs=1e-13)
     assert after[-1, 1] == pytest.approx(after[-1, 2], abs=1e-13)
-    assert np.cos(angles[-1]) ** 2 == pytest.approx(
-        m[0] * m[2] / ((m[0] + m[1]) * (m[1] + m[2])), rel=1e-12
-    )
+    end = m[0] * m[2] / ((m[0] + m[1]) * (m[1] + m[2]))
+    assert np.cos(angles[-1]) ** 2 == pytest.approx(end, rel=1e-12)
     back = [conserving_angle(m, outcome) for outcome in after]
     np.testing.assert_allclose(back, angles, rtol=0, atol=1e-12)
     # Any ordered outcome that conserves both is on the arc: the ellipse of closing speeds.

@@ -150,9 +150,8 @@ def test_mirror_of_a_single_striker():
     checked = met = 0
     for trace, (m, v, e, f, b, meeting), tolerance in generic_chains(3, 500, striker=True):
         mirror = outcome(Chain(m[::-1], -v[::-1], e[::-1]), b[::-1], f[::-1], 1 - meeting)
-        np.testing.assert_allclose(
-            -mirror.velocities[::-1], trace.velocities, rtol=0, atol=tolerance
-        )
+        seen = -mirror.velocities[::-1]
+        np.testing.assert_allclose(seen, trace.velocities, rtol=0, atol=tolerance)
         assert mirror.collisions[::-1].tolist() == trace.collisions.tolist()
         checked += 1
         met += any(

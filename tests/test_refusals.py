@@ -96,10 +96,7 @@ CHAINS = [
     ({"restitution": [0.5, 1.2]}, "restitution[1] = 1.2; must lie in [0, 1]"),
     ({"restitution": 1 + 2**-52}, "restitution = 1.0000000000000002; must lie in [0, 1]"),
     ({"restitution": [1, 1e-31]}, "restitution[1] = 1e-31; must be 0 or at least 1e-30"),
-    (
-        {"restitution": [1, 1, 1]},
-        "restitution has shape (3,); 3 balls need () or (2,): one number, ",
-    ),
+    ({"restitution": [1, 1, 1]}, "restitution has shape (3,); 3 balls need () or (2,): one number"),
     (
         {"masses": [1, 1], "velocities": [1, 0], "restitution": [1, 1]},
         "restitution has shape (2,); 2 balls need () or (1,): one number, or one for each contact",

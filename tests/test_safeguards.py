@@ -78,23 +78,14 @@ NEEDED = [
     ("a cycle that still turns", {"bend": 0.0}, UNFINISHED),
     ("what a sum may be off", {"sound": 0.0}, UNSOUND),
     ("a gap further on that is passed", {"part_beyond": first_room_only}, UNSOUND),
-    (
-        "neighbours that come to their own event in a cycle",
-        {"neighbours_stay": any_neighbours},
-        UNSOUND,
-    ),
-    (
-        "balls held together that go together in a cycle",
-        {"stays_at_zero": lambda _: lambda *_: False},
-        UNSOUND,
-    ),
+    ("neighbours that come to their own event in a cycle", {"neighbours_stay": any_neighbours},
+     UNSOUND),
+    ("balls held together that go together in a cycle",
+     {"stays_at_zero": lambda _: lambda *_: False}, UNSOUND),
     ("cycles that contain collapses", {"look": lower_level_only}, UNFINISHED),
-    (
-        "a cycle that grows",
-        {"limit": changed(cycles, "limit", "-1.0 <= total <= 0.0", "total <= 0.0")},
-        UNFINISHED,
-    ),
-]
+    ("a cycle that grows",
+     {"limit": changed(cycles, "limit", "-1.0 <= total <= 0.0", "total <= 0.0")}, UNFINISHED),
+]  # fmt: skip
 
 
 def run(chain, **exchanged):

@@ -60,9 +60,7 @@ def generic(seed, n, bounded=True, light=0.3):
     else:
         velocities = [1.0] + [0.0] * (n - 1)
     restitution = [(0.05 + (0.95 - 0.05) * rng.random()) for _ in range(n - 1)]
-    forward, backward = (
-        [(0.02 + (0.98 - 0.02) * rng.random()) for _ in range(n - 2)] for _ in range(2)
-    )
+    forward, backward = ([0.02 + 0.96 * rng.random() for _ in range(n - 2)] for _ in range(2))
     if bounded:
         for k in reversed(range(n - 2)):  # Eq. 53 needs the next ratio
             forward[k] *= largest_ratios(masses, forward, backward)[0][k]
