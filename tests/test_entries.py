@@ -60,7 +60,7 @@ class Still:
 
 
 BALLS = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "restitution": 1}
-SEVEN = BALLS | {"forward": 0.1, "backward": 0.1, "meeting": 0.5, "excess": "raise"}
+RATIOS = {"forward": 0.1, "backward": 0.1, "meeting": 0.5, "excess": "raise", "max_events": 100}
 SPRINGS = {"stiffness": 1, "exponent": 1.5}
 FORCES = SPRINGS | {"viscosity": 0.01, "gaps": 0.1, "accuracy": 1e-3}
 PENDULUMS = {"length": 0.1, "gravity": 9.81, "gaps": 0.0, "damping": 0.0, "angle": "small"}
@@ -70,9 +70,7 @@ SHOTS = fit.read_shots(DATA / "shots_synthetic.csv", velocity_unit="m/s")
 ENTRIES = {
     Chain: BALLS,
     collide: {"chain": THREE, "model": MODEL, "record": True, "progress": False},
-    ImpulseCorrelation: {
-        "forward": 0.1, "backward": 0.1, "meeting": 0.5, "excess": "raise", "max_events": 100,
-    },
+    ImpulseCorrelation: RATIOS,
     SequentialCollisions: {"order": "left", "max_events": 100},
     FusedChain: {},
     SpringChain: FORCES | {"max_steps": 10_000},
@@ -82,8 +80,8 @@ ENTRIES = {
     } | FORCES,
     cradle.viscosity_from: {"restitution": 0.9, "speed": 1, "masses": [1, 1], "stiffness": 1},
     QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
-    cradle.post_impact_velocities: SEVEN | {"max_events": 100, "progress": False},
-    cradle.outcomes: SEVEN | {"max_events": 100, "progress": False},
+    cradle.post_impact_velocities: BALLS | RATIOS | {"progress": False},
+    cradle.outcomes: BALLS | RATIOS | {"progress": False},
     cradle.paper_chain: {"sequence": "ABC", "speed": 1.0, "excess": "saturate"},
     cradle.recommend: {
         "chain": THREE, "wanted": "velocities", "accuracy": 1e-3, "model_error": 0.5, "impacts": 1,
@@ -123,9 +121,7 @@ ENTRIES = {
 }  # fmt: skip
 
 #: Formulas as they stand in the paper; their documentation says that ranges are not checked.
-UNCHECKED = {
-    closed_form.three_balls, closed_form.final_impulses, closed_form.one_collision_each,
-}  # fmt: skip
+UNCHECKED = {closed_form.three_balls, closed_form.final_impulses, closed_form.one_collision_each}
 
 #: What no argument takes as it is, or only few.
 BAD = [

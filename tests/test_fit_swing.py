@@ -19,9 +19,8 @@ TRUE = dict(zip(NUMBERS, (0.8, 0.02, 0.98, 1e-4)))
 
 def filmed(true, pulled, seconds, rate, noise=0.0, seed=0, law=LAW, masses=None):
     """Times and places of a swing, each place moved at random."""
-    hanging = Pendulums(
-        9.81 * (true["period"] / 2 / np.pi) ** 2, gaps=true["gaps"], damping=true["damping"]
-    )
+    length = 9.81 * (true["period"] / 2 / np.pi) ** 2
+    hanging = Pendulums(length, gaps=true["gaps"], damping=true["damping"])
     times, n = np.arange(0, seconds, 1 / rate), len(pulled)
     chain = Chain(masses or [1] * n, [0] * n, true["restitution"])
     run = swing(chain, law, pulled, times, pendulums=hanging)

@@ -111,14 +111,13 @@ def without_vector_code():
     found = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     # Two names each: they changed in version 2.33 of the library.
     units = [unit for name in ("AVX512F", "AVX2", "FMA") for unit in (name, f"{name}_Usable")]
+    path = str(ROOT / "benchmarks"), os.environ.get("PYTHONPATH")
     environment = {
         **os.environ,
         "NPY_DISABLE_CPU_FEATURES": " ".join(found),
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=" + ",".join(f"-{unit}" for unit in units),
         "CRADLE_KERNEL": "plain",
-        "PYTHONPATH": os.pathsep.join(
-            filter(None, [str(ROOT / "benchmarks"), os.environ.get("PYTHONPATH")])
-        ),
+        "PYTHONPATH": os.pathsep.join(filter(None, path)),
     }
     run = subprocess.run(
         [sys.executable, __file__], env=environment, capture_output=True, text=True, check=False

@@ -109,9 +109,8 @@ def test_some_ratios_zero_are_the_limit_of_small_ones(forward, backward):
     chain = [1, 2, 1, 0.5, 1], [1, 0.3, 0, 0, -0.5], [0.5, 0.7, 0.9, 0.6]
     exact = solved(*chain, forward, backward).velocities
     for tiny in (1e-7, 1e-9):
-        near = solved(
-            *chain, [a or tiny for a in forward], [b or tiny for b in backward]
-        ).velocities
+        small = ([ratio or tiny for ratio in way] for way in (forward, backward))
+        near = solved(*chain, *small).velocities
         assert np.abs(near - exact).max() < 30 * tiny
     agrees(solved(*chain, forward, backward))
 
@@ -167,9 +166,8 @@ def test_three_equal_plastic_balls_at_ratio_zero():
 
 def test_chatter_beside_a_finite_closing_speed():
     """Contacts 0 and 1 collapse while contact 2 is still closing at a finite speed."""
-    trace = solved(
-        [2, 0.1, 0.2, 5], [1, 0.5, 0, 0], [0, 0.5, 0], [0.8, 0.1], [0.8, 1], max_events=1500
-    )
+    masses, velocities = [2, 0.1, 0.2, 5], [1, 0.5, 0, 0]
+    trace = solved(masses, velocities, [0, 0.5, 0], [0.8, 0.1], [0.8, 1], max_events=1500)
     assert trace.collapsed
     first = next(row for row, event in enumerate(trace.events, 1) if event.kind == "collapse")
     assert {trace.events[first - 1].contact, trace.events[first].contact} == {0, 1}
