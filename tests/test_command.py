@@ -257,8 +257,8 @@ def test_recommend_says_what_python_says():
     text = call("recommend --masses 1,1,1,1,1 --stiffness 1 --accuracy 1e-3 --wanted forces")
     *told, assumed = text.splitlines()
     assert told == repr(recommend(chain, "forces", accuracy=1e-3, stiffness=1)).splitlines()
-    told_too = "the first ball strikes at 1 m/s; no energy is lost (--restitution)"
-    assert assumed.split(":")[1].strip() == told_too
+    usual = "the first ball strikes at 1 m/s; no energy is lost (--restitution)"
+    assert assumed.split(":")[1].strip() == usual
     text = call("recommend --masses 1,1,1,1,1 --ratio 0.1 --impacts 500")
     assert text.startswith(repr(recommend(chain, ratios=0.1, impacts=500)))
     assert text.isascii()  # as a terminal may be
