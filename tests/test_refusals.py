@@ -9,6 +9,7 @@ import re
 import numpy as np
 import pytest
 from chains import striking
+from stored import DATA
 
 from cradle import (
     Chain,
@@ -37,12 +38,14 @@ from cradle.closed_form import (
     one_collision_each,
     three_balls,
 )
+from cradle.fit import read_tracker
 from cradle.measures import bouncing_pattern, condition_number, conserving_outcomes, effective_ratio
 from cradle.pictures.animation import animate_swing
 
 NAN, INF, ONES = np.nan, np.inf, np.ones(3)
 THREE, LOSSY = striking(), striking(e=0.9)
 TRACE = collide(THREE, ImpulseCorrelation(0.1))
+FILM = DATA / "video_synthetic.txt"
 RUN = swing(Chain([1, 1], [0, 0]), SequentialCollisions(), [-0.03, 0], [0.0, 0.1])
 
 
@@ -278,6 +281,8 @@ OTHERS = [
     (collide, (THREE, SpringChain(ONES)), "stiffness has 3 values; 3 balls need 2"),
     (collide, (Chain(ONES, [1, 0, 0], [1, 0.5]), SpringChain()), "restitution[1] = 0.5; must be"),
     (collide, (Chain([1, 1e-10], [1, 0]), SpringChain()), "masses[1] = 1e-10; must be at least 1e"),
+    (read_tracker, {"path": FILM, "unit": 0}, "unit = 0.0; must be above 0"),
+    (read_tracker, {"path": FILM, "time_scale": 0}, "time_scale = 0.0; must be above 0"),
     (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
     (TRACE.plot, {"contact": 4}, "contact = 4; must be a whole number, 0 to 1"),
     (animate_swing, ([],), "runs has no swing, or one without a duration"),
