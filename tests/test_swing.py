@@ -2,6 +2,7 @@
 
 import math
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -621,9 +622,8 @@ def test_no_ball_swings_beyond_its_reach(masses, ball, damping):
     far = after * math.exp(-damping * turn) * math.sin(rate * turn) / rate
     for part, at in ((1 - 1e-6, None), (1 + 1e-6, "0"), (1.5, "0")):
         speed = part * 0.5 * math.pi / abs(far)
-        run = swung(chain=Chain(masses, [speed, 0]), model=SequentialCollisions(),
-                    positions=[0, 0], times=[0.3 * turn, 1.8 * turn],
-                    pendulums=Pendulums(1, damping=damping))  # fmt: skip
+        given = Chain(masses, [speed, 0]), SequentialCollisions(), [0, 0], [0.3 * turn, 1.8 * turn]
+        run = partial(swing, *given, pendulums=Pendulums(1, damping=damping))
         if at is None:
             assert np.abs(run().positions).max() < 0.5 * math.pi
             continue
@@ -637,10 +637,9 @@ def test_no_ball_swings_beyond_its_reach(masses, ball, damping):
 
 
 def test_a_ball_that_an_impact_throws_beyond_its_reach_is_refused_with_the_time():
-    run = swung(chain=Chain([1, 0.1], [0, 0]), model=SequentialCollisions(), positions=[-1, 0],
-                pendulums=Pendulums(1))  # fmt: skip
+    balls, hanging = Chain([1, 0.1], [0, 0]), Pendulums(1)
     with pytest.raises(ValueError, match=r"^after t = 0\.5015 s positions\[1\] = 1\.818"):
-        run()
+        swing(balls, SequentialCollisions(), [-1, 0], [1], pendulums=hanging)
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.1])
