@@ -38,7 +38,7 @@ class Problem(NamedTuple):
 
     def exact(self, max_events=20_000, **options):
         """By the independent solver, at the digits in force."""
-        return self.solve(solve, excess="saturate", max_events=max_events, **options)
+        return self.solve(solve, max_events=max_events, **options)
 
     def mirrored(self):
         return Problem(

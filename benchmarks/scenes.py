@@ -56,7 +56,7 @@ class Scene(NamedTuple):
     @cache  # noqa: B019  (a handful of scenes)
     def truth(self):
         """Return the outcome of the paper's model from another solver, in fifty digits."""
-        return in_fifty_digits(*self.given, excess="saturate")[0]
+        return in_fifty_digits(*self.given)
 
     def viscosity(self):
         """Return that of spheres with this restitution at the striker's speed."""

@@ -6,6 +6,7 @@ threshold that leaves thirty of fifty digits.
 """
 
 import decimal
+from functools import partial
 from itertools import groupby
 
 import mpmath
@@ -35,31 +36,29 @@ def as_meant(x):
     return mpmath.mpf(x) if isinstance(x, str | mpmath.mpf) else mpmath.mpf(str(meaning(x)))
 
 
-def negligible(zero):
-    """What R9 takes for nothing, by the type of a number: six tenths of the digits in force."""
-    if isinstance(zero, float):
-        return 1e-12
-    decimals = isinstance(zero, decimal.Decimal)
-    digits = decimal.getcontext().prec if decimals else mpmath.mp.dps
-    return (zero + 1) / 10 ** int(0.6 * digits)
-
-
 class Impact(textbook.Impact):
     """R1 to R9, with counts of what tests look for."""
-
-    #: Threshold of R9, relative to the largest initial closing speed; None for that of the type.
-    collapse_below = None
 
     def __init__(self, *given):
         super().__init__(*given)
         self.reduced = [a * b / (a + b) for a, b in zip(self.m, self.m[1:])]
-        below = negligible(self.zero) if self.collapse_below is None else self.collapse_below
-        self.tiny = (below * max([*self.u, self.zero])) ** 2
+        self.tiny = (self.collapse_below() * max([*self.u, self.zero])) ** 2
         # Largest squared speed of a contact since its last event; its events in a row with this
         # below `tiny`; the contacts of the latest events, as long as all of these were calm.
         self.peak = [u * u for u in self.u]
         self.calm, self.streak = [0] * len(self.u), []
         self.collapsed, self.meetings, self.recompressions = False, 0, 0
+
+    def collapse_below(self):
+        """Threshold of R9, relative to the largest initial closing speed: by the type of a number.
+
+        It is six tenths of the digits in force.
+        """
+        if isinstance(self.zero, float):
+            return 1e-12
+        decimals = isinstance(self.zero, decimal.Decimal)
+        digits = decimal.getcontext().prec if decimals else mpmath.mp.dps
+        return (self.zero + 1) / 10 ** int(0.6 * digits)
 
     def speed_squared(self, c):
         """Larger of closing speed and speed equivalent of the store, squared."""
@@ -126,49 +125,11 @@ class Impact(textbook.Impact):
             self.record("collapse", c)
 
 
-def check_ratios(masses, forward, backward, slack):
-    """Eq. 53, and its mirror image by the same lines."""
-    for name, way in (("forward", 1), ("backward", -1)):
-        m, ratios, onward = masses[::way], (forward if way == 1 else backward)[::way], 0
-        for i in reversed(range(len(ratios))):
-            bound = m[i + 2] / (m[i + 2] + m[i + 1] * (1 - onward))
-            onward = ratios[i]
-            if onward > bound * (1 + slack):
-                at = i if way == 1 else len(ratios) - 1 - i
-                raise ValueError(f"{name}[{at}] = {onward}; bound at ball {at + 1} is {bound}")
+#: As `textbook.solve`, by R1 to R9: a float means what it prints as, a string that decimal number.
+solve = partial(textbook.solve, number=as_meant, max_events=1_000_000, impact=Impact)
 
 
-def solve(
-    masses, velocities, restitution, forward, backward=None, *,
-    excess="raise", number=as_meant, max_events=1_000_000, collapse_below=None, impact=Impact,
-    **options,
-):  # fmt: skip
-    """Post-impact state by rules R1 to R9, with the digits of `number`.
-
-    A float means what it prints as (`meaning`), a string such as "0.1" that decimal number.
-    `collapse_below` is the threshold of R9 relative to the largest initial closing speed.
-    """
-
-    class Chosen(impact):
-        def __init__(self, m, v, e, ratio, meeting):
-            ratios = [ratio[way][1:-1] for way in (textbook.FORWARD, textbook.BACKWARD)]
-            if not all(0 <= a <= 1 for part in ratios for a in part):
-                raise ValueError(f"ratios {ratios} must lie in [0, 1]")
-            self.collapse_below = collapse_below
-            super().__init__(m, v, e, ratio, meeting)
-            if excess == "raise":
-                check_ratios(m, *ratios, 4 * abs(3 * ((self.zero + 4) / 3 - 1) - 1))
-
-    return textbook.solve(
-        masses, velocities, restitution, forward, backward,
-        number=number, max_events=max_events, impact=Chosen, **options,
-    )  # fmt: skip
-
-
-def in_fifty_digits(masses, velocities, restitution, forward, backward=None, **options):
-    """Velocities as floats, and the whole state, of a chain given in arrays, numbers or texts."""
-    given = (masses, velocities, restitution, forward, backward)
-    parts = [part.tolist() if isinstance(part, np.ndarray) else part for part in given]
+def in_fifty_digits(*chain):
+    """Velocities, as floats, of an impact in fifty digits."""
     with mpmath.workdps(50):
-        state = solve(*parts, **options)
-        return np.array([float(v) for v in state.velocities]), state
+        return np.array([float(v) for v in solve(*chain).velocities])

@@ -33,7 +33,7 @@ def predicted(sequence, meeting="0.5"):
         texts = [[str(x) for x in values] for values in (chain.masses, chain.restitution)]
         ratios = [[str(x) for x in values] for values in (model.forward, model.backward)]
         start = ["1"] + ["0"] * (len(sequence) - 1)
-        return solve(texts[0], start, texts[1], *ratios, meeting=meeting, excess="saturate")
+        return solve(texts[0], start, texts[1], *ratios, meeting=meeting)
 
 
 def interchanged():
@@ -144,7 +144,7 @@ def test_why_two_entries_are_open():
         chain, model = paper_chain(name, excess="saturate")
         exact = solve(
             chain.masses, [1, 0, 0], list(chain.restitution), model.forward, model.backward,
-            excess="saturate", number=float,
+            number=float,
         )  # fmt: skip
         assert chain.masses.argmax() == 2
         closes = exact.events.index(("close", 0)) + 1

@@ -22,7 +22,7 @@ STRUCK = [1, 0, 0, 0, 0]
 def velocities(chain, forward, backward=None):
     """Velocities after an impact by the independent solver."""
     masses, before, restitution = (list(map(float, values)) for values in chain)
-    done = solve(masses, before, restitution, forward, backward, excess="saturate", number=float)
+    done = solve(masses, before, restitution, forward, backward, number=float)
     return floats(done.velocities)
 
 

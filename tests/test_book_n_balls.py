@@ -188,9 +188,11 @@ def test_fig_8_meeting_moves_two_of_ten_sequences():
         ratios, balls = (model.forward, model.backward), (chain.masses, chain.velocities)
         ends = []
         for meeting in np.linspace(0, 1, 5).tolist():
-            how = {"meeting": meeting, "excess": "saturate"}
-            ends.append(collide(chain, ImpulseCorrelation(*ratios, **how)).velocities)
-            exact = truth.solve(*balls, list(chain.restitution), *ratios, number=float, **how)
+            model = ImpulseCorrelation(*ratios, meeting=meeting, excess="saturate")
+            ends.append(collide(chain, model).velocities)
+            exact = truth.solve(
+                *balls, list(chain.restitution), *ratios, meeting=meeting, number=float
+            )
             np.testing.assert_allclose(ends[-1], exact.velocities, atol=1e-12)
         moved[name] = np.ptp(ends, axis=0).max()
     assert {name for name, size in moved.items() if size > 0} == {"ABCCAB", "BCACBA"}

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from chains import local_orders
 from delicate import CHAINS, chains_of, seen
-from truth import as_meant, solve
+from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide
 
@@ -26,8 +26,6 @@ def agrees(trace, atol=1e-13, **options):
             model.forward,
             model.backward,
             meeting=model.meeting,
-            excess="saturate",
-            number=as_meant,
             **options,
         )
         after = [float(v) for v in exact.velocities]

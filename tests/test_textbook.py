@@ -14,7 +14,7 @@ import pytest
 from chains import local_orders
 from march import march
 from problem import Problem
-from truth import EventLimit, meaning, solve
+from truth import EventLimit, Impact, meaning, solve
 
 from cradle import textbook
 from cradle.closed_form import largest_ratios
@@ -154,8 +154,12 @@ CHATTER = ([2, "0.1", "0.2", 5], [1, "0.5", 0, 0], [0, "0.5", 0], ["0.8", "0.1"]
 
 def test_threshold_is_a_limit():
     """Ten digits less in the threshold move the outcome by no more than the threshold."""
-    near = solve(*CHATTER, excess="saturate", collapse_below=mpmath.mpf(10) ** -20)
-    far = solve(*CHATTER, excess="saturate")
+
+    class Near(Impact):
+        def collapse_below(self):
+            return mpmath.mpf(10) ** -20
+
+    near, far = solve(*CHATTER, impact=Near), solve(*CHATTER)
     assert len(near.events) < len(far.events)
     assert max(abs(a - b) for a, b in zip(near.velocities, far.velocities)) < 1e-19
 
@@ -188,7 +192,7 @@ def marched(kind):
         n = kind if isinstance(kind, int) else 3 + seed % 4
         chain, meeting = generic(seed, n, bounded=kind != "held")
         try:
-            plain = solve(*chain, meeting=meeting, excess="saturate", max_events=40, number=float)
+            plain = in_floats(*chain, meeting=meeting, max_events=40)
         except EventLimit:
             continue
         # The march has no rule R9, and needs a step far smaller than the last of many collisions.
