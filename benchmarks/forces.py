@@ -1,7 +1,6 @@
 """Contact forces against plain velocity Verlet: microseconds a chain at a measured error, one run.
 
-    python benchmarks/forces.py              # a minute; writes data/forces.csv
-
+Writes `data/forces.csv` in a minute.
 Both are compiled and run on one thread, in turns; each time is the least of many. Ours is asked for
 an accuracy; what it takes to check and scale its chains, to find its steps and to check its answers
 is in its time. Verlet has the largest of many steps from which on all smaller ones keep the error,
@@ -12,10 +11,12 @@ no step: one ratio, fitted to three spheres.
 
 import os
 import time
+from functools import partial
+from itertools import takewhile
 
 import numpy as np
 from chains import magnitudes
-from stored import options, write
+from stored import make
 from verlet import verlet
 
 os.environ["CRADLE_KERNEL"] = "compiled"
@@ -33,9 +34,9 @@ RATIO = 0.132503287
 COLUMNS = ("chain", "method", "asked", "error", "microseconds", "ratio")
 
 
-def struck(n):
-    """Velocities of a row that the first ball strikes."""
-    return np.array([1.0] + [0.0] * (n - 1))
+def struck(rows, n):
+    """Velocities of rows of balls that the first ball strikes."""
+    return np.tile(np.eye(n)[0], (rows, 1))
 
 
 def cases():
@@ -49,42 +50,37 @@ def cases():
     yield "5 equal, A = .03", np.ones((1, 5)), 0.03, (1e-2, 1e-3)
 
 
-class Ours:
-    """The batch, as one thread calls it: checks, units, runs, certificate."""
+def ours(masses, loss, accuracy):
+    """Return the batch, as one thread calls it: checks, units, runs, certificate."""
+    rows, n = masses.shape
+    ones, out = np.ones((rows, n - 1)), room(rows, n)
+    springs = Springs(masses, struck(rows, n), ones, loss * ones, 0.0 * ones)
 
-    def __init__(self, masses, loss, accuracy):
-        rows, n = masses.shape
-        ones = np.ones((rows, n - 1))
-        v = np.tile(struck(n), (rows, 1))
-        self.given = Springs(masses, v, ones, loss * ones, 0.0 * ones), Law(1.5, accuracy, 1e7)
-        self.out = room(rows, n)
+    def run():
+        assert solve(springs, Law(1.5, accuracy, 1e7), out, True)[:2] == (rows, FINISHED)
+        return out.v
 
-    def run(self):
-        assert solve(*self.given, self.out, True)[:2] == (len(self.out.v), FINISHED)
-        return self.out.v
+    return run
 
 
-class Verlet:
-    """The rival at the step that keeps an error."""
+def rival(masses, loss):
+    """Return Verlet, as a function of the step."""
+    rows, n = masses.shape
+    v, stiffness, out = struck(rows, n), np.ones(n - 1), np.empty((rows, n))
 
-    def __init__(self, masses, loss, exact, error):
-        rows, n = masses.shape
-        self.fixed = masses, np.tile(struck(n), (rows, 1)), np.ones(n - 1), loss
-        self.out = np.empty((rows, n))
-        kept = STEPS[-1]
-        few = slice(0, 300)  # of which all the others are copies
-        self.fixed, whole = (masses[few], self.fixed[1][few], *self.fixed[2:]), self.fixed
-        self.out = self.out[few]
-        for step in STEPS[::-1]:
-            if not abs(self.run(step) - exact[few]).max() <= error:
-                break
-            kept = step
-        self.fixed, self.out = whole, np.empty((rows, n))
-        self.step, self.error = kept, abs(self.run(kept) - exact).max()
+    def run(step):
+        verlet(masses, v, stiffness, loss, np.full(rows, step), FAINT, out)
+        return out
 
-    def run(self, step=None):
-        verlet(*self.fixed, np.full(len(self.out), step or self.step), FAINT, self.out)
-        return self.out
+    return run
+
+
+def largest_step(masses, loss, exact, error):
+    """Return the step from which on all smaller ones of Verlet keep an error."""
+    few = slice(0, 300)  # of which all the others are copies
+    run = rival(masses[few], loss)
+    kept = takewhile(lambda step: abs(run(step) - exact[few]).max() <= error, STEPS[::-1])
+    return max(kept, default=STEPS[-1])
 
 
 def least(runs, seconds=0.6):
@@ -107,36 +103,23 @@ def rows():
         # Enough rows for one call from Python not to count.
         count = max(len(masses), 10_000 // masses.shape[1] ** 2 + 20)
         many = np.ascontiguousarray(np.resize(masses, (count, masses.shape[1])), float)
-        exact = Ours(many, loss, 1e-9).run().copy()
+        exact = ours(many, loss, 1e-9)().copy()
         for accuracy in accuracies:
-            ours = Ours(many, loss, accuracy)
-            error = abs(ours.run() - exact).max()
             # Both within the error asked for, or as near as Verlet's smallest step comes.
-            rival = Verlet(many, loss, exact, accuracy)
-            mine, its = (1e6 * t / count for t in least([ours.run, rival.run]))
+            step = largest_step(many, loss, exact, accuracy)
+            one, other = ours(many, loss, accuracy), partial(rival(many, loss), step)
+            errors = [f"{abs(run() - exact).max():.2e}" for run in (one, other)]
+            mine, its = (1e6 * t / count for t in least([one, other]))
             asked = f"{accuracy:.0e}"
-            yield name, "this package", asked, f"{error:.2e}", f"{mine:.3g}", f"{its / mine:.2g}"
-            yield name, "velocity Verlet", asked, f"{rival.error:.2e}", f"{its:.3g}", 1
+            yield name, "this package", asked, errors[0], f"{mine:.3g}", f"{its / mine:.2g}"
+            yield name, "velocity Verlet", asked, errors[1], f"{its:.3g}", 1
         if not loss:
-            e, v = np.ones(many.shape[1] - 1), np.tile(struck(many.shape[1]), (count, 1))
-
-            def rule(many=many, v=v, e=e):
-                return post_impact_velocities(many, v, e, RATIO, excess="saturate")
-
+            given = many, struck(*many.shape), 1.0, RATIO
+            rule = partial(post_impact_velocities, *given, excess="saturate")
             (its,) = least([rule])
             error = abs(rule() - exact).max()
             yield name, "the paper's rule", "", f"{error:.2e}", f"{1e6 * its / count:.3g}", ""
 
 
-def main(arguments=None):
-    """Measure, print and store."""
-    given = options(__doc__).parse_args(arguments)
-    found = []
-    for row in rows():
-        print(("{:24}" + "{:>18}" * 5).format(*map(str, row)), flush=True)
-        found.append(row)
-    write("forces.csv", COLUMNS, found, given.output)
-
-
 if __name__ == "__main__":
-    main()
+    make(__doc__, {"forces": (COLUMNS, rows)})
