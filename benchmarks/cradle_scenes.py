@@ -14,12 +14,11 @@ import math
 import statistics
 import sys
 import time
-from typing import NamedTuple
 
 import measure
 import numba
 import numpy as np
-from measure import absent, present, quotient, versions
+from measure import Engine, absent, present, quotient, versions
 from stored import DATA, make
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
@@ -52,38 +51,20 @@ COSTS = [
 ]
 
 
-class Engine(NamedTuple):
-    """An engine, its program in `examples/`, and its settings: the step, and what `cradle` takes.
-
-    With the mend the step may be another one, `mended_step`.
-    """
-
-    name: str
-    module: str
-    distribution: str
-    program: str
-    default: dict
-    refined: dict
-
-    @property
-    def fine(self):
-        """A step of a millisecond and nothing else: to compare costs."""
-        return self.default | {"step": 1e-3}
-
-
+#: The scene of each is its program in `examples/`.  With the mend the step may be `mended_step`.
 ENGINES = (
     Engine(
-        "Chipmunk", "pymunk", "pymunk", "pymunk_cradle",
+        "Chipmunk", "pymunk", "pymunk_cradle",
         {"step": 1 / 60, "iterations": 10},
         {"step": 1e-3, "iterations": 100},
     ),
     Engine(
-        "Box2D", "Box2D", "box2d", "box2d_cradle",
+        "Box2D", "Box2D", "box2d_cradle",
         {"step": 1 / 60, "iterations": (8, 3)},
         {"step": 1e-3, "iterations": (100, 30)},
     ),
     Engine(
-        "Bullet", "pybullet", "pybullet", "bullet_cradle",
+        "Bullet", "pybullet", "bullet_cradle",
         {"step": 1 / 240},
         {
             "step": 1e-3, "numSolverIterations": 200, "restitutionVelocityThreshold": 0.0,
@@ -91,7 +72,7 @@ ENGINES = (
         },
     ),
     Engine(
-        "Rapier", "rapier3d", "rapier3d", "rapier_cradle",
+        "Rapier", "rapier3d", "rapier_cradle",
         {"step": 1 / 60},
         {
             "step": 1e-3, "num_internal_pgs_iterations": 50,
@@ -99,7 +80,7 @@ ENGINES = (
         },
     ),
     Engine(
-        "MuJoCo", "mujoco", "mujoco", "mujoco_cradle",
+        "MuJoCo", "mujoco", "mujoco_cradle",
         {"step": 2e-3, "contact": 0.02},
         {"step": 1e-4, "mended_step": 1e-3, "contact": 0.002},
     ),
@@ -111,8 +92,10 @@ ENGINES = (
 
 def scene(engine, setting, pulled, *, mend, gap=0.0):
     """Return a function that makes one step, the bodies, and the step."""
-    program = importlib.import_module(engine.program)
-    chosen = dict(getattr(engine, setting))
+    program = importlib.import_module(engine.scene)
+    # "fine" is a step of a millisecond and nothing else: to compare costs.
+    fine = engine.default | {"step": 1e-3}
+    chosen = fine if setting == "fine" else dict(getattr(engine, setting))
     step = chosen.pop("step")
     mended_step = chosen.pop("mended_step", step)
     bodies = program.cradle(pulled, ANGLE, mend=mend, gap=gap, **chosen)

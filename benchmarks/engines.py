@@ -18,7 +18,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from measure import Row, distance, outcome, present, versions
+from measure import Engine, Row, distance, outcome, present, versions
 from scenes import SCENES, Scene
 from solvers import model_error
 
@@ -228,34 +228,22 @@ def damping_for(restitution, step, steps_a_contact):
     return brentq(excess, 0.0, 0.95, xtol=1e-6)
 
 
-class Engine(NamedTuple):
-    """An engine, its two settings, and what is to be known of them."""
-
-    name: str
-    module: str
-    distribution: str
-    build: Callable
-    default: dict
-    refined: dict
-    note: str
-
-
 FINE = 1e-4
 ENGINES = (
     Engine(
-        "Chipmunk", "pymunk", "pymunk", chipmunk,
+        "Chipmunk", "pymunk", chipmunk,
         {"step": 1 / 60, "iterations": 10},
         {"step": FINE, "iterations": 1000},
         "step 1/60 s as in its manual's example",
     ),
     Engine(
-        "Box2D", "Box2D", "box2d", box2d,
+        "Box2D", "Box2D", box2d,
         {"step": 1 / 60, "iterations": 8},
         {"step": FINE, "iterations": 1000, "faster": 1000.0},
         "closings below 1 m/s do not rebound; refined: all speeds times 1000",
     ),
     Engine(
-        "Bullet", "pybullet", "pybullet", bullet,
+        "Bullet", "pybullet", bullet,
         {"step": 1 / 240, "iterations": 50},
         {
             "step": FINE, "iterations": 1000, "restitutionVelocityThreshold": 0.0,
@@ -264,7 +252,7 @@ ENGINES = (
         "refined: no correction of overlaps, no slop, no threshold",
     ),
     Engine(
-        "Rapier", "rapier3d", "rapier3d", rapier,
+        "Rapier", "rapier3d", rapier,
         {"step": 1 / 60, "iterations": 4},
         {
             "step": FINE, "iterations": 4, "num_internal_pgs_iterations": 200,
@@ -273,7 +261,7 @@ ENGINES = (
         "single precision; refined: no prediction of contacts, 200 inner iterations",
     ),
     Engine(
-        "MuJoCo", "mujoco", "mujoco", mujoco,
+        "MuJoCo", "mujoco", mujoco,
         {"step": 2e-3, "steps_a_contact": 10},
         {"step": 1e-5, "steps_a_contact": 100},
         "no coefficient of restitution: stiffness and damping of the contact are chosen, the "
@@ -309,7 +297,7 @@ def longest(setting, placement):
 def solve(engine, scene, placement, setting):
     """Return steps and velocities over the striker's speed, of one engine on one scene."""
     options = getattr(engine, setting)
-    made = engine.build(Line(scene.masses, scene.restitution, placement), **options)
+    made = engine.scene(Line(scene.masses, scene.restitution, placement), **options)
     steps, v = run(made, options["step"], longest(setting, placement))
     return steps, v / SPEED
 
@@ -321,7 +309,7 @@ def timed(clock, engine, scene, setting):
     def to_the_end(made):
         return run(made, options["step"], longest(setting, "touching"))
 
-    return clock(to_the_end, prepare=partial(engine.build, line, **options))
+    return clock(to_the_end, prepare=partial(engine.scene, line, **options))
 
 
 def rows(clock, quick):

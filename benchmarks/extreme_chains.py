@@ -7,6 +7,7 @@ the change of the exact outcome when every input changes by its last digit.
 
 import math
 from fractions import Fraction
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -116,17 +117,21 @@ def inputs(problem, names=tuple(RANGES)):
     return [(n, k, value) for n in names for k, value in enumerate(getattr(problem, n)) if value]
 
 
-def unavoidable(problem, exact, names=tuple(RANGES), ulps=1, max_events=20_000):
+def in_digits(problem, max_events=20_000):
+    """Exact velocities by the independent solver."""
+    return problem.exact(max_events).velocities
+
+
+def unavoidable(problem, velocities, names=tuple(RANGES), ulps=1, solve=in_digits):
     """Change of each exact velocity when all inputs change by their last digits, added up.
 
     An answer cannot be known better than that from rounded inputs: it is the conditioning, measured
     at the very distance that matters, so that square roots and jumps count at their true size.
     """
-    balls = range(len(problem.masses))
-    total = [mpmath.mpf(0) for _ in balls]
+    total = [mpmath.mpf(0) for _ in velocities]
     for name, k, value in inputs(problem, names):
         low, high = RANGES[name]
-        worst = [mpmath.mpf(0) for _ in balls]
+        worst = [mpmath.mpf(0) for _ in velocities]
         for end in (-math.inf, math.inf):
             near = math.nextafter(value, end)
             if not low <= near <= high or near == 0:
@@ -134,12 +139,11 @@ def unavoidable(problem, exact, names=tuple(RANGES), ulps=1, max_events=20_000):
             values = list(getattr(problem, name))
             values[k] = min(max(value + ulps * (near - value), low), high)
             try:
-                other = problem._replace(**{name: values}).exact(max_events)
+                others = solve(problem._replace(**{name: values}))
             except EventLimit:
-                worst = [mpmath.inf for _ in balls]
+                worst = [mpmath.inf for _ in velocities]
                 break
-            moves = [abs(a - b) for a, b in zip(other.velocities, exact.velocities)]
-            worst = list(map(max, worst, moves))
+            worst = [max(w, abs(a - b)) for w, a, b in zip(worst, others, velocities)]
         total = [a + b for a, b in zip(total, worst)]
     return total
 
@@ -173,8 +177,8 @@ def compare(trace, known):
 def measure(problem, trace):
     """Compare a trace with fifty digits; raises `EventLimit` where these take too long."""
     with mpmath.workdps(50):
-        exact = problem.exact()
-        return compare(trace, (exact.velocities, unavoidable(problem, exact)))
+        exact = in_digits(problem)
+        return compare(trace, (exact, unavoidable(problem, exact)))
 
 
 def truth(problem, trace, longest=400, conditioned=80):
@@ -182,6 +186,7 @@ def truth(problem, trace, longest=400, conditioned=80):
 
     Three balls whose impacts have no end take their common velocity.
     """
+    within = partial(in_digits, max_events=longest)
     with mpmath.workdps(50):
         try:
             exact = problem.exact(longest)
@@ -189,14 +194,14 @@ def truth(problem, trace, longest=400, conditioned=80):
             if not trace.collapsed or len(trace.chain) > 3:
                 return None
             m, v = ([as_meant(x) for x in part] for part in problem[:2])
-            common = sum(a * b for a, b in zip(m, v)) / sum(m)
-            return [common] * 3, None
+            return [mpmath.fdot(m, v) / sum(m)] * 3, None
+        velocities = exact.velocities
         if len(exact.events) > conditioned:
-            return exact.velocities, None
-        change = unavoidable(problem, exact, max_events=longest)
+            return velocities, None
+        change = unavoidable(problem, velocities, solve=within)
         # So near to its bound a ratio counts as at its bound.
-        slack = unavoidable(problem, exact, ("forward", "backward"), 4, longest)
-        return exact.velocities, [a + b for a, b in zip(change, slack)]
+        slack = unavoidable(problem, velocities, ("forward", "backward"), 4, within)
+        return velocities, [a + b for a, b in zip(change, slack)]
 
 
 # --- the map of the error ----------------------------------------------------------------------
@@ -312,7 +317,7 @@ def changes_of_rows(spread, n, e, ratio, chains=4, size=1e-12):
 # --- a light ball between two heavy ones -------------------------------------------------------
 
 
-def alternating(masses, restitution):
+def alternating(problem):
     """Number of impacts of three balls, v = (1, 0, 0), at ratio 0 and e near 1, and the outcome.
 
     In mass-weighted coordinates the three balls are a point in a wedge of angle
@@ -321,8 +326,8 @@ def alternating(masses, restitution):
     ceil(pi / theta) - 1 of them.  Closing speeds map linearly: n impacts are a power of a matrix.
     With e an ulp below 1 another impact may follow.
     """
-    a, b, c = (as_meant(m) for m in masses)
-    e, f = (as_meant(x) for x in restitution)
+    a, b, c = (as_meant(m) for m in problem.masses)
+    e, f = (as_meant(x) for x in problem.restitution)
     angle = mpmath.atan(mpmath.sqrt(b * (a + b + c) / (a * c)))
     number = int(mpmath.ceil(mpmath.pi / angle)) - 1
     left = mpmath.matrix([[-e, 0], [(1 + e) * a / (a + b), 1]])
@@ -338,17 +343,10 @@ def alternating(masses, restitution):
 
 def elastic_impacts(light, last=1.0, e=1.0):
     """Number, exact outcome and its unavoidable change, of (1, light, last), e near 1, ratio 0."""
-    given = [1.0, light, last, e, e]
-    number, after = alternating(given[:3], given[3:])
-    change = [mpmath.mpf(0)] * 3
-    for k, value in enumerate(given):
-        worst = [mpmath.mpf(0)] * 3
-        for end in (0.0, math.inf if k < 3 else 1.0):
-            changed = [*given[:k], math.nextafter(value, end), *given[k + 1 :]]
-            other = alternating(changed[:3], changed[3:])
-            worst = [max(a, abs(b - c)) for a, b, c in zip(worst, other[1], after)]
-        change = [a + b for a, b in zip(change, worst)]
-    return number, after, change
+    problem = case([1, light, last], [1, 0, 0], e, 0)
+    number, after = alternating(problem)
+    inexact = "masses", "restitution"
+    return number, after, unavoidable(problem, after, inexact, solve=lambda p: alternating(p)[1])
 
 
 def infinite_below(e):

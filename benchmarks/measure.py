@@ -9,6 +9,7 @@ import statistics
 import time
 from dataclasses import make_dataclass
 from importlib import metadata
+from typing import NamedTuple
 from unittest import mock
 
 import numpy as np
@@ -32,6 +33,22 @@ COLUMNS = [
 ]  # fmt: skip
 #: One line of the table; an empty field does not apply.
 Row = make_dataclass("Row", [(name, object, "") for name in COLUMNS])
+
+
+class Engine(NamedTuple):
+    """A physics engine, how its scene is made, and two settings of it."""
+
+    name: str
+    module: str
+    scene: object  #: makes the balls in the engine
+    default: dict
+    refined: dict
+    note: str = ""
+
+    @property
+    def distribution(self):
+        """As it is installed."""
+        return self.module.lower()
 
 
 def absent(engines):

@@ -159,7 +159,7 @@ def named(name):
 def energy(engine, scene, placement, **options):
     """Kinetic energy after an impact, over that before."""
     line = engines.Line(scene.masses, scene.restitution, placement)
-    _, v = engines.run(engine.build(line, **options), options["step"], 3.0)
+    _, v = engines.run(engine.scene(line, **options), options["step"], 3.0)
     m = np.array(scene.masses)
     return m @ (v / engines.SPEED) ** 2 / m[0]
 

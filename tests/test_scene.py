@@ -145,7 +145,7 @@ def test_short_strings_at_60_hz_keep_what_one_pendulum_keeps(monkeypatch, engine
     """
     if engine.name in absent(scenes.ENGINES):
         pytest.skip(absent(scenes.ENGINES)[engine.name])
-    for room in (scenes, importlib.import_module(engine.program)):
+    for room in (scenes, importlib.import_module(engine.scene)):
         monkeypatch.setattr(room, "LENGTH", 0.2)
         monkeypatch.setattr(room, "RADIUS", 0.02)
     game = engine._replace(default=engine.default | {"step": 1 / 60})
