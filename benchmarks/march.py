@@ -61,7 +61,7 @@ class March:
 
     ``u`` is kept beside ``v`` so that a closing speed which is zero by construction is an exact
     zero; the two differ by what the steps overshoot. ``absorbed`` and ``released`` count since the
-    contact became active, ``ledger`` sums the work absorbed in all its ended collisions.
+    contact became active.
     """
 
     def __init__(self, m, v, e, forward, backward, meeting, hold):
@@ -71,7 +71,7 @@ class March:
         self.meeting, self.hold = meeting, hold
         self.absorbed, self.released = np.zeros(n), np.zeros(n)
         self.active, self.direction = [False] * n, [0] * (n + 1)
-        self.collisions, self.ledger = [0] * n, [0.0] * n
+        self.collisions = [0] * n
         self.events = self.steps = 0
 
     @property
@@ -129,7 +129,6 @@ class March:
         """R4: the relations of the contact go."""
         self.active[c] = False
         self.direction[c] = self.direction[c + 1] = 0
-        self.ledger[c] += self.absorbed[c]
         if self.hold and self.e[c] == 0:
             self.u[c] = 0.0
         self.events += 1
