@@ -1,8 +1,8 @@
 """Families of random chains that need more than continuous numbers: ties, zeros, light balls.
 
 Every number is made by choices, products, sums and divisions of whole numbers, operations that
-round alike everywhere; printed, it is short.  Draws come from `random.Random`, whose `random` and
-`getrandbits` are the same on every platform; nothing else of it is used.
+round alike everywhere; printed, it is short.  Draws come from the `random` of `random.Random`,
+which is the same on every platform; nothing else of it is used.
 """
 
 import random
@@ -14,15 +14,12 @@ from problem import Problem
 PAPER_MASSES = [0.045, 0.053, 0.053, 0.166]
 
 
-class Draw:
+class Draw(random.Random):
     """Numbers and choices."""
-
-    def __init__(self, seed):
-        self.source = random.Random(seed)
 
     def below(self, n):
         """A whole number below n."""
-        return int(self.source.random() * n)
+        return int(self.random() * n)
 
     def choice(self, values):
         return values[self.below(len(values))]
@@ -110,7 +107,7 @@ def light_balls(draw, n):
 def any_number(draw, low, high):
     """With all its digits, or with two decimals."""
     if draw.chance(50):
-        return low + (high - low) * draw.source.random()
+        return low + (high - low) * draw.random()
     return draw.decimal(low, high, 2)
 
 
@@ -169,11 +166,11 @@ def generic(draw, n):
     """No ties: every number with all its digits."""
 
     def numbers(low, high, size):
-        return [low + (high - low) * draw.source.random() for _ in range(size)]
+        return [low + (high - low) * draw.random() for _ in range(size)]
 
     m = numbers(0.2, 4, n)
-    ways = within_bounds(m, draw.source.random)
-    return Problem(m, numbers(-1, 1, n), numbers(0.3, 1, n - 1), *ways, draw.source.random())
+    ways = within_bounds(m, draw.random)
+    return Problem(m, numbers(-1, 1, n), numbers(0.3, 1, n - 1), *ways, draw.random())
 
 
 def at_bounds(draw, n):
