@@ -262,14 +262,18 @@ def rows_of_balls(spread, n, e, size, chains=10, seed=2001):
     return copies(rng, masses, e, 0.1, size)
 
 
+def relative_changes(pair):
+    """Change of each velocity between two batches, over the largest speed of its chain."""
+    one, other = (post_impact_velocities(*chains, excess="saturate") for chains in pair)
+    return np.abs(other - one) / np.abs(one).max(axis=-1, keepdims=True)
+
+
 def perturbed(spread, n, e, size):
     """Largest change of a velocity relative to the largest speed, one a chain of `rows_of_balls`.
 
     And the number of balls at the far end that keep six digits.
     """
-    one, other = (post_impact_velocities(*these) for these in rows_of_balls(spread, n, e, size))
-    off = np.abs(other - one)
-    off /= np.abs(one).max(axis=-1, keepdims=True)
+    off = relative_changes(rows_of_balls(spread, n, e, size))
     leading = [int(np.argmin([*row[::-1], False])) for row in off <= 1e-6]
     return off.max(axis=-1), np.array(leading)
 
@@ -308,9 +312,7 @@ def changes_of_rows(spread, n, e, ratio, chains=4, size=1e-12):
     """
     rng = np.random.default_rng([2001, n])
     masses = uniform(rng, 1 - spread, 1 + spread, (chains, len(e), n))
-    pair = copies(rng, masses, e, ratio, size)
-    one, other = (post_impact_velocities(*row, excess="saturate") for row in pair)
-    off = np.abs(other - one) / np.abs(one).max(axis=-1, keepdims=True)
+    off = relative_changes(copies(rng, masses, e, ratio, size))
     return off.max(axis=(0, 2)), off[..., -1].max(axis=0)
 
 

@@ -46,9 +46,7 @@ MAP_SIDE = 1000
 
 def still_chain(balls):
     """Return masses and velocities: equal balls, the first at speed 1, the others at rest."""
-    velocities = np.zeros(balls)
-    velocities[0] = 1.0
-    return np.ones(balls), velocities
+    return np.ones(balls), np.eye(1, balls)[0]
 
 
 def cost(function, repeats):

@@ -96,8 +96,7 @@ def random_chains(balls, count):
     """Return random chains of that many balls, ratios within the bounds."""
     rng = np.random.default_rng(balls)
     masses = magnitudes(rng, 1, (count, balls))
-    velocities = np.zeros((count, balls))
-    velocities[:, 0] = 1.0
+    velocities = np.tile(np.eye(1, balls), (count, 1))
     restitution = uniform(rng, 0.3, 1.0, (count, balls - 1))
     # Eq. 34 with any onward ratio: the bound of Eq. 53 is never below it, forward or backward.
     part = uniform(rng, 0.0, 1.0, (count, balls - 2))

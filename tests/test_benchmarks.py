@@ -116,12 +116,16 @@ def test_absent_engines_are_named_and_skipped(monkeypatch):
     assert list(engines.rows(CLOCK, True)) == []
 
 
-@pytest.fixture(params=engines.ENGINES, ids=lambda engine: engine.name)
+def named(name):
+    """The engine of that name, if it is installed."""
+    if name in measure.absent(engines.ENGINES):
+        pytest.skip(measure.absent(engines.ENGINES)[name])
+    return next(engine for engine in engines.ENGINES if engine.name == name)
+
+
+@pytest.fixture(params=[engine.name for engine in engines.ENGINES])
 def engine(request):
-    """An engine, if it is installed."""
-    if request.param.name in measure.absent(engines.ENGINES):
-        pytest.skip(measure.absent(engines.ENGINES)[request.param.name])
-    return request.param
+    return named(request.param)
 
 
 # Box2D's bindings, made by SWIG, warn when they are imported.
@@ -147,13 +151,6 @@ def test_engine_repeats_what_is_stored(engine, setting):
         if row["versions"].startswith(same_version):
             expected = [float(v) for v in row["velocities"].split()]
             np.testing.assert_allclose(after, expected, rtol=0, atol=1e-4)
-
-
-def named(name):
-    """The engine of that name, if it is installed."""
-    if name in measure.absent(engines.ENGINES):
-        pytest.skip(measure.absent(engines.ENGINES)[name])
-    return next(engine for engine in engines.ENGINES if engine.name == name)
 
 
 def energy(engine, scene, placement, **options):
