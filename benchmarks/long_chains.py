@@ -1,10 +1,8 @@
 """Long chains and large maps: work, speed, and what can be trusted, as a CSV.
 
 Writes `data/long_chains.csv` in three minutes.
-All balls are equal and touch, and the first one strikes the others at speed 1.  Times are
-processor times, and each is divided by the time of one impact of three equal balls on Hertz
-springs, integrated beside it, so that a busy machine slows down both.  Seconds are these ratios
-times the median of all those times, so that they too are of one machine at one speed.
+All balls are equal and touch, and the first one strikes the others at speed 1.  Each processor
+time stands beside that of three balls on Hertz springs, so that a busy machine slows down both.
 """
 
 import statistics
