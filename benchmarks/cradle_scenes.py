@@ -13,12 +13,10 @@ import itertools
 import math
 import statistics
 import sys
-import time
 
-import measure
 import numba
 import numpy as np
-from measure import Engine, absent, present, quotient, versions
+from measure import Engine, absent, cpu, present, quotient, versions
 from stored import DATA, make
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
@@ -218,7 +216,7 @@ def strokes(angles, rates):
 @functools.cache
 def runs():
     """Return all runs: who moves the balls and how, gap, balls pulled back, and the run."""
-    return list(each_run(present(ENGINES)))
+    return list(each_run())
 
 
 def all_strokes():
@@ -237,14 +235,14 @@ def film():
                 yield name, how, f"{t:.4f}", *(f"{a:.1f}" for a in each)
 
 
-def each_run(engines):
+def each_run():
     """Yield who moves the balls and how, gap, how many balls were pulled back, and the run."""
     for pulled in (1, 2):
         for setting, given in SPRINGS.items():
             yield "Hertz springs", "alone", setting, 0.0, pulled, on_springs(pulled, **given)
         for setting, model in MODELS.items():
             yield "swing", "alone", setting, 0.0, pulled, by_swing(pulled, model=model)
-    for engine, setting in itertools.product(engines, ("default", "refined")):
+    for engine, setting in itertools.product(present(ENGINES), ("default", "refined")):
         for pulled in (1, 2):
             for gap in (0.0, GAP):
                 run = in_engine(engine, setting, pulled, mend=False, gap=gap)
@@ -264,7 +262,7 @@ def first_strokes_with_gaps():
         yield engine.name, setting, f"{gap:g}", pulled, *(f"{e:.4f}" for e in first)
 
 
-def costs(engines, repeats=5, seconds=5.0):
+def costs(repeats=5, seconds=5.0):
     """Yield what a simulated second costs: on springs, as an engine is, mended; at rest, swinging.
 
     Each time is taken beside that of `swing` and, if mended, of the engine as it is.
@@ -272,29 +270,20 @@ def costs(engines, repeats=5, seconds=5.0):
     on_springs(1, 1 / FRAMES)  # compiles
     alone = {"alone": lambda: cpu(lambda: on_springs(1, seconds)) / seconds}
     cases = [("Hertz springs", "steel", 1, "numba", alone)]
-    for engine, setting, pulled in itertools.product(
-        engines, ("default", "fine", "refined"), (0, 1)
-    ):
+    settings = "default", "fine", "refined"
+    for engine, setting, pulled in itertools.product(present(ENGINES), settings, (0, 1)):
         ways = {
             how: functools.partial(_cost, engine, setting, pulled, how == "mended", seconds)
             for how in ("as it is", "mended")
         }
         cases.append((engine.name, setting, pulled, engine.distribution, ways))
     for name, setting, pulled, package, ways in cases:
-        reference, taken = [], {how: [] for how in ways}
-        for _ in range(repeats):
-            reference.append(cpu(lambda: by_swing(1, seconds)) / seconds)
-            for how, way in ways.items():
-                taken[how].append(way())
-        for how, times in taken.items():
-            over = quotient(times, reference), quotient(times, next(iter(taken.values())))
+        in_turn = [lambda: cpu(lambda: by_swing(1, seconds)) / seconds, *ways.values()]
+        by_swings, *taken = zip(*([way() for way in in_turn] for _ in range(repeats)))
+        for how, times in zip(ways, taken):
+            over = quotient(times, by_swings), quotient(times, taken[0])
             row = name, how, setting, pulled, statistics.median(times), *over, repeats
-            yield dict(zip(COSTS, (*row, versions(package)), strict=True))
-
-
-def cpu(function):
-    """Return the processor time of a call."""
-    return measure.seconds(function, clock=time.process_time)
+            yield *row, versions(package)
 
 
 def _cost(engine, setting, pulled, mend, seconds):
@@ -310,7 +299,7 @@ TABLES = {
     "scene_gaps": (("run", "setting", "gap", "pulled", *ENERGIES), first_strokes_with_gaps),
     "scene_strokes": (("run", "how", "setting", "gap", "pulled", "stroke", *ENERGIES), all_strokes),
     "scene_film": (("run", "how", "time", *ENERGIES), film),
-    "scene_costs": (COSTS, lambda: (row.values() for row in costs(present(ENGINES)))),
+    "scene_costs": (COSTS, costs),
 }
 
 if __name__ == "__main__":

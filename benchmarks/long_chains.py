@@ -6,12 +6,11 @@ time stands beside that of three balls on Hertz springs, so that a busy machine 
 """
 
 import statistics
-import time
 from functools import partial
 from itertools import product
 
 import numpy as np
-from measure import quotient, seconds
+from measure import cpu, quotient
 from stored import make
 
 from cradle import Chain, SpringChain, collide, outcomes
@@ -49,7 +48,6 @@ def still_chain(balls):
 
 def cost(function, repeats):
     """Return the fields of a row that tell the processor time of `function`, and of the unit."""
-    cpu = partial(seconds, clock=time.process_time)
     three_on_springs = partial(collide, Chain(*still_chain(3), 1.0), SpringChain(1.0))
     function()
     calls = max(1, round(0.02 / max(cpu(function), 1e-6)))

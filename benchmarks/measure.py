@@ -8,6 +8,7 @@ import platform
 import statistics
 import time
 from dataclasses import make_dataclass
+from functools import partial
 from importlib import metadata
 from typing import NamedTuple
 from unittest import mock
@@ -88,6 +89,10 @@ def seconds(function, calls=1, clock=time.perf_counter):
     for _ in range(calls):
         function()
     return (clock() - begin) / calls
+
+
+#: The processor time of one call.
+cpu = partial(seconds, clock=time.process_time)
 
 
 def quotient(these, those):
