@@ -192,7 +192,7 @@ def marched(kind):
         n = kind if isinstance(kind, int) else 3 + seed % 4
         chain, meeting = generic(seed, n, bounded=kind != "held")
         try:
-            plain = in_floats(*chain, meeting=meeting, max_events=40)
+            plain = solve(*chain, meeting=meeting, max_events=40, number=float)
         except EventLimit:
             continue
         # The march has no rule R9, and needs a step far smaller than the last of many collisions.
