@@ -213,10 +213,14 @@ def floats(values):
     return np.array([float(x) for x in values])
 
 
-def points(ax, size=None):
-    """Points of the lines of some axes, in rows of x and y; of lines of so many points alone."""
-    lines = [np.column_stack(line.get_data()) for line in ax.get_lines()]
-    return [np.asarray(xy, float) for xy in lines if size is None or len(xy) == size]
+def points(ax, size=None, marker=None):
+    """Points of the lines of some axes, in rows of x and y.
+
+    Where asked for: of lines of so many points alone, of lines with this marker alone.
+    """
+    drawn = [line for line in ax.get_lines() if marker is None or line.get_marker() == marker]
+    found = [np.column_stack(line.get_data()).astype(float) for line in drawn]
+    return [xy for xy in found if size is None or len(xy) == size]
 
 
 def shows(axes, values) -> bool:

@@ -1,5 +1,6 @@
 """Settings that all tests share: processes, random examples, what is made once for all."""
 
+import functools
 import os
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from built_book import SHARED, built
+from explorer import Tab
 from hypothesis import HealthCheck, settings
 from pages import launched, visiting
 
@@ -106,14 +108,14 @@ def browser():
         yield browser
 
 
-@pytest.fixture(scope="module")
-def page(html: Path) -> str:
-    """The address of the explorer's page."""
-    return (html / "book" / "explorer.html").as_uri()
+@pytest.fixture
+def visit(browser, html: Path):
+    """What opens the explorer's page, or a chapter."""
+    with visiting(browser, (html / "book" / "explorer.html").as_uri()) as visit:
+        yield lambda *given, **options: Tab(visit(*given, **options))
 
 
 @pytest.fixture
-def visit(browser, page: str):
-    """What opens the explorer's page, or another one."""
-    with visiting(browser, page) as visit:
-        yield visit
+def still(visit):
+    """The same for a reader who asked for less motion: nothing moves by itself."""
+    return functools.partial(visit, reduced_motion="reduce")

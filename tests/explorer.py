@@ -15,7 +15,7 @@ EXPLORER = "cradleExplorer.live[0]"
 SETTING = f"{EXPLORER}.state.setting"
 
 # A frame may change sizes and so ask for another one; sweeps and maps take many. With a swing in
-# motion there is no last one: see `later`.
+# motion there is no last one: see `Tab.later`.
 AT_REST = f"""async () => {{
   for (let frame = 0; frame < 10000; frame += 1) {{
     await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
@@ -25,45 +25,78 @@ AT_REST = f"""async () => {{
 }}"""
 
 
-def still(visit, fragment="", **options):
-    """Open the page for a reader who asked for less motion: nothing moves by itself."""
-    return visit(fragment, reduced_motion="reduce", **options)
+class Tab:
+    """A page with a live cradle, as Playwright has it, and what tests do with it and ask it."""
 
+    def __init__(self, page):
+        self.page = page
 
-def drawn(tab):
-    """Wait until the page has nothing more to draw, and return its setting and outcome."""
-    assert tab.evaluate(AT_REST), "the page never comes to rest"
-    return shown(tab)
+    def __getattr__(self, name):
+        return getattr(self.page, name)
 
+    def state(self, what: str):
+        """Return a part of the cradle's state."""
+        return self.evaluate(f"{EXPLORER}.state.{what}")
 
-def later(tab, milliseconds: int):
-    """Let time pass on a page whose clock stands still, and return what is shown then."""
-    tab.clock.run_for(milliseconds)
-    return shown(tab)
+    def act(self, what: str):
+        """Let a method change the state, as a control does."""
+        self.evaluate(f"{EXPLORER}.state.{what}, {EXPLORER}.changed()")
 
+    def shown(self):
+        """Return the setting and its outcome."""
+        return self.evaluate(f"({{...{SETTING}, after: {EXPLORER}.state.swing.hit(0).after}})")
 
-def shown(tab):
-    return tab.evaluate(f"({{...{SETTING}, after: {EXPLORER}.state.swing.hit(0).after}})")
+    def drawn(self):
+        """Wait until the page has nothing more to draw, and return its setting and outcome."""
+        assert self.evaluate(AT_REST), "the page never comes to rest"
+        return self.shown()
 
+    def later(self, milliseconds: int):
+        """Let time pass on a page whose clock stands still, and return what is shown then."""
+        self.clock.run_for(milliseconds)
+        return self.shown()
 
-def go_to(tab, fragment: str):
-    """Change the address, as a link does, and wait until the page has heard of it."""
-    tab.evaluate(
-        """(fragment) => new Promise((done) => {
-          addEventListener("hashchange", () => done(), { once: true });
-          location.hash = fragment;
-        })""",
-        fragment,
-    )
+    def go_to(self, fragment: str):
+        """Change the address, as a link does, and wait until the page has heard of it."""
+        self.evaluate(
+            """(fragment) => new Promise((done) => {
+              addEventListener("hashchange", () => done(), { once: true });
+              location.hash = fragment;
+            })""",
+            fragment,
+        )
 
+    def push(self, name: str):
+        """Click on a button."""
+        self.get_by_role("button", name=name, exact=True).click()
 
-def press(tab, name: str):
-    tab.get_by_role("button", name=name, exact=True).click()
+    def choose(self, words: str):
+        """Click on one of several, when it stands still, and return what is then shown."""
+        self.locator(".choice label", has_text=re.compile(f"^{re.escape(words)}$")).click()
+        return self.drawn()
 
+    def typed(self, label: str, text: str, key: str = "Enter"):
+        """Type into the box beside a slider, end with a key, and return the box."""
+        box = self.get_by_label(f"{label}, as a number", exact=True)
+        box.fill(text)
+        box.press(key)
+        return box
 
-def choose(tab, words: str):
-    """Click on one of several, by its words: when it stands still, and where it is seen."""
-    tab.locator(".choice label", has_text=re.compile(f"^{re.escape(words)}$")).click()
+    def middle(self, selector: str) -> tuple[float, float]:
+        box = self.locator(selector).bounding_box()
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def grab(self, selector: str, beside: float = 0.0) -> tuple[float, float]:
+        """Press the mouse on the middle of an element, or beside it; return where the middle is."""
+        x, y = self.middle(selector)
+        self.mouse.move(x + beside, y)
+        self.mouse.down()
+        return x, y
+
+    def bars(self, selector: str = ".outcome .drawn") -> list[float]:
+        """Return the numbers that a picture of bars shows."""
+        texts = self.locator(f"{selector} text.number").all_text_contents()
+        return [float(text.replace("\u2212", "-")) for text in texts]
 
 
 def chain_of(setting) -> tuple[Chain, ImpulseCorrelation]:
@@ -90,22 +123,3 @@ def settings(count: int):
             "backward": backward,
             "letters": "-" * n,
         }
-
-
-def middle(tab, selector: str) -> tuple[float, float]:
-    box = tab.locator(selector).bounding_box()
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-
-def grab(tab, selector: str, beside: float = 0.0) -> tuple[float, float]:
-    """Press the mouse on the middle of an element, or beside it; return where the middle is."""
-    x, y = middle(tab, selector)
-    tab.mouse.move(x + beside, y)
-    tab.mouse.down()
-    return x, y
-
-
-def bars(tab, selector: str = ".outcome .drawn") -> list[float]:
-    """Return the numbers that a picture of bars shows."""
-    texts = tab.locator(f"{selector} text.number").all_text_contents()
-    return [float(text.replace("\u2212", "-")) for text in texts]

@@ -149,7 +149,7 @@ def visiting(browser, home: str):
     """Give what opens pages; at the end: no error on a console, no request that leaves the disk."""
     contexts, faults = [], []
 
-    def visit(fragment="", *, address=home, width=1400, height=900, stopped=False, **options):
+    def visit(fragment="", *, chapter="explorer", width=1400, height=900, stopped=False, **options):
         context = browser.new_context(viewport={"width": width, "height": height}, **options)
         context.set_default_timeout(PATIENCE)
         contexts.append(context)
@@ -158,10 +158,10 @@ def visiting(browser, home: str):
             tab.clock.install(time=0)
             tab.clock.pause_at(10**6)
         faults.append(listened(tab))
-        if address != home:
-            # A chapter: seconds go into its equations, which are not looked at here.
+        if chapter != "explorer":
+            # Seconds go into its equations, which are not looked at here.
             tab.route("**/tex-svg-full.js", lambda route: route.fulfill(body=""))
-        tab.goto(address + fragment)
+        tab.goto(home.replace("explorer.html", f"{chapter}.html") + fragment)
         if options.get("java_script_enabled", True):
             tab.wait_for_function("globalThis.cradleExplorer?.live?.length > 0")
         return tab

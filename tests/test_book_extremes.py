@@ -11,18 +11,13 @@ from chapters import Chapter, floats, number, points, shows
 from problem import Problem
 from stored import read
 
-from cradle import (
-    collide,
-    outcomes,
-    paper_chain,
-)
+from cradle import collide, outcomes, paper_chain
 from cradle.textbook import solve
 
 
 def stored(part, **equal):
     """Rows of a stored table of the study whose columns have these values."""
-    rows = read(f"extremes_{part}.csv")
-    return [row for row in rows if all(row[name] == value for name, value in equal.items())]
+    return read(f"extremes_{part}.csv", **equal)
 
 
 def first_jump(name):

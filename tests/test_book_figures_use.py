@@ -3,19 +3,18 @@
 The second routes: the independent solver of the tests, the stored data files, formulas.
 """
 
-import csv
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
-from chapters import Chapter, drawn, floats, lines, panel
+from chains import HERTZ
+from chapters import Chapter, drawn, floats, lines, panel, points
+from stored import DATA, read
 from test_book_toy import strokes
 from truth import solve
 
 from cradle.tables import paper_chain
 
-DATA = Path(__file__).parents[1] / "data"
 STRUCK = [1, 0, 0, 0, 0]
 
 
@@ -28,19 +27,11 @@ def velocities(chain, forward, backward=None):
 
 def shots(name):
     """Striker's speeds of a stored set, and velocities afterwards over them, by shot."""
-    with (DATA / "shots_synthetic.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(line for line in file if line[0] != "#"))
+    rows = read("shots_synthetic.csv", set=name)
     before, after = (
-        floats(row[column] for row in rows if row["set"] == name).reshape(-1, len(name))
-        for column in ("before", "after")
+        floats(row[column] for row in rows).reshape(-1, len(name)) for column in ("before", "after")
     )
     return before[:, 0], after / before[:, :1]
-
-
-def dots(ax, count):
-    """What error bars mark: points of the lines that have a marker and so many points."""
-    marked = [line.get_xydata() for line in ax.get_lines() if line.get_marker() == "o"]
-    return [xy for xy in marked if len(xy) == count]
 
 
 def test_fig_toy_models():
@@ -52,8 +43,7 @@ def test_fig_toy_models():
         expected = strokes(20, STRUCK, e, a)[::2].T
         np.testing.assert_allclose(drawn_by[:, :10], expected, rtol=0, atol=1e-9)
     # One stroke of five Hertz springs, integrated elsewhere, and a body of four by momentum.
-    hertz = [-0.071085017, -0.030273764, -0.014463629, 0.127044986, 0.988777424]
-    np.testing.assert_allclose(springs[:, 0], hertz, atol=1e-7)
+    np.testing.assert_allclose(springs[:, 0], HERTZ["five equal"], atol=1e-7)
     np.testing.assert_allclose(solid.T, [[-0.6] + [0.4] * 4] * solid.shape[1], atol=1e-9)
 
 
@@ -86,7 +76,7 @@ def test_fig_inventory_resting():
 def test_fig_measure_check():
     ax = drawn("measure")["fig-measure-check"].axes[0]
     striker, after = shots("ABACA")
-    found = np.array([xy[:, 1] for xy in dots(ax, len(striker))])
+    found = np.array([xy[:, 1] for xy in points(ax, len(striker), "o")])
     np.testing.assert_allclose(found, after.T, rtol=1e-12)
     # The bars are the intervals that the chapter prints.
     printed = [line.split() for line in Chapter("measure").printed("check").splitlines()[2:7]]
@@ -127,7 +117,7 @@ def test_likelihoods_cross_their_limit_at_the_printed_ends(figure, printed):
 def test_fig_measure_fit_shots():
     ax = drawn("measure")["fig-measure-fit"].axes[1]
     striker, after = shots("ABA")
-    found = dots(ax, len(striker))
+    found = points(ax, len(striker), "o")
     assert len(found) == 3
     for ball, xy in enumerate(found):
         np.testing.assert_allclose(xy, np.column_stack([striker, after[:, ball]]), rtol=1e-12)

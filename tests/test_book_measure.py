@@ -1,30 +1,19 @@
-"""Chapter "Measure your own cradle": what its text says, by second routes, and with other files."""
+"""Chapter "Measure your own cradle": what its text says, by second routes."""
 
 import math
-from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from chapters import Chapter, floats
 from scipy.stats import norm
 from stored import read
-from test_book_parameters import code, pictures_in_memory, run
 from truth import solve
 
 from cradle import paper_chain
 from cradle.closed_form import one_collision_each, three_balls
 
-ROOT = Path(__file__).parents[1]
 CHAPTER, TABLE = Chapter("measure"), Chapter("table_2")
 GLUED = CHAPTER.glued | TABLE.glued
-
-__all__ = ["pictures_in_memory"]
-
-
-def stored(name, **equal):
-    rows = read(name)
-    return [row for row in rows if all(row[key] == value for key, value in equal.items())]
 
 
 def test_every_page_that_shows_data_calls_them_synthetic():
@@ -42,7 +31,7 @@ def test_error_of_a_line_by_least_squares():
 
 def test_third_digit_by_the_closed_form():
     """Where balls collide once each: sensitivities from the formulas, slope by slope."""
-    study = {row["triplet"]: row for row in stored("fit_precision.csv")}
+    study = {row["triplet"]: row for row in read("fit_precision.csv")}
     mass = {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}
     e = {"AB": 0.53, "BC": 0.28, "AC": 0.31, "AA": 0.97, "BB": 0.36}
     checked = 0
@@ -87,27 +76,13 @@ def test_wrong_coefficient_makes_another_ratio_the_best():
 
 
 def test_power_by_theory():
-    (row,) = stored("fit_precision.csv", triplet="AAA")
+    (row,) = read("fit_precision.csv", triplet="AAA")
     error = 0.01 / (float(row["sensitivity"]) * math.sqrt(10)) * math.sqrt(2)
     limit = norm.ppf(0.975) * error
     power = norm.sf((limit - float(row["detectable"])) / error)
     assert power == pytest.approx(0.8, abs=0.01)
     assert float(GLUED["power"]) == pytest.approx(100 * power, abs=5)
     assert float(GLUED["false"]) == pytest.approx(5, abs=2.5)
-
-
-@pytest.mark.usefixtures("pictures_in_memory")
-def test_chapter_runs_with_a_reader_s_own_file(tmp_path, monkeypatch):
-    """Two sets only, no chain of four: no cell may fail; and with another phone."""
-    lines = (ROOT / "data" / "shots_synthetic.csv").read_text(encoding="utf-8").splitlines()
-    kept = [line for line in lines[1:] if line.split(",")[0] in ("set", "AB", "ABA")]
-    (tmp_path / "my_shots.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    names = run(code("measure"), {"frame_rate": 120, "mark_error": 0.001, "length": 0.31})
-    assert names["mine"].is_file()
-    assert [one.name for one in names["shots"].sets] == ["AB", "ABA"]
-    assert names["check"].name == "ABA"
-    assert not plt.get_fignums()
 
 
 def test_exercise_and_the_blind_triplet():

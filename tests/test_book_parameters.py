@@ -101,6 +101,20 @@ def test_chapter_runs_with_other_numbers(chapter: str, changes: dict):
 
 
 @pytest.mark.usefixtures("pictures_in_memory")
+def test_measure_runs_with_a_reader_s_own_file(root, tmp_path, monkeypatch):
+    """Two sets only, no chain of four: no cell may fail; and with another phone."""
+    lines = (root / "data" / "shots_synthetic.csv").read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines[1:] if line.split(",")[0] in ("set", "AB", "ABA")]
+    (tmp_path / "my_shots.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    names = run(code("measure"), {"frame_rate": 120, "mark_error": 0.001, "length": 0.31})
+    assert names["mine"].is_file()
+    assert [one.name for one in names["shots"].sets] == ["AB", "ABA"]
+    assert names["check"].name == "ABA"
+    assert not plt.get_fignums()
+
+
+@pytest.mark.usefixtures("pictures_in_memory")
 def test_a_cell_tied_to_the_stored_number_is_seen():
     cells = [
         nbformat.v4.new_code_cell("ratio = 0.15", metadata={"tags": ["parameters"]}),

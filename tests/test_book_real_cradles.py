@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import real_cradles
 import real_swing
-from chapters import Chapter
+from chapters import Chapter, points
 from real_cradles import first_strikes, spheres, table
 from scipy.optimize import brentq, least_squares
 from stored import read
@@ -42,12 +42,9 @@ def laws(cell):
     return np.array([[float(x) for x in line.split()] for line in lines]).T
 
 
-def points(ax, marker):
+def marked(ax, marker):
     """Points drawn with one marker, in the order of x."""
-    found = [
-        xy for line in ax.get_lines() if line.get_marker() == marker for xy in line.get_xydata()
-    ]
-    return np.array(sorted(map(tuple, found)))
+    return np.array(sorted(map(tuple, np.concatenate(points(ax, marker=marker)))))
 
 
 def test_velocities_of_the_models_by_the_fitting_script():
@@ -205,7 +202,7 @@ def test_fig_half():
     ball, time, place, *_ = real_swing.peaks()
     for k, marker in ((0, "o"), (4, "s")):
         own = ball == k
-        assert points(top, marker) == pytest.approx(
+        assert marked(top, marker) == pytest.approx(
             np.column_stack([time[own], 1000 * np.abs(place[own])])
         )
     assert len(time) == int(GLUED["turns"])
@@ -250,8 +247,3 @@ def test_touching_spheres_of_free_masses():
     for reading in ("4", "2"):
         row, plain = (FITS[x, "apart", "both", reading] for x in (law, "touching spheres, A"))
         assert 30 * int(row["freedom"]) < chi_square(row) < chi_square(plain)
-        p = parameters(law, "apart", "both", reading)
-        for release, name in ((1, "chi_one"), (2, "chi_two")):
-            data = first_strikes(int(reading))
-            again = real_cradles.chi_square(law, p, True, data, (release,))
-            assert again == pytest.approx(float(row[name]), rel=0.02)

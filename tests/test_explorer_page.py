@@ -2,21 +2,7 @@
 
 import numpy as np
 import pytest
-from explorer import (
-    EXPLORER,
-    SETTING,
-    bars,
-    chain_of,
-    drawn,
-    go_to,
-    grab,
-    later,
-    middle,
-    press,
-    same_outcome,
-    settings,
-    still,
-)
+from explorer import SETTING, chain_of, same_outcome, settings
 from pages import colour, contrast, show
 
 from cradle import Chain, Pendulums, paper_chain, swing
@@ -35,13 +21,13 @@ def swung(setting, strokes: int):
     return swing(released, model, -chain.velocities / frequency, times, pendulums=hanging)
 
 
-def test_swing_of_the_page(visit):
+def test_swing_of_the_page(still):
     """Velocities after hits and positions between them are those of the package's own swing.
 
     Rounding is another there, where sines give the velocities of a hit, and grows from hit to hit;
     where it decides a tie the two part. So: few hits, and balls that are all in motion.
     """
-    tab = still(visit)
+    tab = still()
     for setting in settings(24):
         run = swung(setting, 3)
         hits, places = tab.evaluate(
@@ -75,9 +61,9 @@ def test_swing_of_the_page(visit):
     assert after[0] == pytest.approx(after[1])
 
 
-def test_copied_python_gives_the_same_numbers(visit):
+def test_copied_python_gives_the_same_numbers(still):
     """The text of the button, run as a program."""
-    tab = still(visit, stopped=True)
+    tab = still(stopped=True)
     tab.evaluate(
         "navigator.clipboard.writeText = (text) => ((window.copied = text), Promise.resolve())"
     )
@@ -85,9 +71,9 @@ def test_copied_python_gives_the_same_numbers(visit):
         "speeds=1,0.5,0,-0.35&forward=0.3,0.12&backward=0.2&masses=1,0.05,3,0.166",
         "scene=ABCCAB", "scene=half", "speeds=1,0,0&restitution=0.9&law=spheres&gap=2",
     ):  # fmt: skip
-        go_to(tab, fragment)
-        asked = later(tab, 50)
-        press(tab, "Copy Python")
+        tab.go_to(fragment)
+        asked = tab.later(50)
+        tab.push("Copy Python")
         tab.clock.run_for(3900)
         assert tab.inner_text(".told") == "Python copied"
         tab.clock.run_for(200)
@@ -102,9 +88,9 @@ def test_copied_python_gives_the_same_numbers(visit):
         np.testing.assert_allclose(program["run"].impacts[0].after, asked["after"], atol=1e-9)
 
 
-def test_paper_chains_by_their_letters(visit):
+def test_paper_chains_by_their_letters(still):
     """Letter by letter as a reader does it, and as a scene: Tables 1 and 2 of the paper."""
-    tab = still(visit)
+    tab = still()
     for sequence in paper_sequences():
         by_hand, scene = tab.evaluate(
             """(sequence) => {
@@ -124,26 +110,26 @@ def test_paper_chains_by_their_letters(visit):
 
 def test_a_ball_is_dragged_and_let_go(visit):
     tab = visit("#scene=one", stopped=True)
-    press(tab, "Let go")
+    tab.push("Let go")
     tab.clock.run_for(1000)
-    press(tab, "Pause")
-    press(tab, "Pull back")
-    tab.evaluate(f"{EXPLORER}.state.set(cradleExplorer.atRest({SETTING})), {EXPLORER}.changed()")
+    tab.push("Pause")
+    tab.push("Pull back")
+    tab.act(f"set(cradleExplorer.atRest({SETTING}))")
     tab.clock.run_for(50)
-    x, y = grab(tab, ".ball[data-ball='4'] .disc")
+    x, y = tab.grab(".ball[data-ball='4'] .disc")
     for step in range(1, 9):
         tab.mouse.move(x + 10 * step, y)
         tab.clock.run_for(16)
-    at, _ = middle(tab, ".ball[data-ball='4'] .disc")
+    at, _ = tab.middle(".ball[data-ball='4'] .disc")
     assert abs(at - (x + 80)) < 8
     tab.clock.run_for(1000)  # it waits in the hand
-    assert middle(tab, ".ball[data-ball='4'] .disc")[0] == at
+    assert tab.middle(".ball[data-ball='4'] .disc")[0] == at
     tab.mouse.up()
-    assert same_outcome(later(tab, 50))
+    assert same_outcome(tab.later(50))
     assert tab.inner_text("button.main") == "Pause"
     tab.clock.run_for(950)  # the hit comes after half a second
-    assert tab.evaluate(f"{EXPLORER}.state.clock.time") == pytest.approx(1, abs=0.05)
-    first, second = (middle(tab, f".ball[data-ball='{ball}'] .disc")[0] for ball in (0, 1))
+    assert tab.state("clock.time") == pytest.approx(1, abs=0.05)
+    first, second = (tab.middle(f".ball[data-ball='{ball}'] .disc")[0] for ball in (0, 1))
     assert second - first > 60  # the hit has sent ball 1 to the left; at rest they touch
 
 
@@ -154,49 +140,49 @@ def test_pull_back_where_it_has_an_effect(visit):
     for button, wait, enabled in (
         ("Let go", 1000, True), ("Pause", 50, True), ("Pull back", 1000, False)
     ):  # fmt: skip
-        press(tab, button)
+        tab.push(button)
         tab.clock.run_for(wait)
         assert tab.get_by_role("button", name="Pull back").is_enabled() is enabled
-    assert tab.evaluate(f"{EXPLORER}.state.clock.time") == 0
+    assert tab.state("clock.time") == 0
 
 
 def test_only_a_drag_moves_a_ball(visit):
     """A tap on a ball leaves the swing as it is, and a ball taken at its edge does not jump."""
     tab = visit("#scene=one", stopped=True)
-    time, ball = f"{EXPLORER}.state.clock.time", ".ball[data-ball='4'] .disc"
-    press(tab, "Let go")
+    ball = ".ball[data-ball='4'] .disc"
+    tab.push("Let go")
     tab.clock.run_for(1000)
-    before = tab.evaluate(time)
+    before = tab.state("clock.time")
     pulled(tab, ball, 1)
     tab.mouse.up()
     tab.clock.run_for(500)
-    assert tab.evaluate(time) == pytest.approx(before + 0.5, abs=0.07)
-    assert tab.evaluate(SETTING)["speeds"] == [1, 0, 0, 0, 0]
-    press(tab, "Pause")
-    press(tab, "Pull back")
+    assert tab.state("clock.time") == pytest.approx(before + 0.5, abs=0.07)
+    assert tab.state("setting")["speeds"] == [1, 0, 0, 0, 0]
+    tab.push("Pause")
+    tab.push("Pull back")
     tab.clock.run_for(50)
     x = pulled(tab, ball, 40, from_edge=15)
-    assert abs(middle(tab, ball)[0] - (x + 40)) < 8
+    assert abs(tab.middle(ball)[0] - (x + 40)) < 8
 
 
 def pulled(tab, ball: str, way: int, from_edge: int = 0) -> float:
     """Take a ball, move it, and return where its middle was."""
-    x, y = grab(tab, ball, from_edge)
+    x, y = tab.grab(ball, from_edge)
     tab.mouse.move(x + from_edge + way, y)
     tab.clock.run_for(50)
     return x
 
 
-def test_balls_in_the_way_come_along(visit):
-    tab = still(visit, "#scene=one")
-    x, y = grab(tab, ".ball[data-ball='2'] .disc")
+def test_balls_in_the_way_come_along(still):
+    tab = still("#scene=one")
+    x, y = tab.grab(".ball[data-ball='2'] .disc")
     tab.mouse.move(x - 60, y, steps=6)
-    taken = drawn(tab)["speeds"]
+    taken = tab.drawn()["speeds"]
     assert taken[0] == 1  # was pulled back further
     assert taken[1] == taken[2] > 0
     assert taken[3:] == [0, 0]
     tab.mouse.move(x, y)  # and let go of on the way back
-    assert drawn(tab)["speeds"] == [1, 0, 0, 0, 0]
+    assert tab.drawn()["speeds"] == [1, 0, 0, 0, 0]
     tab.mouse.up()
     assert tab.inner_text("button.main") == "Let go"  # less motion: not by itself
 
@@ -209,19 +195,19 @@ def test_balls_in_the_way_come_along(visit):
         ("ratio, pushed from the left", "forward"),
     ],
 )
-def test_sliders_change_the_outcome(visit, label: str, row: str):
-    tab = still(visit, "#scene=small")
-    before = drawn(tab)
+def test_sliders_change_the_outcome(still, label: str, row: str):
+    tab = still("#scene=small")
+    before = tab.drawn()
     tab.click("label[title='ball 2']")
-    drawn(tab)  # its sliders are there
+    tab.drawn()  # its sliders are there
     for _ in range(3):
         tab.get_by_label(label, exact=True).press("ArrowLeft")
-    after = drawn(tab)
+    after = tab.drawn()
     assert sum(a != b for a, b in zip(before[row], after[row], strict=True)) == 1
     assert after["after"] != before["after"]
     assert same_outcome(after)
     # What is shown is what was computed: the bars, the words, the code.
-    assert bars(tab, ".outcome") == pytest.approx(after["after"], abs=0.0051)
+    assert tab.bars(".outcome") == pytest.approx(after["after"], abs=0.0051)
     assert tab.inner_text(".words").startswith(
         "Before the first hit, ball 1 moves right at 1.00 m/s"
     )
@@ -244,99 +230,92 @@ REFUSED = [
 ]
 
 
-def test_typed_values_out_of_range_are_refused(visit):
+def test_typed_values_out_of_range_are_refused(still):
     """They stay, marked, with a sentence that says what is in force, and change nothing."""
-    tab = still(visit, "#scene=small")
-    before = drawn(tab)
-    for number, (label, typed, sentence) in enumerate(REFUSED):
-        box = tab.get_by_label(f"{label}, as a number", exact=True)
-        alert = box.locator("xpath=ancestor::div[@class='slider']").get_by_role("alert")
+    tab = still("#scene=small")
+    before = tab.drawn()
+    for number, (label, text, sentence) in enumerate(REFUSED):
         key = ("Enter", "Tab")[number % 2]
-        box.fill(typed)
-        box.press(key)
-        assert drawn(tab) == before
+        box = tab.typed(label, text, key)
+        alert = box.locator("xpath=ancestor::div[@class='slider']").get_by_role("alert")
+        assert tab.drawn() == before
         assert alert.inner_text() == sentence
         assert box.get_attribute("aria-describedby") == alert.get_attribute("id")
-        press(tab, "Next hit")  # a redraw wipes nothing away
-        press(tab, "Pull back")
-        drawn(tab)
-        assert box.input_value() == typed
+        tab.push("Next hit")  # a redraw wipes nothing away
+        tab.push("Pull back")
+        tab.drawn()
+        assert box.input_value() == text
         assert box.get_attribute("aria-invalid") == "true"
         for mode in ("light", "dark") if number < 2 else ():
             show(tab, 1400, mode)
             assert contrast(colour(box, "borderTopColor"), colour(box, "backgroundColor")) > 3
         # What is right, if only the value in force, ends it.
-        box.fill(sentence.split("In force: ")[1].split()[0].rstrip("."))
-        box.press(key)
-        assert drawn(tab) == before
+        tab.typed(label, sentence.split("In force: ")[1].split()[0].rstrip("."), key)
+        assert tab.drawn() == before
         assert box.get_attribute("aria-invalid") == "false"
         assert alert.inner_text() == ""
     # So does another setting: the box then shows what is in force.
-    box = tab.get_by_label("ratio, as a number", exact=True)
-    box.fill("2")
-    box.press("Tab")
-    press(tab, "next scene")
-    assert drawn(tab)["forward"] == [0.5] * 3
+    box = tab.typed("ratio", "2", "Tab")
+    tab.push("next scene")
+    assert tab.drawn()["forward"] == [0.5] * 3
     assert box.input_value() == "0.5"
     assert box.get_attribute("aria-invalid") == "false"
 
 
-def test_numbers_are_read_as_people_type_them(visit):
+def test_numbers_are_read_as_people_type_them(still):
     """A comma is a point, whatever the browser's language: 0,25 is not 25."""
-    tab = still(visit, "#scene=small")
-    box = tab.get_by_label("ratio, as a number", exact=True)
-    for typed, number in (
+    tab = still("#scene=small")
+    for text, number in (
         ("0,25", 0.25), (".5", 0.5), ("1e-1", 0.1), (" 0.3 ", 0.3), ("+0,2", 0.2), ("0,125", 0.125),
     ):  # fmt: skip
-        box.fill(typed)
-        box.press("Tab")
-        assert set(drawn(tab)["forward"]) == {number}
+        box = tab.typed("ratio", text, "Tab")
+        assert set(tab.drawn()["forward"]) == {number}
         assert box.input_value() == str(number)
         assert box.get_attribute("aria-invalid") == "false"
 
 
-def test_number_material_and_sweep(visit):
-    tab = still(visit, "#scene=small")
+def test_number_material_and_sweep(still):
+    tab = still("#scene=small")
     for group, name in (("number of balls", "3"), ("material", "D")):
         row = tab.get_by_role("radiogroup", name=group, exact=True)
         row.locator("label", has_text=name).click()
-    setting = drawn(tab)
+    setting = tab.drawn()
     assert setting["letters"] == "DDD"
     assert setting["masses"] == [0.166] * 3
     assert same_outcome(setting)
     tab.click("label:has-text('All ratios')")
-    drawn(tab)
+    tab.drawn()
     assert tab.locator(".drags-x polyline").count() == 3
-    x, y = grab(tab, ".drags-x svg")
+    x, y = tab.grab(".drags-x svg")
     tab.mouse.move(x + 30, y)
     tab.mouse.up()
-    moved = drawn(tab)
+    moved = tab.drawn()
     assert moved["forward"] == moved["backward"] != setting["forward"]
     assert same_outcome(moved)
 
 
-def test_keys_that_come_within_one_frame_count_each(visit):
+def test_keys_that_come_within_one_frame_count_each(still):
     """A browser may pass on several before it draws; no step is lost."""
     twice = """(node) => {
       for (let k = 0; k < 2; k += 1)
         node.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true }));
     }"""
-    tab = still(visit, "#scene=small")
+    tab = still("#scene=small")
     tab.locator(".ball[data-ball='4']").evaluate(twice)
-    assert drawn(tab)["speeds"] == [1, 0, 0, 0, -0.2]
-    go_to(tab, "scene=map")
-    before = drawn(tab)["masses"]
+    assert tab.drawn()["speeds"] == [1, 0, 0, 0, -0.2]
+    tab.go_to("scene=map")
+    before = tab.drawn()["masses"]
     assert before == [1, 1, 1]
     tab.locator(".point").evaluate(twice)
-    assert drawn(tab)["masses"] == [1, 1, pytest.approx(1 / 1.2, rel=1e-3)]
+    assert tab.drawn()["masses"] == [1, 1, pytest.approx(1 / 1.2, rel=1e-3)]
 
 
-def test_a_browser_that_does_not_allow_copying(visit):
+def test_a_browser_that_does_not_allow_copying(still):
     """A page that came over plain HTTP has no clipboard."""
-    tab = still(visit)
+    tab = still()
     tab.evaluate("Object.defineProperty(navigator, 'clipboard', { value: undefined })")
     for name in ("Copy Python", "Copy link"):
-        press(tab, name)
+        tab.push(name)
         tab.wait_for_function("document.querySelector('.told').textContent")
         assert tab.inner_text(".told").startswith("The browser does not allow copying")
         tab.evaluate("document.querySelector('.told').textContent = ''")

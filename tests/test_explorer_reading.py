@@ -1,24 +1,12 @@
 """The live explorer for every reader: address, keys, words, widths, modes, motion, no scripts."""
 
+import itertools
 import re
 from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from explorer import (
-    EXPLORER,
-    SETTING,
-    bars,
-    chain_of,
-    drawn,
-    go_to,
-    grab,
-    later,
-    press,
-    same_outcome,
-    settings,
-    still,
-)
+from explorer import EXPLORER, SETTING, chain_of, same_outcome, settings
 from pages import MISFITS, colour, contrast, show
 
 from cradle import (
@@ -33,28 +21,28 @@ from cradle.measures import bouncing_pattern
 # --- the address ------------------------------------------------------------------------------
 
 
-def test_address_keeps_the_setting(visit):
-    tab, address = still(visit, stopped=True), ""
-    other = still(visit)
+def test_address_keeps_the_setting(still):
+    tab, address = still(stopped=True), ""
+    other = still()
     for setting in settings(6):
         tab.evaluate(f"(setting) => ({EXPLORER}.state.set(setting), {EXPLORER}.changed())", setting)
-        before = later(tab, 190)
+        before = tab.later(190)
         assert tab.evaluate("location.hash") == address  # not at every step of a slider
         tab.clock.run_for(50)
         address = tab.evaluate("location.hash")
-        go_to(other, unquote(address).removeprefix("#"))
-        after = drawn(other)
+        other.go_to(unquote(address).removeprefix("#"))
+        after = other.drawn()
         assert after == before
         assert {name: after[name] for name in setting} == setting
-    assert drawn(still(visit, unquote(address))) == before
+    assert still(unquote(address)).drawn() == before
 
 
-def test_a_link_is_followed_while_an_address_is_due(visit):
+def test_a_link_is_followed_while_an_address_is_due(still):
     """The address is written late, and maybe just before the page hears of a new one."""
-    tab = still(visit)
-    drawn(tab)
+    tab = still()
+    tab.drawn()
     tab.get_by_label("ratio", exact=True).press("ArrowRight")
-    drawn(tab)
+    tab.drawn()
     tab.evaluate(
         f"""(fragment) => new Promise((done) => {{
           const later = setTimeout;
@@ -69,7 +57,7 @@ def test_a_link_is_followed_while_an_address_is_due(visit):
         }})""",
         "speeds=1,0,0",
     )
-    assert drawn(tab)["speeds"] == [1, 0, 0]
+    assert tab.drawn()["speeds"] == [1, 0, 0]
 
 
 WRONG_ADDRESSES = {
@@ -91,49 +79,49 @@ WRONG_ADDRESSES = {
 }
 
 
-def test_wrong_addresses_are_refused(visit):
-    tab = still(visit, "#speeds=%E0%A4,0")
-    drawn(tab)
+def test_wrong_addresses_are_refused(still):
+    tab = still("#speeds=%E0%A4,0")
+    tab.drawn()
     assert "speeds[0] = NaN" in tab.inner_text(".words")
     for fragment, reason in WRONG_ADDRESSES.items():
-        go_to(tab, fragment)
-        shown = drawn(tab)
+        tab.go_to(fragment)
+        shown = tab.drawn()
         assert reason in tab.inner_text(".words"), fragment
         assert same_outcome(shown), fragment
-    go_to(tab, "speeds%3D1%2C0%2C0")  # as some mail programs write it
-    assert drawn(tab)["speeds"] == [1, 0, 0]
+    tab.go_to("speeds%3D1%2C0%2C0")  # as some mail programs write it
+    assert tab.drawn()["speeds"] == [1, 0, 0]
 
 
-def test_letters_bring_their_numbers(visit):
+def test_letters_bring_their_numbers(still):
     """A link may name the paper's balls and nothing else; a ball of another mass has no letter."""
-    tab = still(visit, "#letters=ABACA")
-    found = drawn(tab)
+    tab = still("#letters=ABACA")
+    found = tab.drawn()
     chain, model = paper_chain("ABACA", excess="saturate")
     asked = chain_of(found)
     assert asked[0].masses.tolist() == chain.masses.tolist()
     assert asked[0].restitution.tolist() == chain.restitution.tolist()
     assert asked[1] == model
-    go_to(tab, "letters=AB-&restitution=0.5")
-    found = drawn(tab)
+    tab.go_to("letters=AB-&restitution=0.5")
+    found = tab.drawn()
     assert (found["masses"], found["restitution"]) == ([*chain.masses[:2], 1], [0.5, 0.5])
 
 
-def test_a_reader_walks_on_from_a_changed_setting(visit):
+def test_a_reader_walks_on_from_a_changed_setting(still):
     """An address stays as it was asked for until something changes.
 
     Then no scene is named any more, and the keys go on from the last one.
     """
-    tab = still(visit, "#in-a-lecture", stopped=True)
+    tab = still("#in-a-lecture", stopped=True)
     tab.clock.run_for(1000)
     assert tab.evaluate("location.hash") == "#in-a-lecture"
-    go_to(tab, "scene=half")
+    tab.go_to("scene=half")
     tab.clock.run_for(1000)
     tab.get_by_label("ratio", exact=True).press("ArrowRight")
     tab.clock.run_for(1000)
     assert "forward=0.5" in tab.evaluate("location.hash")
     assert tab.locator(".walk select").input_value() == ""
     assert tab.inner_text(".scene-text") == ""
-    press(tab, "next scene")
+    tab.push("next scene")
     tab.clock.run_for(1000)
     assert tab.locator(".walk select").input_value() == "three"
 
@@ -141,9 +129,9 @@ def test_a_reader_walks_on_from_a_changed_setting(visit):
 # --- words and keys ---------------------------------------------------------------------------
 
 
-def test_outcome_is_said_in_words(visit):
+def test_outcome_is_said_in_words(still):
     """Polite, once the reader pauses, and the same words as on the screen."""
-    tab = still(visit, "#scene=three", stopped=True)
+    tab = still("#scene=three", stopped=True)
     said = tab.locator(".said [aria-live=polite]")
     slider = tab.get_by_label("ratio", exact=True)
     slider.focus()
@@ -159,7 +147,7 @@ def test_outcome_is_said_in_words(visit):
         slider.press("ArrowLeft")
         tab.clock.run_for(600)
     assert tab.evaluate("heard") == []
-    shown = later(tab, 150)
+    shown = tab.later(150)
     words = said.text_content()
     assert words == tab.locator(".words").text_content()
     assert tab.evaluate("heard") == [words]
@@ -169,50 +157,49 @@ def test_outcome_is_said_in_words(visit):
     assert "ball 1 moves left" in words.partition("After it")[2]
 
 
-def test_everything_by_keyboard(visit):
-    tab = still(visit, "#scene=one")
+def test_everything_by_keyboard(still):
+    tab = still("#scene=one")
     tab.evaluate("document.querySelector('.walk button').focus()")
-    reached = []
-    for _ in range(40):
-        name = tab.evaluate(
-            """(() => { const node = document.activeElement;
-            const label = node.getAttribute('aria-label') || node.labels?.[0]?.textContent;
-            return node.closest('.cradle-explorer') && (label || node.textContent); })()"""
-        )
-        if not name:
-            break
-        reached.append(name)
-        tab.keyboard.press("Tab")
     expected = "next scene, pull of ball 1, pull of ball 5, Let go, Next hit, 5, all, any, mass, "
     expected += "restitution, ratio, Inside the hit, Copy Python"
-    assert set(expected.split(", ")) <= set(reached)
+    for name in expected.split(", "):
+        tab_to(tab, name)
     # A ball moves by keys, shows that it has them, and says what it does.
     ball = tab.locator(".ball[data-ball='0']")
     ball.focus()
     for key, speed in (("ArrowLeft", 1.1), ("Shift+ArrowRight", 1.05)):
         tab.keyboard.press(key)
-        assert drawn(tab)["speeds"][0] == speed
+        assert tab.drawn()["speeds"][0] == speed
     assert tab.evaluate(REACH) == "3px"
     assert ball.get_attribute("aria-valuetext") == "comes in at 1.05 m/s"
     # Walk, let go, step.
     tab.locator(".walk button").first.focus()
     tab.keyboard.press("ArrowRight")
-    drawn(tab)
+    tab.drawn()
     assert tab.locator(".walk select").input_value() == "two"
     for _ in range(2):
         tab.keyboard.press(".")
-        drawn(tab)
+        tab.drawn()
     assert tab.locator(".outcome h2").first.inner_text() == "After hit 2 (m/s)"
 
 
-def test_full_screen_for_a_lecture(visit):
+def test_buttons_that_stay_pressed_say_so(still):
+    tab = still()
+    for name in ("Slow motion", "Guess first", "Sound"):
+        for pressed in ("true", "false"):
+            tab.push(name)
+            tab.drawn()
+            assert tab.get_by_role("button", name=name).get_attribute("aria-pressed") == pressed
+
+
+def test_full_screen_for_a_lecture(still):
     """Everything in one window, in letters that are seen from afar, and page keys walk on."""
-    tab = still(visit, width=1366, height=768)
-    press(tab, "Full screen")
+    tab = still(width=1366, height=768)
+    tab.push("Full screen")
     tab.wait_for_function("document.fullscreenElement")
     for count in range(1, 20):
         tab.keyboard.press("PageDown")
-        drawn(tab)
+        tab.drawn()
         assert tab.inner_text(".place") == f"{count + 1} of 20"
         scrolls = tab.evaluate("[document.fullscreenElement.scrollHeight, innerHeight]")
         assert scrolls[0] <= scrolls[1] + 1, tab.locator(".walk select").input_value()
@@ -235,52 +222,54 @@ STATE = (
     f"""(({{ view, clock }}) => [view.scene, clock.playing, clock.time > 0])({EXPLORER}.state)"""
 )
 FULL = "document.fullscreenElement !== null"
+# The name of what has the focus.
+FOCUSED = """(() => {
+  const node = document.activeElement;
+  return node.getAttribute("aria-label") || node.labels?.[0]?.textContent || node.textContent;
+})()"""
 REACH = "getComputedStyle(document.activeElement.querySelector('.reach')).strokeWidth"
 # What keys do in the second scene, from which one can walk both ways.
 WALKS = {"ArrowRight": "small", "ArrowLeft": "one", "PageDown": "small", "PageUp": "one"}
 
 
-def full_screen(visit):
+def full_screen(still):
     """Go to full screen with the mouse; time stands still."""
-    tab = still(visit, width=1366, height=768, stopped=True)
-    later(tab, 50)
-    press(tab, "Full screen")
+    tab = still(width=1366, height=768, stopped=True)
+    tab.later(50)
+    tab.push("Full screen")
     tab.wait_for_function(FULL)
     return tab
 
 
 def take(tab, scene: str):
-    tab.evaluate(f"{EXPLORER}.state.take('{scene}'), {EXPLORER}.changed()")
-    return later(tab, 50)
+    tab.act(f"take('{scene}')")
+    return tab.later(50)
 
 
 def touch(tab, selector: str, way: int = 0):
     """Press the mouse on an element, move it to the side, and let it go."""
-    x, y = grab(tab, selector)
+    x, y = tab.grab(selector)
     tab.mouse.move(x + way, y, steps=4)
     tab.mouse.up()
-    return later(tab, 50)
+    return tab.later(50)
 
 
 def tab_to(tab, name: str):
     """Press Tab until the element of this name has the focus."""
-    focused = (
-        "document.activeElement.getAttribute('aria-label') ?? document.activeElement.innerText"
-    )
     for _ in range(60):
         tab.keyboard.press("Tab")
-        if tab.evaluate(focused) == name:
+        if tab.evaluate(FOCUSED) == name:
             return
     pytest.fail(f"Tab does not reach {name}")
 
 
-def test_space_after_a_click_on_full_screen(visit):
+def test_space_after_a_click_on_full_screen(still):
     """It lets the balls go: the button does not keep the keys, unless one comes to it with Tab."""
-    tab = full_screen(visit)
+    tab = full_screen(still)
     assert tab.evaluate("document.activeElement.matches('.cradle-explorer')")  # for Enter, too
     tab.keyboard.press("Space")
     assert tab.evaluate(STATE) == ["example", True, False]
-    later(tab, 50)
+    tab.later(50)
     assert tab.evaluate(FULL)
     assert tab.inner_text(".full") == "Leave full screen"
     for key in ("Space", "Enter"):
@@ -290,7 +279,7 @@ def test_space_after_a_click_on_full_screen(visit):
             tab.keyboard.press(key)
             assert tab.evaluate(STATE) == before
             tab.wait_for_function(f"({FULL}) === {str(full).lower()}")
-            later(tab, 50)
+            tab.later(50)
 
 
 @pytest.mark.parametrize(
@@ -304,9 +293,9 @@ def test_space_after_a_click_on_full_screen(visit):
         (".pictures label:has-text('All ratios')", 0),
     ],
 )
-def test_keys_of_a_lecture_after_the_mouse(visit, selector: str, way: int):
+def test_keys_of_a_lecture_after_the_mouse(still, selector: str, way: int):
     """In full screen what the mouse has pressed leaves the keys to the lecture."""
-    tab = full_screen(visit)
+    tab = full_screen(still)
     done = {key: [scene, False, False] for key, scene in WALKS.items()}
     for key, state in (done | {".": [False, True], "Space": [True, False]}).items():
         take(tab, "two")
@@ -314,21 +303,21 @@ def test_keys_of_a_lecture_after_the_mouse(visit, selector: str, way: int):
         tab.keyboard.press(key)
         assert tab.evaluate(STATE)[-len(state) :] == state, key
         if key not in WALKS:
-            assert tab.evaluate(SETTING) == {name: before[name] for name in tab.evaluate(SETTING)}
+            assert tab.state("setting") == {name: before[name] for name in tab.state("setting")}
             assert tab.evaluate("document.activeElement === document.body")  # none looks chosen
     assert tab.evaluate(FULL)
 
 
-def test_keys_of_a_lecture_after_tab(visit):
+def test_keys_of_a_lecture_after_tab(still):
     """In full screen a ball that Tab has reached keeps the arrows, and a button the space bar."""
-    tab = full_screen(visit)
+    tab = full_screen(still)
     take(tab, "two")
     touch(tab, ".ball[data-ball='4'] .disc", 30)
     take(tab, "two")
     tab_to(tab, "pull of ball 1")
     for key, speed in (("ArrowLeft", 1.1), ("ArrowRight", 1)):
         tab.keyboard.press(key)
-        assert later(tab, 50)["speeds"] == [speed, 1, 0, 0, 0]
+        assert tab.later(50)["speeds"] == [speed, 1, 0, 0, 0]
     assert tab.evaluate(REACH) == "3px"
     pressed(
         tab, (".", "two", False, True), ("PageUp", "one", False, False),
@@ -346,40 +335,40 @@ def pressed(tab, *steps):
         assert tab.evaluate(STATE) == state, key
 
 
-def test_keys_of_a_lecture_on_the_page(visit):
+def test_keys_of_a_lecture_on_the_page(still):
     """They work after a click into the cradle; page keys scroll, and a ball keeps the arrows."""
-    tab = still(visit, stopped=True)
+    tab = still(stopped=True)
     take(tab, "two")
     pressed(tab, ("ArrowRight", "two", False, False))
     tab.click(".words")
     pressed(tab, ("ArrowRight", "small", False, False), ("ArrowLeft", "two", False, False))
-    later(tab, 50)
+    tab.later(50)
     touch(tab, ".ball[data-ball='4'] .disc")
     pressed(
         tab, (".", "two", False, True), ("Space", "two", True, True), ("Space", "two", False, True)
     )
     tab.keyboard.press("ArrowRight")
-    assert later(tab, 50)["speeds"] == [0, 0, 0, 0, -0.1]  # of a swing the others hang at rest
+    assert tab.later(50)["speeds"] == [0, 0, 0, 0, -0.1]  # of a swing the others hang at rest
     take(tab, "two")
     tab.evaluate("scrollTo({ top: 0, behavior: 'instant' })")
     pressed(tab, ("PageDown", "two", False, False))
     tab.wait_for_function("scrollY > 0")
 
 
-def test_a_box_keeps_the_keys_by_which_one_types(visit):
-    tab = full_screen(visit)
+def test_a_box_keeps_the_keys_by_which_one_types(still):
+    tab = full_screen(still)
     take(tab, "small")
     box = tab.get_by_label("ratio, as a number", exact=True)
     box.click()
     for key in ("Control+a", "0", ".", "3", "ArrowLeft", "2", "Enter"):
         tab.keyboard.press(key)
-    assert later(tab, 50)["forward"] == [0.23] * 3
+    assert tab.later(50)["forward"] == [0.23] * 3
     assert tab.evaluate(STATE) == ["", False, False]
 
 
-def test_keys_of_a_lecture_after_the_list(visit):
+def test_keys_of_a_lecture_after_the_list(still):
     """What a pointer has chosen from the list of scenes is let go by the space bar."""
-    tab = full_screen(visit)
+    tab = full_screen(still)
     chosen = tab.locator(".walk select")
     chosen.dispatch_event("pointerdown")  # a true one opens a window that takes the keys of a test
     chosen.focus()
@@ -392,11 +381,11 @@ def test_keys_of_a_lecture_after_the_list(visit):
 
 
 @pytest.mark.parametrize("width", [390, 1400])
-def test_fits_and_can_be_read(visit, width: int):
-    tab = still(visit, width=width)
+def test_fits_and_can_be_read(still, width: int):
+    tab = still(width=width)
     for scene in ("one", "half", "map", "ABCCAB"):
-        go_to(tab, f"scene={scene}")
-        drawn(tab)
+        tab.go_to(f"scene={scene}")
+        tab.drawn()
         for mode in ("light", "dark"):
             show(tab, width, mode)
             assert tab.evaluate(MISFITS) == []
@@ -425,38 +414,37 @@ def test_fits_and_can_be_read(visit, width: int):
 
 
 def test_motion_is_asked_for(visit):
-    time = f"{EXPLORER}.state.clock.time"
     lively = visit(stopped=True)
     for scene in ("", "two", "small"):  # each stands still until it is let go
         if scene:
-            press(lively, "Let go")
+            lively.push("Let go")
             lively.clock.run_for(1000)
-            press(lively, "next scene") if scene == "small" else go_to(lively, "scene=two")
+            lively.push("next scene") if scene == "small" else lively.go_to("scene=two")
         lively.clock.run_for(2000)
-        assert lively.evaluate(time) == 0
-    press(lively, "Let go")
+        assert lively.state("clock.time") == 0
+    lively.push("Let go")
     lively.clock.run_for(1500)
-    assert lively.evaluate(time) == pytest.approx(1.5, abs=0.05)
+    assert lively.state("clock.time") == pytest.approx(1.5, abs=0.05)
     assert lively.get_by_role("button", name="Pause").is_visible()
     # Out of sight it stands still, and goes on where it was.
     lively.evaluate("document.querySelector('footer').scrollIntoView()")
     lively.wait_for_function(f"!{EXPLORER}.visible")
     lively.clock.run_for(50)
-    before = lively.evaluate(time)
+    before = lively.state("clock.time")
     lively.clock.run_for(5000)
-    assert lively.evaluate(time) == before
+    assert lively.state("clock.time") == before
     lively.evaluate("scrollTo(0, 0)")
     lively.wait_for_function(f"{EXPLORER}.visible")
     lively.clock.run_for(500)
-    assert lively.evaluate(time) == pytest.approx(before + 0.5, abs=0.05)
+    assert lively.state("clock.time") == pytest.approx(before + 0.5, abs=0.05)
 
 
 def test_motion_by_the_frames_of_the_browser(visit):
     """With the true clock, at whatever pace the machine has."""
     tab = visit("#scene=one")
-    press(tab, "Let go")
+    tab.push("Let go")
     tab.wait_for_function(f"{EXPLORER}.state.clock.time > 0.8")
-    places = tab.evaluate(f"{EXPLORER}.state.swing.positions({EXPLORER}.state.clock.time)")
+    places = tab.state(f"swing.positions({EXPLORER}.state.clock.time)")
     assert places[0] == 0 != places[4]  # one comes, one goes
 
 
@@ -487,18 +475,18 @@ SLOW_SOLVER = "(() => { let now = 0; performance.now = () => (now += 0.5); })()"
 
 def counted(tab, milliseconds: int) -> dict[str, int]:
     """Let time pass, and return what was done meanwhile, and how many hits there were."""
-    hits = f"{EXPLORER}.state.swing.latest({EXPLORER}.state.clock.time) + 1"
-    before = tab.evaluate(hits)
+    hits = f"swing.latest({EXPLORER}.state.clock.time) + 1"
+    before = tab.state(hits)
     tab.evaluate("Object.assign(work, { solved: 0, drawn: 0, changed: 0 })")
     tab.clock.run_for(milliseconds)
-    return {**tab.evaluate("work"), "hits": tab.evaluate(hits) - before}
+    return {**tab.evaluate("work"), "hits": tab.state(hits) - before}
 
 
 def test_work_of_a_frame(visit):
     """Little enough for sixty frames a second: counted, as times depend on the machine."""
     tab = visit("#scene=ABCCAB", stopped=True)
     balls, frames = 6, 125
-    press(tab, "Let go")
+    tab.push("Let go")
     tab.clock.run_for(1100)  # beyond the first hit
     tab.evaluate(COUNT_WORK)
     swing = counted(tab, 16 * frames)
@@ -510,7 +498,7 @@ def test_work_of_a_frame(visit):
     between = counted(tab, 16 * 20)
     assert between["hits"] == between["solved"] == between["drawn"] == 0
     assert between["changed"] <= 3 * balls * 20
-    press(tab, "Slow motion")
+    tab.push("Slow motion")
     slow = counted(tab, 16 * 500)
     # A hit is solved again for its history. Inside it bars and shares of energy are made anew.
     assert slow["hits"] > 0
@@ -519,22 +507,34 @@ def test_work_of_a_frame(visit):
     assert slow["changed"] < 20 * balls * 500
 
 
-def test_what_does_not_move_is_not_drawn(visit):
+def test_contacts_are_marked_while_they_are_pressed(still):
+    """In slow motion; at the ratio 0 one after the other, and none between two hits."""
+    tab, seen = still("#scene=one", stopped=True), []
+    tab.push("Slow motion")
+    tab.push("Let go")
+    stars = f"{EXPLORER}.stage.stars.map((star) => star.classList.contains('shown'))"
+    for _ in range(14):
+        tab.later(500)
+        seen.append(np.flatnonzero(tab.evaluate(stars)).tolist())
+    assert [marked for marked, _ in itertools.groupby(seen)] == [[], [0], [1], [2], [3], []]
+
+
+def test_what_does_not_move_is_not_drawn(still):
     """Balls at rest, though let go; those beside one that swings; the cradle beside a sweep."""
-    tab = still(visit, "#speeds=0,0,0,0,0", stopped=True)
+    tab = still("#speeds=0,0,0,0,0", stopped=True)
     tab.clock.run_for(50)
     tab.evaluate(COUNT_WORK)
-    press(tab, "Let go")
+    tab.push("Let go")
     tab.clock.run_for(1000)  # a voice is told once
     assert counted(tab, 2000) == {"solved": 0, "drawn": 0, "changed": 0, "hits": 0}
     assert not tab.evaluate(f"{EXPLORER}.frame")
-    go_to(tab, "scene=one")
+    tab.go_to("scene=one")
     tab.clock.run_for(600)
-    press(tab, "Let go")
+    tab.push("Let go")
     tab.clock.run_for(75)
     frames = 20
     assert 0 < counted(tab, 16 * frames)["changed"] <= 3 * (frames + 1)  # of one ball in five
-    press(tab, "Pause")
+    tab.push("Pause")
     tab.clock.run_for(50)
     tab.click("label:has-text('All ratios')")
     tab.clock.run_for(50)
@@ -552,32 +552,32 @@ def test_what_does_not_move_is_not_drawn(visit):
 def test_bars_follow_the_swing(visit):
     """They show each hit, and so do title and words; a voice tells the first one alone."""
     tab = visit("#scene=losses", stopped=True)
-    press(tab, "Let go")
+    tab.push("Let go")
     tab.clock.run_for(1000)
     title, said = tab.locator(".outcome h2").first, tab.locator(".said [aria-live=polite]")
     heard = said.text_content()
     assert "Before the first hit" in heard
     for number in range(1, 4):
         tab.clock.run_for(1004)  # half a period
-        hit = tab.evaluate(f"{EXPLORER}.state.swing.hit({number})")
+        hit = tab.state(f"swing.hit({number})")
         assert title.inner_text() == f"After hit {number + 1} (m/s)"
-        assert bars(tab, ".outcome") == pytest.approx(hit["after"], abs=0.0051)
+        assert tab.bars(".outcome") == pytest.approx(hit["after"], abs=0.0051)
         assert "After it, ball" in tab.inner_text(".words")
         assert tab.inner_text(".words").startswith(f"Before hit {number + 1}, ")
         assert said.text_content() == heard
-    press(tab, "Pause")
+    tab.push("Pause")
     tab.clock.run_for(1000)
     assert said.text_content() == tab.inner_text(".words")
 
 
-def test_sweeps_and_maps_share_the_frame(visit):
+def test_sweeps_and_maps_share_the_frame(still):
     """They take seven milliseconds of each frame, however slow the solver is."""
-    tab = still(visit, stopped=True)
+    tab = still(stopped=True)
     tab.clock.run_for(50)
     tab.evaluate(COUNT_WORK)
     tab.evaluate(SLOW_SOLVER)
     for scene in ("half", "map"):
-        go_to(tab, f"scene={scene}")
+        tab.go_to(f"scene={scene}")
         tab.clock.run_for(50)
         for _ in range(5):
             assert 0 < counted(tab, 16)["solved"] < 15
@@ -593,13 +593,13 @@ def test_sweeps_and_maps_share_the_frame(visit):
     assert 0 < tab.evaluate(painted) < before / 3
 
 
-def test_what_takes_too_long_is_said(visit):
+def test_what_takes_too_long_is_said(still):
     """Five light balls between two heavy ones take more events than the page computes."""
     masses = "100,0.01,0.01,0.01,0.01,0.01,100"
     fragment = f"#speeds=2,0,0,0,0,0,0&masses={masses}&restitution=0.99&forward=0.02"
-    tab = still(visit, fragment, stopped=True)
+    tab = still(fragment, stopped=True)
     tab.clock.run_for(50)
-    status = tab.evaluate(f"{EXPLORER}.state.swing.hit(0).status")
+    status = tab.state("swing.hit(0).status")
     assert status == "unfinished"
     assert "more than 4000 events" in tab.inner_text(".words")
     limits = tab.inner_text("p:has-text('The limits.')")
@@ -608,20 +608,20 @@ def test_what_takes_too_long_is_said(visit):
     assert f"Masses go from {lightest} to {heaviest} kg" in limits
     assert tab.locator(".outcome rect").count() == 0  # no stale bars
     assert tab.locator(".pictures polyline").count() == 0
-    press(tab, "Let go")
+    tab.push("Let go")
     tab.clock.run_for(300)
     assert tab.get_by_role("button", name="Pause").count() == 1
     tab.clock.run_for(1000)  # the hit comes after half a second
     assert tab.get_by_role("button", name="Pause").count() == 0
-    assert tab.evaluate(f"{EXPLORER}.state.clock.time") == pytest.approx(0.5, abs=0.01)
+    assert tab.state("clock.time") == pytest.approx(0.5, abs=0.01)
 
 
 # --- pictures of many hits ----------------------------------------------------------------------
 
 
-def test_map_is_the_solvers(visit):
+def test_map_is_the_solvers(still):
     """Every twentieth cell of the map against Python, and its own point."""
-    tab = still(visit, "#scene=map")
+    tab = still("#scene=map")
     tab.locator(".map").scroll_into_view_if_needed()
     found = tab.evaluate(
         f"""() => {{
@@ -644,22 +644,22 @@ def test_map_is_the_solvers(visit):
     assert len(np.unique(expected)) == 3
 
     # Drag the point to where the first ball bounces back, by pointer and by key.
-    x, y = grab(tab, ".point .present")
+    x, y = tab.grab(".point .present")
     tab.mouse.move(x + 20, y - 60, steps=4)
     tab.mouse.up()
-    moved = drawn(tab)
+    moved = tab.drawn()
     assert moved["masses"][0] < 1
     assert moved["masses"][1] == 1
     assert same_outcome(moved)
     tab.locator(".point").focus()
     tab.keyboard.press("ArrowRight")
-    assert drawn(tab)["masses"][2] < moved["masses"][2]
+    assert tab.drawn()["masses"][2] < moved["masses"][2]
     assert tab.evaluate("document.activeElement.classList.contains('point')")
 
 
-def test_sweep_is_the_solvers(visit):
-    tab = still(visit, "#scene=half")
-    setting = drawn(tab)
+def test_sweep_is_the_solvers(still):
+    tab = still("#scene=half")
+    setting = tab.drawn()
     values = tab.evaluate(
         f"""() => {{
           const sweep = new cradleExplorer.Sweep({SETTING}, [0, 1, 2]);
@@ -677,9 +677,9 @@ def test_sweep_is_the_solvers(visit):
 # --- what the texts promise -------------------------------------------------------------------
 
 
-def test_scenes_do_what_their_texts_say(visit):
+def test_scenes_do_what_their_texts_say(still):
     """In Python, from the settings that the page has."""
-    tab = still(visit)
+    tab = still()
     scenes = {scene["key"]: scene for scene in tab.evaluate("cradleExplorer.data.scenes")}
     traces = {key: collide(*chain_of(scene["setting"])) for key, scene in scenes.items()}
     after = {key: trace.velocities for key, trace in traces.items()}
@@ -733,12 +733,12 @@ def test_scenes_do_what_their_texts_say(visit):
     np.testing.assert_allclose(np.abs(together["after"]), 0.2)
 
 
-def test_links_of_scenes(visit, html):
+def test_links_of_scenes(still, html):
     """They lead to a heading that is there."""
-    tab, linked = still(visit), set()
+    tab, linked = still(), set()
     for scene in tab.evaluate("cradleExplorer.data.scenes"):
-        go_to(tab, f"scene={scene['key']}")
-        drawn(tab)
+        tab.go_to(f"scene={scene['key']}")
+        tab.drawn()
         text = tab.locator(".scene-text")
         assert text.inner_text().startswith(scene["text"][:60])
         for link in text.locator("a").all():
@@ -748,10 +748,10 @@ def test_links_of_scenes(visit, html):
     assert linked == {"one", "small"}
 
 
-def test_what_rests_is_said_to_rest(visit):
+def test_what_rests_is_said_to_rest(still):
     """In exact numbers balls 2 and 3 stand still, as the landing page says."""
-    tab = still(visit, "#scene=small")
-    assert drawn(tab)["after"][1:3] == [0, 0]
+    tab = still("#scene=small")
+    assert tab.drawn()["after"][1:3] == [0, 0]
     words = tab.inner_text(".words")
     assert "balls 2 and 3 rest and" in words
     assert "almost" not in words
@@ -768,40 +768,39 @@ def test_what_rests_is_said_to_rest(visit):
         ("n_balls", {"ratio"}),
     ],
 )
-def test_small_ones_in_chapters(visit, page, chapter: str, parts: set[str]):
+def test_small_ones_in_chapters(visit, still, chapter: str, parts: set[str]):
     """They wait to be let go, show what the chapter is about, and leave the address alone."""
-    address = page.replace("explorer.html", f"{chapter}.html")
-    tab = visit(address=address, width=390, stopped=True)
+    tab = visit(chapter=chapter, width=390, stopped=True)
     tab.clock.run_for(1000)
     assert tab.evaluate("document.querySelectorAll('.cradle-explorer.live').length") == 1
     host = tab.locator(".cradle-explorer")
     labels = host.locator(".slider:visible label").all_text_contents()
     assert set(labels) == parts
-    assert tab.evaluate(f"{EXPLORER}.state.clock.playing") is False
-    before = later(tab, 50)
+    assert tab.state("clock.playing") is False
+    before = tab.later(50)
     tab.get_by_label("ratio", exact=True).press("ArrowRight")
-    after = later(tab, 1000)
+    after = tab.later(1000)
     assert after["forward"] != before["forward"]
     assert same_outcome(after)
     assert tab.evaluate("location.hash") == ""
     link = host.locator(".more a").get_attribute("href")
-    assert drawn(still(visit, "#" + link.partition("#")[2])) == after
+    assert still("#" + link.partition("#")[2]).drawn() == after
 
 
-def test_the_first_page_does_what_it_says(visit, page):
+def test_the_first_page_does_what_it_says(visit):
     """Let go, ratio 0, drag ball 2: ball 1 comes along, and both swing when they are released."""
-    tab = visit(address=page.replace("explorer.html", "intro.html"), stopped=True)
+    tab = visit(chapter="intro", stopped=True)
     tab.clock.run_for(1000)
-    press(tab, "Let go")
-    assert later(tab, 1000)["speeds"] == [1, 0, 0, 0, 0]
+    tab.push("Let go")
+    assert tab.later(1000)["speeds"] == [1, 0, 0, 0, 0]
     tab.get_by_label("ratio", exact=True).press("Home")
-    x, y = grab(tab, ".ball[data-ball='1'] .disc")
+    x, y = tab.grab(".ball[data-ball='1'] .disc")
     tab.mouse.move(x - 60, y - 10, steps=4)
     tab.mouse.up()
-    shown = later(tab, 50)
+    shown = tab.later(50)
     assert shown["speeds"][0] == shown["speeds"][1] > 0.5
     assert shown["speeds"][2:] == [0, 0, 0]
-    assert tab.evaluate(f"{EXPLORER}.state.clock.playing")
+    assert tab.state("clock.playing")
     np.testing.assert_allclose(shown["after"], shown["speeds"][::-1], atol=1e-15)
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
-from explorer import EXPLORER, SETTING, choose, drawn, press, still
 from script import Script
 
 from cradle import Chain, SpringChain, collide, spring_velocities
@@ -71,19 +70,17 @@ def test_the_history_is_that_of_the_trace(spheres, e, gap):
 
 
 @pytest.mark.parametrize("stiffness", [0.02, 1.0, 7.0])
-def test_linear_springs(spheres, visit, page, stiffness):
+def test_linear_springs(spheres, still, stiffness):
     """The engine's, and those of the live cradle of chapter 2."""
     law = {"stiffness": [1.0, stiffness], "exponent": 1.0}
     given = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "viscosity": [0, 0]} | law
     expected = collide(Chain([1] * 3, [1, 0, 0]), SpringChain(**law)).velocities
     answer = spheres("cradle.forces", given)["velocities"]
     np.testing.assert_allclose(answer, expected, rtol=0, atol=1e-5)
-    tab = still(visit, address=page.replace("explorer.html", "compliance.html"))
-    press(tab, "Next hit")
-    box = tab.get_by_label("stiffness ratio, as a number")
-    box.fill(str(stiffness))
-    box.press("Enter")
-    assert drawn(tab)["after"] == answer
+    tab = still(chapter="compliance")
+    tab.push("Next hit")
+    tab.typed("stiffness ratio", str(stiffness))
+    assert tab.drawn()["after"] == answer
 
 
 def test_what_has_no_answer_says_so(spheres):
@@ -94,28 +91,25 @@ def test_what_has_no_answer_says_so(spheres):
     assert apart["velocities"] == [0, 1]
 
 
-def test_a_reader_chooses_spheres(visit):
+def test_a_reader_chooses_spheres(still):
     """By hand and by an address; the ratio goes, the gaps come; the map and the words follow."""
-    tab = still(visit, "#speeds=1,0,0&restitution=0.9")
+    tab = still("#speeds=1,0,0&restitution=0.9")
     assert tab.get_by_label("gaps", exact=True).is_hidden()
-    choose(tab, "spheres")
-    touching = drawn(tab)["after"]
+    touching = tab.choose("spheres")["after"]
     assert tab.get_by_label("ratio", exact=True).is_hidden()
-    tab.get_by_label("gaps, as a number").fill("3,5")
-    tab.get_by_label("gaps, as a number").press("Enter")
-    apart = drawn(tab)["after"]
+    tab.typed("gaps", "3,5")
+    apart = tab.drawn()["after"]
     assert apart[2] != touching[2]
-    setting = tab.evaluate(SETTING)
+    setting = tab.state("setting")
     assert (setting["law"], setting["gap"]) == ("spheres", 3.5)
-    choose(tab, "All ratios")
-    drawn(tab)
+    tab.choose("All ratios")
     assert "There is no ratio here" in tab.inner_text(".pictures")
-    again = still(visit, f"#{tab.evaluate(f'{EXPLORER}.state.fragment()')}")
-    assert drawn(again)["after"] == apart
-    refused = still(visit, "#speeds=1,0&law=glue")
-    drawn(refused)
+    again = still("#" + tab.state("fragment()"))
+    assert again.drawn()["after"] == apart
+    refused = still("#speeds=1,0&law=glue")
+    refused.drawn()
     assert "law = glue; must be rule or spheres or springs" in refused.inner_text(".words")
-    lossy = still(visit, "#speeds=1,0,0&law=spheres&restitution=0.2")
-    drawn(lossy)
+    lossy = still("#speeds=1,0,0&law=spheres&restitution=0.2")
+    lossy.drawn()
     assert "choose a restitution of 0.65" in lossy.inner_text(".words")
-    assert lossy.evaluate(SETTING)["restitution"] == [0.2, 0.2]
+    assert lossy.state("setting")["restitution"] == [0.2, 0.2]

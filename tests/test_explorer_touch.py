@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from explorer import EXPLORER, SETTING, drawn, go_to, grab, middle, press, same_outcome, still
-
-TIME = f"{EXPLORER}.state.clock.time"
+from explorer import EXPLORER, SETTING, same_outcome
 
 
 class Hand:
@@ -12,7 +10,7 @@ class Hand:
 
     def __init__(self, tab):
         self.tab, self.places = tab, {}
-        self.session = tab.context.new_cdp_session(tab)
+        self.session = tab.context.new_cdp_session(tab.page)
 
     def _send(self, kind):
         points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in self.places.items()]
@@ -29,7 +27,7 @@ class Hand:
             share = step / steps
             self.places[finger] = start[0] + share * x, start[1] + share * y
             self._send("touchMove")
-            drawn(self.tab)
+            self.tab.drawn()
 
     def up(self, finger: int):
         del self.places[finger]
@@ -37,8 +35,8 @@ class Hand:
 
 
 @pytest.fixture(name="phone")
-def phones(visit):
-    return lambda fragment="": still(visit, fragment, width=390, has_touch=True, is_mobile=True)
+def phones(still):
+    return lambda fragment="": still(fragment, width=390, has_touch=True, is_mobile=True)
 
 
 def ball(number: int) -> str:
@@ -48,38 +46,38 @@ def ball(number: int) -> str:
 def test_two_fingers_pull_two_balls(phone):
     """Each follows its own finger, and one that is let go stays where it was pulled to."""
     tab = phone("#speeds=0,0,0,0,0&forward=0.1")
-    drawn(tab)
-    hand, (left, y), (right, _) = Hand(tab), middle(tab, ball(0)), middle(tab, ball(4))
+    tab.drawn()
+    hand, (left, y), (right, _) = Hand(tab), tab.middle(ball(0)), tab.middle(ball(4))
     hand.down(1, (left, y))
     hand.move(1, -60, 0)
-    first = drawn(tab)["speeds"]
+    first = tab.drawn()["speeds"]
     assert first[0] > 0.4
     assert first[1:] == [0] * 4
     hand.down(2, (right, y))
     hand.move(2, 60, 0)
-    both = drawn(tab)["speeds"]
+    both = tab.drawn()["speeds"]
     assert both[0] == first[0]
     assert both[4] < -0.4
     assert both[1:4] == [0] * 3
     hand.move(1, 10, 0)  # while the other one is held
-    assert 0 < drawn(tab)["speeds"][0] < first[0]
-    assert drawn(tab)["speeds"][1:] == both[1:]
+    assert 0 < tab.drawn()["speeds"][0] < first[0]
+    assert tab.drawn()["speeds"][1:] == both[1:]
     hand.up(2)
     hand.move(1, 10, 0)
-    shown = drawn(tab)
+    shown = tab.drawn()
     assert 0 < shown["speeds"][0] < first[0]
     assert shown["speeds"][1:] == both[1:]
     hand.up(1)
-    assert same_outcome(drawn(tab))
-    assert drawn(tab)["speeds"] == shown["speeds"]
+    assert same_outcome(tab.drawn())
+    assert tab.drawn()["speeds"] == shown["speeds"]
 
 
-def test_a_ball_follows_the_finger_as_the_mouse(visit, phone):
+def test_a_ball_follows_the_finger_as_the_mouse(still, phone):
     """The page does not scroll under it."""
-    mouse, tab = still(visit, "#scene=one", width=390), phone("#scene=one")
-    x, y = grab(mouse, ball(4))
+    mouse, tab = still("#scene=one", width=390), phone("#scene=one")
+    x, y = mouse.grab(ball(4))
     mouse.mouse.move(x + 80, y, steps=20)
-    by_mouse = drawn(mouse)["speeds"][4]
+    by_mouse = mouse.drawn()["speeds"][4]
     assert by_mouse < -0.5
     mouse.mouse.up()
     tab.evaluate(
@@ -88,9 +86,9 @@ def test_a_ball_follows_the_finger_as_the_mouse(visit, phone):
     )
     show_middle(tab, ball(4))
     scrolled, hand = tab.evaluate("scrollY"), Hand(tab)
-    hand.down(1, middle(tab, ball(4)))
+    hand.down(1, tab.middle(ball(4)))
     hand.move(1, 80, 0, steps=20)
-    shown = drawn(tab)
+    shown = tab.drawn()
     hand.up(1)
     assert tab.evaluate("globalThis.lost") is None
     assert shown["speeds"][4] == pytest.approx(by_mouse, abs=0.15)  # a finger is still at first
@@ -108,19 +106,18 @@ TARGETS = """(kinds) => [...document.querySelectorAll(kinds)]
 
 @pytest.mark.parametrize("size", [(375, 667), (375, 812), (812, 375)])
 @pytest.mark.parametrize("name", ["explorer", "intro"])
-def test_a_phone_shows_balls_and_bars_at_once(visit, page, name, size):
+def test_a_phone_shows_balls_and_bars_at_once(still, name, size):
     """And the button that lets go, below the bar of the page; what is pressed is large enough."""
-    address = page.replace("explorer.html", f"{name}.html")
     options = {"width": size[0], "height": size[1], "has_touch": True, "is_mobile": True}
-    tab = still(visit, "#speeds=1,0,0,0,0,0,0" * (name == "explorer"), address=address, **options)
-    drawn(tab)
+    tab = still("#speeds=1,0,0,0,0,0,0" * (name == "explorer"), chapter=name, **options)
+    tab.drawn()
     tab.evaluate("document.querySelector('.stage').scrollIntoView({ behavior: 'instant' })")
     covered = tab.locator(".bd-header-article").first.bounding_box()
     tab.evaluate(f"scrollBy({{ top: -{covered['height']}, behavior: 'instant' }})")
     for button in ("Next hit", "Guess first", "Let go"):
         if tab.get_by_role("button", name=button).count():
-            press(tab, button)
-        drawn(tab)
+            tab.push(button)
+        tab.drawn()
         for part in (".stage", ".outcome .drawn", ".run .main"):
             box = tab.locator(part).first.bounding_box()
             assert covered["height"] - 1 <= box["y"] <= size[1] - box["height"], (button, part)
@@ -142,24 +139,24 @@ def test_a_phone_shows_balls_and_bars_at_once(visit, page, name, size):
 def test_a_finger_takes_the_nearest_ball(phone):
     """Where places to touch overlap."""
     tab = phone("#speeds=0,0,0,0,0,0,0")
-    drawn(tab)
+    tab.drawn()
     show_middle(tab, ball(3))
-    hand, (x, y) = Hand(tab), middle(tab, ball(3))
+    hand, (x, y) = Hand(tab), tab.middle(ball(3))
     hand.down(1, (x + 6, y))
     hand.move(1, -60, 0)
-    assert np.sign(drawn(tab)["speeds"]).tolist() == [1, 1, 1, 1, 0, 0, 0]
+    assert np.sign(tab.drawn()["speeds"]).tolist() == [1, 1, 1, 1, 0, 0, 0]
 
 
 def test_a_second_finger_on_the_same_ball_is_none(phone):
     tab = phone("#speeds=0,0,0,0,0&forward=0.1")
-    drawn(tab)
-    hand, (x, y) = Hand(tab), middle(tab, ball(0))
+    tab.drawn()
+    hand, (x, y) = Hand(tab), tab.middle(ball(0))
     hand.down(1, (x - 3, y))
     hand.down(2, (x + 3, y))
     hand.move(2, -60, 0)
-    assert drawn(tab)["speeds"] == [0] * 5
+    assert tab.drawn()["speeds"] == [0] * 5
     hand.move(1, -60, 0)
-    assert drawn(tab)["speeds"][0] > 0.4
+    assert tab.drawn()["speeds"][0] > 0.4
 
 
 def show_middle(tab, place: str):
@@ -172,45 +169,45 @@ def show_middle(tab, place: str):
 def test_scrolling_past_a_picture_changes_nothing(phone, place):
     """Up or down, with the slant of a thumb: the page scrolls and the experiment stays."""
     tab = phone("#scene=map&picture=map" if "map" in place else "#scene=half")
-    go_to(tab, "speeds=1,0,0&picture=map" if "map" in place else "speeds=1,0,0,0,0&picture=sweep")
-    before = drawn(tab)
+    tab.go_to("speeds=1,0,0&picture=map" if "map" in place else "speeds=1,0,0,0,0&picture=sweep")
+    before = tab.drawn()
     show_middle(tab, place)
-    x, y = middle(tab, place)
+    x, y = tab.middle(place)
     scrolled = tab.evaluate("scrollY")
     hand = Hand(tab)
     hand.down(1, (x + 40 if "map" in place else x, y))
     hand.move(1, 12, -150, steps=8)
     hand.up(1)
     tab.wait_for_function("(before) => scrollY > before + 40", arg=scrolled)
-    assert drawn(tab) == before
-    assert tab.evaluate(TIME) == 0
+    assert tab.drawn() == before
+    assert tab.state("clock.time") == 0
 
 
 @pytest.mark.parametrize(("place", "row"), [(".drags-x svg", "forward"), (".map svg", "masses")])
 def test_a_tap_and_a_finger_to_the_side_do_their_work(phone, place, row):
     tab = phone("#speeds=1,0,0&picture=" + ("map" if "map" in place else "sweep"))
-    before = drawn(tab)
+    before = tab.drawn()
     show_middle(tab, place)
-    x, y = middle(tab, place)
+    x, y = tab.middle(place)
     hand = Hand(tab)
     hand.down(1, (x + 20, y - 20))
     hand.up(1)
-    tapped = drawn(tab)
+    tapped = tab.drawn()
     assert tapped[row] != before[row]
     hand.down(1, (x, y))
     hand.move(1, 60, 0)
     hand.up(1)
-    moved = drawn(tab)
+    moved = tab.drawn()
     assert moved[row] != tapped[row]
     assert same_outcome(moved)
 
 
-def test_another_setting_while_a_ball_is_held(visit):
+def test_another_setting_while_a_ball_is_held(still):
     """Typed, or followed as a link: balls that are gone are let go, the others stay in the hand."""
-    tab = still(visit, "#scene=one")
-    x, y = grab(tab, ball(4))
+    tab = still("#scene=one")
+    x, y = tab.grab(ball(4))
     tab.mouse.move(x + 40, y, steps=4)
-    held = drawn(tab)["speeds"]
+    held = tab.drawn()["speeds"]
     assert held[4] < 0
     # Other masses stay in force while it is pulled further.
     for label, number in (("mass", "3"), ("restitution", "0.5")):
@@ -218,16 +215,16 @@ def test_another_setting_while_a_ball_is_held(visit):
             "(box, value) => { box.value = value; box.dispatchEvent(new Event('change')); }", number
         )
     tab.mouse.move(x + 50, y)
-    shown = drawn(tab)
+    shown = tab.drawn()
     assert shown["speeds"][4] < held[4]
     assert shown["masses"] == [3] * 5
     assert shown["restitution"] == [0.5] * 4
     # Fewer balls, before and after the next frame.
-    for wait in (lambda: None, lambda: drawn(tab)):
-        tab.evaluate(f"{EXPLORER}.state.read('speeds=1,0'), {EXPLORER}.changed()")
+    for wait in (lambda: None, lambda: tab.drawn()):
+        tab.act("read('speeds=1,0')")
         wait()
         tab.mouse.move(x + 60, y)
-        assert drawn(tab)["speeds"] == [1, 0]
+        assert tab.drawn()["speeds"] == [1, 0]
     tab.mouse.up()
-    assert drawn(tab)["speeds"] == [1, 0]
+    assert tab.drawn()["speeds"] == [1, 0]
     assert "NaN" not in tab.evaluate(f"{EXPLORER}.host.outerHTML + JSON.stringify({SETTING})")

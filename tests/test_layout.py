@@ -8,7 +8,7 @@ from pathlib import Path
 
 import book_figures
 import pytest
-from explorer import EXPLORER, drawn, later, still
+from explorer import EXPLORER
 from pages import (
     ALL_SET,
     FRAMES,
@@ -181,38 +181,21 @@ def test_numbers_of_equations_on_a_phone(seen):
     assert not cut, "\n".join(map(str, cut))
 
 
-@pytest.mark.parametrize(
-    ("body", "kind"),
-    [
-        ("<p style='width: 500px'>wide</p>", "page"),
-        (
-            "<div style='overflow: hidden'><pre style='overflow: auto'>"
-            + 90 * "x"
-            + "</pre></div>",
-            "code",
-        ),
-        (
-            "<span class='figure-box' data-letters='12'><img class='map' width='100' "
-            "style='width: 100px; height: 9px; filter: invert(0.93)'></span>",
-            "turned map",
-        ),
-        (
-            "<p style='overflow: auto'><span style='display: block; width: 500px'>more",
-            "no sign of more",
-        ),
-        ("<table><td style='width: 2em'>" + 40 * "word " + "</td></table>", "squeezed column"),
-        (
-            "<table style='width: 1px'><td><p style='overflow-wrap: anywhere'>R1</table>",
-            "broken word",
-        ),
-        (
-            "<table style='table-layout: fixed; width: 4em'><td><mjx-container display='true'>"
-            "<svg style='width: 20em'></svg></mjx-container></td></table>",
-            "formula over its column",
-        ),
-    ],
-)
-def test_a_misfit_is_seen(browser, body: str, kind: str):
+SPOILT = {
+    "page": "<p style='width: 500px'>wide</p>",
+    "code": f"<div style='overflow: hidden'><pre style='overflow: auto'>{90 * 'x'}</pre></div>",
+    "turned map": "<span class='figure-box' data-letters='12'><img class='map' width='100' "
+    "style='width: 100px; height: 9px; filter: invert(0.93)'></span>",
+    "no sign of more": "<p style='overflow: auto'><b style='display: block; width: 500px'>more",
+    "squeezed column": f"<table><td style='width: 2em'>{40 * 'word '}</td></table>",
+    "broken word": "<table style='width: 1px'><td><p style='overflow-wrap: anywhere'>R1</table>",
+    "formula over its column": "<table style='table-layout: fixed; width: 4em'><td>"
+    "<mjx-container display='true'><svg style='width: 20em'></svg></mjx-container></td></table>",
+}
+
+
+@pytest.mark.parametrize(("kind", "body"), SPOILT.items())
+def test_a_misfit_is_seen(browser, kind: str, body: str):
     """The list above is not empty because it cannot find anything."""
     tab = browser.new_page(viewport={"width": 390, "height": 900})
     tab.set_content(
@@ -351,10 +334,10 @@ def test_a_page_does_not_jump(browser, html: Path, name: str, width: int):
 # --- paper --------------------------------------------------------------------------------------
 
 
-def test_print_from_dark_mode(visit):
+def test_print_from_dark_mode(still):
     """Black on white, with all that is still to be computed; then the page is as it was."""
-    tab = still(visit, "#scene=map", color_scheme="dark", stopped=True)
-    later(tab, 50)
+    tab = still("#scene=map", color_scheme="dark", stopped=True)
+    tab.later(50)
     map_ = "document.querySelector('.map canvas')"
     ground = "getComputedStyle(document.body).backgroundColor"
     ink = "getComputedStyle(document.querySelector('.words')).color"
@@ -378,16 +361,16 @@ def test_print_from_dark_mode(visit):
     assert tab.get_by_label("ratio, as a number", exact=True).is_visible()
     tab.emulate_media(media="screen")
     tab.evaluate("dispatchEvent(new Event('afterprint'))")
-    later(tab, 50)
+    tab.later(50)
     assert tab.evaluate(f"[{ground}, {ink}]") == dark
     assert tab.evaluate(painted)[1] < 0.5
 
 
-def test_a_question_fits_on_the_first_sheet(visit, page):
+def test_a_question_fits_on_the_first_sheet(still):
     """A part that is too high for what is left of it leaves a blank there."""
     sheet = {"width": 718, "height": 1047}  # A4 less the margins that Chromium gives it, pixels
-    tab = still(visit, address=page.replace("explorer.html", "intro.html"), **sheet)
-    drawn(tab)
+    tab = still(chapter="intro", **sheet)
+    tab.drawn()
     tab.emulate_media(media="print")
     tab.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert tab.locator(".outcome .drawn").is_visible()
@@ -418,22 +401,22 @@ COLOURS = f"""() => {{
 }}"""
 
 
-def test_numbers_in_colours_can_be_read(visit):
+def test_numbers_in_colours_can_be_read(still):
     """Of seven balls, beside their lines and on the bar of energy, in both modes."""
-    tab = still(visit, "#speeds=1,0,0,0,0,0,0&masses=1,2,3,4,3,2,1&forward=0.3")
+    tab = still("#speeds=1,0,0,0,0,0,0&masses=1,2,3,4,3,2,1&forward=0.3")
     for mode, ground in (("light", "#ffffff"), ("dark", "#121212")):
         show(tab, 1400, mode)
-        drawn(tab)
+        tab.drawn()
         names, bars = tab.evaluate(COLOURS)
         assert len(names) == len(set(names)) == len(bars) == 7
         assert min(contrast(code(name), ground) for name in names) >= READABLE
         assert min(contrast(*map(code, pair)) for pair in bars) >= READABLE
 
 
-def test_notes_and_places_can_be_read(visit):
+def test_notes_and_places_can_be_read(still):
     """The soft colour of notes, places and small letters."""
-    tab = still(visit, "#scene=ABCCAB")
-    drawn(tab)
+    tab = still("#scene=ABCCAB")
+    tab.drawn()
     for mode in ("light", "dark"):
         show(tab, 1400, mode)
         assert tab.evaluate(PALE, READABLE) == []

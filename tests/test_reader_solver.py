@@ -63,9 +63,9 @@ def test_a_piece_is_left_to_the_reader(solver):
 
 
 @pytest.fixture
-def editor(visit, page):
+def editor(visit):
     """Open chapter 3 and return what types lines and presses Run; no other page is asked for."""
-    tab = visit(address=page.replace("explorer.html", "three_balls.html"))
+    tab = visit(chapter="three_balls")
     asked = []
     tab.on("request", lambda request: asked.append(request.url))
 
