@@ -83,6 +83,8 @@ def test_copied_python_gives_the_same_numbers(still):
         after = program["trace"].velocities
         if "spheres" in fragment:  # to five digits
             np.testing.assert_allclose(after, asked["after"], rtol=0, atol=2e-5)
+            first = program["run"].impacts[0].after  # strings pull while contacts push
+            np.testing.assert_allclose(first, asked["after"], rtol=0, atol=1e-4)
             continue
         assert after.tolist() == asked["after"]
         np.testing.assert_allclose(program["run"].impacts[0].after, asked["after"], atol=1e-9)

@@ -238,7 +238,8 @@
     const rule = law(setting) === "rule";
     const [name, model] = rule ? ["ImpulseCorrelation", ratios(setting)] : ["SpringChain", springs(setting)];
     const names = ["Chain", "Pendulums", name, "collide", "swing"].sort((a, b) => (a < b ? -1 : 1));
-    return `import numpy as np
+    const gap = law(setting) === "spheres" && setting.gap > 0; // of the first hit, and where they hang
+    return `${gap ? "from dataclasses import replace\n\n" : ""}import numpy as np
 
 from cradle import ${names.join(", ")}
 
@@ -250,10 +251,10 @@ chain = Chain(
 model = ${name}(
 ${model}
 )
-trace = collide(chain, model)  # the first hit
+${gap ? `gaps = ${setting.gap}e-6  # m\n` : ""}trace = collide(chain, ${gap ? "replace(model, gaps=gaps)" : "model"})  # the first hit
 print(trace.velocities)
 
-pendulums = Pendulums(length=1.0)
+pendulums = Pendulums(length=1.0${gap ? ", gaps=gaps" : ""})
 pulled = -chain.velocities / pendulums.natural_frequency(len(chain))
 released = Chain(chain.masses, np.zeros(len(chain)), chain.restitution)
 run = swing(released, model, pulled, np.arange(0, 10, 0.02), pendulums=pendulums)
@@ -277,7 +278,6 @@ print(run)
     const { stiffness, viscosity } = globalThis.cradle.spheresLaw(setting);
     return `    stiffness=[${stiffness.join(", ")}],  # N/m^1.5
     viscosity=[${viscosity.join(", ")}],  # s
-    gaps=${setting.gap}e-6,  # m
     accuracy=1e-6,`;
   }
 
