@@ -190,6 +190,18 @@ def test_works_are_areas(chapter, figure, chain, ratio):
         assert orange == pytest.approx(chain[2] ** 2 * blue, rel=1e-9)
 
 
+def test_fig_area_of_the_toy():
+    """Contact 2-3 of five balls, its line extended back to what ball 2 gains; as much orange."""
+    path, impulses = solved(([1] * 5, [1, 0, 0, 0, 0], 1), 0.15)
+    shown = panel("n_balls", "fig-own-n-balls-area")
+    line = np.column_stack([impulses[:, 1], path[:, 1] - path[:, 2]])
+    np.testing.assert_allclose(shown["$u_3$"], line, **CLOSE)
+    start, bend = shown["second piece, extended"]
+    np.testing.assert_allclose(start, [0, 2 / 1.85], **CLOSE)
+    assert abs(line - bend).sum(axis=1).min() < 1e-12
+    assert line[-1, 0] == pytest.approx(2 / 1.85)
+
+
 def test_fig_overlap():
     """Each bar ends where its run, left alone, would: by the works of the two pairs (Fig. 8)."""
     trace = collide(FIG_8, ImpulseCorrelation(0.1))

@@ -117,6 +117,7 @@ def test_what_the_rules_matter():
     })  # fmt: skip
     CHAPTER.tells({"meeting": spread([after(meeting=x) for x in places])}, off=1e-4)
     # How far the place of a meeting moves the ten chains, and which are held: other tests.
-    moved = [row.split()[-1] for row in Chapter("n_balls").printed("meeting-cell").splitlines()[2:]]
+    table = Chapter("reading_n_balls").printed("meeting-cell").splitlines()
+    moved = [row.split()[-1] for row in table[2:]]
     assert number(CHAPTER.glued["meeting-ten"]) == max(map(number, moved))
     assert CHAPTER.glued["held"] == "two"
