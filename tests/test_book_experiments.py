@@ -9,7 +9,7 @@ from functools import cache
 import mpmath
 import numpy as np
 import pytest
-from chapters import Chapter, floats, shows
+from chapters import Chapter, floats, points
 from truth import solve
 
 from cradle import (
@@ -195,9 +195,16 @@ def test_figs_10_to_12_as_drawn(count):
 
 
 def test_fig_experiments_structure_shows_table_2():
-    upper, lower = FIGURES.figures["fig-experiments-structure"].axes
-    assert shows([upper], [*TABLE_2.ratio, *TABLE_2.bound])
-    assert shows([lower], TABLE_2.ratio / TABLE_2.bound)
+    """Each ratio over its bound, above the letters of its first pair, below those of its middle."""
+    part = TABLE_2.ratio / TABLE_2.bound
+    axes = FIGURES.figures["fig-experiments-structure"].axes
+    for ax, named in zip(axes, (lambda t: "".join(sorted(t[:2])), lambda t: t[1]), strict=True):
+        names = [label.get_text().split()[0] for label in ax.get_xticklabels()]
+        expected = [(names.index(named(t)), part[t]) for t in part.index]
+        (dots,) = points(ax, len(part))
+        np.testing.assert_allclose(dots, expected, rtol=1e-12)
+        for x, (_, bar) in enumerate(points(ax, 2)[1:]):
+            assert bar[1] == pytest.approx(np.median([y for at, y in expected if at == x]))
 
 
 def test_fig_experiments_identify_as_drawn():
