@@ -48,6 +48,7 @@ def test_every_figure_is_checked():
         ("intro", "fig-inside", EQUAL, 0.15),
         ("three_balls", "fig-own-three-opening", THREE, 0.15),
         ("multiple_impacts", "fig-own-multiple-opening", FIVE, 0.15),
+        ("patterns", "fig-own-patterns-light", LIGHT, 0.15),
         ("n_balls", "fig-own-n-balls-toy", ([1] * 5, [1, 0, 0, 0, 0], 1), 0.15),
         ("n_balls", "fig-own-n-balls-opening", ([1] * 4, [1, 0.5, 0, 0], 1), 0.1),
     ],
@@ -65,9 +66,9 @@ def test_opening_figures(chapter, figure, chain, ratio):
 @pytest.mark.parametrize(
     ("chapter", "figure", "chain"),
     [
-        ("three_balls", "fig-p3", THREE),
+        ("reading_three_balls", "fig-p3", THREE),
         ("reading_multiple_impacts", "fig-p5", FIVE),
-        ("patterns", "fig-p7", LIGHT),
+        ("reading_patterns", "fig-p7", LIGHT),
     ],
 )
 def test_velocity_impulse_diagrams(chapter, figure, chain, contact):
