@@ -11,6 +11,8 @@ from families import JUDGED, family
 from judge import batch, exact, judge, meaning, off, on_bounds, second_opinion, shrunk
 from problem import Problem
 
+from cradle.closed_form import largest_ratios
+
 # --- the package -------------------------------------------------------------------------------
 
 
@@ -137,6 +139,18 @@ def test_it_can_say_no():
     bound = exact(on_bounds(beside)).velocities
     assert exact(beside).velocities != bound
     assert judge(beside, lambda _: bound).word == "right"
+
+
+def test_a_bound_is_meant_as_floats_draw_it():
+    """Here the exact one is farther than four roundings: a light ball leaves it few digits."""
+    forward = [0.4267100977198693, 0.9160305343511449, 0.6333333333333333, 8 / 19]
+    masses, rest = [1.0, 4.0, 0.25, 1.0, 1.0, 1.0], [0.0] * 4
+    assert largest_ratios(masses, forward, rest)[0][:3].tolist() == forward[:3]
+    problem = Problem(masses, [1.0, 0.0, *rest], [1.0] * 5, forward, rest)
+    as_it_is = [float(v) for v in exact(problem).velocities]
+    assert off(problem, as_it_is, batch(problem)) > 5e-9
+    assert judge(problem).word == "right"
+    assert judge(problem, lambda _: as_it_is).word == "other reading"
 
 
 def test_a_wrong_chain_is_shrunk():
