@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import real_cradles
 import real_swing
+import scipy
 from chapters import Chapter, points
 from real_cradles import first_strikes, spheres, table
 from scipy.optimize import brentq, least_squares
@@ -126,7 +127,8 @@ def test_the_errors_of_the_fit_by_simulated_films():
         noisy = {}
         for release in (1, 2):
             sigma, v = data[release][1], law(true, release, True)
-            noisy[release] = (1 + 0.01 * rng.normal()) * v + sigma * rng.normal(size=5), sigma
+            scale, *off = scipy.special.ndtri(rng.random(6))
+            noisy[release] = (1 + 0.01 * scale) * v + sigma * off, sigma
         fit = least_squares(
             lambda p, noisy=noisy: real_cradles.misfits(
                 lambda r: law(p, r, True), noisy, (1, 2)),

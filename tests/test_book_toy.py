@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 import real_cradles
-from chapters import Chapter, floats, number, panel
+from chapters import Chapter, drawn, floats, number, panel
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from truth import solve
@@ -139,6 +139,18 @@ def test_contact_of_steel_balls_in_closed_form():
     k = 4 / 3 * modulus * np.sqrt(radius / 2)
     deepest = (5 * (mass / 2) * speed**2 / (4 * k)) ** 0.4
     CHAPTER.tells({"contact-time": 1e6 * 2.94327 * deepest / speed, "compression": 1e6 * deepest})
+
+
+@pytest.mark.parametrize(("row", "gap", "loss"), [(0, 0, 0), (1, 1e-6, 0), (2, 1e-6, 4e-7)])
+def test_first_stroke_of_the_minute_of_steel(row, gap, loss):
+    """By SciPy, without strings: each turns a velocity into as large a swing."""
+    mass, speed = 0.045, BACK * math.sqrt(G / LENGTH)
+    radius = (3 * mass / (4 * np.pi * 7800)) ** (1 / 3)
+    k = 4 / 3 * 210e9 / (2 * (1 - 0.3**2)) * np.sqrt(radius / 2)
+    unit = (mass * speed**2 / k) ** 0.4
+    after = real_cradles.spheres(np.eye(5)[0], [0, *[gap / unit] * 3], loss * speed / unit)
+    swings = [line.get_ydata()[0] for line in drawn("toy")["fig-toy-steel"].axes[row].lines]
+    assert swings == pytest.approx(after, abs=2e-3)
 
 
 def gapped(share):

@@ -218,7 +218,7 @@ def test_the_papers_balls_by_another_law():
 
 
 def test_a_number_of_balls_says_what_one_weighs():
-    assert json.loads(call("solve 3 --unit g --json"))["assumed"][0] == "equal balls of 1 g"
+    assert json.loads(call("solve 3 --unit g --json"))["assumed"][0] == "3 equal balls of 1 g"
 
 
 def test_balls_that_do_not_approach_are_named():

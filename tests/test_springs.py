@@ -9,7 +9,6 @@ from chains import SPRINGS, magnitudes, striking, uniform
 from dop853 import integrated
 from hypothesis import given
 from hypothesis import strategies as st
-from laws import keeps
 from mpmath import zeta
 from scipy.integrate import quad
 from scipy.special import gamma
@@ -393,14 +392,20 @@ def test_what_every_trace_keeps(data):
     chain, p = Chain(rows[0], v), data.draw(st.sampled_from([1, 1.5, 2.5]))
     trace = collide(chain, SpringChain(rows[1], p, accuracy=1e-6))
     m, after, scale = chain.masses, trace.velocities, max(chain.closing_speeds.max(), 0)
-    fastest = abs(chain.velocities).max() or 1.0
-    keeps(trace, energy=1e-4, momentum=1e-12 * scale / fastest, order=1e-8 * scale)
-    kept = abs(0.5 * m @ after**2 - chain.kinetic_energy) - 1e-15 * chain.kinetic_energy
-    assert kept <= 1e-6 * scale * m.sum() * (abs(after).max() + fastest)
+    passed = np.concatenate([[0], trace.impulses, [0]])
+    atol = 1e-12 * scale * m.sum()
+    np.testing.assert_allclose(m * (after - v), passed[:-1] - passed[1:], rtol=0, atol=atol)
+    kept, most = abs(0.5 * m @ after**2 - chain.kinetic_energy), abs(after).max() + np.abs(v).max()
+    assert kept - 1e-15 * chain.kinetic_energy <= 1e-6 * scale * m.sum() * most
+    assert (np.diff(after) >= -1e-8 * scale).all()
+    np.testing.assert_array_equal(trace.path[[0, -1]], [v, after])
+    np.testing.assert_array_equal(trace.path_impulses[-1], trace.impulses)
     assert (np.diff(trace.times) >= 0).all()
     assert min(trace.forces.min(), trace.step_forces.min()) >= 0
     assert (trace.durations <= trace.times[-1] * (1 + 1e-12)).all()
     assert trace.step_times.shape == trace.step_forces.shape[:1]
+    ends = [sum(event == ("end", c) for event in trace.events) for c in range(n - 1)]
+    assert ends == trace.collisions.tolist()
     assert ((trace.impulses != 0) <= (trace.collisions > 0)).all()
     assert trace.energy_loss == 0
 
