@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+import tqdm
 from chains import SPRINGS, magnitudes, striking, uniform
 from dop853 import integrated
 from hypothesis import given
@@ -454,6 +455,17 @@ def test_once_ends_when_all_contacts_have_opened():
     late = seconds - (0.1 + first.durations[0])  # the first node after it
     assert 0.0 <= late < 0.01
     assert way[0] - way[1] == pytest.approx(0.1 - late, abs=1e-6)
+
+
+def test_progress_counts_the_steps_of_all_runs(monkeypatch, capsys):
+    """After two seconds; here at once, and after every step or so."""
+    begin = tqdm.tqdm.__init__
+    monkeypatch.setattr(tqdm.tqdm, "__init__", lambda bar, **given: begin(bar, unit=given["unit"]))
+    monkeypatch.setattr(job, "_EFFORT", {False: 10, True: 10})
+    chain, law = Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain(accuracy=1e-6)
+    found = collide(chain, law, progress=True)
+    assert f"{found.evaluations} steps" in capsys.readouterr().err
+    assert found.velocities.tolist() == collide(chain, law).velocities.tolist()
 
 
 # --- the kernel -----------------------------------------------------------------------------

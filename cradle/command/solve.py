@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from cradle import ImpactNotCertified, ImpactNotFinished, collide
+from cradle import ImpactNotCertified, ImpactNotFinished, SpringChain, collide
 from cradle.advice.choice import made
 from cradle.command.console import format_options, image_format, picture, show
 from cradle.command.describe import chain_options, described
@@ -88,7 +88,7 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
     given = described(**options)
     chain = given.chain
     with given.waiting():
-        trace = collide(chain, given.model)
+        trace = collide(chain, given.model, progress=isinstance(given.model, SpringChain))
     letters = given.letters or "-" * len(chain)
     rows = [
         {"ball": k + 1, "type": letters[k], "mass": float(chain.masses[k]),

@@ -5,6 +5,7 @@ from typing import Protocol
 
 from cradle.chain import Chain
 from cradle.input.values import a, must_be
+from cradle.models.compliant import SpringChain
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.trace import Trace
 
@@ -31,7 +32,8 @@ def collide(
         Whether to keep the path; for `ImpulseCorrelation` only.  Left out, a path of more than ten
         million numbers (2 N - 1 for each event) is cut, with a warning.
     progress : bool
-        Show how many events `ImpulseCorrelation` has counted so far; other models ignore it.
+        Show how many events `ImpulseCorrelation` has counted so far, or, after two seconds, how
+        many steps `SpringChain` has made; other models ignore it.
 
     Returns
     -------
@@ -59,10 +61,12 @@ def collide(
     if isinstance(model, ImpulseCorrelation):
         trace = model.solve(chain, record=record, progress=progress)
         advice = "; record=True keeps all, record=False none"
-    elif record is None:
-        trace, advice = model.solve(chain), ""
-    else:
+    elif record is not None:
         raise TypeError(f"{type(model).__name__} always keeps its path: record does not apply")
+    elif progress and isinstance(model, SpringChain):
+        trace, advice = model.solve(chain, progress=True), ""
+    else:
+        trace, advice = model.solve(chain), ""
     if record is None and trace.left_out:
         kept = len(trace.events)
         told = f"the path holds the first {kept} of {kept + trace.left_out} events{advice}"

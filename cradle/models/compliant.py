@@ -79,7 +79,7 @@ class SpringChain:
             vars(self)[name] = asked.number_or_row(name, getattr(self, name), "N - 1", *rules)
         asked.whole_number("max_steps", self.max_steps)
 
-    def solve(self, chain: Chain, *, once: bool = False) -> TimedTrace:
+    def solve(self, chain: Chain, *, once: bool = False, progress: bool = False) -> TimedTrace:
         """Solve the impact of `chain`; see `collide`.  `once`: until all contacts have opened."""
         n = len(asked.must_be(Chain, "chain", chain))
         rule = "must be 1 for SpringChain, whose losses are its viscosity"
@@ -88,7 +88,14 @@ class SpringChain:
         contacts = (asked.row_of(name, getattr(self, name), n - 1, n) for name in _RULES)
         row = Springs(*(row[None] for row in (chain.masses, chain.velocities, *contacts)))
         out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps), once)
-        _, status, clock = solve(row, law, out)
+        if progress:
+            from tqdm import tqdm
+
+            with tqdm(unit=" steps", delay=2.0) as bar:
+                found = solve(row, law, out, pause=lambda steps: bar.update(steps - bar.n))
+        else:
+            found = solve(row, law, out)
+        _, status, clock = found
         if status == REFUSED:
             raise refused(clock, self.accuracy, [], row)
         if status == UNSOUND:

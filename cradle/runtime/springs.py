@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,10 +26,12 @@ def room(rows: int, n: int) -> Motions:
 def solve(
     chains: Springs, law: Law, out: Motions, large: bool = False,
     stop: threading.Event | None = None, record: list[Any] | None = None,
+    pause: Callable[[int], object] | None = None,
 ) -> tuple[int, int, Any]:  # fmt: skip
     """Follow the chains, until `stop` is set; return the next one's number, how the last ended.
 
-    And its clock.  The pages of one chain are written to a `record`, at the step in `out`.
+    And its clock.  The pages of one chain are written to a `record`, at the step in `out`; `pause`
+    is told the steps of a chain so far.
     """
     (rows, n), k, status = out.v.shape, 0, FINISHED
     compiled: bool | None = None
@@ -52,6 +55,8 @@ def solve(
         k, status = runtime.call(door, k, status == PAUSED, *fixed)
         if not compiled:
             runtime.spend(time.perf_counter() - begun)
+        if pause is not None:
+            pause(int(clock["effort"] + clock["steps"] * (status == PAUSED)))
         if record is not None:
             record.append(pages[: clock["row"]].copy())
             clock["row"] = 0
