@@ -275,6 +275,22 @@ def test_what_is_left_of_a_compression_is_no_overlap():
     assert run.ended == "times"
 
 
+@pytest.mark.parametrize("stiffness", [2e5, 1e6, 1e10])
+def test_elastic_balls_keep_their_energy_for_a_minute(stiffness):
+    """Soft ones too: strikes that last a large part of the swing made energy sixfold."""
+    chain = Chain([0.045] * 5, [0] * 5)
+    run = swing(chain, SpringChain(stiffness, accuracy=1e-6), pulled(5), [0, 20.0, 60.0])
+    assert run.energy == pytest.approx(run.energy[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("law", [ImpulseCorrelation(0), SpringChain(1e9)])
+def test_damped_balls_come_to_rest(law):
+    """Their strikes come to last long, and what is left is no energy that can be told."""
+    run = swing(balls(3), law, pulled(3), [0, 30.0], pendulums=Pendulums(0.1, damping=1.0))
+    assert run.ended == "times"
+    assert run.energy[-1] < 1e-20 * run.energy[0]
+
+
 @pytest.mark.parametrize("angle", ["small", "full"])
 def test_what_is_asked_for_within_a_strike_is_told_as_at_its_end(angle):
     chain, law, hanging = balls(2), SpringChain(1e10), Pendulums(0.1, angle=angle)

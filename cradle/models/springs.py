@@ -99,8 +99,6 @@ class TimedTrace(EnergyTrace):
     def parted(self) -> tuple[float, Vector]:
         """Return how long it takes until no balls overlap, s, and how far each goes, m, shape (N,).
 
-        A compression that is left and would take as long again to open is too little to matter.
-
         Examples
         --------
         Two equal balls go half of the way each, the second one with what the first one loses:

@@ -5,6 +5,7 @@ The rules of touching and resting balls are told in `cradle.swinging.resting`.
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -23,9 +24,9 @@ from cradle.trace import Trace
 
 __all__ = ["swing"]
 
-#: Contact forces take their time if a contact lasts less than about so much of a radian; a softer
-#: one cannot be meant as it is given: then, as with all other laws, an impact takes no time.
-SHORT = 0.03
+#: Contact forces take their time while the depth of a contact over its speed is less than so much
+#: of a radian, and a strike than that; from then on impacts take none, as by all other laws.
+SHORT, LONGEST = 4e-3, 0.1
 #: Events without an impact that one instant can have, for each ball: a contact has a few at most.
 MOST_IDLE = 20
 
@@ -44,12 +45,13 @@ def swing(
         The impact law, such as `ImpulseCorrelation`.  Where a part of the chain collides alone, it
         has its part of the values, with ``excess="saturate"`` if the law has that field.
         `SpringChain` takes its time and sees the gaps that close meanwhile, unless its stiffness is
-        so low that a contact would last some .1 rad of the swing; other impacts take no time.
+        so low that a contact lasts some .01 rad of the swing, or a strike .1; others take no time.
     positions : array_like, shape (N,)
         Where the balls are released, along their arcs from their lowest points, m; positive to the
         right.  At most a quarter of a circle, or half a circle with ``angle="full"``.
     times : array_like, shape (T,)
-        When to report positions and velocities, s since the release; rising, from 0 on.
+        When to report positions and velocities, s since the release; rising, from 0 on.  Within a
+        strike that takes its time they are those at its end.
     pendulums : Pendulums, optional
         How the balls hang; small angles, 0.1 m, no gaps, no damping if left out.
     max_impacts, min_energy : int, float
@@ -177,21 +179,23 @@ class _Run:
         for first, last in groups:  # to where they touch but for rounding; their centre stays
             offset = hanging.offsets(first, last)
             self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
-        duration, way = self.collide(groups, v)
-        if duration:  # of contact forces; what the strings pull meanwhile is one kick at its end
-            self.instants.append((self.t, x, self.x, v, self.v, self.v, duration))
+        duration, way, kicked = self.collide(groups, v)
+        if (
+            duration
+        ):  # of contact forces; what strings pull meanwhile is a kick before and one after
+            self.instants.append((self.t, x, x, v, v, v, duration))
+            self.instants.append((self.t, x, self.x, kicked, self.v, self.v, duration))
             x = hanging.apart(self.x + way)  # but for what is left of a compression, far too little
-            pull = hanging.accelerations(self.x, v) + hanging.accelerations(x, self.v)
-            self.t, self.x, self.v = self.t + duration, x, self.v + 0.5 * duration * pull
-            v = self.v
+            v = self.v = self.v + 0.5 * duration * hanging.accelerations(x, self.v)
+            self.t, self.x = self.t + duration, x
             touching = (self.gaps() == 0.0) & (np.diff(v) >= -RESTING * self.speed)
         struck = self.v
         # What opens at this instant rests no more in it, whatever else happens.
         for c in opening:
             self.freed[c] = self.t
         near = touching.tolist()
-        known = zip(near, self.freed, strict=True)
-        kept = [touches and self.t - freed > hanging.tie for touches, freed in known]
+        closed = [self.t - since > hanging.tie for since in self.freed]
+        kept = [*map(all, zip(near, closed, strict=True))]
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
         self.instants.append((self.t, x, self.x, v, struck, self.v, 0.0))
         if any(resting):
@@ -205,30 +209,33 @@ class _Run:
         gaps = self.hanging.gaps + np.diff(self.x)
         return np.where(gaps > NEAR * self.size, gaps, 0.0)
 
-    def collide(self, groups: list[tuple[int, int]], before: Vector) -> tuple[float, Vector]:
-        """Solve the impacts of this instant as one; return how long, and how far the balls go."""
+    def collide(self, groups: Sequence[Any], before: Vector) -> tuple[float, Vector, Vector]:
+        """Solve the impacts of this instant as one; return how long, how far, and from which v."""
         speeds, slow, duration, way = before.tolist(), RESTING * self.speed, 0.0, 0.0 * before
         struck = [
             (first, last) for first, last in groups
             if any(a - b > slow for a, b in pairwise(speeds[first:last]))
         ]  # fmt: skip
         if not struck:
-            return duration, way
+            return duration, way, before
         if self.lasting:
-            balls, trace, duration, way = self.followed(*struck[0], before)
+            (first, last), _, duration, _ = self.followed(*struck[0], before)
+            self.lasting = duration * self.hanging.fastest < LONGEST
+        if self.lasting:
+            before = before + 0.5 * duration * self.hanging.accelerations(self.x, before)
+            balls, trace, duration, way = self.followed(first, last, before)
+            self.v = before.copy()
             struck, traces = [balls], [trace]
         else:
-            traces = [self.solved(*balls, before) for balls in struck]
-        for (first, last), trace in zip(struck, traces, strict=True):
-            self.v[first:last] = trace.velocities
+            duration, traces = 0.0, [self.solved(*balls, before) for balls in struck]
+        for balls, trace in zip(struck, traces, strict=True):
+            self.v[slice(*balls)] = trace.velocities
         contacts = tuple(c for first, last in struck for c in range(first, last - 1))
         loss = sum(trace.energy_loss for trace in traces)
         self.impacts.append(Impact(self.t, contacts, self.x, before, self.v, loss, tuple(traces)))
-        return duration, way
+        return duration, way, before
 
-    def followed(
-        self, first: int, last: int, before: Vector
-    ) -> tuple[tuple[int, int], Trace, float, Vector]:
+    def followed(self, first: int, last: int, before: Vector) -> tuple[Any, Any, float, Vector]:
         """Follow contact forces, of these balls and all that they meet, until contacts are open."""
         while True:
             trace: Any = self.solved(first, last, before)
@@ -245,10 +252,9 @@ class _Run:
         """Solve the impact of a part of the chain; contact forces with the gaps that it has now."""
         m, e = self.chain.masses[first:last], self.chain.restitution[first : last - 1]
         law: Any = self.model(first, last)
-        more: dict[str, Any] = {}
+        more: dict[str, Any] = {"once": True} if self.lasting else {}
         if self.lasting:
-            gaps, more = self.gaps()[first : last - 1], {"once": True}
-            law = replace(law, gaps=tuple(gaps.tolist()))
+            law = replace(law, gaps=tuple(self.gaps()[first : last - 1].tolist()))
         try:
             # Not by `collide`, whose advice on a long path cannot be taken here.
             trace: Trace = law.solve(Chain._of(m, before[first:last].copy(), e), **more)
@@ -286,14 +292,14 @@ def certify(run: _Run, times: Vector, seen_x: Vector, seen_v: Vector) -> None:
     instants, came, placed, v, struck, left, lasts = map(np.array, zip(*run.instants, strict=True))
     push = INSTANT * ((np.abs(left) + np.abs(v)) @ m)
     before, kept = hanging.energy(placed, struck), hanging.energy(placed, left)
-    work = INSTANT * np.maximum(before, kept)
+    work = INSTANT * np.maximum(before, kept) + INSTANT**2 * run.released
     # Flights: to where they end, and to where they are looked at.
     begun = np.r_[: len(instants) - 1, instants.searchsorted(times, side="right") - 1]
     until = np.concatenate([instants[1:], times])
     x = np.concatenate([came[1:], seen_x])
     gain = hanging.energy(x, np.concatenate([v[1:], seen_v])) - kept[begun]
     most = RADIAN * (1.0 + (until - instants[begun]) * hanging.fastest) * kept[begun]
-    most += lasts[begun] * hanging.fastest * kept[begun]  # of a strike, where strings are one kick
+    most += lasts[begun] * hanging.fastest * kept[begun]  # of a strike: strings are kicks
     least = -math.inf if hanging.damping.any() else -most
     overlap = (x[:, :-1] - x[:, 1:] - hanging.gaps).max(axis=-1)
     top, far = np.pi * (math.inf if hanging.small else hanging.length[0]), np.abs(x).max(axis=-1)
