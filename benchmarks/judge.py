@@ -75,7 +75,7 @@ def exact(problem, read=meaning, *, events=EVENTS, twice=False):
 def on_bounds(problem):
     """The chain with its ratios within 4 roundings of their bounds (Eq. 53, mirrored) on them.
 
-    Of the bounds in floats, as they are drawn for a user: at light balls they lose more digits.
+    Of the bounds as they are, or in floats, as they are drawn: at light balls these lose digits.
     """
 
     def one_way(masses, ratios):
@@ -84,7 +84,8 @@ def on_bounds(problem):
         for here, beyond, ratio in reversed(list(zip(m[1:], m[2:], map(meaning, ratios)))):
             bound = beyond / (beyond + here * (1 - onward))
             drawn = 1 / (1 + float(here) / float(beyond) * (1 - float(onward)))
-            onward = bound if abs(float(ratio) / drawn - 1) < 4 * 2.0**-52 else ratio
+            off = min(abs(ratio / bound - 1), abs(float(ratio) / drawn - 1))
+            onward = bound if off < 4 * Decimal(2) ** -52 else ratio
             found.insert(0, onward)
         return found
 
