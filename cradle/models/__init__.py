@@ -4,7 +4,7 @@ import warnings
 from typing import Protocol
 
 from cradle.chain import Chain
-from cradle.input.values import a, must_be
+from cradle.input.values import a, flag, must_be
 from cradle.models.compliant import SpringChain
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.trace import Trace
@@ -63,7 +63,7 @@ def collide(
         advice = "; record=True keeps all, record=False none"
     elif record is not None:
         raise TypeError(f"{type(model).__name__} always keeps its path: record does not apply")
-    elif progress and isinstance(model, SpringChain):
+    elif flag("progress", progress) and isinstance(model, SpringChain):
         trace, advice = model.solve(chain, progress=True), ""
     else:
         trace, advice = model.solve(chain), ""

@@ -180,9 +180,7 @@ class _Run:
             offset = hanging.offsets(first, last)
             self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
         duration, way, kicked = self.collide(groups, v)
-        if (
-            duration
-        ):  # of contact forces; what strings pull meanwhile is a kick before and one after
+        if duration:  # of contact forces: what strings pull is half a kick before, half after
             self.instants.append((self.t, x, x, v, v, v, duration))
             self.instants.append((self.t, x, self.x, kicked, self.v, self.v, duration))
             x = hanging.apart(self.x + way)  # but for what is left of a compression, far too little
@@ -194,8 +192,8 @@ class _Run:
         for c in opening:
             self.freed[c] = self.t
         near = touching.tolist()
-        closed = [self.t - since > hanging.tie for since in self.freed]
-        kept = [*map(all, zip(near, closed, strict=True))]
+        settled = [self.t - freed > hanging.tie for freed in self.freed]
+        kept = [*map(all, zip(near, settled, strict=True))]
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
         self.instants.append((self.t, x, self.x, v, struck, self.v, 0.0))
         if any(resting):
@@ -218,7 +216,7 @@ class _Run:
         ]  # fmt: skip
         if not struck:
             return duration, way, before
-        if self.lasting:
+        if self.lasting:  # the first half of the kick must know how long it takes
             (first, last), _, duration, _ = self.followed(*struck[0], before)
             self.lasting = duration * self.hanging.fastest < LONGEST
         if self.lasting:
