@@ -151,6 +151,9 @@ def test_first_stroke_of_the_minute_of_steel(row, gap, loss):
     after = real_cradles.spheres(np.eye(5)[0], [0, *[gap / unit] * 3], loss * speed / unit)
     swings = [line.get_ydata()[0] for line in drawn("toy")["fig-toy-steel"].axes[row].lines]
     assert swings == pytest.approx(after, abs=2e-3)
+    if loss:
+        left, right = real_cradles.spheres([1.0, 0.0], [0.0], loss * speed / unit)
+        assert glued("steel-restitution") == pytest.approx(right - left, abs=5e-3)
 
 
 def gapped(share):
