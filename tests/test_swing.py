@@ -283,6 +283,14 @@ def test_elastic_balls_keep_their_energy_for_a_minute(stiffness):
     assert run.energy == pytest.approx(run.energy[0], rel=1e-4)
 
 
+def test_a_strike_that_lasts_long_is_taken_for_none():
+    """Of many lossy balls; strings that pull as long are no kick, and made energy in the end."""
+    chain, law = Chain([0.045] * 20, [0] * 20), SpringChain(1e8, viscosity=6e-6, accuracy=1e-4)
+    run = swing(chain, law, pulled(20), [0, 45.0])
+    assert run.ended == "times"
+    assert run.energy[-1] < 0.1 * run.energy[0]
+
+
 @pytest.mark.parametrize("law", [ImpulseCorrelation(0), SpringChain(1e9)])
 def test_damped_balls_come_to_rest(law):
     """Their strikes come to last long, and what is left is no energy that can be told."""
