@@ -7,7 +7,7 @@ from chains import local_orders
 from delicate import CHAINS, chains_of, seen
 from truth import solve
 
-from cradle import Chain, ImpulseCorrelation, collide
+from cradle import Chain, ImpulseCorrelation, collide, textbook
 
 
 def solved(masses, velocities, restitution, forward, backward=None, **options):
@@ -217,6 +217,33 @@ def test_delicate_chains(name, problem):
     agrees(trace, atol=CHAINS[name.removesuffix(", mirrored")].velocities)
     # Bounded work.  The order of simultaneous events has no mirror image, and with it the cycles.
     assert len(trace.events) < 5000
+
+
+@pytest.mark.parametrize(
+    ("before", "gap", "after"),
+    [
+        # Parts of the segments: (.05, .5) at contact 1, (.3, .3) at 3.  The larger one decides.
+        ([10, 0, 1, 0, 0.6, -0.4], 3, [10, 0, 0.7, 0.3, 0.3, -0.1]),
+        # (.4, .5) and (.5, .2): at a tie of the larger the smaller one.
+        ([1.25, 0, 1, 0, 1, -1.5], 3, [1.25, 0, 0.5, 0.5, 0.5, -1]),
+        # (.4, .5) and (.5, .4): at a tie of both the left gap.
+        ([1.25, 0, 1, 0, 1, -0.25], 1, [0.75, 0.5, 0.5, 0.5, 1, -0.25]),
+        # (.5, .05) and (.3, .3): the run between would pass ball 1 on its way; it goes alone.
+        ([1, 0.9, 1, 0, 0.6, -0.4], 1, [1, 0.9, 0.9, 0.1, 0.6, -0.4]),
+    ],
+)
+@pytest.mark.parametrize("by", ["the kernel", "the textbook"])
+def test_of_several_gaps_the_first_one_reached_closes(by, before, gap, after):
+    """R8.4: three pairs of equal elastic balls exchange velocities; the meetings by hand."""
+    if by == "the textbook":
+        found = textbook.solve([1] * 6, before, 1, 0.3)
+        events, path = found.events, found.path
+    else:
+        found = solved([1] * 6, before, 1, 0.3)
+        events, path = found.events, found.path
+    at = [kind for kind, _ in events].index("close")
+    assert events[at][1] == gap
+    np.testing.assert_allclose(path[at + 1], after, rtol=0, atol=1e-14)
 
 
 def test_light_striker_gives_all_its_momentum():
