@@ -60,7 +60,7 @@ def common_velocity(first, last, left_part, right_part, ball, contact):
 
 
 def last_chatter(c, step, n, state):
-    """Return the last contact from c on that only chatters, with nothing but zeros between."""
+    """Return the last contact from c on that only chatters; what is between is at rest, empty."""
     # It is or was in an exhausted collision, or in one at a speed far below that: dust.
     tally, last, j = state.tally[0], c, c + step
     while 0 <= j < n - 1:
@@ -70,7 +70,7 @@ def last_chatter(c, step, n, state):
         gone = exhausted(j, k.w if now else k.q.real, state.ball, state.contact, tally)
         if gone and (now or dust or k.tiny > 0):
             last = j
-        elif k.u.real != 0.0:
+        elif k.u.real != 0.0 or k.q.real > 0.0:
             break
         j += step
     return last
