@@ -100,21 +100,27 @@ def checked(
     return array
 
 
-def one_number(name: str, value: ArrayLike, *limits: Any, **more: Any) -> float:
+def one_number(
+    name: str, value: ArrayLike, rule: str = "must be finite",
+    low: float = -np.inf, high: float = np.inf, open_low: bool = False,
+) -> float:  # fmt: skip
     """Return `value` as a float, all that `checked` asks fulfilled."""
-    if type(value) is float and len(limits) > 2 and limits[1] < value < limits[2]:
-        return value
-    number = checked(name, value, *limits, **more)
+    if type(value) is float and low <= value <= high and math.isfinite(value):
+        if not (open_low and value == low):
+            return value  # of usual values nothing more need be asked
+    number = checked(name, value, rule, low, high, open_low)
     if number.ndim:
         raise ValueError(f"{name} = {shown(value)}; must be one number")
     return float(number)
 
 
 def number_or_row(
-    name: str, values: ArrayLike | None, length: str, *limits: Any, **more: Any
+    name: str, values: ArrayLike | None, length: str, *limits: Any
 ) -> float | tuple[float, ...]:
     """Return one number for all balls or contacts, or a row with one for each, to be kept."""
-    array = checked(name, values, *limits, **more)
+    if type(values) is float:
+        return one_number(name, values, *limits)
+    array = checked(name, values, *limits)
     if array.ndim > 1:
         raise ValueError(f"{name} has shape {array.shape}; must be () or ({length},)")
     return tuple(array.tolist()) if array.ndim else float(array)

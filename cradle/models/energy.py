@@ -1,5 +1,6 @@
 """Impulses shared out by the energy that the contacts store: Liu, Zhao and Brogliato's model."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -14,14 +15,13 @@ from cradle.trace import Event, ImpactNotFinished, Trace
 
 def fastest(chain: Chain) -> tuple[int, float, float]:
     """Return the contact that closes fastest, its reduced mass and its speed, 1 if none moves."""
-    m, u = chain.masses, chain.closing_speeds
-    c = int(np.argmax(u))
-    with np.errstate(over="ignore"):
-        mass = float(m[c] / (m[c] + m[c + 1]) * m[c + 1])
-    if not np.finfo(np.float64).tiny <= mass:
-        other = f"masses[{c + 1}] = {float(m[c + 1])!r}"
-        rule = f"its reduced mass with {other} is beyond the range of floats: choose other units"
-        raise ValueError(f"masses[{c}] = {float(m[c])!r}; {rule}")
+    u = chain.closing_speeds
+    c = int(u.argmax())
+    left, right = chain.masses[c : c + 2].tolist()
+    mass = left / (left + right) * right
+    if mass < sys.float_info.min:
+        rule = f"its reduced mass with masses[{c + 1}] = {right!r} is beyond the range of floats"
+        raise ValueError(f"masses[{c}] = {left!r}; {rule}: choose other units")
     return c, mass, abs(float(u[c])) or 1.0
 
 
