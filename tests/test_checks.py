@@ -12,6 +12,7 @@ import sympy
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 from cradle.input.values import (
+    ABOVE_ZERO,
     must_be,
     number_or_row,
     numbers,
@@ -149,7 +150,7 @@ def test_the_first_wrong_value_is_named():
 
 
 def test_one_number_or_a_row():
-    assert number_or_row("x", 1, "N", "must be above 0", 0.0, open_low=True) == 1.0
+    assert number_or_row("x", 1, "N", *ABOVE_ZERO) == 1.0
     assert number_or_row("x", [], "N", "any") == ()
     assert row_of("x", 2.0, 3, 3).tolist() == [2.0] * 3
     assert row_of("x", (1.0, 2.0), 2, 3).tolist() == [1.0, 2.0]

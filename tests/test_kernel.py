@@ -23,6 +23,7 @@ from cradle import (
     ImpactNotFinished,
     ImpulseCorrelation,
     SequentialCollisions,
+    SpringChain,
     collide,
     kernel,
     outcomes,
@@ -242,11 +243,14 @@ def test_threads_share_what_is_compiled(monkeypatch):
 
 @needs_numba
 @pytest.mark.usefixtures("plain")
-def test_warm_up_compiles():
+def test_warm_up_compiles_what_calls_take():
+    """A chain's own arrays, which nobody may write to, would be compiled for a second time."""
     drive.warm_up.__wrapped__()
-    for door in ("batch", "follow"):
+    for door, model in (("batch", ImpulseCorrelation(0.0)), ("follow", SpringChain())):
         assert runtime.loaded(door)
         assert runtime.chosen(door=door) is runtime.compiled()
+        collide(Chain([1, 1, 1], [1, 0, 0]), model)
+        assert "readonly" not in str([*vars(runtime.compiled())[door].overloads])
 
 
 @needs_numba

@@ -86,7 +86,8 @@ class SpringChain:
         asked.refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
         fastest(chain)  # is within the range of floats
         contacts = (asked.row_of(name, getattr(self, name), n - 1, n) for name in _RULES)
-        row = Springs(*(row[None] for row in (chain.masses, chain.velocities, *contacts)))
+        # As arrays that may be written to: else all would be compiled a second time.
+        row = Springs(*(np.array([row]) for row in (chain.masses, chain.velocities, *contacts)))
         out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps), once)
         if progress:
             from tqdm import tqdm
