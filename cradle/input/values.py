@@ -105,9 +105,9 @@ def one_number(
     low: float = -np.inf, high: float = np.inf, open_low: bool = False,
 ) -> float:  # fmt: skip
     """Return `value` as a float, all that `checked` asks fulfilled."""
-    if type(value) is float and low <= value <= high and math.isfinite(value):
-        if not (open_low and value == low):
-            return value  # of usual values nothing more need be asked
+    within = type(value) is float and low <= value <= high and math.isfinite(value)
+    if within and not (open_low and value == low):
+        return value  # nothing more need be asked
     number = checked(name, value, rule, low, high, open_low)
     if number.ndim:
         raise ValueError(f"{name} = {shown(value)}; must be one number")
