@@ -274,7 +274,7 @@ OTHERS = [
     (viscosity, ([1, 1, 1], [0.9, 1.1]), "restitution[1] = 1.1; must lie in [0.624, 1]"),
     (viscosity, ([1, 1, 1], [0.9] * 3), "restitution has 3 values; 3 balls need 2, or one number"),
     (viscosity, ([1, 1], 0.9, 0), "speed = 0.0; must be above 0"),
-    (viscosity, (1, 0.9), "masses has shape (); must be (N,) with N >= 2"),
+    (viscosity, (1, 0.9), "masses has shape (); a chain needs (N,) with N >= 2"),
     (viscosity, ([1, 1], 0.9, 1, 0), "stiffness = 0.0; must be above 0"),
     (post_impact_velocities, (MASKED, [1, 0, 0], 1, 0.1), "masses[1] = masked; must be a real"),
     (spring_velocities, (ONES, [1, 0, 0], ONES), "stiffness has shape (3,); must be () or (..., 2"),

@@ -91,6 +91,9 @@ def checked(
     low: float = -np.inf, high: float = np.inf, open_low: bool = False,
 ) -> Vector:  # fmt: skip
     """Return `values` as floats, all finite and inside the limits."""
+    within = type(values) is float and math.isfinite(values) and low <= values <= high
+    if within and not (open_low and values == low):
+        return np.array(values)  # nothing more need be asked
     array = numbers(name, values)
     if array is values:
         array = array.copy()
@@ -100,15 +103,9 @@ def checked(
     return array
 
 
-def one_number(
-    name: str, value: ArrayLike, rule: str = "must be finite",
-    low: float = -np.inf, high: float = np.inf, open_low: bool = False,
-) -> float:  # fmt: skip
+def one_number(name: str, value: ArrayLike, *limits: Any, **more: Any) -> float:
     """Return `value` as a float, all that `checked` asks fulfilled."""
-    within = type(value) is float and low <= value <= high and math.isfinite(value)
-    if within and not (open_low and value == low):
-        return value  # nothing more need be asked
-    number = checked(name, value, rule, low, high, open_low)
+    number = checked(name, value, *limits, **more)
     if number.ndim:
         raise ValueError(f"{name} = {shown(value)}; must be one number")
     return float(number)
@@ -118,8 +115,6 @@ def number_or_row(
     name: str, values: ArrayLike | None, length: str, *limits: Any
 ) -> float | tuple[float, ...]:
     """Return one number for all balls or contacts, or a row with one for each, to be kept."""
-    if type(values) is float:
-        return one_number(name, values, *limits)
     array = checked(name, values, *limits)
     if array.ndim > 1:
         raise ValueError(f"{name} has shape {array.shape}; must be () or ({length},)")

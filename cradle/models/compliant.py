@@ -265,9 +265,8 @@ def viscosity_from(
     """
     from scipy.optimize import brentq
 
-    m, law = asked.checked_masses(masses), SpringChain(stiffness, exponent)
-    if m.ndim != 1 or len(m) < 2:
-        raise ValueError(f"masses has shape {m.shape}; must be (N,) with N >= 2")
+    given, law = asked.numbers("masses", masses), SpringChain(stiffness, exponent)
+    m = Chain(given, np.zeros(given.shape)).masses
     u = asked.one_number("speed", speed, *asked.ABOVE_ZERO)
     p, n = law.exponent, len(m)
     least = _parting(LONGEST, p)

@@ -1,6 +1,5 @@
 """Impulses shared out by the energy that the contacts store: Liu, Zhao and Brogliato's model."""
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -19,7 +18,7 @@ def fastest(chain: Chain) -> tuple[int, float, float]:
     c = int(u.argmax())
     left, right = chain.masses[c : c + 2].tolist()
     mass = left / (left + right) * right
-    if mass < sys.float_info.min:
+    if mass < np.finfo(np.float64).tiny:
         rule = f"its reduced mass with masses[{c + 1}] = {right!r} is beyond the range of floats"
         raise ValueError(f"masses[{c}] = {left!r}; {rule}: choose other units")
     return c, mass, abs(float(u[c])) or 1.0
