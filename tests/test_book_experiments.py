@@ -4,6 +4,7 @@ Velocities come from the independent solver in truth.py; the ranges of ratios fr
 where they hold, and from a bisection elsewhere.
 """
 
+import re
 from functools import cache
 
 import mpmath
@@ -194,17 +195,31 @@ def test_figs_10_to_12_as_drawn(count):
         assert "".join(letters) == sequence == ax.get_title()
 
 
+def test_table_2_as_shown():
+    """Each entry in its place, as blue as it is near to its bound, and framed above it."""
+    (page,) = [output.data["text/html"] for output in FIGURES.cells["table-2"].outputs]
+    cell = r'<td style="background: rgba\(0, 114, 178, ([\d.]+)\)(; outline[^"]*)?">([\d.]+)</td>'
+    found = re.findall(cell, page)
+    assert re.findall(r"<caption>(.)", page) == list("ABCD")
+    triplets = [x + y + z for y in "ABCD" for x in "ABCD" for z in "ABCD"]
+    for triplet, (shade, frame, ratio) in zip(triplets, found, strict=True):
+        entry = TABLE_2.loc[triplet]
+        part = entry.ratio / entry.bound
+        assert float(ratio) == entry.ratio
+        assert float(shade) == pytest.approx(0.45 * min(part, 1), abs=0.005)
+        assert bool(frame) == (part > 1)
+
+
 def test_fig_experiments_structure_shows_table_2():
-    """Each ratio over its bound, above the letters of its first pair, below those of its middle."""
+    """Each ratio over its bound, above the letters of its first pair."""
     part = TABLE_2.ratio / TABLE_2.bound
-    axes = FIGURES.figures["fig-experiments-structure"].axes
-    for ax, named in zip(axes, (lambda t: "".join(sorted(t[:2])), lambda t: t[1]), strict=True):
-        names = [label.get_text().split()[0] for label in ax.get_xticklabels()]
-        expected = [(names.index(named(t)), part[t]) for t in part.index]
-        (dots,) = points(ax, len(part))
-        np.testing.assert_allclose(dots, expected, rtol=1e-12)
-        for x, (_, bar) in enumerate(points(ax, 2)[1:]):
-            assert bar[1] == pytest.approx(np.median([y for at, y in expected if at == x]))
+    (ax,) = FIGURES.figures["fig-experiments-structure"].axes
+    names = [label.get_text().split()[0] for label in ax.get_xticklabels()]
+    expected = [(names.index("".join(sorted(t[:2]))), part[t]) for t in part.index]
+    (dots,) = points(ax, len(part))
+    np.testing.assert_allclose(dots, expected, rtol=1e-12)
+    for x, (_, bar) in enumerate(points(ax, 2)[1:]):
+        assert bar[1] == pytest.approx(np.median([y for at, y in expected if at == x]))
 
 
 def test_fig_experiments_identify_as_drawn():
