@@ -30,6 +30,7 @@ from cradle import (
     paper_chain,
     recommend,
 )
+from cradle import kernel as plain
 from cradle.command.console import text as shown
 from cradle.command.describe import described
 from cradle.command.solve import main, run
@@ -282,7 +283,7 @@ def test_recommend_says_what_python_says():
 def test_warm_up_says_what_was_done(monkeypatch, loaded, before, after, words):
     found = iter([before, after])
     monkeypatch.setattr(drive, "warm_up", lambda: None)
-    monkeypatch.setattr(runtime, "on_disk", lambda *_: next(found))
+    monkeypatch.setattr(runtime, "on_disk", lambda door="batch": vars(plain)[door] and next(found))
     monkeypatch.setattr(runtime, "loaded", lambda: loaded)
     assert re.match(words, call("warm-up"))
 

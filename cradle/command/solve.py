@@ -152,7 +152,7 @@ def warm_up() -> None:
     Examples:
       cradle warm-up
     """
-    there, begun = runtime.on_disk("springs"), time.perf_counter()
+    there, begun = runtime.on_disk("follow"), time.perf_counter()
     drive.warm_up()
     seconds = time.perf_counter() - begun
     if not runtime.loaded():
