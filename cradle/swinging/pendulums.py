@@ -67,13 +67,6 @@ class Pendulums:
         part = 0.5 if self.angle == "small" else 1.0 - 2.0**-20
         return part * np.pi * self.row("length", size)
 
-    def released(self, x: Vector, size: int) -> Vector:
-        """Return where `size` balls are released, m, or refuse to pull them so far aside."""
-        if x.shape != (size,):
-            rule = f"{size} balls need ({size},): a place for each ball"
-            raise ValueError(f"positions has shape {x.shape}; {rule}")
-        return self.within_reach(x)
-
     def within_reach(self, x: Vector, when: str = "") -> Vector:
         """Return where the balls are, m, or refuse that one is so far aside."""
         reach = self.reach(len(x))

@@ -13,10 +13,11 @@ The rules, in the order in which `swing` applies them at every event:
    stays open for this instant, whatever else happens in it.
 """
 
-from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-from cradle.input.values import Vector
+import numpy as np
+
+from cradle.input.values import NDArray, Vector
 from cradle.swinging.pendulums import mean
 
 #: Speeds below this part of the swing's speed are none, as they carry 1e-20 of its energy.
@@ -25,24 +26,21 @@ RESTING = 1e-10
 NEAR = 1e-12
 
 
-def stretches(contacts: Iterable[bool]) -> list[tuple[int, int]]:
+def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the first ball of each stretch of marked contacts, and the one after its last."""
-    edges = [
-        c for c, (one, other) in enumerate(pairwise([False, *contacts, False])) if one != other
-    ]
+    marks = pairwise([False, *contacts.tolist(), False])
+    edges = [c for c, (one, other) in enumerate(marks) if one != other]
     return [(first, end + 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def common_velocities(
-    masses: Vector, velocities: Vector, touching: Sequence[bool], least: float
-) -> tuple[Vector, list[bool]]:
+    masses: Vector, velocities: Vector, touching: NDArray[np.bool_], least: float
+) -> tuple[Vector, NDArray[np.bool_]]:
     """Give touching balls that hardly move against each other their common velocity (rule 2)."""
-    v, resting = velocities.copy(), [False] * len(touching)
+    v, resting = velocities.copy(), np.zeros(len(touching), dtype=bool)
     while True:
-        slow = [b - a <= least for a, b in pairwise(v.tolist())]
-        marks = zip(resting, touching, slow, strict=True)
-        found = [rests or (touches and now) for rests, touches, now in marks]
-        if found == resting:
+        found = resting | (touching & (v[1:] - v[:-1] <= least))
+        if (found == resting).all():
             return v, resting
         # The common velocity may be as slow against the next ball: look again.
         resting = found
@@ -51,21 +49,16 @@ def common_velocities(
 
 
 def pressed(
-    masses: Vector, accelerations: Vector, resting: Sequence[bool], least: float
-) -> list[bool]:
+    masses: Vector, accelerations: Vector, resting: NDArray[np.bool_], least: float
+) -> NDArray[np.bool_]:
     """Return the resting contacts whose balls, left alone, would not separate (rule 3)."""
     # Of all accelerations without passing, contacts that push and do not pull give those nearest to
     # the balls left alone, in the mean square by mass (Gauss's principle of least constraint).  For
-    # a row that is isotonic regression, which pooling solves exactly.
-    kept, m, a = [False] * len(resting), masses.tolist(), accelerations.tolist()
+    # a row that is isotonic regression.
+    from scipy.optimize import isotonic_regression  # slow to import
+
+    kept = np.zeros(len(resting), dtype=bool)
     for first, last in stretches(resting):
-        pools: list[tuple[float, float, int]] = []  # mass, acceleration, number of balls
-        for ball in range(first, last):
-            pools.append((m[ball], a[ball], 1))
-            while len(pools) > 1 and pools[-2][1] >= pools[-1][1] - least:
-                (m1, a1, n1), (m2, a2, n2) = pools.pop(-2), pools.pop(-1)
-                pools.append((m1 + m2, (m1 * a1 + m2 * a2) / (m1 + m2), n1 + n2))
-        for _, _, count in pools:
-            kept[first : first + count - 1] = [True] * (count - 1)
-            first += count
+        nearest = isotonic_regression(accelerations[first:last], weights=masses[first:last]).x
+        kept[first : last - 1] = np.diff(nearest) <= least
     return kept

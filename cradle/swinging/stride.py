@@ -186,7 +186,7 @@ class Alone:
         # Neighbours that have met, and those near each other that hardly move against each other.
         still = np.abs((np.diff(v) * lines.conj()).real) <= self.resting * np.abs(lines)
         touch = (gaps <= self.met) | (still & (gaps <= self.touching))
-        for first, last in stretches(touch.tolist()):
+        for first, last in stretches(touch):
             balls = slice(first, last)
             axis = lines[first : last - 1].sum()
             axis /= abs(axis)
@@ -216,7 +216,7 @@ class Alone:
 
     def _rested(self, masses: Vector, v: Vector, gaps: Vector) -> Vector:
         """Return velocities after those that touch and still approach have come to rest."""
-        v, _ = common_velocities(masses, v, (v[:-1] > v[1:]).tolist(), 0.0)
+        v, _ = common_velocities(masses, v, v[:-1] > v[1:], 0.0)
         if (deep := gaps < -self.touching).any():  # these part, slower than what is an impact
             ramp = np.append(0.0, np.cumsum(0.5 * self.resting * deep))
             v += ramp - masses @ ramp / masses.sum()

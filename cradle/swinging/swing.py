@@ -7,7 +7,6 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -95,7 +94,11 @@ def swing(
         raise ValueError(f"times = {shown(times)}; {rule}")
     most = whole_number("max_impacts", max_impacts)
     least = one_number("min_energy", min_energy, "must lie in [0, 1]", 0.0, 1.0)
-    run = _Run(chain, model, hanging, hanging.released(checked("positions", positions), n))
+    x = checked("positions", positions)
+    if x.shape != (n,):
+        rule = f"{n} balls need ({n},): a place for each ball"
+        raise ValueError(f"positions has shape {x.shape}; {rule}")
+    run = _Run(chain, model, hanging, hanging.within_reach(x))
     ended = run.to_the_end(at, most, least)
     x, v = (np.concatenate(parts) for parts in zip(*run.series, strict=True))
     at = at[: len(x)]
@@ -126,7 +129,7 @@ class _Run:
             c = int(np.argmin(distance))
             told = f"balls {c} and {c + 1} overlap by {-distance[c]:g} m"
             raise ValueError(f"positions = {x.tolist()}; {told}")
-        self.freed = [-math.inf] * (n - 1)  # when the force in each contact last fell to zero
+        self.freed = np.full(n - 1, -math.inf)  # when the force in each contact last fell to zero
         self.lasting = False
         if isinstance(model, SpringChain):
             m, power = chain.masses, 1.0 / (model.exponent + 1.0)
@@ -175,7 +178,7 @@ class _Run:
         touching = self.gaps() == 0.0
         touching[closing] = True
         self.x, self.v = x.copy(), v.copy()
-        groups = stretches(touching.tolist())
+        groups = stretches(touching)
         for first, last in groups:  # to where they touch but for rounding; their centre stays
             offset = hanging.offsets(first, last)
             self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
@@ -189,18 +192,15 @@ class _Run:
             touching = (self.gaps() == 0.0) & (np.diff(v) >= -RESTING * self.speed)
         struck = self.v
         # What opens at this instant rests no more in it, whatever else happens.
-        for c in opening:
-            self.freed[c] = self.t
-        near = touching.tolist()
-        settled = [self.t - freed > hanging.tie for freed in self.freed]
-        kept = [*map(all, zip(near, settled, strict=True))]
+        self.freed[opening] = self.t
+        kept = touching & (self.t - self.freed > hanging.tie)
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
         self.instants.append((self.t, x, self.x, v, struck, self.v, 0.0))
-        if any(resting):
+        if resting.any():
             alone = hanging.accelerations(self.x, self.v)
             resting = pressed(hanging.masses, alone, resting, 1e-12 * self.speed * hanging.fastest)
-        self.together = tuple(resting)
-        self.parting = tuple(t and not one for t, one in zip(near, resting, strict=True))
+        self.together = tuple(resting.tolist())
+        self.parting = tuple((touching & ~resting).tolist())
 
     def gaps(self) -> Vector:
         """Return the gaps of the contacts, m; 0 where balls touch."""
@@ -209,11 +209,8 @@ class _Run:
 
     def collide(self, groups: Sequence[Any], before: Vector) -> tuple[float, Vector, Vector]:
         """Solve the impacts of this instant as one; return how long, how far, and from which v."""
-        speeds, slow, duration, way = before.tolist(), RESTING * self.speed, 0.0, 0.0 * before
-        struck = [
-            (first, last) for first, last in groups
-            if any(a - b > slow for a, b in pairwise(speeds[first:last]))
-        ]  # fmt: skip
+        closing, duration, way = -np.diff(before) > RESTING * self.speed, 0.0, 0.0 * before
+        struck = [(first, last) for first, last in groups if closing[first : last - 1].any()]
         if not struck:
             return duration, way, before
         if self.lasting:  # the first half of the kick must know how long it takes
