@@ -1,9 +1,11 @@
 """Chapter "Measure your own cradle": what its text says, by second routes."""
 
 import math
+import re
 
 import numpy as np
 import pytest
+import real_cradles
 from chapters import Chapter, floats
 from scipy.stats import norm
 from stored import read
@@ -98,3 +100,23 @@ def test_exercise_and_the_blind_triplet():
         ]
         slope = np.linalg.norm(ends[1] - ends[0]) / 0.04
         assert float(GLUED[name]) == pytest.approx(slope, abs=6e-3)
+
+
+def test_gaps_that_one_speed_does_not_tell_apart_and_another_speed_does():
+    """All sets of the table by SciPy's integration: alike at 0.7 m/s, apart at 0.35."""
+    lines = re.findall(r"(m/s) +[\d.]+ +([\d.]+) +([\d.]+) +([\d.]+)", CHAPTER.printed("gaps-fit"))
+    sets = np.array([line[1:] for line in lines], float)
+    stiffness = 4 / 3 * 210e9 / (2 * (1 - 0.3**2)) * math.sqrt(0.01109 / 2)
+
+    def strike(gaps, speed, loss=3.2e-8):
+        unit = (0.0448 * speed**2 / stiffness) ** 0.4
+        gaps = [0.0, *(1e-6 * gaps / unit)]
+        return real_cradles.spheres(np.eye(5)[0], gaps, loss * speed / unit)
+
+    *alike, told = sets
+    CHAPTER.tells({"gap-sets": {6: "six"}[len(alike)]})
+    assert told == pytest.approx([3, 1.5, 0.5], abs=2 * float(GLUED["gap-error"]))
+    same, slower = (np.array([strike(one, speed) for one in alike]) for speed in (0.7, 0.35))
+    assert np.ptp(same, axis=0).max() < 5e-4  # numbers of two digits
+    apart = np.abs(slower[:, None] - slower).max(axis=-1)[np.triu_indices(6, 1)]
+    assert apart.min() > 2e-3  # the error of a reading
