@@ -241,6 +241,7 @@ def test_fig_half():
             assert drawn[:, 0] == pytest.approx(time)
             assert (drawn[:, 1] ** 2).sum() == pytest.approx(sum_, abs=0.6)
             assert sum_ > 2 * len(time)  # no law is right
+            assert (drawn[time > 24, 1] ** 2).mean() > 4  # in the end every fit is off
     rms = [np.sqrt(sum_ / len(time)) for sum_ in shown["constant loss"][1:]]
     CHAPTER.tells({"off-places": rms[0], "clock": rms[1]})
     # Where an outer ball turns within a window, the curve in its colour has that place.
