@@ -33,8 +33,6 @@ def numbers(name: str, values: ArrayLike | None, at: tuple[int, ...] = ()) -> Ve
     """Return `values` as floats of any size; an array of floats comes back as it is."""
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
-    if type(values) is float:
-        return np.array(values)
     given: Any = values
     with suppress(OverflowError, TypeError, ValueError):
         if isinstance(values, (list, tuple)):
@@ -50,7 +48,7 @@ def numbers(name: str, values: ArrayLike | None, at: tuple[int, ...] = ()) -> Ve
     rows = [numbers(name, row, (*at, k)) for k, row in enumerate(given)]
     for k, row in enumerate(rows):
         if row.shape != rows[0].shape:
-            other = f"{name}{place((*at, 0))} has {rows[0].shape}"
+            other = f"{name}{[*at, 0]} has {rows[0].shape}"
             raise refusal(name, (*at, k), f" has shape {row.shape}, {other}; must have one shape")
     return np.array(rows, dtype=np.float64)
 
@@ -194,25 +192,15 @@ def must_be(kind: type[_Thing], name: str, thing: object) -> _Thing:
 
 def refusal(name: str, at: tuple[int, ...], rest: str) -> ValueError:
     """Return the error that refuses a value at its place."""
-    return ValueError(f"{name}{place(at)}{rest}")
+    return ValueError(f"{name}{[*at] or ''}{rest}")
 
 
 def refuse_where(name: str, values: Vector, wrong: NDArray[np.bool_], rule: str) -> None:
     """Raise if any value is wrong."""
     if wrong.any():
-        at = first(wrong)
+        at = tuple(np.argwhere(wrong)[0].tolist())
         value = float(np.broadcast_to(values, wrong.shape)[at])
         raise refusal(name, at, f" = {value!r}; {rule}")
-
-
-def first(true: NDArray[np.bool_]) -> tuple[int, ...]:
-    """Return the index of the first true value."""
-    return tuple(int(k) for k in np.unravel_index(int(np.argmax(true)), true.shape))
-
-
-def place(at: tuple[int, ...]) -> str:
-    """Return an index as an error names it."""
-    return f"[{', '.join(str(int(k)) for k in at)}]" if at else ""
 
 
 def shown(value: object) -> str:

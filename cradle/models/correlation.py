@@ -131,9 +131,7 @@ class ImpulseCorrelation:
 
 def check_options(meeting: float, excess: str, max_events: int) -> None:
     """Raise if an option is outside its range."""
-    # The usual options first: they cost a call for one chain less than the checks in full.
-    if not (type(meeting) is float and 0.0 <= meeting <= 1.0):
-        asked.one_number("meeting", meeting, *asked.PART)
+    asked.one_number("meeting", meeting, *asked.PART)
     asked.one_of("excess", excess, ("raise", "saturate"))
     asked.whole_number("max_events", max_events, "at least 1 and below 2**63", high=2**63 - 1)
 
@@ -158,7 +156,7 @@ def check_values(bounded: bool, *values: ArrayLike) -> None:
     for name, given, bound in zip(("forward", "backward"), (f, b), bounds, strict=True):
         above = given > bound * LIMITS.rounded
         if above.any():
-            at, mirrored = asked.first(above), ", mirrored" * (name == "backward")
+            at, mirrored = tuple(np.argwhere(above)[0]), ", mirrored" * (name == "backward")
             rule = (
                 f"at ball {at[-1] + 1}, counted from 0, it must not exceed {float(bound[at]):.6g} "
                 f"(Eq. 53{mirrored}): a larger ratio would make a contact pull; excess='saturate' "
