@@ -1,9 +1,9 @@
 """What the command line shows: tables as text, CSV or JSON, and figures in files."""
 
 import csv
-import io
 import json
 import math
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -29,10 +29,8 @@ def show(
     if as_json:
         click.echo(json.dumps({"rows": list(rows), **extra}, indent=2))
     elif as_csv:
-        table = io.StringIO()
-        writer = csv.writer(table, lineterminator="\n")
-        writer.writerows([names, *([_plain(row[name]) for name in names] for row in rows)])
-        click.echo(table.getvalue(), nl=False)
+        cells = ([_plain(row[name]) for name in names] for row in rows)
+        csv.writer(sys.stdout, lineterminator="\n").writerows([names, *cells])
     else:
         click.echo(f"{text(rows, names)}\n{note}")
 
