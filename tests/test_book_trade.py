@@ -4,25 +4,33 @@ The table is measured (benchmarks/run.py); its velocities are compared with answ
 independent solver in truth.py, with closed formulas, and with converged springs from elsewhere.
 """
 
+import re
+import types
 from pathlib import Path
 
 import numpy as np
+import parts
 import pytest
 from chains import ELASTIC, HERTZ
 from chapters import Chapter, floats, points, shows
 from dop853 import integrated
 from measured_table import find, fused, sequential, table
+from scenes import random_chains
 from stored import read
 from truth import solve
 
 from cradle import (
     Chain,
     EnergyDistribution,
+    ImpactNotCertified,
     ImpulseCorrelation,
     SpringChain,
     collide,
     post_impact_velocities,
 )
+from cradle.kernel import EVENT_LOOP
+from cradle.runtime import compile as runtime
+from cradle.runtime import job
 
 ROOT = Path(__file__).parents[1]
 CHAPTER, ENGINES_PAGE = Chapter("trade"), Chapter("engines")
@@ -269,3 +277,31 @@ def test_fig_trade_total_equal_balls():
     exact = floats(solve([1] * 5, [1, 0, 0, 0, 0], 1, 0.132503287).velocities)
     missed = np.abs(exact - HERTZ["five equal"]).max()
     assert float(row["error"]) == pytest.approx(missed, rel=1e-2)
+
+
+def test_parts_of_the_rule():
+    """Of functions that the event loop has; without one the answers are the same, or refused."""
+    functions = {f for bodies in parts.WITHOUT.values() for f in bodies}
+    assert functions <= set(re.findall(r"def (\w+)", runtime.unit(EVENT_LOOP)))
+    table = read("parts.csv")
+    assert [row["part"] for row in table[::4]] == [*parts.WITHOUT]
+    refused = [row["chain"] for row in table if not row["saved"]]
+    assert refused == ["5 balls, random"]
+    assert max(float(row["difference"] or 0) for row in table) < 1e-14
+    saved = [[float(row["saved"]) for row in table if row["saved"] and (row["part"] == part)]
+             for part in parts.WITHOUT]  # fmt: skip
+    assert (
+        CHAPTER.glued["parts-long"] == f"{100 * min(saved[-1]):.0f} to {100 * max(saved[-1]):.0f} %"
+    )
+    assert CHAPTER.glued["parts-other"] == f"{100 * max(map(max, saved[:-1])):.0f} %"
+
+
+def test_plain_floats_let_groups_pass_each_other(monkeypatch):
+    """The event loop with them, not compiled."""
+    module = types.ModuleType("floats")
+    vars(module).update(dict.fromkeys(("jit", "apart", "door"), lambda function: function))
+    exec(parts.source(parts.WITHOUT["numbers of 32 digits"]), vars(module))
+    monkeypatch.setattr(job, "plain", module)
+    monkeypatch.setattr(runtime, "chosen", lambda *_: module)
+    with pytest.raises(ImpactNotCertified, match="have passed each other"):
+        post_impact_velocities(*random_chains(5, parts.COUNT), excess="saturate")

@@ -13,7 +13,8 @@ DATA = Path(__file__).parents[1] / "data"
 CHECKSUMS = DATA / "checksums.csv"
 MEASURED = (
     "benchmarks.csv", "cradle_*.csv", "extremes_*.csv", "film_*.csv",
-    "forces.csv", "gaps_*.csv", "implied_ratio.csv", "long_chains.csv", "scene_*.csv",
+    "forces.csv", "gaps_*.csv", "implied_ratio.csv", "long_chains.csv", "parts.csv",
+    "scene_*.csv",
 )  # fmt: skip
 
 
