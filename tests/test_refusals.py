@@ -59,7 +59,7 @@ def ratio_of(velocities):
 
 
 def light(masses, door):
-    """A ball too light for the event loop, at every door: two or three balls take short cuts."""
+    """A ball too light for the event loop, at every door."""
     velocities = [1.0] + [0.0] * (len(masses) - 1)
     if door == "batch":
         return post_impact_velocities(masses, velocities, 1, 0)

@@ -148,7 +148,7 @@ def test_a_batch_needs_inputs_outputs_and_a_small_work_area():
     results = 8 * 6 * count + count
     assert found.velocities.nbytes + found.collisions.nbytes < peak
     # A chunk's inputs (3 + 3 + 2 + 1 + 1 numbers a chain), with indices and as much again in spare.
-    chunk = 8 * 2 * 16 * batch.CHUNK[3]
+    chunk = 8 * 2 * 16 * batch.CHUNK
     assert peak <= results + chunk * (os.cpu_count() or 1) + 2**20
 
 
@@ -182,7 +182,7 @@ def within(seconds, function):
 
 @needs_numba
 def test_threads_do_not_change_a_bit(monkeypatch):
-    rows = batch.CHUNK[4]
+    rows = batch.CHUNK
     chains = mixed_batch(5 * rows + 77)
     whole = outcomes(*chains)
     for begin in range(0, len(whole.velocities), rows):
@@ -197,7 +197,7 @@ def test_threads_do_not_change_a_bit(monkeypatch):
 
 @needs_numba
 def test_an_error_in_the_middle_names_its_element():
-    rows = batch.CHUNK[4]
+    rows = batch.CHUNK
     m, v, e, f, b = mixed_batch(6 * rows)
     at, later = 2 * rows + 1234, 5 * rows + 1
     for array, value, message in (
@@ -218,7 +218,7 @@ def test_an_error_in_the_middle_names_its_element():
 
 @needs_numba
 def test_an_impact_that_does_not_finish_in_the_middle_is_handed_back():
-    rows = batch.CHUNK[3]
+    rows = batch.CHUNK
     m, v, e = np.ones((4 * rows, 3)), np.array([1.0, 0.0, 0.0]), 1.0
     m[[rows + 17, 3 * rows], 1] = 1e-6, 2e-6
     error = within(600, lambda: post_impact_velocities(m, v, e, 0.0, max_events=50))

@@ -16,8 +16,7 @@ from cradle.models import correlation as paper
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
 from cradle.trace import ImpactNotCertified, compared_as_objects
 
-#: Chains solved at a time, which bounds the memory; more where short cuts are likely.
-CHUNK = {2: 16_384, 3: 16_384, 4: 4096}
+CHUNK = 4096  #: Chains solved at a time, which bounds the memory.
 
 
 def post_impact_velocities(
@@ -101,14 +100,13 @@ def outcomes(
     given |= {"forward": forward, "backward": forward if backward is None else backward}
     arrays, lead = shaped(given, (0, 0, 1, 2, 2))  # the kernel checks whether these are in range
     n, count = arrays[0].shape[-1], math.prod(lead)
-    chunk = CHUNK[min(n, 4)]
     if count == 0:
         paper.check_values(options.bounded, *given.values())
     whole, large = outputs(count, n), count * n >= LARGE
 
     def solve(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
         """Solve the chunk of chains that begins there; return how it ended, and where."""
-        rows = slice(begin, min(begin + chunk, count))
+        rows = slice(begin, min(begin + CHUNK, count))
         part = Inputs(*(rows_of(array, lead, rows) for array in arrays))
         v, hits, collapsed, *last = whole
         out = Outputs(v[rows], hits[rows], collapsed[rows], *last)
@@ -116,9 +114,8 @@ def outcomes(
         # Not the job: its arrays would wait for those of the chunks before.
         return job.status, begin + job.next
 
-    starts = range(0, count, chunk)
     # At the first failure in the order of the chains; none has been returned before.
-    for status, failed in in_order(solve, starts, progress):
+    for status, failed in in_order(solve, range(0, count, CHUNK), progress):
         if status == REFUSED:
             paper.raise_refused(options.bounded, *given.values())
         if status != FINISHED:
