@@ -87,7 +87,7 @@ class SpringChain:
         fastest(chain)  # is within the range of floats
         contacts = (asked.row_of(name, getattr(self, name), n - 1, n) for name in _RULES)
         # As arrays that may be written to: else all would be compiled a second time.
-        row = Springs(*(np.array([row]) for row in (chain.masses, chain.velocities, *contacts)))
+        row = Springs(*(row[None].copy() for row in (chain.masses, chain.velocities, *contacts)))
         out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps), once)
         if progress:
             from tqdm import tqdm
