@@ -221,15 +221,9 @@ def follow(begun, resumed, n, chains, law, out, s, clocks, record, effort):
     """
     clock = clocks[0]
     for k in range(begun, len(out.v)):
-        v = chains.v[min(k, len(chains.v) - 1)]
+        v = chains.v[k]
         if not resumed:
-            chain = Springs(
-                chains.m[min(k, len(chains.m) - 1)],
-                v,
-                chains.k[min(k, len(chains.k) - 1)],
-                chains.loss[min(k, len(chains.loss) - 1)],
-                chains.gap[min(k, len(chains.gap) - 1)],
-            )
+            chain = Springs(chains.m[k], v, chains.k[k], chains.loss[k], chains.gap[k])
             measure(n, chain, law, s, clock)
             if clock.rule > 0:
                 return k, REFUSED

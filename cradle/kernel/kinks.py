@@ -44,7 +44,7 @@ class Link:
 
 
 class Springs(NamedTuple):
-    """Chains on springs, a row for each, or one for all."""
+    """Chains on springs, a row for each."""
 
     m: Any
     v: Any

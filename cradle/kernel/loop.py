@@ -30,7 +30,7 @@ from cradle.kernel.state import (
 
 
 class Inputs(NamedTuple):
-    """Chains: one a row, or one row for all."""
+    """Chains, one a row."""
 
     m: Any
     v: Any
@@ -260,11 +260,7 @@ def batch(begin, resumed, n, inputs, options, out, state, effort):
     for k in range(begin, len(out.v)):
         if not resumed:
             chain = Inputs(
-                inputs.m[min(k, len(inputs.m) - 1)],
-                inputs.v[min(k, len(inputs.v) - 1)],
-                inputs.e[min(k, len(inputs.e) - 1)],
-                inputs.forward[min(k, len(inputs.forward) - 1)],
-                inputs.backward[min(k, len(inputs.backward) - 1)],
+                inputs.m[k], inputs.v[k], inputs.e[k], inputs.forward[k], inputs.backward[k]
             )
             if not admissible(n, chain, options.bounded):
                 return k, REFUSED

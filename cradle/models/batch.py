@@ -180,10 +180,10 @@ def in_order(
 
 
 def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
-    """Return some rows of `array` broadcast to the leading shape, or the one row that all share."""
+    """Return some rows of `array` broadcast to the leading shape."""
     size = array.shape[-1]
     if array.size == size:
-        part = array.reshape(1, size)
+        part = np.broadcast_to(array.reshape(size), (rows.stop - rows.start, size))
     elif array.shape[:-1] == lead and array.flags.c_contiguous:
         part = array.reshape(-1, size)[rows]
     else:

@@ -90,7 +90,7 @@ def outputs(rows: int, n: int, last: bool = False) -> plain.Outputs:
 class Job:
     """Chains of n balls on their way through the event loop, from `inputs` into `outputs`."""
 
-    inputs: plain.Inputs  # a row for each chain, or one row for all
+    inputs: plain.Inputs  # a row for each chain
     outputs: plain.Outputs
     options: plain.Options
     room: int = 0  # events to record of the last chain, at most
