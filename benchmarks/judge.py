@@ -76,6 +76,7 @@ def on_bounds(problem):
     """The chain with its ratios within 4 roundings of their bounds (Eq. 53, mirrored) on them.
 
     Of the bounds as they are, or in floats, as they are drawn: at light balls these lose digits.
+    A bound that comes into force later, when a neighbour has ended, is not looked for.
     """
 
     def one_way(masses, ratios):
@@ -85,8 +86,8 @@ def on_bounds(problem):
             bound = beyond / (beyond + here * (1 - onward))
             drawn = 1 / (1 + float(here) / float(beyond) * (1 - float(onward)))
             off = min(abs(ratio / bound - 1), abs(float(ratio) / drawn - 1))
-            onward = bound if off < 4 * Decimal(2) ** -52 else ratio
-            found.insert(0, onward)
+            found.insert(0, bound if off < 4 * Decimal(2) ** -52 else ratio)
+            onward = min(found[0], bound)  # what lies above is held at it
         return found
 
     with decimal.localcontext(prec=4 * DIGITS):
@@ -170,7 +171,7 @@ def second_opinion(problem):
         return Verdict("given up")
     with decimal.localcontext(prec=50):
         try:
-            limit = problem.exact(2000, number=meaning).velocities
+            limit = on_bounds(problem).exact(2000, number=meaning).velocities
             far = off(problem, given, limit)
             return Verdict("as 50 digits" if far <= LIMIT else "unlike them", far)
         except truth.EventLimit:

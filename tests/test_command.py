@@ -470,6 +470,7 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("recommend --masses 1,1,1 --wanted path,x", 1, "--wanted 'x'; must be one of"),
         ("swing ABA --speed 2", 2, "leave --speed and --velocities out: the first ball is pulled"),
         ("plot ABA --output -", 2, "'-'; a picture goes to a file: give its name"),
+        ("swing 5 --output nowhere/toy.gif", 2, "'nowhere/toy.gif'; its folder is not there"),
         (f"{BAC} --slower 0", 1, "--slower = 0.0; must be above 0"),
         (f"{BAC} --window 0", 1, "cradle: --window 0.0; must be above 0"),
         (f"{BAC} --level", 2, "give --length or --period of the pendulums, or --level: one"),

@@ -153,6 +153,14 @@ def test_a_bound_is_meant_as_floats_draw_it():
     assert judge(problem, lambda _: as_it_is).word == "other reading"
 
 
+def test_a_bound_counts_on_what_is_in_force_beyond():
+    """Ball 3's ratio is above its bound, 1/2, and held there; with it ball 2's bound is 2/3."""
+    problem = Problem([1.0] * 5, [1.0] + [0.0] * 4, [1.0] * 4, [0.0, 2 / 3, 1.0], [0.0] * 3)
+    assert judge(problem).word == "right"
+    as_it_stands = [float(v) for v in exact(problem).velocities]
+    assert judge(problem, lambda _: as_it_stands).word == "other reading"
+
+
 def test_a_wrong_chain_is_shrunk():
     """To what an answer is wrong for: here two light balls beside each other."""
     long = Problem([1.0, 3.0, 0.3, 0.3, 1.0], [1.0, 0, 0, 0.5, 0], [0.9] * 4, [0.1] * 3, [0.1] * 3)

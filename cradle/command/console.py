@@ -78,6 +78,8 @@ def picture(_: click.Context, __: click.Parameter, path: str | None) -> str | No
     """Return where to draw; the sign for standard output is the name of no file."""
     if path == "-":
         raise click.BadParameter("'-'; a picture goes to a file: give its name")
+    if path and not Path(path).parent.is_dir():
+        raise click.BadParameter(f"{path!r}; its folder is not there")
     return path
 
 

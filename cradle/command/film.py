@@ -80,7 +80,7 @@ def film(
             numbers = (f"{x:.6g}" for x in (kilograms[k], *velocities))
             writer.writerow([name, shot or file.stem, k + 1, kind, *numbers])
         striker = max(range(len(types)), key=lambda k: abs(one.before[k])) + 1
-        when = f"ball {striker} strikes at {one.time:.4g} s, window {one.window:.3g} s"
+        when = f"ball {striker} strikes at {one.time:.4g} s, marks within {one.window:.3g} s"
         how = f"marks scatter by {one.scatter:.2g} m; chance of such a fit {one.probability:.2g}"
         click.echo(f"{file.name}: {when}, {how}{told}", err=True)
     if unit is None and len(wrong) < len(files):

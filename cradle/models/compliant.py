@@ -270,7 +270,7 @@ def viscosity_from(
     u = asked.one_number("speed", speed, *asked.ABOVE_ZERO)
     p, n = law.exponent, len(m)
     least = _parting(LONGEST, p)
-    rule = f"must lie in [{least:.3f}, 1]: a contact takes no more viscosity than that"
+    rule = f"must lie in [{least:.3f}, 1], from what the most viscosity leaves to none"
     kept = asked.number_or_row("restitution", restitution, "N - 1", rule, least, 1.0)
     e = asked.row_of("restitution", kept, n - 1, n)
     k = asked.row_of("stiffness", law.stiffness, n - 1, n)
