@@ -242,6 +242,26 @@ def test_threads_share_what_is_compiled(monkeypatch):
 
 
 @needs_numba
+@pytest.mark.usefixtures("fresh_runtime")
+def test_one_thread_at_a_time_looks_for_compiled_code(monkeypatch):
+    """A look parses the source: in Python 3.11 two threads at once can trip each other up."""
+    inside, most = [], []
+
+    def look(door):
+        inside.append(door)
+        most.append(len(inside))
+        time.sleep(0.02)
+        inside.pop()
+        return False
+
+    monkeypatch.setattr(runtime, "_found", look)
+    monkeypatch.setattr(runtime, "_spent", (runtime.LOADS_AFTER + runtime.PAYS_AFTER) / 2)
+    with ThreadPoolExecutor(4) as pool:
+        assert [*pool.map(lambda _: runtime.chosen() is kernel, range(4))] == [True] * 4
+    assert most == [1] * 4
+
+
+@needs_numba
 @pytest.mark.usefixtures("plain")
 def test_warm_up_compiles_what_calls_take():
     """A chain's own arrays, which nobody may write to, would be compiled for a second time."""

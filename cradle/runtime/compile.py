@@ -219,11 +219,12 @@ def chosen(large: bool = False, door: str = "batch") -> Any:
         return compiled()
     if wish == "plain" or not available() or _hurry.get():
         return plain
-    pays = wish == "compiled" or large or _spent > PAYS_AFTER
-    if not (pays or (_spent > LOADS_AFTER and _found(door))):
-        return plain
-    # Threads that come here together share one module, which numba compiles once.
+    # Threads that come here together share one module, which numba compiles once; and one at a time
+    # parses source, as a look does: in Python 3.11 two can trip each other up.
     with _deciding:
+        pays = wish == "compiled" or large or _spent > PAYS_AFTER
+        if not (pays or (_spent > LOADS_AFTER and _found(door))):
+            return plain
         module = compiled()
         if module is not None and not on_disk(door):
             _announce()
