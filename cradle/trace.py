@@ -142,8 +142,7 @@ class Trace:
             "impulse with the next (N s)": without_rounding(self.impulses),
             "collisions with the next": self.collisions,
         }
-        states = {"before": self.chain.velocities, "after": self.velocities}
-        return as_html(self.chain.masses, states, columns)
+        return as_html(len(self.chain), columns)
 
     def __repr__(self) -> str:
         counts = f"collisions={self.collisions.tolist()}, collapsed={self.collapsed}"

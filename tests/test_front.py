@@ -27,7 +27,6 @@ from cradle import (
     collide,
     paper_chain,
 )
-from cradle.formatting import as_html
 
 # --- the desk toy --------------------------------------------------------------------------
 
@@ -126,55 +125,31 @@ def cells(tree) -> list[list[str]]:
     return [[cell.text or "" for cell in row] for row in tree.iter("tr")]
 
 
-SVG = "{http://www.w3.org/2000/svg}"
-
-
-def test_picture_and_table_of_a_chain():
-    """HTML that is well formed cannot spill into a page; the picture has the page's colours."""
-    html = Chain([8, 1, 1], [1, 0, -2], [1, 0.5])._repr_html_()
-    tree = tree_of(html)
+def test_table_of_a_chain():
+    """HTML that is well formed cannot spill into a page."""
+    tree = tree_of(Chain([8, 1, 1], [1, 0, -2], [1, 0.5])._repr_html_())
     assert cells(tree) == [
         ["ball", "mass (kg)", "velocity (m/s)", "restitution with the next"],
         ["0", "8", "1", "1"],
         ["1", "1", "0", "0.5"],
         ["2", "1", "-2", ""],
     ]
-    radii = [float(circle.get("r")) for circle in tree.iter(f"{SVG}circle")]
-    assert radii[0] == pytest.approx(2 * radii[1])  # of one density
-    steps = [path.get("d").split(" h ")[1].split()[0] for path in tree.iter(f"{SVG}path")]
-    assert [float(step) for step in steps] == [15, -30]  # arrows: to the right, twice to the left
-    colours = re.findall(r'(?:fill|stroke|color)="([^"]*)"', html)
-    assert set(colours) == {"currentColor", "none"}
-    assert "style>" not in html
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
-def test_picture_and_table_of_a_trace(model):
+def test_table_of_a_trace(model):
     trace = collide(Chain([1, 1, 1], [1, 0, 0]), model)
     tree = tree_of(trace._repr_html_())
     head, *rows = cells(tree)
     assert head[2:4] == ["before (m/s)", "after (m/s)"]
     assert [row[3] for row in rows] == [f"{v + 0.0:.6g}" for v in trace.velocities]
     assert [row[5] for row in rows] == [*map(str, trace.collisions.tolist()), ""]
-    assert len(list(tree.iter(f"{SVG}circle"))) == 6
 
 
 def test_long_chains_are_cut():
     tree = tree_of(Chain([1] * 500, [1] + [0] * 499)._repr_html_())
     names = [row[0] for row in cells(tree)[1:]]
     assert names == [*map(str, range(8)), "…", *map(str, range(496, 500))]
-    assert len(list(tree.iter(f"{SVG}circle"))) == 12
-
-
-def test_pictures_of_extremes():
-    """Light balls are seen, nothing is infinite; text is escaped."""
-    light, tiny = Chain([1, 1e-150, 1], [0, 0, 0]), Chain([5e-324, 5e-324], [1e-300, -1e-300])
-    for chain, radii in ((light, [18, 2, 18]), (tiny, [18, 18])):
-        html = chain._repr_html_()
-        assert not re.search(r"nan|inf", html)
-        assert [float(c.get("r")) for c in tree_of(html).iter(f"{SVG}circle")] == radii
-    escaped = as_html(np.ones(1), {"<b>": np.zeros(1)}, {"&": np.zeros(1)})
-    assert [text.text for text in tree_of(escaped).iter(f"{SVG}text")] == ["<b>"]
 
 
 # --- tables and plots of a path ------------------------------------------------------------
