@@ -7,14 +7,12 @@ times; where each of the two hangs at rest is subtracted.  Small angles: gaps ar
 others.  Angles of 12 degrees lengthen a half swing by 1 ms.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from real_cradles import table
 from scipy.optimize import least_squares
 from stored import make
 
-from cradle import Chain, Pendulums, SequentialCollisions, swing
+from cradle import Chain, ConstantLoss, Pendulums, SequentialCollisions, SpeedDependent, swing
 
 RATE = 2000  # samples a second of a computed swing
 COLUMNS = ["law", "loss", "gap_m", "release_m", "release_s", "chi_places", "chi_times"]
@@ -24,19 +22,6 @@ STARTS = {
     "constant restitution": ([(0.994, 83e-6), (0.994, 91e-6), (0.9915, 70e-6)], (1e-3, 1e-5)),
     "touching": ([(0.988, 0.0), (0.993, 0.0)], (1e-3, None)),
 }
-
-
-@dataclass(frozen=True)
-class ConstantLoss(SequentialCollisions):
-    """Pairs that part more slowly than they met, by the same speed at every impact, m/s."""
-
-    lost: float = 0.0
-
-    def solve(self, chain):
-        """Solve an impact with e = 1 - lost / closing speed."""
-        closing = np.maximum(chain.closing_speeds, 1e-300)
-        e = np.clip(1 - self.lost / closing, 0, 1)
-        return super().solve(Chain(chain.masses, chain.velocities, e))
 
 
 def common():
@@ -70,8 +55,9 @@ def peaks():
 def swung(law, parameters, damping, period):
     """Return the run of `swing` of a law at (loss, gap, release place, release time)."""
     loss, gap, place, start = parameters
-    model = ConstantLoss(lost=loss) if law == "constant loss" else SequentialCollisions()
-    e = 1.0 if law == "constant loss" else loss
+    model, e = SequentialCollisions(), loss
+    if law == "constant loss":
+        model, e = SpeedDependent(model, ConstantLoss(loss)), 1.0
     hanging = Pendulums(9.81 * (period / 2 / np.pi) ** 2, gaps=gap, damping=damping)
     times = np.arange(0, 29.95 - start, 1 / RATE)
     return swing(Chain([1] * 5, [0] * 5, e), model, [place, 0, 0, 0, 0], times, pendulums=hanging)

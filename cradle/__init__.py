@@ -26,6 +26,7 @@ from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
+from cradle.models.speed import ConstantLoss, SpeedDependent, ViscousLoss
 from cradle.models.springs import TimedTrace
 from cradle.runtime.job import warm_up
 from cradle.swinging.pendulums import Pendulums
@@ -35,10 +36,11 @@ from cradle.tables import paper_chain, paper_sequences, ratio_table, restitution
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
 __all__ = [
-    "Chain", "DissipationTrace", "EnergyDistribution", "EnergyTrace", "Event", "FusedChain",
-    "Impact", "ImpactNotCertified", "ImpactNotFinished", "ImpulseCorrelation", "Model", "Outcomes",
-    "Pendulums", "QuadraticDissipation", "Recommendation", "SequentialCollisions", "SpringChain",
-    "Swing", "TimedTrace", "Trace", "collide", "outcomes", "paper_chain", "paper_sequences",
+    "Chain", "ConstantLoss", "DissipationTrace", "EnergyDistribution", "EnergyTrace", "Event",
+    "FusedChain", "Impact", "ImpactNotCertified", "ImpactNotFinished", "ImpulseCorrelation",
+    "Model", "Outcomes", "Pendulums", "QuadraticDissipation", "Recommendation",
+    "SequentialCollisions", "SpeedDependent", "SpringChain", "Swing", "TimedTrace", "Trace",
+    "ViscousLoss", "collide", "outcomes", "paper_chain", "paper_sequences",
     "post_impact_velocities", "ratio_table", "recommend", "restitution_table", "spring_velocities",
     "swing", "viscosity_from", "warm_up",
 ]  # fmt: skip

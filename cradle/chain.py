@@ -90,7 +90,7 @@ class Chain:
             "velocity (m/s)": self.velocities + 0.0,  # no -0
             "restitution with the next": self.restitution,
         }
-        return as_html(len(self), columns)
+        return as_html(columns)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Chain):

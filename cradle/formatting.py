@@ -19,17 +19,10 @@ def without_rounding(values: Vector) -> Vector:
     return np.where(small, 0.0, values) + 0.0
 
 
-def as_html(n: int, columns: Mapping[str, NDArray[Any]]) -> str:
-    """Return a table of n balls; of many, the first and the last ones."""
-    balls = list(range(n)) if n <= 12 else [*range(8), *range(n - 4, n)]
-    rows = [["ball", *columns]]
-    for ball in balls:
-        if ball and ball - 1 not in balls:
-            rows.append(["…"] * len(rows[0]))
-        cells = [f"{v[ball]:.6g}" if ball < len(v) else "" for v in columns.values()]
-        rows.append([str(ball), *cells])
-    head, *body = (
-        f"<tr>{''.join(f'<{tag}>{cell}</{tag}>' for cell in row)}</tr>"
-        for row, tag in zip(rows, ["th"] + ["td"] * len(rows), strict=False)
-    )
-    return f"<table><thead>{head}</thead><tbody>{''.join(body)}</tbody></table>"
+def as_html(columns: Mapping[str, NDArray[Any]]) -> str:
+    """Return a table of balls; of many the first and the last.  A column may be shorter."""
+    import pandas as pd
+
+    table = pd.DataFrame({name: pd.Series(column) for name, column in columns.items()})
+    form: dict[str, Any] = {"float_format": "{:.6g}".format, "na_rep": "", "max_rows": 12}
+    return str(table.rename_axis("ball", axis=1).to_html(**form))

@@ -142,7 +142,7 @@ class Trace:
             "impulse with the next (N s)": without_rounding(self.impulses),
             "collisions with the next": self.collisions,
         }
-        return as_html(len(self.chain), columns)
+        return as_html(columns)
 
     def __repr__(self) -> str:
         counts = f"collisions={self.collisions.tolist()}, collapsed={self.collapsed}"

@@ -6,7 +6,6 @@ import io
 import json
 import math
 import os
-import queue
 import re
 import shlex
 import subprocess
@@ -32,7 +31,6 @@ from cradle import (
 )
 from cradle import kernel as plain
 from cradle.command.console import text as shown
-from cradle.command.describe import described
 from cradle.command.solve import main, run
 from cradle.fit import ratio, read_shots
 from cradle.runtime import compile as runtime
@@ -196,18 +194,6 @@ def test_a_swing_is_drawn(folder, name, begins):
     said = call(f"swing 3 --pull 2 --seconds 0.4 --ratio 0.1 -o {name}")
     assert said.startswith(f"drawn to {name}; impacts: 1\nmodel: ")
     assert (folder / name).read_bytes().startswith(begins)
-
-
-def test_long_work_is_told_of_after_a_while(monkeypatch):
-    """And what would be faster; nothing of short work."""
-    said = queue.Queue()
-    monkeypatch.setattr("click.echo", lambda words, err: said.put((words, err)))
-    with described("3").waiting():
-        pass
-    with described("3", model="sequential").waiting(after=0.01):
-        words = "cradle: still working; fewer balls would be faster"
-        assert said.get(timeout=60) == (words, True)
-    assert said.empty()
 
 
 def test_the_papers_balls_by_another_law():

@@ -73,6 +73,9 @@ ENTRIES = {
     ImpulseCorrelation: RATIOS,
     SequentialCollisions: {"order": "left", "max_events": 100},
     FusedChain: {},
+    cradle.SpeedDependent: {"model": MODEL, "restitution": cradle.ConstantLoss(0.1)},
+    cradle.ConstantLoss: {"speed": 0.1},
+    cradle.ViscousLoss: {"viscosity": 1e-3, "masses": [1, 1]} | SPRINGS,
     SpringChain: FORCES | {"max_steps": 10_000},
     EnergyDistribution: SPRINGS | {"rtol": 1e-6, "max_evaluations": 10_000, "gaps": True},
     cradle.spring_velocities: {

@@ -5,15 +5,23 @@ import numpy as np
 import pytest
 from chains import uniform
 from real_cradles import table
-from real_swing import ConstantLoss
 from stored import read
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, SequentialCollisions, swing
+from cradle import (
+    Chain,
+    ConstantLoss,
+    ImpulseCorrelation,
+    Pendulums,
+    SequentialCollisions,
+    SpeedDependent,
+    swing,
+)
 from cradle.fit import fit_swing
 from cradle.fit.swings import _Film
 
 LAW = ImpulseCorrelation(0.1)
 NUMBERS = ("period", "damping", "restitution", "gaps")
+LOSS = SpeedDependent(SequentialCollisions(), ConstantLoss(1e-3))
 TRUE = dict(zip(NUMBERS, (0.8, 0.02, 0.98, 1e-4)))
 
 
@@ -156,7 +164,7 @@ def test_film_without_an_impact_tells_no_restitution():
 def test_a_law_that_does_not_fit_is_said_and_intervals_grow():
     """A constant loss of speed, and a tracker that wanders."""
     true = TRUE | {"restitution": 1.0}
-    times, places = filmed(true, [-0.03, 0, 0, 0, 0], 6, 60, 2e-4, 3, ConstantLoss(lost=1e-3))
+    times, places = filmed(true, [-0.03, 0, 0, 0, 0], 6, 60, 2e-4, 3, LOSS)
     fit = fit_swing(times, places + wander(places.shape, 3e-4, 60, 3), LAW)
     assert fit.poor
     assert fit.correlation > 0.3
@@ -189,7 +197,7 @@ def test_forty_films(misfit):
         ends = ((0.6, 0.9), (0.01, 0.04), (0.94, 0.997), (2e-5, 2e-4))
         true = {name: uniform(rng, *two) for name, two in zip(NUMBERS, ends)}
         true["restitution"] = 1.0 if misfit else true["restitution"]
-        law = ConstantLoss(lost=1e-3) if misfit else SequentialCollisions()
+        law = LOSS if misfit else SequentialCollisions()
         pulled = [-uniform(rng, 0.02, 0.03), 0, 0, 0, 0]
         times, places = filmed(true, pulled, 10, 60, 2e-4, seed, law)
         fit = fit_swing(times, places + misfit * wander(places.shape, 3e-4, 60, seed), LAW)

@@ -111,11 +111,3 @@ def test_stored_fits_of_the_half_minute(row):
     run = real_swing.swung(row["law"], p, *MEAN[1:3])
     chi = (real_swing.misfits(run, p[3], real_swing.peaks()) ** 2).sum(axis=1)
     assert chi == pytest.approx([float(row["chi_places"]), float(row["chi_times"])], rel=1e-2)
-
-
-def test_a_constant_loss_of_speed_loses_that_speed():
-    for closing, left in ((1.0, 0.9), (0.2, 0.1), (0.05, 0.0)):
-        chain = Chain([1, 3], [closing, 0], 1)
-        v = collide(chain, real_swing.ConstantLoss(lost=0.1)).velocities
-        assert v[1] - v[0] == pytest.approx(left, abs=1e-12)
-        assert v[0] + 3 * v[1] == pytest.approx(closing)

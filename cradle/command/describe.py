@@ -2,9 +2,7 @@
 
 import functools
 import math
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import click
@@ -68,19 +66,6 @@ class Described(NamedTuple):
     model: cradle.Model
     assumed: tuple[str, ...]
     letters: str = ""
-
-    @contextmanager
-    def waiting(self, after: float = 2.0) -> Iterator[None]:
-        """Say after some seconds that work goes on, and what would be faster."""
-        slow = isinstance(self.model, (cradle.SpringChain, cradle.EnergyDistribution))
-        quicker = "--ratio 0.1 or --model sequential would take seconds"
-        said = f"cradle: still working; {quicker if slow else 'fewer balls would be faster'}"
-        teller = threading.Timer(after, click.echo, [said], {"err": True})
-        teller.start()
-        try:
-            yield
-        finally:
-            teller.cancel()
 
     @property
     def note(self) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from cradle import ImpactNotCertified, ImpactNotFinished, SpringChain, collide
+from cradle import ImpactNotCertified, ImpactNotFinished, collide
 from cradle.advice.choice import made
 from cradle.command.console import format_options, image_format, picture, show
 from cradle.command.describe import chain_options, described
@@ -87,8 +87,7 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
     """
     given = described(**options)
     chain = given.chain
-    with given.waiting():
-        trace = collide(chain, given.model, progress=isinstance(given.model, SpringChain))
+    trace = collide(chain, given.model, progress=True)
     letters = given.letters or "-" * len(chain)
     rows = [
         {"ball": k + 1, "type": letters[k], "mass": float(chain.masses[k]),
@@ -131,9 +130,7 @@ def plot(output: str, **options: Any) -> None:
     from cradle.pictures.impacts import velocities
 
     given, figure = described(**options), Figure((7, 4.3), layout="constrained")
-    with given.waiting():
-        trace = collide(given.chain, given.model)
-    velocities(trace, figure.subplots())
+    velocities(collide(given.chain, given.model, progress=True), figure.subplots())
     figure.savefig(output, format=image_format(output))
     click.echo(f"drawn to {output}\n{given.note}")
 

@@ -69,8 +69,7 @@ def swing(
     places = _released(pull or [1.0], by, len(chain))
     balls = cradle.Chain(chain.masses, [0.0] * len(chain), chain.restitution)
     times = [seconds * k / steps for k in range(steps + 1)]
-    with given.waiting():
-        run = cradle.swing(balls, given.model, places, times, pendulums=hanging)
+    run = cradle.swing(balls, given.model, places, times, pendulums=hanging)
     rows = [
         {"time": float(time), **{f"ball {k + 1}": float(x) + 0.0 for k, x in enumerate(places)}}
         for time, places in zip(run.times, run.positions, strict=True)

@@ -17,6 +17,14 @@ class Model(Protocol):
         """Return the path of the impact of `chain`."""
 
 
+def a_model(model: object) -> None:
+    """Raise if this is no impact model."""
+    if isinstance(model, type):
+        raise TypeError(f"model is the class {model.__name__}; must be made: {model.__name__}(...)")
+    if not hasattr(model, "solve"):
+        raise TypeError(f"model is {a(type(model).__name__)}; must be an impact model")
+
+
 def collide(
     chain: Chain, model: Model, *, record: bool | None = None, progress: bool = False
 ) -> Trace:
@@ -32,8 +40,8 @@ def collide(
         Whether to keep the path; for `ImpulseCorrelation` only.  Left out, a path of more than ten
         million numbers (2 N - 1 for each event) is cut, with a warning.
     progress : bool
-        Show how many events `ImpulseCorrelation` has counted so far, or, after two seconds, how
-        many steps `SpringChain` has made; other models ignore it.
+        After two seconds, show how many events `ImpulseCorrelation` has counted so far, or how many
+        steps `SpringChain` has made; other models ignore it.
 
     Returns
     -------
@@ -54,10 +62,7 @@ def collide(
     [0.0, 0.0, 1.0]
     """
     must_be(Chain, "chain", chain)
-    if isinstance(model, type):
-        raise TypeError(f"model is the class {model.__name__}; must be made: {model.__name__}(...)")
-    if not hasattr(model, "solve"):
-        raise TypeError(f"model is {a(type(model).__name__)}; must be an impact model")
+    a_model(model)
     if isinstance(model, ImpulseCorrelation):
         trace = model.solve(chain, record=record, progress=progress)
         advice = "; record=True keeps all, record=False none"

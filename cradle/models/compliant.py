@@ -269,14 +269,14 @@ def viscosity_from(
     m = Chain(given, np.zeros(given.shape)).masses
     u = asked.one_number("speed", speed, *asked.ABOVE_ZERO)
     p, n = law.exponent, len(m)
-    least = _parting(LONGEST, p)
+    least = parting(LONGEST, p)
     rule = f"must lie in [{least:.3f}, 1], from what the most viscosity leaves to none"
     kept = asked.number_or_row("restitution", restitution, "N - 1", rule, least, 1.0)
     e = asked.row_of("restitution", kept, n - 1, n)
     k = asked.row_of("stiffness", law.stiffness, n - 1, n)
     own = [
-        brentq(lambda a, x=x: _parting(a, p) - x, 0.0, LONGEST, xtol=1e-12)
-        for x in np.minimum(e, _parting(0.0, p))  # which is 1, but for rounding
+        brentq(lambda a, x=x: parting(a, p) - x, 0.0, LONGEST, xtol=1e-12)
+        for x in np.minimum(e, parting(0.0, p))  # which is 1, but for rounding
     ]
     mass = m[:-1] / (m[:-1] + m[1:]) * m[1:]
     depth = np.exp((np.log(mass) + 2.0 * np.log(u) - np.log(k)) / (p + 1.0))
@@ -284,7 +284,7 @@ def viscosity_from(
 
 
 @functools.cache
-def _parting(viscosity: float, exponent: float) -> float:
+def parting(viscosity: float, exponent: float) -> float:
     """Return the speed at which two balls part that close with 1, in their own units."""
     # Their compression d has d'' = -d**(p - 1) (d + A p d'), until that would pull.
     from scipy.integrate import solve_ivp

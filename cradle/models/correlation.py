@@ -94,7 +94,7 @@ class ImpulseCorrelation:
         if asked.flag("progress", progress):
             from tqdm import tqdm
 
-            with tqdm(unit=" events") as bar:
+            with tqdm(unit=" events", delay=2.0) as bar:
                 job.run(pause=lambda: bar.update(job.tally("events") - bar.n))
         else:
             job.run()

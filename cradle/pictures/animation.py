@@ -28,15 +28,8 @@ def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Anima
     The balls fly in.  Then the clock stands still, for an impact takes no time: the diagram grows
     with the impulses, a star marks each contact that is pressed, and the bars on the balls are
     their velocities at that point of the diagram.  At last the balls fly off.  The still shows the
-    end of the impact.
-
-    Parameters
-    ----------
-    trace : Trace
-    contact : int, optional
-        Draw this contact's velocity-impulse diagram; if left out, the velocities of all balls.
-    alt : str
-        What the picture shows, for those who do not see it.
+    end of the impact.  The diagram is the velocity-impulse diagram of `contact`, or if it is left
+    out the velocities of all balls; `alt` says what the picture shows to those who do not see it.
 
     Examples
     --------
@@ -123,16 +116,14 @@ def animate_swing(
     ----------
     runs : Swing or sequence of Swing
         Their times are the keyframes, with the impacts in between: twenty in a swing suffice.
-    labels : sequence of str
-        A line of text above each.
+    labels, alt : sequence of str, str
+        A line of text above each; what the picture shows, for those who do not see it.
     speed : float
         1 plays in real time, less in slow motion.
     still : float
         What print and readers who ask for less motion see, s after the first of the times.
     columns : int
         How many stand side by side.
-    alt : str
-        What the picture shows, for those who do not see it.
 
     Raises
     ------

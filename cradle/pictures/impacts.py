@@ -65,13 +65,8 @@ def axes_or_new(ax: Axes | None) -> Axes:
 def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     """Draw the velocities of all balls against the progress of the impact.
 
-    Those of springs are curves: lines join the steps of the integration.
-
-    Parameters
-    ----------
-    trace : Trace
-    ax : Axes, optional
-        Where to draw; new axes if left out.
+    Those of springs are curves: lines join the steps of the integration.  New axes if `ax` is left
+    out.
 
     Examples
     --------
@@ -102,17 +97,8 @@ def velocity_impulse(
     The velocities of the contact's two balls stand against its impulse (sections 2.3, 2.4 and 3.2).
     Where other contacts act while this one rests, its impulse does not grow, and a velocity jumps.
     Markers and letters show the contact's events (`EVENT_STYLES`); with several collisions the
-    letter carries a number.
-
-    Parameters
-    ----------
-    trace : Trace
-    contact : int
-        Contact c joins balls c and c + 1.
-    ax : Axes, optional
-        Where to draw; new axes if left out.
-    other : int, optional
-        Contact whose impulse an upper axis shows, as by `impulse_axis`.
+    letter carries a number.  Contact c joins balls c and c + 1; an upper axis shows the impulse of
+    the contact `other`, as by `impulse_axis`.  New axes if `ax` is left out.
 
     Examples
     --------
@@ -175,17 +161,8 @@ def impulse_axis(
     """Add an upper axis with another contact's impulse to a diagram, and return its axes.
 
     The two do not grow in one proportion: each tick stands where the path of the impact has it.
-
-    Parameters
-    ----------
-    trace : Trace
-    contact, other : int
-        Contacts whose impulses the lower axis and the upper one show.
-    ax : Axes
-        Axes drawn by `velocity_impulse`.
-    values : array_like, optional
-        Impulses to mark, N s. If left out, those at the events; where the lower contact rests
-        while the other one acts, the tick shows the impulse before and after.
+    `contact` is that of the lower axis, as drawn by `velocity_impulse`; `values` are the impulses
+    to mark, N s.  If left out, those at the events are, two where the lower contact rests.
 
     Examples
     --------

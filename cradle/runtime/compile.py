@@ -14,6 +14,7 @@ import logging
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -177,6 +178,13 @@ def loaded(door: str = "batch") -> bool:
 
 def call(door: Callable[..., Any], *arguments: Any) -> Any:
     """Call the kernel; compiled code on disk that cannot be read is removed, and made anew."""
+    global _spent
+    if door in (plain.batch, plain.follow):
+        begun = time.perf_counter()
+        try:
+            return door(*arguments)
+        finally:
+            _spent += time.perf_counter() - begun
     try:
         return door(*arguments)
     except Exception as error:  # half a file can raise anything; the kernel itself nothing
@@ -188,12 +196,6 @@ def call(door: Callable[..., Any], *arguments: Any) -> Any:
         told = "compiled code in %s cannot be read (%r); compiled anew, up to a minute"
         logger.warning(told, broken[0].parent, error)
     return door(*arguments)
-
-
-def spend(seconds: float) -> None:
-    """Count seconds of plain work."""
-    global _spent
-    _spent += seconds
 
 
 @contextlib.contextmanager

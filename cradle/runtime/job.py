@@ -6,7 +6,6 @@ and small work can begin plain and go on compiled.
 
 import functools
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, get_type_hints
@@ -112,14 +111,11 @@ class Job:
             if self.compiled is not (kernel is not plain):
                 self._begin(kernel is not plain)
                 resumed = False
-            begun = time.perf_counter()
             effort = _EFFORT[bool(self.compiled)]
             self.next, self.status = runtime.call(
                 kernel.batch, self.next, resumed, self.n, self.given, self.options, self.outputs,
                 self.state, effort,
             )  # fmt: skip
-            if not self.compiled:
-                runtime.spend(time.perf_counter() - begun)
             if pause is not None:
                 pause()
             resumed = self.status == PAUSED

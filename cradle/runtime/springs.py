@@ -1,7 +1,6 @@
 """From arrays to the loop of the contact forces and back: work area, pauses, plain or compiled."""
 
 import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -51,10 +50,8 @@ def solve(
             given = chains if compiled else Springs(*(part.tolist() for part in chains))
         door = kernel.follow if compiled else plain.follow
         effort = _EFFORT[compiled] if record is None else _PAGES
-        fixed, begun = (n, given, law, out, *area, pages, effort), time.perf_counter()
+        fixed = n, given, law, out, *area, pages, effort
         k, status = runtime.call(door, k, status == PAUSED, *fixed)
-        if not compiled:
-            runtime.spend(time.perf_counter() - begun)
         if pause is not None:
             pause(int(clock["effort"] + clock["steps"] * (status == PAUSED)))
         if record is not None:

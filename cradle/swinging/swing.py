@@ -265,7 +265,9 @@ def part(model: Any, n: int, first: int, last: int) -> Model:
     if last - first < n and is_dataclass(model):
         for name in (field.name for field in fields(model)):
             value = getattr(model, name)
-            if name == "excess":  # a ratio's bound may count on the next ball (Eq. 53)
+            if hasattr(value, "solve"):  # a law within a law
+                changes[name] = part(value, n, first, last)
+            elif name == "excess":  # a ratio's bound may count on the next ball (Eq. 53)
                 changes["excess"] = "saturate"
             elif isinstance(value, tuple | list) and len(value) in (n - 1, n - 2):
                 missing = n - len(value)  # 1: one for each contact; 2: one for each inner ball

@@ -1,0 +1,146 @@
+"""Restitution that depends on the closing speed."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from chains import magnitudes, uniform
+from scipy.special import beta
+
+from cradle import (
+    Chain,
+    ConstantLoss,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    Pendulums,
+    SequentialCollisions,
+    SpeedDependent,
+    ViscousLoss,
+    collide,
+    spring_velocities,
+    swing,
+)
+from cradle.models import correlation
+
+STEEL = {"masses": [0.045, 0.03], "stiffness": 1e10}
+MASS = 0.018  # the reduced one of these
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("model", [ImpulseCorrelation(0.1), SequentialCollisions()], ids=repr)
+def test_two_balls_part_as_the_law_says(model, seed):
+    rng = np.random.default_rng(seed)
+    m, v = magnitudes(rng, 6, 2), [uniform(rng, 0, 1), -uniform(rng, 0, 1)]
+    u = v[0] - v[1]
+    for law, parts in ((ConstantLoss(0.1), max(u - 0.1, 0)), (lambda u: u / 3, u * u / 3)):
+        trace = collide(Chain(m, v), SpeedDependent(model, law))
+        assert trace.velocities[1] - trace.velocities[0] == pytest.approx(parts, abs=1e-14)
+        assert trace.velocities @ m == pytest.approx(np.dot(v, m), abs=1e-13 * m.max())
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_each_contact_has_the_restitution_of_its_fastest_closing(seed):
+    """Solved once more with the restitutions that were found, the impact has just those speeds."""
+    rng = np.random.default_rng(seed)
+    model, law = ImpulseCorrelation(0.1, excess="saturate"), ConstantLoss(0.05)
+    chain = Chain(uniform(rng, 0.5, 2, 5), [1, 0, 0, 0, 0])
+    trace = collide(chain, SpeedDependent(model, law))
+    again = collide(Chain(chain.masses, chain.velocities, trace.chain.restitution), model)
+    assert again.velocities.tolist() == trace.velocities.tolist()
+    fastest = (again.path[:, :-1] - again.path[:, 1:]).max(axis=0)
+    assert again.chain.restitution == pytest.approx([law(u) if u > 0 else 1 for u in fastest])
+    assert trace.energy_loss == pytest.approx(
+        chain.kinetic_energy - 0.5 * (chain.masses * trace.velocities) @ trace.velocities
+    )
+
+
+def test_restitutions_that_never_agree_are_said():
+    fickle = itertools.cycle([0.2, 0.3, 0.4])
+    with pytest.raises(ImpactNotFinished, match="do not agree after 50 runs"):
+        collide(
+            Chain([1, 1], [1, 0]), SpeedDependent(SequentialCollisions(), lambda _: next(fickle))
+        )
+
+
+def test_a_path_that_is_cut_tells_no_speeds(monkeypatch):
+    """What is left out could be faster."""
+    monkeypatch.setattr(correlation, "_MOST_NUMBERS", 11)
+    with pytest.raises(ImpactNotFinished, match="do not agree"):
+        collide(Chain([1, 1, 1], [1, 0, 0]), SpeedDependent(ImpulseCorrelation(0.1), lambda _: 0.9))
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"restitution": 0.9}, TypeError, r"restitution = 0\.9; must be a law e\(u\)"),
+        ({"model": 3}, TypeError, "model is an int; must be an impact model"),
+        ({"restitution": lambda _: 1.5}, ValueError, r"restitution\(u\)\[0\] = 1\.5; must lie in"),
+        ({"restitution": lambda _: math.nan}, ValueError, r"restitution\(u\)\[0\] = nan; must be"),
+        (
+            {"restitution": lambda _: "a"},
+            ValueError,
+            r"restitution\(u\)\[0\] = 'a'; must be a real",
+        ),
+        ({"e": 0.9}, ValueError, r"restitution\[0\] = 0\.9; must be 1: SpeedDependent has its own"),
+    ],
+)
+def test_what_is_refused(change, error, words):
+    given = {"model": SequentialCollisions(), "restitution": ConstantLoss(0.1), "e": 1} | change
+    chain = Chain([1, 1], [1, 0], given.pop("e"))
+    with pytest.raises(error, match=words):
+        collide(chain, SpeedDependent(**given))
+
+
+def test_a_part_of_a_swinging_row_has_its_part_of_the_inner_law():
+    """Balls 0 to 2 touch and are struck, with the ratio of ball 1; the others hang apart."""
+    hanging = Pendulums(0.1, gaps=[0, 0, 0.02, 0])
+    law = ImpulseCorrelation((0.05, 0.1, 0.15))
+    runs = [
+        swing(Chain([1] * 5, [0] * 5), model, [-0.02, 0, 0, 0, 0], [0, 0.2], pendulums=hanging)
+        for model in (law, SpeedDependent(law, lambda _: 1.0))
+    ]
+    assert runs[0].positions.tolist() == runs[1].positions.tolist()
+    with pytest.raises(ValueError, match="forward has 2 values; 5 balls need 3"):
+        swing(
+            Chain([1] * 5, [0] * 5),
+            SpeedDependent(ImpulseCorrelation((0.1, 0.2)), abs),
+            [0] * 5,
+            [0],
+        )
+
+
+# --- viscous balls --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("exponent", [1, 1.5, 2.5])
+@pytest.mark.parametrize("u", [1e-3, 0.1, 0.7])
+def test_viscous_balls_part_as_contact_forces_say(exponent, u):
+    law = ViscousLoss(1e-7, exponent=exponent, **STEEL)
+    left, right = spring_velocities(
+        STEEL["masses"],
+        [u, 0],
+        STEEL["stiffness"],
+        exponent=exponent,
+        viscosity=1e-7,
+        accuracy=1e-9,
+    )
+    assert law(u) == pytest.approx((right - left) / u, abs=3e-9)
+
+
+def test_viscous_spheres_lose_as_the_series_says():
+    """Ramirez et al. (1999), to the second order of the loss, which falls as its square."""
+    first = 1.2 * 1.25**0.6 * beta(0.6, 1.5)  # 1.5 * 1.15344
+    for viscosity in (1e-9, 1e-8):
+        law = ViscousLoss(viscosity, **STEEL)
+        for u in (0.01, 1):
+            small = viscosity * (STEEL["stiffness"] / MASS) ** 0.4 * u**0.2
+            series = 1 - first * small + 0.6 * (first * small) ** 2
+            assert law(u) == pytest.approx(series, abs=2 * small**2.5 + 2e-10)
+
+
+def test_a_viscous_ball_may_be_too_fast():
+    law = ViscousLoss(1e-5, **STEEL)
+    assert 0.6 < law(1e-2) < law(1e-3) < 1
+    with pytest.raises(ValueError, match=r"viscosity = 1e-05; must be at most \d.* at u = 1000"):
+        law(1000)
