@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tqdm
 from chains import random_chains, with_ends
 from plain import solve
 
@@ -518,6 +519,8 @@ def test_progress_of_one_long_impact_is_shown(plain, capsys, on, monkeypatch):
     chain, model = Chain(*LONG[:3]), ImpulseCorrelation(*LONG[3:])
     expected = collide(chain, model)
     assert not capsys.readouterr().err
+    bar = tqdm.tqdm
+    monkeypatch.setattr("tqdm.tqdm", lambda unit, delay: bar(unit=unit, delay=0 * delay))
     same(collide(chain, model, progress=True), expected)
     assert f"{len(expected.events)} events" in capsys.readouterr().err
 
