@@ -125,8 +125,7 @@ class Trace:
     def plot(self, ax: "Axes | None" = None, *, contact: int | None = None) -> "Axes":
         """Draw the velocities over the impact, or the velocity-impulse diagram of a contact.
 
-        As `velocities` and `velocity_impulse` of `cradle.pictures.impacts`, into new axes if `ax`
-        is left out.  A `contact` that the chain does not have is a `ValueError`.
+        As `velocities` and `velocity_impulse` of `cradle.pictures.impacts`, with their errors.
         """
         from cradle.pictures import impacts as figures
 

@@ -110,7 +110,4 @@ class FusedChain:
             told = f"velocities leave it undefined which balls move as one body: {what}"
             rule = "needs one approaching contact and equal velocities on either side of it"
             raise ValueError(f"{told}; FusedChain {rule}")
-        return replace(_LARGEST.solve(chain), model=self)
-
-
-_LARGEST = ImpulseCorrelation(1.0, 1.0, excess="saturate")
+        return replace(ImpulseCorrelation(1.0, 1.0, excess="saturate").solve(chain), model=self)

@@ -94,7 +94,7 @@ class ConstantLoss:
 
 @dataclass(frozen=True)
 class ViscousLoss:
-    """Restitution of two viscoelastic balls, that of contact forces with this viscosity.
+    """Restitution of viscoelastic balls (Ramirez et al., Phys. Rev. E 60 (1999) 4465-4472).
 
     Parameters
     ----------
@@ -102,10 +102,6 @@ class ViscousLoss:
         A, s, k, N/m^p, and p, as for `spring_velocities`; on a call the loss must be within theirs.
     masses : sequence of two floats
         kg.
-
-    References
-    ----------
-    Ramirez, Poeschel, Brilliantov and Schwager, Phys. Rev. E 60 (1999) 4465-4472.
 
     Examples
     --------

@@ -203,17 +203,22 @@ class FullFlight:
         self.body = np.cumsum([0, *(not one for one in together)])
         self.first = np.unique(self.body, return_index=True)[1]
         self.waits = self.half * (1.0 - TIE) * np.array(parting)[self.first[1:] - 1]
+        self.gaps = hanging.gaps[self.first[1:] - 1]
         self.start = np.concatenate([x[self.first], v[self.first]])
 
     def _rate(self, _: float, y: Vector) -> Vector:
         x, v = np.split(y, 2)
         return np.concatenate([v, -self.gravity * np.sin(x / self.length) - 2.0 * self.damping * v])
 
+    def _apart(self, t: float, y: Vector) -> Vector:
+        """Return how far bodies are from their neighbours; infinity where they part for long."""
+        return np.where(t > self.waits, self.gaps + np.diff(y[: len(y) // 2]), np.inf)
+
     def _integrate(self, begin: float, y: Vector, end: float, **options: Any) -> Any:
         from scipy.integrate import solve_ivp  # slow to import, and only needed here
 
         least = _RTOL * max(float(np.abs(self.start).max()), 1e-300)
-        known = {"method": "DOP853", "rtol": _RTOL, "atol": least}
+        known = {"method": "DOP853", "rtol": _RTOL, "atol": least, "max_step": self.half / 4.0}
         found = solve_ivp(self._rate, (begin, end), y, **known, **options)
         if found.status < 0:
             raise RuntimeError(f"the integration of the pendulums failed: {found.message}")
@@ -223,15 +228,21 @@ class FullFlight:
         """Return the first event within `horizon` seconds."""
 
         def nearest(t: float, y: Vector) -> float:
-            return float(np.diff(y[: len(y) // 2])[t > self.waits].min(initial=1.0))
+            return float(self._apart(t, y).min(initial=1.0))
 
+        n = len(self.first)
         vars(nearest).update(terminal=True, direction=-1)
-        found = self._integrate(0.0, self.start, horizon, events=nearest, max_step=self.half / 4.0)
+        turns = [lambda _, y, c=n + c: y[c + 1] - y[c] for c in np.flatnonzero(self.gaps)]
+        found = self._integrate(0.0, self.start, horizon, events=[nearest, *turns])
+        # A gap may close and open again within a step: where the balls turn they overlap then.
+        turned = map(zip, found.t_events[1:], found.y_events[1:])
+        if missed := [t for one in turned for t, y in one if nearest(t, y) < 0.0]:
+            found = self._integrate(0.0, self.start, min(missed), events=nearest)
         if found.status == 0:
             return math.inf, [], []
-        time, (x, v) = float(found.t[-1]), np.split(found.y[:, -1], 2)
-        gaps = np.where(time > self.waits, np.diff(x), np.inf)
-        met = (gaps + self.tie * np.diff(v) <= 0.0) | (gaps == gaps.min())
+        time, y = float(found.t[-1]), found.y[:, -1]
+        gaps = self._apart(time, y)
+        met = (gaps + self.tie * np.diff(y[n:]) <= 0.0) | (gaps == gaps.min())
         return time, (self.first[1:][met] - 1).tolist(), []
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:

@@ -26,8 +26,9 @@ class Pendulums:
     damping : float or array_like of shape (N,)
         Rate at which a ball's amplitude decays, 1/s; below its frequency sqrt(g/l).
     angle : {"small", "full"}
-        Pendulums of any angle need equal lengths, no gaps and one damping: then contacts stay
-        horizontal.  Small-angle ones swing too fast: by 1 % at 0.4 rad, by 7 % at 1 rad.
+        Pendulums of any angle need equal lengths and one damping: then contacts stay horizontal;
+        gaps are counted along the arcs, right near the lowest point, up to a quarter of a circle.
+        Small-angle pendulums swing too fast: by 1 % at 0.4 rad, by 7 % at 1 rad.
 
     Examples
     --------
@@ -52,9 +53,8 @@ class Pendulums:
         }
         asked.one_of("angle", self.angle, ("small", "full"))
         for name, value in values.items() if self.angle == "full" else ():
-            if len(set(np.ravel(value))) > 1 or (name == "gaps" and np.any(value)):
-                rule = "must be 0" if name == "gaps" else "must be equal"
-                raise ValueError(f"{name} = {value!r}; {rule} with angle='full'")
+            if len(set(np.ravel(value))) > 1 and name != "gaps":
+                raise ValueError(f"{name} = {value!r}; must be equal with angle='full'")
         vars(self).update(values, gravity=g)
 
     def row(self, name: str, size: int) -> Vector:
@@ -64,15 +64,15 @@ class Pendulums:
     def reach(self, size: int) -> Vector:
         """Return how far each of `size` balls may be pulled aside, m along its arc."""
         # Above its pivot a string is slack; on a rod a ball would stand at the top.
-        part = 0.5 if self.angle == "small" else 1.0 - 2.0**-20
+        part = 0.5 if self.angle == "small" or np.any(self.gaps) else 1.0 - 2.0**-20
         return part * np.pi * self.row("length", size)
 
     def within_reach(self, x: Vector, when: str = "") -> Vector:
         """Return where the balls are, m, or refuse that one is so far aside."""
         reach = self.reach(len(x))
         beyond = np.abs(x) > reach
-        most = "a quarter of a circle" if self.angle == "small" else "half a circle"
-        far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most}"
+        most = "half" if reach[0] > 2.0 * self.row("length", len(x))[0] else "a quarter of"
+        far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most} a circle"
         asked.refuse_where(f"{when}positions", x, beyond, f"must be within {far}")
         return x
 

@@ -1,7 +1,4 @@
-"""The swinging cradle: impacts by any model of the package, pendulums between them.
-
-The rules of touching and resting balls are told in `cradle.swinging.resting`.
-"""
+"""The swinging cradle; `resting` tells the rules of touching and resting balls."""
 
 import functools
 import math
@@ -299,11 +296,11 @@ def certify(run: _Run, times: Vector, seen_x: Vector, seen_v: Vector) -> None:
     most += lasts[begun] * hanging.fastest * kept[begun]  # of a strike: strings are kicks
     least = -math.inf if hanging.damping.any() else -most
     overlap = (x[:, :-1] - x[:, 1:] - hanging.gaps).max(axis=-1)
-    top, far = np.pi * (math.inf if hanging.small else hanging.length[0]), np.abs(x).max(axis=-1)
+    top, far = math.inf if hanging.small else run.pendulums.reach(len(m))[0], np.abs(x).max(axis=-1)
     for what, at, value, low, high in (
         ("impacts have made or lost {:g} kg m/s", instants, (left - v) @ m, -push, push),
         ("{:g} J are made or lost beside the impacts", instants, kept - before, -work, work),
-        ("a ball that swung over the top is {:g} m along its circle", until, far, 0.0, top),
+        ("a ball that swung too far is {:g} m along its circle", until, far, 0.0, top),
         ("balls overlap by {:g} m", until, overlap, -math.inf, TIE * run.size),
         ("a flight has made or lost {:g} J", until, gain, least, most),
     ):
