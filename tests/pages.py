@@ -149,7 +149,9 @@ def visiting(browser, home: str):
     """Give what opens pages; at the end: no error on a console, no request that leaves the disk."""
     contexts, faults = [], []
 
-    def visit(fragment="", *, chapter="explorer", width=1400, height=900, stopped=False, **options):
+    def visit(
+        fragment=None, *, chapter="explorer", width=1400, height=900, stopped=False, **options
+    ):
         context = browser.new_context(viewport={"width": width, "height": height}, **options)
         context.set_default_timeout(PATIENCE)
         contexts.append(context)
@@ -161,6 +163,8 @@ def visiting(browser, home: str):
         if chapter != "explorer":
             # Seconds go into its equations, which are not looked at here.
             tab.route("**/tex-svg-full.js", lambda route: route.fulfill(body=""))
+        if fragment is None:  # with a setting in the address nothing is covered
+            fragment = "#scene=example" * (chapter == "explorer")
         tab.goto(home.replace("explorer.html", f"{chapter}.html") + fragment)
         if options.get("java_script_enabled", True):
             tab.wait_for_function("globalThis.cradleExplorer?.live?.length > 0")

@@ -50,7 +50,7 @@ def test_every_figure_is_checked():
         ("multiple_impacts", "fig-own-multiple-opening", FIVE, 0.15),
         ("patterns", "fig-own-patterns-light", LIGHT, 0.15),
         ("n_balls", "fig-own-n-balls-toy", ([1] * 5, [1, 0, 0, 0, 0], 1), 0.15),
-        ("n_balls", "fig-own-n-balls-opening", ([1] * 4, [1, 0.5, 0, 0], 1), 0.1),
+        ("n_balls", "fig-own-n-balls-opening", ([1] * 4, [1, 0.5, 0, 0], 1), 0.15),
     ],
 )
 def test_opening_figures(chapter, figure, chain, ratio):

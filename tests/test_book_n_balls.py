@@ -140,10 +140,10 @@ READINGS = {
 }
 
 
-def outcome(turns, meeting=0.5):
+def outcome(turns, meeting=0.5, ratio=0.1):
     """Outcome of Fig. 8's chain when the gap closes with these directions at its two balls."""
     reading = type("Chosen", (Reading,), {"turns": turns})
-    chain = [1] * 4, [1, 0.5, 0, 0], 1, 0.1
+    chain = [1] * 4, [1, 0.5, 0, 0], 1, ratio
     return truth.solve(*chain, meeting=meeting, number=float, impact=reading)
 
 
@@ -167,7 +167,20 @@ def contact_work(trace, c, row):
 def test_fig_8_three_readings():
     table = pd.read_csv(io.StringIO(CHAPTER.printed("readings-table")), sep=r"\s+")
     for reading, way in READINGS.items():
-        np.testing.assert_allclose(table.loc[reading], outcome(way).velocities, atol=6e-5)
+        expected = outcome(way, ratio=0.15).velocities
+        np.testing.assert_allclose(table.loc[reading], expected, atol=6e-5)
+
+
+def test_events_of_two_runs_that_meet():
+    """The table has the ends and closings of the picture, in the chapter's numbering."""
+    lines = [line.split() for line in CHAPTER.printed("events-table").splitlines()[2:]]
+    exact = truth.solve([1] * 4, [1, "0.5", 0, 0], 1, "0.15")
+    rows = [k for k, (kind, _) in enumerate(exact.events, 1) if kind != "maximum_compression"]
+    told = {"end": "ends", "close": "closes"}
+    for place, (line, row) in enumerate(zip(lines, rows, strict=True), start=1):
+        kind, c = exact.events[row - 1]
+        assert line[:3] == [f"{place}", f"{c + 1}-{c + 2}", told[kind]]
+        assert [*map(float, line[3:])] == pytest.approx([*map(float, exact.path[row])], abs=6e-4)
 
 
 def test_the_march_stops_less_than_two_steps_late():

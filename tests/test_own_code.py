@@ -26,7 +26,7 @@ BLOCKS = {
     section.partition("\n")[0]: re.findall(r"```(\w+)\n(.*?)```", section, re.DOTALL)
     for section in SECTIONS
 }
-ONE, MANY, ENGINE, WEB, FIT = BLOCKS
+ONE, MANY, ENGINE, WEB, FIT, EXERCISES = BLOCKS
 #: Python that prints, and what the page shows of it.
 PAIRS = {
     title: [(code, told) for (kind, code), (_, told) in zip(parts, parts[1:]) if kind == "python"]
@@ -51,7 +51,22 @@ def test_plain_blocks(title):
 def test_every_block_is_run_here():
     kinds = {title: " ".join(kind for kind, _ in parts) for title, parts in BLOCKS.items()}
     plain = "python text"
-    assert list(kinds.values()) == [plain] * 3 + ["sh html text", "sh python text python text sh"]
+    assert [*kinds.values()][:3] == [plain] * 3
+    assert [*kinds.values()][3:] == ["sh html text", "sh python text python text sh", ""]
+
+
+def test_answers_of_the_first_exercise():
+    """From the velocities that the page prints."""
+    shown = BLOCKS[FIT][4][1].splitlines()
+    before, after, _ = ([float(v) for v in re.findall(r"\d\.\d*", line)] for line in shown)
+    told = next(section for section in SECTIONS if section.startswith(EXERCISES))
+    assert f"= {53 * before[0]:.1f} g m/s" in told
+    masses, squares = (53, 45, 53), [v * v / 2 for v in after]
+    momentum, energy = (sum(m * x for m, x in zip(masses, xs)) for xs in (after, squares))
+    assert f"= {momentum:.1f} g m/s" in told
+    assert f"{53 * before[0] ** 2 / 2:.2f} mJ come in and {energy:.2f} mJ are left" in told
+    assert 1 - energy / (53 * before[0] ** 2 / 2) == pytest.approx(0.6, abs=0.02)
+    assert abs(momentum - 53 * before[0]) < 0.003 * 53
 
 
 def test_the_best_ball_between_two_others():

@@ -121,6 +121,23 @@ def test_right_wrong_and_endless(editor, solver):
         assert (
             tab.locator(".reader-solver textarea").evaluate(chosen) == broken.split("\n")[line - 1]
         )
+    # An error in one check leaves the others; a hint says what may be missing.
+    some = solver.replace(
+        "    v = np.array(velocities",
+        "    masses[1] == 2 and masses[7]\n    v = np.array(velocities",
+    )
+    assert told(editor(some), "An error in line") == (4, 0)
+    assert tab.locator(".reader-solver li p:has-text('an error: no answer')").count() == 1
+    for right, wrong, hint in (
+        ("    return push, np", "    push, np", "Is a return missing?"),
+        (
+            "    m1, m2, m3 = masses",
+            "    rates(masses, ratio, acting, driver)",
+            "calls itself without end",
+        ),
+    ):
+        told(editor(solver.replace(right, wrong)), "An error")
+        assert hint in tab.locator(".reader-solver .wrong").inner_text()
     # What is printed is shown, and a loop without end is stopped; then all goes on.
     editor("print('here')\nwhile True:\n    pass")
     tab.wait_for_selector(".reader-solver .printed:has-text('here')", timeout=PATIENCE)

@@ -179,9 +179,13 @@ def chapters() -> list[dict[str, Any]]:
     """Return scenes of single chapters, which are not walked through."""
     meets = equal(3, 0.15, e=0.25)
     meets["speeds"] = [1.0, 0.8, 0.0]
+    bounce = equal(3, 0.15, e=0.5) | {"masses": [0.4, 1.0, 4.0]}
+    runs = equal(4, 0.15) | {"speeds": [1.0, 0.5, 0.0, 0.0]}
     springs = equal(3, 0.15) | {"law": "springs", "stiffness": 1.0}
     told = [
         ("meets", "Balls that meet again", meets, "inside"),
+        ("bounce", "Which balls go back?", bounce, "map"),
+        ("runs", "Two runs that meet", runs, "inside"),
         ("springs", "Three balls on springs", springs, "inside"),
     ]
     keys = ("key", "title", "setting", "picture")

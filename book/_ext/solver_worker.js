@@ -3,6 +3,10 @@
   const $B = __BRYTHON__;
   const MOST = 20000; // letters that are shown of what the lines print
   const FILE = "lines";
+  const HINTS = [
+    [/NoneType/, "Is a return missing? A function without one gives None."],
+    [/recursion/i, "A function calls itself without end."],
+  ];
   let said = 0;
 
   const say = (text) => {
@@ -26,7 +30,9 @@
       return own || /^\S/.test(row);
     });
     line ??= raised.lineno ?? null; // some errors of syntax have no place in their trace
-    return { error: kept.join("\n").replace(/File "[^"]*", line/g, "Line"), line };
+    const words = kept.join("\n").replace(/File "[^"]*", line/g, "Line");
+    const hint = HINTS.find(([kind]) => kind.test(words))?.[1];
+    return { error: [words.trim(), ...(hint ? [hint] : [])].join("\n"), line };
   }
 
   const run = (code, name) => $B.runPythonSource(code, name);
@@ -41,13 +47,19 @@
       $B.pythonToAST(code, FILE); // is it Python at all?
       console.log = say; // where `print` writes
       run(code, FILE);
+      let first = null; // error of a check: the others are made all the same
       checks.forEach(({ given }, number) => {
         const asked = given.map((value) => JSON.stringify(value)).join(", ");
         const ask = `import ${FILE}\nfound = repr([float(v) for v in ${FILE}.three_balls(${asked})[-1][2]])`;
-        const check = run(ask, `check_${number}`);
-        postMessage({ number, found: String($B.module_getattr(check, "found")) });
+        try {
+          const check = run(ask, `check_${number}`);
+          postMessage({ number, found: String($B.module_getattr(check, "found")) });
+        } catch (error) {
+          first ??= told(error);
+          postMessage({ number, broken: true });
+        }
       });
-      postMessage({ done: true });
+      postMessage({ ...first, done: true });
     } catch (error) {
       postMessage({ ...told(error), done: true });
     }

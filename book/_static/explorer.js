@@ -42,9 +42,12 @@
       const { scene, parts, picture, guess, answers } = host.dataset;
       this.page = parts === undefined;
       this.parts = new Set((parts ?? ALL_PARTS).split(" "));
-      const guessing = guess === undefined ? "" : guess || "once";
-      // An answer of a few is known once it is told; speeds can be guessed again.
-      const again = answers ? "" : guessing;
+      // Who follows a link to a setting wants to see it.
+      const linked = this.page && location.hash.includes("=");
+      const guessing = guess === undefined || linked ? "" : guess || "once";
+      // An answer of a few is known once it is told; speeds can be guessed again, on a page of its
+      // own by a button.
+      const again = answers || this.page ? "" : guessing;
       this.state = new State({ scene, picture, guessing, again });
       this.visible = true;
       this.pointed = false; // whether a pointer has chosen what has the focus
@@ -80,7 +83,7 @@
       const cradle = make("div", { class: "cradle" });
       const stages = make("div", { class: "stages" }, cradle, beside?.place ?? "");
       // What is to be guessed comes before the button that shows it.
-      const guessed = "guess" in this.host.dataset;
+      const guessed = "guess" in this.host.dataset && !this.page;
       const outcome = (here) => (here ? node("outcome") : "");
       const left = make("div", { class: "left" }, stages, outcome(guessed), node("run"), node("words"));
       this.panels.settings.node.append(node("beside"));

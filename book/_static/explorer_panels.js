@@ -172,7 +172,7 @@
       words: "law",
       choose: act.law,
       options: [
-        { value: "rule", text: "paper's", title: "the paper's rule, by restitution and ratios" },
+        { value: "rule", text: "by ratio", title: "the rule of this book, by restitution and ratios" },
         { value: "spheres", text: "spheres", title: "of steel, which push by Hertz's law" },
         ...(parts.has("scenes") ? [{ value: "springs", text: "springs", title: "linear ones" }] : []),
       ],

@@ -116,9 +116,10 @@
       start.disabled = false;
       told.textContent = words;
     }
-    function hear({ printed: text, number: check, found, error, line, done }) {
+    function hear({ printed: text, number: check, found, broken, error, line, done }) {
       if (text) printed.textContent += text;
       if (found) show(check, found);
+      if (broken) results[check].textContent = "an error: no answer";
       if (error) {
         wrong.textContent = error.trim();
         if (line) mark(line);
