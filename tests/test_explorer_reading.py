@@ -22,7 +22,7 @@ from cradle.measures import bouncing_pattern
 
 
 def test_address_keeps_the_setting(still):
-    tab, address = still(stopped=True), ""
+    tab, address = still("", stopped=True), ""
     other = still()
     for setting in settings(6):
         tab.evaluate(f"(setting) => ({EXPLORER}.state.set(setting), {EXPLORER}.changed())", setting)

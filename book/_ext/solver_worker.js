@@ -5,7 +5,7 @@
   const FILE = "lines";
   const HINTS = [
     [/NoneType/, "Is a return missing? A function without one gives None."],
-    [/recursion/i, "A function calls itself without end."],
+    [/recursion|Previous line repeated/i, "A function calls itself without end."],
   ];
   let said = 0;
 
