@@ -1,10 +1,10 @@
-"""Fit half a minute of a real cradle: its period and damping, then one gap and one law of loss.
+"""Fit half a minute of a real cradle: its damping, then period, one gap and one law of loss.
 
-Writes `data/cradle_fits.csv` in some minutes.
-The mean of the five balls gives period and damping: no impact changes it.  Restitution or loss,
-the gap and the release of ball 1 are fitted to the turning points of the outer balls, places and
-times; where each of the two hangs at rest is subtracted.  Small angles: gaps are not computed with
-others.  Angles of 12 degrees lengthen a half swing by 1 ms.
+Writes `data/cradle_fits.csv` in a quarter of an hour.
+The mean of the five balls gives the damping and nearly the period: no impact changes it.
+Restitution or loss, the gap, the release of ball 1 and the period of small swings are fitted to the
+turning points of the outer balls, places and times; where each of the two hangs at rest is
+subtracted.  Pendulums of any angle: 12 degrees lengthen a half swing by 1 ms.
 """
 
 import numpy as np
@@ -14,11 +14,12 @@ from stored import make
 
 from cradle import Chain, ConstantLoss, Pendulums, SequentialCollisions, SpeedDependent, swing
 
-RATE = 2000  # samples a second of a computed swing
-COLUMNS = ["law", "loss", "gap_m", "release_m", "release_s", "chi_places", "chi_times"]
+RATE = 200  # samples a second of a computed swing
+COLUMNS = ["law", "loss", "gap_m", "release_m", "release_s", "period_s", "chi_places", "chi_times"]
 # Law: starts of loss and gap; their steps (None: not fitted).
 STARTS = {
     "constant loss": ([(0.8e-3, 85e-6), (1e-3, 70e-6)], (1e-4, 1e-5)),
+    "constant loss, small angles": ([(0.8e-3, 85e-6)], (1e-4, 1e-5)),
     "constant restitution": ([(0.994, 83e-6), (0.994, 91e-6), (0.9915, 70e-6)], (1e-3, 1e-5)),
     "touching": ([(0.988, 0.0), (0.993, 0.0)], (1e-3, None)),
 }
@@ -52,15 +53,27 @@ def peaks():
     return [t["ball"][use].astype(int) - 1, *(t[k][use] for k in ("t_s", "x_m", "u_t", "u_x"))]
 
 
-def swung(law, parameters, damping, period):
-    """Return the run of `swing` of a law at (loss, gap, release place, release time)."""
-    loss, gap, place, start = parameters
+def swung(law, parameters, damping):
+    """Return the run of `swing` of a law at (loss, gap, release place, release time, period)."""
+    loss, gap, place, start, period = parameters
     model, e = SequentialCollisions(), loss
-    if law == "constant loss":
+    if "loss" in law:
         model, e = SpeedDependent(model, ConstantLoss(loss)), 1.0
-    hanging = Pendulums(9.81 * (period / 2 / np.pi) ** 2, gaps=gap, damping=damping)
+    length, angle = 9.81 * (period / 2 / np.pi) ** 2, "small" if "small" in law else "full"
+    hanging = Pendulums(length, gaps=gap, damping=damping, angle=angle)
     times = np.arange(0, 29.95 - start, 1 / RATE)
     return swing(Chain([1] * 5, [0] * 5, e), model, [place, 0, 0, 0, 0], times, pendulums=hanging)
+
+
+def turning(run, ball, near):
+    """Return place and time where a ball of a run turns, near a time."""
+    low, high = (int(max(0, (near + d) * RATE)) for d in (-0.12, 0.12))
+    x, v = run.positions[low:high, ball], run.velocities[low:high, ball]
+    turns = v * np.append(v[1:], v[-1]) <= 0  # or is struck, near the lowest point
+    i = (np.abs(x) * turns).argmax()
+    # From the sample on it is slowed down by g x / l.
+    wait = v[i] / (run.pendulums.gravity / run.pendulums.length * x[i])
+    return x[i] + 0.5 * v[i] * wait, run.times[low + i] + wait
 
 
 def misfits(run, start, found):
@@ -68,10 +81,8 @@ def misfits(run, start, found):
     ball, time, place, u_time, u_place = found
     out = np.empty((2, len(ball)))
     for n, (k, at) in enumerate(zip(ball, time)):
-        low, high = (int(max(0, (at + d - start) * RATE)) for d in (-0.12, 0.12))
-        x = run.positions[low:high, k]
-        i = np.abs(x).argmax()
-        out[:, n] = place[n] - x[i], (at - start - run.times[low + i]) / u_time[n]
+        x, t = turning(run, k, at - start)
+        out[:, n] = place[n] - x, (at - start - t) / u_time[n]
     for k in (0, 4):  # where it hangs at rest
         out[0, ball == k] -= np.average(out[0, ball == k], weights=u_place[ball == k] ** -2.0)
     out[0] /= u_place
@@ -82,14 +93,16 @@ def fitted(law, start, steps, swing_of_mean, found):
     """Return the parameters of one fit, by least squares with wide differences."""
     size, damping, period, first = swing_of_mean
     begin = first + round((0.75 - first) / period) * period
-    p = np.array([*start, -5 * size * np.exp(-damping * begin), begin])
-    free = np.array([step is not None for step in (*steps, 1e-3, 0.01)])
-    unit = np.array([step or 1.0 for step in (*steps, 1e-3, 0.01)]) * free
+    p = np.array([*start, -5 * size * np.exp(-damping * begin), begin, period - 5e-4])
+    steps = (*steps, 1e-3, 0.01, 1e-4)
+    free = np.array([step is not None for step in steps])
+    unit = np.array([step or 1.0 for step in steps]) * free
 
     def residual(z):
         q = p.copy()
-        q[free] += (unit[free]) * z
-        return misfits(swung(law, q, damping, period), q[3], found).ravel()
+        q[free] += unit[free] * z
+        q[0] = min(q[0], 1.0)  # restitution; a loss is far below
+        return misfits(swung(law, q, damping), q[3], found).ravel()
 
     def slope(z):
         each = 0.05 * np.eye(len(z))
@@ -97,6 +110,7 @@ def fitted(law, start, steps, swing_of_mean, found):
 
     fit = least_squares(residual, np.zeros(free.sum()), jac=slope, max_nfev=12)
     p[free] += unit[free] * fit.x
+    p[0] = min(p[0], 1.0)
     return p
 
 
@@ -108,7 +122,7 @@ def rows():
         best = None
         for start in starts:
             p = [float(f"{x:.6g}") for x in fitted(law, start, steps, mean, found)]
-            chi = (misfits(swung(law, p, *mean[1:3]), p[3], found) ** 2).sum(axis=1)
+            chi = (misfits(swung(law, p, mean[1]), p[3], found) ** 2).sum(axis=1)
             print(law, p, chi, flush=True)
             best = (chi, p) if best is None or chi.sum() < best[0].sum() else best
         yield [law, *(f"{x:.6g}" for x in best[1]), *(f"{x:.4g}" for x in best[0])]

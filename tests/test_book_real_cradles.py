@@ -247,8 +247,8 @@ def test_fig_half():
     # Where an outer ball turns within a window, the curve in its colour has that place.
     colours = [ball_style(k)["color"] for k in range(5)]
     row = read("cradle_fits.csv", law="constant loss")[0]
-    fit = [float(row[name]) for name in ("loss", "gap_m", "release_m", "release_s")]
-    run = real_swing.swung("constant loss", fit, *real_swing.common()[1:3])
+    fit = [float(row[name]) for name in real_swing.COLUMNS[1:6]]
+    run = real_swing.swung("constant loss", fit, real_swing.common()[1])
     for ax in windows:
         lines = {style: [x for x in ax.get_lines() if x.get_ls() == style] for style in "-:"}
         curves = {colours.index(line.get_color()): line.get_xydata() for line in lines["-"]}

@@ -107,7 +107,7 @@ def test_strikers_that_come_one_by_one():
 
 @pytest.mark.parametrize("row", SWINGS, ids=lambda row: row["law"])
 def test_stored_fits_of_the_half_minute(row):
-    p = [float(row[key]) for key in real_swing.COLUMNS[1:5]]
-    run = real_swing.swung(row["law"], p, *MEAN[1:3])
+    p = [float(row[key]) for key in real_swing.COLUMNS[1:6]]
+    run = real_swing.swung(row["law"], p, MEAN[1])
     chi = (real_swing.misfits(run, p[3], real_swing.peaks()) ** 2).sum(axis=1)
     assert chi == pytest.approx([float(row["chi_places"]), float(row["chi_times"])], rel=1e-2)
