@@ -12,14 +12,24 @@ from real_cradles import table
 from scipy.optimize import least_squares
 from stored import make
 
-from cradle import Chain, ConstantLoss, Pendulums, SequentialCollisions, SpeedDependent, swing
+from cradle import (
+    Chain,
+    ConstantLoss,
+    Pendulums,
+    SequentialCollisions,
+    SpeedDependent,
+    ViscousLoss,
+    swing,
+)
 
+STEEL = {"masses": [0.044756] * 2, "stiffness": 1e10}  # of the balls
 RATE = 200  # samples a second of a computed swing
 COLUMNS = ["law", "loss", "gap_m", "release_m", "release_s", "period_s", "chi_places", "chi_times"]
 # Law: starts of loss and gap; their steps (None: not fitted).
 STARTS = {
     "constant loss": ([(0.8e-3, 85e-6), (1e-3, 70e-6)], (1e-4, 1e-5)),
     "constant loss, small angles": ([(0.8e-3, 85e-6)], (1e-4, 1e-5)),
+    "viscous loss": ([(0.9e-7, 85e-6), (1.2e-7, 80e-6)], (1e-8, 1e-5)),
     "constant restitution": ([(0.994, 83e-6), (0.994, 91e-6), (0.9915, 70e-6)], (1e-3, 1e-5)),
     "touching": ([(0.988, 0.0), (0.993, 0.0)], (1e-3, None)),
 }
@@ -58,7 +68,9 @@ def swung(law, parameters, damping):
     loss, gap, place, start, period = parameters
     model, e = SequentialCollisions(), loss
     if "loss" in law:
-        model, e = SpeedDependent(model, ConstantLoss(loss)), 1.0
+        constant = law.startswith("constant")
+        kept = ConstantLoss(loss) if constant else ViscousLoss(loss, **STEEL)
+        model, e = SpeedDependent(model, kept), 1.0
     length, angle = 9.81 * (period / 2 / np.pi) ** 2, "small" if "small" in law else "full"
     hanging = Pendulums(length, gaps=gap, damping=damping, angle=angle)
     times = np.arange(0, 29.95 - start, 1 / RATE)
