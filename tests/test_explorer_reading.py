@@ -735,7 +735,7 @@ def test_scenes_do_what_their_texts_say(still):
 
 def test_links_of_scenes(still, html):
     """They lead to a heading that is there."""
-    tab, linked = still(), set()
+    tab, linked = still("#scene=one"), set()
     for scene in tab.evaluate("cradleExplorer.data.scenes"):
         tab.go_to(f"scene={scene['key']}")
         tab.drawn()
