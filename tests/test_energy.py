@@ -82,7 +82,8 @@ def test_spring_chain_at_e_1(case):
     chain, stiffness, exponent = case
     chain = Chain(chain.masses, chain.velocities, 1)
     springs = collide(chain, SpringChain(stiffness, exponent, accuracy=1e-10))
-    trace = collide(chain, EnergyDistribution(stiffness, exponent, rtol=1e-10))
+    # Some hundred times the tolerance of a step is what an outcome can be off by.
+    trace = collide(chain, EnergyDistribution(stiffness, exponent, rtol=3e-12))
     np.testing.assert_allclose(trace.velocities, springs.velocities, rtol=0, atol=1e-8)
     np.testing.assert_allclose(trace.absorbed, springs.absorbed, rtol=1e-6, atol=1e-8)
 
