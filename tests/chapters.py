@@ -80,6 +80,12 @@ def code(chapter: str) -> list:
     return [cell for cell in cells if cell.cell_type == "code"]
 
 
+def shown(chapter: str) -> list:
+    """Return the code cells that a reader sees without opening a fold."""
+    hidden = {"hide-input", "hide-cell", "remove-cell"}
+    return [cell for cell in code(chapter) if not hidden & set(cell.metadata.get("tags", ()))]
+
+
 def parsed(cell) -> ast.Module:
     """Return the syntax tree of a code cell, without IPython's own commands."""
     lines = [line for line in cell.source.splitlines() if not line.startswith("%")]

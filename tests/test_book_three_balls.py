@@ -13,7 +13,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import uniform
-from chapters import Chapter, code, floats
+from chapters import Chapter, code, floats, shown
 from chapters import run as run_cells
 from truth import solve
 
@@ -273,13 +273,8 @@ def test_one_outcome_belongs_to_many_parameters():
 @functools.cache
 def typed_in():
     """Run what a reader sees, and nothing else; return the names."""
-    shown = [
-        c
-        for c in code("three_balls")
-        if not {"hide-input", "hide-cell", "remove-cell"} & set(c.metadata.get("tags", ()))
-    ]
     with contextlib.redirect_stdout(io.StringIO()):
-        return run_cells(shown, {})
+        return run_cells(shown("three_balls"), {})
 
 
 def test_shown_cells_use_no_hidden_name():

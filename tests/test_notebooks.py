@@ -4,7 +4,9 @@ nbval runs every notebook and compares its outputs (options in pyproject.toml). 
 notebook whose outputs were cleared, so the stored form itself is checked here.
 """
 
+import contextlib
 import copy
+import io
 import re
 import subprocess
 import sys
@@ -13,6 +15,7 @@ from pathlib import Path
 import execute
 import nbformat
 import pytest
+from chapters import run, shown
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 BOOK = Path(__file__).parents[1] / "book"
@@ -24,6 +27,10 @@ UNCOMPARED = re.compile(r"nbval-ignore-output|NBVAL_IGNORE_OUTPUT|PYTEST_VALIDAT
 UNRUN = re.compile(
     r"nbval-skip|NBVAL_SKIP|raises-exception|NBVAL_RAISES_EXCEPTION|nbval-check-output|skip-execution"
 )
+
+
+# Letters of a line of code that the page shows unbroken, where it is 1200 pixels wide.
+WIDEST = 68
 
 
 def marks(cell) -> str:
@@ -87,6 +94,17 @@ def test_few_cells_escape_comparison():
         if cell.cell_type == "code" and UNCOMPARED.search(marks(cell))
     ]
     assert len(escaping) <= MOST_UNCOMPARED_CELLS, escaping
+
+
+@pytest.mark.parametrize("chapter", ["problem", "compliance", "three_balls"])
+def test_shown_cells_can_be_typed_in(chapter: str):
+    """They use no name of a hidden cell, and their lines fit the page of a desk."""
+    cells = shown(chapter)
+    assert len(cells) > 1
+    with contextlib.redirect_stdout(io.StringIO()):
+        run(cells, {})
+    wide = [line for cell in cells for line in cell.source.splitlines() if len(line) > WIDEST]
+    assert not wide
 
 
 def sample():
