@@ -28,7 +28,7 @@ CHANGES = {
         {"chosen_ratio": 0.35, "chosen_e": 0.9},  # others
         {"chosen_ratio": 0},
     ],
-    "patterns": [{"ALPHA": 0.3, "E": 0.8}, {"ALPHA": 0.5, "E": 0.3}],
+    "patterns": [{"RATIO": 0.3, "E": 0.8}, {"RATIO": 0.5, "E": 0.3}],
     "n_balls": [{"ratio": 0}, {"ratio": 0.05}, {"ratio": 0.33}, {"ratio": 0.5}],
     "toy": [{"ratio": 0.05, "pulled_back": 0.02}, {"ratio": 0.3}],
     "trade": [{"ratio": 0}, {"ratio": 0.4}],
