@@ -422,6 +422,7 @@ def test_one_wrong_film_of_several(folder, capsys):
     ("line", "code", "message"),
     [
         ("solve ABXA", 1, "SEQUENCE, ball 3: 'X'; must be one of A, B, C, D"),
+        ("solve a", 1, "cradle: SEQUENCE = 'A'; must name at least 2 balls"),
         ("solve ABCCA", 1, "--saturate holds the contact closed"),
         ("solve", 2, "give how many equal balls, such as 5, or a sequence of the paper's balls"),
         ("solve 1", 1, "cradle: SEQUENCE = 1; must be a whole number, 2 to 1000000 balls"),

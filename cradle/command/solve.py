@@ -48,6 +48,7 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     _ROW + r" has shape \((\d+),\);[^:]*: ": r"--\1, \2 given: ",
     _ROW + "(?= = | has)": r"--\1",
     r"positions\[(\d+)\] = ": lambda found: f"ball {int(found[1]) + 1} at ",
+    r"\bsequence = ": "SEQUENCE = ",
     r"sequence\[(\d+)\] = ": lambda found: f"SEQUENCE, ball {int(found[1]) + 1}: ",
     r"at ball (\d+), counted from 0,": lambda found: f"at ball {int(found[1]) + 1}",
 }
