@@ -118,7 +118,7 @@ def sequence_occurs(e, ratio):
 
 
 def test_fig_5_region_of_the_sequence():
-    pattern = r"([\d.]+) < e < ([\d.]+), as printed from ([\d.]+)"
+    pattern = r"([\d.]+) < e < ([\d.]+), \nmaxima too in the order of the paper from ([\d.]+)"
     lower, upper, split = map(float, re.search(pattern, CHAPTER.printed("edges")).groups())
     step = 1e-4  # the last digit printed
     for e, occurs in (
