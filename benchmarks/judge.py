@@ -4,7 +4,7 @@ Usage::
 
     python benchmarks/judge.py                             # a hundred chains of every family
     python benchmarks/judge.py --family losses --count 10000 --seed 7
-    python benchmarks/judge.py --count 1000 --seed 2026 --write     # data/judge.csv, ten minutes
+    python benchmarks/judge.py --count 250 --seed {5001..5028} --write    # data/judge.csv, an hour
 
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
 within 600 events, and after no more of them at twice the digits.  A float means what it prints as
@@ -29,6 +29,7 @@ from stored import options, write
 from truth import meaning
 
 from cradle import ImpactNotFinished, post_impact_velocities, textbook
+from cradle.kernel.state import LIMITS
 from cradle.trace import ImpactNotCertified
 
 DIGITS, EVENTS, WRONG = 100, 600, 1e-9
@@ -37,7 +38,7 @@ LONGEST = 200_000
 #: Where an infinite sequence was taken to its limit, answers may differ by this.
 LIMIT = 1e-6
 #: Verdicts that are printed with their chain.
-DOUBTFUL = ("wrong", "other reading", "open", "unfinished", "unlike them")
+DOUBTFUL = ("wrong", "other reading", "warned", "open", "unfinished", "unlike them")
 #: Chains of one task of the pool.
 TASK = 50
 
@@ -113,9 +114,10 @@ class Verdict(NamedTuple):
 
 
 #: Where the exact run ends: "other reading" is wrong by `meaning` and `on_bounds`, right for the
-#: exact values of all floats, or with ratios beside their bounds; "open" hangs on more than so many
-#: digits; "unfinished" has no answer.
-ENDS = ["right", "wrong", "other reading", "open", "unfinished"]
+#: exact values of all floats, or with ratios beside their bounds; "warned" is wrong, and has ratios
+#: so small that the margin warns; "open" hangs on more than so many digits; "unfinished" has no
+#: answer.
+ENDS = ["right", "wrong", "other reading", "warned", "open", "unfinished"]
 #: Where it has no end: who agrees with the answer; "given up" has no answer.
 ENDLESS = ["as 50 digits", "unlike them", "as relations", "nobody knows", "given up"]
 WORDS = ENDS + ENDLESS
@@ -161,7 +163,8 @@ def judge(problem, *ask, events=EVENTS):
     for other in exact(problem, Decimal), exact(problem):
         if other and max(off(problem, one, other.velocities) for one in given) <= WRONG:
             return Verdict("other reading", far)
-    return Verdict("wrong", far)
+    small = any(0 < ratio < LIMITS.faint for ratio in (*problem.forward, *problem.backward))
+    return Verdict("warned" if small else "wrong", far)
 
 
 def second_opinion(problem):
@@ -253,10 +256,16 @@ def main():
     parser = options(__doc__)
     parser.add_argument("--family", choices=JUDGED, action="append")
     parser.add_argument("--count", type=int, default=100, help="chains of each family")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=int, nargs="+", default=[1], help="one run for each")
     parser.add_argument("--write", action="store_true", help="write the counts as judge.csv")
     given = parser.parse_args()
-    counts, found = run(given.family or list(JUDGED), given.count, given.seed)
+    names = given.family or list(JUDGED)
+    counts, found = {name: Counter() for name in names}, []
+    for seed in given.seed:
+        part, wrong = run(names, given.count, seed)
+        found += wrong
+        for name in names:
+            counts[name].update(part[name])
     print(f"{'':18}" + "".join(f"{word:>14}" for word in WORDS))
     for name, count in counts.items():
         print(f"{name:18}" + "".join(f"{count[word]:14}" for word in WORDS))
