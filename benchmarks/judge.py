@@ -29,7 +29,6 @@ from stored import options, write
 from truth import meaning
 
 from cradle import ImpactNotFinished, post_impact_velocities, textbook
-from cradle.kernel.state import LIMITS
 from cradle.trace import ImpactNotCertified
 
 DIGITS, EVENTS, WRONG = 100, 600, 1e-9
@@ -38,7 +37,7 @@ LONGEST = 200_000
 #: Where an infinite sequence was taken to its limit, answers may differ by this.
 LIMIT = 1e-6
 #: Verdicts that are printed with their chain.
-DOUBTFUL = ("wrong", "other reading", "warned", "open", "unfinished", "unlike them")
+DOUBTFUL = ("wrong", "other reading", "open", "unfinished", "unlike them")
 #: Chains of one task of the pool.
 TASK = 50
 
@@ -114,10 +113,9 @@ class Verdict(NamedTuple):
 
 
 #: Where the exact run ends: "other reading" is wrong by `meaning` and `on_bounds`, right for the
-#: exact values of all floats, or with ratios beside their bounds; "warned" is wrong, and has ratios
-#: so small that the margin warns; "open" hangs on more than so many digits; "unfinished" has no
-#: answer.
-ENDS = ["right", "wrong", "other reading", "warned", "open", "unfinished"]
+#: exact values of all floats, or with ratios beside their bounds; "open" hangs on more
+#: than so many digits; "unfinished" has no answer.
+ENDS = ["right", "wrong", "other reading", "open", "unfinished"]
 #: Where it has no end: who agrees with the answer; "given up" has no answer.
 ENDLESS = ["as 50 digits", "unlike them", "as relations", "nobody knows", "given up"]
 WORDS = ENDS + ENDLESS
@@ -163,8 +161,7 @@ def judge(problem, *ask, events=EVENTS):
     for other in exact(problem, Decimal), exact(problem):
         if other and max(off(problem, one, other.velocities) for one in given) <= WRONG:
             return Verdict("other reading", far)
-    small = any(0 < ratio < LIMITS.faint for ratio in (*problem.forward, *problem.backward))
-    return Verdict("warned" if small else "wrong", far)
+    return Verdict("wrong", far)
 
 
 def second_opinion(problem):

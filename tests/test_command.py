@@ -448,16 +448,15 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("swing 3 --pull 2,2", 2, "--pull says how many of the 3 balls are pulled"),
         ("swing 3 --length 1 --period 1", 2, "give one of --length and --period"),
         ("swing 3 --gaps 1,1,1", 1, "--gaps has 3 values; 3 balls need 2, or one number"),
-        ("swing 3 -o toy.bmp", 2, "'toy.bmp'; must end in one of .gif .mp4 .html .svg .png"),
+        ("swing 3 -o toy.bmp", 1, "'toy.bmp'; must end in .svg, .html, .gif, .mp4 or .png"),
+        ("swing 3 -o toy", 1, "'toy'; must end in .svg, .html, .gif, .mp4 or .png"),
         ("swing --masses 1,0.1 --by 0.3 --length 0.2", 1, "after t = 0.2243 s ball 2 at 0.545"),
         ("swing --masses 1,1,1 --length 0", 1, "cradle: --length 0.0; must be above 0"),
         ("swing 3 --seconds 0", 1, "cradle: --seconds = 0.0; must be above 0"),
         ("recommend --masses 1,1,1", 1, "Give --stiffness 1 if all contacts are equal spheres"),
         ("recommend --masses 1,1,1 --wanted path,x", 1, "--wanted 'x'; must be one of"),
         ("swing ABA --speed 2", 2, "leave --speed and --velocities out: the first ball is pulled"),
-        ("plot ABA --output -", 2, "'-'; must end in one of .png .svg .pdf"),
-        ("plot ABA --output impact", 2, "'impact'; must end in one of .png .svg .pdf"),
-        ("fit pairs.csv --plot fit.txt", 2, "'fit.txt'; must end in one of .png .svg .pdf"),
+        ("plot ABA --output -", 2, "'-'; a picture goes to a file: give its name"),
         ("swing 5 --output nowhere/toy.gif", 2, "'nowhere/toy.gif'; its folder is not there"),
         (f"{BAC} --slower 0", 1, "--slower = 0.0; must be above 0"),
         (f"{BAC} --window 0", 1, "cradle: --window 0.0; must be above 0"),
@@ -590,14 +589,8 @@ def test_a_swing_that_ends_early_says_so(monkeypatch):
 
 
 @pytest.mark.usefixtures("folder")
-def test_the_ending_says_what_picture_it_is():
-    for line in ("plot ABA --output impact.PNG", "fit pairs.csv --plot fit.png"):
+def test_a_picture_has_the_name_that_was_given():
+    for line in ("plot ABA --output impact", "fit pairs.csv --plot fit"):
         call(line)
         name = line.split()[-1]
         assert Path(name).read_bytes().startswith(b"\x89PNG"), name
-
-
-def test_a_picture_that_cannot_be_is_refused_before_the_work(monkeypatch):
-    monkeypatch.setattr("cradle.swing", None)
-    result = CliRunner().invoke(main, ["swing", "3", "-o", "toy.bmp"])
-    assert (result.exit_code, "must end in" in result.stderr) == (2, True)

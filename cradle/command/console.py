@@ -74,17 +74,18 @@ def _plain(value: Any) -> Any:
     return "; ".join(f"{low!r}..{high!r}" for low, high in value)
 
 
-def picture(*endings: str) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
-    """Return the check, before all work, of a picture's file, whose ending says of what kind."""
+def picture(_: click.Context, __: click.Parameter, path: str | None) -> str | None:
+    """Return where to draw; the sign for standard output is the name of no file."""
+    if path == "-":
+        raise click.BadParameter("'-'; a picture goes to a file: give its name")
+    if path and not Path(path).parent.is_dir():
+        raise click.BadParameter(f"{path!r}; its folder is not there")
+    return path
 
-    def checked(_: click.Context, __: click.Parameter, path: str | None) -> str | None:
-        if path and not Path(path).parent.is_dir():
-            raise click.BadParameter(f"{path!r}; its folder is not there")
-        if path and Path(path).suffix.lower() not in endings:
-            raise click.BadParameter(f"{path!r}; must end in one of {' '.join(endings)}")
-        return path
 
-    return checked
+def image_format(path: str) -> str:
+    """Return the format of a picture by the ending of its file; without one matplotlib adds one."""
+    return Path(path).suffix[1:] or "png"
 
 
 def plot_fits(fits: Sequence[Any], path: str) -> None:
@@ -97,4 +98,4 @@ def plot_fits(fits: Sequence[Any], path: str) -> None:
     figure = Figure((9, 3.9 * len(drawn)), layout="constrained")
     for (one, name), row in zip(drawn, figure.subplots(len(drawn), 2, squeeze=False), strict=True):
         one.plot(name, row)
-    figure.savefig(path)
+    figure.savefig(path, format=image_format(path))

@@ -31,8 +31,8 @@ from cradle.tables import data_folder
 @click.option("--predict", metavar="SEQUENCE", help="Predict a chain of these balls, beside its "
               "measured mean if the file has shots of it.")  # fmt: skip
 @click.option("--speed", type=float, help="Of its first ball, with --predict, m/s [1].")
-@click.option("--plot", type=click.Path(dir_okay=False), callback=picture(".png", ".svg", ".pdf"),
-              help="Draw the likelihoods to a file: .png, .svg or .pdf.")  # fmt: skip
+@click.option("--plot", type=click.Path(dir_okay=False), callback=picture,
+              help="Draw the likelihoods to a file.")  # fmt: skip
 @click.option("--summary", is_flag=True, help="Print errors, correlations and residuals instead.")
 @format_options
 def fit(

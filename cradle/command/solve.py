@@ -14,7 +14,7 @@ import click
 
 from cradle import ImpactNotCertified, ImpactNotFinished, collide
 from cradle.advice.choice import made
-from cradle.command.console import format_options, picture, show
+from cradle.command.console import format_options, image_format, picture, show
 from cradle.command.describe import chain_options, described
 from cradle.command.film import film
 from cradle.command.fit import fit, template
@@ -116,8 +116,8 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
 
 @main.command()
 @chain_options
-@click.option("--output", "-o", required=True, type=click.Path(dir_okay=False),
-              callback=picture(".png", ".svg", ".pdf"), help="A .png, .svg or .pdf.")  # fmt: skip
+@click.option("--output", "-o", required=True, type=click.Path(dir_okay=False), callback=picture,
+              help="File to draw to: .png, .svg or .pdf.")  # fmt: skip
 def plot(output: str, **options: Any) -> None:
     """Draw the velocities of all balls through an impact.
 
@@ -132,7 +132,7 @@ def plot(output: str, **options: Any) -> None:
 
     given, figure = described(**options), Figure((7, 4.3), layout="constrained")
     velocities(collide(given.chain, given.model, progress=True), figure.subplots())
-    figure.savefig(output)
+    figure.savefig(output, format=image_format(output))
     click.echo(f"drawn to {output}\n{given.note}")
 
 

@@ -24,9 +24,9 @@ from cradle.input.values import ABOVE_ZERO, one_number, whole_number
 @click.option("--damping", callback=numbers_of, help="Of each swing's amplitude, 1/s [0].")
 @click.option("--seconds", default=2.0, help="How long it swings [2].")
 @click.option("--steps", default=20, help="How many rows to print [20].")
-@click.option("--output", "-o", type=click.Path(dir_okay=False),
-              callback=picture(".gif", ".mp4", ".html", ".svg", ".png"),
-              help="Draw a film: .gif, .mp4, .html, .svg; .png is the start.")  # fmt: skip
+@click.option("--output", "-o", type=click.Path(dir_okay=False), callback=picture,
+              help="Draw a film to a file: .gif, .mp4, .html, .svg; .png is a picture of the "
+              "start.")  # fmt: skip
 @format_options
 def swing(
     pull: list[float] | None, by: float, gaps: list[float] | None, damping: list[float] | None,
