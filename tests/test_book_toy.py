@@ -141,7 +141,9 @@ def test_contact_of_steel_balls_in_closed_form():
     CHAPTER.tells({"contact-time": 1e6 * 2.94327 * deepest / speed, "compression": 1e6 * deepest})
 
 
-@pytest.mark.parametrize(("row", "gap", "loss"), [(0, 0, 0), (1, 1e-6, 0), (2, 1e-6, 4e-7)])
+@pytest.mark.parametrize(
+    ("row", "gap", "loss"), [(0, 0, 0), (1, 0.8e-6, 0), (2, 1.2e-6, 0), (3, 1.2e-6, 4e-7)]
+)
 def test_first_stroke_of_the_minute_of_steel(row, gap, loss):
     """By SciPy, without strings: each turns a velocity into as large a swing."""
     mass, speed = 0.045, BACK * math.sqrt(G / LENGTH)
