@@ -50,8 +50,9 @@ def solve(
     state = area(n, False, record)
     state.tally[0].room = 2**62
     out = names["Outputs"](
-        [[0.0] * n], [[0] * (n - 1)], [0], *([kind()] * (n - 1) for kind in (float, float, int))
-    )
+        [[0.0] * n], [[0] * (n - 1)], [0], [0.0],
+        *([kind()] * (n - 1) for kind in (float, float, int)),
+    )  # fmt: skip
     options = names["Options"](meeting, max_events, False)
     plenty = 2**62
     _, status = names["batch"](0, False, n, inputs, options, out, state, plenty)

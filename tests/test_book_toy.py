@@ -57,14 +57,14 @@ def test_several():
 
 def test_strokes_and_fig_toy_models():
     """Twenty strokes and many more; then one body of four, and the end of a lossy one."""
-    after = strokes(172, [1, 0, 0, 0, 0])
-    for row, stroke in zip(rows("strokes"), (1, 2, 3, 20)):
+    after = strokes(173, [1, 0, 0, 0, 0])
+    for row, stroke in zip(rows("strokes"), (1, 2, 3, 20, 173), strict=True):
         np.testing.assert_allclose(row, after[stroke - 1], rtol=0, atol=5.1e-4)
     inner = 100 * (after[:, 1:4] ** 2).sum(axis=1)
     CHAPTER.tells({
         "inner-first": inner[0], "inner-twenty": inner[19], "inner-most": inner.max(),
         "second-first": -after[1, 0], "second-next": -after[1, 1],
-        "late-fifth": after[170, 4], "late-fourth": after[170, 3],
+        "late-fifth": after[172, 4], "late-fourth": after[172, 3],
         "solid-first": (1 - 4) / 5, "solid-rest": 2 / 5, "lossy-last": 1 / 5,
     })  # fmt: skip
 

@@ -200,13 +200,18 @@ def test_batch_is_a_loop_of_single_impacts():
     f, b = 0.2 * rng.random((4, n - 2)), 0.2 * rng.random((3, 1, 2, 1, n - 2))[:, 0]
     f, b = np.minimum(f, 0.05), np.minimum(b, 0.05)
     batch = post_impact_velocities(m, v, e, f, b, excess="saturate", meeting=0.3)
+    margins = outcomes(m, v, e, f, b, excess="saturate", meeting=0.3).margin
     lead = np.broadcast_shapes(*(part.shape[:-1] for part in (m, v, e, f, b)))
     assert batch.shape == (*lead, n)
+    assert margins.shape == lead
+    assert len(np.unique(margins)) > 5
     full = [np.broadcast_to(part, lead + part.shape[-1:]) for part in (m, v, e, f, b)]
     for at in np.ndindex(*lead):
         chain = Chain(*(part[at] for part in full[:3]))
         model = ImpulseCorrelation(full[3][at], full[4][at], excess="saturate", meeting=0.3)
-        assert batch[at].tobytes() == collide(chain, model).velocities.tobytes()
+        trace = collide(chain, model)
+        assert batch[at].tobytes() == trace.velocities.tobytes()
+        assert margins[at] == trace.margin
 
 
 def test_scalars_and_the_missing_backward_ratio():

@@ -11,6 +11,7 @@ from families import JUDGED, family
 from judge import batch, exact, judge, meaning, off, on_bounds, second_opinion, shrunk
 from problem import Problem
 
+from cradle import outcomes
 from cradle.closed_form import largest_ratios
 
 # --- the package -------------------------------------------------------------------------------
@@ -29,7 +30,7 @@ def test_a_tie_decided_by_products_of_tiny_ratios_is_told_by_the_margin():
         [1e-20, 0.0, 1e-20, 0.0, 0.0, 0.0], [0.0, 1e-20, 0.0, 0.0, 0.0, 0.0],
     )  # fmt: skip
     assert judge(problem).word == "wrong"
-    assert problem.collide().margin == 0.0
+    assert problem.collide().margin == outcomes(*problem[:5]).margin == 0.0
     clear = [[1e-4 if x == 1e-20 else x for x in side] for side in problem[3:5]]
     clear = problem._replace(forward=clear[0], backward=clear[1])
     assert judge(clear).word == "right"

@@ -144,8 +144,8 @@ def test_a_batch_needs_inputs_outputs_and_a_small_work_area():
     finally:
         tracemalloc.stop()
     count = math.prod(shape)
-    # Velocities 3, collisions 2, collapses 1 (and their truth), 8 bytes each.
-    results = 8 * 6 * count + count
+    # Velocities 3, collisions 2, collapses 1 (and their truth), margins 1, 8 bytes each.
+    results = 8 * 7 * count + count
     assert found.velocities.nbytes + found.collisions.nbytes < peak
     # A chunk's inputs (3 + 3 + 2 + 1 + 1 numbers a chain), with indices and as much again in spare.
     chunk = 8 * 2 * 16 * batch.CHUNK

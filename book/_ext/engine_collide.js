@@ -155,7 +155,7 @@ function solved(chain, maxEvents, recorded) {
   state.tally[0].room = ENDLESS;
   if (recorded) makeRoom(state, n, 64);
   const { m, v, e, forward, backward, meeting } = chain;
-  const out = Outputs([zeros(n)], [zeros(n - 1)], [0], zeros(n - 1), zeros(n - 1), zeros(n - 1));
+  const out = Outputs([zeros(n)], [zeros(n - 1)], [0], [0], zeros(n - 1), zeros(n - 1), zeros(n - 1));
   const inputs = Inputs([m], [v], [e], [forward], [backward]);
   const options = Options(meeting, maxEvents, false);
   let status = FINISHED;
@@ -191,7 +191,7 @@ function collide(given) {
     collisions: out.hits[0],
     collapsed: out.collapsed[0] === 1,
     saturated: out.held.flatMap((held, c) => (held ? [c] : [])),
-    margin: tally.margin,
+    margin: out.margin[0],
   };
   if (recorded) {
     const { kinds, contacts, velocities, impulses } = state.record;

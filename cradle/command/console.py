@@ -83,11 +83,6 @@ def picture(_: click.Context, __: click.Parameter, path: str | None) -> str | No
     return path
 
 
-def image_format(path: str) -> str:
-    """Return the format of a picture by the ending of its file; without one matplotlib adds one."""
-    return Path(path).suffix[1:] or "png"
-
-
 def plot_fits(fits: Sequence[Any], path: str) -> None:
     """Draw every identified estimate to a file."""
     from matplotlib.figure import Figure
@@ -98,4 +93,4 @@ def plot_fits(fits: Sequence[Any], path: str) -> None:
     figure = Figure((9, 3.9 * len(drawn)), layout="constrained")
     for (one, name), row in zip(drawn, figure.subplots(len(drawn), 2, squeeze=False), strict=True):
         one.plot(name, row)
-    figure.savefig(path, format=image_format(path))
+    figure.savefig(path, format=Path(path).suffix[1:] or "png")

@@ -8,13 +8,14 @@ import re
 import sys
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
 
 from cradle import ImpactNotCertified, ImpactNotFinished, collide
 from cradle.advice.choice import made
-from cradle.command.console import format_options, image_format, picture, show
+from cradle.command.console import format_options, picture, show
 from cradle.command.describe import chain_options, described
 from cradle.command.film import film
 from cradle.command.fit import fit, template
@@ -132,7 +133,7 @@ def plot(output: str, **options: Any) -> None:
 
     given, figure = described(**options), Figure((7, 4.3), layout="constrained")
     velocities(collide(given.chain, given.model, progress=True), figure.subplots())
-    figure.savefig(output, format=image_format(output))
+    figure.savefig(output, format=Path(output).suffix[1:] or "png")
     click.echo(f"drawn to {output}\n{given.note}")
 
 

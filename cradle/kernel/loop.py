@@ -53,6 +53,7 @@ class Outputs(NamedTuple):
     v: Any
     hits: Any
     collapsed: Any
+    margin: Any
     p: Any
     a: Any
     held: Any
@@ -273,6 +274,7 @@ def batch(begin, resumed, n, inputs, options, out, state, effort):
             tally.defect = certify(n, v, ball, contact, tally)
             status = UNSOUND if tally.defect > 0 else FINISHED
         out.collapsed[k] = tally.collapsed
+        out.margin[k] = tally.margin
         for c in range(n - 1):
             hits[c] = contact[c].hits
         for c in range(len(out.p)):

@@ -26,7 +26,7 @@ def post_impact_velocities(
 ) -> Vector:  # fmt: skip
     """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
 
-    As `collide` with `ImpulseCorrelation`, without the path.
+    As `collide` with `ImpulseCorrelation`, without the path; `outcomes` has the margins, too.
 
     Parameters
     ----------
@@ -77,6 +77,7 @@ class Outcomes(NamedTuple):
     velocities: Vector  #: after the impact, shape (..., N), m/s
     collisions: NDArray[np.int64]  #: how often each contact became active, shape (..., N - 1)
     collapsed: NDArray[np.bool_]  #: whether an infinite sequence was taken to its limit, (...)
+    margin: Vector  #: as of `Trace`: 0 where the digits of the solver may decide, shape (...)
 
 
 def outcomes(
@@ -84,7 +85,7 @@ def outcomes(
     backward: ArrayLike | None = None, *, meeting: float = 0.5, excess: str = "raise",
     max_events: int = paper.MAX_EVENTS, progress: bool = False,
 ) -> Outcomes:  # fmt: skip
-    """Velocities and numbers of collisions of many chains of N balls; leading axes broadcast.
+    """Velocities, collisions and margins of many chains of N balls; leading axes broadcast.
 
     Arguments and errors are those of `post_impact_velocities`.
 
@@ -108,8 +109,8 @@ def outcomes(
         """Solve the chunk of chains that begins there; return how it ended, and where."""
         rows = slice(begin, min(begin + CHUNK, count))
         part = Inputs(*(rows_of(array, lead, rows) for array in arrays))
-        v, hits, collapsed, *last = whole
-        out = Outputs(v[rows], hits[rows], collapsed[rows], *last)
+        v, hits, collapsed, margin, *last = whole
+        out = Outputs(v[rows], hits[rows], collapsed[rows], margin[rows], *last)
         job = Job(part, out, options, large=large).run(stop)
         # Not the job: its arrays would wait for those of the chunks before.
         return job.status, begin + job.next
@@ -127,8 +128,8 @@ def outcomes(
             chain = Chain(m, v, e)
             model.solve(chain)
             raise ImpactNotCertified(chain, model, "among others it stops, alone it does not")
-    v, hits, collapsed, *_ = whole
-    return Outcomes(v.reshape(*lead, n), hits.reshape(*lead, n - 1), collapsed.reshape(lead) != 0)
+    v, hits, collapsed, margin = (x.reshape((*lead, *x.shape[1:])) for x in whole[:4])
+    return Outcomes(v, hits, collapsed != 0, margin)
 
 
 def shaped(

@@ -124,7 +124,7 @@ class ImpulseCorrelation:
             written.velocities[: kept + 1], written.impulses[: kept + 1], tuple(events),
             collapsed=bool(results.collapsed[0]),
             saturated=tuple(np.flatnonzero(results.held).tolist()),
-            margin=job.tally("margin"),
+            margin=float(results.margin[0]),
             left_out=count - kept if kept else 0,  # without a record not all are counted
         )  # fmt: skip
 

@@ -82,7 +82,7 @@ def outputs(rows: int, n: int, last: bool = False) -> plain.Outputs:
     integer, one = np.int64, n - 1 if last else 0
     hits, collapsed = np.empty((rows, n - 1), integer), np.empty(rows, integer)
     parts = np.zeros(one), np.zeros(one), np.zeros(one, integer)
-    return plain.Outputs(np.empty((rows, n)), hits, collapsed, *parts)
+    return plain.Outputs(np.empty((rows, n)), hits, collapsed, np.empty(rows), *parts)
 
 
 @dataclass
