@@ -120,7 +120,8 @@ def described(
         )
     elastic = bool((chain.restitution == 1.0).all())
     if masses and ratio is None and model is None and len(chain) > 2:
-        model, kind = "spheres", "elastic spheres" if elastic else "spheres with losses"
+        kind = "elastic spheres" if elastic else "spheres with losses, by the energy law"
+        model = "spheres"
         assumed.append(f"the balls collide as {kind} (--model, --ratio)")
     if model == "sequential":
         law = cradle.SequentialCollisions()

@@ -82,7 +82,7 @@ class SpringChain:
     def solve(self, chain: Chain, *, once: bool = False, progress: bool = False) -> TimedTrace:
         """Solve the impact of `chain`; see `collide`.  `once`: until all contacts have opened."""
         n = len(asked.must_be(Chain, "chain", chain))
-        rule = "must be 1 for SpringChain, whose losses are its viscosity"
+        rule = "must be 1 for SpringChain, whose losses are its viscosity: see viscosity_from"
         asked.refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
         fastest(chain)  # is within the range of floats
         contacts = (asked.row_of(name, getattr(self, name), n - 1, n) for name in _RULES)

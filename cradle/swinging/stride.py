@@ -232,5 +232,5 @@ class Alone:
     def _refuse_a_pack(self, x: list[complex]) -> None:
         for i, j in combinations(range(len(x)), 2):
             if j > i + 1 and abs(x[j] - x[i]) <= self.radii[i] + self.radii[j] + self.touching:
-                rule = "a row alone can be solved, no pack"
+                rule = "a row alone can be solved, no pack; are these radii, not diameters?"
                 raise ValueError(f"balls {i} and {j} touch and are no neighbours; {rule}")
