@@ -69,16 +69,21 @@ def bounded_ties(draw, n):
     return given._replace(forward=forward, backward=backward)
 
 
-def tiny_ratios(draw, n):
-    """Ratios of 1e-20 among those of ties.
+def tiny_ratios(draw, n, size=1e-20):
+    """Ratios of this size among those of ties.
 
     What they do cannot be seen in doubles, but it decides whether a contact has been touched.
     Products of several of them need hundreds of digits: no outcome is demanded, only invariants.
     """
     given = ties(draw, n)
-    values = draw.choice([[0.0, 1e-20], [0.0, 1e-20, 0.1], [0.0, 1e-20, 0.1, 1.0]])
+    values = draw.choice([[0.0, size], [0.0, size, 0.1], [0.0, size, 0.1, 1.0]])
     forward, backward = ([draw.choice(values) for _ in range(n - 2)] for _ in range(2))
     return given._replace(forward=forward, backward=backward)
+
+
+def small_ratios(draw, n):
+    """The same with ratios of 1e-8: products of five decide beyond the 32 digits of the solver."""
+    return tiny_ratios(draw, n, 1e-8)
 
 
 def mixed_zeros(draw, n):
@@ -216,6 +221,7 @@ JUDGED = {
     "at bounds": (at_bounds, 3, 10),
     "extremes": (extremes, 2, 10),
     **FAMILIES,
+    "small ratios": (small_ratios, 3, 20),
 }
 
 

@@ -63,7 +63,7 @@ def exact(problem, read=meaning, *, events=EVENTS, twice=False):
     100 digits; four times as many where a ratio is so small that products of several matter; twice
     as many if asked.
     """
-    tiny = any(0 < ratio < 1e-9 for ratio in (*problem.forward, *problem.backward))
+    tiny = any(0 < ratio < 1e-6 for ratio in (*problem.forward, *problem.backward))
     with decimal.localcontext(prec=DIGITS * (4 if tiny else 1) * (2 if twice else 1)):
         options = {"number": read, "max_events": events, "impact": Exact}
         try:

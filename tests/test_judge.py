@@ -30,7 +30,7 @@ def test_a_tie_decided_by_products_of_tiny_ratios_is_told_by_the_margin():
         [1e-20, 0.0, 1e-20, 0.0, 0.0, 0.0], [0.0, 1e-20, 0.0, 0.0, 0.0, 0.0],
     )  # fmt: skip
     assert judge(problem).word == "wrong"
-    assert problem.collide().margin == outcomes(*problem[:5]).margin == 0.0
+    assert problem.collide().margin == margin(problem) == 0.0
     clear = [[1e-4 if x == 1e-20 else x for x in side] for side in problem[3:5]]
     clear = problem._replace(forward=clear[0], backward=clear[1])
     assert judge(clear).word == "right"
@@ -67,16 +67,24 @@ STORED = Path(__file__).parents[1] / "data" / "judge.csv"
 SAMPLE = {
     "losses": 125, "wide": 75, "generic": 200, "at bounds": 150, "extremes": 40, "ties": 60,
     "ties within bounds": 60, "tiny ratios": 10, "mixed zeros": 60, "light balls": 60,
+    "small ratios": 10,
 }  # fmt: skip
 #: Begins with fifty chains of "losses" of which one was wrong by .1 when first judged.
 SEED = 2026007778
 REFUTED = ("wrong", "other reading")
 
 
+def margin(problem):
+    """What a batch says of how sure it is."""
+    *parts, meeting = problem
+    return outcomes(*parts, meeting=meeting, excess="saturate").margin
+
+
 def no_wrong_chain(name, count, seed, **options):
-    """All of so many chains of a family whose exact run ends are right, and these are most."""
+    """Of so many chains of a family none is wrong at a margin above 0, and most are right."""
     verdicts = [(judge(problem, **options), problem) for problem in family(name, count, seed)]
-    wrong = [f"{verdict}: {problem}" for verdict, problem in verdicts if verdict.word in REFUTED]
+    refuted = [(verdict, problem) for verdict, problem in verdicts if verdict.word in REFUTED]
+    wrong = [f"{verdict}: {problem}" for verdict, problem in refuted if margin(problem) > 0.0]
     right = sum(verdict.word == "right" for verdict, _ in verdicts)
     assert not wrong, f"{len(wrong)} of {count} chains:\n" + "\n".join(wrong)
     assert right > 0.6 * count
@@ -106,8 +114,8 @@ def test_the_stored_run():
         assert list(row) == list(court.WORDS)
         assert sum(map(int, row.values())) >= 7000, name
         assert row["other reading"] == "0", name
-        # A product of two ratios of 1e-20 lies below the last of 32 digits; see the named tests.
-        allowed = {"tiny ratios": 95, "losses": 1}.get(name, 0)
+        # Products of ratios of 1e-20 or 1e-8 lie below the last of 32 digits; see the named tests.
+        allowed = {"tiny ratios": 95, "losses": 1, "small ratios": 18}.get(name, 0)
         assert int(row["wrong"]) <= allowed, name
         assert int(row["open"]) <= 1, name
         assert int(row["right"]) > 4200, name
