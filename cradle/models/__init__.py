@@ -52,8 +52,8 @@ def collide(
     ------
     TypeError, ValueError
         If `chain` or `model` is something else, or the model cannot treat this chain.
-    ImpactNotFinished
-        If the impact takes more steps than the model allows.
+    ImpactNotFinished, ImpactNotCertified
+        If the impact takes more steps than the model allows, or its outcome fails a check.
 
     Examples
     --------

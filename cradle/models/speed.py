@@ -94,7 +94,7 @@ class ConstantLoss:
 
 @dataclass(frozen=True)
 class ViscousLoss:
-    """Restitution of viscoelastic balls (Ramirez et al., Phys. Rev. E 60 (1999) 4465-4472).
+    """Restitution of viscoelastic balls at a closing speed, by Ramirez and others (1999).
 
     Parameters
     ----------
