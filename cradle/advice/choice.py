@@ -239,8 +239,8 @@ def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
                 raise
             models["energy"] = lambda row: EnergyDistribution(stiffness, rtol=row.parameter)
         else:
-            models["springs"] = lambda r: SpringChain(
-                stiffness, viscosity=lost, accuracy=r.parameter
+            models["springs"] = lambda row: SpringChain(
+                stiffness, viscosity=lost, accuracy=row.parameter
             )
             if wish.impacts > 1:
                 models["many springs"] = models["springs"]
