@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import truth
 from chains import magnitudes, uniform
-from chapters import Chapter, number
+from chapters import Chapter, floats, number
 
 from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequences
 from cradle.closed_form import largest_ratios
@@ -140,11 +140,14 @@ READINGS = {
 }
 
 
-def outcome(turns, meeting=0.5, ratio=0.1):
-    """Outcome of Fig. 8's chain when the gap closes with these directions at its two balls."""
-    reading = type("Chosen", (Reading,), {"turns": turns})
-    chain = [1] * 4, [1, 0.5, 0, 0], 1, ratio
-    return truth.solve(*chain, meeting=meeting, number=float, impact=reading)
+def chosen(turns):
+    """The rules of one reading."""
+    return type("Chosen", (Reading,), {"turns": turns})
+
+
+def outcome(turns, ratio="0.1", chain=([1] * 4, [1, "0.5", 0, 0], 1)):
+    """Outcome of a chain when the gap closes with these directions at its two balls."""
+    return truth.solve(*chain, ratio, number=float, impact=chosen(turns))
 
 
 def test_fig_8_path():
@@ -164,11 +167,32 @@ def contact_work(trace, c, row):
     return float(np.sum((u[1:] + u[:-1]) / 2 * np.diff(trace.path_impulses[: row + 1, c])))
 
 
-def test_fig_8_three_readings():
+def test_three_readings():
+    """Who drives after a meeting: in the example, and in the ten chains."""
     table = pd.read_csv(io.StringIO(CHAPTER.printed("readings-table")), sep=r"\s+")
-    for reading, way in READINGS.items():
-        expected = outcome(way, ratio=0.15).velocities
-        np.testing.assert_allclose(table.loc[reading], expected, atol=6e-5)
+    ends = {name: floats(outcome(way, "0.15").velocities) for name, way in READINGS.items()}
+    for name, expected in ends.items():
+        np.testing.assert_allclose(table.loc[name], expected, atol=6e-5)
+    most = np.ptp([*ends.values()], axis=0).max()
+    assert CHAPTER.glued["n-balls-spread"] == f"{most:.2f}"
+    seen = floats(outcome(READINGS["both"], "0.15", ([1] * 4, [0, 0, "-0.5", -1], 1)).velocities)
+    mirror = abs(seen[::-1] + ends["both"]).max()
+    assert CHAPTER.glued["n-balls-mirror-off"] == f"{mirror:.3f}"
+    assert 0.15 < max(mirror, most) < 0.2  # "up to a fifth" in the chapter on the problem
+
+    turned = {}
+    for name in paper_sequences():
+        chain, model = paper_chain(name, excess="saturate")
+        numbers = chain.masses, chain.velocities, list(chain.restitution)
+        numbers += model.forward, model.backward
+        ends = [
+            truth.solve(*numbers, number=float, impact=chosen(way)) for way in READINGS.values()
+        ]
+        turned[name] = np.ptp([floats(end.velocities) for end in ends], axis=0).max()
+    assert {name for name, size in turned.items() if size > 0} == {"ABCCAB", "BCACBA"}
+    for chapter, name in (CHAPTER, "n-balls-ten-spread"), (Chapter("experiments"), "turned"):
+        chapter.tells({name: max(turned.values())})
+    assert max(turned.values()) < 0.005  # "less than half a hundredth"
 
 
 def test_events_of_two_runs_that_meet():
@@ -209,6 +233,8 @@ def test_fig_8_meeting_moves_two_of_ten_sequences():
             np.testing.assert_allclose(ends[-1], exact.velocities, atol=1e-12)
         moved[name] = np.ptp(ends, axis=0).max()
     assert {name for name, size in moved.items() if size > 0} == {"ABCCAB", "BCACBA"}
+    for chapter, name in (CHAPTER, "n-balls-ten-move"), (Chapter("experiments"), "moved"):
+        chapter.tells({name: max(moved.values())})
     lines = [row.split() for row in READING.printed("meeting-cell").splitlines()[2:]]
     stored = {row[0]: number(row[-1]) for row in lines}
     assert stored == pytest.approx({k: v for k, v in moved.items() if v > 0}, rel=0.02)

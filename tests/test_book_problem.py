@@ -5,8 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from chains import uniform
-from chapters import Chapter, floats, number
-from test_book_n_balls import READINGS, outcome
+from chapters import Chapter, floats
 from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, collide
@@ -99,25 +98,3 @@ def test_exercise_2_heavy_middle():
     for name, ratio in (("sequential", 0), ("between", 1 / 6)):
         v = [float(x) for x in solve([1, 2, 1], [1, 0, 0], 1, ratio).velocities]
         np.testing.assert_allclose(rows[name][1:4], v, rtol=0, atol=5e-5)
-
-
-def test_what_the_rules_matter():
-    """The table of the model's parts, by the reference solver and the textbook solver."""
-
-    def after(velocities=(1, "0.5", 0, 0), **options):
-        return floats(solve([1] * 4, velocities, 1, "0.1", number=float, **options).velocities)
-
-    def spread(outcomes):
-        return np.ptp(outcomes, axis=0).max()
-
-    places = np.linspace(0, 1, 11).tolist()
-    CHAPTER.tells({
-        "mirror": abs(-after([0, 0, "-0.5", -1])[::-1] - after()).max(),
-        "readings": spread([floats(outcome(way).velocities) for way in READINGS.values()]),
-    })  # fmt: skip
-    CHAPTER.tells({"meeting": spread([after(meeting=x) for x in places])}, off=1e-4)
-    # How far the place of a meeting moves the ten chains, and which are held: other tests.
-    table = Chapter("reading_n_balls").printed("meeting-cell").splitlines()
-    moved = [row.split()[-1] for row in table[2:]]
-    assert number(CHAPTER.glued["meeting-ten"]) == max(map(number, moved))
-    assert CHAPTER.glued["held"] == "two"
