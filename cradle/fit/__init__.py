@@ -4,11 +4,13 @@
 
 Measured are `shots`; `tracks` and `film` make velocities of positions.  `parameters` says how well
 values explain shots, `search` finds all that do, `estimate` fits, and `result` is what comes back.
-`swings` fits a whole swing to its film: period, damping, restitution, gap.
+`laws` fits any other law to shots, such as spheres with gaps and losses, and `swings` a whole swing
+to its film: period, damping, restitution, gap.
 """
 
 from cradle.fit.estimate import ratio, restitution, restitution_from_heights
 from cradle.fit.film import Velocities, speeds_from_heights, velocities_from_tracks
+from cradle.fit.laws import LawFit, fit_law
 from cradle.fit.result import Estimate, Fit, Prediction
 from cradle.fit.search import Mode
 from cradle.fit.shots import Shots, ShotSet, read_shots
@@ -16,7 +18,7 @@ from cradle.fit.swings import SwingFit, fit_swing
 from cradle.fit.tracks import Tracks, read_tracker
 
 __all__ = [
-    "Estimate", "Fit", "Mode", "Prediction", "ShotSet", "Shots", "SwingFit", "Tracks",
-    "Velocities", "fit_swing", "ratio", "read_shots", "read_tracker", "restitution",
+    "Estimate", "Fit", "LawFit", "Mode", "Prediction", "ShotSet", "Shots", "SwingFit", "Tracks",
+    "Velocities", "fit_law", "fit_swing", "ratio", "read_shots", "read_tracker", "restitution",
     "restitution_from_heights", "speeds_from_heights", "velocities_from_tracks",
 ]  # fmt: skip

@@ -1,0 +1,194 @@
+"""Any impact law fitted to shots: gaps and losses of spheres, one ratio for a whole row."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from cradle.chain import Chain
+from cradle.fit.search import RISE, spread
+from cradle.fit.shots import Shots, chance
+from cradle.input.values import PART, Vector, must_be, one_number, whole_number
+from cradle.models import Model, collide
+
+Law = Callable[..., Model]
+_STEP = 1e-4  # of a slope, as a part of the range
+_SAME = 0.02  # minima nearer to one another than this part of each range are one
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LawFit:
+    """What shots say of the numbers of a law."""
+
+    values: Mapping[str, float]  #: Of each number, the best.
+    intervals: Mapping[str, tuple[float, float]]  #: 95 % about it, by profiles of chi-square.
+    minima: tuple[Mapping[str, float], ...]  #: Other values that explain the shots, best first.
+    residuals: Mapping[str, Vector]  #: By set: measured less computed, over the error, (K, N).
+    chi_square: float
+    degrees_of_freedom: int  #: Velocities after the impacts less numbers fitted.
+
+    def summary(self) -> str:
+        """Return all that the fit says, as text."""
+        lines = [f"{name} = {value:.4g} [{low:.4g}, {high:.4g}]" for (name, value), (low, high)
+                 in zip(self.values.items(), self.intervals.values(), strict=True)]  # fmt: skip
+        likely = chance(self.chi_square, self.degrees_of_freedom)
+        free = f"degrees of freedom {self.degrees_of_freedom}, chance {likely:.2g}"
+        others = (", ".join(f"{name} = {x:.4g}" for name, x in one.items()) for one in self.minima)
+        return "\n".join([*lines, f"chi-square {self.chi_square:.1f}, {free}",
+                          *(f"or {other}" for other in others)])  # fmt: skip
+
+    def __repr__(self) -> str:
+        return f"LawFit({'; '.join(self.summary().splitlines())})"
+
+
+def fit_law(
+    shots: Shots, law: Law | Mapping[str, Law], ranges: Mapping[str, tuple[float, float]], *,
+    restitution: float = 1.0, starts: int = 32,
+) -> LawFit:  # fmt: skip
+    """Fit the numbers of any impact law to shots, by the least chi-square that is found.
+
+    All computed velocities of a shot may be off by one factor, within the error of those before.
+
+    Parameters
+    ----------
+    shots : Shots
+        As of `read_shots`.
+    law : callable, or mapping of callables by the names of the sets
+        ``law(**numbers)`` returns a model.  A number named restitution is that of all contacts of
+        the chain, and not handed on.
+    ranges : mapping of str to (float, float)
+        Least and largest value of each number.
+    restitution : float
+        Of all contacts, where it is not fitted.
+    starts : int
+        Points of the ranges from which minima are looked for.
+
+    Raises
+    ------
+    ValueError
+        If a range is wrong, a set has no law, there are too few velocities, or a law refuses.
+
+    Examples
+    --------
+    Three spheres, the last one a little apart; lengths in units of compression:
+
+    >>> from cradle import SpringChain
+    >>> from cradle.fit import read_shots
+    >>> table = {"set": "gap", "shot": 1, "ball": [1, 2, 3], "type": "A", "mass": 1.0,
+    ...          "before": [1.0, 0.0, 0.0], "after": [-0.037, 0.039, 0.998], "sigma_before": 0.0}
+    >>> table = {name: np.broadcast_to(x, 3) for name, x in table.items()}
+    >>> shots = read_shots(table, sigma=0.01)
+    >>> fit_law(shots, lambda gap: SpringChain(gaps=[0.0, gap]), {"gap": (0.0, 2.0)})
+    LawFit(gap = 0.1184 [0.06352, 0.1963]; chi-square 0.0, degrees of freedom 2, chance 1)
+    """
+    return _Search(shots, law, ranges, restitution).found(whole_number("starts", starts))
+
+
+class _Search:
+    """What a law leaves of shots, by numbers z: 1 at the lower end of a range, 2 at the upper."""
+
+    def __init__(
+        self, shots: Shots, law: Law | Mapping[str, Law],
+        ranges: Mapping[str, tuple[float, float]], restitution: float,
+    ) -> None:  # fmt: skip
+        self.sets, self.ranges = must_be(Shots, "shots", shots).sets, ranges
+        names = [one.name for one in self.sets]
+        self.laws = law if isinstance(law, Mapping) else dict.fromkeys(names, law)
+        for name in (name for name in names if name not in self.laws):
+            raise ValueError(f"law has no set {name!r}; it has {', '.join(self.laws)}")
+        for name, (low, high) in ranges.items():
+            least = one_number(f"ranges[{name!r}][0]", low)
+            rule = f"must be above {least!r}"
+            one_number(f"ranges[{name!r}][1]", high, rule, least, open_low=True)
+        count = sum(one.after.size for one in self.sets)
+        if not 0 < len(ranges) < count:
+            told = f"ranges has {len(ranges)} numbers, shots have {count} velocities"
+            raise ValueError(f"{told}; must be at least 1 number, and fewer than velocities")
+        self.freedom = count - len(ranges)
+        self.fixed = {"restitution": one_number("restitution", restitution, *PART)}
+        self.tried: list[tuple[float, list[float]]] = []  # chi-square and z of all minima
+
+    def numbers(self, z: Vector) -> dict[str, float]:
+        """Return the numbers by name."""
+        ends = self.ranges.items()
+        return {name: low + (high - low) * (x - 1.0)
+                for (name, (low, high)), x in zip(ends, z.tolist(), strict=True)}  # fmt: skip
+
+    def left(self, z: Vector) -> list[Vector]:
+        """Return residuals over errors, (K, N + 1) for each set, the last one of the factor."""
+        values = self.fixed | self.numbers(np.round(z, 9))  # none is nearly at an end
+        e, found = values.pop("restitution"), []
+        for one in self.sets:
+            model, weight = self.laws[one.name](**values), 1.0 / one.sigma**2
+            starts, of = np.unique(one.before, axis=0, return_inverse=True)
+            chains = [Chain(one.masses, before, e) for before in starts]
+            v = np.array([collide(chain, model).velocities for chain in chains])[of.ravel()]
+            part = one.sigma_before / np.where(one.before, np.abs(one.before), np.inf)
+            error = np.maximum(part.max(axis=1), 1e-12)
+            # The factor that makes the sum of squares least, less 1 and over its error.
+            gain = (weight * v * (one.after - v)).sum(axis=1) * error
+            off = gain / (1.0 + error**2 * (weight * v * v).sum(axis=1))
+            rest = (one.after - (1.0 + off * error)[:, None] * v) / one.sigma
+            found.append(np.column_stack([rest, off]))
+        return found
+
+    def descend(self, z: Vector, free: list[int]) -> tuple[Vector, float]:
+        """Go down along some axes to a minimum; return z and chi-square there."""
+        end = z.copy()
+
+        def rest(part: Vector) -> Vector:
+            end[free] = part
+            return np.concatenate([part.ravel() for part in self.left(end)])
+
+        if free:
+            end[free] = scipy.optimize.least_squares(
+                rest, z[free], bounds=(1.0, 2.0), method="dogbox", diff_step=_STEP,
+                ftol=1e-11, xtol=1e-11, max_nfev=60,
+            ).x  # fmt: skip
+        last = rest(end[free])
+        self.tried.append((float(last @ last), end.tolist()))
+        return end, self.tried[-1][0]
+
+    def reach(self, best: Vector, lowest: float, k: int, limit: float) -> float:
+        """Return how far number k goes to a limit before chi-square has risen by `RISE`."""
+        others, here = [i for i in range(best.size) if i != k], best.copy()
+
+        def over(x: float) -> float:
+            here[k] = x
+            here[:], value = self.descend(here, others)
+            return value - lowest - RISE
+
+        near, step = float(best[k]), 10.0 * _STEP
+        while near != limit:
+            far = near + float(np.clip(limit - near, -step, step))
+            if over(far) > 0.0:
+                return float(scipy.optimize.brentq(over, near, far, xtol=0.1 * _STEP))
+            near, step = far, 2.0 * step
+        return limit
+
+    def found(self, starts: int) -> LawFit:
+        """Return the fit: from the lowest minimum, until no profile finds a lower one."""
+        every = list(range(len(self.ranges)))
+        ends = [self.descend(1.0 + z, every) for z in spread(starts, len(every))]
+        while True:
+            lowest = min(value for _, value in ends)
+            # Of those that are equally low the one with the least numbers.
+            ends.sort(key=lambda end: (max(end[1] - lowest, 0.01), end[0].round(3).tolist()))
+            best = ends[0][0]
+            spans = [[self.reach(best, lowest, k, limit) for limit in (1.0, 2.0)] for k in every]
+            value, z = min(self.tried)
+            if value > lowest - 0.01:
+                break
+            ends.append(self.descend(np.array(z), every))
+        minima = [best]
+        for end, value in ends:
+            apart = all(np.abs(end - other).max() > _SAME for other in minima)
+            minima += [end] * bool(apart and value < lowest + RISE)
+        low, high = (self.numbers(np.array(span)) for span in zip(*spans, strict=True))
+        residuals = zip(self.sets, self.left(best), strict=True)
+        values, *others = (self.numbers(np.round(end, 9)) for end in minima)
+        return LawFit(
+            values, {name: (low[name], high[name]) for name in values}, tuple(others),
+            {one.name: left[:, :-1] for one, left in residuals}, lowest, self.freedom,
+        )  # fmt: skip
