@@ -62,6 +62,7 @@ class Still:
 BALLS = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "restitution": 1}
 RATIOS = {"forward": 0.1, "backward": 0.1, "meeting": 0.5, "excess": "raise", "max_events": 100}
 SPRINGS = {"stiffness": 1, "exponent": 1.5}
+MANY = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "progress": False}
 FORCES = SPRINGS | {"viscosity": 0.01, "gaps": 0.1, "accuracy": 1e-3}
 PENDULUMS = {"length": 0.1, "gravity": 9.81, "gaps": 0.0, "damping": 0.0, "angle": "small"}
 SHOTS = fit.read_shots(DATA / "shots_synthetic.csv", velocity_unit="m/s")
@@ -78,9 +79,8 @@ ENTRIES = {
     cradle.ViscousLoss: {"viscosity": 1e-3, "masses": [1, 1]} | SPRINGS,
     SpringChain: FORCES | {"max_steps": 10_000},
     EnergyDistribution: SPRINGS | {"rtol": 1e-6, "max_evaluations": 10_000, "gaps": True},
-    cradle.spring_velocities: {
-        "masses": [1, 1, 1], "velocities": [1, 0, 0], "progress": False,
-    } | FORCES,
+    cradle.spring_velocities: MANY | FORCES,
+    cradle.spring_outcomes: MANY | FORCES,
     cradle.viscosity_from: {"restitution": 0.9, "speed": 1, "masses": [1, 1], "stiffness": 1},
     QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
     cradle.post_impact_velocities: BALLS | RATIOS | {"progress": False},
@@ -211,7 +211,8 @@ def test_no_entry_point_is_missing():
     """All that `cradle` exports is called here, but for results and what takes no argument."""
     results = {
         "DissipationTrace", "EnergyTrace", "Event", "Impact", "ImpactNotCertified", "Model",
-        "ImpactNotFinished", "Outcomes", "Recommendation", "Swing", "TimedTrace", "Trace",
+        "ImpactNotFinished", "Outcomes", "Recommendation", "SpringOutcomes", "Swing",
+        "TimedTrace", "Trace",
     }  # fmt: skip
     nothing = {"paper_sequences", "ratio_table", "restitution_table", "warm_up"}
     called = {call.__name__ for call in ENTRIES}

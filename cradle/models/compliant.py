@@ -5,7 +5,7 @@ import math
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,7 @@ from cradle.models.energy import fastest
 from cradle.models.springs import COARSEST, FINEST, MOST_STEPS, TimedTrace, refused
 from cradle.runtime.job import DEFECTS, FINISHED, LARGE, REFUSED, UNFINISHED, UNSOUND
 from cradle.runtime.springs import room, solve
-from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
+from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace, compared_as_objects
 
 # What is asked of the parameters: a rule, limits, whether the lower one is excluded; of contacts,
 _RULES = {
@@ -132,6 +132,7 @@ def spring_velocities(
 ) -> Vector:  # fmt: skip
     """Post-impact velocities of many chains of balls on springs; leading axes broadcast.
 
+    `spring_outcomes` has the estimated errors, too.
     Each contact pushes with k (d^p + A d(d^p)/dt) while that is above zero, d its compression:
     p = 1 is a linear spring, p = 3/2 the contact of two spheres, elastic or viscoelastic.  The
     velocities depend on the ratios of the stiffnesses alone where there are no losses and gaps.
@@ -179,6 +180,35 @@ def spring_velocities(
     array([-0.07, -0.03, -0.01,  0.13,  0.99])
     array([-0.  ,  0.02,  0.03,  0.1 ,  0.85])
     """
+    return spring_outcomes(
+        masses, velocities, stiffness, exponent=exponent, viscosity=viscosity, gaps=gaps,
+        accuracy=accuracy, progress=progress,
+    ).velocities  # fmt: skip
+
+
+@compared_as_objects
+class SpringOutcomes(NamedTuple):
+    """What a batch of impacts on springs leaves."""
+
+    velocities: Vector  #: after the impact, shape (..., N), m/s
+    error: Vector  #: estimated, of a velocity over the fastest closing speed, shape (...)
+
+
+def spring_outcomes(
+    masses: ArrayLike, velocities: ArrayLike, stiffness: ArrayLike = 1.0, *,
+    exponent: float = 1.5, viscosity: ArrayLike = 0.0, gaps: ArrayLike = 0.0,
+    accuracy: float = 1e-3, progress: bool = False,
+) -> SpringOutcomes:  # fmt: skip
+    """Velocities of many chains of balls on springs, with the error that each is estimated to have.
+
+    Arguments and errors are those of `spring_velocities`.
+
+    Examples
+    --------
+    >>> found = spring_outcomes([1] * 3, [1, 0, 0], [[1, 1], [1, 9]])
+    >>> found.velocities.shape, (found.error < 1e-3).tolist()
+    ((2, 3), [True, True])
+    """
     p = asked.one_number("exponent", exponent, *_EXPONENT)
     accuracy = asked.one_number("accuracy", accuracy, *_ACCURACY)
     given = {"masses": masses, "velocities": velocities, "stiffness": stiffness}
@@ -187,13 +217,13 @@ def spring_velocities(
     n, count = arrays[0].shape[-1], math.prod(lead)
     if count == 0:
         check_rows(arrays)
-    law, out = Law(p, accuracy, float(MOST_STEPS)), np.empty((count, n))
+    law, out, error = Law(p, accuracy, float(MOST_STEPS)), np.empty((count, n)), np.empty(count)
 
     def run_chunk(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
         """Solve the chunk of chains that begins there; return how it ended, and where."""
         rows = slice(begin, min(begin + _CHUNK, count))
         part = Springs(*(rows_of(array, lead, rows) for array in arrays))
-        found = room(rows.stop - begin, n)._replace(v=out[rows])
+        found = room(rows.stop - begin, n)._replace(v=out[rows], error=error[rows])
         at, status, _ = solve(part, law, found, count * n >= LARGE, stop)
         return status, begin + at
 
@@ -211,7 +241,7 @@ def spring_velocities(
         model, chain = SpringChain(k, p, viscosity=loss, gaps=gap, accuracy=accuracy), Chain(m, v)
         model.solve(chain)
         raise ImpactNotCertified(chain, model, "among others it fails, alone it does not")
-    return out.reshape(*lead, n)
+    return SpringOutcomes(out.reshape(*lead, n), error.reshape(lead))
 
 
 def check_rows(arrays: Sequence[Vector]) -> None:
