@@ -41,7 +41,7 @@ def simulated(name, masses, e, ratios, noise, seed, count=12):
 
 def test_a_restitution_is_that_of_the_other_fit():
     shots = Shots((simulated("AB", [0.045, 0.053], 0.6, 0.0, 0.01, 1),))
-    found = fit_law(shots, SequentialCollisions, {"restitution": (0, 1)})
+    found = fit_law(shots, SequentialCollisions, {"restitution": (0, 1)}, starts=4)
     (other,) = restitution(shots).estimates.values()
     assert found.values["restitution"] == pytest.approx(other.value, abs=1e-5)
     assert found.intervals["restitution"] == pytest.approx(other.intervals[0], abs=3e-5)
@@ -51,7 +51,7 @@ def test_a_restitution_is_that_of_the_other_fit():
 
 def test_a_ratio_is_that_of_the_other_fit():
     shots = Shots((simulated("ABA", [0.045, 0.053, 0.045], 0.53, 0.11, 0.01, 2),))
-    found = fit_law(shots, ImpulseCorrelation, {"forward": (0, 0.45)}, restitution=0.53)
+    found = fit_law(shots, ImpulseCorrelation, {"forward": (0, 0.45)}, restitution=0.53, starts=9)
     other = ratio(shots, {"AB": 0.53})
     (one,) = other.estimates.values()
     assert found.values["forward"] == pytest.approx(one.value, abs=1e-4)
@@ -97,7 +97,9 @@ def stored(law, fitted):
 
 
 def test_two_strikes_of_the_film():
-    found = fit_law(Shots((*strikes(1, 2),)), {f"of {k}": spheres(k) for k in (1, 2)}, GAPS)
+    found = fit_law(
+        Shots((*strikes(1, 2),)), {f"of {k}": spheres(k) for k in (1, 2)}, GAPS, starts=9
+    )
     one, two, numbers = next(stored("spheres, three gaps, A", "both"))
     assert found.chi_square == pytest.approx(one + two, abs=2e-3)
     assert [*found.values.values()] == pytest.approx(numbers, rel=1e-3)
