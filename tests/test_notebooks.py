@@ -235,7 +235,8 @@ def test_letters_of_the_chapters_have_one_line_on_the_notation_page():
         for name in ("problem", "compliance", "three_balls", "multiple_impacts", "patterns",
                      "n_balls", "experiments", "notation")
     }  # fmt: skip
-    rows = re.findall(r"(?m)^\| ([^|]*\$[^|]*) \|", words.pop("notation"))
+    book_wide = words.pop("notation").partition("## Letters of single pages")[0]
+    rows = re.findall(r"(?m)^\| ([^|]*\$[^|]*) \|", book_wide)
     symbols = [symbol.strip() for row in rows for symbol in re.split(r",|\$", row)]
     symbols = [symbol.removeprefix("\\ ") for symbol in symbols if symbol]
     assert len(symbols) == len(set(symbols)) > 40
