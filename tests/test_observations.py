@@ -77,7 +77,7 @@ def test_numbers_of_others():
     assert f"spheres {after[2]:.2f}" in told
     power = float(re.search(r"power ([\d.]+) ", told)[1])
     assert power == pytest.approx(1 / 5, abs=2e-3)
-    assert "below True, 1 % above False" in told
+    assert "with 1 % less infinite, with 1 % more finite" in told
 
 
 def test_every_reference_is_cited():
