@@ -206,5 +206,5 @@ def test_rule_nine_says_who_drives_after_a_sequence_without_end():
         # The next event is the greatest compression of the contact that pushes from behind.
         closed = end.events.index(("maximum_compression", 0)) - 1
         assert end.events[closed] == ("close", last)
-        shown = re.search(rf" {digits} digits: (.+) m/s", f" {told}")[1].split()
+        shown = re.search(rf"(?m)^ *{digits} digits: (.+) m/s$", told)[1].split()
         assert [*map(float, shown)] == pytest.approx([*map(float, end.velocities)], abs=6e-5)
