@@ -48,32 +48,21 @@ _REASONS = {
 
 @dataclass(frozen=True, repr=False)
 class Recommendation:
-    """A model for a scene, and what to expect of it.  What was not measured is None.
+    """A model for a scene, and what to expect of it.  What was not measured is None."""
 
-    Attributes
-    ----------
-    model, call, setting : Model, str, str
-        Ready for `collide`; what to call; integrator and tolerance, one call or a batch.
-    numerical_error, model_error : float or None
-        Largest distance of a velocity from the exact answer of the same model on the chains of
-        `measured_on`, as a part of the closing speed (another chain may have a few times as much);
-        and from Hertz springs, the theory of elastic spheres (equal ones, unless `stiffness` says
-        otherwise), which no setting makes smaller, and which there is not with losses.
-    seconds : float or None
-        Time of one impact on the machine that measured, to a factor of two.
-    measured_on, reason : tuple of str, str
-        The chains of these numbers: this very one, or those around it, of which the worst counts;
-        and why this model.
-    """
-
-    model: Model
-    setting: str
-    call: str
+    model: Model  #: Ready for `collide`.
+    setting: str  #: Integrator and tolerance, one call or a batch.
+    call: str  #: What to call.
+    #: Largest distance of a velocity from the exact answer of the same model on the chains of
+    #: `measured_on`, as a part of the closing speed; another chain may have a few times as much.
     numerical_error: float | None
+    #: The same from Hertz springs, the theory of elastic spheres (equal ones, unless `stiffness`
+    #: says otherwise), which no setting makes smaller, and which there is not with losses.
     model_error: float | None
-    seconds: float | None
+    seconds: float | None  #: Time of one impact where it was measured, to a factor of two.
+    #: The chains of these numbers, this very one or those around it, of which the worst counts.
     measured_on: tuple[str, ...]
-    reason: str
+    reason: str  #: Why this model.
 
     def _lines(self) -> dict[str, str]:
         """Return what is shown, by its title."""

@@ -26,19 +26,11 @@ def fastest(chain: Chain) -> tuple[int, float, float]:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class EnergyTrace(Trace):
-    """The path of an impact whose ratios of impulses change all the time; N balls, S steps.
+    """The path of an impact whose ratios of impulses change all the time; N balls, S steps."""
 
-    Attributes
-    ----------
-    step_velocities, step_impulses : ndarray, shapes (S, N) and (S, N - 1)
-        Velocities, m/s, and impulses so far, N s, at each step of the integration.
-    evaluations : int
-        How often the ratios were evaluated.
-    """
-
-    step_velocities: Vector
-    step_impulses: Vector
-    evaluations: int
+    step_velocities: Vector  #: At each step of the integration, shape (S, N), m/s.
+    step_impulses: Vector  #: Impulses so far at each step, shape (S, N - 1), N s.
+    evaluations: int  #: How often the ratios were evaluated.
 
     def curve(self) -> tuple[Vector, Vector]:
         """Return impulses and velocities at the steps of the integration, and at the end."""

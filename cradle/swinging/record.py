@@ -34,22 +34,7 @@ class Impact(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Swing:
-    """A swing of N balls at T times, and its impacts.
-
-    Attributes
-    ----------
-    chain, model, pendulums : Chain, object, Pendulums
-        What `swing` was given.
-    times : ndarray, shape (T,)
-        s since the release; those asked for, up to the end of the run.
-    positions, velocities : ndarray, shape (T, N)
-        Along each ball's arc from its lowest point, m and m/s; after an impact at that instant.
-    impacts : tuple of Impact
-        In the order in which they happened.
-    ended, end : {"times", "impacts", "energy"}, float
-        Whether the last time, `max_impacts` or `min_energy` ended the run; and when, s.
-    together : tuple of int
-        Contacts whose balls moved together at the end.
+    """A swing of N balls at T times, and its impacts; `chain`, `model`, `pendulums` as given.
 
     Examples
     --------
@@ -64,13 +49,13 @@ class Swing:
     chain: Chain
     model: Any
     pendulums: Pendulums
-    times: Vector
-    positions: Vector
-    velocities: Vector
-    impacts: tuple[Impact, ...]
-    ended: str
-    end: float
-    together: tuple[int, ...]
+    times: Vector  #: s since the release, shape (T,); those asked for, up to the end of the run
+    positions: Vector  #: along each ball's arc from its lowest point, shape (T, N), m
+    velocities: Vector  #: shape (T, N), m/s; after an impact at that instant
+    impacts: tuple[Impact, ...]  #: in the order in which they happened
+    ended: str  #: what ended the run, "times", "impacts" (`max_impacts`), "energy" (`min_energy`)
+    end: float  #: when it ended, s
+    together: tuple[int, ...]  #: contacts whose balls moved together at the end
 
     @property
     def energy(self) -> Vector:
