@@ -1,6 +1,5 @@
 """What a command is told of a chain: options, the chain and model they mean, what is assumed."""
 
-import functools
 import math
 from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
@@ -22,24 +21,22 @@ def numbers_of(_: click.Context, __: click.Parameter, value: str | None) -> list
         raise click.BadParameter(f"{value!r}; write numbers with commas between") from None
 
 
-def chain_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add what describes a chain of balls and its impact law."""
-    options = [
-        click.argument("sequence", required=False),
-        click.option("--speed", type=float, help="Velocity of the first ball, m/s [1]."),
-        click.option("--masses", callback=numbers_of, help="Masses, left to right: 45,53,53."),
-        click.option("--unit", type=click.Choice(list(UNITS)), help="Of masses [kg]."),
-        click.option("--velocities", callback=numbers_of, help="Instead of --speed: 1,0,0."),
-        click.option("--restitution", callback=numbers_of, help="One, or one per contact [1]."),
-        click.option("--model", type=click.Choice(["ratio", "spheres", "sequential"]),
-                     help="How the balls collide: by ratios, as elastic spheres (Hertz; with "
-                     "losses the energy law), or one pair after the other [ratio if there are "
-                     "ratios, else spheres]."),
-        click.option("--ratio", callback=numbers_of, help="One, or one per inner ball."),
-        click.option("--backward", callback=numbers_of, help="Ratios from the right [as --ratio]."),
-        click.option("--saturate", is_flag=True, help="Admit ratios above their bound."),
-    ]  # fmt: skip
-    return functools.reduce(lambda made, option: option(made), reversed(options), command)
+#: What describes a chain of balls and its impact law.
+CHAIN = (
+    click.Argument(["sequence"], required=False),
+    click.Option(["--speed"], type=float, help="Velocity of the first ball, m/s [1]."),
+    click.Option(["--masses"], callback=numbers_of, help="Masses, left to right: 45,53,53."),
+    click.Option(["--unit"], type=click.Choice(list(UNITS)), help="Of masses [kg]."),
+    click.Option(["--velocities"], callback=numbers_of, help="Instead of --speed: 1,0,0."),
+    click.Option(["--restitution"], callback=numbers_of, help="One, or one per contact [1]."),
+    click.Option(["--model"], type=click.Choice(["ratio", "spheres", "sequential"]),
+                 help="How the balls collide: by ratios, as elastic spheres (Hertz; with losses "
+                 "the energy law), or one pair after the other [ratio if there are ratios, else "
+                 "spheres]."),
+    click.Option(["--ratio"], callback=numbers_of, help="One, or one per inner ball."),
+    click.Option(["--backward"], callback=numbers_of, help="Ratios from the right [as --ratio]."),
+    click.Option(["--saturate"], is_flag=True, help="Admit ratios above their bound."),
+)  # fmt: skip
 
 
 def swing_options(otherwise: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -75,11 +72,9 @@ class Described(NamedTuple):
 
 
 def described(
-    sequence: str | None, speed: float | None = None, masses: list[float] | None = None,
-    unit: str | None = None, velocities: list[float] | None = None,
-    restitution: list[float] | None = None,
-    model: str | None = None, ratio: list[float] | None = None,
-    backward: list[float] | None = None, saturate: bool = False,
+    sequence: str | None, speed: float | None, masses: list[float] | None, unit: str | None,
+    velocities: list[float] | None, restitution: list[float] | None, ratio: list[float] | None,
+    backward: list[float] | None, saturate: bool, model: str | None = None,
 ) -> Described:  # fmt: skip
     """Return the chain and the model that the options describe."""
     assumed = []
@@ -115,9 +110,8 @@ def described(
         if ratio is None and (model == "ratio" or backward or saturate):
             raise click.UsageError("ratios need --ratio, such as 0.1 or one for each inner ball")
         # Two balls have no ratio, and all models agree.
-        law = cradle.ImpulseCorrelation(
-            one_or_all(ratio or [0.0]), one_or_all(backward), excess=excess
-        )
+        ratios = one_or_all(ratio or [0.0]), one_or_all(backward)
+        law = cradle.ImpulseCorrelation(*ratios, excess=excess)
     elastic = bool((chain.restitution == 1.0).all())
     if masses and ratio is None and model is None and len(chain) > 2:
         kind = "elastic spheres" if elastic else "spheres with losses, by the energy law"

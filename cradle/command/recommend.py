@@ -6,11 +6,10 @@ from typing import Any
 import click
 
 import cradle
-from cradle.command.describe import chain_options, described, numbers_of, one_or_all
+from cradle.command.describe import CHAIN, described, numbers_of, one_or_all
 
 
-@click.command()
-@chain_options
+@click.command(params=[*CHAIN])
 @click.option("--wanted", multiple=True, default=["velocities"], help="velocities, impulses, path, "
               "forces, times, fastest ball; with commas between [velocities].")  # fmt: skip
 @click.option("--accuracy", default=1e-6, help="Largest numerical error, as a part of the closing "

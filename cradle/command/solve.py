@@ -16,7 +16,7 @@ import click
 from cradle import ImpactNotCertified, ImpactNotFinished, collide
 from cradle.advice.choice import made
 from cradle.command.console import format_options, picture, show
-from cradle.command.describe import chain_options, described
+from cradle.command.describe import CHAIN, described
 from cradle.command.film import film
 from cradle.command.fit import fit, template
 from cradle.command.recommend import recommend
@@ -70,8 +70,7 @@ def main(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-@main.command()
-@chain_options
+@main.command(params=[*CHAIN])
 @format_options
 def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
     """Velocities after an impact; balls and contacts count from 1, the left.
@@ -115,8 +114,7 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
     show(rows, extra, "\n".join(words for words in told if told[words]), as_json, as_csv)
 
 
-@main.command()
-@chain_options
+@main.command(params=[*CHAIN])
 @click.option("--output", "-o", required=True, type=click.Path(dir_okay=False), callback=picture,
               help="File to draw to: .png, .svg or .pdf.")  # fmt: skip
 def plot(output: str, **options: Any) -> None:

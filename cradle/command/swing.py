@@ -7,19 +7,24 @@ import click
 
 import cradle
 from cradle.advice.choice import made
-from cradle.command import describe
 from cradle.command.console import format_options, picture, show
-from cradle.command.describe import numbers_of, one_or_all
+from cradle.command.describe import (
+    CHAIN,
+    described,
+    numbers_of,
+    one_or_all,
+    pendulum_length,
+    swing_options,
+)
 from cradle.input.values import ABOVE_ZERO, one_number, whole_number
 
 
-@click.command()
-@describe.chain_options
+@click.command(params=[*CHAIN])
 @click.option("--pull", callback=numbers_of, help="How many balls are pulled aside: 2 at the left "
               "end; 0,1 one at the right; 1,1 one at each [1].")  # fmt: skip
 @click.option("--by", default=0.05, help="How far, m along the arc, at most a quarter of a "
               "circle [0.05].")  # fmt: skip
-@describe.swing_options("0.3")
+@swing_options("0.3")
 @click.option("--gaps", callback=numbers_of, help="Between the balls at rest, m [0].")
 @click.option("--damping", callback=numbers_of, help="Of each swing's amplitude, 1/s [0].")
 @click.option("--seconds", default=2.0, help="How long it swings [2].")
@@ -51,8 +56,8 @@ def swing(
         raise click.UsageError("give one of --output, --json and --csv")
     if options["masses"] is None:
         options["sequence"] = options["sequence"] or "5"
-    length = describe.pendulum_length(options.pop("length"), options.pop("period"))
-    given = describe.described(**options)
+    length = pendulum_length(options.pop("length"), options.pop("period"))
+    given = described(**options)
     chain = given.chain
     hanging = cradle.Pendulums(0.3 if length is None else length, gaps=one_or_all(gaps or [0.0]),
                                damping=one_or_all(damping or [0.0]))  # fmt: skip
