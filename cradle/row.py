@@ -23,9 +23,8 @@ import numpy as np
 from cradle.chain import Chain
 from cradle.input.values import ABOVE_ZERO, ArrayLike, a, one_number, shown
 from cradle.models import Model
-from cradle.swinging.stride import Alone, Flight, Hit, Plane
-
-__all__ = ["Bodies", "Hit", "Row", "step_rows"]
+from cradle.swinging.stride import Alone, Flight, Plane
+from cradle.swinging.stride import Hit as Hit
 
 # From so many looks at moving balls the row learns how the engine steps; at so many impacts it
 # looks what pushes did.
@@ -35,10 +34,7 @@ Pairs = Sequence[Sequence[float]]
 
 
 class Bodies(Protocol):
-    """What a row asks of an engine: an adapter of three short methods.
-
-    All is told in a plane that holds the centres of the balls: two coordinates, the second one up.
-    """
+    """What a row asks of an engine, in the plane of the centres: two numbers, the second one up."""
 
     def motion(self) -> tuple[Pairs, Pairs]:
         """Return the positions and the velocities of the N centres, m and m/s."""
@@ -52,6 +48,9 @@ class Bodies(Protocol):
 
 class Row(Alone):
     """A row of balls that an engine moves and the package collides.
+
+    A TypeError or a ValueError is raised if a value is wrong, or the balls are no row: balls that
+    are no neighbours touch, or overlap by more than `touching`, or pivots are not in their order.
 
     Parameters
     ----------
@@ -74,11 +73,6 @@ class Row(Alone):
     acceleration : float
         The acceleration a of gravity, m/s^2, or what else draws neighbours together at most.
 
-    Raises
-    ------
-    TypeError, ValueError
-        If a value is wrong, or the balls are no row: balls that are no neighbours touch, balls
-        overlap by more than `touching`, or pivots are not in the order of the balls.
 
     Attributes
     ----------
@@ -134,15 +128,12 @@ class Row(Alone):
         self._lessons = self._doubts = self._driven = 0
 
     def step(self, duration: float) -> None:
-        """Move the scene on by one step, which the engine makes as a whole.
+        """Move the scene on by one step of `duration` seconds, which the engine makes as a whole.
 
-        Raises
-        ------
-        ValueError, RuntimeError
-            If the duration or what `motion` tells is wrong, balls that touch are not in a row, have
-            passed through each other or collide without end, a push shows that a mass is not the
-            engine's, or the world is seen to move on between the steps of this row: see
-            `step_rows`.
+        A ValueError or a RuntimeError is raised if the duration or what `motion` tells is wrong,
+        balls that touch are not in a row, have passed through each other or collide without end, a
+        push shows that a mass is not the engine's, or the world is seen to move on between the
+        steps of this row: see `step_rows`.
         """
         if type(duration) is float and 0.0 < duration <= self.quiet:  # the usual case, and fast
             self.quiet -= duration
@@ -281,14 +272,9 @@ class Row(Alone):
 
 
 def step_rows(rows: Sequence[Row], duration: float) -> None:
-    """Move a world with several rows on by one step, made by the first row's engine.
+    """Move a world with all its rows on by one step of `duration` seconds.
 
-    Errors are those of `Row.step`.
-
-    Parameters
-    ----------
-    rows, duration : sequence of Row, float
-        All rows of the world, and how long the step lasts, s.
+    The first row's engine makes the step; errors are those of `Row.step`.
     """
     if not (isinstance(rows, Sequence) and rows and all(isinstance(one, Row) for one in rows)):
         raise ValueError(f"rows = {shown(rows)}; must be one Row or more: the first has the engine")

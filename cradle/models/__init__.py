@@ -28,7 +28,7 @@ def a_model(model: object) -> None:
 def collide(
     chain: Chain, model: Model, *, record: bool | None = None, progress: bool = False
 ) -> Trace:
-    """Solve one impact.
+    """Solve one impact; if no balls approach, its path has no events.
 
     Parameters
     ----------
@@ -42,11 +42,6 @@ def collide(
     progress : bool
         After two seconds, show how many events `ImpulseCorrelation` has counted so far, or how many
         steps `SpringChain` has made; other models ignore it.
-
-    Returns
-    -------
-    Trace
-        The path and the outcome.  If no balls approach, the path has no events.
 
     Raises
     ------

@@ -82,12 +82,8 @@ class FusedChain:
 
     The balls on the left of the one approaching contact and those on its right collide like two
     balls, with the restitution of that contact.  That is the largest admissible ratio at every ball
-    (Eq. 53), and so ``ImpulseCorrelation(1, excess="saturate")`` solves it.
-
-    Raises
-    ------
-    ValueError
-        On solving, if a second contact approaches, or one opens: which balls are one body?
+    (Eq. 53), and so ``ImpulseCorrelation(1, excess="saturate")`` solves it.  If a second contact
+    approaches, or one opens, it is a `ValueError`: which balls are one body?
 
     References
     ----------

@@ -4,7 +4,7 @@ import cmath
 import functools
 import math
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ Marks = tuple[bool, ...]
 Meeting = tuple[float, list[int], list[int]]
 #: A term Re(C exp(rate t)) of a sum: C and its rate.
 Wave = tuple[complex, complex]
+#: What falls to zero when the balls of a contact meet, or are drawn apart that move together (a
+#: gap, a force): a constant, and what is to be added for either ball's amplitude.
+Fall = tuple[float, complex, complex]
 # Below this part of what it is made of a force is a rounding error.
 _ROUNDING = 1e-11
 _RTOL = 1e-12
@@ -105,22 +108,11 @@ def _nodes() -> tuple[Vector, Vector]:
     return nodes, np.asarray(np.linalg.inv(chebvander(nodes, _DEGREE)))
 
 
-class _Bodies(NamedTuple):
-    """How balls swing at small angles that move together or alone."""
-
-    #: Of each ball the first one of its body, where it hangs, and its rate: it is at
-    #: centre + Re(amplitude exp(rate t)).
-    first: list[int]
-    centre: Vector
-    rate: Vector
-    #: Of each contact what falls to zero when its balls meet, or are drawn apart that move
-    #: together (a gap, a force): a constant, and what is to be added for either ball's amplitude.
-    falls: list[tuple[float, complex, complex]]
-
-
 @functools.lru_cache(64)
-def _bodies(hanging: Hanging, together: Marks) -> _Bodies:
-    """Return the bodies: their frequencies, dampings and lowest points are means over the mass."""
+def _bodies(hanging: Hanging, together: Marks) -> tuple[list[int], Vector, Vector, list[Fall]]:
+    """Return the first ball of each ball's body, where it hangs, its rate; what falls to zero."""
+    # A ball is at centre + Re(amplitude exp(rate t)); frequencies, dampings and lowest points of
+    # bodies are means over the mass.
     n, square = len(hanging.masses), hanging.gravity / hanging.length
     centre, rates = np.zeros(n), np.zeros(n, dtype=complex)
     first, forces = list[int](), {}
@@ -140,7 +132,7 @@ def _bodies(hanging: Hanging, together: Marks) -> _Bodies:
             forces[a + k - 1] = (math.inf, 0j, 0j) if alike else (level, wave, 0j)
     gaps = (hanging.gaps + centre[1:] - centre[:-1]).tolist()
     falls = [forces.get(c, (gap, -1.0 + 0j, 1.0 + 0j)) for c, gap in enumerate(gaps)]
-    return _Bodies(first, centre, rates, falls)
+    return first, centre, rates, falls
 
 
 class SmallAngleFlight:
@@ -150,17 +142,15 @@ class SmallAngleFlight:
         self, hanging: Hanging, x: Vector, v: Vector, together: Marks, parting: Marks
     ) -> None:
         self.together, self.parting, self.tie = together, parting, hanging.tie
-        self.bodies = _bodies(hanging, together)
-        first, centre, rate, _ = self.bodies
-        start = (x - centre)[first]
-        #: Of each ball.
-        self.amplitude = start - 1j * ((v[first] - rate.real * start) / rate.imag)
+        first, self.centre, self.rate, self.falls = _bodies(hanging, together)
+        start = (x - self.centre)[first]
+        self.amplitude = start - 1j * ((v[first] - self.rate.real * start) / self.rate.imag)
 
     def next_meeting(self, horizon: float) -> Meeting:
         """Return the first event within `horizon` seconds."""
-        times, first, rates = list[float](), math.inf, self.bodies.rate.tolist()
+        times, first, rates = list[float](), math.inf, self.rate.tolist()
         swings = zip(pairwise(self.amplitude.tolist()), pairwise(rates), strict=True)
-        falls = zip(self.bodies.falls, swings, self.parting, strict=True)
+        falls = zip(self.falls, swings, self.parting, strict=True)
         for (level, one, other), ((a, b), (rate, near)), parts in falls:
             waves = [(one * a + other * b, rate)]
             if rate != near:
@@ -176,15 +166,14 @@ class SmallAngleFlight:
 
     def turning(self, duration: float) -> Vector:
         """Return where each ball first turns, or is after that time, shape (N,)."""
-        rate, wave = self.bodies.rate, self.amplitude
+        rate, wave = self.rate, self.amplitude
         wait = (0.5 * np.pi - np.angle(rate * wave)) % np.pi / rate.imag
-        last: Vector = (wave * np.exp(rate * np.minimum(wait, duration))).real
-        return self.bodies.centre + last
+        return np.asarray(self.centre + (wave * np.exp(rate * np.minimum(wait, duration))).real)
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
         """Return positions and velocities at T times since the start, shapes (T, N)."""
-        wave = self.amplitude * np.exp(np.multiply.outer(times, self.bodies.rate))
-        return self.bodies.centre + wave.real + 0.0, (self.bodies.rate * wave).real + 0.0  # no -0.0
+        wave = self.amplitude * np.exp(np.multiply.outer(times, self.rate))
+        return self.centre + wave.real + 0.0, (self.rate * wave).real + 0.0  # no -0.0
 
 
 class FullFlight:

@@ -18,8 +18,6 @@ from cradle.swinging.record import Impact, Swing
 from cradle.swinging.resting import NEAR, RESTING, common_velocities, pressed, stretches
 from cradle.trace import Trace
 
-__all__ = ["swing"]
-
 #: Contact forces take their time while the depth of a contact over its speed is less than so much
 #: of a radian, and a strike than that; from then on impacts take none, as by all other laws.
 SHORT, LONGEST = 4e-3, 0.1
@@ -53,11 +51,6 @@ def swing(
     max_impacts, min_energy : int, float
         End the run, before the last time, after this number of impacts, or when the energy is below
         this part of that at the release.
-
-    Returns
-    -------
-    Swing
-        The times up to the end of the run, positions, velocities and impacts.
 
     Raises
     ------
