@@ -7,15 +7,9 @@ import click
 
 import cradle
 from cradle.advice.choice import made
+from cradle.command import describe
 from cradle.command.console import format_options, picture, show
-from cradle.command.describe import (
-    CHAIN,
-    described,
-    numbers_of,
-    one_or_all,
-    pendulum_length,
-    swing_options,
-)
+from cradle.command.describe import CHAIN, described, numbers_of, one_or_all
 from cradle.input.values import ABOVE_ZERO, one_number, whole_number
 
 
@@ -24,7 +18,7 @@ from cradle.input.values import ABOVE_ZERO, one_number, whole_number
               "end; 0,1 one at the right; 1,1 one at each [1].")  # fmt: skip
 @click.option("--by", default=0.05, help="How far, m along the arc, at most a quarter of a "
               "circle [0.05].")  # fmt: skip
-@swing_options("0.3")
+@describe.swing_options("0.3")
 @click.option("--gaps", callback=numbers_of, help="Between the balls at rest, m [0].")
 @click.option("--damping", callback=numbers_of, help="Of each swing's amplitude, 1/s [0].")
 @click.option("--seconds", default=2.0, help="How long it swings [2].")
@@ -56,7 +50,7 @@ def swing(
         raise click.UsageError("give one of --output, --json and --csv")
     if options["masses"] is None:
         options["sequence"] = options["sequence"] or "5"
-    length = pendulum_length(options.pop("length"), options.pop("period"))
+    length = describe.pendulum_length(options.pop("length"), options.pop("period"))
     given = described(**options)
     chain = given.chain
     hanging = cradle.Pendulums(0.3 if length is None else length, gaps=one_or_all(gaps or [0.0]),

@@ -79,7 +79,9 @@ def ratio(
 
     One estimate for each triplet and direction that is not known, between 0 and the bound of three
     balls (Eq. 34).  Those that act in the same shots are fitted together; Ceanga and Hurmuzlu fit
-    one at a time (section 4.2).
+    one at a time (section 4.2).  If no set has three balls and nothing is known, a coefficient of
+    restitution is missing, a known ratio is above its bound, or more than six ratios act together,
+    a ValueError is raised.
 
     Parameters
     ----------
@@ -92,12 +94,6 @@ def ratio(
         Ratios not to be fitted, by triplets; with it no set needs three balls.
     progress : bool
         Show after two seconds how many points were tried; six ratios need a million.
-
-    Raises
-    ------
-    ValueError
-        If no set has three balls and nothing is known, a coefficient of restitution is missing, a
-        known ratio is above its bound, or more than six ratios act together.
 
     Examples
     --------

@@ -72,7 +72,9 @@ def velocities_from_tracks(
 
     First the moment at which all tracks bend, then on either side of it the velocity of each ball
     by itself, so that the errors are independent.  The balls but the striker rest before.  A mark
-    that lies farther off than chance allows is named in a warning.
+    that lies farther off than chance allows is named in a warning.  If there are fewer than two
+    balls, too few marks on either side, or the marks do not lie on such a motion (one in a hundred
+    thousand bends as much by chance), a ValueError is raised.
 
     Parameters
     ----------
@@ -86,12 +88,6 @@ def velocities_from_tracks(
         the marks agree with: at most a quarter of a swing, or a quarter of a second on a track.
     striker : int, optional
         Index of the ball that moves before; left out, the one whose marks move most.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than two balls, too few marks on either side, or the marks do not lie on
-        such a motion: one in a hundred thousand bends as much by chance.
 
     Examples
     --------

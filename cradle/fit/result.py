@@ -226,7 +226,8 @@ class Fit:
         """Predict a longer chain, the first ball striking the others at rest.
 
         Errors are drawn independently; ratios fitted together are drawn together, and one that the
-        data left open takes all values up to its bound.
+        data left open takes all values up to its bound.  Fewer than 2 balls, and a mass,
+        restitution or ratio that is not known, are a ValueError.
 
         Parameters
         ----------
@@ -234,11 +235,6 @@ class Fit:
             Types of the balls, left to right; in one string such as "ABA" or "steel-brass-steel".
         speed : float
             Of the first ball, m/s.
-
-        Raises
-        ------
-        ValueError
-            If fewer than 2 balls are named, or a mass, restitution or ratio is not known.
         """
         row = parameters.types_in_a_row(types)
         one_number("speed", speed, *ABOVE_ZERO)

@@ -126,6 +126,9 @@ def read_shots(
 ) -> Shots:  # fmt: skip
     """Read a table of shots and check it; in the result all is in kg and m/s.
 
+    A ValueError that names row and column is raised if a column is missing or there twice, a value
+    is wrong, balls pass through each other, or a shot gains more energy than its errors allow.
+
     Parameters
     ----------
     source : path, open file, DataFrame or mapping of columns
@@ -135,12 +138,6 @@ def read_shots(
         Left out, units are kg and m/s, and numbers that look like others are refused.
     sigma : float, optional
         Standard error of all velocities, in their unit, for a table without it.
-
-    Raises
-    ------
-    ValueError
-        If a column is missing or there twice, a value is wrong, balls pass through each other, or
-        a shot gains more energy than its errors allow; the message names row and column.
 
     Examples
     --------

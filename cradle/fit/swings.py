@@ -73,7 +73,8 @@ def fit_swing(
     Places and velocities there are fitted too, as is where each ball hangs.  Intervals hold 95 %,
     by profiles of chi-square (Venzon and Moolgavkar, Applied Statistics 37, 1988, 87-94).  Where
     the law fails, by chi-square or residuals alike from frame to frame, they are widened by how
-    parts of the film differ (clusters of Liang and Zeger, Biometrika 73, 1986, 13-22).
+    parts of the film differ (clusters of Liang and Zeger, Biometrika 73, 1986, 13-22).  A wrong
+    value, no ball seen on its way at first, and too few readings are a ValueError.
 
     Parameters
     ----------
@@ -91,11 +92,6 @@ def fit_swing(
         What is not fitted; left out, no damping, restitution 1, no gaps.
     masses : array_like, shape (N,), optional
         Of the balls, in any unit; if left out, they are equal.
-
-    Raises
-    ------
-    ValueError
-        If a value is wrong, no ball is seen on its way at first, or there are too few readings.
 
     Examples
     --------

@@ -40,7 +40,8 @@ def read_tracker(
     """Read a text file exported by Tracker, Kinovea, Logger Pro or Capstone.
 
     Frames where a ball was not marked (no number, or NaN) are left out of its track; the tracks are
-    in the order of the titles.
+    in the order of the titles.  Another layout, and a cell that is no number, are a ValueError that
+    names line and column.
 
     Parameters
     ----------
@@ -53,11 +54,6 @@ def read_tracker(
     unit : float
         Length of the file's unit in m, such as 0.01 or the size of a pixel, where the file does not
         name it as in ``X (cm)``.
-
-    Raises
-    ------
-    ValueError
-        If the file has another layout, or a cell is no number; the message names line and column.
 
     Examples
     --------

@@ -112,6 +112,9 @@ def animate_swing(
 ) -> Animation:  # fmt: skip
     """Show one swing or several, one below the other or in columns, by the same clock.
 
+    A run without a duration, another number of labels than of runs, and a number out of range are
+    a ValueError.
+
     Parameters
     ----------
     runs : Swing or sequence of Swing
@@ -124,11 +127,6 @@ def animate_swing(
         What print and readers who ask for less motion see, s after the first of the times.
     columns : int
         How many stand side by side.
-
-    Raises
-    ------
-    ValueError
-        If a run has no duration, there are not as many labels as runs, or a number is out of range.
 
     Examples
     --------

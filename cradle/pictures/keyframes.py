@@ -66,17 +66,9 @@ class Animation:
         return f"Animation({len(self.svg.encode()) / 1000:.0f} kB)"
 
     def save(self, path: str | Path) -> None:
-        """Write the picture to a file; its ending says of what kind.
+        """Write ``.svg``, ``.html``, a film ``.gif`` or ``.mp4``, or the still as ``.png``.
 
-        Parameters
-        ----------
-        path : str or Path
-            ``.svg``, ``.html``, a film ``.gif`` or ``.mp4``, or the still as ``.png``.
-
-        Raises
-        ------
-        ValueError
-            If the ending is another one, or a film needs a program that is missing.
+        If `path` ends otherwise, or a film needs a program that is missing, a ValueError is raised.
         """
         file = Path(path)
         kind = file.suffix.lower()
