@@ -16,10 +16,12 @@ class SequentialCollisions:
     """One collision of two balls after another (Johnson; Han and Gilmore's second answer).
 
     A contact gets no impulse while a neighbouring collision goes on: as with
-    ``ImpulseCorrelation(0)``, which solves it.  When a collision ends, both neighbouring contacts
-    may collide next; one that waits between two collisions does so when both have ended.  Those
-    apart from each other have no common clock: which ends first is rule R8 of the book's chapter 6.
-    A value outside its range is a `ValueError`.
+    ``ImpulseCorrelation(0)``, which solves it (Johnson, Int. J. Mech. Eng. Educ. 4 (1976); Han and
+    Gilmore, J. Mech. Design 115 (1993) 412-422; Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001)
+    575-583, Eq. 6).  When a collision ends, both neighbouring contacts may collide next; one that
+    waits between two collisions does so when both have ended.  Those apart from each other have no
+    common clock: which ends first is rule R8 of the book's chapter 6.  A value outside its range is
+    a `ValueError`.
 
     Parameters
     ----------
@@ -28,11 +30,6 @@ class SequentialCollisions:
         outcome can depend on it.
     max_events : int
         Number of steps after which the impact is given up.
-
-    References
-    ----------
-    Johnson, Int. J. Mech. Eng. Educ. 4 (1976); Han and Gilmore, J. Mech. Design 115 (1993)
-    412-422; Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, Eq. 6.
 
     Examples
     --------
@@ -78,17 +75,13 @@ class SequentialCollisions:
 
 @dataclass(frozen=True)
 class FusedChain:
-    """The balls on either side of the struck contact move as one body (Han and Gilmore's first).
+    """The balls on either side of the struck contact move as one body: Han and Gilmore's first.
 
     The balls on the left of the one approaching contact and those on its right collide like two
-    balls, with the restitution of that contact.  That is the largest admissible ratio at every ball
-    (Eq. 53), and so ``ImpulseCorrelation(1, excess="saturate")`` solves it.  If a second contact
-    approaches, or one opens, it is a `ValueError`: which balls are one body?
-
-    References
-    ----------
-    Han and Gilmore, J. Mech. Design 115 (1993) 412-422; Ceanga and Hurmuzlu, J. Appl. Mech. 68
-    (2001) 575-583, Eq. 5.
+    balls, with the restitution of that contact (Eq. 5; references as of `SequentialCollisions`).
+    That is the largest admissible ratio at every ball (Eq. 53), and so
+    ``ImpulseCorrelation(1, excess="saturate")`` solves it.  If a second contact approaches, or one
+    opens, it is a `ValueError`: which balls are one body?
 
     Examples
     --------
