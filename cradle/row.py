@@ -26,9 +26,7 @@ from cradle.models import Model
 from cradle.swinging.stride import Alone, Flight, Plane
 from cradle.swinging.stride import Hit as Hit
 
-# From so many looks at moving balls the row learns how the engine steps; at so many impacts it
-# looks what pushes did.
-_LESSONS = 200
+_LESSONS = 200  # looks at moving balls to learn how the engine steps, and at what pushes did
 
 Pairs = Sequence[Sequence[float]]
 
@@ -56,11 +54,10 @@ class Row(Alone):
     ----------
     bodies : Bodies
         The engine's adapter.  The engine must not collide these balls with each other.
-    chain : Chain
-        Masses and restitution from left to right.  The mass is what a push at the centre meets: of
-        a ball in one piece with its arm, the moment of inertia about the pivot over arm squared.
-    model : Model
-        The impact law, such as ``ImpulseCorrelation(0.13)``.
+    chain, model : Chain, Model
+        Masses and restitution from left to right, and the impact law.  A mass is what a push at the
+        centre meets: of a ball in one piece with its arm, the moment of inertia about the pivot
+        over arm squared.
     radii : float or array_like, shape (N,)
         Of the balls, m; above 0.
     pivots : array_like, shape (N, 2), optional
@@ -78,10 +75,8 @@ class Row(Alone):
     ----------
     on_hit : callable, optional
         Called with each `Hit` of a step, when the step is made: set it to play a sound.
-    impacts : int
-        How many impacts were solved so far.
-    time : float
-        For how long the row has been stepped, s.
+    impacts, time : int, float
+        How many impacts were solved so far, and for how long the row has been stepped, s.
 
     Notes
     -----

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cradle.advice.measured import LAWS, Measured, evidence, measured_chain, rows
+from cradle.advice.measured import LAWS, evidence, measured_chain, rows
 from cradle.chain import Chain
 from cradle.input.values import ArrayLike, must_be, one_number, one_of, whole_number
 from cradle.models import Model
@@ -18,8 +18,7 @@ from cradle.models.sequential import SequentialCollisions
 
 WANTED = ("velocities", "impulses", "path", "forces", "times", "fastest ball")
 
-# Two measurements of a time differ by less than this factor: so it does not decide between models.
-_NOISE = 1.5
+_NOISE = 1.5  # two measurements of a time differ by less: so it does not decide between models
 #: What solves a batch.
 _BATCH = {
     "event": "post_impact_velocities(masses, velocities, restitution, forward, backward)",
@@ -188,8 +187,8 @@ class _Unfit(Exception):
     """A wish, and why a model does not fulfil it."""
 
 
-def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
-    """Return what is known allows, by group: how a row makes its model.  Or nothing can do it."""
+def _models(wish: _Wish) -> dict[str, Callable[[float], Model]]:
+    """Return what is known allows, by group: how to make it in a setting.  Or nothing can do it."""
     chain, wanted, _, model_error, _, ratios, stiffness, like, elastic = wish
     lossy = int(np.argmin(chain.restitution))
     loss = f"restitution[{lossy}] = {float(chain.restitution[lossy])!r}"
@@ -217,7 +216,7 @@ def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
     for words, wrong in refused.items():
         if wrong:
             raise ValueError(words)
-    models: dict[str, Callable[[Measured], Model]] = {}
+    models: dict[str, Callable[[float], Model]] = {}
     if ratios is not None or len(chain) == 2:
         models["event"] = lambda _: ratios or ImpulseCorrelation(0.0)
     if stiffness is not None:
@@ -226,11 +225,9 @@ def _models(wish: _Wish) -> dict[str, Callable[[Measured], Model]]:
         except ValueError:  # the restitution is too low for springs
             if timed:
                 raise
-            models["energy"] = lambda row: EnergyDistribution(stiffness, rtol=row.parameter)
+            models["energy"] = lambda at: EnergyDistribution(stiffness, rtol=at)
         else:
-            models["springs"] = lambda row: SpringChain(
-                stiffness, viscosity=lost, accuracy=row.parameter
-            )
+            models["springs"] = lambda at: SpringChain(stiffness, viscosity=lost, accuracy=at)
             if wish.impacts > 1:
                 models["many springs"] = models["springs"]
     if modest and (bare or (elastic and like and measured_chain(chain))):
@@ -249,23 +246,20 @@ def _viscosity(chain: Chain, stiffness: float | Sequence[float]) -> float | tupl
 
 
 def _best(
-    group: str, make: Callable[[Measured], Model], wish: _Wish
+    group: str, make: Callable[[float], Model], wish: _Wish
 ) -> tuple[tuple[bool, float], Recommendation]:
     """Return a model in its cheapest setting that fulfils a wish, after what orders models."""
     chain, name = wish.chain, LAWS[group].partition(",")[0]
     gives = {"velocities" if one == "fastest ball" else one for one in wish.wanted}
-    several = wish.impacts > 1
-    usable = (row for row in rows(group) if several or "batch" not in row.setting)
-    found = tuple(
-        row for row in usable
-        if gives <= row.gives and not (wish.elastic and "lossy" in row.chains[0])
-    )  # fmt: skip
+    found = tuple(row for row in rows(group) if gives <= row.gives
+                  and (wish.impacts > 1 or "batch" not in row.setting)
+                  and not (wish.elastic and "lossy" in row.chains[0]))  # fmt: skip
     if not found:
         raise _Unfit(f"wanted = {wish.wanted!r}", f"{name} has no {' and '.join(sorted(gives))}")
     # What a model refuses it refuses now: the same balls at rest cost it no work.
     springs = group in ("springs", "many springs")
     e = 1.0 if springs else chain.restitution  # springs have their viscosity
-    make(found[0]).solve(Chain(chain.masses, 0.0 * chain.velocities, e))
+    make(found[0].parameter).solve(Chain(chain.masses, 0.0 * chain.velocities, e))
     where, settings = evidence(found, wish.like, wish.ratios if group == "event" else None)
     # A chain among the measured ones can be worse than each of them, by a few times.
     margin = 1.0 if where == "here" else 10.0
@@ -292,7 +286,7 @@ def _best(
     if springs and not wish.elastic:
         kind, own = "lossy", "Chain(masses, velocities)"
     return (not measured, row.seconds), Recommendation(
-        model=make(row),
+        model=make(row.parameter),
         setting=row.setting,
         call=_BATCH[group] if "batch" in row.setting else f"collide({own}, model)",
         numerical_error=row.numerical_error if measured else None,

@@ -24,8 +24,7 @@ LAWS = {
     "outcome": "SequentialCollisions",
 }
 
-# No answer is nearer to the true one than half its last digit, in units of the closing speed.
-_DIGIT = 2.0**-53
+_DIGIT = 2.0**-53  # of the closing speed: no answer is nearer to the true one
 
 
 class Measured(NamedTuple):

@@ -109,8 +109,7 @@ def described(
         assumed += [] if restitution else ["no energy is lost (--restitution)"]
         if ratio is None and (model == "ratio" or backward or saturate):
             raise click.UsageError("ratios need --ratio, such as 0.1 or one for each inner ball")
-        # Two balls have no ratio, and all models agree.
-        ratios = one_or_all(ratio or [0.0]), one_or_all(backward)
+        ratios = one_or_all(ratio or [0.0]), one_or_all(backward)  # without effect on two balls
         law = cradle.ImpulseCorrelation(*ratios, excess=excess)
     elastic = bool((chain.restitution == 1.0).all())
     if masses and ratio is None and model is None and len(chain) > 2:

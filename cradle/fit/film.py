@@ -12,10 +12,8 @@ from cradle.input.values import ABOVE_ZERO, ArrayLike, Vector, checked, one_numb
 from cradle.trace import compared_as_objects
 
 _GRAVITY = 9.81
-# Marks that each side of the impact needs; the longest window on a level track, s.
-_LEAST, _LONGEST = 5, 0.25
-# Right films of which one is refused, because its marks happen to bend.
-_CHANCE = 1e-5
+_LEAST, _LONGEST = 5, 0.25  # marks on each side of the impact; window on a level track, s
+_CHANCE = 1e-5  # part of right films that is refused, because their marks happen to bend
 _Stray = tuple[int, float, float]
 
 

@@ -32,10 +32,8 @@ def collide(
 
     Parameters
     ----------
-    chain : Chain
-        The balls at the instant before.
-    model : Model
-        The impact law, such as `ImpulseCorrelation`.
+    chain, model : Chain, Model
+        The balls at the instant before, and the impact law, such as `ImpulseCorrelation`.
     record : bool, optional
         Whether to keep the path; for `ImpulseCorrelation` only.  Left out, a path of more than ten
         million numbers (2 N - 1 for each event) is cut, with a warning.

@@ -10,8 +10,7 @@ from cradle.input import values as asked
 from cradle.input.values import Vector
 from cradle.trace import Event, ImpactNotFinished, Trace
 
-# Beyond these the equations of one problem keep too few digits.
-_LARGEST, _LIGHTEST = 1e9, 1e-6
+_LARGEST, _LIGHTEST = 1e9, 1e-6  # beyond these the equations of a problem keep too few digits
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,7 +41,9 @@ class QuadraticDissipation:
     after it, another such problem follows.
 
     Two balls of reduced mass mu have ``e = (kappa - 1) / (kappa + 1)`` with kappa = k / (2 mu), or
-    e = 0 where kappa is below 1.
+    e = 0 where kappa is below 1.  A value outside its range is a ValueError; so is, on
+    solving, a chain that does not suit the values, or with light balls between heavy ones, which
+    leave the equations too few digits.
 
     Parameters
     ----------
@@ -53,15 +54,7 @@ class QuadraticDissipation:
         kappa of a term for the outer two of three balls; it acts if neither contact opens, and its
         impulse passes through both.
     max_problems : int
-        Number of problems after which the impact is given up.
-
-    Raises
-    ------
-    ValueError
-        If a value is outside its range; on solving, if the chain does not suit the values, or light
-        balls between heavy ones leave the equations too few digits.
-    ImpactNotFinished
-        On solving, if balls still approach after `max_problems`.
+        Number of problems; if balls still approach after them, it is an `ImpactNotFinished`.
 
     References
     ----------

@@ -55,7 +55,8 @@ class EnergyDistribution:
 
     A spring with the force ``F = k x^p`` stores ``E = k x^(p+1) / (p + 1)``, so impulses grow like
     forces of springs, ``dP = F dt`` with a common t, where ``dx/dt = u`` in compression and
-    ``u / e^2`` in release.  So it is solved; nothing is singular at E = 0.
+    ``u / e^2`` in release.  So it is solved; nothing is singular at E = 0.  A value outside its
+    range is a ValueError; so is, on solving, a chain that does not suit the values.
 
     Parameters
     ----------
@@ -71,14 +72,7 @@ class EnergyDistribution:
         Relative tolerance of the integration.  An impact that goes on with speeds alone below rtol
         times that of the fastest closing is ended plastically.
     max_evaluations : int
-        How often the ratios may be evaluated before the impact is given up.
-
-    Raises
-    ------
-    ValueError
-        If a value is outside its range; on solving, if the chain does not suit the values.
-    ImpactNotFinished
-        On solving, if `max_evaluations` is reached.
+        How often the ratios may be evaluated; then the impact is an `ImpactNotFinished`.
 
 
     Examples

@@ -16,8 +16,7 @@ from cradle.input.values import Vector
 from cradle.pictures.impacts import PALETTE, ball_style
 from cradle.swinging.record import Swing
 
-# Beyond this a value of chi-square is of no interest.
-_TOP = 25.0
+_TOP = 25.0  # beyond this a value of chi-square is of no interest
 _LEGEND: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.08), "frameon": False}
 
 
@@ -25,7 +24,6 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
     """Draw one estimate of a fit and its data; see `Fit.plot`."""
     if not fit.estimates:
         raise ValueError("nothing was fitted; there is nothing to draw")
-    # The first identified one, else the first one.
     estimate = fit[name or min(fit.estimates, key=lambda one: not fit[one].identified)]
     if axes is None:
         _, axes = plt.subplots(2, 1, figsize=(5.6, 7), layout="constrained")

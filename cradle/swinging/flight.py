@@ -21,11 +21,9 @@ Wave = tuple[complex, complex]
 #: What falls to zero when the balls of a contact meet, or are drawn apart that move together (a
 #: gap, a force): a constant, and what is to be added for either ball's amplitude.
 Fall = tuple[float, complex, complex]
-# Below this part of what it is made of a force is a rounding error.
-_ROUNDING = 1e-11
+_ROUNDING = 1e-11  # below this part of what it is made of a force is a rounding error
 _RTOL = 1e-12
-# Of the polynomials: the next term of a swing in a radian is below 1e-17.
-_DEGREE = 14
+_DEGREE = 14  # of the polynomials: the next term of a swing in a radian is below 1e-17
 
 
 def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -> float:

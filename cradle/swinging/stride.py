@@ -20,14 +20,10 @@ from cradle.swinging.resting import common_velocities, stretches
 from cradle.swinging.swing import part
 from cradle.trace import compared_as_objects
 
-# By this part of two radii the balls may hang apart or overlap: gaps and leans are smaller.
-_MISFIT = 0.1
-# Contact lines of one cluster may differ by this angle, rad: beyond it the balls are no row.
-_BEND = 0.1
-# Somebody looks at the balls at least that often, s.
-_LONGEST = 0.01
-# More impacts than this in one step are no row of balls: with a resting rule they end long before.
-_MOST_IMPACTS = 10_000
+_MISFIT = 0.1  # of two radii: so far may balls hang apart or overlap; gaps and leans are smaller
+_BEND = 0.1  # rad, between contact lines of one cluster: beyond it the balls are no row
+_LONGEST = 0.01  # s, until somebody looks at the balls
+_MOST_IMPACTS = 10_000  # in one step: with a resting rule they end long before
 
 Plane = NDArray[np.complexfloating[Any, Any]]
 
