@@ -16,7 +16,6 @@ from cradle import (
 )
 from cradle.fit import Shots, ShotSet, fit_law, ratio, restitution
 from cradle.fit.laws import _Search
-from cradle.fit.search import spread
 
 
 def shot_set(name, before, after, sigma, sigma_before=0.0, masses=None):
@@ -128,7 +127,7 @@ def test_gaps_of_none():
     assert found.values["gap"] == pytest.approx(0.0, abs=1e-7)
     assert found.intervals["gap"][0] == 0.0
     assert found.intervals["gap"][1] < 1e-3
-    search = _Search(shots, law, {"gap": (0, 2)}, 1.0)
+    search = _Search(shots.sets, {"three": law}, {"gap": (0, 2)}, {"restitution": 1.0}, 2)
     assert np.array_equal(search.left(np.array([1.0])), search.left(np.array([1.0 + 1e-15])))
 
 
@@ -182,14 +181,6 @@ def test_intervals_hold_the_truth():
         low, high = fit.intervals["forward"]
         held += low <= 0.15 <= high
     assert 89 <= held <= 99
-
-
-def test_points_fill_the_box():
-    for axes in (1, 4, 12):
-        points = spread(512, axes)
-        assert points.shape == (512, axes)
-        tenths = [np.bincount((10 * x).astype(int), minlength=10) for x in points.T]
-        assert np.min(tenths) > 25
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 from cradle.fit import parameters
 from cradle.fit.parameters import Key, fitted_keys, label, pair_keys, parameter_key, ratio_keys
 from cradle.fit.result import Estimate, Fit, Group
-from cradle.fit.search import refine, scan, spread
+from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
 from cradle.input.values import ABOVE_ZERO, PART, ArrayLike, Vector, checked, flag, one_number
 from cradle.kernel.state import LIMITS
@@ -155,7 +155,7 @@ def _bound(key: Key, masses: Mapping[str, float]) -> float:
 def _acting(one: ShotSet, bounds: Mapping[Key, float], given: Mapping[Key, float]) -> set[Key]:
     """Return the ratios that change any outcome of a set, tried at points all over the ranges."""
     keys = sorted(fitted_keys(one.types) & bounds.keys())
-    points = spread(_TRIALS, len(keys)).T
+    points = np.random.default_rng(0).random((len(keys), _TRIALS))
     values = {**given, **{key: bounds[key] * x for key, x in zip(keys, points, strict=True)}}
     # Outcomes go with the speed: shots that differ in nothing else are solved once.
     speeds = np.abs(one.before).max(axis=1, keepdims=True)

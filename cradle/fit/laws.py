@@ -1,14 +1,14 @@
 """Any impact law fitted to shots: gaps and losses of spheres, one ratio for a whole row."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy
 
 from cradle.chain import Chain
-from cradle.fit.search import RISE, spread
-from cradle.fit.shots import Shots, chance
+from cradle.fit.search import RISE
+from cradle.fit.shots import Shots, ShotSet, chance
 from cradle.input.values import PART, Vector, must_be, one_number, whole_number
 from cradle.models import Model, collide
 
@@ -82,43 +82,44 @@ def fit_law(
     >>> fit_law(shots, lambda gap: SpringChain(gaps=[0.0, gap]), {"gap": (0.0, 2.0)})
     LawFit(gap = 0.1184 [0.06352, 0.1963]; chi-square 0.0, degrees of freedom 2, chance 1)
     """
-    return _Search(shots, law, ranges, restitution).found(whole_number("starts", starts))
+    sets, count = must_be(Shots, "shots", shots).sets, len(ranges)
+    measured = sum(one.after.size for one in sets)
+    laws = law if isinstance(law, Mapping) else {one.name: law for one in sets}
+    for name in (one.name for one in sets if one.name not in laws):
+        raise ValueError(f"law has no set {name!r}; it has {', '.join(laws)}")
+    for name, (low, high) in ranges.items():
+        least = one_number(f"ranges[{name!r}][0]", low)
+        one_number(f"ranges[{name!r}][1]", high, f"must be above {least!r}", least, open_low=True)
+    if not 0 < count < measured:
+        told = f"ranges has {count} numbers, shots have {measured} velocities"
+        raise ValueError(f"{told}; must be at least 1 number, and fewer than velocities")
+    known = {"restitution": one_number("restitution", restitution, *PART)}
+    points = scipy.stats.qmc.Halton(count, scramble=False).random(
+        whole_number("starts", starts) + 1
+    )
+    return _Search(sets, laws, ranges, known, measured - count).found(1.0 + points[1:])
 
 
+@dataclass
 class _Search:
     """What a law leaves of shots, by numbers z: 1 at the lower end of a range, 2 at the upper."""
 
-    def __init__(
-        self, shots: Shots, law: Law | Mapping[str, Law],
-        ranges: Mapping[str, tuple[float, float]], restitution: float,
-    ) -> None:  # fmt: skip
-        self.sets, self.ranges = must_be(Shots, "shots", shots).sets, ranges
-        names = [one.name for one in self.sets]
-        self.laws = law if isinstance(law, Mapping) else dict.fromkeys(names, law)
-        for name in (name for name in names if name not in self.laws):
-            raise ValueError(f"law has no set {name!r}; it has {', '.join(self.laws)}")
-        for name, (low, high) in ranges.items():
-            least = one_number(f"ranges[{name!r}][0]", low)
-            rule = f"must be above {least!r}"
-            one_number(f"ranges[{name!r}][1]", high, rule, least, open_low=True)
-        count = sum(one.after.size for one in self.sets)
-        if not 0 < len(ranges) < count:
-            told = f"ranges has {len(ranges)} numbers, shots have {count} velocities"
-            raise ValueError(f"{told}; must be at least 1 number, and fewer than velocities")
-        self.freedom = count - len(ranges)
-        self.fixed = {"restitution": one_number("restitution", restitution, *PART)}
-        self.tried: list[tuple[float, list[float]]] = []  # chi-square and z of all minima
+    sets: Sequence[ShotSet]
+    laws: Mapping[str, Law]
+    ranges: Mapping[str, tuple[float, float]]
+    known: Mapping[str, float]
+    freedom: int
+    tried: list[tuple[float, list[float]]] = field(default_factory=list)  # minima: chi-square, z
 
     def numbers(self, z: Vector) -> dict[str, float]:
         """Return the numbers by name."""
-        ends = self.ranges.items()
-        return {name: low + (high - low) * (x - 1.0)
-                for (name, (low, high)), x in zip(ends, z.tolist(), strict=True)}  # fmt: skip
+        low, high = np.array([*self.ranges.values()], float).T
+        return dict(zip(self.ranges, (low + (high - low) * (z - 1.0)).tolist(), strict=True))
 
     def left(self, z: Vector) -> list[Vector]:
         """Return residuals over errors, (K, N + 1) for each set, the last one of the factor."""
-        values = self.fixed | self.numbers(np.round(z, 9))  # none is nearly at an end
-        e, found = values.pop("restitution"), []
+        values, found = {**self.known, **self.numbers(np.round(z, 9))}, []  # none nearly at an end
+        e = values.pop("restitution")
         for one in self.sets:
             model, weight = self.laws[one.name](**values), 1.0 / one.sigma**2
             starts, of = np.unique(one.before, axis=0, return_inverse=True)
@@ -152,25 +153,24 @@ class _Search:
 
     def reach(self, best: Vector, lowest: float, k: int, limit: float) -> float:
         """Return how far number k goes to a limit before chi-square has risen by `RISE`."""
-        others, here = [i for i in range(best.size) if i != k], best.copy()
+        others, here, step, grow = [i for i in range(best.size) if i != k], best, 10 * _STEP, 2.0
+        while step > 0.1 * _STEP and here[k] != limit:
+            trial = here.copy()
+            trial[k] += np.clip(limit - here[k], -step, step)
+            end, value = self.descend(trial, others)
+            if abs(value - lowest - RISE) < 0.01:
+                return float(end[k])
+            if value > lowest + RISE:
+                grow = 0.5
+            else:
+                here = end
+            step *= grow
+        return float(here[k])
 
-        def over(x: float) -> float:
-            here[k] = x
-            here[:], value = self.descend(here, others)
-            return value - lowest - RISE
-
-        near, step = float(best[k]), 10.0 * _STEP
-        while near != limit:
-            far = near + float(np.clip(limit - near, -step, step))
-            if over(far) > 0.0:
-                return float(scipy.optimize.brentq(over, near, far, xtol=0.1 * _STEP))
-            near, step = far, 2.0 * step
-        return limit
-
-    def found(self, starts: int) -> LawFit:
+    def found(self, begin: Vector) -> LawFit:
         """Return the fit: from the lowest minimum, until no profile finds a lower one."""
-        every = list(range(len(self.ranges)))
-        ends = [self.descend(1.0 + z, every) for z in spread(starts, len(every))]
+        every = list(range(begin.shape[1]))
+        ends = [self.descend(z, every) for z in begin]
         while True:
             lowest = min(value for _, value in ends)
             # Of those that are equally low the one with the least numbers.
@@ -186,9 +186,9 @@ class _Search:
             apart = all(np.abs(end - other).max() > _SAME for other in minima)
             minima += [end] * bool(apart and value < lowest + RISE)
         low, high = (self.numbers(np.array(span)) for span in zip(*spans, strict=True))
-        residuals = zip(self.sets, self.left(best), strict=True)
         values, *others = (self.numbers(np.round(end, 9)) for end in minima)
+        rest = zip(self.sets, self.left(best), strict=True)
         return LawFit(
             values, {name: (low[name], high[name]) for name in values}, tuple(others),
-            {one.name: left[:, :-1] for one, left in residuals}, lowest, self.freedom,
+            {one.name: left[:, :-1] for one, left in rest}, lowest, self.freedom,
         )  # fmt: skip

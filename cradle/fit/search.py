@@ -43,13 +43,6 @@ class Scan(NamedTuple):
     excess: Vector
 
 
-def spread(count: int, axes: int) -> Vector:
-    """Return points that fill the unit box evenly, shape (count, axes)."""
-    from scipy.stats import qmc
-
-    return np.asarray(qmc.Halton(axes, scramble=False).random(count + 1)[1:])
-
-
 def scan(function: Function, upper: Vector) -> Found:
     """Search one dimension: a grid, then walk to each minimum and each end of the set."""
     # Near the bound the outcome goes like the square root of what is left to it.
