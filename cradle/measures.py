@@ -128,7 +128,6 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     # The leftmost approaching contact drives (forward), or the right one alone (backward).
     bounds = largest_ratios(chain.masses, np.zeros(1), np.zeros(1))
     bound = float(bounds[0 if u[0] > 0.0 else 1][0])
-
     balls = chain.masses, chain.velocities, chain.restitution
 
     def distances(ratio: ArrayLike) -> Vector:

@@ -123,8 +123,7 @@ def chi_squares(sets: Sequence[ShotSet], values: Values, uncertain: Uncertain) -
         some = {key: value[begin : begin + _CHUNK] if np.size(value) == size > 1 else value
                 for key, value in values.items()}  # fmt: skip
         parts = zip(*(normal_equations(one, some, uncertain) for one in sets), strict=True)
-        totals: list[Any] = [sum(part) for part in parts]
-        chi_square, slope, curvature = totals
+        chi_square, slope, curvature = (np.asarray(sum(part)) for part in parts)
         if uncertain:  # profiled over the coefficients of restitution that the sets share
             curvature = curvature + np.diag([1.0 / sigma**2 for _, sigma in uncertain])
             step = np.linalg.solve(curvature, slope[..., None])[..., 0]

@@ -112,10 +112,9 @@ def fit_swing(
 class _Film:
     """Readings, and swings by numbers p: of `names`, places of balls on their way, their v / x."""
 
-    def __init__(
-        self, times: ArrayLike, positions: ArrayLike, model: Model, seen: ArrayLike | None,
-        reading: float | None, free: Collection[str], known: Mapping[str, float],
-        masses: ArrayLike | None,
+    def __init__(  # as for `fit_swing`
+        self, times: Any, positions: Any, model: Model, seen: Any, reading: float | None,
+        free: Collection[str], known: Mapping[str, float], masses: Any,
     ) -> None:  # fmt: skip
         t, x = asked.checked("times", times), asked.numbers("positions", positions)
         mask = np.ones(x.shape[1:], bool) if seen is None else np.asarray(seen, bool)

@@ -91,7 +91,13 @@ class QuadraticDissipation:
         # In units in which no product of masses is beyond the range of floats.
         unit = np.ldexp(1.0, int(np.frexp(chain.masses.max())[1]) - 1)
         m = chain.masses / unit
-        kappa = self._kappa(chain)
+        if self.coefficients is None:
+            e, least = chain.restitution, 2.0 / _LARGEST
+            rule = f"must be below 1 - {least:g} for QuadraticDissipation: e = 1 is a limit only"
+            asked.refuse_where("restitution", e, 1.0 - e < least, rule)
+            kappa = (1.0 + e) / (1.0 - e)
+        else:
+            kappa = asked.row_of("coefficients", self.coefficients, n - 1, n)
         if self.distance and n != 3:
             raise ValueError(f"distance = {self.distance!r}; needs three balls, the chain has {n}")
         left, right = np.maximum.accumulate(m), np.maximum.accumulate(m[::-1])[::-1]
@@ -130,15 +136,6 @@ class QuadraticDissipation:
             told = f"the impact was not finished after max_problems = {self.max_problems}"
             raise ImpactNotFinished(told, trace, 0.0)  # between two problems nothing is stored
         return trace
-
-    def _kappa(self, chain: Chain) -> Vector:
-        """Return the coefficient of each contact."""
-        if self.coefficients is None:
-            e, least = chain.restitution, 2.0 / _LARGEST
-            rule = f"must be below 1 - {least:g} for QuadraticDissipation: e = 1 is a limit only"
-            asked.refuse_where("restitution", e, 1.0 - e < least, rule)
-            return (1.0 + e) / (1.0 - e)
-        return asked.row_of("coefficients", self.coefficients, len(chain) - 1, len(chain))
 
 
 def _parted(m: Vector, u: Vector, kappa: Vector, distance: float) -> tuple[Vector, Vector]:

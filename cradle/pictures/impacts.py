@@ -14,10 +14,6 @@ from matplotlib.lines import Line2D
 from cradle.input.values import ArrayLike, Vector, must_be, whole_number
 from cradle.trace import Trace
 
-__all__ = [
-    "EVENT_STYLES", "PALETTE", "ball_style", "impulse_axis", "velocities", "velocity_impulse",
-]  # fmt: skip
-
 #: Colours of Okabe and Ito, told apart by colour-blind readers; in an order of changing lightness.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 
@@ -47,16 +43,16 @@ def ball_style(ball: int) -> dict[str, Any]:
     return {"color": PALETTE[ball % len(PALETTE)], "linestyle": _DASHES[ball % len(_DASHES)]}
 
 
-def indexed(symbol: str, number: int) -> str:
+def _indexed(symbol: str, number: int) -> str:
     """Return a symbol with its index; TeX takes two digits for one index in braces alone."""
     return f"${symbol}_{number}$" if number < 10 else f"${symbol}_{{{number}}}$"
 
 
 def _impulse(contact: int) -> str:
-    return "impulse " + indexed(r"\tau", contact + 2) + " (N s)"
+    return "impulse " + _indexed(r"\tau", contact + 2) + " (N s)"
 
 
-def axes_or_new(ax: Axes | None) -> Axes:
+def _axes_or_new(ax: Axes | None) -> Axes:
     if ax is None:
         return plt.subplots(figsize=(5.6, 3.9), layout="constrained")[1]
     return must_be(Axes, "ax", ax)
@@ -76,10 +72,10 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     ['$v_1$', '$v_2$', '$v_3$']
     """
     must_be(Trace, "trace", trace)
-    ax = axes_or_new(ax)
+    ax = _axes_or_new(ax)
     impulses, path = trace.curve()
     for ball, velocity in enumerate(path.T):
-        label = indexed("v", ball + 1)
+        label = _indexed("v", ball + 1)
         ax.plot(impulses.sum(axis=1), velocity, label=label, lw=2, **ball_style(ball))
     ax.set(xlabel="sum of all impulses (N s)", ylabel="velocity (m/s)")
     ax.margins(x=0)
@@ -109,10 +105,10 @@ def velocity_impulse(
     """
     last = len(must_be(Trace, "trace", trace).impulses) - 1
     contact = whole_number("contact", contact, f"0 to {last}", 0, last)
-    ax = axes_or_new(ax)
+    ax = _axes_or_new(ax)
     impulses, path = trace.curve()
     for ball in (contact, contact + 1):
-        label = indexed("v", ball + 1)
+        label = _indexed("v", ball + 1)
         ax.plot(impulses[:, contact], path[:, ball], label=label, lw=2, **ball_style(ball))
     ax.set(xlabel=_impulse(contact), ylabel="velocity (m/s)")
     ax.grid(alpha=0.3)

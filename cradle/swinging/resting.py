@@ -13,8 +13,6 @@ The rules, in the order in which `swing` applies them at every event:
    stays open for this instant, whatever else happens in it.
 """
 
-from itertools import pairwise
-
 import numpy as np
 
 from cradle.input.values import NDArray, Vector
@@ -28,9 +26,8 @@ NEAR = 1e-12
 
 def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the first ball of each stretch of marked contacts, and the one after its last."""
-    marks = pairwise([False, *contacts.tolist(), False])
-    edges = [c for c, (one, other) in enumerate(marks) if one != other]
-    return [(first, end + 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
+    edges = np.flatnonzero(np.diff(contacts, prepend=False, append=False))
+    return [(first, end + 1) for first, end in edges.reshape(-1, 2).tolist()]
 
 
 def common_velocities(
