@@ -21,13 +21,7 @@ from cradle.advice.choice import Recommendation, recommend
 from cradle.chain import Chain
 from cradle.models import Model, collide
 from cradle.models.batch import Outcomes, outcomes, post_impact_velocities
-from cradle.models.compliant import (
-    SpringChain,
-    SpringOutcomes,
-    spring_outcomes,
-    spring_velocities,
-    viscosity_from,
-)
+from cradle.models.compliant import SpringChain, spring_outcomes, spring_velocities, viscosity_from
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
@@ -45,7 +39,7 @@ __all__ = [
     "Chain", "ConstantLoss", "DissipationTrace", "EnergyDistribution", "EnergyTrace", "Event",
     "FusedChain", "Impact", "ImpactNotCertified", "ImpactNotFinished", "ImpulseCorrelation",
     "Model", "Outcomes", "Pendulums", "QuadraticDissipation", "Recommendation",
-    "SequentialCollisions", "SpeedDependent", "SpringChain", "SpringOutcomes", "Swing",
+    "SequentialCollisions", "SpeedDependent", "SpringChain", "Swing",
     "TimedTrace", "Trace", "ViscousLoss", "collide", "outcomes", "paper_chain", "paper_sequences",
     "post_impact_velocities", "ratio_table", "recommend", "restitution_table", "spring_outcomes",
     "spring_velocities", "swing", "viscosity_from", "warm_up",

@@ -70,7 +70,6 @@ class Row(Alone):
     acceleration : float
         The acceleration a of gravity, m/s^2, or what else draws neighbours together at most.
 
-
     Attributes
     ----------
     on_hit : callable, optional

@@ -211,7 +211,7 @@ def test_no_entry_point_is_missing():
     """All that `cradle` exports is called here, but for results and what takes no argument."""
     results = {
         "DissipationTrace", "EnergyTrace", "Event", "Impact", "ImpactNotCertified", "Model",
-        "ImpactNotFinished", "Outcomes", "Recommendation", "SpringOutcomes", "Swing",
+        "ImpactNotFinished", "Outcomes", "Recommendation", "Swing",
         "TimedTrace", "Trace",
     }  # fmt: skip
     nothing = {"paper_sequences", "ratio_table", "restitution_table", "warm_up"}

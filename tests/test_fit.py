@@ -21,7 +21,6 @@ from cradle.fit import (
     read_shots,
     read_tracker,
     restitution,
-    restitution_from_heights,
     speeds_from_heights,
     velocities_from_tracks,
 )
@@ -259,13 +258,6 @@ def test_restitution_of_exact_data_and_its_error():
 
 
 def test_heights():
-    found = restitution_from_heights("AA", [1.0, 0.5], [0.81, 0.405], 0.002)
-    assert found["AA"].value == pytest.approx(0.9, abs=1e-6)
-    assert found.degrees_of_freedom == 1
-    with pytest.raises(ValueError, match=r"rise\[0\] = -1.0; must be above 0"):
-        restitution_from_heights("AA", [1.0], [-1.0], 0.1)
-    with pytest.raises(ValueError, match=r"rise \(0,\); must be \(K,\), K >= 1"):
-        restitution_from_heights("AA", [], [], 0.1)
     speed, sigma = speeds_from_heights([0.05, -0.05, 0.0], 0.001, 10.0)
     np.testing.assert_allclose(speed, [1, -1, 0])
     np.testing.assert_allclose(sigma, [np.sqrt(1.02) - 1] * 2 + [np.sqrt(0.02)])

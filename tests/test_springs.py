@@ -230,7 +230,7 @@ def test_a_batch_tells_the_error_of_each_chain():
     m, v, k, gaps, lost = random_chains(5, 4, 4, 0.1)
     options = {"exponent": 1.5, "accuracy": 1e-5}
     found = spring_outcomes(m, v, k, viscosity=lost, gaps=gaps, **options)
-    assert found.error.shape == (4,)
+    assert found[1].shape == (4,)
     for row, velocities, error in zip(zip(m, v, k, lost, gaps, strict=True), *found, strict=True):
         model = SpringChain(row[2], viscosity=row[3], gaps=row[4], **options)
         alone = collide(Chain(*row[:2]), model)

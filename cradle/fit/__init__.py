@@ -8,7 +8,7 @@ values explain shots, `search` finds all that do, `estimate` fits, and `result` 
 to its film: period, damping, restitution, gap.
 """
 
-from cradle.fit.estimate import ratio, restitution, restitution_from_heights
+from cradle.fit.estimate import ratio, restitution
 from cradle.fit.film import Velocities, speeds_from_heights, velocities_from_tracks
 from cradle.fit.laws import LawFit, fit_law
 from cradle.fit.result import Estimate, Fit, Prediction
@@ -20,5 +20,5 @@ from cradle.fit.tracks import Tracks, read_tracker
 __all__ = [
     "Estimate", "Fit", "LawFit", "Mode", "Prediction", "ShotSet", "Shots", "SwingFit", "Tracks",
     "Velocities", "fit_law", "fit_swing", "ratio", "read_shots", "read_tracker", "restitution",
-    "restitution_from_heights", "speeds_from_heights", "velocities_from_tracks",
+    "speeds_from_heights", "velocities_from_tracks",
 ]  # fmt: skip

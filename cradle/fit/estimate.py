@@ -11,7 +11,7 @@ from cradle.fit.parameters import Key, fitted_keys, label, pair_keys, parameter_
 from cradle.fit.result import Estimate, Fit, Group
 from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
-from cradle.input.values import ABOVE_ZERO, PART, ArrayLike, Vector, checked, flag, one_number
+from cradle.input.values import PART, Vector, checked, flag, one_number
 from cradle.kernel.state import LIMITS
 
 _TRIALS = 513  # points at which it is tried whether a ratio acts at all
@@ -37,38 +37,6 @@ def restitution(shots: Shots) -> Fit:
     if not pairs:
         raise ValueError("no set has two balls; restitution comes from pairs")
     return _fitted(shots, "restitution", dict.fromkeys(pairs, 1.0), {}, {}, int)
-
-
-def restitution_from_heights(name: str, drop: ArrayLike, rise: ArrayLike, sigma: float) -> Fit:
-    """Fit the coefficient of restitution of a ball that bounces on something very heavy.
-
-    Parameters
-    ----------
-    name : str
-        Name of the pair, such as "AB".
-    drop, rise : array_like, shape (K,)
-        Heights above the point of contact before and after, in one unit: e^2 = rise / drop.
-    sigma : float
-        Standard error of each height, in that unit.  What is not above 0 is a ValueError.
-
-    Examples
-    --------
-    >>> restitution_from_heights("AA", [1.0, 1.0], [0.88, 0.90], 0.01)
-    Fit(restitution AA = 0.9434 [0.9336, 0.9533]; chi-square 1.1 of 1)
-    """
-    high, low = checked("drop", drop, *ABOVE_ZERO), checked("rise", rise, *ABOVE_ZERO)
-    error = one_number("sigma", sigma, *ABOVE_ZERO)
-    if high.ndim != 1 or high.shape != low.shape or not high.size:
-        raise ValueError(f"drop has shape {high.shape}, rise {low.shape}; must be (K,), K >= 1")
-
-    def chi(e: Vector) -> Vector:
-        square = e**2
-        return np.asarray(((low - square * high) ** 2 / (1 + square**2)).sum(axis=1) / error**2)
-
-    key = parameter_key(name)
-    (found,), _, _, lowest = scan(chi, np.ones(1))
-    estimates = {label(key): Estimate.of("restitution", key, 1.0, found)}
-    return Fit(Shots(()), estimates, {}, (), lowest, high.size - 1)
 
 
 def ratio(

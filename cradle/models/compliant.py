@@ -5,7 +5,7 @@ import math
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,7 @@ from cradle.models.energy import fastest
 from cradle.models.springs import COARSEST, FINEST, MOST_STEPS, TimedTrace, refused
 from cradle.runtime.job import DEFECTS, FINISHED, LARGE, REFUSED, UNFINISHED, UNSOUND
 from cradle.runtime.springs import room, solve
-from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace, compared_as_objects
+from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
 
 # What is asked of the parameters: a rule, limits, whether the lower one is excluded; of contacts,
 _RULES = {
@@ -183,30 +183,23 @@ def spring_velocities(
     return spring_outcomes(
         masses, velocities, stiffness, exponent=exponent, viscosity=viscosity, gaps=gaps,
         accuracy=accuracy, progress=progress,
-    ).velocities  # fmt: skip
-
-
-@compared_as_objects
-class SpringOutcomes(NamedTuple):
-    """What a batch of impacts on springs leaves."""
-
-    velocities: Vector  #: after the impact, shape (..., N), m/s
-    error: Vector  #: estimated, of a velocity over the fastest closing speed, shape (...)
+    )[0]  # fmt: skip
 
 
 def spring_outcomes(
     masses: ArrayLike, velocities: ArrayLike, stiffness: ArrayLike = 1.0, *,
     exponent: float = 1.5, viscosity: ArrayLike = 0.0, gaps: ArrayLike = 0.0,
     accuracy: float = 1e-3, progress: bool = False,
-) -> SpringOutcomes:  # fmt: skip
-    """Velocities of many chains of balls on springs, with the error that each is estimated to have.
+) -> tuple[Vector, Vector]:  # fmt: skip
+    """Velocities, m/s, shape (..., N), and estimated errors of many chains of balls on springs.
 
-    Arguments and errors are those of `spring_velocities`.
+    Arguments are those of `spring_velocities`.  The errors are of a velocity over the fastest
+    closing speed, shape (...).
 
     Examples
     --------
-    >>> found = spring_outcomes([1] * 3, [1, 0, 0], [[1, 1], [1, 9]])
-    >>> found.velocities.shape, (found.error < 1e-3).tolist()
+    >>> velocities, errors = spring_outcomes([1] * 3, [1, 0, 0], [[1, 1], [1, 9]])
+    >>> velocities.shape, (errors < 1e-3).tolist()
     ((2, 3), [True, True])
     """
     p = asked.one_number("exponent", exponent, *_EXPONENT)
@@ -241,7 +234,7 @@ def spring_outcomes(
         model, chain = SpringChain(k, p, viscosity=loss, gaps=gap, accuracy=accuracy), Chain(m, v)
         model.solve(chain)
         raise ImpactNotCertified(chain, model, "among others it fails, alone it does not")
-    return SpringOutcomes(out.reshape(*lead, n), error.reshape(lead))
+    return out.reshape(*lead, n), error.reshape(lead)
 
 
 def check_rows(arrays: Sequence[Vector]) -> None:
