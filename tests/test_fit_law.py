@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from chains import uniform
 from real_cradles import SLOWER, first_strikes
+from scipy.special import ndtri
 from stored import read
 
 from cradle import (
@@ -33,8 +34,8 @@ def simulated(name, masses, e, ratios, noise, seed, count=12):
     rng = np.random.default_rng(seed)
     speed = uniform(rng, 0.5, 1.5, count)[:, None] * np.eye(1, len(masses))
     after = post_impact_velocities(masses, speed, e, ratios)
-    seen = speed * (1 + noise * rng.standard_normal((count, 1)))
-    moved = after + noise * rng.standard_normal(after.shape)
+    seen = speed * (1 + noise * ndtri(uniform(rng, 0, 1, (count, 1))))
+    moved = after + noise * ndtri(uniform(rng, 0, 1, after.shape))
     return shot_set(name, seen, moved, noise, noise * speed, masses)
 
 
