@@ -97,6 +97,10 @@ def good():
         (lambda t: t.update(Sigma=t.pop("sigma")), "Sigma: write Sigma in small letters"),
         (lambda t: t["set"].append("AB"), "columns have different lengths"),
         (lambda t: t.update({k: [] for k in t}), "the table has no rows"),
+        (
+            lambda t: [t.update({f"{k}1": t.pop(k)}) for k in [*t]],
+            "no column of set, .* `cradle film`",
+        ),
     ],
 )
 def test_wrong_tables_are_refused_by_row_and_column(change, message):

@@ -151,6 +151,8 @@ def read_shots(
     if not lines:
         raise ValueError("the table has no rows")
     there = list(lines[0][1])
+    if not {*there} & {*COLUMNS}:  # such as a film's
+        raise ValueError(f"no column of {', '.join(COLUMNS)}; marks in a film go to `cradle film`")
     optional = ("sigma_before", "sigma") if sigma is not None else ("sigma_before",)
     for name in COLUMNS:
         if name not in (*there, *optional):
