@@ -24,12 +24,10 @@ def test_named_chain(name):
     assert judge(CHAINS[name].problem).word == "right"
 
 
-def test_a_tie_decided_by_products_of_tiny_ratios_is_told_by_the_margin():
+@pytest.mark.parametrize("name", chains_of("told by the margin"))
+def test_a_tie_decided_by_products_of_tiny_ratios_is_told_by_the_margin(name):
     """Beyond 32 digits, so the answer is wrong; it does not claim to be far from another one."""
-    problem = Problem(
-        [1.0] * 8, [1.0, 0.5, 1.0, 0.5, 0.0, 1.0, 0.0, 0.0], [0.9, 1.0, 0.9, 1.0, 1.0, 0.9, 1.0],
-        [1e-20, 0.0, 1e-20, 0.0, 0.0, 0.0], [0.0, 1e-20, 0.0, 0.0, 0.0, 0.0],
-    )  # fmt: skip
+    problem = CHAINS[name].problem
     assert judge(problem).word == "wrong"
     assert problem.collide().margin == margin(problem) == 0.0
     clear = [[1e-4 if x == 1e-20 else x for x in side] for side in problem[3:5]]
@@ -38,27 +36,8 @@ def test_a_tie_decided_by_products_of_tiny_ratios_is_told_by_the_margin():
     assert clear.collide().margin > 0.0
 
 
-def test_another_chain_wrong_by_products_of_tiny_ratios():
-    """The one of seven thousand of "losses": its ratios of 1e-20 count by their products."""
-    masses = [7.000505702316852, 1, 1, 1, 1, 1, 1, 0.425, 1, 1, 0.3102350802256346, 0.16375, 1]
-    forward = [0, 0, 0, 0, 1e-20, 0, 0, 1e-20, 1e-20, 0, 0]
-    backward = [0, 0, 0, 0, 0, 0, 1e-20, 0, 0, 0, 0]
-    problem = Problem(masses, [1.0] + [0.0] * 12, [1.0] * 12, forward, backward, 1.0)
-    assert judge(problem).word == "wrong"
-    assert problem.collide().margin == 0.0
-    larger = [[1e-4 if x else x for x in side] for side in (forward, backward)]
-    assert judge(problem._replace(forward=larger[0], backward=larger[1])).word == "right"
-
-
 def test_an_outcome_that_hangs_on_when_a_chatter_ends_is_told_by_the_margin():
-    """Two groups chatter, and all runs go on in each round: the last rounds decide by .002."""
-    problem = Problem(
-        [0.053] * 4 + [0.166] * 2 + [0.053] * 7 + [0.045] + [0.053] * 4 + [0.045, 0.166],
-        [1, 1, 0.5, -0.5, 0, 0.5, -0.5, -0.5, 1, -0.5, 1, 0.5, 0, 1, 1, 0.5, -0.5, 1, 1, -0.5],
-        [0.9, 0.5, 0.5, 0.9, 0.9, 0.5, 0.5, 1, 0.5, 0, 0.9, 1, 1, 0, 0.9, 1, 0, 0.5, 1],
-        [1, 1, 1, 1, 1, 0.1, 0, 0, 1, 0.1, 0, 0.1, 0.1, 0.1, 0, 1, 1, 0],
-        [0.1, 1, 0, 0.1, 1, 0, 0, 0.1, 0, 1, 0, 1, 1, 0.1, 1, 0, 0.1, 1],
-    )
+    problem = CHAINS["an outcome that hangs on when a chatter ends"].problem
     assert off(problem, problem.collide().velocities.tolist(), exact(problem).velocities) > 1e-3
     assert problem.collide().margin == 0.0
 
@@ -207,15 +186,7 @@ def test_a_wrong_chain_is_shrunk():
 
 
 def test_a_gap_that_closes_at_once():
-    """It lay at zero: no rounding is absorbed by contact 2 of e = 0, which would end it."""
-    problem = Problem(
-        [0.1, 1.0, 0.053, 0.053, 0.166, 0.166, 1.0],
-        [1.0, 0.0, 0.5, -0.5, 0.5, -0.5, 0.0],
-        [1.0, 1.0, 0.0, 1.0, 1.0, 0.0],
-        [0.2955870108243131, 0.3084507042253521, 0.3789954337899544, 0.0, 0.25],
-        [0.0, 0.25, 0.2857142857142857, 0.15445462114904246, 0.27092262576133547],
-        meeting=0.0,
-    )
+    problem = CHAINS["a gap that closes at once"].problem
     one, other = exact(problem), exact(problem, twice=True)
     assert off(problem, one.velocities, other.velocities) < 1e-60
 
@@ -231,11 +202,7 @@ def test_a_sequence_without_end():
 
 
 def test_a_run_that_ends_where_its_digits_do():
-    """A light ball is pressed for ever, until a last speed counts as zero; R9 goes on elsewhere."""
-    problem = Problem(
-        [1.0, 1.0, 0.01, 0.1, 1.0], [1.0, 0.5, 0.0, 0.0, 0.0], [1.0, 1.0, 0.9, 1.0],
-        [0.9, 0.9, 0.0], [0.0, 1.0, 1.0], meeting=0.3,
-    )  # fmt: skip
+    problem = CHAINS["a run that ends where its digits do"].problem
     assert off(problem, batch(problem), exact(on_bounds(problem)).velocities) > 0.1
     assert judge(problem).word == "endless"
     assert second_opinion(problem).word == "as 50 digits"

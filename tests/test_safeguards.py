@@ -124,11 +124,7 @@ def test_with_it_the_answer_is_that_of_fifty_digits(name):
 
 def test_cycles_that_still_change_leave_digits_in_doubt():
     """Where they end depends on steady neighbours: all digits are those of each collision made."""
-    chain = (
-        [1.160541747753352, 6.747e-07, 0.33448, 1.85497, 6.581e-05, 2.72338],
-        [0.45804, 0.78246, 0.33838, 0.88286, -0.79193, -1.56234], [0.9, 0, 0.001, 0.9, 0.3],
-        [0.1, 0.1, 0, 1], [0.1, 0.5, 1, 0.5], 0.5,
-    )  # fmt: skip
+    chain = CHAINS["cycles that still change"].problem
     real, other = run(chain), run(chain, doubt=math.inf)
     assert real.status == FINISHED
     assert np.abs(np.subtract(real.velocities, other.velocities)).max() > 1e-12
@@ -187,19 +183,10 @@ def test_collisions_without_an_impulse_are_no_cycle():
 
 
 @pytest.mark.parametrize(
-    "chain",
-    [
-        (
-            [0.12340293906449111, 0.015272256033722932, 0.0010428007666734443, 0.2953516775518479],
-            [1, 0.3, 1, 0.5], [0.99, 0.1, 0.9], [0.1, 0],
-        ),
-        (
-            [0.465, 0.002, 0.0775, 0.00198, 0.363], [0, 1, -0.5, 0.5, -1], [0.1, 0.7, 0.1, 0.99],
-            [0.01, 0, 0],
-        ),
-    ],
-)  # fmt: skip
-def test_a_limit_tells_the_velocities_better_than_the_works(chain):
+    "name", ["a cycle that is cut early", "a cycle of two light balls that is cut early"]
+)
+def test_a_limit_tells_the_velocities_better_than_the_works(name):
+    chain = CHAINS[name].problem[:5]
     early, late = solve(*chain), solve(*chain, bend=0.0, self_similar=0.0, many=math.inf)
     assert early.collapsed
     assert late.collapsed
