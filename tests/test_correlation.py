@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from chains import magnitudes, random_chains, uniform, with_ends, within_bounds
+from laws import keeps
 
 from cradle import (
     Chain,
@@ -144,19 +145,9 @@ def test_rows_of_the_path(n):
     for m, v, e, f, b in zip(*chains, strict=True):
         trace = collide(Chain(m, v, e), ImpulseCorrelation(f, b))
         longest = max(longest, len(trace.events))
-        rows = len(trace.events) + 1
-        assert trace.path.shape == (rows, n)
-        assert trace.path_impulses.shape == (rows, n - 1)
-        assert trace.path[0].tobytes() == np.asarray(v).tobytes()
-        assert not trace.path_impulses[0].any()
-        assert trace.path[-1].tobytes() == trace.velocities.tobytes()
-        assert trace.path_impulses[-1].tobytes() == trace.impulses.tobytes()
-        scale = np.abs(v).max()
-        # Eqs. 1-3, 47-48 on every row: m dv = impulse on the left - impulse on the right.
-        impulses = np.pad(trace.path_impulses, ((0, 0), (1, 1)))
-        gained = m * (trace.path - v)
-        np.testing.assert_allclose(gained, -np.diff(impulses, axis=1), atol=1e-13 * scale * m.max())
-        assert (np.diff(trace.path_impulses, axis=0) >= -1e-15 * scale * m.max()).all()
+        keeps(trace, momentum=1e-14, counted=False)
+        least = -1e-15 * np.abs(v).max() * m.max()
+        assert (np.diff(trace.path_impulses, axis=0) >= least).all()
     assert longest > (64 if n > 3 else 1)  # beyond the room that the solver starts with
 
 
@@ -255,14 +246,6 @@ def test_impact_not_finished():
     assert whole.path[: k + 1].tobytes() == trace.path.tobytes()
     assert (trace.path_impulses[-1] <= trace.impulses).all()
     assert (trace.impulses <= whole.path_impulses[k + 2]).all()
-
-
-def test_impact_not_finished_in_a_batch():
-    masses = np.array([[1, 1, 1], [1, 1e-6, 1], [1, 1e-8, 1]])
-    with pytest.raises(ImpactNotFinished, match="max_events = 300") as caught:
-        post_impact_velocities(masses, [1, 0, 0], 1, 0.0, max_events=300)
-    assert caught.value.trace.chain.masses.tolist() == [1, 1e-6, 1]  # the first such chain
-    assert post_impact_velocities(masses[:1], [1, 0, 0], 1, 0.0, max_events=300).shape == (1, 3)
 
 
 def test_enough_events_are_enough():

@@ -126,14 +126,6 @@ def test_held_contact_moves_as_at_its_bound():
     assert at_bound.saturated == ()
 
 
-def test_nominal_ratio_stays_in_force_while_a_contact_is_compressed():
-    free = solved([1, 1, 1], [1, 0.5, 0], 0.7, 0.6, 0.1)
-    assert free.saturated == ()
-    agrees(free)
-    bound = solved([1, 1, 1], [1, 0.5, 0], 0.7, 0.5, 0.1)
-    assert np.abs(free.velocities - bound.velocities).max() > 0.01
-
-
 # --- R8: runs that meet --------------------------------------------------------------------
 
 
@@ -173,20 +165,6 @@ def test_chatter_beside_a_finite_closing_speed():
     assert trace.path[first, 2] - trace.path[first, 3] > 0.1
     common = trace.chain.momentum / trace.chain.masses.sum()
     np.testing.assert_allclose(trace.velocities, common, rtol=0, atol=1e-13)
-
-
-def test_nested_infinite_sequences():
-    """Inside every cycle of the outer sequence the first three contacts collapse on their own."""
-    trace = solved(
-        [1] * 6,
-        [1, 0, 0, 0, 0, 0],
-        0,
-        [0.967963550258582, 0.04515107491767867, 0.23414204067392064, 0.40810942738654143],
-        [0.20344454463172412, 0.5687905977876264, 0.927494733732026, 0.17420000215542086],
-        max_events=20_000,
-    )
-    assert trace.collapsed
-    np.testing.assert_allclose(trace.velocities, [1 / 6] * 6, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("part", [0.99, 0.9999])
