@@ -410,10 +410,7 @@ def test_infinite_bounces_of_pressed_balls_have_the_limit_of_an_independent_run(
 def test_struck_balls_that_touch_collide_as_one_chain():
     """Balls that hang still and touch take part although nothing moves them."""
     run = swing(balls(4), ImpulseCorrelation(0.15), pulled(4), [0.3], pendulums=ONE_HERTZ)
-    (impact,) = run.impacts
-    assert impact.contacts == (0, 1, 2)
-    (trace,) = impact.traces
-    assert len(trace.chain) == 4
+    assert [impact.contacts for impact in run.impacts] == [(0, 1, 2)]
     apart = swing(balls(4), ImpulseCorrelation(0.15), pulled(4), [0.3],
                   pendulums=Pendulums(ONE_HERTZ.length, gaps=[0, 1e-4, 0]))  # fmt: skip
     assert [impact.contacts for impact in apart.impacts[:2]] == [(0,), (1, 2)]
@@ -693,12 +690,6 @@ def test_no_ball_swings_beyond_its_reach(masses, ball, damping):
             run()
         found = float(re.match(words, str(refused.value))[1])
         assert found == pytest.approx(speed * far, rel=1e-9)
-
-
-def test_a_ball_that_an_impact_throws_beyond_its_reach_is_refused_with_the_time():
-    balls, hanging = Chain([1, 0.1], [0, 0]), Pendulums(1)
-    with pytest.raises(ValueError, match=r"^after t = 0\.5015 s positions\[1\] = 1\.818"):
-        swing(balls, SequentialCollisions(), [-1, 0], [1], pendulums=hanging)
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.1])
