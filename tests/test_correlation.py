@@ -91,50 +91,6 @@ def test_ratios_beyond_their_bound(forward, backward, message):
     collide(chain, ImpulseCorrelation(forward, backward, excess="saturate"))
 
 
-BATCH = [
-    ({"masses": [1, -1, 1]}, "masses[1] = -1.0; must be above 0"),
-    ({"masses": [[1, 1, 1], [1, 1, 0]]}, "masses[1, 2] = 0.0; must be above 0"),
-    ({"masses": [1, 1e-151, 1]}, "masses[1] = 1e-151; must be at least 1e-150"),
-    ({"masses": 1.0}, "masses has shape (); must be (..., N) with N >= 2"),
-    ({"masses": [[1.0]]}, "masses has shape (1, 1); must be (..., N) with N >= 2"),
-    ({"velocities": [1, 0]}, "velocities has shape (2,); must be (..., 3), as masses"),
-    ({"velocities": [[1, 0, np.nan]]}, "velocities[0, 2] = nan; must be finite"),
-    ({"velocities": [[0, 0, 0], [1, 0, 1e200]]}, "velocities[1, 2] = 1e+200; kinetic energy"),
-    ({"restitution": 1.5}, "restitution = 1.5; must lie in [0, 1]"),
-    ({"restitution": [[1, 1], [1, -1]]}, "restitution[1, 1] = -1.0; must lie in [0, 1]"),
-    ({"restitution": [1, 1, 1]}, "restitution has shape (3,); must be () or (..., 2) for 3 balls"),
-    ({"forward": [[0.1], [7]]}, "forward[1, 0] = 7.0; must lie in [0, 1]"),
-    ({"backward": [[0.1], [7]]}, "backward[1, 0] = 7.0; must lie in [0, 1]"),
-    (
-        {"masses": np.ones((2, 3)), "velocities": np.ones((3, 3))},
-        "leading axes do not broadcast: masses (2, 3), velocities (3, 3)",
-    ),
-    (
-        {"restitution": np.ones((2, 2)), "forward": np.zeros((3, 1))},
-        "leading axes do not broadcast: masses (3,), velocities (3,), restitution (2, 2)",
-    ),
-    # A batch without a chain is checked all the same.
-    ({"masses": np.ones((0, 3)), "velocities": [np.nan, 0, 0]}, "velocities[0] = nan; must be"),
-    ({"masses": np.ones((0, 3)), "forward": 2}, "forward = 2.0; must lie in [0, 1]"),
-]
-
-
-@pytest.mark.parametrize(("change", "message"), BATCH, ids=[message for _, message in BATCH])
-def test_bad_batches_name_value_and_rule(change, message):
-    good = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "restitution": 1, "forward": 0.1}
-    with pytest.raises(ValueError, match="^" + re.escape(message)):
-        post_impact_velocities(**(good | change))
-
-
-def test_models_compare_by_value_and_their_repr_makes_them_again():
-    model = ImpulseCorrelation([0.1, 0.2], 0.3, meeting=0.25, excess="saturate", max_events=9)
-    assert eval(repr(model)) == model
-    assert model == ImpulseCorrelation(
-        np.array([0.1, 0.2]), 0.3, meeting=0.25, excess="saturate", max_events=np.int64(9)
-    )
-    assert model != ImpulseCorrelation([0.1, 0.2], 0.3)
-
-
 # --- the record ----------------------------------------------------------------------------
 
 

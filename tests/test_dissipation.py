@@ -12,12 +12,6 @@ from laws import keeps
 from cradle import Chain, QuadraticDissipation, collide
 
 
-@pytest.mark.parametrize(("kappa", "e"), [(0, 0), (0.3, 0), (1, 0), (3, 0.5), (1999, 0.999)])
-def test_a_coefficient_is_a_restitution(kappa, e):
-    after = collide(Chain([1, 3], [1, 0], 1), QuadraticDissipation(kappa)).velocities
-    assert after[1] - after[0] == pytest.approx(e, abs=1e-12)
-
-
 @st.composite
 def cases(draw):
     """Chain, coefficients, coefficient at a distance: two to five balls."""

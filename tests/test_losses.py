@@ -1,7 +1,6 @@
 """Restitution that depends on the closing speed."""
 
 import itertools
-import math
 
 import numpy as np
 import pytest
@@ -68,28 +67,6 @@ def test_a_path_that_is_cut_tells_no_speeds(monkeypatch):
     monkeypatch.setattr(correlation, "_MOST_NUMBERS", 11)
     with pytest.raises(ImpactNotFinished, match="do not agree"):
         collide(Chain([1, 1, 1], [1, 0, 0]), SpeedDependent(ImpulseCorrelation(0.1), lambda _: 0.9))
-
-
-@pytest.mark.parametrize(
-    ("change", "error", "words"),
-    [
-        ({"restitution": 0.9}, TypeError, r"restitution = 0\.9; must be a law e\(u\)"),
-        ({"model": 3}, TypeError, "model is an int; must be an impact model"),
-        ({"restitution": lambda _: 1.5}, ValueError, r"restitution\(u\)\[0\] = 1\.5; must lie in"),
-        ({"restitution": lambda _: math.nan}, ValueError, r"restitution\(u\)\[0\] = nan; must be"),
-        (
-            {"restitution": lambda _: "a"},
-            ValueError,
-            r"restitution\(u\)\[0\] = 'a'; must be a real",
-        ),
-        ({"e": 0.9}, ValueError, r"restitution\[0\] = 0\.9; must be 1: SpeedDependent has its own"),
-    ],
-)
-def test_what_is_refused(change, error, words):
-    given = {"model": SequentialCollisions(), "restitution": ConstantLoss(0.1), "e": 1} | change
-    chain = Chain([1, 1], [1, 0], given.pop("e"))
-    with pytest.raises(error, match=words):
-        collide(chain, SpeedDependent(**given))
 
 
 def test_a_part_of_a_swinging_row_has_its_part_of_the_inner_law():

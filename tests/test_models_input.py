@@ -1,5 +1,6 @@
 """What all models have in common: types, two balls, ends, units, defaults."""
 
+import re
 from functools import partial
 
 import numpy as np
@@ -46,10 +47,17 @@ def test_what_is_no_chain(model):
         "EnergyDistribution(stiffness=(1.0, 2.0), exponent=1.0, gaps=True, "
         "rtol=1e-09, max_evaluations=1000000)",
         "QuadraticDissipation(coefficients=(1.0, 2.0), distance=3.0, max_problems=10000)",
+        "ImpulseCorrelation(forward=(0.1, 0.2), backward=0.3, meeting=0.25, excess='saturate', "
+        "max_events=9)",
     ],
 )
-def test_the_repr_is_the_call(caption):
-    assert repr(eval(caption, vars(cradle))) == caption
+def test_models_compare_by_value_and_their_repr_makes_them_again(caption):
+    model = eval(caption, vars(cradle))
+    assert repr(model) == caption
+    arrays = re.sub(r"\(([\d., ]+)\)", r"np.array([\1])", caption)
+    arrays = re.sub(r"(max_\w+)=(\d+)", r"\1=np.int64(\2)", arrays)
+    assert eval(arrays, vars(cradle) | {"np": np}) == model
+    assert model != ImpulseCorrelation([0.1, 0.2], 0.3)
 
 
 @pytest.mark.parametrize("model", LAWS, ids=repr)

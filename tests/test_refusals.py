@@ -13,12 +13,14 @@ from stored import DATA
 
 from cradle import (
     Chain,
+    ConstantLoss,
     EnergyDistribution,
     FusedChain,
     ImpulseCorrelation,
     Pendulums,
     QuadraticDissipation,
     SequentialCollisions,
+    SpeedDependent,
     SpringChain,
     Trace,
     collide,
@@ -111,6 +113,33 @@ CHAINS = [
     ({"restitution": "1"}, "restitution = '1'; must be real numbers, one shape"),
 ]
 
+BATCH = [
+    ({"masses": [1, -1, 1]}, "masses[1] = -1.0; must be above 0"),
+    ({"masses": [[1, 1, 1], [1, 1, 0]]}, "masses[1, 2] = 0.0; must be above 0"),
+    ({"masses": [1, 1e-151, 1]}, "masses[1] = 1e-151; must be at least 1e-150"),
+    ({"masses": 1.0}, "masses has shape (); must be (..., N) with N >= 2"),
+    ({"masses": [[1.0]]}, "masses has shape (1, 1); must be (..., N) with N >= 2"),
+    ({"velocities": [1, 0]}, "velocities has shape (2,); must be (..., 3), as masses"),
+    ({"velocities": [[1, 0, np.nan]]}, "velocities[0, 2] = nan; must be finite"),
+    ({"velocities": [[0, 0, 0], [1, 0, 1e200]]}, "velocities[1, 2] = 1e+200; kinetic energy"),
+    ({"restitution": 1.5}, "restitution = 1.5; must lie in [0, 1]"),
+    ({"restitution": [[1, 1], [1, -1]]}, "restitution[1, 1] = -1.0; must lie in [0, 1]"),
+    ({"restitution": [1, 1, 1]}, "restitution has shape (3,); must be () or (..., 2) for 3 balls"),
+    ({"forward": [[0.1], [7]]}, "forward[1, 0] = 7.0; must lie in [0, 1]"),
+    ({"backward": [[0.1], [7]]}, "backward[1, 0] = 7.0; must lie in [0, 1]"),
+    (
+        {"masses": np.ones((2, 3)), "velocities": np.ones((3, 3))},
+        "leading axes do not broadcast: masses (2, 3), velocities (3, 3)",
+    ),
+    (
+        {"restitution": np.ones((2, 2)), "forward": np.zeros((3, 1))},
+        "leading axes do not broadcast: masses (3,), velocities (3,), restitution (2, 2)",
+    ),
+    # A batch without a chain is checked all the same.
+    ({"masses": np.ones((0, 3)), "velocities": [np.nan, 0, 0]}, "velocities[0] = nan; must be"),
+    ({"masses": np.ones((0, 3)), "forward": 2}, "forward = 2.0; must lie in [0, 1]"),
+]
+
 SHAPES = [
     (([1, 1], [1, 0, 0], [1, 1], 0), "masses has shape (2,); must be (..., 3)"),
     ((ONES, np.ones((3, 4)), [1, 1], 0), "velocities has shape (3, 4); must be (..., 3)"),
@@ -163,6 +192,18 @@ LAWS = [
             ([0, 1, 0, 0], "[1] approach and [0] open;"),
         )
     ),
+    (SpeedDependent, (SequentialCollisions(), 0.9), "restitution = 0.9; must be a law e(u)"),
+    (SpeedDependent, (3, ConstantLoss(0.1)), "model is an int; must be an impact model"),
+    *(
+        (struck, (SpeedDependent(SequentialCollisions(), law),), f"restitution(u)[0] = {words}")
+        for law, words in (
+            (lambda _: 1.5, "1.5; must lie in"),
+            (lambda _: NAN, "nan; must be"),
+            (lambda _: "a", "'a'; must be a real"),
+        )
+    ),
+    (struck, (SpeedDependent(SequentialCollisions(), ConstantLoss(0.1)), ONES, [1, 0, 0], 0.9),
+     "restitution[0] = 0.9; must be 1: SpeedDependent has its own"),
     (EnergyDistribution, (-1,), "stiffness = -1.0; must be above 0"),
     (EnergyDistribution, (1, 0.5), "exponent = 0.5; must be at least 1"),
     (EnergyDistribution, {"gaps": 1}, "gaps = 1; must be True or False"),
@@ -294,6 +335,8 @@ OTHERS = [
 def rows():
     """Every call that is refused: what is called, with what, and the words."""
     yield from ((chain, given, words) for given, words in CHAINS)
+    one = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "restitution": 1, "forward": 0.1}
+    yield from ((post_impact_velocities, one | change, words) for change, words in BATCH)
     for function in (three_balls, final_impulses, one_collision_each):
         yield from ((function, given, words) for given, words in SHAPES)
     yield from ((largest_ratios, given, words) for given, words in BOUNDS)
@@ -323,7 +366,7 @@ def rows():
     [pytest.param(*row, id=f"{row[0].__name__}: {row[2]}") for row in rows()],
 )
 def test_refused_in_these_words(function, given, words):
-    named, no_such = isinstance(given, dict), re.match(r"\w+ is (an?|the) ", words)
+    named, no_such = isinstance(given, dict), re.match(r"\w+ is (an?|the) |.* a law", words)
     kind = TypeError if no_such else ValueError
     with pytest.raises(kind, match="^" + re.escape(words)):
         function(**given) if named else function(*given)
