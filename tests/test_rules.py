@@ -146,14 +146,6 @@ def test_exact_zeros():
 # What a case may cost: far from `MAX_EVENTS`, and about what it costs today.
 
 
-def test_three_equal_plastic_balls_at_ratio_zero():
-    trace = solved([1, 1, 1], [1, 0, 0], 0, 0, max_events=400)
-    np.testing.assert_allclose(trace.velocities, [1 / 3] * 3, rtol=0, atol=1e-15)
-    assert trace.collapsed
-    assert trace.events[-1].kind == "collapse"
-    assert trace.energy_loss == pytest.approx(0.5 - 1 / 6, rel=1e-12)
-
-
 def test_chatter_beside_a_finite_closing_speed():
     """Contacts 0 and 1 collapse while contact 2 is still closing at a finite speed."""
     masses, velocities = [2, 0.1, 0.2, 5], [1, 0.5, 0, 0]
@@ -191,8 +183,9 @@ def test_simultaneous_events_of_one_run():
 @pytest.mark.parametrize(("name", "problem"), seen(chains_of("one line of the solver")))
 def test_delicate_chains(name, problem):
     """Collapsed ones against the sum of a great many impacts: the reference knows no cycles."""
-    trace = problem.collide()
-    agrees(trace, atol=CHAINS[name.removesuffix(", mirrored")].velocities)
+    row = CHAINS[name.removesuffix(", mirrored")]
+    trace = problem.collide(max_events=row.events)
+    agrees(trace, atol=row.velocities)
     # Bounded work.  The order of simultaneous events has no mirror image, and with it the cycles.
     assert len(trace.events) < 5000
 

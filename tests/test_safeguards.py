@@ -1,18 +1,17 @@
 """Every safeguard earns its place: a small chain that goes wrong without it.
 
 The plain event loop runs with one limit or one function exchanged.  As it is, it gives a certified
-answer, for short impacts that of fifty digits; with the exchange it does not: it goes wrong, does
-not finish, or its answer is not certified.  What a limit costs or saves in work is in
-`test_speed.py`.
+answer, for short impacts that of fifty digits (`test_defects.py`); with the exchange it does not:
+it goes wrong, does not finish, or its answer is not certified.  What a limit costs or saves in work
+is in `test_speed.py`.
 """
 
 import inspect
 import math
 
-import mpmath
 import numpy as np
 import pytest
-from delicate import CHAINS, chains_of
+from delicate import CHAINS
 from plain import rooms, solve
 
 from cradle.kernel import cycles
@@ -103,23 +102,6 @@ def test_without_it_a_chain_goes_wrong(name, exchange, becomes):
         assert np.abs(np.subtract(real.velocities, other.velocities)).max() > 1e-6
     else:
         assert other.status == becomes
-
-
-# The others take fifty digits minutes.
-SHORT = [
-    name
-    for name in chains_of("a safeguard")
-    if min(CHAINS[name].problem.masses) > 0.01 and name != "cycles that contain collapses"
-]
-
-
-@pytest.mark.parametrize("name", SHORT)
-def test_with_it_the_answer_is_that_of_fifty_digits(name):
-    problem = CHAINS[name].problem
-    with mpmath.workdps(50):
-        exact = problem.exact(2000)
-        off = max(abs(a - b) for a, b in zip(run(problem).velocities, exact.velocities))
-    assert off < 1e-13
 
 
 def test_cycles_that_still_change_leave_digits_in_doubt():
