@@ -18,8 +18,6 @@ from cradle import (
     post_impact_velocities,
 )
 
-# --- input ---------------------------------------------------------------------------------
-
 MODEL = [
     ({"forward": -0.1}, "forward = -0.1; must lie in [0, 1]"),
     ({"forward": [0.1, 1 + 1e-9]}, "forward[1] = 1.000000001; must lie in [0, 1]"),
@@ -91,9 +89,6 @@ def test_ratios_beyond_their_bound(forward, backward, message):
     collide(chain, ImpulseCorrelation(forward, backward, excess="saturate"))
 
 
-# --- the record ----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("n", [2, 3, 4, 6])
 def test_rows_of_the_path(n):
     """Long and short impacts, some collapsed."""
@@ -125,9 +120,6 @@ def test_the_short_cut_decides_as_the_loop_does():
             assert error <= 2e-15  # of the striker's speed
             taken += (trace.collisions == 1).all()
     assert 1500 < taken < 2900
-
-
-# --- the batch -----------------------------------------------------------------------------
 
 
 def test_no_row_of_a_batch_is_left_out_in_silence(monkeypatch):
@@ -180,9 +172,6 @@ def test_inputs_are_left_alone():
     before = [part.tolist() for part in given]
     post_impact_velocities(*given)
     assert [part.tolist() for part in given] == before
-
-
-# --- giving up -----------------------------------------------------------------------------
 
 
 def test_impact_not_finished():

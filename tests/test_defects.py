@@ -29,9 +29,6 @@ def difference(one, other):
     return max(abs(float(Decimal(a) - Decimal(b))) for a, b in zip(one, other))
 
 
-# --- the named chains --------------------------------------------------------------------------
-
-
 #: Those that the table asks of fifty digits, but for those of the rules.
 EXACT = [
     name
@@ -152,8 +149,6 @@ def test_masses_of_fifteen_decades_are_solved_and_of_more_refused():
     with pytest.raises(ValueError, match=r"^masses\[1\] = 1e-26; "):
         collide(Chain([1e-8, 1e-26, 1e-9, 1], [0, 1, 0, 0], [0, 1, 1]), ImpulseCorrelation(0.3))
 
-
-# --- families ----------------------------------------------------------------------------------
 
 COUNT = 400
 

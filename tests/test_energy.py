@@ -44,9 +44,6 @@ def test_ten_balls_of_the_authors_program():
     assert abs(trace.velocities - siconos)[:8].max() < 1e-4
 
 
-# --- laws that every outcome keeps ---------------------------------------------------------
-
-
 @st.composite
 def chains(draw):
     """Chain, stiffness, exponent: two to four balls."""

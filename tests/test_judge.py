@@ -15,8 +15,6 @@ from cradle import outcomes
 from cradle.closed_form import largest_ratios
 from cradle.kernel.state import LIMITS
 
-# --- the package -------------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("name", chains_of("the judge"))
 def test_named_chain(name):
@@ -108,9 +106,6 @@ def test_the_stored_run():
         assert int(row["wrong"]) <= allowed, name
         assert int(row["open"]) <= 1, name
         assert int(row["right"]) > 4200, name
-
-
-# --- the judge ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

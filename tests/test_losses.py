@@ -87,9 +87,6 @@ def test_a_part_of_a_swinging_row_has_its_part_of_the_inner_law():
         )
 
 
-# --- viscous balls --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("exponent", [1, 1.5, 2.5])
 @pytest.mark.parametrize("u", [1e-3, 0.1, 0.7])
 def test_viscous_balls_part_as_contact_forces_say(exponent, u):

@@ -32,9 +32,6 @@ def test_pattern_of_each_sign():
     assert bouncing_pattern(velocities).tolist() == [[pattern] for pattern in expected.values()]
 
 
-# --- effective ratio -----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("part", [0, 0.01, 0.3, 0.7, 1])
 @pytest.mark.parametrize("e", [1.0, 0.7])
 @pytest.mark.parametrize("masses", [(1, 2, 0.5), (2, 1, 2.5)])
@@ -70,9 +67,6 @@ def test_no_effective_ratio():
     # No ratio of a fine grid comes nearer by much.
     grid = post_impact_velocities([1, 1, 1], [1, 0, 0], 0.5, np.linspace(0, 0.5, 5001)[:, None])
     assert abs(grid - trace.velocities).max(axis=1).min() > 0.95 * miss
-
-
-# --- outcomes that conserve momentum and energy --------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(10))

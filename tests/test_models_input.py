@@ -34,9 +34,6 @@ def test_what_is_no_chain(model):
                 call(thing)
 
 
-# --- values --------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "caption",
     [
@@ -120,9 +117,6 @@ def test_unfinished_impacts_show_what_was_reached(model, masses, velocities, wor
     assert trace.model is model
     assert chain.masses @ trace.velocities == pytest.approx(chain.momentum, abs=1e-13)
     assert reached(trace)
-
-
-# --- masses --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("model", LAWS, ids=repr)

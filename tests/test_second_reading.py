@@ -59,9 +59,6 @@ def no_difference(problems, least):
     assert not wrong, f"{len(wrong)} of {len(compared)} chains:\n" + "\n".join(wrong)
 
 
-# --- two readings ------------------------------------------------------------------------------
-
-
 def test_it_shares_no_code_with_the_textbook():
     tree = ast.parse(Path(second.__file__).read_text(encoding="utf-8"))
     names = [
@@ -99,9 +96,6 @@ def test_many_chains_of_a_family(name):
     no_difference(short(name, 20 * count, seed=32), 15 * least)
 
 
-# --- the paper's numbers -----------------------------------------------------------------------
-
-
 def against_the_package(chain, model, tolerance=1e-13):
     """The second reading's changes; its velocities and changes are those of `collide`."""
     given = Problem(
@@ -136,9 +130,6 @@ def test_figure_8_sequence():
 def test_the_ten_sequences(sequence):
     """ABCCA among them, whose contact of balls 4 and 5 is held (R7)."""
     assert against_the_package(*paper_chain(sequence, excess="saturate"))
-
-
-# --- where the words of a rule decide ----------------------------------------------------------
 
 
 @pytest.mark.parametrize(

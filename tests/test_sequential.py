@@ -87,9 +87,6 @@ def test_endless_sequences_reach_their_limit(order):
     np.testing.assert_allclose(trace.velocities, 1, rtol=1e-12)
 
 
-# --- one solid body ------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("n", range(2, 7))
 def test_fused_bodies_collide_like_two_balls(n):
     rng = np.random.default_rng(n)

@@ -102,9 +102,6 @@ def test_generic_chains_in_every_event(n, bounded):
     assert held > 10 or bounded or n == 2
 
 
-# --- what is known otherwise -------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("number", "tie"), [(float, 1e-11), (mpmath.mpf, 1e-33), (Decimal, "1e-19"), (Fraction, 0)]
 )
@@ -146,9 +143,6 @@ def test_ties_do_not_depend_on_the_digits():
         assert error < 1e-12
 
 
-# --- R9, and limits ----------------------------------------------------------------------------
-
-
 CHATTER = ([2, "0.1", "0.2", 5], [1, "0.5", 0, 0], [0, "0.5", 0], ["0.8", "0.1"], ["0.8", 1])
 
 
@@ -178,8 +172,6 @@ def test_event_limit_reports_what_was_reached():
     assert len(state.events) > 90
     assert sum(m * v for m, v in zip([1, 1e-6, 1], state.velocities)) == pytest.approx(1, rel=1e-12)
 
-
-# --- the march ---------------------------------------------------------------------------------
 
 STEPS = (200, 800, 3200)
 
