@@ -209,19 +209,6 @@ def test_enough_events_are_enough():
     assert 10 < len(limits) < 100
 
 
-def test_long_unfinished_records_are_cut(monkeypatch):
-    monkeypatch.setattr("cradle.models.correlation._MOST_NUMBERS", 5 * 1000)
-    chain = Chain([1, 1e-12, 1], [1, 0, 0], 1)
-    with pytest.raises(ImpactNotFinished) as caught:
-        collide(chain, ImpulseCorrelation(0.0, max_events=12_000))
-    trace = caught.value.trace
-    assert len(trace.events) == 1000
-    assert trace.path.shape == (1001, 3)
-    recorded = sum(event.kind == "close" for event in trace.events)
-    assert trace.collisions.sum() > recorded + 1000
-    assert trace.velocities @ chain.masses == pytest.approx(1, rel=1e-14)
-
-
 def test_batch_and_single_draw_the_line_of_excess_alike():
     """A few roundings around Eq. 53: refused by both, in the same words, or by neither."""
     rng = np.random.default_rng(53)

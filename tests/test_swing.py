@@ -429,13 +429,6 @@ def test_a_long_path_is_cut_without_advice_that_a_swing_cannot_take(monkeypatch)
             assert part.left_out == len(trace.events[4:])
 
 
-def test_balls_at_rest_stay_at_rest():
-    run = swing(balls(3, 0.5), ImpulseCorrelation(0), [0, 0, 0], [0, 1e6])
-    assert not run.positions.any()
-    assert not run.impacts
-    assert run.together == (0, 1)
-
-
 # Several contacts at one instant
 
 
