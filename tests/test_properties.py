@@ -99,16 +99,11 @@ def test_units_that_are_powers_of_two_change_no_bit(impact, powers):
     assert scaled.saturated == trace.saturated
 
 
-# Boosts, other units and mirrors round differently.  What that does to an outcome depends on the
-# chain: each impact of a light ball amplifies a rounding error, simultaneous events may change
-# places, and near the edge between two sequences of events the outcome jumps.  So these
-# invariances are tested on chains of generic numbers (no exact ties, no ratio at its bound, where
-# an ulp moves the outcome by its square root) with few events, and against a tolerance measured
-# on the chain itself: how far the outcome moves when every input moves by 1e-13 of itself.  Long
-# and collapsed sequences, which forget that much, are left out.
-
-
 def generic_chains(seed, count, striker=False):
+    """Chains without ties and with few events, and how far each moves with 1e-13 of its inputs.
+
+    Boosts, other units and mirrors round differently: that far, and no farther, outcomes may part.
+    """
     rng = np.random.default_rng(seed)
     for _ in range(count):
         n = int(rng.integers(2, 9))
