@@ -56,10 +56,9 @@ def test_each_contact_has_the_restitution_of_its_fastest_closing(seed):
 
 def test_restitutions_that_never_agree_are_said():
     fickle = itertools.cycle([0.2, 0.3, 0.4])
+    law = SpeedDependent(SequentialCollisions(), lambda _: next(fickle))
     with pytest.raises(ImpactNotFinished, match="do not agree after 50 runs"):
-        collide(
-            Chain([1, 1], [1, 0]), SpeedDependent(SequentialCollisions(), lambda _: next(fickle))
-        )
+        collide(Chain([1, 1], [1, 0]), law)
 
 
 def test_a_path_that_is_cut_tells_no_speeds(monkeypatch):
@@ -78,28 +77,17 @@ def test_a_part_of_a_swinging_row_has_its_part_of_the_inner_law():
         for model in (law, SpeedDependent(law, lambda _: 1.0))
     ]
     assert runs[0].positions.tolist() == runs[1].positions.tolist()
+    wrong = SpeedDependent(ImpulseCorrelation((0.1, 0.2)), abs)
     with pytest.raises(ValueError, match="forward has 2 values; 5 balls need 3"):
-        swing(
-            Chain([1] * 5, [0] * 5),
-            SpeedDependent(ImpulseCorrelation((0.1, 0.2)), abs),
-            [0] * 5,
-            [0],
-        )
+        swing(Chain([1] * 5, [0] * 5), wrong, [0] * 5, [0])
 
 
 @pytest.mark.parametrize("exponent", [1, 1.5, 2.5])
 @pytest.mark.parametrize("u", [1e-3, 0.1, 0.7])
 def test_viscous_balls_part_as_contact_forces_say(exponent, u):
-    law = ViscousLoss(1e-7, exponent=exponent, **STEEL)
-    left, right = spring_velocities(
-        STEEL["masses"],
-        [u, 0],
-        STEEL["stiffness"],
-        exponent=exponent,
-        viscosity=1e-7,
-        accuracy=1e-9,
-    )
-    assert law(u) == pytest.approx((right - left) / u, abs=3e-9)
+    balls = STEEL | {"exponent": exponent, "viscosity": 1e-7}
+    left, right = spring_velocities(velocities=[u, 0], **balls, accuracy=1e-9)
+    assert ViscousLoss(**balls)(u) == pytest.approx((right - left) / u, abs=3e-9)
 
 
 def test_viscous_spheres_lose_as_the_series_says():

@@ -16,18 +16,12 @@ def solved(masses, velocities, restitution, forward, backward=None, **options):
     return collide(Chain(masses, velocities, restitution), model)
 
 
-def agrees(trace, atol=1e-13, **options):
+def agrees(trace, atol=1e-13):
     """Compare with fifty digits (and in every event, if none collapsed); return that outcome."""
     chain, model = trace.chain, trace.model
-    parts = (chain.masses, chain.velocities, chain.restitution)
+    own = (part.tolist() for part in (chain.masses, chain.velocities, chain.restitution))
     with mpmath.workdps(50):
-        exact = solve(
-            *(part.tolist() for part in parts),
-            model.forward,
-            model.backward,
-            meeting=model.meeting,
-            **options,
-        )
+        exact = solve(*own, model.forward, model.backward, meeting=model.meeting)
         after = [float(v) for v in exact.velocities]
         impulses = [float(p) for p in exact.impulses]
     np.testing.assert_allclose(trace.velocities, after, rtol=0, atol=atol)
