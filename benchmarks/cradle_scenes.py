@@ -1,10 +1,8 @@
 """A minute of Newton's cradle: in engines as they are, with the mend, by `swing`, on Hertz springs.
 
 Writes `data/scene_*.csv` in some minutes, all or those that are named: `scene_costs` and so on.
-Five balls of radius .1 m hang on strings of 1 m, so that they touch or with gaps of a hundredth of
-a diameter; one or two are pulled back by 30 degrees.  The scenes are those of `examples/`.  Hertz
-springs are integrated here, independently of the package, and judge the others.  Every cost stands
-beside that of `swing` or of the engine alone, measured in turn: read the ratios.
+The scenes are those of `examples/`; `data/README.md` describes them.  Hertz springs are integrated
+here, independently of the package, and judge the others.
 """
 
 import functools
@@ -108,11 +106,7 @@ def close(bodies):
 
 
 def in_engine(engine, setting, pulled, *, mend, gap=0.0, duration=MINUTE):
-    """Run a scene in an engine and look at it sixty times a second.
-
-    Pulled back all together, with the mend, the balls swing as one and never collide: what they
-    lose then is lost between the impacts.
-    """
+    """Run a scene in an engine and look at it sixty times a second."""
     advance, bodies, step = scene(engine, setting, pulled, mend=mend, gap=gap)
     pivots = 2 * RADIUS * (1 + gap) * np.arange(BALLS)
     frames, taken = [], 0
@@ -195,11 +189,9 @@ def energies(angles, rates):
 
 
 def strokes(angles, rates):
-    """Return each ball's energy after every stroke, shape (S, N).
+    """Return each ball's energy after every stroke, at the turning point of the mean, shape (S, N).
 
-    The mean of the angles swings as one pendulum, whatever the impacts: they push neighbours
-    apart and leave the mean alone.  A stroke is its passage through zero, and the energies are
-    those at the turning point that follows.
+    A stroke is a passage of the mean angle through zero: impacts leave the mean alone.
     """
     mean = angles.mean(axis=1)
     passed = np.flatnonzero(np.diff(mean > 0.0)) + 1
@@ -263,10 +255,7 @@ def first_strokes_with_gaps():
 
 
 def costs(repeats=5, seconds=5.0):
-    """Yield what a simulated second costs: on springs, as an engine is, mended; at rest, swinging.
-
-    Each time is taken beside that of `swing` and, if mended, of the engine as it is.
-    """
+    """Yield what a simulated second costs, beside `swing` and, if mended, the engine as it is."""
     on_springs(1, 1 / FRAMES)  # compiles
     alone = {"alone": lambda: cpu(lambda: on_springs(1, seconds)) / seconds}
     cases = [("Hertz springs", "steel", 1, "numba", alone)]

@@ -1,14 +1,9 @@
 """Today's physics engines on the scenes of this book; each is optional and skipped when absent.
 
-All have the same line of balls: radius .5 m, striker at 2 m/s, no gravity, no friction, no
-damping, no sleeping. Three placements: `touching` (gap zero), `apart` (gap one hundredth of a
-diameter), `pressed` (overlap one hundred-thousandth). Two settings: `default` (what the engine
-does if only restitution is given) and `refined` (small step, many iterations, and whatever adds
-or takes energy switched off).
-
-Restitution of a pair is the engine's product of one number a ball where there is such a rule; a
-chain always has such numbers. Box2D takes it from a listener. MuJoCo has no coefficient of
-restitution: its contact is a damped constraint, whose damping is found from two balls.
+`data/README.md` describes the scenes.  Settings: `default` (what the engine does if only
+restitution is given) and `refined` (small step, many iterations, what adds or takes energy off).
+Restitution of a pair is the engine's product of one number a ball; Box2D takes it from a listener,
+MuJoCo has none: the damping of its contact is found from two balls.
 """
 
 import math

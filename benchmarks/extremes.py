@@ -1,7 +1,6 @@
 """Maps of the chapter on extremes: errors, edges, long and infinite sequences.
 
 Writes `data/extremes_*.csv` in half an hour, all or those that are named: `extremes_map` and so on.
-The measuring functions are in `extreme_chains.py`; the tests compute a sample of the rows anew.
 """
 
 import math

@@ -70,11 +70,7 @@ def bounded_ties(draw, n):
 
 
 def tiny_ratios(draw, n, size=1e-20):
-    """Ratios of this size among those of ties.
-
-    What they do cannot be seen in doubles, but it decides whether a contact has been touched.
-    Products of several of them need hundreds of digits: no outcome is demanded, only invariants.
-    """
+    """Ratios of this size among those of ties: they decide whether a contact has been touched."""
     given = ties(draw, n)
     values = draw.choice([[0.0, size], [0.0, size, 0.1], [0.0, size, 0.1, 1.0]])
     forward, backward = ([draw.choice(values) for _ in range(n - 2)] for _ in range(2))

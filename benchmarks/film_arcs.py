@@ -1,8 +1,7 @@
 """Arcs of pendulums through the places of filmed balls, and the velocities at the strikes.
 
-Used by `film_reading.py`.  A table has rows: frame, release, ball from 1, x, y, blur (pixels),
-misfit (grey levels), visible part.  Times in frames, lengths in pixels.  The pivots, the length and
-the rate were fitted to all arcs of the film at once.
+A table has rows: frame, release, ball from 1, x, y, blur (pixels), misfit (grey levels), visible
+part.  The pivots, the length and the rate were fitted to all arcs of the film at once.
 """
 
 import warnings
@@ -119,11 +118,7 @@ def predict(i, release, times, arcs):
 
 
 def summary(release, reads):
-    """Return a row per strike and ball; velocities along the strike, over the striker's.
-
-    The striker's speed is the mean of what was read and of what the sum of momentum gives (equal
-    masses), weighted by their errors.
-    """
+    """Return a row per strike and ball; velocities along the strike, over the striker's."""
     rows, balls = [], np.arange(5)
     with np.errstate(invalid="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a ball that was never seen is nan

@@ -1,12 +1,8 @@
 """Read the velocities of a filmed Newton's cradle: every ball before and after every strike.
 
 `python benchmarks/film_reading.py newtons_cradle.mp4` writes `film_reading.csv` in minutes, where
-OpenCV is installed.  `data/README.md` says where the film was found.  Steps: drift of the camera
-off (phase correlation of the frame's posts and base); where a ball may be (normalised correlation
-with a resting ball, sharp and blurred; five balls in their order); each ball drawn over the empty
-background, blurred along its path, and shifted until the picture fits (Gauss-Newton, Huber
-weights); an arc of a pendulum of any angle through each ball's places between two strikes; once
-more from the places and the blur that the arcs predict.  Times in frames, lengths in pixels.
+OpenCV is installed; `data/README.md` says where the film was found, and how it is read.  Places are
+guessed by correlation, then fitted, then fitted again from what the arcs predict.
 """
 
 from concurrent.futures import ProcessPoolExecutor

@@ -1,10 +1,8 @@
 """A synthetic experiment with hanging balls, as a phone would film it: files for the example.
 
 Writes `data/video_synthetic.txt` and `data/shots_synthetic.csv` in seconds.
-Nothing here was measured.  Balls of the paper's types swing on pendulums; before and after the
-impact they follow the pendulum's own equation of motion, step by step, and the impact is solved
-with the values of Tables 1 and 2.  A phone takes 240 frames a second; each mark is off by a random
-amount.  The velocities of the table are found from the marks as a reader would find them.
+The balls follow the pendulum's own equation of motion, the impact the values of Tables 1 and 2;
+velocities are found from the marks, each a random amount off, as a reader would find them.
 """
 
 import numpy as np

@@ -1,9 +1,8 @@
 """How well can a ratio be fitted?  Synthetic shots of all 64 triplets; tables as CSV.
 
 Writes `data/fit_precision.csv` and `data/fit_study.csv` in ten minutes.
-Nothing here was measured.  The true values are those of Tables 1 and 2 (three ratios above their
-bound are taken at it); the balls have the paper's masses, the first strikes at .5, 1, 1.5 and
-2 m/s, and every velocity is off by a random amount, `noise` times the striker's speed.
+The true values are those of Tables 1 and 2, three ratios taken at their bound; the balls have the
+paper's masses.
 """
 
 import numpy as np

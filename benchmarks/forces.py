@@ -1,14 +1,10 @@
 """Contact forces against plain velocity Verlet: microseconds a chain at a measured error, one run.
 
 Writes `data/forces.csv` in a minute.
-Both are compiled and run on one thread, in turns; each time is the least of many. Ours is asked for
-an accuracy; what it takes to check and scale its chains, to find its steps and to check its answers
-is in its time. Verlet has the largest of many steps from which on all smaller ones keep the error,
-found beforehand. Errors are total: the largest distance of a velocity from converged elastic (or
-lossy) spheres, over the striker's speed. The last row of each chain is the paper's rule, which has
-an error and no step: its ratios are those of each three neighbours as elastic spheres, the smallest
-that fit (of random chains those of equal balls), its restitution that of two of the spheres at the
-striker's speed.
+Both are compiled and run on one thread, in turns; each time is the least of many.  Ours is asked
+for an accuracy; Verlet has the largest step from which on all smaller ones keep the error.  The
+last row of each chain is the paper's rule: the smallest ratios that fit each three neighbours as
+elastic spheres (of random chains those of equal balls), restitution that of two of the spheres.
 """
 
 import os

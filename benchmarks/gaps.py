@@ -1,12 +1,10 @@
 """Gaps and leans: what a row of spheres does when its balls do not just touch.
 
 Writes `data/gaps_five.csv` and `data/gaps_triplets.csv` in two minutes.
-Spheres push with F = k s^1.5.  The state s of a contact changes with its closing speed u as
-ds = u dt, and while it gives back as ds = u dt / e^2: the energy law of Liu, Zhao and Brogliato, in
-time.  A gap starts at s = -gap, a lean at s > 0, balanced by constant forces, as inclined strings
-hold it.
-Lengths are in Hertz units, (m v^2 / k)^(2/5), with the mass of ball A, or of each ball of an equal
-row, and v the striker's speed.
+Spheres push with F = k s^1.5, where ds = u dt while they close with u, and u dt / e^2 while they
+give back: the energy law of Liu, Zhao and Brogliato, in time.  A gap starts at s = -gap, a lean at
+s > 0, balanced by constant forces.
+Lengths are in Hertz units, (m v^2 / k)^(2/5), of ball A, or of a ball of an equal row.
 """
 
 import numpy as np

@@ -1,10 +1,7 @@
 """The ratio that springs imply: three elastic balls at rest, the first struck; a map as a CSV.
 
 Writes `data/implied_ratio.csv` in minutes.
-For each row a spring chain (m1 = 1, ball 1 at speed 1, the others at rest) is integrated, and the
-constant ratio with the same outcome is looked for between 0 and its bound (Eq. 34).  Where there is
-none, the ratio is empty and the note has the one that comes nearest.  Near the bound v2 and v3 vary
-like the square root of what is left to it, so all digits of the ratio count.
+Near the bound v2 and v3 vary like the square root of what is left to it: all digits count.
 """
 
 import itertools

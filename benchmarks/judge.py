@@ -60,8 +60,7 @@ class Exact(textbook.Impact):
 def exact(problem, read=meaning, *, events=EVENTS, twice=False):
     """The impact by the rules alone; None if the sequence does not end within so many events.
 
-    100 digits; four times as many where a ratio is so small that products of several matter; twice
-    as many if asked.
+    100 digits; four times as many where products of small ratios matter; twice as many if asked.
     """
     tiny = any(0 < ratio < 1e-6 for ratio in (*problem.forward, *problem.backward))
     with decimal.localcontext(prec=DIGITS * (4 if tiny else 1) * (2 if twice else 1)):

@@ -1,8 +1,6 @@
 """Long chains and large maps: work, speed, and what can be trusted, as a CSV.
 
 Writes `data/long_chains.csv` in three minutes.
-All balls are equal and touch, and the first one strikes the others at speed 1.  Each processor
-time stands beside that of three balls on Hertz springs, so that a busy machine slows down both.
 """
 
 import statistics

@@ -103,8 +103,8 @@ def quotient(these, those):
 class Clock:
     """Takes times beside those of the reference, so that a busy machine slows down both.
 
-    Processors change their speed while a table is made: so what is kept is the ratio, and `unit`
-    turns all ratios of a table into times of one and the same speed.
+    Processors change their speed: what is kept is the ratio, and `unit` turns all ratios of a table
+    into times of one speed.
     """
 
     def __init__(self, repeats):

@@ -1,8 +1,7 @@
 """Where the time of the paper's rule goes in a batch: what is saved without each part of it.
 
 Writes `data/parts.csv` in some minutes, most of which compile the event loop: as it is, and without
-each part. A part is a few functions, which then do the least that lets the others run. One batch is
-solved by both in turns, a thousand times and more; what is saved is good to some hundredths.
+each part, a few functions that then do the least that lets the others run.
 """
 
 import ast

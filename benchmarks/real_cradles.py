@@ -1,16 +1,15 @@
 """The first strikes of a filmed cradle against the models.
 
 Writes `data/film_fits.csv` in some minutes.
-Velocities relative to the row, over the striker's, the striking side first.  Lengths in
-Hertz units of the first release, (m v^2 / k)^(2/5); v its striker's speed.  The striker's speed was
-read in part from the sum of momentum: of the five numbers of a release one may not be free, so the
-degrees of freedom are too many by up to one a release.
+Velocities relative to the row, over the striker's, the striking side first; lengths in Hertz units
+of the first release.  The striker's speed was read in part from the sum of momentum: the degrees of
+freedom are too many by up to one a release.
 """
 
 import itertools
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from dop853 import integrated
 from scipy.optimize import least_squares
 from stored import make, read
 
@@ -48,33 +47,9 @@ def first_strikes(reading):
     return found
 
 
-def spheres(speeds, gaps, loss, limit=400.0, masses=EQUAL):
-    """Return velocities of spheres after F = k (d^1.5 + A d(d^1.5)/dt), never pulling.
-
-    The balls rest at `gaps` in front of one another; k is 1 at all contacts.
-    """
-    n, room = len(speeds), np.asarray(gaps, float)
-    mass = np.asarray(masses[:n], float)
-
-    def rate(_, state):
-        x, v = state[:n], state[n:]
-        deep = np.maximum(x[:-1] - x[1:] - room, 0.0)
-        push = deep**1.5 + loss * 1.5 * np.sqrt(deep) * (v[:-1] - v[1:])
-        return np.concatenate([v, -np.diff(np.maximum(push, 0.0), prepend=0, append=0) / mass])
-
-    state, time = np.concatenate([np.zeros(n), speeds]), 0.0
-    while time < limit:
-        closing = state[n:-1] - state[n + 1 :]
-        apart = room - (state[: n - 1] - state[1:n])
-        if time and (closing < 1e-6).all() and (apart > 0).all():
-            break
-        if (apart > 0).all():  # nothing touches: fly to the next contact
-            wait = np.min(np.where(closing > 1e-9, apart / np.maximum(closing, 1e-9), np.inf))
-            state[:n] += wait * state[n:]
-            time += wait
-        run = solve_ivp(rate, (0, 4), state, method="DOP853", rtol=1e-8, atol=1e-10, max_step=0.3)
-        state, time = run.y[:, -1], time + 4.0
-    return state[n:]
+def spheres(speeds, gaps, loss, masses=EQUAL):
+    """Return velocities of spheres at `gaps` after F = k (d^1.5 + A d(d^1.5)/dt) without a pull."""
+    return integrated(masses[: len(speeds)], speeds, loss=loss, gaps=gaps)
 
 
 def by_law(model, restitution, release, apart, masses=EQUAL):
@@ -209,10 +184,7 @@ def fitted(law, apart, data, releases):
 
 
 def fits_of(reading, law, apart):
-    """Return rows of a law fitted to the releases of one and two, to one alone, and to all.
-
-    Laws of three and more numbers fit the five velocities of one release in several ways.
-    """
+    """Return rows of a law fitted to the releases of one and two, to one alone, and to all."""
     data, rows = first_strikes(reading), []
     count = len(LAWS[law][2])
     how = "own gap" if "four gaps" in law else "apart" if apart else "together"

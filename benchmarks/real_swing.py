@@ -1,10 +1,8 @@
 """Fit half a minute of a real cradle: its damping, then period, one gap and one law of loss.
 
 Writes `data/cradle_fits.csv` in a quarter of an hour.
-The mean of the five balls gives the damping and nearly the period: no impact changes it.
-Restitution or loss, the gap, the release of ball 1 and the period of small swings are fitted to the
-turning points of the outer balls, places and times; where each of the two hangs at rest is
-subtracted.  Pendulums of any angle: 12 degrees lengthen a half swing by 1 ms.
+The mean of the five balls gives the damping and nearly the period: no impact changes it.  The rest
+is fitted to the turning points of the outer balls; where these hang at rest is subtracted.
 """
 
 import numpy as np

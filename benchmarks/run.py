@@ -1,9 +1,8 @@
 """Measure speed against accuracy: all models, a fixed-step scheme, today's physics engines.
 
 Writes `data/benchmarks.csv` in some minutes; `--quick` prints alone, in half a minute.
-Every time stands beside that of one reference impact, taken at the same moment: read the ratios.
-Numerical errors and errors of a model are separate columns. Engines that are not installed
-(``pip install -e ".[engines]"``) are skipped and named; their old rows are not kept.
+Engines that are not installed (``pip install -e ".[engines]"``) are skipped and named; their old
+rows are not kept.
 """
 
 import engines

@@ -156,8 +156,7 @@ def spring_rows(clock, quick):
 def penalty(masses, velocities, stiffness, exponent, step, most=10_000_000):
     """March balls on springs with a fixed step until they part; return velocities and steps.
 
-    A drift, then a whole kick: semi-implicit Euler.  Velocity Verlet halves each kick; between
-    two drifts the halves join.  Where the forces start and end at zero both give one outcome.
+    Semi-implicit Euler: where the forces start and end at zero its outcome is velocity Verlet's.
     """
     n = len(masses)
     v = velocities.copy()
