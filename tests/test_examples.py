@@ -3,7 +3,6 @@
 import importlib
 import math
 import runpy
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -177,9 +176,3 @@ def test_the_program_runs_as_it_stands(program, capsys):
     assert table[2, 4] > 0.45
     assert np.abs(table[2, :4]).max() < 0.06
     assert np.abs(table).max() < 0.505
-
-
-def test_without_its_engine_a_program_says_so(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pymunk", None)
-    with pytest.raises(ImportError, match="pymunk"):
-        runpy.run_path(str(EXAMPLES / "pymunk_cradle.py"))

@@ -52,9 +52,6 @@ def misplaced(found, pulled):
     return 0.5 * np.abs(one - other).sum(axis=1)
 
 
-# The judge.
-
-
 def test_the_judge_is_as_stiff_as_it_says():
     """A contact of two balls at the first stroke lasts as long as that of steel balls."""
     speed = 2 * math.sqrt(9.81) * math.sin(scenes.ANGLE / 2)
@@ -100,9 +97,6 @@ def test_a_stroke_is_told_by_the_mean():
     np.testing.assert_allclose(found, [[0.2, 0, 0, 0, 0.8]] * len(found), atol=2e-3)
 
 
-# The tables.
-
-
 def test_the_tables_are_complete():
     for name in ENGINES:
         for setting in ("default", "refined"):
@@ -138,10 +132,9 @@ def test_an_engine_repeats_what_is_stored(engine, how, mend):
 @pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
 @pytest.mark.parametrize("duration", [60, pytest.param(600, marks=pytest.mark.exhaustive)])
 def test_short_strings_at_60_hz_keep_what_one_pendulum_keeps(monkeypatch, engine, duration):
-    """Strings of 20 cm, where a step is 6 % of a swing: a toy in a game.
+    """Strings of 20 cm, where a step is 6 % of a swing.
 
-    Where swings lose by their height (Box2D, Rapier, Chipmunk) a row may keep a little more: its
-    balls come to share the energy.
+    Where swings lose by their height a row may keep more: its balls come to share the energy.
     """
     if engine.name in absent(scenes.ENGINES):
         pytest.skip(absent(scenes.ENGINES)[engine.name])
@@ -183,9 +176,6 @@ def test_a_row_at_rest_costs_at_most_as_much_again():
     assert set(rest) == set(ENGINES)
     assert max(rest.values()) < 2
     assert len(rows) == 5 * 3 * 2
-
-
-# What the chapters say.
 
 
 def test_the_ratio_is_that_of_elastic_spheres():
@@ -240,13 +230,6 @@ def test_gaps_give_the_school_book_first_and_not_for_ever():
         found = run(name, "as it is", "refined", 1, "0.01")
         assert found[0, 4] > 0.97, name
         assert (found[:, [0, 4]].sum(axis=1) / found.sum(axis=1)).min() < 0.95, name
-
-
-@pytest.mark.parametrize("name", ["pymunk", "box2d", "bullet", "rapier", "mujoco"])
-def test_the_recipe_shows_the_tested_programs(name: str):
-    (output,) = Chapter("recipe").cells[f"recipe-{name}"].outputs
-    text = (EXAMPLES / f"{name}_cradle.py").read_text(encoding="utf-8")
-    assert output.data["text/markdown"] == f"```python\n{text}```"
 
 
 def test_the_recipe_tells_where_the_energy_is():
