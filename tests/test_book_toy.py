@@ -14,7 +14,11 @@ from truth import solve
 CHAPTER = Chapter("toy")
 INVENTORY = Chapter("extremes_inventory").glued
 LENGTH, BACK, G, RATIO = 0.12, 0.04, 9.81, 0.15
-PERIOD = 2 * math.pi * math.sqrt(LENGTH / G)
+PERIOD, STRIKE = 2 * math.pi * math.sqrt(LENGTH / G), BACK * math.sqrt(G / LENGTH)
+#: Steel balls of 45 g: Hertz's stiffness of a contact, from their radius.
+MASS = 0.045
+RADIUS = (3 * MASS / (4 * np.pi * 7800)) ** (1 / 3)
+STIFFNESS = 4 / 3 * 210e9 / (2 * (1 - 0.3**2)) * np.sqrt(RADIUS / 2)
 
 
 def glued(name):
@@ -40,8 +44,8 @@ def rows(cell):
 
 
 def test_minute():
-    strike, impacts = BACK * math.sqrt(G / LENGTH), math.floor((60 - PERIOD / 4) / (PERIOD / 2)) + 1
-    CHAPTER.tells({"period": PERIOD, "impacts": f"{impacts}", "strike": strike})
+    impacts = math.floor((60 - PERIOD / 4) / (PERIOD / 2)) + 1
+    CHAPTER.tells({"period": PERIOD, "impacts": f"{impacts}", "strike": STRIKE})
     energy = f"{0.5 * G / LENGTH * BACK**2:.4f} J"
     assert CHAPTER.printed("minute").count(energy) == 2
     assert "change < 10⁻¹² of it" in CHAPTER.printed("minute")
@@ -133,12 +137,8 @@ def test_second_stroke_of_springs_by_another_integrator():
 
 
 def test_contact_of_steel_balls_in_closed_form():
-    mass, speed = 0.045, BACK * math.sqrt(G / LENGTH)
-    modulus = 210e9 / (2 * (1 - 0.3**2))
-    radius = (3 * mass / (4 * np.pi * 7800)) ** (1 / 3)
-    k = 4 / 3 * modulus * np.sqrt(radius / 2)
-    deepest = (5 * (mass / 2) * speed**2 / (4 * k)) ** 0.4
-    CHAPTER.tells({"contact-time": 1e6 * 2.94327 * deepest / speed, "compression": 1e6 * deepest})
+    deepest = (5 * (MASS / 2) * STRIKE**2 / (4 * STIFFNESS)) ** 0.4
+    CHAPTER.tells({"contact-time": 1e6 * 2.94327 * deepest / STRIKE, "compression": 1e6 * deepest})
 
 
 @pytest.mark.parametrize(
@@ -146,15 +146,13 @@ def test_contact_of_steel_balls_in_closed_form():
 )
 def test_first_stroke_of_the_minute_of_steel(row, gap, loss):
     """By SciPy, without strings: each turns a velocity into as large a swing."""
-    mass, speed = 0.045, BACK * math.sqrt(G / LENGTH)
-    radius = (3 * mass / (4 * np.pi * 7800)) ** (1 / 3)
-    k = 4 / 3 * 210e9 / (2 * (1 - 0.3**2)) * np.sqrt(radius / 2)
-    unit = (mass * speed**2 / k) ** 0.4
-    after = real_cradles.spheres(np.eye(5)[0], [0, *[gap / unit] * 3], loss * speed / unit)
+    unit = (MASS * STRIKE**2 / STIFFNESS) ** 0.4
+    loss = loss * STRIKE / unit
+    after = real_cradles.spheres(np.eye(5)[0], [0, *[gap / unit] * 3], loss)
     swings = [line.get_ydata()[0] for line in drawn("toy")["fig-toy-steel"].axes[row].lines]
     assert swings == pytest.approx(after, abs=2e-3)
     if loss:
-        left, right = real_cradles.spheres([1.0, 0.0], [0.0], loss * speed / unit)
+        left, right = real_cradles.spheres([1.0, 0.0], [0.0], loss)
         assert glued("steel-restitution") == pytest.approx(right - left, abs=5e-3)
 
 
