@@ -145,10 +145,7 @@ def in_memory(show):
 
 @functools.cache
 def drawn(chapter: str) -> dict[str, Figure]:
-    """Run a chapter as it is stored and return its figures by their names.
-
-    The first process of a session that runs it leaves them to the others.
-    """
+    """Run a chapter as stored, in the first process that needs it; return its figures by name."""
     shared = os.environ.get(SHARED)
     if shared and Path(shared, f"{chapter}.figures").exists():
         return pickle.loads(Path(shared, f"{chapter}.figures").read_bytes())
@@ -220,10 +217,7 @@ def floats(values):
 
 
 def points(ax, size=None, marker=None):
-    """Points of the lines of some axes, in rows of x and y.
-
-    Where asked for: of lines of so many points alone, of lines with this marker alone.
-    """
+    """Points of lines, in rows of x and y: of all, of so many points, or with this marker."""
     drawn = [line for line in ax.get_lines() if marker is None or line.get_marker() == marker]
     found = [np.column_stack(line.get_data()).astype(float) for line in drawn]
     return [xy for xy in found if size is None or len(xy) == size]

@@ -1,7 +1,6 @@
-"""The live explorer's page in a browser: how tests open it, and what they ask it.
+"""The live explorer's page in a browser; no test depends on how fast the machine is.
 
-No test depends on how fast the machine is. Where time matters, the page gets a clock that stands
-still until the test moves it; elsewhere tests wait for a state.
+Where time matters the page gets a clock that stands still until the test moves it.
 """
 
 import re

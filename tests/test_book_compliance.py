@@ -1,7 +1,4 @@
-"""The chapter on compliance: three balls and two springs, and the ratio (Eqs. 7-16, Fig. 2).
-
-The second route is the equations of motion with contacts that cannot pull, integrated by SciPy.
-"""
+"""Three balls and two springs, Eqs. 7-16 and Fig. 2; second route: SciPy's integration."""
 
 import math
 import re
@@ -22,9 +19,9 @@ CHAPTER, READING = Chapter("compliance"), Chapter("reading_compliance")
 
 
 def springs(*stiffness, pull=False, until=None):
-    """Integrate equal balls on springs, k = 1; with `pull`, the springs never let go.
+    """State (x, v, impulses) of equal balls on springs, k = 1, which with `pull` never let go.
 
-    State: positions, velocities, impulses. Ends at time `until`, or else 1 after the last contact.
+    Up to the time `until`, or to 1 after the last contact.
     """
     stiffness = np.array(stiffness, dtype=float)
     n = len(stiffness) + 1

@@ -111,10 +111,7 @@ def test_counts_of_triplets_and_sequences():
 
 
 def test_ends_of_eq_44_and_factors_of_eq_14():
-    """The page finds the ends by counting collisions; here the closed form is asked.
-
-    Soft second spring: ratio where the first contact opens, and that with the same outcome.
-    """
+    """By the closed form, and the ratios of a soft second spring."""
     assert float(GLUED["eq-44-r1"]) == pytest.approx(back_impact_line(0, 0.5, 0.5, 0.15), abs=6e-4)
     assert back_impact_line(float(GLUED["eq-44-r2"]), 0.5, 0.5, 0.15) == pytest.approx(0, abs=1e-3)
     soft = math.pi**2 / 8

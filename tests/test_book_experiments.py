@@ -1,8 +1,4 @@
-"""What the tables and the figures of book/experiments.ipynb show, by a second route.
-
-Velocities come from the independent solver in truth.py; the ranges of ratios from Eqs. 30-33
-where they hold, and from a bisection elsewhere.
-"""
+"""What the tables and figures of book/experiments.ipynb show, by truth.py and by bisection."""
 
 import re
 from functools import cache

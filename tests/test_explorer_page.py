@@ -8,8 +8,6 @@ from pages import colour, contrast, show
 from cradle import Chain, Pendulums, paper_chain, swing
 from cradle.tables import paper_sequences
 
-# --- the same numbers as Python (test_explorer_engine.py has the impacts) --------------------
-
 
 def swung(setting, strokes: int):
     """The same cradle by `cradle.swing`."""
@@ -22,10 +20,9 @@ def swung(setting, strokes: int):
 
 
 def test_swing_of_the_page(still):
-    """Velocities after hits and positions between them are those of the package's own swing.
+    """Velocities after hits and positions between them are those of `cradle.swing`.
 
-    Rounding is another there, where sines give the velocities of a hit, and grows from hit to hit;
-    where it decides a tie the two part. So: few hits, and balls that are all in motion.
+    Rounding differs, grows from hit to hit and may decide a tie: few hits, all balls in motion.
     """
     tab = still()
     for setting in settings(24):
@@ -105,9 +102,6 @@ def test_paper_chains_by_their_letters(still):
         )
         expected = paper_chain(sequence, excess="saturate")
         assert chain_of(by_hand) == chain_of(scene) == expected
-
-
-# --- what one can do --------------------------------------------------------------------------
 
 
 def test_a_ball_is_dragged_and_let_go(visit):

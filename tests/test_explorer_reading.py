@@ -9,16 +9,8 @@ import pytest
 from explorer import EXPLORER, SETTING, chain_of, same_outcome, settings
 from pages import MISFITS, colour, contrast, show
 
-from cradle import (
-    Chain,
-    SpringChain,
-    collide,
-    paper_chain,
-    post_impact_velocities,
-)
+from cradle import Chain, SpringChain, collide, paper_chain, post_impact_velocities
 from cradle.measures import bouncing_pattern
-
-# --- the address ------------------------------------------------------------------------------
 
 
 def test_address_keeps_the_setting(still):
@@ -107,10 +99,7 @@ def test_letters_bring_their_numbers(still):
 
 
 def test_a_reader_walks_on_from_a_changed_setting(still):
-    """An address stays as it was asked for until something changes.
-
-    Then no scene is named any more, and the keys go on from the last one.
-    """
+    """An address stays until something changes; then keys go on from the last scene."""
     tab = still("#in-a-lecture", stopped=True)
     tab.clock.run_for(1000)
     assert tab.evaluate("location.hash") == "#in-a-lecture"
@@ -124,9 +113,6 @@ def test_a_reader_walks_on_from_a_changed_setting(still):
     tab.push("next scene")
     tab.clock.run_for(1000)
     assert tab.locator(".walk select").input_value() == "three"
-
-
-# --- words and keys ---------------------------------------------------------------------------
 
 
 def test_outcome_is_said_in_words(still):
@@ -377,9 +363,6 @@ def test_keys_of_a_lecture_after_the_list(still):
     assert tab.evaluate(STATE) == ["half", True, False]
 
 
-# --- widths, modes, motion --------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("width", [390, 1400])
 def test_fits_and_can_be_read(still, width: int):
     tab = still(width=width)
@@ -616,9 +599,6 @@ def test_what_takes_too_long_is_said(still):
     assert tab.state("clock.time") == pytest.approx(0.5, abs=0.01)
 
 
-# --- pictures of many hits ----------------------------------------------------------------------
-
-
 def test_map_is_the_solvers(still):
     """Every twentieth cell of the map against Python, and its own point."""
     tab = still("#scene=map")
@@ -672,9 +652,6 @@ def test_sweep_is_the_solvers(still):
         setting["masses"], setting["speeds"], 1.0, np.tile(ratios[:, None], 3), excess="saturate"
     )
     np.testing.assert_allclose(values, python, rtol=0, atol=1e-12)
-
-
-# --- what the texts promise -------------------------------------------------------------------
 
 
 def test_scenes_do_what_their_texts_say(still):

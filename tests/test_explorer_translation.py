@@ -20,9 +20,6 @@ def source():
     return explorer_engine.engine()
 
 
-# Numbers
-
-
 def some_doubles(count, seed=1):
     """Any bits: all sizes, numbers below 2 ** -1022, zeros."""
     draw = random.Random(seed)
@@ -55,8 +52,6 @@ def test_numbers_as_python_prints_them(source):
     script.context.close()
     assert printed == [repr(float(x)) for x in numbers]
 
-
-# Translation
 
 ALIKE = {
     "a loop keeps its own count": """

@@ -28,9 +28,6 @@ from cradle import (
     paper_chain,
 )
 
-# --- the desk toy --------------------------------------------------------------------------
-
-
 TOY = Chain([1] * 5, [1, 0, 0, 0, 0])
 
 
@@ -73,9 +70,6 @@ def test_what_the_readme_says_of_the_other_answers():
         collide(lossy, SpringChain())
 
 
-# --- version -------------------------------------------------------------------------------
-
-
 def test_version_has_one_source():
     assert cradle.__version__ == version("cradle-companion")
     with pytest.raises(AttributeError, match="module 'cradle' has no attribute 'version'"):
@@ -87,9 +81,6 @@ def test_the_import_loads_only_what_it_needs():
     code = f"import sys, cradle; cradle.paper_chain('ABACA'); print({late} & sys.modules.keys())"
     loaded = subprocess.check_output([sys.executable, "-c", code], text=True)
     assert loaded.strip() == "set()"
-
-
-# --- numbers for people --------------------------------------------------------------------
 
 
 def test_no_minus_zero_and_no_seventeen_digits():
@@ -108,8 +99,6 @@ def test_no_minus_zero_and_no_seventeen_digits():
     assert "<td>1e-11</td>" in light._repr_html_()
     assert eval(repr(light)) == light
 
-
-# --- pictures in notebooks -----------------------------------------------------------------
 
 MODELS = [
     ImpulseCorrelation(0.15),
@@ -150,9 +139,6 @@ def test_long_chains_are_cut():
     tree = tree_of(Chain([1] * 500, [1] + [0] * 499)._repr_html_())
     names = [row[0] for row in cells(tree)[1:]]
     assert names == [*map(str, range(6)), "...", *map(str, range(494, 500))]
-
-
-# --- tables and plots of a path ------------------------------------------------------------
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)

@@ -57,10 +57,7 @@ def covers(name: str, item: str) -> bool:
 
 
 def loosest(path: Path, name: str) -> str:
-    """Return the loosest tolerance that a test allows, itself or in a function of its file.
-
-    A tolerance that is no number is given as it is written, one without any as "exact".
-    """
+    """Loosest tolerance of a test and of its file's functions: a number, words, or exact."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     local = {node.name: node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
     named = {

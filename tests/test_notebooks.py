@@ -1,8 +1,4 @@
-"""What nbval does not see: cleared outputs, warnings, timestamps, figures without a description.
-
-nbval runs every notebook and compares its outputs (options in pyproject.toml). It would pass a
-notebook whose outputs were cleared, so the stored form itself is checked here.
-"""
+"""What nbval does not see: cleared outputs, warnings, timestamps, figures without a description."""
 
 import contextlib
 import copy
@@ -266,10 +262,7 @@ def test_one_changed_digit_fails(tmp_path: Path, root: Path):
 
 
 def test_no_number_is_typed_into_a_description():
-    """What nobody computes, nobody corrects: a description says higher, lower, near, far.
-
-    The numbers that describe the moving picture of the landing page have a test of their own.
-    """
+    """It says higher, lower, near, far; the numbers of `flight` have a test of their own."""
     for path in NOTEBOOKS:
         for cell in nbformat.read(path, as_version=4).cells:
             alt = cell.metadata.get("mystnb", {}).get("image", {}).get("alt", "")
