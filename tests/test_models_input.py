@@ -53,10 +53,9 @@ def test_models_compare_by_value_and_their_repr_makes_them_again(caption):
     assert repr(model) == caption
     arrays = re.sub(r"\(([\d., ]+)\)", r"np.array([\1])", caption)
     arrays = re.sub(r"=(\d+[.e][-\d]+)", r"=np.float64(\1)", arrays)
+    arrays = re.sub(r"(max_\w+)=(\d+)", r"\1=np.int64(\2)", arrays)
     same = eval(arrays, vars(cradle) | {"np": np})
     assert (same, repr(same)) == (model, caption)
-    arrays = re.sub(r"(max_\w+)=(\d+)", r"\1=np.int64(\2)", arrays)
-    assert eval(arrays, vars(cradle) | {"np": np}) == model
     assert model != ImpulseCorrelation([0.1, 0.2], 0.3)
 
 

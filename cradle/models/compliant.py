@@ -77,7 +77,7 @@ class SpringChain:
         vars(self)["accuracy"] = asked.one_number("accuracy", self.accuracy, *_ACCURACY)
         for name, rules in _RULES.items():
             vars(self)[name] = asked.number_or_row(name, getattr(self, name), "N - 1", *rules)
-        asked.whole_number("max_steps", self.max_steps)
+        vars(self)["max_steps"] = asked.whole_number("max_steps", self.max_steps)
 
     def solve(self, chain: Chain, *, once: bool = False, progress: bool = False) -> TimedTrace:
         """Solve the impact of `chain`; see `collide`.  `once`: until all contacts have opened."""

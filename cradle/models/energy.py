@@ -94,8 +94,8 @@ class EnergyDistribution:
             exponent=asked.one_number("exponent", self.exponent, "must be at least 1", 1.0),
             rtol=asked.one_number("rtol", self.rtol, "must lie in [3e-14, 0.1]", 3e-14, 0.1),
             gaps=asked.flag("gaps", self.gaps),
+            max_evaluations=asked.whole_number("max_evaluations", self.max_evaluations),
         )
-        asked.whole_number("max_evaluations", self.max_evaluations)
 
     def solve(self, chain: Chain) -> EnergyTrace:
         """Solve the impact of `chain`; see `collide`."""

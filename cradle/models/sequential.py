@@ -46,7 +46,7 @@ class SequentialCollisions:
 
     def __post_init__(self) -> None:
         one_of("order", self.order, ("left", "right"))
-        ImpulseCorrelation(0.0, max_events=self.max_events)  # checks max_events
+        vars(self)["max_events"] = ImpulseCorrelation(0.0, max_events=self.max_events).max_events
 
     def solve(self, chain: Chain) -> Trace:
         """Solve the impact of `chain`; see `collide`."""
