@@ -1,8 +1,4 @@
-"""What the text of book/beyond.ipynb says, from the stored table and by second routes.
-
-The table is measured (benchmarks/long_chains.py); its outcomes are computed again here by closed
-forms, by the independent solver in truth.py, and by another integrator.
-"""
+"""What book/beyond.ipynb says, from the stored table (long_chains.py) and by second routes."""
 
 from functools import cache, partial
 from pathlib import Path
@@ -54,9 +50,6 @@ def ends(ratio):
     )
 
 
-# The table
-
-
 def test_every_row_of_the_benchmark_is_stored():
     assert list(table()[0]) == long_chains.COLUMNS
     b = long_chains
@@ -106,9 +99,6 @@ def test_rows_of_linear_springs_by_their_modes():
     expected = [speeds[0], middle - relative / 2, middle + relative / 2]
     stored = [row["first"], row["second_last"], row["last"]]
     np.testing.assert_allclose(stored, expected, rtol=0, atol=2e-5)
-
-
-# Figures
 
 
 def test_fig_beyond_map():

@@ -1,8 +1,4 @@
-"""Every curve of the landing page and the first three chapters, against a second route.
-
-The chapters draw from the package's solver; here the textbook solver, formulas that the paper
-prints, or short computations of their own say where each line must lie.
-"""
+"""Every curve of the landing page and the first three chapters, against a second route."""
 
 import math
 import re

@@ -1,7 +1,4 @@
-"""Every curve of the chapters on the toy and on measuring, and the map of a million chains.
-
-The second routes: the independent solver of the tests, the stored data files, formulas.
-"""
+"""Every curve of the chapters on the toy and on measuring, against a second route."""
 
 import math
 

@@ -1,8 +1,6 @@
 """Every chapter runs from top to bottom when a reader changes its ratios and other parameters.
 
-A cell tagged `parameters` holds nothing but plain numbers that a reader may change. The stored
-outputs are those of the stored numbers, and nbval compares them; here other numbers take their
-place, and no cell may fail. All other ratios that the code writes as numbers become smaller too.
+nbval runs the stored numbers of cells tagged `parameters`; here others take their place.
 """
 
 import ast

@@ -45,9 +45,6 @@ def random_cases(seed, size):
     return r1, r2, e, uniform(rng, 0, 1, size) / (1 + np.maximum(r1, r2))
 
 
-# --- the map of one turn, as derived in the chapter: no events, no impulses ------------------
-
-
 def turn(zeta, r, e, alpha):
     b, a = 1 - alpha * (1 + r), 1 - alpha + r
     x = (1 + r) * zeta - b
@@ -91,9 +88,6 @@ def excess(r1, r2, e, alpha):
 def edge(r2, e, alpha):
     """Largest r1 with an infinite sequence."""
     return brentq(lambda r1: excess(r1, r2, e, alpha), 1e-9, 4.0, xtol=1e-14)
-
-
-# --- Eqs. 43 to 46 -----------------------------------------------------------------------------
 
 
 def test_eq_43_impulse_of_the_back_impact():
@@ -148,9 +142,6 @@ def test_eq_44_ends_of_the_curve():
         return (1 + E) * (1 + E * (1 - ALPHA * (1 + r2)) ** 0.5) / (E * (1 + r2)) - 1 - ALPHA / E
 
     CHAPTER.tells({"end-1": height(0), "end-2": brentq(height, 1, 4)})
-
-
-# --- Fig. 6 ------------------------------------------------------------------------------------
 
 
 def test_fig_6_patterns_and_counts_by_the_map_of_turns():
@@ -231,9 +222,6 @@ def test_fig_6_is_not_kept_for_other_parameters():
     assert first_ball_stops(0.4, 0.5) > 1 / 0.5 - 1
     assert first_ball_stops(0.6, 0.5) < 1 / 0.5 - 1
     assert back_impact_line(0.5, 0.4, 0.4, 0.5) < 1 / 0.5 - 1
-
-
-# --- Fig. 7 ------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,4 @@
-"""Chapter "Three balls solved": Eqs. 17-34, Figs. 3 and 4, by a second route each.
-
-The second routes are the independent solver in truth.py, the path of the package's solver
-(whose loop knows no formula of this chapter), and integrals worked out at fifty digits.
-"""
+"""Chapter "Three balls solved": Eqs. 17-34, Figs. 3 and 4, by a second route each."""
 
 import contextlib
 import functools

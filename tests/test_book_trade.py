@@ -1,8 +1,4 @@
-"""What the pages trade and engines of the book say, from the stored table and by second routes.
-
-The table is measured (benchmarks/run.py); its velocities are compared with answers from the
-independent solver in truth.py, with closed formulas, and with converged springs from elsewhere.
-"""
+"""What trade and engines say, from the stored table (benchmarks/run.py) and by second routes."""
 
 import re
 import types

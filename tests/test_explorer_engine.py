@@ -61,9 +61,6 @@ def check(answer, status, trace):
     assert events == [tuple(event) for event in trace.events]
 
 
-# Impacts
-
-
 def generic(draw, n):
     """Any masses over six decades, velocities, coefficients with 0 and 1; ratios up to 1."""
 
