@@ -1,7 +1,4 @@
-"""The pages in a browser, each opened once: nothing is cut, pale, out of order or said in error.
-
-Then single pages: slow phones, print, and the pictures of the live cradle.
-"""
+"""The pages in a browser: nothing is cut, pale, out of order or said in error."""
 
 import re
 from pathlib import Path
@@ -285,9 +282,6 @@ def test_a_ball_of_a_film_looks_as_in_the_figures(browser, html: Path):
         assert min(sizes) > book_figures.LEGIBLE
 
 
-# --- a slow phone ---
-
-
 def test_equations_wait_until_they_are_seen(browser, html: Path):
     """At first those in sight are set, and a voice can read all of them; on paper all are set."""
     tab = browser.new_page(viewport={"width": 390, "height": 800})
@@ -329,9 +323,6 @@ def test_a_page_does_not_jump(browser, html: Path, name: str, width: int):
     tab.evaluate("new Promise((done) => setTimeout(done, 300))")
     assert sum(tab.evaluate("shifts")) < 0.1
     tab.close()
-
-
-# --- paper --------------------------------------------------------------------------------------
 
 
 def test_print_from_dark_mode(still):
@@ -377,9 +368,6 @@ def test_a_question_fits_on_the_first_sheet(still):
     for part in (".stage", ".outcome", ".settings"):
         box = tab.locator(part).bounding_box()
         assert box["y"] + box["height"] < sheet["height"], part
-
-
-# --- the live cradle's pictures -------------------------------------------------------------------
 
 
 # Colours of the names of lines; of letters on the bar of energy and under them, ball by ball.
