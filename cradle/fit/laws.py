@@ -30,7 +30,7 @@ class LawFit:
 
     def summary(self) -> str:
         """Return all that the fit says, as text."""
-        lines = [f"{name} = {value:.4g} [{low:.4g}, {high:.4g}]" for (name, value), (low, high)
+        lines = [f"{name} = {value:.4g} [{low:.3g}, {high:.3g}]" for (name, value), (low, high)
                  in zip(self.values.items(), self.intervals.values(), strict=True)]  # fmt: skip
         likely = chance(self.chi_square, self.degrees_of_freedom)
         free = f"degrees of freedom {self.degrees_of_freedom}, chance {likely:.2g}"
@@ -80,7 +80,7 @@ def fit_law(
     >>> table = {name: np.broadcast_to(x, 3) for name, x in table.items()}
     >>> shots = read_shots(table, sigma=0.01)
     >>> fit_law(shots, lambda gap: SpringChain(gaps=[0.0, gap]), {"gap": (0.0, 2.0)})
-    LawFit(gap = 0.1184 [0.06352, 0.1963]; chi-square 0.0, degrees of freedom 2, chance 1)
+    LawFit(gap = 0.1184 [0.0636, 0.196]; chi-square 0.0, degrees of freedom 2, chance 1)
     """
     sets, count = must_be(Shots, "shots", shots).sets, len(ranges)
     measured = sum(one.after.size for one in sets)
