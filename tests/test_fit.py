@@ -12,11 +12,19 @@ from scipy.optimize import brentq, least_squares, minimize
 from scipy.stats import binom, chi2
 from stored import DATA, read
 
-from cradle import Chain, ImpulseCorrelation, collide, paper_chain, ratio_table
+from cradle import (
+    Chain,
+    ImpulseCorrelation,
+    collide,
+    paper_chain,
+    post_impact_velocities,
+    ratio_table,
+)
 from cradle.closed_form import three_balls
 from cradle.fit import (
     Fit,
     Shots,
+    estimate,
     ratio,
     read_shots,
     read_tracker,
@@ -24,7 +32,7 @@ from cradle.fit import (
     speeds_from_heights,
     velocities_from_tracks,
 )
-from cradle.fit.parameters import chi_squares
+from cradle.fit.parameters import chi_squares, pair_keys, ratio_keys, triplet_keys
 from cradle.fit.result import FOLDED, Group
 from cradle.fit.search import RISE, refine, scan
 from cradle.fit.tracks import Track
@@ -268,6 +276,26 @@ def test_heights():
 
 
 # --- ratio -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["ABBB", "ABCA", "BDDD", "CDDD"])
+def test_a_ratio_that_acts_for_some_values_of_the_others_is_seen(name):
+    """The backward one at the second ball; all values must be tried, not only a plane of them."""
+    (shots,) = read_shots(columns(name, [1.0], outcome(name), 0.01)).sets
+    bounds = {key: estimate._bound(key, MASS) for key in ratio_keys(name)}
+    forward, backward = triplet_keys(name)
+    draws = np.random.default_rng(1).random((2, 20_000, 2))
+    f, b = (x * [bounds[key] for key in keys] for x, keys in zip(draws, (forward, backward)))
+    e = paper_chain(name, excess="saturate")[0].restitution
+    without = b.copy()
+    without[:, 0] = 0.0
+    ends = [
+        post_impact_velocities(shots.masses, shots.before, e, f, x, excess="saturate")
+        for x in (b, without)
+    ]
+    assert 0 < (abs(ends[1] - ends[0]).max(axis=1) > 1e-6).mean() < 0.2
+    given = dict(zip(pair_keys(name), e.tolist()))
+    assert backward[0] in estimate._acting(shots, bounds, given)
 
 
 @pytest.mark.parametrize("name", ["AAA", "ABC", "BAC", "BCD", "DAA", "DDD", "CAA", "BDC"])
