@@ -176,9 +176,9 @@ def spring_velocities(
     Five equal spheres, elastic; and with losses and gaps of a tenth of the compression:
 
     >>> for law in {}, {"viscosity": 0.05, "gaps": 0.1}:
-    ...     spring_velocities([1] * 5, [1, 0, 0, 0, 0], **law).round(2)
-    array([-0.07, -0.03, -0.01,  0.13,  0.99])
-    array([-0.  ,  0.02,  0.03,  0.1 ,  0.85])
+    ...     spring_velocities([1] * 5, [1, 0, 0, 0, 0], **law).round(3)
+    array([-0.071, -0.03 , -0.014,  0.127,  0.989])
+    array([-0.003,  0.023,  0.03 ,  0.101,  0.849])
     """
     return spring_outcomes(
         masses, velocities, stiffness, exponent=exponent, viscosity=viscosity, gaps=gaps,
