@@ -16,8 +16,7 @@ from cradle.closed_form import largest_ratios
 from cradle.input.values import a, one_number, one_of, shown
 from cradle.models.correlation import ImpulseCorrelation
 
-if TYPE_CHECKING:
-    # At run time imported where they are used, so that `import cradle` stays light.
+if TYPE_CHECKING:  # at run time imported where they are used: `import cradle` stays light
     from importlib.resources.abc import Traversable
 
     import pandas as pd

@@ -164,12 +164,21 @@ def test_a_profile_leads_to_a_lower_minimum():
 
 
 def test_numbers_that_do_nothing_are_left_open():
+    """They make no minima of their own."""
     found = told([1.0, 1.1], 0.1, lambda x, y: Given(x + 0.0 * y), {"x": (0, 2), "y": (3, 5)})
+    assert (found.values["y"], found.minima) == (None, ())
+    assert "y open [3, 5]" in found.summary()
     assert found.values["x"] == pytest.approx(1.05, abs=1e-6)
     half = 1.959964 * 0.1 / np.sqrt(2)
     assert found.intervals["x"] == pytest.approx((1.05 - half, 1.05 + half), abs=1e-4)
     assert found.intervals["y"] == (3, 5)
     assert (found.residuals["pair"] ** 2).sum() == pytest.approx(found.chi_square) == 0.5
+
+
+def test_errors_far_too_small_are_no_endless_search():
+    """Chi-square is then so large that its rounding looks like a lower minimum."""
+    found = told([0.3, 0.7], 1e-12, lambda x: Given(np.exp(x)), {"x": (-2, 0)})
+    assert found.values["x"] == pytest.approx(np.log(0.5), abs=1e-4)
 
 
 def test_intervals_hold_the_truth():
@@ -189,7 +198,8 @@ def test_intervals_hold_the_truth():
     [
         ({"ranges": {}}, "ranges has 0 numbers, shots have 3 velocities; must be at least 1"),
         ({"ranges": dict.fromkeys("abc", (0, 1))}, "fewer than velocities"),
-        ({"ranges": {"forward": (0.4, 0.4)}}, r"ranges\['forward'\]\[1\] = 0.4; must be above 0.4"),
+        ({"ranges": {"forward": (0.4, 0.4)}}, r"ranges\['forward'\] = \(0.4, 0.4\); must be two"),
+        ({"ranges": {"forward": (0, 0.1, 0.4)}}, r"\(0, 0.1, 0.4\); must be two numbers that rise"),
         ({"ranges": {"forward": (0.0, np.nan)}}, r"ranges\['forward'\]\[1\] = nan; must be finite"),
         ({"ranges": {"forward": (0.0, 2.0)}}, r"forward\[0\] = .* must not exceed 0.5"),
         ({"law": {"ABC": ImpulseCorrelation}}, "law has no set 'AAA'; it has ABC"),

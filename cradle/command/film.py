@@ -75,10 +75,9 @@ def film(
         if header:
             writer.writerow(COLUMNS)
             header = False
-        for k, kind in enumerate(types):
-            velocities = (x[k] for x in (one.before, one.after, one.sigma, one.sigma_before))
-            numbers = (f"{x:.6g}" for x in (kilograms[k], *velocities))
-            writer.writerow([name, shot or file.stem, k + 1, kind, *numbers])
+        measured = one.before, one.after, one.sigma, one.sigma_before
+        for k, (kind, *numbers) in enumerate(zip(types, kilograms, *measured, strict=True), 1):
+            writer.writerow([name, shot or file.stem, k, kind, *(f"{x:.6g}" for x in numbers)])
         striker = max(range(len(types)), key=lambda k: abs(one.before[k])) + 1
         when = f"ball {striker} strikes at {one.time:.4g} s, marks within {one.window:.3g} s"
         how = f"marks scatter by {one.scatter:.2g} m; chance of such a fit {one.probability:.2g}"

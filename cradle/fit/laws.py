@@ -9,7 +9,7 @@ import scipy
 from cradle.chain import Chain
 from cradle.fit.search import RISE
 from cradle.fit.shots import Shots, ShotSet, chance
-from cradle.input.values import PART, Vector, must_be, one_number, whole_number
+from cradle.input.values import PART, Vector, checked, must_be, one_number, shown, whole_number
 from cradle.models import Model, collide
 
 Law = Callable[..., Model]
@@ -21,22 +21,26 @@ _SAME = 0.02  # minima nearer to one another than this part of each range are on
 class LawFit:
     """What shots say of the numbers of a law."""
 
-    values: Mapping[str, float]  #: Of each number, the best.
+    values: Mapping[str, float | None]  #: Of each number, the best; None if the shots tell none.
     intervals: Mapping[str, tuple[float, float]]  #: 95 % about it, by profiles of chi-square.
-    minima: tuple[Mapping[str, float], ...]  #: Other values that explain the shots, best first.
+    minima: tuple[Mapping[str, float | None], ...]  #: Others that were found to explain the shots.
     residuals: Mapping[str, Vector]  #: By set: measured less computed, over the error, (K, N).
     chi_square: float
     degrees_of_freedom: int  #: Velocities after the impacts less numbers fitted.
 
     def summary(self) -> str:
         """Return all that the fit says, as text."""
-        lines = [f"{name} = {value:.4g} [{low:.3g}, {high:.3g}]" for (name, value), (low, high)
-                 in zip(self.values.items(), self.intervals.values(), strict=True)]  # fmt: skip
+
+        def told(name: str, x: float | None) -> str:
+            return f"{name} open" if x is None else f"{name} = {x:.4g}"
+
+        ends = (f"[{low:.3g}, {high:.3g}]" for low, high in self.intervals.values())
+        chi = f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}"
         likely = chance(self.chi_square, self.degrees_of_freedom)
-        free = f"degrees of freedom {self.degrees_of_freedom}, chance {likely:.2g}"
-        others = (", ".join(f"{name} = {x:.4g}" for name, x in one.items()) for one in self.minima)
-        return "\n".join([*lines, f"chi-square {self.chi_square:.1f}, {free}",
-                          *(f"or {other}" for other in others)])  # fmt: skip
+        sets = self.values, *self.minima
+        best, *others = ([told(*item) for item in one.items()] for one in sets)
+        lines = [*map(" ".join, zip(best, ends, strict=True)), f"{chi}, chance {likely:.2g}"]
+        return "\n".join([*lines, *(f"or {', '.join(one)}" for one in others)])
 
     def __repr__(self) -> str:
         return f"LawFit({'; '.join(self.summary().splitlines())})"
@@ -49,6 +53,7 @@ def fit_law(
     """Fit the numbers of any impact law to shots, by the least chi-square that is found.
 
     All computed velocities of a shot may be off by one factor, within the error of those before.
+    Where the chance of such a chi-square is small, the law fails, and intervals mean nothing.
 
     Parameters
     ----------
@@ -77,8 +82,7 @@ def fit_law(
     >>> from cradle.fit import read_shots
     >>> table = {"set": "gap", "shot": 1, "ball": [1, 2, 3], "type": "A", "mass": 1.0,
     ...          "before": [1.0, 0.0, 0.0], "after": [-0.037, 0.039, 0.998], "sigma_before": 0.0}
-    >>> table = {name: np.broadcast_to(x, 3) for name, x in table.items()}
-    >>> shots = read_shots(table, sigma=0.01)
+    >>> shots = read_shots({k: np.broadcast_to(x, 3) for k, x in table.items()}, sigma=0.01)
     >>> fit_law(shots, lambda gap: SpringChain(gaps=[0.0, gap]), {"gap": (0.0, 2.0)})
     LawFit(gap = 0.1184 [0.0636, 0.196]; chi-square 0.0, degrees of freedom 2, chance 1)
     """
@@ -87,17 +91,17 @@ def fit_law(
     laws = law if isinstance(law, Mapping) else {one.name: law for one in sets}
     for name in (one.name for one in sets if one.name not in laws):
         raise ValueError(f"law has no set {name!r}; it has {', '.join(laws)}")
-    for name, (low, high) in ranges.items():
-        least = one_number(f"ranges[{name!r}][0]", low)
-        one_number(f"ranges[{name!r}][1]", high, f"must be above {least!r}", least, open_low=True)
+    for name, given in ranges.items():
+        ends = checked(f"ranges[{name!r}]", given)
+        if ends.shape != (2,) or not ends[0] < ends[1]:
+            raise ValueError(f"ranges[{name!r}] = {shown(given)}; must be two numbers that rise")
     if not 0 < count < measured:
         told = f"ranges has {count} numbers, shots have {measured} velocities"
         raise ValueError(f"{told}; must be at least 1 number, and fewer than velocities")
     known = {"restitution": one_number("restitution", restitution, *PART)}
-    points = scipy.stats.qmc.Halton(count, scramble=False).random(
-        whole_number("starts", starts) + 1
-    )
-    return _Search(sets, laws, ranges, known, measured - count).found(1.0 + points[1:])
+    spread = scipy.stats.qmc.Halton(count, scramble=False)
+    begin = 1.0 + spread.random(whole_number("starts", starts) + 1)[1:]
+    return _Search(sets, laws, ranges, known, measured - count).found(begin)
 
 
 @dataclass
@@ -125,8 +129,8 @@ class _Search:
             starts, of = np.unique(one.before, axis=0, return_inverse=True)
             chains = [Chain(one.masses, before, e) for before in starts]
             v = np.array([collide(chain, model).velocities for chain in chains])[of.ravel()]
-            part = one.sigma_before / np.where(one.before, np.abs(one.before), np.inf)
-            error = np.maximum(part.max(axis=1), 1e-12)
+            parts = one.sigma_before / np.where(one.before, np.abs(one.before), np.inf)
+            error = parts.max(axis=1)
             # The factor that makes the sum of squares least, less 1 and over its error.
             gain = (weight * v * (one.after - v)).sum(axis=1) * error
             off = gain / (1.0 + error**2 * (weight * v * v).sum(axis=1))
@@ -178,15 +182,19 @@ class _Search:
             best = ends[0][0]
             spans = [[self.reach(best, lowest, k, limit) for limit in (1.0, 2.0)] for k in every]
             value, z = min(self.tried)
-            if value > lowest - 0.01:
+            if value > (1.0 - 1e-6) * lowest - 0.01:
                 break
             ends.append(self.descend(np.array(z), every))
+        whole = np.array([(low, high) == (1.0, 2.0) for low, high in spans])
         minima = [best]
         for end, value in ends:
-            apart = all(np.abs(end - other).max() > _SAME for other in minima)
-            minima += [end] * bool(apart and value < lowest + RISE)
+            far = (np.abs(end - other)[~whole].max(initial=0.0) > _SAME for other in minima)
+            minima += [end] * bool(value < lowest + RISE and all(far))
         low, high = (self.numbers(np.array(span)) for span in zip(*spans, strict=True))
-        values, *others = (self.numbers(np.round(end, 9)) for end in minima)
+        values, *others = (
+            {name: None if lost else x for lost, (name, x) in zip(whole, found, strict=True)}
+            for found in (self.numbers(np.round(end, 9)).items() for end in minima)
+        )
         rest = zip(self.sets, self.left(best), strict=True)
         return LawFit(
             values, {name: (low[name], high[name]) for name in values}, tuple(others),

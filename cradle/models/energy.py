@@ -145,10 +145,8 @@ class _Process:
         # Absolute tolerance, in units of the first collision, but of each contact's own stiffness.
         own = np.concatenate([np.ones(n), k ** (-1 / (p + 1)), np.ones(n - 1)])
         self.atol = 0.1 * self.rtol * own
-        # Loading is what is closed, with a compression that grows.
-        self.closed, self.loading = np.zeros((2, n - 1), dtype=bool)
-        # Of each contact dx / (u dt), up to the next event, and the work absorbed.
-        self.weights, self.absorbed = np.zeros((2, n - 1))
+        self.closed, self.loading = np.zeros((2, n - 1), dtype=bool)  # loading: x grows
+        self.weights, self.absorbed = np.zeros((2, n - 1))  # dx / (u dt) up to an event; work
         self.collisions = np.zeros(n - 1, dtype=np.int64)
         self.evaluations, self.collapsed = 0, False
         self.largest = np.zeros(n)  # change of each velocity at an event: what rounding was left by
@@ -160,7 +158,6 @@ class _Process:
         return y[:n], y[n : 2 * n - 1], y[2 * n - 1 :]
 
     def depths(self, y: Vector) -> Vector:
-        """Return the compressions."""
         return self.parts(y)[1]
 
     def speeds(self, y: Vector) -> Vector:
@@ -291,7 +288,6 @@ class _Process:
         self.closed = closed
 
     def note(self, kind: str, where: Vector) -> None:
-        """Record an event of some contacts, now."""
         self.record += [(kind, c, self.y) for c in np.flatnonzero(where).tolist()]
 
     def part(self) -> None:

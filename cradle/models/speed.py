@@ -11,7 +11,6 @@ from numpy.polynomial import Chebyshev
 
 from cradle.chain import Chain
 from cradle.input import values as asked
-from cradle.input.values import Vector
 from cradle.kernel.accuracy import LONGEST
 from cradle.models import Model, a_model
 from cradle.models.compliant import SpringChain, parting
@@ -65,7 +64,7 @@ class SpeedDependent:
         told = f"restitutions and closing speeds do not agree after {_ROUNDS} runs"
         raise ImpactNotFinished(f"the impact was not finished: {told}", trace)
 
-    def _at(self, speeds: Vector) -> Vector:
+    def _at(self, speeds: asked.Vector) -> asked.Vector:
         """Return the restitution at these closing speeds; 1 where balls do not close."""
         e = [self.restitution(u) if u > 0.0 else 1.0 for u in speeds.tolist()]
         return asked.checked("restitution(u)", e, *asked.PART)

@@ -181,8 +181,7 @@ class _Run:
             self.t, self.x = self.t + duration, x
             touching = (self.gaps() == 0.0) & (np.diff(v) >= -RESTING * self.speed)
         struck = self.v
-        # What opens at this instant rests no more in it, whatever else happens.
-        self.freed[opening] = self.t
+        self.freed[opening] = self.t  # what opens rests no more in this instant, whatever happens
         kept = touching & (self.t - self.freed > hanging.tie)
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
         self.instants.append((self.t, x, self.x, v, struck, self.v, 0.0))
