@@ -184,7 +184,7 @@ def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
     """Return some rows of `array` broadcast to the leading shape."""
     size = array.shape[-1]
     if array.size == size:
-        part = np.broadcast_to(array.reshape(size), (rows.stop - rows.start, size))
+        part = np.repeat(array.reshape(1, size), rows.stop - rows.start, axis=0)
     elif array.shape[:-1] == lead and array.flags.c_contiguous:
         part = array.reshape(-1, size)[rows]
     else:
