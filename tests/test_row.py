@@ -274,6 +274,15 @@ def test_two_rows_of_one_world_are_stepped_together():
         assert row.impacts == alone.impacts > 0
 
 
+def test_a_row_at_rest_is_not_looked_at_in_every_step_of_its_world():
+    bodies, looked = Hanging([0.0, 0.0]), []
+    row, motion = hung(bodies), bodies.motion
+    bodies.motion = lambda: looked.append(1) or motion()
+    for _ in range(500):
+        step_rows([row], 1e-3)
+    assert len(looked) < 250
+
+
 def test_a_hit_is_told_when_the_step_is_made():
     bodies = Free([[-0.45, 0], [0, 0], [0.2, 0]], [[1, 0], [0, 0], [0, 0]], [1, 2, 1])
     row, told = Row(bodies, Chain([1, 2, 1], [0] * 3), MODEL, RADIUS), []

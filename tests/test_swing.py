@@ -1,5 +1,6 @@
 """The swinging cradle against formulas, the independent solver, and springs under gravity."""
 
+import cmath
 import math
 import re
 from functools import partial
@@ -541,6 +542,21 @@ def test_first_fall_is_the_first():
 )
 def test_a_root_next_to_the_start(terms, parting, root):
     assert first_fall(0.0, terms, parting, 10.0) == root
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.1])
+def test_balls_that_meet_now_need_not_swing_once_more(decay):
+    """The sum falls from zero; rounding takes half of such starts for just after the meeting."""
+    for phase in np.linspace(0.1, 3.0, 50).tolist():
+        wave = cmath.rect(1.0, phase)
+        assert abs(first_fall(-wave.real, [(wave, complex(-decay, 1.0))], False, 9.0)) < 1e-12
+
+
+def test_an_integration_that_fails_is_no_motion(monkeypatch):
+    monkeypatch.setattr(FullFlight, "_rate", lambda _, t, y: -1e3 * y * y)
+    with pytest.raises(RuntimeError, match="the integration of the pendulums failed: Required"):
+        swing(balls(2), ImpulseCorrelation(0), [-0.05, 0.0], [1.0],
+              pendulums=Pendulums(0.1, angle="full"))  # fmt: skip
 
 
 @pytest.fixture
