@@ -553,7 +553,7 @@ def test_balls_that_meet_now_need_not_swing_once_more(decay):
 
 
 def test_an_integration_that_fails_is_no_motion(monkeypatch):
-    monkeypatch.setattr(FullFlight, "_rate", lambda _, t, y: -1e3 * y * y)
+    monkeypatch.setattr(FullFlight, "_rate", lambda *of: -1e3 * of[-1] ** 2)
     with pytest.raises(RuntimeError, match="the integration of the pendulums failed: Required"):
         swing(balls(2), ImpulseCorrelation(0), [-0.05, 0.0], [1.0],
               pendulums=Pendulums(0.1, angle="full"))  # fmt: skip
