@@ -105,7 +105,7 @@ def largest_ratios(
 ) -> tuple[Vector, Vector]:
     """Largest admissible ratios of a chain, forward (equations 34 and 53) and backward (mirrored).
 
-    A larger ratio would open a driven contact that has absorbed nothing, but a contact cannot pull.
+    A larger ratio would let a driven contact give work although it has absorbed nothing.
     The bound at a ball needs the ratio of the next ball in the direction of the drive; there is
     none at the last, where the bound is Eq. 34.  Wrong values and shapes are a `ValueError`.
 

@@ -13,8 +13,8 @@ from cradle.input.values import PART, Vector, checked, must_be, one_number, show
 from cradle.models import Model, collide
 
 Law = Callable[..., Model]
-_STEP = 1e-4  # of a slope, as a part of the range
-_SAME = 0.02  # minima nearer to one another than this part of each range are one
+_WAY = 0.25, 0.5, 0.75
+_STEP, _SAME = 1e-4, 0.02  # of a slope; of minima that are one: parts of the range
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +47,7 @@ class LawFit:
 
 
 def fit_law(
-    shots: Shots, law: Law | Mapping[str, Law], ranges: Mapping[str, tuple[float, float]], *,
+    shots: Shots, law: Law | Mapping[str, Law], ranges: dict[str, tuple[float, float]], *,
     restitution: float = 1.0, starts: int = 32,
 ) -> LawFit:  # fmt: skip
     """Fit the numbers of any impact law to shots, by the least chi-square that is found.
@@ -62,7 +62,7 @@ def fit_law(
     law : callable, or mapping of callables by the names of the sets
         ``law(**numbers)`` returns a model.  A number named restitution is that of all contacts of
         the chain, and not handed on.
-    ranges : mapping of str to (float, float)
+    ranges : dict of str to (float, float)
         Least and largest value of each number.
     restitution : float
         Of all contacts, where it is not fitted.
@@ -86,13 +86,14 @@ def fit_law(
     >>> fit_law(shots, lambda gap: SpringChain(gaps=[0.0, gap]), {"gap": (0.0, 2.0)})
     LawFit(gap = 0.1184 [0.0636, 0.196]; chi-square 0.0, degrees of freedom 2, chance 1)
     """
-    sets, count = must_be(Shots, "shots", shots).sets, len(ranges)
+    sets, count = must_be(Shots, "shots", shots).sets, len(must_be(dict, "ranges", ranges))
     measured = sum(one.after.size for one in sets)
     laws = law if isinstance(law, Mapping) else {one.name: law for one in sets}
-    for name in (one.name for one in sets if one.name not in laws):
-        raise ValueError(f"law has no set {name!r}; it has {', '.join(laws)}")
+    for name in (one.name for one in sets if not callable(laws.get(one.name))):
+        told = f"law of set {name!r} = {shown(laws.get(name))}"
+        raise ValueError(f"{told}; must be callable with the numbers of ranges, and give a model")
     for name, given in ranges.items():
-        ends = checked(f"ranges[{name!r}]", given)
+        ends = checked(f"ranges[{name!r}]", given, *(PART if name == "restitution" else ()))
         if ends.shape != (2,) or not ends[0] < ends[1]:
             raise ValueError(f"ranges[{name!r}] = {shown(given)}; must be two numbers that rise")
     if not 0 < count < measured:
@@ -188,7 +189,10 @@ class _Search:
         whole = np.array([(low, high) == (1.0, 2.0) for low, high in spans])
         minima = [best]
         for end, value in ends:
-            far = (np.abs(end - other)[~whole].max(initial=0.0) > _SAME for other in minima)
+            # No other minimum: near one, or where chi-square does not rise on the way to one.
+            far = (np.abs(end - other)[~whole].max(initial=0.0) > _SAME and
+                   max(self.descend(end + s * (other - end), [])[1] for s in _WAY) > value + 0.01
+                   for other in minima)  # fmt: skip
             minima += [end] * bool(value < lowest + RISE and all(far))
         low, high = (self.numbers(np.array(span)) for span in zip(*spans, strict=True))
         values, *others = (
