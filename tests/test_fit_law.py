@@ -193,6 +193,18 @@ def test_intervals_hold_the_truth():
     assert 89 <= held <= 99
 
 
+def test_a_level_stretch_is_one_minimum():
+    """Balls far apart: from some gap on nothing changes."""
+    after = collide(Chain([1, 1, 1], [1, 0, 0]), SpringChain(gaps=[0, 10.0])).velocities
+    shots = Shots((shot_set("AAA", [1.0, 0, 0], after, 0.01),))
+    law = lambda gap: SpringChain(gaps=[0.0, gap])  # noqa: E731
+    fit = fit_law(shots, law, {"gap": (0.0, 20.0)}, starts=8)
+    assert fit.minima == ()
+    low, high = fit.intervals["gap"]
+    assert low < 1.0
+    assert high == 20.0
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -202,7 +214,13 @@ def test_intervals_hold_the_truth():
         ({"ranges": {"forward": (0, 0.1, 0.4)}}, r"\(0, 0.1, 0.4\); must be two numbers that rise"),
         ({"ranges": {"forward": (0.0, np.nan)}}, r"ranges\['forward'\]\[1\] = nan; must be finite"),
         ({"ranges": {"forward": (0.0, 2.0)}}, r"forward\[0\] = .* must not exceed 0.5"),
-        ({"law": {"ABC": ImpulseCorrelation}}, "law has no set 'AAA'; it has ABC"),
+        ({"ranges": {"restitution": (0.5, 1.5)}}, r"restitution'\]\[1\] = 1.5; must lie in \[0, 1"),
+        ({"ranges": [("forward", (0.0, 0.4))]}, "ranges is a list; must be a dict"),
+        ({"law": {"ABC": ImpulseCorrelation}}, "law of set 'AAA' = None; must be callable"),
+        (
+            {"law": ImpulseCorrelation(0)},
+            r"law of set 'AAA' = ImpulseCorrelation\(.*; must be call",
+        ),
         ({"restitution": 1.5}, r"restitution = 1.5; must lie in \[0, 1\]"),
         ({"starts": 0}, "starts = 0; must be a whole number, at least 1"),
     ],
@@ -210,5 +228,5 @@ def test_intervals_hold_the_truth():
 def test_what_is_wrong_is_named(change, words):
     shots = Shots((shot_set("AAA", [1.0, 0, 0], [0.0, 0.1, 0.9], 0.01),))
     given = {"law": ImpulseCorrelation, "ranges": {"forward": (0.0, 0.4)}} | change
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises((TypeError, ValueError), match=words):
         fit_law(shots, **given)

@@ -13,7 +13,6 @@ from cradle.input.values import PART, Vector, checked, must_be, one_number, show
 from cradle.models import Model, collide
 
 Law = Callable[..., Model]
-_WAY = 0.25, 0.5, 0.75
 _STEP, _SAME = 1e-4, 0.02  # of a slope; of minima that are one: parts of the range
 
 
@@ -37,8 +36,7 @@ class LawFit:
         ends = (f"[{low:.3g}, {high:.3g}]" for low, high in self.intervals.values())
         chi = f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}"
         likely = chance(self.chi_square, self.degrees_of_freedom)
-        sets = self.values, *self.minima
-        best, *others = ([told(*item) for item in one.items()] for one in sets)
+        best, *others = ([told(*item) for item in x.items()] for x in (self.values, *self.minima))
         lines = [*map(" ".join, zip(best, ends, strict=True)), f"{chi}, chance {likely:.2g}"]
         return "\n".join([*lines, *(f"or {', '.join(one)}" for one in others)])
 
@@ -90,8 +88,7 @@ def fit_law(
     measured = sum(one.after.size for one in sets)
     laws = law if isinstance(law, Mapping) else {one.name: law for one in sets}
     for name in (one.name for one in sets if not callable(laws.get(one.name))):
-        told = f"law of set {name!r} = {shown(laws.get(name))}"
-        raise ValueError(f"{told}; must be callable with the numbers of ranges, and give a model")
+        raise ValueError(f"law of set {name!r} = {shown(laws.get(name))}; must be callable")
     for name, given in ranges.items():
         ends = checked(f"ranges[{name!r}]", given, *(PART if name == "restitution" else ()))
         if ends.shape != (2,) or not ends[0] < ends[1]:
@@ -186,13 +183,12 @@ class _Search:
             if value > (1.0 - 1e-6) * lowest - 0.01:
                 break
             ends.append(self.descend(np.array(z), every))
-        whole = np.array([(low, high) == (1.0, 2.0) for low, high in spans])
-        minima = [best]
+        minima, whole = [best], np.array([(low, high) == (1.0, 2.0) for low, high in spans])
         for end, value in ends:
             # No other minimum: near one, or where chi-square does not rise on the way to one.
-            far = (np.abs(end - other)[~whole].max(initial=0.0) > _SAME and
-                   max(self.descend(end + s * (other - end), [])[1] for s in _WAY) > value + 0.01
-                   for other in minima)  # fmt: skip
+            far = (np.abs(end - x)[~whole].max(initial=0.0) > _SAME and value + 0.01 <
+                   max(self.descend(end + s * (x - end), [])[1] for s in (0.3, 0.7))
+                   for x in minima)  # fmt: skip
             minima += [end] * bool(value < lowest + RISE and all(far))
         low, high = (self.numbers(np.array(span)) for span in zip(*spans, strict=True))
         values, *others = (

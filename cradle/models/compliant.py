@@ -145,7 +145,7 @@ def spring_velocities(
         k, N/m^p, above 0; A, s, 0 for an elastic contact and at most .3 of the time that the
         fastest closing would take to its depth; and the distance of two balls before the
         impact, m.  Below zero it is a lean: how far the strings press the two together at rest,
-        with a pull that acts until the last contact has opened.
+        with a pull that acts until no contact pushes and no open one closes.
     exponent : float
         p, from 1 to 10.
     accuracy : float
