@@ -13,7 +13,8 @@ from cradle.input.values import PART, Vector, checked, must_be, one_number, show
 from cradle.models import Model, collide
 
 Law = Callable[..., Model]
-_STEP, _SAME = 1e-4, 0.02  # of a slope; of minima that are one: parts of the range
+_STEP = 1e-4  # of a slope, as a part of the range
+_SAME = 0.02  # minima nearer to one another than this part of each range are one
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,7 +46,7 @@ class LawFit:
 
 
 def fit_law(
-    shots: Shots, law: Law | Mapping[str, Law], ranges: dict[str, tuple[float, float]], *,
+    shots: Shots, law: Law | Mapping[str, Law], ranges: Mapping[str, tuple[float, float]], *,
     restitution: float = 1.0, starts: int = 32,
 ) -> LawFit:  # fmt: skip
     """Fit the numbers of any impact law to shots, by the least chi-square that is found.
@@ -60,7 +61,7 @@ def fit_law(
     law : callable, or mapping of callables by the names of the sets
         ``law(**numbers)`` returns a model.  A number named restitution is that of all contacts of
         the chain, and not handed on.
-    ranges : dict of str to (float, float)
+    ranges : mapping of str to (float, float)
         Least and largest value of each number.
     restitution : float
         Of all contacts, where it is not fitted.
@@ -84,11 +85,11 @@ def fit_law(
     >>> fit_law(shots, lambda gap: SpringChain(gaps=[0.0, gap]), {"gap": (0.0, 2.0)})
     LawFit(gap = 0.1184 [0.0636, 0.196]; chi-square 0.0, degrees of freedom 2, chance 1)
     """
-    sets, count = must_be(Shots, "shots", shots).sets, len(must_be(dict, "ranges", ranges))
+    sets, count = must_be(Shots, "shots", shots).sets, len(must_be(Mapping, "ranges", ranges))
     measured = sum(one.after.size for one in sets)
     laws = law if isinstance(law, Mapping) else {one.name: law for one in sets}
     for name in (one.name for one in sets if not callable(laws.get(one.name))):
-        raise ValueError(f"law of set {name!r} = {shown(laws.get(name))}; must be callable")
+        raise ValueError(f"law has no callable for set {name!r}; it has {shown(laws)}")
     for name, given in ranges.items():
         ends = checked(f"ranges[{name!r}]", given, *(PART if name == "restitution" else ()))
         if ends.shape != (2,) or not ends[0] < ends[1]:
@@ -127,8 +128,7 @@ class _Search:
             starts, of = np.unique(one.before, axis=0, return_inverse=True)
             chains = [Chain(one.masses, before, e) for before in starts]
             v = np.array([collide(chain, model).velocities for chain in chains])[of.ravel()]
-            parts = one.sigma_before / np.where(one.before, np.abs(one.before), np.inf)
-            error = parts.max(axis=1)
+            error = np.abs(one.sigma_before / np.where(one.before, one.before, np.inf)).max(axis=1)
             # The factor that makes the sum of squares least, less 1 and over its error.
             gain = (weight * v * (one.after - v)).sum(axis=1) * error
             off = gain / (1.0 + error**2 * (weight * v * v).sum(axis=1))
@@ -183,16 +183,16 @@ class _Search:
             if value > (1.0 - 1e-6) * lowest - 0.01:
                 break
             ends.append(self.descend(np.array(z), every))
-        minima, whole = [best], np.array([(low, high) == (1.0, 2.0) for low, high in spans])
+        minima = [best]
         for end, value in ends:
-            # No other minimum: near one, or where chi-square does not rise on the way to one.
-            far = (np.abs(end - x)[~whole].max(initial=0.0) > _SAME and value + 0.01 <
-                   max(self.descend(end + s * (x - end), [])[1] for s in (0.3, 0.7))
-                   for x in minima)  # fmt: skip
-            minima += [end] * bool(value < lowest + RISE and all(far))
+            far = (np.abs(end - x).max() > _SAME for x in minima)
+            # From another minimum chi-square rises on the straight way to each that is known.
+            tops = (max(self.descend(x + s * (end - x), [])[1] for s in (0.3, 0.7)) for x in minima)
+            if value < lowest + RISE and all(far) and min(tops) > value + 0.01:
+                minima.append(end)
         low, high = (self.numbers(np.array(span)) for span in zip(*spans, strict=True))
         values, *others = (
-            {name: None if lost else x for lost, (name, x) in zip(whole, found, strict=True)}
+            {k: x if span != [1, 2] else None for span, (k, x) in zip(spans, found, strict=True)}
             for found in (self.numbers(np.round(end, 9)).items() for end in minima)
         )
         rest = zip(self.sets, self.left(best), strict=True)
