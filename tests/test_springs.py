@@ -395,6 +395,29 @@ def test_balls_that_part_meet_after_a_flight():
     assert kinds.count("close") == 3  # it opens first
 
 
+def test_a_closing_of_rounding_size_is_none():
+    """Balls that crossed wide gaps keep closing speeds of some 1e-16; the impact ends all the same."""
+    for n, gap, accuracy in ((5, 1.5, 1e-9), (5, 7.25, 1e-9), (6, 3.0, 1e-8), (8, 12.0, 1e-7)):
+        chain = Chain([1] * n, np.eye(n)[0])
+        after = collide(chain, SpringChain(gaps=gap, accuracy=accuracy)).velocities
+        np.testing.assert_allclose(after, np.eye(n)[-1], rtol=0, atol=1e-5)
+    steel = SpringChain(1e10, gaps=1e-4)
+    after = collide(Chain([0.045] * 5, [0.3, 0, 0, 0, 0]), steel).velocities
+    np.testing.assert_allclose(after, [0, 0, 0, 0, 0.3], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-3, 0.1])
+def test_a_slow_closing_counts_while_others_are_still_to_come(gap):
+    """In the long flight of the fast ball the slow one reaches its neighbour."""
+    chain = Chain([1] * 4, [5e-6, 0, 0, -1])
+    found = [
+        collide(chain, SpringChain(gaps=[gap, 10, 5e5], accuracy=accuracy)).velocities
+        for accuracy in (0.02, 1e-3, 1e-7)
+    ]
+    np.testing.assert_allclose(found[0], found[2], rtol=0, atol=0.02)
+    np.testing.assert_allclose(found[1], found[2], rtol=0, atol=1e-3)
+
+
 def test_once_ends_when_all_contacts_have_opened():
     """As in a swing: though others close later; a gap closes before."""
     law = SpringChain(gaps=[0.1, 3.0])

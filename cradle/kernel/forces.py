@@ -36,6 +36,15 @@ def idle(c, slow, s):
 
 
 @jit
+def settled(slow, low, high, s):
+    """Tell whether all watched contacts are idle, or open and closing too slowly to be noticed."""
+    for c in range(low, high):
+        if not idle(c, slow, s) and (s[c].f > 0.0 or s[c].v - s[c + 1].v > slow):
+            return False
+    return True
+
+
+@jit
 def push(p, a, d, move, early):
     """Return force and slope of a contact: once open, none until it closes or its losses push."""
     if d > 0.0 and (move > 0.0 if a.f == 0.0 and early < 1.0 else d + early * move > 0.0):
@@ -305,6 +314,8 @@ def run(n, law, effort, s, clock, record):
             while low < high and idle(high - 1, slow, s) and idle(high - 2, slow, s):
                 high -= 1
                 s[high].seen, s[high].g, s[high].push = time, 0.0, 0.0
+            if settled(slow, low, high, s):
+                low = high
         clock.low, clock.high = low, high
         if len(record) > 0:
             put_down(n, s, clock, record)
