@@ -29,7 +29,6 @@ from cradle import (
     paper_chain,
     recommend,
 )
-from cradle import kernel as plain
 from cradle.command.console import text as shown
 from cradle.command.solve import main, run
 from cradle.fit import ratio, read_shots
@@ -53,7 +52,7 @@ def examples():
     found = []
     for name in COMMANDS:
         lines = re.findall(r"^\s+cradle (.+)$", call(f"{name} --help"), flags=re.M)
-        assert lines, name
+        assert lines or name in ("template", "warm-up"), name  # these take no options
         found += lines
     return found
 
@@ -258,18 +257,14 @@ def test_recommend_says_what_python_says():
 
 
 @pytest.mark.parametrize(
-    ("loaded", "before", "after", "words"),
+    ("loaded", "words"),
     [
-        (False, False, False, "not compiled: numba is missing or switched off"),
-        (True, True, True, r"compiled already; loaded in \d+\.\d s"),
-        (True, False, True, r"compiled in \d+ s, once on this machine"),
-        (True, False, False, r"compiled in \d+ s for this process alone"),
+        (False, "not compiled: numba is missing or switched off"),
+        (True, r"compiled, and loaded in \d+\.\d s"),
     ],
 )
-def test_warm_up_says_what_was_done(monkeypatch, loaded, before, after, words):
-    found = iter([before, after])
+def test_warm_up_says_what_was_done(monkeypatch, loaded, words):
     monkeypatch.setattr(drive, "warm_up", lambda: None)
-    monkeypatch.setattr(runtime, "on_disk", lambda door="batch": vars(plain)[door] and next(found))
     monkeypatch.setattr(runtime, "loaded", lambda: loaded)
     assert re.match(words, call("warm-up"))
 
@@ -389,6 +384,14 @@ def test_several_films_in_any_unit(folder, capsys):
         with pytest.raises(SystemExit):
             run(shlex.split(BAC.replace("film.txt", "px.txt").replace("--length 0.3", how)))
         assert re.search(rf"{words}; say --position-unit", capsys.readouterr().err)
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_pendulum_does_not_swing_over_the_top(capsys):
+    """Where the film plays slower than is told."""
+    with pytest.raises(SystemExit):
+        run(shlex.split(f"{BAC} --slower 100".replace("--length 0.3", "--length 0.2")))
+    assert re.search(r"film.txt: \S+ m/s is unlikely; see --slower", capsys.readouterr().err)
 
 
 def scaled(text, size):

@@ -126,8 +126,9 @@ def test_gaps_of_none():
     shots = Shots((shot_set("three", chain.velocities, collide(chain, law(0.0)).velocities, 1e-5),))
     found = fit_law(shots, law, {"gap": (0, 2)})
     assert found.values["gap"] == pytest.approx(0.0, abs=1e-7)
-    assert found.intervals["gap"][0] == 0.0
-    assert found.intervals["gap"][1] < 1e-3
+    low, high = found.intervals["gap"]
+    assert low == 0.0
+    assert high < 1e-3
     search = _Search(shots.sets, {"three": law}, {"gap": (0, 2)}, {"restitution": 1.0}, 2)
     assert np.array_equal(search.left(np.array([1.0])), search.left(np.array([1.0 + 1e-15])))
 
@@ -175,6 +176,19 @@ def test_numbers_that_do_nothing_are_left_open():
     assert (found.residuals["pair"] ** 2).sum() == pytest.approx(found.chi_square) == 0.5
 
 
+def test_an_interval_reaches_about_every_minimum():
+    """A square tells no sign: by pencil."""
+    found = told([1.0], 0.1, lambda x: Given(x * x), {"x": (-2, 2)})
+    top = np.sqrt(1.1959964)
+    assert found.intervals["x"] == pytest.approx((-top, top), abs=1e-3)
+    assert [abs(one["x"]) for one in (found.values, *found.minima)] == pytest.approx([1.0, 1.0])
+
+
+def test_the_best_at_the_end_of_its_range():
+    found = told([1.2], 0.1, Given, {"v": (0, 0.7)})
+    assert found.intervals["v"][1] == found.values["v"] == 0.7
+
+
 def test_errors_far_too_small_are_no_endless_search():
     """Chi-square is then so large that its rounding looks like a lower minimum."""
     found = told([0.3, 0.7], 1e-12, lambda x: Given(np.exp(x)), {"x": (-2, 0)})
@@ -213,7 +227,14 @@ def test_a_level_stretch_is_one_minimum():
         ({"ranges": {"forward": (0.4, 0.4)}}, r"ranges\['forward'\] = \(0.4, 0.4\); must be two"),
         ({"ranges": {"forward": (0, 0.1, 0.4)}}, r"\(0, 0.1, 0.4\); must be two numbers that rise"),
         ({"ranges": {"forward": (0.0, np.nan)}}, r"ranges\['forward'\]\[1\] = nan; must be finite"),
-        ({"ranges": {"forward": (0.0, 2.0)}}, r"forward\[0\] = .* must not exceed 0.5"),
+        (
+            {"ranges": {"forward": (0.0, 2.0)}},
+            r"inside ranges = {'forward': \(0.0, 2.0\)} is what a law refuses: forward\[0\] = 1.0;",
+        ),
+        (
+            {"ranges": {"restitution": (0.5, 1)}, "restitution": 0.9},
+            "restitution = 0.9 is in ranges, too; leave out one of them",
+        ),
         ({"ranges": {"restitution": (0.5, 1.5)}}, r"restitution'\]\[1\] = 1.5; must lie in \[0, 1"),
         ({"law": {"ABC": ImpulseCorrelation}}, "no callable for set 'AAA'; it has {'ABC': <class"),
         ({"law": ImpulseCorrelation(0)}, "no callable for set 'AAA'; it has {'AAA': ImpulseCorr"),
@@ -230,5 +251,7 @@ def test_what_is_wrong_is_named(change, words):
 
 def test_ranges_have_names():
     shots = Shots((shot_set("AAA", [1.0, 0, 0], [0.0, 0.1, 0.9], 0.01),))
+    with pytest.raises(TypeError, match="a name of ranges is an int; must be a str"):
+        fit_law(shots, ImpulseCorrelation, {1: (0.0, 0.4)})
     with pytest.raises(TypeError, match="ranges is a list; must be a Mapping"):
         fit_law(shots, ImpulseCorrelation, [("forward", (0.0, 0.4))])

@@ -239,7 +239,10 @@ PLACES = np.stack([-0.03 * np.cos(8 * WAYS), 0 * WAYS], axis=1)
         ({"known": {"period": -1.0}}, "must be above 0"),
         ({"known": {"restitution": 1.5}}, r"restitution\b.* = 1.5; must lie in \[0, 1\]"),
         ({"positions": PLACES[::-1] * 0.0}, "no ball is seen on its way"),
-        ({"positions": 100 * PLACES}, "pendulums of this length reach a quarter of a circle"),
+        ({"positions": 100 * PLACES}, "no swing is near the film; .* reach a quarter of a circle"),
+        ({"times": 1000 * WAYS}, r"period that is seen, s, = 7\d\d.*; must lie in \[0.1, 30"),
+        ({"positions": PLACES - [np.inf, 0]}, r"positions\[0, 0\] = -inf; must be finite, or nan"),
+        ({"times": [], "positions": PLACES[:0]}, r"shapes \(0,\), \(0, 2\) and"),
     ],
 )  # fmt: skip
 def test_refused(changes, words):

@@ -396,7 +396,7 @@ def test_balls_that_part_meet_after_a_flight():
 
 
 def test_a_closing_of_rounding_size_is_none():
-    """Balls that crossed wide gaps keep closing speeds of some 1e-16; the impact ends all the same."""
+    """Balls that crossed wide gaps keep closing speeds of some 1e-16; the impact ends."""
     for n, gap, accuracy in ((5, 1.5, 1e-9), (5, 7.25, 1e-9), (6, 3.0, 1e-8), (8, 12.0, 1e-7)):
         chain = Chain([1] * n, np.eye(n)[0])
         after = collide(chain, SpringChain(gaps=gap, accuracy=accuracy)).velocities

@@ -189,10 +189,5 @@ def _predicted(found: Any, shots: Any, sequence: str, speed: float) -> tuple[Any
 
 @click.command()
 def template() -> None:
-    """Print a table of shots to fill in.
-
-    \b
-    Examples:
-      cradle template
-    """
+    """Print a table of shots to fill in."""
     click.echo((data_folder() / "shots_template.csv").read_text(encoding="utf-8"), nl=False)

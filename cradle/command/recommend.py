@@ -14,13 +14,12 @@ from cradle.command.describe import CHAIN, described, numbers_of, one_or_all
               "forces, times, fastest ball; with commas between [velocities].")  # fmt: skip
 @click.option("--accuracy", default=1e-6, help="Largest numerical error, as a part of the closing "
               "speed [1e-6].")  # fmt: skip
-@click.option("--model-error", type=float, help="Largest distance from elastic spheres [any].")
 @click.option("--impacts", default=1, help="How many such impacts [1].")
 @click.option("--stiffness", callback=numbers_of, help="Of the contacts, N/m^1.5; 1 for equal "
               "spheres if neither forces nor times are wanted.")  # fmt: skip
 def recommend(
-    wanted: Sequence[str], stiffness: list[float] | None, accuracy: float,
-    model_error: float | None, impacts: int, **options: Any,
+    wanted: Sequence[str], stiffness: list[float] | None, accuracy: float, impacts: int,
+    **options: Any,
 ) -> None:  # fmt: skip
     """Which impact law to use, with its measured error and time.
 
@@ -36,7 +35,7 @@ def recommend(
     wishes = [name.strip() for names in wanted for name in names.split(",")]
     law = given.model if len(given.chain) > 2 else None  # two balls have no ratio
     advice = cradle.recommend(
-        given.chain, wishes, accuracy=accuracy, model_error=model_error, impacts=impacts,
+        given.chain, wishes, accuracy=accuracy, impacts=impacts,
         ratios=law if isinstance(law, cradle.ImpulseCorrelation) else None,
         stiffness=one_or_all(stiffness),
     )  # fmt: skip

@@ -36,7 +36,6 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"say the unit of the positions": "say --position-unit cm or mm, or px and --scale",
     r"\b(sigma|known)=": r"--\1",
     r"\b(wanted|accuracy|impacts|length|sigma|speed|window) = ": r"--\1 ",
-    r"\bmodel_error = ": "--model-error ",
     r"\btypes = ": "--predict ",
     r"restitution has no '(.+?)', which set (.+) needs; it has (.*)": (
         rf"set \2 needs the restitution of \1: {_SHOOT} (there are: \3)"
@@ -125,12 +124,10 @@ def plot(output: str, **options: Any) -> None:
       cradle plot ABACA --output impact.png
       cradle plot --masses 1,1,1 --ratio 0.15 --output impact.svg
     """
-    from matplotlib.figure import Figure
-
-    from cradle.pictures.impacts import velocities
+    from matplotlib.figure import Figure  # what is missing is said before work
 
     given, figure = described(**options), Figure((7, 4.3), layout="constrained")
-    velocities(collide(given.chain, given.model, progress=True), figure.subplots())
+    collide(given.chain, given.model, progress=True).plot(figure.subplots())
     figure.savefig(output, format=Path(output).suffix[1:] or "png")
     click.echo(f"drawn to {output}\n{given.note}")
 
@@ -144,22 +141,12 @@ def warm_up() -> None:
     """Compile both loops now, so that long work starts at once later.
 
     Small work is never compiled, and need not wait for this.
-
-    \b
-    Examples:
-      cradle warm-up
     """
-    there, begun = runtime.on_disk("follow"), time.perf_counter()
+    begun = time.perf_counter()
     drive.warm_up()
-    seconds = time.perf_counter() - begun
+    told = f"compiled, and loaded in {time.perf_counter() - begun:.1f} s"
     if not runtime.loaded():
         told = f"not compiled: numba is missing or switched off, or {runtime.VARIABLE}=plain is set"
-    elif there:
-        told = f"compiled already; loaded in {seconds:.1f} s"
-    elif runtime.on_disk():
-        told = f"compiled in {seconds:.0f} s, once on this machine"
-    else:
-        told = f"compiled in {seconds:.0f} s for this process alone: no folder can be written"
     click.echo(told)
 
 

@@ -22,7 +22,8 @@ class LawFit:
     """What shots say of the numbers of a law."""
 
     values: Mapping[str, float | None]  #: Of each number, the best; None if the shots tell none.
-    intervals: Mapping[str, tuple[float, float]]  #: 95 % about it, by profiles of chi-square.
+    #: 95 % of each, by profiles of chi-square: from the least to the largest end about any minimum.
+    intervals: Mapping[str, tuple[float, float]]
     minima: tuple[Mapping[str, float | None], ...]  #: Others that were found to explain the shots.
     residuals: Mapping[str, Vector]  #: By set: measured less computed, over the error, (K, N).
     chi_square: float
@@ -30,14 +31,11 @@ class LawFit:
 
     def summary(self) -> str:
         """Return all that the fit says, as text."""
-
-        def told(name: str, x: float | None) -> str:
-            return f"{name} open" if x is None else f"{name} = {x:.4g}"
-
         ends = (f"[{low:.3g}, {high:.3g}]" for low, high in self.intervals.values())
         chi = f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}"
         likely = chance(self.chi_square, self.degrees_of_freedom)
-        best, *others = ([told(*item) for item in x.items()] for x in (self.values, *self.minima))
+        best, *others = ([f"{k} {'open' if x is None else f'= {x:.4g}'}" for k, x in one.items()]
+                         for one in (self.values, *self.minima))  # fmt: skip
         lines = [*map(" ".join, zip(best, ends, strict=True)), f"{chi}, chance {likely:.2g}"]
         return "\n".join([*lines, *(f"or {', '.join(one)}" for one in others)])
 
@@ -91,6 +89,7 @@ def fit_law(
     for name in (one.name for one in sets if not callable(laws.get(one.name))):
         raise ValueError(f"law has no callable for set {name!r}; it has {shown(laws)}")
     for name, given in ranges.items():
+        must_be(str, "a name of ranges", name)
         ends = checked(f"ranges[{name!r}]", given, *(PART if name == "restitution" else ()))
         if ends.shape != (2,) or not ends[0] < ends[1]:
             raise ValueError(f"ranges[{name!r}] = {shown(given)}; must be two numbers that rise")
@@ -98,9 +97,16 @@ def fit_law(
         told = f"ranges has {count} numbers, shots have {measured} velocities"
         raise ValueError(f"{told}; must be at least 1 number, and fewer than velocities")
     known = {"restitution": one_number("restitution", restitution, *PART)}
+    if "restitution" in ranges and restitution != 1.0:
+        raise ValueError(f"restitution = {restitution!r} is in ranges, too; leave out one of them")
     spread = scipy.stats.qmc.Halton(count, scramble=False)
     begin = 1.0 + spread.random(whole_number("starts", starts) + 1)[1:]
-    return _Search(sets, laws, ranges, known, measured - count).found(begin)
+    try:
+        return _Search(sets, laws, ranges, known, measured - count).found(begin)
+    except ValueError as reason:
+        raise ValueError(
+            f"inside ranges = {dict(ranges)} is what a law refuses: {reason}"
+        ) from reason
 
 
 @dataclass
@@ -117,7 +123,7 @@ class _Search:
     def numbers(self, z: Vector) -> dict[str, float]:
         """Return the numbers by name."""
         low, high = np.array([*self.ranges.values()], float).T
-        return dict(zip(self.ranges, (low + (high - low) * (z - 1.0)).tolist(), strict=True))
+        return dict(zip(self.ranges, (low * (2.0 - z) + high * (z - 1.0)).tolist(), strict=True))
 
     def left(self, z: Vector) -> list[Vector]:
         """Return residuals over errors, (K, N + 1) for each set, the last one of the factor."""
@@ -178,25 +184,25 @@ class _Search:
             # Of those that are equally low the one with the least numbers.
             ends.sort(key=lambda end: (max(end[1] - lowest, 0.01), end[0].round(3).tolist()))
             best = ends[0][0]
-            spans = [[self.reach(best, lowest, k, limit) for limit in (1.0, 2.0)] for k in every]
+            minima = [best]
+            for end, value in ends:
+                far = (np.abs(end - x).max() > _SAME for x in minima)
+                # From another minimum chi-square rises on the straight way to each that is known.
+                ways = ([x + s * (end - x) for s in (0.3, 0.7)] for x in minima)
+                tops = (max(self.descend(z, [])[1] for z in way) for way in ways)
+                if value < lowest + RISE and all(far) and min(tops) > value + 0.01:
+                    minima.append(end)
+            spans = [[pick(self.reach(z, lowest, k, limit) for z in minima) for k in every]
+                     for pick, limit in ((min, 1.0), (max, 2.0))]  # fmt: skip
             value, z = min(self.tried)
             if value > (1.0 - 1e-6) * lowest - 0.01:
                 break
             ends.append(self.descend(np.array(z), every))
-        minima = [best]
-        for end, value in ends:
-            far = (np.abs(end - x).max() > _SAME for x in minima)
-            # From another minimum chi-square rises on the straight way to each that is known.
-            tops = (max(self.descend(x + s * (end - x), [])[1] for s in (0.3, 0.7)) for x in minima)
-            if value < lowest + RISE and all(far) and min(tops) > value + 0.01:
-                minima.append(end)
-        low, high = (self.numbers(np.array(span)) for span in zip(*spans, strict=True))
+        low, high = (self.numbers(np.array(span)) for span in spans)
+        intervals = {name: (low[name], high[name]) for name in self.ranges}
         values, *others = (
-            {k: x if span != [1, 2] else None for span, (k, x) in zip(spans, found, strict=True)}
-            for found in (self.numbers(np.round(end, 9)).items() for end in minima)
+            {k: x if intervals[k] != tuple(self.ranges[k]) else None for k, x in found.items()}
+            for found in (self.numbers(np.round(end, 9)) for end in minima)
         )
-        rest = zip(self.sets, self.left(best), strict=True)
-        return LawFit(
-            values, {name: (low[name], high[name]) for name in values}, tuple(others),
-            {one.name: left[:, :-1] for one, left in rest}, lowest, self.freedom,
-        )  # fmt: skip
+        left = {one.name: x[:, :-1] for one, x in zip(self.sets, self.left(best), strict=True)}
+        return LawFit(values, intervals, tuple(others), left, lowest, self.freedom)

@@ -183,7 +183,7 @@ def _number(where: str, line: dict[str, Any], name: str, units: dict[str, str | 
     """Return the number in a column, in kg or m/s."""
     place = f"{where}, column {name}"
     try:
-        value = float(line[name])
+        value = float(line[name] if type(line[name]) is not bool else "")
     except (TypeError, ValueError):
         words = f"{line[name]!r}; must be a number, its decimals after a point"
         raise ValueError(f"{place} = {words}") from None

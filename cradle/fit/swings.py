@@ -118,11 +118,16 @@ class _Film:
     ) -> None:  # fmt: skip
         t, x = asked.checked("times", times), asked.numbers("positions", positions)
         mask = np.ones(x.shape[1:], bool) if seen is None else np.asarray(seen, bool)
-        fit = x.ndim == 2 and t.shape == x.shape[:1] and mask.shape in (x.shape, x.shape[1:])
+        fit = (
+            x.ndim == 2
+            and (t.size,) == t.shape == x.shape[:1] != (0,)
+            and mask.shape in (x.shape, x.shape[1:])
+        )
         if not fit or x.shape[1] < 2:
             told = f"times, positions and seen have shapes {t.shape}, {x.shape} and {mask.shape}"
             raise ValueError(f"{told}; must be (K,), (K, N) and (K, N) or (N,), N at least 2")
         asked.refuse_where("times", t, np.diff(t, prepend=-np.inf) <= 0.0, "must rise")
+        asked.refuse_where("positions", x, np.isinf(x), "must be finite, or nan where not seen")
         n, m = x.shape[1], asked.number_or_row("masses", 1.0 if masses is None else masses, "N")
         self.model, self.balls = model, Chain(asked.row_of("masses", m, n, n), np.zeros(n), 1.0)
         self.times, self.seen = t - t[0], mask & np.isfinite(x)
@@ -150,6 +155,8 @@ class _Film:
         rates = np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
         rate = rates[scipy.signal.lombscargle(at, mean - mean.mean(), rates).argmax()]
         self.period = period = self.fixed.get("period", 2.0 * np.pi / rate)
+        rule = "must lie in [0.1, 30]: are times in s"
+        asked.one_number("the period that is seen, s,", period, rule, 0.1, 30.0)
         self.size = size = float(np.nanmax(np.abs(self.x)))
         early = self.seen & (t <= max(period / 16.0, t[3]))[:, None]
         lines = [np.polyfit(t[some], x[some], 1) if some.sum() > 2 else np.zeros(2)
@@ -186,7 +193,11 @@ class _Film:
         chain = Chain(self.balls.masses, p[-1] * x, now["restitution"])
         length = Pendulums.gravity * (now["period"] / (2.0 * np.pi)) ** 2
         pendulums = Pendulums(length, gaps=now["gaps"], damping=now["damping"])
-        return swing(chain, self.model, x, self.times[:count], pendulums=pendulums)
+        try:
+            return swing(chain, self.model, x, self.times[:count], pendulums=pendulums)
+        except ValueError as reason:
+            rule = "positions are from where each ball hangs, m, balls from left to right"
+            raise ValueError(f"no swing is near the film; {rule}; at last: {reason}") from reason
 
     def left(self, p: Vector, count: int | None = None) -> Vector:
         """Return what the swing by numbers leaves of the readings in these frames."""

@@ -120,7 +120,7 @@ class SpringChain:
         return ImpactNotFinished(
             f"the impact was not finished (max_steps = {self.max_steps}): contact {c}, the "
             "quickest of the springs, makes the steps short; or balls that collide often amplify "
-            "errors, and finer runs do not agree" + held,
+            "errors, and finer runs do not agree: a coarser accuracy may do" + held,
             Trace(chain, self, reached, impulses, none, none.astype(int), *paths, (), left_out=1),
         )
 

@@ -74,7 +74,6 @@ class EnergyDistribution:
     max_evaluations : int
         How often the ratios may be evaluated; then the impact is an `ImpactNotFinished`.
 
-
     Examples
     --------
     >>> from cradle import Chain, collide

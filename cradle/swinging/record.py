@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from cradle.chain import Chain
 from cradle.formatting import as_text
 from cradle.input.values import Vector
@@ -63,16 +61,9 @@ class Swing:
         return Hanging(self.pendulums, self.chain.masses).energy(self.positions, self.velocities)
 
     def to_frame(self) -> "pd.DataFrame":
-        """Return a row for each time and ball: time, ball, position, velocity."""
+        """Return a row for each time and ball; of the impacts ``pd.DataFrame(self.impacts)``."""
         parts = {"position": self.positions, "velocity": self.velocities}
         return by_ball(len(self.chain), {"time": self.times}, parts)
-
-    def impacts_to_frame(self) -> "pd.DataFrame":
-        """Return a row for each impact and ball: impact, time, ball, before, after."""
-        hits, names = self.impacts, ("before", "after")
-        rows = {"impact": np.arange(len(hits)), "time": np.array([hit.time for hit in hits])}
-        parts = {name: np.array([getattr(hit, name) for hit in hits]) for name in names}
-        return by_ball(len(self.chain), rows, parts)
 
     def __repr__(self) -> str:
         told = f"{len(self.times)} times to {self.end:g} s, {len(self.impacts)} impacts"
