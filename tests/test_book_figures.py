@@ -9,6 +9,8 @@ import pytest
 from chapters import BOOK, Chapter, after, code, panel, solved
 from test_book_compliance import first_loss, outcome, printed_10_and_11
 
+from cradle import textbook
+
 EQUAL = [1, 1, 1], [1, 0, 0], 1
 THREE = [1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.9, 0.8]  # of three_balls, ratio 0.15
 FIVE = [1, 1, 1], [1, 0.8, 0], 0.25  # of multiple_impacts, ratio 0.15
@@ -19,6 +21,7 @@ CLOSE = {"rtol": 0, "atol": 1e-12}
 #: Drawings without numbers, what moves (tested by its cell), and names that tests put together.
 OTHERS = {
     *("fig-p1", "fig-p2", "fig-p9", "fig-own-notation-chain", "fig-own-notation-ratio"),
+    "fig-own-n-balls-rules",
     *("fig-flight", "fig-recipe-film", "fig-scene-film", "fig-toy-film", "fig-toy-inside"),
     *("fig-measure-swing", "fig-p10", "fig-p11", "fig-p12"),
 }
@@ -46,16 +49,27 @@ def test_every_figure_is_checked():
         ("multiple_impacts", "fig-own-multiple-opening", FIVE, 0.15),
         ("patterns", "fig-own-patterns-light", LIGHT, 0.15),
         ("n_balls", "fig-own-n-balls-toy", ([1] * 5, [1, 0, 0, 0, 0], 1), 0.15),
-        ("n_balls", "fig-own-n-balls-opening", ([1] * 4, [1, 0.5, 0, 0], 1), 0.15),
     ],
 )
 def test_opening_figures(chapter, figure, chain, ratio):
-    path, impulses = solved(chain, ratio)
-    shown = panel(chapter, figure)
+    follows(panel(chapter, figure), *solved(chain, ratio))
+
+
+def follows(shown, path, impulses):
+    """The lines of all balls go through these points."""
     assert list(shown) == [f"$v_{i + 1}$" for i in range(path.shape[1])]
     for ball, line in enumerate(shown.values()):
         expected = np.column_stack([impulses.sum(axis=1), path[:, ball]])
         np.testing.assert_allclose(line, expected, **CLOSE)
+
+
+def test_two_runs_are_drawn_without_bends_between_events():
+    """Lines bend where a contact ends or closes, and nowhere else: one run does not wait."""
+    done = textbook.solve([1] * 4, [1, 0.5, 0, 0], 1, 0.15)
+    rows = [0, *(k for k, (kind, _) in enumerate(done.events, 1) if kind in ("end", "close"))]
+    path, impulses = np.array(done.path)[rows], np.array(done.path_impulses)[rows]
+    follows(panel("n_balls", "fig-own-n-balls-opening"), path, impulses)
+    assert len(done.events) + 1 - len(rows) > 0
 
 
 @pytest.mark.parametrize("contact", [0, 1])

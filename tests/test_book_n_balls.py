@@ -169,15 +169,15 @@ def contact_work(trace, c, row):
 
 def test_three_readings():
     """Who drives after a meeting: in the example, and in the ten chains."""
-    table = pd.read_csv(io.StringIO(CHAPTER.printed("readings-table")), sep=r"\s+")
+    table = pd.read_csv(io.StringIO(READING.printed("readings-table")), sep=r"\s+")
     ends = {name: floats(outcome(way, "0.15").velocities) for name, way in READINGS.items()}
     for name, expected in ends.items():
         np.testing.assert_allclose(table.loc[name], expected, atol=6e-5)
     most = np.ptp([*ends.values()], axis=0).max()
-    assert CHAPTER.glued["n-balls-spread"] == f"{most:.2f}"
+    assert CHAPTER.glued["n-balls-spread"] == READING.glued["n-balls-spread"] == f"{most:.2f}"
     seen = floats(outcome(READINGS["both"], "0.15", ([1] * 4, [0, 0, "-0.5", -1], 1)).velocities)
     mirror = abs(seen[::-1] + ends["both"]).max()
-    assert CHAPTER.glued["n-balls-mirror-off"] == f"{mirror:.3f}"
+    assert READING.glued["n-balls-mirror-off"] == f"{mirror:.3f}"
     assert 0.15 < max(mirror, most) < 0.2  # "up to a fifth" in the chapter on the problem
 
     turned = {}
@@ -190,7 +190,7 @@ def test_three_readings():
         ]
         turned[name] = np.ptp([floats(end.velocities) for end in ends], axis=0).max()
     assert {name for name, size in turned.items() if size > 0} == {"ABCCAB", "BCACBA"}
-    for chapter, name in (CHAPTER, "n-balls-ten-spread"), (Chapter("experiments"), "turned"):
+    for chapter, name in (READING, "n-balls-ten-spread"), (Chapter("experiments"), "turned"):
         chapter.tells({name: max(turned.values())})
     assert max(turned.values()) < 0.005  # "less than half a hundredth"
 
@@ -205,6 +205,43 @@ def test_events_of_two_runs_that_meet():
         kind, c = exact.events[row - 1]
         assert line[:3] == [f"{place}", f"{c + 1}-{c + 2}", told[kind]]
         assert [*map(float, line[3:])] == pytest.approx([*map(float, exact.path[row])], abs=6e-4)
+
+
+def test_meeting_chooses_a_velocity_of_the_overlap():
+    """What the chapter prints and says of the parameter, by the reference rules."""
+    chain = [1] * 4, [1, "0.5", 0, 0], 1
+    lines = CHAPTER.printed("meeting-live").splitlines()
+    ends, met = [], []
+    for line, place in zip(lines, (0, 0.5, 1), strict=True):
+        exact = truth.solve(*chain, "0.15", meeting=place, number=float)
+        ends.append(exact.velocities)
+        met.append(float(exact.path[exact.events.index(("close", 1)) + 1][1]))
+        place_, *printed = map(float, re.findall(r"-?\d+\.?\d*", line))
+        assert place_ == place
+        assert printed == pytest.approx(exact.velocities, abs=6e-4)
+    told = {f"n-balls-{name}": v for name, v in zip(("low", "mid", "high"), met, strict=True)}
+    CHAPTER.tells(told)
+    assert CHAPTER.glued["n-balls-move-fig8"] == READING.glued["n-balls-move-fig8"]
+    assert np.ptp(ends, axis=0).max() <= float(CHAPTER.glued["n-balls-move-fig8"]) + 5e-4
+
+
+def test_answers_of_the_live_cradle():
+    """Ratio 0: equal elastic balls exchange velocities; the ratio at which ball 2 is fastest."""
+    v, seen = [1, 0.5, 0, 0], []
+    for contacts in ((0,), (1,), (0, 2), (1,)):
+        for c in contacts:
+            assert v[c] > v[c + 1]
+            v[c : c + 2] = v[c + 1], v[c]
+        seen.append(", ".join(f"{x:g}" for x in v))
+    text = CHAPTER.cells["live-cradle"].source
+    places = [text.index(velocities) for velocities in seen]
+    assert places == sorted(places)
+    assert v == sorted(v)
+    runs = [truth.solve([1] * 4, [1, "0.5", 0, 0], 1, k / 100, number=float) for k in range(51)]
+    best = max(range(51), key=lambda k: runs[k].velocities[1])
+    CHAPTER.tells({"n-balls-fastest-ratio": best / 100})
+    CHAPTER.tells({"n-balls-fastest": float(runs[best].velocities[1])})
+    assert [run.meetings > 0 for run in runs] == [k < best for k in range(51)]
 
 
 def test_the_march_stops_less_than_two_steps_late():
@@ -233,9 +270,9 @@ def test_fig_8_meeting_moves_two_of_ten_sequences():
             np.testing.assert_allclose(ends[-1], exact.velocities, atol=1e-12)
         moved[name] = np.ptp(ends, axis=0).max()
     assert {name for name, size in moved.items() if size > 0} == {"ABCCAB", "BCACBA"}
-    for chapter, name in (CHAPTER, "n-balls-ten-move"), (Chapter("experiments"), "moved"):
+    for chapter, name in (READING, "n-balls-ten-move"), (Chapter("experiments"), "moved"):
         chapter.tells({name: max(moved.values())})
-    lines = [row.split() for row in READING.printed("meeting-cell").splitlines()[2:]]
+    lines = [row.split() for row in READING.printed("meeting-cell").splitlines()[3:]]
     stored = {row[0]: number(row[-1]) for row in lines}
     assert stored == pytest.approx({k: v for k, v in moved.items() if v > 0}, rel=0.02)
     assert READING.glued["n-balls-unmoved"] == "eight"
