@@ -283,7 +283,7 @@ def test_shown_cells_use_no_hidden_name():
 
 
 def test_the_readers_solver_against_the_reference_solver():
-    """Its path is that of the rules; its functions have some fifty lines in all."""
+    """Its path is that of the rules; its functions have some sixty lines in all."""
     names = typed_in()
     rng = np.random.default_rng(77)
     repeated = 0

@@ -97,9 +97,9 @@ def test_right_wrong_and_endless(editor, solver):
     assert sum("solver_python" in url for url in editor.asked) == 1
     # Each wrong line is noticed by the checks that it concerns.
     for right, wrong, passed in (
-        ("min(ratio, bound)", "ratio", 4),
-        ("min(ratio, bound)", "0.0", 1),
-        ("np.square(restitution)", "np.array(restitution)", 2),
+        ("min(a, bound)", "a", 4),
+        ("min(a, bound)", "0.0", 1),
+        ("np.square(e)", "np.array(e)", 2),
     ):
         assert solver.count(right) == 1
         counts = told(editor(solver.replace(right, wrong)), f"{passed} of 5 checks passed")
@@ -123,16 +123,16 @@ def test_right_wrong_and_endless(editor, solver):
         )
     # An error in one check leaves the others; a hint says what may be missing.
     some = solver.replace(
-        "    v = np.array(velocities",
-        "    masses[1] == 2 and masses[7]\n    v = np.array(velocities",
+        "    v = np.array(v, dtype",
+        "    m[1] == 2 and m[7]\n    v = np.array(v, dtype",
     )
     assert told(editor(some), "An error in line") == (4, 0)
     assert tab.locator(".reader-solver li p:has-text('an error: no answer')").count() == 1
     for right, wrong, hint in (
         ("    return push, np", "    push, np", "Is a return missing?"),
         (
-            "    m1, m2, m3 = masses",
-            "    rates(masses, ratio, acting, driver)",
+            "    m1, m2, m3 = m\n",
+            "    rates(m, a, acting, driver)\n",
             "calls itself without end",
         ),
     ):
