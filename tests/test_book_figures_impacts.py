@@ -45,7 +45,7 @@ def in_ratios(r1, r2):
 
 
 def test_fig_patterns_three():
-    for number, (r1, r2) in enumerate(((2.5, 1.0), (1.0, 1.0), (2.5, 0.2))):
+    for number, (r1, r2) in enumerate(((2.5, 1.0), (1.0, 1.0), (2.5, 0.25))):
         v = after((*in_ratios(r1, r2), 0.5), 0.15)
         for ball, line in enumerate(panel("patterns", "fig-patterns-three", number).values()):
             places = 0.6 * ball + np.array([-1.0 * (ball == 0), 0, 2 * v[ball]])
@@ -57,7 +57,7 @@ def eq_44(r2, e=0.5, a=0.15):
 
 
 def test_fig_6_drawn():
-    ax = drawn("patterns")["fig-p6"].axes[0]
+    ax, corner = drawn("patterns")["fig-p6"].axes
     shown = lines(ax)
     r2, r1 = shown["Eq. (44): back impact"].T
     np.testing.assert_allclose(r1, eq_44(r2), rtol=1e-13)
@@ -66,7 +66,7 @@ def test_fig_6_drawn():
     np.testing.assert_allclose(shown["Eq. (46): $v_2^+ = 0$"], [(rest_2, 1.7), (rest_2, 3.2)])
     np.testing.assert_allclose(shown["all three meet"], [(rest_2, 1.7)])
     # The thin borders, from the fourth collision on: the map of turns counts one more below.
-    thin = [x.get_xydata() for x in ax.get_lines() if x.get_color() == "0.35"]
+    thin = [x.get_xydata() for x in corner.get_lines() if x.get_color() == "0.35"]
     assert len(thin) == 7
     for number, line in enumerate(thin, start=4):
         for r2, r1 in line[~np.isnan(line[:, 1])][20::60]:
