@@ -115,7 +115,7 @@ def test_events_are_those_of_the_chapter(still):
     tab = still(chapter="multiple_impacts")
     trace = collide(*chain_of(tab.drawn()))
     told = re.search(r"velocities(.*)m/s", Chapter("multiple_impacts").printed("example-code"))[1]
-    assert [float(v) for v in told.split()] == trace.velocities.round(4).tolist()
+    assert [float(v) for v in told.split()] == trace.velocities.round(3).tolist()
     tab.push("Next hit")
     tab.drawn()
     rows = [
