@@ -51,7 +51,7 @@ def test_the_ratio_of_three_spheres_on_five():
     """The landing page sets it beside five spheres: by our own integration, v1 = -a/(2 - a)."""
     back, *_ = strike([1] * 3, np.eye(3)[0], 1, 0)
     ratio, told = -2 * back / (1 - back), Chapter("intro").glued
-    assert told["spheres"] == f"{ratio:.4f}"
+    assert told["spheres"] == f"{ratio:.3f}"
     five = collide(TOY, ImpulseCorrelation(ratio)).velocities
     shown = re.findall(r"[-\d.]+", told["spheres-five"].replace("−", "-"))
     assert [float(x) for x in shown] == [round(float(v), 2) + 0.0 for v in five]
