@@ -272,7 +272,7 @@ def viscosity_from(
     Raises
     ------
     ValueError
-        If a value is wrong, or a restitution so low (below .62 for spheres) that it takes more
+        If a value is wrong, or a restitution so low (below .624 for spheres) that it takes more
         viscosity than contacts may have.
 
     References
