@@ -12,6 +12,7 @@ from cradle import (
     EnergyDistribution,
     ImpulseCorrelation,
     SequentialCollisions,
+    SpringChain,
     collide,
     paper_chain,
     ratio_table,
@@ -33,7 +34,7 @@ def test_touching_spheres_are_the_energy_law_and_wide_gaps_are_pairs():
 
 
 def test_lean_between_two_balls_at_rest_by_scipy():
-    """A lean of .1 with its constant force; read when both contacts have opened."""
+    """A lean of .1 with its constant force; read when both contacts have opened, and when."""
     from scipy.integrate import solve_ivp
 
     lean, held = 0.1, 0.1**1.5
@@ -49,6 +50,9 @@ def test_lean_between_two_balls_at_rest_by_scipy():
     run = solve_ivp(rate, (0, 9), [0, 0, 0, 1, 0, 0], events=opened, rtol=1e-10, atol=1e-12)
     found = gaps.strike([1] * 3, [1, 0, 0], 1.0, [0, -lean])
     np.testing.assert_allclose(found, run.y[3:, -1], atol=2e-3)
+    law = SpringChain(gaps=[0, -lean])
+    way = collide(Chain([1] * 3, [1, 0, 0]), law)
+    assert way.times[-1] == pytest.approx(run.t[-1], rel=1e-5)
 
 
 @pytest.mark.parametrize("triplet", ["AAA", "ADD", "BCB", "DAC", "CDB"])

@@ -401,6 +401,9 @@ def test_a_closing_of_rounding_size_is_none():
         chain = Chain([1] * n, np.eye(n)[0])
         after = collide(chain, SpringChain(gaps=gap, accuracy=accuracy)).velocities
         np.testing.assert_allclose(after, np.eye(n)[-1], rtol=0, atol=1e-5)
+    way = collide(Chain([1] * 4, [1, 0, 0, 0]), SpringChain(gaps=1.5))
+    two = collide(Chain([1, 1], [1, 0]), SpringChain())
+    np.testing.assert_allclose(way.durations, two.durations[0], rtol=1e-4)  # to the last node
     steel = SpringChain(1e10, gaps=1e-4)
     after = collide(Chain([0.045] * 5, [0.3, 0, 0, 0, 0]), steel).velocities
     np.testing.assert_allclose(after, [0, 0, 0, 0, 0.3], rtol=0, atol=1e-9)

@@ -36,10 +36,16 @@ def idle(c, slow, s):
 
 
 @jit
+def done(c, beside, slow, s, leans):
+    """Tell whether contact c need not be watched: it and one beside it are idle, none leans."""
+    return not leans and idle(c, slow, s) and idle(beside, slow, s)
+
+
+@jit
 def settled(slow, low, high, s):
     """Tell whether all watched contacts are idle, or open and closing too slowly to be noticed."""
     for c in range(low, high):
-        if not idle(c, slow, s) and (s[c].f > 0.0 or s[c].v - s[c + 1].v > slow):
+        if not (idle(c, slow, s) if s[c].f > 0.0 else s[c].v - s[c + 1].v <= slow):
             return False
     return True
 
@@ -305,17 +311,13 @@ def run(n, law, effort, s, clock, record):
             bring(s[low], time - s[low].seen, s[low].v - left, h)
         if lossy:
             kick_lossy(h, low, high, s)
-        if leans:
-            low, high = (0, 0) if parted(n, p, slow, s, clock) else (0, n - 1)
-        else:
-            while low < high and idle(low, slow, s) and idle(min(low + 1, high - 1), slow, s):
-                s[low].seen, s[low].g, s[low].push = time, 0.0, 0.0
-                low += 1
-            while low < high and idle(high - 1, slow, s) and idle(high - 2, slow, s):
-                high -= 1
-                s[high].seen, s[high].g, s[high].push = time, 0.0, 0.0
-            if settled(slow, low, high, s):
-                low = high
+        ended = parted(n, p, slow, s, clock) if leans else settled(slow, low, high, s)
+        while low < high and (ended or done(low, min(low + 1, high - 1), slow, s, leans)):
+            s[low].seen, s[low].g, s[low].push = time, 0.0, 0.0
+            low += 1
+        while low < high and done(high - 1, high - 2, slow, s, leans):
+            high -= 1
+            s[high].seen, s[high].g, s[high].push = time, 0.0, 0.0
         clock.low, clock.high = low, high
         if len(record) > 0:
             put_down(n, s, clock, record)
