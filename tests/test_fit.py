@@ -94,6 +94,7 @@ def good():
         (lambda t: t["after"].__setitem__(0, 0.9), "row 2, column after: set AB, shot 0: ball 1"),
         (lambda t: t["after"].__setitem__(1, 1.2), "gains .* % of its energy"),
         (lambda t: t["after"].__setitem__(3, "x"), "column after = 'x'; must be a number, its"),
+        (lambda t: t["after"].__setitem__(3, True), "column after = True; must be a number, its"),
         (lambda t: t["after"].__setitem__(3, np.nan), "row 4, column after = nan; must be finite"),
         (lambda t: t["ball"].__setitem__(1, 3), r"row 1, column ball: set AB, shot 0 has balls"),
         (lambda t: t["ball"].__setitem__(1, 1.5), "row 2, column ball: 1.5; must be 1, 2"),

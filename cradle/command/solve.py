@@ -33,6 +33,7 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"(mass|velocity)_unit='(\S+)'": r"--\1-unit \2",
     r"\bstiffness=": "--stiffness ",
     r"divide time_scale by 1000": "say --slower 1000",
+    r"see time_scale": "see --slower",
     r"say the unit of the positions": "say --position-unit cm or mm, or px and --scale",
     r"\b(sigma|known)=": r"--\1",
     r"\b(wanted|accuracy|impacts|length|sigma|speed|window) = ": r"--\1 ",

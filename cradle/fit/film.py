@@ -135,6 +135,9 @@ def velocities_from_tracks(
         told = f"window = {tried[0]:.3g} s; the marks bend otherwise than by such a motion: if the "
         told += f"balls hang, {rather if length else 'give their length'}; else give a shorter"
         raise ValueError(f"{told} window{wrong and '; or '}{wrong}")
+    fastest = float(np.abs([found.before, found.after]).max())
+    if length is not None and fastest > 2.0 * np.sqrt(_GRAVITY * length):  # over the top
+        raise ValueError(f"{fastest:.3g} m/s is unlikely; see time_scale")
     if wrong:
         warnings.warn(f"{wrong}: more than chance allows", stacklevel=2)
     ratio = 1.0 if scatter is None else scatter / found.scatter

@@ -101,12 +101,7 @@ def fit_law(
         raise ValueError(f"restitution = {restitution!r} is in ranges, too; leave out one of them")
     spread = scipy.stats.qmc.Halton(count, scramble=False)
     begin = 1.0 + spread.random(whole_number("starts", starts) + 1)[1:]
-    try:
-        return _Search(sets, laws, ranges, known, measured - count).found(begin)
-    except ValueError as reason:
-        raise ValueError(
-            f"inside ranges = {dict(ranges)} is what a law refuses: {reason}"
-        ) from reason
+    return _Search(sets, laws, ranges, known, measured - count).found(begin)
 
 
 @dataclass
@@ -130,10 +125,15 @@ class _Search:
         values, found = {**self.known, **self.numbers(np.round(z, 9))}, []  # none nearly at an end
         e = values.pop("restitution")
         for one in self.sets:
-            model, weight = self.laws[one.name](**values), 1.0 / one.sigma**2
             starts, of = np.unique(one.before, axis=0, return_inverse=True)
-            chains = [Chain(one.masses, before, e) for before in starts]
-            v = np.array([collide(chain, model).velocities for chain in chains])[of.ravel()]
+            try:
+                model = self.laws[one.name](**values)
+                chains = [Chain(one.masses, before, e) for before in starts]
+                v = np.array([collide(chain, model).velocities for chain in chains])[of.ravel()]
+            except ValueError as reason:
+                told = f"inside ranges = {dict(self.ranges)} is what a law refuses"
+                raise ValueError(f"{told}: {reason}") from reason
+            weight = 1.0 / one.sigma**2
             error = np.abs(one.sigma_before / np.where(one.before, one.before, np.inf)).max(axis=1)
             # The factor that makes the sum of squares least, less 1 and over its error.
             gain = (weight * v * (one.after - v)).sum(axis=1) * error

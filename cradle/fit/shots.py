@@ -183,8 +183,8 @@ def _number(where: str, line: dict[str, Any], name: str, units: dict[str, str | 
     """Return the number in a column, in kg or m/s."""
     place = f"{where}, column {name}"
     try:
-        value = float(line[name] if type(line[name]) is not bool else "")
-    except (TypeError, ValueError):
+        value = float(str(line[name]))  # it means what it prints as
+    except ValueError:
         words = f"{line[name]!r}; must be a number, its decimals after a point"
         raise ValueError(f"{place} = {words}") from None
     rule, low = _RULES.get(name, ("must be finite", -np.inf))

@@ -118,12 +118,8 @@ class _Film:
     ) -> None:  # fmt: skip
         t, x = asked.checked("times", times), asked.numbers("positions", positions)
         mask = np.ones(x.shape[1:], bool) if seen is None else np.asarray(seen, bool)
-        fit = (
-            x.ndim == 2
-            and (t.size,) == t.shape == x.shape[:1] != (0,)
-            and mask.shape in (x.shape, x.shape[1:])
-        )
-        if not fit or x.shape[1] < 2:
+        fit = x.ndim == 2 and t.shape == x.shape[:1] and mask.shape in (x.shape, x.shape[1:])
+        if not (fit and t.size and x.shape[1] > 1):
             told = f"times, positions and seen have shapes {t.shape}, {x.shape} and {mask.shape}"
             raise ValueError(f"{told}; must be (K,), (K, N) and (K, N) or (N,), N at least 2")
         asked.refuse_where("times", t, np.diff(t, prepend=-np.inf) <= 0.0, "must rise")
@@ -155,8 +151,7 @@ class _Film:
         rates = np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
         rate = rates[scipy.signal.lombscargle(at, mean - mean.mean(), rates).argmax()]
         self.period = period = self.fixed.get("period", 2.0 * np.pi / rate)
-        rule = "must lie in [0.1, 30]: are times in s"
-        asked.one_number("the period that is seen, s,", period, rule, 0.1, 30.0)
+        asked.one_number("the period that is seen, s,", period, "must lie in [0.1, 30]", 0.1, 30.0)
         self.size = size = float(np.nanmax(np.abs(self.x)))
         early = self.seen & (t <= max(period / 16.0, t[3]))[:, None]
         lines = [np.polyfit(t[some], x[some], 1) if some.sum() > 2 else np.zeros(2)
