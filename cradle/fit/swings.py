@@ -44,12 +44,12 @@ class SwingFit:
 
     def summary(self) -> str:
         """Return all that the fit says, as text."""
-        wide = ", ".join(f"{name} {times:.1f}" for name, times in self.widened.items())
+        wide = ", ".join(f"{name} {times:.1f} times" for name, times in self.widened.items())
         return "\n".join([
             *(f"{one}{UNITS[name] * one.identified}" for name, one in self.estimates.items()),
             f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}, "
             f"reading {self.reading:.2g} m, correlation of residuals {self.correlation:.2f}",
-            *[f"poor fit: intervals are too short, though widened: {wide} times"] * self.poor,
+            *[f"poor fit: intervals are too short, though widened: {wide or 'none'}"] * self.poor,
         ])  # fmt: skip
 
     def __repr__(self) -> str:
@@ -135,7 +135,6 @@ class _Film:
         self.fixed = {"damping": 0.0, "restitution": 1.0, "gaps": 0.0, **known}
         if "period" not in {*self.names, *known}:
             raise ValueError("period is neither free nor known; must be one of them")
-        asked.one_number("known['period']", known.get("period", 1.0), *asked.ABOVE_ZERO)
         asked.one_number("reading", 1.0 if reading is None else reading, *asked.ABOVE_ZERO)
         self.reading = reading
 
@@ -151,7 +150,8 @@ class _Film:
         rates = np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
         rate = rates[scipy.signal.lombscargle(at, mean - mean.mean(), rates).argmax()]
         self.period = period = self.fixed.get("period", 2.0 * np.pi / rate)
-        asked.one_number("the period that is seen, s,", period, "must lie in [0.1, 30]", 0.1, 30.0)
+        name = "known['period']" if "period" in self.fixed else "the period that is seen, s,"
+        asked.one_number(name, period, "must lie in [0.1, 30]", 0.1, 30.0)
         self.size = size = float(np.nanmax(np.abs(self.x)))
         early = self.seen & (t <= max(period / 16.0, t[3]))[:, None]
         lines = [np.polyfit(t[some], x[some], 1) if some.sum() > 2 else np.zeros(2)

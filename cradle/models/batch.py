@@ -182,9 +182,9 @@ def in_order(
 
 def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
     """Return some rows of `array` broadcast to the leading shape."""
-    size = array.shape[-1]
+    size, count = array.shape[-1], rows.stop - rows.start
     if array.size == size:
-        part = np.repeat(array.reshape(1, size), rows.stop - rows.start, axis=0)
+        part = array.reshape(1, size) if count == 1 else array.reshape(1, size).repeat(count, 0)
     elif array.shape[:-1] == lead and array.flags.c_contiguous:
         part = array.reshape(-1, size)[rows]
     else:
