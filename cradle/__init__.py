@@ -21,12 +21,12 @@ from cradle.advice.choice import Recommendation, recommend
 from cradle.chain import Chain
 from cradle.models import Model, collide
 from cradle.models.batch import Outcomes, outcomes, post_impact_velocities
-from cradle.models.compliant import SpringChain, spring_outcomes, spring_velocities, viscosity_from
+from cradle.models.compliant import SpringChain, spring_outcomes, spring_velocities
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
 from cradle.models.sequential import FusedChain, SequentialCollisions
-from cradle.models.speed import ConstantLoss, SpeedDependent, ViscousLoss
+from cradle.models.speed import ConstantLoss, SpeedDependent, ViscousLoss, viscosity_from
 from cradle.models.springs import TimedTrace
 from cradle.runtime.job import warm_up
 from cradle.swinging.pendulums import Pendulums

@@ -39,8 +39,8 @@ def test_what_is_no_chain(model):
     [
         "SequentialCollisions(order='right', max_events=5000000)",
         "FusedChain()",
-        "SpringChain(stiffness=(1.0, 2.0), exponent=1.0, viscosity=0.0, gaps=0.0, accuracy=1e-09, "
-        "max_steps=20000000)",
+        "SpringChain(stiffness=(1.0, 2.0), exponent=1.0, viscosity=0.0, gaps=0.0, "
+        "damping='viscoelastic', accuracy=1e-09, max_steps=20000000)",
         "EnergyDistribution(stiffness=(1.0, 2.0), exponent=1.0, gaps=True, "
         "rtol=1e-09, max_evaluations=1000000)",
         "QuadraticDissipation(coefficients=(1.0, 2.0), distance=3.0, max_problems=10000)",

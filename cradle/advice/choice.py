@@ -11,10 +11,11 @@ from cradle.advice.measured import LAWS, evidence, measured_chain, rows
 from cradle.chain import Chain
 from cradle.input.values import ArrayLike, must_be, one_number, one_of, whole_number
 from cradle.models import Model
-from cradle.models.compliant import SpringChain, viscosity_from
+from cradle.models.compliant import SpringChain
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.energy import EnergyDistribution
 from cradle.models.sequential import SequentialCollisions
+from cradle.models.speed import viscosity_from
 
 WANTED = ("velocities", "impulses", "path", "forces", "times", "fastest ball")
 

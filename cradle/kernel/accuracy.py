@@ -38,7 +38,7 @@ OFTEN, LONG = 4.0, 30.0
 TRIALS = 16  # runs of a chain, each finer than the one before
 DAMPED = 0.5  # step times A times the square of a frequency, at most
 SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
-LONGEST = 0.3  # A, in contact times
+LONGEST, MOST_HUNT = 0.3, 0.9  # A, in contact times, and in one over the closing speed
 TINY = 1e-300  # the least depth, and one over the largest
 # The widest gap and the narrowest, in depths; the widest whose last digit is below this accuracy.
 WIDEST, NARROWEST, BLURRED = 1e9, 1e-12, 1e13
@@ -83,21 +83,23 @@ def measure(n, chain, law, s, clock):
         refuse(True, QUICK, at, clock)
         return
     widest = min(WIDEST, BLURRED * law.accuracy)
-    rate = clock.speed / clock.length
+    rate = clock.speed if law.hunt else clock.speed / clock.length
+    longest = MOST_HUNT if law.hunt else LONGEST
     total = mean = 0.0
     clock.lossy = clock.leans = 0.0
     for i in range(n):
         a = s[i]
         refuse(m[i] < SMALLEST * heavy, LIGHT, i, clock)
         a.w, a.start = clock.mass / m[i], (v[i] - v[at]) / clock.speed
-        a.k = a.loss = a.lean = 0.0
+        a.k = a.loss = a.early = a.lean = 0.0
         total += m[i]
         mean += m[i] * a.start
         if i < n - 1:
             refuse(chain.k[i] < SMALLEST * hard, SOFT, i, clock)
             a.k = chain.k[i] / chain.k[at]
             a.loss, a.lean = chain.loss[i] * rate, -chain.gap[i] / clock.length
-            refuse(a.loss > LONGEST, LATE, i, clock)
+            a.early = 0.0 if law.hunt else p * a.loss
+            refuse(a.loss > longest, LATE, i, clock)
             refuse(-a.lean > widest, WIDE, i, clock)
             refuse(a.lean != 0.0 and abs(a.lean) < NARROWEST, NARROW, i, clock)
             refuse(a.lean > 1.0, DEEP, i, clock)
@@ -230,7 +232,7 @@ def follow(begun, resumed, n, chains, law, out, s, clocks, record, effort):
             aim(n, law, s, clock)
             if len(record) > 0:
                 clock.h = out.h[k]
-            begin(n, law.p, s, clock, record)
+            begin(n, law.p, law.hunt, s, clock, record)
         status, more = FINISHED, clock.high > 0
         while more:
             status, effort = run(n, law, effort, s, clock, record)
@@ -245,14 +247,14 @@ def follow(begun, resumed, n, chains, law, out, s, clocks, record, effort):
             if more and clock.trial == TRIALS:
                 status, more = UNFINISHED, False
             elif more:
-                begin(n, law.p, s, clock, record)
+                begin(n, law.p, law.hunt, s, clock, record)
         resumed = False
         put_down(n, s, clock, record)
         for i in range(n):
             out.v[k][i] = v[i] + clock.speed * (s[i].after - s[i].start)
         out.error[k], out.h[k], out.steps[k] = clock.error, clock.h, clock.effort
-        if status == UNFINISHED:
-            return k, UNFINISHED
+        if status != FINISHED:
+            return k, status
         clock.defect = defect_of(n, law, s, clock)
         if clock.defect > 0:
             return k, UNSOUND

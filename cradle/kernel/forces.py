@@ -6,9 +6,9 @@ after the impact exact to h^4, at very small steps to h^3.5:
     the kick     the sum of the kicks is the integral of the force along the path y, and the nodes
                  follow x = y - h^2/12 dv/dt: so the force is that at x + h^2/12 dv/dt, by its slope
     the kink     what a contact that closes or opens owes to the sum is given back (`kinks`)
-    the losses   A df/dt has the impulse A f, whatever happens on the way: a velocity v + b, b that
-                 of the impulses A f, feels f alone, and y has the sum of b as well; a cubic through
-                 the last nodes tells where f + A df/dt begins and ends
+    the losses   dj/dt has the impulse j, whatever happens on the way: a velocity v + b, b that of
+                 the impulses j, feels f alone, and y has the sum of b as well; a cubic through the
+                 last nodes tells where f + dj/dt begins and ends
 
 Takahashi and Imada, J. Phys. Soc. Jpn. 53 (1984) 3765; Rowlands, J. Comput. Phys. 97 (1991) 235.
 """
@@ -16,13 +16,14 @@ Takahashi and Imada, J. Phys. Soc. Jpn. 53 (1984) 3765; Rowlands, J. Comput. Phy
 import math
 
 from cradle.kernel.kinks import FAINT, grade, pay
-from cradle.kernel.state import FINISHED, PAUSED, UNFINISHED, apart, jit
+from cradle.kernel.state import FINISHED, PAUSED, REFUSED, UNFINISHED, apart, jit
 
 # A run begins, and a flight ends, so many steps before the first node that is to find a contact
 # closed: there a closing owes least to the next order.
 AHEAD = 0.8
 # Speed below which a contact rests while others are pulled back, whatever the accuracy.
 REST = 1e-7
+PULLS = 9  # why a chain is refused on its way, after the rules of `accuracy`
 
 
 @jit
@@ -96,23 +97,35 @@ def step(p, h, low, high, s):
 
 
 @jit
-def drift_lossy(p, h, low, high, s):
+def drop(p, hunt, a):
+    """Work out the impulse of a contact's losses, and its slope."""
+    if hunt:
+        a.spent, a.grip = a.loss * (a.f * a.y - a.pull * a.lean) / (p + 1.0), a.loss * a.f
+    else:
+        a.spent, a.grip = a.loss * (a.f - a.pull), a.loss * a.g
+    a.held = a.spent
+
+
+@jit
+def drift_lossy(p, hunt, h, low, high, s):
     """Drift with losses, to where a cubic has the node; return as `step`."""
     kinks = 0
     top = steep = 0.0
     for c in range(low, high):
         a = s[c]
         a.d += h * (a.v - s[c + 1].v)
-        early = a.loss * p / h
         a.before, a.jerk = a.y - a.last + (2.0 * a.bend + a.bent) / 6.0, a.bend - a.bent
         a.last, a.bent = a.y, a.bend
         move = a.before + a.bend + 0.5 * a.jerk
         new = a.y + a.before + 0.5 * a.bend + a.jerk / 6.0
-        f, g = push(p, a, new, move, early)
+        f, g = push(p, a, new, move, a.early / h)
+        if hunt and f > 0.0 and h + a.loss * move < 0.0:
+            return -1 - c, top  # it would pull
         if (f > 0.0) != (a.f > 0.0):
             s[kinks].kink = c
             kinks += 1
         a.f, a.g, a.push, a.move, a.y = f, g, f - a.pull, move, new
+        drop(p, hunt, a)
         top = max(top, (steep + g) * a.w)
         steep = g
     return kinks, max(top, steep * s[high].w)
@@ -126,13 +139,14 @@ def kick_lossy(h, low, high, s):
         force = impulse = rate = dv = b = db = 0.0
         for c in range(low, high + 1):
             z = s[c]
-            f, j, r = z.push, z.loss * z.push, z.loss * z.g * z.move / h
+            f, j, r = z.push, z.held, z.grip * z.move / h
             gain, hold, more = (force - f) * z.w, (impulse - j) * z.w, (rate - r) * z.w
             if c > low:
                 a = s[c - 1]
                 grown, held = dv - gain, b - hold
                 a.lag = 0.5 * h * held + part * (grown - (db - more))
-                a.push = a.f - a.pull + a.g * (a.d + a.lag - a.y)
+                late = a.d + a.lag - a.y
+                a.push, a.held = a.f - a.pull + a.g * late, a.spent + a.grip * late
                 a.move = h * (a.v - z.v + 0.5 * h * grown + held)
                 a.bend = h * h * (grown + db - more)
             force, impulse, rate, dv, b, db = f, j, r, gain, hold, more
@@ -141,18 +155,24 @@ def kick_lossy(h, low, high, s):
         a = s[c]
         a.y = a.d + a.lag
         a.v += h * (force - a.push) * a.w
-        move = h * (impulse - a.loss * a.push) * a.w
+        move = h * (impulse - a.held) * a.w
         if c > low:
             s[c - 1].d += moved - move
-        force, impulse, moved = a.push, a.loss * a.push, move
+        force, impulse, moved = a.push, a.held, move
 
 
 @jit
 def bring(a, time, u, h):
     """Let the balls of an open contact fly freely for this time, at this closing speed."""
     a.d += time * u
-    a.f = a.g = a.push = a.lag = a.bend = a.bent = 0.0
+    a.f = a.g = a.push = a.held = a.grip = a.lag = a.bend = a.bent = 0.0
     a.y, a.last = a.d, a.d - h * u
+
+
+@jit
+def leave(a, time):
+    """Watch a contact no more."""
+    a.seen, a.g, a.push, a.held, a.grip = time, 0.0, 0.0, 0.0, 0.0
 
 
 @jit
@@ -174,7 +194,7 @@ def fly(h, low, high, s):
 
 
 @apart
-def begin(n, p, s, clock, record):
+def begin(n, p, hunt, s, clock, record):
     """Go back to the start; there the sums owe h^2/12 times the rates of forces."""
     clock.low, clock.high, clock.steps, clock.row = n, 0, 0, 0
     clock.top = clock.time = 0.0
@@ -185,6 +205,7 @@ def begin(n, p, s, clock, record):
         a.push = a.move = a.lag = a.seen = a.bend = a.bent = 0.0
         a.f, a.g = push(p, a, a.d, 1.0, 0.0)
         a.pull, a.kinks = a.f, 0
+        drop(p, hunt, a)
         if i < n - 1 and a.v > s[i + 1].start:
             clock.low = min(clock.low, i)
             clock.high = i + 1
@@ -204,10 +225,10 @@ def begin(n, p, s, clock, record):
             a.y, a.last = a.d, a.d - clock.h * u
         f = a.g * u if a.f > 0.0 else 0.0
         a.v += part * a.w * (force - f)
-        more = a.w * (impulse - a.loss * f)
+        more = a.w * (impulse - a.grip * u)
         if i > 0:
             s[i - 1].d += part * (db - more)
-        force, impulse, db = f, a.loss * f, more
+        force, impulse, db = f, a.grip * u, more
 
 
 @apart
@@ -227,7 +248,7 @@ def put_down(n, s, clock, record):
 
 
 @apart
-def parted(n, p, slow, s, clock):
+def parted(n, slow, s, clock):
     """Tell whether in this step all contacts were open or at rest, and none closing; go back there.
 
     Then the pulls end.  Until then they alone act, so that balls fly at constant accelerations.
@@ -242,21 +263,21 @@ def parted(n, p, slow, s, clock):
         swings = swings or (a.f > 0.0 and not idle(i, min(slow, REST), s))
         push = a.f - a.pull
         a.dv = a.w * (before - push)
-        a.free = a.v + a.w * (held - a.loss * push) - 0.5 * h * a.dv
-        before, held = push, a.loss * push
+        a.free = a.v + a.w * (held - a.spent) - 0.5 * h * a.dv
+        before, held = push, a.spent
     for c in range(n - 1):
         a = s[c]
         if a.f > 0.0:
             continue
         u, gain = a.free - s[c + 1].free, a.dv - s[c + 1].dv
         y = a.y if clock.lossy else a.d + h * h / 12.0 * gain
-        y, rate = y + p * a.loss * u, u + p * a.loss * gain
+        y, rate = y + a.early * u, u + a.early * gain
         root = rate * rate - 2.0 * gain * y
         # What still swings goes on, while one that is pulled comes back.
         shut = y > 0.0 and not (root > 0.0 and rate > 0.0)
         if shut or (u > 0.0 and gain <= 0.0) or (swings and gain > 0.0):
             return False
-        # It opened where d + p A u was 0, and may by now be closed again.
+        # It opened where d + p A u was 0 (or d), and may by now be closed again.
         if root > 0.0 and gain > 0.0:
             late = min(late, (rate + math.sqrt(root)) / gain)
         elif root > 0.0 and math.sqrt(root) > rate:
@@ -296,7 +317,10 @@ def run(n, law, effort, s, clock, record):
         time = clock.time
         left, right = s[low].v, s[high].v
         if lossy:
-            kinks, stiff = drift_lossy(p, h, low, high, s)
+            kinks, stiff = drift_lossy(p, law.hunt, h, low, high, s)
+            if kinks < 0:
+                clock.rule, clock.place = PULLS, -1 - kinks
+                return REFUSED, effort
         else:
             kinks, stiff = step(p, h, low, high, s)
         if kinks > 0:
@@ -311,13 +335,13 @@ def run(n, law, effort, s, clock, record):
             bring(s[low], time - s[low].seen, s[low].v - left, h)
         if lossy:
             kick_lossy(h, low, high, s)
-        ended = parted(n, p, slow, s, clock) if leans else settled(slow, low, high, s)
+        ended = parted(n, slow, s, clock) if leans else settled(slow, low, high, s)
         while low < high and (ended or done(low, min(low + 1, high - 1), slow, s, leans)):
-            s[low].seen, s[low].g, s[low].push = time, 0.0, 0.0
+            leave(s[low], time)
             low += 1
         while low < high and done(high - 1, high - 2, slow, s, leans):
             high -= 1
-            s[high].seen, s[high].g, s[high].push = time, 0.0, 0.0
+            leave(s[high], time)
         clock.low, clock.high = low, high
         if len(record) > 0:
             put_down(n, s, clock, record)

@@ -1,10 +1,12 @@
 """Balls on springs: their records, what they push with, what a kink owes to a sum over steps.
 
-A contact pushes with f = k d^p while its compression d is above zero; with losses with f + A df/dt
-while that is above zero.  A sum over nodes differs from the integral of tau^p by
-h^(p + 1) zeta(-p, theta), theta the part of a step between the kink and its first node.
+A contact pushes with f = k d^p while its compression d is above zero; with losses with f + dj/dt
+while that is above zero: j = A f, or by Hunt and Crossley A f d/(p + 1).  A sum over nodes differs
+from the integral of tau^p by h^(p + 1) zeta(-p, theta), theta the part of a step between the kink
+and its first node.
 
-Kuwabara and Kono, Jpn. J. Appl. Phys. 26 (1987) 1230; Navot, J. Math. and Phys. 40 (1961) 271.
+Kuwabara and Kono, Jpn. J. Appl. Phys. 26 (1987) 1230; Hunt and Crossley, J. Appl. Mech. 42 (1975)
+440; Navot, J. Math. and Phys. 40 (1961) 271.
 """
 
 import math
@@ -22,7 +24,8 @@ class Link:
     lean: float  # compression before the impact
     v: float  # velocity between two nodes; with losses, less that of the impulses A f
     k: float  # stiffness
-    loss: float  # A
+    loss: float  # A,
+    early: float  # and p A, so long before d is zero they open it; 0 by Hunt and Crossley
     pull: float  # force that presses the contact together at rest, all the time
     d: float  # compression at a node, as the drifts have it; below zero a gap
     f: float  # force at the node,
@@ -36,6 +39,9 @@ class Link:
     jerk: float  # and what is between the two
     lag: float  # what y is more than `d`,
     push: float  # force less the pull, corrected; none if the contact is not watched
+    spent: float  # impulse j of the losses at a node, as that of the force alone, more than at rest
+    held: float  # and corrected,
+    grip: float  # and dj/dd
     dv: float  # if pulls alone act: acceleration,
     free: float  # and velocity at the node
     seen: float  # time at which the contact was last looked at
@@ -69,6 +75,7 @@ class Law(NamedTuple):
     accuracy: float
     most: float  # steps of a run
     once: bool = False  # stop when all contacts are open that were not
+    hunt: bool = False  # losses by Hunt and Crossley
 
 
 class Clock:
@@ -140,13 +147,12 @@ def zetas(p, theta):
 
 
 @apart
-def crossing(p, h, k, loss, closes, theta, move):
+def crossing(p, h, k, early, closes, theta, move):
     """Return the kick and the shift that a kink owes a contact: an impulse, and that times a time.
 
     It closes theta steps before this node, or reaches d = 0 theta steps after the last one, by
     `move` a step.  With losses its force ends at d = `early` moves, and the rest of A f at once.
     """
-    early = loss * p / h
     unit = h * k * move * grade(p, move)
     one, two = zetas(p, theta)
     if closes:
@@ -208,25 +214,25 @@ def pay(n, p, h, kinks, slow, lossy, s):
         a = s[c]
         a.kinks += 1
         move, left, right = a.move, a.w, s[c + 1].w
-        again, d, loss, early, at, end, slant = False, a.d, 0.0, 0.0, 0.0, 0.0, 0.0
+        again, d, early, at, end, slant = False, a.d, 0.0, 0.0, 0.0, 0.0
         if lossy:
-            d, move, loss, early = a.y, a.y - a.last, a.loss, a.loss * p / h
-            again = a.f > 0.0 and a.last > 0.0 and a.before < 0.0 and loss > 0.0
-            if again or (a.f == 0.0 and loss > 0.0):
+            d, move, early = a.y, a.y - a.last, a.early / h
+            again = a.f > 0.0 and a.last > 0.0 and a.before < 0.0 and early > 0.0
+            if again or (a.f == 0.0 and early > 0.0):
                 at, end, slant = turning(a, early)
         j = x = 0.0
         if again and end > 0.0:
             j, x = resumed(p, h, a, 1.0 - at, end, slant)
-        elif loss == 0.0 and h * a.k * abs(move) * grade(p, abs(move)) * (left + right) <= slow:
+        elif early == 0.0 and h * a.k * abs(move) * grade(p, abs(move)) * (left + right) <= slow:
             continue
         elif a.f == 0.0 and end > 0.0 and slant < 0.0:
-            j, x = crossing(p, h, a.k, loss, False, max(at - end / slant, 0.0), -slant)
+            j, x = crossing(p, h, a.k, early, False, max(at - end / slant, 0.0), -slant)
         elif a.f == 0.0 and move < 0.0:
-            j, x = crossing(p, h, a.k, loss, False, max(1.0 - d / move, 0.0), -move)
+            j, x = crossing(p, h, a.k, early, False, max(1.0 - d / move, 0.0), -move)
         elif a.f > 0.0 and move > 0.0:
             theta, unit = min(max(d / move, 0.0), 1.0), h * a.k * grade(p, move)
-            j, x = crossing(p, h, a.k, loss, True, theta, move)
-            if loss == 0.0:
+            j, x = crossing(p, h, a.k, early, True, theta, move)
+            if a.loss == 0.0:
                 j += h * move * unit * unit * (left + right) * echo(p, theta)
         a.v -= j * left
         s[c + 1].v += j * right

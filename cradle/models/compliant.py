@@ -1,6 +1,5 @@
 """Chains of springs: the contact forces, and the one model here that has a time."""
 
-import functools
 import math
 import threading
 from collections.abc import Sequence
@@ -13,7 +12,6 @@ from numpy.typing import ArrayLike
 from cradle.chain import Chain
 from cradle.input import values as asked
 from cradle.input.values import Vector
-from cradle.kernel.accuracy import LONGEST
 from cradle.kernel.kinks import Law, Springs
 from cradle.models.batch import in_order, rows_of, shaped
 from cradle.models.energy import fastest
@@ -28,7 +26,8 @@ _RULES = {
     "viscosity": ("must be at least 0", 0.0, np.inf, False),
     "gaps": ("must be finite", -np.inf, np.inf, False),
 }
-# and of the whole chain.
+# and of the whole chain; the laws of loss.
+DAMPING = "viscoelastic", "hunt-crossley"
 _EXPONENT = "must lie in [1, 10]", 1.0, 10.0
 _ACCURACY = f"must lie in [{FINEST:g}, {COARSEST:g}]", FINEST, COARSEST
 _CHUNK = 2048  # chains at once
@@ -44,7 +43,7 @@ class SpringChain:
 
     Parameters
     ----------
-    stiffness, exponent, viscosity, gaps, accuracy
+    stiffness, exponent, viscosity, gaps, damping, accuracy
         As for `spring_velocities`, of one chain; times and forces need the stiffness.
     max_steps : int
         Steps of one run after which the impact is given up.
@@ -69,6 +68,7 @@ class SpringChain:
     exponent: float = 1.5
     viscosity: float | Sequence[float] = field(default=0.0, kw_only=True)
     gaps: float | Sequence[float] = field(default=0.0, kw_only=True)
+    damping: str = field(default=DAMPING[0], kw_only=True)
     accuracy: float = field(default=1e-9, kw_only=True)
     max_steps: int = field(default=MOST_STEPS, kw_only=True)
 
@@ -77,6 +77,7 @@ class SpringChain:
         vars(self)["accuracy"] = asked.one_number("accuracy", self.accuracy, *_ACCURACY)
         for name, rules in _RULES.items():
             vars(self)[name] = asked.number_or_row(name, getattr(self, name), "N - 1", *rules)
+        asked.one_of("damping", self.damping, DAMPING)
         vars(self)["max_steps"] = asked.whole_number("max_steps", self.max_steps)
 
     def solve(self, chain: Chain, *, once: bool = False, progress: bool = False) -> TimedTrace:
@@ -88,7 +89,8 @@ class SpringChain:
         contacts = (asked.row_of(name, getattr(self, name), n - 1, n) for name in _RULES)
         # As arrays that may be written to: else all would be compiled a second time.
         row = Springs(*(row[None].copy() for row in (chain.masses, chain.velocities, *contacts)))
-        out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps), once)
+        hunt = self.damping == DAMPING[1]
+        out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps), once, hunt)
         if progress:
             from tqdm import tqdm
 
@@ -98,7 +100,7 @@ class SpringChain:
             found = solve(row, law, out)
         _, status, clock = found
         if status == REFUSED:
-            raise refused(clock, self.accuracy, [], row)
+            raise refused(clock, law, [], row)
         if status == UNSOUND:
             raise ImpactNotCertified(chain, self, DEFECTS[int(clock["defect"])])
         if status == UNFINISHED:
@@ -128,14 +130,15 @@ class SpringChain:
 def spring_velocities(
     masses: ArrayLike, velocities: ArrayLike, stiffness: ArrayLike = 1.0, *,
     exponent: float = 1.5, viscosity: ArrayLike = 0.0, gaps: ArrayLike = 0.0,
-    accuracy: float = 1e-3, progress: bool = False,
+    damping: str = DAMPING[0], accuracy: float = 1e-3, progress: bool = False,
 ) -> Vector:  # fmt: skip
     """Post-impact velocities of many chains of balls on springs; leading axes broadcast.
 
     `spring_outcomes` has the estimated errors, too.
     Each contact pushes with k (d^p + A d(d^p)/dt) while that is above zero, d its compression:
-    p = 1 is a linear spring, p = 3/2 the contact of two spheres, elastic or viscoelastic.  The
-    velocities depend on the ratios of the stiffnesses alone where there are no losses and gaps.
+    p = 1 is a linear spring, p = 3/2 the contact of two spheres, elastic or viscoelastic; or, as
+    Hunt and Crossley have it, with k d^p (1 + A dd/dt).  The velocities depend on the ratios of the
+    stiffnesses alone where there are no losses and gaps.
 
     Parameters
     ----------
@@ -148,6 +151,8 @@ def spring_velocities(
         with a pull that acts until no contact pushes and no open one closes.
     exponent : float
         p, from 1 to 10.
+    damping : {"viscoelastic", "hunt-crossley"}
+        The law of the losses; the latter's A is in s/m, at most .9 over the fastest closing.
     accuracy : float
         Largest estimated error of a velocity over the fastest closing speed, 1e-12 to 0.02.
     progress : bool
@@ -182,14 +187,14 @@ def spring_velocities(
     """
     return spring_outcomes(
         masses, velocities, stiffness, exponent=exponent, viscosity=viscosity, gaps=gaps,
-        accuracy=accuracy, progress=progress,
+        damping=damping, accuracy=accuracy, progress=progress,
     )[0]  # fmt: skip
 
 
 def spring_outcomes(
     masses: ArrayLike, velocities: ArrayLike, stiffness: ArrayLike = 1.0, *,
     exponent: float = 1.5, viscosity: ArrayLike = 0.0, gaps: ArrayLike = 0.0,
-    accuracy: float = 1e-3, progress: bool = False,
+    damping: str = DAMPING[0], accuracy: float = 1e-3, progress: bool = False,
 ) -> tuple[Vector, Vector]:  # fmt: skip
     """Velocities, m/s, shape (..., N), and estimated errors of many chains of balls on springs.
 
@@ -206,11 +211,13 @@ def spring_outcomes(
     accuracy = asked.one_number("accuracy", accuracy, *_ACCURACY)
     given = {"masses": masses, "velocities": velocities, "stiffness": stiffness}
     given |= {"viscosity": viscosity, "gaps": gaps}
+    asked.one_of("damping", damping, DAMPING)
     arrays, lead = shaped(given, (0, 0, 1, 1, 1))
     n, count = arrays[0].shape[-1], math.prod(lead)
     if count == 0:
         check_rows(arrays)
-    law, out, error = Law(p, accuracy, float(MOST_STEPS)), np.empty((count, n)), np.empty(count)
+    law = Law(p, accuracy, float(MOST_STEPS), False, damping == DAMPING[1])
+    out, error = np.empty((count, n)), np.empty(count)
 
     def run_chunk(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
         """Solve the chunk of chains that begins there; return how it ended, and where."""
@@ -228,10 +235,11 @@ def spring_outcomes(
         place = [int(k) for k in np.unravel_index(at, lead)]
         _, status, clock = solve(row, law, room(1, n))
         if status == REFUSED:
-            raise refused(clock, accuracy, place, row)
+            raise refused(clock, law, place, row)
         # Alone, it stops where it stopped here, and raises.
         m, v, k, loss, gap = (values[0] for values in row)
-        model, chain = SpringChain(k, p, viscosity=loss, gaps=gap, accuracy=accuracy), Chain(m, v)
+        more: dict[str, Any] = {"viscosity": loss, "gaps": gap, "damping": damping}
+        model, chain = SpringChain(k, p, accuracy=accuracy, **more), Chain(m, v)
         model.solve(chain)
         raise ImpactNotCertified(chain, model, "among others it fails, alone it does not")
     return out.reshape(*lead, n), error.reshape(lead)
@@ -242,82 +250,3 @@ def check_rows(arrays: Sequence[Vector]) -> None:
     asked.refuse_overflow(asked.checked("velocities", arrays[1]), asked.checked_masses(arrays[0]))
     for (name, rules), values in zip(_RULES.items(), arrays[2:], strict=True):
         asked.checked(name, values, *rules)
-
-
-def viscosity_from(
-    restitution: ArrayLike, *, speed: float, masses: ArrayLike,
-    stiffness: float | Sequence[float] = 1.0, exponent: float = 1.5,
-) -> Vector:  # fmt: skip
-    """Viscosity of contacts whose pairs of balls, alone, have a restitution at a stated speed.
-
-    Viscous balls lose more the faster they close (unless p = 1), so a restitution belongs to one
-    speed.  In a contact's own unit of time it depends on the viscosity alone, which is sought.
-
-    Parameters
-    ----------
-    restitution : float or sequence, length N - 1
-        Speed at which each pair of neighbours parts, over `speed`.
-    speed : float
-        Closing speed, m/s, above 0.
-    masses : array_like, shape (N,)
-        kg.
-    stiffness, exponent
-        As for `spring_velocities`, of one chain.
-
-    Returns
-    -------
-    ndarray, shape (N - 1,)
-        A, s, as `SpringChain` and `spring_velocities` take it.
-
-    Raises
-    ------
-    ValueError
-        If a value is wrong, or a restitution so low (below .624 for spheres) that it takes more
-        viscosity than contacts may have.
-
-    References
-    ----------
-    Ramirez, Poeschel, Brilliantov and Schwager, Phys. Rev. E 60 (1999) 4465-4472.
-
-    Examples
-    --------
-    Steel balls of 45 g that part from each other with 97 % of .3 m/s:
-
-    >>> viscosity_from(0.97, speed=0.3, masses=[0.045] * 3, stiffness=1e10).round(9)
-    array([4.93e-07, 4.93e-07])
-    """
-    from scipy.optimize import brentq
-
-    given, law = asked.numbers("masses", masses), SpringChain(stiffness, exponent)
-    m = Chain(given, np.zeros(given.shape)).masses
-    u = asked.one_number("speed", speed, *asked.ABOVE_ZERO)
-    p, n = law.exponent, len(m)
-    least = parting(LONGEST, p)
-    rule = f"must lie in [{least:.3f}, 1], from what the most viscosity leaves to none"
-    kept = asked.number_or_row("restitution", restitution, "N - 1", rule, least, 1.0)
-    e = asked.row_of("restitution", kept, n - 1, n)
-    k = asked.row_of("stiffness", law.stiffness, n - 1, n)
-    own = [
-        brentq(lambda a, x=x: parting(a, p) - x, 0.0, LONGEST, xtol=1e-12)
-        for x in np.minimum(e, parting(0.0, p))  # which is 1, but for rounding
-    ]
-    mass = m[:-1] / (m[:-1] + m[1:]) * m[1:]
-    depth = np.exp((np.log(mass) + 2.0 * np.log(u) - np.log(k)) / (p + 1.0))
-    return np.asarray(own * depth / u)
-
-
-@functools.cache
-def parting(viscosity: float, exponent: float) -> float:
-    """Return the speed at which two balls part that close with 1, in their own units."""
-    # Their compression d has d'' = -d**(p - 1) (d + A p d'), until that would pull.
-    from scipy.integrate import solve_ivp
-
-    def opens(_: float, state: Any) -> float:
-        return float(state[0] + viscosity * exponent * state[1])
-
-    def course(_: float, state: Any) -> Any:
-        return state[1], -(max(state[0], 0.0) ** (exponent - 1.0)) * opens(_, state)
-
-    vars(opens).update(terminal=True, direction=-1.0)
-    end = solve_ivp(course, (0.0, 20.0), [0.0, 1.0], "DOP853", events=opens, rtol=1e-11, atol=1e-12)
-    return float(-end.y[1, -1])

@@ -8,6 +8,7 @@ import numpy as np
 
 from cradle.input.values import Vector, refusal
 from cradle.kernel import accuracy as limits
+from cradle.kernel.forces import PULLS
 from cradle.kernel.kinks import Law, Motions, Springs
 from cradle.models.energy import EnergyTrace
 from cradle.runtime.springs import solve
@@ -17,17 +18,21 @@ from cradle.trace import Event
 FINEST, COARSEST, MOST_STEPS = 1e-12, 0.02, 20_000_000
 
 
-def refused(clock: Any, accuracy: float, place: Sequence[int], chain: Springs) -> ValueError:
+def refused(clock: Any, law: Law, place: Sequence[int], chain: Springs) -> ValueError:
     """Return the error that says why the kernel refuses a chain, one of a batch at this place."""
     of, most = "the depth of the fastest closing", limits.LONGEST * clock["length"] / clock["speed"]
     late = f"must be at most {most:.3g} s, {limits.LONGEST} of the depth over the speed"
-    widest = min(limits.WIDEST, limits.BLURRED * accuracy)
+    if law.hunt:
+        part = limits.MOST_HUNT
+        late = f"must be at most {part / clock['speed']:.3g} s/m, {part} over the speed"
+    widest = min(limits.WIDEST, limits.BLURRED * law.accuracy)
     least = f"must be at least {limits.SMALLEST} of the"
     name, values, words = {
         limits.LIGHT: ("masses", chain.m, f"{least} heaviest ball of its chain"),
         limits.SOFT: ("stiffness", chain.k, f"{least} stiffest contact of its chain"),
         limits.QUICK: ("stiffness", chain.k, "its time is beyond floats: choose other units"),
         limits.LATE: ("viscosity", chain.loss, f"{late} of the fastest closing"),
+        PULLS: ("viscosity", chain.loss, "must be lower: this contact would pull"),
         limits.WIDE: ("gaps", chain.gap, f"must be at most {widest:g} times {of} at this accuracy"),
         limits.NARROW: ("gaps", chain.gap, f"must be 0, or {limits.NARROWEST} of {of}"),
         limits.DEEP: ("gaps", chain.gap, f"must be a lean of at most {of}"),
@@ -143,8 +148,8 @@ class Path:
         pages = np.concatenate(record)
         #: The units.
         self.mass, self.speed, self.length = (float(clock[x]) for x in ("mass", "speed", "length"))
-        h, loss = clock["h"], chain.loss[0] * (self.speed / self.length)
-        self.p, self.w, self.early = law.p, self.mass / chain.m[0], law.p * loss
+        h, loss = clock["h"], chain.loss[0] * self.speed / (1.0 if law.hunt else self.length)
+        self.p, self.w, self.early = law.p, self.mass / chain.m[0], (not law.hunt) * law.p * loss
         self.k = chain.k[0] / clock["stiffness"]
         #: Velocities after the impact.
         self.last, pages = pages[-1, 1], pages[:-1]
@@ -157,13 +162,17 @@ class Path:
         push = np.where(self.closed, self.pushes(self.y), 0.0)
         slope = self.p * push / np.where(push > 0.0, self.y, 1.0)
         held = push - pull
+        spent, grip = loss * held, loss * slope
+        if law.hunt:
+            spent, grip = loss / (self.p + 1.0) * (push * self.y - pull * y[0]), loss * push
         v[1:] -= 0.5 * h * self.driven(held[1:])
-        v = v + self.driven(loss * held)
-        rate = slope * (v[:, :-1] - v[:, 1:])
+        v = v + self.driven(spent)
+        u = v[:, :-1] - v[:, 1:]
+        rate, damping = slope * u, grip * u
         v[1:] -= h**2 / 12.0 * self.driven(rate)[1:]
         #: Velocities, accelerations, forces.
-        self.v, self.force = v, np.maximum(push + loss * rate, 0.0)
-        self.a = self.driven(held + loss * rate)
+        self.v, self.force = v, np.maximum(push + damping, 0.0)
+        self.a = self.driven(held + damping)
 
     def pushes(self, y: Vector) -> Any:
         """Return what closed contacts push with at rest."""

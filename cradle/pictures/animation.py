@@ -1,109 +1,19 @@
-"""Moving pictures of an impact and of swings."""
+"""Moving pictures of swings."""
 
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
 
 from cradle.input.values import Vector, must_be, one_number, whole_number
-from cradle.pictures.impacts import PALETTE, velocities, velocity_impulse
-from cradle.pictures.keyframes import SEEN, SHIFT, STRETCH, TURN, Animation, Move, moving
+from cradle.pictures.impacts import PALETTE
+from cradle.pictures.keyframes import Animation, Move, moving
 from cradle.swinging.record import Swing
-from cradle.trace import Trace
 
-__all__ = ["Animation", "animate", "animate_swing"]
-
-_END = 6.5  # of an impact in slow motion, s; the instant of the still
-
-
-@mpl.rc_context({"font.size": 12, "legend.columnspacing": 1, "legend.handletextpad": 0.5})
-def animate(trace: Trace, contact: int | None = None, *, alt: str = "") -> Animation:
-    """Show an impact in slow motion: the balls, and their velocities being drawn.
-
-    The balls fly in.  Then the clock stands still, for an impact takes no time: the diagram grows
-    with the impulses, a star marks each contact that is pressed, and the bars on the balls are
-    their velocities at that point of the diagram.  At last the balls fly off.  The still shows the
-    end of the impact.  The diagram is the velocity-impulse diagram of `contact`, or if it is left
-    out the velocities of all balls; `alt` says what the picture shows to those who do not see it.
-
-    Examples
-    --------
-    >>> from cradle import collide, paper_chain
-    >>> animate(collide(*paper_chain("AAA"))).save("impact.svg")  # doctest: +SKIP
-    """
-    must_be(Trace, "trace", trace)
-    must_be(str, "alt", alt)
-    figure = Figure(figsize=(4.8, 4.8), dpi=72, layout="constrained", facecolor="white")
-    row, diagram = figure.subplots(2, 1, height_ratios=[1, 2.6])
-    impulses, path = trace.curve()
-    done = impulses.sum(axis=1)
-    progress = done / done[-1] if done[-1] else np.linspace(0, 1, len(done))
-    # A flight of 1.5 s, the impact, a flight of 2 s, and a rest.
-    times = np.concatenate([[0.0], 1.5 + (_END - 1.5) * progress, [_END + 2.0, _END + 3.5]])
-    impulses, path = (np.pad(rows, ((1, 2), (0, 0)), "edge") for rows in (impulses, path))
-    moves = [*_balls(trace, row, times, impulses, path)]
-    moves += _diagram(trace, contact, diagram, times, impulses, path)
-    return moving(figure, moves, alt)
-
-
-def _balls(trace: Trace, ax: Axes, times: Vector, impulses: Vector, path: Vector) -> Iterator[Move]:
-    """Draw the balls as they touch, their velocities as bars, and a star on each contact."""
-    # The balls move in the flights alone; bars are in diameters of the largest one.
-    radii = 0.5 * np.cbrt(trace.chain.masses / trace.chain.masses.max())
-    centres = np.cumsum(2 * radii) - radii
-    ax.set(xlim=(-2.6, centres[-1] + radii[-1] + 2.6), ylim=(-0.6, 0.95), aspect="equal")
-    ax.set_axis_off()
-    per_speed = 1.9 / (float(np.abs(path[[0, -1]]).max()) or 1.0)
-    flown = np.zeros(path.shape)
-    if not (trace.chain.closing_speeds < 0.0).any():
-        flown[0] = -per_speed * path[0]
-    flown[-2:] = per_speed * path[-1]
-    bars = 0.95 * path / (float(np.abs(path).max()) or 1.0)
-    for ball, (x, radius) in enumerate(zip(centres.tolist(), radii.tolist(), strict=True)):
-        colour, way, bar = PALETTE[ball % len(PALETTE)], flown[:, ball], bars[:, ball]
-        disk = ax.add_patch(Circle((x, 0), radius, fc="0.95", ec=colour, lw=2))
-        name = ax.text(x, -0.02, f"{ball + 1}", ha="center", va="center", size=12)
-        line = ax.add_patch(Rectangle((x, 0.68), 1, 0.1, fc=colour, ec="none"))
-        tip = ax.add_patch(Circle((x, 0.73), 0.09, fc="white", ec=colour, lw=2))
-        along, end = np.column_stack([way, 0 * way]), np.column_stack([way + bar, 0 * way])
-        yield Move(f"ball{ball}", [disk, name], times, along, SHIFT, _END)
-        yield Move(f"tip{ball}", [tip], times, end, SHIFT, _END)
-        both = np.column_stack([way, bar])
-        yield Move(f"bar{ball}", [line], times, both, STRETCH, _END, (x, 0.0))
-    # A star is seen while the impulse of its contact grows.
-    lit = np.diff(impulses, axis=0, append=impulses[-1:]) > 0.0
-    for contact, x in enumerate((centres + radii)[:-1].tolist()):
-        star = ax.plot(x, 0, "*", ms=13, mfc="#F0E442", mec="black", mew=0.8, zorder=5)
-        yield Move(f"star{contact}", star, times, lit[:, [contact]].astype(float), SEEN, _END)
-
-
-def _diagram(
-    trace: Trace, contact: int | None, ax: Axes, times: Vector, impulses: Vector, path: Vector
-) -> Iterator[Move]:
-    """Draw the diagram, dots on its curves, and a cover that draws back to the right."""
-    if contact is None:
-        velocities(trace, ax)
-        along, shown = impulses.sum(axis=1), range(len(trace.chain))
-    else:
-        velocity_impulse(trace, contact, ax)
-        along, shown = impulses[:, contact], range(contact, contact + 2)
-    (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
-    cover = ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fc="white", alpha=0.9, zorder=4))
-    hidden = (x1 - along) / (x1 - x0)
-    hidden[-2:] = 0.0  # beyond the last point too
-    values = np.column_stack([0 * hidden, hidden])
-    yield Move("cover", [cover], times, values, STRETCH, float(times[-1]), (x1, 0.0))
-    ring: dict[str, Any] = {"ms": 9, "mfc": "white", "mew": 2.5, "zorder": 6, "clip_on": False}
-    for ball in shown:
-        curve = np.column_stack([along, path[:, ball]])
-        dot = ax.plot(*curve[-1:].T, "o", mec=PALETTE[ball % len(PALETTE)], **ring)
-        yield Move(f"dot{ball}", dot, times, curve - curve[-1], SHIFT, _END)
-    ax.set(xlim=(x0, x1), ylim=(y0, y1))
+__all__ = ["Animation", "animate_swing"]
 
 
 def animate_swing(
@@ -162,7 +72,7 @@ def animate_swing(
             ax.text(left + 12, top + 20, lines[k], size=min(wide / 29, 26), parse_math=False)
         for move in _swing(run, f"s{k}b", ax, (left + cell / 2, top + 34), duration):
             moves.append(move._replace(times=move.times / speed, still=still / speed))
-    return moving(figure, moves, alt, "px")
+    return moving(figure, moves, alt)
 
 
 def _hung(run: Swing) -> tuple[float, Vector, Vector, float]:
@@ -196,6 +106,6 @@ def _swing(
         look |= {"mec": PALETTE[ball % len(PALETTE)], "ms": 2 * radii[ball] - 2.5}
         hanging = ax.plot([x, x], [beam, y], "#555", lw=1, clip_on=False, **look)
         parts = [*hanging, ax.text(x, y + size / 3, f"{ball + 1}", size=size, ha="center")]
-        yield Move(f"{name}{ball}", parts, times[rows], angles[:, [ball]], TURN, 0.0, (x, beam))
+        yield Move(f"{name}{ball}", parts, times[rows], angles[:, ball], (x, beam))
     ends = middle + pivots[[0, -1]] + [-30, 30]
     ax.plot(ends, [beam, beam], "#333", lw=4, solid_capstyle="butt", clip_on=False)

@@ -1,14 +1,14 @@
-"""Pictures by matplotlib of which parts move: as SVG with keyframes in CSS, or as pixels.
+"""Pictures by matplotlib of which parts turn: as SVG with keyframes in CSS, or as pixels.
 
-The solver's own events are the keyframes, and between them a browser interpolates linearly, as
-velocities go: the motion is exact, sharp at any size, and a few kilobytes long.  A style sheet,
+The solver's own events are the keyframes, and between them a browser interpolates linearly: the
+motion is exact to a tenth of a degree, sharp at any size, and a few kilobytes long.  A style sheet,
 unlike SMIL, also gives the still to paper and to readers who ask for less motion.
 """
 
 import io
 import zlib
 from bisect import insort
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -20,21 +20,11 @@ from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D
 
-from cradle.input.values import ArrayLike, NDArray, Vector
+from cradle.input.values import Vector
 
 #: Pictures a second of a film; a GIF counts hundredths of a second.
 RATE = 25
-# What the numbers of a part do, as CSS.
-SEEN = "opacity:{}"
-TURN = "transform:rotate({}deg)"
-SHIFT = "transform:translate({}px,{}px)"
-STRETCH = "transform:translate({}px) scaleX({})"
-# How matplotlib does the same, and how far straight lines may be off.
-_FORMS: dict[str, tuple[Callable[..., Any], list[float]]] = {
-    TURN: (Affine2D.rotate_deg, [0.1]),
-    SHIFT: (Affine2D.translate, [0.03, 0.03]),
-    STRETCH: (lambda moved, x, share: moved.scale(share, 1).translate(x, 0), [0.03, 0.0005]),
-}
+_OFF = 0.1  # degrees by which straight lines between keyframes may be off
 # Before the name of every moving part, until a key of the picture's own takes its place: in a page
 # the names of all pictures share one space.
 _KEY = "moving-part-"
@@ -97,63 +87,51 @@ class Animation:
     def show(self, time: float | None) -> None:
         """Bring every part of the figure to where it is at a time, s; None is the still."""
         for move in self.moves:
-            values, (x, y) = move.at(move.still if time is None else time), move.origin
+            angle = move.at(move.still if time is None else time)
             for artist in move.artists:
-                if move.form == SEEN:
-                    artist.set_visible(values[0] > 0.5)
-                else:
-                    moved = _FORMS[move.form][0](Affine2D().translate(-x, -y), *values)
-                    artist.set_transform(moved.translate(x, y) + artist.axes.transData)
+                turn = Affine2D().rotate_deg_around(*move.origin, angle)
+                artist.set_transform(turn + artist.axes.transData)
 
 
 class Move(NamedTuple):
-    """How artists move together; lengths are in the data units of their axes."""
+    """How artists turn together about a point, in the data units of their axes."""
 
     part: str
     artists: Sequence[Any]
     times: Vector  # s
-    values: NDArray[np.float64]  # a row at each time
-    form: str  # what the values do
-    still: float  # the time of the still, s
-    origin: tuple[float, float] = (0.0, 0.0)  # what turns and stretches does so about this point
+    angles: Vector  # degrees, one at each time
+    origin: tuple[float, float]
+    still: float = 0.0  # the time of the still, s
 
-    def at(self, time: float) -> list[float]:
-        """Return the values at a time, s."""
-        if self.form == SEEN:  # it lasts until the next keyframe
-            return [float(self.values[np.searchsorted(self.times, time, side="right") - 1, 0])]
-        return [float(np.interp(time, self.times, column)) for column in self.values.T]
+    def at(self, time: float) -> float:
+        """Return the angle at a time, s."""
+        return float(np.interp(time, self.times, self.angles))
 
     def css(self) -> str:
         """Return the style of the part: where it rests, and its keyframes; a point is a px."""
         ax, name, times = self.artists[0].axes, f"{_KEY}{self.part}", self.times
-        (x, y), far = ax.transData.transform([self.origin, np.add(self.origin, 1.0)])
-        wide, high = far - (x, y)
-        units = {TURN: [1], SHIFT: [wide, -high], STRETCH: [wide, 1], SEEN: [1]}[self.form]
-        if self.form == SEEN:
-            pace, rows = "step-end", [0, *(np.flatnonzero(np.diff(self.values[:, 0])) + 1)]
-        else:
-            pace, rows = "linear", thin(times, self.values * units, _FORMS[self.form][1])
-
-        def state(values: Sequence[float]) -> str:
-            return self.form.format(*map(number, np.multiply(values, units).tolist()))
-
-        frames = (f"{number(100 * times[k] / times[-1])}%{{{state(self.values[k])}}}" for k in rows)
+        x, y = ax.transData.transform(self.origin).tolist()
+        frames = (f"{number(100 * times[k] / times[-1])}%{{{_turned(self.angles[k])}}}"
+                  for k in thin(times, self.angles))  # fmt: skip
         about = f"transform-origin:{number(x)}px {number(ax.figure.bbox.height - y)}px"
-        moves = f"animation:{name} {number(times[-1])}s {pace} infinite"
-        rest = f"[id^={name}-]{{{state(self.at(self.still))};{about};{moves}}}"
+        moves = f"animation:{name} {number(times[-1])}s linear infinite"
+        rest = f"[id^={name}-]{{{_turned(self.at(self.still))};{about};{moves}}}"
         return f"{rest}\n@keyframes {name}{{{' '.join(frames)}}}\n"
 
 
-def thin(times: Vector, values: NDArray[np.float64], tolerance: ArrayLike) -> list[int]:
-    """Return the rows that straight lines need to stay within the tolerance of each column."""
+def thin(times: Vector, angles: Vector) -> list[int]:
+    """Return the rows that straight lines need to stay within the tolerance."""
     rows = [0, len(times) - 1]
     while True:
-        lines = [np.interp(times, times[rows], column[rows]) for column in values.T]
-        off = (np.abs(values - np.transpose(lines)) / tolerance).max(axis=1)
+        off = np.abs(angles - np.interp(times, times[rows], angles[rows]))
         off[rows] = 0.0
-        if off.max() <= 1.0:
+        if off.max() <= _OFF:
             return rows
         insort(rows, int(off.argmax()))
+
+
+def _turned(angle: float) -> str:
+    return f"transform:rotate({number(angle)}deg)"
 
 
 def number(value: float) -> str:
@@ -161,7 +139,7 @@ def number(value: float) -> str:
     return f"{round(value, 3) + 0.0:.7g}"  # no -0
 
 
-def moving(figure: Figure, moves: Sequence[Move], alt: str, unit: str = "pt") -> Animation:
+def moving(figure: Figure, moves: Sequence[Move], alt: str) -> Animation:
     """Return a figure of 72 dots an inch as a picture that moves."""
     for move in moves:
         for k, artist in enumerate(move.artists):
@@ -171,7 +149,7 @@ def moving(figure: Figure, moves: Sequence[Move], alt: str, unit: str = "pt") ->
         figure.savefig(file, format="svg", metadata=nothing)
     figure.set_layout_engine("none")  # parts that move leave the others where they are
     # Matplotlib sets a style for `*`: in a page that would be every picture.
-    svg = file.getvalue().replace(_STYLE_OF_ALL, "").replace('pt"', f'{unit}"', 2)
+    svg = file.getvalue().replace(_STYLE_OF_ALL, "").replace('pt"', 'px"', 2)
     style = "".join(move.css() for move in moves) + "".join(
         f"@media {media} {{ [id^={_KEY}] {{ animation: none !important }} }}\n"
         for media in ("print", "(prefers-reduced-motion: reduce)")

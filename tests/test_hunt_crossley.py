@@ -1,0 +1,137 @@
+"""Losses by Hunt and Crossley, F = k d^p (1 + A dd/dt): closed form, another integrator, words."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from cradle import Chain, SpringChain, collide, spring_outcomes, spring_velocities, viscosity_from
+from cradle.runtime import compile as runtime
+
+LAW = {"damping": "hunt-crossley"}
+
+
+def kept(x):
+    """Restitution of two balls that close at x / A, from the integral of u du / (1 + A u)."""
+    return brentq(lambda e: x - np.log1p(x) + x * e + np.log1p(-x * e), 1e-9, min(1.0, 0.999 / x))
+
+
+def motion(m, v, k, loss, gaps, times):
+    """Velocities and forces of spheres on strings that pull all the time, by SciPy."""
+    rest = k * np.maximum(-gaps, 0.0) ** 1.5
+
+    def forces(y):
+        d, w = np.split(y, [len(m) - 1])
+        return np.maximum(k * np.maximum(d, 0.0) ** 1.5 * (1.0 - loss * np.diff(w)), 0.0)
+
+    def rate(_, y):
+        push = np.concatenate([[0.0], forces(y) - rest, [0.0]])
+        return np.concatenate([-np.diff(y[len(m) - 1 :]), -np.diff(push) / m])
+
+    start, bounds = np.concatenate([-gaps, v]), {"rtol": 1e-12, "atol": 1e-13, "max_step": 0.01}
+    y = solve_ivp(rate, (0.0, times[-1]), start, "DOP853", t_eval=times, **bounds).y.T
+    return y[:, len(m) - 1 :], np.array([forces(one) for one in y])
+
+
+@pytest.mark.parametrize(("x", "p"), [*itertools.product((0.05, 0.4, 0.9), (1.0, 1.5, 2.2))])
+def test_two_balls_by_closed_form(x, p):
+    """Whatever the masses, the stiffness and the exponent."""
+    (left, right), error = spring_outcomes(
+        [1.0, 2.5], [0.5, -1.5], 3.0, exponent=p, viscosity=x / 2.0, **LAW, accuracy=1e-9
+    )
+    assert (right - left) / 2.0 == pytest.approx(kept(x), abs=1e-9)
+    assert 0 < error <= 1e-9
+
+
+@pytest.mark.parametrize("e", [0.63, 0.9, 1 - 1e-6, 1.0])
+def test_viscosity_that_gives_a_restitution(e):
+    viscosity = viscosity_from([e, 0.8], speed=2.0, masses=[1, 3, 1], stiffness=1e6, **LAW)
+    if e < 0.9999:
+        assert kept(2.0 * viscosity[0]) == pytest.approx(e, abs=1e-9)
+    law = {"viscosity": viscosity[0], **LAW, "accuracy": 1e-9}
+    left, right = spring_velocities([1, 3], [2, 0], 1e6, **law)
+    assert (right - left) / 2.0 == pytest.approx(e, abs=1e-9)
+
+
+@pytest.mark.parametrize("gaps", [(0.0, 0.0), (0.1, 0.3), (-0.1, 0.05), (-0.2, -0.2)])
+def test_another_integrator_agrees_on_the_way(gaps):
+    """Velocities and forces at every step, as long as the strings' pull acts."""
+    m, v, k, loss = np.array([1.0, 0.7, 1.3]), np.array([1.0, 0.0, 0.0]), 2.0, 0.5
+    law = SpringChain(k, viscosity=loss, gaps=gaps, **LAW)
+    trace = collide(Chain(m, v), law)
+    pulled = trace.times[-1] if min(gaps) < 0.0 else np.inf
+    some = (trace.step_times >= 0.0) & (trace.step_times < 0.9 * pulled)
+    velocities, forces = motion(m, v, k, loss, np.array(gaps), trace.step_times[some])
+    assert abs(trace.step_velocities[some] - velocities).max() < 1e-7
+    assert abs(trace.step_forces[some] - forces).max() < 1e-5
+    lost = 0.5 * (m @ v**2 - m @ trace.velocities**2)
+    assert trace.energy_loss == pytest.approx(lost, abs=1e-12)
+    assert lost > 0.1
+    if pulled == np.inf:
+        assert abs(trace.velocities - velocities[-1]).max() < 1e-8
+
+
+def random_chains(count, seed):
+    """Masses over a decade and a half, stiffnesses over one, losses up to the most, gaps, leans."""
+    rng = np.random.default_rng(seed)
+    for n in rng.integers(3, 7, count).tolist():
+        m, k = (2.0 ** rng.uniform(-2.5, 2.5, size) for size in (n, n - 1))
+        gaps = np.full(n - 1, rng.choice([0.0, 0.1, 1.0]))
+        gaps[0] = rng.choice([gaps[0], -0.1])
+        yield m, k, rng.uniform(0.0, 0.9), gaps
+
+
+def test_accuracy_is_kept():
+    """Against a run a thousand times finer; the last one is what SciPy gives, see above."""
+    checked = 0
+    for m, k, loss, gap in random_chains(60, seed=4):
+        law = {"stiffness": k, "viscosity": loss, "gaps": gap, **LAW}
+        v = np.eye(len(m))[0]
+        try:
+            exact = spring_velocities(m, v, **law, accuracy=1e-9)
+        except ValueError:  # it would pull
+            continue
+        checked += 1
+        for accuracy in (1e-2, 1e-4, 1e-6):
+            found, error = spring_outcomes(m, v, **law, accuracy=accuracy)
+            assert abs(found - exact).max() <= accuracy
+            assert 0 < error <= accuracy
+    assert checked > 50
+
+
+@pytest.mark.skipif(not runtime.available(), reason="numba is not installed")
+def test_plain_and_compiled_agree_to_the_last_bit(monkeypatch):
+    outcomes = []
+    for kernel in ("plain", "compiled"):
+        monkeypatch.setenv(runtime.VARIABLE, kernel)
+        law = {"viscosity": 0.4, "gaps": [0.1, 0.0, -0.05], **LAW}
+        outcomes.append(spring_velocities([1, 0.5, 2, 1], [1, 0, 0, 0], **law).tolist())
+    assert outcomes[0] == outcomes[1]
+
+
+def test_a_contact_that_would_pull_is_refused():
+    """A light ball is hit away from its neighbour faster than 1 / A, while it is still pressed."""
+    m, v, k = [30, 0.04, 30, 0.24], [1, 1, -1, 1], [0.76, 1.4, 0.23]
+    words = r"viscosity\[0\] = 0.4; must be lower: this contact would pull"
+    with pytest.raises(ValueError, match=words):
+        spring_velocities(m, v, k, viscosity=0.4, **LAW)
+    with pytest.raises(ValueError, match=words):
+        collide(Chain(m, v), SpringChain(k, viscosity=0.4, **LAW))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: SpringChain(damping="hunt"), "damping = 'hunt'; must be 'viscoelastic' or 'hunt-"),
+        (lambda: spring_velocities([1, 1], [1, 0], damping=1), "damping = 1; must be 'viscoelasti"),
+        (lambda: spring_velocities([1, 1], [4, 0], viscosity=0.3, **LAW),
+         r"viscosity\[0\] = 0.3; must be at most 0.225 s/m, 0.9 over the speed of the fastest"),
+        (lambda: viscosity_from(0.6, speed=1.0, masses=[1, 1], **LAW),
+         r"restitution = 0.6; must lie in \[0.620, 1\]"),
+    ],
+)  # fmt: skip
+def test_refused(call, words):
+    with pytest.raises(ValueError, match=words):
+        call()
