@@ -7,7 +7,15 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from cradle import Chain, SpringChain, collide, spring_outcomes, spring_velocities, viscosity_from
+from cradle import (
+    Chain,
+    ImpactNotFinished,
+    SpringChain,
+    collide,
+    spring_outcomes,
+    spring_velocities,
+    viscosity_from,
+)
 from cradle.runtime import compile as runtime
 
 LAW = {"damping": "hunt-crossley"}
@@ -84,14 +92,14 @@ def random_chains(count, seed):
 
 
 def test_accuracy_is_kept():
-    """Against a run a thousand times finer; the last one is what SciPy gives, see above."""
+    """Against a run a hundred times finer; the last one is what SciPy gives, see above."""
     checked = 0
     for m, k, loss, gap in random_chains(60, seed=4):
         law = {"stiffness": k, "viscosity": loss, "gaps": gap, **LAW}
         v = np.eye(len(m))[0]
         try:
-            exact = spring_velocities(m, v, **law, accuracy=1e-9)
-        except ValueError:  # it would pull
+            exact = spring_velocities(m, v, **law, accuracy=1e-8)
+        except (ValueError, ImpactNotFinished):  # it would pull; leans hold balls together
             continue
         checked += 1
         for accuracy in (1e-2, 1e-4, 1e-6):
