@@ -129,6 +129,18 @@ def test_no_row_of_a_batch_is_left_out_in_silence(monkeypatch):
         post_impact_velocities([[1, 1, 1, 1]] * 3, [1, 0, 0, 0], 1, 0.1, max_events=1)
 
 
+def test_a_row_that_is_not_finished_is_named():
+    """By its place in the batch; there is none to name where it is alone."""
+    speeds = np.zeros((2, 3, 3))
+    speeds[1, 1:, 0] = 1.0
+    with pytest.raises(ImpactNotFinished) as stopped:
+        post_impact_velocities([1, 1, 1], speeds, 0.9, 0.1, max_events=1)
+    assert stopped.value.__notes__ == ["in the batch it is chain [1, 1]"]
+    with pytest.raises(ImpactNotFinished) as stopped:
+        post_impact_velocities([1, 1, 1], [1, 0, 0], 0.9, 0.1, max_events=1)
+    assert not hasattr(stopped.value, "__notes__")
+
+
 def test_batch_is_a_loop_of_single_impacts():
     """Every argument with its own leading axes: one broadcast against the others, bit by bit."""
     rng = np.random.default_rng(5)

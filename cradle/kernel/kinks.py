@@ -232,7 +232,7 @@ def pay(n, p, h, kinks, slow, lossy, s):
         elif a.f > 0.0 and move > 0.0:
             theta, unit = min(max(d / move, 0.0), 1.0), h * a.k * grade(p, move)
             j, x = crossing(p, h, a.k, early, True, theta, move)
-            if a.loss == 0.0:
+            if not lossy:
                 j += h * move * unit * unit * (left + right) * echo(p, theta)
         a.v -= j * left
         s[c + 1].v += j * right

@@ -4,8 +4,8 @@ import itertools
 import math
 import os
 import threading
-from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from cradle.input.values import ArrayLike, NDArray, Vector, flag, numbers
 from cradle.kernel import Inputs, Options, Outputs
 from cradle.models import correlation as paper
 from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
-from cradle.trace import ImpactNotCertified, compared_as_objects
+from cradle.trace import ImpactNotCertified, ImpactNotFinished, compared_as_objects
 
 CHUNK = 4096  #: Chains solved at a time, which bounds the memory.
 
@@ -50,7 +50,8 @@ def post_impact_velocities(
     ------
     ValueError, ImpactNotFinished, ImpactNotCertified
         If a value or a shape is wrong; for the first chain whose impact takes more than
-        `max_events` steps, or whose outcome fails the check that every answer has to pass.
+        `max_events` steps, with a note of its place, or whose outcome fails the check that every
+        answer has to pass.
 
     References
     ----------
@@ -125,11 +126,20 @@ def outcomes(
             model = paper.ImpulseCorrelation(
                 f, b, meeting=meeting, excess="saturate", max_events=max_events
             )
-            chain = Chain(m, v, e)
-            model.solve(chain)
-            raise ImpactNotCertified(chain, model, "among others it stops, alone it does not")
+            fail(model, Chain(m, v, e), np.unravel_index(failed, lead))
     v, hits, collapsed, margin = (x.reshape((*lead, *x.shape[1:])) for x in whole[:4])
     return Outcomes(v, hits, collapsed != 0, margin)
+
+
+def fail(model: Any, chain: Chain, place: Sequence[Any]) -> NoReturn:
+    """Raise what this chain of a batch raises alone, with a note of its place."""
+    try:
+        model.solve(chain)
+    except ImpactNotFinished as error:
+        if place:
+            error.add_note(f"in the batch it is chain {[int(k) for k in place]}")
+        raise
+    raise ImpactNotCertified(chain, model, "among others it stops, alone it does not")
 
 
 def shaped(

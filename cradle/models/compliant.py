@@ -13,7 +13,7 @@ from cradle.chain import Chain
 from cradle.input import values as asked
 from cradle.input.values import Vector
 from cradle.kernel.kinks import Law, Springs
-from cradle.models.batch import in_order, rows_of, shaped
+from cradle.models.batch import fail, in_order, rows_of, shaped
 from cradle.models.energy import fastest
 from cradle.models.springs import COARSEST, FINEST, MOST_STEPS, TimedTrace, refused
 from cradle.runtime.job import DEFECTS, FINISHED, LARGE, REFUSED, UNFINISHED, UNSOUND
@@ -239,9 +239,7 @@ def spring_outcomes(
         # Alone, it stops where it stopped here, and raises.
         m, v, k, loss, gap = (values[0] for values in row)
         more: dict[str, Any] = {"viscosity": loss, "gaps": gap, "damping": damping}
-        model, chain = SpringChain(k, p, accuracy=accuracy, **more), Chain(m, v)
-        model.solve(chain)
-        raise ImpactNotCertified(chain, model, "among others it fails, alone it does not")
+        fail(SpringChain(k, p, accuracy=accuracy, **more), Chain(m, v), place)
     return out.reshape(*lead, n), error.reshape(lead)
 
 
