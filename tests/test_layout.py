@@ -60,12 +60,17 @@ PALE = """(least) => {
       .map((p) => (p <= 0.04045 ? p / 12.92 : ((p + 0.055) / 1.055) ** 2.4));
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
   };
+  const grounds = new Map([[null, [255, 255, 255]]]);
+  const groundOf = (node) => {
+    if (!grounds.has(node)) {
+      const own = parse(getComputedStyle(node).backgroundColor);
+      grounds.set(node, over(own, groundOf(node.parentElement)));
+    }
+    return grounds.get(node);
+  };
   const found = {};
   const look = (node, colour, words) => {
-    const above = [];
-    for (let at = node; at; at = at.parentElement) above.unshift(at);
-    const ground = above.reduce(
-      (under, at) => over(parse(getComputedStyle(at).backgroundColor), under), [255, 255, 255]);
+    const ground = groundOf(node);
     const letters = over(parse(colour), ground);
     const [low, high] = [luminance(letters), luminance(ground)].sort((a, b) => a - b);
     const ratio = (high + 0.05) / (low + 0.05);
@@ -122,8 +127,8 @@ def looked_at(tab, page: Path, views) -> dict[str, list]:
     found["misfits"] += [cut for cut in tab.evaluate(MISFITS) if cut[0] in AS_IT_CAME]
     found["headings"], found["stops"] = tab.evaluate(SKIPPED), tab.evaluate(STOPS)
     tagged = re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8"))
-    sights = {**dict.fromkeys(views), (1280, "light"): None, (1280, "dark"): None}
-    for width, mode in sights | dict.fromkeys((width, "light") for width in PHONES if tagged):
+    sights = {*views, (1280, "light"), (1280, "dark"), *((w, "light") for w in PHONES if tagged)}
+    for width, mode in sorted(sights, reverse=True):  # a new width takes longer than a new mode
         show(tab, width, mode)
         if (width, mode) in views and page.parent.name == "book":
             found["misfits"] += [[width, mode, *misfit] for misfit in tab.evaluate(MISFITS)]
