@@ -115,7 +115,6 @@ ENTRIES = {
     closed_form.middle_ball_stops: {"e3": 0.9, "ratio": 0.1},
     measures.conserving_outcomes: {"masses": [1, 1, 1], "velocities": [1, 0, 0], "angles": [0]},
     measures.conserving_angle: {"masses": [1, 1, 1], "velocities": [1, 0, 0]},
-    animation.animate: {"trace": TRACE, "contact": 0, "alt": "a"},
     animation.animate_swing: {
         "runs": RUN, "labels": ["a"], "speed": 1.0, "still": 0.0, "columns": 1, "alt": "a",
     },

@@ -151,11 +151,11 @@ class Job:
     def _make_room(self, wanted: int) -> None:
         """Make room for so many events, within the limit, and keep what is written."""
         room, old = min(wanted, self.room), self.state.record
-        record = _record(room, self.n)
-        if len(old.kinds):
+        if len(self.outputs.p):  # of one chain whose path the caller keeps; others need none
+            record = _record(room, self.n)
             for part, written in zip(record, old, strict=True):
                 part[: len(written)] = written
-        self.state = rooms.State(*self.state[:-1], record)
+            self.state = rooms.State(*self.state[:-1], record)
         self.counts["room"] = _ENDLESS if room == self.room else room - _ROUND * self.n
 
 
