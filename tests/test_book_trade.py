@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import parts
 import pytest
+import real_cradles
 from chains import ELASTIC, HERTZ
 from chapters import Chapter, floats, points, shows
 from dop853 import integrated
@@ -218,17 +219,79 @@ def test_fig_trade_models():
     assert errors["light middle"][1] > 0.2
 
 
+METHODS = (
+    "this package", "velocity Verlet", "the paper's rule", "measured ratio", "pair after pair",
+    "all as one body",
+)  # fmt: skip
+
+
 def test_fig_trade_total_drawn():
     """Each panel is the stored table; no error is above the one asked for."""
     rows = [(r["chain"], r["method"], float(r["microseconds"]), float(r["error"]),
              float(r["asked"] or 1)) for r in read("forces.csv")]  # fmt: skip
-    methods = "this package", "velocity Verlet", "the paper's rule"
     axes = CHAPTER.figures["fig-trade-total"].axes
-    for ax, name in zip(axes, ("5 equal", "20 equal", *CALIBRATED), strict=True):
-        for line, method in zip(points(ax), methods, strict=True):
+    for ax, name in zip(axes, ("5 equal", "5 equal, A = .03"), strict=True):
+        for line, method in zip(points(ax), METHODS, strict=True):
             found = np.array([row[2:] for row in rows if row[:2] == (name, method)])
             np.testing.assert_allclose(line, found[:, :2])
             assert (found[:, 1] <= found[:, 2]).all()
+
+
+def test_other_rows_are_the_stored_table():
+    """At the accuracy of a thousandth; no error is above it."""
+    printed = CHAPTER.printed("trade-others").splitlines()[1:]
+    found = [
+        (float(r["error"]), float(r["microseconds"]), r["method"])
+        for name in ("20 equal", "1 1 .1 1 1", "ABCCA")
+        for method in (*METHODS[:3], METHODS[4])
+        for r in read("forces.csv", chain=name, method=method)
+        if r["asked"] in ("", "1e-03")
+    ]
+    for line, (error, time, method) in zip(printed, found, strict=True):
+        *_, percent, unit, microseconds = line.split()
+        assert unit == "%"
+        assert float(percent) == pytest.approx(100 * error, rel=0.05)
+        assert float(microseconds) == pytest.approx(time, rel=0.05)
+        assert error < 1e-3 or method not in METHODS[:2]
+
+
+def test_errors_of_the_rule_with_one_ratio():
+    """The measured ratio and the two textbook answers, by the independent solver."""
+    struck, loss = [1, 0, 0, 0, 0], 0.03
+    left, right = integrated([1, 1], [1, 0], loss=loss)
+    cases = ("5 equal", 0, 1.0), ("5 equal, A = .03", loss, right - left)
+    for chain, viscous, e in cases:
+        exact = integrated([1] * 5, struck, loss=viscous)
+        for method, ratio in (("measured ratio", 0.167), ("pair after pair", 0)):
+            found = floats(solve([1] * 5, struck, e, ratio).velocities)
+            (row,) = read("forces.csv", chain=chain, method=method)
+            assert float(row["error"]) == pytest.approx(np.abs(found - exact).max(), rel=1e-2)
+        (row,) = read("forces.csv", chain=chain, method="all as one body")
+        # The row of four leaves as one, and the striker parts from it with e.
+        body = np.append(1 - (1 + e) * 4 / 5, np.full(4, (1 + e) / 5))
+        assert float(row["error"]) == pytest.approx(np.abs(body - exact).max(), rel=1e-2)
+
+
+def test_laws_beside_the_film():
+    """Distances by another integrator and by the independent solver; the test as stored."""
+    film = real_cradles.first_strikes(4)[1][0]
+    off = []
+    for law in ("pairs, e", "touching spheres, A", "one ratio, e", "three ratios, e",
+                "spheres, three gaps, A"):  # fmt: skip
+        (row,) = read("film_fits.csv", reading="4", law=law, strikers="apart", fitted="both")
+        p = [float(x) for x in row["parameters"].split()]
+        if "spheres" in law:
+            gaps = [0, *(p[:3] if "gaps" in law else [0, 0, 0])]
+            v = integrated([1] * 5, [1, 0, 0, 0, 0], loss=p[-1], gaps=gaps)
+        else:
+            ratios = {1: 0, 2: p[0], 4: p[:3]}[len(p)]
+            v = floats(solve([1] * 5, [1, 0, 0, 0, 0], p[-1], ratios).velocities)
+        off.append((100 * np.abs(v - film).max(), float(row["chi_three"])))
+    printed = CHAPTER.printed("trade-film").splitlines()[1:]
+    for line, (distance, test) in zip(printed, off, strict=True):
+        percent, _, shown = line.split()[-3:]
+        assert float(percent) == pytest.approx(distance, abs=0.051)
+        assert float(shown) == pytest.approx(test, abs=0.51)
 
 
 #: Chains of the figure: masses, A of the losses.
