@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from chains import HERTZ
 from chapters import Chapter, code, in_memory, number, panel, run
+from scipy import optimize
 from truth import solve
 
 CHAPTER = Chapter("forces")
@@ -59,3 +60,29 @@ def test_the_rule_is_per_cents_from_spheres():
         if line.get_linestyle() == "--"
     ]
     assert line == pytest.approx(off, abs=1e-8)
+
+
+def test_fig_loss():
+    """Hunt and Crossley's by its closed form, the spheres' by the series of Ramirez and others."""
+    (ax,) = CHAPTER.figures["fig-own-forces-loss"].axes
+    level, spheres, hunt, steady = (line.get_xydata() for line in ax.get_lines()[:4])
+    speeds = level[:, 0]
+    assert (level[:, 1] == 0.9).all()
+    assert steady[:, 1] == pytest.approx(np.maximum(1 - 0.05 / speeds, 0), abs=1e-12)
+    for name in (spheres, hunt, steady):
+        assert np.interp(0.5, *name.T) == pytest.approx(0.9, abs=1e-5)
+    u, e = hunt.T
+    a = optimize.brentq(lambda x: closed(x, 0.9), 0.1, 0.2) / 0.5
+    assert [closed(a * s, k) / (a * s) ** 2 for s, k in zip(u, e, strict=True)] == pytest.approx(
+        [0] * len(u), abs=2e-6
+    )
+    # e = 1 - C1 A u^(1/5) + 3/5 C1^2 A^2 u^(2/5) - ..., in units of its own.
+    part = 1 - spheres[:, 1]
+    few = part < 0.12
+    slope = np.polyfit(np.log(spheres[few, 0]), np.log(part[few]), 1)[0]
+    assert slope == pytest.approx(0.2, abs=0.015)
+
+
+def closed(x, e):
+    """What is zero for two balls that close at x / A and part at e x / A."""
+    return x - np.log1p(x) + e * x + np.log1p(-e * x)

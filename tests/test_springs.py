@@ -250,6 +250,16 @@ def test_what_still_swings_is_not_at_rest_while_another_contact_comes_back():
     assert abs(rough - fine).max() <= 1e-2
 
 
+def test_what_the_pull_of_strings_takes_is_lost_too():
+    """Elastic balls that lean lose motion, though no viscosity takes it."""
+    chain = Chain([1] * 5, struck(5))
+    trace = collide(chain, SpringChain(gaps=[-0.1, 0, 0, 0]))
+    left = 0.5 * float(trace.velocities @ trace.velocities)
+    assert trace.energy_loss == pytest.approx(chain.kinetic_energy - left, abs=1e-12)
+    assert trace.energy_loss > 1e-3
+    assert collide(chain, SpringChain(gaps=0.1)).energy_loss == 0.0
+
+
 @needs_numba
 @pytest.mark.parametrize("name", [*LOSSY, *(n for n in MISSED if n != "swings long")])
 def test_losses_and_leans_leave_the_fourth_order(monkeypatch, name):

@@ -126,8 +126,8 @@ class TimedTrace(EnergyTrace):
 
     @property
     def energy_loss(self) -> float:
-        """Kinetic energy that the viscosity of the contacts has taken, in joules."""
-        if not np.any(self.model.viscosity):
+        """Kinetic energy lost, J: to viscosities, and where balls lean, to the pull of strings."""
+        if not np.any(self.model.viscosity) and np.min(self.model.gaps) >= 0.0:
             return 0.0
         m, v = self.chain.masses, self.chain.velocities
         centre = self.chain.momentum / m.sum()
