@@ -1,6 +1,7 @@
 """Fit half a minute of a real cradle: its damping, then period, one gap and one law of loss.
 
-Writes `data/cradle_fits.csv` in a quarter of an hour.
+Writes `data/cradle_fits.csv` in a quarter of an hour, and where the outer balls of each fit turn,
+`data/cradle_turns.csv`, in half a minute.
 The mean of the five balls gives the damping and nearly the period: no impact changes it.  The rest
 is fitted to the turning points of the outer balls; where these hang at rest is subtracted.
 """
@@ -8,11 +9,12 @@ is fitted to the turning points of the outer balls; where these hang at rest is 
 import numpy as np
 from real_cradles import table
 from scipy.optimize import least_squares
-from stored import make
+from stored import make, read
 
 from cradle import (
     Chain,
     ConstantLoss,
+    ImpulseCorrelation,
     Pendulums,
     SequentialCollisions,
     SpeedDependent,
@@ -23,6 +25,8 @@ from cradle import (
 STEEL = {"masses": [0.044756] * 2, "stiffness": 1e10}  # of the balls
 RATE = 200  # samples a second of a computed swing
 COLUMNS = ["law", "loss", "gap_m", "release_m", "release_s", "period_s", "chi_places", "chi_times"]
+TURNS = ["law", "ball", "t_s", "x_m"]
+RATIO = 0.3  # tried in the place of pairs: ", ratio" behind a law
 # Law: starts of loss and gap; their steps (None: not fitted).
 STARTS = {
     "constant loss": ([(0.8e-3, 85e-6), (1e-3, 70e-6)], (1e-4, 1e-5)),
@@ -64,7 +68,8 @@ def peaks():
 def swung(law, parameters, damping):
     """Return the run of `swing` of a law at (loss, gap, release place, release time, period)."""
     loss, gap, place, start, period = parameters
-    model, e = SequentialCollisions(), loss
+    model = ImpulseCorrelation(RATIO) if law.endswith("ratio") else SequentialCollisions()
+    e = loss
     if "loss" in law:
         constant = law.startswith("constant")
         kept = ConstantLoss(loss) if constant else ViscousLoss(loss, **STEEL)
@@ -86,13 +91,19 @@ def turning(run, ball, near):
     return x[i] + 0.5 * v[i] * wait, run.times[low + i] + wait
 
 
+def turns(run, start, found):
+    """Return places and times, in the time of the film, of the computed turning points, (2, K)."""
+    at = [turning(run, k, at - start) for k, at in zip(*found[:2])]
+    places, times = np.array(at).T
+    return np.array([places, times + start])
+
+
 def misfits(run, start, found):
     """Return residuals of places and of times, over their uncertainties, (2, K)."""
     ball, time, place, u_time, u_place = found
     out = np.empty((2, len(ball)))
-    for n, (k, at) in enumerate(zip(ball, time)):
-        x, t = turning(run, k, at - start)
-        out[:, n] = place[n] - x, (at - start - t) / u_time[n]
+    x, t = turns(run, start, found)
+    out[:] = place - x, (time - t) / u_time
     for k in (0, 4):  # where it hangs at rest
         out[0, ball == k] -= np.average(out[0, ball == k], weights=u_place[ball == k] ** -2.0)
     out[0] /= u_place
@@ -138,5 +149,17 @@ def rows():
         yield [law, *(f"{x:.6g}" for x in best[1]), *(f"{x:.4g}" for x in best[0])]
 
 
+def turned():
+    """Yield the turning points of each stored fit, and of one with a ratio."""
+    mean, found = common(), peaks()
+    fits = read("cradle_fits.csv")
+    fits += [{**x, "law": x["law"] + ", ratio"} for x in fits if "restitution" in x["law"]]
+    for row in fits:
+        p = [float(row[name]) for name in COLUMNS[1:6]]
+        places, times = turns(swung(row["law"], p, mean[1]), p[3], found)
+        for ball, place, time in zip(found[0], places, times):
+            yield [row["law"], ball + 1, f"{time:.5f}", f"{place:.7f}"]
+
+
 if __name__ == "__main__":
-    make(__doc__, {"cradle_fits": (COLUMNS, rows)})
+    make(__doc__, {"cradle_fits": (COLUMNS, rows), "cradle_turns": (TURNS, turned)})
