@@ -192,6 +192,9 @@ def test_gaps_and_not_ratios_predict_the_third_release():
     assert ratios == pytest.approx(100 * real_cradles.ratios(p[:3], p[3], 3, True), abs=6e-3)
     assert (np.abs(gaps - film)[:2] < 0.5 * error[:2]).all()
     assert (np.abs(ratios - film)[:2] > 5 * error[:2]).all()
+    CHAPTER.tells({"gaps-three": (np.abs(gaps - film) / error)[2]})
+    assert (np.abs(gaps - film) / error).argmax() == 2
+    CHAPTER.tells({"ratios-three": (np.abs(ratios - film) / error)[2]})
     CHAPTER.tells({"slow-off": np.abs(ratios - film)[:2].max(), "slow-error": error[:2].max()})
     assert f"{np.abs(ratios - film)[:2].min():.1f}" == GLUED["slow-off"]  # both
 
