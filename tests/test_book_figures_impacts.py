@@ -45,11 +45,29 @@ def in_ratios(r1, r2):
 
 
 def test_fig_patterns_three():
-    for number, (r1, r2) in enumerate(((2.5, 1.0), (1.0, 1.0), (2.5, 0.25))):
+    for number, (r1, r2) in enumerate(((1.0, 1.0), (2.5, 1.0), (2.5, 0.25))):
         v = after((*in_ratios(r1, r2), 0.5), 0.15)
         for ball, line in enumerate(panel("patterns", "fig-patterns-three", number).values()):
             places = 0.6 * ball + np.array([-1.0 * (ball == 0), 0, 2 * v[ball]])
             np.testing.assert_allclose(line, np.column_stack([places, [-1, 0, 2]]), **CLOSE)
+        chart = drawn("patterns")["fig-patterns-three"].axes[3 + number]
+        assert chart.get_lines()[-1].get_xydata().tolist() == [[r2, r1]]
+
+
+def test_one_point_of_the_map_with_a_pencil():
+    """The numbers of the text, from another solver; the three patterns are those it names."""
+    done = textbook.solve([1, 1, 1], [1, 0, 0], 0.5, 0.15)
+    assert list(done.collisions) == [1, 1]
+    tau_2, tau_3 = done.impulses
+    told = {"tau2": tau_2, "tau3": tau_3, "late": tau_3 - 0.15 * tau_2, "lead": 0.5}
+    told |= {f"v{k}": v for k, v in enumerate(done.velocities[:2], start=1)}
+    told["height"] = eq_44(1.0)
+    Chapter("patterns").tells({f"point-{name}": value for name, value in told.items()})
+    found = [
+        bouncing_pattern(np.array(after((*in_ratios(r1, r2), 0.5), 0.15)))
+        for r1, r2 in ((1.0, 1.0), (2.5, 1.0), (2.5, 0.25))
+    ]
+    assert found == [2, 1, 3]
 
 
 def eq_44(r2, e=0.5, a=0.15):

@@ -92,7 +92,10 @@ def test_few_cells_escape_comparison():
     assert len(escaping) <= MOST_UNCOMPARED_CELLS, escaping
 
 
-@pytest.mark.parametrize("chapter", ["problem", "compliance", "three_balls"])
+@pytest.mark.parametrize(
+    "chapter",
+    ["problem", "compliance", "three_balls", "multiple_impacts", "patterns", "n_balls"],
+)
 def test_shown_cells_can_be_typed_in(chapter: str):
     """They use no name of a hidden cell, and their lines fit the page of a desk."""
     cells = shown(chapter)
@@ -161,7 +164,7 @@ GIVEN = {
     "compliance": "0.15",
     "three_balls": "0.01 0.09 0.1 0.11 0.15 0.8 0.9",
     "multiple_impacts": "0.15 0.2 0.25 0.8",
-    "patterns": "0.01 0.15 0.3 0.4 0.5 0.6 0.9",
+    "patterns": "0.01 0.15 0.25 0.3 0.4 0.5 0.6 0.9 2.5",
     "n_balls": "0.1 0.15 0.5 1.5 4.5",
     "experiments": "0.5",
     "toy": "0.9 0.95 0.97 0.99",
