@@ -63,6 +63,9 @@ def test_one_point_of_the_map_with_a_pencil():
     told |= {f"v{k}": v for k, v in enumerate(done.velocities[:2], start=1)}
     told["height"] = eq_44(1.0)
     Chapter("patterns").tells({f"point-{name}": value for name, value in told.items()})
+    tau_2 = 1.5 * 0.4 / (0.85 * 0.4 + 1)  # Eq. 24
+    tau_3 = tau_2 * 0.8 * (1 + 0.5 * math.sqrt(1 - 0.15 * 1.25))  # Eq. 30
+    Chapter("patterns").tells({"light-tau2": tau_2, "heavy-tau3": tau_3})
     found = [
         bouncing_pattern(np.array(after((*in_ratios(r1, r2), 0.5), 0.15)))
         for r1, r2 in ((1.0, 1.0), (2.5, 1.0), (2.5, 0.25))
