@@ -136,13 +136,18 @@ def test_fig_extremes_shortest_as_drawn():
     """The least of all ratios; the textbook's outcome jumps there, too."""
     rows = [r for r in stored("shortest", spread="0") if int(r["balls"])]
     (ax,) = CHAPTER.figures["fig-extremes-shortest"].axes
-    for line, ratios in zip(points(ax), ((0.1, 0.2), (0.0, 0.4))):
-        least = {}
-        for r in rows:
-            e, balls = float(r["restitution"]), int(r["balls"])
-            if ratios[0] <= float(r["ratio"]) <= ratios[1]:
-                least[e] = min(least.get(e, 99), balls)
-        np.testing.assert_array_equal(line, sorted(least.items()))
+    (line,) = points(ax)
+    least, middle = {}, set()
+    for r in rows:
+        e, balls = float(r["restitution"]), int(r["balls"])
+        least[e] = min(least.get(e, 99), balls)
+        if 0.1 <= float(r["ratio"]) <= 0.2:
+            middle.add(e)
+    np.testing.assert_array_equal(line, sorted(least.items()))
+    bars = [bar.get_y() for bar in ax.patches]
+    np.testing.assert_array_equal(bars, line[:, 1])
+    assert CHAPTER.glued["middle"] == "0.1 to 0.2"
+    assert float(CHAPTER.glued["middle-e"]) == max(middle)
     one, other = x.copies(np.random.default_rng(1), np.ones((6, 8)), 0.42, 0.2, 1e-12)
     with mpmath.workdps(50):
         off = [
