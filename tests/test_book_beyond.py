@@ -174,12 +174,12 @@ def test_copies_are_told_apart_by_decimals():
 
 def test_fig_beyond_stability():
     """The count of collisions, the point where the order becomes chance, and the front."""
-    upper, lower = CHAPTER.figures["fig-beyond-stability"].axes
+    digits, counts = CHAPTER.figures["fig-beyond-stability"].axes
     for k, ratio in enumerate((0.0, 0.1, 0.3, 0.45)):
         rows = find("losses", restitution=0.99, ratio=ratio, collapsed=0.0)
         balls, collisions = column(rows, "balls", "collisions").T
-        np.testing.assert_allclose(points(upper)[k][:, 1], collisions / (balls * (balls - 1) / 2))
-        np.testing.assert_array_equal(points(lower)[k], column(rows, "balls", "kept"))
+        np.testing.assert_allclose(points(counts)[k][:, 1], collisions / (balls * (balls - 1) / 2))
+        np.testing.assert_array_equal(points(digits)[k], column(rows, "balls", "kept"))
     for e in (0.9, 0.99, 0.999):
         # At ratio zero, Newton's rule for two balls, from ball to ball.
         for row in find("losses", restitution=e, ratio=0.0, collapsed=0.0):
