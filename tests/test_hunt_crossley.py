@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from chains import magnitudes
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -82,13 +83,13 @@ def test_another_integrator_agrees_on_the_way(gaps):
 
 
 def random_chains(count, seed):
-    """Masses over a decade and a half, stiffnesses over one, losses up to the most, gaps, leans."""
+    """Masses and stiffnesses over a decade and a half, losses up to the most, gaps, leans."""
     rng = np.random.default_rng(seed)
     for n in rng.integers(3, 7, count).tolist():
-        m, k = (2.0 ** rng.uniform(-2.5, 2.5, size) for size in (n, n - 1))
+        m, k = (magnitudes(rng, 1.5, size) for size in (n, n - 1))
         gaps = np.full(n - 1, rng.choice([0.0, 0.1, 1.0]))
         gaps[0] = rng.choice([gaps[0], -0.1])
-        yield m, k, rng.uniform(0.0, 0.9), gaps
+        yield m, k, 0.9 * rng.random(), gaps
 
 
 def test_accuracy_is_kept():
