@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 import real_cradles
+from chains import HERTZ
 from chapters import Chapter, drawn, floats, number, panel
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -211,3 +212,8 @@ def test_fig_toy_inside_and_film():
             seconds = found[:, 0] / 100 * (6 - 1 / 40) * PERIOD * 2
             angle = np.interp(PERIOD, seconds, found[:, 1])
             assert angle == pytest.approx(-math.degrees(BACK / LENGTH * v[ball]), abs=0.3)
+
+
+def test_the_first_stroke_parts_the_models_least():
+    apart = np.abs(np.array(HERTZ["five equal"]) - strokes(1, [1, 0, 0, 0, 0])[0])
+    CHAPTER.tells({"first-apart": apart.max()})
