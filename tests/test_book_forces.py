@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from chains import HERTZ
 from chapters import Chapter, code, in_memory, number, panel, run
-from scipy import optimize
+from dop853 import integrated
+from scipy import integrate, optimize
 from truth import solve
 
 CHAPTER = Chapter("forces")
@@ -86,3 +87,34 @@ def test_fig_loss():
 def closed(x, e):
     """What is zero for two balls that close at x / A and part at e x / A."""
     return x - np.log1p(x) + e * x + np.log1p(-e * x)
+
+
+def test_laws_of_loss_in_a_row():
+    """By SciPy; and what the first terms of the restitution give by the closed form."""
+    first, second = (
+        optimize.brentq(lambda e, x=1.5 * (1 - meant): closed(x, e), 0.3, 1) for meant in (0.9, 0.8)
+    )
+    lowest = optimize.brentq(lambda e: closed(0.9, e), 0.3, 1)
+    CHAPTER.tells({"hunt-first": first, "hunt-second": second, "hunt-lowest": lowest})
+    a = optimize.brentq(lambda x: closed(x, 0.9), 0.1, 0.2)
+    spheres = optimize.brentq(lambda x: integrated([1, 1], [1, 0], 1, 1.5, x) @ [-1, 1] - 0.9,
+                              0.01, 0.3, xtol=1e-6)  # fmt: skip
+    for name, speed in (("hunt-row", 1), ("hunt-fast", 5)):
+        v = speed * np.eye(5)[0]
+        one = integrated([1] * 5, v, 1, 1.5, spheres)
+        other = in_time([1] * 5, v, a)
+        CHAPTER.tells({name: abs(one - other).max() / speed}, off=1e-5)
+
+
+def in_time(m, v, loss):
+    """Velocities after the impact of spheres with the losses of Hunt and Crossley."""
+    n = len(m)
+
+    def rate(_, y):
+        u = -np.diff(y[n - 1 :])
+        push = np.maximum(np.maximum(y[: n - 1], 0) ** 1.5 * (1 + loss * u), 0)
+        return np.concatenate([u, -np.diff(np.pad(push, 1)) / m])
+
+    y = np.concatenate([np.zeros(n - 1), v])
+    return integrate.solve_ivp(rate, (0, 40), y, "DOP853", rtol=1e-9, atol=1e-10,
+                               max_step=0.05).y[n - 1 :, -1]  # fmt: skip

@@ -169,12 +169,12 @@ GIVEN = {
     "experiments": "0.5",
     "toy": "0.9 0.95 0.97 0.99",
     "real_cradles": "22.2 25.3 44.8",
-    "recipe": "",
+    "recipe": "0.62",
     "scene": "0.1",
     "measure": "0.2 0.5 1.5 1.96 2.54 3.84",
     "table_2": "0.01 0.050 0.1 0.15 0.215 0.22 0.3 0.390 0.462 0.5 "
     "0.6 0.710 0.73 0.730 0.755 0.782",
-    "forces": "0.5 0.9",  # what four laws of loss are set to
+    "forces": "0.5 0.8 0.9",  # what laws of loss are set to
     "trade": "",
     "engines": "0.01 0.1",
     "laws": "0.5",
