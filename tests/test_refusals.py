@@ -312,7 +312,7 @@ OTHERS = [
     (paper_chain, ("ABC", [1, 2]), "speed = [1, 2]; must be one number"),
     (paper_chain, (3,), "sequence is an int; must be letters, as in 'ABC'"),
     (paper_chain, (np.array("ABC"),), "sequence is a ndarray; must be letters, as in 'ABC'"),
-    (viscosity, ([1, 1, 1], 0.5), "restitution = 0.5; must lie in [0.624, 1], from what"),
+    (viscosity, ([1, 1, 1], 0.5), "restitution = 0.5; must lie in [0.624, 1]: less takes"),
     (viscosity, ([1, 1, 1], [0.9, 1.1]), "restitution[1] = 1.1; must lie in [0.624, 1]"),
     (viscosity, ([1, 1, 1], [0.9] * 3), "restitution has 3 values; 3 balls need 2, or one number"),
     (viscosity, ([1, 1], 0.9, 0), "speed = 0.0; must be above 0"),

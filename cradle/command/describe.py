@@ -113,7 +113,8 @@ def described(
         law = cradle.ImpulseCorrelation(*ratios, excess=excess)
     elastic = bool((chain.restitution == 1.0).all())
     if masses and ratio is None and model is None and len(chain) > 2:
-        kind = "elastic spheres" if elastic else "spheres with losses, by the energy law"
+        lossy = "spheres with losses, by the energy law (others: cradle recommend --stiffness 1)"
+        kind = "elastic spheres" if elastic else lossy
         model = "spheres"
         assumed.append(f"the balls collide as {kind} (--model, --ratio)")
     if model == "sequential":

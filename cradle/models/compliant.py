@@ -166,7 +166,8 @@ def spring_velocities(
     Raises
     ------
     ValueError
-        If a value or a shape is wrong, or a value too far from the others to be resolved.
+        If a value or a shape is wrong, a value too far from the others to be resolved, or a contact
+        would pull by Hunt and Crossley.
     ImpactNotFinished, ImpactNotCertified
         If runs take more than twenty million steps or do not agree, or leans hold balls together;
         if an outcome breaks momentum, energy or order.

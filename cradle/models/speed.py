@@ -190,7 +190,7 @@ def viscosity_from(
     hunt = damping == DAMPING[1]
     part, most = (parting_hunt, MOST_HUNT) if hunt else (lambda a: parting(a, p), LONGEST)
     least = part(most)
-    rule = f"must lie in [{least:.3f}, 1], from what the most viscosity leaves to none"
+    rule = f"must lie in [{least:.3f}, 1]: less takes more viscosity than contacts may have"
     kept = asked.number_or_row("restitution", restitution, "N - 1", rule, least, 1.0)
     e = asked.row_of("restitution", kept, n - 1, n)
     k = asked.row_of("stiffness", law.stiffness, n - 1, n)

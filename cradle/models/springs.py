@@ -31,7 +31,8 @@ def refused(clock: Any, law: Law, place: Sequence[int], chain: Springs) -> Value
         limits.LIGHT: ("masses", chain.m, f"{least} heaviest ball of its chain"),
         limits.SOFT: ("stiffness", chain.k, f"{least} stiffest contact of its chain"),
         limits.QUICK: ("stiffness", chain.k, "its time is beyond floats: choose other units"),
-        limits.LATE: ("viscosity", chain.loss, f"{late} of the fastest closing"),
+        limits.LATE: ("viscosity", chain.loss, f"{late} of the fastest closing; was it found for "
+                      "this stiffness, speed and damping?"),
         PULLS: ("viscosity", chain.loss, "must be lower: this contact would pull"),
         limits.WIDE: ("gaps", chain.gap, f"must be at most {widest:g} times {of} at this accuracy"),
         limits.NARROW: ("gaps", chain.gap, f"must be 0, or {limits.NARROWEST} of {of}"),
