@@ -17,7 +17,7 @@ import numpy as np
 from measure import Engine, absent, cpu, present, quotient, versions
 from stored import DATA, make
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing
+from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing, viscosity_from
 from cradle.runtime.job import warm_up
 
 sys.path.append(str(DATA.parent / "examples"))
@@ -40,6 +40,16 @@ SPRINGS = {
     "ten times softer": {"contact": 10**0.4 * STEEL},
 }
 MODELS = {"ratio": ImpulseCorrelation(RATIO), "springs": SpringChain(1.0)}
+RESTITUTION = 0.97  # of what loses energy; of springs at the striker's first speed
+SPEED = 2.0 * math.sqrt(GRAVITY * LENGTH) * math.sin(ANGLE / 2)
+LOSSY = viscosity_from(RESTITUTION, speed=SPEED, masses=[1] * BALLS)
+#: What else a row can solve its impacts by: restitution and model.
+LAWS = {
+    "springs": (1, MODELS["springs"]),
+    "ratio, losses": (RESTITUTION, MODELS["ratio"]),
+    "springs, losses": (1, SpringChain(1.0, viscosity=LOSSY)),
+}
+AT = (1, 5, 20, 50)  # strokes that are kept of these
 ENERGIES = [f"ball{i}" for i in range(1, BALLS + 1)]
 COSTS = [
     *("run", "how", "setting", "pulled"),
@@ -86,8 +96,8 @@ ENGINES = (
 # One run: times, angles and rates of the balls, shape (T, N).
 
 
-def scene(engine, setting, pulled, *, mend, gap=0.0):
-    """Return a function that makes one step, the bodies, and the step."""
+def scene(engine, setting, pulled, *, mend, gap=0.0, law=None):
+    """Return a function that makes one step, the bodies, and the step; a law if not one ratio."""
     program = importlib.import_module(engine.scene)
     # "fine" is a step of a millisecond and nothing else: to compare costs.
     fine = engine.default | {"step": 1e-3}
@@ -96,7 +106,10 @@ def scene(engine, setting, pulled, *, mend, gap=0.0):
     mended_step = chosen.pop("mended_step", step)
     bodies = program.cradle(pulled, ANGLE, mend=mend, gap=gap, **chosen)
     if mend:
-        return program.mended(bodies).step, bodies, mended_step
+        row = program.mended(bodies)
+        if law is not None:
+            row.chain, row.model = Chain([1] * BALLS, [0] * BALLS, law[0]), law[1]
+        return row.step, bodies, mended_step
     return bodies.advance, bodies, step
 
 
@@ -105,9 +118,9 @@ def close(bodies):
     getattr(bodies, "close", lambda: None)()
 
 
-def in_engine(engine, setting, pulled, *, mend, gap=0.0, duration=MINUTE):
+def in_engine(engine, setting, pulled, *, mend, gap=0.0, duration=MINUTE, law=None):
     """Run a scene in an engine and look at it sixty times a second."""
-    advance, bodies, step = scene(engine, setting, pulled, mend=mend, gap=gap)
+    advance, bodies, step = scene(engine, setting, pulled, mend=mend, gap=gap, law=law)
     pivots = 2 * RADIUS * (1 + gap) * np.arange(BALLS)
     frames, taken = [], 0
     for k in range(int(duration * FRAMES) + 1):
@@ -122,22 +135,21 @@ def in_engine(engine, setting, pulled, *, mend, gap=0.0, duration=MINUTE):
     return tuple(np.array(part) for part in zip(*frames, strict=True))
 
 
-def by_swing(pulled, duration=MINUTE, model=MODELS["ratio"]):
+def by_swing(pulled, duration=MINUTE, model=MODELS["ratio"], restitution=1):
     """Run the scene by the package's own events."""
     hanging = Pendulums(length=LENGTH, gravity=GRAVITY, angle="full")
     release = [-ANGLE * LENGTH] * pulled + [0.0] * (BALLS - pulled)
     times = np.arange(int(duration * FRAMES) + 1) / FRAMES
-    chain = Chain([1] * BALLS, [0] * BALLS, 1)
+    chain = Chain([1] * BALLS, [0] * BALLS, restitution)
     run = swing(chain, model, release, times, pendulums=hanging)
     return run.times, run.positions / LENGTH, run.velocities / LENGTH
 
 
 def on_springs(pulled, duration=MINUTE, *, contact=STEEL, steps_a_contact=100):
     """Run the scene on Hertz springs, with that contact of two balls at the first stroke."""
-    speed = 2.0 * math.sqrt(GRAVITY * LENGTH) * math.sin(ANGLE / 2)
     # Two balls of mass 1 at speed v: contact 2.9432 d/v, depth d, k d^(5/2) = 5/8 v^2.
-    depth = contact * speed / 2.9432
-    stiffness = 0.625 * speed**2 / depth**2.5
+    depth = contact * SPEED / 2.9432
+    stiffness = 0.625 * SPEED**2 / depth**2.5
     angle = np.zeros(BALLS)
     angle[:pulled] = -ANGLE
     inner = math.ceil(steps_a_contact / contact / FRAMES)
@@ -254,6 +266,44 @@ def first_strokes_with_gaps():
         yield engine.name, setting, f"{gap:g}", pulled, *(f"{e:.4f}" for e in first)
 
 
+def minutes_with_tiny_gaps():
+    """Yield energies after some strokes of engines as they are, with the smallest gap."""
+    settings = "default", "fine", "refined"
+    for engine, setting, pulled in itertools.product(present(ENGINES), settings, (1, 2)):
+        _, angles, rates = in_engine(engine, setting, pulled, mend=False, gap=GAPS[1])
+        each = strokes(angles, rates)
+        for k in AT:
+            if k <= len(each):
+                yield engine.name, setting, pulled, k, *(f"{e:.4f}" for e in each[k - 1])
+
+
+def other_laws():
+    """Yield energies after some strokes of rows with other laws, and of `swing` with the same."""
+    for (name, law), pulled in itertools.product(LAWS.items(), (1, 2)):
+        restitution, model = law
+        found = {("swing", "alone"): by_swing(pulled, model=model, restitution=restitution)}
+        for engine, setting in itertools.product(present(ENGINES), ("default", "refined")):
+            found[engine.name, setting] = in_engine(engine, setting, pulled, mend=True, law=law)
+        for (who, setting), (_, angles, rates) in found.items():
+            each = strokes(angles, rates)
+            for k in AT:
+                yield who, name, setting, pulled, k, *(f"{e:.4f}" for e in each[k - 1])
+
+
+def costs_of_laws(repeats=5, seconds=5.0):
+    """Yield what `swing` and a swinging row cost with another law, as a multiple of one ratio."""
+
+    def swung(law=(1, MODELS["ratio"])):
+        return cpu(lambda: by_swing(1, seconds, law[1], law[0]))
+
+    ways = {"swing": swung}
+    for engine in present(ENGINES):
+        ways[engine.name] = functools.partial(_cost, engine, "fine", 1, True, seconds)
+    for (who, way), (name, law) in itertools.product(ways.items(), LAWS.items()):
+        pairs = [(way(law=law), way()) for _ in range(repeats)]
+        yield who, name, quotient(*zip(*pairs)), repeats
+
+
 def costs(repeats=5, seconds=5.0):
     """Yield what a simulated second costs, beside `swing` and, if mended, the engine as it is."""
     on_springs(1, 1 / FRAMES)  # compiles
@@ -275,9 +325,9 @@ def costs(repeats=5, seconds=5.0):
             yield *row, versions(package)
 
 
-def _cost(engine, setting, pulled, mend, seconds):
+def _cost(engine, setting, pulled, mend, seconds, law=None):
     """Return the processor time of a simulated second."""
-    advance, bodies, step = scene(engine, setting, pulled, mend=mend)
+    advance, bodies, step = scene(engine, setting, pulled, mend=mend, law=law)
     count = round(seconds / step)
     taken = cpu(lambda: [advance(step) for _ in range(count)])
     close(bodies)
@@ -289,6 +339,12 @@ TABLES = {
     "scene_strokes": (("run", "how", "setting", "gap", "pulled", "stroke", *ENERGIES), all_strokes),
     "scene_film": (("run", "how", "time", *ENERGIES), film),
     "scene_costs": (COSTS, costs),
+    "scene_gap_minutes": (
+        ("run", "setting", "pulled", "stroke", *ENERGIES),
+        minutes_with_tiny_gaps,
+    ),
+    "scene_laws": (("run", "law", "setting", "pulled", "stroke", *ENERGIES), other_laws),
+    "scene_law_costs": (("run", "law", "over_one_ratio", "repeats"), costs_of_laws),
 }
 
 if __name__ == "__main__":

@@ -199,6 +199,59 @@ def test_with_the_row_all_engines_do_what_spheres_do(pulled: int):
         assert misplaced(own, pulled).max() > 3 * worst, name
 
 
+@cache
+def by_law(name, law, setting, pulled):
+    """Energies of the balls at the strokes of the table, by a row with another law."""
+    key = (name, law, setting, str(pulled))
+    names = ("run", "law", "setting", "pulled")
+    rows = [row for row in stored("laws") if tuple(row[k] for k in names) == key]
+    assert [int(row["stroke"]) for row in rows] == list(AT), key
+    return np.array([balls(row) for row in rows])
+
+
+@pytest.mark.parametrize("pulled", [1, 2])
+@pytest.mark.parametrize("law", scenes.LAWS)
+def test_a_row_with_another_law_does_what_swing_does(law, pulled: int):
+    """The same shares; of the energy what the pendulums leave, a little less in Chipmunk."""
+    other = by_law("swing", law, "alone", pulled)
+    for name, setting in [(name, s) for name in ENGINES for s in ("default", "refined")]:
+        found = by_law(name, law, setting, pulled)
+        shares = [e / e.sum(axis=1, keepdims=True) for e in (found, other)]
+        most = {"default": 0.08, "refined": 0.03}[setting]
+        assert 0.5 * np.abs(shares[0] - shares[1]).sum(axis=1).max() < most, (name, setting)
+        alone = run(name, "no impacts", setting, 5)[np.array(AT) - 1].sum(axis=1)
+        kept = found.sum(axis=1) / other.sum(axis=1)
+        assert (kept > 0.98 * alone - (0.15 if name == "Chipmunk" else 0.0)).all(), (name, setting)
+        assert kept.max() < 1.06, (name, setting)
+
+
+@pytest.mark.parametrize("pulled", [1, 2])
+def test_springs_in_the_row_are_elastic_spheres_in_every_engine(pulled: int):
+    judge = run(*HERTZ, pulled)[np.array(AT) - 1]
+    judge = judge / judge.sum(axis=1, keepdims=True)
+    off = {}
+    for setting in ("default", "refined"):
+        shares = [by_law(name, "springs", setting, pulled) for name in ENGINES]
+        shares = [e / e.sum(axis=1, keepdims=True) for e in shares]
+        off[setting] = max(0.5 * np.abs(e - judge).sum(axis=1).max() for e in shares)
+    assert off["refined"] < 0.02
+    told = Chapter("scene").glued
+    assert float(told[f"law-{pulled}"]) == pytest.approx(off["refined"], abs=0.006)
+    assert float(told[f"law-default-{pulled}"]) == pytest.approx(off["default"], abs=0.006)
+
+
+@pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
+@pytest.mark.parametrize("law", scenes.LAWS)
+def test_an_engine_repeats_what_is_stored_of_other_laws(engine, law):
+    if engine.name in absent(scenes.ENGINES):
+        pytest.skip(absent(scenes.ENGINES)[engine.name])
+    _, angles, rates = scenes.in_engine(
+        engine, "default", 2, mend=True, duration=5.6, law=scenes.LAWS[law]
+    )
+    found = scenes.strokes(angles, rates)[[0, 4]]
+    np.testing.assert_allclose(found, by_law(engine.name, law, "default", 2)[:2], atol=0.02)
+
+
 def test_what_a_mended_cradle_loses_its_pendulums_lose_alone():
     """To a hundredth of the energy, but in Chipmunk.
 
@@ -230,6 +283,58 @@ def test_gaps_give_the_school_book_first_and_not_for_ever():
         found = run(name, "as it is", "refined", 1, "0.01")
         assert found[0, 4] > 0.97, name
         assert (found[:, [0, 4]].sum(axis=1) / found.sum(axis=1)).min() < 0.95, name
+
+
+def with_tiny_gaps(name, setting, pulled):
+    """Part of the energy on wrong balls, and what is left, after the strokes that were reached."""
+    key = (name, setting, str(pulled))
+    rows = [
+        row
+        for row in stored("gap_minutes")
+        if tuple(row[k] for k in ("run", "setting", "pulled")) == key
+    ]
+    found = np.array([balls(row) for row in rows])
+    judge = run(*HERTZ, pulled)[[int(row["stroke"]) - 1 for row in rows]]
+    one, other = (e / e.sum(axis=1, keepdims=True) for e in (found, judge))
+    return 0.5 * np.abs(one - other).sum(axis=1), found.sum(axis=1)
+
+
+def test_tiny_gaps_want_a_small_step():
+    """Right for a minute with a millisecond, in two engines; at the default step for one stroke."""
+    for name in ("Chipmunk", "Box2D"):
+        for pulled, most in ((1, 0.03), (2, 0.2)):
+            off, left = with_tiny_gaps(name, "fine", pulled)
+            assert len(off) == len(AT)
+            assert off.max() < most, name
+            assert left.min() > 0.94, name
+            off, _ = with_tiny_gaps(name, "default", pulled)
+            assert off[0] < most
+            assert off.max() > 0.4, name
+    off, left = with_tiny_gaps("Bullet", "refined", 1)
+    assert off.max() < 0.03
+    assert left == pytest.approx(1, abs=0.01)
+    off, left = with_tiny_gaps("Rapier", "refined", 1)
+    assert off[:3].max() < 0.03 < off[3]
+    assert left[3] < 0.7
+    for setting in ("default", "fine"):
+        assert with_tiny_gaps("MuJoCo", setting, 1)[0][0] > 0.5
+        assert with_tiny_gaps("Bullet", setting, 1)[1][0] > 1.2
+
+
+@pytest.mark.parametrize("name", ["Chipmunk", "Box2D"])
+def test_an_engine_repeats_what_is_stored_with_tiny_gaps(name):
+    engine = {engine.name: engine for engine in scenes.ENGINES}[name]
+    if name in absent(scenes.ENGINES):
+        pytest.skip(absent(scenes.ENGINES)[name])
+    _, angles, rates = scenes.in_engine(
+        engine, "fine", 1, mend=False, gap=scenes.GAPS[1], duration=5.6
+    )
+    (row,) = [
+        row
+        for row in stored("gap_minutes")
+        if (row["run"], row["setting"], row["pulled"], row["stroke"]) == (name, "fine", "1", "5")
+    ]
+    np.testing.assert_allclose(scenes.strokes(angles, rates)[4], balls(row), atol=0.02)
 
 
 def test_the_recipe_tells_where_the_energy_is():
