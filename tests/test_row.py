@@ -274,15 +274,6 @@ def test_two_rows_of_one_world_are_stepped_together():
         assert row.impacts == alone.impacts > 0
 
 
-def test_a_row_at_rest_is_not_looked_at_in_every_step_of_its_world():
-    bodies, looked = Hanging([0.0, 0.0]), []
-    row, motion = hung(bodies), bodies.motion
-    bodies.motion = lambda: looked.append(1) or motion()
-    for _ in range(500):
-        step_rows([row], 1e-3)
-    assert len(looked) < 250
-
-
 def test_a_hit_is_told_when_the_step_is_made():
     bodies = Free([[-0.45, 0], [0, 0], [0.2, 0]], [[1, 0], [0, 0], [0, 0]], [1, 2, 1])
     row, told = Row(bodies, Chain([1, 2, 1], [0] * 3), MODEL, RADIUS), []
@@ -299,27 +290,19 @@ def test_a_hit_is_told_when_the_step_is_made():
 
 
 def test_one_impact_of_free_balls_is_that_of_collide():
-    masses, e = [1.0, 3.0, 2.0, 1.0], [1.0, 0.5, 0.25]
-    angle = 0.3  # the row lies askew in the plane
-    axis = np.array([math.cos(angle), math.sin(angle)])
-    places = np.array([-0.3, 0.0, 0.2, 0.4])[:, None] * axis
+    """Along the row; across it each ball keeps its velocity, as without friction."""
+    masses, e, model = [1.0, 3.0, 2.0, 1.0], [1.0, 0.5, 0.25], ImpulseCorrelation(0.2)
+    along, aside = np.array([2.0, 0.0, 0.0, 0.0]), np.array([0.25, -0.5, 0.1, 0.0])
+    axis = np.array([math.cos(0.3), math.sin(0.3)])  # the row lies askew in the plane
     across = np.array([-axis[1], axis[0]])
-    v = np.array([2.0, 0.0, 0.0, 0.0])[:, None] * axis
-    bodies = Free(places, v, masses)
-    model = ImpulseCorrelation(0.2)
+    v = np.outer(along, axis) + np.outer(aside, across)
+    bodies = Free(np.outer([-0.2, 0.0, 0.2, 0.4], axis), v, masses)
     row = Row(bodies, Chain(masses, [0] * 4, e), model, RADIUS)
-    steps(row, 4, 0.02)
-    chain = Chain(masses, [2.0, 0, 0, 0], e)
-    np.testing.assert_allclose(bodies.v @ axis, collide(chain, model).velocities, atol=1e-12)
-    np.testing.assert_allclose(bodies.v @ across, 0, atol=1e-12)
+    row.step(1e-6)
+    expected = collide(Chain(masses, along, e), model).velocities
+    np.testing.assert_allclose(bodies.v @ axis, expected, atol=1e-12)
+    np.testing.assert_allclose(bodies.v @ across, aside, atol=1e-12)
     assert row.impacts == 1
-
-
-def test_what_is_across_the_row_is_kept():
-    """Without friction a ball keeps its velocity across the line of centres."""
-    bodies = Free([[-0.2, 0.0], [0.0, 0.0]], [[1.0, 0.25], [0.0, -0.5]], [1, 1])
-    Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS).step(1e-6)
-    np.testing.assert_allclose(bodies.v, [[0.0, 0.25], [1.0, -0.5]], atol=1e-15)
 
 
 def test_an_impact_up_the_arc_keeps_the_energy():
@@ -337,38 +320,34 @@ def test_an_impact_up_the_arc_keeps_the_energy():
     np.testing.assert_allclose(after, collide(chain, MODEL).velocities, atol=1e-13)
 
 
-def test_any_model_and_rows_of_parameters():
-    """A part of the row gets its part of the model's numbers."""
-    model = ImpulseCorrelation([0.1, 0.2, 0.3])
-    # Ball 0 is far away: balls 1 to 4 collide.
-    bodies = Free([[-9, 0], [0, 0], [0.2, 0], [0.4, 0], [0.6, 0]], np.zeros((5, 2)), [1] * 5)
-    bodies.v[1, 0] = 1.0
+@pytest.mark.parametrize(
+    ("model", "part"),
+    [
+        (ImpulseCorrelation([0.1, 0.2, 0.3]), ImpulseCorrelation([0.2, 0.3])),
+        (SpringChain(1.0), SpringChain(1.0)),
+    ],
+)
+def test_a_part_of_the_row_gets_its_part_of_the_model(model, part):
+    """Ball 0 is far away: balls 1 to 4 collide."""
+    v = np.eye(5)[1]
+    x = [[-9, 0], [0, 0], [0.2, 0], [0.4, 0], [0.6, 0]]
+    bodies = Free(x, np.column_stack([v, 0 * v]), [1] * 5)
     Row(bodies, Chain([1] * 5, [0] * 5), model, RADIUS).step(1e-6)
-    expected = collide(Chain([1] * 4, [1, 0, 0, 0]), ImpulseCorrelation([0.2, 0.3])).velocities
+    expected = collide(Chain([1] * 4, v[1:]), part).velocities
     np.testing.assert_allclose(bodies.v[1:, 0], expected, atol=1e-14)
-    bodies.v[:] = 0
-    bodies.v[1, 0] = 1.0
-    Row(bodies, Chain([1] * 5, [0] * 5), SpringChain(1.0), RADIUS).step(1e-6)
-    hertz = collide(Chain([1] * 4, [1, 0, 0, 0]), SpringChain(1.0)).velocities
-    np.testing.assert_allclose(bodies.v[1:, 0], hertz, atol=1e-14)
 
 
-def test_balls_at_rest_cost_no_impact():
-    bodies = Hanging([0.0] * 5)
-    looks = count(bodies)
-    row = hung(bodies)
-    looks.clear()
-    steps(row, 2000, 1e-3)
+@pytest.mark.parametrize("together", [False, True])
+def test_balls_at_rest_are_looked_at_every_hundredth_of_a_second(together):
+    """And cost no impact, also in a world of several rows."""
+    bodies, looks = Hanging([0.0] * 5), []
+    row, motion = hung(bodies), bodies.motion
+    bodies.motion = lambda: looks.append(1) or motion()
+    for _ in range(2000):
+        step_rows([row], 1e-3) if together else row.step(1e-3)
     assert row.impacts == 0
     np.testing.assert_array_equal(bodies.angles, 0)
-    assert len(looks) <= 220  # every hundredth of a second
-
-
-def count(bodies):
-    """Note when somebody looks at the balls."""
-    looks, motion = [], bodies.motion
-    bodies.motion = lambda: looks.append(1) or motion()
-    return looks
+    assert len(looks) <= 220
 
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
