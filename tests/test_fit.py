@@ -42,15 +42,14 @@ MASS = {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}
 
 def columns(name, speeds, after, sigma, errors=None):
     """Shots of the paper's balls as columns; `after` at unit speed of the striker."""
-    table = {key: [] for key in ("set", "shot", "ball", "type", "mass", "before", "after", "sigma")}
-    for shot, speed in enumerate(speeds):
-        for ball, letter in enumerate(name):
-            error = 0.0 if errors is None else errors[shot][ball]
-            row = (name, shot, ball + 1, letter, MASS[letter], speed if ball == 0 else 0.0,
-                   speed * after[ball] + error, sigma)  # fmt: skip
-            for key, value in zip(table, row):
-                table[key].append(value)
-    return table
+    errors = np.zeros((len(speeds), len(name))) if errors is None else errors
+    rows = [
+        (name, shot, ball + 1, letter, MASS[letter], 0.0 if ball else speed,
+         speed * after[ball] + errors[shot][ball], sigma)
+        for shot, speed in enumerate(speeds) for ball, letter in enumerate(name)
+    ]  # fmt: skip
+    keys = ("set", "shot", "ball", "type", "mass", "before", "after", "sigma")
+    return dict(zip(keys, map(list, zip(*rows))))
 
 
 def any_shots(before, sigma, errors=None, moved=None):
@@ -171,18 +170,6 @@ def test_momentum_shows_a_wrong_mass():
     after = outcome("AB")
     gain = 0.050 * after[0] + 0.053 * after[1] - 0.050
     assert residuals[0] == pytest.approx(gain / (0.01 * np.sqrt(2 * 0.05**2 + 0.053**2)))
-
-
-def test_sets_are_left_out_by_name():
-    tables = [columns(name, [1.0], outcome(name), 0.01) for name in ("AB", "ABA", "ABACA")]
-    shots = read_shots({key: [x for table in tables for x in table[key]] for key in tables[0]})
-    kept = shots.without("ABACA", "AB")
-    assert kept.sets == (shots["ABA"],)
-    assert shots.without().sets == shots.sets
-    with pytest.raises(ValueError, match="no set 'ABC' to leave out; there are AB, ABA, ABACA"):
-        shots.without("ABC")
-    with pytest.raises(ValueError, match="no set is left without ABA"):
-        kept.without("ABA")
 
 
 def test_mean_of_shots_at_different_speeds():
@@ -775,11 +762,11 @@ def test_predictions_cover():
     random = np.random.default_rng(11)
     for _ in range(12):
         tables = [
-            columns(name, [0.5, 1.0, 1.5, 2.0], outcome(name), 0.01,
-                    0.01 * random.standard_normal((4, len(name))))
+            pd.DataFrame(columns(name, [0.5, 1.0, 1.5, 2.0], outcome(name), 0.01,
+                                 0.01 * random.standard_normal((4, len(name)))))
             for name in ("AB", "ABA", "BAB")
         ]  # fmt: skip
-        shots = read_shots({key: [x for table in tables for x in table[key]] for key in tables[0]})
+        shots = read_shots(pd.concat(tables))
         predicted = ratio(shots, restitution(shots)).predict("ABABA")
         inside += ((predicted.lower <= truth) & (truth <= predicted.upper)).tolist()
     assert binom.ppf(1e-3, 60, 0.9) <= sum(inside)
