@@ -76,6 +76,9 @@ REFUSED = [
     (np.array([1, 2j]), "x[0] = (1+0j); must be a real number"),
     (np.ma.masked, f"x = masked; {WHOLE}"),
     ([1, np.ma.masked], "x[1] = masked; must be a real number"),
+    (np.ma.array([1.0, 2.0], mask=[False, True]), "x[1] = masked; must be a real number"),
+    # NumPy makes floats of nanoseconds, of seconds none.
+    (np.array([1, 2], "m8[ns]"), "x[0] = np.timedelta64(1,'ns'); must be a real number"),
     (Uncertain(), f"x = 0.9+/-0.1 (test_checks.Uncertain); {WHOLE}"),
     ([pd.NA, 1], "x[0] = <NA> (pandas."),
     ({"a": 1}, "x = {'a': 1}; must be real numbers"),
