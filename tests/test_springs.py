@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from mpmath import zeta
 from scipy.integrate import quad
 from scipy.special import gamma
+from test_kernel import needs_numba
 
 from cradle import (
     Chain,
@@ -32,8 +33,6 @@ from cradle.kernel import kinks
 from cradle.kernel.state import REFUSED, UNFINISHED, UNSOUND
 from cradle.runtime import compile as runtime
 from cradle.runtime import springs as job
-
-needs_numba = pytest.mark.skipif(not runtime.available(), reason="numba is not installed")
 
 
 def struck(n):

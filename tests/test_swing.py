@@ -200,24 +200,19 @@ def test_drift_of_five_balls():
     assert np.ptp(run.positions[-1]) < 1e-13
 
 
-def springs(m, x, end, times, k, pendulums, exponent=1.5):
-    """Pendulums and contact springs, all integrated in time together."""
+def springs(y, span, m, k, pendulums, viscosity=0.0, **options):
+    """Pendulums with spheres that push each other, integrated in time: places, then velocities."""
     m, n = np.asarray(m, float), len(m)
     square, gaps = 9.81 / pendulums.row("length", n), pendulums.row("gaps", n - 1)
 
     def rate(_, y):
-        x, v = y[:n], y[n:]
-        force = k * np.maximum(x[:-1] - x[1:] - gaps, 0) ** exponent
-        a = -square * x
-        a[:-1] -= force / m[:-1]
-        a[1:] += force / m[1:]
-        return np.concatenate([v, a])
+        x, v = np.split(y, 2)
+        deep = np.maximum(x[:-1] - x[1:] - gaps, 0.0)
+        slope = 1.5 * viscosity * (v[:-1] - v[1:])
+        force = np.maximum(k * np.sqrt(deep) * (deep + slope), 0.0)
+        return np.concatenate([v, -square * x - np.diff(force, prepend=0, append=0) / m])
 
-    found = solve_ivp(
-        rate, (0, end), [*x, *np.zeros(n)], "DOP853", t_eval=times, rtol=1e-10, atol=1e-14,
-        max_step=0.01,
-    )  # fmt: skip
-    return found.y[:n].T
+    return solve_ivp(rate, span, y, "DOP853", **options).y
 
 
 @pytest.mark.parametrize(
@@ -233,10 +228,9 @@ def test_two_balls_at_a_time_are_the_limit_of_stiff_springs(m, x, pendulums):
     times = np.linspace(0, 2, 21)
     run = swing(Chain(m, np.zeros(len(m)), 1), ImpulseCorrelation(0), x, times, pendulums=pendulums)
     assert len(run.impacts) >= 3
-    apart = [
-        np.abs(springs(m, x, 2, times, k, pendulums) - run.positions).max() / 0.02
-        for k in (1e7, 1e9, 1e11)
-    ]
+    y, exact = [*x, *np.zeros(len(m))], {"t_eval": times, "rtol": 1e-10, "atol": 1e-14}
+    ways = [springs(y, (0, 2), m, k, pendulums, max_step=0.01, **exact) for k in (1e7, 1e9, 1e11)]
+    apart = [np.abs(way[: len(m)].T - run.positions).max() / 0.02 for way in ways]
     assert apart[2] < 0.005
     for coarse, fine in zip(apart, apart[1:]):
         assert 0.5 < math.log(coarse / fine) / math.log(100**0.4) < 1.5
@@ -257,31 +251,21 @@ FORCES = {
 @pytest.mark.parametrize(("viscosity", "gaps", "side"), FORCES.values(), ids=FORCES)
 def test_contact_forces_move_the_balls_as_their_equations_of_motion_do(viscosity, gaps, side):
     """By SciPy, in three strikes a micrometre of 3 cm apart; a strike in no time is 1 mm off."""
-    stiffness, period, x0 = 1e10, 2 * math.pi / math.sqrt(9.81 / 0.14), 0.03 * np.array(side)
-    chain = Chain([0.045] * 5, [0] * 5)
-
-    def rate(_, y):
-        x, v = np.split(y, 2)
-        deep = np.maximum(x[:-1] - x[1:] - gaps, 0.0)
-        slope = 1.5 * viscosity * (v[:-1] - v[1:])
-        force = np.maximum(stiffness * np.sqrt(deep) * (deep + slope), 0.0)
-        return np.concatenate([v, -9.81 / 0.14 * x - np.diff(force, prepend=0, append=0) / 0.045])
-
+    m, w, x0 = [0.045] * 5, math.sqrt(9.81 / 0.14), 0.03 * np.array(side)
+    hanging = Pendulums(0.14, gaps=gaps)
+    exact = {"max_step": 2e-5, "rtol": 1e-9, "atol": 1e-12}
     # Pendulums of one length swing alike: all meet near the middle of each stroke, and only there.
-    times, y, found = period * np.array([0.248, 0.256, 0.748, 0.756, 1.248, 1.256, 1.5]), None, []
-    y = np.concatenate([x0, np.zeros(5)])
+    times = 2 * math.pi / w * np.array([0.248, 0.256, 0.748, 0.756, 1.248, 1.256, 1.5])
+    y, found = np.concatenate([x0, np.zeros(5)]), []
     for strike, (begin, end) in enumerate(zip([0.0, *times], times)):
         if strike % 2:
-            y = solve_ivp(rate, (begin, end), y, "DOP853", max_step=2e-5, rtol=1e-9, atol=1e-12)
-            y = y.y[:, -1]
+            y = springs(y, (begin, end), m, 1e10, hanging, viscosity, **exact)[:, -1]
         else:
-            turn, (x, v), w = 2 * math.pi * (end - begin) / period, np.split(y, 2), 2 * math.pi
-            w /= period
-            y = np.concatenate([x * math.cos(turn) + v / w * math.sin(turn),
-                                v * math.cos(turn) - w * x * math.sin(turn)])  # fmt: skip
+            (x, v), c, s = np.split(y, 2), math.cos(w * (end - begin)), math.sin(w * (end - begin))
+            y = np.concatenate([x * c + v / w * s, v * c - w * x * s])
         found.append(y[:5])
-    law = SpringChain(stiffness, viscosity=viscosity, accuracy=1e-7)
-    run = swing(chain, law, x0, times, pendulums=Pendulums(0.14, gaps=gaps))
+    law = SpringChain(1e10, viscosity=viscosity, accuracy=1e-7)
+    run = swing(Chain(m, [0] * 5), law, x0, times, pendulums=hanging)
     assert len(run.impacts) >= 3
     np.testing.assert_allclose(run.positions, found, atol=2e-6)
 
