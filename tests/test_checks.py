@@ -13,7 +13,6 @@ import sympy
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 from cradle.input.values import (
     ABOVE_ZERO,
-    must_be,
     number_or_row,
     numbers,
     one_number,
@@ -129,17 +128,6 @@ def test_fractions_and_decimals_go_through():
     ratios = [Fraction(1, 8)]
     several = post_impact_velocities([Fraction(1), Decimal("0.5"), 2], [1, 0, 0], 0.9, ratios)
     assert several.tolist() == after.tolist()
-
-
-def test_types_are_named():
-    with pytest.raises(TypeError, match=r"^trace is a list; must be a Chain$"):
-        must_be(Chain, "trace", [1])
-    with pytest.raises(TypeError, match=r"^chain is the class Chain; must be a Chain$"):
-        must_be(Chain, "chain", Chain)
-    with pytest.raises(TypeError, match=r"^model is an int; must be an ImpulseCorrelation$"):
-        must_be(ImpulseCorrelation, "model", 3)
-    chain = Chain([1, 1], [1, 0])
-    assert must_be(Chain, "chain", chain) is chain
 
 
 def test_the_first_wrong_value_is_named():

@@ -43,7 +43,6 @@ THREE = Chain([1, 1, 1], [1, 0, 0])
 MODEL = ImpulseCorrelation(0.15)
 TRACE = collide(THREE, MODEL)
 RUN = cradle.swing(THREE, MODEL, [-0.02, 0, 0], [0.0, 0.1, 0.2])
-SEVERAL = cradle.outcomes([1, 1, 1], [1, 0, 0], 1, [[0.1], [0.2]])
 
 
 class Still:
