@@ -4,10 +4,11 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from march import march, njit
+from march import march
 from measure import Row, distance, ours, outcome
 from scenes import LOSSY, SCENES, random_chains
 from truth import in_fifty_digits
+from verlet import verlet
 
 from cradle import (
     Chain,
@@ -152,43 +153,17 @@ def spring_rows(clock, quick):
             yield row(clock, about | many, scene, f"batch, {setting}", run, exact, 2000, **common)
 
 
-@njit(cache=True)
-def penalty(masses, velocities, stiffness, exponent, step, most=10_000_000):
-    """March balls on springs with a fixed step until they part; return velocities and steps.
-
-    Semi-implicit Euler: where the forces start and end at zero its outcome is velocity Verlet's.
-    """
-    n = len(masses)
-    v = velocities.copy()
-    d = np.zeros(n - 1)
-    steps = 0
-    apart = False
-    while steps < most and not apart:
-        for c in range(n - 1):
-            d[c] += step * (v[c] - v[c + 1])
-        for c in range(n - 1):
-            if d[c] > 0.0:
-                kick = step * stiffness * d[c] ** exponent
-                v[c] -= kick / masses[c]
-                v[c + 1] += kick / masses[c + 1]
-        steps += 1
-        apart = True
-        for c in range(n - 1):
-            apart = apart and d[c] <= 0.0 and v[c] <= v[c + 1]
-    return v, steps
-
-
 def penalty_rows(clock, quick):
     """Yield springs with a fixed step, as simulators do it: over the step and the stiffness."""
     scene = SCENES["three equal"]
     about = {
         "needs": "stiffness, step, e = 1", "gives": TIMED,
-        "note": "compiled by numba" if hasattr(penalty, "py_func") else "plain Python",
+        "note": "compiled by numba" if hasattr(verlet, "py_func") else "plain Python",
     }  # fmt: skip
 
     def stepped(group, law, setting, parameter, stiffness, exponent, step):
-        balls = np.array(scene.masses), np.array(scene.velocities)
-        run = partial(penalty, *balls, stiffness, exponent, step)
+        balls = np.array([scene.masses]), np.array([scene.velocities])
+        run = partial(verlet, *balls, stiffness, exponent, 0.0, step, 0.0)
         exact, model = (scene.springs(exponent), CONVERGED), f"penalty, {law}"
         return row(
             clock, about, scene, setting, run, exact, group=group, model=model, parameter=parameter
