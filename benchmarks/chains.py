@@ -33,15 +33,6 @@ def striking(masses=(1, 1, 1), e=1.0, speed=1.0):
     return Chain(masses, [speed] + [0] * (len(masses) - 1), e)
 
 
-def runge_kutta(rate, y, step):
-    """The state after a step, dy/dt = rate(y), to fourth order."""
-    a = rate(y)
-    b = rate(y + step / 2 * a)
-    c = rate(y + step / 2 * b)
-    d = rate(y + step * c)
-    return y + step / 6 * (a + 2 * b + 2 * c + d)
-
-
 # Random numbers are made of operations that round alike everywhere: products, sums, powers of two.
 # `10 ** x` rounds as the processor's vector unit or the C library does, and `Generator.uniform` and
 # `normal` hold a product and a sum that some compilers join into one rounding.

@@ -24,6 +24,13 @@ class Draw(random.Random):
     def choice(self, values):
         return values[self.below(len(values))]
 
+    def some(self, values, count):
+        return [self.choice(values) for _ in range(count)]
+
+    def ways(self, values, n):
+        """Ratios, forward and backward."""
+        return [self.some(values, n - 2) for _ in range(2)]
+
     def decimal(self, low, high, places):
         """A number of a few decimals, as it is printed."""
         scale = 10**places
@@ -49,17 +56,14 @@ def ties(draw, n):
     kind = draw.below(3)
     masses = [1.0] * n
     if kind == 1:
-        masses = [draw.choice(PAPER_MASSES) for _ in range(n)]
+        masses = draw.some(PAPER_MASSES, n)
     elif kind == 2:
-        masses = [draw.choice([1.0, 1.0, 1.0, 3.0, 0.3]) for _ in range(n)]
-    velocities = struck(n)
-    if not draw.chance(40):
-        velocities = [draw.choice([-0.5, 0, 0.5, 1]) for _ in range(n)]
+        masses = draw.some([1.0, 1.0, 1.0, 3.0, 0.3], n)
+    velocities = struck(n) if draw.chance(40) else draw.some([-0.5, 0, 0.5, 1], n)
     coefficients = draw.choice([[1], [1], [0, 0.5, 0.9, 1], [0.5, 0.9, 1], [0.9]])
-    restitution = [float(draw.choice(coefficients)) for _ in range(n - 1)]
-    values = draw.choice([[0.0, 1.0], [0.0, 0.1], [0.0, 0.1, 1.0]])
-    forward, backward = ([draw.choice(values) for _ in range(n - 2)] for _ in range(2))
-    return Problem(masses, velocities, restitution, forward, backward, draw.choice([0.0, 0.5, 1.0]))
+    restitution = [float(e) for e in draw.some(coefficients, n - 1)]
+    ways = draw.ways(draw.choice([[0.0, 1.0], [0.0, 0.1], [0.0, 0.1, 1.0]]), n)
+    return Problem(masses, velocities, restitution, *ways, draw.choice([0.0, 0.5, 1.0]))
 
 
 def bounded_ties(draw, n):
@@ -73,7 +77,7 @@ def tiny_ratios(draw, n, size=1e-20):
     """Ratios of this size among those of ties: they decide whether a contact has been touched."""
     given = ties(draw, n)
     values = draw.choice([[0.0, size], [0.0, size, 0.1], [0.0, size, 0.1, 1.0]])
-    forward, backward = ([draw.choice(values) for _ in range(n - 2)] for _ in range(2))
+    forward, backward = draw.ways(values, n)
     return given._replace(forward=forward, backward=backward)
 
 
@@ -99,10 +103,9 @@ def mixed_zeros(draw, n):
 
 def light_balls(draw, n):
     """Balls a thousand to a million times lighter among the others; elastic or nearly so."""
-    masses = [draw.choice([1.0, 1.0, 1.7, 1e-3, 1e-6]) for _ in range(n)]
-    restitution = [draw.choice([1.0, 1.0, 0.99, 0.9]) for _ in range(n - 1)]
-    ways = ([draw.choice([0.0, 0.05, 0.1]) for _ in range(n - 2)] for _ in range(2))
-    return Problem(masses, struck(n), restitution, *ways)
+    masses = draw.some([1.0, 1.0, 1.7, 1e-3, 1e-6], n)
+    restitution = draw.some([1.0, 1.0, 0.99, 0.9], n - 1)
+    return Problem(masses, struck(n), restitution, *draw.ways([0.0, 0.05, 0.1], n))
 
 
 def any_number(draw, low, high):
@@ -118,7 +121,7 @@ def any_masses(draw, n, decades=2):
     if kind == 0:
         return [1.0] * n
     if kind == 1:
-        return [draw.choice(PAPER_MASSES) for _ in range(n)]
+        return draw.some(PAPER_MASSES, n)
     octaves = round(decades * 1.66)  # on either side of 1
     powers = [2.0 ** (draw.below(2 * octaves) - octaves) for _ in range(n)]
     return [x * any_number(draw, 1, 2) for x in powers]
@@ -128,7 +131,7 @@ def few_velocities(draw, n):
     """The first ball strikes, or few different numbers, zeros and equal ones among them."""
     if draw.chance(50):
         return struck(n)
-    return [draw.choice([0.0, 1.0, 0.5, -0.5]) for _ in range(n)]
+    return draw.some([0.0, 1.0, 0.5, -0.5], n)
 
 
 def losses(draw, n):
@@ -138,8 +141,8 @@ def losses(draw, n):
     return Problem(
         any_masses(draw, n),
         few_velocities(draw, n),
-        [draw.choice(coefficients) for _ in range(n - 1)],
-        *([draw.choice(values) for _ in range(n - 2)] for _ in range(2)),
+        draw.some(coefficients, n - 1),
+        *draw.ways(values, n),
         draw.choice([0.0, 0.5, 1.0]),
     )
 
@@ -176,13 +179,12 @@ def generic(draw, n):
 
 def at_bounds(draw, n):
     """Ratios exactly on their bounds where these are short decimals, or one digit beside them."""
-    m = [draw.choice([1.0, 1.0, 1.5, 3.0, 4.0, 0.25]) for _ in range(n)]
-    parts = [[draw.choice([0.0, 0.5, 1.0, 1.0]) for _ in range(n - 2)] for _ in range(2)]
+    m = draw.some([1.0, 1.0, 1.5, 3.0, 4.0, 0.25], n)
+    parts = draw.ways([0.0, 0.5, 1.0, 1.0], n)
     if draw.chance(60):  # no ratio beside another: all bounds are quotients of two masses
         parts = [[part * (i % 2) for i, part in enumerate(way)] for way in parts]
     ways = within_bounds(m, iter([*parts[0], *parts[1]]).__next__)
-    coefficients = draw.choice([[1.0], [0.9], [0.5, 0.9, 1.0]])
-    e = [draw.choice(coefficients) for _ in range(n - 1)]
+    e = draw.some(draw.choice([[1.0], [0.9], [0.5, 0.9, 1.0]]), n - 1)
     meeting = draw.choice([0.0, 0.5, 1.0])
     return Problem(m, few_velocities(draw, n), e, *ways, meeting)
 
@@ -192,10 +194,10 @@ def extremes(draw, n):
     masses = draw.choice([[1.0], [1.0, 2.0], [1.0, 1e-6, 1e6], [0.045, 0.053, 0.166]])
     ends = draw.choice([[0.0, 1.0], [0.0], [1.0]]), draw.choice([[0.0, 1.0], [1.0], [0.5, 1.0]])
     return Problem(
-        [draw.choice(masses) for _ in range(n)],
+        draw.some(masses, n),
         few_velocities(draw, n),
-        [draw.choice(ends[1]) for _ in range(n - 1)],
-        *([draw.choice(ends[0]) for _ in range(n - 2)] for _ in range(2)),
+        draw.some(ends[1], n - 1),
+        *draw.ways(ends[0], n),
         draw.choice([0.0, 1.0]),
     )
 

@@ -8,7 +8,6 @@ Lengths are in Hertz units, (m v^2 / k)^(2/5), of ball A, or of a ball of an equ
 """
 
 import numpy as np
-from chains import runge_kutta
 from scipy.optimize import least_squares
 from stored import make
 
@@ -43,6 +42,15 @@ LAWS = {
     "convex": QuadraticDissipation(),
     "fused": FusedChain(),
 }
+
+
+def runge_kutta(rate, y, step):
+    """The state after a step, dy/dt = rate(y), to fourth order."""
+    a = rate(y)
+    b = rate(y + step / 2 * a)
+    c = rate(y + step / 2 * b)
+    d = rate(y + step * c)
+    return y + step / 6 * (a + 2 * b + 2 * c + d)
 
 
 def strike(masses, velocities, restitution, gaps, stiffness=1.0, step=0.02, longest=60.0):

@@ -8,7 +8,7 @@ is fitted to the turning points of the outer balls; where these hang at rest is 
 
 import numpy as np
 from real_cradles import table
-from scipy.optimize import least_squares
+from scipy.optimize import curve_fit, least_squares
 from stored import make, read
 
 from cradle import (
@@ -43,19 +43,15 @@ def common():
     mean, time = np.mean([t[f"x{k}_m"] for k in range(1, 6)], axis=0), t["t_s"]
     use = np.isfinite(mean) & (time > 0.8)
 
-    def basis(p):
-        wave = np.exp(-p[0] * time[use] + 2j * np.pi * time[use] / p[1])
-        return np.stack([wave.real, wave.imag, np.ones(use.sum())], axis=1)
+    def wave(time, damping, period, cosine, sine, middle):
+        turn = 2 * np.pi * time / period
+        return np.exp(-damping * time) * (cosine * np.cos(turn) + sine * np.sin(turn)) + middle
 
-    def left(p):
-        found = np.linalg.lstsq(basis(p), mean[use], rcond=None)[0]
-        return 1e3 * (basis(p) @ found - mean[use])
-
-    damping, period = least_squares(left, [0.027, 0.732], x_scale=[0.01, 0.001]).x
-    cosine, minus_sine, _ = np.linalg.lstsq(basis([damping, period]), mean[use], rcond=None)[0]
-    phase = np.arctan2(-minus_sine, cosine)  # mean = size exp(-damping t) cos(2 pi t/T + phase)
+    start = 0.027, 0.732, 0.01, 0.0, 0.0
+    (damping, period, cosine, sine, _), _ = curve_fit(wave, time[use], mean[use], start)
+    phase = np.arctan2(-sine, cosine)  # mean = size exp(-damping t) cos(2 pi t/T + phase)
     first = (np.pi - phase) % (2 * np.pi) * period / (2 * np.pi)
-    return np.hypot(cosine, minus_sine), damping, period, first
+    return np.hypot(cosine, sine), damping, period, first
 
 
 def peaks():
