@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cradle.kernel.state import LIMITS, Record
+from cradle.kernel.state import LIMITS
 from cradle.runtime import compile as runtime
 from cradle.runtime import job as drive
 
@@ -28,11 +28,6 @@ def rooms(**exchanged: Any) -> dict[str, Any]:
     return names
 
 
-def no_record() -> Record:
-    """No room for events."""
-    return Record([], [], [], [])
-
-
 def solve(
     m, v, e, forward, backward=None, *, meeting=0.5, max_events=10**6, room=0, kernel=None,
     area=drive._area, **exchanged,
@@ -44,27 +39,20 @@ def solve(
     sizes = (m, n), (v, n), (e, n - 1), *((way, n - 2) for way in ways)
     parts = (np.broadcast_to(np.asarray(x, float), size).tolist() for x, size in sizes)
     inputs = names["Inputs"](*([part] for part in parts))
-    record = Record(
-        [0] * room, [0] * room, *([[0.0] * k for _ in range(room + 1)] for k in (n, n - 1))
-    )
-    state = area(n, False, record)
+    state, out = area(n, False, drive._record(room, n)), drive.outputs(1, n, last=True)
     state.tally[0].room = 2**62
-    out = names["Outputs"](
-        [[0.0] * n], [[0] * (n - 1)], [0], [0.0],
-        *([kind()] * (n - 1) for kind in (float, float, int)),
-    )  # fmt: skip
     options = names["Options"](meeting, max_events, False)
     plenty = 2**62
     _, status = names["batch"](0, False, n, inputs, options, out, state, plenty)
     tally = state.tally[0]
     return SimpleNamespace(
         status=status,
-        velocities=out.v[0],
-        collisions=out.hits[0],
+        velocities=out.v[0].tolist(),
+        collisions=out.hits[0].tolist(),
         collapsed=bool(out.collapsed[0]),
-        impulses=out.p,
-        absorbed=out.a,
-        held=out.held,
+        impulses=out.p.tolist(),
+        absorbed=out.a.tolist(),
+        held=out.held.tolist(),
         events=tally.events,
         rounds=tally.rounds,
         effort=plenty - tally.effort,

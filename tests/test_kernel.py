@@ -469,12 +469,13 @@ def test_a_path_grows_with_its_impact(plain, on):
     names = {"maximum_compression": 0, "end": 1, "close": 2, "collapse": 3, "repetition": 4}
     found = solve(*LONG, room=count)
     assert found.events == count
-    assert found.state.record.contacts == [event.contact for event in trace.events]
-    assert found.state.record.kinds == [names[event.kind] for event in trace.events]
+    kinds, contacts, velocities, impulses = (part.tolist() for part in found.state.record)
+    assert contacts == [event.contact for event in trace.events]
+    assert kinds == [names[event.kind] for event in trace.events]
     # The first row is the chain as it was given; the event loop does not write it.
     assert trace.path[0].tolist() == LONG[1].tolist()
-    assert found.state.record.velocities[1:] == trace.path[1:].tolist()
-    assert found.state.record.impulses == trace.path_impulses.tolist()
+    assert velocities[1:] == trace.path[1:].tolist()
+    assert impulses == trace.path_impulses.tolist()
 
 
 @pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])

@@ -115,7 +115,7 @@ def test_no_index_lies_outside_the_work_area_where_sequences_are_infinite(way, k
 
 
 def test_an_impact_forgets_the_one_before(kernel):
-    one = drive._area(9, False, plain.no_record())
+    one = drive._area(9, False, drive._record(0, 9))
     for problem in (BEFORE, WAITING):
         assert outcome(problem, kernel, area=lambda *_: one) == outcome(problem, kernel)
 
@@ -129,7 +129,7 @@ LEAVING = Problem([1, 1, 1e-12, 1, 3], [1, 0, 0, 0, 0], [0, 0, 0, 1], [0.5, 0.5,
 
 def test_an_impact_forgets_the_collisions_of_the_one_before(kernel):
     """They were compared with its own where a sequence is slower than the last digit."""
-    one = drive._area(5, False, plain.no_record())
+    one = drive._area(5, False, drive._record(0, 5))
     for problem in (LEAVING, CHATTERING):
         found = plain.solve(*problem[:5], kernel=kernel, area=lambda *_: one)
         expected = plain.solve(*problem[:5], kernel=kernel)
