@@ -14,7 +14,7 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
-from problem import Problem
+from problem import case
 from truth import EventLimit, as_meant
 
 from cradle import ImpactNotFinished, outcomes, paper_chain, post_impact_velocities
@@ -31,15 +31,6 @@ RANGES = {
     "forward": (0.0, 1.0),
     "backward": (0.0, 1.0),
 }
-
-
-def case(masses, velocities, restitution, forward, backward=None, meeting=0.5):
-    """A problem from arrays or scalars."""
-    n = len(masses)
-    backward = forward if backward is None else backward
-    sizes = (n, n, n - 1, n - 2, n - 2)
-    parts = zip((masses, velocities, restitution, forward, backward), sizes)
-    return Problem(*(np.broadcast_to(np.float64(x), k).tolist() for x, k in parts), meeting)
 
 
 def sequence(name):

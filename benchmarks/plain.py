@@ -4,7 +4,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
+from problem import case
 
 from cradle.kernel.state import LIMITS
 from cradle.runtime import compile as runtime
@@ -35,10 +35,7 @@ def solve(
     """Solve one impact by the plain event loop; return all that it leaves."""
     names = kernel or rooms(**exchanged)
     n = len(m)
-    ways = forward, forward if backward is None else backward
-    sizes = (m, n), (v, n), (e, n - 1), *((way, n - 2) for way in ways)
-    parts = (np.broadcast_to(np.asarray(x, float), size).tolist() for x, size in sizes)
-    inputs = names["Inputs"](*([part] for part in parts))
+    inputs = names["Inputs"](*([part] for part in case(m, v, e, forward, backward)[:5]))
     state, out = area(n, False, drive._record(room, n)), drive.outputs(1, n, last=True)
     state.tally[0].room = 2**62
     options = names["Options"](meeting, max_events, False)

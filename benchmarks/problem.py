@@ -2,9 +2,19 @@
 
 from typing import NamedTuple
 
+import numpy as np
 from truth import solve
 
 from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide
+
+
+def case(masses, velocities, restitution, forward, backward=None, meeting=0.5):
+    """A problem from arrays or scalars."""
+    n = len(masses)
+    backward = forward if backward is None else backward
+    sizes = (n, n, n - 1, n - 2, n - 2)
+    parts = zip((masses, velocities, restitution, forward, backward), sizes)
+    return Problem(*(np.broadcast_to(np.float64(x), k).tolist() for x, k in parts), meeting)
 
 
 class Problem(NamedTuple):

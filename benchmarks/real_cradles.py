@@ -9,9 +9,10 @@ freedom are too many by up to one a release.
 import itertools
 
 import numpy as np
+import pandas as pd
 from dop853 import integrated
 from scipy.optimize import least_squares
-from stored import make, read
+from stored import DATA, make
 
 from cradle import (
     Chain,
@@ -29,9 +30,7 @@ SLOWER = 0.766  # strikers of the second release over the one of the first, rela
 
 def table(name):
     """Return the columns of a file as arrays, empty fields as nan."""
-    rows = read(name)
-    columns = {key: np.array([row[key] or "nan" for row in rows]) for key in rows[0]}
-    return {key: x if key == "kind" else x.astype(float) for key, x in columns.items()}
+    return {key: column.to_numpy() for key, column in pd.read_csv(DATA / name).items()}
 
 
 def first_strikes(reading):
