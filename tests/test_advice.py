@@ -116,7 +116,7 @@ def test_events_against_fifty_digits():
         given.append((striking(m, e), ImpulseCorrelation(*within_bounds(m, rng.random))))
     for chain, ratios in given:
         advice = recommend(chain, "path", ratios=ratios, accuracy=1e-12)
-        assert (advice.model, advice.call) == (ratios, "collide(chain, model)")
+        assert (advice.model, advice.call) == (ratios, "collide(advice.chain, advice.model)")
         ways = [ratios.forward, ratios.forward if ratios.backward is None else ratios.backward]
         forward, backward = (np.broadcast_to(part, len(chain) - 2).tolist() for part in ways)
         own = chain.masses, chain.velocities, chain.restitution
@@ -154,11 +154,15 @@ def test_losses_that_viscous_springs_can_have():
             wanted = "velocities" if accuracy == 1e-2 else ("forces", "times")
             advice = recommend(chain, wanted, accuracy=accuracy, stiffness=50.0)
             assert advice.model == SpringChain(50.0, viscosity=loss, accuracy=advice.model.accuracy)
-            assert advice.call == "collide(Chain(masses, velocities), model)"
-            after = collide(Chain(m, chain.velocities), advice.model).velocities
+            after = eval(advice.call).velocities
             assert np.abs(after - answer).max() <= 0.3 * accuracy
             assert (advice.model_error, "five lossy" in advice.measured_on) == (None, True)
             assert advice.numerical_error * 10 <= accuracy
+    five = striking([1] * 5, 0.63)
+    law = recommend(five, stiffness=1)
+    springs, energy = collide(law.chain, law.model), collide(five, EnergyDistribution())
+    apart = f"balls by {springs.velocities[-1] - energy.velocities[-1]:.2f} of the closing speed"
+    assert apart.replace("0.", ".") in recommend(striking([1] * 5, 0.62), stiffness=1).reason
     with pytest.raises(ValueError, match=r"restitution\[0\] = 0.5; must lie in \[0.624, 1\]"):
         recommend(LOST, "forces", stiffness=1)
     heavy = striking([1, 1, 200, 200], [1, 1, 0.7])  # slower than the first by far
@@ -260,7 +264,9 @@ def test_many_impacts_go_into_one_call():
     np.testing.assert_allclose(after, [collide(THREE, one.model).velocities] * 3, atol=1e-15)
     assert many.call.partition("(")[0] == "post_impact_velocities"
     forces = recommend(THREE, stiffness=1, impacts=1000)
-    assert forces.call.startswith("spring_velocities(masses, velocities, model.stiffness, ")
+    assert forces.call.startswith("spring_velocities(masses, velocities, advice.model.stiffness, ")
+    unmeasured = recommend(striking([1] * 20), stiffness=1, impacts=1000)
+    assert (unmeasured.call, unmeasured.seconds) == (forces.call, None)
     assert forces.seconds < recommend(THREE, stiffness=1).seconds
     # A batch keeps no path.
     paths = [recommend(THREE, "path", ratios=0.1, impacts=k) for k in (1, 1000)]
@@ -292,8 +298,10 @@ def test_outside_nothing_is_claimed(chain, known):
     elastic = isinstance(advice.model, SpringChain) and (chain.restitution == 1).all()
     assert advice.model_error == (0.0 if elastic else None)
     lines = re.findall(r"^  .*: +not measured$", repr(advice), flags=re.M)
-    assert len(lines) == (2 if advice.model_error == 0.0 else 3)
-    eval(advice.call, {**vars(chain), **vars(cradle), "chain": chain, "model": advice.model})
+    springs = isinstance(advice.model, SpringChain)
+    assert len(lines) == 3 - springs - (advice.model_error == 0.0)
+    assert ("1e-07 at most by its own estimate" in repr(advice)) == springs
+    eval(advice.call, {**vars(chain), **vars(cradle), "advice": advice})
 
 
 def test_units_direction_and_frame_do_not_matter():

@@ -29,6 +29,7 @@ from cradle import (
     collide,
     paper_chain,
     recommend,
+    viscosity_from,
 )
 from cradle.command.console import text as shown
 from cradle.command.solve import main, run
@@ -114,6 +115,7 @@ def test_solve_agrees_with_the_solver():
 # --- what is assumed ---------------------------------------------------------------------------
 
 LOSSY = "--restitution 0.9"
+VISCOUS = SpringChain(viscosity=viscosity_from(0.9, speed=2, masses=[1, 1, 1])[0])
 BAC = "film film.txt --set BAC --masses 1,1,1 --length 0.3"
 
 
@@ -121,9 +123,10 @@ BAC = "film film.txt --set BAC --masses 1,1,1 --length 0.3"
     ("options", "model", "assumed"),
     [
         ("", SpringChain(), ["the first ball strikes at 1 m/s", "no energy is lost", "elastic sp"]),
-        (f"--speed 2 {LOSSY}", EnergyDistribution(), ["strikes at 2 m/s", "spheres with losses"]),
+        (f"--speed 2 {LOSSY}", VISCOUS, ["strikes at 2 m/s", "viscous spheres; restitution at 2 "]),
+        ("--restitution 0.5", EnergyDistribution(), ["strikes at 1", "lose much, by the energy"]),
         (f"--velocities 1,0,0 {LOSSY} --ratio 0.1", ImpulseCorrelation(0.1), []),
-        (f"{LOSSY} --velocities 1,0,0 --model spheres", EnergyDistribution(), []),
+        (f"{LOSSY} --velocities 2,0,0 --model spheres", VISCOUS, []),
         ("--velocities 1,0,0 --model sequential", SequentialCollisions(), ["no energy is lost"]),
     ],
 )
@@ -135,7 +138,8 @@ def test_what_is_not_given_is_said(options, model, assumed):
     assert len(answer["assumed"]) == len(assumed)
     for said, words in zip(answer["assumed"], assumed, strict=True):
         assert words in said
-    chain = Chain([1] * 3, [row["before"] for row in answer["rows"]], 0.9 if "0.9" in line else 1)
+    e = next((e for e in (0.9, 0.5) if f"{e}" in line and model != VISCOUS), 1)
+    chain = Chain([1] * 3, [row["before"] for row in answer["rows"]], e)
     after = collide(chain, model).velocities
     np.testing.assert_allclose([row["after"] for row in answer["rows"]], after, atol=1e-12)
     text = call(line)
@@ -176,6 +180,18 @@ def test_the_balls_that_are_pulled(pull, start):
     line = f"swing 4 --pull {pull} --by 0.02 --seconds 0.1 --ratio 0.1 --json"
     first = json.loads(call(line))["rows"][0]
     assert [first[f"ball {k}"] for k in range(1, 5)] == [0.02 * one for one in start]
+
+
+def test_losses_of_a_swing_belong_to_the_first_strike():
+    """At the lowest point a ball has its pull times the frequency."""
+    told = json.loads(call("swing 3 --by 0.02 --length 0.2 --restitution 0.9 --steps 2 --json"))
+    speed = 0.02 * math.sqrt(9.81 / 0.2)
+    law = SpringChain(viscosity=viscosity_from(0.9, speed=speed, masses=[1, 1, 1])[0])
+    assert eval(told["model"]).viscosity == pytest.approx(law.viscosity, rel=1e-12)
+    first = told["impacts"][0]
+    after = collide(Chain([1, 1, 1], [speed, 0, 0]), law).velocities
+    np.testing.assert_allclose(first["after"], after, atol=1e-9)
+    assert f"restitution at {speed:.3g} m/s" in told["assumed"][-1]
 
 
 def test_gaps_and_damping_of_a_swing():
@@ -249,6 +265,10 @@ def test_recommend_says_what_python_says():
     text = call("recommend --masses 1,1,1,1,1 --ratio 0.1 --impacts 500")
     assert text.startswith(repr(recommend(chain, ratios=0.1, impacts=500)))
     assert text.isascii()  # as a terminal may be
+    said = call("recommend 5 --restitution 0.9 --accuracy 1e-3")
+    lossy = Chain([1] * 5, [1, 0, 0, 0, 0], 0.9)
+    assert said.startswith(repr(recommend(lossy, accuracy=1e-3, stiffness=1)))
+    assert said.splitlines()[-1].endswith("; equal spheres (--stiffness, --ratio)")
     two = call("recommend --masses 1,1,1,1,1 --ratio 0.1 --wanted velocities,path")
     assert two.startswith(repr(recommend(chain, ("velocities", "path"), ratios=0.1)))
     text = call("recommend ABACA --stiffness 1,2,2,1")
@@ -428,7 +448,11 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("solve ABXA", 1, "SEQUENCE, ball 3: 'X'; must be one of A, B, C, D"),
         ("solve a", 1, "cradle: SEQUENCE = 'A'; must name at least 2 balls"),
         ("solve ABCCA", 1, "--saturate holds the contact closed"),
-        ("solve", 2, "give how many equal balls, such as 5, or a sequence of the paper's balls"),
+        (
+            "solve 5 --masses 1,1",
+            2,
+            "give one of: how many equal balls, such as 5; a sequence of the ",
+        ),
         ("solve 1", 1, "cradle: SEQUENCE = 1; must be a whole number, 2 to 1000000 balls"),
         (f"solve {'9' * 5000}", 1, "cradle: SEQUENCE = '9999"),
         (f"solve {'9' * 5000}", 1, "; must be a whole number, 2 to 1000000 balls"),
@@ -457,7 +481,11 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("swing --masses 1,0.1 --by 0.3 --length 0.2", 1, "after t = 0.2243 s ball 2 at 0.545"),
         ("swing --masses 1,1,1 --length 0", 1, "cradle: --length 0.0; must be above 0"),
         ("swing 3 --seconds 0", 1, "cradle: --seconds = 0.0; must be above 0"),
-        ("recommend --masses 1,1,1", 1, "Give --stiffness 1 if all contacts are equal spheres"),
+        (
+            "recommend 3 --wanted 'path,fastest ball'",
+            1,
+            "Give --stiffness 1 if all contacts are equal spheres",
+        ),
         ("recommend --masses 1,1,1 --wanted path,x", 1, "--wanted 'x'; must be one of"),
         ("swing ABA --speed 2", 2, "leave --speed and --velocities out: the first ball is pulled"),
         ("plot ABA --output -", 2, "'-'; a picture goes to a file: give its name"),

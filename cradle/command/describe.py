@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 import click
 
 import cradle
-from cradle.advice.choice import made
+from cradle.advice.choice import made, own_viscosity
 from cradle.input.values import ABOVE_ZERO, one_number, whole_number
 
 UNITS = {"kg": 1.0, "g": 1e-3}
@@ -30,9 +30,9 @@ CHAIN = (
     click.Option(["--velocities"], callback=numbers_of, help="Instead of --speed: 1,0,0."),
     click.Option(["--restitution"], callback=numbers_of, help="One, or one per contact [1]."),
     click.Option(["--model"], type=click.Choice(["ratio", "spheres", "sequential"]),
-                 help="How the balls collide: by ratios, as elastic spheres (Hertz; with losses "
-                 "the energy law), or one pair after the other [ratio if there are ratios, else "
-                 "spheres]."),
+                 help="How the balls collide: by ratios, as spheres (Hertz; with losses viscous "
+                 "ones, or the energy law if they lose too much for that), or one pair after the "
+                 "other [ratio if there are ratios, else spheres]."),
     click.Option(["--ratio"], callback=numbers_of, help="One, or one per inner ball."),
     click.Option(["--backward"], callback=numbers_of, help="Ratios from the right [as --ratio]."),
     click.Option(["--saturate"], is_flag=True, help="Admit ratios above their bound."),
@@ -60,6 +60,7 @@ class Described(NamedTuple):
     """A chain, how it collides, what was not given and stands for it, and the paper's types."""
 
     chain: cradle.Chain
+    taken: cradle.Chain  # as the model takes it: springs have a viscosity, not a restitution
     model: cradle.Model
     assumed: tuple[str, ...]
     letters: str = ""
@@ -84,8 +85,8 @@ def described(
         sequence = None
         assumed.append(f"{len(masses)} equal balls of 1 {unit or 'kg'}")
     if (sequence is None) == (masses is None):
-        need = "how many equal balls, such as 5, or a sequence of the paper's balls, such as ABCCA"
-        raise click.UsageError(f"give {need}, or --masses")
+        need = "how many equal balls, such as 5; a sequence of the paper's balls, such as ABCCA"
+        raise click.UsageError(f"give one of: {need}; --masses")
     if model not in (None, "ratio") and (ratio or backward or saturate):
         raise click.UsageError(f"--model {model} has no ratios; leave them out, and --saturate")
     if not (speed is None or velocities is None):
@@ -111,17 +112,22 @@ def described(
             raise click.UsageError("ratios need --ratio, such as 0.1 or one for each inner ball")
         ratios = one_or_all(ratio or [0.0]), one_or_all(backward)  # without effect on two balls
         law = cradle.ImpulseCorrelation(*ratios, excess=excess)
-    elastic = bool((chain.restitution == 1.0).all())
-    if masses and ratio is None and model is None and len(chain) > 2:
-        lossy = "spheres with losses, by the energy law (others: cradle recommend --stiffness 1)"
-        kind = "elastic spheres" if elastic else lossy
+    taken = chain
+    if bare := masses and ratio is None and model is None and len(chain) > 2:
         model = "spheres"
-        assumed.append(f"the balls collide as {kind} (--model, --ratio)")
     if model == "sequential":
         law = cradle.SequentialCollisions()
     elif model == "spheres":
-        law = cradle.SpringChain() if elastic else cradle.EnergyDistribution()
-    return Described(chain, law, tuple(assumed), letters)
+        kind = "elastic spheres"
+        try:
+            law = cradle.SpringChain(viscosity=own_viscosity(chain, 1.0))
+            taken = cradle.Chain(chain.masses, chain.velocities)
+            if law.viscosity:
+                kind = f"viscous spheres; restitution at {chain.closing_speeds.max():.3g} m/s"
+        except ValueError:
+            law, kind = cradle.EnergyDistribution(), "spheres that lose much, by the energy law"
+        assumed += [f"the balls collide as {kind} (--model, --ratio)"] if bare else []
+    return Described(chain, taken, law, tuple(assumed), letters)
 
 
 def one_or_all(values: list[float] | None) -> Any:

@@ -15,8 +15,12 @@ from cradle.command.describe import CHAIN, described, numbers_of, one_or_all
 @click.option("--accuracy", default=1e-6, help="Largest numerical error, as a part of the closing "
               "speed [1e-6].")  # fmt: skip
 @click.option("--impacts", default=1, help="How many such impacts [1].")
-@click.option("--stiffness", callback=numbers_of, help="Of the contacts, N/m^1.5; 1 for equal "
-              "spheres if neither forces nor times are wanted.")  # fmt: skip
+@click.option(
+    "--stiffness",
+    callback=numbers_of,
+    help="Of the contacts, N/m^1.5 [1, for equal "
+    "spheres, if velocities, impulses or the path are wanted and there are no ratios].",
+)
 def recommend(
     wanted: Sequence[str], stiffness: list[float] | None, accuracy: float, impacts: int,
     **options: Any,
@@ -25,7 +29,7 @@ def recommend(
 
     \b
     Examples:
-      cradle recommend --masses 1,1,1,1,1 --stiffness 1 --accuracy 1e-3
+      cradle recommend 5 --restitution 0.9 --accuracy 1e-3
       cradle recommend ABACA --impacts 1000
       cradle recommend --masses 1,2,1 --wanted "fastest ball"
     """
@@ -33,12 +37,15 @@ def recommend(
         raise click.UsageError("leave --model out: it is what is recommended")
     given = described(**options)
     wishes = [name.strip() for names in wanted for name in names.split(",")]
-    law = given.model if len(given.chain) > 2 else None  # two balls have no ratio
+    law = given.model if isinstance(given.model, cradle.ImpulseCorrelation) else None
+    law = law if len(given.chain) > 2 else None  # two balls have no ratio
+    spheres = law is None and stiffness is None and len(given.chain) > 2
+    spheres &= {"velocities", "impulses", "path"} >= {*wishes}
     advice = cradle.recommend(
-        given.chain, wishes, accuracy=accuracy, impacts=impacts,
-        ratios=law if isinstance(law, cradle.ImpulseCorrelation) else None,
-        stiffness=one_or_all(stiffness),
+        given.chain, wishes, accuracy=accuracy, impacts=impacts, ratios=law,
+        stiffness=1.0 if spheres else one_or_all(stiffness),
     )  # fmt: skip
     click.echo(repr(advice))
-    if assumed := [words for words in given.assumed if "--model" not in words]:
+    assumed = [words for words in given.assumed if "--model" not in words]
+    if assumed := assumed + ["equal spheres (--stiffness, --ratio)"] * spheres:
         click.echo(f"  {'assumed:':<17}{'; '.join(assumed)}")

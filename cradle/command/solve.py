@@ -88,7 +88,7 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
     """
     given = described(**options)
     chain = given.chain
-    trace = collide(chain, given.model, progress=True)
+    trace = collide(given.taken, given.model, progress=True)
     letters = given.letters or "-" * len(chain)
     rows = [
         {"ball": k + 1, "type": letters[k], "mass": float(chain.masses[k]),
@@ -128,7 +128,7 @@ def plot(output: str, **options: Any) -> None:
     from matplotlib.figure import Figure  # what is missing is said before work
 
     given, figure = described(**options), Figure((7, 4.3), layout="constrained")
-    collide(given.chain, given.model, progress=True).plot(figure.subplots())
+    collide(given.taken, given.model, progress=True).plot(figure.subplots())
     figure.savefig(output, format=Path(output).suffix[1:] or "png")
     click.echo(f"drawn to {output}\n{given.note}")
 

@@ -51,10 +51,12 @@ def swing(
     if options["masses"] is None:
         options["sequence"] = options["sequence"] or "5"
     length = describe.pendulum_length(options.pop("length"), options.pop("period"))
-    given = described(**options)
-    chain = given.chain
     hanging = cradle.Pendulums(0.3 if length is None else length, gaps=one_or_all(gaps or [0.0]),
                                damping=one_or_all(damping or [0.0]))  # fmt: skip
+    if 0.0 < by < math.inf:  # the speed of the first strike, to which a restitution belongs
+        options["speed"] = by * float(hanging.natural_frequency(2)[0])
+    given = described(**options)
+    chain = given.taken
     far = float(hanging.reach(len(chain))[0])
     rule = f"must be above 0 and at most a quarter of a circle of that --length, {far:.4g} m"
     one_number("--by", by, rule, 0.0, far, open_low=True)

@@ -128,7 +128,10 @@ def row_of(name: str, kept: Any, size: int, balls: int) -> Vector:
 
 def checked_masses(masses: ArrayLike) -> Vector:
     """Return masses as floats: positive, and none too light beside the heaviest of its chain."""
-    array = checked("masses", masses, *ABOVE_ZERO)
+    array = numbers("masses", masses)
+    rule = "must be finite: of a wall or a floor, a million times that of the heaviest ball"
+    refuse_where("masses", array, array == np.inf, rule)
+    array = checked("masses", array, *ABOVE_ZERO)
     if array.size and array.ndim:
         small = array < LIGHTEST * array.max(axis=-1, keepdims=True)
         rule = f"must be at least {LIGHTEST} of the heaviest ball of its chain"
