@@ -147,8 +147,9 @@ def spring_velocities(
     stiffness, viscosity, gaps : array_like, shape (..., N - 1) or ()
         k, N/m^p, above 0; A, s, 0 for an elastic contact and at most .3 of the time that the
         fastest closing would take to its depth; and the distance of two balls before the
-        impact, m, which acts by how it compares with that depth, so by the stiffness.  Below zero it is a lean: how far the strings press the two together at rest,
-        with a pull that acts until no contact pushes and no open one closes.
+        impact, m, to be compared with that depth, so with k.  Below zero it is a lean: how far the
+        strings press the two together at rest, with a pull that acts until no contact pushes and no
+        open one closes.
     exponent : float
         p, from 1 to 10.
     damping : {"viscoelastic", "hunt-crossley"}
