@@ -48,7 +48,8 @@ def fit(
 
     The column intervals is the 95 % confidence set.  If several ranges of values explain the shots
     it has several pieces: 0.10-0.12 or 0.17-0.19.  With --csv this is 0.10..0.12; 0.17..0.19 in one
-    cell, with --json the list [[0.10, 0.12], [0.17, 0.19]].
+    cell, with --json the list [[0.10, 0.12], [0.17, 0.19]].  Then: how many minima chi-square has,
+    whether the shots tell the value at all, the end of the range if it is one, and the upper end.
 
     \b
     Examples:
