@@ -81,6 +81,8 @@ def test_two_balls_and_what_is_said(two_balls):
     assert np.nanmax(np.abs(fit.residuals.mean(axis=0))) < 1e-12
     offset = places - fit.swing.positions - fit.residuals
     assert np.ptp(offset, axis=0).max() < 1e-12  # one number for each ball
+    assert fit.chi_square is None  # the residuals themselves made the reading
+    assert "chi-square" not in fit.summary()
     lines = fit.summary().splitlines()
     assert [line.split()[1] for line in lines[:4]] == [*NUMBERS]
     assert lines[3].endswith(" m")
@@ -135,6 +137,29 @@ def test_five_balls_of_which_some_are_hidden():
     other = fit_swing(times, np.where(seen, places, 9.0), LAW, seen=seen)
     assert other.intervals == fit.intervals
     assert (np.isfinite(fit.residuals) == seen).all()
+
+
+def test_three_balls_pulled():
+    """By readings that overlap; each counts, or nothing says where a ball is."""
+    film = filmed(TRUE, [-0.03] * 3 + [0, 0], 2, 40, 3e-4, 3, SequentialCollisions())
+    fit = fit_swing(*film, SequentialCollisions())
+    assert held(fit, TRUE, 2) == {*NUMBERS}
+    assert not fit.poor
+    film = _Film(*film, LAW, None, None, NUMBERS, {"period": 0.8, "gaps": 1e-4}, None)
+    film.begin()
+    pooled = film.swung(np.array([0.02, 0.98, -0.03, -0.031, -0.029, 0])).positions[0]
+    assert pooled[:3] == pytest.approx([-0.03045, -0.03055, -0.029], abs=1e-12)
+
+
+def test_a_profile_in_rough_country(two_balls, monkeypatch):
+    """No interval is narrower than slopes say, though each swing near by leaves more."""
+    film = _Film(*two_balls[:2], LAW, None, None, NUMBERS, {}, None)
+    p, rest, slopes = film.descend(film.begin())
+    film.judged(p, rest, slopes)
+    left = _Film.left
+    monkeypatch.setattr(_Film, "left", lambda self, q: left(self, q) * (2 - (q == p).all()))
+    scan = film.profile(p, rest, slopes, 2, 1e-4, 3.84 * film.variance)
+    assert np.ptp(scan.intervals[0]) == pytest.approx(2 * 1.96e-4, rel=1e-3)
 
 
 def test_outer_balls_alone():
@@ -241,6 +266,7 @@ PLACES = np.stack([-0.03 * np.cos(8 * WAYS), 0 * WAYS], axis=1)
         ({"known": {"period": -1.0}}, r"known\['period'\] = -1.0; must lie in \[0.1, 30\]"),
         ({"known": {"restitution": 1.5}}, r"restitution\b.* = 1.5; must lie in \[0, 1\]"),
         ({"positions": PLACES[::-1] * 0.0}, "no ball is seen on its way"),
+        ({"positions": PLACES - PLACES[:, ::-1]}, "rests, and tells no period: give known"),
         ({"positions": 100 * PLACES}, "no swing is near the film; .* reach a quarter of a circle"),
         ({"times": 1000 * WAYS}, r"period that is seen, s, = 7\d\d.*; must lie in \[0.1, 30"),
         ({"positions": PLACES - [np.inf, 0]}, r"positions\[0, 0\] = -inf; must be finite, or nan"),

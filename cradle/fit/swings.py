@@ -36,7 +36,7 @@ class SwingFit:
     swing: Swing  #: What fits best; its times begin with the first frame.
     residuals: Vector  #: Filmed less computed, less the mean of each ball, shape (K, N), m.
     reading: float  #: Standard error of a reading, m, as given or that of the residuals.
-    chi_square: float  #: Sum of squares of the residuals over `reading`.
+    chi_square: float | None  #: Of the residuals over `reading`; None where they made it.
     degrees_of_freedom: int  #: Readings less what was fitted to them.
     correlation: float  #: Of a ball's residuals in successive frames, about 0 if the law fits.
     poor: bool  #: Whether the law does not fit.
@@ -45,9 +45,10 @@ class SwingFit:
     def summary(self) -> str:
         """Return all that the fit says, as text."""
         wide = ", ".join(f"{name} {times:.1f} times" for name, times in self.widened.items())
+        chi = f"chi-square {self.chi_square:.1f}, " if self.chi_square else ""
         return "\n".join([
             *(f"{one}{UNITS[name] * one.identified}" for name, one in self.estimates.items()),
-            f"chi-square {self.chi_square:.1f}, degrees of freedom {self.degrees_of_freedom}, "
+            f"{chi}degrees of freedom {self.degrees_of_freedom}, "
             f"reading {self.reading:.2g} m, correlation of residuals {self.correlation:.2f}",
             *[f"poor fit: intervals are too short, though widened: {wide or 'none'}"] * self.poor,
         ])  # fmt: skip
@@ -73,8 +74,9 @@ def fit_swing(
     Places and velocities there are fitted too, as is where each ball hangs.  Intervals hold 95 %,
     by profiles of chi-square (Venzon and Moolgavkar, Applied Statistics 37, 1988, 87-94).  Where
     the law fails, by chi-square or residuals alike from frame to frame, they are widened by how
-    parts of the film differ (clusters of Liang and Zeger, Biometrika 73, 1986, 13-22).  A wrong
-    value, no ball seen on its way at first, and too few readings are a ValueError.
+    parts of the film differ (clusters of Liang and Zeger, Biometrika 73, 1986, 13-22).  That of the
+    damping is too short where nearly all balls were pulled; one of no width says that the law jumps
+    there.  A wrong value, no ball seen on its way, and too few readings are a ValueError.
 
     Parameters
     ----------
@@ -147,12 +149,14 @@ class _Film:
         mean, at = mean[np.isfinite(mean)], t[np.isfinite(mean)]
         if min(at.size, often.sum() // 3) < 10:
             raise ValueError(f"{often.sum()} readings, {at.size} frames with all balls; too few")
+        self.size = size = float(np.nanmax(np.abs(self.x)))
+        if "period" not in self.fixed and np.std(mean) < 0.02 * size:
+            raise ValueError("their mean rests, and tells no period: give known['period']")
         rates = np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
         rate = rates[scipy.signal.lombscargle(at, mean - mean.mean(), rates).argmax()]
         self.period = period = self.fixed.get("period", 2.0 * np.pi / rate)
         name = "known['period']" if "period" in self.fixed else "the period that is seen, s,"
         asked.one_number(name, period, "must lie in [0.1, 30]", 0.1, 30.0)
-        self.size = size = float(np.nanmax(np.abs(self.x)))
         early = self.seen & (t <= max(period / 16.0, t[3]))[:, None]
         lines = [np.polyfit(t[some], x[some], 1) if some.sum() > 2 else np.zeros(2)
                  for some, x in zip(early.T, self.x.T, strict=True)]  # fmt: skip
@@ -168,8 +172,8 @@ class _Film:
             "gaps": (0.0, size, 1e-3 * size, size * np.append(0.0, np.geomspace(1e-4, 0.1, 13))),
         }  # limits, first steps, and where to begin  # fmt: skip
         used = [rows[name] for name in self.names]
-        used += [(-np.inf, np.inf, 1e-3 * size, [place]) for place in x]
-        used.append((-np.inf, np.inf, 1e-2 / period, [x @ v / (x @ x)]))
+        used += [(-2.0 * size, 2.0 * size, 1e-3 * size, [place]) for place in x]
+        used.append((-100.0 / period, 100.0 / period, 1e-2 / period, [x @ v / (x @ x)]))
         self.low, self.high, self.steps = np.array([row[:3] for row in used]).T
         self.least, count = 1e-4 * self.steps, int(np.searchsorted(t, 2.2 * period))
         nodes = [np.array(node) for node in product(*(row[3] for row in used))]
@@ -184,7 +188,7 @@ class _Film:
         now = self.fixed | dict(zip(self.names, p.tolist(), strict=False))
         x, hung = np.zeros(len(self.balls)), now["gaps"] * np.arange(len(self.balls))
         x[self.movers] = p[len(self.names) : -1]
-        x = np.maximum.accumulate(x + hung) - hung  # none overlap
+        x = scipy.optimize.isotonic_regression(x + hung).x - hung  # none overlap
         chain = Chain(self.balls.masses, p[-1] * x, now["restitution"])
         length = Pendulums.gravity * (now["period"] / (2.0 * np.pi)) ** 2
         pendulums = Pendulums(length, gaps=now["gaps"], damping=now["damping"])
@@ -232,9 +236,9 @@ class _Film:
         apart = [grid[k:] * grid[:-k] for k in range(1, most)]
         alike = [np.nansum(both) / np.sqrt(np.isfinite(both).sum()) / spread
                  for both in (apart[0], np.concatenate(apart))]  # fmt: skip
-        chi, wide = float(left @ left) / reading**2, np.ones(p.size)
+        chi, wide = self.reading and float(left @ left) / reading**2, np.ones(p.size)
         exact = spread < (1e-6 * self.size) ** 2  # rounding alone is left
-        poor = not exact and bool(max(alike) > _FAR or chance(chi, freedom) < _CHANCE)
+        poor = not exact and bool(max(alike) > _FAR or (chi and chance(chi, freedom) < _CHANCE))
         self.variance = max(reading**2, spread * poor)
         inverse = (solver := np.linalg.pinv(slopes)) @ solver.T
         errors = np.sqrt(self.variance * np.diag(inverse))
@@ -288,7 +292,9 @@ class _Film:
                 if abs(near - 1.0) < 0.02 or (q[k] == limit and near < 1.0):
                     break
                 way = abs(q[k] - p[k]) / np.clip(near, 0.3, 3.0)
-            ends.append(float(q[k]))
+            # Where all is rough, a swing near by may leave more than one far off: by slopes, then.
+            away = max(side * (q[k] - p[k]), np.sqrt(RISE) * error)
+            ends.append(float(np.clip(p[k] + side * away, self.low[k], self.high[k])))
         grid, excess = np.array(sorted(points)).T
         mode = Mode(float(p[k]), 0.0)
         return Scan((mode,), ((ends[0], ends[1]),), grid, excess * RISE / rise)
