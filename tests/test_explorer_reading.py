@@ -100,9 +100,9 @@ def test_letters_bring_their_numbers(still):
 
 def test_a_reader_walks_on_from_a_changed_setting(still):
     """An address stays until something changes; then keys go on from the last scene."""
-    tab = still("#in-a-lecture", stopped=True)
+    tab = still("#what-you-see", stopped=True)
     tab.clock.run_for(1000)
-    assert tab.evaluate("location.hash") == "#in-a-lecture"
+    assert tab.evaluate("location.hash") == "#what-you-see"
     tab.go_to("scene=half")
     tab.clock.run_for(1000)
     tab.get_by_label("ratio", exact=True).press("ArrowRight")

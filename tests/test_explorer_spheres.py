@@ -79,7 +79,7 @@ def test_linear_springs(spheres, still, stiffness):
     np.testing.assert_allclose(answer, expected, rtol=0, atol=1e-5)
     tab = still(chapter="compliance")
     tab.push("Next hit")
-    tab.typed("stiffness ratio", str(stiffness))
+    tab.typed("stiffness quotient", str(stiffness))
     assert tab.drawn()["after"] == answer
 
 

@@ -337,18 +337,17 @@
 
     // After a hit: as loud as the balls meet fast.
     sound() {
-      const { before, happened } = this.state.swing.hit(this.state.view.number);
-      if (!this.audio || !happened || this.state.clock.inside > 0) return;
+      const { clock, swing } = this.state;
+      const { before, happened } = swing.hit(swing.latest(clock.time));
+      if (!this.audio || !happened || clock.inside > 0) return;
       click(this.audio, Math.min(1, Math.max(...before.slice(1).map((v, c) => before[c] - v))));
     }
 
     // Bring everything up to date with the state.
     draw(scenery) {
       this.stale = false;
-      const { pictures, outcome } = this.panels;
+      const { pictures } = this.panels;
       if (pictures) pictures.node.hidden = scenery.covered;
-      // Who chooses an answer draws no bars.
-      outcome.node.hidden = scenery.covered && "answers" in this.host.dataset;
       this.host.classList.toggle("covered", scenery.covered);
       for (const panel of Object.values(this.panels))
         if (!panel?.node.hidden) panel?.show({ ...scenery, loud: this.audio }, this.box, this.stageBox);

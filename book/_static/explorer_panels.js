@@ -40,14 +40,16 @@
             full,
           ]),
     );
-    function show({ scene }) {
+    function show({ scene, covered }) {
       full.textContent = document.fullscreenElement ? "Leave full screen" : "Full screen";
       const at = scenes.findIndex(({ key }) => key === scene);
       list.show(scene);
       place.textContent = at < 0 ? "" : `${at + 1} of ${scenes.length}`;
       const { text: said, link } = scenes[at] ?? { text: "" };
       const more = link ? [" ", make("a", { href: link.address }, link.words)] : [];
-      text.replaceChildren(said, ...more);
+      // It tells the answer; its place stays.
+      if (covered) text.replaceChildren("After the hit: what this scene shows, and diagrams.");
+      else text.replaceChildren(said, ...more);
     }
     return { node: make("div", { class: "scenes" }, walk, chains ? "" : text), show };
   }
@@ -134,7 +136,7 @@
       backward: ratio("ratio, pushed from the right", ["backward"]),
       gap: slider({ words: "gaps", low: 0, high: 100, step: 0.1, unit: "µm", input: act.gap }),
       stiffness: slider({
-        words: "stiffness ratio",
+        words: "stiffness quotient",
         low: 0.01,
         high: 1000,
         step: 0.01,
@@ -257,15 +259,16 @@
       other ?? "",
       balance,
     );
-    function show(state, box) {
+    function show(seen, box) {
+      // Who chooses an answer draws no bars: until then all is as before the hit.
+      const asked = seen.covered && "answers" in host.dataset;
+      const state = asked ? { ...seen, covered: false, guess: null, now: seen.hit.before } : seen;
       const { setting, hit, number, now, part, guess, covered } = state;
-      const name = explorer.hitName(number);
-      title.textContent = covered
-        ? "Your guess (m/s)"
-        : `${part < 1 ? "During" : "After"} ${name} (m/s)`;
+      const when = asked ? "Before" : part < 1 ? "During" : "After";
+      title.textContent = covered ? "Your guess (m/s)" : `${when} ${explorer.hitName(number)} (m/s)`;
       second.textContent = covered ? "Momentum and energy of your guess" : "Momentum and energy";
       caption.textContent =
-        "Momentum: ball by ball, up to the dashed line; balls that go back take some off. Energy: 100\u00a0% is " +
+        "Momentum: ball by ball, from 0 to the dashed line; a ball that goes back (lower row) steps back. Energy: 100\u00a0% is " +
         `what there was before the hit; grey is ${covered ? "what you have not given away" : "lost, or stored in the contacts"}.`;
       const ghost = guess?.open && guess.touched && number === 0 ? { guess: guess.values } : {};
       const drawn = covered ? { span: explorer.guessReach(setting).span, gap: 1.1 } : ghost;
@@ -284,7 +287,7 @@
 
   // At the side of the first one, with the same clock: another ratio, or a setting that was kept.
   function besidePanel(act) {
-    const options = [["", "nothing"], ["0", "ratio 0"], ["0.15", "ratio 0.15"], ["spheres", "spheres that touch"], ["kept", "this setting, kept as it is"]]; // prettier-ignore
+    const options = [["", "nothing"], ["0", "ratio 0"], ["0.15", "ratio 0.15"], ["spheres", "spheres that touch"], ["kept", "a copy of this setting"]]; // prettier-ignore
     const chosen = choice({
       words: "beside it",
       choose: act.beside,

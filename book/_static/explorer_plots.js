@@ -158,15 +158,15 @@
     return picture({ width, height: count * row + 0.2 * em }, words, parts.join(""));
   }
 
-  // Momentum, ball by ball, each from where the one before has ended: to the right, or back. The
-  // mark is the momentum before the hit, where the last one has to end.
+  // Momentum, ball by ball, each from where the one before has ended: to the right, or back. One
+  // mark is zero, the other the momentum before the hit, where the last one has to end.
   function momentum(box, setting, before, now) {
     const { width, em } = box;
     const of = (row) => row.map((v, ball) => setting.masses[ball] * v);
     const ends = of(now).reduce((all, p) => [...all, all[all.length - 1] + p], [0]);
     const total = sum(of(before));
     const [low, high] = [Math.min(0, total, ...ends), Math.max(0, total, ...ends)];
-    const x = (p) => px(em + ((p - low) / Math.max(high - low, 1e-9)) * (width - 2 * em));
+    const x = (p) => px(1.7 * em + ((p - low) / Math.max(high - low, 1e-9)) * (width - 3.4 * em));
     const thick = 0.55 * em;
     const pieces = ends.slice(1).map((end, ball) => {
       const [from, to] = [x(ends[ball]), x(end)];
@@ -177,13 +177,17 @@
         `height="${px(thick)}" fill="${colour(ball)}"/>`
       );
     });
-    const height = em + 2 * thick;
-    const tick = (p, how) => `<path class="${how}" d="M${x(p)} 0V${px(height)}"/>`;
+    const below = em + 2 * thick;
+    const height = below + 1.1 * em;
+    const tick = (p, how) => `<path class="${how}" d="M${x(p)} 0V${px(below)}"/>`;
+    const name = (p, words) => text(p, below + 0.85 * em, words, 'text-anchor="middle" class="small"');
+    const apart = Math.abs(x(total) - x(0)) > 2.4 * em;
+    const names = apart ? name(x(0), "0") + name(x(total), "before") : name(x(0), "0, before");
     const last = ends[ends.length - 1];
     return picture(
       { width, height },
       `Momentum: ${fixed(last)}, before the hit ${fixed(total)} kg m/s`,
-      tick(0, "zero") + pieces.join("") + tick(total, "cursor"),
+      tick(0, "zero") + pieces.join("") + tick(total, "cursor") + names,
     );
   }
 
@@ -227,8 +231,18 @@
   // Sum of all impulses at each row of a record's path.
   const progress = (record) => record.pathImpulses.map(sum);
 
+  // The rows of a record by rule between which all goes straight. At a maximum of compression no line
+  // bends; where two runs overlap, the record alone has one maximum after the other.
+  function straight(record) {
+    const { path, pathImpulses, events } = record;
+    if (path.length !== events.length + 1) return record; // of forces: lines are curved
+    const kept = (rows) => rows.filter((_, row) => events[row - 1]?.kind !== "maximum_compression");
+    return { path: kept(path), pathImpulses: kept(pathImpulses) };
+  }
+
   // Velocities and impulses when the hit has come so far, from 0 to 1.
-  function during(record, part) {
+  function during(whole, part) {
+    const record = straight(whole);
     const along = progress(record);
     const end = along[along.length - 1];
     const target = part * end;
@@ -252,9 +266,11 @@
   // two balls over its own impulse.
   function lines(record, contact) {
     const all = contact === "all";
+    const { path, pathImpulses } = straight(record);
     return {
-      along: all ? progress(record) : record.pathImpulses.map((row) => row[contact]),
-      balls: all ? record.path[0].map((_, ball) => ball) : [contact, contact + 1],
+      path,
+      along: all ? progress({ pathImpulses }) : pathImpulses.map((row) => row[contact]),
+      balls: all ? path[0].map((_, ball) => ball) : [contact, contact + 1],
     };
   }
 
@@ -289,9 +305,9 @@
 
   // The hit from the inside.
   function diagram(box, record, contact) {
-    const { along, balls } = lines(record, contact);
+    const { path, along, balls } = lines(record, contact);
     const { em } = box;
-    const shown = balls.flatMap((ball) => record.path.map((row) => row[ball]));
+    const shown = balls.flatMap((ball) => path.map((row) => row[ball]));
     const end = along[along.length - 1];
     const plot = axes(box, [0, end > 0 ? end : 1], span(shown), [
       contact === "all"
@@ -301,11 +317,11 @@
     ]);
     const drawn = balls.map((ball) =>
       polyline(
-        along.map((at, row) => [plot.x(at), plot.y(record.path[row][ball])]),
+        along.map((at, row) => [plot.x(at), plot.y(path[row][ball])]),
         stroke(ball),
       ),
     );
-    const last = record.path[record.path.length - 1];
+    const last = path[path.length - 1];
     drawn.push(
       names(
         plot,

@@ -6,7 +6,8 @@
   const SLOW = 0.25; // of the true speed
   const INSIDE = 3.5; // seconds that a hit takes in slow motion
   const REST = 0.5; // seconds before the balls are let go again
-  const GUESS = "Nothing is shown before the hit. Guess, then press Let go.";
+  const LOOK = 1.2; // seconds that the balls wait after a hit that was guessed
+  const GUESS = "Guess, then press Let go. The answer appears at the hit.";
 
   const { chapters, scenes } = explorer.data;
   const named = (key) => [...scenes, ...chapters].find((scene) => scene.key === key);
@@ -18,7 +19,7 @@
     constructor({ scene, picture, guessing = "", again = "" }) {
       this.picture = picture;
       Object.assign(this, { guessing, again });
-      this.clock = { time: 0, playing: false, slow: false, inside: null, guessed: false };
+      this.clock = { time: 0, playing: false, slow: false, inside: null, guessed: false, wait: 0 };
       this.view = {
         scene: "", // a key, or none for a setting of the reader's own
         scope: "all", // or the number of a ball
@@ -167,6 +168,7 @@
     // Hold the balls where they are pulled to; go on by oneself if asked.
     restart(playing) {
       Object.assign(this.clock, { time: playing ? -REST : 0, playing, inside: null });
+      this.follow();
       this.show(0);
     }
 
@@ -176,34 +178,46 @@
       this.record = this.swing.record(number);
     }
 
+    // Let the pictures follow all hits again.
+    follow() {
+      Object.assign(this.clock, { guessed: false, wait: 0 });
+    }
+
     play() {
       const { clock } = this;
+      this.follow();
       clock.playing = !clock.playing && this.swing.positions(clock.time) !== null;
     }
 
     step() {
       const number = this.swing.latest(Math.max(this.clock.time, 0)) + 1;
       Object.assign(this.clock, { time: Swing.time(number), playing: false, inside: null });
+      this.follow();
       this.open();
       this.show(number);
     }
 
     // Let time pass; return whether more than positions has changed. In slow motion the clock
-    // stands still during a hit, which takes no time. After a hit that was guessed the balls wait,
-    // so that the guess can be compared.
+    // stands still during a hit, which takes no time. After a hit that was guessed the balls wait
+    // a little; then they swing on, and the pictures stay, so that the guess can be compared.
     advance(seconds) {
       const { clock, view, swing } = this;
+      if (clock.wait > 0) {
+        clock.wait -= seconds;
+        return false;
+      }
       if (clock.inside !== null) {
         clock.inside += seconds / INSIDE;
         view.part = Math.min(clock.inside, 1);
         if (clock.inside < 1) return false;
-        Object.assign(clock, { inside: null, playing: !clock.guessed });
+        Object.assign(clock, { inside: null, wait: clock.guessed ? LOOK : 0 });
         return true;
       }
       const next = swing.latest(clock.time) + 1;
       clock.time += seconds * (clock.slow ? SLOW : 1);
       if (clock.time < Swing.time(next)) return false;
-      clock.guessed = this.open();
+      const opened = this.open();
+      clock.guessed = opened || (clock.guessed && !clock.slow);
       const { status, happened } = swing.hit(next);
       if (status !== "finished") {
         Object.assign(clock, { time: Swing.time(next), playing: false });
@@ -212,8 +226,8 @@
       }
       if (!happened) return false;
       if (clock.slow) Object.assign(clock, { time: Swing.time(next), inside: 0 });
-      else if (clock.guessed) Object.assign(clock, { time: Swing.time(next), playing: false });
-      this.show(next, clock.slow ? 0 : 1);
+      else if (opened) Object.assign(clock, { time: Swing.time(next), wait: LOOK });
+      if (opened || !clock.guessed) this.show(next, clock.slow ? 0 : 1);
       return true;
     }
 
