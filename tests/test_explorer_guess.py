@@ -83,6 +83,7 @@ def test_pictures_wait_after_a_hit_that_was_guessed(still):
     assert tab.locator(".outcome .drawn .guess").count() == 5
     # Who presses a button has compared.
     tab.push("Pause")
+    tab.later(50)
     tab.push("Go on")
     for _ in range(3):
         tab.later(1000)
@@ -125,7 +126,7 @@ def test_events_are_those_of_the_chapter(still):
     tab.push("Next hit")
     tab.drawn()
     rows = [
-        (row, f"balls {c + 1} and {c + 2} {'meet again' if kind == 'close' else 'part'}")
+        (row, f"contact {c + 1}\u2011{c + 2} {'closes' if kind == 'close' else 'ends'}")
         for row, (kind, c) in enumerate(trace.events, start=1)
         if kind != "maximum_compression"
     ]
