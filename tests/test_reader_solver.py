@@ -66,6 +66,7 @@ def test_a_piece_is_left_to_the_reader(solver):
 def editor(visit):
     """Open chapter 3 and return what types lines and presses Run; no other page is asked for."""
     tab = visit(chapter="three_balls")
+    tab.click(".admonition:has(.reader-solver) > .admonition-title")  # it is folded
     asked = []
     tab.on("request", lambda request: asked.append(request.url))
 
