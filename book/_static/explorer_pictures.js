@@ -15,7 +15,7 @@
     const node = make("ol", { class: "events" });
     let listed = null;
     const words = ({ kind, contact }) =>
-      `balls ${contact + 1} and ${contact + 2} ${kind === "close" ? "meet again" : "part"}`;
+      `contact ${contact + 1}\u2011${contact + 2} ${kind === "close" ? "closes" : "ends"}`;
     function show({ record, part }) {
       const total = record ? explorer.progress(record) : [0];
       const end = total[total.length - 1];
