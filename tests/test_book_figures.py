@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chapters import BOOK, Chapter, after, code, panel, solved
-from test_book_compliance import first_loss, outcome, printed_10_and_11
+from test_book_compliance import constant_ratio, first_loss, outcome, printed_10_and_11
 
 from cradle import textbook
 
@@ -183,6 +183,26 @@ def test_fig_compliance_ratio():
     theta = np.pi * part
     np.testing.assert_allclose(limit, theta**2 / (4 * (1 - np.cos(theta))) - 0.5, rtol=1e-9)
     assert (shown["Eq. 14"][:, 1] == 1).all()
+
+
+def test_fig_compliance_paths():
+    """Springs by the printed Eqs. 10 and 11, then straight up; two pieces of a constant ratio."""
+    shown = panel("compliance", "fig-own-compliance-paths")
+    end = outcome(1, 1)
+    left, right = 1 - end[0], end[2]
+    loss, _ = first_loss(1)
+    together, alone = np.split(shown["springs"], 2)
+    expected = [-printed_10_and_11(1, 1, t) for t in np.linspace(0, loss, len(together))]
+    np.testing.assert_allclose(together, expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(alone[:, 0], left, rtol=0, atol=1e-8)
+    ratio = constant_ratio(end)
+    *first, last = shown["constant ratio"]
+    first = np.array([point for point in first if point[1] <= ratio * left + 1e-8])
+    np.testing.assert_allclose(first[:, 1], ratio * first[:, 0], rtol=0, atol=1e-8)
+    assert first[-1, 0] == pytest.approx(left, abs=1e-8)
+    for point in (alone[-1], last):
+        np.testing.assert_allclose(point, [left, right], rtol=0, atol=1e-8)
+    assert (np.diff(alone[:, 1]) >= 0).all()
 
 
 def test_fig_compliance_effective():
