@@ -164,9 +164,9 @@ GIVEN = {
     "compliance": "0.15",
     "three_balls": "0.01 0.09 0.1 0.11 0.15 0.8 0.9",
     "multiple_impacts": "0.15 0.2 0.25 0.8",
-    "patterns": "0.01 0.15 0.25 0.3 0.4 0.5 0.6 0.9 2.5",
+    "patterns": "0.01 0.15 0.25 0.3 0.4 0.5 0.9 2.5",
     "n_balls": "0.1 0.15 0.5 1.5 4.5",
-    "experiments": "0.5",
+    "experiments": "0.001 0.01 0.5",  # a step, and what is small beside it
     "toy": "0.9 0.95 0.97 0.99",
     "real_cradles": "22.2 25.3 44.8",
     "recipe": "0.62",
