@@ -42,10 +42,15 @@ SPRINGS = {
 MODELS = {"ratio": ImpulseCorrelation(RATIO), "springs": SpringChain(1.0)}
 RESTITUTION = 0.97  # of what loses energy; of springs at the striker's first speed
 SPEED = 2.0 * math.sqrt(GRAVITY * LENGTH) * math.sin(ANGLE / 2)
+#: Contacts that last so long; a gap of three times the depth to which balls press at first.
+DEPTH = STEEL * SPEED / 2.9432
+STIFFNESS, APART = 0.625 * SPEED**2 / DEPTH**2.5, 3 * DEPTH
 LOSSY = viscosity_from(RESTITUTION, speed=SPEED, masses=[1] * BALLS)
 #: What else a row can solve its impacts by: restitution and model.
 LAWS = {
+    "ratio": (1, MODELS["ratio"]),
     "springs": (1, MODELS["springs"]),
+    "springs, outer apart": (1, SpringChain(STIFFNESS, gaps=(APART, 0, 0, APART))),
     "ratio, losses": (RESTITUTION, MODELS["ratio"]),
     "springs, losses": (1, SpringChain(1.0, viscosity=LOSSY)),
 }
@@ -145,19 +150,23 @@ def by_swing(pulled, duration=MINUTE, model=MODELS["ratio"], restitution=1):
     return run.times, run.positions / LENGTH, run.velocities / LENGTH
 
 
-def on_springs(pulled, duration=MINUTE, *, contact=STEEL, steps_a_contact=100):
-    """Run the scene on Hertz springs, with that contact of two balls at the first stroke."""
+def on_springs(pulled, duration=MINUTE, *, contact=STEEL, steps_a_contact=100, apart=0.0):
+    """Run the scene on Hertz springs, with that contact of two balls at the first stroke.
+
+    The outer balls hang `apart` from their neighbours.
+    """
     # Two balls of mass 1 at speed v: contact 2.9432 d/v, depth d, k d^(5/2) = 5/8 v^2.
     depth = contact * SPEED / 2.9432
     stiffness = 0.625 * SPEED**2 / depth**2.5
     angle = np.zeros(BALLS)
     angle[:pulled] = -ANGLE
     inner = math.ceil(steps_a_contact / contact / FRAMES)
-    return _march(angle, int(duration * FRAMES), inner, stiffness)
+    gaps = np.array([apart, *[0.0] * (BALLS - 3), apart])
+    return _march(angle, int(duration * FRAMES), inner, stiffness, gaps)
 
 
 @numba.njit(cache=False)
-def _march(angle, frames, inner, stiffness):
+def _march(angle, frames, inner, stiffness, gaps):
     """Velocity Verlet for pendulums whose balls repel each other by k d^(3/2), in the plane."""
     n = len(angle)
     step = 1.0 / FRAMES / inner
@@ -176,7 +185,7 @@ def _march(angle, frames, inner, stiffness):
                 sine[i], cosine[i] = math.sin(angle[i]), math.cos(angle[i])
                 pull[i] = -GRAVITY / LENGTH * sine[i]
             for c in range(n - 1):
-                dx = 2.0 * RADIUS + LENGTH * (sine[c + 1] - sine[c])
+                dx = 2.0 * RADIUS + gaps[c] + LENGTH * (sine[c + 1] - sine[c])
                 if dx < 2.0 * RADIUS:
                     dy = LENGTH * (cosine[c] - cosine[c + 1])
                     distance = math.sqrt(dx * dx + dy * dy)
@@ -278,16 +287,32 @@ def minutes_with_tiny_gaps():
 
 
 def other_laws():
-    """Yield energies after some strokes of rows with other laws, and of `swing` with the same."""
+    """Yield energies after some strokes of rows by each law, and of what they should do.
+
+    That is `swing` with the same law; Hertz springs where the law has gaps.  Engines as they are
+    come last, with a step of a millisecond.
+    """
+    settings = "default", "fine", "refined"
     for (name, law), pulled in itertools.product(LAWS.items(), (1, 2)):
         restitution, model = law
-        found = {("swing", "alone"): by_swing(pulled, model=model, restitution=restitution)}
-        for engine, setting in itertools.product(present(ENGINES), ("default", "refined")):
+        if name == "springs, outer apart":
+            found = {("Hertz springs", "alone"): on_springs(pulled, apart=APART)}
+        else:
+            found = {("swing", "alone"): by_swing(pulled, model=model, restitution=restitution)}
+        for engine, setting in itertools.product(present(ENGINES), settings):
             found[engine.name, setting] = in_engine(engine, setting, pulled, mend=True, law=law)
         for (who, setting), (_, angles, rates) in found.items():
-            each = strokes(angles, rates)
-            for k in AT:
-                yield who, name, setting, pulled, k, *(f"{e:.4f}" for e in each[k - 1])
+            yield from _some(who, name, setting, pulled, strokes(angles, rates))
+    for engine, pulled in itertools.product(present(ENGINES), (1, 2)):
+        _, angles, rates = in_engine(engine, "fine", pulled, mend=False)
+        yield from _some(engine.name, "as it is", "fine", pulled, strokes(angles, rates))
+
+
+def _some(who, law, setting, pulled, each):
+    """Yield the energies after the strokes that are kept, as far as the run went."""
+    for k in AT:
+        if k <= len(each):
+            yield who, law, setting, pulled, k, *(f"{e:.4f}" for e in each[k - 1])
 
 
 def costs_of_laws(repeats=5, seconds=5.0):
@@ -300,6 +325,8 @@ def costs_of_laws(repeats=5, seconds=5.0):
     for engine in present(ENGINES):
         ways[engine.name] = functools.partial(_cost, engine, "fine", 1, True, seconds)
     for (who, way), (name, law) in itertools.product(ways.items(), LAWS.items()):
+        if name == "ratio" or (who, name) == ("swing", "springs, outer apart"):
+            continue
         pairs = [(way(law=law), way()) for _ in range(repeats)]
         yield who, name, quotient(*zip(*pairs)), repeats
 
