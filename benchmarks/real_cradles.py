@@ -113,6 +113,9 @@ LAWS = {
     "three ratios, e": (
         lambda p, r, a: ratios(p[:3], p[3], r, a),
         [[*s, 0.985] for s in FINE], [(0, 0.5)] * 3 + [E]),
+    "three ratios, e, four masses": (
+        lambda p, r, a: ratios(p[:3], p[3], r, a, masses=[1, *p[4:]]),
+        [[*s, 0.985, 1, 1, 1, 1] for s in THREE], [(0, 0.45)] * 3 + [E, *MASSES]),
     "three ratios, four e": (
         lambda p, r, a: ratios(p[:3], p[3:], r, a),
         [[*s, *[0.985] * 4] for s in THREE], [(0, 0.5)] * 3 + [E] * 4),
@@ -138,8 +141,7 @@ LAWS = {
         [(0, 6)] * 3 + [LOSS, (0, 6)]),
 }  # fmt: skip
 TOGETHER = [name for name in LAWS if name != "spheres, three gaps, A"]
-NOT_APART = ("three ratios, four e", "three ratios each way, e", "spheres, four gaps, A")
-ONE_BY_ONE = [name for name in LAWS if name not in NOT_APART]
+ONE_BY_ONE = [name for name in LAWS if name != "spheres, four gaps, A"]
 SUMS = ("chi_one", "chi_two", "chi_three")
 COLUMNS = ["reading", "law", "strikers", "fitted", "freedom", *SUMS, "parameters"]
 
