@@ -340,12 +340,12 @@ def test_what_the_third_strike_wants_of_ball_4():
     *gaps, loss = parameters("spheres, three gaps, A", "apart", "both")
     unit = 1e6 * (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
 
-    def least(law, top):
-        def sum_(x):
-            off = real_cradles.misfits(lambda _: law(x), film, (3,))
-            return off @ off
+    def sum_of(velocities):
+        off = real_cradles.misfits(lambda _: velocities, film, (3,))
+        return off @ off
 
-        return minimize_scalar(sum_, bounds=(0, top), method="bounded")
+    def least(law, top):
+        return minimize_scalar(lambda x: sum_of(law(x)), bounds=(0, top), method="bounded")
 
     ratio = least(lambda x: real_cradles.ratios([*ratios[:2], x], e, 3, True), 0.3)
     gap = least(lambda x: real_cradles.by_spheres([*gaps[:2], x, loss], 3, True), 0.1)
@@ -353,6 +353,17 @@ def test_what_the_third_strike_wants_of_ball_4():
     assert float(GLUED["gap-chosen"]) == pytest.approx(unit * gaps[2], abs=6e-3)
     assert float(GLUED["gap-wanted"]) == pytest.approx(unit * gap.x, abs=0.011)
     assert float(GLUED["gap-implies"]) == pytest.approx(implied(gaps[2] / 0.766**0.8), abs=6e-4)
+    # A standard error on, the sum of squares is larger by 1.
+    for name, best, on, scale, step in (
+        ("ratio", ratio, lambda x: real_cradles.ratios([*ratios[:2], x], e, 3, True), 1, 1e-3),
+        ("gap", gap, lambda x: real_cradles.by_spheres([*gaps[:2], x, loss], 3, True), unit, 0.01),
+    ):
+        sides = [
+            brentq(lambda x, on=on, best=best: sum_of(on(x)) - best.fun - 1, best.x, best.x + side)
+            for side in (-0.015, 0.015)
+        ]
+        error = scale * (sides[1] - sides[0]) / 2
+        assert float(GLUED[f"{name}-wanted-error"]) == pytest.approx(error, abs=step)
     # Either fits then; the gap did before.
     assert max(ratio.fun, gap.fun) < 6
     assert sums_of("gaps") - gap.fun < 1
