@@ -749,13 +749,14 @@ def test_small_ones_in_chapters(visit, still, chapter: str, parts: set[str]):
     """They wait to be let go, show what the chapter is about, and leave the address alone."""
     tab = visit(chapter=chapter, width=390, stopped=True)
     tab.clock.run_for(1000)
-    assert tab.evaluate("document.querySelectorAll('.cradle-explorer.live').length") == 1
-    host = tab.locator(".cradle-explorer")
+    count = 2 if chapter == "patterns" else 1  # there the map has a cradle of its own
+    assert tab.evaluate("document.querySelectorAll('.cradle-explorer.live').length") == count
+    host = tab.locator(".cradle-explorer").first
     labels = host.locator(".slider:visible label").all_text_contents()
     assert set(labels) == parts
     assert tab.state("clock.playing") is False
     before = tab.later(50)
-    tab.get_by_label("ratio", exact=True).press("ArrowRight")
+    host.get_by_label("ratio", exact=True).press("ArrowRight")
     after = tab.later(1000)
     assert after["forward"] != before["forward"]
     assert same_outcome(after)
