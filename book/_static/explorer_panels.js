@@ -48,7 +48,7 @@
       const { text: said, link } = scenes[at] ?? { text: "" };
       const more = link ? [" ", make("a", { href: link.address }, link.words)] : [];
       // It tells the answer; its place stays.
-      if (covered) text.replaceChildren("After the hit: what this scene shows, and diagrams.");
+      if (covered && said) text.replaceChildren("After the hit: what this scene shows, and diagrams.");
       else text.replaceChildren(said, ...more);
     }
     return { node: make("div", { class: "scenes" }, walk, chains ? "" : text), show };
