@@ -585,7 +585,7 @@ def test_what_takes_too_long_is_said(still):
     status = tab.state("swing.hit(0).status")
     assert status == "unfinished"
     assert "more than 4000 events" in tab.inner_text(".words")
-    limits = tab.locator("details:has-text('The limits of this page')").text_content()
+    limits = tab.locator(".admonition:has-text('The limits of this page')").text_content()
     assert "After 4000 events" in limits
     lightest, heaviest = tab.evaluate("cradleExplorer.LIMITS.masses")
     assert f"Masses go from {lightest} to {heaviest} kg" in limits
