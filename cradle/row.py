@@ -66,8 +66,8 @@ class Row(Alone):
     touching, resting : float, optional
         Neighbours touch, and are struck together, whose gap is at most this, m, while they close or
         part no faster than that, m/s; so do those that meet.  Slower than that they go on together.
-        The law does not see the engine's gap: gaps that matter are the law's, as of `SpringChain`.
-        r / 1000 and sqrt(a r) / 100 if left out, with the smallest radius r.
+        The law does not see the engine's gap; `SpringChain` has gaps of its own.  If left out,
+        r / 1000 and sqrt(a r) / 100, with the smallest radius r.
     acceleration : float
         The acceleration a of gravity, m/s^2, or what else draws neighbours together at most.
 

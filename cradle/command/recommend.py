@@ -37,9 +37,9 @@ def recommend(
         raise click.UsageError("leave --model out: it is what is recommended")
     given = described(**options)
     wishes = [name.strip() for names in wanted for name in names.split(",")]
-    law = given.model if isinstance(given.model, cradle.ImpulseCorrelation) else None
-    law = law if len(given.chain) > 2 else None  # two balls have no ratio
-    spheres = law is None and stiffness is None and len(given.chain) > 2
+    more = len(given.chain) > 2  # two balls have no ratio
+    law = given.model if more and isinstance(given.model, cradle.ImpulseCorrelation) else None
+    spheres = more and law is None and stiffness is None
     spheres &= {"velocities", "impulses", "path"} >= {*wishes}
     advice = cradle.recommend(
         given.chain, wishes, accuracy=accuracy, impacts=impacts, ratios=law,
