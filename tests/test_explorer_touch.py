@@ -117,6 +117,8 @@ def test_a_phone_shows_balls_and_bars_at_once(still, name, size):
     for button in ("Next hit", "Guess first", "Let go"):
         if tab.get_by_role("button", name=button).count():
             tab.push(button)
+        if tab.state("clock.playing"):
+            tab.push("Pause")
         tab.drawn()
         for part in (".stage", ".outcome .drawn", ".run .main"):
             box = tab.locator(part).first.bounding_box()
