@@ -168,7 +168,7 @@
 
   // --- all mass ratios of three balls ---------------------------------------------------------------
 
-  const PATTERNS = ["none (II)", "ball 1 (I)", "balls 1 and 2 (III)", "all"];
+  const PATTERNS = ["none", "ball 1", "balls 1 and 2", "all"];
 
   function mapPicture(act) {
     const canvas = make("canvas", { class: "cells", "aria-hidden": true });

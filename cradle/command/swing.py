@@ -22,14 +22,15 @@ from cradle.input.values import ABOVE_ZERO, one_number, whole_number
 @click.option("--gaps", callback=numbers_of, help="Between the balls at rest, m [0].")
 @click.option("--damping", callback=numbers_of, help="Of each swing's amplitude, 1/s [0].")
 @click.option("--seconds", default=2.0, help="How long it swings [2].")
-@click.option("--steps", default=20, help="How many rows to print [20].")
+@click.option("--steps", type=int, help="How many rows to print [20].")
 @click.option("--output", "-o", type=click.Path(dir_okay=False), callback=picture,
               help="Draw a film to a file: .gif, .mp4, .html, .svg; .png is a picture of the "
               "start.")  # fmt: skip
 @format_options
 def swing(
     pull: list[float] | None, by: float, gaps: list[float] | None, damping: list[float] | None,
-    seconds: float, steps: int, output: str | None, as_json: bool, as_csv: bool, **options: Any,
+    seconds: float, steps: int | None, output: str | None, as_json: bool, as_csv: bool,
+    **options: Any,
 ) -> None:  # fmt: skip
     """Positions of a swinging cradle, impact after impact.
 
@@ -46,10 +47,9 @@ def swing(
     if (options["speed"], options["velocities"]) != (None, None):
         raise click.UsageError("leave --speed and --velocities out: the first ball is pulled aside "
                                "(--pull) and let go")  # fmt: skip
-    if output and (as_json or as_csv):
-        raise click.UsageError("give one of --output, --json and --csv")
-    if options["masses"] is None:
-        options["sequence"] = options["sequence"] or "5"
+    if output and (as_json or as_csv or steps is not None):
+        raise click.UsageError("--output draws a film; --json, --csv and --steps are of tables")
+    options["sequence"] = options["sequence"] or (None if options["masses"] else "5")
     length = describe.pendulum_length(options.pop("length"), options.pop("period"))
     hanging = cradle.Pendulums(0.3 if length is None else length, gaps=one_or_all(gaps or [0.0]),
                                damping=one_or_all(damping or [0.0]))  # fmt: skip
@@ -61,7 +61,7 @@ def swing(
     rule = f"must be above 0 and at most a quarter of a circle of that --length, {far:.4g} m"
     one_number("--by", by, rule, 0.0, far, open_low=True)
     one_number("--seconds", seconds, *ABOVE_ZERO)
-    whole_number("--steps", steps)
+    steps = whole_number("--steps", 20 if steps is None else steps)
     if output:
         from cradle.pictures.animation import animate_swing  # what is missing is said before work
 
