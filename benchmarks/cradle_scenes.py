@@ -42,9 +42,16 @@ SPRINGS = {
 MODELS = {"ratio": ImpulseCorrelation(RATIO), "springs": SpringChain(1.0)}
 RESTITUTION = 0.97  # of what loses energy; of springs at the striker's first speed
 SPEED = 2.0 * math.sqrt(GRAVITY * LENGTH) * math.sin(ANGLE / 2)
-#: Contacts that last so long; a gap of three times the depth to which balls press at first.
-DEPTH = STEEL * SPEED / 2.9432
-STIFFNESS, APART = 0.625 * SPEED**2 / DEPTH**2.5, 3 * DEPTH
+
+
+def pressed(contact):
+    """Depth and stiffness of Hertz springs by which two balls touch so long at the first stroke."""
+    depth = contact * SPEED / 2.9432  # of masses 1: a contact takes 2.9432 d/v, k d^(5/2) = 5/8 v^2
+    return depth, 0.625 * SPEED**2 / depth**2.5
+
+
+DEPTH, STIFFNESS = pressed(STEEL)
+APART = 3 * DEPTH  # a gap
 LOSSY = viscosity_from(RESTITUTION, speed=SPEED, masses=[1] * BALLS)
 #: What else a row can solve its impacts by: restitution and model.
 LAWS = {
@@ -155,14 +162,11 @@ def on_springs(pulled, duration=MINUTE, *, contact=STEEL, steps_a_contact=100, a
 
     The outer balls hang `apart` from their neighbours.
     """
-    # Two balls of mass 1 at speed v: contact 2.9432 d/v, depth d, k d^(5/2) = 5/8 v^2.
-    depth = contact * SPEED / 2.9432
-    stiffness = 0.625 * SPEED**2 / depth**2.5
     angle = np.zeros(BALLS)
     angle[:pulled] = -ANGLE
     inner = math.ceil(steps_a_contact / contact / FRAMES)
     gaps = np.array([apart, *[0.0] * (BALLS - 3), apart])
-    return _march(angle, int(duration * FRAMES), inner, stiffness, gaps)
+    return _march(angle, int(duration * FRAMES), inner, pressed(contact)[1], gaps)
 
 
 @numba.njit(cache=False)
@@ -280,10 +284,7 @@ def minutes_with_tiny_gaps():
     settings = "default", "fine", "refined"
     for engine, setting, pulled in itertools.product(present(ENGINES), settings, (1, 2)):
         _, angles, rates = in_engine(engine, setting, pulled, mend=False, gap=GAPS[1])
-        each = strokes(angles, rates)
-        for k in AT:
-            if k <= len(each):
-                yield engine.name, setting, pulled, k, *(f"{e:.4f}" for e in each[k - 1])
+        yield from _some(engine.name, setting, pulled, each=strokes(angles, rates))
 
 
 def other_laws():
@@ -302,17 +303,17 @@ def other_laws():
         for engine, setting in itertools.product(present(ENGINES), settings):
             found[engine.name, setting] = in_engine(engine, setting, pulled, mend=True, law=law)
         for (who, setting), (_, angles, rates) in found.items():
-            yield from _some(who, name, setting, pulled, strokes(angles, rates))
+            yield from _some(who, name, setting, pulled, each=strokes(angles, rates))
     for engine, pulled in itertools.product(present(ENGINES), (1, 2)):
         _, angles, rates = in_engine(engine, "fine", pulled, mend=False)
-        yield from _some(engine.name, "as it is", "fine", pulled, strokes(angles, rates))
+        yield from _some(engine.name, "as it is", "fine", pulled, each=strokes(angles, rates))
 
 
-def _some(who, law, setting, pulled, each):
-    """Yield the energies after the strokes that are kept, as far as the run went."""
+def _some(*run, each):
+    """Yield the energies after the strokes of a run that are kept, as far as it went."""
     for k in AT:
         if k <= len(each):
-            yield who, law, setting, pulled, k, *(f"{e:.4f}" for e in each[k - 1])
+            yield *run, k, *(f"{e:.4f}" for e in each[k - 1])
 
 
 def costs_of_laws(repeats=5, seconds=5.0):

@@ -41,7 +41,7 @@ def first_strikes(reading):
         v, sigma, before = (t[key][use][::-1] for key in ("after", "sigma_after", "before"))
         if reading > 2:  # in the room: the row drifts
             row = before[release:].mean()
-            v, sigma = (v - row) / (1 - row), np.maximum(np.hypot(sigma, 0.002), 0.002)
+            v, sigma = (v - row) / (1 - row), np.hypot(sigma, 0.002)
         found[release] = v, sigma
     return found
 

@@ -47,8 +47,12 @@ def run(name, how, setting, pulled=1, gap="0"):
 
 def misplaced(found, pulled):
     """Part of the energy on another ball than with Hertz springs, at the strokes of the table."""
-    shares = [e[np.array(AT) - 1] for e in (found, run(*HERTZ, pulled))]
-    one, other = (e / e.sum(axis=1, keepdims=True) for e in shares)
+    return apart(*(e[np.array(AT) - 1] for e in (found, run(*HERTZ, pulled))))
+
+
+def apart(found, judge):
+    """Part of the energy that is on another ball, at each stroke."""
+    one, other = (e / e.sum(axis=1, keepdims=True) for e in (found, judge))
     return 0.5 * np.abs(one - other).sum(axis=1)
 
 
@@ -201,12 +205,6 @@ def test_with_the_row_all_engines_do_what_spheres_do(pulled: int):
         assert misplaced(own, pulled).max() > 3 * worst, name
 
 
-def apart(found, judge):
-    """Part of the energy that is on another ball, at each stroke."""
-    one, other = (e / e.sum(axis=1, keepdims=True) for e in (found, judge))
-    return 0.5 * np.abs(one - other).sum(axis=1)
-
-
 @cache
 def by_law(name, law, setting, pulled):
     """Energies of the balls at the strokes of the table, by a row with another law."""
@@ -236,12 +234,12 @@ def test_a_row_with_another_law_does_what_swing_does(law, pulled: int):
 @pytest.mark.parametrize("pulled", [1, 2])
 def test_springs_in_the_row_are_elastic_spheres_in_every_engine(pulled: int):
     judge = run(*HERTZ, pulled)[np.array(AT) - 1]
-    judge = judge / judge.sum(axis=1, keepdims=True)
-    off = {}
-    for setting in ("default", "fine", "refined"):
-        shares = [by_law(name, "springs", setting, pulled) for name in ENGINES]
-        shares = [e / e.sum(axis=1, keepdims=True) for e in shares]
-        off[setting] = max(0.5 * np.abs(e - judge).sum(axis=1).max() for e in shares)
+    off = {
+        setting: max(
+            apart(by_law(name, "springs", setting, pulled), judge).max() for name in ENGINES
+        )
+        for setting in ("default", "fine", "refined")
+    }
     assert off["refined"] < 0.02
     told = Chapter("scene").glued
     assert float(told[f"law-{pulled}"]) == pytest.approx(off["fine"], abs=0.006)
