@@ -58,7 +58,7 @@ PLACE = re.compile(r"translate\(([\d.]+) ([\d.]+)\)")
 #: Pixels that the smallest letters of a figure have on a phone, at least. (Indices are smaller.)
 LEGIBLE = 11
 #: Their size on a desk, at least, where the column has room for it.
-EASY = 14
+EASY = 16
 #: Sizes of letters: Matplotlib draws them as curves in units of a hundredth of a point.
 LETTERS = re.compile(r"\bscale\((0\.\d+) -0\.\d+\)")
 FONT_SIZE = re.compile(r'\bfont-size[:=]"?\s*([\d.]+)')
