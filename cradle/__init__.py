@@ -21,7 +21,7 @@ from cradle.advice.choice import Recommendation, recommend
 from cradle.chain import Chain
 from cradle.models import Model, collide
 from cradle.models.batch import Outcomes, outcomes, post_impact_velocities
-from cradle.models.compliant import SpringChain, spring_outcomes, spring_velocities
+from cradle.models.compliant import SpringChain, hertz_stiffness, spring_outcomes, spring_velocities
 from cradle.models.correlation import ImpulseCorrelation
 from cradle.models.dissipation import DissipationTrace, QuadraticDissipation
 from cradle.models.energy import EnergyDistribution, EnergyTrace
@@ -39,8 +39,8 @@ __all__ = [
     "Chain", "ConstantLoss", "DissipationTrace", "EnergyDistribution", "EnergyTrace", "Event",
     "FusedChain", "Impact", "ImpactNotCertified", "ImpactNotFinished", "ImpulseCorrelation",
     "Model", "Outcomes", "Pendulums", "QuadraticDissipation", "Recommendation",
-    "SequentialCollisions", "SpeedDependent", "SpringChain", "Swing",
-    "TimedTrace", "Trace", "ViscousLoss", "collide", "outcomes", "paper_chain", "paper_sequences",
+    "SequentialCollisions", "SpeedDependent", "SpringChain", "Swing", "TimedTrace", "Trace",
+    "ViscousLoss", "collide", "hertz_stiffness", "outcomes", "paper_chain", "paper_sequences",
     "post_impact_velocities", "ratio_table", "recommend", "restitution_table", "spring_outcomes",
     "spring_velocities", "swing", "viscosity_from", "warm_up",
 ]  # fmt: skip

@@ -80,6 +80,7 @@ ENTRIES = {
     EnergyDistribution: SPRINGS | {"rtol": 1e-6, "max_evaluations": 10_000, "gaps": True},
     cradle.spring_velocities: MANY | FORCES,
     cradle.spring_outcomes: MANY | FORCES,
+    cradle.hertz_stiffness: {"radii": [0.01, 0.01], "young": 1e9, "poisson": 0.3},
     cradle.viscosity_from: {"restitution": 0.9, "speed": 1, "masses": [1, 1], "stiffness": 1},
     QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
     cradle.post_impact_velocities: BALLS | RATIOS | {"progress": False},

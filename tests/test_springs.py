@@ -24,6 +24,7 @@ from cradle import (
     ImpactNotFinished,
     SpringChain,
     collide,
+    hertz_stiffness,
     spring_outcomes,
     spring_velocities,
     viscosity_from,
@@ -158,6 +159,10 @@ def test_viscosity_from_a_restitution_at_a_speed():
         law = {"stiffness": stiffness[c], "viscosity": found[c], "accuracy": 1e-9}
         left, right = spring_velocities(masses[c : c + 2], [speed, 0], **law)
         assert (right - left) / speed == pytest.approx(wanted, abs=1e-8)
+    # Rows of chains have what each of them has alone, to the last bit.
+    rows = viscosity_from(e, speed=speed, masses=[masses, 2 * masses], stiffness=stiffness)
+    alone = viscosity_from(e, speed=speed, masses=2 * masses, stiffness=stiffness)
+    assert rows.tolist() == [found.tolist(), alone.tolist()]
     # d'' + w^2 (d + A d') = 0 with z = A w / 2: d ~ exp(-z w t) sin(q w t), q = sqrt(1 - z^2).  The
     # bracket is zero where tan(q w t) = -2 z q / (1 - 2 z^2), and there d' is -exp(-z w t).
     m, k, wanted = 1.5, 7.0, 0.8
@@ -166,6 +171,17 @@ def test_viscosity_from_a_restitution_at_a_speed():
     angle = math.pi - math.atan2(2 * zeta * math.sqrt(1 - zeta**2), 1 - 2 * zeta**2)
     parting = math.exp(-zeta * angle / math.sqrt(1 - zeta**2))
     assert parting == pytest.approx(wanted, abs=1e-9)
+
+
+def test_stiffness_of_spheres_of_a_material():
+    """Hertz: F = 4/3 E* R*^(1/2) d^(3/2), 1/R* = 1/R + 1/R', 1/E* likewise of E/(1 - nu^2)."""
+    radii = np.array([[0.011, 0.02, 1e-3], [0.3, 0.3, 0.5]])
+    k = hertz_stiffness(radii, 70e9, 0.33)
+    for row, found in zip(radii, k, strict=True):
+        for left, right, one in zip(row, row[1:], found, strict=False):
+            size, modulus = 1 / (1 / left + 1 / right), 1 / (2 * (1 - 0.33**2) / 70e9)
+            assert one == pytest.approx(4 / 3 * modulus * math.sqrt(size), rel=1e-14)
+    assert hertz_stiffness([0.01, 0.01])[0] == pytest.approx(1.0878e10, rel=1e-4)
 
 
 @pytest.mark.parametrize("n", [10, 20, 40])

@@ -245,6 +245,45 @@ def spring_outcomes(
     return out.reshape(*lead, n), error.reshape(lead)
 
 
+def hertz_stiffness(radii: ArrayLike, young: float = 210e9, poisson: float = 0.3) -> Vector:
+    """Stiffness of the contacts of rows of spheres of one material, steel if nothing is said.
+
+    Neighbours with the radii R and R' push with k d^(3/2) (Hertz), where
+    k = (2/3) E / (1 - nu^2) (R R' / (R + R'))^(1/2).
+
+    Parameters
+    ----------
+    radii : array_like, shape (..., N)
+        m, above 0.
+    young, poisson : float
+        E, Pa, above 0; and nu, above -1 and at most 1/2.
+
+    Returns
+    -------
+    ndarray, shape (..., N - 1)
+        k, N/m^(3/2), as `SpringChain` and `spring_velocities` take it.
+
+    References
+    ----------
+    Johnson, Contact Mechanics (1985), section 4.2.
+
+    Examples
+    --------
+    Balls of 1 cm, the last one of 2 cm:
+
+    >>> [f"{k:.3g}" for k in hertz_stiffness([0.01, 0.01, 0.02])]
+    ['1.09e+10', '1.26e+10']
+    """
+    r = asked.checked("radii", radii, *asked.ABOVE_ZERO)
+    if r.ndim == 0 or r.shape[-1] < 2:
+        raise ValueError(f"radii has shape {r.shape}; must be (..., N), of two balls or more")
+    e = asked.one_number("young", young, *asked.ABOVE_ZERO)
+    rule = "must be above -1 and at most 0.5"
+    nu = asked.one_number("poisson", poisson, rule, -1.0, 0.5, open_low=True)
+    left, right = r[..., :-1], r[..., 1:]
+    return np.asarray(2.0 / 3.0 * e / (1.0 - nu * nu) * np.sqrt(left / (left + right) * right))
+
+
 def check_rows(arrays: Sequence[Vector]) -> None:
     """Raise at the first value that has no meaning."""
     asked.refuse_overflow(asked.checked("velocities", arrays[1]), asked.checked_masses(arrays[0]))

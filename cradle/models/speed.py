@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from cradle.chain import Chain
 from cradle.input import values as asked
 from cradle.kernel.accuracy import LONGEST, MOST_HUNT
 from cradle.models import Model, a_model
+from cradle.models.batch import shaped
 from cradle.models.compliant import DAMPING, SpringChain
 from cradle.trace import ImpactNotFinished, Trace
 
@@ -140,28 +141,29 @@ def _kept(exponent: float) -> Any:
 
 def viscosity_from(
     restitution: asked.ArrayLike, *, speed: float, masses: asked.ArrayLike,
-    stiffness: float | Sequence[float] = 1.0, exponent: float = 1.5, damping: str = DAMPING[0],
+    stiffness: asked.ArrayLike = 1.0, exponent: float = 1.5, damping: str = DAMPING[0],
 ) -> asked.Vector:  # fmt: skip
     """Viscosity of contacts whose pairs of balls, alone, have a restitution at a stated speed.
 
     Such balls lose more the faster they close (viscoelastic ones with p = 1 excepted), so a
     restitution belongs to one speed.  In a contact's own units it depends on the viscosity alone,
     which is sought; by Hunt and Crossley on A times the speed, whatever the masses, k and p.
+    Leading axes broadcast.
 
     Parameters
     ----------
-    restitution : float or sequence, length N - 1
+    restitution : array_like, shape (..., N - 1) or ()
         Speed at which each pair of neighbours parts, over `speed`.
     speed : float
         Closing speed, m/s, above 0.
-    masses : array_like, shape (N,)
+    masses : array_like, shape (..., N)
         kg.
     stiffness, exponent, damping
-        As for `spring_velocities`, of one chain.
+        As for `spring_velocities`.
 
     Returns
     -------
-    ndarray, shape (N - 1,)
+    ndarray, shape (..., N - 1)
         A, s or s/m, as `SpringChain` and `spring_velocities` take it.
 
     Raises
@@ -183,24 +185,22 @@ def viscosity_from(
     """
     from scipy.optimize import brentq
 
-    given, law = asked.numbers("masses", masses), SpringChain(stiffness, exponent, damping=damping)
-    m = Chain(given, np.zeros(given.shape)).masses
+    p, hunt = SpringChain(1.0, exponent, damping=damping).exponent, damping == DAMPING[1]
     u = asked.one_number("speed", speed, *asked.ABOVE_ZERO)
-    p, n = law.exponent, len(m)
-    hunt = damping == DAMPING[1]
     part, most = (parting_hunt, MOST_HUNT) if hunt else (lambda a: parting(a, p), LONGEST)
     least = part(most)
     rule = f"must lie in [{least:.3f}, 1]: less takes more viscosity than contacts may have"
-    kept = asked.number_or_row("restitution", restitution, "N - 1", rule, least, 1.0)
-    e = asked.row_of("restitution", kept, n - 1, n)
-    k = asked.row_of("stiffness", law.stiffness, n - 1, n)
-    own = [
-        brentq(lambda a, x=x: part(a) - x, 0.0, most, xtol=1e-12)
-        for x in np.minimum(e, part(0.0))  # which is 1, but for rounding
-    ]
+    given: dict[str, asked.ArrayLike] = {"masses": (balls := asked.checked_masses(masses))}
+    given |= {"velocities": np.zeros(balls.shape)}
+    given |= {"restitution": asked.checked("restitution", restitution, rule, least, 1.0)}
+    given |= {"stiffness": asked.checked("stiffness", stiffness, *asked.ABOVE_ZERO)}
+    m, _, e, k = shaped(given, (0, 0, 1, 1))[0]
+    found, place = np.unique(np.minimum(e, part(0.0)), return_inverse=True)  # 1, but for rounding
+    sought = [brentq(lambda a, x=x: part(a) - x, 0.0, most, xtol=1e-12) for x in found.tolist()]
+    mass = m[..., :-1] / (m[..., :-1] + m[..., 1:]) * m[..., 1:]
+    own, mass, k = np.broadcast_arrays(np.array(sought)[place].reshape(e.shape), mass, k)
     if hunt:
-        return np.array(own) / u
-    mass = m[:-1] / (m[:-1] + m[1:]) * m[1:]
+        return np.asarray(own / u)
     depth = np.exp((np.log(mass) + 2.0 * np.log(u) - np.log(k)) / (p + 1.0))
     return np.asarray(own * depth / u)
 
