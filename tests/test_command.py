@@ -26,6 +26,7 @@ from cradle import (
     Pendulums,
     SequentialCollisions,
     SpringChain,
+    TimedTrace,
     collide,
     paper_chain,
     recommend,
@@ -125,6 +126,18 @@ BAC = "film film.txt --set BAC --masses 1,1,1 --length 0.3"
         ("", SpringChain(), ["the first ball strikes at 1 m/s", "no energy is lost", "elastic sp"]),
         (f"--speed 2 {LOSSY}", VISCOUS, ["strikes at 2 m/s", "viscous spheres; restitution at 2 "]),
         ("--restitution 0.5", EnergyDistribution(), ["strikes at 1", "lose much, by the energy"]),
+        (
+            "--stiffness 1e9,2e9",
+            SpringChain((1e9, 2e9)),
+            ["strikes", "no energy", "elastic sphere"],
+        ),
+        ("--velocities 1,1,0 --ratio 0.1", ImpulseCorrelation(0.1), ["no energy", "strike as one"]),
+        ("--velocities 1,1,0 --model sequential", SequentialCollisions(), ["no energy is lost"]),
+        (
+            "--velocities 1,1,0 --model spheres --stiffness 1e9 --gaps 1e-4,0",
+            SpringChain(1e9, gaps=(1e-4, 0.0)),
+            ["no energy is lost"],
+        ),
         (f"--velocities 1,0,0 {LOSSY} --ratio 0.1", ImpulseCorrelation(0.1), []),
         (f"{LOSSY} --velocities 2,0,0 --model spheres", VISCOUS, []),
         ("--velocities 1,0,0 --model sequential", SequentialCollisions(), ["no energy is lost"]),
@@ -192,6 +205,33 @@ def test_losses_of_a_swing_belong_to_the_first_strike():
     after = collide(Chain([1, 1, 1], [speed, 0, 0]), law).velocities
     np.testing.assert_allclose(first["after"], after, atol=1e-9)
     assert f"restitution at {speed:.3g} m/s" in told["assumed"][-1]
+
+
+def test_balls_let_go_together_strike_as_one():
+    """A swing says so, unless gaps part them."""
+    said = "balls that move alike strike as one"
+    line = "swing 3 --steps 2 --ratio 0.1"
+    assert said in call(f"{line} --pull 2")
+    assert said not in call(line) + call(f"{line} --pull 2 --gaps 0.001")
+    assert said not in call("swing 3 --steps 2 --pull 2 --model sequential")
+
+
+def test_a_long_swing_is_told_of(monkeypatch, capsys):
+    def stop(*_, **__):
+        raise ValueError("enough")
+
+    monkeypatch.setattr("cradle.swing", stop)
+    for seconds, told in ("1000", False), ("10000", True):
+        with pytest.raises(SystemExit):
+            run(["swing", "3", "--seconds", seconds])
+        assert ("swings take a while" in capsys.readouterr().err) == told
+
+
+def test_a_long_row_of_springs_needs_no_way(monkeypatch):
+    """Its collisions are counted on the way, which would fill the memory."""
+    monkeypatch.setattr(TimedTrace, "_way", lambda *_: pytest.fail("the way was followed"))
+    assert json.loads(call("solve 21 --json"))["collisions"] is None
+    assert "energy lost: 0.00 %\nmodel" in call("solve 21")
 
 
 def test_gaps_and_damping_of_a_swing():
@@ -451,7 +491,16 @@ def test_one_wrong_film_of_several(folder, capsys):
         (
             "solve 5 --masses 1,1",
             2,
-            "give one of: how many equal balls, such as 5; a sequence of the ",
+            "a sequence of the paper's balls, such as ABCCA; --masses, not both",
+        ),
+        ("solve", 2, "give one of: how many equal balls, such as 5; a sequence of the "),
+        ("solve 5 --gaps 1e-6", 2, "--gaps need --stiffness: wide is what balls do not press"),
+        ("solve 5 --ratio 0.1 --stiffness 1", 2, "--stiffness and --gaps are those of --model sph"),
+        ("solve 3 --stiffness 1,-1", 1, "cradle: --stiffness, value 2: -1.0; must be above 0"),
+        (
+            "solve 3 --restitution 0.5 --stiffness 1 --gaps 1",
+            1,
+            "--restitution, value 1: 0.5; must",
         ),
         ("solve 1", 1, "cradle: SEQUENCE = 1; must be a whole number, 2 to 1000000 balls"),
         (f"solve {'9' * 5000}", 1, "cradle: SEQUENCE = '9999"),
@@ -488,7 +537,7 @@ def test_one_wrong_film_of_several(folder, capsys):
             "Give --stiffness 1 if all contacts are equal spheres",
         ),
         ("recommend --masses 1,1,1 --wanted path,x", 1, "--wanted 'x'; must be one of"),
-        ("swing ABA --speed 2", 2, "leave --speed and --velocities out: the first ball is pulled"),
+        ("swing ABA --speed 2", 2, "No such option '--speed'"),
         ("plot ABA --output -", 2, "'-'; a picture goes to a file: give its name"),
         ("swing 5 --output nowhere/toy.gif", 2, "'nowhere/toy.gif'; its folder is not there"),
         (f"{BAC} --slower 0", 1, "--slower = 0.0; must be above 0"),
@@ -501,7 +550,7 @@ def test_one_wrong_film_of_several(folder, capsys):
         (BAC.replace("BAC", "CAB"), 1, "track 1 is named B, --set CAB has C there"),
         (BAC.replace("film.txt", "wide.txt"), 1, "wide.txt is no UTF-8 text (byte 0); save"),
         (BAC.replace("BAC", "BA"), 1, "has 3 tracks, --set 2 types"),
-        ("recommend --masses 1,1,1 --model spheres", 2, "leave --model out"),
+        ("recommend --masses 1,1,1 --model spheres", 2, "No such option '--model'"),
         ("fit nothing.csv", 2, "does not exist"),
         ("fit shots.csv --mass-unit g --restitution AB", 2, "write NAME=NUMBER"),
         ("fit grams.csv", 1, "grams: say --mass-unit g (or in kg indeed: say --mass-unit kg)"),

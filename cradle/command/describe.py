@@ -21,8 +21,8 @@ def numbers_of(_: click.Context, __: click.Parameter, value: str | None) -> list
         raise click.BadParameter(f"{value!r}; write numbers with commas between") from None
 
 
-#: What describes a chain of balls and its impact law.
-CHAIN = (
+# What describes a chain of balls and its impact law.
+_CHAIN = (
     click.Argument(["sequence"], required=False),
     click.Option(["--speed"], type=float, help="Velocity of the first ball, m/s [1]."),
     click.Option(["--masses"], callback=numbers_of, help="Masses, left to right: 45,53,53."),
@@ -33,10 +33,18 @@ CHAIN = (
                  help="How the balls collide: by ratios, as spheres (Hertz; with losses viscous "
                  "ones, or the energy law if they lose too much for that), or one pair after the "
                  "other [ratio if there are ratios, else spheres]."),
+    click.Option(["--stiffness"], callback=numbers_of, help="Of the contacts of spheres, N/m^1.5: "
+                 "one, or one per contact [1; gaps, forces and times need it]."),
+    click.Option(["--gaps"], callback=numbers_of, help="Between the balls, m [0]."),
     click.Option(["--ratio"], callback=numbers_of, help="One, or one per inner ball."),
     click.Option(["--backward"], callback=numbers_of, help="Ratios from the right [as --ratio]."),
     click.Option(["--saturate"], is_flag=True, help="Admit ratios above their bound."),
 )  # fmt: skip
+
+
+def chain_options(*without: str) -> list[click.Parameter]:
+    """Return what describes a chain and its law, but for some options."""
+    return [one for one in _CHAIN if one.name not in without]
 
 
 def swing_options(otherwise: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -56,6 +64,10 @@ def pendulum_length(length: float | None, period: float | None) -> float | None:
     return 9.81 * (0.5 * period / math.pi) ** 2
 
 
+#: Of balls that move alike.
+AS_ONE = "balls that move alike strike as one; those of a toy come one by one (--gaps)"
+
+
 class Described(NamedTuple):
     """A chain, how it collides, what was not given and stands for it, and the paper's types."""
 
@@ -73,9 +85,11 @@ class Described(NamedTuple):
 
 
 def described(
-    sequence: str | None, speed: float | None, masses: list[float] | None, unit: str | None,
-    velocities: list[float] | None, restitution: list[float] | None, ratio: list[float] | None,
-    backward: list[float] | None, saturate: bool, model: str | None = None,
+    sequence: str | None, masses: list[float] | None, unit: str | None,
+    restitution: list[float] | None, ratio: list[float] | None, backward: list[float] | None,
+    saturate: bool, *, speed: float | None = None, velocities: list[float] | None = None,
+    model: str | None = None, stiffness: list[float] | None = None,
+    gaps: list[float] | None = None,
 ) -> Described:  # fmt: skip
     """Return the chain and the model that the options describe."""
     assumed = []
@@ -86,7 +100,8 @@ def described(
         assumed.append(f"{len(masses)} equal balls of 1 {unit or 'kg'}")
     if (sequence is None) == (masses is None):
         need = "how many equal balls, such as 5; a sequence of the paper's balls, such as ABCCA"
-        raise click.UsageError(f"give one of: {need}; --masses")
+        both = ", not both" * (masses is not None)
+        raise click.UsageError(f"give one of: {need}; --masses{both}")
     if model not in (None, "ratio") and (ratio or backward or saturate):
         raise click.UsageError(f"--model {model} has no ratios; leave them out, and --saturate")
     if not (speed is None or velocities is None):
@@ -115,18 +130,29 @@ def described(
     taken = chain
     if bare := masses and ratio is None and model is None and len(chain) > 2:
         model = "spheres"
+    if model != "spheres" and (stiffness or gaps):
+        raise click.UsageError("--stiffness and --gaps are those of --model spheres")
+    if gaps and not stiffness:
+        raise click.UsageError("--gaps need --stiffness: wide is what balls do not press into each "
+                               "other meanwhile; about 1e10 for steel balls of 1 cm")  # fmt: skip
     if model == "sequential":
         law = cradle.SequentialCollisions()
     elif model == "spheres":
         kind = "elastic spheres"
         try:
-            law = cradle.SpringChain(viscosity=own_viscosity(chain, 1.0))
+            k, wide = one_or_all(stiffness or [1.0]), one_or_all(gaps or [0.0])
+            law = cradle.SpringChain(k, viscosity=own_viscosity(chain, k), gaps=wide)
             taken = cradle.Chain(chain.masses, chain.velocities)
             if law.viscosity:
                 kind = f"viscous spheres; restitution at {chain.closing_speeds.max():.3g} m/s"
         except ValueError:
-            law, kind = cradle.EnergyDistribution(), "spheres that lose much, by the energy law"
+            if gaps or (chain.restitution == 1.0).all():
+                raise  # it is not the restitution
+            law = cradle.EnergyDistribution(one_or_all(stiffness or [1.0]))
+            kind = "spheres that lose much, by the energy law"
         assumed += [f"the balls collide as {kind} (--model, --ratio)"] if bare else []
+    alike = (chain.velocities[1:] == chain.velocities[:-1]) & (chain.velocities[1:] != 0.0)
+    assumed += [AS_ONE] if bool(alike.any()) and not gaps and model != "sequential" else []
     return Described(chain, taken, law, tuple(assumed), letters)
 
 

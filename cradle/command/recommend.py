@@ -6,21 +6,15 @@ from typing import Any
 import click
 
 import cradle
-from cradle.command.describe import CHAIN, described, numbers_of, one_or_all
+from cradle.command.describe import chain_options, described, one_or_all
 
 
-@click.command(params=[*CHAIN])
+@click.command(params=chain_options("model", "gaps"))
 @click.option("--wanted", multiple=True, default=["velocities"], help="velocities, impulses, path, "
               "forces, times, fastest ball; with commas between [velocities].")  # fmt: skip
 @click.option("--accuracy", default=1e-6, help="Largest numerical error, as a part of the closing "
               "speed [1e-6].")  # fmt: skip
 @click.option("--impacts", default=1, help="How many such impacts [1].")
-@click.option(
-    "--stiffness",
-    callback=numbers_of,
-    help="Of the contacts, N/m^1.5 [1, for equal "
-    "spheres, if velocities, impulses or the path are wanted and there are no ratios].",
-)
 def recommend(
     wanted: Sequence[str], stiffness: list[float] | None, accuracy: float, impacts: int,
     **options: Any,
@@ -33,8 +27,6 @@ def recommend(
       cradle recommend ABACA --impacts 1000
       cradle recommend --masses 1,2,1 --wanted "fastest ball"
     """
-    if options.pop("model") is not None:
-        raise click.UsageError("leave --model out: it is what is recommended")
     given = described(**options)
     wishes = [name.strip() for names in wanted for name in names.split(",")]
     more = len(given.chain) > 2  # two balls have no ratio

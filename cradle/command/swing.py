@@ -9,17 +9,16 @@ import cradle
 from cradle.advice.choice import made
 from cradle.command import describe
 from cradle.command.console import format_options, picture, show
-from cradle.command.describe import CHAIN, described, numbers_of, one_or_all
+from cradle.command.describe import AS_ONE, chain_options, described, numbers_of, one_or_all
 from cradle.input.values import ABOVE_ZERO, one_number, whole_number
 
 
-@click.command(params=[*CHAIN])
+@click.command(params=chain_options("speed", "velocities"))
 @click.option("--pull", callback=numbers_of, help="How many balls are pulled aside: 2 at the left "
               "end; 0,1 one at the right; 1,1 one at each [1].")  # fmt: skip
 @click.option("--by", default=0.05, help="How far, m along the arc, at most a quarter of a "
               "circle [0.05].")  # fmt: skip
 @describe.swing_options("0.3")
-@click.option("--gaps", callback=numbers_of, help="Between the balls at rest, m [0].")
 @click.option("--damping", callback=numbers_of, help="Of each swing's amplitude, 1/s [0].")
 @click.option("--seconds", default=2.0, help="How long it swings [2].")
 @click.option("--steps", type=int, help="How many rows to print [20].")
@@ -34,8 +33,7 @@ def swing(
 ) -> None:  # fmt: skip
     """Positions of a swinging cradle, impact after impact.
 
-    Five equal balls, if none are named.  Those that are pulled aside are let go: --speed and
-    --velocities are refused.
+    Five equal balls, if none are named.  Those that are pulled aside are let go.
 
     \b
     Examples:
@@ -44,9 +42,6 @@ def swing(
       cradle swing ABACA --by 0.03 --seconds 1
       cradle swing --masses 1,1,1,1,1 --csv
     """
-    if (options["speed"], options["velocities"]) != (None, None):
-        raise click.UsageError("leave --speed and --velocities out: the first ball is pulled aside "
-                               "(--pull) and let go")  # fmt: skip
     if output and (as_json or as_csv or steps is not None):
         raise click.UsageError("--output draws a film; --json, --csv and --steps are of tables")
     options["sequence"] = options["sequence"] or (None if options["masses"] else "5")
@@ -70,6 +65,8 @@ def swing(
     places = _released(pull or [1.0], by, len(chain))
     balls = cradle.Chain(chain.masses, [0.0] * len(chain), chain.restitution)
     times = [seconds * k / steps for k in range(steps + 1)]
+    if (count := seconds * hanging.natural_frequency(2)[0] / math.tau) > 2000:
+        click.echo(f"cradle: {count:.3g} swings take a while; --seconds is how long", err=True)
     run = cradle.swing(balls, given.model, places, times, pendulums=hanging)
     rows = [
         {"time": float(time), **{f"ball {k + 1}": float(x) + 0.0 for k, x in enumerate(places)}}
@@ -80,7 +77,10 @@ def swing(
         for one in run.impacts
     ]
     # How fast the first ball strikes follows from the pull.
-    told = given._replace(assumed=tuple(one for one in given.assumed if "strikes" not in one))
+    assumed = [one for one in given.assumed if "strikes" not in one]
+    if max(pull or [1.0]) > 1 and not gaps and options["model"] != "sequential":
+        assumed.append(AS_ONE)
+    told = given._replace(assumed=tuple(assumed))
     extra = {"model": made(given.model), "assumed": told.assumed, "impacts": impacts}
     if output:
         animate_swing(run).save(output)
