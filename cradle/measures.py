@@ -56,7 +56,7 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
     1.6).  A number of 1000 says: inputs known to seven digits give an outcome known to about four.
     Where `same_events` is False another sequence of events follows within `step`, and the outcome
     may jump; ask again with the accuracy of your own inputs as the step.  An edge that only several
-    inputs together reach is not seen.
+    inputs together reach is not seen, nor one that a ball at rest reaches: zeros are not moved.
 
     Examples
     --------

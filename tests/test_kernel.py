@@ -321,15 +321,25 @@ def test_code_on_disk_that_cannot_be_read_is_removed_once(monkeypatch, tmp_path,
     for file in (*files, other):
         file.write_bytes(b"half")
 
-    def door(value):
+    def follow(value):
+        raise TimeoutError(value)
+
+    # What interrupts a compilation, as an alarm, spoils no file of the other loop.
+    made = runtime.compiled()
+    with pytest.raises(TimeoutError):
+        runtime.call(follow, 1)
+    assert files[0].exists()
+    assert runtime.compiled() is not made
+
+    def batch(value):
         if value < 0 or files[0].exists():
             raise EOFError("Ran out of input")
         return value
 
     with caplog.at_level(logging.WARNING, "cradle"):
-        assert runtime.call(door, 3) == 3
+        assert runtime.call(batch, 3) == 3
         with pytest.raises(EOFError):  # nothing is left to remove
-            runtime.call(door, -1)
+            runtime.call(batch, -1)
     assert not any(file.exists() for file in files)
     assert other.exists()
     (said,) = caplog.records

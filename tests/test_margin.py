@@ -39,6 +39,26 @@ def test_it_vanishes_where_the_outcome_jumps(name):
     assert 1e-5 < changed(*which, near + 1e-3 * at).margin < 1e-2
 
 
+@pytest.mark.parametrize(
+    ("velocities", "ball", "e", "ratio", "jump"),
+    [([1, 0.25, 0.25, 0], 2, 0.95, 0.2, 0.1222), ([1, 0, 0, 0, -1], 3, 0.98, 0.15, 0.157)],
+)
+def test_it_tells_of_balls_at_rest_between_two_that_approach(velocities, ball, e, ratio, jump):
+    """R2: all that touch have one source; a motion of any size makes them two stretches."""
+
+    def struck(change):
+        v = np.array(velocities, float)
+        v[ball] += change
+        return collide(Chain(np.ones(len(v)), v, e), ImpulseCorrelation(ratio))
+
+    rest, left, right = struck(0.0), struck(-1e-12), struck(1e-12)
+    assert rest.margin == 0.0
+    assert max(left.margin, right.margin) < 2e-12
+    assert np.abs(rest.velocities - right.velocities).max() == pytest.approx(jump, rel=0.01)
+    fastest = -np.diff(velocities).min()
+    assert struck(1e-3).margin == pytest.approx(1e-3 / fastest, rel=0.01)
+
+
 def test_it_is_large_far_from_any_other_order():
     assert collide(Chain([1, 1, 1], [1, 0, 0]), ImpulseCorrelation(0.5)).margin == 1.0
     assert collide(*paper_chain("AAA")).margin > 0.01

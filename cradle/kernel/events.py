@@ -34,8 +34,20 @@ def make_run(first, last, source, low, high, run):
 
 def start(n, state):
     """R2: in each touching stretch the leftmost approaching contact is the source."""
-    ball, contact, run = state.ball, state.contact, state.run
+    ball, contact, run, tally = state.ball, state.contact, state.run, state.tally[0]
     link(n - 1, n - 1, run)
+    # Whether two approaching contacts are of one stretch hangs on the contacts between them.
+    last, wide, between = n, 0.0, False
+    for k in range(n - 1):
+        u = contact[k].u.real
+        if u > 0.0:
+            if last < k and wide == 0.0 and between:
+                tally.margin = min(tally.margin, contact[last].u.real / tally.fastest)
+            if last < k - 1:
+                tally.margin = min(tally.margin, wide / tally.fastest)
+            between = last < k and wide == 0.0
+            last, wide = k, 0.0
+        wide = max(wide, -u)
     c = 0
     while c < n - 1:
         first, source = c, -1

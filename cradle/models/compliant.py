@@ -171,7 +171,7 @@ def spring_velocities(
         would pull by Hunt and Crossley.
     ImpactNotFinished, ImpactNotCertified
         If runs take more than twenty million steps or do not agree, or leans hold balls together;
-        if an outcome breaks momentum, energy or order.
+        if an outcome breaks momentum, or energy or order by more than `accuracy`.
 
     References
     ----------

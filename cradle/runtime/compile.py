@@ -185,11 +185,15 @@ def call(door: Callable[..., Any], *arguments: Any) -> Any:
             return door(*arguments)
         finally:
             _spent += time.perf_counter() - begun
+    name = door.__name__
+    stored = not loaded(name) and on_disk(name)
     try:
         return door(*arguments)
     except Exception as error:  # half a file can raise anything; the kernel itself nothing
-        broken = [] if loaded(door.__name__) else _files("*.nb[ci]")
+        broken = _files("*.nb[ci]") if stored else []
         if not broken:
+            if not loaded(name):  # a signal's, meanwhile: begin anew
+                compiled.cache_clear()
             raise
         for file in broken:
             file.unlink(missing_ok=True)
