@@ -12,19 +12,13 @@ from chapters import Chapter, floats, number, points, shows
 from problem import Problem
 from stored import read
 
-from cradle import collide, outcomes, paper_chain
+from cradle import outcomes
 from cradle.textbook import solve
 
 
 def stored(part, **equal):
     """Rows of a stored table of the study whose columns have these values."""
     return read(f"extremes_{part}.csv", **equal)
-
-
-def first_jump(name):
-    """The nearest edge behind which the outcome jumps."""
-    jumps = [row for row in stored("edges", sequence=name) if float(row["jump"]) > 1e-8]
-    return min(jumps, key=lambda row: float(row["distance"]))
 
 
 def exactly(problem, which, k, value):
@@ -59,6 +53,19 @@ def test_jumps_behind_the_first_edge():
     assert len(again) == len(here) > 1
     expected = [(float(r["change"]), float(r["jump"])) for r in here]
     np.testing.assert_allclose(again, expected, rtol=2e-3)
+
+
+def test_the_nearest_jump_of_the_papers_chains():
+    """By fifty digits on both sides."""
+    jumps = [row for row in stored("edges") if float(row["jump"]) > 1e-8]
+    edge = min(jumps, key=lambda row: float(row["distance"]))
+    told = (CHAPTER.glued[name] for name in ("first-jump", "first-jump-chain", "first-jump-size"))
+    far, jump = float(edge["distance"]), float(edge["jump"])
+    assert [*told] == [f"{100 * far:.1f}", edge["sequence"], f"{100 * jump:.2f}"]
+    problem, which, k = x.sequence(edge["sequence"]), edge["input"], int(edge["index"])
+    moved = int(edge["side"]) * far * getattr(problem, which)[k]
+    sides = [exactly(problem, which, k, part * moved) for part in (0.999, 1.001)]
+    assert np.abs(sides[1] - sides[0]).max() / sides[0].max() == pytest.approx(jump, rel=0.1)
 
 
 def test_fig_extremes_edge():
@@ -185,19 +192,45 @@ def test_fig_extremes_digits_and_condition_as_drawn():
 
 
 def test_fig_extremes_jump_as_drawn():
-    """Points of both branches by the reference solver; the step between them is the stored jump."""
+    """By the textbook over fifty digits: what rests is at the filled circle, what moves beyond."""
     (ax,) = CHAPTER.figures["fig-extremes-jump"].axes
-    name = ax.get_title()
-    edge, problem = first_jump(name), x.sequence(name)
-    first, second = (line for line in points(ax) if len(line) > 2)
-    which, k = edge["input"], int(edge["index"])
-    ball = int(ax.get_ylabel().split()[3].rstrip(",")) - 1
-    for line in (first[0], first[50], first[-1], second[0], second[40], second[-1]):
-        value = getattr(problem, which)[k] * line[0] / 100
-        assert line[1] == pytest.approx(exactly(problem, which, k, value)[ball], abs=1e-9)
-    step = abs(second[0, 1] - first[-1, 1])
-    largest = max(collide(*paper_chain(name, excess="saturate")).velocities)
-    assert step / largest == pytest.approx(float(edge["jump"]), rel=0.1)
+    lines = [line for line in points(ax) if len(line) > 20]
+    ends = {}
+    for line, ball in zip(lines, (3, 3, 4, 4), strict=True):
+        for moves, after in (line[0], line[10], line[-1]):
+            row = [1] * 5, [1, 0, 0, moves, -1], "0.98", "0.15"
+            with localcontext(prec=50):
+                right = solve(*row, number=lambda x: Decimal(str(x))).velocities
+            assert after == pytest.approx(float(right[ball]), abs=1e-9)
+            ends[ball, moves] = right[ball]
+    jump = max(abs(ends[ball, 0.0] - ends[ball, 1e-12]) for ball in (3, 4))
+    assert float(CHAPTER.glued["ends-jump"]) == pytest.approx(float(jump), abs=0.005)
+    assert float(CHAPTER.glued["ends-speed"]) == pytest.approx(float(ends[4, 0.0]), abs=0.005)
+
+
+def test_a_light_ball_amplifies_by_half_the_number_of_its_impacts():
+    """Between balls of mass 1, by powers of the map of two impacts over fifty digits."""
+    with mpmath.workdps(50):
+
+        def struck(m):
+            """Velocities after all impacts of elastic balls, and how many there are."""
+            v, count = [mpmath.mpf(1), mpmath.mpf(0), mpmath.mpf(0)], 0
+            masses = [mpmath.mpf(1), m, mpmath.mpf(1)]
+            while v[0] > v[1] or v[1] > v[2]:
+                c = 0 if v[0] > v[1] else 1
+                a, b = masses[c : c + 2]
+                common = 2 * (a * v[c] + b * v[c + 1]) / (a + b)
+                v[c], v[c + 1], count = common - v[c], common - v[c + 1], count + 1
+            return v, count
+
+        m, part = mpmath.mpf("1e-6"), mpmath.mpf("1e-9")
+        (here, impacts), (there, _) = struck(m), struck(m * (1 + part))
+        grown = [float(abs(b - a) / part) for a, b in zip(here, there)]
+    told = CHAPTER.glued
+    assert number(told["light-impacts"]) == impacts
+    assert grown[1] == pytest.approx(impacts / 2, rel=0.01)
+    assert number(told["light-grown"]) == pytest.approx(grown[1], rel=0.05)
+    assert number(told["heavy-grown"]) == pytest.approx(max(grown[0], grown[2]), rel=0.2)
 
 
 def test_rule_nine_says_who_drives_after_a_sequence_without_end():
