@@ -1,8 +1,8 @@
 """Measuring apparatus for the extremes: invariants in exact arithmetic, errors at fifty digits.
 
-`faults` needs no reference: it checks in rational numbers what must hold for every outcome.
-`measure` compares with the independent solver and says how much of the error is the problem's own:
-the change of the exact outcome when every input changes by its last digit.
+`faults` needs no reference.  `measure` compares with the independent solver and says how much of
+the error is the problem's own: the change of the exact outcome when every input changes by its
+last digit.
 """
 
 import math
@@ -23,18 +23,12 @@ from cradle.measures import _events_at_balls as events_at_balls
 EPS = 2.0**-52
 TINIEST = 5e-324  # the smallest number above zero
 
-#: The ranges of the inputs of a problem.
-RANGES = {
-    "masses": (TINIEST, math.inf),
-    "velocities": (-math.inf, math.inf),
-    "restitution": (0.0, 1.0),
-    "forward": (0.0, 1.0),
-    "backward": (0.0, 1.0),
-}
+RANGES = {"masses": (TINIEST, math.inf), "velocities": (-math.inf, math.inf)}
+RANGES |= dict.fromkeys(("restitution", "forward", "backward"), (0.0, 1.0))
 
 
 def sequence(name):
-    """One of the paper's chains, its ratios held at their bounds."""
+    """One of the paper's chains."""
     chain, model = paper_chain(name, excess="saturate")
     own = chain.masses, chain.velocities, chain.restitution
     return case(*own, model.forward, model.backward)
@@ -44,11 +38,10 @@ def sequence(name):
 
 
 def invariants(trace):
-    """Defects of momentum, energy and ledger, each in units of rounding, and the overlap of balls.
+    """Defects of momentum, energy and ledger, in units of rounding, and overlap: by fractions.
 
-    Exact rational arithmetic on the stored numbers.  Momentum: in units of eps times the larger sum
-    of |m v|, before or after.  Energy gained and ledger: in units of eps times the larger sum of
-    m v^2 / 2.  Both units contain one smallest number a ball, for results that underflow.
+    The units are eps times the larger sum of |m v| or m v^2 / 2, before or after, and one smallest
+    number a ball, for results that underflow.
     """
     chain = trace.chain
     arrays = chain.masses, chain.velocities, trace.velocities, chain.restitution, trace.absorbed
@@ -73,9 +66,9 @@ def invariants(trace):
 def faults(trace, finished=True, momentum=8.0, energy=8.0, overlap=0.0):
     """What is wrong with a trace, by itself; empty if nothing is.
 
-    `momentum` and `energy` are multiples of rounding that are granted per ball, and, for the
-    energy, per square root of the number of events: so do rounding errors add up.  Balls that come
-    to rest together may approach each other by `overlap`.
+    `momentum` and `energy` are roundings granted per ball, and, for the energy, per square root of
+    the number of events: so do they add up.  Balls that come to rest together may approach each
+    other by `overlap`.
     """
     arrays = (trace.velocities, trace.impulses, trace.absorbed, trace.path, trace.path_impulses)
     if not all(np.isfinite(array).all() for array in arrays):
@@ -109,20 +102,19 @@ def inputs(problem, names=tuple(RANGES)):
 
 
 def in_digits(problem, max_events=20_000):
-    """Exact velocities by the independent solver."""
     return problem.exact(max_events).velocities
 
 
 def unavoidable(problem, velocities, names=tuple(RANGES), ulps=1, solve=in_digits):
     """Change of each exact velocity when all inputs change by their last digits, added up.
 
-    An answer cannot be known better than that from rounded inputs: it is the conditioning, measured
-    at the very distance that matters, so that square roots and jumps count at their true size.
+    The conditioning, measured at the very distance that matters, so that square roots and jumps
+    count at their true size.
     """
-    total = [mpmath.mpf(0) for _ in velocities]
+    total = nothing = [mpmath.mpf(0)] * len(velocities)
     for name, k, value in inputs(problem, names):
         low, high = RANGES[name]
-        worst = [mpmath.mpf(0) for _ in velocities]
+        worst = nothing
         for end in (-math.inf, math.inf):
             near = math.nextafter(value, end)
             if not low <= near <= high or near == 0:
@@ -132,7 +124,7 @@ def unavoidable(problem, velocities, names=tuple(RANGES), ulps=1, solve=in_digit
             try:
                 others = solve(problem._replace(**{name: values}))
             except EventLimit:
-                worst = [mpmath.inf for _ in velocities]
+                worst = [mpmath.inf] * len(velocities)
                 break
             worst = [max(w, abs(a - b)) for w, a, b in zip(worst, others, velocities)]
         total = [a + b for a, b in zip(total, worst)]
@@ -140,16 +132,11 @@ def unavoidable(problem, velocities, names=tuple(RANGES), ulps=1, solve=in_digit
 
 
 class Measured(NamedTuple):
-    """Error of one outcome.
-
-    error: largest error of a velocity, in units of eps times the largest speed.
-    condition: unavoidable change, in the same units.
-    own: largest error of a velocity in units of its own rounding plus its own unavoidable change.
-    """
+    """Largest error of a velocity and unavoidable change, over eps times the largest speed."""
 
     error: float
     condition: float
-    own: float
+    own: float  #: largest error over the velocity's own rounding plus its own unavoidable change
 
 
 def compare(trace, known):
@@ -223,7 +210,6 @@ VELOCITIES = {
 
 
 def map_case(shape, power, e, ratio, velocities):
-    """A point of the map: three balls."""
     m1, m2, m3 = SHAPES[shape](power_of_ten(4 * power))
     forward, backward = (RATIOS[ratio](m / (m + m2)) for m in (m3, m1))
     return case((m1, m2, m3), VELOCITIES[velocities], e, [forward], [backward])
@@ -235,7 +221,7 @@ def map_case(shape, power, e, ratio, velocities):
 def copies(rng, masses, e, ratio, size):
     """Chains whose first balls strike, and the same with every input changed by the part `size`.
 
-    Masses have a shape (..., n); `e` and `ratio` are numbers, or one for each of the last chains.
+    Masses have a shape (..., n); `e` and `ratio` fit the shape before n.
     """
     *chains, n = masses.shape
     e, ratio = (np.atleast_1d(x)[:, None] for x in (e, ratio))
@@ -260,17 +246,13 @@ def relative_changes(pair):
 
 
 def perturbed(spread, n, e, size):
-    """Largest change of a velocity relative to the largest speed, one a chain of `rows_of_balls`.
-
-    And the number of balls at the far end that keep six digits.
-    """
+    """Largest change of each of `rows_of_balls`, and how many last balls keep six digits."""
     off = relative_changes(rows_of_balls(spread, n, e, size))
     leading = [int(np.argmin([*row[::-1], False])) for row in off <= 1e-6]
     return off.max(axis=-1), np.array(leading)
 
 
-UNEQUAL = {
-    # name: masses of n balls, and by which part each is off
+UNEQUAL = {  # name: masses of n balls, and by which part each is off
     "1 kg, off by 1 %": (lambda n: np.ones(n), 0.01),
     "1 kg, off by 10 %": (lambda n: np.ones(n), 0.1),
     "1 and 0.3 kg in turn, off by 10 %": (lambda n: np.where(np.arange(n) % 2, 0.3, 1.0), 0.1),
@@ -279,10 +261,7 @@ UNEQUAL = {
 
 
 def unequal_jumps(family, n, ratio, chains=24, size=1e-12, e=0.9):
-    """Change of a velocity, one a chain, if every input of unequal rows changes by the part `size`.
-
-    The first ball strikes; ratios above their bounds are held.  NaN: not done in a million steps.
-    """
+    """Largest change of each of some unequal rows; NaN: not done in a million steps."""
     masses, spread = UNEQUAL[family]
     rng = np.random.default_rng([2001, n, round(1000 * ratio)])
     masses = masses(n) * uniform(rng, 1 - spread, 1 + spread, (chains, n))
@@ -297,10 +276,7 @@ def unequal_jumps(family, n, ratio, chains=24, size=1e-12, e=0.9):
 
 
 def changes_of_rows(spread, n, e, ratio, chains=4, size=1e-12):
-    """Largest change of a velocity, over the largest speed, and of the last ball's, one a setting.
-
-    Settings are arrays of `e` and `ratio`; inputs change by the part `size`, in so many rows each.
-    """
+    """Largest change of a velocity, and of the last ball's, for each of the arrays e and ratio."""
     rng = np.random.default_rng([2001, n])
     masses = uniform(rng, 1 - spread, 1 + spread, (chains, len(e), n))
     off = relative_changes(copies(rng, masses, e, ratio, size))
@@ -313,11 +289,10 @@ def changes_of_rows(spread, n, e, ratio, chains=4, size=1e-12):
 def alternating(problem):
     """Number of impacts of three balls, v = (1, 0, 0), at ratio 0 and e near 1, and the outcome.
 
-    In mass-weighted coordinates the three balls are a point in a wedge of angle
-    theta = arctan sqrt(m2 (m1 + m2 + m3) / (m1 m3)), and every elastic impact is a mirror.
-    Unfolded, the path is a straight line, at right angles to the first wall: it meets
-    ceil(pi / theta) - 1 of them.  Closing speeds map linearly: n impacts are a power of a matrix.
-    With e an ulp below 1 another impact may follow.
+    In mass-weighted coordinates the balls are a point in a wedge of angle
+    theta = arctan sqrt(m2 (m1 + m2 + m3) / (m1 m3)), every elastic impact a mirror: unfolded, the
+    path is a straight line, at right angles to the first wall, and meets ceil(pi / theta) - 1.
+    Closing speeds map linearly.  With e an ulp below 1 another impact may follow.
     """
     a, b, c = (as_meant(m) for m in problem.masses)
     e, f = (as_meant(x) for x in problem.restitution)
@@ -345,9 +320,8 @@ def elastic_impacts(light, last=1.0, e=1.0):
 def infinite_below(e):
     """Largest light mass of (1, light, 1) with an infinite sequence, ratio 0, both e alike.
 
-    The closing speeds of a cycle of two impacts map by a matrix of determinant e^2 and trace
-    (1 + e)^2 / (1 + light)^2 - 2 e.  Its eigenvalues are real, and no turn of the closing speeds
-    ends the sequence, from trace = 2 e on.
+    Two impacts map the closing speeds by a matrix of determinant e^2 and trace
+    (1 + e)^2 / (1 + light)^2 - 2 e, whose eigenvalues are real from trace = 2 e on.
     """
     return (1 - math.sqrt(e)) ** 2 / (2 * math.sqrt(e)) if e > 0 else math.inf
 
@@ -365,10 +339,9 @@ def edge(e, ratio, low=1e-7, high=2.0):
 
 
 def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
-    """How far an input can move to one side before the events change, and the jump there.
+    """How far, relatively, an input can move to one side before the events change; the jump there.
 
-    Relative distance and the largest change of a velocity across it, relative to the largest
-    speed; (inf, 0) if there is no edge up to `farthest` or to the end of the input's range.
+    (inf, 0) if there is no edge up to `farthest` or to the end of the input's range.
     """
     base = events_at_balls(problem.attempt()[0])
 
@@ -394,11 +367,10 @@ def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
 
 
 def jumps(problem, name, k, scale, least=1e-3, farthest=0.3, steps=6000):
-    """Where the outcome jumps while one input moves, one element a jump.
+    """Relative changes of one input where the outcome jumps by more than `least`, and the jumps.
 
-    Relative change of the input, and the largest change of a velocity there, relative to the
-    largest speed.  Jumps below `least` are left out.  A step of the scan that moves a velocity as
-    far is halved, again and again: a steep slope then becomes small, and a jump stays.
+    A step of the scan that moves a velocity so far is halved, again and again: a steep slope then
+    becomes small, and a jump stays.
     """
 
     def after(parts):
@@ -431,8 +403,7 @@ def jumps(problem, name, k, scale, least=1e-3, farthest=0.3, steps=6000):
 # --- every chain finishes ----------------------------------------------------------------------
 
 FAMILIES = (("within", 3), ("within", 6), ("saturate", 3), ("saturate", 6))
-#: How many chains of each family the map counts.
-CHAINS = 25_000
+CHAINS = 25_000  # of each family
 
 
 def any_chain(family, decades, index):
@@ -440,11 +411,8 @@ def any_chain(family, decades, index):
     rng = np.random.default_rng([FAMILIES.index((family, decades)), index])
     n = int(rng.integers(2, 9))
     masses = magnitudes(rng, decades, n)
-    velocities = (
-        uniform(rng, -1, 1, n),
-        np.sort(uniform(rng, -1, 1, n))[::-1],
-        np.eye(n)[0],
-    )[rng.integers(3)]
+    some, falling = uniform(rng, -1, 1, n), np.sort(uniform(rng, -1, 1, n))[::-1]
+    velocities = (some, falling, np.eye(n)[0])[rng.integers(3)]
     part = with_ends(rng)
     e = part((n - 1,))
     within = family == "within"
@@ -455,7 +423,7 @@ def any_chain(family, decades, index):
 def longer_than(problem, steps):
     """Collisions, whether it collapsed, whether so many steps were too few; and what is open then.
 
-    Open is how much a velocity can still change, over the largest closing speed at the start.
+    That is how much a velocity can still change, over the largest closing speed at the start.
     """
     try:
         found = outcomes(*problem[:5], excess="saturate", max_events=steps)

@@ -20,8 +20,9 @@ from cradle.models.correlation import MAX_EVENTS
 from cradle.tables import paper_sequences
 
 
-def the_map():
+def extremes_map():
     """Yield the worst of the velocities of each (shape, mass ratio, restitution, ratio)."""
+    yield "shape power restitution ratio error condition own events compared faulty unfinished"
     for labels in product(x.SHAPES, x.POWERS, x.RESTITUTION, x.RATIOS):
         worst = np.zeros(3)
         events, compared, faulty, unfinished = 0, 0, 0, 0
@@ -37,8 +38,9 @@ def the_map():
         yield (*labels, *map(float, worst), events, compared, faulty, unfinished)
 
 
-def growth():
+def extremes_growth():
     """Yield what a change of all inputs does to the outcome."""
+    yield "spread restitution size balls median largest leading"
     sizes = (3, 5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 80)
     for case in product((0.0, 0.1), (0.9, 0.97, 1.0), (1e-12, 1e-9), sizes):
         spread, e, size, n = case
@@ -46,16 +48,18 @@ def growth():
         yield *case, float(np.median(change)), float(change.max()), int(leading.min())
 
 
-def unequal():
+def extremes_unequal():
     """Yield the same of unequal rows."""
+    yield "family balls ratio least median largest jumps unfinished"
     for case in product(x.UNEQUAL, (20, 40, 80), (0.1, 0.2, 0.3, 0.45)):
         change = x.unequal_jumps(*case)
         counts = int(sum(change > 1e-6)), int(sum(np.isnan(change)))
         yield *case, *map(float, np.nanquantile(change, [0, 0.5, 1])), *counts
 
 
-def shortest():
+def extremes_shortest():
     """Yield the shortest row that jumps, and largest changes, of equal and of unequal balls."""
+    yield "spread restitution ratio balls short largest last"
     ratios = 0, 1, 2, 4, 6, 8, 10, 12, 15, 20, 30, 40  # in hundredths
     for spread, step in ((0.0, 2), (0.1, 10)):
         cases = [*product(range(40, 101, step), ratios)]
@@ -78,21 +82,24 @@ def each_input():
             yield name, problem, part, k, scale
 
 
-def edges():
+def extremes_edges():
     """Yield how far each input is from another sequence of events."""
+    yield "sequence input index side distance jump"
     for (name, problem, part, k, scale), side in product(each_input(), (-1, 1)):
         yield name, part, k, side, *x.nearest_edge(problem, part, k, side, scale)
 
 
-def jumps():
+def extremes_jumps():
     """Yield where the outcome jumps while an input moves."""
+    yield "sequence input index change jump"
     for name, problem, part, k, scale in each_input():
         for change, jump in x.jumps(problem, part, k, scale):
             yield name, part, k, change, jump
 
 
-def elastic():
+def extremes_elastic():
     """Yield the impacts of a light ball between two others, without losses."""
+    yield "power ratio impacts theory error condition own gain collapsed"
     for quarters, ratio in product(range(41), (0.0, 0.15)):
         light = power_of_ten(-quarters)
         problem = x.case([1, light, 1], [1, 0, 0], 1, ratio)
@@ -108,8 +115,9 @@ def elastic():
         yield quarters / 4, ratio, impacts, theory, *measured, gain, int(trace.collapsed)
 
 
-def limits():
+def extremes_limits():
     """Yield edges between finite and infinite sequences, and what both sides cost."""
+    yield "restitution ratio edge theory half below above double"
     restitution = (0.05, 0.1, 0.3, 0.5, 0.7, 0.9, 0.95, 0.99)
     # All ratios are within 1/3, the bound of the heaviest middle ball of the search.
     for e, ratio in product(restitution, (0.0, 0.05, 0.15, 0.3)):
@@ -120,8 +128,7 @@ def limits():
 
 
 LONG = 50_000
-#: How much of the largest closing speed is open in an unfinished chain, at most.
-DECIDED = (1e-6, 1e-3, 0.1, 1.0)
+DECIDED = (1e-6, 1e-3, 0.1, 1.0)  # parts of the largest closing speed that may still be open
 
 
 def long_or_not(family, decades, index):
@@ -136,8 +143,12 @@ def long_or_not(family, decades, index):
     return len(problem.masses), (1, collapsed, *longer, unfinished, *left)
 
 
-def finish():
+def extremes_finish():
     """Yield counts by family and number of balls."""
+    yield (
+        "family decades balls chains collapsed above_100 above_1000 above_10000 unfinished left "
+        "open_1e-6 open_1e-3 open_0.1 open_1"
+    )
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
         for family, decades in x.FAMILIES:
             table = np.zeros((9, 7 + len(DECIDED)), dtype=int)
@@ -148,28 +159,5 @@ def finish():
                 yield (family, decades, n, *table[n].tolist())
 
 
-#: Columns, rows.
-TABLES = {
-    "extremes_map": (
-        "shape power restitution ratio error condition own events compared faulty unfinished",
-        the_map,
-    ),
-    "extremes_growth": ("spread restitution size balls median largest leading", growth),
-    "extremes_unequal": ("family balls ratio least median largest jumps unfinished", unequal),
-    "extremes_shortest": ("spread restitution ratio balls short largest last", shortest),
-    "extremes_edges": ("sequence input index side distance jump", edges),
-    "extremes_jumps": ("sequence input index change jump", jumps),
-    "extremes_elastic": (
-        "power ratio impacts theory error condition own gain collapsed",
-        elastic,
-    ),
-    "extremes_finish": (
-        "family decades balls chains collapsed above_100 above_1000 above_10000 unfinished left "
-        "open_1e-6 open_1e-3 open_0.1 open_1",
-        finish,
-    ),
-    "extremes_limits": ("restitution ratio edge theory half below above double", limits),
-}
-
 if __name__ == "__main__":
-    make(__doc__, {name: (words.split(), rows) for name, (words, rows) in TABLES.items()})
+    make(__doc__, *(rows for name, rows in vars().copy().items() if name.startswith("extremes_")))

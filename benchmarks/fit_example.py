@@ -5,6 +5,8 @@ The balls follow the pendulum's own equation of motion, the impact the values of
 velocities are found from the marks, each a random amount off, as a reader would find them.
 """
 
+from functools import partial
+
 import numpy as np
 from scipy.special import ellipj
 from stored import options, write
@@ -21,7 +23,7 @@ DIAMETER = 0.035
 SPEEDS = (0.6, 1.0, 1.4)
 #: Sets of the experiment and how many shots of each there are at every speed.
 SETS = {"AB": 4, "AC": 4, "ABA": 4, "BAC": 4, "CAB": 4, "ACA": 4, "ABACA": 2}
-HEADER = ("set", "shot", "ball", "type", "mass", "before", "after", "sigma", "sigma_before")
+HEADER = "set shot ball type mass before after sigma sigma_before"
 
 
 def swing(velocity, times):
@@ -48,13 +50,11 @@ def film(name, speed, random):
 
 def export(tracks):
     """Return the text that Tracker would export for several tracks."""
-    names = list(tracks)
-    lines = ["#multi:", "\t" + "".join(f"{name}\t\t" for name in names),
-             "t\t" + "x\ty\t" * len(names)]  # fmt: skip
-    times = tracks[names[0]].times
-    for k, time in enumerate(times):
-        cells = "".join(f"{tracks[name].positions[k]:.5f}\t0.00000\t" for name in names)
-        lines.append(f"{time:.6f}\t{cells}")
+    lines = ["#multi:", "\t" + "".join(f"{name}\t\t" for name in tracks)]
+    lines.append("t\t" + "x\ty\t" * len(tracks))
+    times = next(iter(tracks.values())).times
+    for time, *places in zip(times, *(track.positions for track in tracks.values())):
+        lines.append(f"{time:.6f}\t" + "".join(f"{x:.5f}\t0.00000\t" for x in places))
     return "\n".join(lines) + "\n"
 
 
@@ -69,13 +69,11 @@ def experiment():
             tracks, masses = film(name, true_speed, random)
             films.append((name, shot, tracks, masses))
     # The marks of all films have one scatter: pooled, it is known well.
-    alone = [
-        velocities_from_tracks(tracks, length=LENGTH, window=WINDOW) for _, _, tracks, _ in films
-    ]
-    scatter = float(np.sqrt(np.mean([found.scatter**2 for found in alone])))
+    velocities = partial(velocities_from_tracks, length=LENGTH, window=WINDOW)
+    scatter = float(np.sqrt(np.mean([velocities(film[2]).scatter ** 2 for film in films])))
     rows = []
     for name, shot, tracks, masses in films:
-        found = velocities_from_tracks(tracks, length=LENGTH, window=WINDOW, scatter=scatter)
+        found = velocities(tracks, scatter=scatter)
         for k, letter in enumerate(name):
             numbers = (found.before[k], found.after[k], found.sigma[k], found.sigma_before[k])
             rows.append([name, shot, k + 1, letter, f"{masses[k]:.3f}",
@@ -84,14 +82,9 @@ def experiment():
     return rows, text
 
 
-def main(arguments=None):
-    """Write the files."""
-    folder = options(__doc__).parse_args(arguments).output
+if __name__ == "__main__":
+    folder = options(__doc__).parse_args().output
     rows, text = experiment()
     (folder / "video_synthetic.txt").write_text(text, encoding="utf-8")
     comment = "# SYNTHETIC: made by benchmarks/fit_example.py, not measured\n"
     write("shots_synthetic.csv", HEADER, rows, folder, comment)
-
-
-if __name__ == "__main__":
-    main()

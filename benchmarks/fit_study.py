@@ -18,9 +18,6 @@ NOISES = (0.003, 0.01, 0.03)
 REPEATS, DATASETS = 3, 25  # shots at each speed; experiments of each triplet and noise
 SHOTS = 20  # of the experiment whose precision is worked out
 GRID = 401
-STUDY = ["triplet", "noise", "ratio", "bound", "datasets", "covered", "width", "bias",
-         "not_identified", "several_intervals", "wrong_least_squares", "wrong_bounded",
-         "wrong_five_starts"]  # fmt: skip
 PRECISION = ["triplet", "ratio", "bound", "backward_acts", "sensitivity", "third_digit", "second",
              "second_excess", "trap_low", "trap_high", "trap_misfit", "detectable"]  # fmt: skip
 
@@ -29,8 +26,8 @@ def truth(triplet):
     """Return chain, ratio, reverse ratio and bound of a triplet; no ratio is above its bound."""
     chain, model = paper_chain(triplet, excess="saturate")
     left, middle, right = map(float, chain.masses)
-    bounds = right / (middle + right), left / (middle + left)
-    return chain, min(model.forward[0], bounds[0]), min(model.backward[0], bounds[1]), bounds[0]
+    bound, back = right / (middle + right), left / (middle + left)
+    return chain, min(model.forward[0], bound), min(model.backward[0], back), bound
 
 
 def outcomes(chain, ratios, backward):
@@ -65,7 +62,7 @@ def wrong_minima(shots, chain, backward, bound, noise):
     speed, after = shots.before[:, 0], shots.after
 
     def residuals(value):
-        at = np.array([np.interp(value, ratios, unit[:, k]) for k in range(3)]).reshape(3)
+        at = np.array([np.interp(value, ratios, one) for one in unit.T]).reshape(3)
         return ((after - speed[:, None] * at) / (noise * speed[:, None])).ravel()
 
     def squares(value):
@@ -163,11 +160,18 @@ def minima(values):
     return np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] < padded[2:]))
 
 
+def fit_precision():
+    yield PRECISION
+    yield from map(precision, ratio_table().triplet)
+
+
+def fit_study():
+    yield (
+        "triplet noise ratio bound datasets covered width bias not_identified several_intervals "
+        "wrong_least_squares wrong_bounded wrong_five_starts"
+    )
+    yield from (study(triplet, noise) for noise in NOISES for triplet in ratio_table().triplet)
+
+
 if __name__ == "__main__":
-    names = list(ratio_table().triplet)
-    studies = (study(triplet, noise) for noise in NOISES for triplet in names)
-    tables = {
-        "fit_precision": (PRECISION, lambda: map(precision, names)),
-        "fit_study": (STUDY, lambda: studies),
-    }
-    make(__doc__, tables)
+    make(__doc__, fit_precision, fit_study)

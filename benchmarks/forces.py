@@ -15,6 +15,7 @@ from itertools import takewhile
 
 import numpy as np
 from chains import magnitudes
+from measure import seconds as timed
 from stored import make
 from verlet import verlet
 
@@ -25,31 +26,26 @@ from cradle.kernel.state import FINISHED
 from cradle.measures import effective_ratio
 from cradle.runtime.springs import room, solve
 
-#: Compressions and speeds, relative to the first, at which Verlet stops.
-FAINT = 1e-6
-#: Steps of Verlet that are tried.
-STEPS = np.geomspace(0.8, 2e-3, 90)
-#: Gives three equal balls what elastic spheres give them.
-RATIO = 0.132503287
+FAINT = 1e-6  # compressions and speeds, relative to the first, at which Verlet stops
+STEPS = np.geomspace(0.8, 2e-3, 90)  # of Verlet
+RATIO = 0.132503287  # gives three equal balls what elastic spheres give them
 #: One ratio for all balls: measured (Table 2, AAA), and what the textbooks assume.
 RATIOS = {"measured ratio": 0.167, "pair after pair": 0.0, "all as one body": 1.0}
-COLUMNS = ("chain", "method", "asked", "error", "microseconds", "ratio")
 
 
 def struck(rows, n):
-    """Velocities of rows of balls that the first ball strikes."""
     return np.tile(np.eye(n)[0], (rows, 1))
 
 
 def cases():
     """Yield names, masses (a row each), A of the losses, and accuracies asked for."""
-    rng = np.random.default_rng(1)
     yield "5 equal", np.ones((1, 5)), 0.0, (1e-2, 1e-3, 1e-4, 1e-6)
     yield "1 1 .1 1 1", np.array([[1, 1, 0.1, 1, 1]]), 0.0, (1e-2, 1e-3)
     yield "20 equal", np.ones((1, 20)), 0.0, (1e-2, 1e-3)
     yield "ABCCA", np.array([[45, 53, 53, 53, 45]]) / 45, 0.0, (1e-2, 1e-3)  # grams, as elastic
     yield "100 equal", np.ones((1, 100)), 0.0, (1e-2, 1e-3)
-    yield "5 random, two decades", magnitudes(rng, 2, (300, 5)), 0.0, (1e-2, 1e-3)
+    random = magnitudes(np.random.default_rng(1), 2, (300, 5))
+    yield "5 random, two decades", random, 0.0, (1e-2, 1e-3)
     yield "5 equal, A = .03", np.ones((1, 5)), 0.03, (1e-2, 1e-3, 1e-4)
 
 
@@ -82,7 +78,6 @@ def fitted(masses):
 
 
 def rule(masses, loss, ratios):
-    """Return the paper's rule with forward and backward ratios."""
     rows, n = masses.shape
     left, right = spring_velocities([1, 1], [1, 0], viscosity=loss, accuracy=1e-6)
     given = masses, struck(rows, n), min(right - left, 1.0), *ratios
@@ -97,9 +92,8 @@ def rival(masses, loss):
 
 def largest_step(masses, loss, exact, error):
     """Return the step from which on all smaller ones of Verlet keep an error."""
-    few = slice(0, 300)  # of which all the others are copies
-    run = rival(masses[few], loss)
-    kept = takewhile(lambda step: abs(run(step) - exact[few]).max() <= error, STEPS[::-1])
+    run, known = rival(masses[:300], loss), exact[:300]  # all the others are copies
+    kept = takewhile(lambda step: abs(run(step) - known).max() <= error, STEPS[::-1])
     return max(kept, default=STEPS[-1])
 
 
@@ -110,15 +104,12 @@ def least(runs, seconds=0.6):
     times = [np.inf] * len(runs)
     end = time.perf_counter() + seconds
     while time.perf_counter() < end:
-        for k, one in enumerate(runs):
-            begun = time.perf_counter()
-            one()
-            times[k] = min(times[k], time.perf_counter() - begun)
+        times = [min(known, timed(one)) for known, one in zip(times, runs)]
     return times
 
 
-def rows():
-    """Yield the table."""
+def forces():
+    yield "chain method asked error microseconds ratio"
     for name, masses, loss, accuracies in cases():
         # Enough rows for one call from Python not to count.
         count = max(len(masses), 10_000 // masses.shape[1] ** 2 + 20)
@@ -141,4 +132,4 @@ def rows():
 
 
 if __name__ == "__main__":
-    make(__doc__, {"forces": (COLUMNS, rows)})
+    make(__doc__, forces)

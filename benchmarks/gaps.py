@@ -11,18 +11,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from stored import make
 
-from cradle import (
-    Chain,
-    EnergyDistribution,
-    FusedChain,
-    QuadraticDissipation,
-    SequentialCollisions,
-    SpringChain,
-    collide,
-    paper_chain,
-    post_impact_velocities,
-    ratio_table,
-)
+import cradle
+from cradle import Chain, SpringChain, collide, paper_chain, post_impact_velocities
 from cradle.measures import effective_ratio
 from cradle.tables import ball_masses
 
@@ -36,11 +26,11 @@ SHIFTS = np.round(
 ONE = np.linspace(0, 0.5, 101)  # ratios
 QUOTIENTS = np.array([float(f"{10 ** (k / 4):.4g}") for k in range(-16, 17)])  # stiffness
 LAWS = {
-    "sequential": SequentialCollisions(),
-    "energy_hertz": EnergyDistribution(1.0),
-    "energy_linear": EnergyDistribution(1.0, 1),
-    "convex": QuadraticDissipation(),
-    "fused": FusedChain(),
+    "sequential": cradle.SequentialCollisions(),
+    "energy_hertz": cradle.EnergyDistribution(1.0),
+    "energy_linear": cradle.EnergyDistribution(1.0, 1),
+    "convex": cradle.QuadraticDissipation(),
+    "fused": cradle.FusedChain(),
 }
 
 
@@ -56,8 +46,8 @@ def runge_kutta(rate, y, step):
 def strike(masses, velocities, restitution, gaps, stiffness=1.0, step=0.02, longest=60.0):
     """Return velocities (..., N) after the impact of spheres at `gaps` (..., N - 1).
 
-    Runge-Kutta of order four.  What is still closing after the time `longest`, or is closed when
-    nothing pushes any more, goes on as pairs, one after the other.
+    What is still closing after the time `longest`, or is closed when nothing pushes any more, goes
+    on as pairs, one after the other.
     """
     m, v, e, s = (np.asarray(x, float) for x in (masses, velocities, restitution, gaps))
     n = m.shape[-1]
@@ -67,22 +57,21 @@ def strike(masses, velocities, restitution, gaps, stiffness=1.0, step=0.02, long
     # The states of the contacts, then the velocities of the balls.
     y = np.concatenate([-np.broadcast_to(s, contacts), np.broadcast_to(v, row)], -1)
     held = stiffness * np.maximum(y[..., : n - 1], 0.0) ** 1.5
-    ends = [(0, 0)] * (len(row) - 1) + [(1, 1)]
 
     def rate(y):
         s, v = y[..., : n - 1], y[..., n - 1 :]
         closing = v[..., :-1] - v[..., 1:]
-        push = np.pad(stiffness * np.maximum(s, 0.0) ** 1.5 - held, ends)
+        push = stiffness * np.maximum(s, 0.0) ** 1.5 - held
         slow = np.where((closing < 0) & (s > 0), closing / np.maximum(e, 1e-3) ** 2, closing)
-        return np.concatenate([slow, (push[..., :-1] - push[..., 1:]) / m], -1)
+        return np.concatenate([slow, -np.diff(push, prepend=0, append=0) / m], -1)
 
     left, time, out = np.ones(row[:-1], bool), 0.0, np.empty(row)
     while time < longest and left.any():
         y = runge_kutta(rate, y, step)
         time += step
         s, v = y[..., : n - 1], y[..., n - 1 :]
-        done = left & (s <= 0).all(-1)
-        done &= (v[..., :-1] <= v[..., 1:]).all(-1) | (held > 0).any(-1)
+        ordered = (v[..., :-1] <= v[..., 1:]).all(-1)
+        done = left & (s <= 0).all(-1) & (ordered | (held > 0).any(-1))
         out[done] = v[done]
         left &= ~done
     if left.any():
@@ -91,11 +80,11 @@ def strike(masses, velocities, restitution, gaps, stiffness=1.0, step=0.02, long
     return out
 
 
-def five():
+def gaps_five():
     """Yield gap and velocities: five equal elastic balls, the first striking."""
-    gaps = np.outer(GAPS, [0.0, 1.0, 1.0, 1.0])
-    after = strike([1] * 5, np.eye(5)[0], 1.0, gaps)
-    return (map(written, row) for row in np.column_stack([GAPS, after]))
+    yield "gap v1 v2 v3 v4 v5"
+    after = strike([1] * 5, np.eye(5)[0], 1.0, np.outer(GAPS, [0.0, 1.0, 1.0, 1.0]))
+    yield from (map(written, row) for row in np.column_stack([GAPS, after]))
 
 
 def of_triplets(names):
@@ -107,7 +96,6 @@ def of_triplets(names):
 
 
 def off(after, listed):
-    """Return the largest difference of a velocity, over the striker's speed."""
     return np.abs(after - listed).max(-1)
 
 
@@ -137,9 +125,9 @@ def by_pair(names, masses, e, listed):
     return after(min(fits, key=lambda fit: fit.cost).x)
 
 
-def triplets():
-    """Yield columns, then rows: how far each law is from the outcome that Table 2 encodes."""
-    names = list(ratio_table()["triplet"])
+def gaps_triplets():
+    """Yield how far each law is from the outcome that Table 2 encodes."""
+    names = list(cradle.ratio_table()["triplet"])
     masses, e, listed = of_triplets(names)
     columns = {"triplet": names}
     for name, model in LAWS.items():
@@ -151,11 +139,9 @@ def triplets():
     ]
     every, m, r, listed_too = np.arange(len(names)), masses[:, None], e[:, None], listed[:, None]
     alike = [""] * len(names)
-
     after = post_impact_velocities(m, [1, 0, 0], r, ONE[:, None], excess="saturate")
     one = off(after, listed_too)
     columns["one_ratio"] = one[every, shared(one, alike)]
-
     shift = np.stack(np.broadcast_arrays(0.0, SHIFTS), -1)
     errors = off(strike(m, [1, 0, 0], r, shift), listed_too)
     last = ["".join(sorted(t[1:])) for t in names]
@@ -165,13 +151,12 @@ def triplets():
         own = shared(found, names)
         columns[f"own_{name}"] = SHIFTS[own]
         columns[f"with_own_{name}"] = found[every, own]
-
     k = np.stack([np.minimum(1, 1 / QUOTIENTS), np.minimum(1, QUOTIENTS)], -1)
     errors = off(strike(m, [1, 0, 0], r, 0.0 * k, k, longest=150.0), listed_too)
     own = shared(errors, names)
     columns["own_quotient"], columns["with_own_quotient"] = QUOTIENTS[own], errors[every, own]
     columns["stiffness_of_pair"] = off(by_pair(names, masses, e, listed), listed)
-    return zip(*([name, *map(written, column)] for name, column in columns.items()), strict=True)
+    yield from zip(*([name, *map(written, one)] for name, one in columns.items()), strict=True)
 
 
 def written(x):
@@ -182,5 +167,4 @@ def written(x):
 
 
 if __name__ == "__main__":
-    columns = ["gap", *(f"v{k}" for k in range(1, 6))]
-    make(__doc__, {"gaps_five": (columns, five), "gaps_triplets": (None, triplets)})
+    make(__doc__, gaps_five, gaps_triplets)

@@ -16,21 +16,16 @@ EXPONENTS = (1.0, 1.5)  # linear, Hertz
 MASS_RATIOS = (0.1, 0.3, 1.0, 3.0, 10.0)
 # Six digits, because the last one of a power depends on the C library.
 STIFFNESS_RATIOS = tuple(float(f"{10.0 ** (k / 4):.6g}") for k in range(-12, 13))
-CASE = ["exponent", "m2_over_m1", "m3_over_m2", "k2_over_k1"]
-COLUMNS = [*CASE, "v1", "v2", "v3", "bound", "ratio", "note"]
-
-
-def outcome(exponent, m2_over_m1, m3_over_m2, k2_over_k1):
-    """Return the impact of three balls on springs."""
-    masses = np.cumprod([1.0, m2_over_m1, m3_over_m2])
-    model = SpringChain([1.0, k2_over_k1], exponent, accuracy=1e-11)
-    return collide(Chain(masses, [1.0, 0.0, 0.0], 1.0), model)
+COLUMNS = [
+    "exponent", "m2_over_m1", "m3_over_m2", "k2_over_k1", "v1", "v2", "v3", "bound", "ratio", "note"
+]  # fmt: skip
 
 
 def row(exponent, m2_over_m1, m3_over_m2, k2_over_k1):
     """Return one row of the map."""
-    trace = outcome(exponent, m2_over_m1, m3_over_m2, k2_over_k1)
-    ratio, note = "", ""
+    masses = np.cumprod([1.0, m2_over_m1, m3_over_m2])
+    model = SpringChain([1.0, k2_over_k1], exponent, accuracy=1e-11)
+    trace, ratio, note = collide(Chain(masses, [1.0, 0.0, 0.0], 1.0), model), "", ""
     try:
         ratio = f"{effective_ratio(trace):.15g}"
     except ValueError as error:
@@ -41,6 +36,11 @@ def row(exponent, m2_over_m1, m3_over_m2, k2_over_k1):
     return [*(f"{x:.9g}" for x in numbers), *velocities, f"{bound:.9f}", ratio, note]
 
 
-if __name__ == "__main__":
+def implied_ratio():
+    yield COLUMNS
     cases = itertools.product(EXPONENTS, MASS_RATIOS, MASS_RATIOS, STIFFNESS_RATIOS)
-    make(__doc__, {"implied_ratio": (COLUMNS, lambda: itertools.starmap(row, cases))})
+    yield from itertools.starmap(row, cases)
+
+
+if __name__ == "__main__":
+    make(__doc__, implied_ratio)

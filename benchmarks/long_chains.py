@@ -18,14 +18,9 @@ COLUMNS = [
     "orders", "kept", "spread", "fast", "fast_least", "fast_most", "back", "first", "third_last",
     "second_last", "last", "cpu_seconds", "time_ratio", "repeats",
 ]  # fmt: skip
-
-#: A ball counts as flying off if it is faster than this part of the striker's speed.
-FAST = 0.01
-#: Copies of a chain whose masses and restitutions differ by up to this part, at random.
-COPIES, CHANGE = 16, 1e-15
-#: A velocity is kept if no copy's differs by more than this part of it.
-KEPT = 1e-6
-
+FAST = 0.01  # of the striker's speed: a ball counts as flying off
+COPIES, CHANGE = 16, 1e-15  # by up to which part masses and restitutions differ, at random
+KEPT = 1e-6  # no copy's velocity differs by more than this part of it
 ELASTIC_RATIOS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.45, 0.5)
 ELASTIC_BALLS = (100, 300, 1000, 3000, 10_000, 30_000, 100_000)
 # Few enough balls that nothing collapses, but for the last ones at .9.
@@ -68,38 +63,35 @@ def leaving(velocities):
     }
 
 
-def large_map(side, repeats):
-    """Return a row: collisions of three balls over the mass ratios m2/m1 and m2/m3 of Fig. 6."""
-    ratios = (np.arange(side) + 0.5) * 3.0 / side
-    masses = np.stack(np.broadcast_arrays(1.0 / ratios[:, None], 1.0, 1.0 / ratios), axis=-1)
-    solve = partial(outcomes, masses, [1.0, 0.0, 0.0], 0.5, 0.15)
-    found = solve()
-    given = {"group": "map", "restitution": 0.5, "ratio": 0.15, "balls": 3, "chains": side**2}
+def solved(group, chain, e, ratio, repeats=9):
+    """Return the outcomes, and a row of them."""
+    found = (solve := partial(outcomes, *chain, e, ratio))()
+    given = {"group": group, "restitution": e, "ratio": ratio, "balls": chain[0].shape[-1]}
     counts = {
         "collisions": int(found.collisions[~found.collapsed].sum()),
         "collapsed": int(found.collapsed.sum()),
     }
-    return given | counts | cost(solve, repeats)
+    return found, given | counts | cost(solve, repeats)
+
+
+def large_map(side):
+    """Return a row: collisions of three balls over the mass ratios m2/m1 and m2/m3 of Fig. 6."""
+    ratios = (np.arange(side) + 0.5) * 3.0 / side
+    masses = np.stack(np.broadcast_arrays(1.0 / ratios[:, None], 1.0, 1.0 / ratios), axis=-1)
+    return solved("map", (masses, [1.0, 0.0, 0.0]), 0.5, 0.15)[1] | {"chains": side**2}
 
 
 def elastic(ratio, balls):
     """Return a row: no losses, so every contact collides once, at any length."""
-    solve = partial(outcomes, *still_chain(balls), 1.0, ratio)
-    found = solve()
-    given = {"group": "elastic", "restitution": 1.0, "ratio": ratio, "balls": balls}
-    counts = {
-        "collisions": int(found.collisions.sum()),
-        "collapsed": int(found.collapsed),
-    }
-    time = cost(solve, 9 if balls <= 10_000 else 5)
-    return given | counts | leaving(found.velocities) | time
+    repeats = 9 if balls <= 10_000 else 5
+    found, row = solved("elastic", still_chain(balls), 1.0, ratio, repeats)
+    return row | leaving(found.velocities)
 
 
 def copies(restitution, balls):
     """Return masses, velocities and restitutions of a chain and of its copies."""
     rng = np.random.default_rng(balls)
-    masses, velocities = still_chain(balls)
-    masses = np.tile(masses, (1 + COPIES, 1))
+    masses, velocities = np.ones((1 + COPIES, balls)), still_chain(balls)[1]
     restitutions = np.full((1 + COPIES, balls - 1), restitution)
     for values in (masses, restitutions):
         values[1:] *= 1.0 + CHANGE * (2.0 * rng.random(values[1:].shape) - 1.0)
@@ -137,7 +129,7 @@ def springs(exponent, balls):
 
 def all_rows():
     """Yield all rows, without seconds."""
-    yield large_map(MAP_SIDE, 9)
+    yield large_map(MAP_SIDE)
     for ratio, balls in product(ELASTIC_RATIOS, ELASTIC_BALLS):
         yield elastic(ratio, balls)
     for restitution, lengths in LOSSES.items():
@@ -148,15 +140,16 @@ def all_rows():
             yield springs(exponent, balls)
 
 
-def rows():
-    """Return all rows, their seconds by the median of all units."""
+def long_chains():
+    """Yield all rows, their seconds by the median of all units."""
     found = list(all_rows())
     timed = [row for row in found if "units" in row]
     unit = statistics.median(one for row in timed for one in row.pop("units"))
     for row in timed:
         row["cpu_seconds"] = row["time_ratio"] * unit
-    return ([row.get(name, "") for name in COLUMNS] for row in found)
+    yield COLUMNS
+    yield from ([row.get(name, "") for name in COLUMNS] for row in found)
 
 
 if __name__ == "__main__":
-    make(__doc__, {"long_chains": (COLUMNS, rows)}, digits=10)
+    make(__doc__, long_chains, digits=10)

@@ -14,16 +14,9 @@ from dop853 import integrated
 from scipy.optimize import least_squares
 from stored import DATA, make
 
-from cradle import (
-    Chain,
-    EnergyDistribution,
-    ImpulseCorrelation,
-    SequentialCollisions,
-    collide,
-    spring_velocities,
-)
+import cradle
+from cradle import Chain, ImpulseCorrelation, SequentialCollisions, collide, spring_velocities
 
-READINGS = (1, 2, 3, 4)
 EQUAL = (1, 1, 1, 1, 1)
 SLOWER = 0.766  # strikers of the second release over the one of the first, relative to the row
 
@@ -68,11 +61,8 @@ def by_law(model, restitution, release, apart, masses=EQUAL):
 
 def ratios(p, e, release, apart, backward=None, masses=EQUAL):
     """Return velocities by the ratios p of balls 2, 3, 4."""
-
-    def model(k):
-        back = None if backward is None else backward[k:]
-        return ImpulseCorrelation(p[k:], back, excess="saturate")
-
+    back = p if backward is None else backward
+    model = lambda k: ImpulseCorrelation(p[k:], back[k:], excess="saturate")  # noqa: E731
     return by_law(model, e, release, apart, masses)
 
 
@@ -102,7 +92,7 @@ LAWS = {
         lambda p, r, a: by_law(lambda _: SequentialCollisions(), p[0], r, a),
         [[0.98]], [E]),
     "energy law (Hertz), e": (
-        lambda p, r, a: by_law(lambda _: EnergyDistribution(1.0, 1.5), p[0], r, a),
+        lambda p, r, a: by_law(lambda _: cradle.EnergyDistribution(1.0, 1.5), p[0], r, a),
         [[0.98]], [E]),
     "one ratio, e": (
         lambda p, r, a: ratios([p[0]] * 3, p[1], r, a),
@@ -185,9 +175,8 @@ def fitted(law, apart, data, releases):
 
 
 def fits_of(reading, law, apart):
-    """Return rows of a law fitted to the releases of one and two, to one alone, and to all."""
-    data, rows = first_strikes(reading), []
-    count = len(LAWS[law][2])
+    """Yield rows of a law fitted to the releases of one and two, to one alone, and to all."""
+    data, count = first_strikes(reading), len(LAWS[law][2])
     how = "own gap" if "four gaps" in law else "apart" if apart else "together"
     minima = fitted(law, apart, data, (1, 2))
     names = ("both", "both, second", "both, third") if count < 6 else ("both",)
@@ -199,16 +188,16 @@ def fits_of(reading, law, apart):
         found.append(("all", 15 - count, fitted(law, apart, data, (1, 2, 3))[0]))
     for name, free, p in found:
         p = [float(f"{x:.5g}") for x in p]  # as stored
-        chi = [
-            f"{chi_square(law, p, apart, data, (r,)):.4g}" if r in data else "" for r in (1, 2, 3)
-        ]
-        rows.append([reading, law, how, name, free, *chi, " ".join(f"{x:.5g}" for x in p)])
-        print(*rows[-1], sep=", ", flush=True)
-    return rows
+        sums = [chi_square(law, p, apart, data, (r,)) for r in data]
+        chi = [*(f"{x:.4g}" for x in sums), ""][:3]
+        row = [reading, law, how, name, free, *chi, " ".join(f"{x:.5g}" for x in p)]
+        print(*row, sep=", ", flush=True)
+        yield row
 
 
-def rows():
+def film_fits():
     """Yield fits of every law to readings 4 and 2."""
+    yield COLUMNS
     for reading in (4, 2):
         for apart, laws in ((False, TOGETHER), (True, ONE_BY_ONE)):
             for law in laws:
@@ -216,4 +205,4 @@ def rows():
 
 
 if __name__ == "__main__":
-    make(__doc__, {"film_fits": (COLUMNS, rows)})
+    make(__doc__, film_fits)

@@ -11,16 +11,8 @@ from real_cradles import table
 from scipy.optimize import curve_fit, least_squares
 from stored import make, read
 
-from cradle import (
-    Chain,
-    ConstantLoss,
-    ImpulseCorrelation,
-    Pendulums,
-    SequentialCollisions,
-    SpeedDependent,
-    ViscousLoss,
-    swing,
-)
+import cradle
+from cradle import Chain, ImpulseCorrelation, Pendulums, SequentialCollisions, swing
 
 STEEL = {"masses": [0.044756] * 2, "stiffness": 1e10}  # of the balls
 RATE = 200  # samples a second of a computed swing
@@ -68,8 +60,8 @@ def swung(law, parameters, damping):
     e = loss
     if "loss" in law:
         constant = law.startswith("constant")
-        kept = ConstantLoss(loss) if constant else ViscousLoss(loss, **STEEL)
-        model, e = SpeedDependent(model, kept), 1.0
+        kept = cradle.ConstantLoss(loss) if constant else cradle.ViscousLoss(loss, **STEEL)
+        model, e = cradle.SpeedDependent(model, kept), 1.0
     length, angle = 9.81 * (period / 2 / np.pi) ** 2, "small" if "small" in law else "full"
     hanging = Pendulums(length, gaps=gap, damping=damping, angle=angle)
     times = np.arange(0, 29.95 - start, 1 / RATE)
@@ -89,21 +81,17 @@ def turning(run, ball, near):
 
 def turns(run, start, found):
     """Return places and times, in the time of the film, of the computed turning points, (2, K)."""
-    at = [turning(run, k, at - start) for k, at in zip(*found[:2])]
-    places, times = np.array(at).T
-    return np.array([places, times + start])
+    at = [turning(run, k, near - start) for k, near in zip(*found[:2])]
+    return np.transpose(at) + np.array([[0.0], [start]])
 
 
 def misfits(run, start, found):
     """Return residuals of places and of times, over their uncertainties, (2, K)."""
     ball, time, place, u_time, u_place = found
-    out = np.empty((2, len(ball)))
-    x, t = turns(run, start, found)
-    out[:] = place - x, (time - t) / u_time
+    off, late = np.array([place, time]) - turns(run, start, found)
     for k in (0, 4):  # where it hangs at rest
-        out[0, ball == k] -= np.average(out[0, ball == k], weights=u_place[ball == k] ** -2.0)
-    out[0] /= u_place
-    return out
+        off[ball == k] -= np.average(off[ball == k], weights=u_place[ball == k] ** -2.0)
+    return np.array([off / u_place, late / u_time])
 
 
 def fitted(law, start, steps, swing_of_mean, found):
@@ -131,22 +119,22 @@ def fitted(law, start, steps, swing_of_mean, found):
     return p
 
 
-def rows():
+def cradle_fits():
     """Yield the best fit of each law from several starts."""
+    yield COLUMNS
     mean, found = common(), peaks()
-    print("mean of five:", mean)
     for law, (starts, steps) in STARTS.items():
-        best = None
+        fits = []
         for start in starts:
             p = [float(f"{x:.6g}") for x in fitted(law, start, steps, mean, found)]
-            chi = (misfits(swung(law, p, mean[1]), p[3], found) ** 2).sum(axis=1)
-            print(law, p, chi, flush=True)
-            best = (chi, p) if best is None or chi.sum() < best[0].sum() else best
-        yield [law, *(f"{x:.6g}" for x in best[1]), *(f"{x:.4g}" for x in best[0])]
+            fits.append(((misfits(swung(law, p, mean[1]), p[3], found) ** 2).sum(axis=1), p))
+        chi, p = min(fits, key=lambda fit: fit[0].sum())
+        yield [law, *(f"{x:.6g}" for x in p), *(f"{x:.4g}" for x in chi)]
 
 
-def turned():
+def cradle_turns():
     """Yield the turning points of each stored fit, and of one with a ratio."""
+    yield TURNS
     mean, found = common(), peaks()
     fits = read("cradle_fits.csv")
     fits += [{**x, "law": x["law"] + ", ratio"} for x in fits if "restitution" in x["law"]]
@@ -158,4 +146,4 @@ def turned():
 
 
 if __name__ == "__main__":
-    make(__doc__, {"cradle_fits": (COLUMNS, rows), "cradle_turns": (TURNS, turned)})
+    make(__doc__, cradle_fits, cradle_turns)

@@ -40,12 +40,12 @@ def text(value, digits=4):
 
 
 def write(name, columns, rows, folder=DATA, comment=""):
-    """Write rows as they come, and say how many there were."""
-    count = 0
+    """Write rows as they come, and say how many there were; columns may be words in a text."""
     with (folder / name).open("w", encoding="utf-8", newline="") as file:
         file.write(comment)
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
+        writer.writerow(columns.split() if isinstance(columns, str) else columns)
+        count = 0
         for row in rows:
             count += 1
             writer.writerow(row)
@@ -53,15 +53,15 @@ def write(name, columns, rows, folder=DATA, comment=""):
     print(f"{name}: {count} rows", flush=True)
 
 
-def make(document, tables, digits=4):
-    """Write tables, all or those that are named: {name: (columns, function that gives rows)}.
-
-    Where columns are None the first row has them.
-    """
+def make(document, *tables, digits=4):
+    """Write tables, all or those that are named: functions that give columns, then rows."""
+    named = {table.__name__: table for table in tables}
     parser = options(document)
-    parser.add_argument("tables", nargs="*", help=f"of {', '.join(tables)}; all if none is named")
+    parser.add_argument("tables", nargs="*", help=f"of {', '.join(named)}; all if none is named")
     given = parser.parse_args()
-    for name in given.tables or tables:
-        columns, rows = tables[name]
-        lines = ([text(value, digits) for value in row] for row in rows())
-        write(f"{name}.csv", columns or next(lines), lines, given.output)
+    for name in given.tables or named:
+        rows = iter(named[name]())
+        columns = next(rows)
+        write(
+            f"{name}.csv", columns, ([text(x, digits) for x in row] for row in rows), given.output
+        )

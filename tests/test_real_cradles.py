@@ -14,7 +14,7 @@ MEAN = real_swing.common()
 
 
 def test_the_readings_of_the_film_agree():
-    all_readings = [first_strikes(reading) for reading in (1, *real_cradles.READINGS[1:])]
+    all_readings = [first_strikes(reading) for reading in (1, 2, 3, 4)]
     for release in (1, 2):
         one, own = all_readings[0][release]
         for reading in all_readings[1:]:
