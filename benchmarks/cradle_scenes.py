@@ -1,16 +1,16 @@
 """A minute of Newton's cradle: in engines as they are, with the mend, by `swing`, on Hertz springs.
 
-Writes `data/scene_*.csv` in some minutes, all or those that are named: `scene_costs` and so on.
-The scenes are those of `examples/`; `data/README.md` describes them.  Hertz springs are integrated
-here, independently of the package, and judge the others.
+Writes `data/scene_*.csv` in some minutes.  The scenes are those of `examples/`; `data/README.md`
+describes them.  Hertz springs are integrated here, independently of the package: the judge.
 """
 
-import functools
 import importlib
-import itertools
 import math
 import statistics
 import sys
+from contextlib import contextmanager
+from functools import cache, partial
+from itertools import product
 
 import numba
 import numpy as np
@@ -62,12 +62,8 @@ LAWS = {
     "springs, losses": (1, SpringChain(1.0, viscosity=LOSSY)),
 }
 AT = (1, 5, 20, 50)  # strokes that are kept of these
-ENERGIES = [f"ball{i}" for i in range(1, BALLS + 1)]
-COSTS = [
-    *("run", "how", "setting", "pulled"),
-    *("seconds", "over_swing", "over_as_it_is", "repeats", "version"),
-]
-
+ENERGIES = " ball1 ball2 ball3 ball4 ball5"
+SETTINGS = "default", "fine", "refined"
 
 #: The scene of each is its program in `examples/`.  With the mend the step may be `mended_step`.
 ENGINES = (
@@ -108,8 +104,9 @@ ENGINES = (
 # One run: times, angles and rates of the balls, shape (T, N).
 
 
+@contextmanager
 def scene(engine, setting, pulled, *, mend, gap=0.0, law=None):
-    """Return a function that makes one step, the bodies, and the step; a law if not one ratio."""
+    """Give a function that makes one step, the bodies, and the step; a law if not one ratio."""
     program = importlib.import_module(engine.scene)
     # "fine" is a step of a millisecond and nothing else: to compare costs.
     fine = engine.default | {"step": 1e-3}
@@ -117,38 +114,32 @@ def scene(engine, setting, pulled, *, mend, gap=0.0, law=None):
     step = chosen.pop("step")
     mended_step = chosen.pop("mended_step", step)
     bodies = program.cradle(pulled, ANGLE, mend=mend, gap=gap, **chosen)
+    advance = bodies.advance
     if mend:
-        row = program.mended(bodies)
+        row, step = program.mended(bodies), mended_step
+        advance = row.step
         if law is not None:
             row.chain, row.model = Chain([1] * BALLS, [0] * BALLS, law[0]), law[1]
-        return row.step, bodies, mended_step
-    return bodies.advance, bodies, step
-
-
-def close(bodies):
-    """Give back what an engine holds."""
-    getattr(bodies, "close", lambda: None)()
+    yield advance, bodies, step
+    getattr(bodies, "close", lambda: None)()  # gives back what an engine holds
 
 
 def in_engine(engine, setting, pulled, *, mend, gap=0.0, duration=MINUTE, law=None):
-    """Run a scene in an engine and look at it sixty times a second."""
-    advance, bodies, step = scene(engine, setting, pulled, mend=mend, gap=gap, law=law)
     pivots = 2 * RADIUS * (1 + gap) * np.arange(BALLS)
     frames, taken = [], 0
-    for k in range(int(duration * FRAMES) + 1):
-        while taken < round(k / FRAMES / step):
-            advance(step)
-            taken += 1
-        x, v = (np.array(part, float) for part in bodies.motion())
-        angle = np.arctan2(x[:, 0] - pivots, -x[:, 1])
-        rate = (v[:, 0] * np.cos(angle) + v[:, 1] * np.sin(angle)) / LENGTH
-        frames.append((taken * step, angle, rate))
-    close(bodies)
+    with scene(engine, setting, pulled, mend=mend, gap=gap, law=law) as (advance, bodies, step):
+        for k in range(int(duration * FRAMES) + 1):
+            while taken < round(k / FRAMES / step):
+                advance(step)
+                taken += 1
+            x, v = (np.array(part, float) for part in bodies.motion())
+            angle = np.arctan2(x[:, 0] - pivots, -x[:, 1])
+            rate = (v[:, 0] * np.cos(angle) + v[:, 1] * np.sin(angle)) / LENGTH
+            frames.append((taken * step, angle, rate))
     return tuple(np.array(part) for part in zip(*frames, strict=True))
 
 
 def by_swing(pulled, duration=MINUTE, model=MODELS["ratio"], restitution=1):
-    """Run the scene by the package's own events."""
     hanging = Pendulums(length=LENGTH, gravity=GRAVITY, angle="full")
     release = [-ANGLE * LENGTH] * pulled + [0.0] * (BALLS - pulled)
     times = np.arange(int(duration * FRAMES) + 1) / FRAMES
@@ -158,18 +149,14 @@ def by_swing(pulled, duration=MINUTE, model=MODELS["ratio"], restitution=1):
 
 
 def on_springs(pulled, duration=MINUTE, *, contact=STEEL, steps_a_contact=100, apart=0.0):
-    """Run the scene on Hertz springs, with that contact of two balls at the first stroke.
-
-    The outer balls hang `apart` from their neighbours.
-    """
-    angle = np.zeros(BALLS)
-    angle[:pulled] = -ANGLE
+    """Run on Hertz springs of that contact at the first stroke; the outer balls hang `apart`."""
+    angle = np.repeat([-ANGLE, 0.0], [pulled, BALLS - pulled])
     inner = math.ceil(steps_a_contact / contact / FRAMES)
     gaps = np.array([apart, *[0.0] * (BALLS - 3), apart])
     return _march(angle, int(duration * FRAMES), inner, pressed(contact)[1], gaps)
 
 
-@numba.njit(cache=False)
+@numba.njit
 def _march(angle, frames, inner, stiffness, gaps):
     """Velocity Verlet for pendulums whose balls repel each other by k d^(3/2), in the plane."""
     n = len(angle)
@@ -230,28 +217,6 @@ def strokes(angles, rates):
     return found[: wild[0] + 1] if wild.size else found
 
 
-@functools.cache
-def runs():
-    """Return all runs: who moves the balls and how, gap, balls pulled back, and the run."""
-    return list(each_run())
-
-
-def all_strokes():
-    """Yield what every ball has after each stroke."""
-    for name, how, setting, gap, pulled, (_, angles, rates) in runs():
-        for k, each in enumerate(strokes(angles, rates), start=1):
-            yield name, how, setting, f"{gap:g}", pulled, k, *(f"{e:.4f}" for e in each)
-
-
-def film():
-    """Yield how some of them look, thirty times a second."""
-    for name, how, setting, gap, pulled, (times, angles, _) in runs():
-        if pulled == 1 and not gap and setting in FILMED:
-            frames = list(zip(times, np.degrees(angles), strict=True))[: FILM * FRAMES + 1 : 2]
-            for t, each in frames:
-                yield name, how, f"{t:.4f}", *(f"{a:.1f}" for a in each)
-
-
 def each_run():
     """Yield who moves the balls and how, gap, how many balls were pulled back, and the run."""
     for pulled in (1, 2):
@@ -259,7 +224,7 @@ def each_run():
             yield "Hertz springs", "alone", setting, 0.0, pulled, on_springs(pulled, **given)
         for setting, model in MODELS.items():
             yield "swing", "alone", setting, 0.0, pulled, by_swing(pulled, model=model)
-    for engine, setting in itertools.product(present(ENGINES), ("default", "refined")):
+    for engine, setting in product(present(ENGINES), ("default", "refined")):
         for pulled in (1, 2):
             for gap in (0.0, GAP):
                 run = in_engine(engine, setting, pulled, mend=False, gap=gap)
@@ -270,79 +235,91 @@ def each_run():
         yield engine.name, "no impacts", setting, 0.0, BALLS, run
 
 
-def first_strokes_with_gaps():
+runs = cache(lambda: [*each_run()])
+
+
+def written(each):
+    return [f"{e:.4f}" for e in each]
+
+
+def some(*about, run):
+    """Yield the energies after the strokes of a run that are kept, as far as it went."""
+    each = strokes(*run[1:])
+    yield from ((*about, k, *written(each[k - 1])) for k in AT if k <= len(each))
+
+
+def scene_strokes():
+    """Yield what every ball has after each stroke."""
+    yield "run how setting gap pulled stroke" + ENERGIES
+    for name, how, setting, gap, pulled, (_, *run) in runs():
+        for k, each in enumerate(strokes(*run), start=1):
+            yield name, how, setting, f"{gap:g}", pulled, k, *written(each)
+
+
+def scene_film():
+    """Yield how some of them look, thirty times a second."""
+    yield "run how time" + ENERGIES
+    for name, how, setting, gap, pulled, (times, angles, _) in runs():
+        if pulled == 1 and not gap and setting in FILMED:
+            frames = list(zip(times, np.degrees(angles), strict=True))[: FILM * FRAMES + 1 : 2]
+            for t, each in frames:
+                yield name, how, f"{t:.4f}", *(f"{a:.1f}" for a in each)
+
+
+def scene_gaps():
     """Yield energies after the first stroke of engines as they are, with gaps."""
-    for case in itertools.product(present(ENGINES), ("default", "refined"), GAPS, (1, 2)):
+    yield "run setting gap pulled" + ENERGIES
+    for case in product(present(ENGINES), ("default", "refined"), GAPS, (1, 2)):
         engine, setting, gap, pulled = case
-        _, angles, rates = in_engine(engine, setting, pulled, mend=False, gap=gap, duration=1.3)
-        first = strokes(angles, rates)[0]
-        yield engine.name, setting, f"{gap:g}", pulled, *(f"{e:.4f}" for e in first)
+        _, *run = in_engine(engine, setting, pulled, mend=False, gap=gap, duration=1.3)
+        yield engine.name, setting, f"{gap:g}", pulled, *written(strokes(*run)[0])
 
 
-def minutes_with_tiny_gaps():
+def scene_gap_minutes():
     """Yield energies after some strokes of engines as they are, with the smallest gap."""
-    settings = "default", "fine", "refined"
-    for engine, setting, pulled in itertools.product(present(ENGINES), settings, (1, 2)):
-        _, angles, rates = in_engine(engine, setting, pulled, mend=False, gap=GAPS[1])
-        yield from _some(engine.name, setting, pulled, each=strokes(angles, rates))
+    yield "run setting pulled stroke" + ENERGIES
+    for engine, setting, pulled in product(present(ENGINES), SETTINGS, (1, 2)):
+        run = in_engine(engine, setting, pulled, mend=False, gap=GAPS[1])
+        yield from some(engine.name, setting, pulled, run=run)
 
 
-def other_laws():
+def scene_laws():
     """Yield energies after some strokes of rows by each law, and of what they should do.
 
     That is `swing` with the same law; Hertz springs where the law has gaps.  Engines as they are
     come last, with a step of a millisecond.
     """
-    settings = "default", "fine", "refined"
-    for (name, law), pulled in itertools.product(LAWS.items(), (1, 2)):
-        restitution, model = law
+    yield "run law setting pulled stroke" + ENERGIES
+    for (name, law), pulled in product(LAWS.items(), (1, 2)):
         if name == "springs, outer apart":
             found = {("Hertz springs", "alone"): on_springs(pulled, apart=APART)}
         else:
-            found = {("swing", "alone"): by_swing(pulled, model=model, restitution=restitution)}
-        for engine, setting in itertools.product(present(ENGINES), settings):
+            found = {("swing", "alone"): by_swing(pulled, model=law[1], restitution=law[0])}
+        for engine, setting in product(present(ENGINES), SETTINGS):
             found[engine.name, setting] = in_engine(engine, setting, pulled, mend=True, law=law)
-        for (who, setting), (_, angles, rates) in found.items():
-            yield from _some(who, name, setting, pulled, each=strokes(angles, rates))
-    for engine, pulled in itertools.product(present(ENGINES), (1, 2)):
-        _, angles, rates = in_engine(engine, "fine", pulled, mend=False)
-        yield from _some(engine.name, "as it is", "fine", pulled, each=strokes(angles, rates))
+        for (who, setting), run in found.items():
+            yield from some(who, name, setting, pulled, run=run)
+    for engine, pulled in product(present(ENGINES), (1, 2)):
+        run = in_engine(engine, "fine", pulled, mend=False)
+        yield from some(engine.name, "as it is", "fine", pulled, run=run)
 
 
-def _some(*run, each):
-    """Yield the energies after the strokes of a run that are kept, as far as it went."""
-    for k in AT:
-        if k <= len(each):
-            yield *run, k, *(f"{e:.4f}" for e in each[k - 1])
+def cost(engine, setting, pulled, seconds, mend, law=None):
+    """Return the processor time of a simulated second."""
+    with scene(engine, setting, pulled, mend=mend, law=law) as (advance, _, step):
+        count = round(seconds / step)
+        return cpu(lambda: [advance(step) for _ in range(count)]) / (count * step)
 
 
-def costs_of_laws(repeats=5, seconds=5.0):
-    """Yield what `swing` and a swinging row cost with another law, as a multiple of one ratio."""
-
-    def swung(law=(1, MODELS["ratio"])):
-        return cpu(lambda: by_swing(1, seconds, law[1], law[0]))
-
-    ways = {"swing": swung}
-    for engine in present(ENGINES):
-        ways[engine.name] = functools.partial(_cost, engine, "fine", 1, True, seconds)
-    for (who, way), (name, law) in itertools.product(ways.items(), LAWS.items()):
-        if name == "ratio" or (who, name) == ("swing", "springs, outer apart"):
-            continue
-        pairs = [(way(law=law), way()) for _ in range(repeats)]
-        yield who, name, quotient(*zip(*pairs)), repeats
-
-
-def costs(repeats=5, seconds=5.0):
+def scene_costs(repeats=5, seconds=5.0):
     """Yield what a simulated second costs, beside `swing` and, if mended, the engine as it is."""
+    yield "run how setting pulled seconds over_swing over_as_it_is repeats version"
     on_springs(1, 1 / FRAMES)  # compiles
     alone = {"alone": lambda: cpu(lambda: on_springs(1, seconds)) / seconds}
     cases = [("Hertz springs", "steel", 1, "numba", alone)]
-    settings = "default", "fine", "refined"
-    for engine, setting, pulled in itertools.product(present(ENGINES), settings, (0, 1)):
-        ways = {
-            how: functools.partial(_cost, engine, setting, pulled, how == "mended", seconds)
-            for how in ("as it is", "mended")
-        }
+    for engine, setting, pulled in product(present(ENGINES), SETTINGS, (0, 1)):
+        of = partial(cost, engine, setting, pulled, seconds)
+        ways = {"as it is": partial(of, False), "mended": partial(of, True)}
         cases.append((engine.name, setting, pulled, engine.distribution, ways))
     for name, setting, pulled, package, ways in cases:
         in_turn = [lambda: cpu(lambda: by_swing(1, seconds)) / seconds, *ways.values()]
@@ -353,30 +330,24 @@ def costs(repeats=5, seconds=5.0):
             yield *row, versions(package)
 
 
-def _cost(engine, setting, pulled, mend, seconds, law=None):
-    """Return the processor time of a simulated second."""
-    advance, bodies, step = scene(engine, setting, pulled, mend=mend, law=law)
-    count = round(seconds / step)
-    taken = cpu(lambda: [advance(step) for _ in range(count)])
-    close(bodies)
-    return taken / (count * step)
+def scene_law_costs(repeats=5, seconds=5.0):
+    """Yield what `swing` and a swinging row cost with another law, as a multiple of one ratio."""
+    yield "run law over_one_ratio repeats"
 
+    def swung(law=(1, MODELS["ratio"])):
+        return cpu(lambda: by_swing(1, seconds, law[1], law[0]))
 
-TABLES = {
-    "scene_gaps": (("run", "setting", "gap", "pulled", *ENERGIES), first_strokes_with_gaps),
-    "scene_strokes": (("run", "how", "setting", "gap", "pulled", "stroke", *ENERGIES), all_strokes),
-    "scene_film": (("run", "how", "time", *ENERGIES), film),
-    "scene_costs": (COSTS, costs),
-    "scene_gap_minutes": (
-        ("run", "setting", "pulled", "stroke", *ENERGIES),
-        minutes_with_tiny_gaps,
-    ),
-    "scene_laws": (("run", "law", "setting", "pulled", "stroke", *ENERGIES), other_laws),
-    "scene_law_costs": (("run", "law", "over_one_ratio", "repeats"), costs_of_laws),
-}
+    ways = {"swing": swung}
+    for engine in present(ENGINES):
+        ways[engine.name] = partial(cost, engine, "fine", 1, seconds, True)
+    for (who, way), (name, law) in product(ways.items(), LAWS.items()):
+        if name != "ratio" and (who, name) != ("swing", "springs, outer apart"):
+            pairs = [(way(law=law), way()) for _ in range(repeats)]
+            yield who, name, quotient(*zip(*pairs)), repeats
+
 
 if __name__ == "__main__":
     for reason in absent(ENGINES).values():
         print("skipped:", reason)
     warm_up()
-    make(__doc__, TABLES)
+    make(__doc__, *(rows for name, rows in vars().copy().items() if name.startswith("scene_")))

@@ -1,9 +1,7 @@
 """Today's physics engines on the scenes of this book; each is optional and skipped when absent.
 
-`data/README.md` describes the scenes.  Settings: `default` (what the engine does if only
-restitution is given) and `refined` (small step, many iterations, what adds or takes energy off).
-Restitution of a pair is the engine's product of one number a ball; Box2D takes it from a listener,
-MuJoCo has none: the damping of its contact is found from two balls.
+`data/README.md` describes the scenes.  Settings: `default`, only restitution is given; `refined`,
+small step, many iterations, what adds or takes energy off.
 """
 
 import math
@@ -15,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from measure import Engine, Row, distance, outcome, present, versions
 from scenes import SCENES, Scene
+from scipy.optimize import brentq
 from solvers import model_error
 
 SPEED, RADIUS = 2.0, 0.5
@@ -68,12 +67,7 @@ class World(NamedTuple):
 
 def by_one(step):
     """Return a function that makes so many steps, one by one."""
-
-    def advance(count):
-        for _ in range(count):
-            step()
-
-    return advance
+    return lambda count: [step() for _ in range(count)]
 
 
 # Each engine: a function that makes the world.
@@ -123,7 +117,6 @@ def box2d(line, *, step, iterations, faster=1.0):
         )
         for i, (mass, x, v, _) in enumerate(line.balls())
     ]
-
     return World(
         by_one(partial(world.Step, step / faster, iterations, 3)),
         lambda: [b.linearVelocity.x / faster for b in bodies],
@@ -132,7 +125,6 @@ def box2d(line, *, step, iterations, faster=1.0):
 
 
 def bullet(line, *, step, iterations, **parameters):
-    """Bullet through pybullet."""
     import pybullet
 
     world = pybullet.connect(pybullet.DIRECT)
@@ -174,7 +166,6 @@ def rapier(line, *, step, iterations, **parameters):
         ball = rapier3d.Collider.ball(RADIUS).mass(mass).friction(0.0).restitution(factor)
         ball = ball.restitution_combine_rule(product)
         bodies.append(world.add_body(body.can_sleep(False), [ball]))
-
     return World(by_one(world.step), lambda: [world.rigid_bodies[b].linvel.x for b in bodies])
 
 
@@ -183,10 +174,7 @@ def mujoco(line, *, step, steps_a_contact, damping=None):
     import mujoco as engine
 
     stiffness = (math.pi / (steps_a_contact * step)) ** 2
-    if damping is None:
-        damping = [
-            0.0 if e == 1.0 else damping_for(e, step, steps_a_contact) for e in line.restitution
-        ]
+    damping = damping or [damping_for(e, step, steps_a_contact) for e in line.restitution]
     balls = "".join(
         f'<body pos="{x!r} 0 0"><joint type="slide" axis="1 0 0"/>'
         f'<geom name="{i}" type="sphere" size="{RADIUS}" mass="{mass!r}" contype="0" '
@@ -211,8 +199,8 @@ def mujoco(line, *, step, steps_a_contact, damping=None):
 @cache
 def damping_for(restitution, step, steps_a_contact):
     """Return the damping ratio that gives two balls this restitution."""
-    from scipy.optimize import brentq
-
+    if restitution == 1.0:
+        return 0.0
     line = Line((1.0, 1.0), (restitution,), "touching")
 
     def excess(damping):
@@ -267,50 +255,36 @@ ENGINES = (
 
 def run(world, step, longest):
     """Step until all balls are apart and in order of velocity; return steps and velocities."""
-    taken, before = 0, None
-    while True:
+    taken, off, v = 0, np.inf, np.inf
+    # Nothing more to come: in order of velocity, and the same as at the last look.
+    while taken * step < longest and (off >= 1e-6 * SPEED or np.diff(v).min() <= -1e-6 * SPEED):
         world.advance(CHUNK)
         taken += CHUNK
-        v = np.array(world.velocities())
-        # Nothing more to come: in order of velocity, and the same as at the last look.
-        settled = before is not None and np.abs(v - before).max() < 1e-6 * SPEED
-        if settled and np.diff(v).min() > -1e-6 * SPEED:
-            break
-        if taken * step >= longest:
-            break
-        before = v
+        v, before = np.array(world.velocities()), v
+        off = np.abs(v - before).max()
     world.close()
     return taken, v
 
 
-def longest(setting, placement):
-    """Return the time after which balls that are not settled are left so, s."""
+def parts(engine, scene, placement, setting):
+    """Return a function that makes a world, and one that runs it."""
+    options, line = getattr(engine, setting), Line(scene.masses, scene.restitution, placement)
     # Across gaps slow balls need long to meet; where all touch, what is left is jitter.
-    return 10.0 if placement == "apart" else 3.0 if setting == "default" else 1.0
+    longest = 10.0 if placement == "apart" else 3.0 if setting == "default" else 1.0
+    to_the_end = partial(run, step=options["step"], longest=longest)
+    return partial(engine.scene, line, **options), to_the_end
 
 
 def solve(engine, scene, placement, setting):
     """Return steps and velocities over the striker's speed, of one engine on one scene."""
-    options = getattr(engine, setting)
-    made = engine.scene(Line(scene.masses, scene.restitution, placement), **options)
-    steps, v = run(made, options["step"], longest(setting, placement))
+    make, to_the_end = parts(engine, scene, placement, setting)
+    steps, v = to_the_end(make())
     return steps, v / SPEED
-
-
-def timed(clock, engine, scene, setting):
-    """Return the fields that tell the time of touching balls."""
-    options, line = getattr(engine, setting), Line(scene.masses, scene.restitution, "touching")
-
-    def to_the_end(made):
-        return run(made, options["step"], longest(setting, "touching"))
-
-    return clock(to_the_end, prepare=partial(engine.scene, line, **options))
 
 
 def rows(clock, quick):
     """Yield a row for each engine, setting, scene and placement."""
-    settings = ("default",) if quick else ("default", "refined")
-    scenes = [*CHECKS.values(), *SCENES.values()]
+    settings, scenes = ("default", "refined")[: 2 - quick], (CHECKS | SCENES).values()
     cases = product(present(ENGINES), settings, scenes, PLACEMENTS)
     for engine, setting, scene, placement in cases:
         steps, after = solve(engine, scene, placement, setting)
@@ -322,7 +296,8 @@ def rows(clock, quick):
         else:
             error = model_error(scene, after)
             if placement == "touching":
-                time = timed(clock, engine, scene, setting)
+                make, to_the_end = parts(engine, scene, placement, setting)
+                time = clock(to_the_end, prepare=make)
         about = {
             "group": "engine", "model": engine.name, "note": engine.note, "needs": "e",
             "gives": "velocities, path in time", "versions": versions(engine.distribution),

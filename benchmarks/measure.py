@@ -24,9 +24,7 @@ from cradle.runtime.job import warm_up
 REFERENCE = "one impact of three balls, in a batch of 2000 random chains"
 _BATCH = random_chains(3, 2000)
 
-#: data/README.md says what they are. `numerical_error` is the distance from the converged answer
-#: of the same model, `model_error` that from another model or from an exact result that the model
-#: does not use: the two are never mixed.
+#: data/README.md says what they are; errors of the two kinds are never mixed.
 COLUMNS = [
     "group", "model", "setting", "chain", "parameter", "velocities", "numerical_error",
     "numerical_reference", "model_error", "model_reference", "momentum_error", "energy_change",
@@ -37,7 +35,7 @@ Row = make_dataclass("Row", [(name, object, "") for name in COLUMNS])
 
 
 class Engine(NamedTuple):
-    """A physics engine, how its scene is made, and two settings of it."""
+    """A physics engine and two settings of it."""
 
     name: str
     module: str
@@ -62,13 +60,10 @@ def absent(engines):
 
 
 def present(engines):
-    """Return the engines that are installed."""
-    missing = absent(engines)
-    return [engine for engine in engines if engine.name not in missing]
+    return [engine for engine in engines if engine.name not in absent(engines)]
 
 
 def distance(velocities, reference):
-    """Return the largest difference of two outcomes."""
     return float(np.max(np.abs(np.asarray(velocities, float) - np.asarray(reference, float))))
 
 
@@ -84,7 +79,7 @@ def outcome(masses, before, after):
 
 
 def seconds(function, calls=1, clock=time.perf_counter):
-    """Return the time of one call."""
+    """Return the time of a call."""
     begin = clock()
     for _ in range(calls):
         function()
@@ -101,10 +96,9 @@ def quotient(these, those):
 
 
 class Clock:
-    """Takes times beside those of the reference, so that a busy machine slows down both.
+    """Takes times beside those of the reference: a busy machine, or another speed, changes both.
 
-    Processors change their speed: what is kept is the ratio, and `unit` turns all ratios of a table
-    into times of one speed.
+    What is kept is the ratio; `unit` turns all ratios of a table into times of one speed.
     """
 
     def __init__(self, repeats):
@@ -118,12 +112,10 @@ class Clock:
     def __call__(self, function, impacts=1, prepare=None, kernel=None):
         """Return the fields of a row that tell the time of `function`, which solves `impacts`.
 
-        `prepare` makes the argument of each call anew, outside the measured time. `kernel` names
-        the kernel that `function`, not the reference, runs on.
+        `prepare` makes the argument of each call, outside the measured time. `kernel` names the
+        kernel that `function`, not the reference, runs on.
         """
-
-        def reference():
-            post_impact_velocities(*_BATCH)
+        reference = partial(post_impact_velocities, *_BATCH)
 
         def measured(calls):
             given = [prepare()] if prepare else []
@@ -133,8 +125,7 @@ class Clock:
         warm_up()  # else the reference, as small work, would run plain at first
         measured(1)
         once = measured(1)
-        # A millisecond at least.
-        calls = 1 if prepare else max(1, math.ceil(1e-3 / once))
+        calls = 1 if prepare else max(1, math.ceil(1e-3 / once))  # a millisecond at least
         reference()
         # As long as the row itself, within limits: what interrupts one interrupts the other.
         units = min(20, max(2, math.ceil(once * calls / seconds(reference))))
@@ -154,7 +145,6 @@ def running(kernel):
 
 
 def versions(*packages):
-    """Return name and version of the packages, and of Python."""
     named = [f"{name} {metadata.version(name)}" for name in packages]
     return "; ".join([*named, f"CPython {platform.python_version()}"])
 

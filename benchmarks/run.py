@@ -1,8 +1,7 @@
 """Measure speed against accuracy: all models, a fixed-step scheme, today's physics engines.
 
 Writes `data/benchmarks.csv` in some minutes; `--quick` prints alone, in half a minute.
-Engines that are not installed (``pip install -e ".[engines]"``) are skipped and named; their old
-rows are not kept.
+Engines that are not installed are skipped and named; their old rows are not kept.
 """
 
 import engines
@@ -13,7 +12,6 @@ from stored import DATA, options, text, write
 
 
 def main(arguments=None):
-    """Run the suite."""
     parser = options(__doc__)
     parser.set_defaults(output=None)
     parser.add_argument("--quick", action="store_true", help="fewer settings and repetitions")

@@ -19,9 +19,7 @@ def pairs(quick):
     """Yield question, chain, impacts, and both ways: a name, a function, what it gives."""
     few, many = (100, 1000) if quick else (500, 10_000)
     chains = random_chains(6, few)
-    made = [
-        (Chain(m, v, e), ImpulseCorrelation(f, b)) for m, v, e, f, b in zip(*chains, strict=True)
-    ]
+    made = [(Chain(*one[:3]), ImpulseCorrelation(*one[3:])) for one in zip(*chains, strict=True)]
     yield (
         *("paths or outcomes", "6 balls, random", few),
         ("the path of each, one call a chain",
@@ -41,7 +39,7 @@ def pairs(quick):
     m, v, e, *_ = two = random_chains(2, many)
 
     def newton():
-        impulse = (1 + e[:, 0]) * (v[:, 0] - v[:, 1]) / (1 / m[:, 0] + 1 / m[:, 1])
+        impulse = (1 + e[:, 0]) * (v[:, 0] - v[:, 1]) / (1 / m).sum(axis=1)
         return v + np.stack([-impulse, impulse], axis=-1) / m
 
     yield (

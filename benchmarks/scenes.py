@@ -8,14 +8,8 @@ from chains import ELASTIC, magnitudes, uniform
 from dop853 import integrated
 from truth import in_fifty_digits
 
-from cradle import (
-    Chain,
-    EnergyDistribution,
-    ImpulseCorrelation,
-    collide,
-    paper_chain,
-    viscosity_from,
-)
+import cradle
+from cradle import Chain, collide
 
 
 class Scene(NamedTuple):
@@ -30,12 +24,10 @@ class Scene(NamedTuple):
 
     @property
     def elastic(self):
-        """Whether Hertz springs apply."""
         return min(self.restitution) == 1.0
 
     @property
     def velocities(self):
-        """The first ball has speed one."""
         return (1.0,) + (0.0,) * (len(self.masses) - 1)
 
     @property
@@ -45,13 +37,12 @@ class Scene(NamedTuple):
 
     @property
     def chain(self):
-        """As the package takes it."""
         return Chain(*self.given[:3])
 
     @property
     def model(self):
         """The paper's model with the measured ratios; CCA is above its bound."""
-        return ImpulseCorrelation(self.forward, self.backward, excess="saturate")
+        return cradle.ImpulseCorrelation(self.forward, self.backward, excess="saturate")
 
     @cache  # noqa: B019  (a handful of scenes)
     def truth(self):
@@ -60,7 +51,7 @@ class Scene(NamedTuple):
 
     def viscosity(self):
         """Return that of spheres with this restitution at the striker's speed."""
-        return viscosity_from(self.restitution, speed=1.0, masses=self.masses)
+        return cradle.viscosity_from(self.restitution, speed=1.0, masses=self.masses)
 
     @cache  # noqa: B019
     def springs(self, exponent=1.5):
@@ -68,7 +59,7 @@ class Scene(NamedTuple):
         if not self.elastic:
             return integrated(self.masses, self.velocities, loss=self.viscosity())
         # Without losses the energy law is the spring chain, in SciPy's hands.
-        model = EnergyDistribution(1.0, exponent, rtol=3e-14)
+        model = cradle.EnergyDistribution(1.0, exponent, rtol=3e-14)
         return collide(self.chain, model).velocities
 
 
@@ -79,8 +70,8 @@ def _scenes():
         ratios = (0.167,) * (contacts - 1)
         balls = tuple(map(float, masses))
         yield Scene(name, balls, (1.0,) * contacts, ratios, ratios, "Table 2, AAA")
-    chain, model = paper_chain("ABCCA", excess="saturate")
-    parts = (chain.masses, chain.restitution, model.forward, model.backward)
+    chain, model = cradle.paper_chain("ABCCA", excess="saturate")
+    parts = chain.masses, chain.restitution, model.forward, model.backward
     yield Scene("ABCCA", *(tuple(map(float, part)) for part in parts), "Tables 1 and 2")
 
 
@@ -93,7 +84,7 @@ LOSSY = {
 
 
 def random_chains(balls, count):
-    """Return random chains of that many balls, ratios within the bounds."""
+    """Return random chains, ratios within the bounds."""
     rng = np.random.default_rng(balls)
     masses = magnitudes(rng, 1, (count, balls))
     velocities = np.tile(np.eye(1, balls), (count, 1))

@@ -10,35 +10,23 @@ from scenes import LOSSY, SCENES, random_chains
 from truth import in_fifty_digits
 from verlet import verlet
 
-from cradle import (
-    Chain,
-    EnergyDistribution,
-    FusedChain,
-    ImpulseCorrelation,
-    QuadraticDissipation,
-    SequentialCollisions,
-    SpringChain,
-    collide,
-    post_impact_velocities,
-    spring_velocities,
-)
+import cradle
+from cradle import Chain, QuadraticDissipation, SpringChain, collide
 from cradle.runtime import compile as runtime
 
 FIFTY = "same rules, event loop of the tests in fifty digits"
 CONVERGED = "same springs, DOP853 with rtol 3e-14"
 PATH = "velocities, impulses, path"
 TIMED = "velocities, impulses, path, forces, times"
-#: Of three equal balls, as the paper measured it.
-(RATIO,) = SCENES["three equal"].forward
-batch = partial(post_impact_velocities, excess="saturate")
+batch = partial(cradle.post_impact_velocities, excess="saturate")
 
 
 def model_error(scene, velocities):
     """Return the distance from Hertz where that applies, else from the paper's model."""
-    reference, name = scene.truth(), "event solver with Tables 1 and 2"
+    reference, name = scene.truth, "event solver with Tables 1 and 2"
     if scene.elastic:
-        reference, name = scene.springs(), "Hertz springs, converged"
-    return {"model_error": distance(velocities, reference), "model_reference": name}
+        reference, name = scene.springs, "Hertz springs, converged"
+    return {"model_error": distance(velocities, reference()), "model_reference": name}
 
 
 def row(clock, about, scene, setting, run, exact=None, impacts=1, kernel=None, **more):
@@ -63,9 +51,7 @@ def row(clock, about, scene, setting, run, exact=None, impacts=1, kernel=None, *
 def event_rows(clock, quick):
     """Yield the paper's model: compiled or as it stands, one call or a batch, single precision."""
     about = {"group": "event", "model": "ImpulseCorrelation", "needs": "e, ratios"}
-    kernels = {"compiled": None, "plain": "plain"}
-    if runtime.compiled() is None:
-        kernels.pop("compiled")
+    kernels = ({"compiled": None} if runtime.compiled() else {}) | {"plain": "plain"}
     usual = f"{next(iter(kernels))}, batch"
     for scene in SCENES.values():
         exact = scene.truth(), FIFTY
@@ -82,8 +68,7 @@ def event_rows(clock, quick):
             yield row(clock, shared, scene, setting, run, exact, kernel=kernel, gives=gives)
         many = partial(batch, *(np.tile(part, (2000, 1)) for part in scene.given))
         yield row(clock, shared, scene, usual, many, exact, 2000, gives="velocities")
-    for balls in (3, 6):
-        yield from random_rows(clock, quick, about, usual, balls)
+    yield from (row for balls in (3, 6) for row in random_rows(clock, quick, about, usual, balls))
 
 
 def random_rows(clock, quick, about, usual, balls):
@@ -102,10 +87,9 @@ def random_rows(clock, quick, about, usual, balls):
     }  # fmt: skip
     note = f"{count} chains, e from .3 to 1; error: worst of {some}"
     in_24_bits = "inputs and outcome rounded to 24 bits; solved in 53"
-    for setting, run, words in (
-        (usual, partial(post_impact_velocities, *chains), note),
-        (f"{usual}, stored in float32", single, in_24_bits),
-    ):
+    full = partial(cradle.post_impact_velocities, *chains)
+    single_setting = f"{usual}, stored in float32"
+    for setting, run, words in (usual, full, note), (single_setting, single, in_24_bits):
         error, time = distance(run()[:some], truth), clock(run, count)
         yield Row(**shared, setting=setting, numerical_error=error, note=words, **time)
 
@@ -148,7 +132,7 @@ def spring_rows(clock, quick):
         setting = f"accuracy {accuracy:.0e}"
         yield row(clock, about, scene, setting, run, exact, evaluations=run().evaluations, **common)
         copies = [np.tile(part, (2000, 1)) for part in (scene.masses, scene.velocities)]
-        run = partial(spring_velocities, *copies, viscosity=lost, accuracy=accuracy)
+        run = partial(cradle.spring_velocities, *copies, viscosity=lost, accuracy=accuracy)
         if accuracy > 1e-9:
             yield row(clock, about | many, scene, f"batch, {setting}", run, exact, 2000, **common)
 
@@ -164,10 +148,8 @@ def penalty_rows(clock, quick):
     def stepped(group, law, setting, parameter, stiffness, exponent, step):
         balls = np.array([scene.masses]), np.array([scene.velocities])
         run = partial(verlet, *balls, stiffness, exponent, 0.0, step, 0.0)
-        exact, model = (scene.springs(exponent), CONVERGED), f"penalty, {law}"
-        return row(
-            clock, about, scene, setting, run, exact, group=group, model=model, parameter=parameter
-        )
+        given = about | {"group": group, "model": f"penalty, {law}", "parameter": parameter}
+        return row(clock, given, scene, setting, run, (scene.springs(exponent), CONVERGED))
 
     counts = (10, 100, 1000) if quick else (5, 10, 30, 100, 300, 1000, 3000, 10_000)
     for law, exponent in (("Hertz", 1.5), ("linear", 1.0)):
@@ -193,29 +175,31 @@ def energy_rows(clock, quick):
     }  # fmt: skip
     for name in ("three equal",) if quick else ("three equal", "ABCCA"):
         scene = SCENES[name]
-        finest = collide(scene.chain, EnergyDistribution(1.0, rtol=3e-13)).velocities
+        law = partial(cradle.EnergyDistribution, 1.0)
+        finest = collide(scene.chain, law(rtol=3e-13)).velocities
         exact = finest, "same law, rtol 3e-13"
         if scene.elastic:
             exact = scene.springs(), "Hertz springs, converged: its limit at e = 1"
         for rtol in (1e-6,) if quick else (1e-3, 1e-5, 1e-7, 1e-9, 1e-11):
-            run = partial(collide, scene.chain, EnergyDistribution(1.0, rtol=rtol))
+            run = partial(collide, scene.chain, law(rtol=rtol))
             trace = run()
-            errors = {} if scene.elastic else model_error(scene, trace.velocities)
-            yield row(
-                clock, about, scene, f"rtol {rtol:.0e}", run, exact,
-                parameter=rtol, evaluations=trace.evaluations, **errors,
-            )  # fmt: skip
+            more = {} if scene.elastic else model_error(scene, trace.velocities)
+            more |= {"parameter": rtol, "evaluations": trace.evaluations}
+            yield row(clock, about, scene, f"rtol {rtol:.0e}", run, exact, **more)
 
 
 def outcome_rows(clock, _):
     """Yield models that answer at once, against Hertz or against the paper's model."""
     for scene in SCENES.values():
-        models = [(SequentialCollisions(), "e", PATH, ""), (FusedChain(), "e", PATH, "")]
+        models = [
+            (cradle.SequentialCollisions(), "e", PATH, ""),
+            (cradle.FusedChain(), "e", PATH, ""),
+        ]
         if scene.elastic:  # a limit of the convex problem
             limit = QuadraticDissipation(1e9)
             models.append((limit, "e", "velocities, impulses", "coefficients 1e9"))
         else:
-            one = ImpulseCorrelation(RATIO, excess="saturate")
+            one = cradle.ImpulseCorrelation(0.167, excess="saturate")
             models.append((QuadraticDissipation(), "e", "velocities, impulses", ""))
             models.append((one, "e, ratio", PATH, "one ratio, .167, everywhere"))
         for model, needs, gives, note in models:
@@ -226,7 +210,5 @@ def outcome_rows(clock, _):
 
 def rows(clock, quick):
     """Yield the rows of all families."""
-    for family in (
-        event_rows, march_rows, spring_rows, penalty_rows, energy_rows, outcome_rows,
-    ):  # fmt: skip
-        yield from family(clock, quick)
+    families = event_rows, march_rows, spring_rows, penalty_rows, energy_rows, outcome_rows
+    yield from (row for family in families for row in family(clock, quick))
