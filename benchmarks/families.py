@@ -1,8 +1,8 @@
 """Families of random chains that need more than continuous numbers: ties, zeros, light balls.
 
-Every number is made by choices, products, sums and divisions of whole numbers, operations that
-round alike everywhere; printed, it is short.  Draws come from the `random` of `random.Random`,
-which is the same on every platform; nothing else of it is used.
+Numbers are made by choices, products, sums and divisions of whole numbers, which round alike
+everywhere; printed, they are short.  Of `random.Random` nothing but `random` is used, the same on
+every platform.
 """
 
 import random
@@ -18,7 +18,6 @@ class Draw(random.Random):
     """Numbers and choices."""
 
     def below(self, n):
-        """A whole number below n."""
         return int(self.random() * n)
 
     def choice(self, values):
@@ -41,24 +40,21 @@ class Draw(random.Random):
 
 
 def within_bounds(masses, part):
-    """Ratios, forward and backward, as parts of their bounds, which `part` gives one by one."""
+    """Ratios as parts of their bounds, which `part` gives one by one."""
     ways = chains.within_bounds(masses, lambda shape: np.array([part() for _ in range(*shape)]))
     return [way.tolist() for way in ways]
 
 
 def struck(n):
-    """Velocities: the first ball strikes."""
     return [1.0] + [0.0] * (n - 1)
 
 
 def ties(draw, n):
     """Equal or the paper's masses, few different numbers: everything coincides."""
     kind = draw.below(3)
-    masses = [1.0] * n
-    if kind == 1:
-        masses = draw.some(PAPER_MASSES, n)
-    elif kind == 2:
-        masses = draw.some([1.0, 1.0, 1.0, 3.0, 0.3], n)
+    masses = (
+        draw.some((PAPER_MASSES, [1.0, 1.0, 1.0, 3.0, 0.3])[kind - 1], n) if kind else [1.0] * n
+    )
     velocities = struck(n) if draw.chance(40) else draw.some([-0.5, 0, 0.5, 1], n)
     coefficients = draw.choice([[1], [1], [0, 0.5, 0.9, 1], [0.5, 0.9, 1], [0.9]])
     restitution = [float(e) for e in draw.some(coefficients, n - 1)]
@@ -110,41 +106,30 @@ def light_balls(draw, n):
 
 def any_number(draw, low, high):
     """With all its digits, or with two decimals."""
-    if draw.chance(50):
-        return low + (high - low) * draw.random()
-    return draw.decimal(low, high, 2)
+    return low + (high - low) * draw.random() if draw.chance(50) else draw.decimal(low, high, 2)
 
 
 def any_masses(draw, n, decades=2):
     """Equal, the paper's, or random over some decades."""
     kind = draw.below(4)
-    if kind == 0:
-        return [1.0] * n
-    if kind == 1:
-        return draw.some(PAPER_MASSES, n)
+    if kind < 2:
+        return draw.some(PAPER_MASSES, n) if kind else [1.0] * n
     octaves = round(decades * 1.66)  # on either side of 1
     powers = [2.0 ** (draw.below(2 * octaves) - octaves) for _ in range(n)]
     return [x * any_number(draw, 1, 2) for x in powers]
 
 
 def few_velocities(draw, n):
-    """The first ball strikes, or few different numbers, zeros and equal ones among them."""
-    if draw.chance(50):
-        return struck(n)
-    return draw.some([0.0, 1.0, 0.5, -0.5], n)
+    """The first ball strikes, or few different numbers."""
+    return struck(n) if draw.chance(50) else draw.some([0.0, 1.0, 0.5, -0.5], n)
 
 
 def losses(draw, n):
     """Chains with losses and few different ratios, in which ties decide."""
     values = draw.choice([[0.0, 0.1], [0.0, 0.05, 0.1], [0.05, 0.1], [0.0, 1e-20]])
     coefficients = draw.choice([[0.9], [0.8, 0.9, 0.95]])
-    return Problem(
-        any_masses(draw, n),
-        few_velocities(draw, n),
-        draw.some(coefficients, n - 1),
-        *draw.ways(values, n),
-        draw.choice([0.0, 0.5, 1.0]),
-    )
+    m, v, e = any_masses(draw, n), few_velocities(draw, n), draw.some(coefficients, n - 1)
+    return Problem(m, v, e, *draw.ways(values, n), draw.choice([0.0, 0.5, 1.0]))
 
 
 def wide(draw, n):
@@ -157,13 +142,10 @@ def wide(draw, n):
     ways = [numbers([[0.0, 0.1], [0.0, 0.1, 0.5, 1.0], [0.3], [1.0], []], n - 2) for _ in range(2)]
     if draw.chance(10) and n > 2:
         draw.choice(ways)[draw.below(n - 2)] = 1e-20
-    return Problem(
-        any_masses(draw, n, draw.choice([2, 2, 12])),
-        few_velocities(draw, n) if draw.chance(60) else numbers([[]], n),
-        numbers([[0.9], [0.5, 0.8, 0.9], [0.0, 0.5, 0.9, 1.0], [1.0], []], n - 1),
-        *ways,
-        draw.choice([0.0, 0.3, 0.5, 1.0]),
-    )
+    m = any_masses(draw, n, draw.choice([2, 2, 12]))
+    v = few_velocities(draw, n) if draw.chance(60) else numbers([[]], n)
+    e = numbers([[0.9], [0.5, 0.8, 0.9], [0.0, 0.5, 0.9, 1.0], [1.0], []], n - 1)
+    return Problem(m, v, e, *ways, draw.choice([0.0, 0.3, 0.5, 1.0]))
 
 
 def generic(draw, n):
@@ -192,14 +174,10 @@ def at_bounds(draw, n):
 def extremes(draw, n):
     """Nothing but ends: e and ratios 0 and 1, meeting 0 and 1, masses twelve decades apart."""
     masses = draw.choice([[1.0], [1.0, 2.0], [1.0, 1e-6, 1e6], [0.045, 0.053, 0.166]])
-    ends = draw.choice([[0.0, 1.0], [0.0], [1.0]]), draw.choice([[0.0, 1.0], [1.0], [0.5, 1.0]])
-    return Problem(
-        draw.some(masses, n),
-        few_velocities(draw, n),
-        draw.some(ends[1], n - 1),
-        *draw.ways(ends[0], n),
-        draw.choice([0.0, 1.0]),
-    )
+    ratios = draw.choice([[0.0, 1.0], [0.0], [1.0]])
+    coefficients = draw.choice([[0.0, 1.0], [1.0], [0.5, 1.0]])
+    m, v, e = draw.some(masses, n), few_velocities(draw, n), draw.some(coefficients, n - 1)
+    return Problem(m, v, e, *draw.ways(ratios, n), draw.choice([0.0, 1.0]))
 
 
 #: name: generator, least and largest number of balls

@@ -9,17 +9,17 @@ Usage::
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
 within 600 events, and after no more of them at twice the digits.  A float means what it prints as
 if that is short, see `meaning`: ties of an exact run are those of the decimals that a reader sees.
-Wrong chains are made as small and plain as they stay wrong, and printed to be pasted.  Where the
-exact run has no end, see `second_opinion`.
-
-Every chain counted as right or wrong was judged by the exact run, at some hundred chains a second.
+Wrong chains are printed, as small and plain as they stay wrong.  Where the exact run has no end,
+see `second_opinion`.
 """
 
+import contextlib
 import decimal
 import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from decimal import Decimal
+from itertools import product
 from typing import NamedTuple
 
 import truth
@@ -32,14 +32,10 @@ from cradle import ImpactNotFinished, post_impact_velocities, textbook
 from cradle.trace import ImpactNotCertified
 
 DIGITS, EVENTS, WRONG = 100, 600, 1e-9
-#: Events after which the package gives up: far beyond those of an exact run that ends.
-LONGEST = 200_000
-#: Where an infinite sequence was taken to its limit, answers may differ by this.
-LIMIT = 1e-6
-#: Verdicts that are printed with their chain.
-DOUBTFUL = ("wrong", "other reading", "open", "unfinished", "unlike them")
-#: Chains of one task of the pool.
-TASK = 50
+LONGEST = 200_000  # events of the package: far beyond those of an exact run that ends
+LIMIT = 1e-6  # by which answers may differ where an infinite sequence was taken to its limit
+DOUBTFUL = ("wrong", "other reading", "open", "unfinished", "unlike them")  # printed
+TASK = 50  # chains of one task of the pool
 
 
 # --- what is true ------------------------------------------------------------------------------
@@ -64,9 +60,8 @@ def exact(problem, read=meaning, *, events=EVENTS, twice=False):
     """
     tiny = any(0 < ratio < 1e-6 for ratio in (*problem.forward, *problem.backward))
     with decimal.localcontext(prec=DIGITS * (4 if tiny else 1) * (2 if twice else 1)):
-        options = {"number": read, "max_events": events, "impact": Exact}
         try:
-            return problem.solve(textbook.solve, **options)
+            return problem.solve(textbook.solve, number=read, max_events=events, impact=Exact)
         except textbook.EventLimit:
             return None
 
@@ -120,24 +115,18 @@ ENDLESS = ["as 50 digits", "unlike them", "as relations", "nobody knows", "given
 WORDS = ENDS + ENDLESS
 
 
-def answer(solve):
-    """What somebody answers, as a list; None if there is no answer."""
-    try:
-        return solve().tolist()
-    except (ImpactNotFinished, ImpactNotCertified):
-        return None
-
-
 def batch(problem):
     """The package's velocities, of a batch; None if it gives none."""
     *parts, meeting = problem
     options = {"meeting": meeting, "excess": "saturate", "max_events": LONGEST}
-    return answer(lambda: post_impact_velocities(*parts, **options))
+    with contextlib.suppress(ImpactNotFinished, ImpactNotCertified):
+        return post_impact_velocities(*parts, **options).tolist()
 
 
 def single(problem):
     """The same, of `collide`."""
-    return answer(lambda: problem.collide(max_events=LONGEST).velocities)
+    with contextlib.suppress(ImpactNotFinished, ImpactNotCertified):
+        return problem.collide(max_events=LONGEST).velocities.tolist()
 
 
 def judge(problem, *ask, events=EVENTS):
@@ -168,13 +157,10 @@ def second_opinion(problem):
     given = batch(problem)
     if given is None:
         return Verdict("given up")
-    with decimal.localcontext(prec=50):
-        try:
-            limit = on_bounds(problem).exact(2000, number=meaning).velocities
-            far = off(problem, given, limit)
-            return Verdict("as 50 digits" if far <= LIMIT else "unlike them", far)
-        except truth.EventLimit:
-            pass
+    with decimal.localcontext(prec=50), contextlib.suppress(truth.EventLimit):
+        limit = on_bounds(problem).exact(2000, number=meaning).velocities
+        far = off(problem, given, limit)
+        return Verdict("as 50 digits" if far <= LIMIT else "unlike them", far)
     far = [off(problem, given, other) for other in seen_otherwise(problem)]
     word = "as relations" if far and max(far) <= LIMIT else "nobody knows"
     return Verdict(word, max(far, default=1.0))
@@ -218,7 +204,7 @@ def shrunk(problem, word, *ask):
 
 
 def task(name, count, seed):
-    """Judge some chains; counts, and those that are wrong or doubtful."""
+    """Judge some chains; counts, and those that are doubtful."""
     counts, found = Counter(), []
     for problem in family(name, count, seed):
         verdict = judge(problem)
@@ -231,14 +217,12 @@ def task(name, count, seed):
     return name, counts, found
 
 
-def run(names, count, seed, workers=2):
-    """Judge so many chains of each family; counts by family, and those that are wrong."""
+def run(names, count, *seeds, workers=2):
+    """Judge so many chains of each family for each seed; counts by family, and what is wrong."""
     counts, found = {name: Counter() for name in names}, []
-    # Each task has a seed of its own.
-    tasks = [
+    tasks = [  # each with a seed of its own
         (name, min(TASK, count - start), seed * 1_000_003 + start)
-        for name in names
-        for start in range(0, count, TASK)
+        for seed, name, start in product(seeds, names, range(0, count, TASK))
     ]
     with ProcessPoolExecutor(workers, initializer=os.nice, initargs=(10,)) as pool:
         for name, part, wrong in pool.map(task, *zip(*tasks, strict=True)):
@@ -255,13 +239,7 @@ def main():
     parser.add_argument("--seed", type=int, nargs="+", default=[1], help="one run for each")
     parser.add_argument("--write", action="store_true", help="write the counts as judge.csv")
     given = parser.parse_args()
-    names = given.family or list(JUDGED)
-    counts, found = {name: Counter() for name in names}, []
-    for seed in given.seed:
-        part, wrong = run(names, given.count, seed)
-        found += wrong
-        for name in names:
-            counts[name].update(part[name])
+    counts, found = run(given.family or list(JUDGED), given.count, *given.seed)
     print(f"{'':18}" + "".join(f"{word:>14}" for word in WORDS))
     for name, count in counts.items():
         print(f"{name:18}" + "".join(f"{count[word]:14}" for word in WORDS))
