@@ -4,6 +4,7 @@ A table has rows: frame, release, ball from 1, x, y, blur (pixels), misfit (grey
 part.  The pivots, the length and the rate were fitted to all arcs of the film at once.
 """
 
+import itertools
 import warnings
 
 import numpy as np
@@ -39,12 +40,9 @@ def arc(rows, ball, at, slope=0.06):
     t, x, y = rows[:, 0] - at, rows[:, 3] - REST[ball], rows[:, 4] - PIVOT[ball]
     sigma = 0.25 + slope * rows[:, 5]  # a fast ball is a smear
     basis = np.column_stack([np.cos(RATE * t), np.sin(RATE * t) / RATE])
-    pairs = [[a, b] for a, b in zip(*np.triu_indices(len(t), 1))]
-    starts = [
-        np.linalg.solve(basis[pair], x[pair] / LENGTH)
-        for pair in pairs
-        if abs(np.linalg.det(basis[pair])) > 0.3
-    ]
+    pairs = np.transpose(np.triu_indices(len(t), 1))
+    pairs = [pair for pair in pairs if abs(np.linalg.det(basis[pair])) > 0.3]
+    starts = [np.linalg.solve(basis[pair], x[pair] / LENGTH) for pair in pairs]
     if not starts:
         return None
     # The pair that most others agree with.
@@ -73,15 +71,13 @@ def strikes(table, release, times, window=12.5, slope=0.06, late=0.0):
     """Return angle, rate and its error of each strike, ball, before and after; (S, 5, 2, 3)."""
     out = np.full((len(times), 5, 2, 3), np.nan)
     for s, at in enumerate(times + late):
-        last = times[s - 1] if s else -np.inf
-        then = times[s + 1] if s + 1 < len(times) else np.inf
-        for k in range(5):
-            sides = ((max(at - window, last), at), (at, min(at + window, then)))
-            for side, between in enumerate(sides):
-                seen = 0.35 if s == side == 0 else 0.6
-                fit = arc(chosen(table, release, k, *between, seen), k, at, slope)
-                if fit is not None:
-                    out[s, k, side] = *fit[0], fit[1][1]
+        last, _, then = np.pad(times, 1, constant_values=(-np.inf, np.inf))[s : s + 3]
+        sides = (max(at - window, last), at), (at, min(at + window, then))
+        for k, (side, between) in itertools.product(range(5), enumerate(sides)):
+            seen = 0.35 if s == side == 0 else 0.6
+            fit = arc(chosen(table, release, k, *between, seen), k, at, slope)
+            if fit is not None:
+                out[s, k, side] = *fit[0], fit[1][1]
     return out
 
 
@@ -118,8 +114,8 @@ def predict(i, release, times, arcs):
 
 
 def summary(release, reads):
-    """Return a row per strike and ball; velocities along the strike, over the striker's."""
-    rows, balls = [], np.arange(5)
+    """Yield a row per strike and ball; velocities along the strike, over the striker's."""
+    balls = np.arange(5)
     with np.errstate(invalid="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a ball that was never seen is nan
         means, spreads = np.nanmean(reads[..., 0], 0), np.nanstd(reads[..., 0], 0)
@@ -127,11 +123,10 @@ def summary(release, reads):
         mean = mean * (-1) ** (s + 1)
         error = np.sqrt(reads[0, s, ..., 1] ** 2 + spreads[s] ** 2 + 0.04**2 + (0.005 * mean) ** 2)
         striking = balls >= 5 - release if s % 2 == 0 else balls < release
-        speed, sigma = mean[striking, 0], error[striking, 0]
         total = mean[:, 1].sum() - mean[~striking, 0].sum()
         total_error = np.sqrt((error[:, 1] ** 2).sum() + (error[~striking, 0] ** 2).sum())
-        speed = np.append(speed, total / release)
-        sigma = np.append(sigma, total_error / release)
+        speed = np.append(mean[striking, 0], total / release)
+        sigma = np.append(error[striking, 0], total_error / release)
         weight = np.where(np.isfinite(speed), sigma, np.inf) ** -2.0
         if not weight.sum():
             continue
@@ -140,5 +135,4 @@ def summary(release, reads):
         for k in balls:
             values = np.stack([mean[k], np.hypot(error[k], own * mean[k])], 1).ravel() / unit
             numbers = ["" if np.isnan(x) else f"{x + 0.0:.4f}" for x in values]
-            rows.append([release, s + 1, k + 1, int(striking[k]), f"{unit:.2f}", *numbers])
-    return rows
+            yield [release, s + 1, k + 1, int(striking[k]), f"{unit:.2f}", *numbers]

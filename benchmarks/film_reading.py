@@ -6,6 +6,7 @@ guessed by correlation, then fitted, then fitted again from what the arcs predic
 """
 
 from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
 from pathlib import Path
 
 import cv2
@@ -19,8 +20,7 @@ X0, X1, Y0, Y1 = 330, 1120, 400, 600  # the strip where balls move
 POSTS = ((428, 487), (921, 975))  # hide balls
 REFERENCE, HALF = 60, 48
 FIXED = ((35, 600, 400, 520), (30, 180, 890, 985), (540, 615, 380, 860))
-COLUMNS = ["release", "strike", "ball", "striker", "speed"]
-COLUMNS += ["before", "sigma_before", "after", "sigma_after"]
+COLUMNS = "release strike ball striker speed before sigma_before after sigma_after"
 
 film = {}  # frames, drift, background, template: shared with the workers by fork
 
@@ -30,9 +30,9 @@ def read(path):
     capture, frames = cv2.VideoCapture(str(path)), []
     while (got := capture.read())[0]:
         frames.append(got[1])
-    film["frames"] = frames = np.array(frames)
+    film["frames"] = np.array(frames)
     for part in (drift, background, template):
-        film[part.__name__] = part(frames)
+        film[part.__name__] = part(film["frames"])
 
 
 def drift(frames):
@@ -49,7 +49,6 @@ def drift(frames):
 
 
 def moved(picture, shift, back=False):
-    """Return the picture shifted by some pixels."""
     flags = cv2.INTER_LINEAR | (cv2.WARP_INVERSE_MAP if back else 0)
     matrix = np.float32(np.column_stack([np.eye(2), shift]))
     size = picture.shape[1::-1]
@@ -63,9 +62,9 @@ def background(frames):
     order = np.argsort(strip.sum(3, dtype="i4"), 0)[len(free) // 2 : int(0.9 * len(free))]
     bright = np.take_along_axis(strip, order[..., None], 0).mean(0)
     empty = np.median(strip, 0)
-    left, right = empty[:, 205:220].mean(1), empty[:, 545:560].mean(1)
-    part = np.linspace(0, 1, 341)[None, :, None]
-    fill = left[:, None] * (1 - part) + right[:, None] * part
+    left, right = (empty[:, a : a + 15].mean(1, keepdims=True) for a in (205, 545))
+    part = np.linspace(0, 1, 341)[:, None]
+    fill = left * (1 - part) + right * part
     shade = bright[60:76, 212:553].mean(0) - fill[60:76].mean(0)
     fill[70:150] += shade * (np.arange(80, 0, -1) / 80)[:, None, None]
     empty[70:150, 212:553] = fill[70:150]
@@ -100,17 +99,12 @@ def blurred(blur, slope):
 
 
 def placed(ball, at, shape):
-    """Return a ball at (x, y) of a window."""
     matrix = np.float32(np.column_stack([np.eye(2), np.subtract(at, HALF)]))
     return cv2.warpAffine(ball, matrix, shape[::-1], flags=cv2.INTER_CUBIC)
 
 
-def refine(job):
-    """Fit the places of five balls in a frame, from a guess (5, 3): x, y, blur.
-
-    Returns rows: frame, release, ball, x, y, blur, misfit (grey levels), visible part.
-    """
-    i, release, guess = job
+def refine(i, release, guess):
+    """Fit the places of five balls in a frame, from a guess (5, 3): x, y, blur; rows of a table."""
     shift, guess = film["drift"][i], np.array(guess, float)
     empty, image = moved(film["background"], shift), film["frames"][i][Y0:Y1, X0:X1].astype("f4")
     seen = np.ones(empty.shape[:2], bool)
@@ -124,9 +118,8 @@ def refine(job):
     for k in [*range(5)] * 3:
         if balls[k] is not None:
             guess[k, :2], misfit[k], part[k] = fit_ball(k, guess, balls, (empty, image, seen))
-    table = np.column_stack([np.full(5, i), np.full(5, release), range(1, 6), guess, misfit, part])
-    table[:, 3:5] -= shift
-    return table
+    guess[:, :2] -= shift
+    return np.column_stack([[i] * 5, [release] * 5, range(1, 6), guess, misfit, part])
 
 
 def fit_ball(k, guess, balls, strip):
@@ -163,9 +156,8 @@ def gauss_newton(residual, p, step=0.4):
         r = residual(p)
         weight = (1 + r * r) ** -0.5
         slope = [(residual(p + e) - residual(p - e)) / (2 * step) for e in step * np.eye(2)]
-        change = np.linalg.lstsq(np.transpose(slope) * weight[:, None], -r * weight, rcond=None)[0]
-        change = np.clip(change, -4, 4)
-        p = p + change
+        full = np.linalg.lstsq(np.transpose(slope) * weight[:, None], -r * weight, rcond=None)[0]
+        p = p + (change := np.clip(full, -4, 4))
         if np.abs(change).max() < 0.005:
             break
     return p, 12 * np.sqrt(np.mean(residual(p) ** 2))
@@ -189,8 +181,7 @@ def detect(i, release):
     place = xs - shift[0]
     best[place < 560 if to_the_right else place > 880] = -1
     for left, right in POSTS:
-        hidden = (place > left) & (place < right) & (best > -1)
-        best[hidden] = np.minimum(best[hidden], 0.45)
+        best[(place > left) & (place < right) & (best > 0.45)] = 0.45
     if (release == 1 and i > 268) or i - start < (5 if release > 1 else 0):
         best[place > 975] = -1
     total, chosen = best.copy(), []
@@ -199,7 +190,7 @@ def detect(i, release):
         first = np.searchsorted(reach, reach)  # where this maximum was reached
         total = np.full(len(xs), -9.0)
         total[49:] = best[49:] + reach[:-49]
-        chosen.append(np.concatenate([np.zeros(49, int), first[:-49]]))
+        chosen.append(np.pad(first[:-49], (49, 0)))
     path = [int(total.argmax())]
     for back in chosen[::-1]:
         path.append(back[path[-1]])
@@ -208,30 +199,26 @@ def detect(i, release):
     return np.column_stack([np.where(best[at] > 0.15, xs[at], np.nan), y, blur_of[at]])
 
 
-def main(arguments=None):
-    """Read the film, write a row per release, strike and ball."""
-    parser, rows = options(__doc__), []
-    parser.add_argument("film", type=Path)
-    given = parser.parse_args(arguments)
-    read(given.film)
+def rows():
+    """Yield a row per release, strike and ball."""
     for release, (start, half, first, last) in RELEASES.items():
         times, frames = np.arange(start, last, half)[:-1], range(first, last + 1)
         guesses = [detect(i, release) for i in frames]
         with ProcessPoolExecutor() as pool:
             for _ in range(3):  # from what is detected, then twice from what the arcs predict
-                jobs = [(i, release, guess) for i, guess in zip(frames, guesses)]
-                table = np.concatenate([*pool.map(refine, jobs)])
+                table = np.concatenate([*pool.map(refine, frames, repeat(release), guesses)])
                 times = crossing(table, release, times)
                 arcs = strikes(table, release, times)
-                guesses = [
-                    predict(i, release, times, arcs) + np.append(film["drift"][i], 0)
-                    for i in frames
-                ]
+                drift = np.pad(film["drift"], ((0, 0), (0, 1)))
+                guesses = [predict(i, release, times, arcs) + drift[i] for i in frames]
         ways = ({}, {"window": 8}, {"slope": 0.02}, {"late": 0.04}, {"late": -0.04})
         reads = [LENGTH * strikes(table, release, times, **way)[..., 1:] for way in ways]
-        rows += summary(release, np.array(reads))
-    write("film_reading.csv", COLUMNS, rows, given.output)
+        yield from summary(release, np.array(reads))
 
 
 if __name__ == "__main__":
-    main()
+    parser = options(__doc__)
+    parser.add_argument("film", type=Path)
+    given = parser.parse_args()
+    read(given.film)
+    write("film_reading.csv", COLUMNS, rows(), given.output)
