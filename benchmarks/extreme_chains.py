@@ -28,7 +28,6 @@ RANGES |= dict.fromkeys(("restitution", "forward", "backward"), (0.0, 1.0))
 
 
 def sequence(name):
-    """One of the paper's chains."""
     chain, model = paper_chain(name, excess="saturate")
     own = chain.masses, chain.velocities, chain.restitution
     return case(*own, model.forward, model.backward)

@@ -26,7 +26,6 @@ film = {}  # frames, drift, background, template: shared with the workers by for
 
 
 def read(path):
-    """Fill `film` from the file."""
     capture, frames = cv2.VideoCapture(str(path)), []
     while (got := capture.read())[0]:
         frames.append(got[1])
@@ -200,7 +199,6 @@ def detect(i, release):
 
 
 def rows():
-    """Yield a row per release, strike and ball."""
     for release, (start, half, first, last) in RELEASES.items():
         times, frames = np.arange(start, last, half)[:-1], range(first, last + 1)
         guesses = [detect(i, release) for i in frames]

@@ -22,7 +22,6 @@ COLUMNS = [
 
 
 def row(exponent, m2_over_m1, m3_over_m2, k2_over_k1):
-    """Return one row of the map."""
     masses = np.cumprod([1.0, m2_over_m1, m3_over_m2])
     model = SpringChain([1.0, k2_over_k1], exponent, accuracy=1e-11)
     trace, ratio, note = collide(Chain(masses, [1.0, 0.0, 0.0], 1.0), model), "", ""

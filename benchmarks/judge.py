@@ -100,15 +100,14 @@ def off(problem, one, other):
 
 
 class Verdict(NamedTuple):
-    """What was found out about a chain: one of `WORDS`, and its distance from the truth."""
+    """One of `WORDS`, and the distance from the truth."""
 
     word: str
     off: float = 0.0
 
 
-#: Where the exact run ends: "other reading" is wrong by `meaning` and `on_bounds`, right for the
-#: exact values of all floats, or with ratios beside their bounds; "open" hangs on more
-#: than so many digits; "unfinished" has no answer.
+#: Where the exact run ends: "other reading" is right for the exact values of all floats, or with
+#: ratios beside their bounds; "open" hangs on more digits; "unfinished" has no answer.
 ENDS = ["right", "wrong", "other reading", "open", "unfinished"]
 #: Where it has no end: who agrees with the answer; "given up" has no answer.
 ENDLESS = ["as 50 digits", "unlike them", "as relations", "nobody knows", "given up"]
@@ -232,7 +231,6 @@ def run(names, count, *seeds, workers=2):
 
 
 def main():
-    """Judge, print, and store if told so."""
     parser = options(__doc__)
     parser.add_argument("--family", choices=JUDGED, action="append")
     parser.add_argument("--count", type=int, default=100, help="chains of each family")

@@ -1,6 +1,5 @@
 """What one row of the table is, and how its time is taken."""
 
-import contextlib
 import importlib.util
 import math
 import os
@@ -86,7 +85,6 @@ def seconds(function, calls=1, clock=time.perf_counter):
     return (clock() - begin) / calls
 
 
-#: The processor time of one call.
 cpu = partial(seconds, clock=time.process_time)
 
 
@@ -106,20 +104,19 @@ class Clock:
         self.units = []  # seconds of the reference, whenever it was taken
 
     def unit(self):
-        """Return the median time of the reference so far, in seconds."""
         return statistics.median(self.units)
 
     def __call__(self, function, impacts=1, prepare=None, kernel=None):
         """Return the fields of a row that tell the time of `function`, which solves `impacts`.
 
-        `prepare` makes the argument of each call, outside the measured time. `kernel` names the
-        kernel that `function`, not the reference, runs on.
+        `prepare` makes the argument of each call, outside the measured time. `kernel` names that
+        of `function`, if it is not the one in force.
         """
         reference = partial(post_impact_velocities, *_BATCH)
 
         def measured(calls):
             given = [prepare()] if prepare else []
-            with running(kernel):
+            with mock.patch.dict(os.environ, {runtime.VARIABLE: kernel} if kernel else {}):
                 return seconds(lambda: function(*given), calls)
 
         warm_up()  # else the reference, as small work, would run plain at first
@@ -135,13 +132,6 @@ class Clock:
             taken.append(measured(calls) / impacts)
         self.units += beside
         return {"time_ratio": quotient(taken, beside), "repeats": self.repeats}
-
-
-def running(kernel):
-    """Run with the kernel of that name ("plain"), or with the one in force if None."""
-    if kernel is None:
-        return contextlib.nullcontext()
-    return mock.patch.dict(os.environ, {runtime.VARIABLE: kernel})
 
 
 def versions(*packages):

@@ -37,23 +37,14 @@ def solve(
     n = len(m)
     inputs = names["Inputs"](*([part] for part in case(m, v, e, forward, backward)[:5]))
     state, out = area(n, False, drive._record(room, n)), drive.outputs(1, n, last=True)
-    state.tally[0].room = 2**62
+    state.tally[0].room = plenty = 2**62
     options = names["Options"](meeting, max_events, False)
-    plenty = 2**62
     _, status = names["batch"](0, False, n, inputs, options, out, state, plenty)
-    tally = state.tally[0]
+    tally, lists = state.tally[0], {"velocities": out.v[0], "collisions": out.hits[0]}
+    lists |= {"impulses": out.p, "absorbed": out.a, "held": out.held}
     return SimpleNamespace(
-        status=status,
-        velocities=out.v[0].tolist(),
-        collisions=out.hits[0].tolist(),
-        collapsed=bool(out.collapsed[0]),
-        impulses=out.p.tolist(),
-        absorbed=out.a.tolist(),
-        held=out.held.tolist(),
-        events=tally.events,
-        rounds=tally.rounds,
+        **{name: array.tolist() for name, array in lists.items()},
+        **{name: getattr(tally, name) for name in ("events", "rounds", "margin")},
+        **{"status": status, "collapsed": bool(out.collapsed[0]), "state": state},
         effort=plenty - tally.effort,
-        defect=tally.defect,
-        margin=tally.margin,
-        state=state,
     )

@@ -29,15 +29,12 @@ class Problem(NamedTuple):
 
     def solve(self, solver, **options):
         """By `textbook.solve`, `truth.solve` or anything that is called like them."""
-        *parts, meeting = self
-        return solver(*parts, meeting=meeting, **options)
+        return solver(*self[:5], meeting=self.meeting, **options)
 
     def collide(self, **options):
         """By the package."""
-        model = ImpulseCorrelation(
-            self.forward, self.backward, meeting=self.meeting, excess="saturate", **options
-        )
-        return collide(Chain(self.masses, self.velocities, self.restitution), model)
+        options |= {"meeting": self.meeting, "excess": "saturate"}
+        return collide(Chain(*self[:3]), ImpulseCorrelation(*self[3:5], **options))
 
     def attempt(self, max_events=200_000):
         """The package's trace, finished or not, and whether it finished."""
@@ -51,14 +48,8 @@ class Problem(NamedTuple):
         return self.solve(solve, max_events=max_events, **options)
 
     def mirrored(self):
-        return Problem(
-            self.masses[::-1],
-            [-v for v in self.velocities[::-1]],
-            self.restitution[::-1],
-            self.backward[::-1],
-            self.forward[::-1],
-            1 - self.meeting,
-        )
+        m, v, e, forward, backward = (part[::-1] for part in self[:5])
+        return Problem(m, [-x for x in v], e, backward, forward, 1 - self.meeting)
 
     def boosted(self, speed):
         """Seen from a moving frame; exact if velocities and speed are multiples of a power of 2."""
@@ -66,7 +57,5 @@ class Problem(NamedTuple):
 
     def in_units(self, mass, velocity):
         """In other units; exact if these are powers of two."""
-        return self._replace(
-            masses=[m * mass for m in self.masses],
-            velocities=[v * velocity for v in self.velocities],
-        )
+        m, v = [x * mass for x in self.masses], [x * velocity for x in self.velocities]
+        return self._replace(masses=m, velocities=v)

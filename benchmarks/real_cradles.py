@@ -6,7 +6,7 @@ of the first release.  The striker's speed was read in part from the sum of mome
 freedom are too many by up to one a release.
 """
 
-import itertools
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -82,9 +82,9 @@ def by_spheres(p, release, apart=False, masses=EQUAL, solve=spheres):
 
 
 APART = 30.0  # Hertz units: far enough
-E, LOSS, THREE = (0.5, 1.0), (0.0, 0.1), list(itertools.product((0.04, 0.12), repeat=3))
-FINE = itertools.product((0.02, 0.05, 0.08, 0.11), (0.07, 0.1, 0.13), (0.1, 0.14))
-GAPS = list(itertools.product((0.08, 0.17, 0.33), (0.04, 0.08, 0.12, 0.16), (0.02, 0.05)))
+E, LOSS, THREE = (0.5, 1.0), (0.0, 0.1), list(product((0.04, 0.12), repeat=3))
+FINE = product((0.02, 0.05, 0.08, 0.11), (0.07, 0.1, 0.13), (0.1, 0.14))
+GAPS = list(product((0.08, 0.17, 0.33), (0.04, 0.08, 0.12, 0.16), (0.02, 0.05)))
 MASSES = [(0.95, 1.05)] * 4
 # Name: velocities from parameters, release and whether strikers are apart; starts; bounds.
 LAWS = {
@@ -196,12 +196,10 @@ def fits_of(reading, law, apart):
 
 
 def film_fits():
-    """Yield fits of every law to readings 4 and 2."""
     yield COLUMNS
-    for reading in (4, 2):
-        for apart, laws in ((False, TOGETHER), (True, ONE_BY_ONE)):
-            for law in laws:
-                yield from fits_of(reading, law, apart)
+    for reading, (apart, laws) in product((4, 2), ((False, TOGETHER), (True, ONE_BY_ONE))):
+        for law in laws:
+            yield from fits_of(reading, law, apart)
 
 
 if __name__ == "__main__":

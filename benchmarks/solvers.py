@@ -209,6 +209,5 @@ def outcome_rows(clock, _):
 
 
 def rows(clock, quick):
-    """Yield the rows of all families."""
     families = event_rows, march_rows, spring_rows, penalty_rows, energy_rows, outcome_rows
     yield from (row for family in families for row in family(clock, quick))
