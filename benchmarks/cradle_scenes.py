@@ -14,7 +14,7 @@ from itertools import product
 
 import numba
 import numpy as np
-from measure import Engine, absent, cpu, present, quotient, versions
+from measure import BULLET, RAPIER, absent, cpu, named_engines, present, quotient, versions
 from stored import DATA, make
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing, viscosity_from
@@ -65,43 +65,22 @@ AT = (1, 5, 20, 50)  # strokes that are kept of these
 ENERGIES = " ball1 ball2 ball3 ball4 ball5"
 SETTINGS = "default", "fine", "refined"
 
-#: The scene of each is its program in `examples/`.  With the mend the step may be `mended_step`.
-ENGINES = (
-    Engine(
-        "Chipmunk", "pymunk", "pymunk_cradle",
-        {"step": 1 / 60, "iterations": 10},
-        {"step": 1e-3, "iterations": 100},
-    ),
-    Engine(
-        "Box2D", "Box2D", "box2d_cradle",
-        {"step": 1 / 60, "iterations": (8, 3)},
-        {"step": 1e-3, "iterations": (100, 30)},
-    ),
-    Engine(
-        "Bullet", "pybullet", "bullet_cradle",
-        {"step": 1 / 240},
-        {
-            "step": 1e-3, "numSolverIterations": 200, "restitutionVelocityThreshold": 0.0,
-            "contactSlop": 0.0, "contactERP": 0.0, "erp": 0.0,
-        },
-    ),
-    Engine(
-        "Rapier", "rapier3d", "rapier_cradle",
-        {"step": 1 / 60},
-        {
-            "step": 1e-3, "num_internal_pgs_iterations": 50,
-            "normalized_prediction_distance": 1e-6, "contact_recycling": False,
-        },
-    ),
-    Engine(
-        "MuJoCo", "mujoco", "mujoco_cradle",
-        {"step": 2e-3, "contact": 0.02},
-        {"step": 1e-4, "mended_step": 1e-3, "contact": 0.002},
-    ),
-)  # fmt: skip
-
-
-# One run: times, angles and rates of the balls, shape (T, N).
+FINER = {"step": 1e-4, "mended_step": 1e-3, "contact": 0.002}  # with the mend another step
+ENGINES = named_engines(  # program in `examples/`: default, refined
+    {
+        "pymunk_cradle": ({"step": 1 / 60, "iterations": 10}, {"step": 1e-3, "iterations": 100}),
+        "box2d_cradle": (
+            {"step": 1 / 60, "iterations": (8, 3)},
+            {"step": 1e-3, "iterations": (100, 30)},
+        ),
+        "bullet_cradle": ({"step": 1 / 240}, BULLET | {"step": 1e-3, "numSolverIterations": 200}),
+        "rapier_cradle": (
+            {"step": 1 / 60},
+            RAPIER | {"step": 1e-3, "num_internal_pgs_iterations": 50},
+        ),
+        "mujoco_cradle": ({"step": 2e-3, "contact": 0.02}, FINER),
+    }
+)
 
 
 @contextmanager
@@ -189,9 +168,6 @@ def _march(angle, frames, inner, stiffness, gaps):
                 rate[i] += 0.5 * step * pull[i]
         angles[frame], rates[frame] = angle, rate
     return times, angles, rates
-
-
-# What is read off a run.
 
 
 def energies(angles, rates):

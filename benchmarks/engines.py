@@ -11,7 +11,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from measure import Engine, Row, distance, outcome, present, versions
+from measure import BULLET, RAPIER, Row, distance, named_engines, outcome, present, versions
 from scenes import SCENES, Scene
 from scipy.optimize import brentq
 from solvers import model_error
@@ -212,45 +212,37 @@ def damping_for(restitution, step, steps_a_contact):
 
 
 FINE = 1e-4
-ENGINES = (
-    Engine(
-        "Chipmunk", "pymunk", chipmunk,
-        {"step": 1 / 60, "iterations": 10},
-        {"step": FINE, "iterations": 1000},
-        "step 1/60 s as in its manual's example",
-    ),
-    Engine(
-        "Box2D", "Box2D", box2d,
-        {"step": 1 / 60, "iterations": 8},
-        {"step": FINE, "iterations": 1000, "faster": 1000.0},
-        "closings below 1 m/s do not rebound; refined: all speeds times 1000",
-    ),
-    Engine(
-        "Bullet", "pybullet", bullet,
-        {"step": 1 / 240, "iterations": 50},
-        {
-            "step": FINE, "iterations": 1000, "restitutionVelocityThreshold": 0.0,
-            "contactSlop": 0.0, "contactERP": 0.0, "erp": 0.0,
-        },
-        "refined: no correction of overlaps, no slop, no threshold",
-    ),
-    Engine(
-        "Rapier", "rapier3d", rapier,
-        {"step": 1 / 60, "iterations": 4},
-        {
-            "step": FINE, "iterations": 4, "num_internal_pgs_iterations": 200,
-            "normalized_prediction_distance": 1e-6, "contact_recycling": False,
-        },
-        "single precision; refined: no prediction of contacts, 200 inner iterations",
-    ),
-    Engine(
-        "MuJoCo", "mujoco", mujoco,
-        {"step": 2e-3, "steps_a_contact": 10},
-        {"step": 1e-5, "steps_a_contact": 100},
-        "no coefficient of restitution: stiffness and damping of the contact are chosen, the "
-        "damping from two balls",
-    ),
-)  # fmt: skip
+MANY = {"step": FINE, "iterations": 1000}
+ENGINES = named_engines(  # what makes its world: default, refined, note
+    {
+        chipmunk: (
+            {"step": 1 / 60, "iterations": 10},
+            MANY,
+            "step 1/60 s as in its manual's example",
+        ),
+        box2d: (
+            {"step": 1 / 60, "iterations": 8},
+            MANY | {"faster": 1000.0},
+            "closings below 1 m/s do not rebound; refined: all speeds times 1000",
+        ),
+        bullet: (
+            {"step": 1 / 240, "iterations": 50},
+            MANY | BULLET,
+            "refined: no correction of overlaps, no slop, no threshold",
+        ),
+        rapier: (
+            {"step": 1 / 60, "iterations": 4},
+            RAPIER | {"step": FINE, "iterations": 4, "num_internal_pgs_iterations": 200},
+            "single precision; refined: no prediction of contacts, 200 inner iterations",
+        ),
+        mujoco: (
+            {"step": 2e-3, "steps_a_contact": 10},
+            {"step": 1e-5, "steps_a_contact": 100},
+            "no coefficient of restitution: stiffness and damping of the contact are chosen, the "
+            "damping from two balls",
+        ),
+    }
+)
 
 
 def run(world, step, longest):

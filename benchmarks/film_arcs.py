@@ -1,6 +1,6 @@
 """Arcs of pendulums through the places of filmed balls, and the velocities at the strikes.
 
-A table has rows: frame, release, ball from 1, x, y, blur (pixels), misfit (grey levels), visible
+Rows of a table: frame, release, ball from 1, x, y, blur (pixels), misfit (grey levels), visible
 part.  The pivots, the length and the rate were fitted to all arcs of the film at once.
 """
 

@@ -1,8 +1,7 @@
 """How well can a ratio be fitted?  Synthetic shots of all 64 triplets; tables as CSV.
 
 Writes `data/fit_precision.csv` and `data/fit_study.csv` in ten minutes.
-The true values are those of Tables 1 and 2, three ratios taken at their bound; the balls have the
-paper's masses.
+The true values are those of Tables 1 and 2, three ratios taken at their bound.
 """
 
 import numpy as np
@@ -32,8 +31,8 @@ def truth(triplet):
 
 def outcomes(chain, ratios, backward):
     """Return velocities after the impact at unit speed of the striker, for many ratios."""
-    given = chain.masses, [1.0, 0.0, 0.0], chain.restitution
-    return post_impact_velocities(*given, np.asarray(ratios)[:, None], backward, excess="saturate")
+    given = chain.masses, [1.0, 0.0, 0.0], chain.restitution, np.reshape(ratios, (-1, 1))
+    return post_impact_velocities(*given, backward, excess="saturate")
 
 
 def table(triplet, chain, after, noise, random):
@@ -109,10 +108,7 @@ def study(triplet, noise):
 
 
 def distances(unit):
-    """Return the squared distance of outcomes i from outcome j that a shot can see.
-
-    The striker's speed is measured with the same error as the others, and profiled over.
-    """
+    """Squared distances of outcomes that a shot can see, the striker's speed profiled over."""
     difference = unit[:, None] - unit[None, :]
     along = (difference * unit[:, None]).sum(axis=-1)
     return (difference**2).sum(axis=-1) - along**2 / (1 + (unit**2).sum(axis=-1))[:, None]
@@ -143,7 +139,7 @@ def precision(triplet):
         for k in minima(seen[:, j])
         if abs(other - true) > 0.02 and abs(ratios[k] - true) < 0.003
     ]
-    trap = ["", "", ""]
+    trap = [""] * 3
     if traps:
         others, misfits = zip(*traps)
         trap = [f"{x:.4f}" for x in (min(others), max(others), min(misfits))]

@@ -1,11 +1,10 @@
 """Contact forces against plain velocity Verlet: microseconds a chain at a measured error, one run.
 
 Writes `data/forces.csv` in a minute.
-Both are compiled and run on one thread, in turns; each time is the least of many.  Ours is asked
-for an accuracy; Verlet has the largest step from which on all smaller ones keep the error.  The
-last rows of each chain are the paper's rule, restitution that of two of the spheres: with the
-smallest ratios that fit each three neighbours as elastic spheres (of random chains those of equal
-balls), with the ratio of Table 2, AAA, for all, and with its two ends, the textbook answers.
+Both are compiled and run on one thread, in turns; each time is the least of many.  Verlet has the
+largest step from which on all smaller ones keep the error that ours is asked for.  The last rows of
+each chain are the paper's rule, restitution that of two of the spheres: with ratios that fit each
+three neighbours as elastic spheres (of random chains equal ones), and with one for all.
 """
 
 import os

@@ -3,8 +3,7 @@
 Writes `data/gaps_five.csv` and `data/gaps_triplets.csv` in two minutes.
 Spheres push with F = k s^1.5, where ds = u dt while they close with u, and u dt / e^2 while they
 give back: the energy law of Liu, Zhao and Brogliato, in time.  A gap starts at s = -gap, a lean at
-s > 0, balanced by constant forces.
-Lengths are in Hertz units, (m v^2 / k)^(2/5), of ball A, or of a ball of an equal row.
+s > 0, balanced by constant forces.  Lengths are in Hertz units, (m v^2 / k)^(2/5).
 """
 
 import numpy as np

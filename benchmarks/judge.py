@@ -38,9 +38,6 @@ DOUBTFUL = ("wrong", "other reading", "open", "unfinished", "unlike them")  # pr
 TASK = 50  # chains of one task of the pool
 
 
-# --- what is true ------------------------------------------------------------------------------
-
-
 class Exact(textbook.Impact):
     """The textbook's impact: zero and equal is what is so to six tenths of the digits; no path."""
 
@@ -94,9 +91,6 @@ def off(problem, one, other):
     """How far two outcomes are apart, as a part of the largest speed before the impact."""
     most = max(abs(a - Decimal(b)) for a, b in zip(map(Decimal, one), other, strict=True))
     return float(most / (Decimal(max(map(abs, problem.velocities))) or 1))
-
-
-# --- what is answered --------------------------------------------------------------------------
 
 
 class Verdict(NamedTuple):
@@ -197,9 +191,6 @@ def shrunk(problem, word, *ask):
         if judge(other, *ask).word == word:
             return shrunk(other, word, *ask)
     return problem
-
-
-# --- many chains -------------------------------------------------------------------------------
 
 
 def task(name, count, seed):

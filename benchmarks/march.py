@@ -1,9 +1,8 @@
 """A brute-force march of the impact rules by small fixed steps of impulse.
 
-The rules are those of `cradle.textbook`, which shares no code with the solver; but no event is the
-root of a formula.  The march only steps, looks, and applies the rule that has come due.  Overshoot
-at an event is left as it is, so every result carries an error of first order in the step, and
-converges to the outcome of the exact rules as `steps` grows.  R9 is left out.
+The rules are those of `cradle.textbook`; but no event is the root of a formula: the march steps,
+looks, and applies the rule that has come due.  Overshoot is left as it is: an error of first order
+in the step.  R9 is left out.
 """
 
 import math
@@ -49,7 +48,7 @@ def stride(u, gained, given, e, inside, change, push, most):
 
 
 class March(textbook.Impact):
-    """State of a march; the last state is the result."""
+    """State of a march."""
 
     def __init__(self, *given, steps, hold, max_steps):
         super().__init__(*given)
@@ -116,12 +115,12 @@ class March(textbook.Impact):
 
 
 def march(*chain, meeting=0.5, steps=2000, hold=True, max_steps=20_000_000, max_events=200_000):
-    """March a chain through its impact; arguments as for `textbook.solve`; return its last state.
+    """March a chain through its impact, as `textbook.solve`; return its last state.
 
     One step is the impulse that changes the closing speed of the lightest pair by 1/`steps` of the
-    largest initial closing speed; the contact of a run with the largest rate takes whole steps.
-    With `hold=False` a contact at its largest admissible ratio is not held (R7) but left to end and
-    close again and again at the level of the steps.
+    largest initial one; the contact of a run with the largest rate takes whole steps.  With
+    `hold=False` a contact at its largest admissible ratio is not held (R7): it ends and closes
+    again and again.
     """
     impact = partial(March, steps=steps, hold=hold, max_steps=max_steps)
     state = textbook.solve(*chain, meeting=meeting, max_events=max_events, impact=impact)

@@ -49,6 +49,19 @@ class Engine(NamedTuple):
         return self.module.lower()
 
 
+#: What takes corrections and margins from the engine.
+BULLET = {"restitutionVelocityThreshold": 0.0, "contactSlop": 0.0, "contactERP": 0.0, "erp": 0.0}
+RAPIER = {"normalized_prediction_distance": 1e-6, "contact_recycling": False}
+
+
+def named_engines(scenes):
+    """Return the five engines from {scene: (default, refined, note)}, in this order."""
+    names = ("Chipmunk", "Box2D", "Bullet", "Rapier", "MuJoCo")
+    modules = ("pymunk", "Box2D", "pybullet", "rapier3d", "mujoco")
+    given = zip(names, modules, scenes.items(), strict=True)
+    return [Engine(name, module, scene, *rest) for name, module, (scene, rest) in given]
+
+
 def absent(engines):
     """Return the names of engines that are not installed, and what to do about each."""
     return {

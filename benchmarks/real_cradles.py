@@ -1,9 +1,8 @@
 """The first strikes of a filmed cradle against the models.
 
 Writes `data/film_fits.csv` in some minutes.
-Velocities relative to the row, over the striker's, the striking side first; lengths in Hertz units
-of the first release.  The striker's speed was read in part from the sum of momentum: the degrees of
-freedom are too many by up to one a release.
+The striking side comes first; lengths are in Hertz units of the first release.  The striker's speed
+was read in part from the sum of momentum: up to one degree of freedom a release is too many.
 """
 
 from itertools import product

@@ -1,7 +1,6 @@
 """Fit half a minute of a real cradle: its damping, then period, one gap and one law of loss.
 
-Writes `data/cradle_fits.csv` in a quarter of an hour, and where the outer balls of each fit turn,
-`data/cradle_turns.csv`, in half a minute.
+Writes `data/cradle_fits.csv` in a quarter of an hour, and `data/cradle_turns.csv` in half a minute.
 The mean of the five balls gives the damping and nearly the period: no impact changes it.  The rest
 is fitted to the turning points of the outer balls; where these hang at rest is subtracted.
 """
