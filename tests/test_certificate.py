@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import plain
 import pytest
+from delicate import CHAINS
 
 from cradle.kernel.state import ENERGY, LEDGER, MOMENTUM, ORDER, PULL
 
@@ -59,14 +60,7 @@ def exactly(number):
 
 def test_a_cycle_taken_in_part_moves_impulses_and_closing_speeds_alike():
     """Its rest is what the part leaves, to 32 digits; as a float it left balls apart by 1e-16."""
-    found = plain.solve(
-        [901.5989808350828, 0.002949248338543602, 21.140413781476184, 49.50695790764679],
-        [0.6843239851596099, 0.05682501887918989, 0.5139387761330143, -0.7095331836093497],
-        [0.7579733156338904, 0.0, 0.8588236056820905],
-        [0.3261405056846192, 0.19244200679674547],
-        [0.799189580825052, 0.0004010096605456601],
-        kernel=KERNEL,
-    )
+    found = plain.solve(*CHAINS["a cycle taken in part"].problem[:5], kernel=KERNEL)
     assert max(found.collisions) > 800
     after = [exactly(ball.start) + exactly(ball.x) for ball in found.state.ball]
     for c, (one, other) in enumerate(pairwise(after)):

@@ -79,17 +79,6 @@ def f(n):
 def f(n):
     return max(0.0, -0.0 * n), max(-0.0 * n, 0.0), min(0.0, -0.0 * n), max(1, n, 2), min(1, n, 2)
 """,
-    "chains of comparisons": """
-def f(n):
-    return [0 < n < 9 == (n > 3), 0 < n != 1 * n, not 1 <= n < 3 <= n][0 if n > 1 else 1]
-""".replace("[0 < n", "(0 < n").replace("][0 if n > 1 else 1]", ")"),
-    "a tuple is made before its parts are stored": """
-def f(n):
-    a, b = n, n + 1
-    a, b = b, a
-    _, c = a, b
-    return a, b, c
-""",
     "truth values are numbers": """
 def f(n):
     known = n > 1

@@ -7,30 +7,12 @@ from typing import get_type_hints
 
 import plain
 import pytest
+from delicate import chains_of, seen
 from extreme_chains import any_chain
 from families import FAMILIES, Draw, family
-from problem import Problem
 
 from cradle.runtime import job as drive
 
-#: Contacts that wait from the beginning: no impulse has reached them yet.
-WAITING = Problem(
-    [1.0] * 9,
-    [-0.5, 1, 0, 0.5, 0, -0.5, -0.5, 1, 0.5],
-    [1.0] * 8,
-    [0, 1, 0, 0, 0, 0, 1],
-    [0, 0, 0, 1, 1, 0, 1],
-    meeting=0.0,
-)
-#: An impact that leaves rates where the contacts of the next one wait.
-BEFORE = Problem(
-    [1, 1, 1, 1, 1, 3, 0.3, 1, 1],
-    [1.0] + [0.0] * 8,
-    [0.9] * 8,
-    [0, 0.1, 0, 0.1, 0, 0.1, 1],
-    [1, 0.1, 0, 0.1, 0.1, 1, 1],
-    meeting=1.0,
-)
 OTHERS = {"effort", "room"}  # the caller sets them
 
 
@@ -116,21 +98,14 @@ def test_no_index_lies_outside_the_work_area_where_sequences_are_infinite(way, k
 
 def test_an_impact_forgets_the_one_before(kernel):
     one = drive._area(9, False, drive._record(0, 9))
-    for problem in (BEFORE, WAITING):
+    for _, problem in seen(chains_of("rates of the impact before")):
         assert outcome(problem, kernel, area=lambda *_: one) == outcome(problem, kernel)
-
-
-#: Light balls that chatter, and an impact that leaves as many collisions as one of theirs has.
-CHATTERING = Problem(
-    [1e-12, 3, 1e-5, 1e-12, 1e-5], [1, 0, 0, 0, 0], [0, 0, 1e-6, 0.5], [1, 0, 0.5], [0, 0, 1]
-)
-LEAVING = Problem([1, 1, 1e-12, 1, 3], [1, 0, 0, 0, 0], [0, 0, 0, 1], [0.5, 0.5, 0], [1, 0.5, 0])
 
 
 def test_an_impact_forgets_the_collisions_of_the_one_before(kernel):
     """They were compared with its own where a sequence is slower than the last digit."""
     one = drive._area(5, False, drive._record(0, 5))
-    for problem in (LEAVING, CHATTERING):
+    for _, problem in seen(chains_of("collisions of the impact before")):
         found = plain.solve(*problem[:5], kernel=kernel, area=lambda *_: one)
         expected = plain.solve(*problem[:5], kernel=kernel)
         assert found.status == 0
