@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 
-def keeps(trace, energy=1e-13, momentum=1e-12, order=1e-14, counted=True):
+def keeps(trace, energy=1e-13, momentum=1e-12, order=1e-14):
     """Momentum ball by ball, order, the ledger, and a path that says the same as the totals.
 
     `energy` is granted as a part of the energy of the relative motion, `momentum` of all masses at
-    the largest speed; `order` as a speed.  Collisions are the ends on the path where `counted`.
+    the largest speed; `order` as a speed.
     """
     chain, after = trace.chain, trace.velocities
     m, before = chain.masses, chain.velocities
@@ -31,7 +31,7 @@ def keeps(trace, energy=1e-13, momentum=1e-12, order=1e-14, counted=True):
     assert (np.diff(trace.path_impulses, axis=0) >= -pulled).all()
     assert len(trace.path) == len(trace.path_impulses) == len(trace.events) + 1
     ends = [contact for kind, contact in trace.events if kind in ("end", "collapse")]
-    assert not counted or np.bincount(ends, minlength=len(m) - 1).tolist() == [*trace.collisions]
+    assert np.bincount(ends, minlength=len(m) - 1).tolist() == [*trace.collisions]
     if not (chain.closing_speeds > 0).any():
         assert after.tolist() == before.tolist()
         assert not trace.events

@@ -30,6 +30,18 @@ def parameters(law, strikers, fitted, reading="4"):
     return [float(x) for x in FITS[law, strikers, fitted, reading]["parameters"].split()]
 
 
+#: Of fits to both releases, strikers one by one: three gaps and a loss; three ratios and e.
+GAPS, RATIOS = (
+    parameters(law, "apart", "both") for law in ("spheres, three gaps, A", "three ratios, e")
+)
+#: By the fitting script: touching spheres, ratios, gaps.
+MODELS = (
+    lambda release: real_cradles.by_spheres([0] * 5, release, True),
+    lambda release: real_cradles.ratios(RATIOS[:3], RATIOS[3], release, True),
+    lambda release: real_cradles.by_spheres(GAPS, release, True),
+)
+
+
 def rows(cell):
     """Numbers at the end of each line of a printed table of the appendix, by the words before."""
     found = {}
@@ -54,18 +66,10 @@ def marked(ax, marker):
 
 def test_velocities_of_the_models_by_the_fitting_script():
     """Touching spheres, ratios and gaps, strikers one by one; ratios with strikers that touch."""
-    gapped = parameters("spheres, three gaps, A", "apart", "both")
-    apart = parameters("three ratios, e", "apart", "both")
     for release in (1, 2):
-        expected = [
-            real_cradles.by_spheres([0] * 5, release, True),
-            real_cradles.ratios(apart[:3], apart[3], release, True),
-            real_cradles.by_spheres(gapped, release, True),
-        ]
-        film = {release: first_strikes(4)[release]}
-        for row, v in zip(laws(release), expected, strict=True):
-            assert row[2:] == pytest.approx(100 * v, abs=6e-2)
-            off = real_cradles.misfits(lambda _, v=v: v, film, (release,))
+        for row, model in zip(laws(release), MODELS, strict=True):
+            assert row[2:] == pytest.approx(100 * model(release), abs=6e-2)
+            off = real_cradles.misfits(model, first_strikes(4), (release,))
             assert row[0] == pytest.approx(off @ off, rel=2e-3, abs=0.06)
             assert 100 * (row[1] - 1) == pytest.approx(off[-1], abs=0.06)
     touch = parameters("three ratios, e", "together", "both")
@@ -104,15 +108,8 @@ def test_chi_square_ball_by_ball():
 def test_fig_off_and_the_table_of_three_laws():
     """Bars are differences in errors of reading; their squares and the factor make chi-square."""
     axes = CHAPTER.figures["fig-real-off"].axes
-    gapped = parameters("spheres, three gaps, A", "apart", "both")
-    *ratios, e = parameters("three ratios, e", "apart", "both")
-    models = (
-        lambda r: real_cradles.by_spheres([0] * 5, r, True),
-        lambda r: real_cradles.ratios(ratios, e, r, True),
-        lambda r: real_cradles.by_spheres(gapped, r, True),
-    )
     table_of_sums = re.findall(r"(\S+)\u202f/\u202f(\d+)", CHAPTER.printed("table"))
-    for k, (ax, model) in enumerate(zip(axes, models, strict=True)):
+    for k, (ax, model) in enumerate(zip(axes, MODELS, strict=True)):
         bars = np.array([bar.get_height() for bar in ax.patches if bar.get_width() < 1])
         sums = []
         for release in (1, 2, 3):
@@ -165,9 +162,7 @@ def test_what_is_said_to_be_refuted_is_and_what_is_not_is_not():
 
 def test_strikers_one_by_one():
     """The arrows: spheres with the fitted gap in time, then pairs by Newton's rule."""
-    (*_, gap, loss), (*_, e) = (
-        parameters(law, "apart", "both") for law in ("spheres, three gaps, A", "three ratios, e")
-    )
+    (*_, gap, loss), (*_, e) = GAPS, RATIOS
     law = SpringChain(gaps=[0, gap], viscosity=loss)
     after = collide(Chain([1] * 3, [0.766, 0, 0]), law).velocities / 0.766
     stages = [[1, 1, 1, 0, 0], [1, 1, *after]]
@@ -210,11 +205,9 @@ def test_gaps_and_not_ratios_predict_the_third_release():
     assert shown == pytest.approx(film, abs=6e-3)
     alone = 100 * real_cradles.by_spheres([0] * 5, 3, True, solve=real_cradles.quick)
     assert touching == pytest.approx(alone, abs=6e-3)
-    p = parameters("spheres, three gaps, A", "apart", "both")
-    computed = 100 * real_cradles.by_spheres(p, 3, apart=True, solve=real_cradles.quick)
+    computed = 100 * real_cradles.by_spheres(GAPS, 3, True, solve=real_cradles.quick)
     assert gaps == pytest.approx(computed, abs=6e-3)
-    p = parameters("three ratios, e", "apart", "both")
-    assert ratios == pytest.approx(100 * real_cradles.ratios(p[:3], p[3], 3, True), abs=6e-3)
+    assert ratios == pytest.approx(100 * MODELS[1](3), abs=6e-3)
     assert (np.abs(gaps - film)[:2] < 0.5 * error[:2]).all()
     assert (np.abs(ratios - film)[:2] > 5 * error[:2]).all()
     CHAPTER.tells({"gaps-three": (np.abs(gaps - film) / error)[2]})
@@ -227,12 +220,12 @@ def test_gaps_and_not_ratios_predict_the_third_release():
 def test_the_first_two_of_three_strikers_did_not_come_as_one():
     """Two strikers as one by ratios; the last ball, and how far apart they are, by the package."""
     film, error = first_strikes(4)[3]
-    *p, e = parameters("three ratios, e", "apart", "both")
+    *p, e = RATIOS
     pair = collide(
         Chain([1] * 4, [1, 1, 0, 0], e), ImpulseCorrelation(p[1:], excess="saturate")
     ).velocities  # the last striker is far behind and changes no ball but the one that it meets
     assert float(GLUED["pair-ratio"]) == pytest.approx(100 * pair[-1], abs=0.51)
-    gap, loss = parameters("spheres, three gaps, A", "apart", "both")[2:]
+    gap, loss = GAPS[2:]
     slower = real_cradles.SLOWER
 
     def behind(between):
@@ -250,7 +243,7 @@ def test_the_first_two_of_three_strikers_did_not_come_as_one():
 def test_the_errors_of_the_fit_by_simulated_films():
     """How far three ratios miss the third release, over the scatter of fits to noisy strikes."""
     rng, data, predicted = np.random.default_rng(0), first_strikes(4), []
-    true = np.array(parameters("three ratios, e", "apart", "both"))
+    true = np.array(RATIOS)
     law = real_cradles.LAWS["three ratios, e"][0]
     for _ in range(60):
         noisy = {}
@@ -284,12 +277,11 @@ def test_fig_gaps():
     for gap, ratio in line[::3]:
         assert ratio == pytest.approx(implied(gap), abs=2e-5)
     assert line[0, 1] == pytest.approx(0.1325, abs=1e-4)
-    gap = parameters("spheres, three gaps, A", "apart", "both")[0]
-    assert float(TOLD["implied"]) == pytest.approx(implied(gap), abs=5.1e-3)
+    assert float(TOLD["implied"]) == pytest.approx(implied(GAPS[0]), abs=5.1e-3)
     both = (parameters("three ratios, e", "apart", fit)[0] for fit in ("both", "both, second"))
     shown = [float(TOLD[name]) for name in ("first-ratio", "first-ratio-second")]
     assert shown == pytest.approx(sorted(both), abs=5.1e-3)
-    assert min(shown) > 2 * implied(gap)
+    assert min(shown) > 2 * implied(GAPS[0])
     listed = ratio_table().set_index("triplet").ratio
     above = sum(listed[3 * ball] > line[0, 1] for ball in "ABCD")
     assert TOLD["above"] == {3: "three"}[above]
@@ -361,30 +353,31 @@ def test_sums_of_the_readings():
 def test_what_the_third_strike_wants_of_ball_4():
     """Its best ratio and its best gap, the others as chosen; what a gap implies for it."""
     film = {3: first_strikes(4)[3]}
-    *ratios, e = parameters("three ratios, e", "apart", "both")
-    *gaps, loss = parameters("spheres, three gaps, A", "apart", "both")
+    (*ratios, e), (*gaps, loss) = RATIOS, GAPS
     unit = 1e6 * (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
 
     def sum_of(velocities):
         off = real_cradles.misfits(lambda _: velocities, film, (3,))
         return off @ off
 
-    def least(law, top):
-        return minimize_scalar(lambda x: sum_of(law(x)), bounds=(0, top), method="bounded")
+    def by_ratio(x):
+        return sum_of(real_cradles.ratios([*ratios[:2], x], e, 3, True))
 
-    ratio = least(lambda x: real_cradles.ratios([*ratios[:2], x], e, 3, True), 0.3)
-    gap = least(lambda x: real_cradles.by_spheres([*gaps[:2], x, loss], 3, True), 0.1)
+    def by_gap(x):
+        return sum_of(real_cradles.by_spheres([*gaps[:2], x, loss], 3, True))
+
+    ratio = minimize_scalar(by_ratio, bounds=(0, 0.3), method="bounded")
+    gap = minimize_scalar(by_gap, bounds=(0, 0.1), method="bounded")
     CHAPTER.tells({"ratio-chosen": ratios[2], "ratio-wanted": ratio.x}, off=1e-3)
     assert float(GLUED["gap-chosen"]) == pytest.approx(unit * gaps[2], abs=6e-3)
     assert float(GLUED["gap-wanted"]) == pytest.approx(unit * gap.x, abs=0.011)
     assert float(GLUED["gap-implies"]) == pytest.approx(implied(gaps[2] / 0.766**0.8), abs=6e-4)
     # A standard error on, the sum of squares is larger by 1.
-    for name, best, on, scale, step in (
-        ("ratio", ratio, lambda x: real_cradles.ratios([*ratios[:2], x], e, 3, True), 1, 1e-3),
-        ("gap", gap, lambda x: real_cradles.by_spheres([*gaps[:2], x, loss], 3, True), unit, 0.01),
-    ):
+    for name, best, chi, scale, step in (
+        ("ratio", ratio, by_ratio, 1, 1e-3), ("gap", gap, by_gap, unit, 0.01),
+    ):  # fmt: skip
         sides = [
-            brentq(lambda x, on=on, best=best: sum_of(on(x)) - best.fun - 1, best.x, best.x + side)
+            brentq(lambda x, chi=chi, best=best: chi(x) - best.fun - 1, best.x, best.x + side)
             for side in (-0.015, 0.015)
         ]
         error = scale * (sides[1] - sides[0]) / 2

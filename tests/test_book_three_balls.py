@@ -273,15 +273,6 @@ def typed_in():
         return run_cells(shown("three_balls"), {})
 
 
-def test_shown_cells_use_no_hidden_name():
-    """What a reader sees can be typed in: it runs, and ends with the chapter's numbers."""
-    names = typed_in()
-    assert len(names["fits"]) == 3
-    *_, (_, _, velocities, _) = names["path"]
-    np.testing.assert_allclose(velocities, run(*EXAMPLE).velocities, rtol=0, atol=1e-14)
-    np.testing.assert_allclose(names["outcome"][0], [0, 0, 1], atol=1e-14)
-
-
 def test_the_readers_solver_against_the_reference_solver():
     """Its path is that of the rules; its functions have some sixty lines in all."""
     names = typed_in()

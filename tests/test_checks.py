@@ -12,12 +12,8 @@ import sympy
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 from cradle.input.values import (
-    ABOVE_ZERO,
-    number_or_row,
     numbers,
     one_number,
-    refuse_where,
-    row_of,
     whole_number,
 )
 
@@ -128,23 +124,3 @@ def test_fractions_and_decimals_go_through():
     ratios = [Fraction(1, 8)]
     several = post_impact_velocities([Fraction(1), Decimal("0.5"), 2], [1, 0, 0], 0.9, ratios)
     assert several.tolist() == after.tolist()
-
-
-def test_the_first_wrong_value_is_named():
-    """Of a value that stands for several, too: the place is the one where it is wrong."""
-    refuse_where("x", np.ones(2), np.zeros(2, dtype=bool), "must not be")
-    wrong = np.array([[False, False], [False, True]])
-    with pytest.raises(ValueError, match=r"^x\[1, 1\] = 3\.0; must not be$"):
-        refuse_where("x", np.array([2.0, 3.0]), wrong, "must not be")
-    with pytest.raises(ValueError, match=r"^x = 3\.0; must not be$"):
-        refuse_where("x", np.array(3.0), np.array(True), "must not be")
-
-
-def test_one_number_or_a_row():
-    assert number_or_row("x", 1, "N", *ABOVE_ZERO) == 1.0
-    assert number_or_row("x", [], "N", "any") == ()
-    assert row_of("x", 2.0, 3, 3).tolist() == [2.0] * 3
-    assert row_of("x", (1.0, 2.0), 2, 3).tolist() == [1.0, 2.0]
-    for kept in ((1.0,), (1.0, 2.0, 3.0), ()):
-        with pytest.raises(ValueError, match=f"^x has {len(kept)} values; 3 balls need 2, or one"):
-            row_of("x", kept, 2, 3)

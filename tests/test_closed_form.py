@@ -3,10 +3,9 @@
 import numpy as np
 from chains import magnitudes, uniform
 
-from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
+from cradle import Chain, ImpulseCorrelation, collide
 from cradle.closed_form import (
     back_impact_line,
-    final_impulses,
     largest_ratios,
     one_collision_each,
     three_balls,
@@ -24,29 +23,6 @@ def random_three_balls(seed, count=4000):
     ratio = rng.random(count) * masses[:, 2] / (masses[:, 1] + masses[:, 2])
     ratio[rng.random(count) < 0.1] = 0.0
     return masses, velocities, e, ratio
-
-
-def test_one_collision_per_contact():
-    """Eqs. 24, 30, 31-33: impulses and velocities, 1 000 chains and more."""
-    chains = random_three_balls(seed=30)
-    apply = one_collision_each(*chains)
-    masses, velocities, e, ratio = (part[apply] for part in chains)
-    approach = velocities[:, 1] > velocities[:, 2]
-    assert apply.sum() >= 1000
-    assert approach.sum() >= 400
-    assert (~approach).sum() >= 400
-
-    speed = np.abs(velocities).max(axis=1, keepdims=True)
-    # The backward ratio never acts.
-    solved = post_impact_velocities(masses, velocities, e, ratio[:, None], 0.0)
-    closed = three_balls(masses, velocities, e, ratio)
-    assert np.max(np.abs(solved - closed) / speed) < 1e-12
-
-    impulses = np.stack(final_impulses(masses, velocities, e, ratio), axis=1)
-    for m, v, restitution, alpha, tau in zip(masses, velocities, e, ratio, impulses):
-        trace = collide(Chain(m, v, restitution), ImpulseCorrelation(alpha, 0.0))
-        np.testing.assert_allclose(trace.impulses, tau, rtol=0, atol=1e-12 * m.max() * abs(v).max())
-        assert trace.collisions.tolist() == [1, 1]
 
 
 def test_where_the_closed_form_does_not_apply_the_solver_finds_more_collisions():

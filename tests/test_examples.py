@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, swing
+from cradle import Chain, ImpulseCorrelation, Pendulums, collide, swing
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 PROGRAMS = {
@@ -124,22 +124,6 @@ def test_ten_strokes(program, pulled):
     assert row.impacts < 20 * 10
     closed(bodies)
     closed(alone)
-
-
-def test_springs_in_the_row_are_elastic_spheres(program):
-    """Two balls pulled back, where one ratio is not quite Hertz, and springs are."""
-    pytest.importorskip("numba", reason="the judge of the scene is compiled by numba")
-    scenes = importlib.import_module("cradle_scenes")
-    bodies = program.cradle(pulled=2)
-    row = program.mended(bodies)
-    row.model = SpringChain(1.0)
-    for _ in range(4600):
-        row.step(STEP)
-    kept = energies(program, bodies)
-    _, angles, rates = scenes.on_springs(2, 4.6)
-    judge = scenes.energies(angles, rates)[-1]
-    np.testing.assert_allclose(kept / kept.sum(), judge, atol=0.01)
-    closed(bodies)
 
 
 def test_an_engine_alone_moves_its_balls_otherwise(program):

@@ -17,7 +17,6 @@ from cradle import (
     spring_velocities,
     viscosity_from,
 )
-from cradle.runtime import compile as runtime
 
 LAW = {"damping": "hunt-crossley"}
 
@@ -108,16 +107,6 @@ def test_accuracy_is_kept():
             assert abs(found - exact).max() <= accuracy
             assert 0 < error <= accuracy
     assert checked > 50
-
-
-@pytest.mark.skipif(not runtime.available(), reason="numba is not installed")
-def test_plain_and_compiled_agree_to_the_last_bit(monkeypatch):
-    outcomes = []
-    for kernel in ("plain", "compiled"):
-        monkeypatch.setenv(runtime.VARIABLE, kernel)
-        law = {"viscosity": 0.4, "gaps": [0.1, 0.0, -0.05], **LAW}
-        outcomes.append(spring_velocities([1, 0.5, 2, 1], [1, 0, 0, 0], **law).tolist())
-    assert outcomes[0] == outcomes[1]
 
 
 def test_a_contact_that_would_pull_is_refused():

@@ -68,16 +68,6 @@ def test_paper_chain_by_hand():
     assert model.excess == "saturate"
 
 
-@pytest.mark.parametrize("sequence", list(paper_sequences()))
-def test_reversing_the_balls_exchanges_the_directions(sequence):
-    chain, model = paper_chain(sequence)
-    mirrored, mirrored_model = paper_chain(sequence[::-1])
-    np.testing.assert_array_equal(mirrored.masses, chain.masses[::-1])
-    np.testing.assert_array_equal(mirrored.restitution, chain.restitution[::-1])
-    np.testing.assert_array_equal(mirrored_model.forward, model.backward[::-1])
-    np.testing.assert_array_equal(mirrored_model.backward, model.forward[::-1])
-
-
 def test_any_number_of_letters_in_any_list():
     chain, model = paper_chain("DA")
     assert (chain.restitution.tolist(), model.forward) == ([0.94], ())
