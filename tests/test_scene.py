@@ -26,8 +26,21 @@ AT = (1, 5, 20, 50)
 
 
 @cache
-def stored(name):
+def table(name):
     return read(f"scene_{name}.csv")
+
+
+def stored(name, **equal):
+    """Rows of a table whose columns have these values."""
+    wanted = {key: str(value) for key, value in equal.items()}.items()
+    return [row for row in table(name) if row.items() >= wanted]
+
+
+def energies_at(name, strokes, **equal):
+    """Energies of the balls at the strokes of a table, which are these, shape (S, 5)."""
+    rows = stored(name, **equal)
+    assert [int(row["stroke"]) for row in rows] == list(strokes or range(1, len(rows) + 1)), equal
+    return np.array([balls(row) for row in rows])
 
 
 def balls(row):
@@ -37,12 +50,9 @@ def balls(row):
 
 @cache
 def run(name, how, setting, pulled=1, gap="0"):
-    """Energies of the balls after each stroke, shape (S, 5)."""
-    key = (name, how, setting, str(pulled), gap)
-    names = ("run", "how", "setting", "pulled", "gap")
-    rows = [row for row in stored("strokes") if tuple(row[k] for k in names) == key]
-    assert [int(row["stroke"]) for row in rows] == list(range(1, len(rows) + 1)), key
-    return np.array([balls(row) for row in rows])
+    """Energies of the balls after each stroke."""
+    asked = {"run": name, "how": how, "setting": setting, "pulled": pulled, "gap": gap}
+    return energies_at("strokes", None, **asked)
 
 
 def misplaced(found, pulled):
@@ -125,7 +135,7 @@ def test_an_engine_repeats_what_is_stored(engine, how, mend):
     _, angles, rates = scenes.in_engine(engine, "default", 1, mend=mend, duration=5.6)
     found, expected = scenes.strokes(angles, rates), run(engine.name, how, "default")
     assert len(found) == 5
-    (version,) = {row["version"] for row in stored("costs") if row["run"] == engine.name}
+    (version,) = {row["version"] for row in stored("costs", run=engine.name)}
     if version.startswith(versions(engine.distribution).split("; ")[0]):
         np.testing.assert_allclose(found, expected[:5], atol=1e-3)
     if mend:
@@ -162,7 +172,7 @@ def test_swing_repeats_what_is_stored():
 
 def test_the_film_shows_what_the_table_says():
     for name, how in (("Chipmunk", "as it is"), ("Rapier", "mended"), ("Hertz springs", "alone")):
-        rows = [row for row in stored("film") if (row["run"], row["how"]) == (name, how)]
+        rows = stored("film", run=name, how=how)
         angles = np.radians([balls(row) for row in rows])
         times = np.array([float(row["time"]) for row in rows])
         assert times[-1] >= 11
@@ -174,9 +184,9 @@ def test_the_film_shows_what_the_table_says():
 
 def test_a_row_at_rest_costs_at_most_as_much_again():
     """Measured with steps of a millisecond, nothing refined: within twice the engine's own cost."""
-    rows = [row for row in stored("costs") if row["how"] == "mended"]
-    rest = {row["run"]: float(row["over_as_it_is"]) for row in rows
-            if row["setting"] == "fine" and row["pulled"] == "0"}  # fmt: skip
+    rows = stored("costs", how="mended")
+    rest = {row["run"]: float(row["over_as_it_is"])
+            for row in stored("costs", how="mended", setting="fine", pulled=0)}  # fmt: skip
     assert set(rest) == set(ENGINES)
     assert max(rest.values()) < 2
     assert len(rows) == 5 * 3 * 2
@@ -208,11 +218,7 @@ def test_with_the_row_all_engines_do_what_spheres_do(pulled: int):
 @cache
 def by_law(name, law, setting, pulled):
     """Energies of the balls at the strokes of the table, by a row with another law."""
-    key = (name, law, setting, str(pulled))
-    names = ("run", "law", "setting", "pulled")
-    rows = [row for row in stored("laws") if tuple(row[k] for k in names) == key]
-    assert [int(row["stroke"]) for row in rows] == list(AT), key
-    return np.array([balls(row) for row in rows])
+    return energies_at("laws", AT, run=name, law=law, setting=setting, pulled=pulled)
 
 
 @pytest.mark.parametrize("pulled", [1, 2])
@@ -326,16 +332,10 @@ def test_gaps_give_the_school_book_first_and_not_for_ever():
 
 def with_tiny_gaps(name, setting, pulled):
     """Part of the energy on wrong balls, and what is left, after the strokes that were reached."""
-    key = (name, setting, str(pulled))
-    rows = [
-        row
-        for row in stored("gap_minutes")
-        if tuple(row[k] for k in ("run", "setting", "pulled")) == key
-    ]
+    rows = stored("gap_minutes", run=name, setting=setting, pulled=pulled)
     found = np.array([balls(row) for row in rows])
     judge = run(*HERTZ, pulled)[[int(row["stroke"]) - 1 for row in rows]]
-    one, other = (e / e.sum(axis=1, keepdims=True) for e in (found, judge))
-    return 0.5 * np.abs(one - other).sum(axis=1), found.sum(axis=1)
+    return apart(found, judge), found.sum(axis=1)
 
 
 def test_tiny_gaps_want_a_small_step():
@@ -368,11 +368,7 @@ def test_an_engine_repeats_what_is_stored_with_tiny_gaps(name):
     _, angles, rates = scenes.in_engine(
         engine, "fine", 1, mend=False, gap=scenes.GAPS[1], duration=5.6
     )
-    (row,) = [
-        row
-        for row in stored("gap_minutes")
-        if (row["run"], row["setting"], row["pulled"], row["stroke"]) == (name, "fine", "1", "5")
-    ]
+    (row,) = stored("gap_minutes", run=name, setting="fine", pulled=1, stroke=5)
     np.testing.assert_allclose(scenes.strokes(angles, rates)[4], balls(row), atol=0.02)
 
 
@@ -424,9 +420,8 @@ def test_judged_by_the_film():
         assert float(glued[f"film-row-{name}"]) == pytest.approx(off, abs=0.012)
         small = [  # speeds over the strikers', from energies over that of all
             np.abs(np.sqrt(back * balls(row)) - seen[back])
-            for row in stored("gaps")
+            for row in stored("gaps", gap=5e-05, pulled=back)
             if (row["run"], row["setting"]) in RESOLVING
-            and (row["gap"], row["pulled"]) == ("5e-05", str(back))
         ]
         assert len(small) == 6
         ends = glued[f"film-gaps-{name}"].split(" to ")
@@ -439,7 +434,7 @@ def test_judged_by_the_film():
 @pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
 def test_stored_first_strokes_with_gaps(engine):
     """Where a gap is stored elsewhere, the same; an engine that is here repeats the smallest."""
-    rows = [row for row in stored("gaps") if row["run"] == engine.name]
+    rows = stored("gaps", run=engine.name)
     assert len(rows) == 16
     for row in rows:
         own = balls(row)
