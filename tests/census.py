@@ -26,7 +26,7 @@ from cradle.pictures import animation, impacts
 
 sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ("benchmarks", "tests")]
 from chains import random_chains, uniform  # noqa: E402
-from test_command import examples  # noqa: E402
+from commands import examples  # noqa: E402
 from test_entries import BAD, DATA, ENTRIES  # noqa: E402
 
 FEW = {"max_evaluations": 1000}

@@ -55,8 +55,8 @@ class Tab:
         self.clock.run_for(milliseconds)
         return self.shown()
 
-    def go_to(self, fragment: str):
-        """Change the address, as a link does, and wait until the page has heard of it."""
+    def go_to(self, fragment: str, wait: int = 0):
+        """Change the address, as a link does, until the page has heard of it; see `push`."""
         self.evaluate(
             """(fragment) => new Promise((done) => {
               addEventListener("hashchange", () => done(), { once: true });
@@ -64,10 +64,14 @@ class Tab:
             })""",
             fragment,
         )
+        if wait:
+            self.clock.run_for(wait)
 
-    def push(self, name: str):
-        """Click on a button."""
+    def push(self, name: str, wait: int = 0):
+        """Click on a button; where the clock stands still so many milliseconds may pass then."""
         self.get_by_role("button", name=name, exact=True).click()
+        if wait:
+            self.clock.run_for(wait)
 
     def choose(self, words: str):
         """Click on one of several, when it stands still, and return what is then shown."""

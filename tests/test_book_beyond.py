@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from chains import HERTZ, uniform
 from chapters import Chapter, number, points
+from kernels import needs_numba
 from problem import Problem
 from stored import numbers
 from truth import solve
@@ -16,13 +17,9 @@ from truth import solve
 from cradle import Chain, SpringChain, collide, outcomes, post_impact_velocities
 from cradle.closed_form import back_impact_line, one_collision_each
 from cradle.kernel.state import LIMITS
-from cradle.runtime import compile as runtime
 
 ROOT = Path(__file__).parents[1]
 CHAPTER = Chapter("beyond")
-
-
-needs_numba = pytest.mark.skipif(runtime.compiled() is None, reason="too long without numba")
 
 
 table = cache(partial(numbers, "long_chains.csv"))

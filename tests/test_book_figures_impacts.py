@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from chapters import Chapter, after, drawn, lines, panel, points, solved
 from test_book_n_balls import FIG_8, contact_work
-from test_book_patterns import by_turns, edge, last_with, turn
+from turns import by_turns, edge, last_with, turn
 
 from cradle import ImpulseCorrelation, collide, ratio_table, textbook
 from cradle.measures import bouncing_pattern

@@ -7,7 +7,8 @@ import pytest
 from chains import HERTZ
 from chapters import Chapter, code, in_memory, number, panel, run
 from dop853 import integrated
-from scipy import integrate, optimize
+from hunt_crossley import closed, motion
+from scipy import optimize
 from truth import solve
 
 CHAPTER = Chapter("forces")
@@ -84,11 +85,6 @@ def test_fig_loss():
     assert slope == pytest.approx(0.2, abs=0.015)
 
 
-def closed(x, e):
-    """What is zero for two balls that close at x / A and part at e x / A."""
-    return x - np.log1p(x) + e * x + np.log1p(-e * x)
-
-
 def test_laws_of_loss_in_a_row():
     """By SciPy; and what the first terms of the restitution give by the closed form."""
     first, second = (
@@ -102,19 +98,5 @@ def test_laws_of_loss_in_a_row():
     for name, speed in (("hunt-row", 1), ("hunt-fast", 5)):
         v = speed * np.eye(5)[0]
         one = integrated([1] * 5, v, 1, 1.5, spheres)
-        other = in_time([1] * 5, v, a)
+        other = motion(np.ones(5), v, 1.0, a, np.zeros(4), [0, 40])[0][-1]
         CHAPTER.tells({name: abs(one - other).max() / speed}, off=1e-5)
-
-
-def in_time(m, v, loss):
-    """Velocities after the impact of spheres with the losses of Hunt and Crossley."""
-    n = len(m)
-
-    def rate(_, y):
-        u = -np.diff(y[n - 1 :])
-        push = np.maximum(np.maximum(y[: n - 1], 0) ** 1.5 * (1 + loss * u), 0)
-        return np.concatenate([u, -np.diff(np.pad(push, 1)) / m])
-
-    y = np.concatenate([np.zeros(n - 1), v])
-    return integrate.solve_ivp(rate, (0, 40), y, "DOP853", rtol=1e-9, atol=1e-10,
-                               max_step=0.05).y[n - 1 :, -1]  # fmt: skip

@@ -16,7 +16,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from test_fit import columns, outcome
+from commands import call, examples
+from shots import columns, outcome
 from tqdm import tqdm
 
 from cradle import (
@@ -40,24 +41,6 @@ from cradle.runtime import job as drive
 from cradle.swinging import swing
 
 DATA = Path(__file__).parents[1] / "data"
-COMMANDS = list(main.commands)
-
-
-def call(line, expected=0):
-    # What a command chooses for its own process must not reach the next one.
-    free = {runtime.VARIABLE: None}
-    result = CliRunner(env=free).invoke(main, shlex.split(line), catch_exceptions=False)
-    assert result.exit_code == expected, result.output
-    return result.stdout
-
-
-def examples():
-    found = []
-    for name in COMMANDS:
-        lines = re.findall(r"^\s+cradle (.+)$", call(f"{name} --help"), flags=re.M)
-        assert lines or name in ("template", "warm-up"), name  # these take no options
-        found += lines
-    return found
 
 
 @pytest.fixture

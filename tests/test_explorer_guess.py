@@ -71,8 +71,7 @@ def test_pictures_wait_after_a_hit_that_was_guessed(still):
     tab = still(chapter="intro", stopped=True)
     tab.later(50)
     tab.get_by_label("your guess for ball 5, m/s").press("ArrowRight")
-    tab.push("Let go")
-    tab.later(1000)
+    tab.push("Let go", 1000)
     at = tab.state("clock.time")
     tab.later(500)
     assert tab.state("clock.time") == at == tab.evaluate("cradleExplorer.Swing.time(0)")
@@ -82,8 +81,7 @@ def test_pictures_wait_after_a_hit_that_was_guessed(still):
     assert (tab.state("clock.playing"), tab.state("view.number")) == (True, 0)
     assert tab.locator(".outcome .drawn .guess").count() == 5
     # Who presses a button has compared.
-    tab.push("Pause")
-    tab.later(50)
+    tab.push("Pause", 50)
     tab.push("Go on")
     for _ in range(3):
         tab.later(1000)
@@ -240,10 +238,8 @@ def test_a_hit_is_heard(still):
           globalThis.AudioContext = class { createOscillator = node; createGain = node; };
         }"""
     )
-    tab.push("Let go")
-    tab.later(2000)
+    tab.push("Let go", 2000)
     assert tab.evaluate("clicks") == []  # off by default
-    tab.push("Sound")
-    tab.later(4000)
+    tab.push("Sound", 4000)
     assert tab.evaluate("clicks")
     assert set(tab.evaluate("clicks")) == {0.25}  # half of the loudest, as the speed is

@@ -70,8 +70,7 @@ def test_copied_python_gives_the_same_numbers(still):
     ):  # fmt: skip
         tab.go_to(fragment)
         asked = tab.later(50)
-        tab.push("Copy Python")
-        tab.clock.run_for(3900)
+        tab.push("Copy Python", 3900)
         assert tab.inner_text(".told") == "Python copied"
         tab.clock.run_for(200)
         assert tab.inner_text(".told") == ""
@@ -106,8 +105,7 @@ def test_paper_chains_by_their_letters(still):
 
 def test_a_ball_is_dragged_and_let_go(visit):
     tab = visit("#scene=one", stopped=True)
-    tab.push("Let go")
-    tab.clock.run_for(1000)
+    tab.push("Let go", 1000)
     tab.push("Pause")
     tab.push("Pull back")
     tab.act(f"set(cradleExplorer.atRest({SETTING}))")
@@ -136,8 +134,7 @@ def test_pull_back_where_it_has_an_effect(visit):
     for button, wait, enabled in (
         ("Let go", 1000, True), ("Pause", 50, True), ("Pull back", 1000, False)
     ):  # fmt: skip
-        tab.push(button)
-        tab.clock.run_for(wait)
+        tab.push(button, wait)
         assert tab.get_by_role("button", name="Pull back").is_enabled() is enabled
     assert tab.state("clock.time") == 0
 
@@ -146,8 +143,7 @@ def test_only_a_drag_moves_a_ball(visit):
     """A tap on a ball leaves the swing as it is, and a ball taken at its edge does not jump."""
     tab = visit("#scene=one", stopped=True)
     ball = ".ball[data-ball='4'] .disc"
-    tab.push("Let go")
-    tab.clock.run_for(1000)
+    tab.push("Let go", 1000)
     before = tab.state("clock.time")
     pulled(tab, ball, 1)
     tab.mouse.up()
@@ -155,8 +151,7 @@ def test_only_a_drag_moves_a_ball(visit):
     assert tab.state("clock.time") == pytest.approx(before + 0.5, abs=0.07)
     assert tab.state("setting")["speeds"] == [1, 0, 0, 0, 0]
     tab.push("Pause")
-    tab.push("Pull back")
-    tab.clock.run_for(50)
+    tab.push("Pull back", 50)
     x = pulled(tab, ball, 40, from_edge=15)
     assert abs(tab.middle(ball)[0] - (x + 40)) < 8
 

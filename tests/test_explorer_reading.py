@@ -103,15 +103,13 @@ def test_a_reader_walks_on_from_a_changed_setting(still):
     tab = still("#what-you-see", stopped=True)
     tab.clock.run_for(1000)
     assert tab.evaluate("location.hash") == "#what-you-see"
-    tab.go_to("scene=half")
-    tab.clock.run_for(1000)
+    tab.go_to("scene=half", 1000)
     tab.get_by_label("ratio", exact=True).press("ArrowRight")
     tab.clock.run_for(1000)
     assert "forward=0.5" in tab.evaluate("location.hash")
     assert tab.locator(".walk select").input_value() == ""
     assert tab.inner_text(".scene-text") == ""
-    tab.push("next scene")
-    tab.clock.run_for(1000)
+    tab.push("next scene", 1000)
     assert tab.locator(".walk select").input_value() == "three"
 
 
@@ -400,13 +398,11 @@ def test_motion_is_asked_for(visit):
     lively = visit(stopped=True)
     for scene in ("", "two", "small"):  # each stands still until it is let go
         if scene:
-            lively.push("Let go")
-            lively.clock.run_for(1000)
+            lively.push("Let go", 1000)
             lively.push("next scene") if scene == "small" else lively.go_to("scene=two")
         lively.clock.run_for(2000)
         assert lively.state("clock.time") == 0
-    lively.push("Let go")
-    lively.clock.run_for(1500)
+    lively.push("Let go", 1500)
     assert lively.state("clock.time") == pytest.approx(1.5, abs=0.05)
     assert lively.get_by_role("button", name="Pause").is_visible()
     # Out of sight it stands still, and goes on where it was.
@@ -469,8 +465,7 @@ def test_work_of_a_frame(visit):
     """Little enough for sixty frames a second: counted, as times depend on the machine."""
     tab = visit("#scene=ABCCAB", stopped=True)
     balls, frames = 6, 125
-    tab.push("Let go")
-    tab.clock.run_for(1100)  # beyond the first hit
+    tab.push("Let go", 1100)  # beyond the first hit
     tab.evaluate(COUNT_WORK)
     swing = counted(tab, 16 * frames)
     # Each hit is solved twice, for its outcome and for its history, and laid out once. Between hits
@@ -507,18 +502,14 @@ def test_what_does_not_move_is_not_drawn(still):
     tab = still("#speeds=0,0,0,0,0", stopped=True)
     tab.clock.run_for(50)
     tab.evaluate(COUNT_WORK)
-    tab.push("Let go")
-    tab.clock.run_for(1000)  # a voice is told once
+    tab.push("Let go", 1000)  # a voice is told once
     assert counted(tab, 2000) == {"solved": 0, "drawn": 0, "changed": 0, "hits": 0}
     assert not tab.evaluate(f"{EXPLORER}.frame")
-    tab.go_to("scene=one")
-    tab.clock.run_for(600)
-    tab.push("Let go")
-    tab.clock.run_for(75)
+    tab.go_to("scene=one", 600)
+    tab.push("Let go", 75)
     frames = 20
     assert 0 < counted(tab, 16 * frames)["changed"] <= 3 * (frames + 1)  # of one ball in five
-    tab.push("Pause")
-    tab.clock.run_for(50)
+    tab.push("Pause", 50)
     tab.click("label:has-text('All ratios')")
     tab.clock.run_for(50)
     tab.evaluate(SLOW_SOLVER)
@@ -535,8 +526,7 @@ def test_what_does_not_move_is_not_drawn(still):
 def test_bars_follow_the_swing(visit):
     """They show each hit, and so do title and words; a voice tells the first one alone."""
     tab = visit("#scene=losses", stopped=True)
-    tab.push("Let go")
-    tab.clock.run_for(1000)
+    tab.push("Let go", 1000)
     title, said = tab.locator(".outcome h2").first, tab.locator(".said [aria-live=polite]")
     heard = said.text_content()
     assert "Before the first hit" in heard
@@ -548,8 +538,7 @@ def test_bars_follow_the_swing(visit):
         assert "After it, ball" in tab.inner_text(".words")
         assert tab.inner_text(".words").startswith(f"Before hit {number + 1}, ")
         assert said.text_content() == heard
-    tab.push("Pause")
-    tab.clock.run_for(1000)
+    tab.push("Pause", 1000)
     assert said.text_content() == tab.inner_text(".words")
 
 
@@ -560,8 +549,7 @@ def test_sweeps_and_maps_share_the_frame(still):
     tab.evaluate(COUNT_WORK)
     tab.evaluate(SLOW_SOLVER)
     for scene in ("half", "map"):
-        tab.go_to(f"scene={scene}")
-        tab.clock.run_for(50)
+        tab.go_to(f"scene={scene}", 50)
         for _ in range(5):
             assert 0 < counted(tab, 16)["solved"] < 15
     # What is known belongs to its own question: the map begins anew with another ratio.
@@ -591,8 +579,7 @@ def test_what_takes_too_long_is_said(still):
     assert f"Masses go from {lightest} to {heaviest} kg" in limits
     assert tab.locator(".outcome rect").count() == 0  # no stale bars
     assert tab.locator(".pictures polyline").count() == 0
-    tab.push("Let go")
-    tab.clock.run_for(300)
+    tab.push("Let go", 300)
     assert tab.get_by_role("button", name="Pause").count() == 1
     tab.clock.run_for(1000)  # the hit comes after half a second
     assert tab.get_by_role("button", name="Pause").count() == 0

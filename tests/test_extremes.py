@@ -12,9 +12,9 @@ from delicate import CHAINS, chains_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judge import on_bounds
+from kernels import needs_numba
 from problem import Problem
 from stored import numbers
-from test_kernel import needs_numba
 
 from cradle import (
     Chain,

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from scipy.optimize import brentq, least_squares, minimize
 from scipy.stats import binom, chi2
+from shots import MASS, columns, outcome
 from stored import DATA, read
 
 from cradle import (
@@ -37,20 +38,6 @@ from cradle.fit.result import FOLDED, Group
 from cradle.fit.search import RISE, refine, scan
 from cradle.fit.tracks import Track
 
-MASS = {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}
-
-
-def columns(name, speeds, after, sigma, errors=None):
-    """Shots of the paper's balls as columns; `after` at unit speed of the striker."""
-    errors = np.zeros((len(speeds), len(name))) if errors is None else errors
-    rows = [
-        (name, shot, ball + 1, letter, MASS[letter], 0.0 if ball else speed,
-         speed * after[ball] + errors[shot][ball], sigma)
-        for shot, speed in enumerate(speeds) for ball, letter in enumerate(name)
-    ]  # fmt: skip
-    keys = ("set", "shot", "ball", "type", "mass", "before", "after", "sigma")
-    return dict(zip(keys, map(list, zip(*rows))))
-
 
 def any_shots(before, sigma, errors=None, moved=None):
     """Shots of balls A, B, C whichever of them move; ratio 0.1 to the right, 0.2 to the left."""
@@ -64,11 +51,6 @@ def any_shots(before, sigma, errors=None, moved=None):
                          after.velocities[ball] + error, sigma, uncertain))  # fmt: skip
     names = ("shot", "ball", "type", "mass", "before", "after", "sigma", "sigma_before")
     return read_shots({"set": ["ABC"] * len(rows)} | dict(zip(names, map(list, zip(*rows)))))
-
-
-def outcome(name):
-    chain, model = paper_chain(name, excess="saturate")
-    return collide(chain, model).velocities
 
 
 def pairs_of(name, error):
@@ -190,21 +172,6 @@ def test_mean_of_shots_at_different_speeds():
 
 
 # --- search ------------------------------------------------------------------------------------
-
-
-def test_scan_reports_every_minimum_and_a_union_of_intervals():
-    def chi(x):
-        return 1e4 * np.minimum((x[:, 0] - 0.3) ** 2, (x[:, 0] - 0.7) ** 2 + 1e-4)
-
-    (found,), _, _, lowest = scan(chi, np.ones(1))
-    assert lowest == pytest.approx(0, abs=1e-9)
-    np.testing.assert_allclose([m.value for m in found.modes], [0.3, 0.7], atol=1e-7)
-    np.testing.assert_allclose([m.excess for m in found.modes], [0, 1], atol=1e-7)
-    half, other = np.sqrt(RISE * 1e-4), np.sqrt((RISE - 1) * 1e-4)
-    expected = [(0.3 - half, 0.3 + half), (0.7 - other, 0.7 + other)]
-    np.testing.assert_allclose(found.intervals, expected, atol=1e-7)
-    (level,), *_ = scan(lambda x: 0 * x[:, 0], np.ones(1))
-    assert level.intervals == ((0.0, 1.0),)
 
 
 def test_scan_finds_minima_narrower_than_a_cell():

@@ -4,7 +4,7 @@ import json
 
 import pytest
 from click.testing import CliRunner
-from test_command import call
+from commands import call
 
 from cradle.command.solve import main
 from cradle.fit import ratio, read_shots, restitution

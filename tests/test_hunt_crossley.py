@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from chains import magnitudes
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from hunt_crossley import kept, motion
 
 from cradle import (
     Chain,
@@ -19,28 +18,6 @@ from cradle import (
 )
 
 LAW = {"damping": "hunt-crossley"}
-
-
-def kept(x):
-    """Restitution of two balls that close at x / A, from the integral of u du / (1 + A u)."""
-    return brentq(lambda e: x - np.log1p(x) + x * e + np.log1p(-x * e), 1e-9, min(1.0, 0.999 / x))
-
-
-def motion(m, v, k, loss, gaps, times):
-    """Velocities and forces of spheres on strings that pull all the time, by SciPy."""
-    rest = k * np.maximum(-gaps, 0.0) ** 1.5
-
-    def forces(y):
-        d, w = np.split(y, [len(m) - 1])
-        return np.maximum(k * np.maximum(d, 0.0) ** 1.5 * (1.0 - loss * np.diff(w)), 0.0)
-
-    def rate(_, y):
-        push = np.concatenate([[0.0], forces(y) - rest, [0.0]])
-        return np.concatenate([-np.diff(y[len(m) - 1 :]), -np.diff(push) / m])
-
-    start, bounds = np.concatenate([-gaps, v]), {"rtol": 1e-12, "atol": 1e-13, "max_step": 0.01}
-    y = solve_ivp(rate, (0.0, times[-1]), start, "DOP853", t_eval=times, **bounds).y.T
-    return y[:, len(m) - 1 :], np.array([forces(one) for one in y])
 
 
 @pytest.mark.parametrize(("x", "p"), [*itertools.product((0.05, 0.4, 0.9), (1.0, 1.5, 2.2))])

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import tqdm
 from chains import random_chains, with_ends
+from kernels import needs_numba
 from plain import solve
 
 from cradle import (
@@ -55,9 +56,6 @@ def fresh_runtime(monkeypatch):
     # The caches of this process are kept: to load compiled code again would take seconds.
     for name in ("available", "compiled", "_stored", "_announce", "_found"):
         monkeypatch.setattr(runtime, name, functools.cache(vars(runtime)[name].__wrapped__))
-
-
-needs_numba = pytest.mark.skipif(not runtime.available(), reason="numba is not installed")
 
 
 def mixed_chains(seed, count):

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from chains import magnitudes, uniform
 from delicate import CHAINS, chains_of
+from kernels import needs_numba
 from plain import solve as solved
-from test_kernel import needs_numba
 
 from cradle import ImpactNotFinished, outcomes, paper_chain, post_impact_velocities
 from cradle.kernel.state import FINISHED, LIMITS

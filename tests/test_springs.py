@@ -12,10 +12,10 @@ from chains import SPRINGS, magnitudes, striking, uniform
 from dop853 import integrated
 from hypothesis import given
 from hypothesis import strategies as st
+from kernels import needs_numba
 from mpmath import zeta
 from scipy.integrate import quad
 from scipy.special import gamma
-from test_kernel import needs_numba
 
 from cradle import (
     Chain,

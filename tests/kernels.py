@@ -1,0 +1,7 @@
+"""What a test of compiled code needs."""
+
+import pytest
+
+from cradle.runtime import compile as runtime
+
+needs_numba = pytest.mark.skipif(not runtime.available(), reason="numba is not installed")
