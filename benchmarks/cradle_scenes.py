@@ -95,7 +95,7 @@ def scene(engine, setting, pulled, *, mend, gap=0.0, law=None):
     bodies = program.cradle(pulled, ANGLE, mend=mend, gap=gap, **chosen)
     advance = bodies.advance
     if mend:
-        row, step = program.mended(bodies), mended_step
+        row, step = program.mended(bodies, MODELS["ratio"]), mended_step
         advance = row.step
         if law is not None:
             row.chain, row.model = Chain([1] * BALLS, [0] * BALLS, law[0]), law[1]

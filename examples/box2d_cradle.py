@@ -4,11 +4,13 @@ import math
 
 from Box2D import b2CircleShape, b2Filter, b2FixtureDef, b2World
 
-from cradle import Chain, ImpulseCorrelation
+from cradle import Chain, SpringChain, warm_up
 from cradle.row import Row
 
 BALLS, RADIUS, LENGTH, MASS = 5, 0.1, 1.0, 1.0  # m, kg
 ANGLE = math.radians(30)
+# Spheres; the outer balls are apart, as on a desk strikers come one by one.
+TOY = SpringChain(1e10, gaps=[4e-4, 0, 0, 4e-4])  # N/m^1.5, m
 
 
 class Bodies:
@@ -64,14 +66,15 @@ def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=(8, 3)):
     return Bodies(world, balls, iterations)
 
 
-def mended(bodies):
+def mended(bodies, law=TOY):
     """Let the package solve the impacts of the row."""
     chain = Chain([MASS] * BALLS, [0] * BALLS, restitution=1)
     pivots = [(2 * RADIUS * i, 0) for i in range(BALLS)]
-    return Row(bodies, chain, ImpulseCorrelation(0.1325), RADIUS, pivots)
+    return Row(bodies, chain, law, RADIUS, pivots)
 
 
 if __name__ == "__main__":
+    warm_up()
     row = mended(cradle())
     for step in range(5001):
         if step % 500 == 0:  # how far each ball is out

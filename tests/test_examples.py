@@ -20,6 +20,7 @@ PROGRAMS = {
 }
 DISTRIBUTIONS = {"Box2D": "box2d"}
 STEP, GRAVITY = 1e-3, 9.81
+LAW = ImpulseCorrelation(0.1325)
 #: Relative rounding of an engine's numbers: Box2D and Rapier have single precision.
 SINGLE = 1e-5
 
@@ -81,11 +82,11 @@ def test_an_adapter_tells_and_does_what_a_row_asks(program):
 def test_one_impact_is_that_of_collide(program):
     """Velocities, and with them momentum and energy, from the model and back into the engine."""
     bodies = program.cradle(pulled=0)
-    row = program.mended(bodies)
+    row = program.mended(bodies, LAW)
     bodies.push(0, (1.5, 0.0))
     row.step(STEP)
     _, v = motion(bodies)
-    expected = collide(Chain([1] * 5, [1.5, 0, 0, 0, 0]), ImpulseCorrelation(0.1325)).velocities
+    expected = collide(Chain([1] * 5, [1.5, 0, 0, 0, 0]), LAW).velocities
     np.testing.assert_allclose(v[:, 0], expected, atol=5e-5)
     rise = expected**2 / program.LENGTH * STEP  # up the arc, for one step
     np.testing.assert_allclose(v[:, 1], 0, atol=2 * rise.max())
@@ -100,7 +101,7 @@ def test_ten_strokes(program, pulled):
     duration = 10.5 * math.pi / period
     alone = program.cradle(pulled=5)
     bodies = program.cradle(pulled)
-    row = program.mended(bodies)
+    row = program.mended(bodies, LAW)
     start, started = energies(program, bodies), energies(program, alone)
     least = 0.0
     for _ in range(round(duration / STEP)):
@@ -114,7 +115,7 @@ def test_ten_strokes(program, pulled):
     hanging = Pendulums(length=program.LENGTH, gravity=GRAVITY, angle="full")
     angles = [-program.ANGLE] * pulled + [0.0] * (5 - pulled)
     run = swing(
-        Chain([1] * 5, [0] * 5), ImpulseCorrelation(0.1325), angles, [0, duration],
+        Chain([1] * 5, [0] * 5), LAW, angles, [0, duration],
         pendulums=hanging,
     )  # fmt: skip
     each = 0.5 * run.velocities[-1] ** 2 + 2 * GRAVITY * np.sin(run.positions[-1] / 2) ** 2
@@ -141,7 +142,7 @@ def test_an_engine_alone_moves_its_balls_otherwise(program):
 def test_hanging_balls_are_looked_at_every_hundredth_of_a_second(program):
     """A step with the row then costs little more than one of the engine."""
     bodies = program.cradle(pulled=0)
-    row = program.mended(bodies)
+    row = program.mended(bodies, LAW)
     looks, motion = [], bodies.motion
     bodies.motion = lambda: looks.append(1) or motion()
     for _ in range(1000):
