@@ -373,22 +373,22 @@ def test_an_engine_repeats_what_is_stored_with_tiny_gaps(name):
 
 
 def test_the_recipe_tells_where_the_energy_is():
-    """Beside what is left, in brackets: the part of it on the ball that has most."""
+    """How much of it is on the ball that has most, and how much is left."""
     chapter = Chapter("recipe")
     (output,) = chapter.cells["recipe-table"].outputs
     lines = re.findall(r"<tr>(.*?)</tr>", output.data["text/html"], flags=re.S)
     cells = [re.findall(r"<t[hd]>(.*?)</t[hd]>", line) for line in lines]
-    rows = [row for row in cells if len(row) == 4]
+    rows = [row for row in cells if len(row) == 5 and row[1].isdigit()]
     assert [name for name, *_ in rows[::2]] == ENGINES
     assert {name for name, *_ in rows[1::2]} == {"… refined"}
-    for k, (_, own, row, alone) in enumerate(rows):
+    for k, (_, *told) in enumerate(rows):
         name, setting = ENGINES[k // 2], ("default", "refined")[k % 2]
-        for how, cell in (("as it is", own), ("mended", row)):
-            end = run(name, how, setting)[-1]
-            most = end.max() / end.sum()
-            assert cell == f"{100 * end.sum():.0f}\u00a0({100 * most:.0f})"
-            assert (most > 0.95) if how == "mended" else (most < 0.6), (name, setting)
-        assert alone == f"{100 * run(name, 'no impacts', setting, 5)[-1].sum():.0f}"
+        own, row = (run(name, how, setting)[-1] for how in ("as it is", "mended"))
+        alone = run(name, "no impacts", setting, 5)[-1]
+        parts = own.max() / own.sum(), row.max() / row.sum(), row.sum(), alone.sum()
+        assert told == [f"{100 * part:.0f}" for part in parts]
+        assert parts[0] < 0.6, (name, setting)
+        assert parts[1] > 0.95, (name, setting)
     end = run(*HERTZ)[-1]
     assert chapter.glued["one"] == f"{100 * end.max() / end.sum():.0f}"
 
