@@ -278,10 +278,9 @@ def _best(
         raise _Unfit(f"accuracy = {wish.accuracy!r}", f"{told} {on}")
     fit = [row for row, error in zip(settings, errors, strict=True) if error <= wish.accuracy]
     row = min(fit, key=lambda row: row.seconds)
-    apart = row.model_error if where == "here" else None
     two = len(chain) == 2
-    if wish.elastic and (springs or two):
-        apart = 0.0
+    here = row.model_error if where == "here" else None
+    apart = 0.0 if wish.elastic and (springs or two) else here
     if wish.model_error is not None and (apart is None or apart > wish.model_error):
         known = "was not measured here" if apart is None else f"is {apart:.2g}"
         raise _Unfit(f"model_error = {wish.model_error!r}", f"that of {name} {known}")

@@ -30,9 +30,7 @@ _UNITS: dict[str, tuple[dict[str, float], float, str, str]] = {
     "mass_unit": ({"kg": 1.0, "g": 1e-3}, 5.0, "grams", "g"),
     "velocity_unit": ({"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}, 20.0, "cm/s", "cm/s"),
 }
-# What a number must be, and its lowest value.
-_RULES = {"mass": ("must be above 0", 0.0), "sigma": ("must be above 0", 0.0),
-          "sigma_before": ("must be at least 0", 0.0)}  # fmt: skip
+_RULES = {"mass": ABOVE_ZERO, "sigma": ABOVE_ZERO, "sigma_before": ("must be at least 0", 0.0)}
 _BEYOND = 5.0  # standard errors from which on a defect of a measurement counts
 _MEASURED = ("before", "after", "sigma", "sigma_before")
 _Row = dict[str, Any]  # cells by column, in kg and m/s, and under "where" the place in the source
@@ -187,8 +185,7 @@ def _number(where: str, line: dict[str, Any], name: str, units: dict[str, str | 
     except ValueError:
         words = f"{line[name]!r}; must be a number, its decimals after a point"
         raise ValueError(f"{place} = {words}") from None
-    rule, low = _RULES.get(name, ("must be finite", -np.inf))
-    value = one_number(place, value, rule, low, open_low="above" in rule)
+    value = one_number(place, value, *_RULES.get(name, ()))
     if name == "ball":
         return value
     unit = "mass_unit" if name == "mass" else "velocity_unit"

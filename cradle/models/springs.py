@@ -189,10 +189,7 @@ class Path:
         return np.where(self.collisions > 0, passed, 0.0)
 
     def events(self) -> tuple[Vector, tuple[Event, ...], Vector, Vector]:
-        """Return times, events, velocities and forces, these and the times from the start on.
-
-        Collisions, durations and works are booked beside.
-        """
+        """Book collisions, durations, works; return times, events, velocities and forces there."""
         from scipy.interpolate import CubicHermiteSpline as Cubic  # slow to import
 
         self.collisions = self.closed[0].astype(np.int64)

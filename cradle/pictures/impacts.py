@@ -4,6 +4,7 @@ Balls and impulses carry the paper's numbers here: ball i is B(i + 1) with veloc
 the impulse of contact c is tau(c + 2). With a colour always goes a dash, a marker or a letter.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -52,10 +53,15 @@ def _impulse(contact: int) -> str:
     return "impulse " + _indexed(r"\tau", contact + 2) + " (N s)"
 
 
-def _axes_or_new(ax: Axes | None) -> Axes:
-    if ax is None:
-        return plt.subplots(figsize=(5.6, 3.9), layout="constrained")[1]
-    return must_be(Axes, "ax", ax)
+def _lines(ax: Axes | None, over: str, x: Vector, path: Vector, balls: Sequence[int]) -> Axes:
+    """Draw the velocities of some balls over an impulse, on new axes if there are none."""
+    ax = plt.subplots(figsize=(5.6, 3.9), layout="constrained")[1] if ax is None else ax
+    for ball in balls:
+        label = _indexed("v", ball + 1)
+        must_be(Axes, "ax", ax).plot(x, path[:, ball], label=label, lw=2, **ball_style(ball))
+    ax.set(xlabel=over, ylabel="velocity (m/s)")
+    ax.grid(alpha=0.3)
+    return ax
 
 
 def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
@@ -71,15 +77,10 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     >>> [line.get_label() for line in ax.get_lines()]
     ['$v_1$', '$v_2$', '$v_3$']
     """
-    must_be(Trace, "trace", trace)
-    ax = _axes_or_new(ax)
-    impulses, path = trace.curve()
-    for ball, velocity in enumerate(path.T):
-        label = _indexed("v", ball + 1)
-        ax.plot(impulses.sum(axis=1), velocity, label=label, lw=2, **ball_style(ball))
-    ax.set(xlabel="sum of all impulses (N s)", ylabel="velocity (m/s)")
+    impulses, path = must_be(Trace, "trace", trace).curve()
+    balls, over = range(path.shape[1]), "sum of all impulses (N s)"
+    ax = _lines(ax, over, impulses.sum(axis=1), path, balls)
     ax.margins(x=0)
-    ax.grid(alpha=0.3)
     beside = min(len(trace.chain), 6)  # a longer legend takes several lines
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=beside, frameon=False)
     return ax
@@ -105,13 +106,9 @@ def velocity_impulse(
     """
     last = len(must_be(Trace, "trace", trace).impulses) - 1
     contact = whole_number("contact", contact, f"0 to {last}", 0, last)
-    ax = _axes_or_new(ax)
     impulses, path = trace.curve()
-    for ball in (contact, contact + 1):
-        label = _indexed("v", ball + 1)
-        ax.plot(impulses[:, contact], path[:, ball], label=label, lw=2, **ball_style(ball))
-    ax.set(xlabel=_impulse(contact), ylabel="velocity (m/s)")
-    ax.grid(alpha=0.3)
+    balls = contact, contact + 1
+    ax = _lines(ax, _impulse(contact), impulses[:, contact], path, balls)
     _mark_events(trace, contact, ax)
     if other is not None:
         impulse_axis(trace, contact, other, ax)

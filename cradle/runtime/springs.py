@@ -27,11 +27,8 @@ def solve(
     stop: threading.Event | None = None, record: list[Any] | None = None,
     pause: Callable[[int], object] | None = None,
 ) -> tuple[int, int, Any]:  # fmt: skip
-    """Follow the chains, until `stop` is set; return the next one's number, how the last ended.
-
-    And its clock.  The pages of one chain are written to a `record`, at the step in `out`; `pause`
-    is told the steps of a chain so far.
-    """
+    """Follow chains until `stop`; return the next one's number, how the last ended, its clock."""
+    # A `record` takes the pages of one chain, at the step in `out`; `pause` the steps so far.
     (rows, n), k, status = out.v.shape, 0, FINISHED
     compiled: bool | None = None
     pages = np.empty((0 if record is None else _PAGES + 2, 4, n))
