@@ -107,8 +107,7 @@ class Row(Alone):
         pivots: ArrayLike | None = None, *, touching: float | None = None,
         resting: float | None = None, acceleration: float = 9.81,
     ) -> None:  # fmt: skip
-        missing = [name for name in ("motion", "push", "advance") if not hasattr(bodies, name)]
-        if missing:
+        if missing := [x for x in ("motion", "push", "advance") if not hasattr(bodies, x)]:
             what = f"bodies is {a(type(bodies).__name__)} without {', '.join(missing)}"
             raise TypeError(f"{what}; must be an adapter with motion, push and advance")
         x = bodies.motion()[0]
