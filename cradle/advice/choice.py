@@ -71,7 +71,7 @@ class Recommendation:
         numerical, apart = (
             "not measured" if error is None else f"{error:.1e}" if error else "0, by definition"
             for error in (self.numerical_error, self.model_error)
-        )  # fmt: skip
+        )
         if self.numerical_error is None and isinstance(self.model, SpringChain):
             numerical = f"{self.model.accuracy:g} at most by its own estimate; not measured"
         time = "not measured" if self.seconds is None else lasting(self.seconds)

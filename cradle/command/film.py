@@ -26,8 +26,7 @@ _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 @click.option("--position-unit", type=click.Choice([*_SIZES, "px"]),
               help="Of positions, where the file does not say it [m].")  # fmt: skip
 @click.option("--scale", type=float, help="Pixels in a metre.")
-@click.option("--window", type=float,
-              help="Time used before and after, s [the longest that fits].")  # fmt: skip
+@click.option("--window", type=float, help="Time used before and after, s [the longest that fits].")
 @click.option("--slower", default=1.0, help="8 if 240 pictures a second play at 30 [1].")
 @click.option("--header", is_flag=True, help="Print the names of the columns too.")
 def film(

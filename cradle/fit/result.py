@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Columns of the table of a fit.
-RESULT_COLUMNS = ("name", "kind", "value", "intervals", "minima", "identified", "at_bound",
-                  "bound")  # fmt: skip
+RESULT_COLUMNS = ("name", "kind", "value", "intervals", "minima", "identified", "at_bound", "bound")
 _DRAWS = 4000  # from the fitted parameters, for a prediction
 # A set that is so much longer on one side than on the other is no bell curve's; what is said then.
 SKEW = 1.3

@@ -170,7 +170,7 @@ class _Film:
             "damping": (0.0, np.pi / period, 1e-2 / period, [0.0]),
             "restitution": (0.0, 1.0, 1e-3, [0.997, 0.99, 0.97, 0.9, 0.7]),
             "gaps": (0.0, size, 1e-3 * size, size * np.append(0.0, np.geomspace(1e-4, 0.1, 13))),
-        }  # limits, first steps, and where to begin  # fmt: skip
+        }  # limits, first steps, and where to begin
         used = [rows[name] for name in self.names]
         used += [(-2.0 * size, 2.0 * size, 1e-3 * size, [place]) for place in x]
         used.append((-100.0 / period, 100.0 / period, 1e-2 / period, [x @ v / (x @ x)]))
