@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cradle.chain import Chain
 from cradle.input import values as asked
-from cradle.input.values import Vector
+from cradle.input.values import ArrayLike, Vector
 from cradle.kernel.kinks import Law, Springs
 from cradle.models.batch import fail, in_order, rows_of, shaped
 from cradle.models.energy import fastest
