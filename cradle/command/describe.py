@@ -75,7 +75,7 @@ class Described(NamedTuple):
     taken: cradle.Chain  # as the model takes it: springs have a viscosity, not a restitution
     model: cradle.Model
     assumed: tuple[str, ...]
-    letters: str = ""
+    letters: str
 
     @property
     def note(self) -> str:
@@ -118,7 +118,7 @@ def described(
         letters = str(sequence).upper()
         chain, law = cradle.paper_chain(letters, striker, excess=excess)
     else:
-        letters, before = "", velocities or [striker] + [0.0] * (len(masses) - 1)
+        letters, before = "-" * len(masses), velocities or [striker] + [0.0] * (len(masses) - 1)
         balls = [UNITS[unit or "kg"] * m for m in masses]
         chain = cradle.Chain(balls, before, one_or_all(restitution or [1.0]))
         assumed += [] if velocities else [f"the first ball strikes at {striker:g} m/s"]

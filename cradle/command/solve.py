@@ -91,9 +91,8 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
     given = described(**options)
     chain = given.chain
     trace = collide(given.taken, given.model, progress=True)
-    letters = given.letters or "-" * len(chain)
     rows = [
-        {"ball": k + 1, "type": letters[k], "mass": float(chain.masses[k]),
+        {"ball": k + 1, "type": given.letters[k], "mass": float(chain.masses[k]),
          "before": float(chain.velocities[k]), "after": float(trace.velocities[k]) + 0.0}
         for k in range(len(chain))
     ]  # fmt: skip

@@ -106,18 +106,17 @@ def outcomes(
         paper.check_values(options.bounded, *given.values())
     whole, large = outputs(count, n), count * n >= LARGE
 
-    def solve(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
-        """Solve the chunk of chains that begins there; return how it ended, and where."""
-        rows = slice(begin, min(begin + CHUNK, count))
+    def solve(rows: slice, stop: threading.Event | None = None) -> tuple[int, int]:
+        """Solve these chains; return how the last of them ended, and where."""
         part = Inputs(*(rows_of(array, lead, rows) for array in arrays))
         v, hits, collapsed, margin, *last = whole
         out = Outputs(v[rows], hits[rows], collapsed[rows], margin[rows], *last)
         job = Job(part, out, options, large=large).run(stop)
         # Not the job: its arrays would wait for those of the chunks before.
-        return job.status, begin + job.next
+        return job.status, rows.start + job.next
 
     # At the first failure in the order of the chains; none has been returned before.
-    for status, failed in in_order(solve, range(0, count, CHUNK), progress):
+    for status, failed in in_order(solve, count, CHUNK, progress):
         if status == REFUSED:
             paper.raise_refused(options.bounded, *given.values())
         if status != FINISHED:
@@ -168,23 +167,24 @@ def shaped(
 
 
 def in_order(
-    solve: Callable[..., tuple[int, int]], starts: range, progress: bool
+    solve: Callable[..., tuple[int, int]], count: int, size: int, progress: bool
 ) -> Iterable[tuple[int, int]]:
-    """Yield the results of `solve` in order, made by as many threads as there are processors."""
+    """Solve chunks of that size on all processors; yield what `solve` returns, in order."""
+    chunks = [slice(begin, min(begin + size, count)) for begin in range(0, count, size)]
     if flag("progress", progress):
         from tqdm import tqdm
 
-        ended = in_order(solve, starts, progress=False)
-        yield from tqdm(ended, total=len(starts), unit="chunk")
-    elif len(starts) < 2 or (workers := min(len(starts), os.cpu_count() or 1)) < 2:
-        yield from map(solve, starts)
+        ended = in_order(solve, count, size, progress=False)
+        yield from tqdm(ended, total=len(chunks), unit="chunk")
+    elif (workers := min(len(chunks), os.cpu_count() or 1)) < 2:
+        yield from map(solve, chunks)
     else:
         from concurrent.futures import ThreadPoolExecutor
 
         stop = threading.Event()
         with ThreadPoolExecutor(workers) as pool:
             try:
-                yield from pool.map(solve, starts, itertools.repeat(stop))
+                yield from pool.map(solve, chunks, itertools.repeat(stop))
             finally:
                 stop.set()
                 pool.shutdown(cancel_futures=True)

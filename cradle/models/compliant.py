@@ -220,15 +220,14 @@ def spring_outcomes(
     law = Law(p, accuracy, float(MOST_STEPS), False, damping == DAMPING[1])
     out, error = np.empty((count, n)), np.empty(count)
 
-    def run_chunk(begin: int, stop: threading.Event | None = None) -> tuple[int, int]:
-        """Solve the chunk of chains that begins there; return how it ended, and where."""
-        rows = slice(begin, min(begin + _CHUNK, count))
+    def run_chunk(rows: slice, stop: threading.Event | None = None) -> tuple[int, int]:
+        """Solve these chains; return how the last of them ended, and where."""
         part = Springs(*(rows_of(array, lead, rows) for array in arrays))
-        found = room(rows.stop - begin, n)._replace(v=out[rows], error=error[rows])
+        found = room(rows.stop - rows.start, n)._replace(v=out[rows], error=error[rows])
         at, status, _ = solve(part, law, found, count * n >= LARGE, stop)
-        return status, begin + at
+        return status, rows.start + at
 
-    for status, at in in_order(run_chunk, range(0, count, _CHUNK), progress):
+    for status, at in in_order(run_chunk, count, _CHUNK, progress):
         if status == FINISHED:
             continue
         check_rows(arrays)
