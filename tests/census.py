@@ -35,7 +35,7 @@ MODELS = {
     "kernel": [LAW(0.1, 0.05, excess="saturate"), LAW(1, excess="saturate", meeting=0.2), LAW(0)],
     "sequential": [cradle.SequentialCollisions(x, max_events=300) for x in ("left", "right")],
     "springs": [cradle.SpringChain(2.0, 1.5), cradle.SpringChain(1.0, 1.0)],
-    "energy": [SHARES(1.0, **FEW), SHARES(1.0, gaps=True, **FEW)],
+    "energy": [SHARES(1.0, **FEW)],
     "quadratic": [cradle.QuadraticDissipation(distance=x, max_problems=50) for x in (0, 0.1)],
 }
 REFUSED = """

@@ -77,7 +77,7 @@ ENTRIES = {
     cradle.ConstantLoss: {"speed": 0.1},
     cradle.ViscousLoss: {"viscosity": 1e-3, "masses": [1, 1]} | SPRINGS,
     SpringChain: FORCES | {"max_steps": 10_000},
-    EnergyDistribution: SPRINGS | {"rtol": 1e-6, "max_evaluations": 10_000, "gaps": True},
+    EnergyDistribution: SPRINGS | {"rtol": 1e-6, "max_evaluations": 10_000},
     cradle.spring_velocities: MANY | FORCES,
     cradle.spring_outcomes: MANY | FORCES,
     cradle.hertz_stiffness: {"radii": [0.01, 0.01], "young": 1e9, "poisson": 0.3},

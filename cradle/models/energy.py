@@ -51,7 +51,8 @@ class EnergyDistribution:
     E is the energy that a contact stores.  With the closing speed u it changes by ``dE = u dP`` in
     compression (u > 0) and by ``dE = u dP / e^2`` in release (u < 0), so it is used up when the
     part e^2 of the work absorbed has been given back.  With e = 0 it is lost at u = 0; the contact
-    ends there, and closes anew if a neighbour pushes on.
+    ends there, and closes anew if a neighbour pushes on.  What has ended leaves a gap that must
+    close before the contact acts again, as between springs.
 
     A spring with the force ``F = k x^p`` stores ``E = k x^(p+1) / (p + 1)``, so impulses grow like
     forces of springs, ``dP = F dt`` with a common t, where ``dx/dt = u`` in compression and
@@ -64,10 +65,6 @@ class EnergyDistribution:
         k of each contact, above 0; only ratios count.
     exponent : float
         p, at least 1: 1 a linear spring, 3/2 the contact of two elastic spheres (Hertz).
-    gaps : bool
-        Whether a contact that has ended leaves a gap that must close before it acts again, as
-        between springs.  If not, it acts as soon as its balls approach, as in the authors' program
-        (OSNSMultipleImpact of Siconos, https://siconos.org).
     rtol : float
         Relative tolerance of the integration.  An impact that goes on with speeds alone below rtol
         times that of the fastest closing is ended plastically.
@@ -83,7 +80,6 @@ class EnergyDistribution:
 
     stiffness: float | Sequence[float] = 1.0
     exponent: float = 1.5
-    gaps: bool = field(default=True, kw_only=True)
     rtol: float = field(default=1e-9, kw_only=True)
     max_evaluations: int = field(default=1_000_000, kw_only=True)
 
@@ -92,7 +88,6 @@ class EnergyDistribution:
             stiffness=asked.number_or_row("stiffness", self.stiffness, "N - 1", *asked.ABOVE_ZERO),
             exponent=asked.one_number("exponent", self.exponent, "must be at least 1", 1.0),
             rtol=asked.one_number("rtol", self.rtol, "must lie in [3e-14, 0.1]", 3e-14, 0.1),
-            gaps=asked.flag("gaps", self.gaps),
             max_evaluations=asked.whole_number("max_evaluations", self.max_evaluations),
         )
 
@@ -138,7 +133,7 @@ class _Process:
     def __init__(self, m: Vector, u: Vector, k: Vector, e: Vector, model: EnergyDistribution):
         n, p = len(m), model.exponent
         self.m, self.u, self.k, self.e, self.p = m, u, k, e, p
-        self.gaps, self.rtol, self.most = model.gaps, model.rtol, model.max_evaluations
+        self.rtol, self.most = model.rtol, model.max_evaluations
         self.reduced = m[:-1] / (m[:-1] + m[1:]) * m[1:]
         self.t, self.y = 0.0, np.zeros(3 * n - 2)
         # Absolute tolerance, in units of the first collision, but of each contact's own stiffness.
@@ -190,7 +185,7 @@ class _Process:
         """Run to the last separation."""
         self.settle([])
         self.record = self.record[:1]  # what touches from the start does not close
-        while self.closed.any() or (self.gaps and (self.speeds(self.y) > self.rtol).any()):
+        while self.closed.any() or (self.speeds(self.y) > self.rtol).any():
             self.integrate()
         self.part()
 
@@ -199,7 +194,7 @@ class _Process:
         from scipy.integrate import solve_ivp  # slow to import
 
         released = np.divide(1.0, self.e**2, out=np.ones_like(self.e), where=self.e > 0.0)
-        self.weights = np.where(self.closed & ~self.loading, released, self.closed | self.gaps)
+        self.weights = np.where(self.closed & ~self.loading, released, 1.0)
         # Balls at rest together that nothing touches have no events.
         moving = (self.depths(self.y) != 0.0) | (self.speeds(self.y) != 0.0)
         contacts = np.flatnonzero(self.closed | moving).tolist()
@@ -234,8 +229,7 @@ class _Process:
 
     def watched(self, c: int) -> tuple[Any, Any]:
         """Return SciPy's events of contact c: it opens or closes; and it turns."""
-        own = self.depths if self.closed[c] or self.gaps else self.speeds
-        crossing = _leaving(1.0 if self.closed[c] else -1.0, own, c)
+        crossing = _leaving(1.0 if self.closed[c] else -1.0, self.depths, c)
         # Where a closed contact turns the rate has a kink, unless e = 1: no step may cross it.
         if self.closed[c]:
             return crossing, _leaving(1.0 if self.loading[c] else -1.0, self.speeds, c)
@@ -257,9 +251,6 @@ class _Process:
         change, d, _ = self.parts(self.y)
         self.largest = np.maximum(self.largest, np.abs(change))
         d[crossed] = 0.0
-        if not self.gaps:
-            # Where several end at one instant, rounding shows gaps that rigid balls never close.
-            np.maximum(d, 0.0, out=d)
         # The limit of e to zero: what is stored is lost at u = 0.
         plastic = self.closed & ~self.loading & (self.e == 0.0)
         d[plastic] = 0.0
