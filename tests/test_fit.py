@@ -174,11 +174,13 @@ def test_mean_of_shots_at_different_speeds():
 # --- search ------------------------------------------------------------------------------------
 
 
-def test_scan_finds_minima_narrower_than_a_cell():
+def test_scan_finds_minima_narrower_than_a_cell_and_level_stretches():
     (found,), *_ = scan(lambda x: 1e10 * (x[:, 0] - 0.30071) ** 2, np.ones(1))
     assert found.modes[0].value == pytest.approx(0.30071, abs=1e-8)
     ((low, high),) = found.intervals
     assert high - low == pytest.approx(2 * np.sqrt(RISE * 1e-10), rel=1e-3)
+    (level,), *_ = scan(lambda x: 0 * x[:, 0], np.ones(1))
+    assert level.intervals == ((0.0, 1.0),)
 
 
 def test_refine_where_the_grid_is_far_above_the_minimum():
