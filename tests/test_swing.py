@@ -187,19 +187,6 @@ def test_damping_between_impacts():
         v = impact.after
 
 
-def test_drift_of_five_balls():
-    """All energy but that of the common swing dies out; in the end the balls swing together."""
-    n = 5
-    run = swing(balls(n, 0.9), ImpulseCorrelation(0.15), pulled(n), [60.0], pendulums=ONE_HERTZ)
-    relative = [np.var(impact.after) for impact in run.impacts]
-    assert relative[29] < 1e-2 * relative[0]
-    # No more impacts, energy of the mean velocity.
-    assert run.together == (0, 1, 2, 3)
-    assert run.impacts[-1].time < 59
-    assert run.energy[-1] == pytest.approx(0.5 * n * (0.02 * 2 * math.pi / n) ** 2, rel=1e-12)
-    assert np.ptp(run.positions[-1]) < 1e-13
-
-
 def springs(y, span, m, k, pendulums, viscosity=0.0, **options):
     """Pendulums with spheres that push each other, integrated in time: places, then velocities."""
     m, n = np.asarray(m, float), len(m)
