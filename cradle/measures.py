@@ -99,12 +99,12 @@ def _events_at_balls(trace: Trace) -> list[list[Event]]:
     return [[one for one in seen if ball - one.contact in (0, 1)] for ball in balls]
 
 
-def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
+def effective_ratio(trace: Trace) -> float:
     """Return the constant ratio that gives the outcome of an impact of three balls.
 
     It lies between 0 and its bound (Eq. 34) and acts in both directions, as in
     `ImpulseCorrelation(ratio)`, held at its bound where one is smaller.  If several give the
-    outcome within `tolerance`, as a part of the fastest closing speed, it is the smallest.
+    outcome within 1e-6 of the fastest closing speed, it is the smallest.
     Outcomes that lose no energy differ by one number, so that one ratio often suffices; with losses
     there is in general none, and the `ValueError` names the one that comes nearest.  Not three
     balls, and none that approach, are a `ValueError` too.
@@ -115,7 +115,6 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     >>> round(effective_ratio(collide(Chain([1, 1, 1], [1, 0, 0]), SpringChain(1.0))), 6)
     0.132503
     """
-    tolerance = one_number("tolerance", tolerance, "must be at least 0", 0.0)
     from scipy.optimize import brentq  # slow to import
 
     chain, target = must_be(Trace, "trace", trace).chain, trace.velocities
@@ -146,9 +145,9 @@ def effective_ratio(trace: Trace, *, tolerance: float = 1e-6) -> float:
     # The outcome can be that of an end, and rounding hide the change of sign there.
     candidates = np.array([*found, *grid[side == 0.0], 0.0, bound])
     far = np.abs(distances(candidates)).max(axis=1)
-    if (far <= tolerance).any():
+    if (far <= 1e-6).any():
         # The smallest that fits; but an end that fits beside a root gives way to the root.
-        beside = candidates <= candidates[far <= tolerance].min() + grid[1]
+        beside = candidates <= candidates[far <= 1e-6].min() + grid[1]
         return float(candidates[np.argmin(np.where(beside, far, np.inf))])
     near = np.abs(missed).max(axis=1).argmin()
     finer = np.linspace(grid[max(near - 1, 0)], grid[min(near + 1, 256)], 257)

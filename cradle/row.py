@@ -66,8 +66,7 @@ class Row(Alone):
     touching, resting : float, optional
         Neighbours touch, and are struck together, whose gap is at most this, m, while they close or
         part no faster than that, m/s; so do those that meet.  Slower than that they go on together.
-        The law does not see the engine's gap; `SpringChain` has gaps of its own.  If left out,
-        r / 1000 and sqrt(a r) / 100, with the smallest radius r.
+        Laws do not see the gap.  If left out, r / 1000 and sqrt(a r) / 100, r the smallest radius.
     acceleration : float
         The acceleration a of gravity, m/s^2, or what else draws neighbours together at most.
 

@@ -118,7 +118,9 @@ class Trace:
         rows["contact"] = pd.array(contacts, dtype="Int64")
         impulses = np.pad(self.path_impulses, ((0, 0), (1, 1)))
         parts = {"velocity": self.path, "left": impulses[:, :-1], "right": impulses[:, 1:]}
-        return by_ball(len(self.chain), rows, parts)
+        table = {name: np.repeat(values, len(self.chain)) for name, values in rows.items()}
+        table["ball"] = np.tile(np.arange(len(self.chain)), len(self.path))
+        return pd.DataFrame(table | {name: part.ravel() for name, part in parts.items()})
 
     def curve(self) -> tuple[Vector, Vector]:
         """Return impulses (N s) and velocities (m/s) that straight lines join in a picture."""
@@ -148,15 +150,6 @@ class Trace:
     def __repr__(self) -> str:
         counts = f"collisions={self.collisions.tolist()}, collapsed={self.collapsed}"
         return f"Trace(velocities={as_text(self.velocities)}, {counts})"
-
-
-def by_ball(balls: int, rows: dict[str, Any], parts: dict[str, Vector]) -> "pd.DataFrame":
-    """Return a table with each of these rows once for each ball, and the ball's part of it."""
-    import pandas as pd
-
-    columns = {name: np.repeat(values, balls) for name, values in rows.items()}
-    columns["ball"] = np.tile(np.arange(balls), len(next(iter(rows.values()))))
-    return pd.DataFrame(columns | {name: part.ravel() for name, part in parts.items()})
 
 
 class ImpactNotFinished(RuntimeError):

@@ -126,7 +126,7 @@ def shown() -> Iterator[bytes]:
         yield told(impacts.velocity_impulse(trace, 1, other=0))
     still, times = cradle.Chain([1] * 3, [0] * 3), np.linspace(0, 2, 21)
     run = cradle.swing(still, MODELS["sequential"][0], [-0.02, 0, 0], times)
-    yield told([run, run.impacts, run.to_frame().to_json()])
+    yield told([run, run.impacts, run.positions, run.velocities])
     yield told([animation.animate_swing(run, labels=["a"]), cradle.ratio_table().to_json()])
     for wanted, n in product(("velocities", "fastest ball", "times", "path"), (1, 10**6)):
         yield answer(cradle.recommend, chain, wanted=wanted, impacts=n, stiffness=1, ratios=0.1)

@@ -445,7 +445,7 @@ def test_once_ends_when_all_contacts_have_opened():
     first = law.solve(Chain([1, 1, 1], [1, 0, 0]), once=True)
     np.testing.assert_allclose(first.velocities, [0, 1, 0], atol=1e-9)
     np.testing.assert_allclose(law.solve(first.chain).velocities, [0, 0, 1], atol=1e-9)
-    seconds, way = first.parted()
+    seconds, way = first._until_apart()
     late = seconds - (0.1 + first.durations[0])  # the first node after it
     assert 0.0 <= late < 0.01
     assert way[0] - way[1] == pytest.approx(0.1 - late, abs=1e-6)

@@ -697,10 +697,7 @@ def test_ends():
     assert (by_count.ended, len(by_count.impacts)) == ("impacts", 3)
     assert by_count.end == by_count.impacts[-1].time == pytest.approx(1.25)
     assert by_count.times[-1] <= by_count.end < by_count.times[-1] + 0.1
-    by_energy = swing(*arguments, pendulums=ONE_HERTZ, min_energy=0.5)
-    # All energy is relative: .81, .656, .531, .43 of it are left.
-    assert (by_energy.ended, len(by_energy.impacts)) == ("energy", 4)
-    for run in (by_time, by_count, by_energy):
+    for run in (by_time, by_count):
         assert run.positions.shape == run.velocities.shape == (len(run.times), 2)
 
 
@@ -737,10 +734,6 @@ def test_mirror():
 
 def test_frames():
     run = swing(balls(3), ImpulseCorrelation(0), pulled(3), [0, 0.3, 0.6], pendulums=ONE_HERTZ)
-    frame = run.to_frame()
-    assert list(frame.columns) == ["time", "ball", "position", "velocity"]
-    wide = frame.pivot(index="time", columns="ball", values="position")
-    np.testing.assert_array_equal(wide.to_numpy(), run.positions)
     impacts = pandas.DataFrame(run.impacts)
     assert list(impacts.columns[:2]) == ["time", "contacts"]
     assert len(impacts) == len(run.impacts)

@@ -130,11 +130,9 @@ def recommend(
 
     Notes
     -----
-    Errors of velocities alone were measured, on rows that touch, struck at one end: three and five
-    equal elastic balls, three with a light one in the middle, the paper's ABCCA, and, event by
-    event, random ones; all springs were equal.  For a chain between theirs the worst counts, and
-    must be ten times better than `accuracy`.  Of models whose times differ by less than half, as
-    measurements do, it is the one that uses most of what is known.
+    Errors of velocities alone were measured, on rows that touch, struck at one end, with equal
+    springs.  For a chain between those measured the worst counts, and must be ten times better than
+    `accuracy`.  Of models whose times differ by less than half the one that uses most is taken.
 
     Examples
     --------

@@ -48,7 +48,7 @@ def film(
     """
     from cradle.fit.parameters import parameter_key
     from cradle.fit.shots import COLUMNS
-    from cradle.input.values import ABOVE_ZERO, one_number
+    from cradle.input.values import ABOVE_ZERO, checked_masses, one_number
 
     length, window = pendulum_length(length, period), options["window"]
     given = {"length": length, "window": window, "--slower": slower, "--scale": scale}
@@ -62,7 +62,8 @@ def film(
     if (position_unit == "px") != (scale is not None):
         raise click.UsageError("--position-unit px and --scale, pixels in a metre, go together")
     size = _SIZES[position_unit or "m"] if scale is None else 1.0 / scale
-    types, kilograms = parameter_key(name), [UNITS[unit or "kg"] * mass for mass in masses]
+    types = parameter_key(name)
+    kilograms = checked_masses([UNITS[unit or "kg"] * mass for mass in masses]).tolist()
     writer, wrong = csv.writer(sys.stdout, lineterminator="\n"), []
     for file in files:
         try:

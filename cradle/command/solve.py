@@ -1,4 +1,4 @@
-"""The command line: `cradle solve`, `film`, `fit`, `plot` ...; also `python -m cradle`.
+"""The command line: `cradle solve`, `film`, `fit` ...; also `python -m cradle`.
 
 Answers go to standard output, errors to standard error.  Exit codes: 0 for an answer, 1 for input
 that is wrong or an impact that did not finish, 2 for a command that was not understood.
@@ -72,8 +72,10 @@ def main(context: click.Context) -> None:
 
 
 @main.command(params=chain_options())
+@click.option("--plot", type=click.Path(dir_okay=False), callback=picture,
+              help="Draw the velocities to a file: .png, .svg or .pdf.")  # fmt: skip
 @format_options
-def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
+def solve(plot: str | None, as_json: bool, as_csv: bool, **options: Any) -> None:
     """Velocities after an impact; balls and contacts count from 1, the left.
 
     SEQUENCE names the paper's balls, first ball first, such as ABACA, or says how many equal balls
@@ -86,11 +88,18 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
       cradle solve ABCCA --saturate --json
       cradle solve --masses 45,53,53 --unit g --restitution 0.53,0.36 --ratio 0.104
       cradle solve --masses 1,1,1 --velocities 1,0,-1 --model sequential --csv
+      cradle solve --masses 1,1,1 --ratio 0.15 --plot impact.svg
       cradle solve 5 --unit g --velocities 1,1,0,0,0 --stiffness 1e10 --gaps 2e-5,0,0,2e-5
     """
     given = described(**options)
     chain = given.chain
+    if plot:
+        from matplotlib.figure import Figure  # what is missing is said before work
     trace = collide(given.taken, given.model, progress=True)
+    if plot:
+        figure = Figure((7, 4.3), layout="constrained")
+        trace.plot(figure.subplots())
+        figure.savefig(plot, format=Path(plot).suffix[1:] or "png")
     rows = [
         {"ball": k + 1, "type": given.letters[k], "mass": float(chain.masses[k]),
          "before": float(chain.velocities[k]), "after": float(trace.velocities[k]) + 0.0}
@@ -117,25 +126,6 @@ def solve(as_json: bool, as_csv: bool, **options: Any) -> None:
         given.note: True,
     }
     show(rows, extra, "\n".join(words for words in told if told[words]), as_json, as_csv)
-
-
-@main.command(params=chain_options())
-@click.option("--output", "-o", required=True, type=click.Path(dir_okay=False), callback=picture,
-              help="File to draw to: .png, .svg or .pdf.")  # fmt: skip
-def plot(output: str, **options: Any) -> None:
-    """Draw the velocities of all balls through an impact.
-
-    \b
-    Examples:
-      cradle plot ABACA --output impact.png
-      cradle plot --masses 1,1,1 --ratio 0.15 --output impact.svg
-    """
-    from matplotlib.figure import Figure  # what is missing is said before work
-
-    given, figure = described(**options), Figure((7, 4.3), layout="constrained")
-    collide(given.taken, given.model, progress=True).plot(figure.subplots())
-    figure.savefig(output, format=Path(output).suffix[1:] or "png")
-    click.echo(f"drawn to {output}\n{given.note}")
 
 
 for verb in (film, fit, recommend, swing, template):

@@ -66,7 +66,7 @@ def swing(
     balls = cradle.Chain(chain.masses, [0.0] * len(chain), chain.restitution)
     times = [seconds * k / steps for k in range(steps + 1)]
     if (count := seconds * hanging.natural_frequency(2)[0] / math.tau) > 2000:
-        click.echo(f"cradle: {count:.3g} swings take a while; --seconds is how long", err=True)
+        click.echo(f"cradle: {count:.3g} swings take a while (--seconds)", err=True)
     run = cradle.swing(balls, given.model, places, times, pendulums=hanging)
     rows = [
         {"time": float(time), **{f"ball {k + 1}": float(x) + 0.0 for k, x in enumerate(places)}}

@@ -103,10 +103,12 @@ def velocities_from_tracks(
     length, window, scatter = (None if value is None else one_number(name, value, *ABOVE_ZERO)
                                for name, value in given.items())  # fmt: skip
     for name, ball in tracks.items():
+        if ball.times.size < _LEAST:
+            raise ValueError(f"track {name!r} has {ball.times.size} marks; needs {_LEAST} and more")
         if length is not None and (span := float(np.ptp(ball.positions))) > 2.0 * length:
             told = f"track {name!r} spans {span:.3g} m, more than a pendulum of {length:g} m"
             raise ValueError(f"{told}; say the unit of the positions")
-    frame = max(float(np.median(np.diff(ball.times))) for ball in balls if ball.times.size > 1)
+    frame = max(float(np.median(np.diff(ball.times))) for ball in balls)
     least = window or max(0.05, (_LEAST + 0.5) * frame)
     coarse, striker = _coarse(balls, striker, least)
     longest = _LONGEST if length is None else 0.5 * np.pi * float(np.sqrt(length / _GRAVITY))

@@ -1,7 +1,6 @@
 """What is measured: shots, velocities before and after impacts, read from tables and checked."""
 
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -167,8 +166,12 @@ def read_shots(
     for option, unit in units.items():
         one_of(option, unit or next(iter(_UNITS[option][0])), list(_UNITS[option][0]))
     groups: dict[str, dict[str, list[_Row]]] = {}
+    masses: dict[str, float] = {}
     for where, line in lines:
         row = _row(where, line if sigma is None else {**line, "sigma": sigma}, units)
+        if row["mass"] != (usual := masses.setdefault(row["type"], row["mass"])):
+            _refuse(where, "mass", f"{row['mass']!r}; balls of type {row['type']} have {usual!r} "
+                    "elsewhere, and those of one type are alike")  # fmt: skip
         groups.setdefault(row["set"], {}).setdefault(row["shot"], []).append(row)
     return Shots(tuple(_shot_set(name, shots) for name, shots in groups.items()))
 
@@ -221,10 +224,10 @@ def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
         if len(rows) != len(first):
             _refuse(rows[0]["where"], "ball", f"{what} has {len(rows)} balls; the first shot of "
                     f"the set has {len(first)}")  # fmt: skip
-        for (row, usual), column in product(zip(rows, first, strict=True), ("type", "mass")):
-            if row[column] != usual[column]:
-                _refuse(row["where"], column, f"{row[column]!r}; ball {row['ball']} of set "
-                        f"{name} has {usual[column]!r} elsewhere")  # fmt: skip
+        for row, usual in zip(rows, first, strict=True):
+            if row["type"] != usual["type"]:
+                _refuse(row["where"], "type", f"{row['type']!r}; ball {row['ball']} of set "
+                        f"{name} has {usual['type']!r} elsewhere")  # fmt: skip
         _check_physics(what, rows)
     types = "".join(row["type"] for row in first)
     rest = name.removeprefix(types)

@@ -34,9 +34,7 @@ _CLOCKS = ("t", "time")
 _UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "s": 1.0, "ms": 1e-3, "px": 1.0, "": 1.0}
 
 
-def read_tracker(
-    path: str | Path, *, column: str = "x", time_scale: float = 1.0, unit: float = 1.0
-) -> Tracks:
+def read_tracker(path: str | Path, *, time_scale: float = 1.0, unit: float = 1.0) -> Tracks:
     """Read a text file exported by Tracker, Kinovea, Logger Pro or Capstone.
 
     Frames where a ball was not marked (no number, or NaN) are left out of its track; the tracks are
@@ -47,8 +45,6 @@ def read_tracker(
     ----------
     path : str or Path
         The file; tabs, semicolons or commas between the columns, decimals with a point or a comma.
-    column : str
-        Which column holds the position along the row.
     time_scale : float
         True time over the time of the video: 30 / 240 where 240 frames a second are shown as 30.
     unit : float
@@ -80,7 +76,7 @@ def read_tracker(
             if any(cells[len(titles) :]):
                 told = f"{where}: {len(cells)} values under {len(titles)} titles"
                 raise ValueError(f"{told} (between commas, decimals need a point)")
-            for at, (name, clock) in _owners(titles, column, above, block).items():
+            for at, (name, clock) in _owners(titles, above, block).items():
                 found = marks.setdefault(name, [])  # of a ball that is marked later only, too
                 if "".join(cells[at : at + 1]).casefold() not in ("", "nan"):
                     time = time_scale * _number(where, cells[clock], titles[clock])
@@ -91,7 +87,7 @@ def read_tracker(
     if not tracks:
         balls = [text for text, _ in titles[1:] if text]
         hint = f"; if each column is a ball, write {'/x, '.join(balls)}/x" if balls else ""
-        rule = f"a line of titles must begin with t or Time and name {column} too"
+        rule = "a line of titles must begin with t or Time and name x too"
         told = f"{file.name} has no column of positions: {rule}"
         raise ValueError(f"{told}, as Tracker, Kinovea, Logger Pro and Capstone do{hint}")
     for name, (times, _) in tracks.items():
@@ -106,10 +102,10 @@ def read_tracker(
 
 
 def _owners(
-    titles: list[tuple[str, str]], column: str, above: list[str], block: str
+    titles: list[tuple[str, str]], above: list[str], block: str
 ) -> dict[int, tuple[str, int]]:
     """Return the ball of each column of positions, and the column of its times."""
-    form = re.compile(rf"(?:(.+?)/.*)?(?:{re.escape(column)}|position)(?:\W*(?:ch )?\d+)?", re.I)
+    form = re.compile(r"(?:(.+?)/.*)?(?:x|position)(?:\W*(?:ch )?\d+)?", re.I)
     found = {at: match for at, (text, _) in enumerate(titles) if (match := form.fullmatch(text))}
     names = {titles[at][0].casefold() for at in found}
     owners, name = {}, ""

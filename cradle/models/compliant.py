@@ -244,17 +244,14 @@ def spring_outcomes(
 
 
 def hertz_stiffness(radii: ArrayLike, young: float = 210e9, poisson: float = 0.3) -> Vector:
-    """Stiffness of the contacts of rows of spheres of one material, steel if nothing is said.
-
-    Neighbours with the radii R and R' push with k d^(3/2) (Hertz), where
-    k = (2/3) E / (1 - nu^2) (R R' / (R + R'))^(1/2).
+    """Stiffness of the contacts of spheres, k = 2/3 E / (1 - nu^2) (R R' / (R + R'))^(1/2) (Hertz).
 
     Parameters
     ----------
     radii : array_like, shape (..., N)
         m, above 0.
     young, poisson : float
-        E, Pa, above 0; and nu, above -1 and at most 1/2.
+        E, Pa, above 0, and nu, above -1 and at most 1/2; those of steel if left out.
 
     Returns
     -------

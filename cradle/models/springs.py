@@ -102,18 +102,8 @@ class TimedTrace(EnergyTrace):
             step_impulses=mass * speed * path.impulses(path.v), evaluations=self.evaluations,
         )  # fmt: skip
 
-    def parted(self) -> tuple[float, Vector]:
-        """Return how long it takes until no balls overlap, s, and how far each goes, m, shape (N,).
-
-        Examples
-        --------
-        Two equal balls go half of the way each, the second one with what the first one loses:
-
-        >>> from cradle import Chain, SpringChain, collide
-        >>> seconds, way = collide(Chain([1, 1], [1, 0]), SpringChain(1e6)).parted()
-        >>> (way / seconds).round(2)
-        array([0.5, 0.5])
-        """
+    def _until_apart(self) -> tuple[float, Vector]:
+        """Return how long it takes until no balls overlap, s, and how far each goes, m."""
         record: list[Any] = []
         row, law, out = vars(self)["_ran"]
         clock = solve(row, law, out, record=record)[2]

@@ -1,16 +1,13 @@
 """What happened in a swing: positions and velocities in time, and every impact."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from cradle.chain import Chain
 from cradle.formatting import as_text
 from cradle.input.values import Vector
 from cradle.swinging.pendulums import Hanging, Pendulums
-from cradle.trace import Trace, by_ball, compared_as_objects
-
-if TYPE_CHECKING:
-    import pandas as pd
+from cradle.trace import Trace, compared_as_objects
 
 
 @compared_as_objects
@@ -51,7 +48,7 @@ class Swing:
     positions: Vector  #: along each ball's arc from its lowest point, shape (T, N), m
     velocities: Vector  #: shape (T, N), m/s; after an impact at that instant
     impacts: tuple[Impact, ...]  #: in the order in which they happened
-    ended: str  #: what ended the run, "times", "impacts" (`max_impacts`), "energy" (`min_energy`)
+    ended: str  #: what ended the run, "times" or "impacts" (`max_impacts`)
     end: float  #: when it ended, s
     together: tuple[int, ...]  #: contacts whose balls moved together at the end
 
@@ -59,11 +56,6 @@ class Swing:
     def energy(self) -> Vector:
         """Kinetic and potential energy of all balls at each time, shape (T,), J."""
         return Hanging(self.pendulums, self.chain.masses).energy(self.positions, self.velocities)
-
-    def to_frame(self) -> "pd.DataFrame":
-        """Return a row for each time and ball; of the impacts ``pd.DataFrame(self.impacts)``."""
-        parts = {"position": self.positions, "velocity": self.velocities}
-        return by_ball(len(self.chain), {"time": self.times}, parts)
 
     def __repr__(self) -> str:
         told = f"{len(self.times)} times to {self.end:g} s, {len(self.impacts)} impacts"

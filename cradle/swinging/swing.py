@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.input.values import ArrayLike, Vector, checked, must_be, one_number, shown, whole_number
+from cradle.input.values import ArrayLike, Vector, checked, must_be, shown, whole_number
 from cradle.models import Model, collide
 from cradle.models.compliant import SpringChain
 from cradle.swinging.flight import FullFlight, SmallAngleFlight
@@ -27,7 +27,7 @@ MOST_IDLE = 20
 
 def swing(
     chain: Chain, model: Model, positions: ArrayLike, times: ArrayLike, *,
-    pendulums: Pendulums | None = None, max_impacts: int = 100_000, min_energy: float = 0.0,
+    pendulums: Pendulums | None = None, max_impacts: int = 100_000,
 ) -> Swing:  # fmt: skip
     """Let a cradle swing.
 
@@ -48,9 +48,8 @@ def swing(
         strike that takes its time they are those at its end.
     pendulums : Pendulums, optional
         How the balls hang; small angles, 0.1 m, no gaps, no damping if left out.
-    max_impacts, min_energy : int, float
-        End the run, before the last time, after this number of impacts, or when the energy is below
-        this part of that at the release.
+    max_impacts : int
+        End the run, before the last time, after this number of impacts.
 
     Raises
     ------
@@ -83,13 +82,12 @@ def swing(
         rule = "must be a row of rising numbers, none below 0, such as [0, 0.5, 1]"
         raise ValueError(f"times = {shown(times)}; {rule}")
     most = whole_number("max_impacts", max_impacts)
-    least = one_number("min_energy", min_energy, "must lie in [0, 1]", 0.0, 1.0)
     x = checked("positions", positions)
     if x.shape != (n,):
         rule = f"{n} balls need ({n},): a place for each ball"
         raise ValueError(f"positions has shape {x.shape}; {rule}")
     run = _Run(chain, model, hanging, hanging.within_reach(x))
-    ended = run.to_the_end(at, most, least)
+    ended = run.to_the_end(at, most)
     x, v = (np.concatenate(parts) for parts in zip(*run.series, strict=True))
     at = at[: len(x)]
     certify(run, at, x, v)
@@ -128,14 +126,11 @@ class _Run:
             self.lasting = deepest * hanging.fastest < SHORT * self.speed
         self.settle([], [])
 
-    def to_the_end(self, times: Vector, most: int, least: float) -> str:
+    def to_the_end(self, times: Vector, most: int) -> str:
         """Fly from event to event; return why the run ended."""
-        done, end, ended = 0, float(times[-1]), "impacts"
+        done, end = 0, float(times[-1])
         idle, kind = 0, SmallAngleFlight if self.hanging.small else FullFlight
         while len(self.impacts) < most:
-            if least and self.hanging.energy(self.x, self.v) < least * self.released:
-                ended = "energy"
-                break
             flight = kind(self.hanging, self.x, self.v, self.together, self.parting)
             wait, closing, opening = flight.next_meeting(left := max(end - self.t, 0.0))
             if isinstance(flight, SmallAngleFlight):  # others are certified not to go over the top
@@ -160,7 +155,7 @@ class _Run:
         # The instant at which the run ends is reported if it was asked for.
         count = int(np.searchsorted(times[done:], self.t, side="right"))
         self.series.append((np.tile(self.x, (count, 1)), np.tile(self.v, (count, 1))))
-        return ended
+        return "impacts"
 
     def settle(self, closing: list[int], opening: list[int]) -> None:
         """Apply the rules of touching, resting, pressing and pulling apart to this instant."""
@@ -223,7 +218,7 @@ class _Run:
         """Follow contact forces, of these balls and all that they meet, until contacts are open."""
         while True:
             trace: Any = self.solved(first, last, before)
-            duration, own = trace.parted()
+            duration, own = trace._until_apart()
             way = duration * before
             way[first:last] = own
             met = np.flatnonzero(self.gaps() + np.diff(way) < 0.0).tolist()
