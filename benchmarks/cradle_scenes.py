@@ -29,8 +29,7 @@ FRAMES = 60  # samples a second
 MINUTE, FILM = 60, 11  # s
 WILD = 10.0  # times the energy at the release
 FILMED = ("default", "ratio", "steel")
-GAP = 1e-2  # over a diameter
-GAPS = (0.0, 5e-5, 1e-3, 1e-2)  # of the first strokes
+GAPS = (0.0, 5e-5, 1e-3, 1e-2)  # of the first strokes, over a diameter
 FREQUENCY = math.sqrt(GRAVITY / LENGTH)
 #: Contact of two balls at the first stroke, s: steel, if the cradle were ten times smaller.
 STEEL = 6.9e-4 / FREQUENCY
@@ -54,9 +53,7 @@ DEPTH, STIFFNESS = pressed(STEEL)
 APART = 3 * DEPTH  # a gap
 LOSSY = viscosity_from(RESTITUTION, speed=SPEED, masses=[1] * BALLS)
 #: What else a row can solve its impacts by: restitution and model.
-LAWS = {
-    "ratio": (1, MODELS["ratio"]),
-    "springs": (1, MODELS["springs"]),
+LAWS = {name: (1, model) for name, model in MODELS.items()} | {
     "springs, outer apart": (1, SpringChain(STIFFNESS, gaps=(APART, 0, 0, APART))),
     "ratio, losses": (RESTITUTION, MODELS["ratio"]),
     "springs, losses": (1, SpringChain(1.0, viscosity=LOSSY)),
@@ -200,15 +197,13 @@ def each_run():
             yield "Hertz springs", "alone", setting, 0.0, pulled, on_springs(pulled, **given)
         for setting, model in MODELS.items():
             yield "swing", "alone", setting, 0.0, pulled, by_swing(pulled, model=model)
-    for engine, setting in product(present(ENGINES), ("default", "refined")):
-        for pulled in (1, 2):
-            for gap in (0.0, GAP):
-                run = in_engine(engine, setting, pulled, mend=False, gap=gap)
-                yield engine.name, "as it is", setting, gap, pulled, run
-            run = in_engine(engine, setting, pulled, mend=True)
-            yield engine.name, "mended", setting, 0.0, pulled, run
-        run = in_engine(engine, setting, BALLS, mend=True)
-        yield engine.name, "no impacts", setting, 0.0, BALLS, run
+    ways = ("as it is", 0.0), ("as it is", GAPS[-1]), ("mended", 0.0)
+    cases = [(*way, pulled) for pulled in (1, 2) for way in ways]
+    cases.append(("no impacts", 0.0, BALLS))
+    for engine, setting, case in product(present(ENGINES), ("default", "refined"), cases):
+        how, gap, pulled = case
+        run = in_engine(engine, setting, pulled, mend=how != "as it is", gap=gap)
+        yield engine.name, how, setting, gap, pulled, run
 
 
 runs = cache(lambda: [*each_run()])

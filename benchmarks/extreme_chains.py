@@ -5,6 +5,7 @@ the error is the problem's own: the change of the exact outcome when every input
 last digit.
 """
 
+import contextlib
 import math
 from fractions import Fraction
 from functools import partial
@@ -69,8 +70,8 @@ def faults(trace, finished=True, momentum=8.0, energy=8.0, overlap=0.0):
     the number of events: so do they add up.  Balls that come to rest together may approach each
     other by `overlap`.
     """
-    arrays = (trace.velocities, trace.impulses, trace.absorbed, trace.path, trace.path_impulses)
-    if not all(np.isfinite(array).all() for array in arrays):
+    names = "velocities", "impulses", "absorbed", "path", "path_impulses"
+    if not all(np.isfinite(getattr(trace, name)).all() for name in names):
         return ["not finite"]
     n, defect = len(trace.chain), invariants(trace)
     energy *= n * max(1.0, math.sqrt(len(trace.events)))
@@ -264,14 +265,12 @@ def unequal_jumps(family, n, ratio, chains=24, size=1e-12, e=0.9):
     masses, spread = UNEQUAL[family]
     rng = np.random.default_rng([2001, n, round(1000 * ratio)])
     masses = masses(n) * uniform(rng, 1 - spread, 1 + spread, (chains, n))
-    options, found = {"excess": "saturate", "max_events": 1_000_000}, []
-    for pair in zip(*(zip(*parts) for parts in copies(rng, masses, e, ratio, size))):
-        try:
+    options, found = {"excess": "saturate", "max_events": 1_000_000}, np.full(chains, math.nan)
+    for k, pair in enumerate(zip(*(zip(*parts) for parts in copies(rng, masses, e, ratio, size)))):
+        with contextlib.suppress(ImpactNotFinished):
             one, other = (post_impact_velocities(*chain, **options) for chain in pair)
-            found.append(np.abs(other - one).max())
-        except ImpactNotFinished:
-            found.append(math.nan)
-    return np.array(found)
+            found[k] = np.abs(other - one).max()
+    return found
 
 
 def changes_of_rows(spread, n, e, ratio, chains=4, size=1e-12):
@@ -346,11 +345,9 @@ def nearest_edge(problem, name, k, side, scale, farthest=0.3, step=1.12):
 
     def at(distance):
         """Velocities, and whether the events are the same; None outside the range."""
-        changed = moved(problem, name, k, side * distance * scale)
-        if changed is None:
-            return None
-        trace = changed.attempt()[0]
-        return trace.velocities, events_at_balls(trace) == base
+        if changed := moved(problem, name, k, side * distance * scale):
+            trace = changed.attempt()[0]
+            return trace.velocities, events_at_balls(trace) == base
 
     near, far, found = 0.0, 1e-12, at(1e-12)
     while found and found[1] and far <= farthest:

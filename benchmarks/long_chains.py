@@ -46,32 +46,24 @@ def cost(function, repeats):
     calls = max(1, round(0.02 / max(cpu(function), 1e-6)))
     # As many units as outlast the clock's ticks and what the row itself has pushed from the caches.
     pairs = [(cpu(function, calls), cpu(three_on_springs, 400)) for _ in range(repeats)]
-    return {
-        "units": [unit for _, unit in pairs],  # for `rows`
-        "time_ratio": quotient(*zip(*pairs, strict=True)),
-        "repeats": repeats,
-    }
+    times, units = zip(*pairs)
+    return {"units": units, "time_ratio": quotient(times, units), "repeats": repeats}
 
 
 def leaving(velocities):
     """Return the fields of a row that tell which balls fly off."""
-    names = {"first": 0, "third_last": -3, "second_last": -2, "last": -1}
-    return {
-        "fast": int((velocities > FAST).sum()),
-        "back": int((velocities < -FAST).sum()),
-        **{name: velocities[k] for name, k in names.items()},
-    }
+    counts = {"fast": int((velocities > FAST).sum()), "back": int((velocities < -FAST).sum())}
+    names = "first", "third_last", "second_last", "last"
+    return counts | dict(zip(names, velocities[[0, -3, -2, -1]]))
 
 
 def solved(group, chain, e, ratio, repeats=9):
     """Return the outcomes, and a row of them."""
     found = (solve := partial(outcomes, *chain, e, ratio))()
     given = {"group": group, "restitution": e, "ratio": ratio, "balls": chain[0].shape[-1]}
-    counts = {
-        "collisions": int(found.collisions[~found.collapsed].sum()),
-        "collapsed": int(found.collapsed.sum()),
-    }
-    return found, given | counts | cost(solve, repeats)
+    given["collisions"] = int(found.collisions[~found.collapsed].sum())
+    given["collapsed"] = int(found.collapsed.sum())
+    return found, given | cost(solve, repeats)
 
 
 def large_map(side):
