@@ -220,7 +220,6 @@ def some(*about, run):
 
 
 def scene_strokes():
-    """Yield what every ball has after each stroke."""
     yield "run how setting gap pulled stroke" + ENERGIES
     for name, how, setting, gap, pulled, (_, *run) in runs():
         for k, each in enumerate(strokes(*run), start=1):
@@ -228,7 +227,6 @@ def scene_strokes():
 
 
 def scene_film():
-    """Yield how some of them look, thirty times a second."""
     yield "run how time" + ENERGIES
     for name, how, setting, gap, pulled, (times, angles, _) in runs():
         if pulled == 1 and not gap and setting in FILMED:
@@ -238,7 +236,6 @@ def scene_film():
 
 
 def scene_gaps():
-    """Yield energies after the first stroke of engines as they are, with gaps."""
     yield "run setting gap pulled" + ENERGIES
     for case in product(present(ENGINES), ("default", "refined"), GAPS, (1, 2)):
         engine, setting, gap, pulled = case
@@ -247,7 +244,6 @@ def scene_gaps():
 
 
 def scene_gap_minutes():
-    """Yield energies after some strokes of engines as they are, with the smallest gap."""
     yield "run setting pulled stroke" + ENERGIES
     for engine, setting, pulled in product(present(ENGINES), SETTINGS, (1, 2)):
         run = in_engine(engine, setting, pulled, mend=False, gap=GAPS[1])

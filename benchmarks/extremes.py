@@ -1,6 +1,6 @@
 """Maps of the chapter on extremes: errors, edges, long and infinite sequences.
 
-Writes `data/extremes_*.csv` in half an hour, all or those that are named: `extremes_map` and so on.
+Writes `data/extremes_*.csv` in half an hour; `data/README.md` says what each row is.
 """
 
 import math
@@ -39,7 +39,6 @@ def extremes_map():
 
 
 def extremes_growth():
-    """Yield what a change of all inputs does to the outcome."""
     yield "spread restitution size balls median largest leading"
     sizes = (3, 5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 80)
     for case in product((0.0, 0.1), (0.9, 0.97, 1.0), (1e-12, 1e-9), sizes):
@@ -49,7 +48,6 @@ def extremes_growth():
 
 
 def extremes_unequal():
-    """Yield the same of unequal rows."""
     yield "family balls ratio least median largest jumps unfinished"
     for case in product(x.UNEQUAL, (20, 40, 80), (0.1, 0.2, 0.3, 0.45)):
         change = x.unequal_jumps(*case)
@@ -83,14 +81,12 @@ def each_input():
 
 
 def extremes_edges():
-    """Yield how far each input is from another sequence of events."""
     yield "sequence input index side distance jump"
     for (name, problem, part, k, scale), side in product(each_input(), (-1, 1)):
         yield name, part, k, side, *x.nearest_edge(problem, part, k, side, scale)
 
 
 def extremes_jumps():
-    """Yield where the outcome jumps while an input moves."""
     yield "sequence input index change jump"
     for name, problem, part, k, scale in each_input():
         for change, jump in x.jumps(problem, part, k, scale):
@@ -132,7 +128,7 @@ DECIDED = (1e-6, 1e-3, 0.1, 1.0)  # parts of the largest closing speed that may 
 
 
 def long_or_not(family, decades, index):
-    """Return the number of balls of a chain, and what it adds to the columns of `finish`."""
+    """Return the number of balls of a chain, and what it adds to the counts."""
     problem = x.any_chain(family, decades, index)
     collisions, collapsed, unfinished, _ = x.longer_than(problem, LONG)
     left = [False] * (1 + len(DECIDED))
@@ -144,7 +140,6 @@ def long_or_not(family, decades, index):
 
 
 def extremes_finish():
-    """Yield counts by family and number of balls."""
     yield (
         "family decades balls chains collapsed above_100 above_1000 above_10000 unfinished left "
         "open_1e-6 open_1e-3 open_0.1 open_1"

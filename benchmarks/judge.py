@@ -110,10 +110,9 @@ WORDS = ENDS + ENDLESS
 
 def batch(problem):
     """The package's velocities, of a batch; None if it gives none."""
-    *parts, meeting = problem
-    options = {"meeting": meeting, "excess": "saturate", "max_events": LONGEST}
+    options = {"excess": "saturate", "max_events": LONGEST}
     with contextlib.suppress(ImpactNotFinished, ImpactNotCertified):
-        return post_impact_velocities(*parts, **options).tolist()
+        return problem.solve(post_impact_velocities, **options).tolist()
 
 
 def single(problem):

@@ -70,7 +70,6 @@ def pairs(quick):
 
 
 def rows(clock, quick):
-    """Yield two rows a pair, each with the difference between the two."""
     for question, chain, impacts, *ways in pairs(quick):
         answers = [np.asarray(run(), float) for _, run, _ in ways]
         about = {
