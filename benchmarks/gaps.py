@@ -33,15 +33,6 @@ LAWS = {
 }
 
 
-def runge_kutta(rate, y, step):
-    """The state after a step, dy/dt = rate(y), to fourth order."""
-    a = rate(y)
-    b = rate(y + step / 2 * a)
-    c = rate(y + step / 2 * b)
-    d = rate(y + step * c)
-    return y + step / 6 * (a + 2 * b + 2 * c + d)
-
-
 def strike(masses, velocities, restitution, gaps, stiffness=1.0, step=0.02, longest=60.0):
     """Return velocities (..., N) after the impact of spheres at `gaps` (..., N - 1).
 
@@ -66,7 +57,10 @@ def strike(masses, velocities, restitution, gaps, stiffness=1.0, step=0.02, long
 
     left, time, out = np.ones(row[:-1], bool), 0.0, np.empty(row)
     while time < longest and left.any():
-        y = runge_kutta(rate, y, step)
+        a = rate(y)  # Runge-Kutta of order four
+        b = rate(y + step / 2 * a)
+        c = rate(y + step / 2 * b)
+        y = y + step / 6 * (a + 2 * b + 2 * c + rate(y + step * c))
         time += step
         s, v = y[..., : n - 1], y[..., n - 1 :]
         ordered = (v[..., :-1] <= v[..., 1:]).all(-1)
