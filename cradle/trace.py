@@ -57,12 +57,11 @@ class Trace:
         How close another sequence of events came: the least distance of two events of one run, of
         two meetings, or of a ratio from its bound, relative to what is compared; exact ties do not
         count.  Below about 1e-12 another outcome may lie within the last digit of the input.  Also
-        the speed, over the fastest closing, that would join or divide balls that touch and are
-        struck from both sides: 0 if balls rest between, where any motion changes who drives (R2).
-        0 if a ratio lies between 0 and 1e-4, as products of such may decide a tie beyond 32 digits;
-        or if a sequence was taken to its limit while balls elsewhere still collided: where these
-        are then depends on its last rounds.  What hundreds of collisions amplify,
-        `condition_number` sees.
+        the speed, over the fastest closing, that would join or divide balls struck from both sides:
+        0 if balls rest between, where any motion changes who drives (R2).  0 if a ratio lies
+        between 0 and 1e-4, as products of such may decide a tie beyond 32 digits; or if a sequence
+        was taken to its limit while balls elsewhere still collided: where these are then depends on
+        its last rounds.  What hundreds of collisions amplify, `condition_number` sees.
     left_out : int
         How many more events there were, if the path was cut; 0 with ``record=False``.
 

@@ -477,7 +477,7 @@ def test_one_wrong_film_of_several(folder, capsys):
             "a sequence of the paper's balls, such as ABCCA; --masses, not both",
         ),
         ("solve", 2, "give one of: how many equal balls, such as 5; a sequence of the "),
-        ("solve 5 --gaps 1e-6", 2, "--gaps need --stiffness: wide is what balls do not press"),
+        ("solve 5 --gaps 1e-6", 2, "--gaps need --stiffness, about 1e10 for steel"),
         ("solve 5 --ratio 0.1 --stiffness 1", 2, "--stiffness and --gaps are those of --model sph"),
         ("solve 3 --stiffness 1,-1", 1, "cradle: --stiffness, value 2: -1.0; must be above 0"),
         (

@@ -131,8 +131,7 @@ def recommend(
     Notes
     -----
     Errors of velocities alone were measured, on rows that touch, struck at one end, with equal
-    springs.  For a chain between those measured the worst counts, and must be ten times better than
-    `accuracy`.  Of models whose times differ by less than half the one that uses most is taken.
+    springs; between those chains the worst counts, and must be ten times better than `accuracy`.
 
     Examples
     --------

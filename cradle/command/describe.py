@@ -64,7 +64,6 @@ def pendulum_length(length: float | None, period: float | None) -> float | None:
     return 9.81 * (0.5 * period / math.pi) ** 2
 
 
-#: Of balls that move alike.
 AS_ONE = "balls that move alike strike as one; those of a toy come one by one (--gaps)"
 
 
@@ -100,8 +99,7 @@ def described(
         assumed.append(f"{len(masses)} equal balls of 1 {unit or 'kg'}")
     if (sequence is None) == (masses is None):
         need = "how many equal balls, such as 5; a sequence of the paper's balls, such as ABCCA"
-        both = ", not both" * (masses is not None)
-        raise click.UsageError(f"give one of: {need}; --masses{both}")
+        raise click.UsageError(f"give one of: {need}; --masses{', not both' * bool(masses)}")
     if model not in (None, "ratio") and (ratio or backward or saturate):
         raise click.UsageError(f"--model {model} has no ratios; leave them out, and --saturate")
     if not (speed is None or velocities is None):
@@ -133,8 +131,7 @@ def described(
     if model != "spheres" and (stiffness or gaps):
         raise click.UsageError("--stiffness and --gaps are those of --model spheres")
     if gaps and not stiffness:
-        raise click.UsageError("--gaps need --stiffness: wide is what balls do not press into each "
-                               "other meanwhile; about 1e10 for steel balls of 1 cm")  # fmt: skip
+        raise click.UsageError("--gaps need --stiffness, about 1e10 for steel balls of 1 cm")
     if model == "sequential":
         law = cradle.SequentialCollisions()
     elif model == "spheres":

@@ -119,8 +119,7 @@ def solve(plot: str | None, as_json: bool, as_csv: bool, **options: Any) -> None
         counts = f"{min(collisions)} to {max(collisions)}"
     told = {
         "no balls approach: no impact": not (chain.closing_speeds > 0.0).any(),
-        f"energy lost: {100 * lost:z.2f} %": not few,
-        f"energy lost: {100 * lost:z.2f} %; collisions of the contacts: {counts}": few,
+        f"energy lost: {100 * lost:z.2f} %{f'; collisions of the contacts: {counts}' * few}": True,
         f"held closed at their largest ratio: contact {contacts} (--saturate)": held,
         "an infinite sequence of impacts was taken to its limit": trace.collapsed,
         given.note: True,

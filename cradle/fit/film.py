@@ -103,8 +103,8 @@ def velocities_from_tracks(
     length, window, scatter = (None if value is None else one_number(name, value, *ABOVE_ZERO)
                                for name, value in given.items())  # fmt: skip
     for name, ball in tracks.items():
-        if ball.times.size < _LEAST:
-            raise ValueError(f"track {name!r} has {ball.times.size} marks; needs {_LEAST} and more")
+        if (size := ball.times.size) < _LEAST:
+            raise ValueError(f"track {name!r} has {size} marks; needs {_LEAST} and more")
         if length is not None and (span := float(np.ptp(ball.positions))) > 2.0 * length:
             told = f"track {name!r} spans {span:.3g} m, more than a pendulum of {length:g} m"
             raise ValueError(f"{told}; say the unit of the positions")

@@ -275,8 +275,8 @@ def hertz_stiffness(radii: ArrayLike, young: float = 210e9, poisson: float = 0.3
     e = asked.one_number("young", young, *asked.ABOVE_ZERO)
     rule = "must be above -1 and at most 0.5"
     nu = asked.one_number("poisson", poisson, rule, -1.0, 0.5, open_low=True)
-    left, right = r[..., :-1], r[..., 1:]
-    return np.asarray(2.0 / 3.0 * e / (1.0 - nu * nu) * np.sqrt(left / (left + right) * right))
+    half = r[..., :-1] / (r[..., :-1] + r[..., 1:]) * r[..., 1:]
+    return np.asarray(2.0 / 3.0 * e / (1.0 - nu * nu) * np.sqrt(half))
 
 
 def check_rows(arrays: Sequence[Vector]) -> None:

@@ -51,8 +51,7 @@ class EnergyDistribution:
     E is the energy that a contact stores.  With the closing speed u it changes by ``dE = u dP`` in
     compression (u > 0) and by ``dE = u dP / e^2`` in release (u < 0), so it is used up when the
     part e^2 of the work absorbed has been given back.  With e = 0 it is lost at u = 0; the contact
-    ends there, and closes anew if a neighbour pushes on.  What has ended leaves a gap that must
-    close before the contact acts again, as between springs.
+    ends there, and closes anew if a neighbour pushes on.  What has ended leaves a gap to be closed.
 
     A spring with the force ``F = k x^p`` stores ``E = k x^(p+1) / (p + 1)``, so impulses grow like
     forces of springs, ``dP = F dt`` with a common t, where ``dx/dt = u`` in compression and

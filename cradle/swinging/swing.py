@@ -49,7 +49,7 @@ def swing(
     pendulums : Pendulums, optional
         How the balls hang; small angles, 0.1 m, no gaps, no damping if left out.
     max_impacts : int
-        End the run, before the last time, after this number of impacts.
+        End the run after this number of impacts.
 
     Raises
     ------
