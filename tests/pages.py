@@ -167,7 +167,10 @@ def visiting(browser, home: str):
             fragment = "#scene=example" * (chapter == "explorer")
         tab.goto(home.replace("explorer.html", f"{chapter}.html") + fragment)
         if options.get("java_script_enabled", True):
-            tab.wait_for_function("globalThis.cradleExplorer?.live?.length > 0")
+            tab.wait_for_function(
+                "!document.querySelector('.cradle-explorer')"
+                " || globalThis.cradleExplorer?.live?.length > 0"
+            )
         return tab
 
     yield visit

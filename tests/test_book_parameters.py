@@ -21,6 +21,10 @@ CHANGES = {
         {"ratio": 0.4, "masses": [3, 1, 2], "velocities": [1, 0.2, 0]},
         {"ratio": 0.5, "restitution": [0.5, 0.3]},  # at the bound
     ],
+    "own_solver": [
+        {"ratio": 0.4, "masses": [3, 1, 2], "velocities": [1, 0.2, 0]},
+        {"ratio": 0, "restitution": [0, 1]},
+    ],
     "multiple_impacts": [
         {"chosen_ratio": 0.1, "chosen_e": 0.2},  # the six events of Fig. 5
         {"chosen_ratio": 0.35, "chosen_e": 0.9},  # others

@@ -1,4 +1,4 @@
-"""Chapter "Three balls solved": Eqs. 17-34, Figs. 3 and 4, by a second route each."""
+"""Chapter "Three balls solved" and its program: Eqs. 17-34, Figs. 3 and 4, by a second route."""
 
 import contextlib
 import functools
@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import uniform
-from chapters import Chapter, code, floats, shown
+from chapters import Chapter, code, floats, numbers, panel, shown
 from chapters import run as run_cells
 from truth import solve
 
@@ -17,6 +17,7 @@ from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
 from cradle.closed_form import final_impulses, one_collision_each, three_balls
 
 CHAPTER, READING = Chapter("three_balls"), Chapter("reading_three_balls")
+PROGRAM = Chapter("own_solver")
 # The chapter's example.
 EXAMPLE = ([1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.9, 0.8], 0.15)
 CLOSE = {"rtol": 1e-12, "atol": 1e-13}
@@ -247,6 +248,7 @@ def test_one_outcome_belongs_to_many_parameters():
             a = mpmath.mpf(ratio)
             e = losses(1 - target[0], target[2], a, mpmath.sqrt)
             assert floats(e) == pytest.approx(printed, abs=5.1e-7)
+            assert " ".join(f"{x:.6f}" for x in printed) in CHAPTER.printed("ambiguity")
             again = solve([1, 1, 1], [1, 0, 0], list(e), a).velocities
             assert max(abs(x - y) for x, y in zip(again, target)) < mpmath.mpf(10) ** -45
     # At the ends of the range one of the two is 1; beyond them it would have to be larger.
@@ -259,7 +261,7 @@ def test_one_outcome_belongs_to_many_parameters():
             assert np.argmax(found) == one
     twice = [
         solve(["0.045", "0.045", "0.053"], [1, 0, 0], 1, ratio)
-        for ratio in ("0.018", CHAPTER.glued["three-balls-other-ratio"])
+        for ratio in ("0.018", READING.glued["three-balls-other-ratio"])
     ]
     assert [sum(x.collisions) for x in twice] == [3, 2]
     outcomes = [floats(x.velocities) for x in twice]
@@ -267,15 +269,25 @@ def test_one_outcome_belongs_to_many_parameters():
 
 
 @functools.cache
-def typed_in():
-    """Run what a reader sees, and nothing else; return the names."""
+def typed_in(page):
+    """Run what a reader of a page sees, and nothing else; return the names."""
     with contextlib.redirect_stdout(io.StringIO()):
-        return run_cells(shown("three_balls"), {})
+        return run_cells(shown(page), {})
+
+
+def test_shown_cells_use_no_hidden_name():
+    """What a reader sees can be typed in: it runs, and ends with the chapter's numbers."""
+    names = typed_in("three_balls")
+    impulses = names["tau_2f"], names["tau_3f"]
+    np.testing.assert_allclose(impulses, run(*EXAMPLE).impulses, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(names["outcome"][0], [0, 0, 1], atol=1e-14)
+    *_, (_, _, velocities, _) = typed_in("own_solver")["path"]
+    np.testing.assert_allclose(velocities, run(*EXAMPLE).velocities, rtol=0, atol=1e-14)
 
 
 def test_the_readers_solver_against_the_reference_solver():
     """Its path is that of the rules; its functions have some sixty lines in all."""
-    names = typed_in()
+    names = typed_in("own_solver")
     rng = np.random.default_rng(77)
     repeated = 0
     for _ in range(60):
@@ -290,10 +302,34 @@ def test_the_readers_solver_against_the_reference_solver():
     assert repeated > 5
     lines = sum(
         len(cell.source.splitlines())
-        for cell in code("three_balls")
+        for cell in code("own_solver")
         if cell.id in ("rates", "ways", "loop")
     )
     assert lines < 65
+
+
+def test_what_the_page_says_of_the_program():
+    """Both ways of contact 1-2 by Eqs. 22 and 24; the light ball of the figure."""
+    m, v, e, a = EXAMPLE
+    slope = -((1 - a) / m[1] + 1 / m[0])
+    compression = -(v[0] - v[1]) / slope
+    owed = e[0] ** 2 * (v[0] - v[1]) * compression / 2
+    PROGRAM.tells(
+        {
+            "own-solver-ways-slope": slope,
+            "own-solver-ways-owed": owed,
+            "own-solver-ways-root": math.sqrt(-2 * slope * owed),
+            "own-solver-ways-step": e[0] * compression,
+        }
+    )
+    light = solve([1, "0.1", 1], [1, 0, 0], 1, "0.15")
+    said = PROGRAM.printed("light")
+    assert f"{len(light.path) - 1} events" in said
+    assert numbers(said) == pytest.approx(floats(light.velocities), abs=5.1e-4)
+    shown_lines = panel("own_solver", "fig-own-solver-light")
+    assert list(shown_lines) == [f"$v_{i}$" for i in (1, 2, 3)]
+    for ball, line in enumerate(shown_lines.values()):
+        np.testing.assert_allclose(line[:, 1], [float(v[ball]) for v in light.path], atol=1e-12)
 
 
 def test_exercises_1_and_2():

@@ -94,7 +94,15 @@ def test_few_cells_escape_comparison():
 
 @pytest.mark.parametrize(
     "chapter",
-    ["problem", "compliance", "three_balls", "multiple_impacts", "patterns", "n_balls"],
+    [
+        "problem",
+        "compliance",
+        "three_balls",
+        "own_solver",
+        "multiple_impacts",
+        "patterns",
+        "n_balls",
+    ],
 )
 def test_shown_cells_can_be_typed_in(chapter: str):
     """They use no name of a hidden cell, and their lines fit the page of a desk."""
@@ -163,6 +171,7 @@ GIVEN = {
     "problem": "0.15",
     "compliance": "0.15",
     "three_balls": "0.01 0.09 0.1 0.11 0.15 0.8 0.9",
+    "own_solver": "0.1 0.15",
     "multiple_impacts": "0.15 0.2 0.25 0.8",
     "patterns": "0.01 0.15 0.25 0.3 0.4 0.5 0.9 2.5",
     "n_balls": "0.1 0.15 0.5 1.5 4.5",
@@ -224,15 +233,15 @@ def test_a_typed_number_is_seen():
 
 
 def test_letters_of_the_chapters_have_one_line_on_the_notation_page():
-    """Greek ones of chapters 1 to 7; a letter without index has one meaning."""
+    """Greek ones of chapters 1 to 7 and of the program; a letter without index has one meaning."""
     words = {
         name: "".join(
             cell.source
             for cell in nbformat.read(BOOK / f"{name}.ipynb", as_version=4).cells
             if cell.cell_type == "markdown"
         )
-        for name in ("problem", "compliance", "three_balls", "multiple_impacts", "patterns",
-                     "n_balls", "experiments", "notation")
+        for name in ("problem", "compliance", "three_balls", "own_solver", "multiple_impacts",
+                     "patterns", "n_balls", "experiments", "notation")
     }  # fmt: skip
     book_wide = words.pop("notation").partition("## Letters of single pages")[0]
     rows = re.findall(r"(?m)^\| ([^|]*\$[^|]*) \|", book_wide)

@@ -1,4 +1,4 @@
-"""The reader's own solver: the chapter's lines in the page, right, wrong, endless and broken."""
+"""The reader's own solver: the lines of its page, right, wrong, endless and broken."""
 
 import operator
 import sys
@@ -37,7 +37,7 @@ def test_rows_are_those_of_numpy():
     assert solver_numpy.zeros(2).copy().sum() == 0
 
 
-def test_the_chapter_s_lines_pass(solver, monkeypatch):
+def test_the_page_s_lines_pass(solver, monkeypatch):
     """In this Python, with the rows that the browser has."""
     checks = reader_solver.checks(reader_solver.cells())
     assert len(checks) == 5
@@ -64,9 +64,8 @@ def test_a_piece_is_left_to_the_reader(solver):
 
 @pytest.fixture
 def editor(visit):
-    """Open chapter 3 and return what types lines and presses Run; no other page is asked for."""
-    tab = visit(chapter="three_balls")
-    tab.click(".admonition:has(.reader-solver) > .admonition-title")  # it is folded
+    """Open the page and return what types lines and presses Run; no other page is asked for."""
+    tab = visit(chapter="own_solver")
     asked = []
     tab.on("request", lambda request: asked.append(request.url))
 

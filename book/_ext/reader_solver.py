@@ -1,7 +1,7 @@
 """Sphinx extension: the reader's own solver of three balls, run in the page.
 
 A page asks for it by `<div class="reader-solver"></div>`. The editor holds the lines of the
-chapter's shown cells, read from its notebook, so there is no second copy of them. What comes out is
+page's shown cells, read from its notebook, so there is no second copy of them. What comes out is
 compared with `cradle`, asked here.
 
 Python runs in the browser by Brython, which comes from PyPI. Interpreter, `math` and the little of
@@ -21,9 +21,9 @@ from sphinx.application import Sphinx
 
 HERE = Path(__file__).parent
 PLACE = '<div class="reader-solver"'
-#: The functions that the chapter builds up.
+#: The functions that the page builds up.
 PIECES = ("rates", "way_to_event", "three_balls")
-#: Title; masses, velocities, restitution, ratio. The chapter's own example is put in front.
+#: Title; masses, velocities, restitution, ratio. The page's own example is put in front.
 CASES = (
     ("Equal balls, ratio 0: one leaves", ([1, 1, 1], [1, 0, 0], [1, 1], 0)),
     ("Both contacts lose energy", ([1, 2, 0.5], [1, 0.3, 0.1], [0.6, 0.9], 0.1)),
@@ -33,8 +33,8 @@ CASES = (
 
 
 def cells() -> list[str]:
-    """Return the code of the chapter's cells."""
-    path = HERE.parent / "three_balls.ipynb"
+    """Return the code of the page's cells."""
+    path = HERE.parent / "own_solver.ipynb"
     found = json.loads(path.read_text(encoding="utf-8"))["cells"]
     return [
         "".join(cell["source"])
@@ -44,13 +44,13 @@ def cells() -> list[str]:
 
 
 def lines(codes: list[str]) -> str:
-    """Return the chapter's solver: the cells that define its pieces."""
+    """Return the page's solver: the cells that define its pieces."""
     wanted = re.compile(rf"^def ({'|'.join(PIECES)})\(", re.MULTILINE)
     parts = [code.strip() for code in codes if wanted.search(code)]
     solver = "\n\n\n".join(["import numpy as np", *parts]) + "\n"
     if sorted(wanted.findall(solver)) != sorted(PIECES):
         raise ValueError(
-            f"book/three_balls.ipynb defines not each of {PIECES} once"
+            f"book/own_solver.ipynb defines not each of {PIECES} once"
         )
     return solver
 
@@ -72,7 +72,7 @@ def without(solver: str, piece: str) -> str:
 
 
 def example(codes: list[str]) -> tuple[list[float], list[float], list[float], float]:  # fmt: skip
-    """Return the numbers of the chapter's example."""
+    """Return the numbers of the page's example."""
     (parameters,) = (code for code in codes if code.startswith("masses = "))
     values: dict[str, Any] = {}
     exec(parameters, values)
@@ -88,7 +88,7 @@ def checks(codes: list[str]) -> list[dict[str, Any]]:
 
     asked = []
     for title, (masses, velocities, restitution, ratio) in (
-        ("The chapter's example", example(codes)),
+        ("The example of this page", example(codes)),
         *CASES,
     ):
         trace = collide(

@@ -1,4 +1,4 @@
-"""What the chapter's three-ball solver uses of numpy, for a browser: rows of numbers."""
+"""What the page's three-ball solver uses of numpy, for a browser: rows of numbers."""
 
 from math import inf, pi, sqrt  # noqa: F401  (np.inf, np.pi, np.sqrt)
 

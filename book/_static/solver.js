@@ -76,7 +76,7 @@
         "label",
         {},
         make("input", { type: "radio", name: "solver-piece", value: name, onchange: () => take(name) }),
-        name ? make("code", {}, name) : "nothing: the chapter's lines, to be changed",
+        name ? make("code", {}, name) : "nothing: the page's lines, to be changed",
       ),
     );
     choices[0].firstChild.checked = true;
