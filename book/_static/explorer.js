@@ -87,12 +87,11 @@
       const outcome = (here) => (here ? node("outcome") : "");
       const left = make("div", { class: "left" }, stages, outcome(guessed), node("run"), node("words"));
       this.panels.settings.node.append(node("beside"));
-      const right = make("div", { class: "right" }, outcome(!guessed), node("pictures"));
+      const right = make("div", { class: "right" }, outcome(!guessed), node("pictures"), node("tasks"));
       this.link = make("a", { href: "explorer.html" }, "Open in the full explorer");
       this.host.replaceChildren(
         node("question"),
         node("scenes"),
-        node("tasks"),
         make("div", { class: "desk" }, left, node("settings"), right),
         this.panels.question?.after ?? "",
         node("share"),

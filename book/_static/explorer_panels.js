@@ -47,9 +47,10 @@
       place.textContent = at < 0 ? "" : `${at + 1} of ${scenes.length}`;
       const { text: said, link } = scenes[at] ?? { text: "" };
       const more = link ? [" ", make("a", { href: link.address }, link.words)] : [];
-      // It tells the answer; its place stays.
-      if (covered && said) text.replaceChildren("After the hit: what this scene shows, and diagrams.");
-      else text.replaceChildren(said, ...more);
+      // It tells the answer: it is there unseen, so that nothing below it moves when it comes.
+      const told = make("span", { class: "said-of-scene" }, said, ...more);
+      const later = "After the hit these lines say what the scene shows.";
+      text.replaceChildren(...(covered && said ? [make("span", { class: "later" }, later)] : []), told);
     }
     return { node: make("div", { class: "scenes" }, walk, chains ? "" : text), show };
   }
@@ -156,7 +157,7 @@
         text: String(fewest + k),
       })),
     });
-    const scope = choice({ words: "set for", options: [], choose: act.scope });
+    const scope = choice({ words: "sliders for", options: [], choose: act.scope });
     const letters = [NONE, ...Object.keys(explorer.data.masses)];
     const material = choice({
       words: "material",
@@ -289,7 +290,7 @@
   function besidePanel(act) {
     const options = [["", "nothing"], ["0", "ratio 0"], ["0.15", "ratio 0.15"], ["spheres", "spheres that touch"], ["kept", "a copy of this setting"]]; // prettier-ignore
     const chosen = choice({
-      words: "beside it",
+      words: "second cradle",
       choose: act.beside,
       options: options.map(([value, text]) => ({ value, text })),
     });

@@ -37,7 +37,7 @@
     const count = make("span", { role: "status" });
     const node = make(
       "details",
-      { class: "tasks" },
+      { class: "tasks", open: true },
       make("summary", {}, "Tasks ", count),
       make("p", {}, "Of three balls or more pull back the first, and set whatever else you like. The first hit counts."),
       make("ol", {}, ...items),
