@@ -44,7 +44,6 @@ def test_every_figure_is_checked():
 @pytest.mark.parametrize(
     ("chapter", "figure", "chain", "ratio"),
     [
-        ("intro", "fig-inside", EQUAL, 0.15),
         ("three_balls", "fig-own-three-opening", THREE, 0.15),
         ("multiple_impacts", "fig-own-multiple-opening", FIVE, 0.15),
         ("patterns", "fig-own-patterns-light", LIGHT, 0.15),
