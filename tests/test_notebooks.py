@@ -243,6 +243,9 @@ def test_letters_of_the_chapters_have_one_line_on_the_notation_page():
         for name in ("problem", "compliance", "three_balls", "own_solver", "multiple_impacts",
                      "patterns", "n_balls", "experiments", "notation")
     }  # fmt: skip
+    # The modes of chapter 2 stand beside it.
+    beside = nbformat.read(BOOK / "reading_compliance.ipynb", as_version=4).cells
+    (words["modes"],) = (cell.source for cell in beside if cell.id == "compliance-modes")
     book_wide = words.pop("notation").partition("## Letters of single pages")[0]
     rows = re.findall(r"(?m)^\| ([^|]*\$[^|]*) \|", book_wide)
     symbols = [symbol.strip() for row in rows for symbol in re.split(r",|\$", row)]
