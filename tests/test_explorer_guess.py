@@ -66,6 +66,24 @@ def test_the_guess_comes_before_the_button(still, name):
     assert last["y"] + last["height"] < button["y"] < last["y"] + 300
 
 
+@pytest.mark.parametrize("width", [390, 1400])
+def test_the_cradle_stays_where_it_is_when_the_answer_comes(still, width):
+    """What is said of the scene, up to three lines above it, has its place before."""
+    tab = still("#scene=small", width=width)
+    tab.push("Guess first")
+    tab.drawn()
+    said, top = (
+        "document.querySelector('.said-of-scene').checkVisibility({ checkVisibilityCSS: true })",
+        "document.querySelector('.cradle').getBoundingClientRect().top + scrollY",
+    )
+    assert not tab.evaluate(said)
+    before = tab.evaluate(top)
+    tab.push("Next hit")
+    tab.drawn()
+    assert tab.evaluate(said)
+    assert tab.evaluate(top) == before
+
+
 def test_pictures_wait_after_a_hit_that_was_guessed(still):
     """So that the guess can be compared; the balls rest a little, then they swing on."""
     tab = still(chapter="intro", stopped=True)
