@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chapters import BOOK, Chapter, after, code, panel, solved
+from chapters import BOOK, Chapter, after, code, drawn, panel, solved
 from test_book_compliance import constant_ratio, first_loss, outcome, printed_10_and_11
 
 from cradle import textbook
@@ -21,7 +21,7 @@ CLOSE = {"rtol": 0, "atol": 1e-12}
 #: Drawings without numbers, what moves (tested by its cell), and names that tests put together.
 OTHERS = {
     *("fig-p1", "fig-p2", "fig-p9", "fig-own-notation-chain", "fig-own-notation-ratio"),
-    "fig-own-n-balls-rules",
+    "fig-own-multiple-rules",
     *("fig-flight", "fig-recipe-film", "fig-scene-film", "fig-toy-film"),
     *("fig-measure-swing", "fig-p10", "fig-p11", "fig-p12"),
 }
@@ -45,7 +45,6 @@ def test_every_figure_is_checked():
     ("chapter", "figure", "chain", "ratio"),
     [
         ("three_balls", "fig-own-three-opening", THREE, 0.15),
-        ("multiple_impacts", "fig-own-multiple-opening", FIVE, 0.15),
         ("patterns", "fig-own-patterns-light", LIGHT, 0.15),
         ("n_balls", "fig-own-n-balls-toy", ([1] * 5, [1, 0, 0, 0, 0], 1), 0.15),
     ],
@@ -60,6 +59,36 @@ def follows(shown, path, impulses):
     for ball, line in enumerate(shown.values()):
         expected = np.column_stack([impulses.sum(axis=1), path[:, ball]])
         np.testing.assert_allclose(line, expected, **CLOSE)
+
+
+def test_six_events_at_equal_distances():
+    """Each velocity at each event; bars: who acts between two, and dark who sets the pace."""
+    done = textbook.solve(*FIVE, 0.15)
+    rows = [0, *(k for k, (kind, _) in enumerate(done.events, 1) if kind in ("end", "close"))]
+    path, impulses = np.array(done.path)[rows], np.array(done.path_impulses)[rows]
+    shown = panel("multiple_impacts", "fig-own-multiple-opening")
+    assert list(shown) == ["$v_1$", "$v_2$", "$v_3$"]
+    for ball, line in enumerate(shown.values()):
+        np.testing.assert_allclose(line, np.column_stack([range(7), path[:, ball]]), **CLOSE)
+    upper, bars = drawn("multiple_impacts")["fig-own-multiple-opening"].axes
+    (lens,) = upper.child_axes
+    for ball, line in zip((1, 2), lens.get_lines()):
+        np.testing.assert_allclose(line.get_ydata(), path[:, ball], **CLOSE)
+    found = {}
+    for bar in bars.collections:
+        if bar.get_label() == "_child0":  # the dotted lines of the events
+            continue
+        ((left, low),) = [shape.vertices.min(axis=0) for shape in bar.get_paths()]
+        found[round(left), round(low + 0.3)] = bar.get_facecolor()[0, 0]
+    acts = np.diff(impulses, axis=0)
+    assert set(found) == {(k, c) for k, step in enumerate(acts) for c in (0, 1) if step[c] > 0}
+    for k, step in enumerate(acts):
+        dark = min((0, 1), key=lambda c: found.get((k, c), 1.0))
+        assert step[dark] == step.max()
+        if (step > 0).all():
+            assert min(step) == pytest.approx(0.15 * max(step), rel=1e-12)
+    told = [text.get_text() for text in bars.texts if text.get_text()]
+    assert told == ["drives", "alone", "drives", "alone", "drives", "alone"]
 
 
 def test_two_runs_are_drawn_without_bends_between_events():

@@ -208,9 +208,9 @@ def test_events_of_two_runs_that_meet():
 
 
 def test_meeting_chooses_a_velocity_of_the_overlap():
-    """What the chapter prints and says of the parameter, by the reference rules."""
+    """What its page prints and the chapter says of it, by the reference rules."""
     chain = [1] * 4, [1, "0.5", 0, 0], 1
-    lines = CHAPTER.printed("meeting-live").splitlines()
+    lines = READING.printed("meeting-live").splitlines()
     ends, met = [], []
     for line, place in zip(lines, (0, 0.5, 1), strict=True):
         exact = truth.solve(*chain, "0.15", meeting=place, number=float)
