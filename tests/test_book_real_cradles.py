@@ -9,14 +9,25 @@ import real_swing
 import scipy
 from chapters import Chapter, points
 from real_cradles import first_strikes, spheres, table
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, least_squares, minimize_scalar
 from stored import read
 
-from cradle import Chain, ImpulseCorrelation, SpringChain, collide, ratio_table
+from cradle import (
+    Chain,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    ratio_table,
+)
 from cradle.pictures.impacts import ball_style
 
 CHAPTER = Chapter("real_cradles")
 GLUED = CHAPTER.glued
+#: What the chapter says in few words, with its numbers; values by their whole names.
+READING = Chapter("reading_real_cradles")
+AUDITS = READING.glued
 #: The appendix has what the chapter leaves out of these films.
 APPENDIX = Chapter("observations")
 TOLD = APPENDIX.glued
@@ -94,12 +105,13 @@ def test_chi_square_ball_by_ball():
     c = minimize_scalar(
         lambda c: (((film - c * law) / error) ** 2).sum() + ((c - 1) / 0.01) ** 2, bounds=(0.8, 1.2)
     )
-    CHAPTER.tells({"c": c.x}, off=2e-4)
+    READING.tells({"c": c.x}, off=2e-4)
     assert float(GLUED["sum"]) == pytest.approx(c.fun, abs=2)
     assert scaled == pytest.approx(((film - c.x * law) / error) ** 2, rel=0.02, abs=0.1)
-    assert float(GLUED["scaled"]) + float(GLUED["paid"]) == pytest.approx(c.fun, abs=2)
-    top, bottom = (1e4 + float(GLUED[name]) for name in ("c-top", "c-bottom"))
+    assert float(AUDITS["scaled"]) + float(AUDITS["paid"]) == pytest.approx(c.fun, abs=2)
+    top, bottom = (1e4 + float(AUDITS[name]) for name in ("c-top", "c-bottom"))
     assert top / bottom == pytest.approx(c.x, abs=6e-4)
+    assert AUDITS["sum"] == GLUED["sum"]
     assert float(GLUED["sum"]) == round(
         float(FITS["touching spheres, A", "together", "one", "4"]["chi_one"])
     )
@@ -108,7 +120,7 @@ def test_chi_square_ball_by_ball():
 def test_fig_off_and_the_table_of_three_laws():
     """Bars are differences in errors of reading; their squares and the factor make chi-square."""
     axes = CHAPTER.figures["fig-real-off"].axes
-    table_of_sums = re.findall(r"(\S+)\u202f/\u202f(\d+)", CHAPTER.printed("table"))
+    table_of_sums = re.findall(r"(\S+)\u202f/\u202f(\d+)", READING.printed("films-table"))
     for k, (ax, model) in enumerate(zip(axes, MODELS, strict=True)):
         bars = np.array([bar.get_height() for bar in ax.patches if bar.get_width() < 1])
         sums = []
@@ -122,6 +134,8 @@ def test_fig_off_and_the_table_of_three_laws():
         assert float(both[0]) == pytest.approx(sums[0] + sums[1], rel=2e-3, abs=0.06)
         assert float(third[0]) == shown[2]
         assert (int(both[1]), int(third[1])) == (10 - (k > 0) * 4, 5)
+        if k:
+            assert GLUED["both-" + ("ratios", "gaps")[k - 1]] == both[0]
     CHAPTER.tells({"times": sums_of("ratios") / sums_of("gaps")})
 
 
@@ -189,8 +203,8 @@ def test_one_strike_is_fitted_in_six_ways_that_predict_different_things():
             for k, one in enumerate(numbers):
                 assert all(np.abs(np.subtract(one, x)).max() > 0.02 for x in numbers[:k])
             if reading == "4":
-                assert float(GLUED[f"{short}-least"]) == pytest.approx(min(chi), abs=0.06)
-                assert float(GLUED[f"{short}-most"]) == pytest.approx(max(chi), abs=0.6)
+                assert float(AUDITS[f"{short}-least"]) == pytest.approx(min(chi), abs=0.06)
+                assert float(AUDITS[f"{short}-most"]) == pytest.approx(max(chi), abs=0.6)
 
 
 def test_gaps_and_not_ratios_predict_the_third_release():
@@ -235,6 +249,13 @@ def test_the_first_two_of_three_strikers_did_not_come_as_one():
 
     assert float(GLUED["pair-gap"]) == pytest.approx(100 * behind(0)[0][-1], abs=0.51)
     assert min(float(GLUED["pair-ratio"]), float(GLUED["pair-gap"])) > 100 * (film + 4 * error)[-1]
+    # One by one is kindest to ratios: nothing else comes near.
+    two = collide(Chain([1] * 5, [1, *pair], e), SequentialCollisions()).velocities
+    together = {"two-as-one": two, "all-as-one": real_cradles.ratios([*p], e, 3, False)}
+    for name, v in together.items():
+        off = real_cradles.misfits(lambda _, v=v: v, {3: (film, error)}, (3,))
+        CHAPTER.tells({f"{name}-ratio": off @ off})
+        assert off @ off > 5 * sums_of("ratios")
     unit = (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
     least = float(GLUED["pair-um"]) * 1e-6 / unit
     assert behind(least)[1] == pytest.approx(behind(30)[1] + 3.84, abs=0.3)
@@ -317,7 +338,7 @@ def test_the_figure_of_the_strikes():
         2: laws(2)[:, 2:],
         3: np.array([line.split() for line in third], float).T,
     }
-    _, *panels = CHAPTER.figures["fig-real-strikes"].axes
+    _, *panels = READING.figures["fig-real-strikes"].axes
     for release in (1, 2, 3):
         seen, error = (100 * x for x in first_strikes(4)[release])
         fast, slow = panels[2 * release - 2 : 2 * release]
@@ -386,6 +407,59 @@ def test_what_the_third_strike_wants_of_ball_4():
     assert max(ratio.fun, gap.fun) < 6
     assert sums_of("gaps") - gap.fun < 1
     assert sums_of("ratios") - ratio.fun > 40
+
+
+def pushes(release, gaps, loss):
+    """Times in Hertz units, and forces of the last two contacts, by an integration of its own."""
+    balls, speed = 6 - release, 1.0 if release == 1 else 0.766
+
+    def forces(y):
+        x, v = y[:balls], y[balls:]
+        deep = np.maximum(x[:-1] - x[1:] - [0, *gaps[release - 1 :]], 0)
+        return np.maximum(deep**1.5 + 1.5 * loss * deep**0.5 * (v[:-1] - v[1:]), 0)
+
+    def rate(_, y):
+        f = np.concatenate([[0], forces(y), [0]])
+        return np.append(y[balls:], -np.diff(f))
+
+    start = [0.0] * balls + [speed] + [0.0] * (balls - 1)
+    t = np.linspace(0, 8, 16001)
+    run = solve_ivp(rate, (0, 8), start, "RK45", t, rtol=1e-8, atol=1e-10, max_step=0.01)
+    first, second = np.array([forces(y)[-2:] for y in run.y.T]).T
+    return t - t[first.argmax()], first / first.max(), second / first.max()
+
+
+def test_the_two_pushes_at_ball_4():
+    """Their curves, their overlap, and that the push of a flying ball has no foot."""
+    *gaps, loss = parameters("spheres, three gaps, A", "apart", "both")
+    unit = (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
+    found = {release: pushes(release, gaps, loss) for release in (1, 2, 3)}
+    shares = {
+        release: 100 * np.minimum(first, second).sum() / first.sum()
+        for release, (_, first, second) in found.items()
+    }
+    CHAPTER.tells(
+        {f"overlap-{name}": shares[k] for k, name in enumerate(("one", "two", "three"), 1)}
+    )
+    assert shares[1] > shares[2] > shares[3] + 1
+    above, below = CHAPTER.figures["fig-real-forces"].axes
+    for ax, shown in ((above, (1,)), (below, (3, 1))):
+        curves = [line.get_xydata() for line in ax.get_lines()]
+        assert len(curves) == 2 * len(shown)
+        for k, curve in enumerate(curves):
+            t, *forces = found[shown[k // 2]]
+            expected = np.interp(curve[:, 0], 1e6 * unit / 0.69 * t, 100 * forces[k % 2])
+            assert curve[:, 1] == pytest.approx(expected, abs=0.5)
+        told = next(x.get_text() for x in ax.texts if "overlap" in x.get_text())
+        assert float(told.split()[1]) == pytest.approx(shares[shown[0]], abs=0.51)
+    # Of the push as a whole: when it has a hundredth of its peak, and when the next one has it.
+    begins = {
+        release: [t[np.argmax(push > 0.01)] for push in forces]
+        for release, (t, *forces) in found.items()
+    }
+    for release in (1, 2):
+        assert begins[release][0] < begins[3][0] - 0.1
+        assert begins[release][1] < begins[3][1] - 0.05
 
 
 def test_a_share_of_chi_square_with_a_pencil():
@@ -461,7 +535,7 @@ def test_fig_half():
 
 def test_a_line_and_not_an_exponential():
     lines, exponentials = (
-        [float(x) for x in GLUED[name].split(" and ")] for name in ("line", "exponential")
+        [float(x) for x in AUDITS[name].split(" and ")] for name in ("line", "exponential")
     )
     t = table("cradle_peaks.csv")
     for k, ball in enumerate((1, 5)):
@@ -471,7 +545,7 @@ def test_a_line_and_not_an_exponential():
         least = (((size - np.polyval(line, x)) / error) ** 2).sum()
         assert lines[k] == pytest.approx(least, abs=0.51)
         assert exponentials[k] > 5 * least
-        assert int(GLUED["flights"]) == use.sum() - 2
+        assert int(AUDITS["flights"]) == use.sum() - 2
 
 
 def test_another_height():
