@@ -46,6 +46,9 @@ def cases():
     random = magnitudes(np.random.default_rng(1), 2, (300, 5))
     yield "5 random, two decades", random, 0.0, (1e-2, 1e-3)
     yield "5 equal, A = .03", np.ones((1, 5)), 0.03, (1e-2, 1e-3, 1e-4)
+    six = magnitudes(rng, 2, (300, 6))
+    yield "6 random, two decades", six, 0.0, (1e-3,)
+    yield "6 random, A = .03", six, 0.03, (1e-3,)
 
 
 def ours(masses, loss, accuracy):

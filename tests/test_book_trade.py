@@ -24,13 +24,14 @@ from cradle import (
     SpringChain,
     collide,
     post_impact_velocities,
+    viscosity_from,
 )
 from cradle.kernel import EVENT_LOOP
 from cradle.runtime import compile as runtime
 from cradle.runtime import job
 
 ROOT = Path(__file__).parents[1]
-CHAPTER, ENGINES_PAGE = Chapter("trade"), Chapter("engines")
+CHAPTER, ENGINES_PAGE, FORCES = Chapter("trade"), Chapter("engines"), Chapter("forces")
 IMPULSE_ENGINES = ("Chipmunk", "Box2D", "Bullet", "Rapier")
 ENGINES = (*IMPULSE_ENGINES, "MuJoCo")
 
@@ -182,7 +183,7 @@ def test_figures_show_the_table(figure):
     rows = [row for row in rows if not row["chain"].startswith("two")]
     values = [row[column][0] if column == "velocities" else row[column] for row in rows]
     assert len(values) > 5
-    figures = {**CHAPTER.figures, **ENGINES_PAGE.figures}
+    figures = {**FORCES.figures, **ENGINES_PAGE.figures}
     assert shows(figures[figure].axes, values)
 
 
@@ -190,7 +191,7 @@ def test_fig_trade_models():
     measured, fitted = ImpulseCorrelation(0.167), ImpulseCorrelation(0.132503287)
     (ax,) = CHAPTER.figures["fig-trade-models"].axes
     errors = {}
-    for line, scene in zip(points(ax), ELASTIC, strict=True):
+    for line, scene in zip(points(ax, 7), ELASTIC, strict=True):
         m = ELASTIC[scene]
         chain, answer = Chain(m, [1] + [0] * (len(m) - 1), 1), np.array(HERTZ[scene])
         found = [
@@ -200,7 +201,7 @@ def test_fig_trade_models():
         # The last one is the limit of the convex problem.
         found += [sequential(scene), fused(scene), fused(scene)]
         errors[scene] = np.abs(np.array(found) - answer).max(axis=1)
-        np.testing.assert_allclose(line[:, 0], errors[scene], rtol=0, atol=1e-6)
+        np.testing.assert_allclose(line[:, 0] / 100, errors[scene], rtol=0, atol=1e-6)
         assert errors[scene][0] < 1e-8
         assert 0.5 < errors[scene][5] < 0.7
         assert errors[scene][2] < errors[scene][4]
@@ -220,39 +221,87 @@ def test_fig_trade_models():
 
 
 METHODS = (
-    "this package", "velocity Verlet", "the paper's rule", "measured ratio", "pair after pair",
+    "this package", "velocity Verlet", "measured ratio", "the paper's rule", "pair after pair",
     "all as one body",
 )  # fmt: skip
 
 
 def test_fig_trade_total_drawn():
-    """Each panel is the stored table; no error is above the one asked for."""
+    """The stored table, with its times as numbers; no error is above the one asked for."""
     rows = [(r["chain"], r["method"], float(r["microseconds"]), float(r["error"]),
              float(r["asked"] or 1)) for r in read("forces.csv")]  # fmt: skip
-    axes = CHAPTER.figures["fig-trade-total"].axes
-    for ax, name in zip(axes, ("5 equal", "5 equal, A = .03"), strict=True):
-        for line, method in zip(points(ax), METHODS, strict=True):
-            found = np.array([row[2:] for row in rows if row[:2] == (name, method)])
-            np.testing.assert_allclose(line, found[:, :2])
-            assert (found[:, 1] <= found[:, 2]).all()
+    (ax,) = CHAPTER.figures["fig-trade-total"].axes
+    both = [(m, c) for m in METHODS for c in ("5 equal", "5 equal, A = .03")]
+    times = iter(ax.texts)
+    for line, (method, name) in zip(points(ax), both, strict=True):
+        found = np.array([row[2:] for row in rows if row[:2] == (name, method)])
+        np.testing.assert_allclose(line[:, 0], 100 * found[:, 1])
+        assert (found[:, 1] <= found[:, 2]).all()
+        for (x, y), (time, *_) in zip(line, found, strict=True):
+            text = next(times)
+            assert text.xy == (x, y)
+            assert float(text.get_text()) == pytest.approx(time, rel=0.05)
+    assert next(times, None) is None
+
+
+SIX = "6 random, two decades"
 
 
 def test_other_rows_are_the_stored_table():
     """At the accuracy of a thousandth; no error is above it."""
     printed = CHAPTER.printed("trade-others").splitlines()[1:]
+    names = ("20 equal", "1 1 .1 1 1", "ABCCA", SIX, "6 random, A = .03")
     found = [
         (float(r["error"]), float(r["microseconds"]), r["method"])
-        for name in ("20 equal", "1 1 .1 1 1", "ABCCA")
-        for method in (*METHODS[:3], METHODS[4])
+        for name in names
+        for method in (*METHODS[:2], *METHODS[3:5])
         for r in read("forces.csv", chain=name, method=method)
         if r["asked"] in ("", "1e-03")
     ]
     for line, (error, time, method) in zip(printed, found, strict=True):
-        *_, percent, unit, microseconds = line.split()
-        assert unit == "%"
+        *_, percent, microseconds = line.split()
         assert float(percent) == pytest.approx(100 * error, rel=0.05)
         assert float(microseconds) == pytest.approx(time, rel=0.05)
         assert error < 1e-3 or method not in METHODS[:2]
+
+
+def test_the_table_of_advice():
+    """Its times and its distances from spheres are the stored ones."""
+    told = CHAPTER.glued
+    calls = {
+        "spheres": find("springs", "accuracy 1e-03", chain="five equal"),
+        "viscous": [],
+        "ratios": find("event", "compiled, one call, outcome", chain="five equal"),
+        "pairs": find("outcome", "one call", chain="five equal", model="SequentialCollisions"),
+    }
+    lossy = ("5 equal, A = .03", "6 random, A = .03")
+    for name, method in zip(calls, ("this package", "this package", *METHODS[3:5]), strict=True):
+        times = []
+        for chain in lossy if name == "viscous" else ("5 equal", SIX):
+            row = next(r for r in read("forces.csv", chain=chain, method=method)
+                       if r["asked"] in ("", "1e-03"))  # fmt: skip
+            times.append(float(row["microseconds"]))
+        times += [row["microseconds"] for row in calls[name]]
+        numbers = [float(x) for x in told[f"us-{name}"].removesuffix(", –").split(", ")]
+        assert numbers == pytest.approx(times, rel=0.06)
+    off = {r["method"]: 100 * float(r["error"]) for r in read("forces.csv", chain="5 equal")}
+    assert told["off-ratios"] == f"{off['measured ratio']:.0f} to {off[METHODS[3]]:.0f}"
+    assert told["off-pairs"] == f"{off['pair after pair']:.0f}"
+    energy = [r["microseconds"] for r in find("energy", chain="ABCCA")]
+    assert told["us-energy"] == f"–, –, {min(energy) / 1000:.0f} ms"
+
+
+def test_who_arrives_together():
+    """Ten viscous balls by another integrator, the last one in percent."""
+    m, v = [1] * 10, [1, 1] + [0] * 8
+    loss = viscosity_from(0.9, speed=1, masses=m)
+    last = [integrated(m, v, loss=loss, gaps=[g] + [0] * 8)[-1] for g in (0, 9)]
+    assert float(CHAPTER.glued["together"]) == pytest.approx(100 * (last[0] - last[1]), abs=0.51)
+    seen = real_cradles.first_strikes(4)[2][0]
+    for name, gap in (("together", 0), ("apart", 30)):
+        v = integrated([1] * 5, [1, 1, 0, 0, 0], loss=0, gaps=[gap, 0, 0, 0])
+        off = 100 * np.abs(v - seen).max()
+        assert float(CHAPTER.glued[f"film-two-{name}"]) == pytest.approx(off, abs=0.51)
 
 
 def test_errors_of_the_rule_with_one_ratio():
@@ -273,25 +322,30 @@ def test_errors_of_the_rule_with_one_ratio():
 
 
 def test_laws_beside_the_film():
-    """Distances by another integrator and by the independent solver; the test as stored."""
-    film = real_cradles.first_strikes(4)[1][0]
-    off = []
-    for law in ("pairs, e", "touching spheres, A", "one ratio, e", "three ratios, e",
-                "spheres, three gaps, A"):  # fmt: skip
-        (row,) = read("film_fits.csv", reading="4", law=law, strikers="apart", fitted="both")
-        p = [float(x) for x in row["parameters"].split()]
-        if "spheres" in law:
-            gaps = [0, *(p[:3] if "gaps" in law else [0, 0, 0])]
-            v = integrated([1] * 5, [1, 0, 0, 0, 0], loss=p[-1], gaps=gaps)
-        else:
-            ratios = {1: 0, 2: p[0], 4: p[:3]}[len(p)]
-            v = floats(solve([1] * 5, [1, 0, 0, 0, 0], p[-1], ratios).velocities)
-        off.append((100 * np.abs(v - film).max(), float(row["chi_three"])))
+    """Distances of three strikes by the functions that fitted the laws; the test as stored."""
+    film = real_cradles.first_strikes(4)
     printed = CHAPTER.printed("trade-film").splitlines()[1:]
-    for line, (distance, test) in zip(printed, off, strict=True):
-        percent, _, shown = line.split()[-3:]
-        assert float(percent) == pytest.approx(distance, abs=0.051)
-        assert float(shown) == pytest.approx(test, abs=0.51)
+    names = {
+        "pairs, e": "pairs", "spheres, nothing": "touching", "touching spheres, A": "viscous",
+        "energy law (Hertz), e": "energy", "one ratio, e": "one", "three ratios, e": "three",
+        "spheres, three gaps, A": "gaps",
+    }  # fmt: skip
+    for line, (law, name) in zip(printed, names.items(), strict=True):
+        if law == "spheres, nothing":
+            p, law = [0.0], "touching spheres, A"
+            chi = real_cradles.chi_square(law, p, True, film, (3,))
+        else:
+            found = read("film_fits.csv", reading="4", law=law, strikers="apart", fitted="both")
+            p = [float(x) for x in found[0]["parameters"].split()]
+            chi = float(found[0]["chi_three"])
+        off = []
+        for lifted in (1, 2, 3):
+            v = real_cradles.LAWS[law][0](p, lifted, True)
+            off.append(100 * np.abs(v - film[lifted][0]).max())
+        *shown, test = (float(x) for x in line.split()[-4:])
+        assert shown == pytest.approx(off, abs=0.051)
+        assert test == pytest.approx(chi, abs=0.51)
+        assert CHAPTER.glued[f"test-{name}"] == f"{test:.0f} ({shown[2]})"
 
 
 #: Chains of the figure: masses, A of the losses.
