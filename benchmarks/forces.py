@@ -43,7 +43,8 @@ def cases():
     yield "20 equal", np.ones((1, 20)), 0.0, (1e-2, 1e-3)
     yield "ABCCA", np.array([[45, 53, 53, 53, 45]]) / 45, 0.0, (1e-2, 1e-3)  # grams, as elastic
     yield "100 equal", np.ones((1, 100)), 0.0, (1e-2, 1e-3)
-    random = magnitudes(np.random.default_rng(1), 2, (300, 5))
+    rng = np.random.default_rng(1)
+    random = magnitudes(rng, 2, (300, 5))
     yield "5 random, two decades", random, 0.0, (1e-2, 1e-3)
     yield "5 equal, A = .03", np.ones((1, 5)), 0.03, (1e-2, 1e-3, 1e-4)
     six = magnitudes(rng, 2, (300, 6))
