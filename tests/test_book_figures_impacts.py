@@ -42,13 +42,15 @@ def in_ratios(r1, r2):
 
 
 def test_fig_patterns_three():
-    for number, (r1, r2) in enumerate(((1.0, 1.0), (2.5, 1.0), (2.5, 0.25))):
+    points = ((1.0, 1.0), (2.5, 1.0), (2.5, 0.25))
+    for number, (r1, r2) in enumerate(points):
         v = after((*in_ratios(r1, r2), 0.5), 0.15)
         for ball, line in enumerate(panel("patterns", "fig-patterns-three", number).values()):
             places = 0.6 * ball + np.array([-1.0 * (ball == 0), 0, 2 * v[ball]])
             np.testing.assert_allclose(line, np.column_stack([places, [-1, 0, 2]]), **CLOSE)
-        chart = drawn("patterns")["fig-patterns-three"].axes[3 + number]
-        assert chart.get_lines()[-1].get_xydata().tolist() == [[r2, r1]]
+    chart = drawn("patterns")["fig-patterns-three"].axes[3]
+    shown = [line.get_xydata().tolist() for line in chart.get_lines()]
+    assert shown == [[[r2, r1]] for r1, r2 in points]
 
 
 def test_one_point_of_the_map_with_a_pencil():
@@ -75,7 +77,7 @@ def eq_44(r2, e=0.5, a=0.15):
 
 
 def test_fig_6_drawn():
-    ax, corner = drawn("patterns")["fig-p6"].axes
+    (ax,) = drawn("patterns")["fig-p6"].axes
     shown = lines(ax)
     r2, r1 = shown["Eq. (44): back impact"].T
     np.testing.assert_allclose(r1, eq_44(r2), rtol=1e-13)
@@ -83,13 +85,6 @@ def test_fig_6_drawn():
     np.testing.assert_allclose(shown["Eq. (45): $v_1^+ = 0$"], [(rest_2, 1.7), (3.2, 1.7)])
     np.testing.assert_allclose(shown["Eq. (46): $v_2^+ = 0$"], [(rest_2, 1.7), (rest_2, 3.2)])
     np.testing.assert_allclose(shown["all three meet"], [(rest_2, 1.7)])
-    # The thin borders, from the fourth collision on: the map of turns counts one more below.
-    thin = [x.get_xydata() for x in corner.get_lines() if x.get_color() == "0.35"]
-    assert len(thin) == 7
-    for number, line in enumerate(thin, start=4):
-        for r2, r1 in line[~np.isnan(line[:, 1])][20::60]:
-            assert by_turns(r1 * (1 - 1e-7), r2, 0.5, 0.15)[0] == number
-            assert by_turns(r1 * (1 + 1e-7), r2, 0.5, 0.15)[0] == number - 1
     # Shaded: where balls 1 and 2 go back.
     shades = [x.get_paths()[0] for x in ax.collections if getattr(x, "filled", False)]
     assert len(shades) == 2
@@ -126,6 +121,13 @@ def test_fig_patterns_corner():
     (border,) = solid
     for r2, r1 in border[:20:6]:
         assert r1 == pytest.approx(edge(r2, 0.5, 0.15), rel=1e-6)
+    # The thin borders, from the third collision on: the map of turns counts one more below.
+    thin = [x.get_xydata() for x in right.get_lines() if x.get_color() == "0.35"]
+    assert len(thin) == 8
+    for number, line in enumerate(thin, start=3):
+        for r2, r1 in line[~np.isnan(line[:, 1])][20::60]:
+            assert by_turns(r1 * (1 - 1e-7), r2, 0.5, 0.15)[0] == number
+            assert by_turns(r1 * (1 + 1e-7), r2, 0.5, 0.15)[0] == number - 1
     assert len(dots) == 3
     for r2, r1 in dots:
         np.testing.assert_allclose(by_turns(r1, r2, 0.5, 0.15)[1][:2], 0, atol=1e-9)
@@ -155,7 +157,7 @@ def test_fig_patterns_wedge():
     """Each arrow is one cycle on from the one before; the last one left has no further cycle."""
     for number, r in enumerate((0.12, 0.06)):
         share = 1 / (1 + r)  # of the outer ball in the mass of a pair
-        arrows = panel("patterns", "fig-patterns-wedge", number)
+        arrows = panel("reading_patterns", "fig-patterns-wedge", number)
         stays = arrows.pop("stays", None)
         v = np.array([1.0, 0.0, 0.0])  # masses 1/r, 1, 1/r
         for place, arrow in enumerate(arrows.values()):
@@ -176,7 +178,8 @@ def test_fig_patterns_wedge():
 
 
 def test_fig_patterns_micro():
-    top, low = (panel("patterns", "fig-patterns-micro", k) for k in (0, 1))
+    top = panel("reading_patterns", "fig-patterns-count")
+    low = panel("patterns", "fig-patterns-micro")
     r, first = low["$v_1^+$"][:, 0], 4000 - len(low["$v_2^+$"])
     low["$v_2^+$"] = np.vstack([np.full((first, 2), np.nan), low["$v_2^+$"]])
     np.testing.assert_allclose(top["estimate"][:, 1], np.pi * np.sqrt(0.85 / (2 * r)), rtol=1e-12)
