@@ -96,7 +96,7 @@ LETTERS = {
 
 
 def test_fig_trade_engines_textbook_answers():
-    """The table of letters: S within .01 of sequential, F of fused; all engines are measured."""
+    """The table of words: S within .01 of sequential, F of fused; all engines are measured."""
     rows = find("engine")
     assert {row["model"] for row in rows} == set(ENGINES)
     assert len(rows) == 5 * 2 * 3 * 6
@@ -112,6 +112,35 @@ def test_fig_trade_engines_textbook_answers():
             letter = {"three equal": "S", "light middle": "F"}.get(scene)
         if letter is not None:
             assert "".join(key for key in near if near[key]) == letter, (name, placement, scene)
+
+
+def test_engines_table_of_words():
+    """Per engine and placement: the answer of most rows, and of the others by name."""
+    printed = " ".join(ENGINES_PAGE.printed("engines-letters").split())
+    lines = re.split("|".join(ENGINES), printed)[1:]
+    for name, line in zip(ENGINES, lines, strict=True):
+        rest = line
+        for placement in ("apart", "touching", "pressed"):
+            answers = {}
+            for scene in (*ELASTIC, "ABCCA"):
+                (row,) = find("engine", f"refined, {placement}", model=name, chain=scene)
+                pairs = off(row, sequential(scene)) < 0.01
+                one = off(row, fused(scene)) < 0.01
+                answers[scene] = "pairs" if pairs else "one body" if one else "neither"
+            told = list(answers.values())
+            most = max(told, key=told.count)
+            others = [f"{k}: {v}" for k, v in answers.items() if v != most]
+            expected = "; ".join([most, *others])
+            assert rest.strip().startswith(expected), (name, placement, rest)
+            rest = rest.strip()[len(expected) :]
+        assert not rest.strip()
+
+
+def test_engines_across_a_gap_by_default():
+    """Three equal balls: only two engines give one pair after the other as they are."""
+    for row in find("engine", "default, apart", chain="three equal"):
+        near = off(row, sequential("three equal")) < 0.01
+        assert near == (row["model"] in ("Chipmunk", "Box2D")), row["model"]
 
 
 def rapier(scene):
