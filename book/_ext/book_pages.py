@@ -188,12 +188,13 @@ def keep_punctuation(
         if not (opening or closing):
             continue
         whole = nodes.inline("", "", classes=["nowrap"])
-        parent.replace(formula, whole)
+        # By place: another text of the paragraph may be the same.
+        parent[at] = whole
         whole += [nodes.Text(opening), formula, nodes.Text(closing)]
         if opening:
-            parent.replace(before, nodes.Text(before[: -len(opening)]))
+            parent[at - 1] = nodes.Text(before[: -len(opening)])
         if closing:
-            parent.replace(after, nodes.Text(after[len(closing) :]))
+            parent[at + 1] = nodes.Text(after[len(closing) :])
 
 
 def _end_of(node: nodes.Node | None, pattern: re.Pattern[str]) -> str:
