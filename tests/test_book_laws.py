@@ -55,6 +55,20 @@ def test_fig_laws_curve_angles():
             assert min(abs(at), abs(at - 60)) < 0.1, row["model"]
 
 
+def test_mujoco_on_the_arc():
+    """Five of its six outcomes are near an end; the sixth one is near linear springs."""
+    rows = find("engine", model="MuJoCo", chain="three equal")
+    assert len(rows) == 6
+    by_distance = []
+    for row in rows:
+        at = angle("three equal", row["velocities"])
+        by_distance.append((min(at, 60 - at), at, row["setting"], row["velocities"]))
+    *_, (second, *_), (_, at, setting, v) = sorted(by_distance, key=lambda found: found[0])
+    assert setting == "default, apart"
+    off = np.abs(v - np.array(LINEAR["three equal"])).max()
+    CHAPTER.tells({"mujoco": at, "mujoco-ends": second, "mujoco-off": off})
+
+
 NAMES = "exponent", "k2_over_k1", "m2_over_m1", "m3_over_m2"
 #: Ratio that springs imply, by exponent, stiffness and both ratios of masses.
 IMPLIED = {
