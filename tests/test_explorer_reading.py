@@ -406,6 +406,7 @@ def test_motion_is_asked_for(visit):
     assert lively.state("clock.time") == pytest.approx(1.5, abs=0.05)
     assert lively.get_by_role("button", name="Pause").is_visible()
     # Out of sight it stands still, and goes on where it was.
+    lively.evaluate("document.querySelector('footer').style.marginTop = '3000px'")
     lively.evaluate("document.querySelector('footer').scrollIntoView()")
     lively.wait_for_function(f"!{EXPLORER}.visible")
     lively.clock.run_for(50)

@@ -240,7 +240,7 @@ def test_every_figure_has_both_colourings(html: Path):
     assert len(drawings) > 40
     assert all(path.stem.startswith("fig-") for path in drawings)  # who saves one finds it again
     maps = [path for path in drawings if "<image" in path.read_text(encoding="utf-8")]
-    assert 5 < len(maps) < 15  # their points stay as they are
+    assert 4 < len(maps) < 15  # their points stay as they are
     points = re.compile(r'<image[^>]*"data:[^"]*"')
     for path in maps:
         drawing = path.with_name(f"{path.stem}-dark.svg").read_text(encoding="utf-8")

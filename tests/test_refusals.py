@@ -203,7 +203,6 @@ LAWS = [
      "restitution[0] = 0.9; must be 1: SpeedDependent has its own"),
     (EnergyDistribution, (-1,), "stiffness = -1.0; must be above 0"),
     (EnergyDistribution, (1, 0.5), "exponent = 0.5; must be at least 1"),
-    (EnergyDistribution, {"gaps": 1}, "gaps = 1; must be True or False"),
     (EnergyDistribution, {"rtol": 0}, "rtol = 0.0; must lie in"),
     (EnergyDistribution, {"max_evaluations": 0}, "max_evaluations = 0; must be a whole number, at"),
     (struck, (EnergyDistribution([1, 2, 3]),), "stiffness has 3 values; 3 balls need 2"),

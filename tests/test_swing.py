@@ -626,9 +626,9 @@ def test_an_unsound_swing_is_refused(monkeypatch, where, name, how, words, hangi
 
 def test_a_strike_that_makes_energy_is_refused(monkeypatch):
     """The balls are left where no contact force can have brought them."""
-    parted = TimedTrace.parted
+    parted = TimedTrace._until_apart
     far = np.array([-0.01, 0.01])
-    monkeypatch.setattr(TimedTrace, "parted", lambda trace: (parted(trace)[0], far))
+    monkeypatch.setattr(TimedTrace, "_until_apart", lambda trace: (parted(trace)[0], far))
     with pytest.raises(RuntimeError, match=f"not certified: at t = .* {LOST}"):
         swing(balls(2), SpringChain(1e10), [-0.02, 0], [0.5])
 
