@@ -64,9 +64,6 @@ def pendulum_length(length: float | None, period: float | None) -> float | None:
     return 9.81 * (0.5 * period / math.pi) ** 2
 
 
-AS_ONE = "balls that move alike strike as one; those of a toy come one by one (--gaps)"
-
-
 class Described(NamedTuple):
     """A chain, how it collides, what was not given and stands for it, and the paper's types."""
 
@@ -149,8 +146,14 @@ def described(
             kind = "spheres that lose much, by the energy law"
         assumed += [f"the balls collide as {kind} (--model, --ratio)"] if bare else []
     alike = (chain.velocities[1:] == chain.velocities[:-1]) & (chain.velocities[1:] != 0.0)
-    assumed += [AS_ONE] if bool(alike.any()) and not gaps and model != "sequential" else []
+    assumed += as_one(bool(alike.any()), gaps, model)
     return Described(chain, taken, law, tuple(assumed), letters)
+
+
+def as_one(alike: bool, gaps: list[float] | None, model: str | None) -> list[str]:
+    """Return what is assumed where neighbours move alike."""
+    told = "balls that move alike strike as one; those of a toy come one by one (--gaps)"
+    return [told] * (alike and not gaps and model != "sequential")
 
 
 def one_or_all(values: list[float] | None) -> Any:

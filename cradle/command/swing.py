@@ -9,7 +9,7 @@ import cradle
 from cradle.advice.choice import made
 from cradle.command import describe
 from cradle.command.console import format_options, picture, show
-from cradle.command.describe import AS_ONE, chain_options, described, numbers_of, one_or_all
+from cradle.command.describe import chain_options, described, numbers_of, one_or_all
 from cradle.input.values import ABOVE_ZERO, one_number, whole_number
 
 
@@ -77,10 +77,9 @@ def swing(
         for one in run.impacts
     ]
     # How fast the first ball strikes follows from the pull.
+    together = describe.as_one(max(pull or [1.0]) > 1, gaps, options["model"])
     assumed = [one for one in given.assumed if "strikes" not in one]
-    if max(pull or [1.0]) > 1 and not gaps and options["model"] != "sequential":
-        assumed.append(AS_ONE)
-    told = given._replace(assumed=tuple(assumed))
+    told = given._replace(assumed=(*assumed, *together))
     extra = {"model": made(given.model), "assumed": told.assumed, "impacts": impacts}
     if output:
         animate_swing(run).save(output)

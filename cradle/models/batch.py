@@ -149,7 +149,7 @@ def shaped(
     n = arrays[0].shape[-1] if arrays[0].ndim else 0
     if n < 2:
         raise ValueError(f"masses has shape {arrays[0].shape}; must be (..., N) with N >= 2")
-    if arrays[1].shape[-1:] != (n,):
+    if "velocities" in given and arrays[1].shape[-1:] != (n,):
         raise ValueError(f"velocities has shape {arrays[1].shape}; must be (..., {n}), as masses")
     for k, name in enumerate(given):
         size = n - missing[k]

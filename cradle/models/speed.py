@@ -190,11 +190,10 @@ def viscosity_from(
     part, most = (parting_hunt, MOST_HUNT) if hunt else (lambda a: parting(a, p), LONGEST)
     least = part(most)
     rule = f"must lie in [{least:.3f}, 1]: less takes more viscosity than contacts may have"
-    given: dict[str, asked.ArrayLike] = {"masses": (balls := asked.checked_masses(masses))}
-    given |= {"velocities": np.zeros(balls.shape)}
+    given: dict[str, asked.ArrayLike] = {"masses": asked.checked_masses(masses)}
     given |= {"restitution": asked.checked("restitution", restitution, rule, least, 1.0)}
     given |= {"stiffness": asked.checked("stiffness", stiffness, *asked.ABOVE_ZERO)}
-    m, _, e, k = shaped(given, (0, 0, 1, 1))[0]
+    m, e, k = shaped(given, (0, 1, 1))[0]
     found, place = np.unique(np.minimum(e, part(0.0)), return_inverse=True)  # 1, but for rounding
     sought = [brentq(lambda a, x=x: part(a) - x, 0.0, most, xtol=1e-12) for x in found.tolist()]
     mass = m[..., :-1] / (m[..., :-1] + m[..., 1:]) * m[..., 1:]

@@ -185,16 +185,15 @@ def call(door: Callable[..., Any], *arguments: Any) -> Any:
             return door(*arguments)
         finally:
             _spent += time.perf_counter() - begun
-    name = door.__name__
-    stored = not loaded(name) and on_disk(name)
     try:
         return door(*arguments)
     except Exception as error:  # half a file can raise anything; the kernel itself nothing
-        broken = _files("*.nb[ci]") if stored else []
-        if not broken:
-            if not loaded(name):  # a signal's, meanwhile: begin anew
-                compiled.cache_clear()
+        if loaded(name := door.__name__):
             raise
+        if not on_disk(name):
+            compiled.cache_clear()  # what a signal interrupts begins anew
+            raise
+        broken = _files("*.nb[ci]")
         for file in broken:
             file.unlink(missing_ok=True)
         told = "compiled code in %s cannot be read (%r); compiled anew, up to a minute"
