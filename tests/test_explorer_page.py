@@ -84,6 +84,9 @@ def test_copied_python_gives_the_same_numbers(still):
             continue
         assert after.tolist() == asked["after"]
         np.testing.assert_allclose(program["run"].impacts[0].after, asked["after"], atol=1e-9)
+    tab.get_by_text("The same in Python").click()  # line by line in the page, too
+    lines = [line for line in tab.evaluate("window.copied").splitlines() if line]
+    assert [line for line in tab.inner_text("details pre").splitlines() if line] == lines
 
 
 def test_paper_chains_by_their_letters(still):

@@ -211,13 +211,13 @@
         box,
         [0, LARGEST],
         [0, LARGEST],
-        [`m${sub(2)} / m${sub(3)}`, `m${sub(2)} / m${sub(1)}`],
+        [`m${sub(2)} / m${sub(3)} (ball 3 lighter →)`, `m${sub(2)} / m${sub(1)} (ball 1 lighter →)`],
       );
       this.plot = plot;
       const at = ratios(setting);
       const [x, y] = [at.right, at.left].map((value) => Math.min(value, LARGEST));
       const beyond = at.right > LARGEST || at.left > LARGEST;
-      const words = `m2/m3 = ${explorer.fixed(at.right)}, m2/m1 = ${explorer.fixed(at.left)}`;
+      const words = `mass of ball 2 over ball 3: ${explorer.fixed(at.right)}, over ball 1: ${explorer.fixed(at.left)}`;
       const point =
         `<g class="point" tabindex="0" role="slider" aria-label="mass ratios" aria-valuetext="${words}" ` +
         `aria-valuenow="${px(at.right)}" aria-valuemin="0" aria-valuemax="${LARGEST}">` +
