@@ -195,6 +195,14 @@ def test_three_readings():
     assert max(turned.values()) < 0.005  # "less than half a hundredth"
 
 
+def test_the_jump_of_a_start():
+    """It is that of R2 on the other side: of one source for all, or one at each end."""
+    both = READINGS["both"]
+    ends = [floats(outcome(both, "0.15", ([1] * 4, [1, moved, 0, -1], 1)).velocities)
+            for moved in ("-1e-9", "1e-9")]  # fmt: skip
+    assert READING.glued["n-balls-start-jump"] == f"{np.ptp(ends, axis=0).max():.3f}"
+
+
 def test_events_of_two_runs_that_meet():
     """The table has the ends and closings of the picture, in the chapter's numbering."""
     lines = [line.split() for line in CHAPTER.printed("events-table").splitlines()[2:]]
