@@ -1,5 +1,6 @@
 """What a newcomer meets first: the desk toy, the version, pictures, tables and plots."""
 
+import pydoc
 import re
 import subprocess
 import sys
@@ -81,6 +82,13 @@ def test_the_import_loads_only_what_it_needs():
     code = f"import sys, cradle; cradle.paper_chain('ABACA'); print({late} & sys.modules.keys())"
     loaded = subprocess.check_output([sys.executable, "-c", code], text=True)
     assert loaded.strip() == "set()"
+
+
+def test_help_names_types():
+    """`help` has a line of names in place of what they stand for."""
+    for name in cradle.__all__:
+        text = pydoc.plain(pydoc.render_doc(getattr(cradle, name)))
+        assert "_Buffer" not in text and "numpy._typing" not in text, name
 
 
 def test_no_minus_zero_and_no_seventeen_digits():

@@ -183,8 +183,7 @@ class _Search:
             lowest = min(value for _, value in ends)
             # Of those that are equally low the one with the least numbers.
             ends.sort(key=lambda end: (max(end[1] - lowest, 0.01), end[0].round(3).tolist()))
-            best = ends[0][0]
-            minima = [best]
+            minima = [ends[0][0]]
             for end, value in ends:
                 far = (np.abs(end - x).max() > _SAME for x in minima)
                 # From another minimum chi-square rises on the straight way to each that is known.
@@ -204,5 +203,5 @@ class _Search:
             {k: x if intervals[k] != tuple(self.ranges[k]) else None for k, x in found.items()}
             for found in (self.numbers(np.round(end, 9)) for end in minima)
         )
-        left = {one.name: x[:, :-1] for one, x in zip(self.sets, self.left(best), strict=True)}
+        left = {one.name: x[:, :-1] for one, x in zip(self.sets, self.left(minima[0]), strict=True)}
         return LawFit(values, intervals, tuple(others), left, lowest, self.freedom)

@@ -52,8 +52,7 @@ class ShotSet:
     def momentum_residuals(self) -> Vector:
         """Momentum gained in each shot over its standard error, about 1 in size; shape (K,)."""
         gain = (self.after - self.before) @ self.masses
-        error = np.sqrt((self.sigma**2 + self.sigma_before**2) @ self.masses**2)
-        return np.asarray(gain / error)
+        return np.asarray(gain / np.sqrt((self.sigma**2 + self.sigma_before**2) @ self.masses**2))
 
     def mean_after(self, speed: float = 1.0) -> tuple[Vector, Vector]:
         """Return means of the velocities after the impact, with their errors: each shape (N,), m/s.

@@ -296,5 +296,4 @@ class _Film:
             away = max(side * (q[k] - p[k]), np.sqrt(RISE) * error)
             ends.append(float(np.clip(p[k] + side * away, self.low[k], self.high[k])))
         grid, excess = np.array(sorted(points)).T
-        mode = Mode(float(p[k]), 0.0)
-        return Scan((mode,), ((ends[0], ends[1]),), grid, excess * RISE / rise)
+        return Scan((Mode(float(p[k]), 0.0),), ((ends[0], ends[1]),), grid, excess * RISE / rise)

@@ -119,8 +119,7 @@ def _owners(
             name = next(filter(None, over[at::-1]), name or titles[at][0])
         else:
             name = block.replace("_", " ") or "track"
-        clock = max(k for k in range(at) if titles[k][0].casefold() in _CLOCKS)
-        owners[at] = name, clock
+        owners[at] = name, max(k for k in range(at) if titles[k][0].casefold() in _CLOCKS)
     return owners
 
 

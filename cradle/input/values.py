@@ -7,7 +7,7 @@ import math
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, NewType, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike as ArrayLike
@@ -16,6 +16,8 @@ from numpy.typing import NDArray as NDArray
 from cradle.kernel.state import LIMITS
 
 Vector = NDArray[np.float64]
+if not TYPE_CHECKING:  # `help` has their names, not what they stand for
+    ArrayLike, Vector = NewType("ArrayLike", object), np.ndarray
 _Thing = TypeVar("_Thing")
 
 #: Mass of the lightest ball of a chain, as a part of the heaviest: beyond it squares vanish.
