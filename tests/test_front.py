@@ -88,7 +88,7 @@ def test_help_names_types():
     """`help` has a line of names in place of what they stand for."""
     for name in cradle.__all__:
         text = pydoc.plain(pydoc.render_doc(getattr(cradle, name)))
-        assert "_Buffer" not in text and "numpy._typing" not in text, name
+        assert not re.search(r"_Buffer|numpy\._typing", text), name
 
 
 def test_no_minus_zero_and_no_seventeen_digits():
