@@ -119,6 +119,8 @@ def test_impulses_beside_heavy_balls(masses, velocities, restitution, impulses):
         ([1, 1, 1, 1, 1, 1], 1, 1.5, 1e-5),
         ([1, 1, 1, 1, 1], 0.5, 1.5, 1e-6),  # without an end, if the two contacts act in turn
         ([2, 0.5, 0.3, 0.5, 2], 0.7, 2, 1e-6),
+        ([3, 0.5, 0.2, 0.5, 3], 0.5, 3, 1e-6),  # one that has turned still has its old sign
+        ([3, 2, 1, 1, 1, 2, 3], 0.9, 2, 1e-6),
     ],
 )
 def test_rigid_balls_struck_from_both_sides_alike(masses, e, exponent, rtol):

@@ -237,7 +237,9 @@ class _Process:
     def turn(self, turned: list[int]) -> None:
         """Book extremes of compressions: the energy stored there, and maxima as events."""
         # Where several turn at one instant, only one has ended the integration.
-        turning = self.loading == (self.speeds(self.y) < 0.0)
+        gain = -np.diff(self.parts(self.rate(self.t, self.y))[0])
+        # A root has an error: one that has turned may still have its old sign, but goes on.
+        turning = (self.loading == (self.speeds(self.y) < 0.0)) & (self.loading == (gain < 0.0))
         turning[turned] = True
         turning &= self.closed & (self.depths(self.y) > 0.0)
         self.absorbed += np.where(turning, self.stored(self.y) * np.where(self.loading, 1, -1), 0.0)
