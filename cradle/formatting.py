@@ -15,8 +15,7 @@ def as_text(values: Vector) -> str:
 
 def without_rounding(values: Vector) -> Vector:
     """Return velocities or impulses without what is left of sums that should be zero."""
-    small = np.abs(values) < 1e-12 * np.abs(values).max(initial=0.0)
-    return np.where(small, 0.0, values) + 0.0
+    return np.where(np.abs(values) < 1e-12 * np.abs(values).max(initial=0.0), 0.0, values) + 0.0
 
 
 def as_html(columns: Mapping[str, NDArray[Any]]) -> str:

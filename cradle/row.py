@@ -240,8 +240,7 @@ class Row(Alone):
         fast = speed > np.maximum(4.0 * gained, self.resting)
         self._lessons += 1
         if fast.any():
-            twice = (np.abs(mean[fast]) > 1.5 * speed[fast]).all()
-            self._doubts = self._doubts + 1 if twice else 0
+            self._doubts = self._doubts + 1 if (np.abs(mean[fast]) > 1.5 * speed[fast]).all() else 0
         if self._doubts > 2:
             rule = "rows of one world are stepped together, by cradle.row.step_rows"
             told = f"the world moves on between the steps of this row; {rule}"

@@ -113,8 +113,7 @@ class Trace:
         if hasattr(self, "times"):
             rows["time"] = self.times
         rows["event"] = ["before", *(event.kind for event in self.events)]
-        contacts = [None, *(event.contact for event in self.events)]
-        rows["contact"] = pd.array(contacts, dtype="Int64")
+        rows["contact"] = pd.array([None, *(e.contact for e in self.events)], dtype="Int64")
         impulses = np.pad(self.path_impulses, ((0, 0), (1, 1)))
         parts = {"velocity": self.path, "left": impulses[:, :-1], "right": impulses[:, 1:]}
         table = {name: np.repeat(values, len(self.chain)) for name, values in rows.items()}

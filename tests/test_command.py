@@ -59,6 +59,7 @@ def folder(tmp_path, monkeypatch):
         "pairs": pairs,
         "grams": shots.assign(mass=1000 * shots.mass),
         "fast": pairs.assign(**100 * pairs[speeds]),
+        "exact": pairs.assign(sigma=0),
     }
     for name, rows in tables.items():
         rows.to_csv(tmp_path / f"{name}.csv", index=False)
@@ -106,7 +107,11 @@ BAC = "film film.txt --set BAC --masses 1,1,1 --length 0.3"
 @pytest.mark.parametrize(
     ("options", "model", "assumed"),
     [
-        ("", SpringChain(), ["the first ball strikes at 1 m/s", "no energy is lost", "elastic sp"]),
+        (
+            "",
+            SpringChain(),
+            ["the first ball strikes at 1 m/s", "contacts lose no energy", "elastic sp"],
+        ),
         (f"--speed 2 {LOSSY}", VISCOUS, ["strikes at 2 m/s", "viscous spheres; restitution at 2 "]),
         ("--restitution 0.5", EnergyDistribution(), ["strikes at 1", "lose much, by the energy"]),
         (
@@ -115,15 +120,23 @@ BAC = "film film.txt --set BAC --masses 1,1,1 --length 0.3"
             ["strikes", "no energy", "elastic sphere"],
         ),
         ("--velocities 1,1,0 --ratio 0.1", ImpulseCorrelation(0.1), ["no energy", "strike as one"]),
-        ("--velocities 1,1,0 --model sequential", SequentialCollisions(), ["no energy is lost"]),
+        (
+            "--velocities 1,1,0 --model sequential",
+            SequentialCollisions(),
+            ["contacts lose no energy"],
+        ),
         (
             "--velocities 1,1,0 --model spheres --stiffness 1e9 --gaps 1e-4,0",
             SpringChain(1e9, gaps=(1e-4, 0.0)),
-            ["no energy is lost"],
+            ["contacts lose no energy"],
         ),
         (f"--velocities 1,0,0 {LOSSY} --ratio 0.1", ImpulseCorrelation(0.1), []),
         (f"{LOSSY} --velocities 2,0,0 --model spheres", VISCOUS, []),
-        ("--velocities 1,0,0 --model sequential", SequentialCollisions(), ["no energy is lost"]),
+        (
+            "--velocities 1,0,0 --model sequential",
+            SequentialCollisions(),
+            ["contacts lose no energy"],
+        ),
     ],
 )
 def test_what_is_not_given_is_said(options, model, assumed):
@@ -196,6 +209,7 @@ def test_balls_let_go_together_strike_as_one():
     line = "swing 3 --steps 2 --ratio 0.1"
     assert said in call(f"{line} --pull 2")
     assert said not in call(line) + call(f"{line} --pull 2 --gaps 0.001")
+    assert "times in s; gaps 0.001 m" in call(f"{line} --pull 2 --gaps 0.001")
     assert said not in call("swing 3 --steps 2 --pull 2 --model sequential")
 
 
@@ -283,7 +297,7 @@ def test_recommend_says_what_python_says():
     text = call("recommend --masses 1,1,1,1,1 --stiffness 1 --accuracy 1e-3 --wanted forces")
     *told, assumed = text.splitlines()
     assert told == repr(recommend(chain, "forces", accuracy=1e-3, stiffness=1)).splitlines()
-    usual = "the first ball strikes at 1 m/s; no energy is lost (--restitution)"
+    usual = "the first ball strikes at 1 m/s; contacts lose no energy (--restitution)"
     assert assumed.split(":")[1].strip() == usual
     text = call("recommend --masses 1,1,1,1,1 --ratio 0.1 --impacts 500")
     assert text.startswith(repr(recommend(chain, ratios=0.1, impacts=500)))
@@ -503,13 +517,21 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("solve --masses 1,1,1 --ratio 0 --backward 1", 1, "--backward, value 1: 1.0; at ball 2 "),
         ("solve --masses 1,1,1 --ratio 0.1,0.1", 1, "--ratio has 2 values; 3 balls need 1"),
         ("swing --masses 1,1,1 --by 5", 1, "--by = 5.0; must be above 0 and at most a quarter"),
-        ("swing 3 --pull 0.05", 2, "--pull says how many of the 3 balls are pulled, 2 or 1,1; how"),
+        (
+            "swing 3 --pull 0.05",
+            2,
+            "--pull 0.05: it says how many of the 3 balls are pulled, 2 or 1",
+        ),
         ("swing 3 -o toy.gif --json", 2, "--output draws a film; --json, --csv and --steps are of"),
         ("swing 3 -o toy.gif --steps 9", 2, "--output draws a film; --json, --csv and --steps "),
-        ("swing 3 --pull 2,2", 2, "--pull says how many of the 3 balls are pulled"),
+        ("swing 3 --pull 2,2", 2, "--pull 2.0, 2.0: it says how many of the 3 balls are pulled"),
         ("swing 3 --length 1 --period 1", 2, "give one of --length and --period"),
         ("swing 3 --gaps 1,1,1", 1, "--gaps has 3 values; 3 balls need 2, or one number"),
-        ("swing 3 -o toy.bmp", 1, "'toy.bmp'; must end in .svg, .html, .gif, .mp4 or .png"),
+        (
+            "swing 3 -o toy.bmp",
+            1,
+            "--output 'toy.bmp'; must end in .svg, .html, .gif, .mp4 or .png",
+        ),
         ("swing 3 -o toy", 1, "'toy'; must end in .svg, .html, .gif, .mp4 or .png"),
         ("swing --masses 1,0.1 --by 0.3 --length 0.2", 1, "after t = 0.2243 s ball 2 at 0.545"),
         ("swing --masses 1,1,1 --length 0", 1, "cradle: --length 0.0; must be above 0"),
@@ -521,6 +543,8 @@ def test_one_wrong_film_of_several(folder, capsys):
         ),
         ("recommend --masses 1,1,1 --wanted path,x", 1, "--wanted 'x'; must be one of"),
         ("swing ABA --speed 2", 2, "No such option '--speed'"),
+        ("solve ABA --plot a.xyz", 1, "--plot ends in .xyz; must end in .png, .svg or .pdf"),
+        ("solve 5.5", 1, "SEQUENCE = '5.5'; must be a whole number, 2 to 1000000 balls"),
         ("solve ABA --plot -", 2, "'-'; a picture goes to a file: give its name"),
         ("swing 5 --output nowhere/toy.gif", 2, "'nowhere/toy.gif'; its folder is not there"),
         (f"{BAC} --slower 0", 1, "--slower = 0.0; must be above 0"),
@@ -549,6 +573,7 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("fit shots.csv --predict ABA --csv", 2, "--csv prints the fitted values alone"),
         ("fit shots.csv --summary --csv", 2, "give one of --summary, --json and --csv"),
         ("fit shots.csv --speed 2", 2, "--speed is that of the chain to --predict; give both"),
+        ("fit exact.csv", 1, "line 2, column sigma = 0.0; must be above 0"),
         ("fit shots.csv --sigma 0.01", 1, "--sigma 0.01; the table has a column sigma: leave out"),
         ("fit shots.csv --known ABA=0.6 --predict ABA", 1, "--known ABA: 0.6; must not exceed"),
         ("fit shots.csv --known ABA=0.1:0.2", 2, "write TRIPLET=RATIO; a known ratio has no error"),

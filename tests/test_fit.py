@@ -69,6 +69,7 @@ def good():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        (lambda t: t.update(sigmab=t["sigma"]), "column 'sigmab': write 'sigma', or another name"),
         (lambda t: t.pop("sigma"), r"column 'sigma' is missing \(standard error"),
         (lambda t: t.update(mass=[45, 53] * 2), r"row 1, column mass: 45 kg is unlikely; .*grams"),
         (lambda t: t.update(after=[17.0, 70, 26, 105]), "row 2, column after: 70 m/s is unlikely"),

@@ -170,10 +170,16 @@ SPRINGS = [
     ({"stiffness": [1, 1e-10]}, "stiffness[1] = 1e-10; must be at least 1e-09 of the stiffest"),
     ({"exponent": 0.9}, "exponent = 0.9; must lie in [1, 10]"),
     ({"viscosity": [0.1, -0.1]}, "viscosity[1] = -0.1; must be at least 0"),
-    ({"viscosity": 5.0}, "viscosity[0] = 5.0; must be at most 0.227 s, 0.3 of the depth over the"),
-    ({"gaps": 1e12}, "gaps[0] = 1000000000000.0; must be at most "),
-    ({"gaps": [0, 1e-20]}, "gaps[1] = 1e-20; must be 0, or 1e-12 of the depth"),
-    ({"gaps": [0, -3]}, "gaps[1] = -3.0; must be a lean of at most the depth"),
+    (
+        {"viscosity": 5.0},
+        "viscosity[0] = 5.0; must be at most 0.227 s, 0.3 (m u^2 / k)^(1 / 2.5) / u",
+    ),
+    (
+        {"gaps": 1e12},
+        "gaps[0] = 1000000000000.0; must at this accuracy be at most 1",
+    ),
+    ({"gaps": [0, 1e-20]}, "gaps[1] = 1e-20; must be 0, or 1e-12 of 0.758 m, that is (m u^2"),
+    ({"gaps": [0, -3]}, "gaps[1] = -3.0; must be a lean of at most 0.758 m, that is (m"),
     ({"accuracy": 1e-13}, "accuracy = 1e-13; must lie in [1e-12, 0.02]"),
     ({"max_steps": 0}, "max_steps = 0; must be a whole number, at least 1"),
 ]

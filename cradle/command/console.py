@@ -40,8 +40,7 @@ def text(rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> str:
     columns = []
     for name in names or rows[0]:
         words = [name, *_texts([row[name] for row in rows])]
-        width = max(map(len, words))
-        columns.append([word.rjust(width) for word in words])
+        columns.append([word.rjust(max(map(len, words))) for word in words])
     return "\n".join("  ".join(line).rstrip() for line in zip(*columns, strict=True))
 
 

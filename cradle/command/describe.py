@@ -35,7 +35,8 @@ _CHAIN = (
                  "other [ratio if there are ratios, else spheres]."),
     click.Option(["--stiffness"], callback=numbers_of, help="Of the contacts of spheres, N/m^1.5: "
                  "one, or one per contact [1; gaps, forces and times need it]."),
-    click.Option(["--gaps"], callback=numbers_of, help="Between the balls, m [0]."),
+    click.Option(["--gaps"], callback=numbers_of, help="Between the balls, m; below 0 where "
+                 "their strings press them together [0]."),
     click.Option(["--ratio"], callback=numbers_of, help="One, or one per inner ball."),
     click.Option(["--backward"], callback=numbers_of, help="Ratios from the right [as --ratio]."),
     click.Option(["--saturate"], is_flag=True, help="Admit ratios above their bound."),
@@ -89,8 +90,8 @@ def described(
 ) -> Described:  # fmt: skip
     """Return the chain and the model that the options describe."""
     assumed = []
-    if sequence is not None and sequence.isdecimal() and masses is None:
-        size = int(sequence) if len(sequence) < 10 else sequence  # Python reads no longest numbers
+    if sequence is not None and sequence[:1].isdecimal() and masses is None:
+        size = int(sequence) if sequence.isdecimal() and len(sequence) < 10 else sequence
         masses = [1.0] * whole_number("SEQUENCE", size, "2 to 1000000 balls", 2, 1_000_000)
         sequence = None
         assumed.append(f"{len(masses)} equal balls of 1 {unit or 'kg'}")
@@ -117,7 +118,7 @@ def described(
         balls = [UNITS[unit or "kg"] * m for m in masses]
         chain = cradle.Chain(balls, before, one_or_all(restitution or [1.0]))
         assumed += [] if velocities else [f"the first ball strikes at {striker:g} m/s"]
-        assumed += [] if restitution else ["no energy is lost (--restitution)"]
+        assumed += [] if restitution else ["contacts lose no energy (--restitution)"]
         if ratio is None and (model == "ratio" or backward or saturate):
             raise click.UsageError("ratios need --ratio, such as 0.1 or one for each inner ball")
         ratios = one_or_all(ratio or [0.0]), one_or_all(backward)  # without effect on two balls

@@ -37,7 +37,9 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"see time_scale": "see --slower",
     r"say the unit of the positions": "say --position-unit cm or mm, or px and --scale",
     r"\b(sigma|known)=": r"--\1",
-    r"\b(wanted|accuracy|impacts|length|sigma|speed|window) = ": r"--\1 ",
+    r"(?<!column )\b(wanted|accuracy|impacts|length|sigma|speed|window) = ": r"--\1 ",
+    r"^path = ": "--output ",
+    r"^Format '(\w+)' is not supported.*": r"--plot ends in .\1; must end in .png, .svg or .pdf",
     r"\btypes = ": "--predict ",
     r"restitution has no '(.+?)', which set (.+) needs; it has (.*)": (
         rf"set \2 needs the restitution of \1: {_SHOOT} (there are: \3)"

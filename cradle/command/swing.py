@@ -81,11 +81,12 @@ def swing(
     assumed = [one for one in given.assumed if "strikes" not in one]
     told = given._replace(assumed=(*assumed, *together))
     extra = {"model": made(given.model), "assumed": told.assumed, "impacts": impacts}
+    wide = f"; gaps {hanging.gaps} m" * bool(gaps)
     if output:
         animate_swing(run).save(output)
         click.echo(f"drawn to {output}; impacts: {len(impacts)}\n{told.note}")
     else:
-        note = f"impacts: {len(impacts)}; positions in m, times in s\n{told.note}"
+        note = f"impacts: {len(impacts)}; positions in m, times in s{wide}\n{told.note}"
         show(rows, extra, note, as_json, as_csv)
     if run.ended != "times":  # also where the table goes to a file
         click.echo(f"cradle: ended at {run.end:g} s, after {len(impacts)} impacts", err=True)
@@ -96,6 +97,6 @@ def _released(pull: list[float], by: float, size: int) -> list[float]:
     left, right = [*pull, 0.0][:2]
     wrong = len(pull) > 2 or any(one < 0.0 or not one.is_integer() for one in pull)
     if wrong or not 0 < left + right <= size:
-        raise click.UsageError(f"--pull says how many of the {size} balls are pulled, 2 or 1,1; "
-                               "how far is --by")  # fmt: skip
+        raise click.UsageError(f"--pull {str(pull)[1:-1]}: it says how many of the {size} balls "
+                               "are pulled, 2 or 1,1; how far is --by")  # fmt: skip
     return [-by] * int(left) + [0.0] * int(size - left - right) + [by] * int(right)

@@ -1,6 +1,7 @@
 """What is measured: shots, velocities before and after impacts, read from tables and checked."""
 
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -156,6 +157,9 @@ def read_shots(
             hint = "".join(f": write {x} in small letters" for x in there if x.lower() == name)
             told = f"column {name!r} is missing ({COLUMNS[name]}{other})"
             raise ValueError(f"{told}; there are {', '.join(there)}{hint}")
+    for name in there:
+        if name not in COLUMNS and (near := get_close_matches(name, COLUMNS, cutoff=0.85)):
+            raise ValueError(f"column {name!r}: write {near[0]!r}, or another name if it is not")
     if sigma is not None:
         one_number("sigma", sigma, *ABOVE_ZERO)
         if "sigma" in there:

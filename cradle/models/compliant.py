@@ -144,11 +144,11 @@ def spring_velocities(
     masses, velocities : array_like, shape (..., N)
         kg and m/s.
     stiffness, viscosity, gaps : array_like, shape (..., N - 1) or ()
-        k, N/m^p, above 0; A, s, 0 for an elastic contact and at most .3 of the time that the
-        fastest closing would take to its depth; and the distance of two balls before the
-        impact, m, to be compared with that depth, so with k.  Below zero it is a lean: how far the
-        strings press the two together at rest, with a pull that acts until no contact pushes and no
-        open one closes.
+        k, N/m^p, above 0; A, s, 0 for an elastic contact and at most .3 L / u, u the fastest
+        closing, m its reduced mass, L = (m u^2 / k)^(1 / (p + 1)); and the distance of two balls
+        before the impact, m, to be compared with L, so with k.  Below zero it is a lean, at most L:
+        how far the strings press the two together at rest, with a pull that acts until no contact
+        pushes and no open one closes.
     exponent : float
         p, from 1 to 10.
     damping : {"viscoelastic", "hunt-crossley"}

@@ -200,8 +200,7 @@ def viscosity_from(
     own, mass, k = np.broadcast_arrays(np.array(sought)[place].reshape(e.shape), mass, k)
     if hunt:
         return np.asarray(own / u)
-    depth = np.exp((np.log(mass) + 2.0 * np.log(u) - np.log(k)) / (p + 1.0))
-    return np.asarray(own * depth / u)
+    return np.asarray(own * np.exp((np.log(mass) + 2.0 * np.log(u) - np.log(k)) / (p + 1.0)) / u)
 
 
 @functools.cache

@@ -20,8 +20,9 @@ FINEST, COARSEST, MOST_STEPS = 1e-12, 0.02, 20_000_000
 
 def refused(clock: Any, law: Law, place: Sequence[int], chain: Springs) -> ValueError:
     """Return the error that says why the kernel refuses a chain, one of a batch at this place."""
-    of, most = "the depth of the fastest closing", limits.LONGEST * clock["length"] / clock["speed"]
-    late = f"must be at most {most:.3g} s, {limits.LONGEST} of the depth over the speed"
+    unit, part = f"(m u^2 / k)^(1 / {law.p + 1:g})", limits.LONGEST
+    of = f"{clock['length']:.3g} m, that is {unit} of the fastest closing"
+    late = f"must be at most {part * clock['length'] / clock['speed']:.3g} s, {part} {unit} / u"
     if law.hunt:
         part = limits.MOST_HUNT
         late = f"must be at most {part / clock['speed']:.3g} s/m, {part} over the speed"
@@ -34,7 +35,7 @@ def refused(clock: Any, law: Law, place: Sequence[int], chain: Springs) -> Value
         limits.LATE: ("viscosity", chain.loss, f"{late} of the fastest closing; was it found for "
                       "this stiffness, speed and damping?"),
         PULLS: ("viscosity", chain.loss, "must be lower: this contact would pull"),
-        limits.WIDE: ("gaps", chain.gap, f"must be at most {widest:g} times {of} at this accuracy"),
+        limits.WIDE: ("gaps", chain.gap, f"must at this accuracy be at most {widest:g} times {of}"),
         limits.NARROW: ("gaps", chain.gap, f"must be 0, or {limits.NARROWEST} of {of}"),
         limits.DEEP: ("gaps", chain.gap, f"must be a lean of at most {of}"),
     }[int(clock["rule"])]  # fmt: skip

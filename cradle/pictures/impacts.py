@@ -107,8 +107,7 @@ def velocity_impulse(
     last = len(must_be(Trace, "trace", trace).impulses) - 1
     contact = whole_number("contact", contact, f"0 to {last}", 0, last)
     impulses, path = trace.curve()
-    balls = contact, contact + 1
-    ax = _lines(ax, _impulse(contact), impulses[:, contact], path, balls)
+    ax = _lines(ax, _impulse(contact), impulses[:, contact], path, (contact, contact + 1))
     _mark_events(trace, contact, ax)
     if other is not None:
         impulse_axis(trace, contact, other, ax)

@@ -147,8 +147,7 @@ def compiled() -> Any | None:
     module = ModuleType(name)
     module.__file__ = str(path or name)
     for mark, options in _MEANINGS.items():
-        kept = mark == "door" and path is not None
-        vars(module)[mark] = numba.njit(**options, cache=kept)
+        vars(module)[mark] = numba.njit(**options, cache=mark == "door" and path is not None)
     vars(module)["unsigned"] = np.uint64
     sys.modules[name] = module
     exec(compile(_for_numba(unit()), module.__file__, "exec"), vars(module))

@@ -46,8 +46,7 @@ def solve(
             clock = area[1][0] if compiled else vars(area[1][0])
             given = chains if compiled else Springs(*(part.tolist() for part in chains))
         door = kernel.follow if compiled else plain.follow
-        effort = _EFFORT[compiled] if record is None else _PAGES
-        fixed = n, given, law, out, *area, pages, effort
+        fixed = n, given, law, out, *area, pages, _EFFORT[compiled] if record is None else _PAGES
         k, status = runtime.call(door, k, status == PAUSED, *fixed)
         if pause is not None:
             pause(int(clock["effort"] + clock["steps"] * (status == PAUSED)))

@@ -254,8 +254,7 @@ def part(model: Any, n: int, first: int, last: int) -> Model:
             elif name == "excess":  # a ratio's bound may count on the next ball (Eq. 53)
                 changes["excess"] = "saturate"
             elif isinstance(value, tuple | list) and len(value) in (n - 1, n - 2):
-                missing = n - len(value)  # 1: one for each contact; 2: one for each inner ball
-                changes[name] = tuple(value[first : last - missing])
+                changes[name] = tuple(value[first : last - n + len(value)])
     return replace(model, **changes) if changes else model  # type: ignore[no-any-return]
 
 
