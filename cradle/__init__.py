@@ -1,6 +1,10 @@
 """Newton's cradle by the Impulse Correlation Ratio: a companion to Ceanga and Hurmuzlu (2001).
 
-Every impact model is a rule from a chain of balls to a path of contact impulses.
+>>> from cradle import Chain, ImpulseCorrelation, collide
+>>> collide(Chain([1, 1, 1], [1, 0, 0]), ImpulseCorrelation(0.15)).velocities.round(3).tolist()
+[-0.081, 0.088, 0.993]
+
+Every impact model is a rule from a chain of balls to a path of contact impulses::
 
     Chain -> collide(chain, model) -> Trace -> measures -> figures
 

@@ -122,8 +122,7 @@ def effective_ratio(trace: Trace) -> float:
     if len(chain) != 3:
         raise ValueError(f"trace has {len(chain)} balls; an effective ratio is that of three")
     if not (u > 0.0).any():
-        why = "any ratio fits balls that do not approach"
-        raise ValueError(f"closing_speeds = {u.tolist()}; {why}")
+        raise ValueError(f"closing_speeds = {u.tolist()}; any ratio fits where none approach")
     # The leftmost approaching contact drives (forward), or the right one alone (backward).
     bounds = largest_ratios(chain.masses, np.zeros(1), np.zeros(1))
     bound = float(bounds[0 if u[0] > 0.0 else 1][0])

@@ -143,8 +143,7 @@ class Row(Alone):
         return [[complex(*one) for one in told] for told in self.bodies.motion()]
 
     def _push(self, own: Plane, x: Plane) -> None:
-        impulses = self.chain.masses * own * self.ways(x)
-        for ball, impulse in enumerate(impulses.tolist()):
+        for ball, impulse in enumerate((self.chain.masses * own * self.ways(x)).tolist()):
             if impulse:
                 self.bodies.push(ball, (impulse.real, impulse.imag))
 

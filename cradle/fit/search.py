@@ -15,8 +15,7 @@ import scipy
 from cradle.input.values import Vector
 
 #: A set holds the true value in 95 of 100 experiments where chi-square rises by no more than this.
-LEVEL = 0.95
-RISE = 3.841458820694124
+LEVEL, RISE = 0.95, 3.841458820694124
 
 _GRID = 2001  # points of the grid in one dimension
 _KEPT = 600  # points of a grid in several dimensions that go on to the next finer one
@@ -85,8 +84,7 @@ def refine(function: Function, upper: Vector) -> Found:
         order = np.argsort(values, kind="stable")
         # The grid can be far above the minimum in its best cell, from where the set is counted.
         *_, lowest = _walked(function, points[order[:1]], step[None], upper)
-        inside = values - lowest <= RISE
-        if np.count_nonzero(inside) >= _ENOUGH or (step < 1e-6 * upper).all():
+        if np.count_nonzero(values - lowest <= RISE) >= _ENOUGH or (step < 1e-6 * upper).all():
             break
         points = (points[order[:_KEPT], None, :] + halves * step).reshape(-1, size)
         step = step / 2

@@ -204,8 +204,7 @@ def refuse_where(name: str, values: Vector, wrong: NDArray[np.bool_], rule: str)
     """Raise if any value is wrong."""
     if wrong.any():
         at = tuple(np.argwhere(wrong)[0].tolist())
-        value = float(np.broadcast_to(values, wrong.shape)[at])
-        raise refusal(name, at, f" = {value!r}; {rule}")
+        raise refusal(name, at, f" = {float(np.broadcast_to(values, wrong.shape)[at])!r}; {rule}")
 
 
 def shown(value: object) -> str:

@@ -1,5 +1,8 @@
 """The event loop in rooms: the rules of `cradle.textbook`, fast and at the extremes.
 
+The rooms are plain: numbers, loops, sequences, tuples of arrays and `math`.  They run as they
+stand, and compiled as one unit (`cradle.runtime`), with the same bits::
+
     state     groups of arrays, the notation; the limits of rounding
     numbers   sums of two floats, 32 digits
     rules     one run: rates, ratios in force, its way to its next event      R1, R3, R6, R7
@@ -10,14 +13,11 @@
     progress  segments, two runs that meet                                    R8.2 to R8.6
     loop      the rounds; the certificate of every answer; the door           R8.1
 
-and contact forces in time, with a door of their own:
+and contact forces in time, with a door of their own::
 
     kinks     the records, the law of force; what a contact that closes or opens owes
     forces    steps, one run
     accuracy  units, the length of steps, runs that are compared; the certificate; the door
-
-The rooms are plain: numbers, loops, sequences, tuples of arrays and `math`.  They run as they
-stand, and compiled as one unit (`cradle.runtime`), with the same bits.
 """
 
 from cradle.kernel.accuracy import follow

@@ -38,8 +38,12 @@ def collide(
         Whether to keep the path; for `ImpulseCorrelation` only.  Left out, a path of more than ten
         million numbers (2 N - 1 for each event) is cut, with a warning.
     progress : bool
-        After two seconds, show how many events `ImpulseCorrelation` has counted so far, or how many
-        steps `SpringChain` has made; other models ignore it.
+        After two seconds, show the events of `ImpulseCorrelation`, or the steps of `SpringChain`.
+
+    Returns
+    -------
+    Trace
+        Its `velocities` are those after the impact, m/s.
 
     Raises
     ------

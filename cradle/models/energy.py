@@ -255,8 +255,7 @@ class _Process:
         # The limit of e to zero: what is stored is lost at u = 0.
         plastic = self.closed & ~self.loading & (self.e == 0.0)
         d[plastic] = 0.0
-        u = self.speeds(self.y)
-        touching = d >= 0.0
+        u, touching = self.speeds(self.y), d >= 0.0
         closed = ~plastic & np.where(self.closed, (d > 0.0) | (u > 0.0), touching & (u > 0.0))
         resting = ~closed & touching & ((u == 0.0) | plastic)
         resting[crossed] |= ~self.closed[crossed]

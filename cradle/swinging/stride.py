@@ -181,8 +181,7 @@ class Alone:
         gaps = np.abs(lines) - self.reach
         # Neighbours that have met, and those near each other that hardly move against each other.
         still = np.abs((np.diff(v) * lines.conj()).real) <= self.resting * np.abs(lines)
-        touch = (gaps <= self.met) | (still & (gaps <= self.touching))
-        for first, last in stretches(touch):
+        for first, last in stretches((gaps <= self.met) | (still & (gaps <= self.touching))):
             balls = slice(first, last)
             axis = lines[first : last - 1].sum()
             axis /= abs(axis)
