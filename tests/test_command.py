@@ -10,6 +10,7 @@ import re
 import shlex
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,7 @@ from cradle import (
     collide,
     paper_chain,
     recommend,
+    textbook,
     viscosity_from,
 )
 from cradle.command.console import text as shown
@@ -95,6 +97,21 @@ def test_solve_agrees_with_the_solver():
     assert text[0].split() == ["ball", "type", "mass", "before", "after"]
     ends = [float(line.split()[-1]) for line in text[1:6]]
     assert ends == pytest.approx(after.tolist(), abs=5.1e-5)
+
+
+def test_tasks_without_a_solution():
+    """The command by which their answers are found; only the last one has a back impact."""
+    text = (DATA.parent / "book" / "instructors.md").read_text(encoding="utf-8")
+    tasks = re.findall(r"(?m)^\| ([\d, ]+) \| ([\d/, ]+) \| ([\d/]+) \|$", text)
+    collisions = []
+    for task in tasks:
+        rows = [[float(Fraction(number)) for number in numbers.split(", ")] for numbers in task]
+        found = textbook.solve(rows[0], [1, 0, 0], rows[1] * (2 // len(rows[1])), rows[2])
+        m, e, a = (",".join(f"{number:g}" for number in row) for row in rows)
+        told = json.loads(call(f"solve --masses {m} --restitution {e} --ratio {a} --json"))
+        assert [row["after"] for row in told["rows"]] == pytest.approx(found.velocities, abs=1e-14)
+        collisions.append(told["collisions"])
+    assert collisions == [[1, 1]] * 5 + [[2, 1]]
 
 
 # --- what is assumed ---------------------------------------------------------------------------
