@@ -236,7 +236,7 @@ def test_equal_springs():
     )
     first, _, _, last = CHAPTER.printed("equal-springs").splitlines()
     assert [float(v) for v in last.split()[1:-1]] == pytest.approx(velocities, abs=6e-7)
-    assert first == f"t = {loss:.6f}: contact {['1-2', '2-3'][contact]} opens"
+    assert first == f"t = {loss:.6f}: contact {['1-2', '2-3'][contact]} ends"
     # The model with that ratio: an independent solver gives the springs' outcome.
     again = floats(solve([1, 1, 1], [1, 0, 0], 1, ratio).velocities)
     np.testing.assert_allclose(again, velocities, rtol=0, atol=1e-9)

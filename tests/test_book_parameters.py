@@ -15,7 +15,7 @@ from chapters import code, in_memory, run
 CHANGES = {
     "intro": [{"ratio": 0}, {"ratio": 0.31}, {"ratio": 0.5}],
     "problem": [{"ratio": 0}, {"ratio": 0.4}, {"ratio": 0.5}],
-    "compliance": [{"stiffness_ratio": 0.2}, {"stiffness_ratio": 30}],
+    "compliance": [{"gamma": 0.2}, {"gamma": 30}],
     "three_balls": [
         {"ratio": 0, "restitution": [0, 1]},
         {"ratio": 0.4, "masses": [3, 1, 2], "velocities": [1, 0.2, 0]},
