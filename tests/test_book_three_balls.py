@@ -236,6 +236,14 @@ def test_fig_4_curves():
         np.testing.assert_allclose(outcome[k], floats(other.velocities), atol=1e-13)
 
 
+def test_a_light_ball_in_the_middle_has_its_kink_where_only_ball_3_leaves():
+    """Ball 2 of half a kilogram, no losses: back impacts below the ratio 1/2, none above."""
+    found = [solve([1, "0.5", 1], [1, 0, 0], 1, ratio) for ratio in ("0.499", "0.5", "0.501")]
+    assert [sum(x.collisions) for x in found] == [3, 2, 2]
+    np.testing.assert_allclose(floats(found[1].velocities), [0, 0, 1], atol=1e-14)
+    assert found[0].velocities[1] > 0 < found[2].velocities[1]
+
+
 def test_one_outcome_belongs_to_many_parameters():
     """Eqs. 24 and 30 solved for e2 and e3, at fifty digits; and a ratio that comes twice."""
 
