@@ -297,28 +297,34 @@ def test_other_rows_are_the_stored_table():
 def test_the_table_of_advice():
     """Its times and its distances from spheres are the stored ones."""
     told = CHAPTER.glued
-    calls = {
-        "spheres": find("springs", "accuracy 1e-03", chain="five equal"),
-        "viscous": find("springs", "accuracy 1e-03", chain="five lossy"),
-        "ratios": find("event", "compiled, one call, outcome", chain="five equal"),
-        "pairs": find("outcome", "one call", chain="five equal", model="SequentialCollisions"),
-    }
-    lossy = ("5 equal, A = .03", "6 random, A = .03")
-    for name, method in zip(calls, ("this package", "this package", *METHODS[3:5]), strict=True):
-        times = []
-        for chain in lossy if name == "viscous" else ("5 equal", SIX):
-            row = next(r for r in read("forces.csv", chain=chain, method=method)
-                       if r["asked"] in ("", "1e-03"))  # fmt: skip
-            times.append(float(row["microseconds"]))
-        numbers = [float(x) for x in re.findall(r"[\d.]+", told[f"us-{name}"])]
-        assert numbers == pytest.approx(times, rel=0.06)
-        (row,) = calls[name]
-        assert float(told[f"alone-{name}"]) == pytest.approx(row["microseconds"], rel=0.06)
+    for name, chain, method in (
+        ("spheres", "5 equal", "this package"), ("viscous", "5 equal, A = .03", "this package"),
+        ("ratios", "5 equal", METHODS[3]), ("pairs", "5 equal", METHODS[4]),
+    ):  # fmt: skip
+        row = next(r for r in read("forces.csv", chain=chain, method=method)
+                   if r["asked"] in ("", "1e-03"))  # fmt: skip
+        assert float(told[f"us-{name}"]) == pytest.approx(float(row["microseconds"]), rel=0.06)
     off = {r["method"]: 100 * float(r["error"]) for r in read("forces.csv", chain="5 equal")}
-    assert told["off-ratios"] == f"{off['measured ratio']:.0f} to {off[METHODS[3]]:.0f}"
+    assert told["off-ratios"] == f"{off['measured ratio']:.0f}"
     assert told["off-pairs"] == f"{off['pair after pair']:.0f}"
     energy = [r["microseconds"] for r in find("energy", chain="ABCCA")]
     assert told["alone-energy"] == f"{min(energy) / 1000:.0f} ms"
+
+
+def test_one_impact_in_a_call():
+    """The least and the most of five balls, all laws but two."""
+    calls = [
+        *find("springs", "accuracy 1e-02", chain="five equal"),
+        *find("springs", "accuracy 1e-03", chain="five equal"),
+        *find("event", "compiled, one call with", chain="five equal"),
+        *find("event", "compiled, one call, outcome", chain="five equal"),
+        *find("outcome", "one call", chain="five equal", model="SequentialCollisions"),
+        *find("outcome", "one call", chain="five equal", model="FusedChain"),
+    ]
+    times = [row["microseconds"] for row in calls]
+    assert float(CHAPTER.glued["call-least"]) == pytest.approx(min(times), rel=0.06)
+    most = CHAPTER.glued["call-most"].removesuffix(" µs")
+    assert float(most) == pytest.approx(max(times), rel=0.06)
 
 
 def test_who_arrives_together():
@@ -332,6 +338,40 @@ def test_who_arrives_together():
         v = integrated([1] * 5, [1, 1, 0, 0, 0], loss=0, gaps=[gap, 0, 0, 0])
         off = 100 * np.abs(v - seen).max()
         assert float(CHAPTER.glued[f"film-two-{name}"]) == pytest.approx(off, abs=0.51)
+    # A gap in depths: the compression of two balls that meet at 1 m/s, from their energy.
+    depth = (2.5 * 0.5 * 0.5) ** 0.4
+    m, v = [1] * 10, [1, 1] + [0] * 8
+    for name, count in (("three", 3), ("ten", 10)):
+        eighth = integrated(m, v, loss=loss, gaps=[count * depth] + [0] * 8)[7]
+        assert float(CHAPTER.glued[f"{name}-depths"]) == pytest.approx(100 * eighth, abs=0.51)
+
+
+def test_the_film_by_the_printed_calls():
+    """Three lifted, with the fitted numbers; by another integrator, and the independent solver."""
+    seen = real_cradles.first_strikes(4)[3][0]
+    fitted = {
+        row["law"]: [float(x) for x in row["parameters"].split()]
+        for row in read("film_fits.csv", reading="4", strikers="apart", fitted="both")
+    }
+    m, v, slower = [1] * 5, np.array([1, 1, 1, 0, 0]), 0.766
+    far = 10 * (2.5 * 0.5 * 0.5) ** 0.4
+    (loss,), (*gaps, other) = fitted["touching spheres, A"], fitted["spheres, three gaps, A"]
+    (ratio, e), (*ratios, e_three) = fitted["one ratio, e"], fitted["three ratios, e"]
+    found = {
+        "toy": integrated(m, v, gaps=[far, far, 0, 0]),
+        "touching": integrated(m, v),
+        "viscous": integrated(m, slower * v, loss=loss) / slower,
+        "gaps": integrated(m, slower * v, loss=other, gaps=[0, *gaps]) / slower,
+        "one": floats(solve(m, v.tolist(), e, ratio).velocities),
+        "three": floats(solve(m, v.tolist(), e_three, ratios).velocities),
+        "pairs": floats(solve(m, v.tolist(), *fitted["pairs, e"], 0).velocities),
+        "energy": real_cradles.LAWS["energy law (Hertz), e"][0](
+            fitted["energy law (Hertz), e"], 3, False
+        ),
+    }
+    for name, velocities in found.items():
+        off = 100 * np.abs(velocities - seen).max()
+        assert float(CHAPTER.glued[f"call-{name}"]) == pytest.approx(off, abs=0.1), name
 
 
 def test_errors_of_the_rule_with_one_ratio():
@@ -376,7 +416,7 @@ def test_laws_beside_the_film():
         *shown, test = (float(x) for x in line.split()[-4:])
         assert shown == pytest.approx(off, abs=0.051)
         assert test == pytest.approx(chi, abs=0.51)
-        assert CHAPTER.glued[f"test-{name}"] == f"{test:.0f} ({shown[2]})"
+        assert CHAPTER.glued[f"test-{name}"] == f"{shown[2]}"
 
 
 #: Chains of the figure: masses, A of the losses.
@@ -408,12 +448,6 @@ def test_fig_trade_total_by_the_rule(masses, loss, request):
     assert float(row["error"]) == pytest.approx(missed, rel=1e-2)
     if loss:
         assert CHAPTER.glued["total-e"] == f"{e:.2f}"
-        assert CHAPTER.glued["total-lossy"] == f"{100 * missed:.0f} %"
-    elif chain != "ABCCA":
-        assert CHAPTER.glued["total-own"] == f"{100 * missed:.0f} %"
-        one = floats(solve(masses, struck, 1, 0.132503287).velocities)
-        missed = np.abs(one - integrated(masses, struck)).max()
-        assert CHAPTER.glued["total-light"] == f"{100 * missed:.0f} %"
 
 
 def test_fig_trade_total_equal_balls():
