@@ -22,7 +22,7 @@ CLOSE = {"rtol": 0, "atol": 1e-12}
 OTHERS = {
     *("fig-p1", "fig-p2", "fig-p9", "fig-own-notation-chain", "fig-own-notation-ratio"),
     "fig-own-multiple-rules",
-    *("fig-flight", "fig-recipe-film", "fig-scene-film", "fig-toy-film"),
+    *("fig-flight", "fig-recipe-film", "fig-toy-film"),
     *("fig-measure-swing", "fig-p10", "fig-p11", "fig-p12"),
 }
 

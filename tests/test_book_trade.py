@@ -471,7 +471,6 @@ def test_parts_of_the_rule():
     assert (
         CHAPTER.glued["parts-long"] == f"{100 * min(saved[-1]):.0f} to {100 * max(saved[-1]):.0f} %"
     )
-    assert CHAPTER.glued["parts-other"] == f"{100 * max(map(max, saved[:-1])):.0f} %"
 
 
 def test_plain_floats_let_groups_pass_each_other(monkeypatch):

@@ -178,7 +178,7 @@ GIVEN = {
     "experiments": "0.001 0.01 0.5",  # a step, and what is small beside it
     "toy": "0.9 0.95 0.97 0.99",
     "real_cradles": "0.2 22.2 25.3 44.8",  # two ways of reading apart, sizes, frames, grams
-    "recipe": "0.1325 0.62",
+    "recipe": "0.62",
     "scene": "0.1 0.97",  # a step, and a restitution of the run
     "measure": "0.2 0.35 0.5 0.7 1.4 1.5 1.96 2.54 3.84",
     "table_2": "0.01 0.050 0.1 0.15 0.215 0.22 0.3 0.390 0.462 0.5 "
