@@ -31,7 +31,7 @@ from cradle.runtime import compile as runtime
 from cradle.runtime import job
 
 ROOT = Path(__file__).parents[1]
-CHAPTER, ENGINES_PAGE, FORCES = Chapter("trade"), Chapter("engines"), Chapter("forces")
+CHAPTER, ENGINES_PAGE = Chapter("trade"), Chapter("engines")
 IMPULSE_ENGINES = ("Chipmunk", "Box2D", "Bullet", "Rapier")
 ENGINES = (*IMPULSE_ENGINES, "MuJoCo")
 
@@ -58,7 +58,7 @@ def test_times_are_medians_and_say_what_the_text_says():
     assert calls["plain"] > calls["compiled"] > 3  # a call costs more than its impact
 
 
-def test_fig_trade_cost_springs():
+def test_the_cost_of_springs():
     verlet = find("penalty", model="penalty, Hertz")
     one_call = find("event", "compiled, one call", chain="three equal")
     assert cost(verlet, 1e-2) < min(row["time_ratio"] for row in one_call)
@@ -67,7 +67,7 @@ def test_fig_trade_cost_springs():
     assert 1 < cost(springs, 2e-9) / cost(springs, 2e-3) < 1000
     # Of fourth order: six digits for ten times the steps to the power 6/4, and the runs before.
     assert cost(springs, 2e-9, "evaluations") < 100 * cost(springs, 2e-3, "evaluations")
-    # The right panel: error control spends fewer evaluations than fixed steps on many digits.
+    # Error control spends fewer evaluations than fixed steps on many digits.
     assert cost(springs, 1e-8, "evaluations") < cost(verlet, 1e-8, "evaluations")
 
 
@@ -195,12 +195,6 @@ def test_engines_energy_from_nowhere():
 DRAWN = {
     "fig-trade-engines": (find("engine", "refined", chain="three equal"), "velocities"),
     "fig-trade-engines-all": (find("engine"), "velocities"),
-    "fig-trade-cost": (
-        [*find("march", chain="three equal"), *find("penalty", model="penalty, Hertz"),
-         *find("springs", "accuracy", chain="three equal", model="SpringChain, Hertz"),
-         *find("energy", "rtol", chain="three equal")],
-        "numerical_error",
-    ),
     "fig-trade-stiffness": (find("stiffness"), "numerical_error"),
 }  # fmt: skip
 
@@ -212,8 +206,7 @@ def test_figures_show_the_table(figure):
     rows = [row for row in rows if not row["chain"].startswith("two")]
     values = [row[column][0] if column == "velocities" else row[column] for row in rows]
     assert len(values) > 5
-    figures = {**FORCES.figures, **ENGINES_PAGE.figures}
-    assert shows(figures[figure].axes, values)
+    assert shows(ENGINES_PAGE.figures[figure].axes, values)
 
 
 def test_fig_trade_models():
