@@ -136,14 +136,6 @@ def test_fig_flight():
     assert stated == [float(f"{x:.2f}") for x in expected]
 
 
-def test_fig_five_balls():
-    shown = panel("intro", "fig-five-balls")
-    for k in (0, 30, 60, 137, 200):
-        ratio = shown["ball 1"][k, 0]
-        v = after(([1] * 5, [1, 0, 0, 0, 0], 1), ratio)
-        assert [shown[f"ball {i + 1}"][k, 1] for i in range(5)] == pytest.approx(v, abs=1e-7)
-
-
 def test_fig_problem_family():
     shown = panel("problem", "fig-own-problem-family")
     u2, u3 = shown["momentum and energy conserved"].T

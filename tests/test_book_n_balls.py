@@ -245,11 +245,30 @@ def test_answers_of_the_live_cradle():
     places = [text.index(velocities) for velocities in seen]
     assert places == sorted(places)
     assert v == sorted(v)
-    runs = [truth.solve([1] * 4, [1, "0.5", 0, 0], 1, k / 100, number=float) for k in range(51)]
-    best = max(range(51), key=lambda k: runs[k].velocities[1])
-    CHAPTER.tells({"n-balls-fastest-ratio": best / 100})
-    CHAPTER.tells({"n-balls-fastest": float(runs[best].velocities[1])})
-    assert [run.meetings > 0 for run in runs] == [k < best for k in range(51)]
+
+    def run(ratio):
+        return truth.solve([1] * 4, [1, "0.5", 0, 0], 1, ratio, number=float)
+
+    low, high = 0.3, 0.35  # the last ratio at which the runs meet, by bisection
+    while high - low > 1e-9:
+        middle = (low + high) / 2
+        low, high = (middle, high) if run(middle).meetings else (low, middle)
+    most = float(run(low).velocities[1])
+    CHAPTER.tells({"n-balls-fastest-ratio": low, "n-balls-fastest": most})
+    for k in range(51):
+        assert (run(k / 100).meetings > 0) == (k / 100 < low)
+        assert run(k / 100).velocities[1] < most
+    assert float(run(high).velocities[2]) == pytest.approx(most, abs=1e-6)  # equally fast
+
+
+def test_where_the_second_of_two_strikers_turns():
+    """Two strike three, elastic; below this ratio the second striker goes back, too."""
+    turns = float(CHAPTER.glued["n-balls-turns"])
+    for ratio in (turns - 0.01, turns + 0.01, *np.arange(1, 50) / 100):
+        run = truth.solve([1] * 5, [1, 1, 0, 0, 0], 1, ratio, number=float)
+        first, second, middle, *_ = run.velocities
+        assert first < 0 < middle
+        assert abs(ratio - turns) < 0.009 or (second < 0) == (ratio < turns)
 
 
 def test_the_march_stops_less_than_two_steps_late():
