@@ -166,6 +166,12 @@ def test_landing_five_equal_balls():
 FIGURES, AS_MEASURED = Chapter("experiments"), Chapter("table_2")
 
 
+def test_five_balls_a():
+    """Exercise 2: the striker, and the slowest of five balls that all move."""
+    five = np.array(floats(predicted("AAAAA").velocities))
+    FIGURES.tells({"ex-five": five[0], "ex-slowest": abs(five).min()})
+
+
 def test_figs_10_to_12_as_drawn():
     """Each bar at the velocity of its ball in the second solver, each panel with its letters."""
     axes, per_unit = FIGURES.figures["fig-p10"].axes, set()
