@@ -193,7 +193,7 @@ def test_strikers_one_by_one():
         stages.append(v)
     for ax, v in zip(CHAPTER.figures["fig-real-one-by-one"].axes, stages, strict=True):
         arrows = [(one.xy[0] - one.xyann[0]) for one in ax.texts if hasattr(one, "xyann")]
-        drawn = [(length - 0.25 * np.sign(length)) / 0.6 for length in arrows]
+        drawn = [(length - 0.4 * np.sign(length)) / 0.5 for length in arrows]
         assert drawn == pytest.approx([speed for speed in v if abs(speed) > 0.02], abs=2e-3)
 
 
