@@ -17,7 +17,9 @@ def test_the_first_page_is_guessed(still):
     host = tab.locator(".cradle-explorer")
     for value in expected[np.abs(expected) > 0.05]:
         assert f"{abs(value):.2f}" not in host.inner_text()
+    answer = tab.locator(".admonition", has_text="The answer to the task")
     assert tab.locator(".question p").last.is_hidden()
+    assert answer.is_hidden()
     for ball, key, times in ((5, "ArrowRight", 18), (1, "ArrowLeft", 2)):
         for _ in range(times):
             tab.get_by_label(f"your guess for ball {ball}, m/s").press(key)
@@ -33,6 +35,7 @@ def test_the_first_page_is_guessed(still):
     words = f"off by at most {off.max():.2f} m/s, at ball {off.argmax() + 1}"
     assert words in host.inner_text()
     assert tab.locator(".question p").last.is_visible()
+    assert answer.is_visible()
     # One may guess again, from the last guess; a ball that is pulled now spends none.
     tab.push("Guess again")
     tab.drawn()
@@ -51,6 +54,33 @@ def test_the_first_page_is_guessed(still):
     after = tab.drawn()["after"]
     assert tab.bars() == np.round(after, 2).tolist()
     assert tab.get_by_role("button", name="Guess again").is_enabled()
+
+
+@pytest.mark.parametrize(
+    ("name", "before"), [("Guess first", 0), ("Full screen", 0), ("Full screen", 1)]
+)
+def test_scene_by_scene_is_guessed(still, name, before):
+    """Once the button is pressed, or in full screen, until it is released."""
+    tab = still("", width=1366, height=768)
+    pressed = tab.get_by_role("button", name="Guess first").get_attribute
+    tab.drawn()
+    assert (tab.state("covered"), pressed("aria-pressed")) == (True, "false")
+    for _ in range(before):
+        tab.push("Next hit")
+        tab.drawn()
+    tab.push(name)
+    tab.wait_for_function("document.querySelector('.run [aria-pressed=true]')")
+    for _ in range(3):
+        tab.keyboard.press("PageDown" if name == "Full screen" else "ArrowRight")
+        tab.drawn()
+        assert (tab.state("covered"), pressed("aria-pressed")) == (True, "true")
+        tab.push("Next hit")
+        tab.drawn()
+        assert not tab.state("covered")
+    tab.push("Guess first")
+    tab.keyboard.press("ArrowRight")
+    tab.drawn()
+    assert (tab.state("covered"), pressed("aria-pressed")) == (False, "false")
 
 
 @pytest.mark.parametrize("name", ["intro", "compliance", "explorer"])

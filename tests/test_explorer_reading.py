@@ -156,6 +156,8 @@ def test_everything_by_keyboard(still):
         assert tab.drawn()["speeds"][0] == speed
     assert tab.evaluate(REACH) == "3px"
     assert ball.get_attribute("aria-valuetext") == "comes in at 1.05 m/s"
+    ring, disc = (float(ball.locator(part).get_attribute("r")) for part in (".reach", ".disc"))
+    assert ring >= disc + 6
     # Walk, let go, step.
     tab.locator(".walk button").first.focus()
     tab.keyboard.press("ArrowRight")
@@ -619,6 +621,10 @@ def test_map_is_the_solvers(still):
     assert moved["masses"][0] < 1
     assert moved["masses"][1] == 1
     assert same_outcome(moved)
+    back = sum(velocity < 0 for velocity in moved["after"])
+    masses = ", ".join(f"{mass:g}" for mass in moved["masses"])
+    said = f"masses {masses} kg; going back: {['none', 'ball 1', 'balls 1 and 2'][back]}"
+    assert tab.locator(".point").get_attribute("aria-valuetext") == said
     tab.locator(".point").focus()
     tab.keyboard.press("ArrowRight")
     assert tab.drawn()["masses"][2] < moved["masses"][2]

@@ -1,11 +1,16 @@
 """The pages in a browser: nothing is cut, pale, out of order or said in error."""
 
+import base64
+import io
 import re
 from pathlib import Path
 
 import book_figures
+import numpy as np
 import pytest
 from explorer import EXPLORER
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 from pages import (
     ALL_SET,
     FRAMES,
@@ -18,6 +23,7 @@ from pages import (
     shape,
     show,
 )
+from PIL import Image
 
 from cradle.pictures.impacts import PALETTE
 
@@ -220,17 +226,61 @@ def test_pale_letters_are_seen(browser, style, pale):
     tab.close()
 
 
+def colours_of_areas(browser, html: Path) -> list[str]:
+    """The colours of the live map in dark mode, and of areas in figures."""
+    tab = browser.new_page(color_scheme="dark")
+    tab.goto((html / "book" / "explorer.html").as_uri())
+    style = "getComputedStyle(document.querySelector('.cradle-explorer'))"
+    live = [tab.evaluate(f"{style}.getPropertyValue('--pattern-{k}')").strip() for k in (1, 2, 3)]
+    tab.close()
+    tints = [book_figures.dark(tint) for tint in ("#d0e6f5", "#fae2bb", "#d9b3cf")]
+    assert live == tints
+    return [*tints, *map(book_figures.dark, ("#9ecae1", "#fee6ce"))]
+
+
+def test_areas_in_dark_mode_can_be_seen(browser, html: Path):
+    """And the letters on them."""
+    for area in colours_of_areas(browser, html):
+        assert contrast(area, book_figures.dark("white")) >= 2.49, area
+        assert contrast(area, book_figures.dark("black")) >= READABLE, area
+
+
+LETTERS_OF_FIGURES = re.compile(r'<g style="fill: (#\w{6})[^>]*scale\(0\.')
+
+
+def test_coloured_letters_of_figures_can_be_read(html: Path):
+    """In both colourings; greys are looked at elsewhere."""
+    found = set()
+    for path in (html / "_images").glob("fig-*.svg"):
+        ground = book_figures.dark("white") if path.stem.endswith("-dark") else "#ffffff"
+        for colour in LETTERS_OF_FIGURES.findall(path.read_text(encoding="utf-8")):
+            if book_figures.spread(colour) > book_figures.COLOURFUL:
+                found.add((colour, ground))
+                assert contrast(colour, ground) >= READABLE, (path, colour)
+    assert len(found) > 10
+
+
 def test_colours_of_dark_mode_can_be_seen():
     ground = book_figures.dark("white")
     assert contrast(book_figures.dark("black"), ground) > LETTERS
     for colour in PALETTE:
         assert contrast(book_figures.dark(colour), ground) > LINES, colour
-    # Letters on a coloured ground stay as they are.
-    assert all(book_figures.dark(kept) == kept for kept in ("#010101", "#fefefe"))
+    # A scale of a map goes from pale to strong: from the ground on.
+    for name in ("Blues", "Oranges", "cividis_r"):
+        scale = [to_hex(colormaps[name](share)) for share in np.linspace(0, 1, 9)]
+        for one in scale:
+            there = min(contrast(one, "#ffffff"), contrast("#e0e0e0", ground))
+            assert contrast(book_figures.turned(one), ground) == pytest.approx(there, rel=0.03)
     # Greys and tints change sides and keep their order.
     greys = ["#000000", "#666666", "#b0b0b0", "#e8eef4", "#ffffff"]
     light = [luminance(book_figures.dark(grey)) for grey in greys]
     assert light == sorted(light, reverse=True)
+
+
+def light_of(image: str) -> float:
+    """The middle brightness of a picture of points."""
+    points = np.array(Image.open(io.BytesIO(base64.b64decode(image))).convert("RGBA"))
+    return float(np.median(points[points[..., 3] > 0][:, :3])) / 255
 
 
 def test_every_figure_has_both_colourings(html: Path):
@@ -240,18 +290,24 @@ def test_every_figure_has_both_colourings(html: Path):
     assert len(drawings) > 40
     assert all(path.stem.startswith("fig-") for path in drawings)  # who saves one finds it again
     maps = [path for path in drawings if "<image" in path.read_text(encoding="utf-8")]
-    assert 4 < len(maps) < 15  # their points stay as they are
-    points = re.compile(r'<image[^>]*"data:[^"]*"')
+    assert 4 < len(maps) < 15
     for path in maps:
-        drawing = path.with_name(f"{path.stem}-dark.svg").read_text(encoding="utf-8")
-        assert f"fill: {book_figures.dark('white')}" in drawing.split('id="axes_1"')[0], path
-        assert points.findall(drawing) == points.findall(path.read_text(encoding="utf-8")) != []
-    for path in set(drawings) - set(maps):
+        points, turned = (
+            np.array([light_of(image) for image in book_figures.POINTS.findall(text)])
+            for text in (
+                path.read_text(encoding="utf-8"),
+                path.with_name(f"{path.stem}-dark.svg").read_text(encoding="utf-8"),
+            )
+        )
+        assert len(points) == len(turned) > 0, path
+        assert (turned[points > 0.5] < 0.5).all(), path  # pale ones are dark
+    for path in drawings:
         drawing = path.with_name(f"{path.stem}-dark.svg").read_text(encoding="utf-8")
         colours = {match.lower() for match in book_figures.COLOUR.findall(drawing)}
         assert not colours & {"#ffffff", "#fff", "#000000", "#000", "white", "black"}, path
         # Colours alone differ.
-        blank = re.compile(f'fill="#e0e0e0" |{book_figures.COLOUR.pattern}')
+        points = book_figures.POINTS.pattern
+        blank = re.compile(f'fill="#e0e0e0" |{book_figures.COLOUR.pattern}|{points}')
         assert blank.sub("", drawing) == blank.sub("", path.read_text(encoding="utf-8")), path
     shown = "".join(page.read_text(encoding="utf-8") for page in (html / "book").glob("*.html"))
     for path in drawings:
@@ -306,6 +362,60 @@ def test_equations_wait_until_they_are_seen(browser, html: Path):
     tab.pdf()
     assert tab.evaluate(count.format(" > svg")) == everything
     tab.close()
+
+
+@pytest.mark.parametrize("width", [390, 1400])
+def test_equations_keep_about_their_place(browser, html: Path, width: int):
+    """A page is about as high before they are set as after."""
+    tab = browser.new_page(viewport={"width": width, "height": 800})
+    tab.set_default_timeout(PATIENCE)
+    tab.goto((html / "book" / "three_balls.html").as_uri())
+    tab.wait_for_function("document.querySelector('mjx-container svg')")
+    tab.evaluate("MathJax.startup.promise")
+    heights = []
+    for _ in range(2):
+        heights.append(tab.evaluate("document.scrollingElement.scrollHeight"))
+        tab.evaluate(ALL_SET)
+        tab.evaluate(FRAMES)
+    assert heights[0] == pytest.approx(heights[1], rel=0.03)
+    tab.close()
+
+
+def test_folds_and_boxes(browser, html: Path):
+    """They show who has the key, have names and room for a finger; a link into one opens it."""
+    context = browser.new_context(
+        viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True
+    )
+    context.set_default_timeout(PATIENCE)
+    tab = context.new_page()
+    tab.goto((html / "book" / "measure.html").as_uri())
+    summaries = tab.locator(".bd-content details > summary")
+    assert summaries.count() > 2
+    for summary in summaries.all():
+        if summary.is_visible():
+            assert summary.bounding_box()["height"] >= 36
+    first = tab.locator(".bd-content details > summary:visible").first
+    first.focus()
+    tab.keyboard.press("Shift+Tab")
+    tab.keyboard.press("Tab")
+    drawn = "(node) => [node === document.activeElement, getComputedStyle(node).outlineStyle]"
+    assert first.evaluate(drawn) == [True, "solid"]
+    tab.wait_for_function("!document.querySelector('[aria-label*=\"hidden content\"]')")
+    box = tab.locator(".toggle-hidden", has_text="What error to expect")
+    assert tab.get_by_role("button", name="What error to expect").is_visible()
+    place = box.locator("[id]:not(.toggle-button)").first.get_attribute("id")
+    assert not tab.locator(f"#{place}").is_visible()
+    tab.evaluate("(place) => (location.hash = place)", place)
+    tab.wait_for_function("(place) => document.getElementById(place).checkVisibility()", arg=place)
+    tab.wait_for_function("document.querySelector('.toggle-hidden :target') === null")
+    for name, parts in (("own_code", ".copybtn"), ("own_solver", ".reader-solver button"),
+                        ("toy", ".animation label")):  # fmt: skip
+        tab.goto((html / "book" / f"{name}.html").as_uri())
+        tab.wait_for_selector(parts)
+        for part in tab.locator(parts).all():
+            if part.is_visible():
+                assert part.bounding_box()["height"] >= 40, name
+    context.close()
 
 
 SHIFTS = """

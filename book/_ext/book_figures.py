@@ -3,11 +3,11 @@
 Notebooks store their figures as SVG on white, which is right for Jupyter and for paper. The build
 writes each one a second time for dark mode: black becomes the colour of the text, white that of
 the page, greys and pale tints change sides, and colours that tell lines apart stay. A page carries
-both; the theme's classes `only-light` and `only-dark` show one of them.
+both; the theme's classes `only-light` and `only-dark` show one of them. In both, letters in a
+colour are as dark or as bright as it takes to read them.
 
-A map, a figure that contains a picture of points, has colours all over, with letters and lines on
-them, and its scale of colours is read from pale to strong. Turned round it would say something
-else. So these stay, and what is around them follows the theme.
+The colours of a map, of its picture of points or its mesh, are a scale from pale to strong: each
+stands out from the dark page as much as from the white one, so that strong remains strong.
 
 A moving picture is part of its page. A style sheet gives it the same colours as figures have.
 
@@ -16,12 +16,17 @@ a narrow screen the style sheet lets a wider one scroll in this box. On a desk s
 figures have one size.
 """
 
+import base64
 import colorsys
+import io
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from docutils import nodes
+from PIL import Image
 from sphinx.application import Sphinx
 
 #: Ground and text of the theme's dark mode.
@@ -29,10 +34,12 @@ GROUND, TEXT = 0x12 / 255, 0xE0 / 255
 #: A moving picture in its page, and what the style of a part of it says of colours.
 MOVING = re.compile(r'<div class="animation">.*?</div>', re.S)
 PAINT = re.compile(r"\b(fill|stroke): (#\w{6})\b")
-#: Black and white that stay: letters and lines on a coloured ground.
-KEPT = {"#010101", "#fefefe"}
 #: From this difference of its channels on, a colour is one that tells lines apart.
 COLOURFUL = 0.3
+#: From this one on, a pale one is a tint that tells areas apart; its contrast with the dark page.
+TINTED, AREA = 0.1, 2.5
+#: Contrast of coloured letters with the page (WCAG 2.1, 1.4.3, is 4.5).
+READ = 4.6
 
 IMAGE = re.compile(
     r'<img(?P<other>[^>]*?)\bsrc="(?P<path>[^"]*_images/[^"/]+)\.svg"(?P<rest>[^>]*)>'
@@ -42,18 +49,11 @@ COLOUR = re.compile(
 )
 NAMED = {"white": "#ffffff", "black": "#000000"}
 
-#: Matplotlib's axes, their ground, and in a map what lies on it: all but ticks and frame.
-AXES = re.compile(r'^  <g id="axes_\d+">\n.*?^  </g>\n', re.M | re.S)
-GROUND_OF_AXES = re.compile(
-    r"M ([\d.]+) ([\d.]+) \nL ([\d.]+) [\d.]+ \nL [\d.]+ ([\d.]+)"
-)
-ON_MAP = re.compile(
-    r'^   <g id="(line2d|QuadContourSet|QuadMesh|LineCollection|text)_\d+">\n.*?^   </g>\n',
-    re.M | re.S,
-)
-#: A colour of a map in its legend.
-SWATCH = re.compile(r"fill: #\w+; stroke: #666666")
-PLACE = re.compile(r"translate\(([\d.]+) ([\d.]+)\)")
+#: What a map paints: pictures of points, and meshes.
+POINTS = re.compile(r"data:image/png;base64,([^\"]+)")
+MESH = re.compile(r'^   <g id="QuadMesh_\d+">\n.*?^   </g>\n', re.M | re.S)
+#: Letters and their colour.
+COLOURED = re.compile(r'(?<=<g style="fill: )#\w{6}(?=[^>]*\bscale\(0\.)')
 
 #: Pixels that the smallest letters of a figure have on a phone, at least. (Indices are smaller.)
 LEGIBLE = 11
@@ -64,66 +64,139 @@ LETTERS = re.compile(r"\bscale\((0\.\d+) -0\.\d+\)")
 FONT_SIZE = re.compile(r'\bfont-size[:=]"?\s*([\d.]+)')
 
 
+def channels(colour: str) -> list[float]:
+    """Return red, green and blue, each from 0 to 1."""
+    digits = NAMED.get(colour, colour)[1:]
+    if len(digits) == 3:
+        digits = "".join(2 * digit for digit in digits)
+    return [int(digits[k : k + 2], 16) / 255 for k in (0, 2, 4)]
+
+
+def written(rgb: tuple[float, float, float]) -> str:
+    """Write red, green and blue as a colour."""
+    return "#" + "".join(f"{round(255 * part):02x}" for part in rgb)
+
+
+def spread(colour: str) -> float:
+    """Return how far the channels of a colour are apart: 0 for a grey."""
+    return max(channels(colour)) - min(channels(colour))
+
+
+def light(colour: str) -> float:
+    """Return relative luminance plus 0.05: quotients of two are contrasts (WCAG 2.1)."""
+    linear = [
+        p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4
+        for p in channels(colour)
+    ]
+    return 0.05 + float(np.dot((0.2126, 0.7152, 0.0722), linear))
+
+
+PAPER = light("white")
+PAGE = light(written((GROUND,) * 3))
+
+
+def lit(colour: str, wanted: float, vivid: float = 1.0) -> str:
+    """Return the shade of a colour that is so light, and so vivid beside it.
+
+    >>> lit("#e69f00", light("#767676"))
+    '#9e6d00'
+    """
+    hue, _, saturation = colorsys.rgb_to_hls(*channels(colour))
+
+    def shade(lightness: float) -> str:
+        return written(
+            colorsys.hls_to_rgb(hue, lightness, vivid * saturation)
+        )
+
+    low, high = 0.0, 1.0
+    for _ in range(20):
+        middle = (low + high) / 2
+        if light(shade(middle)) < wanted:
+            low = middle
+        else:
+            high = middle
+    return shade(high)
+
+
 def dark(colour: str) -> str:
     """Return the colour that takes the place of `colour` in dark mode.
 
     >>> dark("#000000"), dark("white"), dark("#0072b2")
     ('#e0e0e0', '#121212', '#0072b2')
     """
-    digits = NAMED.get(colour, colour)[1:]
-    if len(digits) == 3:
-        digits = "".join(2 * digit for digit in digits)
-    if f"#{digits}" in KEPT:
-        return f"#{digits}"
-    channels = [int(digits[k : k + 2], 16) / 255 for k in (0, 2, 4)]
-    if max(channels) - min(channels) >= COLOURFUL:
-        return f"#{digits}"
-    hue, lightness, saturation = colorsys.rgb_to_hls(*channels)
+    if spread(colour) >= COLOURFUL:
+        return written(channels(colour))
+    hue, lightness, saturation = colorsys.rgb_to_hls(*channels(colour))
     lightness = TEXT + lightness * (GROUND - TEXT)
-    channels = colorsys.hls_to_rgb(hue, lightness, saturation)
-    return "#" + "".join(
-        f"{round(255 * channel):02x}" for channel in channels
+    turned = written(colorsys.hls_to_rgb(hue, lightness, saturation))
+    if spread(colour) >= TINTED and light(turned) < AREA * PAGE:
+        # Less vivid than lines, which are seen on it.
+        return lit(colour, AREA * PAGE, 0.6)
+    return turned
+
+
+def turned(colour: str) -> str:
+    """Return the colour that stands out from the dark page as `colour` does from the white one.
+
+    >>> turned("#ffffff"), turned("#000000")
+    ('#121212', '#e0e0e0')
+    """
+    return lit(
+        colour,
+        min(PAPER / light(colour) * PAGE, light(written((TEXT,) * 3))),
     )
+
+
+def repainted_points(match: re.Match[str]) -> str:
+    """Return a picture of points in the colours of dark mode."""
+    picture = Image.open(io.BytesIO(base64.b64decode(match[1])))
+    points = np.array(picture.convert("RGBA"))
+    found, place = np.unique(
+        points[..., :3].reshape(-1, 3), axis=0, return_inverse=True
+    )
+    colours = [written(tuple(one / 255)) for one in found]
+    # Pale tints alone are those of areas, as in other figures.
+    scale = max(map(spread, colours)) >= COLOURFUL
+    change: Callable[[str], str] = turned if scale else dark
+    painted = np.array([channels(change(colour)) for colour in colours])
+    points[..., :3] = np.rint(255 * painted)[place.ravel()].reshape(
+        points[..., :3].shape
+    )
+    file = io.BytesIO()
+    Image.fromarray(points).save(file, "png")
+    return match[0][: -len(match[1])] + base64.b64encode(
+        file.getvalue()
+    ).decode("ascii")
 
 
 def darkened(svg: str) -> str:
-    """Return a drawing in the colours of dark mode; a map and what lies on it stay."""
-    kept: list[str] = []
-
-    def keep(part: str) -> str:
-        kept.append(part)
-        return f"<kept {len(kept) - 1}>"
-
-    def keep_map(match: re.Match[str]) -> str:
-        axes = match[0]
-        if not is_map(axes) and "QuadMesh" not in axes:
-            return axes
-        left, low, right, high = map(
-            float, GROUND_OF_AXES.search(axes).groups()
-        )
-
-        def on_map(part: re.Match[str]) -> str:
-            if part[1] == "text":
-                x, y = map(float, PLACE.search(part[0]).groups())
-                if not (left < x < right and high < y < low):
-                    return part[0]  # a title
-            return keep(part[0].replace("<g ", '<g fill="#010101" ', 1))
-
-        # Without a value the ground of a map is seen.
-        return ON_MAP.sub(
-            on_map, axes.replace("fill: #ffffff", "fill: #fefefe", 1)
-        )
-
-    if is_map(svg):
-        svg = SWATCH.sub(
-            lambda match: keep(match[0]), AXES.sub(keep_map, svg)
-        )
-    drawing = COLOUR.sub(lambda match: dark(match[0]), svg)
-    drawing = re.sub(
-        r"<kept (\d+)>", lambda match: kept[int(match[1])], drawing
+    """Return a drawing in the colours of dark mode."""
+    parts = []
+    end = 0
+    for mesh in MESH.finditer(svg):
+        parts += [(svg[end : mesh.start()], dark), (mesh[0], turned)]
+        end = mesh.end()
+    drawing = "".join(
+        COLOUR.sub(lambda match, change=change: change(match[0]), part)
+        for part, change in [*parts, (svg[end:], dark)]
     )
+    drawing = POINTS.sub(repainted_points, drawing)
     # What names no colour, such as black letters, is black.
     return drawing.replace("<svg ", f'<svg fill="{dark("black")}" ', 1)
+
+
+def readable(svg: str, ground: float) -> str:
+    """Return a drawing whose coloured letters can be read on a ground that is so light."""
+
+    def shade(match: re.Match[str]) -> str:
+        colour = match[0]
+        high, low = sorted((light(colour), ground), reverse=True)
+        if spread(colour) < COLOURFUL or high / low >= READ:
+            return colour
+        wanted = ground / READ if ground > 0.5 else ground * READ
+        return lit(colour, wanted)
+
+    return COLOURED.sub(shade, svg)
 
 
 def repainted(page: str) -> str:
@@ -159,11 +232,6 @@ def drawn_size(svg: str) -> tuple[int, int]:
     return tuple(
         round(float(side[1]) * (4 / 3 if side[2] else 1)) for side in sides
     )
-
-
-def is_map(svg: str) -> bool:
-    """Return whether a drawing contains a picture of points."""
-    return "<image" in svg
 
 
 def letters(svg: str) -> float:
@@ -232,14 +300,15 @@ def pair_images(
 
 
 def write_dark(app: Sphinx, exception: Exception | None) -> None:
-    """Write the pictures of dark mode beside the others."""
+    """Write the pictures of dark mode beside the others; let letters of both be read."""
     if exception is None and app.builder.format == "html":
         for path in Path(app.outdir, "_images").glob("*.svg"):
             drawing = path.read_text(encoding="utf-8")
             if not path.stem.endswith("-dark"):
                 path.with_name(f"{path.stem}-dark.svg").write_text(
-                    darkened(drawing), encoding="utf-8"
+                    readable(darkened(drawing), PAGE), encoding="utf-8"
                 )
+                path.write_text(readable(drawing, PAPER), encoding="utf-8")
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

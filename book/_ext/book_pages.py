@@ -8,12 +8,14 @@ r"""Sphinx extension: what Jupyter Book leaves to be put right in the pages.
   code is off. They are dropped.
 - Sphinx wraps an equation of several lines in `split`, where MathJax refuses the `\tag` that
   carries the paper's number. Such an equation is passed on as it is.
+- An equation that is not set yet says about how large it will be; custom.css keeps the place.
 - A line does not break between a formula and the comma behind it, nor behind the bracket before it.
 - A table of pandas names its row labels in a row of their own; they go into that of column names.
 - In such a table numbers and their heads stand at the right, words at the left, and a minus is one.
 - In a table a name of the code breaks after a point, a bracket or a comma, and nowhere else.
 - Figures of the appendices carry a letter: Fig. A.1.
-- The summary of what is folded is read as it is written, and a notebook is kept, not shown.
+- The summary of what is folded is read as it is written; a box is called by its title, and opens
+  for a link into it. A notebook is kept, not shown.
 - A page that is linked from elsewhere shows a title, a sentence and a picture.
 - Until the project has a public address, buttons that lead there are left out. `book_published` in
   `_config.yml` is the one switch.
@@ -63,6 +65,11 @@ NUMBER = re.compile(
 )
 #: What a column of numbers may hold as well.
 NEITHER = ("", "NaN", "none")
+#: An equation as MathJax will find it; of TeX, what takes the place of one letter, and of none.
+EQUATION = re.compile(
+    r'<(div|span) class="(?:amsmath )?math [^>]*(?=>(.*?)</\1>)', re.DOTALL
+)
+COMMAND, UNSEEN = re.compile(r"\\[a-zA-Z]+"), re.compile(r"[\s{}_^\\()]")
 #: Code up to where it may break: behind a point, an opening bracket or a comma.
 JOINTS = re.compile(r"[^.(\[,]*[.(\[,]+\s*|[^.(\[,]+")
 
@@ -128,6 +135,28 @@ def name_summaries(
         context["body"] = context["body"].replace(
             '<summary aria-label="Toggle hidden content">', "<summary>"
         )
+
+
+def measure_equations(
+    app: Sphinx,
+    page: str,
+    template: str,
+    context: dict[str, Any],
+    doctree: nodes.document | None,
+) -> None:
+    """Say how many lines an equation has, and how many letters one in a line of text."""
+
+    def measured(match: re.Match[str]) -> str:
+        kind, tex = match.groups()
+        letters = len(UNSEEN.sub("", COMMAND.sub("x", tex)))
+        rows = 1 + tex.count(r"\\")
+        size = (
+            f"--rows: {rows}" if kind == "div" else f"--letters: {letters}"
+        )
+        return f'{match[0]} style="{size}"'
+
+    if "body" in context:
+        context["body"] = EQUATION.sub(measured, context["body"])
 
 
 def keep_notebooks(app: Sphinx, exception: Exception | None) -> None:
@@ -371,8 +400,10 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("html-page-context", drop_thebe, priority=900)
     app.connect("html-page-context", drop_mathjax, priority=900)
     app.connect("html-page-context", name_summaries)
+    app.connect("html-page-context", measure_equations)
     app.connect("html-page-context", describe)
     app.connect("build-finished", keep_notebooks)
+    app.add_js_file("boxes.js", loading_method="defer")
     app.connect("builder-inited", set_all_for_print)
     app.connect("doctree-resolved", keep_tags)
     app.connect("doctree-resolved", keep_punctuation)

@@ -45,6 +45,7 @@
       // Who follows a link to a setting wants to see it.
       const linked = this.page && location.hash.includes("=");
       const guessing = guess === undefined || linked ? "" : guess || "once";
+      this.lecture = Boolean(guessing); // in full screen each scene is guessed, unless one has said
       // An answer of a few is known once it is told; speeds can be guessed again, on a page of its
       // own by a button.
       const again = answers || this.page ? "" : guessing;
@@ -125,7 +126,10 @@
         this.visible = entry.isIntersecting;
         this.wake();
       }).observe(this.host);
-      document.addEventListener("fullscreenchange", redraw);
+      document.addEventListener("fullscreenchange", () => {
+        if (this.full && this.lecture) this.state.guessing = "always";
+        redraw();
+      });
       window.addEventListener("beforeprint", () => this.print());
       this.host.addEventListener("pointerdown", () => (this.pointed = true));
       document.addEventListener("keydown", (event) => this.key(event), true);
@@ -156,7 +160,8 @@
         guess: on((ball, value) => state.guess(ball, value)),
         answer: on((answer) => (view.guess.answer = answer)),
         guessing: on(() => {
-          state.guessing = state.guessing ? "" : "always";
+          state.guessing = state.guessing === "always" ? "" : "always";
+          this.lecture = false;
           state.set(state.setting);
           if (state.guessing) state.restart(false);
         }),
@@ -387,7 +392,10 @@
       const em = parseFloat(getComputedStyle(host).fontSize);
       const width = host.clientWidth;
       const wall = Math.max(this.below(host) - under * em, 11 * em);
-      return { width, height: this.wall ? wall : Math.min(20 * em, 0.62 * width + 4 * em), em };
+      // A bar has room for a finger, as far as all of them are seen with the cradle.
+      const room = matchMedia("(pointer: coarse)").matches ? 12.5 / this.state.setting.masses.length : 0;
+      const row = Math.min(Math.max(room, 1.75), 2.5) * em;
+      return { width, height: this.wall ? wall : Math.min(20 * em, 0.62 * width + 4 * em), em, row };
     }
 
     // The cradle's box; on the wall, what the rest of its column leaves.

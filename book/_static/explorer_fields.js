@@ -205,7 +205,8 @@
       pen.putImageData(image, 0, 0);
     }
 
-    svg(box, setting) {
+    // `back`: which balls go back, in words.
+    svg(box, setting, back) {
       const { em } = box;
       const plot = axes(
         box,
@@ -217,7 +218,7 @@
       const at = ratios(setting);
       const [x, y] = [at.right, at.left].map((value) => Math.min(value, LARGEST));
       const beyond = at.right > LARGEST || at.left > LARGEST;
-      const words = `mass of ball 2 over ball 3: ${explorer.fixed(at.right)}, over ball 1: ${explorer.fixed(at.left)}`;
+      const words = `masses ${setting.masses.join(", ")} kg; going back: ${back}`;
       const point =
         `<g class="point" tabindex="0" role="slider" aria-label="mass ratios" aria-valuetext="${words}" ` +
         `aria-valuenow="${px(at.right)}" aria-valuemin="0" aria-valuemax="${LARGEST}">` +

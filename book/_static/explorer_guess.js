@@ -50,6 +50,7 @@
         Object.assign(range.style, {
           left: `${x(span[0]) - half}px`,
           top: `${ball * row}px`,
+          height: `${row}px`,
           width: `${x(span[1]) - x(span[0]) + 2 * half}px`,
         });
       });

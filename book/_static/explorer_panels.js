@@ -64,7 +64,7 @@
     const slow = button("Slow motion", act.slow);
     const more = parts.has("share")
       ? [
-          button("Guess first", act.guessing, { title: "cover what comes out until the balls have moved" }),
+          button("Guess first", act.guessing, { title: "in each scene cover what comes out until the balls have moved" }),
           button("Sound", act.sound, { title: "a click at each hit, as loud as it is hard" }),
         ]
       : [];
@@ -75,7 +75,7 @@
       if (back.textContent !== name) back.textContent = name;
       back.disabled = clock.time <= 0 && !clock.playing && !again;
       slow.setAttribute("aria-pressed", clock.slow);
-      [Boolean(guessing), Boolean(loud)].forEach((on, k) => more[k]?.setAttribute("aria-pressed", on));
+      [guessing === "always", Boolean(loud)].forEach((on, k) => more[k]?.setAttribute("aria-pressed", on));
     }
     return { node: make("div", { class: "run" }, play, step, back, slow, ...more), show };
   }

@@ -215,7 +215,7 @@
       );
       painted = document.documentElement.dataset.theme + map.key + map.points.finished;
     }
-    function show({ setting }, box) {
+    function show({ setting, firstAfter }, box) {
       const fits = setting.masses.length === 3;
       host.hidden = !fits;
       three.hidden = fits;
@@ -229,7 +229,8 @@
       const focused = plot.contains(document.activeElement);
       const space = box(plot, 7);
       space.width = Math.min(space.width, 1.25 * space.height);
-      plot.innerHTML = map.svg(space, setting);
+      const back = firstAfter?.filter((v) => v < 0).length;
+      plot.innerHTML = map.svg(space, setting, PATTERNS[back] ?? "no answer");
       if (focused) plot.querySelector(".point").focus({ preventScroll: true });
       const { left, right, top, bottom } = map.plot;
       Object.assign(canvas.style, {

@@ -117,7 +117,7 @@
 
   // Where bars of velocities stand: a row for each ball, and room for its name and its number.
   // `span`: the velocities that must have room.
-  function barPlaces({ width, em }, span) {
+  function barPlaces({ width, em, row }, span) {
     const name = 3.2 * em;
     const number = 3.4 * em;
     const largest = Math.max(...span.map(Math.abs), 1e-9);
@@ -126,7 +126,7 @@
     // Room for a number beyond a bar that goes to the left.
     const left = name + (low < 0 ? number : 0);
     const scale = (width - number - left) / Math.max(high - low, 1e-9);
-    return { row: 1.75 * em, x: (value) => px(left + (value / largest - low) * scale) };
+    return { row, x: (value) => px(left + (value / largest - low) * scale) };
   }
 
   // Velocities as bars, to the left and to the right as the balls move. Thin outlines show the
@@ -137,7 +137,7 @@
     const { row, x } = barPlaces(box, span ?? [...before, ...now, ...guess]);
     const parts = [];
     for (let ball = 0; ball < count; ball += 1) {
-      const top = px(ball * row + 0.25 * em);
+      const top = px((ball + 0.5) * row - 0.625 * em);
       const bar = (value, how) =>
         `<rect x="${Math.min(x(0), x(value))}" y="${top}" width="${px(Math.abs(x(value) - x(0)))}" ` +
         `height="${px(1.2 * em)}" rx="2" ${how}/>`;

@@ -68,7 +68,7 @@
       this.balls.forEach((ball, k) => {
         const r = this.radii[k];
         ball.disc.setAttribute("r", px(r));
-        ball.reach.setAttribute("r", px(Math.max(r, 1.4 * em)));
+        ball.reach.setAttribute("r", px(Math.max(r + 6, 1.4 * em)));
         ball.name.textContent = letters[k] === explorer.NONE ? k + 1 : letters[k];
         // Names of small balls that would touch are left out.
         const small = r <= 0.7 * em;
