@@ -11,6 +11,7 @@ import pytest
 from explorer import EXPLORER
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
+from matplotlib.image import imread
 from pages import (
     ALL_SET,
     FRAMES,
@@ -23,7 +24,6 @@ from pages import (
     shape,
     show,
 )
-from PIL import Image
 
 from cradle.pictures.impacts import PALETTE
 
@@ -279,8 +279,8 @@ def test_colours_of_dark_mode_can_be_seen():
 
 def light_of(image: str) -> float:
     """The middle brightness of a picture of points."""
-    points = np.array(Image.open(io.BytesIO(base64.b64decode(image))).convert("RGBA"))
-    return float(np.median(points[points[..., 3] > 0][:, :3])) / 255
+    points = imread(io.BytesIO(base64.b64decode(image)))
+    return float(np.median(points[points[..., 3] > 0][:, :3]))
 
 
 def test_every_figure_has_both_colourings(html: Path):

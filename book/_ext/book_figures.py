@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 from docutils import nodes
-from PIL import Image
+from matplotlib.image import imread, imsave
 from sphinx.application import Sphinx
 
 #: Ground and text of the theme's dark mode.
@@ -149,21 +149,18 @@ def turned(colour: str) -> str:
 
 def repainted_points(match: re.Match[str]) -> str:
     """Return a picture of points in the colours of dark mode."""
-    picture = Image.open(io.BytesIO(base64.b64decode(match[1])))
-    points = np.array(picture.convert("RGBA"))
+    points = imread(io.BytesIO(base64.b64decode(match[1])))
     found, place = np.unique(
         points[..., :3].reshape(-1, 3), axis=0, return_inverse=True
     )
-    colours = [written(tuple(one / 255)) for one in found]
+    colours = [written(tuple(one)) for one in found]
     # Pale tints alone are those of areas, as in other figures.
     scale = max(map(spread, colours)) >= COLOURFUL
     change: Callable[[str], str] = turned if scale else dark
     painted = np.array([channels(change(colour)) for colour in colours])
-    points[..., :3] = np.rint(255 * painted)[place.ravel()].reshape(
-        points[..., :3].shape
-    )
+    points[..., :3] = painted[place.ravel()].reshape(points[..., :3].shape)
     file = io.BytesIO()
-    Image.fromarray(points).save(file, "png")
+    imsave(file, points, metadata={"Software": None})
     return match[0][: -len(match[1])] + base64.b64encode(
         file.getvalue()
     ).decode("ascii")
