@@ -144,9 +144,12 @@ def in_memory(show):
 
 
 @functools.cache
-def drawn(chapter: str) -> dict[str, Figure]:
-    """Run a chapter as stored, in the first process that needs it; return its figures by name."""
-    shared = os.environ.get(SHARED)
+def drawn(chapter: str, cells: tuple[str, ...] | None = None) -> dict[str, Figure]:
+    """Run a chapter as stored, in the first process that needs it; return its figures by name.
+
+    Of some `cells`, by their ids, only these are run.
+    """
+    shared = os.environ.get(SHARED) if cells is None else None
     if shared and Path(shared, f"{chapter}.figures").exists():
         return pickle.loads(Path(shared, f"{chapter}.figures").read_bytes())
     figures, names = {}, {}
@@ -158,7 +161,7 @@ def drawn(chapter: str) -> dict[str, Figure]:
         plt.close(plt.gcf())
 
     with in_memory(keep), contextlib.redirect_stdout(io.StringIO()):
-        run(code(chapter), {}, names=names)
+        run([cell for cell in code(chapter) if cells is None or cell.id in cells], {}, names=names)
     if shared:
         part = Path(shared, f"{chapter}.{os.getpid()}")
         part.write_bytes(pickle.dumps(figures))

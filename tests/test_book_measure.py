@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 import real_cradles
-from chapters import Chapter, floats
+from chapters import BOOK, Chapter, floats
 from scipy.special import ndtri
 from scipy.stats import norm
 from stored import read
@@ -20,7 +20,7 @@ GLUED = CHAPTER.glued | TABLE.glued
 
 
 def test_every_page_that_shows_data_calls_them_synthetic():
-    for name in ("fig-check", "fig-tracks", "fig-fit", "fig-minima"):
+    for name in ("fig-tracks", "fig-fit", "fig-minima", "swing-figure"):
         caption = (CHAPTER.cells | TABLE.cells)[name].metadata.mystnb.figure.caption
         assert "synthetic" in caption.lower(), name
 
@@ -88,10 +88,11 @@ def test_power_by_theory():
     assert float(GLUED["false"]) == pytest.approx(5, abs=2.5)
 
 
-def test_exercise_and_the_blind_triplet():
+def test_frames_of_the_laboratory_and_the_blind_triplet():
     """Frames by Eq. (measure-error) in whole numbers; the outcome of BBD by the other solver."""
-    frames = next(n for n in range(3, 40) if n * (n * n - 1) >= 432)
-    assert (GLUED["frames"], GLUED["frames-ms"]) == (str(frames), f"{1000 * frames / 120:.0f}")
+    assert next(n for n in range(3, 40) if n * (n * n - 1) >= 12 * (1 * 120 / 20) ** 2) == 8
+    text = (BOOK / "instructors.md").read_text(encoding="utf-8")
+    assert "At 120 frames a second and marks off by 1 mm: eight for an error of 20 mm/s" in text
     chain, model = paper_chain("BBD", excess="saturate")
     back, e = float(model.backward[0]), chain.restitution.tolist()
     for name, second in (("blind", 0.0), ("seeing", -0.3)):
@@ -101,6 +102,33 @@ def test_exercise_and_the_blind_triplet():
         ]
         slope = np.linalg.norm(ends[1] - ends[0]) / 0.04
         assert float(GLUED[name]) == pytest.approx(slope, abs=6e-3)
+
+
+def test_prediction_of_a_longer_row():
+    """The medians by the independent solver, and the shots beside them."""
+    found = CHAPTER.printed("show-pairs") + CHAPTER.printed("show-ratios")
+    told = {name: float(x) for name, x in re.findall(r"(?m)^\w+ (\w+) = ([\d.]+)", found)}
+    rows = read("shots_synthetic.csv", set="ABACA")
+    columns = ("mass", "before", "after", "sigma", "sigma_before")
+    mass, before, after, sigma, sigma_before = (
+        floats(row[name] for row in rows).reshape(-1, 5) for name in columns
+    )
+    losses = [told["AB"], told["AB"], told["AC"], told["AC"]]
+    ratios = [
+        [told[name] for name in way] for way in (["ABA", "BAC", "ACA"], ["ABA", "CAB", "ACA"])
+    ]
+    done = solve(mass[0].tolist(), [1.0, 0, 0, 0, 0], losses, *ratios, number=float)
+    printed = [line.split() for line in CHAPTER.printed("check").splitlines()[2:7]]
+    median, low, high = floats(x for line in printed for x in line[2:]).reshape(5, 3).T
+    assert floats(done.velocities) == pytest.approx(median, abs=1.5e-3)
+    assert ((low < median) & (median < high)).all()
+    speed = before[:, :1]
+    error = np.hypot(sigma, speed * (high - low) / 3.92)
+    off = (after - speed * median) / np.hypot(error, median * sigma_before[:, :1])
+    said = re.findall(r"[\d.]+\d", CHAPTER.printed("check-how"))
+    assert [float(x) for x in said] == pytest.approx(
+        [np.abs(off).max(), np.square(off).mean()], abs=0.15
+    )
 
 
 def test_gaps_that_one_speed_does_not_tell_apart_and_another_speed_does():

@@ -180,9 +180,9 @@ GIVEN = {
     "real_cradles": "0.01 0.2 22.2 25.3 44.8",  # error of c, two readings, sizes, frames, grams
     "recipe": "0.62",
     "scene": "0.1 0.97",  # a step, and a restitution of the run
-    "measure": "0.2 0.35 0.5 0.7 1.4 1.5 1.96 2.54 3.84",
+    "measure": "0.2 0.35 0.5 0.7 1.4 1.5 2.54 3.84",
     "table_2": "0.01 0.050 0.1 0.15 0.215 0.22 0.3 0.390 0.462 0.5 "
-    "0.6 0.710 0.73 0.730 0.755 0.782",
+    "0.6 0.710 0.73 0.730 0.755 0.782 1.96",
     "forces": "0.5 0.8 0.9",  # what laws of loss are set to
     "trade": "",
     "engines": "0.01 0.1",
