@@ -141,7 +141,7 @@ def test_gaps_that_one_speed_does_not_tell_apart_and_another_speed_does():
     alike, told = np.array([line.split() for line in lines], float), np.array(told, float)
     stiffness = 4 / 3 * 210e9 / (2 * (1 - 0.3**2)) * math.sqrt(0.01109 / 2)
 
-    def strike(gaps, speed, loss=3.2e-8):
+    def strike(gaps, speed, loss=3e-8):
         unit = (0.0448 * speed**2 / stiffness) ** 0.4
         gaps = [0.0, *(1e-6 * gaps / unit)]
         return real_cradles.spheres(np.eye(5)[0], gaps, loss * speed / unit)
