@@ -109,7 +109,12 @@ def test_measure_runs_with_a_reader_s_own_file(root, tmp_path, monkeypatch):
     kept = [line for line in lines[1:] if line.split(",")[0] in ("set", "AB", "ABA")]
     (tmp_path / "my_shots.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    names = run(code("measure"), {"frame_rate": 120, "mark_error": 0.001, "length": 0.31})
+    # These take longest and use none of this: fits to a synthetic row and a synthetic swing.
+    other = {"gaps-found", "gaps-alike", "gaps-told"}
+    other |= {f"swing-{name}" for name in ("made", "fit", "figure", "notes")}
+    assert other < {cell.id for cell in code("measure")}
+    cells = [cell for cell in code("measure") if cell.id not in other]
+    names = run(cells, {"frame_rate": 120, "mark_error": 0.001, "length": 0.31})
     assert names["mine"].is_file()
     assert [one.name for one in names["shots"].sets] == ["AB", "ABA"]
     assert names["check"].name == "ABA"
