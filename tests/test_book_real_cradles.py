@@ -395,8 +395,9 @@ def test_what_the_third_strike_wants_of_ball_4():
     def by_gap(x):
         return sum_of(real_cradles.by_spheres([*gaps[:2], x, loss], 3, True))
 
-    ratio = minimize_scalar(by_ratio, bounds=(0, 0.3), method="bounded")
-    gap = minimize_scalar(by_gap, bounds=(0, 0.1), method="bounded")
+    near = {"method": "bounded", "options": {"xatol": 1e-4}}
+    ratio = minimize_scalar(by_ratio, bounds=(0, 0.3), **near)
+    gap = minimize_scalar(by_gap, bounds=(0, 0.1), **near)
     CHAPTER.tells({"ratio-chosen": ratios[2], "ratio-wanted": ratio.x}, off=1e-3)
     assert float(GLUED["gap-chosen"]) == pytest.approx(unit * gaps[2], abs=6e-3)
     assert float(GLUED["gap-wanted"]) == pytest.approx(unit * gap.x, abs=0.011)
@@ -406,7 +407,12 @@ def test_what_the_third_strike_wants_of_ball_4():
         ("ratio", ratio, by_ratio, 1, 1e-3), ("gap", gap, by_gap, unit, 0.01),
     ):  # fmt: skip
         sides = [
-            brentq(lambda x, chi=chi, best=best: chi(x) - best.fun - 1, best.x, best.x + side)
+            brentq(
+                lambda x, chi=chi, best=best: chi(x) - best.fun - 1,
+                best.x,
+                best.x + side,
+                xtol=1e-4,
+            )
             for side in (-0.015, 0.015)
         ]
         error = scale * (sides[1] - sides[0]) / 2

@@ -95,13 +95,13 @@
     };
   }
 
-  function settingSliders(act) {
+  function settingSliders(act, most) {
     const [lightest, heaviest] = LIMITS.masses;
     const ratio = (words, directions) =>
       slider({
         words,
         low: 0,
-        high: 1,
+        high: most,
         step: 0.01,
         input: (value) => act.ratio(value, directions),
       });
@@ -180,7 +180,7 @@
         ...(parts.has("scenes") ? [{ value: "springs", text: "springs", title: "linear ones" }] : []),
       ],
     });
-    const sliders = settingSliders(act);
+    const sliders = settingSliders(act, parts.has("half") ? 0.5 : 1); // the largest ratio
     const wanted = { count, scope, material, law, ...sliders };
     const has = (name) => parts.has({ forward: "ratio", backward: "ratio", gap: "law" }[name] ?? name);
     const nodes = Object.keys(wanted)
