@@ -123,40 +123,29 @@ def drop_mathjax(
         ]
 
 
-def name_summaries(
+def measured(match: re.Match[str]) -> str:
+    """Say how many lines an equation has, and how many letters one in a line of text."""
+    kind, tex = match.groups()
+    if kind == "div":
+        rows = 1 + tex.count(r"\\")
+        return f'{match[0]} style="--rows: {rows}"'
+    letters = len(UNSEEN.sub("", COMMAND.sub("x", tex)))
+    return f'{match[0]} style="--letters: {letters}"'
+
+
+def mend_body(
     app: Sphinx,
     page: str,
     template: str,
     context: dict[str, Any],
     doctree: nodes.document | None,
 ) -> None:
-    """Remove the label that MyST-NB gives to all summaries alike, and that hides their words."""
+    """Measure equations; remove the label of MyST-NB that hides the words of all summaries."""
     if "body" in context:
-        context["body"] = context["body"].replace(
+        body = context["body"].replace(
             '<summary aria-label="Toggle hidden content">', "<summary>"
         )
-
-
-def measure_equations(
-    app: Sphinx,
-    page: str,
-    template: str,
-    context: dict[str, Any],
-    doctree: nodes.document | None,
-) -> None:
-    """Say how many lines an equation has, and how many letters one in a line of text."""
-
-    def measured(match: re.Match[str]) -> str:
-        kind, tex = match.groups()
-        letters = len(UNSEEN.sub("", COMMAND.sub("x", tex)))
-        rows = 1 + tex.count(r"\\")
-        size = (
-            f"--rows: {rows}" if kind == "div" else f"--letters: {letters}"
-        )
-        return f'{match[0]} style="{size}"'
-
-    if "body" in context:
-        context["body"] = EQUATION.sub(measured, context["body"])
+        context["body"] = EQUATION.sub(measured, body)
 
 
 def keep_notebooks(app: Sphinx, exception: Exception | None) -> None:
@@ -399,8 +388,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("doctree-resolved", drop_thebe_settings, priority=900)
     app.connect("html-page-context", drop_thebe, priority=900)
     app.connect("html-page-context", drop_mathjax, priority=900)
-    app.connect("html-page-context", name_summaries)
-    app.connect("html-page-context", measure_equations)
+    app.connect("html-page-context", mend_body)
     app.connect("html-page-context", describe)
     app.connect("build-finished", keep_notebooks)
     app.add_js_file("boxes.js", loading_method="defer")

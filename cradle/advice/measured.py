@@ -74,7 +74,8 @@ def evidence(
         settings.setdefault(row.setting, []).append(row)
     every = list(settings.values())
     if chain is not None:
-        if here := [row for row in rows if row.chains == (measured_chain(chain, ratios),)]:
+        name = measured_chain(chain, ratios)
+        if here := [row for row in rows if row.chains == (name,)]:
             return "here", here
         if around := [_worst(found) for same in every if (found := _around(same, chain))]:
             return "around", around

@@ -37,11 +37,10 @@ def show(
 
 def text(rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> str:
     """Return rows as a table of text; its columns are those of the first row, if not `names`."""
-    columns = []
-    for name in names or rows[0]:
-        words = [name, *_texts([row[name] for row in rows])]
-        columns.append([word.rjust(max(map(len, words))) for word in words])
-    return "\n".join("  ".join(line).rstrip() for line in zip(*columns, strict=True))
+    columns = [[name, *_texts([row[name] for row in rows])] for name in names or rows[0]]
+    widths = [max(map(len, column)) for column in columns]
+    lines = (map(str.rjust, line, widths) for line in zip(*columns, strict=True))
+    return "\n".join("  ".join(line).rstrip() for line in lines)
 
 
 def _texts(column: Sequence[Any]) -> list[str]:

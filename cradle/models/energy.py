@@ -237,8 +237,8 @@ class _Process:
     def turn(self, turned: list[int]) -> None:
         """Book extremes of compressions: the energy stored there, and maxima as events."""
         # Where several turn at one instant, only one has ended the integration.
-        gain = -np.diff(self.parts(self.rate(self.t, self.y))[0])
         # A root has an error: one that has turned may still have its old sign, but goes on.
+        gain = -np.diff(self.parts(self.rate(self.t, self.y))[0])
         turning = (self.loading == (self.speeds(self.y) < 0.0)) & (self.loading == (gain < 0.0))
         turning[turned] = True
         turning &= self.closed & (self.depths(self.y) > 0.0)

@@ -254,7 +254,7 @@ def part(model: Any, n: int, first: int, last: int) -> Model:
             elif name == "excess":  # a ratio's bound may count on the next ball (Eq. 53)
                 changes["excess"] = "saturate"
             elif isinstance(value, tuple | list) and len(value) in (n - 1, n - 2):
-                changes[name] = tuple(value[first : last - n + len(value)])
+                changes[name] = tuple(value[first : last - n + len(value)])  # contacts, inner balls
     return replace(model, **changes) if changes else model  # type: ignore[no-any-return]
 
 
