@@ -4,6 +4,7 @@ import base64
 import io
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import book_figures
 import numpy as np
@@ -314,6 +315,23 @@ def test_every_figure_has_both_colourings(html: Path):
         dark = shown.count(f"{path.stem}-dark.svg")
         assert shown.count(path.name) > 0, path
         assert dark == shown.count(path.name), path
+
+
+def test_figures_of_a_second_build_are_those_of_the_first(tmp_path):
+    """Colours are made from what a notebook stores, not from what was made of it."""
+    letters = '<g style="fill: #e69f00" transform="translate(1 1) scale(0.1 -0.1)"/>'
+    (tmp_path / "stored.svg").write_text(f"<svg >{letters}</svg>", encoding="utf-8")
+    (tmp_path / "_images").mkdir()
+    builder = SimpleNamespace(format="html", images={"stored.svg": "fig-a.svg"})
+    app = SimpleNamespace(builder=builder, srcdir=tmp_path, outdir=tmp_path)
+    built = tmp_path / "_images" / "fig-a.svg"
+    built.write_bytes((tmp_path / "stored.svg").read_bytes())
+    found = []
+    for _ in range(2):
+        book_figures.write_colourings(app, None)
+        found.append([path.read_bytes() for path in sorted(built.parent.iterdir())])
+    assert found[0] == found[1]
+    assert len(set(found[0])) == len(found[0]) == 2
 
 
 def test_a_ball_of_a_film_looks_as_in_the_figures(browser, html: Path):

@@ -252,6 +252,17 @@ def name_images(app: Sphinx, doctree: nodes.document) -> None:
                 images[path] = images[path][0], name
 
 
+def originals(app: Sphinx) -> dict[str, Path]:
+    """Return the pictures as notebooks store them, by their names in the built book.
+
+    Sphinx copies them after it has written the pages; what it copied is then changed.
+    """
+    return {
+        name: Path(app.srcdir, path)
+        for path, name in app.builder.images.items()
+    }
+
+
 def pair_images(
     app: Sphinx,
     page: str,
@@ -260,14 +271,10 @@ def pair_images(
     doctree: nodes.document | None,
 ) -> None:
     """Put every figure of a page into its box, in the colours of both modes."""
-    # Sphinx copies the pictures after it has written the pages: look at the originals.
-    originals = {
-        name: Path(app.srcdir, path)
-        for path, name in app.builder.images.items()
-    }
+    there = originals(app)
 
     def box(match: re.Match[str]) -> str:
-        original = originals.get(Path(match["path"]).name + ".svg")
+        original = there.get(Path(match["path"]).name + ".svg")
         if original is None:
             return match[0]
         svg = original.read_text(encoding="utf-8")
@@ -296,23 +303,24 @@ def pair_images(
         context["body"] = IMAGE.sub(box, body) + repainted(body)
 
 
-def write_dark(app: Sphinx, exception: Exception | None) -> None:
-    """Write the pictures of dark mode beside the others; let letters of both be read."""
+def write_colourings(app: Sphinx, exception: Exception | None) -> None:
+    """Write the pictures of both modes, with letters that can be read."""
     if exception is None and app.builder.format == "html":
-        for path in Path(app.outdir, "_images").glob("*.svg"):
-            drawing = path.read_text(encoding="utf-8")
-            if not path.stem.endswith("-dark"):
+        for name, original in originals(app).items():
+            if original.suffix == ".svg":
+                drawing = original.read_text(encoding="utf-8")
+                path = Path(app.outdir, "_images", name)
+                path.write_text(readable(drawing, PAPER), encoding="utf-8")
                 path.with_name(f"{path.stem}-dark.svg").write_text(
                     readable(darkened(drawing), PAGE), encoding="utf-8"
                 )
-                path.write_text(readable(drawing, PAPER), encoding="utf-8")
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the callbacks."""
     app.connect("doctree-read", name_images, priority=900)
     app.connect("html-page-context", pair_images)
-    app.connect("build-finished", write_dark)
+    app.connect("build-finished", write_colourings)
     return {
         "version": "1",
         "parallel_read_safe": True,
