@@ -122,7 +122,7 @@ def story() -> list[dict[str, Any]]:
         ("light", "A light ball in the middle", light, "inside",
          "A ball of three hundredths of the mass rattles between its heavy neighbours: one hit, a "
          "dozen collisions. Make it lighter still, and count them."),
-        ("meeting", "Two impacts that meet", meeting, "inside",
+        ("meeting", "Two runs that meet", meeting, "inside",
          "The first ball comes in at full speed, the second at half of it: Fig. 8 of the paper. "
          "Two stretches of the row are in contact at once, until the gap between them closes too."),
         ("map", "Who bounces back?", equal(3, 0.15, e=0.5), "map",
