@@ -23,7 +23,7 @@ from cradle import Chain, SpringChain, collide, post_impact_velocities, spring_v
 from cradle.kernel.kinks import Law, Springs
 from cradle.kernel.state import FINISHED
 from cradle.measures import effective_ratio
-from cradle.runtime.springs import room, solve
+from cradle.runtime.job import follow, motions
 
 FAINT = 1e-6  # compressions and speeds, relative to the first, at which Verlet stops
 STEPS = np.geomspace(0.8, 2e-3, 90)  # of Verlet
@@ -55,11 +55,11 @@ def cases():
 def ours(masses, loss, accuracy):
     """Return the batch, as one thread calls it: checks, units, runs, certificate."""
     rows, n = masses.shape
-    ones, out = np.ones((rows, n - 1)), room(rows, n)
+    ones, out = np.ones((rows, n - 1)), motions(rows, n)
     springs = Springs(masses, struck(rows, n), ones, loss * ones, 0.0 * ones)
 
     def run():
-        assert solve(springs, Law(1.5, accuracy, 1e7), out, True)[:2] == (rows, FINISHED)
+        assert follow(springs, Law(1.5, accuracy, 1e7), out, True)[:2] == (rows, FINISHED)
         return out.v
 
     return run

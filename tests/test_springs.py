@@ -33,7 +33,7 @@ from cradle.kernel import accuracy as control
 from cradle.kernel import kinks
 from cradle.kernel.state import REFUSED, UNFINISHED, UNSOUND
 from cradle.runtime import compile as runtime
-from cradle.runtime import springs as job
+from cradle.runtime import job
 
 
 def struck(n):
@@ -279,9 +279,9 @@ def test_losses_and_leans_leave_the_fourth_order(monkeypatch, name):
     row = kinks.Springs(np.array([m]), np.array([v]), *rows)
 
     def error(h):
-        out, pages = job.room(1, len(m)), []
+        out, pages = job.motions(1, len(m)), []
         out.h[0] = h
-        clock = job.solve(row, kinks.Law(1.5, 1e-7, 1e6), out, record=pages)[2]
+        clock = job.follow(row, kinks.Law(1.5, 1e-7, 1e6), out, record=pages)[2]
         return abs(clock["speed"] * np.diff(pages[-1][-1, 1]) - exact).max(), clock["top"]
 
     omega = math.sqrt(error(0.1)[1])
@@ -455,7 +455,7 @@ def test_progress_counts_the_steps_of_all_runs(monkeypatch, capsys):
     """After two seconds; here at once, and after every step or so."""
     begin = tqdm.tqdm.__init__
     monkeypatch.setattr(tqdm.tqdm, "__init__", lambda bar, **given: begin(bar, unit=given["unit"]))
-    monkeypatch.setattr(job, "_EFFORT", {False: 10, True: 10})
+    monkeypatch.setattr(job, "_STEPS", {False: 10, True: 10})
     chain, law = Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain(accuracy=1e-6)
     found = collide(chain, law, progress=True)
     assert f"{found.evaluations} steps" in capsys.readouterr().err
@@ -486,7 +486,7 @@ def test_plain_and_compiled_agree_to_the_last_bit(monkeypatch, p, loss, damping)
     for kernel, pause in itertools.product(("plain", "compiled"), (None, 7)):
         monkeypatch.setenv(runtime.VARIABLE, kernel)
         if pause:
-            monkeypatch.setattr(job, "_EFFORT", {False: pause, True: pause})
+            monkeypatch.setattr(job, "_STEPS", {False: pause, True: pause})
             monkeypatch.setattr(job, "_PAGES", pause)
         many = spring_velocities(m, v, k, **law, gaps=gaps, viscosity=lost, accuracy=1e-2)
         trace = collide(Chain(m[5], v[5]), model)
@@ -520,10 +520,10 @@ def test_nan_ends_and_is_no_answer(monkeypatch, kernel):
     row, law = kinks.Springs(*rows), kinks.Law(1.5, 1e-3, 1000.0)
     for name in row._fields:
         nan = {name: np.full_like(getattr(row, name), math.nan)}
-        assert job.solve(row._replace(**nan), law, job.room(1, 2))[1] == REFUSED
-    out = job.room(1, 2)
+        assert job.follow(row._replace(**nan), law, job.motions(1, 2))[1] == REFUSED
+    out = job.motions(1, 2)
     out.h[0] = math.nan
-    assert job.solve(row, law, out, record=[])[1] in (UNFINISHED, UNSOUND)
+    assert job.follow(row, law, out, record=[])[1] in (UNFINISHED, UNSOUND)
 
 
 @pytest.mark.parametrize(

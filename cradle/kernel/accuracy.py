@@ -22,7 +22,6 @@ from cradle.kernel.state import (
     UNSOUND,
     apart,
     door,
-    jit,
 )
 
 # Why a chain is refused: a value that is none, too quick, light, soft, lossy, wide, narrow, deep.
@@ -44,7 +43,6 @@ TINY = 1e-300  # the least depth, and one over the largest
 WIDEST, NARROWEST, BLURRED = 1e9, 1e-12, 1e13
 
 
-@jit
 def refuse(wrong, rule, place, clock):
     """Note the first rule that is broken, and where first."""
     if wrong and not 0 < clock.rule <= rule:

@@ -16,7 +16,7 @@ Takahashi and Imada, J. Phys. Soc. Jpn. 53 (1984) 3765; Rowlands, J. Comput. Phy
 import math
 
 from cradle.kernel.kinks import FAINT, grade, pay
-from cradle.kernel.state import FINISHED, PAUSED, REFUSED, UNFINISHED, apart, jit
+from cradle.kernel.state import FINISHED, PAUSED, REFUSED, UNFINISHED, apart
 
 # A run begins, and a flight ends, so many steps before the first node that is to find a contact
 # closed: there a closing owes least to the next order.
@@ -26,7 +26,6 @@ REST = 1e-7
 PULLS = 9  # why a chain is refused on its way, after the rules of `accuracy`
 
 
-@jit
 def idle(c, slow, s):
     """Tell whether contact c is open and stays so, or what it stores moves no ball that counts."""
     a = s[c]
@@ -36,13 +35,11 @@ def idle(c, slow, s):
     return abs(u) <= slow and abs(a.f - a.pull) * a.d * (a.w + s[c + 1].w) <= slow * slow
 
 
-@jit
 def done(c, beside, slow, s, leans):
     """Tell whether contact c need not be watched: it and one beside it are idle, none leans."""
     return not leans and idle(c, slow, s) and idle(beside, slow, s)
 
 
-@jit
 def settled(slow, low, high, s):
     """Tell whether all watched contacts are idle, or open and closing too slowly to be noticed."""
     for c in range(low, high):
@@ -51,7 +48,6 @@ def settled(slow, low, high, s):
     return True
 
 
-@jit
 def push(p, a, d, move, early):
     """Return force and slope of a contact: once open, none until it closes or its losses push."""
     if d > 0.0 and (move > 0.0 if a.f == 0.0 and early < 1.0 else d + early * move > 0.0):
@@ -60,7 +56,6 @@ def push(p, a, d, move, early):
     return 0.0, 0.0
 
 
-@jit
 def step(p, h, low, high, s):
     """Drift to the next node and kick; return the number of kinks, and the largest frequency^2.
 
@@ -96,7 +91,6 @@ def step(p, h, low, high, s):
     return kinks, max(top, steep * last.w)
 
 
-@jit
 def drop(p, hunt, a):
     """Work out the impulse of a contact's losses, and its slope."""
     if hunt:
@@ -106,7 +100,6 @@ def drop(p, hunt, a):
     a.held = a.spent
 
 
-@jit
 def drift_lossy(p, hunt, h, low, high, s):
     """Drift with losses, to where a cubic has the node; return as `step`."""
     kinks = 0
@@ -131,7 +124,6 @@ def drift_lossy(p, hunt, h, low, high, s):
     return kinks, max(top, steep * s[high].w)
 
 
-@jit
 def kick_lossy(h, low, high, s):
     """Move nodes to where the forces have them, and the forces along their slopes; twice; kick."""
     part = h * h / 12.0
@@ -161,7 +153,6 @@ def kick_lossy(h, low, high, s):
         force, impulse, moved = a.push, a.held, move
 
 
-@jit
 def bring(a, time, u, h):
     """Let the balls of an open contact fly freely for this time, at this closing speed."""
     a.d += time * u
@@ -169,13 +160,11 @@ def bring(a, time, u, h):
     a.y, a.last = a.d, a.d - h * u
 
 
-@jit
 def leave(a, time):
     """Watch a contact no more."""
     a.seen, a.g, a.push, a.held, a.grip = time, 0.0, 0.0, 0.0, 0.0
 
 
-@jit
 def fly(h, low, high, s):
     """Fly, with all contacts open, to the next closing if it is not near; return how long."""
     soonest = 0.0

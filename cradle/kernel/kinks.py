@@ -12,7 +12,7 @@ Kuwabara and Kono, Jpn. J. Appl. Phys. 26 (1987) 1230; Hunt and Crossley, J. App
 import math
 from typing import Any, NamedTuple
 
-from cradle.kernel.state import apart, jit
+from cradle.kernel.state import apart
 
 
 class Link:
@@ -114,7 +114,6 @@ class Clock:
 FAINT = 0.01  # what is too little to matter, over the accuracy
 
 
-@jit
 def grade(p, x):
     """Return x^(p - 1); with the same bits everywhere for spheres and linear springs."""
     if p == 1.5:
@@ -122,7 +121,6 @@ def grade(p, x):
     return 1.0 if p == 1.0 else x ** (p - 1.0)
 
 
-@jit
 def tail(q, x, inverse):
     """Return zeta(-q, x) / x^q for x not small, by the sum of Euler and Maclaurin."""
     s = inverse * inverse
@@ -166,7 +164,6 @@ def crossing(p, h, k, early, closes, theta, move):
     return unit * kick, h * unit * ((1.0 - theta + early) * kick - moment - early / p * spent)
 
 
-@jit
 def echo(p, x):
     """Return what a closing owes besides, of second order in the force, in parts of its square.
 
@@ -179,7 +176,6 @@ def echo(p, x):
     return 0.0
 
 
-@jit
 def turning(a, early):
     """Return when, in steps from the last node on, d and `early` moves are 0; d there, its move.
 

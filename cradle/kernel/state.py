@@ -15,7 +15,7 @@ if "door" not in globals():
         return function
 
     #: Marks the function that is called from outside, whose compiled code is kept on disk.
-    door = jit = apart
+    door = apart
 
 
 # Status codes.

@@ -12,8 +12,9 @@ import numpy as np
 from cradle.chain import Chain
 from cradle.input.values import ArrayLike, NDArray, Vector, flag, numbers
 from cradle.kernel import Inputs, Options, Outputs
+from cradle.kernel.state import FINISHED, REFUSED
 from cradle.models import correlation as paper
-from cradle.runtime.job import FINISHED, LARGE, REFUSED, Job, outputs
+from cradle.runtime.job import LARGE, Job, outputs
 from cradle.trace import ImpactNotCertified, ImpactNotFinished, compared_as_objects
 
 CHUNK = 4096  #: Chains solved at a time, which bounds the memory.

@@ -12,11 +12,11 @@ from cradle.chain import Chain
 from cradle.input import values as asked
 from cradle.input.values import ArrayLike, Vector
 from cradle.kernel.kinks import Law, Springs
+from cradle.kernel.state import FINISHED, REFUSED, UNFINISHED, UNSOUND
 from cradle.models.batch import fail, in_order, rows_of, shaped
 from cradle.models.energy import fastest
 from cradle.models.springs import COARSEST, FINEST, MOST_STEPS, TimedTrace, refused
-from cradle.runtime.job import DEFECTS, FINISHED, LARGE, REFUSED, UNFINISHED, UNSOUND
-from cradle.runtime.springs import room, solve
+from cradle.runtime.job import DEFECTS, LARGE, follow, motions
 from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
 
 # What is asked of the parameters: a rule, limits, whether the lower one is excluded; of contacts,
@@ -89,14 +89,17 @@ class SpringChain:
         # As arrays that may be written to: else all would be compiled a second time.
         row = Springs(*(row[None].copy() for row in (chain.masses, chain.velocities, *contacts)))
         hunt = self.damping == DAMPING[1]
-        out, law = room(1, n), Law(self.exponent, self.accuracy, float(self.max_steps), once, hunt)
+        out, law = (
+            motions(1, n),
+            Law(self.exponent, self.accuracy, float(self.max_steps), once, hunt),
+        )
         if progress:
             from tqdm import tqdm
 
             with tqdm(unit=" steps", delay=2.0) as bar:
-                found = solve(row, law, out, pause=lambda steps: bar.update(steps - bar.n))
+                found = follow(row, law, out, pause=lambda steps: bar.update(steps - bar.n))
         else:
-            found = solve(row, law, out)
+            found = follow(row, law, out)
         _, status, clock = found
         if status == REFUSED:
             raise refused(clock, law, [], row)
@@ -223,8 +226,8 @@ def spring_outcomes(
     def run_chunk(rows: slice, stop: threading.Event | None = None) -> tuple[int, int]:
         """Solve these chains; return how the last of them ended, and where."""
         part = Springs(*(rows_of(array, lead, rows) for array in arrays))
-        found = room(rows.stop - rows.start, n)._replace(v=out[rows], error=error[rows])
-        at, status, _ = solve(part, law, found, count * n >= LARGE, stop)
+        found = motions(rows.stop - rows.start, n)._replace(v=out[rows], error=error[rows])
+        at, status, _ = follow(part, law, found, count * n >= LARGE, stop)
         return status, rows.start + at
 
     for status, at in in_order(run_chunk, count, _CHUNK, progress):
@@ -233,7 +236,7 @@ def spring_outcomes(
         check_rows(arrays)
         row = Springs(*(rows_of(array, lead, slice(at, at + 1)) for array in arrays))
         place = [int(k) for k in np.unravel_index(at, lead)]
-        _, status, clock = solve(row, law, room(1, n))
+        _, status, clock = follow(row, law, motions(1, n))
         if status == REFUSED:
             raise refused(clock, law, place, row)
         # Alone, it stops where it stopped here, and raises.

@@ -11,8 +11,8 @@ from cradle.closed_form import largest_ratios
 from cradle.input import values as asked
 from cradle.input.values import ArrayLike, Vector
 from cradle.kernel import Inputs, Options
-from cradle.kernel.state import LIMITS
-from cradle.runtime.job import DEFECTS, REFUSED, UNFINISHED, UNSOUND, Job, outputs
+from cradle.kernel.state import LIMITS, REFUSED, UNFINISHED, UNSOUND
+from cradle.runtime.job import DEFECTS, Job, outputs
 from cradle.trace import Event, ImpactNotCertified, ImpactNotFinished, Trace
 
 MAX_EVENTS = 5_000_000  #: Steps after which an impact is given up, unless told otherwise.

@@ -11,7 +11,7 @@ from cradle.kernel import accuracy as limits
 from cradle.kernel.forces import PULLS
 from cradle.kernel.kinks import Law, Motions, Springs
 from cradle.models.energy import EnergyTrace
-from cradle.runtime.springs import solve
+from cradle.runtime.job import follow
 from cradle.trace import Event
 
 #: Least and largest error that can be asked for; steps of one run after which it is given up.
@@ -107,7 +107,7 @@ class TimedTrace(EnergyTrace):
         """Return how long it takes until no balls overlap, s, and how far each goes, m."""
         record: list[Any] = []
         row, law, out = vars(self)["_ran"]
-        clock = solve(row, law, out, record=record)[2]
+        clock = follow(row, law, out, record=record)[2]
         begun, ended = record[0][0], record[-1][-1]
         time, y, u = ended[0, 0], ended[2, :-1], -np.diff(ended[1])  # u: closing speeds
         late = np.divide(y, -u, out=np.zeros_like(u), where=(y > 0.0) & (y < -u * time)).max()
@@ -136,7 +136,7 @@ class Path:
 
     def __init__(self, chain: Springs, law: Law, out: Motions) -> None:
         record: list[Any] = []
-        clock = solve(chain, law, out, record=record)[2]
+        clock = follow(chain, law, out, record=record)[2]
         pages = np.concatenate(record)
         #: The units.
         self.mass, self.speed, self.length = (float(clock[x]) for x in ("mass", "speed", "length"))

@@ -1,6 +1,6 @@
-"""From arrays to the event loop and back: work areas, pauses, plain or compiled.
+"""From arrays to the two loops and back: work areas, pauses, plain or compiled.
 
-The loop stops by itself after some effort and is called again: so Ctrl-C works, a record can grow,
+A loop stops by itself after some effort and is called again: so Ctrl-C works, a record can grow,
 and small work can begin plain and go on compiled.
 """
 
@@ -14,7 +14,8 @@ import numpy as np
 
 from cradle import kernel as plain
 from cradle.kernel import state as rooms
-from cradle.kernel.state import FINISHED, PAUSED, REFUSED, UNFINISHED, UNSOUND
+from cradle.kernel.kinks import Clock, Law, Link, Motions, Springs
+from cradle.kernel.state import FINISHED, PAUSED
 from cradle.runtime import compile as runtime
 
 #: What an answer can break, by the number that the kernel gives.
@@ -28,10 +29,9 @@ DEFECTS = {
     rooms.LEDGER: "the energy lost is not what the contacts keep back",
 }
 
-__all__ = ["DEFECTS", "FINISHED", "LARGE", "REFUSED", "UNFINISHED", "UNSOUND", "Job", "Stopped"]
-
-# Contacts touched between two pauses, plain and compiled: some hundredths of a second.
-_EFFORT = {False: 5_000, True: 2_000_000}
+# Contacts touched between two pauses, plain and compiled, some hundredths of a second: of events;
+# of contact forces, in each step; and with a record, of which each step is a page.
+_EFFORT, _STEPS, _PAGES = {False: 5_000, True: 2_000_000}, {False: 5_000, True: 5_000_000}, 1024
 LARGE = 50_000  #: Chains times balls from which on compiling is worth the wait at once.
 _ENDLESS = 2**62  # no limit
 _ROUND = 5  # events of a contact in one round: end, close, collapse, maximum, repetition
@@ -159,6 +159,44 @@ class Job:
         self.counts["room"] = _ENDLESS if room == self.room else room - _ROUND * self.n
 
 
+def motions(rows: int, n: int) -> Motions:
+    """Return room for what so many chains come to."""
+    return Motions(np.empty((rows, n)), np.zeros(rows), np.zeros(rows), np.zeros(rows, np.int64))
+
+
+def follow(
+    chains: Springs, law: Law, out: Motions, large: bool = False,
+    stop: threading.Event | None = None, record: list[Any] | None = None,
+    pause: Callable[[int], object] | None = None,
+) -> tuple[int, int, Any]:  # fmt: skip
+    """Follow chains until `stop`; return the next one's number, how the last ended, its clock."""
+    # A `record` takes the pages of one chain, at the step in `out`; `pause` the steps so far.
+    (rows, n), k, status = out.v.shape, 0, FINISHED
+    compiled: bool | None = None
+    pages = np.empty((0 if record is None else _PAGES + 2, 4, n))
+    clock: Any = None
+    while k < rows and status in (FINISHED, PAUSED):
+        if stop is not None and stop.is_set():
+            raise Stopped
+        kernel = runtime.chosen(large, "follow")
+        if compiled is not (kernel is not plain):
+            # A chain that has begun plain begins anew.
+            compiled, status = kernel is not plain, FINISHED
+            if record is not None:
+                record.clear()
+            area = blank(Link, n, compiled), blank(Clock, 1, compiled)
+            clock = area[1][0] if compiled else vars(area[1][0])
+            given = chains if compiled else Springs(*(part.tolist() for part in chains))
+        fixed = n, given, law, out, *area, pages, _STEPS[compiled] if record is None else _PAGES
+        k, status = runtime.call(kernel.follow, k, status == PAUSED, *fixed)
+        if pause is not None:
+            pause(int(clock["effort"] + clock["steps"] * (status == PAUSED)))
+        if record is not None:
+            record.append(pages[: clock["row"]].copy())
+            clock["row"] = 0
+    return k, status, clock
+
+
 @functools.cache
 def warm_up() -> None:
     """Compile both loops, or load them compiled, if numba is there: then nothing waits for them.
@@ -169,10 +207,7 @@ def warm_up() -> None:
     --------
     >>> warm_up()
     """
-    from cradle.kernel.kinks import Law, Springs
-    from cradle.runtime.springs import room, solve
-
     one, still, apart, none = np.ones((1, 2)), np.zeros((1, 2)), np.ones((1, 1)), np.zeros((1, 1))
     inputs = plain.Inputs(one, still, apart, *[np.ones((1, 0))] * 2)
     Job(inputs, outputs(1, 2), plain.Options(0.5, 1000, True), large=True).run()
-    solve(Springs(one, still, apart, none, none), Law(1.5, 1e-3, 1e3), room(1, 2), large=True)
+    follow(Springs(one, still, apart, none, none), Law(1.5, 1e-3, 1e3), motions(1, 2), large=True)
