@@ -18,9 +18,8 @@ from cradle import (
     SequentialCollisions,
     swing,
 )
-from cradle.pictures.animation import animate_swing
+from cradle.pictures.animation import RATE, animate_swing, thin
 from cradle.pictures.impacts import PALETTE
-from cradle.pictures.keyframes import RATE, thin
 
 RUN = swing(
     Chain([1, 2, 1], [0] * 3, 0.9), ImpulseCorrelation(0.1), [-0.03, 0, 0], np.linspace(0, 3, 91),
