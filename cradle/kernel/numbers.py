@@ -104,16 +104,14 @@ def most(a, b):
 
 def read(x):
     """Return what a float means: the decimal of up to 15 digits that it prints as, or its bits."""
-    # So .9 is nine tenths.  From 1e-7 to 1e15 the powers of ten in the way are floats themselves.
+    # So .9 is nine tenths.  From 1e-7 to 1e14 the powers of ten in the way are floats themselves.
     size = abs(x)
-    if not 1e-7 <= size < 1e15 or (x + ROUND) - ROUND == x:
+    if not 1e-7 <= size < 1e14 or (x + ROUND) - ROUND == x:
         return complex(x, 0.0)
     # 15 digits: x 10**k lies between 1e14 and 1e15, as far as the binary exponent can tell.
     k = 15 - (math.frexp(size)[1] * 1233 + 4095) // 4096
-    if k >= 0 and size * TENS[k] < 1e14:
+    if size * TENS[k] < 1e14:
         k += 1
-    if k < 0:
-        return complex(x, 0.0)
     whole = (x * TENS[k] + ROUND) - ROUND
     if whole / TENS[k] != x:
         return complex(x, 0.0)

@@ -12,7 +12,7 @@ def velocity(b, change, unit):
 
 
 @apart
-def write(kind, c, low, high, way, n, state):
+def write(kind, c, n, state, low, high, way):
     """Write an event and the state when contacts low..high have gone so far on at their rates."""
     record, tally = state.record, state.tally[0]
     ball, contact, k = state.ball, state.contact, tally.events
@@ -31,10 +31,10 @@ def write(kind, c, low, high, way, n, state):
         before = after
 
 
-def record(kind, c, n, state):
-    """Count an event; write it and the state after it, if there is room."""
+def record(kind, c, n, state, low=0, high=-1, way=ZERO):
+    """Count an event; write it and the state after it, if there is room; contacts as `write`."""
     if state.tally[0].events < len(state.record.kinds):
-        write(kind, c, 0, -1, ZERO, n, state)
+        write(kind, c, n, state, low, high, way)
     state.tally[0].events += 1
 
 
@@ -46,7 +46,7 @@ def goes_all(one):
 @apart
 def record_compressions(one, n, state):
     """Record every maximum compression of a run on its way, in order: it does not stop for them."""
-    contact, tally = state.contact, state.tally[0]
+    contact = state.contact
     low, high, way = one.low, one.high, one.way
     for c in range(low, high + 1):
         k = contact[c]
@@ -66,6 +66,4 @@ def record_compressions(one, n, state):
         if at.real == math.inf:
             return
         contact[found].x = NEVER
-        if tally.events < len(state.record.kinds):
-            write(MAXIMUM_COMPRESSION, found, low, high, least(at, way), n, state)
-        tally.events += 1
+        record(MAXIMUM_COMPRESSION, found, n, state, low, high, least(at, way))
