@@ -112,6 +112,13 @@ def test_impulses_beside_heavy_balls(masses, velocities, restitution, impulses):
     np.testing.assert_allclose(trace.impulses, impulses, rtol=1e-7)
 
 
+def test_a_coarse_end_beside_a_heavy_ball():
+    """Closing speeds that are left are counted from that ball: its last digit is 2000 N s."""
+    chain = Chain([0.8, 0.6, 1.3e19, 0.6], [0.8, 0.5, -0.9, -0.9], 0)
+    impulses = collide(chain, EnergyDistribution(rtol=0.1)).impulses
+    np.testing.assert_allclose(impulses, [0.8 * 1.7, 0.8 * 1.7 + 0.6 * 1.4, 0], atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("masses", "e", "exponent", "rtol"),
     [

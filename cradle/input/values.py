@@ -209,11 +209,8 @@ def refuse_where(name: str, values: Vector, wrong: NDArray[np.bool_], rule: str)
 
 def shown(value: object) -> str:
     """Return a value as an error repeats it: on one line, and cut if it is long."""
-    # NumPy's own scalars as plain numbers; of a long list no more than is shown.
     if isinstance(value, (np.floating, np.complexfloating)):
-        return str(value)
-    if isinstance(value, (list, tuple)) and len(value) > _SHOWN:
-        value = [*value[:_SHOWN]]
+        return str(value)  # as a plain number
     text = " ".join(repr(value).split())
     return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
 

@@ -4,7 +4,6 @@ import math
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -241,8 +240,8 @@ def spring_outcomes(
             raise refused(clock, law, place, row)
         # Alone, it stops where it stopped here, and raises.
         m, v, k, loss, gap = (values[0] for values in row)
-        more: dict[str, Any] = {"viscosity": loss, "gaps": gap, "damping": damping}
-        fail(SpringChain(k, p, accuracy=accuracy, **more), Chain(m, v), place)
+        model = SpringChain(k, p, viscosity=loss, gaps=gap, damping=damping, accuracy=accuracy)
+        fail(model, Chain(m, v), place)
     return out.reshape(*lead, n), error.reshape(lead)
 
 
