@@ -442,6 +442,16 @@ def test_balls_that_swing_alike_touch_all_the_time():
     np.testing.assert_allclose(whole.positions[1], rest.positions[0], rtol=0, atol=1e-13)
 
 
+@pytest.mark.parametrize(("m", "length", "damping"), [([1, 2], 0.3, 0.05), ([1, 2, 1], 0.1, 0.3)])
+def test_rounding_draws_nothing_apart_that_swings_alike(m, length, damping):
+    """Equal pendulums need no force to keep together, whatever rounding leaves of it."""
+    balls, places = Chain(m, [0] * len(m), 0), [-0.05] + [0] * (len(m) - 1)
+    hanging = Pendulums(length, damping=damping)
+    run = swing(balls, SequentialCollisions(), places, [0, 3], pendulums=hanging)
+    assert len(run.impacts) == 1
+    assert run.together == tuple(range(len(m) - 1))
+
+
 def test_a_run_that_stands_still_says_so(monkeypatch):
     monkeypatch.setattr(SmallAngleFlight, "next_meeting", lambda *_: (0.0, [0], [1]))
     with pytest.raises(RuntimeError, match=r"does not get beyond t = 0\.0 s: contacts \[0\] close"):
