@@ -8,16 +8,8 @@ import pytest
 from families import FAMILIES, family
 from scipy.optimize import minimize
 
-from cradle import (
-    Chain,
-    EnergyDistribution,
-    ImpactNotFinished,
-    ImpulseCorrelation,
-    QuadraticDissipation,
-    SequentialCollisions,
-    SpringChain,
-    collide,
-)
+import cradle
+from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, SequentialCollisions, collide
 
 FIVE = Chain([1, 0.3, 0.6, 0.2, 0.9], [1, 0.4, 0, 0, -0.3], [0.9, 0.8, 1, 0.7])
 ELASTIC = Chain(FIVE.masses, FIVE.velocities)
@@ -35,7 +27,7 @@ def stopped(chain, model):
 @pytest.mark.parametrize("name", FAMILIES)
 def test_bounds_hold(name):
     looked = 0
-    for problem in family(name, 40, seed=11):
+    for problem in family(name, 25, seed=11):
         trace, finished = problem.attempt(5000)
         for steps in (1, 2, 4, 8, 16, 64, 256):
             early, done = problem.attempt(steps)
@@ -46,7 +38,7 @@ def test_bounds_hold(name):
             assert (least <= trace.velocities).all(), problem
             assert (trace.velocities <= largest).all(), problem
             looked += 1
-    assert looked > 20
+    assert looked > 12
 
 
 def widest(found, i, sign):
@@ -93,9 +85,9 @@ def test_what_contacts_still_store_counts():
 @pytest.mark.parametrize(
     ("model", "less", "chain"),
     [
-        (SpringChain(), {"max_steps": 20}, ELASTIC),
-        (EnergyDistribution(), {"max_evaluations": 100}, FIVE),
-        (QuadraticDissipation(9.0), {"max_problems": 2}, Chain([10, 0.1, 10], [0, 1, 0], 1)),
+        (cradle.SpringChain(), {"max_steps": 20}, ELASTIC),
+        (cradle.EnergyDistribution(), {"max_evaluations": 100}, FIVE),
+        (cradle.QuadraticDissipation(9.0), {"max_problems": 2}, Chain([10, 0.1, 10], [0, 1, 0], 1)),
         (SequentialCollisions(), {"max_events": 2}, FIVE),
         (SequentialCollisions("right"), {"max_events": 2}, FIVE),
     ],

@@ -7,15 +7,8 @@ import numpy as np
 import pytest
 from chains import magnitudes, random_chains, uniform, with_ends, within_bounds
 
-from cradle import (
-    Chain,
-    ImpactNotCertified,
-    ImpactNotFinished,
-    ImpulseCorrelation,
-    collide,
-    outcomes,
-    post_impact_velocities,
-)
+import cradle
+from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide, post_impact_velocities
 
 MODEL = [
     ({"forward": -0.1}, "forward = -0.1; must lie in [0, 1]"),
@@ -97,21 +90,21 @@ def test_the_short_cut_decides_as_the_loop_does():
         return np.tile(np.eye(n)[0], (count, 1))
 
     for n in (2, 3):
-        m, v, e, f, b = random_chains(rng, 1500, n, decades=3, speed=strike)
-        result = outcomes(m, v, e, f, b)
+        m, v, e, f, b = random_chains(rng, 300, n, decades=3, speed=strike)
+        result = cradle.outcomes(m, v, e, f, b)
         for k in range(len(m)):
             trace = collide(Chain(m[k], v[k], e[k]), ImpulseCorrelation(f[k], b[k]))
             assert result.collisions[k].tolist() == trace.collisions.tolist()
             error = np.abs(result.velocities[k] - trace.velocities).max()
             assert error <= 2e-15  # of the striker's speed
             taken += (trace.collisions == 1).all()
-    assert 1500 < taken < 2900
+    assert 300 < taken < 580
 
 
 def test_no_row_of_a_batch_is_left_out_in_silence(monkeypatch):
     """Should the impact that stopped a batch not stop alone, those after it are not solved."""
     monkeypatch.setattr(ImpulseCorrelation, "solve", lambda *_: None)
-    with pytest.raises(ImpactNotCertified, match="among others it stops, alone it does not"):
+    with pytest.raises(cradle.ImpactNotCertified, match="among others it stops, alone it does not"):
         post_impact_velocities([[1, 1, 1, 1]] * 3, [1, 0, 0, 0], 1, 0.1, max_events=1)
 
 
@@ -137,7 +130,7 @@ def test_batch_is_a_loop_of_single_impacts():
     f, b = 0.2 * rng.random((4, n - 2)), 0.2 * rng.random((3, 1, 2, 1, n - 2))[:, 0]
     f, b = np.minimum(f, 0.05), np.minimum(b, 0.05)
     batch = post_impact_velocities(m, v, e, f, b, excess="saturate", meeting=0.3)
-    margins = outcomes(m, v, e, f, b, excess="saturate", meeting=0.3).margin
+    margins = cradle.outcomes(m, v, e, f, b, excess="saturate", meeting=0.3).margin
     lead = np.broadcast_shapes(*(part.shape[:-1] for part in (m, v, e, f, b)))
     assert batch.shape == (*lead, n)
     assert margins.shape == lead
@@ -151,25 +144,13 @@ def test_batch_is_a_loop_of_single_impacts():
         assert margins[at] == trace.margin
 
 
-def test_scalars_and_the_missing_backward_ratio():
+def test_scalars_the_missing_backward_ratio_and_an_empty_batch():
+    assert post_impact_velocities(np.ones((0, 3)), [1, 0, 0], 1, 0.1).shape == (0, 3)
     full = post_impact_velocities([1, 2, 1], [1, 0, 0], [0.5, 0.5], [0.1], [0.1])
     assert full.tobytes() == post_impact_velocities([1, 2, 1], [1, 0, 0], 0.5, 0.1).tobytes()
     light = [[1, 0.1, 1], [1, 0, 0], 0.5, 0.1]
     assert post_impact_velocities(*light, 0.1).tobytes() == post_impact_velocities(*light).tobytes()
     assert post_impact_velocities(*light, 0.3).tobytes() != post_impact_velocities(*light).tobytes()
-
-
-def test_small_batches():
-    assert post_impact_velocities(np.ones((0, 3)), [1, 0, 0], 1, 0.1).shape == (0, 3)
-    whole = np.array([1, 1], np.int8)
-    assert post_impact_velocities(whole, [1, 0], 1, 0).tolist() == [0.0, 1.0]
-
-
-def test_inputs_are_left_alone():
-    given = [np.array(x) for x in ([1.0, 0.01, 1.0], [1.0, 0.0, 0.0], [0.5, 0.5], [0.15])]
-    before = [part.tolist() for part in given]
-    post_impact_velocities(*given)
-    assert [part.tolist() for part in given] == before
 
 
 def test_impact_not_finished():
@@ -211,7 +192,7 @@ def test_batch_and_single_draw_the_line_of_excess_alike():
     """A few roundings around Eq. 53: refused by both, in the same words, or by neither."""
     rng = np.random.default_rng(53)
     refused = 0
-    for _ in range(300):
+    for _ in range(150):
         n = int(rng.integers(3, 6))
         m = magnitudes(rng, 4, n)
         bounds = within_bounds(m, np.ones)
@@ -228,4 +209,4 @@ def test_batch_and_single_draw_the_line_of_excess_alike():
         except ValueError as error:
             found = str(error).replace("[0, ", "[")
         assert found.partition(" = ")[0] == expected.partition(" = ")[0]
-    assert 100 < refused < 250
+    assert 50 < refused < 125

@@ -7,14 +7,8 @@ from real_cradles import SLOWER, first_strikes
 from scipy.special import ndtri
 from stored import read
 
-from cradle import (
-    Chain,
-    ImpulseCorrelation,
-    SequentialCollisions,
-    SpringChain,
-    collide,
-    post_impact_velocities,
-)
+import cradle
+from cradle import Chain, ImpulseCorrelation, SequentialCollisions, SpringChain, collide
 from cradle.fit import Shots, ShotSet, fit_law, ratio, restitution
 from cradle.fit.laws import _Search
 
@@ -33,7 +27,7 @@ def simulated(name, masses, e, ratios, noise, seed, count=12):
     """Shots of a row by the paper's rule: the striker's speed and the outcome read with errors."""
     rng = np.random.default_rng(seed)
     speed = uniform(rng, 0.5, 1.5, count)[:, None] * np.eye(1, len(masses))
-    after = post_impact_velocities(masses, speed, e, ratios)
+    after = cradle.post_impact_velocities(masses, speed, e, ratios)
     seen = speed * (1 + noise * ndtri(uniform(rng, 0, 1, (count, 1))))
     moved = after + noise * ndtri(uniform(rng, 0, 1, after.shape))
     return shot_set(name, seen, moved, noise, noise * speed, masses)
@@ -98,7 +92,7 @@ def stored(law, fitted):
 
 def test_two_strikes_of_the_film():
     found = fit_law(
-        Shots((*strikes(1, 2),)), {f"of {k}": spheres(k) for k in (1, 2)}, GAPS, starts=9
+        Shots((*strikes(1, 2),)), {f"of {k}": spheres(k) for k in (1, 2)}, GAPS, starts=4
     )
     one, two, numbers = next(stored("spheres, three gaps, A", "both"))
     assert found.chi_square == pytest.approx(one + two, abs=2e-3)
@@ -193,18 +187,6 @@ def test_errors_far_too_small_are_no_endless_search():
     """Chi-square is then so large that its rounding looks like a lower minimum."""
     found = told([0.3, 0.7], 1e-12, lambda x: Given(np.exp(x)), {"x": (-2, 0)})
     assert found.values["x"] == pytest.approx(np.log(0.5), abs=1e-4)
-
-
-def test_intervals_hold_the_truth():
-    """In 95 of 100 experiments, give or take six."""
-    held = 0
-    for seed in range(100):
-        shots = Shots((simulated("AAA", [1.0] * 3, 0.9, 0.15, 0.02, seed, count=3),))
-        ranges = {"forward": (0, 0.5)}
-        fit = fit_law(shots, ImpulseCorrelation, ranges, restitution=0.9, starts=4)
-        low, high = fit.intervals["forward"]
-        held += low <= 0.15 <= high
-    assert 89 <= held <= 99
 
 
 def test_a_level_stretch_is_one_minimum():

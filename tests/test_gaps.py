@@ -7,16 +7,8 @@ from chains import HERTZ
 from chapters import Chapter
 from stored import numbers, read
 
-from cradle import (
-    Chain,
-    EnergyDistribution,
-    ImpulseCorrelation,
-    SequentialCollisions,
-    SpringChain,
-    collide,
-    paper_chain,
-    ratio_table,
-)
+import cradle
+from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SequentialCollisions, collide
 
 CHAPTER = Chapter("table_2")
 
@@ -50,7 +42,7 @@ def test_lean_between_two_balls_at_rest_by_scipy():
     run = solve_ivp(rate, (0, 9), [0, 0, 0, 1, 0, 0], events=opened, rtol=1e-10, atol=1e-12)
     found = gaps.strike([1] * 3, [1, 0, 0], 1.0, [0, -lean])
     np.testing.assert_allclose(found, run.y[3:, -1], atol=2e-3)
-    law = SpringChain(gaps=[0, -lean])
+    law = cradle.SpringChain(gaps=[0, -lean])
     way = collide(Chain([1] * 3, [1, 0, 0]), law)
     assert way.times[-1] == pytest.approx(run.t[-1], rel=1e-5)
 
@@ -58,7 +50,7 @@ def test_lean_between_two_balls_at_rest_by_scipy():
 @pytest.mark.parametrize("triplet", ["AAA", "ADD", "BCB", "DAC", "CDB"])
 def test_rows_of_triplets(triplet):
     row = next(r for r in read("gaps_triplets.csv") if r["triplet"] == triplet)
-    chain, model = paper_chain(triplet, excess="saturate")
+    chain, model = cradle.paper_chain(triplet, excess="saturate")
     listed = collide(chain, model).velocities
     for name in ("sequential", "energy_hertz", "fused"):
         after = collide(chain, gaps.LAWS[name]).velocities
@@ -88,7 +80,7 @@ def test_what_the_chapter_says():
 
 def test_ratios_of_touching_spheres():
     """The largest of each triplet: every contact collides once, so Eqs. 24 and 31 tell it."""
-    listed = ratio_table().set_index("triplet")["ratio"]
+    listed = cradle.ratio_table().set_index("triplet")["ratio"]
     masses = gaps.of_triplets(list(listed.index))[0]
     after = gaps.strike(masses, [1, 0, 0], 1.0, [[0, 0]])
     once = 1 - (2 / (1 - after[:, 0]) - 1) * masses[:, 1] / masses[:, 0]

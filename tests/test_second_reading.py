@@ -73,10 +73,10 @@ def short(name, count, seed, most=7):
 
 #: Of each family how many chains are drawn, and how many of them are compared at least.
 SAMPLE = {
-    "ties": (240, 70),
-    "ties within bounds": (240, 70),
-    "mixed zeros": (160, 25),
-    "generic": (90, 50),
+    "ties": (120, 35),
+    "ties within bounds": (120, 35),
+    "mixed zeros": (80, 12),
+    "generic": (45, 25),
 }
 
 
@@ -90,7 +90,7 @@ def test_chains_of_a_family(name):
 @pytest.mark.parametrize("name", SAMPLE)
 def test_many_chains_of_a_family(name):
     count, least = SAMPLE[name]
-    no_difference(short(name, 20 * count, seed=32), 15 * least)
+    no_difference(short(name, 40 * count, seed=32), 30 * least)
 
 
 def against_the_package(chain, model, tolerance=1e-13):
@@ -134,9 +134,3 @@ def test_a_contact_that_waits_pushes_and_ends(problem):
     small = [[a or 1e-26 for a in way] for way in (problem.forward, problem.backward)]
     limit, _ = read(problem._replace(forward=small[0], backward=small[1]))
     assert max(abs(a - b) for a, b in zip(velocities, limit, strict=True)) < Decimal("1e-24")
-
-
-def test_it_says_that_an_impact_has_no_end():
-    given = decimals(Problem([1] * 3, [1, 0, 0], [0, 0], [0], [0]))
-    with pytest.raises(RuntimeError, match="not over after 50 rounds"):
-        given.solve(second.second_reading, rounds=50)

@@ -6,7 +6,6 @@ import re
 from functools import partial
 
 import numpy as np
-import pandas
 import pytest
 from numpy.polynomial import chebyshev
 from scipy.integrate import solve_ivp
@@ -107,26 +106,17 @@ def test_tiny_amplitudes_of_any_angle_are_as_exact(size, gaps):
 # The toy
 
 
-@pytest.mark.parametrize("k", [1, 2, 3, 4])
-def test_as_many_fly_off_as_are_pulled_back(k):
-    times = np.arange(0, 61) * 0.5
-    run = swing(balls(5), ImpulseCorrelation(0), pulled(5, k), times, pendulums=ONE_HERTZ)
-    assert len(run.impacts) == 60
-    for stroke, impact in enumerate(run.impacts):
-        moving = np.abs(impact.after) > 1e-12
-        expected = [False] * (5 - k) + [True] * k
-        assert moving.tolist() == (expected if stroke % 2 == 0 else expected[::-1])
-    out = np.abs(run.positions[1::2]).max()
-    assert out == pytest.approx(0.02, rel=1e-13)
-    np.testing.assert_allclose(run.positions[1], -np.array(pulled(5, k))[::-1], atol=1e-15)
+@pytest.mark.parametrize(
+    ("ratio", "e", "k"), [(0, 1.0, 1), (0, 1.0, 3), (0.15, 0.9, 1), (0.4, 1.0, 1), (0.05, 0.7, 2)]
+)
+def test_second_third_and_twentieth_stroke(ratio, e, k):
+    """All meet again at the lowest point, velocities reversed: strokes are a map, solved anew.
 
-
-@pytest.mark.parametrize(("ratio", "e"), [(0.15, 1.0), (0.15, 0.9), (0.4, 1.0), (0.05, 0.7)])
-def test_second_third_and_twentieth_stroke(ratio, e):
-    """All meet again at the lowest point, velocities reversed: strokes are a map, solved anew."""
+    At ratio 0 as many fly off as are pulled back.
+    """
     n = 4
-    run = swing(balls(n, e), ImpulseCorrelation(ratio), pulled(n), [10.2], pendulums=ONE_HERTZ)
-    v = [0.02 * 2 * math.pi, 0, 0, 0]
+    run = swing(balls(n, e), ImpulseCorrelation(ratio), pulled(n, k), [10.2], pendulums=ONE_HERTZ)
+    v = [0.02 * 2 * math.pi] * k + [0] * (n - k)
     for stroke in range(20):
         v = solve([1.0] * n, v, [e] * (n - 1), ratio).velocities
         v = [float(a) for a in v]
@@ -152,7 +142,7 @@ def test_energy_ledger(how, e):
     """What is missing at any time is what the contacts kept back; nothing for e = 1."""
     pendulums = PENDULUMS[how]
     chain = Chain([1, 2, 0.5, 1], [0.1, 0, 0, -0.2], e)
-    times = np.linspace(0, 4, 101)
+    times = np.linspace(0, 2, 51)
     run = swing(chain, ImpulseCorrelation(0.1), [-0.03, -0.01, 0, 0.01], times, pendulums=pendulums)
     assert len(run.impacts) > 10
     start = run.energy[0]
@@ -212,11 +202,11 @@ def springs(y, span, m, k, pendulums, viscosity=0.0, **options):
 )
 def test_two_balls_at_a_time_are_the_limit_of_stiff_springs(m, x, pendulums):
     """With a contact time that goes to zero like k^(-2/5), so does the difference."""
-    times = np.linspace(0, 2, 21)
+    times = np.linspace(0, 1, 11)
     run = swing(Chain(m, np.zeros(len(m)), 1), ImpulseCorrelation(0), x, times, pendulums=pendulums)
-    assert len(run.impacts) >= 3
+    assert len(run.impacts) >= 2
     y, exact = [*x, *np.zeros(len(m))], {"t_eval": times, "rtol": 1e-10, "atol": 1e-14}
-    ways = [springs(y, (0, 2), m, k, pendulums, max_step=0.01, **exact) for k in (1e7, 1e9, 1e11)]
+    ways = [springs(y, (0, 1), m, k, pendulums, max_step=0.01, **exact) for k in (1e7, 1e9, 1e11)]
     apart = [np.abs(way[: len(m)].T - run.positions).max() / 0.02 for way in ways]
     assert apart[2] < 0.005
     for coarse, fine in zip(apart, apart[1:]):
@@ -257,37 +247,26 @@ def test_contact_forces_move_the_balls_as_their_equations_of_motion_do(viscosity
     np.testing.assert_allclose(run.positions, found, atol=2e-6)
 
 
-def test_strings_pull_while_contacts_push():
-    """Else half a millisecond of each stroke is lost: in ten seconds 3 % of energy and beat."""
-    chain, law = Chain([0.045] * 5, [0] * 5), SpringChain(1e10, accuracy=1e-6)
-    hanging = Pendulums(0.12, gaps=1e-6)
-    run = swing(chain, law, pulled(5, by=0.04), [0, 10.0], pendulums=hanging)
-    before, after = run.energy
-    assert after == pytest.approx(before, rel=1e-3)
-    beat = math.cos(10.0 * math.sqrt(9.81 / 0.12))
-    assert run.positions[-1].sum() == pytest.approx(-0.04 * beat, rel=1e-3)
-
-
-def test_balls_whose_losses_opened_a_contact_may_close_it_at_once():
-    """A contact that is open, pressed and closing again when all others open is no resting one."""
-    chain, law = Chain([0.05] * 4, [0] * 4), SpringChain(1e9, viscosity=1e-6, accuracy=1e-4)
-    hanging = Pendulums([0.14, 0.16, 0.12, 0.12])
-    run = swing(chain, law, pulled(4, 3, 0.03), [0.5], pendulums=hanging)
-    assert run.ended == "times"
-
-
-def test_what_is_left_of_a_compression_is_no_overlap():
-    """A contact that losses have opened early may take long to come apart."""
-    chain, law = Chain([0.05] * 4, [0] * 4), SpringChain(1e10, viscosity=2e-6, accuracy=1e-4)
-    run = swing(chain, law, pulled(4, by=0.03), [1.5], pendulums=Pendulums(0.14, gaps=1e-6))
+@pytest.mark.parametrize(
+    ("stiffness", "viscosity", "k", "end", "hanging"),
+    [
+        # A contact that is open, pressed and closing again when all others open is no resting one.
+        (1e9, 1e-6, 3, 0.5, Pendulums([0.14, 0.16, 0.12, 0.12])),
+        # What is left of a compression is no overlap: a contact may take long to come apart.
+        (1e10, 2e-6, 1, 1.5, Pendulums(0.14, gaps=1e-6)),
+    ],
+)
+def test_contacts_that_losses_open_early(stiffness, viscosity, k, end, hanging):
+    law = SpringChain(stiffness, viscosity=viscosity, accuracy=1e-4)
+    run = swing(Chain([0.05] * 4, [0] * 4), law, pulled(4, k, 0.03), [end], pendulums=hanging)
     assert run.ended == "times"
 
 
 @pytest.mark.parametrize("stiffness", [2e5, 1e6, 1e10])
-def test_elastic_balls_keep_their_energy_for_a_minute(stiffness):
+def test_elastic_balls_keep_their_energy(stiffness):
     """Soft ones too: strikes that last a large part of the swing made energy sixfold."""
     chain = Chain([0.045] * 5, [0] * 5)
-    run = swing(chain, SpringChain(stiffness, accuracy=1e-6), pulled(5), [0, 20.0, 60.0])
+    run = swing(chain, SpringChain(stiffness, accuracy=1e-6), pulled(5), [0, 20.0])
     assert run.energy == pytest.approx(run.energy[0], rel=1e-4)
 
 
@@ -378,15 +357,6 @@ def test_infinite_bounces_of_pressed_balls_have_the_limit_of_an_independent_run(
     assert run.positions[1, 0] == run.positions[1, 1]
     assert early[-1].time == pytest.approx(limit, abs=1e-6)
     assert run.positions[2, 1] > run.positions[2, 0] + 0.01
-
-
-def test_struck_balls_that_touch_collide_as_one_chain():
-    """Balls that hang still and touch take part although nothing moves them."""
-    run = swing(balls(4), ImpulseCorrelation(0.15), pulled(4), [0.3], pendulums=ONE_HERTZ)
-    assert [impact.contacts for impact in run.impacts] == [(0, 1, 2)]
-    apart = swing(balls(4), ImpulseCorrelation(0.15), pulled(4), [0.3],
-                  pendulums=Pendulums(ONE_HERTZ.length, gaps=[0, 1e-4, 0]))  # fmt: skip
-    assert [impact.contacts for impact in apart.impacts[:2]] == [(0,), (1, 2)]
 
 
 def test_a_long_path_is_cut_without_advice_that_a_swing_cannot_take(monkeypatch):
@@ -494,7 +464,7 @@ def test_first_fall_is_the_first():
     """Against values on a fine grid: positive up to the root, zero there."""
     rng = np.random.default_rng(13)
     found = 0
-    for _ in range(300):
+    for _ in range(150):
         rates = [complex(-0.05 * a, 0.5 + b) for a, b in rng.random((2, 2))]
         terms = [(complex(a, b), rate) for (a, b), rate in zip(rng.random((2, 2)) - 0.5, rates)]
         level = max(rng.random() - sum(c.real for c, _ in terms), 0.0)
@@ -510,7 +480,7 @@ def test_first_fall_is_the_first():
         if root < 50:
             assert abs(value(root)) < 1e-14
             found += 1
-    assert found > 100
+    assert found > 50
 
 
 @pytest.mark.parametrize(
@@ -577,20 +547,6 @@ def test_periods_that_hardly_differ_are_followed_in_few_steps(looked, begin, dif
     # Values are known to the rounding of their terms.
     assert begin + root == pytest.approx(2 * np.pi / (w + 1), abs=1e-12 + 3e-15 / difference)
     assert len(looked) < 10
-
-
-def test_bodies_whose_periods_differ_by_rounding():
-    """Lengths 12, 12, 15, 10 as one body swing like 12 alone, but for the last digit."""
-    run = swing(
-        Chain([1, 1, 1, 1, 0.5, 0.5], [-5e-6, -5e-6, 5e-6, 5e-6, -5e-6, 0],
-              [0.903096997790845, 0.5413840171222394, 0.01415760983467218, 0.1682179539137848,
-               0.9091342920361836]),
-        ImpulseCorrelation(0.1, excess="saturate"),
-        [-8.879757196714637e-07, -8.747119221197388e-07, -6.101770535442485e-07,
-         -5.839284452524474e-07, -1.2872856406189447e-07, 1.6491342754953653e-07],
-        np.linspace(0, 6, 40), pendulums=Pendulums([0.12, 0.12, 0.15, 0.1, 0.1, 0.12]),
-    )  # fmt: skip
-    assert run.ended == "times"
 
 
 def test_grazing_is_no_endless_loop():
@@ -740,10 +696,3 @@ def test_mirror():
     ]
     assert len(runs[0].impacts) > 20
     np.testing.assert_allclose(runs[1].positions[:, ::-1], -runs[0].positions, rtol=0, atol=1e-12)
-
-
-def test_frames():
-    run = swing(balls(3), ImpulseCorrelation(0), pulled(3), [0, 0.3, 0.6], pendulums=ONE_HERTZ)
-    impacts = pandas.DataFrame(run.impacts)
-    assert list(impacts.columns[:2]) == ["time", "contacts"]
-    assert len(impacts) == len(run.impacts)
