@@ -145,7 +145,7 @@ def middle(animation, part):
     return x, animation.figure.bbox.height - y
 
 
-@pytest.mark.parametrize("row", [0, 17, 45, 77])
+@pytest.mark.parametrize("row", [0, 17, 77])
 def test_balls_of_a_swing_hang_where_they_are(row):
     """Pivot + l sin and cos of the angle, as the run has it; 105 units are a length."""
     animation = animate_swing([RUN] * 4, columns=2)
@@ -192,14 +192,15 @@ def test_pixels_of_a_film_show_the_ball_where_it_is(kind, k, tmp_path):
 
 
 def test_files_of_every_kind(tmp_path):
-    film = animate_swing(RUN, ["three balls"])
+    run = swing(Chain([1] * 3, [0] * 3), SequentialCollisions(), [-0.05, 0, 0], TIMES)
+    film = animate_swing(run, ["three balls"])
     for name, begins in (("a.svg", "<svg"), ("a.HTML", "<!doctype html>")):
         film.save(tmp_path / name)
         assert (tmp_path / name).read_text(encoding="utf-8").startswith(begins)
     film.save(tmp_path / "a.gif")
     film.save(tmp_path / "a.png")
     with Image.open(tmp_path / "a.gif") as film, Image.open(tmp_path / "a.png") as still:
-        assert film.n_frames == 3 * RATE
+        assert film.n_frames == RATE
         assert film.info["duration"] == 1000 / RATE
         assert still.size == (2 * film.size[0], 2 * film.size[1])
         # The still is the first picture, but for its size and the colours of a GIF.

@@ -98,15 +98,6 @@ def test_bounds_of_other_models(model, less, chain):
     assert (found.bounds[1] - found.bounds[0] < 4.0).all()
 
 
-def test_bounds_narrow_as_the_impact_comes_to_rest():
-    chain = Chain([1, 1e-3, 1, 1e-3, 1], [1, 0, 0, 0, 0], 0.1)
-    widths = []
-    for steps in (10, 100, 1000):
-        found = stopped(chain, ImpulseCorrelation(0.1, excess="saturate", max_events=steps))
-        widths.append(np.ptp(found.bounds, axis=0).max())
-    assert widths[0] > widths[1] > widths[2] > 0.0
-
-
 def test_bounds_in_any_units_and_frame():
     model = ImpulseCorrelation(0.2, excess="saturate", max_events=2)
     here = stopped(FIVE, model).bounds

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from laws import keeps
 
@@ -32,6 +32,7 @@ def part(chain):
     return taking
 
 
+@settings(max_examples=50)
 @given(cases())
 def test_laws(case):
     chain, kappa, distance = case
@@ -75,6 +76,7 @@ def minimum(chain, kappa, distance=0.0):
     return best.astype(float)
 
 
+@settings(max_examples=50)
 @given(cases())
 def test_against_every_active_set(case):
     chain, kappa, distance = case

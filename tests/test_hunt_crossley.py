@@ -87,19 +87,3 @@ def test_a_contact_that_would_pull_is_refused():
         spring_velocities(m, v, k, viscosity=0.4, **LAW)
     with pytest.raises(ValueError, match=words):
         collide(Chain(m, v), SpringChain(k, viscosity=0.4, **LAW))
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: SpringChain(damping="hunt"), "damping = 'hunt'; must be 'viscoelastic' or 'hunt-"),
-        (lambda: spring_velocities([1, 1], [1, 0], damping=1), "damping = 1; must be 'viscoelasti"),
-        (lambda: spring_velocities([1, 1], [4, 0], viscosity=0.3, **LAW),
-         r"viscosity\[0\] = 0.3; must be at most 0.225 s/m, 0.9 over the speed of the fastest"),
-        (lambda: viscosity_from(0.6, speed=1.0, masses=[1, 1], **LAW),
-         r"restitution = 0.6; must lie in \[0.620, 1\]"),
-    ],
-)  # fmt: skip
-def test_refused(call, words):
-    with pytest.raises(ValueError, match=words):
-        call()

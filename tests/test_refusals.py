@@ -48,6 +48,7 @@ from cradle.pictures.animation import animate_swing
 from cradle.row import Row
 
 NAN, INF, ONES = np.nan, np.inf, np.ones(3)
+PAIR = {"masses": [1, 1], "velocities": [1, 0]}
 THREE, LOSSY = striking(), striking(e=0.9)
 TRACE = collide(THREE, ImpulseCorrelation(0.1))
 STILL = SimpleNamespace(motion=lambda: ([[0, 0], [1, 0]], [[0] * 2] * 2), push=None, advance=None)
@@ -135,6 +136,27 @@ BATCH = [
     # A batch without a chain is checked all the same.
     ({"masses": np.ones((0, 3)), "velocities": [np.nan, 0, 0]}, "velocities[0] = nan; must be"),
     ({"masses": np.ones((0, 3)), "forward": 2}, "forward = 2.0; must lie in [0, 1]"),
+]
+
+#: Of a model, and of a batch.  Holding contacts at their bounds excuses no ratio outside 0 and 1.
+RATIOS = [
+    ({"forward": -0.1}, "forward = -0.1; must lie in [0, 1]"),
+    ({"forward": [0.1, 1 + 1e-9]}, "forward[1] = 1.000000001; must lie in [0, 1]"),
+    ({"forward": [0.1, NAN]}, "forward[1] = nan; must be finite"),
+    ({"forward": None}, "forward = None; must be real numbers"),
+    ({"forward": [[0.1]]}, "forward has shape (1, 1); must be () or (N - 2,)"),
+    ({"backward": [0.1, 2]}, "backward[1] = 2.0; must lie in [0, 1]"),
+    ({"backward": -INF}, "backward = -inf; must be finite"),
+    ({"backward": [[0.1]]}, "backward has shape (1, 1); must be () or (N - 2,)"),
+    ({"meeting": -0.5}, "meeting = -0.5; must lie in [0, 1]"),
+    ({"meeting": 1.5}, "meeting = 1.5; must lie in [0, 1]"),
+    ({"meeting": [0.5]}, "meeting = [0.5]; must be one number"),
+    ({"excess": "ignore"}, "excess = 'ignore'; must be 'raise' or 'saturate'"),
+    ({"excess": np.array(["raise"])}, "excess = array(['raise'], dtype='<U5'); must be 'raise' or"),
+    ({"max_events": 0}, "max_events = 0; must be a whole number, at least 1"),
+    ({"max_events": 2**63}, f"max_events = {2**63}; must be a whole number, at least 1 and below"),
+    ({"max_events": 1e6}, "max_events = 1000000.0; must be an int, at least 1 and below 2**63"),
+    ({"max_events": True}, "max_events = True; must be a whole number"),
 ]
 
 SHAPES = [
@@ -315,6 +337,12 @@ OTHERS = [
     (collide, (THREE, SpringChain(ONES)), "stiffness has 3 values; 3 balls need 2"),
     (collide, (Chain(ONES, [1, 0, 0], [1, 0.5]), SpringChain()), "restitution[1] = 0.5; must be"),
     (collide, (Chain([1, 1e-10], [1, 0]), SpringChain()), "masses[1] = 1e-10; must be at least 1e"),
+    (SpringChain, {"damping": "hunt"}, "damping = 'hunt'; must be 'viscoelastic' or 'hunt-crossle"),
+    (spring_velocities, PAIR | {"damping": 1}, "damping = 1; must be 'viscoelastic' or 'hunt-cros"),
+    (spring_velocities, PAIR | {"velocities": [4, 0], "viscosity": 0.3, "damping": "hunt-crossley"},
+     "viscosity[0] = 0.3; must be at most 0.225 s/m, 0.9 over the speed of the fastest"),
+    (viscosity_from, {"restitution": 0.6, "speed": 1, "masses": [1, 1], "damping": "hunt-crossley"},
+     "restitution = 0.6; must lie in [0.620, 1]"),
     (read_tracker, {"path": FILM, "unit": 0}, "unit = 0.0; must be above 0"),
     (read_tracker, {"path": FILM, "time_scale": 0}, "time_scale = 0.0; must be above 0"),
     (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
@@ -331,6 +359,12 @@ def rows():
     yield from ((chain, given, words) for given, words in CHAINS)
     one = {"masses": [1, 1, 1], "velocities": [1, 0, 0], "restitution": 1, "forward": 0.1}
     yield from ((post_impact_velocities, one | change, words) for change, words in BATCH)
+    for change, words in RATIOS:
+        asked = {"forward": 0.1, "excess": "saturate"} | change
+        yield ImpulseCorrelation, asked, words
+        words = words.replace("(N - 2,)", "(..., 2) for 4 balls")
+        batch = {"masses": np.ones(4), "velocities": [1, 0, 0, 0], "restitution": 1}
+        yield post_impact_velocities, batch | asked, words
     for function in (three_balls, final_impulses, one_collision_each):
         yield from ((function, given, words) for given, words in SHAPES)
     yield from ((largest_ratios, given, words) for given, words in BOUNDS)

