@@ -92,7 +92,7 @@ def stored(law, fitted):
 
 def test_two_strikes_of_the_film():
     found = fit_law(
-        Shots((*strikes(1, 2),)), {f"of {k}": spheres(k) for k in (1, 2)}, GAPS, starts=4
+        Shots((*strikes(1, 2),)), {f"of {k}": spheres(k) for k in (1, 2)}, GAPS, starts=9
     )
     one, two, numbers = next(stored("spheres, three gaps, A", "both"))
     assert found.chi_square == pytest.approx(one + two, abs=2e-3)
