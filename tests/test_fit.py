@@ -404,6 +404,8 @@ def test_what_the_data_do_not_tell():
     assert not silent.identified
     assert silent.value is None
     assert "not identified" in str(silent)
+    told = found.predict("ADB")  # with any ratio up to the bound
+    assert (told.upper - told.lower).max() > 0.05
     shots = read_shots(columns("BDA", [1.0], outcome("BDA"), 0.4))
     rough = ratio(shots, pairs_of("BDA", 0.0))["BDA"]
     assert not rough.identified
