@@ -12,6 +12,7 @@ from itertools import product
 import extreme_chains as x
 import mpmath
 import numpy as np
+import pandas as pd
 from chains import power_of_ten
 from stored import make
 
@@ -62,13 +63,12 @@ def extremes_shortest():
     for spread, step in ((0.0, 2), (0.1, 10)):
         cases = [*product(range(40, 101, step), ratios)]
         e, ratio = np.array(cases).T / 100
-        least, (short, largest, last) = np.zeros(len(e), dtype=int), np.zeros((3, len(e)))
-        for n in range(3, 21):
-            any_ball, last_ball = x.changes_of_rows(spread, n, e, ratio)
-            least = np.where((least == 0) & (any_ball > 1e-6), n, least)
-            largest, last = np.maximum(largest, any_ball), np.maximum(last, last_ball)
-            short = largest if n <= 7 else short
-        columns = (column.tolist() for column in (e, ratio, least, short, largest, last))
+        found = [x.changes_of_rows(spread, n, e, ratio) for n in range(3, 21)]
+        any_ball, last_ball = np.swapaxes(found, 0, 1)
+        jumps = any_ball > 1e-6
+        least = np.where(jumps.any(axis=0), 3 + jumps.argmax(axis=0), 0)
+        largest = (part.max(axis=0) for part in (any_ball[:5], any_ball, last_ball))
+        columns = (column.tolist() for column in (e, ratio, least, *largest))
         yield from ((spread, *row) for row in zip(*columns, strict=True))
 
 
@@ -128,7 +128,7 @@ DECIDED = (1e-6, 1e-3, 0.1, 1.0)  # parts of the largest closing speed that may 
 
 
 def long_or_not(family, decades, index):
-    """Return the number of balls of a chain, and what it adds to the counts."""
+    """Return the number of balls of a chain, and what it adds to each count."""
     problem = x.any_chain(family, decades, index)
     collisions, collapsed, unfinished, _ = x.longer_than(problem, LONG)
     left = [False] * (1 + len(DECIDED))
@@ -136,7 +136,7 @@ def long_or_not(family, decades, index):
         _, _, left[0], still_open = x.longer_than(problem, MAX_EVENTS)
         left[1:] = [left[0] and still_open <= part for part in DECIDED]
     longer = (collisions > 100, collisions > 1000, collisions > 10_000)
-    return len(problem.masses), (1, collapsed, *longer, unfinished, *left)
+    return len(problem.masses), 1, collapsed, *longer, unfinished, *left
 
 
 def extremes_finish():
@@ -146,12 +146,10 @@ def extremes_finish():
     )
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
         for family, decades in x.FAMILIES:
-            table = np.zeros((9, 7 + len(DECIDED)), dtype=int)
             chains = partial(long_or_not, family, decades)
-            for n, row in pool.map(chains, range(x.CHAINS), chunksize=100):
-                table[n] += row
-            for n in range(2, 9):
-                yield (family, decades, n, *table[n].tolist())
+            rows = pd.DataFrame(pool.map(chains, range(x.CHAINS), chunksize=100))
+            counts = rows.groupby(0).sum()
+            yield from ((family, decades, *row) for row in counts.itertuples())
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ s > 0, balanced by constant forces.  Lengths are in Hertz units, (m v^2 / k)^(2/
 """
 
 import numpy as np
+import pandas as pd
 from scipy.optimize import least_squares
 from stored import make
 
@@ -94,11 +95,7 @@ def off(after, listed):
 
 def shared(errors, keys):
     """Return the choice (last axis) that each group of equal keys has the least rms error with."""
-    best = np.empty(len(keys), int)
-    for key in set(keys):
-        group = np.array([k == key for k in keys])
-        best[group] = (errors[group] ** 2).mean(0).argmin()
-    return best
+    return pd.DataFrame(errors**2).groupby(keys).transform("mean").to_numpy().argmin(axis=1)
 
 
 def by_pair(names, masses, e, listed):
