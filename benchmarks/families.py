@@ -6,6 +6,7 @@ every platform.
 """
 
 import random
+from functools import partial
 
 import chains
 import numpy as np
@@ -75,11 +76,6 @@ def tiny_ratios(draw, n, size=1e-20):
     values = draw.choice([[0.0, size], [0.0, size, 0.1], [0.0, size, 0.1, 1.0]])
     forward, backward = draw.ways(values, n)
     return given._replace(forward=forward, backward=backward)
-
-
-def small_ratios(draw, n):
-    """The same with ratios of 1e-8: products of five decide beyond the 32 digits of the solver."""
-    return tiny_ratios(draw, n, 1e-8)
 
 
 def mixed_zeros(draw, n):
@@ -197,7 +193,8 @@ JUDGED = {
     "at bounds": (at_bounds, 3, 10),
     "extremes": (extremes, 2, 10),
     **FAMILIES,
-    "small ratios": (small_ratios, 3, 20),
+    # Products of five decide beyond the 32 digits of the solver.
+    "small ratios": (partial(tiny_ratios, size=1e-8), 3, 20),
 }
 
 
