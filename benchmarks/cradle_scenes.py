@@ -14,7 +14,7 @@ from itertools import product
 
 import numba
 import numpy as np
-from measure import BULLET, RAPIER, absent, cpu, named_engines, present, quotient, versions
+from measure import BULLET, RAPIER, absent, cpu, in_turn, named_engines, present, quotient, versions
 from stored import DATA, make
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, swing, viscosity_from
@@ -289,8 +289,8 @@ def scene_costs(repeats=5, seconds=5.0):
         ways = {"as it is": partial(of, False), "mended": partial(of, True)}
         cases.append((engine.name, setting, pulled, engine.distribution, ways))
     for name, setting, pulled, package, ways in cases:
-        in_turn = [lambda: cpu(lambda: by_swing(1, seconds)) / seconds, *ways.values()]
-        by_swings, *taken = zip(*([way() for way in in_turn] for _ in range(repeats)))
+        clocks = [lambda: cpu(lambda: by_swing(1, seconds)) / seconds, *ways.values()]
+        by_swings, *taken = in_turn(clocks, repeats)
         for how, times in zip(ways, taken):
             over = quotient(times, by_swings), quotient(times, taken[0])
             row = name, how, setting, pulled, statistics.median(times), *over, repeats
@@ -309,8 +309,7 @@ def scene_law_costs(repeats=5, seconds=5.0):
         ways[engine.name] = partial(cost, engine, "fine", 1, seconds, True)
     for (who, way), (name, law) in product(ways.items(), LAWS.items()):
         if name != "ratio" and (who, name) != ("swing", "springs, outer apart"):
-            pairs = [(way(law=law), way()) for _ in range(repeats)]
-            yield who, name, quotient(*zip(*pairs)), repeats
+            yield who, name, quotient(*in_turn([partial(way, law=law), way], repeats)), repeats
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from measure import cpu, quotient
+from measure import cpu, in_turn, quotient
 from stored import make
 
 from cradle import Chain, SpringChain, collide, outcomes
@@ -45,8 +45,8 @@ def cost(function, repeats):
     function()
     calls = max(1, round(0.02 / max(cpu(function), 1e-6)))
     # As many units as outlast the clock's ticks and what the row itself has pushed from the caches.
-    pairs = [(cpu(function, calls), cpu(three_on_springs, 400)) for _ in range(repeats)]
-    times, units = zip(*pairs)
+    clocks = partial(cpu, function, calls), partial(cpu, three_on_springs, 400)
+    times, units = in_turn(clocks, repeats)
     return {"units": units, "time_ratio": quotient(times, units), "repeats": repeats}
 
 

@@ -101,6 +101,11 @@ def seconds(function, calls=1, clock=time.perf_counter):
 cpu = partial(seconds, clock=time.process_time)
 
 
+def in_turn(clocks, repeats):
+    """Return the times that each of some clocks takes, one after the other, so many times."""
+    return zip(*([clock() for clock in clocks] for _ in range(repeats)))
+
+
 def quotient(these, those):
     """Return the median quotient of times that were taken in turn."""
     return statistics.median(a / b for a, b in zip(these, those, strict=True))
@@ -139,12 +144,12 @@ class Clock:
         reference()
         # As long as the row itself, within limits: what interrupts one interrupts the other.
         units = min(20, max(2, math.ceil(once * calls / seconds(reference))))
-        taken, beside = [], []
-        for _ in range(self.repeats):
-            beside.append(seconds(reference, units) / len(_BATCH[0]))
-            taken.append(measured(calls) / impacts)
-        self.units += beside
-        return {"time_ratio": quotient(taken, beside), "repeats": self.repeats}
+        clocks = partial(measured, calls), partial(seconds, reference, units)
+        taken, beside = in_turn(clocks, self.repeats)
+        chains = len(_BATCH[0])
+        self.units += [time / chains for time in beside]
+        ratio = quotient(taken, beside) * chains / impacts
+        return {"time_ratio": ratio, "repeats": self.repeats}
 
 
 def versions(*packages):
