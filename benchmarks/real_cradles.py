@@ -27,10 +27,10 @@ def table(name):
 
 def first_strikes(reading):
     """Return {release: (velocities, errors)} relative to the row, over the striker's speed."""
-    t, found = table("film_strikes.csv"), {}
-    for release in (1, 2, 3) if reading > 2 else (1, 2):
-        use = (t["reading"] == reading) & (t["release"] == release) & (t["strike"] == 1)
-        v, sigma, before = (t[key][use][::-1] for key in ("after", "sigma_after", "before"))
+    t, found = pd.read_csv(DATA / "film_strikes.csv"), {}
+    first = t[(t.reading == reading) & (t.strike == 1)]
+    for release, rows in first.groupby("release"):
+        v, sigma, before = rows[["after", "sigma_after", "before"]].to_numpy()[::-1].T
         if reading > 2:  # in the room: the row drifts
             row = before[release:].mean()
             v, sigma = (v - row) / (1 - row), np.hypot(sigma, 0.002)
