@@ -22,10 +22,11 @@ from decimal import Decimal
 from itertools import product
 from typing import NamedTuple
 
+import pandas as pd
 import truth
 from families import JUDGED, family
 from problem import Problem
-from stored import options, write
+from stored import options
 from truth import meaning
 
 from cradle import ImpactNotFinished, post_impact_velocities, textbook
@@ -228,12 +229,10 @@ def main():
     parser.add_argument("--write", action="store_true", help="write the counts as judge.csv")
     given = parser.parse_args()
     counts, found = run(given.family or list(JUDGED), given.count, *given.seed)
-    print(f"{'':18}" + "".join(f"{word:>14}" for word in WORDS))
-    for name, count in counts.items():
-        print(f"{name:18}" + "".join(f"{count[word]:14}" for word in WORDS))
+    table = pd.DataFrame(counts, WORDS).fillna(0).astype(int).T
+    print(table.to_string())
     if given.write:
-        lines = ([name, *(count[word] for word in WORDS)] for name, count in counts.items())
-        write("judge.csv", ["family", *WORDS], lines, given.output)
+        table.to_csv(given.output / "judge.csv", index_label="family", lineterminator="\n")
     for name, verdict, problem in found:
         print(f"\n{name}: {verdict.word}, off by {verdict.off:.1e}\n{problem!r}")
 
