@@ -7,7 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chapters import BOOK, Chapter, after, code, drawn, panel, solved
-from test_book_compliance import constant_ratio, first_loss, outcome, printed_10_and_11
+from test_book_compliance import (
+    constant_ratio,
+    first_loss,
+    outcome,
+    printed_7_to_9,
+    printed_10_and_11,
+)
 
 from cradle import textbook
 
@@ -203,6 +209,13 @@ def test_fig_compliance_ratio():
     theta = np.pi * part
     np.testing.assert_allclose(limit, theta**2 / (4 * (1 - np.cos(theta))) - 0.5, rtol=1e-9)
     assert (shown["Eq. 14"][:, 1] == 1).all()
+    # The rate is the quotient of the two forces: gamma (q2 - q3) / (q1 - q2), gamma small.
+    gamma = 1e-5
+    loss, _ = first_loss(gamma)
+    for part, rate in shown["rate"][20:180:40]:
+        q = printed_7_to_9(gamma, 1, part * loss)
+        assert rate == pytest.approx((q[1] - q[2]) / (q[0] - q[1]), rel=1e-4)
+    assert shown["rate"][-1, 1] > 50
 
 
 def test_fig_compliance_paths():
