@@ -1,5 +1,6 @@
 """Settings that all tests share: processes, random examples, what is made once for all."""
 
+import collections
 import functools
 import os
 import subprocess
@@ -108,10 +109,16 @@ def browser():
         yield browser
 
 
+@pytest.fixture(scope="module")
+def idle() -> dict[tuple, list]:
+    """Windows of the file's browser that no test uses at present, by their kind."""
+    return collections.defaultdict(list)
+
+
 @pytest.fixture
-def visit(browser, html: Path):
+def visit(browser, idle, html: Path):
     """What opens the explorer's page, or a chapter."""
-    with visiting(browser, (html / "book" / "explorer.html").as_uri()) as visit:
+    with visiting(browser, idle, (html / "book" / "explorer.html").as_uri()) as visit:
         yield lambda *given, **options: Tab(visit(*given, **options))
 
 

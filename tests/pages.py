@@ -145,24 +145,34 @@ def listened(tab) -> list[str]:
 
 
 @contextlib.contextmanager
-def visiting(browser, home: str):
-    """Give what opens pages; at the end: no error on a console, no request that leaves the disk."""
-    contexts, faults = [], []
+def visiting(browser, idle: dict[tuple, list], home: str):
+    """Give what opens pages; at the end: no error on a console, no request that leaves the disk.
 
-    def visit(
-        fragment=None, *, chapter="explorer", width=1400, height=900, stopped=False, **options
-    ):
-        context = browser.new_context(viewport={"width": width, "height": height}, **options)
+    A new window takes three times as long as a new page in an old one: those that are `idle`, of
+    each kind, are used again.
+    """
+    used = []
+
+    def window(stopped, plain, options):
+        context = browser.new_context(**dict(options))
         context.set_default_timeout(PATIENCE)
-        contexts.append(context)
         tab = context.new_page()
         if stopped:  # for dates, timers and frames alike; `tab.clock.run_for` lets time pass
             tab.clock.install(time=0)
             tab.clock.pause_at(10**6)
-        faults.append(listened(tab))
-        if chapter != "explorer":
-            # Seconds go into its equations, which are not looked at here.
+        if plain:  # seconds go into equations
             tab.route("**/tex-svg-full.js", lambda route: route.fulfill(body=""))
+        return tab, listened(tab)
+
+    def visit(
+        fragment=None, *, chapter="explorer", width=1400, height=900, stopped=False,
+        equations=False, color_scheme="light", reduced_motion="no-preference", **options,
+    ):  # fmt: skip
+        kind = stopped, chapter != "explorer" and not equations, tuple(options.items())
+        tab, faults = idle[kind].pop() if idle[kind] else window(*kind)
+        used.append((kind, tab, faults))
+        tab.set_viewport_size({"width": width, "height": height})
+        tab.emulate_media(media="screen", color_scheme=color_scheme, reduced_motion=reduced_motion)
         if fragment is None:  # with a setting in the address nothing is covered
             fragment = "#scene=example" * (chapter == "explorer")
         tab.goto(home.replace("explorer.html", f"{chapter}.html") + fragment)
@@ -174,9 +184,11 @@ def visiting(browser, home: str):
         return tab
 
     yield visit
-    for context in contexts:
-        context.close()
-    assert not any(faults), faults
+    for kind, tab, faults in used:
+        tab.mouse.up()
+        tab.goto("about:blank")
+        idle[kind].append((tab, faults))
+    assert not any(faults for *_, faults in used), used
 
 
 def shape(tab, width: int, mode: str) -> None:

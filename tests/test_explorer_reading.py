@@ -7,7 +7,7 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 from explorer import EXPLORER, SETTING, chain_of, same_outcome, settings
-from pages import MISFITS, colour, contrast, show
+from pages import FRAMES, MISFITS, colour, contrast, show
 
 from cradle import Chain, SpringChain, collide, paper_chain, post_impact_velocities
 from cradle.measures import bouncing_pattern
@@ -214,8 +214,6 @@ FOCUSED = """(() => {
   return node.getAttribute("aria-label") || node.labels?.[0]?.textContent || node.textContent;
 })()"""
 REACH = "getComputedStyle(document.activeElement.querySelector('.reach')).strokeWidth"
-# What keys do in the second scene, from which one can walk both ways.
-WALKS = {"ArrowRight": "small", "ArrowLeft": "one", "PageDown": "small", "PageUp": "one"}
 
 
 def full_screen(still):
@@ -268,27 +266,27 @@ def test_space_after_a_click_on_full_screen(still):
             tab.later(50)
 
 
-@pytest.mark.parametrize(
-    ("selector", "way"),
-    [
-        (".ball[data-ball='0'] .disc", -30),
-        (".ball[data-ball='4'] .disc", 0),
-        (".run button:has-text('Slow motion')", 0),
-        (".settings label[title='ball 2']", 0),
-        (".settings input[type=range] >> nth=1", 20),
-        (".pictures label:has-text('All ratios')", 0),
-    ],
-)
-def test_keys_of_a_lecture_after_the_mouse(still, selector: str, way: int):
+def test_keys_of_a_lecture_after_the_mouse(still):
     """In full screen what the mouse has pressed leaves the keys to the lecture."""
     tab = full_screen(still)
-    done = {key: [scene, False, False] for key, scene in WALKS.items()}
-    for key, state in (done | {".": [False, True], "Space": [True, False]}).items():
+    # What the keys do in the second scene, from which one can walk both ways.
+    walks = {"ArrowRight": "small", "ArrowLeft": "one", "PageDown": "small", "PageUp": "one"}
+    done = {key: [scene, False, False] for key, scene in walks.items()}
+    done |= {".": [False, True], "Space": [True, False]}
+    pressed_before = {
+        ".ball[data-ball='0'] .disc": -30,
+        ".ball[data-ball='4'] .disc": 0,
+        ".run button:has-text('Slow motion')": 0,
+        ".settings input[type=range] >> nth=1": 20,
+        ".settings label[title='ball 2']": 0,
+        ".pictures label:has-text('All ratios')": 0,
+    }
+    for (selector, way), (key, state) in itertools.product(pressed_before.items(), done.items()):
         take(tab, "two")
         before = touch(tab, selector, way)
         tab.keyboard.press(key)
-        assert tab.evaluate(STATE)[-len(state) :] == state, key
-        if key not in WALKS:
+        assert tab.evaluate(STATE)[-len(state) :] == state, (selector, key)
+        if key not in walks:
             assert tab.state("setting") == {name: before[name] for name in tab.state("setting")}
             assert tab.evaluate("document.activeElement === document.body")  # none looks chosen
     assert tab.evaluate(FULL)
@@ -709,7 +707,7 @@ def test_links_of_scenes(still, html):
     tab, linked = still("#scene=one"), set()
     for scene in tab.evaluate("cradleExplorer.data.scenes"):
         tab.go_to(f"scene={scene['key']}")
-        tab.drawn()
+        tab.evaluate(FRAMES)
         text = tab.locator(".scene-text")
         assert text.inner_text().startswith(scene["text"][:60])
         for link in text.locator("a").all():

@@ -203,45 +203,32 @@ SPOILT = {
 }
 
 
-@pytest.mark.parametrize(("kind", "body"), SPOILT.items())
-def test_a_misfit_is_seen(browser, kind: str, body: str):
-    """The list above is not empty because it cannot find anything."""
+def test_what_is_spoilt_is_seen(browser):
+    """The lists above are not empty because they cannot find anything."""
     tab = browser.new_page(viewport={"width": 390, "height": 900})
-    tab.set_content(
-        "<!DOCTYPE html><h1>page</h1>"
-        f"<main class='bd-content' style='line-height: 20px'>{body}</main>"
-    )
-    assert kind in [misfit[0] for misfit in tab.evaluate(MISFITS)]
+    for kind, body in SPOILT.items():
+        tab.set_content(
+            "<!DOCTYPE html><h1>page</h1>"
+            f"<main class='bd-content' style='line-height: 20px'>{body}</main>"
+        )
+        assert kind in [misfit[0] for misfit in tab.evaluate(MISFITS)]
+    for style, pale in (
+        ("color: #777", True), ("color: #767676", False), ("background: #176de8", True),
+        ("opacity: 1; color: rgb(0 0 0 / 50%)", True), ("color: color(srgb 0.5 0.5 0.5)", True),
+    ):  # fmt: skip
+        tab.set_content(f"<!DOCTYPE html><p style='color: #000; {style}'>words</p>")
+        assert bool(tab.evaluate(PALE, READABLE)) is pale, style
     tab.close()
 
 
-@pytest.mark.parametrize(
-    ("style", "pale"),
-    [("color: #777", True), ("color: #767676", False), ("background: #176de8", True),
-     ("opacity: 1; color: rgb(0 0 0 / 50%)", True), ("color: color(srgb 0.5 0.5 0.5)", True)],
-)  # fmt: skip
-def test_pale_letters_are_seen(browser, style, pale):
-    tab = browser.new_page()
-    tab.set_content(f"<!DOCTYPE html><p style='color: #000; {style}'>words</p>")
-    assert bool(tab.evaluate(PALE, READABLE)) is pale
-    tab.close()
-
-
-def colours_of_areas(browser, html: Path) -> list[str]:
-    """The colours of the live map in dark mode, and of areas in figures."""
-    tab = browser.new_page(color_scheme="dark")
-    tab.goto((html / "book" / "explorer.html").as_uri())
+def test_areas_in_dark_mode_can_be_seen(visit):
+    """Those of the live map and of figures, and the letters on them."""
     style = "getComputedStyle(document.querySelector('.cradle-explorer'))"
+    tab = visit(color_scheme="dark")
     live = [tab.evaluate(f"{style}.getPropertyValue('--pattern-{k}')").strip() for k in (1, 2, 3)]
-    tab.close()
     tints = [book_figures.dark(tint) for tint in ("#d0e6f5", "#fae2bb", "#d9b3cf")]
     assert live == tints
-    return [*tints, *map(book_figures.dark, ("#9ecae1", "#fee6ce"))]
-
-
-def test_areas_in_dark_mode_can_be_seen(browser, html: Path):
-    """And the letters on them."""
-    for area in colours_of_areas(browser, html):
+    for area in (*tints, *map(book_figures.dark, ("#9ecae1", "#fee6ce"))):
         assert contrast(area, book_figures.dark("white")) >= 2.49, area
         assert contrast(area, book_figures.dark("black")) >= READABLE, area
 
@@ -334,12 +321,12 @@ def test_figures_of_a_second_build_are_those_of_the_first(tmp_path):
     assert len(set(found[0])) == len(found[0]) == 2
 
 
-def test_a_ball_of_a_film_looks_as_in_the_figures(browser, html: Path):
+def test_a_ball_of_a_film_looks_as_in_the_figures(visit):
     """Both modes: its own colour, on the ground of the page; on a phone its letters can be read."""
+    tab = visit(chapter="toy", width=375)
+    assert tab.locator(".animation svg").count() == 1
     for mode, ground in (("light", "#ffffff"), ("dark", book_figures.dark("white"))):
-        tab = browser.new_page(viewport={"width": 375, "height": HEIGHT}, color_scheme=mode)
-        tab.goto((html / "book" / "toy.html").as_uri())
-        assert tab.locator(".animation svg").count() == 1
+        show(tab, 375, mode)
         painted, filters, sizes = tab.evaluate("""(() => {
           const films = [...document.querySelectorAll(".animation svg")];
           const style = (query) => getComputedStyle(document.querySelector(".animation " + query));
@@ -352,22 +339,23 @@ def test_a_ball_of_a_film_looks_as_in_the_figures(browser, html: Path):
           const filters = films.map((svg) => getComputedStyle(svg).filter);
           return [[...rims, style("#patch_1 path").fill], filters, sizes];
         })()""")
-        tab.close()
-        rgb = [re.findall(r"\d+", one) for one in painted]
-        hexes = ["#" + "".join(f"{int(part):02x}" for part in one) for one in rgb]
-        assert hexes == [*map(str.lower, PALETTE[:5]), ground]
+        assert [*map(code, painted)] == [*map(str.lower, PALETTE[:5]), ground]
         assert set(filters) == {"none"}
         assert len(sizes) == 18  # numbers of the balls, and a title for each cradle
         assert min(sizes) > book_figures.LEGIBLE
 
 
-def test_equations_wait_until_they_are_seen(browser, html: Path):
-    """At first those in sight are set, and a voice can read all of them; on paper all are set."""
-    tab = browser.new_page(viewport={"width": 390, "height": 800})
-    tab.set_default_timeout(PATIENCE)
-    tab.goto((html / "book" / "reading_patterns.html").as_uri())
+def with_equations(visit, chapter: str, width: int):
+    """Open a page whose equations are set as they come into sight; wait for the first ones."""
+    tab = visit(chapter=chapter, width=width, height=800, equations=True)
     tab.wait_for_function("document.querySelector('mjx-container svg')")
     tab.evaluate("MathJax.startup.promise")
+    return tab
+
+
+def test_equations_wait_until_they_are_seen(visit):
+    """At first those in sight are set, and a voice can read all of them; on paper all are set."""
+    tab = with_equations(visit, "reading_patterns", 390)
     count = "document.querySelectorAll('mjx-container{}').length"
     everything, first = (tab.evaluate(count.format(end)) for end in ("", " > svg"))
     assert everything > 100
@@ -379,34 +367,22 @@ def test_equations_wait_until_they_are_seen(browser, html: Path):
     tab.wait_for_function(f"{shown}.pop().firstElementChild?.matches('svg')")
     tab.pdf()
     assert tab.evaluate(count.format(" > svg")) == everything
-    tab.close()
 
 
 @pytest.mark.parametrize("width", [390, 1400])
-def test_equations_keep_about_their_place(browser, html: Path, width: int):
+def test_equations_keep_about_their_place(visit, width: int):
     """A page is about as high before they are set as after."""
-    tab = browser.new_page(viewport={"width": width, "height": 800})
-    tab.set_default_timeout(PATIENCE)
-    tab.goto((html / "book" / "three_balls.html").as_uri())
-    tab.wait_for_function("document.querySelector('mjx-container svg')")
-    tab.evaluate("MathJax.startup.promise")
-    heights = []
+    tab, heights = with_equations(visit, "three_balls", width), []
     for _ in range(2):
         heights.append(tab.evaluate("document.scrollingElement.scrollHeight"))
         tab.evaluate(ALL_SET)
         tab.evaluate(FRAMES)
     assert heights[0] == pytest.approx(heights[1], rel=0.03)
-    tab.close()
 
 
-def test_folds_and_boxes(browser, html: Path):
+def test_folds_and_boxes(visit, html: Path):
     """They show who has the key, have names and room for a finger; a link into one opens it."""
-    context = browser.new_context(
-        viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True
-    )
-    context.set_default_timeout(PATIENCE)
-    tab = context.new_page()
-    tab.goto((html / "book" / "measure.html").as_uri())
+    tab = visit(chapter="measure", width=390, height=800, has_touch=True, is_mobile=True)
     summaries = tab.locator(".bd-content details > summary")
     assert summaries.count() > 2
     for summary in summaries.all():
@@ -433,7 +409,6 @@ def test_folds_and_boxes(browser, html: Path):
         for part in tab.locator(parts).all():
             if part.is_visible():
                 assert part.bounding_box()["height"] >= 40, name
-    context.close()
 
 
 SHIFTS = """
@@ -443,18 +418,19 @@ SHIFTS = """
 """
 
 
-@pytest.mark.parametrize("width", [320, 390, 1400])
-@pytest.mark.parametrize("name", ["explorer", "intro", "patterns"])
-def test_a_page_does_not_jump(browser, html: Path, name: str, width: int):
+def test_pages_do_not_jump(browser, html: Path):
     """The live cradle comes late, into its own place. Below .1 a shift counts as good."""
-    tab = browser.new_page(viewport={"width": width, "height": 800})
+    tab = browser.new_page()
     tab.set_default_timeout(PATIENCE)
     tab.add_init_script(SHIFTS)
-    tab.goto((html / "book" / f"{name}.html").as_uri())
-    tab.wait_for_function("globalThis.cradleExplorer?.live?.length > 0")
-    tab.evaluate(ALL_SET.replace("lazyTypesetAll", "none"))
-    tab.evaluate("new Promise((done) => setTimeout(done, 300))")
-    assert sum(tab.evaluate("shifts")) < 0.1
+    for name in ("explorer", "intro", "patterns"):
+        for width in (320, 390, 1400):
+            tab.set_viewport_size({"width": width, "height": 800})
+            tab.goto((html / "book" / f"{name}.html").as_uri())
+            tab.wait_for_function("globalThis.cradleExplorer?.live?.length > 0")
+            tab.evaluate(ALL_SET.replace("lazyTypesetAll", "none"))
+            tab.evaluate("new Promise((done) => setTimeout(done, 300))")
+            assert sum(tab.evaluate("shifts")) < 0.1, (name, width)
     tab.close()
 
 
