@@ -1,7 +1,6 @@
 """What book/beyond.ipynb says, from the stored table (long_chains.py) and by second routes."""
 
 from functools import cache, partial
-from pathlib import Path
 
 import judge
 import long_chains
@@ -18,7 +17,6 @@ from cradle import Chain, SpringChain, collide, outcomes, post_impact_velocities
 from cradle.closed_form import back_impact_line, one_collision_each
 from cradle.kernel.state import LIMITS
 
-ROOT = Path(__file__).parents[1]
 CHAPTER = Chapter("beyond")
 
 

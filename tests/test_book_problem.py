@@ -20,19 +20,17 @@ def elastic(m1, v1, m2, v2):
     return 2 * centre - v1, 2 * centre - v2
 
 
-def random_chain(rng):
-    chain = Chain(
-        uniform(rng, 0.5, 2, 3), np.sort(uniform(rng, -1, 1, 3))[::-1], uniform(rng, 0.2, 1, 2)
-    )
-    return chain, ImpulseCorrelation(uniform(rng, 0, 0.2))
-
-
 @pytest.mark.parametrize("equation", [1, 2, 3])
 def test_eqs_1_to_3_momentum_of_each_ball(equation: int):
     rng = np.random.default_rng(1)
     for _ in range(50):
-        chain, model = random_chain(rng)
-        trace = collide(chain, model)
+        masses, velocities, e = (
+            uniform(rng, 0.5, 2, 3),
+            uniform(rng, -1, 1, 3),
+            uniform(rng, 0.2, 1, 2),
+        )
+        chain = Chain(masses, np.sort(velocities)[::-1], e)
+        trace = collide(chain, ImpulseCorrelation(uniform(rng, 0, 0.2)))
         tau_2, tau_3 = trace.path_impulses.T
         push = {1: -tau_2, 2: tau_2 - tau_3, 3: tau_3}[equation]
         ball = equation - 1

@@ -1,7 +1,6 @@
 """Chapter "Three balls solved" and its program: Eqs. 17-34, Figs. 3 and 4, by a second route."""
 
 import contextlib
-import functools
 import io
 import math
 
@@ -276,26 +275,10 @@ def test_one_outcome_belongs_to_many_parameters():
     np.testing.assert_allclose(*outcomes, rtol=0, atol=1e-7)  # seven digits of the ratio
 
 
-@functools.cache
-def typed_in(page):
-    """Run what a reader of a page sees, and nothing else; return the names."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        return run_cells(shown(page), {})
-
-
-def test_shown_cells_use_no_hidden_name():
-    """What a reader sees can be typed in: it runs, and ends with the chapter's numbers."""
-    names = typed_in("three_balls")
-    impulses = names["tau_2f"], names["tau_3f"]
-    np.testing.assert_allclose(impulses, run(*EXAMPLE).impulses, rtol=0, atol=1e-14)
-    np.testing.assert_allclose(names["outcome"][0], [0, 0, 1], atol=1e-14)
-    *_, (_, _, velocities, _) = typed_in("own_solver")["path"]
-    np.testing.assert_allclose(velocities, run(*EXAMPLE).velocities, rtol=0, atol=1e-14)
-
-
 def test_the_readers_solver_against_the_reference_solver():
     """Its path is that of the rules; its functions have some sixty lines in all."""
-    names = typed_in("own_solver")
+    with contextlib.redirect_stdout(io.StringIO()):
+        names = run_cells(shown("own_solver"), {})
     rng = np.random.default_rng(77)
     repeated = 0
     for _ in range(60):

@@ -2,7 +2,6 @@
 
 import re
 import types
-from pathlib import Path
 
 import numpy as np
 import parts
@@ -30,7 +29,6 @@ from cradle.kernel import EVENT_LOOP
 from cradle.runtime import compile as runtime
 from cradle.runtime import job
 
-ROOT = Path(__file__).parents[1]
 CHAPTER, ENGINES_PAGE = Chapter("trade"), Chapter("engines")
 IMPULSE_ENGINES = ("Chipmunk", "Box2D", "Bullet", "Rapier")
 ENGINES = (*IMPULSE_ENGINES, "MuJoCo")
