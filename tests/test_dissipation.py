@@ -197,3 +197,12 @@ def test_a_light_striker_keeps_its_momentum():
     for masses in ([1e-5, 1e5, 1e5, 1.0], [1e-5, 1.0, 1e3, 1e5]):
         trace = collide(Chain(masses, [1, 0, 0, 0], 0.5), QuadraticDissipation())
         assert np.dot(masses, trace.velocities) == pytest.approx(masses[0], rel=1e-14)
+
+
+def test_a_last_digit_opens_no_contact():
+    """Balls 2 and 3 touch, though 0.1 + 0.2 is not 0.3."""
+    touching, by_rounding = (
+        collide(Chain([1, 1, 1], [1, 0.3, last], 0.5), QuadraticDissipation()).velocities
+        for last in (0.3, 0.1 + 0.2)
+    )
+    np.testing.assert_allclose(by_rounding, touching, rtol=1e-14)
