@@ -216,6 +216,24 @@ def test_march_converges_to_the_textbook_at_first_order(kind):
     assert errors[-1] < 4e-4
 
 
+def test_hold_is_the_limit_of_chatter_where_the_held_contact_drives_nobody():
+    chain = (1.0, 1.3, 0.8), (1, 0, 0), 0.7, 0.9
+    held = march(*chain, steps=50_000).velocities
+    slope = [abs(march(*chain, steps=k, hold=False).velocities - held).max() for k in STEPS]
+    assert march(*chain, steps=STEPS[-1], hold=False).collisions[1] > 500
+    assert slope[0] > 2 * slope[1] > 4 * slope[2]
+    assert slope[2] < 1e-3
+
+
+def test_hold_is_not_the_limit_of_chatter_where_the_held_contact_drives_on():
+    """Each end of a chattering contact cuts the run in two: the pieces lose their common clock."""
+    chain = (1, 1, 1, 1), (1, 0, 0, 0), 1, (0.8, 0.3)
+    held = march(*chain, steps=1000)
+    chatter = march(*chain, steps=1000, hold=False)
+    assert held.velocities == pytest.approx((-0.41668, 0.18184, 0.49304, 0.74179), abs=2e-3)
+    assert chatter.velocities == pytest.approx((-0.5, 0.5, 0.5, 0.5), abs=2e-3)
+
+
 def test_two_runs_that_meet():
     """R8 for a symmetric chain, by hand: the gap closes at zero and is driven from both sides.
 
