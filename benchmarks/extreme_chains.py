@@ -63,20 +63,21 @@ def invariants(trace):
     }
 
 
-def faults(trace, finished=True, momentum=8.0, energy=8.0, overlap=0.0):
+def faults(trace, finished=True, overlap=0.0):
     """What is wrong with a trace, by itself; empty if nothing is.
 
-    `momentum` and `energy` are roundings granted per ball, and, for the energy, per square root of
-    the number of events: so do they add up.  Balls that come to rest together may approach each
-    other by `overlap`.
+    Eight roundings are granted per ball, and, for the energy, per square root of the number of
+    events: so do they add up.  Balls that come to rest together may approach each other by
+    `overlap`.
     """
     names = "velocities", "impulses", "absorbed", "path", "path_impulses"
     if not all(np.isfinite(getattr(trace, name)).all() for name in names):
         return ["not finite"]
     n, defect = len(trace.chain), invariants(trace)
-    energy *= n * max(1.0, math.sqrt(len(trace.events)))
+    momentum = 8.0 * n
+    energy = momentum * max(1.0, math.sqrt(len(trace.events)))
     wrong = {
-        f"momentum off by {defect['momentum']:.3g} roundings": defect["momentum"] > momentum * n,
+        f"momentum off by {defect['momentum']:.3g} roundings": defect["momentum"] > momentum,
         f"energy gained: {defect['gain']:.3g} roundings": defect["gain"] > energy,
         f"ledger open by {defect['ledger']:.3g} roundings": finished and defect["ledger"] > energy,
         f"balls overlap by {defect['overlap']:.3g}": finished and defect["overlap"] > overlap,
