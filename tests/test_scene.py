@@ -375,6 +375,16 @@ def test_the_recipe_tells_where_the_energy_is():
     film = {k: sorted(int(scene[f"film-{k}-{n}"]) for n in (1, 2)) for k in ("apart", "pairs")}
     assert chapter.glued["off-row"] == "{} to {}".format(*film["apart"])
     assert chapter.glued["off-pairs"] == str(film["pairs"][1])
+    assert chapter.glued["off-three"] == scene["apart-three"]
+    # Three depths between the outer balls and the others, or ten.
+    depth = (5 * 0.5 / 4) ** 0.4
+    wider = max(
+        np.abs(np.subtract(*(
+            integrated([1] * 5, v, gaps=[d * depth, 0, 0, d * depth]) for d in (3, 10)
+        ))).max()
+        for v in ([1.0, 0, 0, 0, 0], [1.0, 1.0, 0, 0, 0])
+    )  # fmt: skip
+    assert float(chapter.glued["wider"]) == pytest.approx(100 * wider, abs=0.051)
     end = run(*HERTZ)[49]
     assert chapter.glued["one"] == f"{100 * end.max() / end.sum():.0f}"
 

@@ -69,9 +69,11 @@ class Recommendation:
     def _lines(self) -> dict[str, str]:
         """Return what is shown, by its title."""
         numerical, apart = (
-            "not measured" if error is None else f"{error:.1e}" if error else "0, by definition"
+            "not measured" if error is None else f"{error:.1e}"
             for error in (self.numerical_error, self.model_error)
         )
+        if self.model_error == 0.0:
+            apart = "0 from spheres that touch and strike as one"
         if self.numerical_error is None and isinstance(self.model, SpringChain):
             numerical = f"{self.model.accuracy:g} at most by its own estimate; not measured"
         time = "not measured" if self.seconds is None else lasting(self.seconds)
