@@ -143,25 +143,32 @@ def in_memory(show):
         plt.switch_backend(backend)
 
 
+def figure_name(cell) -> str | None:
+    return cell.metadata.get("mystnb", {}).get("figure", {}).get("name")
+
+
 @functools.cache
 def drawn(chapter: str, cells: tuple[str, ...] | None = None) -> dict[str, Figure]:
     """Run a chapter as stored, in the first process that needs it; return its figures by name.
 
-    Of some `cells`, by their ids, only these are run.
+    Of some `cells`, by their ids, only these are run; else all up to the last figure.
     """
     shared = os.environ.get(SHARED) if cells is None else None
     if shared and Path(shared, f"{chapter}.figures").exists():
         return pickle.loads(Path(shared, f"{chapter}.figures").read_bytes())
-    figures, names = {}, {}
+    figures, names, chosen = {}, {}, code(chapter)
+    if cells is not None:
+        chosen = [cell for cell in chosen if cell.id in cells]
+    while not figure_name(chosen[-1]):
+        chosen.pop()
 
     def keep():
-        settings = names["__cell__"].metadata.get("mystnb", {})
-        figures[settings.get("figure", {}).get("name")] = plt.gcf()
+        figures[figure_name(names["__cell__"])] = plt.gcf()
         plt.figure(plt.gcf().number).canvas.draw()
         plt.close(plt.gcf())
 
     with in_memory(keep), contextlib.redirect_stdout(io.StringIO()):
-        run([cell for cell in code(chapter) if cells is None or cell.id in cells], {}, names=names)
+        run(chosen, {}, names=names)
     if shared:
         part = Path(shared, f"{chapter}.{os.getpid()}")
         part.write_bytes(pickle.dumps(figures))
