@@ -2,6 +2,7 @@
 
 import re
 from functools import cache
+from math import factorial
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from chapters import Chapter, points
 from numpy.polynomial import Polynomial
 from real_cradles import first_strikes, spheres, table
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq, least_squares, minimize_scalar
+from scipy.optimize import brentq, least_squares, minimize, minimize_scalar
+from scipy.special import gammaincc
 from stored import read
 
 from cradle import (
@@ -96,7 +98,7 @@ def test_velocities_of_the_models_by_the_fitting_script():
 def test_chi_square_ball_by_ball():
     """A pencil with the digits of the table gets the sums of the text; c makes the sum least."""
     lines = re.findall(r"(?m)^\d +(.*)$", CHAPTER.printed("chi-code").replace("−", "-"))
-    film, error, law, off, square, scaled = np.array([x.split() for x in lines], float).T
+    film, error, law, off, square = np.array([x.split() for x in lines], float).T
     seen, sigma = (100 * x for x in first_strikes(4)[1])
     assert film == pytest.approx(seen, abs=6e-3)
     assert error == pytest.approx(sigma, abs=6e-4)
@@ -108,13 +110,12 @@ def test_chi_square_ball_by_ball():
         lambda c: (((film - c * law) / error) ** 2).sum() + ((c - 1) / 0.01) ** 2, bounds=(0.8, 1.2)
     )
     READING.tells({"c": c.x}, off=2e-4)
-    CHAPTER.tells({"pencil-c": c.x}, off=2e-4)
-    last = CHAPTER.printed("chi-code").splitlines()[-2:]  # the price of c, and both sums
-    price, *sums = (float(x) for line in last for x in line.split()[1:])
-    assert price == pytest.approx(((c.x - 1) / 0.01) ** 2, abs=0.2)
-    assert sums == pytest.approx([square.sum(), scaled.sum() + price], abs=0.16)
+    last = CHAPTER.printed("chi-code").splitlines()[-1]
+    assert float(last.split()[1]) == pytest.approx(square.sum(), abs=0.16)
+    scaled = ((film - c.x * law) / error) ** 2
+    assert float(AUDITS["paid"]) == pytest.approx(((c.x - 1) / 0.01) ** 2, abs=0.2)
+    assert float(AUDITS["scaled"]) == pytest.approx(scaled.sum(), abs=2)
     assert float(GLUED["sum"]) == pytest.approx(c.fun, abs=2)
-    assert scaled == pytest.approx(((film - c.x * law) / error) ** 2, rel=0.02, abs=0.1)
     assert float(AUDITS["scaled"]) + float(AUDITS["paid"]) == pytest.approx(c.fun, abs=2)
     top, bottom = (1e4 + float(AUDITS[name]) for name in ("c-top", "c-bottom"))
     assert top / bottom == pytest.approx(c.x, abs=6e-4)
@@ -140,7 +141,7 @@ def test_fig_off_and_the_table_of_three_laws():
         both, third = table_of_sums[2 * k : 2 * k + 2]
         assert float(both[0]) == pytest.approx(sums[0] + sums[1], rel=2e-3, abs=0.06)
         assert float(third[0]) == shown[2]
-        assert (int(both[1]), int(third[1])) == (10 - (k > 0) * 4, 5)
+        assert (int(both[1]), int(third[1])) == (8 - (k > 0) * 4, 4)
         if k:
             assert GLUED["both-" + ("ratios", "gaps")[k - 1]] == both[0]
     CHAPTER.tells({"times": sums_of("ratios") / sums_of("gaps")})
@@ -150,6 +151,150 @@ def sums_of(law):
     """Chi-square of the third strike, predicted."""
     name = {"ratios": "three ratios, e", "gaps": "spheres, three gaps, A"}[law]
     return float(FITS[name, "apart", "both", "4"]["chi_three"])
+
+
+def strikes(systematic):
+    """Velocities and errors of three strikes, the systematic error another one."""
+    found = {}
+    for release, (v, error) in first_strikes(4).items():
+        found[release] = v, np.sqrt(error**2 - 0.002**2 + systematic**2)
+    return found
+
+
+def test_the_verdict_against_the_systematic_error():
+    """Another search for the least chi-square, and the chance by the sum of a series."""
+    lines = CHAPTER.printed("verdict").splitlines()[1:]
+    simplex = np.vstack([np.ones(4), np.ones((4, 4)) + 0.01 * np.eye(4)])
+    assert [line.split()[0] for line in lines] == ["none", "0.2", "0.3", "0.4"]
+    for line, percent in zip(lines, (0, 0.2, 0.3, 0.4), strict=True):
+        *_, ratios, chance, gaps = line.split()
+        data = strikes(percent / 100)
+        for shown, law in ((ratios, "three ratios, e"), (gaps, "spheres, three gaps, A")):
+            start = np.array(parameters(law, "apart", "all"))
+            least = minimize(
+                lambda x, law=law, start=start, data=data: real_cradles.chi_square(
+                    law, np.minimum(x * start, 1), True, data, (1, 2, 3)
+                ),
+                np.ones(4),
+                method="Nelder-Mead",
+                options={"xatol": 1e-3, "fatol": 1e-2, "initial_simplex": simplex},
+            ).fun
+            assert float(shown) == pytest.approx(least, rel=0.01, abs=0.1)
+            if law == "three ratios, e":
+                half = least / 2
+                tail = np.exp(-half) * sum(half**k / factorial(k) for k in range(4))
+                digits, _, power = chance.partition("·10")
+                power = power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))
+                assert float(digits) * 10.0 ** int(power or 0) == pytest.approx(tail, rel=0.3)
+            if percent == 0.2:
+                short = "ratios" if "ratios" in law else "gaps"
+                assert GLUED[f"joint-{short}"] == shown
+                if short == "ratios":
+                    CHAPTER.tells({"joint-chance": {4: "four"}[round(1e6 * tail)]})
+                    digits, power = AUDITS["lenient"].split("·")  # eleven degrees of freedom
+                    assert power == "10⁻⁵"
+                    assert float(digits) == pytest.approx(1e5 * gammaincc(5.5, half), abs=0.5)
+                    assert AUDITS["ratios-all"] == shown
+
+
+def test_a_strike_counts_as_four_velocities():
+    """Simulated films whose sum helps to find the strikers' speed as it did: chi-square is four."""
+    rng, t = np.random.default_rng(0), table("film_strikes.csv")
+    for release, (_, error) in first_strikes(4).items():
+        own = np.sqrt(error**2 - 0.002**2)
+        w = MODELS[1](release)
+        use = (t["reading"] == 4) & (t["release"] == release) & (t["strike"] == 1)
+        direct = t["sigma_before"][use & (t["striker"] == 1)]
+        direct = np.nansum(direct**-2.0) ** -0.5
+        weight = direct**2 / (direct**2 + (own @ own) / release**2)
+        off, slip = rng.normal(size=(4000, 5)) * own, direct * rng.normal(size=4000)
+        off += 0.002 * rng.normal(size=off.shape)
+        unit = 1 + weight * off.sum(axis=1) / release + (1 - weight) * slip
+        films = (w + off) / unit[:, None]
+        sums = [
+            (real_cradles.misfits(lambda _, w=w: w, {release: (v, error)}, (release,)) ** 2).sum()
+            for v in films
+        ]
+        assert 3.5 < np.mean(sums) < 4.5
+
+
+def test_the_row_before_the_first_strike_and_the_slower_strikers():
+    t = table("film_strikes.csv")
+    use = (t["reading"] == 4) & (t["release"] == 1) & (t["strike"] == 1) & (t["striker"] == 0)
+    v, error = (100 * t[name][use] for name in ("before", "sigma_before"))
+    least = minimize_scalar(lambda mean: (((v - mean) / error) ** 2).sum())
+    CHAPTER.tells({"row-chi": least.fun, "row-least": v.max(), "row-most": v.min()})
+    speed = float(GLUED["striker"])
+    CHAPTER.tells({"row-opens": 0.001 * 1000 * speed, "slower": real_cradles.SLOWER})
+    assert float(GLUED["striker-slow"]) == pytest.approx(real_cradles.SLOWER * speed, abs=0.01)
+
+
+def test_gaps_and_the_distance_of_the_strikers():
+    """Three ways to fit; two miss the test unless the distance is chosen anew."""
+    lines = READING.printed("films-four").splitlines()[1:]
+    unit = 1e6 * (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
+    film, slower = {3: first_strikes(4)[3]}, real_cradles.SLOWER
+    names = ("both", "both, second", "both, third")
+    for line, which, name in zip(lines, names, ("first", "second", "third"), strict=True):
+        row = FITS["spheres, four gaps, A", "own gap", which, "4"]
+        both, apart, _, gap, _, test, anew = line.split()
+        p = [float(x) for x in row["parameters"].split()]
+        assert float(both) == pytest.approx(chi_square(row), abs=0.051)
+        assert float(test) == pytest.approx(float(row["chi_three"]), abs=0.51)
+        assert (GLUED[f"own-{name}"], GLUED[f"own-{name}-test"]) == (both, test)
+        assert [float(apart), float(gap)] == pytest.approx([unit * p[4], unit * p[2]], abs=0.51)
+        assert float(gap) == pytest.approx(unit * p[2], abs=0.051)
+
+        def left(between, p=p):
+            v = spheres([slower] * 3 + [0, 0], [30, between, 0, p[2]], p[3]) / slower
+            return (real_cradles.misfits(lambda _: v, film, (3,)) ** 2).sum()
+
+        bounds = (3, 5) if which == "both, second" else (1, 2.5)
+        least = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": 0.02})
+        assert float(anew) == pytest.approx(least.fun, abs=0.15)
+        assert (float(test) > 30) == (which != "both, second")
+
+
+def test_a_softer_first_touch():
+    """Balls that push by d^p, integrated here; the loss that fits best at the p of the text."""
+    power = float(AUDITS["soft-power"])
+
+    def struck(speeds, loss):
+        n = len(speeds)
+
+        def forces(y):
+            deep = np.maximum(y[: n - 1] - y[1:n], 0)
+            rate = y[n:-1] - y[n + 1 :]
+            return np.maximum(deep**power + loss * power * deep ** (power - 1) * rate, 0)
+
+        def rate(_, y):
+            return np.append(y[n:], -np.diff([0, *forces(y), 0]))
+
+        run = solve_ivp(rate, (0, 30), [0.0] * n + list(speeds), rtol=1e-7, atol=1e-9)
+        return run.y[n:, -1]
+
+    def after(release, loss):
+        unit = 1.0 if release == 1 else real_cradles.SLOWER
+        v = list(struck([unit, *[0.0] * (5 - release)], loss) / unit)
+        for _ in range(release - 1):
+            v = [1.0, *v]
+            while meets := [k for k in range(len(v) - 1) if v[k] - v[k + 1] > 1e-6]:
+                k = meets[0]
+                v[k : k + 2] = struck([unit * v[k], unit * v[k + 1]], loss) / unit
+        return np.array(v)
+
+    def left(loss, releases):
+        off = real_cradles.misfits(lambda r: after(r, loss), first_strikes(4), releases)
+        return off @ off
+
+    best = minimize_scalar(
+        lambda loss: left(loss, (1, 2)), bounds=(0, 0.03), method="bounded",
+        options={"xatol": 1e-4},
+    )  # fmt: skip
+    for name, value, free in (("both", best.fun, 6), ("test", left(best.x, (3,)), 4)):
+        shown, _, count = AUDITS[f"soft-{name}"].partition("\u202f/\u202f")
+        assert float(shown) == pytest.approx(value, rel=0.03)
+        assert int(count) == free
 
 
 def chi_square(row, columns=("chi_one", "chi_two")):
@@ -378,7 +523,6 @@ def test_sums_of_the_readings():
         assert float(total) == pytest.approx(v.sum(), abs=6e-3)
         assert float(spread) == pytest.approx(np.sqrt(error @ error), abs=6e-3)
         assert abs(v.sum() - 100 * release) < np.hypot(float(spread), release)
-        assert abs(v.sum() - 100 * release) <= float(GLUED["sum-off"]) + 0.05
 
 
 def test_what_the_third_strike_wants_of_ball_4():
@@ -400,7 +544,8 @@ def test_what_the_third_strike_wants_of_ball_4():
     CHAPTER.tells({"ratio-chosen": ratios[2]}, off=1e-3)
     assert float(GLUED["gap-chosen"]) == pytest.approx(unit * gaps[2], abs=6e-3)
     assert float(GLUED["gap-implies"]) == pytest.approx(implied(gaps[2] / 0.766**0.8), abs=6e-4)
-    least = {}
+    assert float(GLUED["gap-full"]) == pytest.approx(implied(gaps[2]), abs=6e-4)
+    least, wanted = {}, {}
     for name, chi, scale, step in (("ratio", by_ratio, 1, 1e-3), ("gap", by_gap, unit, 0.01)):
         told = float(GLUED[f"{name}-wanted"])
         # Around it the sum of squares is nearly a parabola: five points and two to spare.
@@ -412,21 +557,23 @@ def test_what_the_third_strike_wants_of_ball_4():
             return [z.real for z in found if abs(z.imag) < 1e-9 and x[0] < z.real < x[-1]]
 
         (best,) = inside(near.deriv())
-        least[name] = near(best)
+        least[name], wanted[name] = near(best), best
         CHAPTER.tells({f"{name}-wanted": scale * best}, off=1e-3)
         # A standard error on, the sum of squares is larger by 1.
         low, high = sorted(inside(near - least[name] - 1))
         error = scale * (high - low) / 2
         assert float(GLUED[f"{name}-wanted-error"]) == pytest.approx(error, abs=step)
+    by_speed = implied(gaps[2]) - implied(gaps[2] / 0.766**0.8)
+    assert 0.115 < by_speed / (ratios[2] - wanted["ratio"]) < 0.14  # about an eighth
     # Either fits then; the gap did before.
     assert max(least.values()) < 6
     assert sums_of("gaps") - least["gap"] < 1
     assert sums_of("ratios") - least["ratio"] > 40
 
 
-def pushes(release, gaps, loss):
+def pushes(release, gaps, loss, speed=None):
     """Times in Hertz units, and forces of the last two contacts, by an integration of its own."""
-    balls, speed = 6 - release, 1.0 if release == 1 else 0.766
+    balls, speed = 6 - release, speed or (1.0 if release == 1 else 0.766)
 
     def forces(y):
         x, v = y[:balls], y[balls:]
@@ -457,6 +604,8 @@ def test_the_two_pushes_at_ball_4():
         {f"overlap-{name}": shares[k] for k, name in enumerate(("one", "two", "three"), 1)}
     )
     assert shares[1] > shares[2] > shares[3] + 1
+    _, first, second = pushes(3, gaps, loss, 1.0)
+    CHAPTER.tells({"overlap-full": 100 * np.minimum(first, second).sum() / first.sum()})
     above, below = CHAPTER.figures["fig-real-forces"].axes
     for ax, shown in ((above, (1,)), (below, (3, 1))):
         curves = [line.get_xydata() for line in ax.get_lines()]

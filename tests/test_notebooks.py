@@ -177,7 +177,7 @@ GIVEN = {
     "n_balls": "0.1 0.15 0.5 1.5 4.5",
     "experiments": "0.001 0.01 0.5",  # a step, and what is small beside it
     "toy": "0.9 0.95 0.97 0.99",
-    "real_cradles": "0.01 0.2 22.2 25.3 44.8",  # error of c, two readings, sizes, frames, grams
+    "real_cradles": "0.1 0.2 0.4 22.2 25.3 44.8",  # errors, sizes, frames, grams
     "recipe": "0.62",
     "scene": "0.1 0.97",  # a step, and a restitution of the run
     "measure": "0.2 0.35 0.5 0.7 1.4 1.5 2.54 3.84",
@@ -202,7 +202,7 @@ GIVEN = {
     "reading_patterns": "0.003 0.01 0.1 0.15 0.3475 0.348 0.5 0.9 0.999",
     "reading_n_balls": "0.01 0.1 0.15 0.2 0.5 0.8 1.75",
     "reading_table_2": "0.171 0.17121",
-    "reading_real_cradles": "0.2",  # two ways of reading apart
+    "reading_real_cradles": "0.01 1.28",  # errors of c and of a scale
     "observations": "0.02 0.05 0.15 0.71 0.9 0.98 0.99 22.17 44.756",
     "ledger": "",
 }
