@@ -179,7 +179,7 @@ def test_the_verdict_against_the_systematic_error():
                 method="Nelder-Mead",
                 options={"xatol": 1e-3, "fatol": 1e-2, "initial_simplex": simplex},
             ).fun
-            assert float(shown) == pytest.approx(least, rel=0.01, abs=0.1)
+            assert float(shown) == pytest.approx(least, abs=0.6 if least > 30 else 0.1)
             if law == "three ratios, e":
                 half = least / 2
                 tail = np.exp(-half) * sum(half**k / factorial(k) for k in range(4))
