@@ -164,12 +164,12 @@ def finished(name, count, seed):
 
 @pytest.mark.parametrize("name", FAMILIES)
 def test_invariants(name):
-    for problem, trace in finished(name, 150, seed=1):
+    for problem, trace in finished(name, 400, seed=1):
         assert faults(trace, overlap=1e-30) == [], problem
 
 
 @pytest.mark.parametrize("name", ["ties", "ties within bounds"])
 def test_boosts_by_exact_speeds(name):
-    for problem, trace in finished(name, 75, seed=3):
+    for problem, trace in finished(name, 200, seed=3):
         boosted = problem.boosted(1.5).collide(max_events=100_000)
         assert difference(boosted.velocities - 1.5, trace.velocities) < 1e-8, problem

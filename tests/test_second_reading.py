@@ -64,10 +64,10 @@ def short(name, count, seed, most=7):
 
 #: Of each family how many chains are drawn, and how many of them are compared at least.
 SAMPLE = {
-    "ties": (120, 35),
-    "ties within bounds": (120, 35),
-    "mixed zeros": (80, 12),
-    "generic": (45, 25),
+    "ties": (240, 70),
+    "ties within bounds": (240, 70),
+    "mixed zeros": (160, 25),
+    "generic": (90, 50),
 }
 
 
@@ -81,7 +81,7 @@ def test_chains_of_a_family(name):
 @pytest.mark.parametrize("name", SAMPLE)
 def test_many_chains_of_a_family(name):
     count, least = SAMPLE[name]
-    no_difference(short(name, 40 * count, seed=32), 30 * least)
+    no_difference(short(name, 20 * count, seed=32), 15 * least)
 
 
 def against_the_package(chain, model, tolerance=1e-13):
