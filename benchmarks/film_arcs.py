@@ -34,26 +34,20 @@ def pendulum(start, t, steps=100):
 
 
 def arc(rows, ball, at, slope=0.06):
-    """Return (angle, rate) at a time, their errors, the residuals; None from too few frames."""
+    """Return (angle, rate) at a time, their errors, how many frames; None from one."""
     if len(rows) < 2:
         return None
     t, x, y = rows[:, 0] - at, rows[:, 3] - REST[ball], rows[:, 4] - PIVOT[ball]
     sigma = 0.25 + slope * rows[:, 5]  # a fast ball is a smear
     basis = np.column_stack([np.cos(RATE * t), np.sin(RATE * t) / RATE])
-    pairs = np.transpose(np.triu_indices(len(t), 1))
-    pairs = [pair for pair in pairs if abs(np.linalg.det(basis[pair])) > 0.3]
-    starts = [np.linalg.solve(basis[pair], x[pair] / LENGTH) for pair in pairs]
-    if not starts:
-        return None
-    # The pair that most others agree with.
-    start = min(starts, key=lambda p: np.minimum(np.abs(LENGTH * basis @ p - x), 6).sum())
+    start = np.linalg.lstsq(basis, x / LENGTH, rcond=None)[0]
 
     def residual(p):
         angle = pendulum(p, t)[0]
         across, down = LENGTH * np.sin(angle) - x, LENGTH * np.cos(angle) - y
         return np.concatenate([across / sigma, down / (3 * sigma)])
 
-    fit = least_squares(residual, start, x_scale=[0.01, 0.01], loss="soft_l1")
+    fit = least_squares(residual, start, loss="soft_l1")
     off = np.abs(residual(fit.x)[: len(t)])
     if 2 <= (off < 4).sum() < len(t):
         return arc(rows[off < 4], ball, at, slope)
@@ -62,9 +56,9 @@ def arc(rows, ball, at, slope=0.06):
 
 def chosen(table, release, ball, after, before, visible):
     """Return the rows of a ball between two times that can be trusted."""
-    t, misfit = table[:, 0], 30 if ball == 0 else 25
-    use = (table[:, 1] == release) & (table[:, 2] == ball + 1) & (table[:, 7] > visible)
-    return table[use & (t > after + 0.24) & (t < before - 0.24) & (table[:, 6] < misfit)]
+    t, use = table[:, 0], (table[:, 1] == release) & (table[:, 2] == ball + 1)
+    use &= (t > after + 0.24) & (t < before - 0.24)
+    return table[use & (table[:, 6] < 25) & (table[:, 7] > visible)]
 
 
 def strikes(table, release, times, window=12.5, slope=0.06, late=0.0):
