@@ -12,7 +12,7 @@ from cradle.closed_form import (
 )
 
 
-def random_three_balls(seed, count=800):
+def random_three_balls(seed, count=4000):
     """Half with v2 = v3, half with v2 > v3; e = 0 and 1 among them; ratios up to Eq. 34."""
     rng = np.random.default_rng(seed)
     masses = magnitudes(rng, 2, (count, 3))
@@ -39,7 +39,7 @@ def test_where_the_closed_form_does_not_apply_the_solver_finds_more_collisions()
         once = trace.collisions.tolist() == [1, 1]
         assert once == apply[i], i
         more += not once
-    assert more > 60
+    assert more > 300
 
 
 def test_largest_ratios_broadcast():

@@ -55,7 +55,7 @@ def test_the_short_cut_decides_as_the_loop_does():
         return np.tile(np.eye(n)[0], (count, 1))
 
     for n in (2, 3):
-        m, v, e, f, b = random_chains(rng, 300, n, decades=3, speed=strike)
+        m, v, e, f, b = random_chains(rng, 1500, n, decades=3, speed=strike)
         result = cradle.outcomes(m, v, e, f, b)
         for k in range(len(m)):
             trace = collide(Chain(m[k], v[k], e[k]), ImpulseCorrelation(f[k], b[k]))
@@ -63,7 +63,7 @@ def test_the_short_cut_decides_as_the_loop_does():
             error = np.abs(result.velocities[k] - trace.velocities).max()
             assert error <= 2e-15  # of the striker's speed
             taken += (trace.collisions == 1).all()
-    assert 300 < taken < 580
+    assert 1500 < taken < 2900
 
 
 def test_no_row_of_a_batch_is_left_out_in_silence(monkeypatch):
@@ -118,6 +118,13 @@ def test_scalars_the_missing_backward_ratio_and_an_empty_batch():
     assert post_impact_velocities(*light, 0.3).tobytes() != post_impact_velocities(*light).tobytes()
 
 
+def test_inputs_are_left_alone():
+    given = [np.array(x) for x in ([1.0, 0.01, 1.0], [1.0, 0.0, 0.0], [0.5, 0.5], [0.15])]
+    before = [part.tolist() for part in given]
+    post_impact_velocities(*given)
+    assert [part.tolist() for part in given] == before
+
+
 def test_impact_not_finished():
     chain = Chain([1, 1e-6, 1], [1, 0, 0], 1)
     with pytest.raises(ImpactNotFinished, match="max_events = 50") as caught:
@@ -157,7 +164,7 @@ def test_batch_and_single_draw_the_line_of_excess_alike():
     """A few roundings around Eq. 53: refused by both, in the same words, or by neither."""
     rng = np.random.default_rng(53)
     refused = 0
-    for _ in range(150):
+    for _ in range(300):
         n = int(rng.integers(3, 6))
         m = magnitudes(rng, 4, n)
         bounds = within_bounds(m, np.ones)
@@ -174,4 +181,4 @@ def test_batch_and_single_draw_the_line_of_excess_alike():
         except ValueError as error:
             found = str(error).replace("[0, ", "[")
         assert found.partition(" = ")[0] == expected.partition(" = ")[0]
-    assert 50 < refused < 125
+    assert 100 < refused < 250

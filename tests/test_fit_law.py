@@ -189,6 +189,18 @@ def test_errors_far_too_small_are_no_endless_search():
     assert found.values["x"] == pytest.approx(np.log(0.5), abs=1e-4)
 
 
+def test_intervals_hold_the_truth():
+    """In 95 of 100 experiments, give or take six."""
+    held = 0
+    for seed in range(100):
+        shots = Shots((simulated("AAA", [1.0] * 3, 0.9, 0.15, 0.02, seed, count=3),))
+        ranges = {"forward": (0, 0.5)}
+        fit = fit_law(shots, ImpulseCorrelation, ranges, restitution=0.9, starts=4)
+        low, high = fit.intervals["forward"]
+        held += low <= 0.15 <= high
+    assert 89 <= held <= 99
+
+
 def test_a_level_stretch_is_one_minimum():
     """Balls far apart: from some gap on nothing changes."""
     after = collide(Chain([1, 1, 1], [1, 0, 0]), SpringChain(gaps=[0, 10.0])).velocities

@@ -92,7 +92,7 @@ def same(one, other):
 @needs_numba
 def test_compiled_and_plain_traces_are_equal_to_the_last_bit(plain):
     finished = 0
-    for chain, options in mixed_chains(1, 70):
+    for chain, options in mixed_chains(1, 250):
         plain(False)
         assert runtime.chosen() is runtime.compiled()
         done, one = outcome(chain, options)
@@ -102,7 +102,7 @@ def test_compiled_and_plain_traces_are_equal_to_the_last_bit(plain):
         assert done == also_done
         finished += done
         same(one, other)
-    assert finished > 63
+    assert finished > 225
 
 
 @needs_numba
