@@ -28,7 +28,7 @@ CASES = (
     ("Equal balls, ratio 0: one leaves", ([1, 1, 1], [1, 0, 0], [1, 1], 0)),
     ("Both contacts lose energy", ([1, 2, 0.5], [1, 0.3, 0.1], [0.6, 0.9], 0.1)),
     ("A light ball rattles in the middle", ([1, 0.05, 1], [1, 0, 0], [1, 1], 0.2)),
-    ("A ratio above its bound", ([1, 3, 1], [1, 0, 0], [0.9, 0.8], 0.5)),
+    ("A ratio above its bound (Eq. 34)", ([1, 3, 1], [1, 0, 0], [0.9, 0.8], 0.5)),
 )  # fmt: skip
 
 
