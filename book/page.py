@@ -201,22 +201,21 @@ def name_lines(ax: Axes, *, side: str = "right", apart: float = 11) -> None:
     end, sign = (-1, 1) if side == "right" else (0, -1)
     ax.figure.canvas.draw()
     point, box, placed = ax.figure.dpi / 72, ax.bbox.padded(1), []
-    for line in sorted(
-        ax.get_lines(), key=lambda one: one.get_ydata()[end]
-    ):
-        if line.get_label()[0] == "_":
-            continue
-        places = line.get_xydata()
-        seen = ax.transData.transform(places)
-        inside = [box.contains(*xy) for xy in seen]
-        x, y = seen[inside][end]
+    ends = []
+    for line in ax.get_lines():
+        if line.get_label()[0] != "_":
+            places = line.get_xydata()
+            at = ax.transData.transform(places)
+            seen = [k for k, xy in enumerate(at) if box.contains(*xy)][end]
+            ends.append((*at[seen], places[seen], line))
+    for x, y, place, line in sorted(ends, key=lambda one: one[1]):
         lifted = y
         for other_x, other_y in placed:
             if abs(x - other_x) < 60 * point:
                 lifted = max(lifted, other_y + apart * point)
         placed.append((x, lifted))
         ax.annotate(
-            line.get_label(), places[inside][end], (5 * sign, (lifted - y) / point),
+            line.get_label(), place, (5 * sign, (lifted - y) / point),
             textcoords="offset points", color=line.get_color(), fontsize=9.5,
             ha="left" if sign > 0 else "right", va="center",
         )  # fmt: skip
