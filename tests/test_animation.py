@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from cradle import Chain, ImpulseCorrelation, Pendulums, SequentialCollisions, swing
-from cradle.pictures.animation import RATE, animate_swing, thin
+from cradle.pictures.animation import RATE, _thin, animate_swing
 from cradle.pictures.impacts import PALETTE
 
 RUN = swing(
@@ -97,7 +97,7 @@ def test_pause():
 def test_thinning_stays_within_a_tenth_of_a_degree():
     times = np.linspace(0, 1, 201)
     for angles in (10 * times * (1 - times), 10 * np.abs(times - 0.3)):
-        rows = thin(times, angles)
+        rows = _thin(times, angles)
         assert np.abs(np.interp(times, times[rows], angles[rows]) - angles).max() <= 0.1
         assert 3 <= len(rows) < 15
 

@@ -91,7 +91,7 @@ def animate_swing(
             ax.text(left + 12, top + 20, lines[k], size=min(wide / 29, 26), parse_math=False)
         for move in _swing(run, f"s{k}b", ax, (left + cell / 2, top + 34), duration):
             moves.append(move._replace(times=move.times / speed, still=still / speed))
-    return moving(figure, moves, alt)
+    return _moving(figure, moves, alt)
 
 
 def _hung(run: Swing) -> tuple[float, Vector, Vector, float]:
@@ -210,15 +210,15 @@ class Move(NamedTuple):
         """Return the style of the part: where it rests, and its keyframes; a point is a px."""
         ax, name, times = self.artists[0].axes, f"{_KEY}{self.part}", self.times
         x, y = ax.transData.transform(self.origin).tolist()
-        frames = (f"{number(100 * times[k] / times[-1])}%{{{_turned(self.angles[k])}}}"
-                  for k in thin(times, self.angles))  # fmt: skip
-        about = f"transform-origin:{number(x)}px {number(ax.figure.bbox.height - y)}px"
-        moves = f"animation:{name} {number(times[-1])}s linear infinite"
+        frames = (f"{_number(100 * times[k] / times[-1])}%{{{_turned(self.angles[k])}}}"
+                  for k in _thin(times, self.angles))  # fmt: skip
+        about = f"transform-origin:{_number(x)}px {_number(ax.figure.bbox.height - y)}px"
+        moves = f"animation:{name} {_number(times[-1])}s linear infinite"
         rest = f"[id^={name}-]{{{_turned(self.at(self.still))};{about};{moves}}}"
         return f"{rest}\n@keyframes {name}{{{' '.join(frames)}}}\n"
 
 
-def thin(times: Vector, angles: Vector) -> list[int]:
+def _thin(times: Vector, angles: Vector) -> list[int]:
     """Return the rows that straight lines need to stay within the tolerance."""
     rows = [0, len(times) - 1]
     while True:
@@ -230,15 +230,15 @@ def thin(times: Vector, angles: Vector) -> list[int]:
 
 
 def _turned(angle: float) -> str:
-    return f"transform:rotate({number(angle)}deg)"
+    return f"transform:rotate({_number(angle)}deg)"
 
 
-def number(value: float) -> str:
+def _number(value: float) -> str:
     """Return a number as CSS, to a thousandth."""
     return f"{round(value, 3) + 0.0:.7g}"  # no -0
 
 
-def moving(figure: Figure, moves: Sequence[Move], alt: str) -> Animation:
+def _moving(figure: Figure, moves: Sequence[Move], alt: str) -> Animation:
     """Return a figure of 72 dots an inch as a picture that moves."""
     for move in moves:
         for k, artist in enumerate(move.artists):
