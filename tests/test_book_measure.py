@@ -26,10 +26,13 @@ def test_every_page_that_shows_data_calls_them_synthetic():
 
 
 def test_error_of_a_line_by_least_squares():
-    times = np.arange(12) / 240
-    matrix = np.stack([np.ones(12), times], axis=1)
-    error = 0.0004 * math.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1])
-    assert f"{1000 * error:.0f}" == GLUED["error"]
+    def error(frames, rate):
+        matrix = np.stack([np.ones(frames), np.arange(frames) / rate], axis=1)
+        return 0.4 * math.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1])
+
+    assert f"{error(12, 240):.0f}" == GLUED["error"]
+    assert f"{error(16, 60):.1f}" == GLUED["error-long"]
+    assert f"{error(16, 60) / 7:.1f}" == "0.2"  # percent of 0.7 m/s, as the text says
 
 
 def test_third_digit_by_the_closed_form():
