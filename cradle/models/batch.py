@@ -54,6 +54,10 @@ def post_impact_velocities(
         `max_events` steps, with a note of its place, or whose outcome fails the check that every
         answer has to pass.
 
+    References
+    ----------
+    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583.
+
     Examples
     --------
     The two ends of Fig. 4 in one call:
