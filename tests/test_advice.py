@@ -15,10 +15,20 @@ from energy_law import strike
 from stored import read
 from truth import in_fifty_digits
 
-import cradle
 import cradle.advice.choice
 import cradle.advice.measured
-from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SpringChain, collide, recommend
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    paper_chain,
+    post_impact_velocities,
+    recommend,
+    viscosity_from,
+)
 from cradle.advice.choice import lasting
 from cradle.advice.measured import evidence, measured_chain, rows
 
@@ -26,7 +36,7 @@ from cradle.advice.measured import evidence, measured_chain, rows
 SLACK, ROUNDING = 2.0, 2.0**-50
 LOSSY, LOST = (Chain([1, 1, 1], [1, 0, 0], e) for e in (0.9, 0.5))
 THREE, FIVE, LIGHT = (striking(ELASTIC[name]) for name in ELASTIC)
-ABCCA, TABLES = cradle.paper_chain("ABCCA", excess="saturate")
+ABCCA, TABLES = paper_chain("ABCCA", excess="saturate")
 
 
 def off(chain, advice, answer):
@@ -45,7 +55,7 @@ def between(number, spread, seed=7):
 # --- what was promised is kept ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-5, 1e-8])
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-5, 1e-8])
 @pytest.mark.parametrize("name", [*ELASTIC, "ABCCA"])
 def test_the_cheapest_setting_of_the_table(name, accuracy):
     """Springs against velocities from another program, too; its last digit is the ninth."""
@@ -70,7 +80,7 @@ def test_the_cheapest_setting_of_the_table(name, accuracy):
 
 def test_springs_among_the_measured_chains():
     """Against spheres by steps of our own, which are finer than what is asked."""
-    for m, _ in between(3, 3.0):
+    for m, _ in between(4, 3.0):
         struck = m, np.eye(len(m))[0], 1, 0
         answer, finer = (gaps.strike(*struck, step=h, longest=500) for h in (0.02, 0.01))
         own = np.abs(answer - finer).max()
@@ -80,16 +90,16 @@ def test_springs_among_the_measured_chains():
             assert advice.measured_on == ("three equal", "five equal", "light middle")
             assert off(striking(m), advice, finer) <= accuracy + own
             assert advice.numerical_error * 10 <= accuracy
-    for m, _ in between(3, 60.0, seed=8):
-        other = collide(striking(m), SpringChain(1.0, accuracy=1e-10)).velocities
-        for accuracy in (1e-3, 1e-7):
+    for m, _ in between(6, 60.0, seed=8):
+        other = collide(striking(m), SpringChain(1.0, accuracy=1e-12)).velocities
+        for accuracy in (1e-3, 1e-5, 1e-7):
             advice = recommend(striking(m), accuracy=accuracy, stiffness=1.0)
             assert off(striking(m), advice, other) <= accuracy
 
 
 def test_forces_and_times_are_no_worse_than_said():
     """Their errors were not measured; the notes say so.  Of three balls they can be looked at."""
-    best = collide(THREE, SpringChain(1.0, accuracy=1e-10))
+    best = collide(THREE, SpringChain(1.0, accuracy=1e-12))
     for accuracy in (1e-3, 1e-6):
         model = recommend(THREE, ("forces", "times"), accuracy=accuracy, stiffness=1.0).model
         trace = collide(THREE, model)
@@ -120,13 +130,13 @@ def test_losses_and_no_ratios():
     advice = recommend(LOST, "impulses", accuracy=1e-3, stiffness=1.0)
     assert isinstance(advice.model, EnergyDistribution)
     balls = LOST.masses / LOST.masses[0], LOST.velocities, LOST.restitution
-    steps = [strike(*balls, count)[0] for count in (500, 1000)]
+    steps = [strike(*balls, count)[0] for count in (1000, 2000)]
     answer, own = 2 * steps[1] - steps[0], np.abs(steps[1] - steps[0]).max()
     assert own < 1e-3
     assert off(LOST, advice, answer) <= 1e-3 + own
-    for m, rng in between(3, 1.15):
+    for m, rng in between(4, 1.15):
         chain = striking(m, [0.5, *uniform(rng, 0.3, 1.0, len(m) - 2)])
-        finer = collide(chain, EnergyDistribution(rtol=1e-10)).velocities
+        finer = collide(chain, EnergyDistribution(rtol=1e-12)).velocities
         for accuracy in (1e-2, 1e-5):
             advice = recommend(chain, accuracy=accuracy, stiffness=1.0)
             assert off(chain, advice, finer) <= accuracy
@@ -135,10 +145,10 @@ def test_losses_and_no_ratios():
 
 def test_losses_that_viscous_springs_can_have():
     """Forces too; each pair alone parts with its restitution.  By SciPy's integrator."""
-    for m, rng in between(3, 5.0):
+    for m, rng in between(6, 5.0):
         e = uniform(rng, 0.85, 1.0, len(m) - 1)
         chain = striking(m, e, 0.3)
-        loss = cradle.viscosity_from(e, speed=0.3, masses=m, stiffness=50.0)
+        loss = viscosity_from(e, speed=0.3, masses=m, stiffness=50.0)
         answer = integrated(m, chain.velocities, k=50.0, loss=loss)
         for accuracy in (1e-2, 1e-4):
             wanted = "velocities" if accuracy == 1e-2 else ("forces", "times")
@@ -165,7 +175,7 @@ def test_losses_that_viscous_springs_can_have():
 def test_model_errors(name):
     """Of what restitution alone allows, and of the measured ratio: from the other program."""
     chain = striking(ELASTIC[name])
-    for known, kind in (({}, cradle.SequentialCollisions), ({"ratios": 0.167}, ImpulseCorrelation)):
+    for known, kind in (({}, SequentialCollisions), ({"ratios": 0.167}, ImpulseCorrelation)):
         advice = recommend(chain, model_error=0.5, **known)
         assert isinstance(advice.model, kind)
         assert advice.model_error == pytest.approx(off(chain, advice, HERTZ[name]), abs=1e-4)
@@ -189,7 +199,7 @@ def test_sequential_is_the_nearest_that_needs_restitution_alone():
         recommend(THREE)
     said = re.search(r"off by (\S+) to (\S+) of", str(refused.value))
     errors = [
-        np.abs(collide(striking(m), cradle.SequentialCollisions()).velocities - HERTZ[name]).max()
+        np.abs(collide(striking(m), SequentialCollisions()).velocities - HERTZ[name]).max()
         for name, m in ELASTIC.items()
     ]
     assert [float(x) for x in said.groups()] == pytest.approx([min(errors), max(errors)], rel=0.05)
@@ -198,7 +208,7 @@ def test_sequential_is_the_nearest_that_needs_restitution_alone():
 def test_the_fastest_ball():
     """Right on the measured elastic chains, wrong on another one, as the reason warns."""
     for chain, answer in zip((THREE, FIVE, LIGHT), HERTZ.values(), strict=True):
-        for known, kind in (({}, cradle.SequentialCollisions), ({"stiffness": 1.0}, SpringChain)):
+        for known, kind in (({}, SequentialCollisions), ({"stiffness": 1.0}, SpringChain)):
             advice = recommend(chain, "fastest ball", **known)
             assert isinstance(advice.model, kind)
             assert len(advice.measured_on) == 1
@@ -213,6 +223,23 @@ def test_the_fastest_ball():
     assert wrong != np.abs(gaps.strike(chain.masses, np.eye(5)[0], 1, 0)).argmax()
     # Whoever knows the stiffness is given springs there.
     assert isinstance(recommend(chain, "fastest ball", stiffness=1).model, SpringChain)
+
+
+def test_scatter_of_times_does_not_choose_the_model(monkeypatch):
+    """Each time may be a fifth more or less, as in another run: the same model is recommended."""
+    asked = {"wanted": "fastest ball", "ratios": 0.167}
+    measured, rng = cradle.advice.choice.rows, np.random.default_rng(8)
+
+    def scattered(*group):
+        return tuple(
+            row._replace(seconds=row.seconds * uniform(rng, 0.8, 1.2)) for row in measured(*group)
+        )
+
+    models = [recommend(chain, **asked).model for chain in (THREE, FIVE, LIGHT)]
+    monkeypatch.setattr(cradle.advice.choice, "rows", scattered)
+    for _ in range(20):
+        models += [recommend(chain, **asked).model for chain in (THREE, FIVE, LIGHT)]
+    assert set(models) == {ImpulseCorrelation(0.167)}
 
 
 def test_two_balls_need_no_ratio():
@@ -233,7 +260,7 @@ def test_many_impacts_go_into_one_call():
     one, many = (recommend(THREE, ratios=0.1, impacts=k) for k in (1, 1000))
     assert many.seconds < one.seconds
     assert "batch" in many.setting
-    after = cradle.post_impact_velocities([[1, 1, 1]] * 3, [1, 0, 0], 1, many.model.forward)
+    after = post_impact_velocities([[1, 1, 1]] * 3, [1, 0, 0], 1, many.model.forward)
     np.testing.assert_allclose(after, [collide(THREE, one.model).velocities] * 3, atol=1e-15)
     assert many.call.partition("(")[0] == "post_impact_velocities"
     forces = recommend(THREE, stiffness=1, impacts=1000)
@@ -357,9 +384,12 @@ def test_what_is_shown():
     assert "any stiffness will do" in recommend(THREE, stiffness=1).reason
     times = [lasting(t) for t in (2.5e-7, 9.996e-4, 0.0123, 12.3)]
     assert times == ["0.25 us", "1 ms", "12 ms", "12 s"]
-    # A time of compiled code says so.
+
+
+def test_a_time_of_compiled_code_says_so():
     words = f"{lasting(recommend(FIVE, ratios=0.167).seconds)} once compiled; small work runs in"
     assert words in repr(recommend(FIVE, ratios=0.167))
+    assert "once compiled" in repr(recommend(FIVE, stiffness=1, accuracy=1e-3))
     assert "once compiled" not in repr(recommend(LOST, stiffness=1, accuracy=1e-3))
 
 

@@ -13,6 +13,7 @@ import scenes
 import solvers
 from chains import HERTZ, LINEAR
 from stored import read
+from verlet import verlet
 
 from cradle.closed_form import three_balls
 
@@ -53,6 +54,22 @@ def test_fixed_steps_converge(rows, group, text, order):
         steps, errors = np.log([[r.parameter, r.numerical_error] for r in series]).T
         assert len(series) > 1
         assert np.polyfit(steps, errors, 1)[0] > order, law
+
+
+@pytest.mark.parametrize("step", [0.5, 0.1, 0.01])
+def test_penalty_gives_the_outcome_of_velocity_verlet(step):
+    """Half a kick, the drift, half a kick, as textbooks have it."""
+    m, start = np.array([1.0, 0.5, 2.0]), np.array([1.0, 0.0, 0.0])
+    v, d, force, steps = start.copy(), np.zeros(2), np.zeros(2), 0
+    while steps == 0 or (d > 0).any() or (np.diff(v) < 0).any():
+        steps += 1
+        v += 0.5 * step * np.diff(-force, prepend=0, append=0) / m
+        d -= step * np.diff(v)
+        force = np.maximum(d, 0.0) ** 1.5
+        v += 0.5 * step * np.diff(-force, prepend=0, append=0) / m
+    (after,), count = verlet(m[None], start[None], 1.0, 1.5, 0.0, step, 0.0)
+    np.testing.assert_allclose(after, v, rtol=0, atol=1e-13)
+    assert count == steps
 
 
 def test_truths_by_a_second_route():

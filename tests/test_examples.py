@@ -139,6 +139,19 @@ def test_an_engine_alone_moves_its_balls_otherwise(program):
     closed(mended)
 
 
+def test_hanging_balls_are_looked_at_every_hundredth_of_a_second(program):
+    """A step with the row then costs little more than one of the engine."""
+    bodies = program.cradle(pulled=0)
+    row = program.mended(bodies, LAW)
+    looks, motion = [], bodies.motion
+    bodies.motion = lambda: looks.append(1) or motion()
+    for _ in range(1000):
+        row.step(STEP)
+    assert len(looks) <= 101
+    assert row.impacts == 0
+    closed(bodies)
+
+
 def test_the_program_runs_as_it_stands(program, capsys):
     runpy.run_path(str(EXAMPLES / f"{program.__name__}.py"), run_name="__main__")
     table = np.array([line.split() for line in capsys.readouterr().out.splitlines()[-11:]], float)

@@ -7,8 +7,16 @@ from chains import HERTZ
 from chapters import Chapter
 from stored import numbers, read
 
-import cradle
-from cradle import Chain, EnergyDistribution, ImpulseCorrelation, SequentialCollisions, collide
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    paper_chain,
+    ratio_table,
+)
 
 CHAPTER = Chapter("table_2")
 
@@ -25,10 +33,32 @@ def test_touching_spheres_are_the_energy_law_and_wide_gaps_are_pairs():
             np.testing.assert_allclose(found[gap][k], after, atol=1e-3)
 
 
+def test_lean_between_two_balls_at_rest_by_scipy():
+    """A lean of .1 with its constant force; read when both contacts have opened, and when."""
+    from scipy.integrate import solve_ivp
+
+    lean, held = 0.1, 0.1**1.5
+
+    def rate(_, y):
+        push = np.maximum([y[0] - y[1], y[1] - y[2] + lean], 0) ** 1.5 - [0, held]
+        return [*y[3:], -push[0], push[0] - push[1], push[1]]
+
+    def opened(_, y):
+        return max(y[0] - y[1], y[1] - y[2] + lean)
+
+    opened.terminal, opened.direction = True, -1
+    run = solve_ivp(rate, (0, 9), [0, 0, 0, 1, 0, 0], events=opened, rtol=1e-10, atol=1e-12)
+    found = gaps.strike([1] * 3, [1, 0, 0], 1.0, [0, -lean])
+    np.testing.assert_allclose(found, run.y[3:, -1], atol=2e-3)
+    law = SpringChain(gaps=[0, -lean])
+    way = collide(Chain([1] * 3, [1, 0, 0]), law)
+    assert way.times[-1] == pytest.approx(run.t[-1], rel=1e-5)
+
+
 @pytest.mark.parametrize("triplet", ["AAA", "ADD", "BCB", "DAC", "CDB"])
 def test_rows_of_triplets(triplet):
     row = next(r for r in read("gaps_triplets.csv") if r["triplet"] == triplet)
-    chain, model = cradle.paper_chain(triplet, excess="saturate")
+    chain, model = paper_chain(triplet, excess="saturate")
     listed = collide(chain, model).velocities
     for name in ("sequential", "energy_hertz", "fused"):
         after = collide(chain, gaps.LAWS[name]).velocities
@@ -58,7 +88,7 @@ def test_what_the_chapter_says():
 
 def test_ratios_of_touching_spheres():
     """The largest of each triplet: every contact collides once, so Eqs. 24 and 31 tell it."""
-    listed = cradle.ratio_table().set_index("triplet")["ratio"]
+    listed = ratio_table().set_index("triplet")["ratio"]
     masses = gaps.of_triplets(list(listed.index))[0]
     after = gaps.strike(masses, [1, 0, 0], 1.0, [[0, 0]])
     once = 1 - (2 / (1 - after[:, 0]) - 1) * masses[:, 1] / masses[:, 0]

@@ -24,6 +24,18 @@ def masses(row):
     return np.cumprod([1.0, *numbers(row, "m2_over_m1 m3_over_m2")])
 
 
+def test_map_is_whole():
+    rows = table()
+    keys = {tuple(numbers(r, "exponent m2_over_m1 m3_over_m2 k2_over_k1")) for r in rows}
+    assert len(keys) == len(rows) == 2 * 5 * 5 * 25
+    for row in rows:
+        assert bool(row["ratio"]) != bool(row["note"])
+        bound = float(row["m3_over_m2"]) / (1 + float(row["m3_over_m2"]))
+        assert float(row["bound"]) == pytest.approx(bound, abs=1e-9)
+        # Elastic springs: each of these outcomes can be had from an admissible ratio.
+        assert 0 <= float(row["ratio"]) <= bound * (1 + 1e-14)
+
+
 def test_ratios_give_the_outcomes():
     """By the solver for all, by the closed form where it holds."""
     rows = table()

@@ -4,7 +4,6 @@ import importlib.util
 import math
 import re
 from functools import cache
-from itertools import product
 
 import numpy as np
 import pytest
@@ -71,8 +70,9 @@ def apart(found, judge):
 
 def slower(found, judge, pulled):
     """Largest difference of a ball's speed of several runs, in percent of the strikers'."""
-    both = np.array(found), judge
-    one, other = (np.sqrt(pulled * e / e.sum(axis=-1, keepdims=True)) for e in both)
+    one, other = (
+        np.sqrt(pulled * e / e.sum(axis=-1, keepdims=True)) for e in (np.array(found), judge)
+    )
     return 100 * np.abs(one - other).max()
 
 
@@ -96,10 +96,13 @@ def test_the_judge_is_as_stiff_as_it_says():
 
 
 def test_the_judge_repeats_what_is_stored_and_keeps_the_energy():
-    _, angles, rates = scenes.on_springs(2, 3.5)
-    np.testing.assert_allclose(scenes.strokes(angles, rates), run(*HERTZ, 2)[:3], atol=1e-4)
+    times, angles, rates = scenes.on_springs(2, 4.5)
+    found = scenes.strokes(angles, rates)
+    assert len(found) == 4
+    np.testing.assert_allclose(found, run(*HERTZ, 2)[:4], atol=1e-4)
     total = scenes.energies(angles, rates).sum(axis=1)
     assert np.abs(total - 1).max() < 1e-4
+    assert times[-1] == 4.5
 
 
 @pytest.mark.parametrize("pulled", [1, 2])
@@ -112,17 +115,38 @@ def test_two_routes_to_elastic_spheres(pulled: int):
     np.testing.assert_allclose(judge.sum(axis=1), 1, atol=5e-4)
 
 
-@pytest.fixture(params=scenes.ENGINES, ids=lambda engine: engine.name)
-def engine(request):
-    """Each engine that is installed."""
-    if request.param.name in absent(scenes.ENGINES):
-        pytest.skip(absent(scenes.ENGINES)[request.param.name])
-    return request.param
+def test_a_stroke_is_told_by_the_mean():
+    """Free pendulums: as many strokes as half periods, and the energies of the release."""
+    times = np.arange(0, 20, 1 / 60)
+    one = 0.01 * np.cos(scenes.FREQUENCY * times)
+    angles = np.column_stack([one, 0 * one, 0 * one, 0 * one, 2 * one])
+    rates = np.gradient(angles, times, axis=0)
+    found = scenes.strokes(angles, rates)
+    assert len(found) == int(20 * scenes.FREQUENCY / math.pi - 0.5)
+    np.testing.assert_allclose(found, [[0.2, 0, 0, 0, 0.8]] * len(found), atol=2e-3)
 
 
+def test_the_tables_are_complete():
+    for name in ENGINES:
+        for setting in ("default", "refined"):
+            for pulled in (1, 2):
+                assert len(run(name, "mended", setting, pulled)) in (58, 59)
+                for gap in ("0", "0.01"):
+                    found = run(name, "as it is", setting, pulled, gap)
+                    assert len(found) in (58, 59) or found[-1].sum() > scenes.WILD
+            assert len(run(name, "no impacts", setting, 5)) in (58, 59)
+    assert len(run("swing", "alone", "ratio")) == len(run(*HERTZ)) == 58
+    numbers = np.array([balls(row) for row in stored("strokes")])
+    assert np.isfinite(numbers).all()
+    assert numbers.min() >= 0
+
+
+@pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
 @pytest.mark.parametrize(("how", "mend"), [("as it is", False), ("mended", True)])
 def test_an_engine_repeats_what_is_stored(engine, how, mend):
     """Same version, same strokes; another one is asked only for what the row promises."""
+    if engine.name in absent(scenes.ENGINES):
+        pytest.skip(absent(scenes.ENGINES)[engine.name])
     _, angles, rates = scenes.in_engine(engine, "default", 1, mend=mend, duration=5.6)
     found, expected = scenes.strokes(angles, rates), run(engine.name, how, "default")
     assert len(found) == 5
@@ -134,12 +158,15 @@ def test_an_engine_repeats_what_is_stored(engine, how, mend):
         np.testing.assert_allclose(share, run("swing", "alone", "ratio")[:5], atol=0.03)
 
 
+@pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
 @pytest.mark.parametrize("duration", [60, pytest.param(600, marks=pytest.mark.exhaustive)])
 def test_short_strings_at_60_hz_keep_what_one_pendulum_keeps(monkeypatch, engine, duration):
     """Strings of 20 cm, where a step is 6 % of a swing.
 
     Where swings lose by their height a row may keep more: its balls come to share the energy.
     """
+    if engine.name in absent(scenes.ENGINES):
+        pytest.skip(absent(scenes.ENGINES)[engine.name])
     for room in (scenes, importlib.import_module(engine.scene)):
         monkeypatch.setattr(room, "LENGTH", 0.2)
         monkeypatch.setattr(room, "RADIUS", 0.02)
@@ -158,6 +185,18 @@ def test_swing_repeats_what_is_stored():
     np.testing.assert_allclose(found, run("swing", "alone", "ratio")[:5], atol=1e-4)
 
 
+def test_the_film_shows_what_the_table_says():
+    for name, how in (("Chipmunk", "as it is"), ("Rapier", "mended"), ("Hertz springs", "alone")):
+        rows = stored("film", run=name, how=how)
+        angles = np.radians([balls(row) for row in rows])
+        times = np.array([float(row["time"]) for row in rows])
+        assert times[-1] >= 11
+        np.testing.assert_allclose(np.diff(times), 1 / 30, atol=0.02)
+        setting = "steel" if how == "alone" else "default"
+        found = scenes.strokes(angles, np.gradient(angles, times, axis=0))
+        np.testing.assert_allclose(found[:9], run(name, how, setting)[:9], atol=0.03)
+
+
 def test_a_row_at_rest_costs_at_most_as_much_again():
     """Measured with steps of a millisecond, nothing refined: within twice the engine's own cost."""
     rows = stored("costs", how="mended")
@@ -174,8 +213,9 @@ def test_the_ratio_is_that_of_elastic_spheres():
     assert pytest.approx(float(row["ratio"]), abs=5e-5) == scenes.RATIO
     assert Chapter("recipe").glued["ratio"] == f"{scenes.RATIO:.2f}"
     for path in EXAMPLES.glob("*.py"):
-        text = path.read_text(encoding="utf-8")
-        assert "TOY = SpringChain(1e10, gaps=[4e-4, 0, 0, 4e-4])" in text
+        assert "TOY = SpringChain(1e10, gaps=[4e-4, 0, 0, 4e-4])" in path.read_text(
+            encoding="utf-8"
+        )
 
 
 @pytest.mark.parametrize("pulled", [1, 2])
@@ -216,8 +256,13 @@ def test_a_row_with_another_law_does_what_swing_does(law, pulled: int):
 @pytest.mark.parametrize("pulled", [1, 2])
 def test_springs_in_the_row_are_elastic_spheres_in_every_engine(pulled: int):
     judge = run(*HERTZ, pulled)[np.array(AT) - 1]
-    for name in ENGINES:
-        assert apart(by_law(name, "springs", "refined", pulled), judge).max() < 0.02
+    off = {
+        setting: max(
+            apart(by_law(name, "springs", setting, pulled), judge).max() for name in ENGINES
+        )
+        for setting in ("default", "fine", "refined")
+    }
+    assert off["refined"] < 0.02
     for setting, end in (("fine", ""), ("default", "-default")):
         found = [by_law(name, "springs", setting, pulled) for name in ENGINES]
         off = slower(found, judge, pulled)
@@ -226,18 +271,26 @@ def test_springs_in_the_row_are_elastic_spheres_in_every_engine(pulled: int):
 
 def test_energy_left():
     """After fifty strokes, in percent, one and two lifted."""
-    glued, names = Chapter("scene").glued, {"springs, outer apart": "apart"}
-    fine, usual = ("fine", ""), ("default", "-default")
-    for law, (setting, end) in product(("springs", "ratio", "springs, outer apart"), (fine, usual)):
-        each = product(ENGINES, (1, 2))
-        left = min(by_law(name, law, setting, pulled)[-1].sum() for name, pulled in each)
-        assert glued[f"least-{names.get(law, law)}{end}"] == f"{100 * left:.0f}"
-    each = product(("Chipmunk", "Box2D"), (1, 2))
-    pairs = min(with_tiny_gaps(name, "fine", pulled)[1][-1] for name, pulled in each)
-    assert glued["least-pairs"] == f"{100 * pairs:.0f}"
-    own = [balls(row).sum() for row in stored("laws", law="as it is", setting="fine", stroke=50)]
-    assert glued["least-own"] == f"{100 * min(own):.0f}"
-    assert max(own) > 2
+    glued = Chapter("scene").glued
+    for law, name in (
+        ("springs", "springs"), ("ratio", "ratio"), ("springs, outer apart", "apart"),
+    ):  # fmt: skip
+        for setting, end in (("fine", ""), ("default", "-default")):
+            left = [
+                100 * by_law(engine, law, setting, pulled)[-1].sum()
+                for engine in ENGINES for pulled in (1, 2)
+            ]  # fmt: skip
+            assert glued[f"least-{name}{end}"] == f"{min(left):.0f}"
+    pairs = [
+        100 * with_tiny_gaps(name, "fine", pulled)[1][-1]
+        for name in ("Chipmunk", "Box2D") for pulled in (1, 2)
+    ]  # fmt: skip
+    assert glued["least-pairs"] == f"{min(pairs):.0f}"
+    own = [
+        100 * balls(row).sum() for row in stored("laws", law="as it is", setting="fine", stroke=50)
+    ]
+    assert glued["least-own"] == f"{min(own):.0f}"
+    assert max(own) > 200
 
 
 def test_the_judge_of_outer_balls_apart():
@@ -272,10 +325,14 @@ def test_outer_balls_apart_in_the_row(pulled: int):
     assert max(missed) < 0.5 * told("film-springs", 2)
 
 
+@pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
 @pytest.mark.parametrize("law", scenes.LAWS)
 def test_an_engine_repeats_what_is_stored_of_other_laws(engine, law):
-    asked = {"mend": True, "duration": 5.6, "law": scenes.LAWS[law]}
-    _, angles, rates = scenes.in_engine(engine, "default", 2, **asked)
+    if engine.name in absent(scenes.ENGINES):
+        pytest.skip(absent(scenes.ENGINES)[engine.name])
+    _, angles, rates = scenes.in_engine(
+        engine, "default", 2, mend=True, duration=5.6, law=scenes.LAWS[law]
+    )
     found = scenes.strokes(angles, rates)[[0, 4]]
     np.testing.assert_allclose(found, by_law(engine.name, law, "default", 2)[:2], atol=0.02)
 
@@ -348,8 +405,9 @@ def test_an_engine_repeats_what_is_stored_with_tiny_gaps(name):
     engine = {engine.name: engine for engine in scenes.ENGINES}[name]
     if name in absent(scenes.ENGINES):
         pytest.skip(absent(scenes.ENGINES)[name])
-    asked = {"mend": False, "gap": scenes.GAPS[1], "duration": 5.6}
-    _, angles, rates = scenes.in_engine(engine, "fine", 1, **asked)
+    _, angles, rates = scenes.in_engine(
+        engine, "fine", 1, mend=False, gap=scenes.GAPS[1], duration=5.6
+    )
     (row,) = stored("gap_minutes", run=name, setting="fine", pulled=1, stroke=5)
     np.testing.assert_allclose(scenes.strokes(angles, rates)[4], balls(row), atol=0.02)
 
@@ -406,6 +464,11 @@ def test_the_figures_draw_the_tables():
         assert np.isnan(line[len(share) :, 0]).all()
 
 
+#: Engines and settings that let one pair collide after the other at gaps of 10 µm.
+RESOLVING = {(name, s) for name in ("Chipmunk", "Box2D") for s in ("default", "refined")}
+RESOLVING |= {("Bullet", "refined"), ("Rapier", "refined")}
+
+
 @pytest.mark.parametrize("pulled", [1, 2])
 def test_judged_by_the_film(pulled: int):
     """After the first strike: the film, laws by other routes, and engines with tiny gaps."""
@@ -417,13 +480,15 @@ def test_judged_by_the_film(pulled: int):
         ("film-ratio", np.array(solve([1] * 5, struck, 1, scenes.RATIO).velocities, float)),
     ):
         assert told(name, pulled) == pytest.approx(100 * np.abs(v - seen).max(), abs=0.51)
-    off = [  # speeds over the strikers', from energies over that of all
-        100 * np.abs(np.sqrt(pulled * balls(row)) - np.abs(seen)).max()
-        for name in ("Chipmunk", "Box2D") for setting in ("default", "refined")
-        for row in stored("gaps", run=name, setting=setting, gap=5e-05, pulled=pulled)
-    ]  # fmt: skip
-    assert len(off) == 4
-    most = max(off)
+    small = {  # speeds over the strikers', from energies over that of all
+        (row["run"], row["setting"]): 100
+        * np.abs(np.sqrt(pulled * balls(row)) - np.abs(seen)).max()
+        for row in stored("gaps")
+        if (row["run"], row["setting"]) in RESOLVING
+        and (row["gap"], row["pulled"]) == ("5e-05", str(pulled))
+    }
+    assert len(small) == 6
+    most = max(off for (name, _), off in small.items() if name in ("Chipmunk", "Box2D"))
     assert told("film-pairs", pulled) == pytest.approx(most, abs=0.51)
 
 
@@ -451,6 +516,7 @@ def test_stored_first_strokes_with_gaps(engine):
             np.testing.assert_allclose(own, known, atol=0.05)
         elif engine.name not in absent(scenes.ENGINES) and row["pulled"] == "1":
             gap = float(row["gap"])
-            asked = {"mend": False, "gap": gap, "duration": 1.3}
-            _, angles, rates = scenes.in_engine(engine, row["setting"], 1, **asked)
+            _, angles, rates = scenes.in_engine(
+                engine, row["setting"], 1, mend=False, gap=gap, duration=1.3
+            )
             np.testing.assert_allclose(scenes.strokes(angles, rates)[0], own, atol=0.05)

@@ -1,7 +1,9 @@
 """The textbook against a second reading of its rules, which shares no code with it."""
 
 import decimal
+import re
 from decimal import Decimal
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -55,6 +57,13 @@ def no_difference(problems, least):
     assert len(compared) >= least
     wrong = [f"{off:.2g}: {problem}" for off, problem in compared if off > AGREE]
     assert not wrong, f"{len(wrong)} of {len(compared)} chains:\n" + "\n".join(wrong)
+
+
+def test_it_shares_no_code_with_the_textbook():
+    source = Path(second.__file__).read_text(encoding="utf-8")
+    assert re.findall(r"(?m)^ *(?:from|import) (.*)", source) == [
+        "decimal import Decimal, getcontext"
+    ]
 
 
 def short(name, count, seed, most=7):
@@ -125,3 +134,9 @@ def test_a_contact_that_waits_pushes_and_ends(problem):
     small = [[a or 1e-26 for a in way] for way in (problem.forward, problem.backward)]
     limit, _ = read(problem._replace(forward=small[0], backward=small[1]))
     assert max(abs(a - b) for a, b in zip(velocities, limit, strict=True)) < Decimal("1e-24")
+
+
+def test_it_says_that_an_impact_has_no_end():
+    given = decimals(Problem([1] * 3, [1, 0, 0], [0, 0], [0], [0]))
+    with pytest.raises(RuntimeError, match="not over after 50 rounds"):
+        given.solve(second.second_reading, rounds=50)
