@@ -8,8 +8,16 @@ import pytest
 from families import FAMILIES, family
 from scipy.optimize import minimize
 
-import cradle
-from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, SequentialCollisions, collide
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    QuadraticDissipation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+)
 
 FIVE = Chain([1, 0.3, 0.6, 0.2, 0.9], [1, 0.4, 0, 0, -0.3], [0.9, 0.8, 1, 0.7])
 ELASTIC = Chain(FIVE.masses, FIVE.velocities)
@@ -85,9 +93,9 @@ def test_what_contacts_still_store_counts():
 @pytest.mark.parametrize(
     ("model", "less", "chain"),
     [
-        (cradle.SpringChain(), {"max_steps": 20}, ELASTIC),
-        (cradle.EnergyDistribution(), {"max_evaluations": 100}, FIVE),
-        (cradle.QuadraticDissipation(9.0), {"max_problems": 2}, Chain([10, 0.1, 10], [0, 1, 0], 1)),
+        (SpringChain(), {"max_steps": 20}, ELASTIC),
+        (EnergyDistribution(), {"max_evaluations": 100}, FIVE),
+        (QuadraticDissipation(9.0), {"max_problems": 2}, Chain([10, 0.1, 10], [0, 1, 0], 1)),
         (SequentialCollisions(), {"max_events": 2}, FIVE),
         (SequentialCollisions("right"), {"max_events": 2}, FIVE),
     ],
@@ -96,6 +104,15 @@ def test_bounds_of_other_models(model, less, chain):
     found, after = stopped(chain, replace(model, **less)), collide(chain, model).velocities
     assert ((found.bounds[0] <= after) & (after <= found.bounds[1])).all()
     assert (found.bounds[1] - found.bounds[0] < 4.0).all()
+
+
+def test_bounds_narrow_as_the_impact_comes_to_rest():
+    chain = Chain([1, 1e-3, 1, 1e-3, 1], [1, 0, 0, 0, 0], 0.1)
+    widths = []
+    for steps in (10, 100, 1000):
+        found = stopped(chain, ImpulseCorrelation(0.1, excess="saturate", max_events=steps))
+        widths.append(np.ptp(found.bounds, axis=0).max())
+    assert widths[0] > widths[1] > widths[2] > 0.0
 
 
 def test_bounds_in_any_units_and_frame():

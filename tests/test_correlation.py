@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from chains import magnitudes, random_chains, uniform, with_ends, within_bounds
 
-import cradle
-from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide, post_impact_velocities
+from cradle import (
+    Chain,
+    ImpactNotCertified,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    collide,
+    outcomes,
+    post_impact_velocities,
+)
 
 
 @pytest.mark.parametrize("name", ["forward", "backward"])
@@ -56,7 +63,7 @@ def test_the_short_cut_decides_as_the_loop_does():
 
     for n in (2, 3):
         m, v, e, f, b = random_chains(rng, 1500, n, decades=3, speed=strike)
-        result = cradle.outcomes(m, v, e, f, b)
+        result = outcomes(m, v, e, f, b)
         for k in range(len(m)):
             trace = collide(Chain(m[k], v[k], e[k]), ImpulseCorrelation(f[k], b[k]))
             assert result.collisions[k].tolist() == trace.collisions.tolist()
@@ -69,7 +76,7 @@ def test_the_short_cut_decides_as_the_loop_does():
 def test_no_row_of_a_batch_is_left_out_in_silence(monkeypatch):
     """Should the impact that stopped a batch not stop alone, those after it are not solved."""
     monkeypatch.setattr(ImpulseCorrelation, "solve", lambda *_: None)
-    with pytest.raises(cradle.ImpactNotCertified, match="among others it stops, alone it does not"):
+    with pytest.raises(ImpactNotCertified, match="among others it stops, alone it does not"):
         post_impact_velocities([[1, 1, 1, 1]] * 3, [1, 0, 0, 0], 1, 0.1, max_events=1)
 
 
@@ -95,7 +102,7 @@ def test_batch_is_a_loop_of_single_impacts():
     f, b = 0.2 * rng.random((4, n - 2)), 0.2 * rng.random((3, 1, 2, 1, n - 2))[:, 0]
     f, b = np.minimum(f, 0.05), np.minimum(b, 0.05)
     batch = post_impact_velocities(m, v, e, f, b, excess="saturate", meeting=0.3)
-    margins = cradle.outcomes(m, v, e, f, b, excess="saturate", meeting=0.3).margin
+    margins = outcomes(m, v, e, f, b, excess="saturate", meeting=0.3).margin
     lead = np.broadcast_shapes(*(part.shape[:-1] for part in (m, v, e, f, b)))
     assert batch.shape == (*lead, n)
     assert margins.shape == lead
@@ -109,13 +116,18 @@ def test_batch_is_a_loop_of_single_impacts():
         assert margins[at] == trace.margin
 
 
-def test_scalars_the_missing_backward_ratio_and_an_empty_batch():
-    assert post_impact_velocities(np.ones((0, 3)), [1, 0, 0], 1, 0.1).shape == (0, 3)
+def test_scalars_and_the_missing_backward_ratio():
     full = post_impact_velocities([1, 2, 1], [1, 0, 0], [0.5, 0.5], [0.1], [0.1])
     assert full.tobytes() == post_impact_velocities([1, 2, 1], [1, 0, 0], 0.5, 0.1).tobytes()
     light = [[1, 0.1, 1], [1, 0, 0], 0.5, 0.1]
     assert post_impact_velocities(*light, 0.1).tobytes() == post_impact_velocities(*light).tobytes()
     assert post_impact_velocities(*light, 0.3).tobytes() != post_impact_velocities(*light).tobytes()
+
+
+def test_small_batches():
+    assert post_impact_velocities(np.ones((0, 3)), [1, 0, 0], 1, 0.1).shape == (0, 3)
+    whole = np.array([1, 1], np.int8)
+    assert post_impact_velocities(whole, [1, 0], 1, 0).tolist() == [0.0, 1.0]
 
 
 def test_inputs_are_left_alone():

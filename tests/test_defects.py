@@ -150,6 +150,9 @@ def test_masses_of_fifteen_decades_are_solved_and_of_more_refused():
         collide(Chain([1e-8, 1e-26, 1e-9, 1], [0, 1, 0, 0], [0, 1, 1]), ImpulseCorrelation(0.3))
 
 
+COUNT = 400
+
+
 def finished(name, count, seed):
     """Problems of a family with their traces; nearly all must finish."""
     found = []
@@ -164,12 +167,12 @@ def finished(name, count, seed):
 
 @pytest.mark.parametrize("name", FAMILIES)
 def test_invariants(name):
-    for problem, trace in finished(name, 400, seed=1):
+    for problem, trace in finished(name, COUNT, seed=1):
         assert faults(trace, overlap=1e-30) == [], problem
 
 
 @pytest.mark.parametrize("name", ["ties", "ties within bounds"])
 def test_boosts_by_exact_speeds(name):
-    for problem, trace in finished(name, 200, seed=3):
+    for problem, trace in finished(name, COUNT // 2, seed=3):
         boosted = problem.boosted(1.5).collide(max_events=100_000)
         assert difference(boosted.velocities - 1.5, trace.velocities) < 1e-8, problem

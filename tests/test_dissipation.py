@@ -86,10 +86,10 @@ def test_against_every_active_set(case):
     np.testing.assert_allclose(trace.path[1], minimum(*case), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("last", [0.0, 1e-300, 1e-15, 1e-3])
+@pytest.mark.parametrize("last", [0.0, 1e-300, 1e-25, 1e-15, 1e-9, 1e-3])
 def test_a_light_pair_between_heavy_balls_and_a_coefficient_of_0_or_next_to_it(last):
     rng = np.random.default_rng(1)
-    for _ in range(25):
+    for _ in range(50):
         masses = rng.integers(1, 9, 4) / [1, 32, 32, 1]
         chain = Chain(masses, -np.sort(rng.integers(0, 9, 4)) / 8, 0)
         if not (chain.closing_speeds > 0).any():
@@ -112,7 +112,7 @@ def test_a_light_pair_between_heavy_balls_and_a_coefficient_of_0_or_next_to_it(l
 )
 def test_coefficients_of_all_magnitudes_in_one_chain(values, sizes, tolerance):
     rng = np.random.default_rng(2)
-    for _ in range(120):
+    for _ in range(300):
         n = int(rng.choice(sizes))
         masses = np.ldexp(rng.random(n) + 0.5, rng.integers(-4, 5, n))
         chain = Chain(masses, rng.integers(-4, 5, n) / 4, 0)
@@ -176,20 +176,6 @@ def test_heavy_balls_come_to_rest_by_impulses_below_their_last_digit():
     common = sum(map(Fraction, np.multiply(m, v))) / sum(map(Fraction, m))
     np.testing.assert_allclose(trace.velocities, float(common), rtol=2e-15)
     assert len(trace.events) < 1000
-
-
-@pytest.mark.parametrize("power", [-1074, -1030, 900])
-def test_no_unit_of_mass(power):
-    """To the smallest floats, where the equations in kilograms were singular."""
-    velocities = collide(Chain([1, 2, 1], [1, 0, 0], 0.5), QuadraticDissipation()).velocities
-    same = Chain(np.ldexp([1.0, 2.0, 1.0], power), [1, 0, 0], 0.5)
-    assert collide(same, QuadraticDissipation()).velocities.tolist() == velocities.tolist()
-
-
-def test_balls_that_grow_lighter_towards_an_end_and_just_heavy_ones():
-    for masses in ([1, 1e-6, 1], [1, 1e-7, 1e-14], [1e-12, 1, 1e12]):
-        after = collide(Chain(masses, [1, 0, 0], 0.5), QuadraticDissipation()).velocities
-        assert (np.diff(after) > -1e-14).all()
 
 
 def test_a_light_striker_keeps_its_momentum():

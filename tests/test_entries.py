@@ -17,7 +17,21 @@ import pytest
 from matplotlib.figure import Figure
 
 import cradle
-from cradle import Chain, ImpulseCorrelation, Pendulums, closed_form, collide, fit, measures
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    FusedChain,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    Pendulums,
+    QuadraticDissipation,
+    SequentialCollisions,
+    SpringChain,
+    closed_form,
+    collide,
+    fit,
+    measures,
+)
 from cradle.pictures import animation
 from cradle.pictures import impacts as figures
 from cradle.row import Row, step_rows
@@ -57,18 +71,18 @@ ENTRIES = {
     Chain: BALLS,
     collide: {"chain": THREE, "model": MODEL, "record": True, "progress": False},
     ImpulseCorrelation: RATIOS,
-    cradle.SequentialCollisions: {"order": "left", "max_events": 100},
-    cradle.FusedChain: {},
+    SequentialCollisions: {"order": "left", "max_events": 100},
+    FusedChain: {},
     cradle.SpeedDependent: {"model": MODEL, "restitution": cradle.ConstantLoss(0.1)},
     cradle.ConstantLoss: {"speed": 0.1},
     cradle.ViscousLoss: {"viscosity": 1e-3, "masses": [1, 1]} | SPRINGS,
-    cradle.SpringChain: FORCES | {"max_steps": 10_000},
-    cradle.EnergyDistribution: SPRINGS | {"rtol": 1e-6, "max_evaluations": 10_000},
+    SpringChain: FORCES | {"max_steps": 10_000},
+    EnergyDistribution: SPRINGS | {"rtol": 1e-6, "max_evaluations": 10_000},
     cradle.spring_velocities: MANY | FORCES,
     cradle.spring_outcomes: MANY | FORCES,
     cradle.hertz_stiffness: {"radii": [0.01, 0.01], "young": 1e9, "poisson": 0.3},
     cradle.viscosity_from: {"restitution": 0.9, "speed": 1, "masses": [1, 1], "stiffness": 1},
-    cradle.QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
+    QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
     cradle.post_impact_velocities: BALLS | RATIOS | {"progress": False},
     cradle.outcomes: BALLS | RATIOS | {"progress": False},
     cradle.paper_chain: {"sequence": "ABC", "speed": 1.0, "excess": "saturate"},
@@ -137,7 +151,7 @@ def fault(call, arguments) -> str:
     """Say what is wrong with how a call ends; nothing if it is right."""
     try:
         call(**arguments)
-    except (ValueError, TypeError, cradle.ImpactNotFinished) as error:
+    except (ValueError, TypeError, ImpactNotFinished) as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         own = Path(last.filename).is_relative_to(PACKAGE)
         if own and last.lineno in raising_lines(last.filename):

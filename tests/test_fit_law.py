@@ -7,8 +7,14 @@ from real_cradles import SLOWER, first_strikes
 from scipy.special import ndtri
 from stored import read
 
-import cradle
-from cradle import Chain, ImpulseCorrelation, SequentialCollisions, SpringChain, collide
+from cradle import (
+    Chain,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    post_impact_velocities,
+)
 from cradle.fit import Shots, ShotSet, fit_law, ratio, restitution
 from cradle.fit.laws import _Search
 
@@ -27,7 +33,7 @@ def simulated(name, masses, e, ratios, noise, seed, count=12):
     """Shots of a row by the paper's rule: the striker's speed and the outcome read with errors."""
     rng = np.random.default_rng(seed)
     speed = uniform(rng, 0.5, 1.5, count)[:, None] * np.eye(1, len(masses))
-    after = cradle.post_impact_velocities(masses, speed, e, ratios)
+    after = post_impact_velocities(masses, speed, e, ratios)
     seen = speed * (1 + noise * ndtri(uniform(rng, 0, 1, (count, 1))))
     moved = after + noise * ndtri(uniform(rng, 0, 1, after.shape))
     return shot_set(name, seen, moved, noise, noise * speed, masses)

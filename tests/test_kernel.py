@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -16,11 +17,19 @@ import numpy as np
 import pytest
 import tqdm
 from chains import random_chains, with_ends
-from kernels import needs_numba, runtimes
+from kernels import needs_numba
 from plain import solve
 
-import cradle
-from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide, kernel, outcomes
+from cradle import (
+    Chain,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    kernel,
+    outcomes,
+)
 from cradle import post_impact_velocities as batch
 from cradle.runtime import compile as runtime
 from cradle.runtime import job as drive
@@ -215,25 +224,40 @@ def test_compiled_code_is_looked_for_once(monkeypatch):
     assert looks[0] > runtime.LOADS_AFTER
 
 
-@pytest.mark.parametrize(("name", "large"), [("_found", False), ("_stored", True)])
+@pytest.mark.usefixtures("fresh_runtime")
+@needs_numba
+def test_threads_share_what_is_compiled(monkeypatch):
+    """Threads that need compiled code at the same time get one module, so it compiles once."""
+    monkeypatch.setattr(runtime, "_stored", lambda: time.sleep(0.2))
+    together = threading.Barrier(4)
+
+    def choose(_):
+        together.wait()
+        return runtime.chosen(large=True)
+
+    with ThreadPoolExecutor(4) as pool:
+        modules = set(pool.map(choose, range(4)))
+    assert len(modules) == 1
+
+
 @needs_numba
 @pytest.mark.usefixtures("fresh_runtime")
-def test_one_thread_at_a_time_looks_for_compiled_code_and_makes_it(monkeypatch, name, large):
-    """Else each has a module to compile; in Python 3.11 two parsers can trip each other up."""
+def test_one_thread_at_a_time_looks_for_compiled_code(monkeypatch):
+    """A look parses the source: in Python 3.11 two threads at once can trip each other up."""
     inside, most = [], []
 
-    def look(*door):
+    def look(door):
         inside.append(door)
         most.append(len(inside))
         time.sleep(0.02)
         inside.pop()
+        return False
 
-    monkeypatch.setattr(runtime, name, look)
+    monkeypatch.setattr(runtime, "_found", look)
     monkeypatch.setattr(runtime, "_spent", (runtime.LOADS_AFTER + runtime.PAYS_AFTER) / 2)
     with ThreadPoolExecutor(4) as pool:
-        found = set(pool.map(lambda _: runtime.chosen(large), range(4)))
-    assert len(found) == 1
-    assert set(most) == {1}
+        assert [*pool.map(lambda _: runtime.chosen() is kernel, range(4))] == [True] * 4
+    assert most == [1] * 4
 
 
 @needs_numba
@@ -241,7 +265,7 @@ def test_one_thread_at_a_time_looks_for_compiled_code_and_makes_it(monkeypatch, 
 def test_warm_up_compiles_what_calls_take():
     """A chain's own arrays, which nobody may write to, would be compiled for a second time."""
     drive.warm_up.__wrapped__()
-    for door, model in (("batch", ImpulseCorrelation(0.0)), ("follow", cradle.SpringChain())):
+    for door, model in (("batch", ImpulseCorrelation(0.0)), ("follow", SpringChain())):
         assert runtime.loaded(door)
         assert runtime.chosen(door=door) is runtime.compiled()
         collide(Chain([1, 1, 1], [1, 0, 0]), model)
@@ -262,8 +286,9 @@ def test_compiled_code_is_found_on_disk():
 @pytest.mark.usefixtures("fresh_runtime")
 def test_an_edit_and_another_way_to_compile_make_new_units(monkeypatch):
     names, source = [runtime._name()], runtime.unit()
-    monkeypatch.setattr(runtime, "unit", lambda: source + "\nLAST = 1\n")
-    names.append(runtime._name())
+    with monkeypatch.context() as other:
+        other.setattr(runtime, "unit", lambda: source + "\nLAST = 1\n")
+        names.append(runtime._name())
     monkeypatch.setitem(runtime._MEANINGS, "apart", {**runtime._APART, "error_model": "python"})
     names.append(runtime._name())
     assert len(set(names)) == 3
@@ -383,11 +408,11 @@ def test_no_function_is_inlined_that_is_meant_to_stand_apart():
 LONG = np.ones(30), np.eye(30)[0], np.full(29, 0.9), np.full(28, 0.1), np.full(28, 0.1)
 
 
-@runtimes
+@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
 @pytest.mark.parametrize("effort", [1, 1000])
 def test_pauses_do_not_change_a_bit(plain, monkeypatch, on, effort):
     plain(on)
-    cases = [(LONG, {"max_events": 10**6}), *mixed_chains(5, 20)]
+    cases = [(LONG, {"max_events": 10**6}), *mixed_chains(5, 40)]
     expected = [outcome(*case) for case in cases]
     monkeypatch.setattr(drive, "_EFFORT", {False: effort, True: effort})
     for case, (done, trace) in zip(cases, expected, strict=True):
@@ -426,7 +451,7 @@ def test_the_same_bits_if_it_goes_on_compiled_midway(monkeypatch):
         assert one.tobytes() == other.tobytes()
 
 
-@runtimes
+@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
 def test_a_path_grows_with_its_impact(plain, on):
     """Longer than the room made first; the same as in room enough from the start."""
     plain(on)
@@ -446,7 +471,7 @@ def test_a_path_grows_with_its_impact(plain, on):
     assert impulses == trace.path_impulses.tolist()
 
 
-@runtimes
+@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
 def test_the_path_is_kept_if_asked_for_or_up_to_a_bound(plain, on, monkeypatch):
     plain(on)
     chain, model = Chain(*LONG[:3]), ImpulseCorrelation(*LONG[3:])
@@ -478,10 +503,10 @@ def test_a_path_holds_ten_million_numbers_unless_asked_for(monkeypatch):
             assert len(collide(chain, model).events) == kept
         # This model takes no `record`, so it is not advised.
         with pytest.warns(UserWarning, match=r"events$"):
-            collide(chain, cradle.SequentialCollisions())
+            collide(chain, SequentialCollisions())
 
 
-@runtimes
+@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
 def test_progress_of_one_long_impact_is_shown(plain, capsys, on, monkeypatch):
     plain(on)
     monkeypatch.setattr(drive, "_EFFORT", {False: 1000, True: 1000})

@@ -6,17 +6,26 @@ import numpy as np
 import pytest
 from chains import magnitudes, uniform
 
-import cradle
-from cradle import Chain, ConstantLoss, ImpulseCorrelation, SpeedDependent, collide
+from cradle import (
+    Chain,
+    ConstantLoss,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    Pendulums,
+    SequentialCollisions,
+    SpeedDependent,
+    ViscousLoss,
+    collide,
+    spring_velocities,
+    swing,
+)
 from cradle.models import correlation
 
 STEEL = {"masses": [0.045, 0.03], "stiffness": 1e10}
 
 
 @pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize(
-    "model", [ImpulseCorrelation(0.1), cradle.SequentialCollisions()], ids=repr
-)
+@pytest.mark.parametrize("model", [ImpulseCorrelation(0.1), SequentialCollisions()], ids=repr)
 def test_two_balls_part_as_the_law_says(model, seed):
     rng = np.random.default_rng(seed)
     m, v = magnitudes(rng, 6, 2), [uniform(rng, 0, 1), -uniform(rng, 0, 1)]
@@ -45,32 +54,30 @@ def test_each_contact_has_the_restitution_of_its_fastest_closing(seed):
 
 def test_restitutions_that_never_agree_are_said():
     fickle = itertools.cycle([0.2, 0.3, 0.4])
-    law = SpeedDependent(cradle.SequentialCollisions(), lambda _: next(fickle))
-    with pytest.raises(cradle.ImpactNotFinished, match="do not agree after 50 runs"):
+    law = SpeedDependent(SequentialCollisions(), lambda _: next(fickle))
+    with pytest.raises(ImpactNotFinished, match="do not agree after 50 runs"):
         collide(Chain([1, 1], [1, 0]), law)
 
 
 def test_a_path_that_is_cut_tells_no_speeds(monkeypatch):
     """What is left out could be faster."""
     monkeypatch.setattr(correlation, "_MOST_NUMBERS", 11)
-    with pytest.raises(cradle.ImpactNotFinished, match="do not agree"):
+    with pytest.raises(ImpactNotFinished, match="do not agree"):
         collide(Chain([1, 1, 1], [1, 0, 0]), SpeedDependent(ImpulseCorrelation(0.1), lambda _: 0.9))
 
 
 def test_a_part_of_a_swinging_row_has_its_part_of_the_inner_law():
     """Balls 0 to 2 touch and are struck, with the ratio of ball 1; the others hang apart."""
-    hanging = cradle.Pendulums(0.1, gaps=[0, 0, 0.02, 0])
+    hanging = Pendulums(0.1, gaps=[0, 0, 0.02, 0])
     law = ImpulseCorrelation((0.05, 0.1, 0.15))
     runs = [
-        cradle.swing(
-            Chain([1] * 5, [0] * 5), model, [-0.02, 0, 0, 0, 0], [0, 0.2], pendulums=hanging
-        )
+        swing(Chain([1] * 5, [0] * 5), model, [-0.02, 0, 0, 0, 0], [0, 0.2], pendulums=hanging)
         for model in (law, SpeedDependent(law, lambda _: 1.0))
     ]
     assert runs[0].positions.tolist() == runs[1].positions.tolist()
     wrong = SpeedDependent(ImpulseCorrelation((0.1, 0.2)), abs)
     with pytest.raises(ValueError, match="forward has 2 values; 5 balls need 3"):
-        cradle.swing(Chain([1] * 5, [0] * 5), wrong, [0] * 5, [0])
+        swing(Chain([1] * 5, [0] * 5), wrong, [0] * 5, [0])
 
 
 @pytest.mark.parametrize("exponent", [1, 1.5, 2.5])
@@ -78,12 +85,12 @@ def test_a_part_of_a_swinging_row_has_its_part_of_the_inner_law():
 def test_viscous_balls_part_as_contact_forces_say(exponent, u):
     for viscosity in (1e-7, 1e-9):
         balls = STEEL | {"exponent": exponent, "viscosity": viscosity}
-        left, right = cradle.spring_velocities(velocities=[u, 0], **balls, accuracy=1e-9)
-        assert cradle.ViscousLoss(**balls)(u) == pytest.approx((right - left) / u, abs=3e-9)
+        left, right = spring_velocities(velocities=[u, 0], **balls, accuracy=1e-9)
+        assert ViscousLoss(**balls)(u) == pytest.approx((right - left) / u, abs=3e-9)
 
 
 def test_a_viscous_ball_may_be_too_fast():
-    law = cradle.ViscousLoss(1e-5, **STEEL)
+    law = ViscousLoss(1e-5, **STEEL)
     assert 0.6 < law(1e-2) < law(1e-3) < 1
     with pytest.raises(ValueError, match=r"viscosity = 1e-05; must be at most \d.* at u = 1000"):
         law(1000)

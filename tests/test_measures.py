@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 from chains import magnitudes, striking, uniform
 
-import cradle
-from cradle import Chain, EnergyDistribution, FusedChain, ImpulseCorrelation, collide
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    FusedChain,
+    ImpulseCorrelation,
+    SequentialCollisions,
+    collide,
+    post_impact_velocities,
+)
 from cradle.measures import (
     bouncing_pattern,
     condition_number,
@@ -36,7 +43,7 @@ def test_effective_ratio_of_a_ratio_is_that_ratio(masses, e, part):
 
 
 def test_effective_ratio_of_the_textbook_answers():
-    assert effective_ratio(collide(striking(), cradle.SequentialCollisions())) == pytest.approx(0)
+    assert effective_ratio(collide(striking(), SequentialCollisions())) == pytest.approx(0)
     assert effective_ratio(collide(striking(), FusedChain())) == pytest.approx(0.5, abs=1e-9)
 
 
@@ -58,9 +65,7 @@ def test_no_effective_ratio():
     after = collide(trace.chain, ImpulseCorrelation(ratio)).velocities
     assert abs(after - trace.velocities).max() == pytest.approx(miss, rel=0.01)
     # No ratio of a fine grid comes nearer by much.
-    grid = cradle.post_impact_velocities(
-        [1, 1, 1], [1, 0, 0], 0.5, np.linspace(0, 0.5, 5001)[:, None]
-    )
+    grid = post_impact_velocities([1, 1, 1], [1, 0, 0], 0.5, np.linspace(0, 0.5, 5001)[:, None])
     assert abs(grid - trace.velocities).max(axis=1).min() > 0.95 * miss
 
 

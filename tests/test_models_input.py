@@ -7,12 +7,22 @@ import numpy as np
 import pytest
 
 import cradle
-from cradle import Chain, EnergyDistribution, SequentialCollisions, SpringChain, collide
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    FusedChain,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    QuadraticDissipation,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+)
 
-DISSIPATION = cradle.QuadraticDissipation
+DISSIPATION = QuadraticDissipation
 LAWS = [
     SpringChain(), EnergyDistribution(), DISSIPATION(3), SequentialCollisions("left"),
-    SequentialCollisions("right"), cradle.FusedChain(), cradle.ImpulseCorrelation(0.1),
+    SequentialCollisions("right"), FusedChain(), ImpulseCorrelation(0.1),
 ]  # fmt: skip
 
 
@@ -46,7 +56,7 @@ def test_models_compare_by_value_and_their_repr_makes_them_again(caption):
     arrays = re.sub(r"(max_\w+)=(\d+)", r"\1=np.int64(\2)", arrays)
     same = eval(arrays, vars(cradle) | {"np": np})
     assert (same, repr(same)) == (model, caption)
-    assert model != cradle.ImpulseCorrelation([0.1, 0.2], 0.3)
+    assert model != ImpulseCorrelation([0.1, 0.2], 0.3)
 
 
 @pytest.mark.parametrize("model", LAWS, ids=repr)
@@ -102,7 +112,7 @@ def test_two_balls(model, masses, e):
 )  # fmt: skip
 def test_unfinished_impacts_show_what_was_reached(model, masses, velocities, words, reached):
     chain = Chain(masses, velocities, 1)
-    with pytest.raises(cradle.ImpactNotFinished, match=f"max_[a-z]+ = {words}") as stopped:
+    with pytest.raises(ImpactNotFinished, match=f"max_[a-z]+ = {words}") as stopped:
         collide(chain, model)
     trace = stopped.value.trace
     assert trace.chain is chain
@@ -124,6 +134,23 @@ def test_outcomes_have_no_units(model, mass, speed):
     assert other.kinetic_energy == np.ldexp(chain.kinetic_energy, mass + 2 * speed)
     lost = np.ldexp(one.energy_loss, mass + 2 * speed)
     assert same.energy_loss == pytest.approx(lost, abs=works.max() * 1e-14)
+
+
+@pytest.mark.parametrize("power", [-1074, -1030, 900])
+def test_dissipation_has_no_unit_of_mass(power):
+    """To the smallest floats, where the equations in kilograms were singular."""
+    velocities = collide(Chain([1, 2, 1], [1, 0, 0], 0.5), QuadraticDissipation()).velocities
+    same = Chain(np.ldexp([1.0, 2.0, 1.0], power), [1, 0, 0], 0.5)
+    assert collide(same, QuadraticDissipation()).velocities.tolist() == velocities.tolist()
+
+
+@pytest.mark.parametrize("masses", [[1, 1e-6, 1], [1, 1e-7, 1e-14], [1e-12, 1, 1e12]])
+def test_dissipation_takes_balls_that_grow_lighter_towards_an_end_and_just_heavy_ones(masses):
+    after = collide(Chain(masses, [1, 0, 0], 0.5), DISSIPATION()).velocities
+    if masses[2] == 1:
+        np.testing.assert_allclose(after, 1 / (2 + 1e-6), rtol=1e-9)
+    else:
+        assert (np.diff(after) > -1e-14).all()
 
 
 def test_one_stiffness_for_all_needs_no_value():

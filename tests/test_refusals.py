@@ -5,7 +5,6 @@ entry point for whatever is no such value at all.
 """
 
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -45,14 +44,11 @@ from cradle.closed_form import (
 from cradle.fit import read_tracker
 from cradle.measures import bouncing_pattern, condition_number, conserving_outcomes, effective_ratio
 from cradle.pictures.animation import animate_swing
-from cradle.row import Row
 
 NAN, INF, ONES = np.nan, np.inf, np.ones(3)
 PAIR = {"masses": [1, 1], "velocities": [1, 0]}
 THREE, LOSSY = striking(), striking(e=0.9)
 TRACE = collide(THREE, ImpulseCorrelation(0.1))
-STILL = SimpleNamespace(motion=lambda: ([[0, 0], [1, 0]], [[0] * 2] * 2), push=None, advance=None)
-ROW = Row(STILL, Chain([1, 1], [0, 0]), SequentialCollisions(), 0.5)
 FILM = DATA / "video_synthetic.txt"
 RUN = swing(Chain([1, 1], [0, 0]), SequentialCollisions(), [-0.03, 0], [0.0, 0.1])
 
@@ -106,6 +102,10 @@ CHAINS = [
     ({"restitution": 1 + 2**-52}, "restitution = 1.0000000000000002; must lie in [0, 1]"),
     ({"restitution": [1, 1e-31]}, "restitution[1] = 1e-31; must be 0 or at least 1e-30"),
     ({"restitution": [1, 1, 1]}, "restitution has shape (3,); 3 balls need () or (2,): one number"),
+    (
+        {"masses": [1, 1], "velocities": [1, 0], "restitution": [1, 1]},
+        "restitution has shape (2,); 2 balls need () or (1,): one number, or one for each contact",
+    ),
     ({"masses": [1, [2, 3], 4]}, "masses[1] has shape (2,), masses[0] has (); must have one shape"),
     ({"velocities": [1j, 0, 0]}, "velocities[0] = 1j; must be a real number"),
     ({"restitution": "1"}, "restitution = '1'; must be real numbers, one shape"),
@@ -192,8 +192,14 @@ SPRINGS = [
     ({"stiffness": [1, 1e-10]}, "stiffness[1] = 1e-10; must be at least 1e-09 of the stiffest"),
     ({"exponent": 0.9}, "exponent = 0.9; must lie in [1, 10]"),
     ({"viscosity": [0.1, -0.1]}, "viscosity[1] = -0.1; must be at least 0"),
-    ({"viscosity": 5.0}, "viscosity[0] = 5.0; must be at most 0.227 s, 0.3 (m u^2 / k)^(1 / 2.5)"),
-    ({"gaps": 1e12}, "gaps[0] = 1000000000000.0; must at this accuracy be at most 1"),
+    (
+        {"viscosity": 5.0},
+        "viscosity[0] = 5.0; must be at most 0.227 s, 0.3 (m u^2 / k)^(1 / 2.5) / u",
+    ),
+    (
+        {"gaps": 1e12},
+        "gaps[0] = 1000000000000.0; must at this accuracy be at most 1",
+    ),
     ({"gaps": [0, 1e-20]}, "gaps[1] = 1e-20; must be 0, or 1e-12 of 0.758 m, that is (m u^2"),
     ({"gaps": [0, -3]}, "gaps[1] = -3.0; must be a lean of at most 0.758 m, that is (m"),
     ({"accuracy": 1e-13}, "accuracy = 1e-13; must lie in [1e-12, 0.02]"),
@@ -347,8 +353,6 @@ OTHERS = [
     (read_tracker, {"path": FILM, "time_scale": 0}, "time_scale = 0.0; must be above 0"),
     (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
     (TRACE.plot, {"contact": 4}, "contact = 4; must be a whole number, 0 to 1"),
-    *((ROW.step, (time,), f"duration = {time}; must be above 0") for time in (0.0, -1.0)),
-    (ROW.step, (NAN,), "duration = nan; must be finite"),
     (animate_swing, ([],), "runs has no swing, or one without a duration"),
     (animate_swing, (RUN, ["a", "b"]), "labels has 2 lines; 1 swings need as many"),
 ]  # fmt: skip

@@ -10,15 +10,25 @@ import pytest
 import tqdm
 from chains import SPRINGS, magnitudes, striking, uniform
 from dop853 import integrated
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from kernels import needs_numba
 from mpmath import zeta
 from scipy.integrate import quad
 from scipy.special import gamma
 
-import cradle
-from cradle import Chain, ImpactNotFinished, SpringChain, collide, spring_velocities, viscosity_from
+from cradle import (
+    Chain,
+    EnergyDistribution,
+    ImpactNotCertified,
+    ImpactNotFinished,
+    SpringChain,
+    collide,
+    hertz_stiffness,
+    spring_outcomes,
+    spring_velocities,
+    viscosity_from,
+)
 from cradle.kernel import accuracy as control
 from cradle.kernel import kinks
 from cradle.kernel.state import REFUSED, UNFINISHED, UNSOUND
@@ -50,7 +60,7 @@ def test_another_integrator_agrees_to_the_accuracy_asked_for(case):
     m, v, k, p, loss, gaps = case
     exact, law = integrated(*case), {"exponent": p, "viscosity": loss, "gaps": gaps}
     scale = max(a - b for a, b in itertools.pairwise(v))
-    for accuracy in (1e-2, 1e-4, 1e-6):
+    for accuracy in (1e-2, 1e-4, 1e-6, 1e-8):
         found = spring_velocities(m, v, k, **law, accuracy=accuracy)
         assert abs(found - exact).max() <= accuracy * scale
     trace = collide(Chain(m, v), SpringChain(k, **law, accuracy=1e-8))
@@ -166,15 +176,15 @@ def test_viscosity_from_a_restitution_at_a_speed():
 def test_stiffness_of_spheres_of_a_material():
     """Hertz: F = 4/3 E* R*^(1/2) d^(3/2), 1/R* = 1/R + 1/R', 1/E* likewise of E/(1 - nu^2)."""
     radii = np.array([[0.011, 0.02, 1e-3], [0.3, 0.3, 0.5]])
-    k = cradle.hertz_stiffness(radii, 70e9, 0.33)
+    k = hertz_stiffness(radii, 70e9, 0.33)
     for row, found in zip(radii, k, strict=True):
         for left, right, one in zip(row, row[1:], found, strict=False):
             size, modulus = 1 / (1 / left + 1 / right), 1 / (2 * (1 - 0.33**2) / 70e9)
             assert one == pytest.approx(4 / 3 * modulus * math.sqrt(size), rel=1e-14)
-    assert cradle.hertz_stiffness([0.01, 0.01])[0] == pytest.approx(1.0878e10, rel=1e-4)
+    assert hertz_stiffness([0.01, 0.01])[0] == pytest.approx(1.0878e10, rel=1e-4)
 
 
-@pytest.mark.parametrize("n", [10, 40])
+@pytest.mark.parametrize("n", [10, 20, 40])
 def test_fast_balls_of_a_long_chain(n):
     """Hinch and Saint-Jean 1999: about 1.5 N^(1/3) balls fly off, the others rebound slowly."""
     after = spring_velocities([1] * n, struck(n), accuracy=1e-6)
@@ -207,12 +217,12 @@ def random_chains(seed, count, n, loss=0.0):
 def test_accuracy_is_kept_on_random_chains(monkeypatch, p, loss, n):
     """Against the same loop asked for a hundred times more; the seeds were not used for tuning."""
     monkeypatch.setenv(runtime.VARIABLE, "compiled")
-    m, v, k, gaps, lost = random_chains(300 + n, 100, n, loss)
+    m, v, k, gaps, lost = random_chains(300 + n, 200, n, loss)
     options = {"exponent": p, "viscosity": lost, "gaps": gaps}
     finer = spring_velocities(m, v, k, **options, accuracy=1e-7 if not loss else 1e-6)
     speed = (v[:, :-1] - v[:, 1:]).max(axis=1)
     for accuracy in (1e-2, 1e-3, 1e-4):
-        found, told = cradle.spring_outcomes(m, v, k, **options, accuracy=accuracy)
+        found, told = spring_outcomes(m, v, k, **options, accuracy=accuracy)
         off = abs(found - finer).max(axis=1) / speed
         assert off.max() <= accuracy >= told.max()
         assert (off > told).mean() < 0.02  # an estimate, hardly ever too low
@@ -220,16 +230,15 @@ def test_accuracy_is_kept_on_random_chains(monkeypatch, p, loss, n):
         assert (np.diff(found, axis=1) >= -0.01 * accuracy * speed[:, None]).all()
 
 
-def test_a_batch_tells_the_error_of_each_chain_and_leading_axes_broadcast():
+def test_a_batch_tells_the_error_of_each_chain():
     m, v, k, gaps, lost = random_chains(5, 4, 4, 0.1)
-    options = {"viscosity": lost[:, None], "accuracy": 1e-5}
-    found = cradle.spring_outcomes(m[:, None], v[:2], k[0], gaps=gaps[:2], **options)
-    assert (found[0].shape, found[1].shape) == ((4, 2, 4), (4, 2))
-    for i, j in np.ndindex(4, 2):
-        model = SpringChain(k[0], viscosity=lost[i], gaps=gaps[j], accuracy=1e-5)
-        alone = collide(Chain(m[i], v[j]), model)
-        assert (alone.velocities.tolist(), alone.error) == (found[0][i, j].tolist(), found[1][i, j])
-    assert spring_velocities(np.ones((0, 3)), [1, 0, 0]).shape == (0, 3)
+    options = {"exponent": 1.5, "accuracy": 1e-5}
+    found = spring_outcomes(m, v, k, viscosity=lost, gaps=gaps, **options)
+    assert found[1].shape == (4,)
+    for row, velocities, error in zip(zip(m, v, k, lost, gaps, strict=True), *found, strict=True):
+        model = SpringChain(row[2], viscosity=row[3], gaps=row[4], **options)
+        alone = collide(Chain(*row[:2]), model)
+        assert (alone.velocities.tolist(), alone.error) == (velocities.tolist(), error)
 
 
 @needs_numba
@@ -277,19 +286,20 @@ def test_losses_and_leans_leave_the_fourth_order(monkeypatch, name):
 
     omega = math.sqrt(error(0.1)[1])
     largest = [
-        max(error(radians / omega * part)[0] for part in np.linspace(0.95, 1.05, 21))
+        max(error(radians / omega * part)[0] for part in np.linspace(0.95, 1.05, 41))
         for radians in (0.16, 0.04)
     ]
     assert largest[0] <= (0.05 if name in LOSSY else 2.0) * 0.16**4
     assert largest[1] <= largest[0] / 4**3.3
     if name == "opened and closed within a step":
-        assert max(error(h)[0] for h in np.linspace(0.13, 0.155, 20)) <= 0.01
+        assert max(error(h)[0] for h in np.linspace(0.13, 0.155, 40)) <= 0.01
 
 
-def test_a_light_ball_that_swings_often_amplifies_no_error():
+@pytest.mark.parametrize("light", [1e-3, 1e-4])
+def test_a_light_ball_that_swings_often_amplifies_no_error(light):
     """Each swing adds to the error: from some on two runs are compared."""
-    chain = striking([1, 3e-4, 1])
-    exact = collide(chain, cradle.EnergyDistribution(rtol=1e-13)).velocities
+    chain = striking([1, light, 1])
+    exact = collide(chain, EnergyDistribution(rtol=1e-13)).velocities
     found = collide(chain, SpringChain(accuracy=1e-4)).velocities
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-4)
 
@@ -330,10 +340,18 @@ def test_far_scales_and_what_the_impact_does_not_reach():
     assert (trace.events, trace.durations.any(), trace.evaluations) == ((), False, 0)
 
 
+def test_leading_axes_broadcast():
+    v = np.array([[1.0, 0, 0], [1.0, 0.5, 0], [0, 0, -1.0]])
+    found = spring_velocities(np.ones((2, 1, 3)), v, [1.0, 2.0], gaps=[[[0.1, 0]], [[0.0, 0]]])
+    assert found.shape == (2, 3, 3)
+    alone = spring_velocities([1, 1, 1], v[1], [1.0, 2.0], gaps=[0.1, 0.0])
+    assert found[0, 1].tobytes() == alone.tobytes()
+    assert spring_velocities(np.ones((0, 3)), [1, 0, 0]).shape == (0, 3)
+
+
 # --- the trace ------------------------------------------------------------------------------
 
 
-@settings(max_examples=50)
 @given(st.data())
 def test_what_every_trace_keeps(data):
     n, part = data.draw(st.integers(2, 5)), st.floats(-1, 1)
@@ -359,6 +377,13 @@ def test_what_every_trace_keeps(data):
     assert ends == trace.collisions.tolist()
     assert ((trace.impulses != 0) <= (trace.collisions > 0)).all()
     assert trace.energy_loss == 0
+
+
+def test_what_was_handed_out_is_not_written_to_when_the_way_is_followed():
+    trace = collide(Chain([1, 1], [1, 0]), SpringChain())
+    trace.velocities[:] = 7.0
+    assert len(trace.path) == 3
+    assert trace.velocities.tolist() == [7.0, 7.0]
 
 
 def test_events_forces_and_works():
@@ -390,7 +415,7 @@ def test_balls_that_part_meet_after_a_flight():
 
 def test_a_closing_of_rounding_size_is_none():
     """Balls that crossed wide gaps keep closing speeds of some 1e-16; the impact ends."""
-    for n, gap, accuracy in ((5, 7.25, 1e-9), (6, 3.0, 1e-8), (8, 12.0, 1e-7)):
+    for n, gap, accuracy in ((5, 1.5, 1e-9), (5, 7.25, 1e-9), (6, 3.0, 1e-8), (8, 12.0, 1e-7)):
         chain = Chain([1] * n, np.eye(n)[0])
         after = collide(chain, SpringChain(gaps=gap, accuracy=accuracy)).velocities
         np.testing.assert_allclose(after, np.eye(n)[-1], rtol=0, atol=1e-5)
@@ -517,7 +542,7 @@ def test_the_certificate_breaks(monkeypatch, change, defect):
 
     monkeypatch.setenv(runtime.VARIABLE, "plain")
     monkeypatch.setattr(control, "run", wrong)
-    with pytest.raises(cradle.ImpactNotCertified, match=defect):
+    with pytest.raises(ImpactNotCertified, match=defect):
         spring_velocities([1, 1, 1], [1, 0, 0])
 
 
@@ -526,9 +551,7 @@ def test_the_way_of_a_trace_is_there_for_all_who_read_it():
     trace = collide(Chain([1, 1, 1], struck(3)), SpringChain())
     assert {"times", "forces", "path", "impulses", "durations"} <= set(dir(trace))
     assert not hasattr(trace, "time")
-    trace.velocities[:] = 7.0  # what was handed out is not written to any more
     assert trace.times is not None
-    assert trace.velocities.tolist() == [7.0] * 3
     # The second thread has looked for it in vain, and asks here when the first one is done.
     np.testing.assert_array_equal(trace.__getattr__("times"), trace.times)
 

@@ -6,6 +6,7 @@ import re
 from functools import partial
 
 import numpy as np
+import pandas
 import pytest
 from numpy.polynomial import chebyshev
 from scipy.integrate import solve_ivp
@@ -106,17 +107,26 @@ def test_tiny_amplitudes_of_any_angle_are_as_exact(size, gaps):
 # The toy
 
 
-@pytest.mark.parametrize(
-    ("ratio", "e", "k"), [(0, 1.0, 1), (0, 1.0, 3), (0.15, 0.9, 1), (0.4, 1.0, 1), (0.05, 0.7, 2)]
-)
-def test_second_third_and_twentieth_stroke(ratio, e, k):
-    """All meet again at the lowest point, velocities reversed: strokes are a map, solved anew.
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+def test_as_many_fly_off_as_are_pulled_back(k):
+    times = np.arange(0, 61) * 0.5
+    run = swing(balls(5), ImpulseCorrelation(0), pulled(5, k), times, pendulums=ONE_HERTZ)
+    assert len(run.impacts) == 60
+    for stroke, impact in enumerate(run.impacts):
+        moving = np.abs(impact.after) > 1e-12
+        expected = [False] * (5 - k) + [True] * k
+        assert moving.tolist() == (expected if stroke % 2 == 0 else expected[::-1])
+    out = np.abs(run.positions[1::2]).max()
+    assert out == pytest.approx(0.02, rel=1e-13)
+    np.testing.assert_allclose(run.positions[1], -np.array(pulled(5, k))[::-1], atol=1e-15)
 
-    At ratio 0 as many fly off as are pulled back.
-    """
+
+@pytest.mark.parametrize(("ratio", "e"), [(0.15, 1.0), (0.15, 0.9), (0.4, 1.0), (0.05, 0.7)])
+def test_second_third_and_twentieth_stroke(ratio, e):
+    """All meet again at the lowest point, velocities reversed: strokes are a map, solved anew."""
     n = 4
-    run = swing(balls(n, e), ImpulseCorrelation(ratio), pulled(n, k), [10.2], pendulums=ONE_HERTZ)
-    v = [0.02 * 2 * math.pi] * k + [0] * (n - k)
+    run = swing(balls(n, e), ImpulseCorrelation(ratio), pulled(n), [10.2], pendulums=ONE_HERTZ)
+    v = [0.02 * 2 * math.pi, 0, 0, 0]
     for stroke in range(20):
         v = solve([1.0] * n, v, [e] * (n - 1), ratio).velocities
         v = [float(a) for a in v]
@@ -142,7 +152,7 @@ def test_energy_ledger(how, e):
     """What is missing at any time is what the contacts kept back; nothing for e = 1."""
     pendulums = PENDULUMS[how]
     chain = Chain([1, 2, 0.5, 1], [0.1, 0, 0, -0.2], e)
-    times = np.linspace(0, 2, 51)
+    times = np.linspace(0, 4, 101)
     run = swing(chain, ImpulseCorrelation(0.1), [-0.03, -0.01, 0, 0.01], times, pendulums=pendulums)
     assert len(run.impacts) > 10
     start = run.energy[0]
@@ -202,11 +212,11 @@ def springs(y, span, m, k, pendulums, viscosity=0.0, **options):
 )
 def test_two_balls_at_a_time_are_the_limit_of_stiff_springs(m, x, pendulums):
     """With a contact time that goes to zero like k^(-2/5), so does the difference."""
-    times = np.linspace(0, 1, 11)
+    times = np.linspace(0, 2, 21)
     run = swing(Chain(m, np.zeros(len(m)), 1), ImpulseCorrelation(0), x, times, pendulums=pendulums)
-    assert len(run.impacts) >= 2
+    assert len(run.impacts) >= 3
     y, exact = [*x, *np.zeros(len(m))], {"t_eval": times, "rtol": 1e-10, "atol": 1e-14}
-    ways = [springs(y, (0, 1), m, k, pendulums, max_step=0.01, **exact) for k in (1e7, 1e9, 1e11)]
+    ways = [springs(y, (0, 2), m, k, pendulums, max_step=0.01, **exact) for k in (1e7, 1e9, 1e11)]
     apart = [np.abs(way[: len(m)].T - run.positions).max() / 0.02 for way in ways]
     assert apart[2] < 0.005
     for coarse, fine in zip(apart, apart[1:]):
@@ -484,7 +494,7 @@ def test_first_fall_is_the_first():
     """Against values on a fine grid: positive up to the root, zero there."""
     rng = np.random.default_rng(13)
     found = 0
-    for _ in range(150):
+    for _ in range(300):
         rates = [complex(-0.05 * a, 0.5 + b) for a, b in rng.random((2, 2))]
         terms = [(complex(a, b), rate) for (a, b), rate in zip(rng.random((2, 2)) - 0.5, rates)]
         level = max(rng.random() - sum(c.real for c, _ in terms), 0.0)
@@ -500,7 +510,7 @@ def test_first_fall_is_the_first():
         if root < 50:
             assert abs(value(root)) < 1e-14
             found += 1
-    assert found > 50
+    assert found > 100
 
 
 @pytest.mark.parametrize(
@@ -730,3 +740,10 @@ def test_mirror():
     ]
     assert len(runs[0].impacts) > 20
     np.testing.assert_allclose(runs[1].positions[:, ::-1], -runs[0].positions, rtol=0, atol=1e-12)
+
+
+def test_frames():
+    run = swing(balls(3), ImpulseCorrelation(0), pulled(3), [0, 0.3, 0.6], pendulums=ONE_HERTZ)
+    impacts = pandas.DataFrame(run.impacts)
+    assert list(impacts.columns[:2]) == ["time", "contacts"]
+    assert len(impacts) == len(run.impacts)
