@@ -6,6 +6,7 @@ from functools import cache
 import mpmath
 import numpy as np
 import pytest
+from chains import uniform
 from chapters import Chapter, floats, points
 from truth import solve
 
@@ -206,7 +207,7 @@ def test_bands_of_the_ten_predictions():
             off = {}  # of an entry, wherever the chain uses it
 
             def entry(name, value, off=off):
-                return max(0, value + off.setdefault(name, rng.uniform(-0.01, 0.01)))
+                return max(0, value + off.setdefault(name, uniform(rng, -0.01, 0.01)))
 
             e = [min(1, entry("".join(sorted(xy)), table_1.loc[xy[0], xy[1]])) for xy in pairs]
             forward, backward = (

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 import real_cradles
 import real_swing
-import scipy
 from chapters import Chapter, points
 from numpy.polynomial import Polynomial
 from real_cradles import first_strikes, spheres, table
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, least_squares, minimize, minimize_scalar
-from scipy.special import gammaincc
+from scipy.special import gammaincc, ndtri
 from stored import read
 
 from cradle import (
@@ -207,8 +206,9 @@ def test_a_strike_counts_as_four_velocities():
         direct = t["sigma_before"][use & (t["striker"] == 1)]
         direct = np.nansum(direct**-2.0) ** -0.5
         weight = direct**2 / (direct**2 + (own @ own) / release**2)
-        off, slip = rng.normal(size=(4000, 5)) * own, direct * rng.normal(size=4000)
-        off += 0.002 * rng.normal(size=off.shape)
+        normal = ndtri(rng.random((4000, 11)))
+        off = normal[:, :5] * own + 0.002 * normal[:, 5:10]
+        slip = direct * normal[:, 10]
         unit = 1 + weight * off.sum(axis=1) / release + (1 - weight) * slip
         films = (w + off) / unit[:, None]
         sums = [
@@ -425,7 +425,7 @@ def test_the_errors_of_the_fit_by_simulated_films():
         noisy = {}
         for release in (1, 2):
             sigma, v = data[release][1], law(true, release, True)
-            scale, *off = scipy.special.ndtri(rng.random(6))
+            scale, *off = ndtri(rng.random(6))
             noisy[release] = (1 + 0.01 * scale) * v + sigma * off, sigma
         fit = least_squares(
             lambda p, noisy=noisy: real_cradles.misfits(

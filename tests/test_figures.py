@@ -2,6 +2,7 @@
 
 import io
 import re
+import struct
 from itertools import pairwise
 
 import draw_readme
@@ -118,6 +119,14 @@ def test_balls_differ_in_colour_and_in_dash():
     # Told apart in grey as well: the first three, which most figures need.
     grey = [np.dot(to_rgb(style["color"]), [0.2126, 0.7152, 0.0722]) for style in styles[:3]]
     assert len(set(np.round(grey, 2))) == 3
+
+
+def test_readme_picture_is_sharp_and_small(root):
+    head = (root / "book" / "_static" / "cradle.png").read_bytes()
+    width, height = struct.unpack(">II", head[16:24])
+    assert width >= 1500
+    assert height >= 700
+    assert len(head) < 200_000
 
 
 def test_readme_film_is_the_toys(root):

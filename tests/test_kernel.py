@@ -344,6 +344,21 @@ def test_code_on_disk_that_cannot_be_read_is_removed_once(monkeypatch, tmp_path,
     assert "cannot be read (EOFError('Ran out of input')); compiled anew" in said.getMessage()
 
 
+@pytest.mark.exhaustive
+@needs_numba
+def test_half_a_file_of_compiled_code_is_compiled_anew(tmp_path):
+    command = [sys.executable, "-W", "error", "-m", "cradle", "warm-up"]
+    options = {"capture_output": True, "text": True, "check": True}
+    own = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    warm_up = functools.partial(subprocess.run, command, env=own, **options)
+    warm_up()
+    for pattern in ("*batch-*.nbc", "*batch-*.nbi"):
+        (file,) = tmp_path.rglob(pattern)
+        file.write_bytes(file.read_bytes()[:100])
+        assert "cannot be read" in warm_up().stderr
+        assert "loaded in" in warm_up().stdout
+
+
 @pytest.mark.usefixtures("fresh_runtime")
 @pytest.mark.parametrize("large", [False, True])
 def test_the_wish_for_a_kernel_is_one_of_two_words(monkeypatch, large):
