@@ -88,10 +88,8 @@ class SpringChain:
         # As arrays that may be written to: else all would be compiled a second time.
         row = Springs(*(row[None].copy() for row in (chain.masses, chain.velocities, *contacts)))
         hunt = self.damping == DAMPING[1]
-        out, law = (
-            motions(1, n),
-            Law(self.exponent, self.accuracy, float(self.max_steps), once, hunt),
-        )
+        out = motions(1, n)
+        law = Law(self.exponent, self.accuracy, float(self.max_steps), once, hunt)
         if progress:
             from tqdm import tqdm
 
