@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,7 @@ from cradle import (
     outcomes,
 )
 from cradle import post_impact_velocities as batch
+from cradle.kernel import numbers
 from cradle.runtime import compile as runtime
 from cradle.runtime import job as drive
 
@@ -357,6 +359,16 @@ def test_half_a_file_of_compiled_code_is_compiled_anew(tmp_path):
         file.write_bytes(file.read_bytes()[:100])
         assert "cannot be read" in warm_up().stderr
         assert "loaded in" in warm_up().stdout
+
+
+@pytest.mark.parametrize("power", range(-7, 15))
+@pytest.mark.parametrize("digits", ["1", "107", "123456789012345", "999999999999999"])
+def test_a_number_means_the_decimal_that_it_prints_as(power, digits):
+    """Of up to fifteen digits, to the last bit of two floats."""
+    text = f"{digits[0]}.{digits[1:]}e{power}"
+    found = numbers.read(float(text))
+    off = abs(Decimal(found.real) + Decimal(found.imag) - Decimal(text))
+    assert off <= Decimal(text) * Decimal(2) ** -104
 
 
 @pytest.mark.usefixtures("fresh_runtime")
