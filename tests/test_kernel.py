@@ -524,8 +524,8 @@ def test_the_path_is_kept_if_asked_for_or_up_to_a_bound(plain, on, monkeypatch):
 def test_a_path_holds_ten_million_numbers_unless_asked_for(monkeypatch):
     """However many balls: N velocities and N - 1 impulses at each event, at least one event."""
     chain, model = Chain(*LONG[:3]), ImpulseCorrelation(0)
-    for numbers, kept in ((59 * 7, 7), (59 * 8 - 1, 7), (1, 1)):
-        monkeypatch.setattr("cradle.models.correlation._MOST_NUMBERS", numbers)
+    for room, kept in ((59 * 7, 7), (59 * 8 - 1, 7), (1, 1)):
+        monkeypatch.setattr("cradle.models.correlation._MOST_NUMBERS", room)
         with pytest.warns(UserWarning, match=f"the first {kept} of"):
             assert len(collide(chain, model).events) == kept
         # This model takes no `record`, so it is not advised.
