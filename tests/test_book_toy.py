@@ -199,7 +199,7 @@ def test_fig_toy_inside_and_film():
     """The curves end, and the stored film moves, as the independent solver says."""
     shown = [xy[-1, 1] for xy in panel("toy", "fig-toy-inside").values()]
     expected = strokes(2, [1, 0, 0, 0, 0])[1]
-    np.testing.assert_allclose(np.array(shown) / STRIKE, expected, atol=1e-9)
+    np.testing.assert_allclose(shown, expected, atol=1e-9)
     film = CHAPTER.cells["film"].outputs[0].data["text/html"]
     for row, ratio in enumerate((0, RATIO, 0.5)):
         v = strokes(1, [1, 0, 0, 0, 0], ratio=ratio)[0]
