@@ -5,8 +5,6 @@ import contextlib
 import decimal
 import functools
 import io
-import os
-import pickle
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +13,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import nbformat
 import numpy as np
-from built_book import SHARED
+from kept_figures import keep, kept
 from matplotlib.figure import Figure
 from page import WORDS
 
@@ -147,32 +145,37 @@ def figure_name(cell) -> str | None:
     return cell.metadata.get("mystnb", {}).get("figure", {}).get("name")
 
 
+def shows_image(cell) -> bool:
+    return any(
+        kind.startswith("image/") for output in cell.outputs for kind in output.get("data", {})
+    )
+
+
 @functools.cache
 def drawn(chapter: str, cells: tuple[str, ...] | None = None) -> dict[str, Figure]:
-    """Run a chapter as stored, in the first process that needs it; return its figures by name.
+    """Return the figures of a chapter as stored, by name: if nobody has drawn them it is run.
 
     Of some `cells`, by their ids, only these are run; else all up to the last figure.
     """
-    shared = os.environ.get(SHARED) if cells is None else None
-    if shared and Path(shared, f"{chapter}.figures").exists():
-        return pickle.loads(Path(shared, f"{chapter}.figures").read_bytes())
-    figures, names, chosen = {}, {}, code(chapter)
-    if cells is not None:
-        chosen = [cell for cell in chosen if cell.id in cells]
+    chosen = [cell for cell in code(chapter) if cells is None or cell.id in cells]
     while not figure_name(chosen[-1]):
         chosen.pop()
+    pictures = {figure_name(cell): cell.source for cell in chosen if shows_image(cell)}
+    figures = {name: kept(source) for name, source in pictures.items()}
+    if all(figures.values()):
+        return figures
+    figures, names = {}, {}
 
-    def keep():
-        figures[figure_name(names["__cell__"])] = plt.gcf()
-        plt.figure(plt.gcf().number).canvas.draw()
-        plt.close(plt.gcf())
+    def show():
+        cell, figure = names["__cell__"], plt.gcf()
+        figures[figure_name(cell)] = figure
+        figure.canvas.draw()
+        plt.close(figure)
 
-    with in_memory(keep), contextlib.redirect_stdout(io.StringIO()):
+    with in_memory(show), contextlib.redirect_stdout(io.StringIO()):
         run(chosen, {}, names=names)
-    if shared:
-        part = Path(shared, f"{chapter}.{os.getpid()}")
-        part.write_bytes(pickle.dumps(figures))
-        part.replace(Path(shared, f"{chapter}.figures"))
+    for name, figure in figures.items():
+        keep(pictures[name], figure)
     return figures
 
 

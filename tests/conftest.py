@@ -12,6 +12,7 @@ import pytest
 from built_book import SHARED, built
 from explorer import Tab
 from hypothesis import HealthCheck, settings
+from kept_figures import in_kernels
 from pages import launched, visiting
 
 # The same examples at every run of the same sources. Hypothesis also draws the numbers that it
@@ -59,20 +60,26 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 #: Files that take longest, in this order: begun first, so that no process is left alone with one.
+#: Notebooks come before the tests that look at what they draw.
 LONG = (
-    "tests/test_book_parameters.py", "tests/test_explorer_reading.py", "tests/test_layout.py",
-    "book/reading_patterns.ipynb", "tests/test_extremes.py", "tests/test_book_figures.py",
-    "tests/test_explorer_page.py", "tests/test_kernel.py", "tests/test_speed.py",
-    "tests/test_command.py", "tests/test_work_area.py", "tests/test_judge.py",
-    "tests/test_scene.py", "tests/test_explorer_engine.py", "tests/test_explorer_touch.py",
-    "book/toy.ipynb", "tests/test_fit.py", "tests/test_springs.py", "tests/test_row.py",
+    "tests/test_layout.py", "tests/test_explorer_reading.py", "tests/test_book_parameters.py",
+    "book/toy.ipynb", "book/measure.ipynb", "book/real_cradles.ipynb", "book/",
+    "tests/test_book_real_cradles.py", "tests/test_fit_swing.py", "tests/test_explorer_guess.py",
+    "tests/test_explorer_touch.py", "tests/test_explorer_page.py", "tests/test_fit_law.py",
+    "tests/test_real_cradles.py", "tests/test_reader_solver.py", "tests/test_command.py",
+    "tests/test_explorer_spheres.py", "tests/test_extremes.py", "tests/test_kernel.py",
+    "tests/test_book_figures.py", "tests/test_book_experiments.py", "tests/test_speed.py",
 )  # fmt: skip
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the files that take longest first, in the order in which processes take them."""
-    place = {name: number for number, name in enumerate(LONG)}
-    items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(LONG)))
+    files = {item.nodeid.partition("::")[0] for item in items}
+    places = {
+        file: next((k for k, name in enumerate(LONG) if file.startswith(name)), len(LONG))
+        for file in files
+    }
+    items.sort(key=lambda item: places[item.nodeid.partition("::")[0]])
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -86,6 +93,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     shared = tempfile.TemporaryDirectory(prefix="cradle-tests-", ignore_cleanup_errors=True)
     session.config.add_cleanup(shared.cleanup)
     os.environ[SHARED] = shared.name
+    in_kernels(shared.name)
     everything = option.markexpr == "not exhaustive" and not option.keyword
     if everything and "tests" in session.config.args:
         book = subprocess.Popen(

@@ -11,7 +11,9 @@ from pathlib import Path
 import execute
 import nbformat
 import pytest
-from chapters import run, shown
+from built_book import SHARED
+from chapters import code, run, shown, shows_image
+from kept_figures import in_kernels, kept
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 BOOK = Path(__file__).parents[1] / "book"
@@ -33,12 +35,6 @@ def marks(cell) -> str:
     """Return all that tells nbval how to treat a cell: its tags, and comments in its source."""
     comments = [line for line in cell.source.splitlines() if line.lstrip().startswith("#")]
     return "\n".join([*cell.metadata.get("tags", []), *comments])
-
-
-def shows_image(cell) -> bool:
-    return any(
-        kind.startswith("image/") for output in cell.outputs for kind in output.get("data", {})
-    )
 
 
 def faults(notebook) -> list[str]:
@@ -258,13 +254,29 @@ def test_letters_of_the_chapters_have_one_line_on_the_notation_page():
     assert len(used) > 8
 
 
-def test_one_changed_digit_fails(tmp_path: Path, root: Path):
-    """The project's own options compare stored outputs; a lax option would pass both."""
+DRAWS = """import importlib.util
+assert not importlib.util.find_spec("chapters")
+assert not {"note", "keep", "kept", "plt"} & {*globals()}
+import matplotlib.pyplot as plt
+plt.plot([3, 1, 2])
+plt.show()"""
+
+
+def test_one_changed_digit_fails(tmp_path: Path, tmp_path_factory, root: Path, monkeypatch):
+    """The project's own options compare stored outputs; a lax option would pass both.
+
+    What cells draw is kept for other tests, and cells find nothing that helps with that.
+    """
     for name, stored in (("right", "42\n"), ("wrong", "43\n")):
         notebook = sample()
         notebook.cells = notebook.cells[:2]
         notebook.cells[1].outputs[0].text = stored
         nbformat.write(notebook, tmp_path / f"{name}.ipynb")
+    nbformat.write(new_notebook(cells=[new_code_cell(DRAWS)]), tmp_path / "drawn.ipynb")
+    shared = str(tmp_path_factory.mktemp("shared"))
+    monkeypatch.setenv(SHARED, shared)
+    monkeypatch.setenv("IPYTHONDIR", "")  # put back afterwards
+    in_kernels(shared)
     run = subprocess.run(
         [sys.executable, "-m", "pytest", "-n0", "-p", "no:cacheprovider",
          "--config-file", root / "pyproject.toml", tmp_path],
@@ -273,8 +285,16 @@ def test_one_changed_digit_fails(tmp_path: Path, root: Path):
         text=True,
         check=False,
     )  # fmt: skip
-    assert "1 failed, 1 passed" in run.stdout
+    assert "1 failed, 2 passed" in run.stdout
     assert re.search(r"(?s)right\.ipynb \. .*wrong\.ipynb F ", run.stdout)
+    (line,) = kept(DRAWS).axes[0].lines
+    assert line.get_ydata().tolist() == [3, 1, 2]
+
+
+def test_no_two_cells_draw_with_the_same_words():
+    """Figures are kept by the sources of their cells."""
+    sources = [cell.source for path in NOTEBOOKS for cell in code(path.stem) if shows_image(cell)]
+    assert len(sources) == len(set(sources)) > 50
 
 
 def test_no_number_is_typed_into_a_description():
