@@ -115,6 +115,14 @@ class _Search:
     freedom: int
     tried: list[tuple[float, list[float]]] = field(default_factory=list)  # minima: chi-square, z
 
+    def __post_init__(self) -> None:
+        """Ask each set once: its different starts, who has which, and the errors of the factor."""
+        self.starts = [np.unique(one.before, axis=0, return_inverse=True) for one in self.sets]
+        self.errors = [
+            np.abs(one.sigma_before / np.where(one.before, one.before, np.inf)).max(axis=1)
+            for one in self.sets
+        ]
+
     def numbers(self, z: Vector) -> dict[str, float]:
         """Return the numbers by name."""
         low, high = np.array([*self.ranges.values()], float).T
@@ -124,8 +132,7 @@ class _Search:
         """Return residuals over errors, (K, N + 1) for each set, the last one of the factor."""
         values, found = {**self.known, **self.numbers(np.round(z, 9))}, []  # none nearly at an end
         e = values.pop("restitution")
-        for one in self.sets:
-            starts, of = np.unique(one.before, axis=0, return_inverse=True)
+        for one, (starts, of), error in zip(self.sets, self.starts, self.errors, strict=True):
             try:
                 model = self.laws[one.name](**values)
                 chains = [Chain(one.masses, before, e) for before in starts]
@@ -134,7 +141,6 @@ class _Search:
                 told = f"inside ranges = {dict(self.ranges)} is what a law refuses"
                 raise ValueError(f"{told}: {reason}") from reason
             weight = 1.0 / one.sigma**2
-            error = np.abs(one.sigma_before / np.where(one.before, one.before, np.inf)).max(axis=1)
             # The factor that makes the sum of squares least, less 1 and over its error.
             gain = (weight * v * (one.after - v)).sum(axis=1) * error
             off = gain / (1.0 + error**2 * (weight * v * v).sum(axis=1))

@@ -109,7 +109,7 @@ class TimedTrace(EnergyTrace):
         row, law, out = vars(self)["_ran"]
         clock = follow(row, law, out, record=record)[2]
         begun, ended = record[0][0], record[-1][-1]
-        time, y, u = ended[0, 0], ended[2, :-1], -np.diff(ended[1])  # u: closing speeds
+        time, y, u = ended[0, 0], ended[2, :-1], ended[1, :-1] - ended[1, 1:]  # u: closing
         late = np.divide(y, -u, out=np.zeros_like(u), where=(y > 0.0) & (y < -u * time)).max()
         length, time = clock["length"], time + late
         way = np.append(0.0, length * np.cumsum(begun[2, :-1] - y - late * u))

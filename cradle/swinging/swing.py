@@ -1,5 +1,6 @@
 """The swinging cradle; `resting` tells the rules of touching and resting balls."""
 
+import copy
 import functools
 import math
 from collections.abc import Sequence
@@ -188,12 +189,13 @@ class _Run:
 
     def gaps(self) -> Vector:
         """Return the gaps of the contacts, m; 0 where balls touch."""
-        gaps = self.hanging.gaps + np.diff(self.x)
+        gaps = self.hanging.gaps + (self.x[1:] - self.x[:-1])
         return np.where(gaps > NEAR * self.size, gaps, 0.0)
 
     def collide(self, groups: Sequence[Any], before: Vector) -> tuple[float, Vector, Vector]:
         """Solve the impacts of this instant as one; return how long, how far, and from which v."""
-        closing, duration, way = -np.diff(before) > RESTING * self.speed, 0.0, 0.0 * before
+        closing = before[:-1] - before[1:] > RESTING * self.speed
+        duration, way = 0.0, 0.0 * before
         struck = [(first, last) for first, last in groups if closing[first : last - 1].any()]
         if not struck:
             return duration, way, before
@@ -233,7 +235,8 @@ class _Run:
         law: Any = self.model(first, last)
         more: dict[str, Any] = {"once": True} if self.lasting else {}
         if self.lasting:
-            law = replace(law, gaps=tuple(self.gaps()[first : last - 1].tolist()))
+            law = copy.copy(law)  # whose gaps need not be asked about
+            vars(law)["gaps"] = tuple(self.gaps()[first : last - 1].tolist())
         try:
             # Not by `collide`, whose advice on a long path cannot be taken here.
             trace: Trace = law.solve(Chain._of(m, before[first:last].copy(), e), **more)
