@@ -160,8 +160,9 @@ def visiting(browser, idle: dict[tuple, list], home: str):
         if stopped:  # for dates, timers and frames alike; `tab.clock.run_for` lets time pass
             tab.clock.install(time=0)
             tab.clock.pause_at(10**6)
-        if plain:  # seconds go into equations
-            tab.route("**/tex-svg-full.js", lambda route: route.fulfill(body=""))
+        # Seconds go into equations, and into icons of the theme.
+        for script in ("fontawesome", *["tex-svg-full"] * plain):
+            tab.route(f"**/{script}.js*", lambda route: route.fulfill(body=""))
         return tab, listened(tab)
 
     def visit(
