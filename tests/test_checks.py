@@ -11,11 +11,7 @@ import pytest
 import sympy
 
 from cradle import Chain, ImpulseCorrelation, collide, post_impact_velocities
-from cradle.input.values import (
-    numbers,
-    one_number,
-    whole_number,
-)
+from cradle.input.values import numbers, one_number, shown, whole_number
 
 
 class Uncertain:
@@ -112,6 +108,18 @@ def test_long_values_are_cut():
         with pytest.raises(ValueError, match=r"\.\.\.; must be") as error:
             check("step", list(range(10_000)))
         assert len(str(error.value)) < 200
+
+
+def test_of_a_long_list_only_the_beginning_is_written():
+    class Loud:
+        written = 0
+
+        def __repr__(self):
+            Loud.written += 1
+            return "loud"
+
+    assert shown([Loud()] * 10_000).endswith("...")
+    assert Loud.written < 100
 
 
 def test_fractions_and_decimals_go_through():

@@ -39,7 +39,6 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"\b(sigma|known)=": r"--\1",
     r"(?<!column )\b(wanted|accuracy|impacts|length|sigma|speed|window) = ": r"--\1 ",
     r"^path = ": "--output ",
-    r"^Format '(\w+)' is not supported.*": r"--plot ends in .\1; must end in .png, .svg or .pdf",
     r"\btypes = ": "--predict ",
     r"restitution has no '(.+?)', which set (.+) needs; it has (.*)": (
         rf"set \2 needs the restitution of \1: {_SHOOT} (there are: \3)"
@@ -95,10 +94,10 @@ def solve(plot: str | None, as_json: bool, as_csv: bool, **options: Any) -> None
     """
     given = described(**options)
     chain = given.chain
-    if plot:
-        from matplotlib.figure import Figure  # what is missing is said before work
     trace = collide(given.taken, given.model, progress=True)
     if plot:
+        from matplotlib.figure import Figure
+
         figure = Figure((7, 4.3), layout="constrained")
         trace.plot(figure.subplots())
         figure.savefig(plot, format=Path(plot).suffix[1:] or "png")

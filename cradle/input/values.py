@@ -211,6 +211,8 @@ def shown(value: object) -> str:
     """Return a value as an error repeats it: on one line, and cut if it is long."""
     if isinstance(value, (np.floating, np.complexfloating)):
         return str(value)  # as a plain number
+    if isinstance(value, list | tuple) and len(value) > _SHOWN:
+        value = value[:_SHOWN]  # enough; a long one takes long to write
     text = " ".join(repr(value).split())
     return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
 
