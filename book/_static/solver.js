@@ -158,7 +158,7 @@
       halt.disabled = false;
       told.textContent = "running \u2026";
       slow = setTimeout(() => {
-        told.textContent = "Still running. If a loop has no end, press Stop.";
+        told.textContent = "Still running. If a loop has no end, press Stop and bound it: for k in range(100).";
       }, LONG);
     }
 
