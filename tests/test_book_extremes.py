@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 from chapters import Chapter, floats, number, points, shows
+from page import said
 from problem import Problem
 from stored import read
 
@@ -135,6 +136,12 @@ def test_fig_extremes_count_by_the_wedge_and_edge_by_the_eigenvalues():
         assert border == pytest.approx(x.infinite_below(e), rel=1e-9)
 
 
+def calm(row, pairs, middle):
+    """Whether equal balls stand in the second line of the table."""
+    e, ratio = float(row["restitution"]), float(row["ratio"])
+    return e == 1 or (ratio == 0 and e > pairs) or (0.1 <= ratio <= 0.2 and e > max(middle))
+
+
 def test_fig_extremes_shortest_as_drawn():
     """The least of all ratios; the textbook's outcome jumps there, too."""
     rows = [r for r in stored("shortest", spread="0") if int(r["balls"])]
@@ -154,6 +161,14 @@ def test_fig_extremes_shortest_as_drawn():
     every = sorted({float(r["restitution"]) for r in stored("shortest", spread="0")})
     pairs = max(float(r["restitution"]) for r in rows if float(r["ratio"]) == 0)
     assert float(CHAPTER.glued["pairs-e"]) == every[every.index(pairs) + 1]
+    grown = [
+        max(
+            float(r["short"]),
+            0 if int(r["balls"]) or not calm(r, pairs, middle) else float(r["largest"]),
+        )
+        for r in stored("shortest", spread="0")
+    ]
+    assert float(CHAPTER.glued["calm"]) == math.ceil(1e12 * max(grown))
     one, other = x.copies(np.random.default_rng(1), np.ones((6, 8)), 0.42, 0.2, 1e-12)
     with mpmath.workdps(50):
         off = [
@@ -161,6 +176,25 @@ def test_fig_extremes_shortest_as_drawn():
             for pair in zip(zip(*one), zip(*other))
         ]
     assert np.abs(off).max() > 1e-4
+
+
+def test_unequal_rows_lose_what_the_table_says():
+    """More than twenty balls at small ratios: two digits, but for one group of the longest."""
+    told, lost = CHAPTER.glued, {}
+    for r in stored("unequal"):
+        key = "long" if int(r["balls"]) > int(told["uneven-short"]) else "short"
+        small = float(r["ratio"]) <= float(told[f"uneven-{'calm' if key == 'long' else 'ratio'}"])
+        digits = math.log10(float(r["largest"]) / 1e-12)
+        lost.setdefault((key, small), []).append((digits, int(r["balls"])))
+    assert max(lost["short", True])[0] < 2
+    assert said(round(max(lost["short", False])[0])) == told["uneven-digits"]
+    *others, (most, balls) = sorted(lost["long", True])
+    assert max(others)[0] < 2
+    assert (said(round(most)), balls) == (told["uneven-calm-most"], 80)
+    assert max(lost["long", False])[0] > 8
+    tried = {int(r["balls"]) for r in stored("unequal")} - {int(told["uneven-short"])}
+    assert told["uneven-long"] == " and ".join(map(str, sorted(tried)))
+    assert float(told["tried-ratio"]) == max(float(r["ratio"]) for r in stored("shortest"))
 
 
 def admissible(three):

@@ -302,6 +302,8 @@ def test_the_table_of_advice():
     assert told["off-ratios"] == f"{one:.0f} to {other:.0f}"
     half = integrated([1] * 5, np.eye(5)[0], gaps=0.5 * DEPTH)
     assert told["off-pairs"] == f"{100 * np.abs(half - np.eye(5)[4]).max():.1f}"
+    touching = integrated([1] * 5, np.eye(5)[0])
+    assert told["off-pairs-touch"] == f"{100 * np.abs(touching - np.eye(5)[4]).max():.0f}"
     energy = [r["microseconds"] for r in find("energy", chain="ABCCA")]
     assert told["alone-energy"] == f"{min(energy) / 1000:.0f} ms"
 
