@@ -80,7 +80,7 @@ def by_spheres(p, release, apart=False, masses=EQUAL, solve=spheres):
     return solve(speeds, np.abs(gaps), abs(p[3]), masses=masses) / unit
 
 
-APART = 30.0  # Hertz units: far enough
+APART = 30.0  # Hertz units: 0.6 mm; gaps fitted to the release of two depend on it
 E, LOSS, THREE = (0.5, 1.0), (0.0, 0.1), list(product((0.04, 0.12), repeat=3))
 FINE = product((0.02, 0.05, 0.08, 0.11), (0.07, 0.1, 0.13), (0.1, 0.14))
 GAPS = list(product((0.08, 0.17, 0.33), (0.04, 0.08, 0.12, 0.16), (0.02, 0.05)))
