@@ -117,9 +117,9 @@ def batch(problem):
 
 
 def single(problem):
-    """The same, of `collide`."""
+    """The same, of `collide`; with all of its path, whose cut would be warned of."""
     with contextlib.suppress(ImpactNotFinished, ImpactNotCertified):
-        return problem.collide(max_events=LONGEST).velocities.tolist()
+        return problem.collide(record=True, max_events=LONGEST).velocities.tolist()
 
 
 def judge(problem, *ask, events=EVENTS):

@@ -31,10 +31,11 @@ class Problem(NamedTuple):
         """By `textbook.solve`, `truth.solve` or anything that is called like them."""
         return solver(*self[:5], meeting=self.meeting, **options)
 
-    def collide(self, **options):
+    def collide(self, record=None, **options):
         """By the package."""
         options |= {"meeting": self.meeting, "excess": "saturate"}
-        return collide(Chain(*self[:3]), ImpulseCorrelation(*self[3:5], **options))
+        model = ImpulseCorrelation(*self[3:5], **options)
+        return collide(Chain(*self[:3]), model, record=record)
 
     def attempt(self, max_events=200_000):
         """The package's trace, finished or not, and whether it finished."""
