@@ -72,13 +72,18 @@ def _plain(value: Any) -> Any:
     return "; ".join(f"{low!r}..{high!r}" for low, high in value)
 
 
-def picture(_: click.Context, option: click.Parameter, path: str | None) -> str | None:
+def picture(_: click.Context, __: click.Parameter, path: str | None) -> str | None:
     """Return where to draw; the sign for standard output is the name of no file."""
     if path == "-":
         raise click.BadParameter("'-'; a picture goes to a file: give its name")
     if path and not Path(path).parent.is_dir():
         raise click.BadParameter(f"{path!r}; its folder is not there")
-    if path and option.name == "plot":
+    return path
+
+
+def plotted(context: click.Context, option: click.Parameter, path: str | None) -> str | None:
+    """Return where to draw a figure, whose format is known by the ending."""
+    if path := picture(context, option, path):
         from matplotlib.backend_bases import FigureCanvasBase  # what is missing is said before work
 
         if Path(path).suffix[1:].lower() not in ("", *FigureCanvasBase.filetypes):

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from cradle.command.console import format_options, picture, plot_fits, show, text
+from cradle.command.console import format_options, plot_fits, plotted, show, text
 from cradle.input.values import ABOVE_ZERO, one_number
 from cradle.tables import data_folder
 
@@ -31,7 +31,7 @@ from cradle.tables import data_folder
 @click.option("--predict", metavar="SEQUENCE", help="Predict a chain of these balls, beside its "
               "measured mean if the file has shots of it.")  # fmt: skip
 @click.option("--speed", type=float, help="Of its first ball, with --predict, m/s [1].")
-@click.option("--plot", type=click.Path(dir_okay=False), callback=picture,
+@click.option("--plot", type=click.Path(dir_okay=False), callback=plotted,
               help="Draw the likelihoods to a file.")  # fmt: skip
 @click.option("--summary", is_flag=True, help="Print errors, correlations and residuals instead.")
 @format_options

@@ -16,7 +16,7 @@ import click
 import cradle
 from cradle import ImpactNotCertified, ImpactNotFinished, collide
 from cradle.advice.choice import made
-from cradle.command.console import format_options, picture, show
+from cradle.command.console import format_options, plotted, show
 from cradle.command.describe import chain_options, described
 from cradle.command.film import film
 from cradle.command.fit import fit, template
@@ -73,7 +73,7 @@ def main(context: click.Context) -> None:
 
 
 @main.command(params=chain_options())
-@click.option("--plot", type=click.Path(dir_okay=False), callback=picture,
+@click.option("--plot", type=click.Path(dir_okay=False), callback=plotted,
               help="Draw the velocities to a file: .png, .svg or .pdf.")  # fmt: skip
 @format_options
 def solve(plot: str | None, as_json: bool, as_csv: bool, **options: Any) -> None:
