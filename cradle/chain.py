@@ -19,9 +19,9 @@ def _within(values: Vector, low: float, high: float) -> bool:
 class Chain:
     """A straight chain of balls at the instant before an impact.
 
-    Velocities are positive to the right; contact c joins balls c and c + 1.  Contacts whose balls
-    do not separate (closing speed at or above zero) touch.  A wrong value or length is a
-    `ValueError`, whose message names it and the rule.
+    Velocities are positive to the right; contact c joins balls c and c + 1.  Neighbours touch
+    unless they move apart (closing speed below zero).  A wrong value or length raises a
+    `ValueError` that names it and the rule.
 
     Parameters
     ----------

@@ -48,9 +48,9 @@ def three_balls(
 ) -> Vector:
     """Return velocities after one collision per contact of three balls (equations 22 to 33), m/s.
 
-    The result, shape (..., 3), is NaN where the radical of Eq. 30 is not real, and
-    `one_collision_each` tells where it applies.  What is no number or has a wrong shape is a
-    `ValueError`; ranges are not checked.
+    The result, shape (..., 3), is NaN where the radical of Eq. 30 is not real; where it applies,
+    `one_collision_each` tells.  What is no number or has a wrong shape raises a `ValueError`;
+    ranges are not checked.
 
     Parameters
     ----------
@@ -105,9 +105,9 @@ def largest_ratios(
 ) -> tuple[Vector, Vector]:
     """Largest admissible ratios of a chain, forward (equations 34 and 53) and backward (mirrored).
 
-    A larger ratio would let a driven contact give work although it has absorbed nothing.
-    The bound at a ball needs the ratio of the next ball in the direction of the drive; there is
-    none at the last, where the bound is Eq. 34.  Wrong values and shapes are a `ValueError`.
+    With a larger ratio a driven contact would give work without having absorbed any.  The bound at
+    a ball depends on the ratio of the next ball in the direction of the drive; at the last inner
+    ball there is none, and the bound is Eq. 34.  Wrong values and shapes raise a `ValueError`.
 
     Parameters
     ----------
@@ -144,8 +144,8 @@ def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLi
     """Mass ratio r1 = m2/m1 at and below which ball 2 falls back on ball 1 (Eq. 44, Fig. 6).
 
     The arguments broadcast: the mass ratio r2 = m2/m3, at least 0, the restitution of the two
-    contacts, e2 at least 1e-30, and the forward ratio, all 0 to 1; others are a `ValueError`.  It
-    is NaN where the ratio exceeds its bound (Eq. 34).
+    contacts, e2 at least 1e-30, and the forward ratio, all 0 to 1; others raise a `ValueError`.
+    The result is NaN where the ratio exceeds its bound (Eq. 34).
 
     Examples
     --------

@@ -21,8 +21,8 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
     Ball 1 comes from the left and strikes two balls at rest.  In pattern 1 it alone goes back
     (velocity below zero), in pattern 2 no ball does, in pattern 3 balls 1 and 2 do (Ceanga and
     Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, section 2.5).  The velocities after the impact have
-    the shape (..., 3), m/s, the patterns (...).  Another shape, a velocity that is not finite and a
-    last ball that goes back are a `ValueError`: then momentum did not come from the left.
+    the shape (..., 3), m/s, the patterns (...).  Another shape, a velocity that is not finite, and
+    a last ball that goes back (then no ball came from the left) raise a `ValueError`.
 
     Examples
     --------
@@ -54,9 +54,9 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
     counts, relative to the largest speed after the impact; the changes are added over all inputs
     and divided by `step` (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section
     1.6).  A number of 1000 says: inputs known to seven digits give an outcome known to about four.
-    Where `same_events` is False another sequence of events follows within `step`, and the outcome
-    may jump; ask again with the accuracy of your own inputs as the step.  An edge that only several
-    inputs together reach is not seen, nor one that a ball at rest reaches: zeros are not moved.
+    Where `same_events` is False, a change within `step` leads to other events, and the outcome may
+    jump; ask again with the accuracy of your own inputs as the step.  Zeros are not moved, and only
+    one input at a time; so an edge that takes several, or a ball set in motion, is not seen.
 
     Examples
     --------
@@ -103,11 +103,11 @@ def effective_ratio(trace: Trace) -> float:
     """Return the constant ratio that gives the outcome of an impact of three balls.
 
     It lies between 0 and its bound (Eq. 34) and acts in both directions, as in
-    `ImpulseCorrelation(ratio)`, held at its bound where one is smaller.  If several give the
-    outcome within 1e-6 of the fastest closing speed, it is the smallest.
+    `ImpulseCorrelation(ratio)`; in a direction with a smaller bound it is held at that.  If several
+    ratios give the outcome within 1e-6 of the fastest closing speed, it is the smallest.
     Outcomes that lose no energy differ by one number, so that one ratio often suffices; with losses
-    there is in general none, and the `ValueError` names the one that comes nearest.  Not three
-    balls, and none that approach, are a `ValueError` too.
+    there is in general none, and the `ValueError` names the one that comes nearest.  Other than
+    three balls, and balls of which none approach, raise a `ValueError` too.
 
     Examples
     --------
@@ -163,12 +163,12 @@ def conserving_outcomes(
 
     They are an arc, from v1 = v2 at angle 0 to v2 = v3 at ``arccos((m1 m3 / ((m1 + m2)
     (m2 + m3)))^(1/2))``, 60 degrees for equal balls (Walkiewicz and Newby, Am. J. Phys. 40 (1972)
-    133-137): with s = v2 - v1, and w the velocity of ball 3 from the centre of mass of balls 1 and
-    2, energy leaves the circle ``mu s^2 + M w^2 = const``; mu and M are the reduced masses.
+    133-137).  With s = v2 - v1, and w the velocity of ball 3 relative to the centre of mass of
+    balls 1 and 2, energy allows the circle ``mu s^2 + M w^2 = const``, mu and M the reduced masses.
 
     The masses, kg, and the velocities before the impact, m/s, have the shape (3,), the angles, rad,
-    (K,); 181 from end to end if left out.  They come back, with the velocities there, shape (K, 3).
-    Other values and an angle off the arc are a `ValueError`.
+    (K,); if left out, 181 from end to end.  The angles and the velocities there, shape (K, 3), are
+    returned.  Other values and an angle off the arc raise a `ValueError`.
 
     Examples
     --------
@@ -194,8 +194,8 @@ def conserving_outcomes(
 def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
     """Return the angle of an outcome on the arc of `conserving_outcomes`, rad.
 
-    Arguments are as there, with the velocities after the impact.  It is 0 for balls that all have
-    one velocity, and off the arc where they are not in order.
+    Arguments are as there, with the velocities after the impact.  The angle is 0 where all balls
+    have one velocity, and off the arc where their velocities are not in order.
 
     Examples
     --------

@@ -47,28 +47,28 @@ class Bodies(Protocol):
 class Row(Alone):
     """A row of balls that an engine moves and the package collides.
 
-    A TypeError or a ValueError is raised if a value is wrong, or the balls are no row: balls that
-    are no neighbours touch, or overlap by more than `touching`, or pivots are not in their order.
+    A TypeError or a ValueError is raised if a value is wrong, or the balls are no row: if balls
+    that are no neighbours touch, balls overlap by more than `touching`, or pivots are out of order.
 
     Parameters
     ----------
     bodies : Bodies
         The engine's adapter.  The engine must not collide these balls with each other.
     chain, model : Chain, Model
-        Masses and restitution from left to right, and the impact law.  A mass is what a push at the
-        centre meets: of a ball in one piece with its arm, the moment of inertia about the pivot
-        over arm squared.
+        Masses and restitution from left to right, and the impact law.  A mass is what resists a
+        push at the centre: for a ball that is one piece with its arm, the moment of inertia about
+        the pivot over the square of the arm.
     radii : float or array_like, shape (N,)
         Of the balls, m; above 0.
     pivots : array_like, shape (N, 2), optional
-        Where the strings end, m, in the order of the row; a string takes the part of an impulse
-        across the ball's arc.  Without pivots the balls are free.
+        Where the strings end, m, in the order of the row; a string takes up the part of an impulse
+        that is at right angles to the ball's arc.  Without pivots the balls are free.
     touching, resting : float, optional
-        Neighbours touch, and are struck together, whose gap is at most this, m, while they close or
-        part no faster than that, m/s; so do those that meet.  Slower than that they go on together.
-        Laws do not see the gap.  If left out, r / 1000 and sqrt(a r) / 100, r the smallest radius.
+        Neighbours are struck together, as if they touched, if they meet, or if their gap is at most
+        `touching`, m, and they close or part no faster than `resting`, m/s.  Balls that close more
+        slowly go on together.  If left out, r / 1000 and sqrt(a r) / 100, r the smallest radius.
     acceleration : float
-        The acceleration a of gravity, m/s^2, or what else draws neighbours together at most.
+        The acceleration a of gravity, m/s^2, or the most by which anything draws neighbours closer.
 
     Attributes
     ----------
@@ -79,8 +79,8 @@ class Row(Alone):
 
     Notes
     -----
-    A step never compiles: an impact of five balls takes a millisecond or two if `cradle.warm_up`
-    was not called before.  Any unit of length will do if the acceleration has it too.
+    A step never waits for a compiler: unless `cradle.warm_up` was called before, an impact of five
+    balls takes a millisecond or two.  Any unit of length will do if the acceleration has it too.
 
     Examples
     --------
@@ -123,10 +123,10 @@ class Row(Alone):
     def step(self, duration: float) -> None:
         """Move the scene on by one step of `duration` seconds, which the engine makes as a whole.
 
-        A ValueError or a RuntimeError is raised if the duration or what `motion` tells is wrong,
-        balls that touch are not in a row, have passed through each other or collide without end, a
-        push shows that a mass is not the engine's, or the world is seen to move on between the
-        steps of this row: see `step_rows`.
+        A ValueError or a RuntimeError is raised if the duration or what `motion` tells is wrong; if
+        balls that touch are not in a row, have passed through each other or collide without end; if
+        a push shows that a mass is not the engine's; or if the world moves on between the steps of
+        this row: see `step_rows`.
         """
         if type(duration) is float and 0.0 < duration <= self.quiet:  # the usual case, and fast
             self.quiet -= duration

@@ -109,16 +109,16 @@ def paper_chain(
 ) -> tuple[Chain, ImpulseCorrelation]:  # fmt: skip
     """Build a chain of the paper's balls, the first one striking the others at rest.
 
-    Pairs of neighbours have Table 1's restitution, and the ratios are those of Table 2: at ball Y
-    of the neighbours X, Y, Z the entry XYZ forward, and the entry ZYX backward.
+    Pairs of neighbours have the restitution of Table 1.  At ball Y of the neighbours X, Y, Z the
+    forward ratio is the entry XYZ of Table 2, the backward ratio the entry ZYX.
 
     Parameters
     ----------
     sequence : str or iterable of str
-        Ball types, first ball first: at least two letters out of "A" to "D"; else a `ValueError`,
-        or a `TypeError`.
+        Ball types, first ball first: at least two letters out of "A" to "D"; other values raise a
+        `ValueError` or a `TypeError`.
     speed, excess, meeting
-        Velocity of the first ball, m/s; the others as for `ImpulseCorrelation`.
+        Velocity of the first ball, m/s; the other two as for `ImpulseCorrelation`.
 
     Examples
     --------

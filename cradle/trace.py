@@ -40,30 +40,30 @@ class Trace:
     velocities, impulses : ndarray, shapes (N,) and (N - 1,)
         Velocities after the impact, m/s, and total impulse of each contact, N s.
     absorbed : ndarray, shape (N - 1,)
-        Work that each contact absorbed in compression, over all its collisions, J.  Of an infinite
-        sequence taken to its limit the sum is exact, the shares of its rest are good to 1e-4.
+        Work that each contact absorbed in compression, J, over all its collisions.  Where an
+        infinite sequence was taken to its limit their sum is exact, each one good to 1e-4.
     collisions : ndarray of int, shape (N - 1,)
-        How often each contact became active.  Those slower than the last digit of the velocities
-        mean nothing: an endless sequence may end there, without `collapsed`.
+        How often each contact became active.  Do not rely on collisions slower than the last digit
+        of the velocities: an endless sequence may stop there, without `collapsed`.
     path, path_impulses : ndarray, shapes (K + 1, N) and (K + 1, N - 1)
         Velocities, m/s, and impulses so far, N s, before the impact and at every event.  Between
-        two rows they are linear, but before a "collapse" or "repetition", which stand for many.
+        two rows they are linear, except before a "collapse" or a "repetition" of many events.
     events : tuple of Event, length K
         What happened at each row of the path but the first.
     collapsed, saturated : bool, tuple of int
         Whether an infinite sequence of impacts was taken to its limit; contacts that were held
         closed at the largest admissible ratio (Eqs. 34, 53) at some time.
     margin : float
-        How close another sequence of events came: the least distance of two events of one run, of
-        two meetings, or of a ratio from its bound, relative to what is compared; exact ties do not
-        count.  Below about 1e-12 another outcome may lie within the last digit of the input.  Also
-        the speed, over the fastest closing, that would join or divide balls struck from both sides:
-        0 if balls rest between, where any motion changes who drives (R2).  0 if a ratio lies
-        between 0 and 1e-4, as products of such may decide a tie beyond 32 digits; or if a sequence
-        was taken to its limit while balls elsewhere still collided: where these are then depends on
-        its last rounds.  What hundreds of collisions amplify, `condition_number` sees.
+        How close another sequence of events came: the smallest relative distance between two events
+        of one run, two meetings, or a ratio and its bound; exact ties do not count.  Below about
+        1e-12 a change of the input's last digit may change the outcome.  It is 0 in three cases: a
+        ratio lies between 0 and 1e-4, so that products of ratios may decide a tie beyond 32 digits;
+        balls are struck from both sides and those between rest, so that any motion of these changes
+        who drives (R2; if they move, the speed that would do so counts, over the fastest closing);
+        or a sequence was taken to its limit while other balls still collided.  Errors that hundreds
+        of collisions amplify are seen by `condition_number` alone.
     left_out : int
-        How many more events there were, if the path was cut; 0 with ``record=False``.
+        Number of events that are missing in a path that was cut; 0 with ``record=False``.
 
     Examples
     --------
@@ -151,11 +151,11 @@ class Trace:
 
 
 class ImpactNotFinished(RuntimeError):
-    """An impact was still going on after `max_events` steps.
+    """An impact was still going on after the largest number of steps that its model allows.
 
-    Its `trace` is what was reached, of the path at most the first 100 000 events.  `stored` is the
-    work that the contacts can still release, over the heaviest mass times the square of the largest
-    speed before, or None if not known, so that all energy that is not lost yet counts.
+    `trace` holds what was reached.  `stored` is the work that the contacts can still release, over
+    the heaviest mass times the square of the largest speed before the impact.  It is None where
+    that is not known; then `bounds` counts all energy that is not lost yet.
 
     Examples
     --------
@@ -175,9 +175,9 @@ class ImpactNotFinished(RuntimeError):
     def bounds(self) -> Vector:
         """Least and largest velocity that each ball can end with, m/s, shape (2, N).
 
-        Until the end momentum stays and energy does not grow (in `SpringChain` and
+        They follow from three facts: momentum stays, energy does not grow (for `SpringChain` and
         `EnergyDistribution` to the tolerance of their integration), and in the end no ball is
-        faster than the next on its right.
+        faster than the next one on its right.
         """
         # Count velocities from that of the centre of mass.  If ball i ends at x > 0, the balls from
         # i on, of mass A, are at least as fast: they have a momentum of A x or more, and the
@@ -206,7 +206,7 @@ class ImpactNotFinished(RuntimeError):
 class ImpactNotCertified(RuntimeError):
     """An outcome failed the check that every answer has to pass, so it is not returned.
 
-    This is a defect of the solver: please report `chain`, `model`, and `defect`, what was broken.
+    This is a defect of the solver.  Please report its `chain`, `model` and `defect` (what failed).
     """
 
     def __init__(self, chain: Any, model: Any, defect: str) -> None:

@@ -109,7 +109,7 @@ def recommend(
 ) -> Recommendation:  # fmt: skip
     """Recommend the cheapest model that gives what is wanted from what is known.
 
-    Where a value is wrong or no model fits, the `ValueError` says what is missing.
+    If a value is wrong or no model fits, a `ValueError` says what is missing.
 
     Parameters
     ----------
@@ -119,11 +119,11 @@ def recommend(
         Of "velocities", "impulses", "path", "forces", "times" (how long contacts last) and
         "fastest ball" (which one it is).
     accuracy, model_error : float
-        Largest numerical error of a velocity, as a part of the closing speed, 1e-15 to 1, and in
-        the same unit the largest distance from Hertz springs, elastic spheres; any if left out.
+        Largest numerical error of a velocity, as a part of the closing speed, 1e-15 to 1; and in
+        the same unit the largest distance from Hertz springs, elastic spheres, any if left out.
     impacts : int
-        How many impacts of such chains are to be solved; several go into one call where a model
-        has one, measured with 2000.
+        How many impacts of such chains are to be solved; if several, a call that takes many chains
+        is recommended where a model has one (measured with 2000).
     ratios : ImpulseCorrelation, float or sequence of length N - 2, optional
         Impulse Correlation Ratios, if they are known, as a model or as its `forward`.
     stiffness : float or sequence of length N - 1, optional
@@ -132,8 +132,8 @@ def recommend(
 
     Notes
     -----
-    Errors of velocities alone were measured, on rows that touch, struck at one end, with equal
-    springs; between those chains the worst counts, and must be ten times better than `accuracy`.
+    Only errors of velocities were measured, on rows that touch, struck at one end, with equal
+    springs.  For a chain between those the worst counts, and must be ten times below `accuracy`.
 
     Examples
     --------

@@ -21,8 +21,8 @@ Known = Mapping[str, "float | tuple[float, float]"]
 def restitution(shots: Shots) -> Fit:
     """Fit the coefficient of restitution of every pair of balls that was shot alone.
 
-    One estimate a pair, named by its types in alphabetical order; longer sets are left aside, and
-    without a set of two balls a ValueError is raised.
+    There is one estimate for each pair, named by its types in alphabetical order.  Longer sets are
+    left aside; without a set of two balls a ValueError is raised.
 
     Examples
     --------
@@ -45,23 +45,23 @@ def ratio(
 ) -> Fit:  # fmt: skip
     """Fit the Impulse Correlation Ratio of every triplet in shots of three balls and more.
 
-    One estimate for each triplet and direction that is not known, between 0 and the bound of three
-    balls (Eq. 34).  Those that act in the same shots are fitted together; Ceanga and Hurmuzlu fit
-    one at a time (section 4.2).  If no set has three balls and nothing is known, a coefficient of
-    restitution is missing, a known ratio is above its bound, or more than six ratios act together,
-    a ValueError is raised.
+    There is one estimate for each triplet and direction that is not known, between 0 and the bound
+    of three balls (Eq. 34).  Those that act in the same shots are fitted together; Ceanga and
+    Hurmuzlu fit one at a time (section 4.2).  A ValueError is raised if no set has three balls and
+    nothing is known, a coefficient of restitution is missing, a known ratio is above its bound, or
+    more than six ratios act together.
 
     Parameters
     ----------
     shots : Shots
         Sets of two balls are left aside.
     restitution : Fit or mapping
-        The result of `restitution`, or by the name of each pair of neighbours the coefficient or
+        The result of `restitution`; or for the name of each pair of neighbours its coefficient, or
         (coefficient, standard error).
     known : mapping, optional
-        Ratios not to be fitted, by triplets; with it no set needs three balls.
+        Ratios not to be fitted, by triplet; if given, no set needs three balls.
     progress : bool
-        Show after two seconds how many points were tried; six ratios need a million.
+        After two seconds, show how many points were tried; six ratios need a million.
 
     Examples
     --------

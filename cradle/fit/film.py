@@ -43,12 +43,12 @@ def speeds_from_heights(
     heights : array_like
         Above the lowest point, m; negative for a ball that swings to the left.
     sigma, gravity : float
-        Standard error of a height, m; m/s^2.  Above 0, else a ValueError is raised.
+        Standard error of a height, m, and g, m/s^2; above 0, else a ValueError is raised.
 
     Returns
     -------
     velocities, sigma : ndarray
-        m/s, shapes of `heights`; the error is that towards larger speeds, and so finite at rest.
+        m/s, in the shape of `heights`; the error is that towards larger speeds, so finite at rest.
 
     Examples
     --------
@@ -68,24 +68,24 @@ def velocities_from_tracks(
 ) -> Velocities:  # fmt: skip
     """Find the impact in the tracks, and the velocities just before and just after it.
 
-    First the moment at which all tracks bend, then on either side of it the velocity of each ball
-    by itself, so that the errors are independent.  The balls but the striker rest before.  A mark
-    that lies farther off than chance allows is named in a warning.  If there are fewer than two
-    balls, too few marks on either side, or the marks do not lie on such a motion (one in a hundred
-    thousand bends as much by chance), a ValueError is raised.
+    First the moment is fitted at which all tracks bend, then the velocity of each ball by itself on
+    either side of it, so that the errors are independent.  Before the impact all balls but the
+    striker rest.  A mark that lies farther off than chance allows is named in a warning.  If there
+    are fewer than two balls or too few marks on either side, or if the marks do not lie on such a
+    motion (by chance one film in a hundred thousand), a ValueError is raised.
 
     Parameters
     ----------
     tracks : mapping of str to Track
         One track a ball, left to right, from one origin.
     length, scatter : float, optional
-        Of the pendulums, m (left out, the balls roll on a level track); standard deviation of a
-        mark, m, known from many shots (left out, that of these tracks).
+        Of the pendulums, m (if left out, the balls roll on a level track); standard deviation of a
+        mark, m, known from many shots (if left out, that of these tracks).
     window : float, optional
-        How much time before and after the impact is used, s.  Left out, it is the longest one that
-        the marks agree with: at most a quarter of a swing, or a quarter of a second on a track.
+        How much time before and after the impact is used, s.  If left out, the longest one that the
+        marks agree with: at most a quarter of a swing, or a quarter of a second on a track.
     striker : int, optional
-        Index of the ball that moves before; left out, the one whose marks move most.
+        Index of the ball that moves before; if left out, the one whose marks move most.
 
     Examples
     --------

@@ -49,22 +49,22 @@ def fit_law(
 ) -> LawFit:  # fmt: skip
     """Fit the numbers of any impact law to shots, by the least chi-square that is found.
 
-    All computed velocities of a shot may be off by one factor, within the error of those before.
-    Where the chance of such a chi-square is small, the law fails, and intervals mean nothing.
+    All computed velocities of a shot may be off by one factor, within the error of the velocities
+    before.  If the chance of such a chi-square is small, the law fails, and intervals mean nothing.
 
     Parameters
     ----------
     shots : Shots
         As of `read_shots`.
     law : callable, or mapping of callables by the names of the sets
-        ``law(**numbers)`` returns a model.  A number named restitution is that of all contacts of
-        the chain, and not handed on.
+        ``law(**numbers)`` returns a model.  A number named restitution is not passed to it: it is
+        that of all contacts of the chain.
     ranges : mapping of str to (float, float)
         Least and largest value of each number.
     restitution : float
         Of all contacts, where it is not fitted.
     starts : int
-        Points of the ranges from which minima are looked for.
+        Number of points in the ranges from which minima are searched for.
 
     Raises
     ------

@@ -59,14 +59,14 @@ class Estimate:
 
     @property
     def standard_error(self) -> float:
-        """Total length of the confidence set over 3.92, as if it were that of a bell curve."""
+        """Total length of the confidence set over 3.92: right for a bell curve."""
         return sum(high - low for low, high in self.intervals) / (2.0 * float(np.sqrt(RISE)))
 
     @property
     def folded(self) -> bool:
-        """Whether chi-square is no parabola over the confidence set, which may then cover but 90 %.
+        """Whether chi-square is no parabola over the confidence set, which may then hold only 90 %.
 
-        So it is near a fold, a ratio at which the order of the impact's events changes.
+        That happens near a fold, a ratio at which the order of the impact's events changes.
         """
         if self.value is None or self.at_bound:
             return False
@@ -96,8 +96,8 @@ class Group(NamedTuple):
 class Prediction:
     """Velocities predicted for N balls, with what the errors of the parameters leave open.
 
-    `lower` to `upper` holds the central 95 % of the predictions, and what lies between groups of
-    them, as a confidence set of several pieces may give.
+    `lower` to `upper` holds the central 95 % of the predictions; where a confidence set of several
+    pieces makes groups of them, also what lies between the groups.
     """
 
     types: tuple[str, ...]
@@ -155,7 +155,7 @@ class Fit:
         return f"Fit({shown}; {chi}{'' if self.probability > 1e-3 else ', a poor fit'})"
 
     def expected(self, shots: ShotSet) -> Vector | None:
-        """Return the velocities after the shots of a set by the best parameters, shape (K, N)."""
+        """Return velocities after shots of a set by the best parameters, (K, N), m/s; or None."""
         best: dict[str, float | None] = {name: value for name, (value, _) in self.given.items()}
         # What acts in no shot may have any value.
         best |= {name: one.value if one.modes else 0.0 for name, one in self.estimates.items()}
@@ -215,7 +215,8 @@ class Fit:
     def plot(self, name: str | None = None, axes: Any = None) -> Any:
         """Draw the likelihood of one estimate, its data and what is predicted, on two `axes`.
 
-        The first identified one if `name` is left out; if nothing was fitted, a ValueError.
+        If `name` is left out it is the first identified one; if nothing was fitted, a ValueError is
+        raised.
         """
         from cradle.pictures.fits import draw_fit
 
@@ -224,9 +225,9 @@ class Fit:
     def predict(self, types: str | Sequence[str], speed: float = 1.0) -> Prediction:
         """Predict a longer chain, the first ball striking the others at rest.
 
-        Errors are drawn independently; ratios fitted together are drawn together, and one that the
-        data left open takes all values up to its bound.  Fewer than 2 balls, and a mass,
-        restitution or ratio that is not known, are a ValueError.
+        Errors are drawn independently, but ratios that were fitted together are drawn together; one
+        that the data left open takes all values up to its bound.  Fewer than 2 balls, and a mass,
+        restitution or ratio that is not known, raise a ValueError.
 
         Parameters
         ----------

@@ -121,7 +121,7 @@ def read_shots(
     source: str | Path | Any, *, mass_unit: str | None = None, velocity_unit: str | None = None,
     sigma: float | None = None,
 ) -> Shots:  # fmt: skip
-    """Read a table of shots and check it; in the result all is in kg and m/s.
+    """Read a table of shots and check it; the result is in kg and m/s.
 
     A ValueError that names row and column is raised if a column is missing or there twice, a value
     is wrong, balls pass through each other, or a shot gains more energy than its errors allow.
@@ -132,7 +132,7 @@ def read_shots(
         A CSV file (UTF-8, comma, one header line; lines that begin with # and empty rows are
         skipped), a pandas DataFrame, or columns by name; see `COLUMNS`.
     mass_unit, velocity_unit : {"kg", "g"}, {"m/s", "cm/s", "mm/s"}, optional
-        Left out, units are kg and m/s, and numbers that look like others are refused.
+        If left out, units are kg and m/s, and numbers that look like other units are refused.
     sigma : float, optional
         Standard error of all velocities, in their unit, for a table without it.
 

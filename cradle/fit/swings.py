@@ -30,7 +30,7 @@ _CHANCE, _FAR, _PARTS = 1e-3, 3.3, (4, 6, 8, 12, 16, 24, 32)
 class SwingFit:
     """What a film of K frames says of a cradle of N balls."""
 
-    values: Mapping[str, float | None]  #: Of each number, the best; None if the film tells none.
+    values: Mapping[str, float | None]  #: The best of each number; None if the film tells none.
     intervals: Mapping[str, tuple[float, float]]  #: 95 % of each number.
     estimates: Mapping[str, Estimate]  #: The same with profiles of chi-square.
     swing: Swing  #: What fits best; its times begin with the first frame.
@@ -71,17 +71,18 @@ def fit_swing(
     """Fit `swing` to a film, with one restitution and one gap for all contacts.
 
     At the first frame some balls, let go at one moment, are on their way; the others are at rest.
-    Places and velocities there are fitted too, as is where each ball hangs.  Intervals hold 95 %,
-    by profiles of chi-square (Venzon and Moolgavkar, Applied Statistics 37, 1988, 87-94).  Where
-    the law fails, by chi-square or residuals alike from frame to frame, they are widened by how
-    parts of the film differ (clusters of Liang and Zeger, Biometrika 73, 1986, 13-22).  That of the
-    damping is too short where nearly all balls were pulled; one of no width says that the law jumps
-    there.  A wrong value, no ball seen on its way, and too few readings are a ValueError.
+    Their places and velocities then are fitted too, as is where each ball hangs.  Intervals hold
+    95 %, by profiles of chi-square (Venzon and Moolgavkar, Applied Statistics 37, 1988, 87-94).
+    Where the law fails (a large chi-square, or residuals alike from frame to frame) they are
+    widened by how much parts of the film differ (clusters: Liang and Zeger, Biometrika 73, 1986,
+    13-22).  The interval of the damping is too short where nearly all balls were pulled; one of no
+    width says that the law jumps there.  A wrong value, no ball seen on its way, and too few
+    readings raise a ValueError.
 
     Parameters
     ----------
     times, positions : array_like, shapes (K,) and (K, N)
-        Of the frames, s; of each ball from where it hangs, m, nan where it was not seen.
+        Of the frames, s; and of each ball, from where it hangs, m, nan where it was not seen.
     model : Model
         The impact law.
     seen : array_like of bool, shape (K, N) or (N,), optional
@@ -91,7 +92,7 @@ def fit_swing(
     free : collection of str
         What is fitted: "period" of small swings, s; "damping", 1/s; "restitution"; "gaps", m.
     known : mapping of str to float, optional
-        What is not fitted; left out, no damping, restitution 1, no gaps.
+        Values of what is not fitted; if left out, no damping, restitution 1, no gaps.
     masses : array_like, shape (N,), optional
         Of the balls, in any unit; if left out, they are equal.
 

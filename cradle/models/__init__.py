@@ -28,15 +28,15 @@ def a_model(model: object) -> None:
 def collide(
     chain: Chain, model: Model, *, record: bool | None = None, progress: bool = False
 ) -> Trace:
-    """Solve one impact; if no balls approach, its path has no events.
+    """Solve one impact; where no balls approach nothing happens, and its path has no events.
 
     Parameters
     ----------
     chain, model : Chain, Model
         The balls at the instant before, and the impact law, such as `ImpulseCorrelation`.
     record : bool, optional
-        Whether to keep the path; for `ImpulseCorrelation` only.  Left out, a path of more than ten
-        million numbers (2 N - 1 for each event) is cut, with a warning.
+        Whether to keep the path; for `ImpulseCorrelation` only.  If left out, a path of more than
+        ten million numbers (2 N - 1 for each event) is cut, with a warning.
     progress : bool
         After two seconds, show the events of `ImpulseCorrelation`, or the steps of `SpringChain`.
 
@@ -48,7 +48,7 @@ def collide(
     Raises
     ------
     TypeError, ValueError
-        If `chain` or `model` is something else, or the model cannot treat this chain.
+        If `chain` or `model` is of another type, or the model cannot treat this chain.
     ImpactNotFinished, ImpactNotCertified
         If the impact takes more steps than the model allows, or its outcome fails a check.
 

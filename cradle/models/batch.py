@@ -50,9 +50,9 @@ def post_impact_velocities(
     Raises
     ------
     ValueError, ImpactNotFinished, ImpactNotCertified
-        If a value or a shape is wrong; for the first chain whose impact takes more than
-        `max_events` steps, with a note of its place, or whose outcome fails the check that every
-        answer has to pass.
+        If a value or a shape is wrong; if an impact takes more than `max_events` steps, or its
+        outcome fails the check that every answer has to pass.  The first such chain is reported,
+        with a note of its place.
 
     References
     ----------
@@ -74,7 +74,7 @@ def post_impact_velocities(
 
 @compared_as_objects
 class Outcomes(NamedTuple):
-    """What a batch of impacts leaves; collapsed ones count the collisions before the limit."""
+    """The outcomes of a batch; where an impact collapsed, collisions before its limit count."""
 
     velocities: Vector  #: after the impact, shape (..., N), m/s
     collisions: NDArray[np.int64]  #: how often each contact became active, shape (..., N - 1)

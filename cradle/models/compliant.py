@@ -35,9 +35,9 @@ _CHUNK = 2048  # chains at once
 class SpringChain:
     """Balls on massless springs: the contact forces of `spring_velocities`, followed in time.
 
-    `absorbed` is the energy stored at each maximum of a compression, less that at a minimum between
-    two of them.  Speeds below a hundredth of the accuracy, times that of the fastest closing, are
-    too little to matter, and how often balls touch at them depends on it.
+    In the trace, `absorbed` is the energy stored at each maximum of a compression, less that at a
+    minimum between two of them.  Speeds below ``accuracy / 100`` of the fastest closing speed count
+    as none; how often balls touch so gently depends on that.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class SpringChain:
     Raises
     ------
     ValueError, ImpactNotFinished, ImpactNotCertified
-        As `spring_velocities`, the last two on solving; and ValueError if a restitution is below 1.
+        As for `spring_velocities`, the last two on solving; ValueError if a restitution is below 1.
 
     References
     ----------
@@ -134,21 +134,22 @@ def spring_velocities(
     """Post-impact velocities of many chains of balls on springs; leading axes broadcast.
 
     `spring_outcomes` has the estimated errors, too.
-    Each contact pushes with k (d^p + A d(d^p)/dt) while that is above zero, d its compression:
-    p = 1 is a linear spring, p = 3/2 the contact of two spheres, elastic or viscoelastic; or, as
-    Hunt and Crossley have it, with k d^p (1 + A dd/dt).  The velocities depend on the ratios of the
-    stiffnesses alone where there are no losses and gaps.
+    With the compression d, each contact pushes with k (d^p + A d(d^p)/dt) while that is above zero:
+    p = 1 is a linear spring, p = 3/2 the contact of two spheres, elastic or viscoelastic.  By Hunt
+    and Crossley's law it pushes with k d^p (1 + A dd/dt).  Without losses and gaps the velocities
+    depend on the ratios of the stiffnesses alone.
 
     Parameters
     ----------
     masses, velocities : array_like, shape (..., N)
         kg and m/s.
     stiffness, viscosity, gaps : array_like, shape (..., N - 1) or ()
-        k, N/m^p, above 0; A, s, 0 for an elastic contact and at most .3 L / u, u the fastest
-        closing, m its reduced mass, L = (m u^2 / k)^(1 / (p + 1)); and the distance of two balls
-        before the impact, m, to be compared with L, so with k.  Below zero it is a lean, at most L:
-        how far the strings press the two together at rest, with a pull that acts until no contact
-        pushes and no open one closes.
+        k, N/m^p, above 0; A, s, 0 for an elastic contact; and the distance of two balls before the
+        impact, m.  Length and time are those of the contact that closes fastest: with its speed u,
+        reduced mass m and L = (m u^2 / k)^(1 / (p + 1)), A is at most .3 L / u, and a gap matters
+        where it is not small beside L.  A gap below zero is a lean, at most L: how far the strings
+        press the two together at rest, with a pull that acts until no contact pushes and no open
+        one closes.
     exponent : float
         p, from 1 to 10.
     damping : {"viscoelastic", "hunt-crossley"}
@@ -166,8 +167,8 @@ def spring_velocities(
     Raises
     ------
     ValueError
-        If a value or a shape is wrong, a value too far from the others to be resolved, or a contact
-        would pull by Hunt and Crossley.
+        If a value or a shape is wrong, a value is too far from the others to be resolved, or by
+        Hunt and Crossley's law a contact would pull.
     ImpactNotFinished, ImpactNotCertified
         If runs take more than twenty million steps or do not agree, or leans hold balls together;
         if an outcome breaks momentum, or energy or order by more than `accuracy`.

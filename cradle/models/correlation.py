@@ -30,11 +30,11 @@ class ImpulseCorrelation:
 
     At an interior ball the impulse of the driven contact grows in proportion to that of the
     contact that drives it.  Every contact ends when it has given back the part e^2 of the work it
-    absorbed.  Velocities are linear in the impulses between events, so no step size is needed.  A
-    value outside its range is a `ValueError`.
+    absorbed.  Between events velocities are linear in the impulses, so no step size is needed.  A
+    value outside its range raises a `ValueError`.
 
-    Where several contacts of a touching stretch approach, the leftmost one drives all the others,
-    so balls that are struck from both sides do not end as their mirror image does.
+    Where several contacts of balls that touch approach, the leftmost one drives all the others; so
+    balls that are struck from both sides and their mirror image end differently.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ class ImpulseCorrelation:
         Ratio at each interior ball when its left contact drives its right one, and when its right
         one drives its left one; `backward` as `forward` if left out.
     meeting : float
-        Where two balls meet that are driven towards each other by separate collisions, as a part
-        of the overlap of their velocities; 1/2 is the paper's midpoint.
+        Two balls may be driven towards each other by separate collisions.  Their velocities meet at
+        this part of the overlap of the ranges that they run through; 1/2 is the paper's midpoint.
     excess : {"raise", "saturate"}
         What to do with a ratio above its bound (Eq. 53): refuse it, or hold the contact closed
         while the ratio would open it.

@@ -18,7 +18,8 @@ class DissipationTrace(Trace):
     """The outcome of an impact that has no phases: all contacts end at one instant.
 
     Here `absorbed` is the net work that each contact takes from the balls, J: its impulse times the
-    mean of its closing speeds before and after, below zero if it gives work that others take.
+    mean of its closing speeds before and after; it is below zero where a contact does work that
+    others take.
     """
 
     @property
@@ -36,14 +37,14 @@ class QuadraticDissipation:
         1/2 sum_i m_i (v_i - v_i^-)^2 + sum_c k_c D_c^2
 
     as small as possible while no two balls go on approaching.  So the impulse of a contact is
-    ``k_c D_c``, and a reaction beside it where the balls would still approach; it can hold back
+    ``k_c D_c``, with a reaction added where the balls would still approach; it can also hold back
     balls that part.  Contacts that open before the impact take no part; if their balls approach
     after it, another such problem follows.
 
     Two balls of reduced mass mu have ``e = (kappa - 1) / (kappa + 1)`` with kappa = k / (2 mu), or
-    e = 0 where kappa is below 1.  A value outside its range is a ValueError; so is, on
-    solving, a chain that does not suit the values, or with light balls between heavy ones, which
-    leave the equations too few digits.
+    e = 0 where kappa is below 1.  A value outside its range raises a ValueError; so does, on
+    solving, a chain that does not suit the values, or one with light balls between heavy ones,
+    which leave the equations too few digits.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ class QuadraticDissipation:
         kappa of a term for the outer two of three balls; it acts if neither contact opens, and its
         impulse passes through both.
     max_problems : int
-        Number of problems; if balls still approach after them, it is an `ImpactNotFinished`.
+        Number of problems; if balls still approach after them, `ImpactNotFinished` is raised.
 
     References
     ----------

@@ -27,7 +27,7 @@ def fastest(chain: Chain) -> tuple[int, float, float]:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class EnergyTrace(Trace):
-    """The path of an impact whose ratios of impulses change all the time; N balls, S steps."""
+    """The path of an impact whose ratios of impulses change continuously; N balls, S steps."""
 
     step_velocities: Vector  #: At each step of the integration, shape (S, N), m/s.
     step_impulses: Vector  #: Impulses so far at each step, shape (S, N - 1), N s.
@@ -50,13 +50,15 @@ class EnergyDistribution:
 
     E is the energy that a contact stores.  With the closing speed u it changes by ``dE = u dP`` in
     compression (u > 0) and by ``dE = u dP / e^2`` in release (u < 0), so it is used up when the
-    part e^2 of the work absorbed has been given back.  With e = 0 it is lost at u = 0; the contact
-    ends there, and closes anew if a neighbour pushes on.  What has ended leaves a gap to be closed.
+    part e^2 of the work absorbed has been given back.  With e = 0 it is lost at u = 0: the contact
+    ends there, and closes anew if a neighbour pushes on.  A contact that has ended leaves a gap,
+    which must close before it acts again.
 
     A spring with the force ``F = k x^p`` stores ``E = k x^(p+1) / (p + 1)``, so impulses grow like
     forces of springs, ``dP = F dt`` with a common t, where ``dx/dt = u`` in compression and
-    ``u / e^2`` in release.  So it is solved; nothing is singular at E = 0.  A value outside its
-    range is a ValueError; so is, on solving, a chain that does not suit the values.
+    ``u / e^2`` in release.  The model is solved in this form, in which nothing is singular at
+    E = 0.  A value outside its range raises a ValueError; so does, on solving, a chain that does
+    not suit the values.
 
     Parameters
     ----------
@@ -65,10 +67,10 @@ class EnergyDistribution:
     exponent : float
         p, at least 1: 1 a linear spring, 3/2 the contact of two elastic spheres (Hertz).
     rtol : float
-        Relative tolerance of the integration.  An impact that goes on with speeds alone below rtol
-        times that of the fastest closing is ended plastically.
+        Relative tolerance of the integration.  When all speeds that are left lie below rtol times
+        the fastest closing speed, the impact is ended plastically.
     max_evaluations : int
-        How often the ratios may be evaluated; then the impact is an `ImpactNotFinished`.
+        How often the ratios may be evaluated; beyond that `ImpactNotFinished` is raised.
 
     Examples
     --------

@@ -15,13 +15,13 @@ from cradle.trace import Event, ImpactNotFinished, Trace
 class SequentialCollisions:
     """One collision of two balls after another (Johnson; Han and Gilmore's second answer).
 
-    A contact gets no impulse while a neighbouring collision goes on: as with
+    While two balls collide the contacts beside them get no impulse, as with
     ``ImpulseCorrelation(0)``, which solves it (Johnson, Int. J. Mech. Eng. Educ. 4 (1976); Han and
     Gilmore, J. Mech. Design 115 (1993) 412-422; Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001)
-    575-583, Eq. 6).  When a collision ends, both neighbouring contacts may collide next; one that
-    waits between two collisions does so when both have ended.  Those apart from each other have no
-    common clock: which ends first is rule R8 of the book's chapter 6.  A value outside its range is
-    a `ValueError`.
+    575-583, Eq. 6).  Afterwards either of these contacts may collide; one between two collisions
+    waits until both have ended.  Collisions that do not touch have no common clock: which of them
+    ends first is decided by rule R8 of the book's chapter 6.  A value outside its range raises a
+    `ValueError`.
 
     Parameters
     ----------
@@ -77,11 +77,11 @@ class SequentialCollisions:
 class FusedChain:
     """The balls on either side of the struck contact move as one body: Han and Gilmore's first.
 
-    The balls on the left of the one approaching contact and those on its right collide like two
-    balls, with the restitution of that contact (Eq. 5; references as of `SequentialCollisions`).
-    That is the largest admissible ratio at every ball (Eq. 53), and so
-    ``ImpulseCorrelation(1, excess="saturate")`` solves it.  If a second contact approaches, or one
-    opens, it is a `ValueError`: which balls are one body?
+    One contact approaches.  All balls on its left and all on its right collide like two bodies,
+    with the restitution of that contact (Eq. 5; references as for `SequentialCollisions`).  This is
+    the largest admissible ratio at every ball (Eq. 53), so it is solved by
+    ``ImpulseCorrelation(1, excess="saturate")``.  If a second contact approaches or one opens, it
+    is not clear which balls are one body, and a `ValueError` is raised.
 
     Examples
     --------

@@ -24,9 +24,10 @@ _ROUNDS = 50  # until restitutions and speeds agree; two or three are common
 class SpeedDependent:
     """An impact law whose restitution is a law e(u) of the closing speed u, m/s.
 
-    In one impact each contact has one restitution: e(u) at its largest closing speed on the way.
-    As the way depends on it, impacts are solved again until they agree; ``trace.chain`` has what is
-    found.  The chain that is solved must have restitution 1.  Errors are those of `model`.
+    In one impact each contact has one restitution: e(u) at its largest closing speed during the
+    impact.  That speed depends on the restitution, so the impact is solved again until both agree;
+    ``trace.chain`` has the restitution found.  The chain given must have restitution 1.  Errors are
+    those of `model`.
 
     Parameters
     ----------
@@ -145,10 +146,10 @@ def viscosity_from(
 ) -> asked.Vector:  # fmt: skip
     """Viscosity of contacts whose pairs of balls, alone, have a restitution at a stated speed.
 
-    Such balls lose more the faster they close (viscoelastic ones with p = 1 excepted), so a
+    Such balls lose more the faster they close (except viscoelastic ones with p = 1), so a
     restitution belongs to one speed.  In a contact's own units it depends on the viscosity alone,
-    which is sought; by Hunt and Crossley on A times the speed, whatever the masses, k and p.
-    Leading axes broadcast.
+    which is searched for; by Hunt and Crossley's law it depends on A times the speed, whatever the
+    masses, k and p.  Leading axes broadcast.
 
     Parameters
     ----------

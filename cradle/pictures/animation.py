@@ -41,8 +41,8 @@ def animate_swing(
 ) -> "Animation":  # fmt: skip
     """Show one swing or several, one below the other or in columns, by the same clock.
 
-    A run without a duration, another number of labels than of runs, and a number out of range are
-    a ValueError.
+    A run without a duration, another number of labels than of runs, and a number out of range
+    raise a ValueError.
 
     Parameters
     ----------

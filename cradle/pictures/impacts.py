@@ -67,8 +67,8 @@ def _lines(ax: Axes | None, over: str, x: Vector, path: Vector, balls: Sequence[
 def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     """Draw the velocities of all balls against the progress of the impact.
 
-    Those of springs are curves: lines join the steps of the integration.  New axes if `ax` is left
-    out.
+    For springs they are curves: lines join the steps of the integration.  Without `ax` new axes are
+    made.
 
     Examples
     --------
@@ -91,11 +91,11 @@ def velocity_impulse(
 ) -> Axes:
     """Draw the velocity-impulse diagram of one contact, as in the paper's Figs. 3, 5 and 8.
 
-    The velocities of the contact's two balls stand against its impulse (sections 2.3, 2.4 and 3.2).
+    It shows the velocities of the contact's two balls against its impulse (sections 2.3, 2.4, 3.2).
     Where other contacts act while this one rests, its impulse does not grow, and a velocity jumps.
     Markers and letters show the contact's events (`EVENT_STYLES`); with several collisions the
-    letter carries a number.  Contact c joins balls c and c + 1; an upper axis shows the impulse of
-    the contact `other`, as by `impulse_axis`.  New axes if `ax` is left out.
+    letter carries a number.  Contact c joins balls c and c + 1.  With `other` an upper axis shows
+    the impulse of that contact, as by `impulse_axis`.  Without `ax` new axes are made.
 
     Examples
     --------
@@ -152,9 +152,9 @@ def impulse_axis(
 ) -> Axes:
     """Add an upper axis with another contact's impulse to a diagram, and return its axes.
 
-    The two do not grow in one proportion: each tick stands where the path of the impact has it.
+    The two do not grow in proportion: each tick stands where the path of the impact has it.
     `contact` is that of the lower axis, as drawn by `velocity_impulse`; `values` are the impulses
-    to mark, N s.  If left out, those at the events are, two where the lower contact rests.
+    to mark, N s: if left out, those at the events, two where the lower contact rests.
 
     Examples
     --------

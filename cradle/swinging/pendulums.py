@@ -26,9 +26,9 @@ class Pendulums:
     damping : float or array_like of shape (N,)
         Rate at which a ball's amplitude decays, 1/s; below its frequency sqrt(g/l).
     angle : {"small", "full"}
-        Pendulums of any angle need equal lengths and one damping: then contacts stay horizontal;
-        gaps are counted along the arcs, right near the lowest point, up to a quarter of a circle.
-        Small-angle pendulums swing too fast: by 1 % at 0.4 rad, by 7 % at 1 rad.
+        "small" pendulums swing too fast: by 1 % at 0.4 rad, by 7 % at 1 rad.  "full" ones need
+        equal lengths and one damping, so that contacts stay horizontal; their gaps are counted
+        along the arcs, right near the lowest point, and let them reach a quarter of a circle.
 
     Examples
     --------

@@ -37,16 +37,16 @@ def swing(
     chain : Chain
         Masses, restitution, and the velocities at the release (usually zeros).
     model : Model
-        The impact law, such as `ImpulseCorrelation`.  Where a part of the chain collides alone, it
-        has its part of the values, with ``excess="saturate"`` if the law has that field.
-        `SpringChain` takes its time and sees the gaps that close meanwhile, unless its stiffness is
-        so low that a contact lasts some .01 rad of the swing, or a strike .1; others take no time.
+        The impact law, such as `ImpulseCorrelation`.  Where a part of the chain collides alone, the
+        law keeps that part's values, with ``excess="saturate"`` if it has that field.  Impacts take
+        no time, except those of `SpringChain`, which sees the gaps that close meanwhile; if its
+        contacts last some .01 rad of the swing, or a strike .1 rad, they take none either.
     positions : array_like, shape (N,)
         Where the balls are released, along their arcs from their lowest points, m; positive to the
         right.  At most a quarter of a circle, or half a circle with ``angle="full"``.
     times : array_like, shape (T,)
-        When to report positions and velocities, s since the release; rising, from 0 on.  Within a
-        strike that takes its time they are those at its end.
+        When to report positions and velocities, s since the release; rising, from 0 on.  During a
+        strike that takes time those at its end are reported.
     pendulums : Pendulums, optional
         How the balls hang; small angles, 0.1 m, no gaps, no damping if left out.
     max_impacts : int
@@ -57,11 +57,11 @@ def swing(
     TypeError, ImpactNotFinished
         As `collide`.
     ValueError
-        If a value is wrong, balls overlap, one swings farther aside at small angles than it may be
-        released, or the model cannot treat an impact.
+        If a value is wrong, balls overlap, a ball at small angles swings farther aside than it may
+        be released, or the model cannot treat an impact.
     RuntimeError
-        If contacts open and close without end at one instant, balls pass each other or swing over
-        the top, or energy or momentum are made or lost: all flights and instants are checked.
+        If contacts open and close without end at one instant, or the check of all flights and
+        instants fails: balls pass each other or go over the top, energy or momentum is not kept.
 
     Examples
     --------
