@@ -1,5 +1,6 @@
 """The built book: no warning, no request to another server, no missing file."""
 
+import operator
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -9,6 +10,9 @@ import nbformat
 import pytest
 import yaml
 from stored import read
+
+import cradle.fit
+import cradle.row
 
 # Attributes whose address a browser loads by itself: not that of <a>, which waits for a click, nor
 # that of a <link> which only says how pages belong together.
@@ -279,3 +283,12 @@ def test_code_in_tables_breaks_at_its_joints(html: Path):
     plain = [re.sub(r"<(?!wbr)[^>]*>", "", piece) for piece in pieces]
     assert "chain.<wbr>restitution[<wbr>i-2]" in plain
     assert any("<wbr>" not in piece for piece in plain)
+
+
+def test_the_reference_tells_every_field(html: Path):
+    """Whole: what stands before a colon would be taken for a type."""
+    text = "".join(page.read_text(encoding="utf-8") for page in (html / "book").glob("api_*.html"))
+    for name in ("Outcomes", "Impact", "row.Hit", "fit.Velocities"):
+        fields = operator.attrgetter(name)(cradle)._fields
+        assert [field for field in fields if f'id="cradle.{name}.{field}"' not in text] == []
+    assert not re.findall(r">Type<span", text)

@@ -21,11 +21,11 @@ _SAME = 0.02  # minima nearer to one another than this part of each range are on
 class LawFit:
     """What shots say of the numbers of a law."""
 
-    values: Mapping[str, float | None]  #: Of each number, the best; None if the shots tell none.
-    #: 95 % of each, by profiles of chi-square: from the least to the largest end about any minimum.
+    values: Mapping[str, float | None]  #: The best of each number; None if the shots tell none.
+    #: 95 % of each, by profiles of chi-square, from the least to the largest end about any minimum.
     intervals: Mapping[str, tuple[float, float]]
     minima: tuple[Mapping[str, float | None], ...]  #: Others that were found to explain the shots.
-    residuals: Mapping[str, Vector]  #: By set: measured less computed, over the error, (K, N).
+    residuals: Mapping[str, Vector]  #: Of each set, measured less computed, over the error, (K, N).
     chi_square: float
     degrees_of_freedom: int  #: Velocities after the impacts less numbers fitted.
 

@@ -59,7 +59,7 @@ class Estimate:
 
     @property
     def standard_error(self) -> float:
-        """Total length of the confidence set over 3.92: right for a bell curve."""
+        """Total length of the confidence set over 3.92, as is right for a bell curve."""
         return sum(high - low for low, high in self.intervals) / (2.0 * float(np.sqrt(RISE)))
 
     @property

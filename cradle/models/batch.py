@@ -79,7 +79,7 @@ class Outcomes(NamedTuple):
     velocities: Vector  #: after the impact, shape (..., N), m/s
     collisions: NDArray[np.int64]  #: how often each contact became active, shape (..., N - 1)
     collapsed: NDArray[np.bool_]  #: whether an infinite sequence was taken to its limit, (...)
-    margin: Vector  #: as of `Trace`: 0 where the digits of the solver may decide, shape (...)
+    margin: Vector  #: as `Trace.margin`; 0 where digits of the solver may decide, shape (...)
 
 
 def outcomes(

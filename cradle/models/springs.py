@@ -118,7 +118,7 @@ class TimedTrace(EnergyTrace):
 
     @property
     def energy_loss(self) -> float:
-        """Kinetic energy lost, J: to viscosities, and where balls lean, to the pull of strings."""
+        """Kinetic energy lost, J, to viscosities and, where balls lean, to the pull of strings."""
         if not np.any(self.model.viscosity) and np.min(self.model.gaps) >= 0.0:
             return 0.0
         m, v = self.chain.masses, self.chain.velocities

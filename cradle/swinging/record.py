@@ -15,12 +15,12 @@ class Impact(NamedTuple):
     """One impact of a swing."""
 
     time: float  #: s since the release
-    contacts: tuple[int, ...]  #: that touched, in stretches with an approaching one
+    contacts: tuple[int, ...]  #: those that touched, in stretches with an approaching one
     positions: Vector  #: where the balls were, shape (N,), m
     before: Vector  #: velocities just before, shape (N,), m/s
     after: Vector  #: velocities just after, shape (N,), m/s
     energy_loss: float  #: what the contacts kept back, J
-    traces: tuple[Trace, ...]  #: of each chain that collided; see `Trace.left_out` of long ones
+    traces: tuple[Trace, ...]  #: one of each chain that collided; see `Trace.left_out`
 
     def __repr__(self) -> str:
         speeds = f"before={as_text(self.before)}, after={as_text(self.after)}"

@@ -33,10 +33,10 @@ class Hit(NamedTuple):
     """One impact of a row, as `Row.on_hit` is told of it."""
 
     time: float  #: s, of the steps since the row was made
-    balls: range  #: that touched each other
+    balls: range  #: those that touched each other
     before: Vector  #: their velocities along the row, from left to right, m/s
     after: Vector  #: the same after the impact, m/s
-    loudest: int  #: the contact of the largest impulse: between this ball and the next one
+    loudest: int  #: the contact of the largest impulse, that of this ball and the next one
     impulse: float  #: of that contact, N s
 
 
