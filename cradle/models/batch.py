@@ -36,7 +36,8 @@ def post_impact_velocities(
     restitution : array_like, shape (..., N - 1) or ()
         Energetic coefficients of restitution.
     forward, backward : array_like, shape (..., N - 2) or ()
-        Ratios; `backward` as `forward` if left out.
+        Ratios; `backward` as `forward` if left out.  Ratios below 1e-4 but not 0 can decide a tie
+        wrongly where several of them multiply: write 0 if that is meant, and see the margins.
     meeting, excess, max_events
         As for `ImpulseCorrelation`.
     progress : bool
