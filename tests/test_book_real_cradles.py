@@ -14,7 +14,7 @@ from real_cradles import first_strikes, spheres, table
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, least_squares, minimize, minimize_scalar
 from scipy.special import gammaincc, ndtri
-from stored import read
+from stored import numbers, read
 
 from cradle import (
     Chain,
@@ -254,48 +254,55 @@ def test_gaps_and_the_distance_of_the_strikers():
         assert (float(test) > 30) == (which != "both, second")
 
 
-def test_gaps_chosen_anew_for_other_distances_of_two_strikers():
-    """By another integrator, from the printed gaps; without reach by restitution of each pair."""
+def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
+    """By another integrator, from what is stored; without reach by restitution of each pair."""
     unit = 1e3 * (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4  # mm
     data, slower = first_strikes(4), real_cradles.SLOWER
 
-    def two(p, mm):
-        if mm is not None:
-            return spheres([slower] * 2 + [0] * 3, [mm / unit, 0, *p[1:3]], p[3]) / slower
+    def two(p, between):
+        if between is not None:
+            return spheres([slower] * 2 + [0] * 3, [between, 0, *p[1:3]], p[3]) / slower
         v = [1.0, *spheres([slower, 0, 0, 0], [0, *p[1:3]], p[3]) / slower]
         while c := next((k for k in range(1, 5) if v[k - 1] - v[k] > 1e-7), 0):
             closing = v[c - 1] - v[c]
             v[c - 1 : c + 1] = spheres([slower * closing, 0], [0], p[3]) / slower + v[c]
         return np.array(v)
 
-    def after(p, release, mm):
-        return two(p, mm) if release == 2 else real_cradles.by_spheres(p, release, True)
+    def after(p, release, between):
+        return two(p, between) if release == 2 else real_cradles.by_spheres(p, release, True)
 
-    def left(p, mm, releases):
-        return real_cradles.misfits(lambda r: after(np.abs(p), r, mm), data, releases)
+    def left(p, between, releases):
+        return real_cradles.misfits(lambda r: after(np.abs(p), r, between), data, releases)
 
-    shown = {}
-    for line in CHAPTER.printed("distances").splitlines()[1:]:
-        words, both, test, *gaps = re.findall(r"no reach|[\d.]+(?: mm)?", line)[-6:]
-        mm = None if words == "no reach" else float(words.removesuffix(" mm"))
-        shown[mm] = float(both), float(test), [1e-3 * float(g) / unit for g in gaps]
-    assert list(shown) == [0.06, 0.1, 0.12, 0.2, 0.3, 0.4, 0.6, 0.8, 1, 5, None]
-    for mm in (0.06, 0.12, 0.4, None):
-        both, test, gaps = shown[mm]
-        fit = least_squares(lambda p, mm=mm: left(p, mm, (1, 2)), [*gaps, 0.007], diff_step=1e-3)
-        assert 2 * fit.cost == pytest.approx(both, abs=0.08)
-        off = left(fit.x, mm, (3,))
-        assert off @ off == pytest.approx(test, abs=0.08 if test < 30 else 0.8)
-    far = [shown[mm] for mm in list(shown)[1:-1]]
-    for k, name in enumerate(("both", "test")):
-        CHAPTER.tells({f"far-{name}": max(one[k] for one in far)})
-    # What the text says of each distance.
-    assert {mm for mm, one in shown.items() if one[0] < 2.5 and one[1] < 6} == {0.12, 0.6}
-    assert {mm for mm, one in shown.items() if one[1] > 30} == {0.06, None}
-    v = two(GAPS, None)
+    *rows, reach = numbers("film_distances.csv")
+    for row in (*rows[5::19], reach):
+        between, both, test, *p = row.values()
+        for releases, chi in (((1, 2), both), ((3,), test)):
+            off = left(np.array(p), between, releases)
+            assert off @ off == pytest.approx(chi, rel=2e-3, abs=0.02)
+    assert reach["apart"] is None
+    near, far = ([r for r in rows if (unit * r["apart"] < 0.095) == side] for side in (True, False))
+    told = {"near-both": min(r["both"] for r in near), "near-test": min(r["three"] for r in near)}
+    for name, column in (("both", "both"), ("test", "three")):
+        told |= {f"reach-{name}": reach[column], f"far-{name}": max(r[column] for r in far)}
+        told |= {f"far-{name}-least": min(r[column] for r in far)}
+    gaps = [1e3 * unit * row["gap_4"] for row in far]
+    CHAPTER.tells(told | {"far-gap": max(gaps), "far-gap-least": min(gaps)})
+    assert 0 <= float(GLUED["far-sum"]) - max(r["both"] + r["three"] for r in far) < 1
+    # What the text says of distances: where gaps fit, and where they fail.
+    good = [unit * r["apart"] for r in far if r["both"] < 2.5 and r["three"] < 6.2]
+    assert all(0.1 < mm < 0.15 or 0.52 < mm < 0.77 for mm in good)
+    assert len(good) > 8
+    assert unit * far[0]["apart"] < 0.1
+    ax = CHAPTER.figures["fig-real-distance"].axes[0]
+    for marker, column in (("o", "both"), ("s", "three")):
+        (drawn,) = points(ax, marker=marker)
+        shown = [[unit * row["apart"], row[column]] for row in rows]
+        assert drawn[:-1] == pytest.approx(np.array(shown), rel=1e-3)
+    v = spheres([slower, 0, 0, 0], [0, *GAPS[1:3]], GAPS[3]) / slower
     CHAPTER.tells({"part": 100 * (v[1] - v[0]), "apart": real_cradles.APART * unit})
     READING.tells({"apart": real_cradles.APART * unit})
-    off = left(np.array(GAPS), 1, (2,))
+    off = left(np.array(GAPS), 1 / unit, (2,))
     CHAPTER.tells({"same-mm": off @ off}, off=0.5)
 
 

@@ -5,7 +5,7 @@ import pytest
 import real_cradles
 import real_swing
 from real_cradles import by_spheres, chi_square, first_strikes, ratios, spheres, table
-from stored import read
+from stored import numbers, read
 
 from cradle import Chain, SequentialCollisions, SpringChain, collide
 
@@ -84,6 +84,15 @@ def test_a_stored_fit_to_both_is_a_minimum(law, strikers):
     for change in (*np.eye(len(p)), *-np.eye(len(p))):
         # Half a percent of each number: above the rounding of what is stored.
         assert chi_square(law, p * (1 + 0.005 * change), strikers == "apart", data, (1, 2)) > least
+
+
+@pytest.mark.parametrize("at", [10, 23, 44, 60])
+def test_no_gaps_are_better_at_a_distance_than_those_stored(at):
+    """From starts that the search has not seen."""
+    row, rng = numbers("film_distances.csv")[at], np.random.default_rng(at)
+    starts = [[*gaps, 0.006] for gaps in rng.uniform(0.01, 0.4, (12, 3))]
+    found, _ = real_cradles.best_at(row["apart"], first_strikes(4), starts)
+    assert found > row["both"] - 0.02
 
 
 def test_every_law_is_fitted_and_freedom_counts_its_numbers():
