@@ -170,11 +170,17 @@ def test_copies_are_told_apart_by_decimals():
 def test_fig_beyond_stability():
     """The count of collisions, the point where the order becomes chance, and the front."""
     digits, counts = CHAPTER.figures["fig-beyond-stability"].axes
+    written = iter(digits.texts)
     for k, ratio in enumerate((0.0, 0.1, 0.3, 0.45)):
         rows = find("losses", restitution=0.99, ratio=ratio, collapsed=0.0)
         balls, collisions = column(rows, "balls", "collisions").T
         np.testing.assert_allclose(points(counts)[k][:, 1], collisions / (balls * (balls - 1) / 2))
-        np.testing.assert_array_equal(points(digits)[k], column(rows, "balls", "kept"))
+        assert digits.get_yticklabels()[k].get_text() == f"{ratio:g}"
+        for place, (length, kept) in enumerate(column(rows, "balls", "kept")):
+            mark = next(written)
+            assert mark.get_position() == (place, k)
+            assert float(mark.get_text()) == kept
+            assert float(digits.get_xticklabels()[place].get_text()) == length
     for e in (0.9, 0.99, 0.999):
         # At ratio zero, Newton's rule for two balls, from ball to ball.
         for row in find("losses", restitution=e, ratio=0.0, collapsed=0.0):
@@ -224,6 +230,7 @@ def test_fig_beyond_springs():
     by_striker = -2 * first / (1 - first)
     names = "ratio-leader", "ratio-three", "ratio-striker"
     CHAPTER.tells(dict(zip(names, (by_leader[-1], by_leader[0], by_striker[-1]))))
+    CHAPTER.tells({"leader-asks": by_leader[-1]})
     assert (np.diff(by_leader[:8]) > 0).all()
     assert np.abs(by_striker - by_striker[-1]).max() < 3e-4
     np.testing.assert_allclose(by_leader[0], by_striker[0], atol=1e-5)
@@ -240,6 +247,8 @@ def test_ratios_that_differ_from_ball_to_ball_give_the_springs():
     ratios = [float(a) for a in CHAPTER.glued["along-five"].split(", ")]
     after = post_impact_velocities(*struck(5), 1.0, ratios, excess="saturate")
     np.testing.assert_allclose(after, HERTZ["five equal"], rtol=0, atol=2e-4)
+    rough = CHAPTER.glued["along-rough"].replace(" and", ",").split(", ")
+    assert rough == [f"{a:.2f}" for a in ratios]
 
 
 def test_these_ratios_miss_springs_when_two_strike():
