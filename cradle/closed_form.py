@@ -48,9 +48,9 @@ def three_balls(
 ) -> Vector:
     """Return velocities after one collision per contact of three balls (equations 22 to 33), m/s.
 
-    The result, shape (..., 3), is NaN where the radical of Eq. 30 is not real; where it applies,
-    `one_collision_each` tells.  What is no number or has a wrong shape raises a `ValueError`;
-    ranges are not checked.
+    The result has the shape (..., 3); where the radical of Eq. 30 is not real, balls 2 and 3 are
+    NaN.  Where the equations hold, `one_collision_each` tells.  A `ValueError` is raised if a shape
+    is wrong, or a value is no real number; whether values are in range is not checked.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def final_impulses(
 ) -> tuple[Vector, Vector]:
     """Return the final impulses tau_2 and tau_3 of `three_balls`, N s, shapes (...) (Eqs. 24, 30).
 
-    Arguments, errors and NaN are those of `three_balls`.
+    Arguments and errors are those of `three_balls`; where its balls 2 and 3 are NaN, tau_3 is.
 
     Examples
     --------
@@ -107,14 +107,14 @@ def largest_ratios(
 
     With a larger ratio a driven contact would give work without having absorbed any.  The bound at
     a ball depends on the ratio of the next ball in the direction of the drive; at the last inner
-    ball there is none, and the bound is Eq. 34.  Wrong values and shapes raise a `ValueError`.
+    ball there is none: Eq. 34.  Leading axes broadcast; wrong values or shapes are a `ValueError`.
 
     Parameters
     ----------
     masses : array_like, shape (..., N)
         kg, above 0; N >= 2.
     forward, backward : array_like, shape (..., N - 2)
-        Ratios at the interior balls, 0 to 1; the bounds come back in the same shapes.
+        Ratios at the interior balls, 0 to 1; their bounds are returned, each ball's in its place.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLi
 
     The arguments broadcast: the mass ratio r2 = m2/m3, at least 0, the restitution of the two
     contacts, e2 at least 1e-30, and the forward ratio, all 0 to 1; others raise a `ValueError`.
-    The result is NaN where the ratio exceeds its bound (Eq. 34).
+    It is NaN where the ratio exceeds its bound (Eq. 34), below 0 if ball 2 cannot fall back.
 
     Examples
     --------

@@ -20,9 +20,9 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
 
     Ball 1 comes from the left and strikes two balls at rest.  In pattern 1 it alone goes back
     (velocity below zero), in pattern 2 no ball does, in pattern 3 balls 1 and 2 do (Ceanga and
-    Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, section 2.5).  The velocities after the impact have
-    the shape (..., 3), m/s, the patterns (...).  Another shape, a velocity that is not finite, and
-    a last ball that goes back (then no ball came from the left) raise a `ValueError`.
+    Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, section 2.5).  The velocities after the impact, m/s,
+    shape (..., 3), are in order, so those below zero are just counted; the patterns have the shape
+    (...).  Another shape, a velocity that is not finite, or ball 3 going back is a `ValueError`.
 
     Examples
     --------
@@ -163,8 +163,9 @@ def conserving_outcomes(
 
     They are an arc, from v1 = v2 at angle 0 to v2 = v3 at ``arccos((m1 m3 / ((m1 + m2)
     (m2 + m3)))^(1/2))``, 60 degrees for equal balls (Walkiewicz and Newby, Am. J. Phys. 40 (1972)
-    133-137).  With s = v2 - v1, and w the velocity of ball 3 relative to the centre of mass of
-    balls 1 and 2, energy allows the circle ``mu s^2 + M w^2 = const``, mu and M the reduced masses.
+    133-137).  With s = v2 - v1, w the velocity of ball 3 relative to the centre of mass of balls 1
+    and 2, and mu and M the reduced masses of both, energy keeps the point (M^(1/2) w, mu^(1/2) s)
+    on a circle about the origin; the angle is counted there from the first axis.
 
     The masses, kg, and the velocities before the impact, m/s, have the shape (3,), the angles, rad,
     (K,); if left out, 181 from end to end.  The angles and the velocities there, shape (K, 3), are

@@ -68,7 +68,7 @@ class Row(Alone):
         `touching`, m, and they close or part no faster than `resting`, m/s.  Balls that close more
         slowly go on together.  If left out, r / 1000 and sqrt(a r) / 100, r the smallest radius.
     acceleration : float
-        The acceleration a of gravity, m/s^2, or the most by which anything draws neighbours closer.
+        That of gravity, a, m/s^2, or the most by which anything draws neighbours closer; above 0.
 
     Attributes
     ----------

@@ -46,8 +46,8 @@ class Trace:
         How often each contact became active.  Do not rely on collisions slower than the last digit
         of the velocities: an endless sequence may stop there, without `collapsed`.
     path, path_impulses : ndarray, shapes (K + 1, N) and (K + 1, N - 1)
-        Velocities, m/s, and impulses so far, N s, before the impact and at every event.  Between
-        two rows they are linear, except before a "collapse" or a "repetition" of many events.
+        Velocities, m/s, and impulses so far, N s, before the impact and at every event.  In between
+        they are linear, but not before a "collapse" or "repetition", nor for springs: see `curve`.
     events : tuple of Event, length K
         What happened at each row of the path but the first.
     collapsed, saturated : bool, tuple of int
@@ -60,8 +60,8 @@ class Trace:
         ratio lies between 0 and 1e-4, so that products of ratios may decide a tie beyond 32 digits;
         balls are struck from both sides and those between rest, so that any motion of these changes
         who drives (R2; if they move, the speed that would do so counts, over the fastest closing);
-        or a sequence was taken to its limit while other balls still collided.  Errors that hundreds
-        of collisions amplify are seen by `condition_number` alone.
+        or a sequence was taken to its limit while other balls still collided.  `condition_number`
+        alone sees what hundreds of collisions amplify.  Without ratios it is not measured, and 1.
     left_out : int
         Number of events that are missing in a path that was cut; 0 with ``record=False``.
 
@@ -121,13 +121,13 @@ class Trace:
         return pd.DataFrame(table | {name: part.ravel() for name, part in parts.items()})
 
     def curve(self) -> tuple[Vector, Vector]:
-        """Return impulses (N s) and velocities (m/s) that straight lines join in a picture."""
+        """Return impulses (N s) and velocities (m/s), a row for each point of a drawn line."""
         return self.path_impulses, self.path
 
     def plot(self, ax: "Axes | None" = None, *, contact: int | None = None) -> "Axes":
         """Draw the velocities over the impact, or the velocity-impulse diagram of a contact.
 
-        As `velocities` and `velocity_impulse` of `cradle.pictures.impacts`, with their errors.
+        By `velocities` and `velocity_impulse` of `cradle.pictures.impacts`, with the same errors.
         """
         from cradle.pictures import impacts as figures
 

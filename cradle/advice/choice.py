@@ -127,8 +127,8 @@ def recommend(
     ratios : ImpulseCorrelation, float or sequence of length N - 2, optional
         Impulse Correlation Ratios, if they are known, as a model or as its `forward`.
     stiffness : float or sequence of length N - 1, optional
-        k of the contacts of spheres (Hertz) if the material is known, N/m^(3/2); 1 for equal ones
-        if neither forces nor times are wanted.
+        k of the contacts of spheres (Hertz) if the material is known, N/m^(3/2); if neither forces
+        nor times are wanted, give 1 for spheres that are all alike.
 
     Notes
     -----

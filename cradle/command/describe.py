@@ -32,11 +32,11 @@ _CHAIN = (
     click.Option(["--model"], type=click.Choice(["ratio", "spheres", "sequential"]),
                  help="How the balls collide: by ratios, as spheres (Hertz; with losses viscous "
                  "ones, or the energy law if they lose too much for that), or one pair after the "
-                 "other [ratio if there are ratios, else spheres]."),
+                 "other [ratio if there are ratios or two balls, else spheres]."),
     click.Option(["--stiffness"], callback=numbers_of, help="Of the contacts of spheres, N/m^1.5: "
-                 "one, or one per contact [1; gaps, forces and times need it]."),
-    click.Option(["--gaps"], callback=numbers_of, help="Between the balls, m; below 0 where "
-                 "their strings press them together [0]."),
+                 "one, or one per contact [1; forces, times and solve --gaps need it]."),
+    click.Option(["--gaps"], callback=numbers_of, help="Between the balls, m; for solve below 0 "
+                 "where strings press them together [0]."),
     click.Option(["--ratio"], callback=numbers_of, help="One, or one per inner ball."),
     click.Option(["--backward"], callback=numbers_of, help="Ratios from the right [as --ratio]."),
     click.Option(["--saturate"], is_flag=True, help="Admit ratios above their bound."),

@@ -21,7 +21,7 @@ from cradle.input.values import ABOVE_ZERO, one_number, whole_number
 @describe.swing_options("0.3")
 @click.option("--damping", callback=numbers_of, help="Of each swing's amplitude, 1/s [0].")
 @click.option("--seconds", default=2.0, help="How long it swings [2].")
-@click.option("--steps", type=int, help="How many rows to print [20].")
+@click.option("--steps", type=int, help="How many rows to print after the start [20].")
 @click.option("--output", "-o", type=click.Path(dir_okay=False), callback=picture,
               help="Draw a film to a file: .gif, .mp4, .html, .svg; .png is a picture of the "
               "start.")  # fmt: skip

@@ -61,7 +61,7 @@ def ratio(
     known : mapping, optional
         Ratios not to be fitted, by triplet; if given, no set needs three balls.
     progress : bool
-        After two seconds, show how many points were tried; six ratios need a million.
+        After two seconds, show how many points were tried; six ratios need 2.5 million.
 
     Examples
     --------

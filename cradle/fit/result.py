@@ -29,8 +29,8 @@ _ALL = 0.999  # a confidence set that covers more than this part of the range sa
 class Estimate:
     """One coefficient of restitution or one ratio."""
 
-    kind: str  #: "restitution" or "ratio".
-    key: Key  #: Types of the balls.
+    kind: str  #: "restitution", "ratio", or "swing" for the numbers of `fit_swing`.
+    key: Key  #: Types of the balls; for a swing, the name of the number.
     value: float | None  #: Where chi-square is lowest; None if the data tell nothing.
     #: The 95 % confidence set, (lower, upper), by profile likelihood; or several that explain all.
     intervals: tuple[tuple[float, float], ...]
@@ -54,7 +54,7 @@ class Estimate:
 
     @property
     def name(self) -> str:
-        """Name of the parameter, such as "ABC"."""
+        """Name of the parameter, such as "ABC" or, of a swing, "period"."""
         return label(self.key)
 
     @property
@@ -167,7 +167,7 @@ class Fit:
         return outcomes(shots.types, shots.masses, shots.before[:, None], values)[:, 0]
 
     def correlations(self) -> dict[tuple[str, str], float]:
-        """Return the correlation of the errors of two ratios that were fitted together."""
+        """Return the correlation of the errors of every two ratios that were fitted together."""
         found = {}
         for group in self.groups:
             for (i, one), (j, other) in combinations(enumerate(map(label, group.keys)), 2):
@@ -234,7 +234,7 @@ class Fit:
         types : str or sequence of str, length N
             Types of the balls, left to right; in one string such as "ABA" or "steel-brass-steel".
         speed : float
-            Of the first ball, m/s.
+            Of the first ball, m/s, above 0.
         """
         row = parameters.types_in_a_row(types)
         one_number("speed", speed, *ABOVE_ZERO)

@@ -123,8 +123,8 @@ def read_shots(
 ) -> Shots:  # fmt: skip
     """Read a table of shots and check it; the result is in kg and m/s.
 
-    A ValueError that names row and column is raised if a column is missing or there twice, a value
-    is wrong, balls pass through each other, or a shot gains more energy than its errors allow.
+    A ValueError names the place if a column is missing or there twice, a value is wrong, no balls
+    approach, balls pass through each other, or a shot gains more energy than its errors allow.
 
     Parameters
     ----------

@@ -38,8 +38,8 @@ def read_tracker(path: str | Path, *, time_scale: float = 1.0, unit: float = 1.0
     """Read a text file exported by Tracker, Kinovea, Logger Pro or Capstone.
 
     Frames where a ball was not marked (no number, or NaN) are left out of its track; the tracks are
-    in the order of the titles.  Another layout, and a cell that is no number, raise a ValueError
-    that names line and column.
+    in the order of the titles.  Another layout raises a ValueError, and so does a cell that is no
+    number; then line and column are named.
 
     Parameters
     ----------

@@ -51,9 +51,9 @@ def post_impact_velocities(
     Raises
     ------
     ValueError, ImpactNotFinished, ImpactNotCertified
-        If a value or a shape is wrong; if an impact takes more than `max_events` steps, or its
-        outcome fails the check that every answer has to pass.  The first such chain is reported,
-        with a note of its place.
+        If a value, whose place is told, or a shape is wrong; if an impact takes more than
+        `max_events` steps (the first such chain is reported, with a note of its place); or if an
+        outcome fails the check that every answer has to pass.
 
     References
     ----------

@@ -265,7 +265,7 @@ def hertz_stiffness(radii: ArrayLike, young: float = 210e9, poisson: float = 0.3
 
     Examples
     --------
-    Balls of 1 cm, the last one of 2 cm:
+    Balls with a radius of 1 cm, the last one with 2 cm:
 
     >>> [f"{k:.3g}" for k in hertz_stiffness([0.01, 0.01, 0.02])]
     ['1.09e+10', '1.26e+10']

@@ -39,11 +39,11 @@ class ImpulseCorrelation:
     Parameters
     ----------
     forward, backward : float or sequence, length N - 2
-        Ratio at each interior ball when its left contact drives its right one, and when its right
-        one drives its left one; `backward` as `forward` if left out.
+        Ratio, 0 to 1, at each interior ball when its left contact drives its right one, and when
+        its right one drives its left one; `backward` as `forward` if left out.
     meeting : float
         Two balls may be driven towards each other by separate collisions.  Their velocities meet at
-        this part of the overlap of the ranges that they run through; 1/2 is the paper's midpoint.
+        this part, 0 to 1, of the overlap of the ranges that they run through; 1/2 as in the paper.
     excess : {"raise", "saturate"}
         What to do with a ratio above its bound (Eq. 53): refuse it, or hold the contact closed
         while the ratio would open it.

@@ -67,8 +67,8 @@ class EnergyDistribution:
     exponent : float
         p, at least 1: 1 a linear spring, 3/2 the contact of two elastic spheres (Hertz).
     rtol : float
-        Relative tolerance of the integration.  When all speeds that are left lie below rtol times
-        the fastest closing speed, the impact is ended plastically.
+        Relative tolerance of the integration, 3e-14 to 0.1.  When all speeds that are left lie
+        below rtol times the fastest closing speed, the impact is ended plastically.
     max_evaluations : int
         How often the ratios may be evaluated; beyond that `ImpactNotFinished` is raised.
 

@@ -74,7 +74,7 @@ class SpeedDependent:
 
 @dataclass(frozen=True)
 class ConstantLoss:
-    """Restitution ``e = max(0, 1 - speed / u)``: balls part more slowly by one `speed`, m/s.
+    """Restitution ``e = max(0, 1 - speed / u)``: balls part by `speed` slower than they close, m/s.
 
     Examples
     --------
@@ -89,7 +89,7 @@ class ConstantLoss:
         vars(self)["speed"] = asked.one_number("speed", self.speed, "must be at least 0", 0.0)
 
     def __call__(self, u: float) -> float:
-        """Return e at the closing speed u."""
+        """Return e at the closing speed u, m/s, above 0."""
         return max(0.0, 1.0 - self.speed / u)
 
 
@@ -100,7 +100,7 @@ class ViscousLoss:
     Parameters
     ----------
     viscosity, stiffness, exponent : float
-        A, s, k, N/m^p, and p, as for `spring_velocities`; on a call the loss must be within theirs.
+        A, s, k, N/m^p, and p, as for `spring_velocities`.
     masses : sequence of two floats
         kg.
 
@@ -123,7 +123,7 @@ class ViscousLoss:
         vars(self)["masses"] = tuple(Chain(self.masses, np.zeros(2)).masses.tolist())
 
     def __call__(self, u: float) -> float:
-        """Return e at the closing speed u."""
+        """Return e at the closing speed u, m/s, above 0; ValueError if A is too large for u."""
         left, right = self.masses
         mass, p = left / (left + right) * right, self.exponent
         own = self.viscosity * (self.stiffness / mass * u ** (p - 1.0)) ** (1.0 / (p + 1.0))

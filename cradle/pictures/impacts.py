@@ -94,8 +94,9 @@ def velocity_impulse(
     It shows the velocities of the contact's two balls against its impulse (sections 2.3, 2.4, 3.2).
     Where other contacts act while this one rests, its impulse does not grow, and a velocity jumps.
     Markers and letters show the contact's events (`EVENT_STYLES`); with several collisions the
-    letter carries a number.  Contact c joins balls c and c + 1.  With `other` an upper axis shows
-    the impulse of that contact, as by `impulse_axis`.  Without `ax` new axes are made.
+    letter carries a number.  Contact c joins balls c and c + 1; one that is not there is refused by
+    a ValueError.  With `other` an upper axis shows the impulse of that contact, as by
+    `impulse_axis`.  Without `ax` new axes are made.
 
     Examples
     --------
@@ -154,7 +155,8 @@ def impulse_axis(
 
     The two do not grow in proportion: each tick stands where the path of the impact has it.
     `contact` is that of the lower axis, as drawn by `velocity_impulse`; `values` are the impulses
-    to mark, N s: if left out, those at the events, two where the lower contact rests.
+    to mark, N s: if left out, those at the events, two where the lower contact rests.  A contact
+    that is not there is refused by a ValueError.
 
     Examples
     --------
@@ -164,6 +166,9 @@ def impulse_axis(
     >>> upper.get_xticks().round(4).tolist()
     [0.0, 0.5, 0.6667]
     """
+    last = len(must_be(Trace, "trace", trace).impulses) - 1
+    for name, given in ("contact", contact), ("other", other):
+        whole_number(name, given, f"0 to {last}", 0, last)
     if values is None:
         places, labels = _event_ticks(*trace.path_impulses[:, [contact, other]].T)
     else:

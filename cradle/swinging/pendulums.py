@@ -15,7 +15,7 @@ TIE = 1e-9
 class Pendulums:
     """How the balls hang: strings, gravity, gaps, and the damping of the swing.
 
-    A value outside its range is a `ValueError`.
+    A value outside its range is a `ValueError`; `swing` refuses what does not suit its balls.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Pendulums:
     gaps : float or array_like of shape (N - 1,)
         Between the surfaces of neighbours at rest, m; 0 if they just touch.
     damping : float or array_like of shape (N,)
-        Rate at which a ball's amplitude decays, 1/s; below its frequency sqrt(g/l).
+        Rate at which a ball's amplitude decays, 1/s; for `swing` below the frequency sqrt(g/l).
     angle : {"small", "full"}
         "small" pendulums swing too fast: by 1 % at 0.4 rad, by 7 % at 1 rad.  "full" ones need
         equal lengths and one damping, so that contacts stay horizontal; their gaps are counted

@@ -43,7 +43,7 @@ def swing(
         contacts last some .01 rad of the swing, or a strike .1 rad, they take none either.
     positions : array_like, shape (N,)
         Where the balls are released, along their arcs from their lowest points, m; positive to the
-        right.  At most a quarter of a circle, or half a circle with ``angle="full"``.
+        right.  At most a quarter of a circle; with ``angle="full"`` and no gaps less than half one.
     times : array_like, shape (T,)
         When to report positions and velocities, s since the release; rising, from 0 on.  During a
         strike that takes time those at its end are reported.
@@ -54,7 +54,7 @@ def swing(
 
     Raises
     ------
-    TypeError, ImpactNotFinished
+    TypeError, ImpactNotFinished, ImpactNotCertified
         As `collide`.
     ValueError
         If a value is wrong, balls overlap, a ball at small angles swings farther aside than it may
