@@ -104,7 +104,7 @@ def effective_ratio(trace: Trace) -> float:
 
     It lies between 0 and its bound (Eq. 34) and acts in both directions, as in
     `ImpulseCorrelation(ratio)`; in a direction with a smaller bound it is held at that.  If several
-    ratios give the outcome within 1e-6 of the fastest closing speed, it is the smallest.
+    ranges of ratios give the outcome within 1e-6 of the fastest closing speed, it is in the lowest.
     Outcomes that lose no energy differ by one number, so that one ratio often suffices; with losses
     there is in general none, and the `ValueError` names the one that comes nearest.  Other than
     three balls, and balls of which none approach, raise a `ValueError` too.
