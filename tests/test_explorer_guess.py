@@ -190,6 +190,22 @@ def test_events_are_those_of_the_chapter(still):
         assert tab.bars() == trace.path[row].round(2).tolist()
 
 
+def test_a_contact_waits_at_ratio_zero(still):
+    """Until its driver ends it closes in name only (R6): its impulse does not grow."""
+    tab = still(chapter="n_balls")
+    for ratio in ("0.15", "0"):
+        tab.act(f"read('speeds=1,0.5,0,0&forward={ratio}')")
+        trace = collide(*chain_of(tab.drawn()))
+        impulses = trace.path_impulses
+        told = []
+        for row, (kind, c) in enumerate(trace.events, start=1):
+            idle = kind == "close" and impulses[row + 1, c] == impulses[row, c]
+            words = {"end": "ends", "close": "waits" if idle else "closes"}.get(kind)
+            told += [f"contact {c + 1}\u2011{c + 2} {words}"] * bool(words)
+        assert tab.locator(".events button").all_inner_texts() == told
+        assert sum("waits" in words for words in told) == (0 if float(ratio) else 2)
+
+
 def test_each_chain_of_chapter_7_is_guessed(still):
     tab = still(chapter="experiments")
     tab.drawn()

@@ -4,27 +4,36 @@
   "use strict";
   const { axes, names, picture, polyline, px, span, stroke, sub } = explorer;
 
-  // `compute(k)` for k below `count`, every 16th first, then those between.
+  // The places of a row, or of a square of such rows, from coarse to fine: first every 16th, then
+  // those between. Each has the size of what it stands for until finer ones are known.
+  function coarseToFine(side, rows = 1) {
+    const order = [];
+    for (let size = 16; size >= 1; size /= 2)
+      for (let row = 0; row < rows; row += size)
+        for (let column = 0; column < side; column += size)
+          if (size === 16 || row % (2 * size) || column % (2 * size))
+            order.push({ k: row * side + column, row, column, size });
+    return order;
+  }
+
+  // `compute(k)` for all places, in their order.
   class Gradual {
-    constructor(count, compute) {
-      this.values = new Array(count);
+    constructor(order, compute) {
+      this.values = new Array(order.length);
+      this.order = order;
       this.compute = compute;
-      this.stride = 16;
-      this.next = 0;
+      this.done = 0;
     }
 
     get finished() {
-      return this.stride < 1;
+      return this.done === this.order.length;
     }
 
     resume(deadline) {
       while (!this.finished && performance.now() < deadline) {
-        if (this.values[this.next] === undefined) this.values[this.next] = this.compute(this.next);
-        this.next += this.stride;
-        if (this.next >= this.values.length) {
-          this.next = 0;
-          this.stride = this.stride >> 1;
-        }
+        const { k } = this.order[this.done];
+        this.values[k] = this.compute(k);
+        this.done += 1;
       }
     }
   }
@@ -55,7 +64,7 @@
       this.key = Sweep.key(setting, inner);
       this.setting = setting;
       this.inner = inner;
-      this.points = new Gradual(STEPS + 1, (k) =>
+      this.points = new Gradual(coarseToFine(STEPS + 1), (k) =>
         explorer.outcome(explorer.withRatio(setting, inner, k / STEPS)),
       );
     }
@@ -168,7 +177,7 @@
     constructor(setting) {
       this.key = RegionMap.key(setting);
       const { masses: _, ...others } = setting;
-      this.points = new Gradual(CELLS * CELLS, (k) => {
+      this.points = new Gradual(coarseToFine(CELLS, CELLS), (k) => {
         const left = ((Math.floor(k / CELLS) + 0.5) / CELLS) * LARGEST;
         const right = (((k % CELLS) + 0.5) / CELLS) * LARGEST;
         const masses = [1 / left, 1, 1 / right];
@@ -195,13 +204,16 @@
       const [plain, shaded] = shades(pen, fills);
       const image = pen.createImageData(CELLS, CELLS);
       const pixels = new Uint32Array(image.data.buffer);
-      const wide = this.points.finished ? 1 : Math.min(this.points.stride * 2, 16);
-      this.points.values.forEach(({ pattern, odd }, k) => {
-        if (pattern < 0) return;
-        const row = (CELLS - 1 - Math.floor(k / CELLS)) * CELLS;
-        const from = row + (k % CELLS);
-        pixels.fill((odd ? shaded : plain)[pattern], from, Math.min(from + wide, row + CELLS));
-      });
+      const { done, order, values } = this.points;
+      for (const { k, row, column, size } of order.slice(0, done)) {
+        const { pattern, odd } = values[k];
+        const [rows, columns] = [row, column].map((at) => Math.min(at + size, CELLS));
+        const fill = pattern < 0 ? 0 : (odd ? shaded : plain)[pattern]; // none where there is no answer
+        for (let line = row; line < rows; line += 1) {
+          const from = (CELLS - 1 - line) * CELLS;
+          pixels.fill(fill, from + column, from + columns);
+        }
+      }
       pen.putImageData(image, 0, 0);
     }
 

@@ -249,8 +249,9 @@
     const handles = panels.handles(act);
     const told = make("p", { class: "note guessed" });
     const second = make(level, {});
-    const caption = make("p", { class: "note" });
-    const balance = make("div", { class: "balance" }, second, momentum, energy, caption);
+    const caption = make("p", {});
+    const legend = make("details", { class: "note" }, make("summary", {}, "How to read these two bars"), caption);
+    const balance = make("div", { class: "balance" }, second, momentum, energy, legend);
     const node = make(
       "div",
       { class: "outcome" },

@@ -10,18 +10,31 @@
 
   // --- a hit from the inside ------------------------------------------------------------------------
 
+  // Whether a contact that closes gets no push yet: a neighbour drives it, at the ratio zero.
+  function waits({ forward, backward }, { pathImpulses }, contact, row) {
+    const now = pathImpulses[row];
+    const next = pathImpulses.slice(row + 1).find((later) => later.some((p, c) => p > now[c]));
+    const grows = (c) => next?.[c] > now[c];
+    const idle = (neighbour, ratio) => grows(neighbour) && ratio === 0;
+    return !grows(contact) && (idle(contact - 1, forward[contact - 1]) || idle(contact + 1, backward[contact]));
+  }
+
   // The events of a hit as buttons, numbered as in chapter 4: contacts that end, and that begin anew.
   function eventList(act) {
     const node = make("ol", { class: "events" });
     let listed = null;
-    const words = ({ kind, contact }) =>
-      `contact ${contact + 1}\u2011${contact + 2} ${kind === "close" ? "closes" : "ends"}`;
-    function show({ record, part }) {
+    const words = ({ kind, contact, pending }) =>
+      `contact ${contact + 1}\u2011${contact + 2} ${kind === "end" ? "ends" : pending ? "waits" : "closes"}`;
+    function show({ setting, record, part }) {
       const total = record ? explorer.progress(record) : [0];
       const end = total[total.length - 1];
       const events = (record?.events ?? []).flatMap((event, k) =>
-        event.kind === "maximum_compression" ? [] : [{ ...event, at: total[event.row ?? k + 1] / end }],
+        event.kind === "maximum_compression" ? [] : [{ ...event, row: event.row ?? k + 1 }],
       );
+      for (const event of events) {
+        event.at = total[event.row] / end;
+        event.pending = event.kind === "close" && waits(setting, record, event.contact, event.row);
+      }
       if (record !== listed)
         node.replaceChildren(
           ...events.slice(0, LISTED).map((event) => make("li", {}, button(words(event), () => act.part(event.at)))),
