@@ -13,7 +13,7 @@ from page import said
 from problem import Problem
 from stored import read
 
-from cradle import Chain, ImpulseCorrelation, outcomes
+from cradle import Chain, ImpulseCorrelation, collide, outcomes
 from cradle.measures import condition_number
 from cradle.textbook import solve
 
@@ -289,6 +289,23 @@ def test_the_table_of_the_inventory():
     assert int(told["given-up"]) == sum(int(r["given up"]) for r in rows)
     assert int(told["not-judged"]) == sum(int(r["nobody knows"]) for r in rows)
     assert int(told["rest"]) == sum(int(r["left"]) for r in stored("finish"))
+
+
+def test_the_thresholds_of_the_inventory():
+    """Typed here, and by what chains on both sides of those meet that a user can cross."""
+    printed = Chapter("extremes_inventory").printed("inventory-limits-table")
+    told = re.findall(r"\b\d+⁻\S+|\d(?= roundings)", printed)
+    assert " ".join(told) == "2⁻⁸⁴ 2⁻¹²⁰ 10⁻¹⁸ 10⁻¹³ 10⁻⁴ 10⁻³⁰ 10⁻¹⁵ 4"
+    rows, still = [1.0, 1.0, 1.0], [1.0, 0.5, 0.0]
+    for ratio, warned in ((0.0, False), (0.9e-4, True), (1.1e-4, False)):
+        trace = collide(Chain(rows, still, 0.5), ImpulseCorrelation(ratio))
+        assert (trace.margin == 0) == warned
+    Chain([1, 1], [1, 0], 1.1e-30)
+    with pytest.raises(ValueError, match="at least 1e-30"):
+        Chain([1, 1], [1, 0], 0.9e-30)
+    collide(Chain([1, 1.1e-15], [1, 0]), ImpulseCorrelation(0))
+    with pytest.raises(ValueError, match="1e-15"):
+        collide(Chain([1, 0.9e-15], [1, 0]), ImpulseCorrelation(0))
 
 
 def test_rule_nine_says_who_drives_after_a_sequence_without_end():
