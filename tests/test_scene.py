@@ -289,7 +289,7 @@ def test_energy_left():
     own = [
         100 * balls(row).sum() for row in stored("laws", law="as it is", setting="fine", stroke=50)
     ]
-    assert glued["least-own"] == f"{min(own):.0f}"
+    assert glued["least-own"] == f"{min(own):.0f}–{max(own):.0f}"
     assert max(own) > 200
 
 
@@ -306,6 +306,23 @@ def test_the_judge_of_outer_balls_apart():
     law = scenes.LAWS["springs, outer apart"][1]
     struck = collide(Chain([1] * 5, [scenes.SPEED] * 2 + [0] * 3), law).velocities
     np.testing.assert_allclose(struck**2 / (struck**2).sum(), found / found.sum(), atol=3e-3)
+
+
+@pytest.mark.parametrize("pulled", [1, 2])
+def test_engines_as_they_are_from_the_best_to_the_worst(pulled: int):
+    """The last line of the first table; Bullet stops early."""
+    glued, judge = Chapter("scene").glued, run(*HERTZ, pulled)[np.array(AT) - 1]
+    found = [by_law(name, "as it is", "fine", pulled) for name in ENGINES if name != "Bullet"]
+    off = [slower([one], judge, pulled) for one in found]
+    assert glued[f"off-own-{pulled}"] == f"{min(off):.0f}–{max(off):.0f}"
+    seen = np.abs(first_strikes(4)[pulled][0])
+    missed = [
+        100 * np.abs(np.sqrt(pulled * balls(row)) - seen).max()
+        for row in stored("gaps", gap="0", pulled=str(pulled))
+        if row["setting"] in ("default", "refined")
+    ]
+    assert len(missed) == 10
+    assert glued[f"film-own-{pulled}"] == f"{min(missed):.0f}–{max(missed):.0f}"
 
 
 @pytest.mark.parametrize("pulled", [1, 2])
