@@ -26,7 +26,7 @@ def test_the_table_at_the_top_says_what_the_next_one_computes():
         cells = re.search(rf"(?m)^\| \*\*{row}\*\* .*? \| (.*) \| (.*) \|$", source)
         every = ", ".join(found[1])
         told = (x.replace("\N{NO-BREAK SPACE}", " ").replace("all", every) for x in cells.groups())
-        yes, no = (re.sub(r"; with little loss", ",", x).split(", ") for x in told)
+        yes, no = (re.sub(r"; with little loss:", ",", x).split(", ") for x in told)
         if row == 6:
             assert (set(yes), no) == (set(found[1]), ["–"])
             continue
