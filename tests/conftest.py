@@ -13,6 +13,7 @@ from built_book import SHARED, built
 from explorer import Tab
 from hypothesis import HealthCheck, settings
 from kept_figures import in_kernels
+from kernel_copies import copied
 from pages import launched, visiting
 
 # The same examples at every run of the same sources. Hypothesis also draws the numbers that it
@@ -60,15 +61,18 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 #: Files that take longest, in this order: begun first, so that no process is left alone with one.
+#: The first of them leave time to build the book, before others open its pages.
 #: Notebooks come before the tests that look at what they draw.
 LONG = (
-    "tests/test_layout.py", "tests/test_explorer_reading.py", "tests/test_book_parameters.py",
-    "book/toy.ipynb", "book/measure.ipynb", "book/real_cradles.ipynb", "book/",
-    "tests/test_book_real_cradles.py", "tests/test_fit_swing.py", "tests/test_explorer_guess.py",
-    "tests/test_explorer_touch.py", "tests/test_explorer_page.py", "tests/test_fit_law.py",
-    "tests/test_real_cradles.py", "tests/test_reader_solver.py", "tests/test_command.py",
-    "tests/test_explorer_spheres.py", "tests/test_extremes.py", "tests/test_kernel.py",
-    "tests/test_book_figures.py", "tests/test_book_experiments.py", "tests/test_speed.py",
+    "tests/test_book_parameters.py", "tests/test_fit_swing.py", "tests/test_layout.py",
+    "tests/test_explorer_reading.py", "book/toy.ipynb", "book/measure.ipynb",
+    "book/real_cradles.ipynb", "book/", "tests/test_book_real_cradles.py",
+    "tests/test_explorer_guess.py", "tests/test_explorer_touch.py", "tests/test_explorer_page.py",
+    "tests/test_command.py", "tests/test_fit_law.py", "tests/test_real_cradles.py",
+    "tests/test_reader_solver.py", "tests/test_kernel.py", "tests/test_extremes.py",
+    "tests/test_fit.py", "tests/test_swing.py", "tests/test_explorer_spheres.py",
+    "tests/test_speed.py", "tests/test_springs.py", "tests/test_work_area.py",
+    "tests/test_explorer_engine.py", "tests/test_book_experiments.py", "tests/test_book_figures.py",
 )  # fmt: skip
 
 
@@ -88,6 +92,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     Beside it, as the compiler keeps but one processor busy, the book is built if it will be needed.
     """
     option = session.config.option
+    if hasattr(session.config, "workerinput"):
+        session.config.add_cleanup(copied())
     if not session.config.getoption("numprocesses", None) or option.collectonly:
         return
     shared = tempfile.TemporaryDirectory(prefix="cradle-tests-", ignore_cleanup_errors=True)

@@ -9,11 +9,15 @@ import sys
 from pathlib import Path
 
 import execute
+import jupyter_client
 import nbformat
+import nbval.kernel
 import pytest
 from built_book import SHARED
 from chapters import code, run, shown, shows_image
+from jupyter_client.provisioning import local_provisioner
 from kept_figures import in_kernels, kept
+from kernel_copies import copied
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 BOOK = Path(__file__).parents[1] / "book"
@@ -289,6 +293,39 @@ def test_one_changed_digit_fails(tmp_path: Path, tmp_path_factory, root: Path, m
     assert re.search(r"(?s)right\.ipynb \. .*wrong\.ipynb F ", run.stdout)
     (line,) = kept(DRAWS).axes[0].lines
     assert line.get_ydata().tolist() == [3, 1, 2]
+
+
+SURROUNDINGS = """print(dir())
+import os, signal, sys, threading
+import matplotlib.pyplot as plt, numpy, pandas
+print(os.getcwd(), sys.path, sys.flags, sys.executable, sorted({*os.environ} - {"JPY_PARENT_PID"}))
+print(plt.get_backend(), plt.rcParams, numpy.geterr(), pandas.get_option("display.max_columns"))
+print([signal.getsignal(number) for number in (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM)])
+print(threading.active_count())"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="kernels are copied on Linux only")
+def test_a_copied_kernel_is_like_any_other(monkeypatch):
+    def told() -> str:
+        name = nbval.kernel.CURRENT_ENV_KERNEL_NAME
+        manager, client = nbval.kernel.start_new_kernel(kernel_name=name, cwd=str(BOOK))
+        said = []
+        client.execute_interactive(
+            SURROUNDINGS, output_hook=lambda message: said.append(message["content"].get("text"))
+        )
+        client.stop_channels()
+        manager.shutdown_kernel(now=True)
+        assert not manager.is_alive()
+        return "".join(filter(None, said))
+
+    monkeypatch.delenv("MPLBACKEND", raising=False)
+    monkeypatch.setattr(local_provisioner, "launch_kernel", jupyter_client.launch_kernel)
+    expected = told()
+    end = copied()
+    found = told(), told()
+    end()
+    assert found == (expected, expected)
+    assert str(BOOK) in expected
 
 
 def test_no_two_cells_draw_with_the_same_words():
