@@ -14,9 +14,12 @@ def integrated(m, v, k=1.0, p=1.5, loss=0.0, gaps=0.0):
         viscous = np.where(d > 0, np.maximum(d, 1e-300) ** (p - 1), 0.0) * p * loss * u
         return np.maximum(k * (np.maximum(d, 0.0) ** p + viscous), 0.0)
 
+    force = np.zeros(n + 1)  # on either side of each ball
+
     def rate(_, y):
-        u = -np.diff(y[:n])
-        return np.append(-np.diff(push(y[n:], u) - pull, prepend=0, append=0) / m, u)
+        u = y[: n - 1] - y[1:n]
+        force[1:-1] = push(y[n:], u) - pull
+        return np.concatenate([(force[:-1] - force[1:]) / m, u])
 
     def kink(c, early):
         """Tell where the force ends, also where its losses outweigh it."""
