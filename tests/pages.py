@@ -198,13 +198,25 @@ def shape(tab, width: int, mode: str) -> None:
     tab.emulate_media(color_scheme=mode)
 
 
+# Wait until the page has this width and this mode, and what follows the window has followed:
+# fit_equations.js hears of it before the next frame.
+FOLLOWED = f"""async ([width, mode]) => {{
+  const frames = {FRAMES};
+  const there = () => innerWidth === width && document.documentElement.dataset.theme === mode;
+  for (let k = 0; k < 10000 && !there(); k += 1) await frames();
+  await frames();
+  return there();
+}}"""
+
+
 def show(tab, width: int, mode: str) -> None:
     """Give the window this width and the page this mode, and wait until it has followed."""
-    shape(tab, width, mode)
-    shown = "[innerWidth, document.documentElement.dataset.theme]"
-    tab.wait_for_function(f"(asked) => `${{{shown}}}` === `${{asked}}`", arg=[width, mode])
-    # fit_equations.js follows the window, and hears of it before the next frame.
-    tab.evaluate(FRAMES)
+    # To give it again what it has takes as long: all styles are computed anew.
+    if tab.viewport_size["width"] != width:
+        tab.set_viewport_size({**tab.viewport_size, "width": width})
+    if tab.evaluate("document.documentElement.dataset.theme") != mode:
+        tab.emulate_media(color_scheme=mode)
+    assert tab.evaluate(FOLLOWED, [width, mode]), "the page does not follow the window"
 
 
 def luminance(colour: str) -> float:

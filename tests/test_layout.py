@@ -135,7 +135,8 @@ def looked_at(tab, page: Path, views) -> dict[str, list]:
     found["headings"], found["stops"] = tab.evaluate(SKIPPED), tab.evaluate(STOPS)
     tagged = re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8"))
     sights = {*views, (1280, "light"), (1280, "dark"), *((w, "light") for w in PHONES if tagged)}
-    for width, mode in sorted(sights, reverse=True):  # a new width takes longer than a new mode
+    # Each change takes long: first the light ones, narrow to wide, then the dark ones.
+    for width, mode in sorted(sights, key=lambda sight: (sight[1] == "dark", sight)):
         show(tab, width, mode)
         if (width, mode) in views and page.parent.name == "book":
             found["misfits"] += [[width, mode, *misfit] for misfit in tab.evaluate(MISFITS)]
