@@ -175,7 +175,7 @@ class _Run:
             x = hanging.apart(self.x + way)  # but for what is left of a compression, far too little
             v = self.v = self.v + 0.5 * duration * hanging.accelerations(x, self.v)
             self.t, self.x = self.t + duration, x
-            touching = (self.gaps() == 0.0) & (np.diff(v) >= -RESTING * self.speed)
+            touching = (self.gaps() == 0.0) & (v[1:] - v[:-1] >= -RESTING * self.speed)
         struck = self.v
         self.freed[opening] = self.t  # what opens rests no more in this instant, whatever happens
         kept = touching & (self.t - self.freed > hanging.tie)
@@ -223,7 +223,7 @@ class _Run:
             duration, own = trace._until_apart()
             way = duration * before
             way[first:last] = own
-            met = np.flatnonzero(self.gaps() + np.diff(way) < 0.0).tolist()
+            met = np.flatnonzero(self.gaps() + (way[1:] - way[:-1]) < 0.0).tolist()
             begin, end = min([first, *met]), max([last, *(c + 2 for c in met)])
             if (begin, end) == (first, last):
                 return (first, last), trace, duration, way
