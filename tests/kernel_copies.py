@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -113,7 +114,11 @@ def serve() -> None:
     """Make a copy for each line that comes, until none does."""
     signal.signal(signal.SIGCHLD, forget)
     for line in sys.stdin:
-        if pid := os.fork():
+        with warnings.catch_warnings():
+            # Python warns where there are threads; those of OpenBLAS end before a fork.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            pid = os.fork()
+        if pid:
             with contextlib.suppress(OSError):  # the copy has done it before
                 os.setpgid(pid, pid)  # whoever signals to its group means it alone
             print(pid, flush=True)
