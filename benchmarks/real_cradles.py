@@ -9,6 +9,7 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
+from chains import magnitudes
 from dop853 import integrated
 from scipy.optimize import least_squares
 from stored import DATA, make
@@ -230,7 +231,7 @@ def film_distances():
     yield "apart both three gap_2 gap_3 gap_4 loss"
     data, rng = first_strikes(4), np.random.default_rng(1)
     distances = [*np.geomspace(2.5, 250, 81), None]
-    random = np.exp(rng.uniform(np.log(0.01), np.log(0.6), (40, 3)))
+    random = 0.08 * magnitudes(rng, 2, (40, 3))
     starts = [[*gaps, 0.007] for gaps in (*GAPS, *random)]
     found = [best_at(between, data, starts) for between in distances]
     ways = [(k, k + step) for step in (1, -1) for k in range(81)[::-step] if 0 <= k + step < 81]

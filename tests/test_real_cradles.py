@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import real_cradles
 import real_swing
+from chains import uniform
 from real_cradles import by_spheres, chi_square, first_strikes, ratios, spheres, table
 from stored import numbers, read
 
@@ -90,7 +91,7 @@ def test_a_stored_fit_to_both_is_a_minimum(law, strikers):
 def test_no_gaps_are_better_at_a_distance_than_those_stored(at):
     """From starts that the search has not seen."""
     row, rng = numbers("film_distances.csv")[at], np.random.default_rng(at)
-    starts = [[*gaps, 0.006] for gaps in rng.uniform(0.01, 0.4, (12, 3))]
+    starts = [[*gaps, 0.006] for gaps in uniform(rng, 0.01, 0.4, (12, 3))]
     found, _ = real_cradles.best_at(row["apart"], first_strikes(4), starts)
     assert found > row["both"] - 0.02
 
