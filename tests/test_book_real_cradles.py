@@ -283,6 +283,9 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
     assert reach["apart"] is None
     near, far = ([r for r in rows if (unit * r["apart"] < 0.095) == side] for side in (True, False))
     told = {"near-both": min(r["both"] for r in near), "near-test": min(r["three"] for r in near)}
+    best = min(rows, key=lambda row: row["both"])
+    assert best in near
+    told["near-mm"] = unit * best["apart"]
     for name, column in (("both", "both"), ("test", "three")):
         told |= {f"reach-{name}": reach[column], f"far-{name}": max(r[column] for r in far)}
         told |= {f"far-{name}-least": min(r[column] for r in far)}
