@@ -5,7 +5,9 @@ The striking side comes first; lengths are in Hertz units of the first release. 
 was read in part from the sum of momentum: up to one degree of freedom a release is too many.
 """
 
+from functools import partial
 from itertools import product
+from operator import itemgetter
 
 import numpy as np
 import pandas as pd
@@ -196,11 +198,8 @@ def fits_of(reading, law, apart):
         yield row
 
 
-def one_after_other(p, between):
-    """Return velocities after two strikers by gaps, the second so far behind, or out of reach."""
-    if between is not None:
-        unit = [SLOWER] * 2 + [0.0] * 3
-        return quick(unit, [between, 0.0, *p[1:3]], p[3]) / SLOWER
+def out_of_reach(p):
+    """Return velocities after two strikers by gaps, balls 2 and 3 far apart before the second."""
     v = np.array([SLOWER, *quick([SLOWER, 0, 0, 0], [0.0, *p[1:3]], p[3])])
     while (meets := np.diff(v) < -1e-9).any():  # then all are apart: pairs
         k = int(meets.argmax())
@@ -212,18 +211,21 @@ def misfits_at(between, data, releases=(1, 2)):
     """Return residuals as a function of three gaps and A, two strikers being so far apart."""
 
     def by(p, release):
-        if release == 2:
-            return one_after_other(p, between)
-        return by_spheres(p, release, True, solve=quick)
+        if release == 2 and between is None:
+            return out_of_reach(p)
+        return by_spheres([*p, between], release, release == 3, solve=quick)
 
     return lambda p: misfits(lambda release: by(p, release), data, releases)
+
+
+lower = partial(min, key=itemgetter(0))  # of pairs of a chi-square and where it is
 
 
 def best_at(between, data, starts):
     """Return the least chi-square of the first two releases from some starts, and where it is."""
     limits, off = ([0] * 4, [1, 1, 1, 0.1]), misfits_at(between, data)
     fits = (least_squares(off, p, bounds=limits, diff_step=1e-3) for p in starts)
-    return min(((2.0 * fit.cost, fit.x) for fit in fits), key=lambda one: one[0])
+    return lower((2.0 * fit.cost, fit.x) for fit in fits)
 
 
 def film_distances():
@@ -234,11 +236,10 @@ def film_distances():
     random = 0.08 * magnitudes(rng, 2, (40, 3))
     starts = [[*gaps, 0.007] for gaps in (*GAPS, *random)]
     found = [best_at(between, data, starts) for between in distances]
-    ways = [(k, k + step) for step in (1, -1) for k in range(81)[::-step] if 0 <= k + step < 81]
+    last = len(distances) - 2
+    ways = [(k, k + 1) for k in range(last)[::-1]] + [(k + 1, k) for k in range(last)]
     for k, near in ways * 2:  # the valley of a neighbour may be deeper
-        found[k] = min(
-            found[k], best_at(distances[k], data, [found[near][1]]), key=lambda one: one[0]
-        )
+        found[k] = lower([found[k], best_at(distances[k], data, [found[near][1]])])
     for between, (both, p) in zip(distances, found, strict=True):
         three = (misfits_at(between, data, (3,))(p) ** 2).sum()
         yield "" if between is None else float(between), both, float(three), *map(float, p)

@@ -143,6 +143,7 @@
   // --- the map --------------------------------------------------------------------------------
 
   const CELLS = 180;
+  let square; // the order of all maps
   const LARGEST = 3; // of both axes, as in the paper's Fig. 6
 
   const ratios = ({ masses }) => ({ right: masses[1] / masses[2], left: masses[1] / masses[0] });
@@ -177,7 +178,7 @@
     constructor(setting) {
       this.key = RegionMap.key(setting);
       const { masses: _, ...others } = setting;
-      this.points = new Gradual(coarseToFine(CELLS, CELLS), (k) => {
+      this.points = new Gradual((square ??= coarseToFine(CELLS, CELLS)), (k) => {
         const left = ((Math.floor(k / CELLS) + 0.5) / CELLS) * LARGEST;
         const right = (((k % CELLS) + 0.5) / CELLS) * LARGEST;
         const masses = [1 / left, 1, 1 / right];

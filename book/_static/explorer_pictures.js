@@ -23,23 +23,25 @@
   function eventList(act) {
     const node = make("ol", { class: "events" });
     let listed = null;
+    let events = [];
     const words = ({ kind, contact, pending }) =>
       `contact ${contact + 1}\u2011${contact + 2} ${kind === "end" ? "ends" : pending ? "waits" : "closes"}`;
-    function show({ setting, record, part }) {
+    function list(setting, record) {
+      listed = record;
       const total = record ? explorer.progress(record) : [0];
       const end = total[total.length - 1];
-      const events = (record?.events ?? []).flatMap((event, k) =>
-        event.kind === "maximum_compression" ? [] : [{ ...event, row: event.row ?? k + 1 }],
+      events = (record?.events ?? []).flatMap((event, k) => {
+        if (event.kind === "maximum_compression") return [];
+        const row = event.row ?? k + 1;
+        const pending = event.kind === "close" && waits(setting, record, event.contact, row);
+        return [{ ...event, at: total[row] / end, pending }];
+      });
+      node.replaceChildren(
+        ...events.slice(0, LISTED).map((event) => make("li", {}, button(words(event), () => act.part(event.at)))),
       );
-      for (const event of events) {
-        event.at = total[event.row] / end;
-        event.pending = event.kind === "close" && waits(setting, record, event.contact, event.row);
-      }
-      if (record !== listed)
-        node.replaceChildren(
-          ...events.slice(0, LISTED).map((event) => make("li", {}, button(words(event), () => act.part(event.at)))),
-        );
-      listed = record;
+    }
+    function show({ setting, record, part }) {
+      if (record !== listed) list(setting, record); // each frame comes here
       [...node.children].forEach(({ firstChild }, k) => {
         const now = part >= events[k].at - 1e-9 && !(part >= (events[k + 1]?.at ?? 2) - 1e-9);
         firstChild.setAttribute("aria-pressed", now);

@@ -53,6 +53,12 @@ def _impulse(contact: int) -> str:
     return "impulse " + _indexed(r"\tau", contact + 2) + " (N s)"
 
 
+def _contact(trace: Trace, name: str, contact: int) -> int:
+    """Return a contact that the impact has."""
+    last = len(must_be(Trace, "trace", trace).impulses) - 1
+    return whole_number(name, contact, f"0 to {last}", 0, last)
+
+
 def _lines(ax: Axes | None, over: str, x: Vector, path: Vector, balls: Sequence[int]) -> Axes:
     """Draw the velocities of some balls over an impulse, on new axes if there are none."""
     ax = plt.subplots(figsize=(5.6, 3.9), layout="constrained")[1] if ax is None else ax
@@ -105,8 +111,7 @@ def velocity_impulse(
     >>> [line.get_label() for line in ax.get_lines()[:2]]
     ['$v_2$', '$v_3$']
     """
-    last = len(must_be(Trace, "trace", trace).impulses) - 1
-    contact = whole_number("contact", contact, f"0 to {last}", 0, last)
+    contact = _contact(trace, "contact", contact)
     impulses, path = trace.curve()
     ax = _lines(ax, _impulse(contact), impulses[:, contact], path, (contact, contact + 1))
     _mark_events(trace, contact, ax)
@@ -166,9 +171,7 @@ def impulse_axis(
     >>> upper.get_xticks().round(4).tolist()
     [0.0, 0.5, 0.6667]
     """
-    last = len(must_be(Trace, "trace", trace).impulses) - 1
-    for name, given in ("contact", contact), ("other", other):
-        whole_number(name, given, f"0 to {last}", 0, last)
+    contact, other = _contact(trace, "contact", contact), _contact(trace, "other", other)
     if values is None:
         places, labels = _event_ticks(*trace.path_impulses[:, [contact, other]].T)
     else:
