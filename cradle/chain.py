@@ -28,8 +28,8 @@ class Chain:
     masses, velocities : array_like, shape (N,)
         kg, above 0, and m/s, left to right; N >= 2.
     restitution : float or array_like, shape (N - 1,)
-        Energetic coefficient of restitution of each contact, 0 to 1 (Stronge, 1990).  If left out,
-        1: elastic balls, that lose nothing.
+        Energetic coefficient of restitution of each contact, 0 or 1e-30 to 1 (Stronge, 1990).
+        If left out, 1: elastic balls, that lose nothing.
 
     Examples
     --------

@@ -23,6 +23,7 @@ from cradle import (
     SpeedDependent,
     SpringChain,
     Trace,
+    ViscousLoss,
     collide,
     hertz_stiffness,
     paper_chain,
@@ -41,7 +42,7 @@ from cradle.closed_form import (
     one_collision_each,
     three_balls,
 )
-from cradle.fit import read_tracker
+from cradle.fit import read_tracker, velocities_from_tracks
 from cradle.measures import bouncing_pattern, condition_number, conserving_outcomes, effective_ratio
 from cradle.pictures.animation import animate_swing
 from cradle.pictures.impacts import impulse_axis, velocity_impulse
@@ -219,6 +220,8 @@ LAWS = [
         )
     ),
     (SpeedDependent, (SequentialCollisions(), 0.9), "restitution = 0.9; must be a law e(u)"),
+    (ConstantLoss(0.1), (0,), "u = 0.0; must be above 0"),
+    (ViscousLoss(1e-6, masses=[1, 1], stiffness=1e9), (-1,), "u = -1.0; must be above 0"),
     (SpeedDependent, (3, ConstantLoss(0.1)), "model is an int; must be an impact model"),
     *(
         (struck, (SpeedDependent(SequentialCollisions(), law),), f"restitution(u)[0] = {words}")
@@ -352,6 +355,11 @@ OTHERS = [
      "restitution = 0.6; must lie in [0.620, 1]"),
     (read_tracker, {"path": FILM, "unit": 0}, "unit = 0.0; must be above 0"),
     (read_tracker, {"path": FILM, "time_scale": 0}, "time_scale = 0.0; must be above 0"),
+    *(
+        (velocities_from_tracks, {"tracks": read_tracker(FILM), "striker": ball},
+         f"striker = {ball}; must be a whole number, from 0 to 2")
+        for ball in (1.5, -1, 3)
+    ),
     (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
     (TRACE.plot, {"contact": 4}, "contact = 4; must be a whole number, 0 to 1"),
     (velocity_impulse, {"trace": TRACE, "contact": 0, "other": -1}, "other = -1; must be a whole"),
@@ -397,7 +405,7 @@ def rows():
 
 @pytest.mark.parametrize(
     ("function", "given", "words"),
-    [pytest.param(*row, id=f"{row[0].__name__}: {row[2]}") for row in rows()],
+    [pytest.param(*row, id=f"{getattr(row[0], '__name__', row[0])}: {row[2]}") for row in rows()],
 )
 def test_refused_in_these_words(function, given, words):
     named, no_such = isinstance(given, dict), re.match(r"\w+ is (an?|the) |.* a law", words)

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from cradle.fit.tracks import Track
-from cradle.input.values import ABOVE_ZERO, ArrayLike, Vector, checked, one_number
+from cradle.input.values import ABOVE_ZERO, ArrayLike, Vector, checked, one_number, whole_number
 from cradle.trace import compared_as_objects
 
 _GRAVITY = 9.81
@@ -96,9 +96,11 @@ def velocities_from_tracks(
     [0.009, 0.009, 0.009]
     """
     balls = list(tracks.values())
-    if len(balls) < 2 or not 0 <= (striker or 0) < len(balls):
-        told = f"{len(balls)} tracks, striker = {striker or 0}"
-        raise ValueError(f"{told}; needs two balls and a striker")
+    if len(balls) < 2:
+        raise ValueError(f"{len(balls)} tracks; needs two balls and more")
+    if striker is not None:
+        last = len(balls) - 1
+        striker = whole_number("striker", striker, f"from 0 to {last}", 0, last)
     given = {"length": length, "window": window, "scatter": scatter}
     length, window, scatter = (None if value is None else one_number(name, value, *ABOVE_ZERO)
                                for name, value in given.items())  # fmt: skip

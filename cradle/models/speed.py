@@ -92,7 +92,7 @@ class ConstantLoss:
 
     def __call__(self, u: float) -> float:
         """Return e at the closing speed u, m/s, above 0."""
-        return max(0.0, 1.0 - self.speed / u)
+        return max(0.0, 1.0 - self.speed / asked.one_number("u", u, *asked.ABOVE_ZERO))
 
 
 @dataclass(frozen=True)
@@ -126,8 +126,8 @@ class ViscousLoss:
 
     def __call__(self, u: float) -> float:
         """Return e at the closing speed u, m/s, above 0; ValueError if A is too large for u."""
-        left, right = self.masses
-        mass, p = left / (left + right) * right, self.exponent
+        (left, right), p = self.masses, self.exponent
+        mass, u = left / (left + right) * right, asked.one_number("u", u, *asked.ABOVE_ZERO)
         own = self.viscosity * (self.stiffness / mass * u ** (p - 1.0)) ** (1.0 / (p + 1.0))
         if not own <= LONGEST:
             rule = f"must be at most {LONGEST * self.viscosity / own:.3g} at u = {u:g}"
