@@ -15,10 +15,10 @@ from cradle.fit.result import Estimate, Fit, Prediction
 from cradle.fit.search import Mode
 from cradle.fit.shots import Shots, ShotSet, read_shots
 from cradle.fit.swings import SwingFit, fit_swing
-from cradle.fit.tracks import Tracks, read_tracker
+from cradle.fit.tracks import Tracks, frames, read_tracker
 
 __all__ = [
     "Estimate", "Fit", "LawFit", "Mode", "Prediction", "ShotSet", "Shots", "SwingFit", "Tracks",
-    "Velocities", "fit_law", "fit_swing", "ratio", "read_shots", "read_tracker", "restitution",
-    "speeds_from_heights", "velocities_from_tracks",
+    "Velocities", "fit_law", "fit_swing", "frames", "ratio", "read_shots", "read_tracker",
+    "restitution", "speeds_from_heights", "velocities_from_tracks",
 ]  # fmt: skip

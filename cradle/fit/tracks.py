@@ -1,6 +1,7 @@
 """Positions of balls in a film: text exported by Tracker, Kinovea, Logger Pro or Capstone."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -99,6 +100,34 @@ def read_tracker(path: str | Path, *, time_scale: float = 1.0, unit: float = 1.0
         told = f"{file.name} has marks {apart:g} s apart"
         raise ValueError(f"{told}; if the times are in ms, divide time_scale by 1000")
     return tracks
+
+
+def frames(tracks: Mapping[str, Track]) -> tuple[Vector, Vector]:
+    """Return the times of a film and the places of its balls, as `fit_swing` takes them.
+
+    Each place is counted from the middle one of its ball, which is near where it hangs.
+
+    Parameters
+    ----------
+    tracks : mapping of str to Track
+        As `read_tracker` gives them, from left to right.
+
+    Returns
+    -------
+    times, positions : ndarray, shapes (K,) and (K, N)
+        s, and m, nan where a ball was not marked.
+
+    Examples
+    --------
+    >>> tracks = {"A": Track([0, 1, 2], [0.1, 0.2, 0.4]), "B": Track([1, 2], [0.5, 0.5])}
+    >>> frames(tracks)[1].round(3).tolist()
+    [[-0.1, nan], [0.0, 0.0], [0.2, 0.0]]
+    """
+    times = np.unique(np.concatenate([ball.times for ball in tracks.values()]))
+    positions = np.full((times.size, len(tracks)), np.nan)
+    for k, (t, x) in enumerate(tracks.values()):
+        positions[np.searchsorted(times, t), k] = np.asarray(x) - np.median(x)
+    return times, positions
 
 
 def _owners(
