@@ -28,7 +28,6 @@ RATIO = 0.1325  # three equal balls on Hertz springs (data/implied_ratio.csv)
 FRAMES = 60  # samples a second
 MINUTE, FILM = 60, 11  # s
 WILD = 10.0  # times the energy at the release
-FILMED = ("default", "ratio", "steel")
 GAPS = (0.0, 5e-5, 1e-3, 1e-2)  # of the first strokes, over a diameter
 FREQUENCY = math.sqrt(GRAVITY / LENGTH)
 #: Contact of two balls at the first stroke, s: steel, if the cradle were ten times smaller.
@@ -227,12 +226,15 @@ def scene_strokes():
 
 
 def scene_film():
+    """Yield angles in one engine, as it is and by the law of the programs of `examples/`."""
     yield "run how time" + ENERGIES
-    for name, how, setting, gap, pulled, (times, angles, _) in runs():
-        if pulled == 1 and not gap and setting in FILMED:
-            frames = list(zip(times, np.degrees(angles), strict=True))[: FILM * FRAMES + 1 : 2]
-            for t, each in frames:
-                yield name, how, f"{t:.4f}", *(f"{a:.1f}" for a in each)
+    for engine, (how, mend) in product(
+        present(ENGINES[:1]), (("as it is", False), ("mended", True))
+    ):
+        law = LAWS["springs, outer apart"]
+        run = in_engine(engine, "default", 1, mend=mend, duration=FILM, law=law)
+        for t, each in list(zip(run[0], np.degrees(run[1]), strict=True))[::2]:
+            yield engine.name, how, f"{t:.4f}", *(f"{a:.1f}" for a in each)
 
 
 def scene_gaps():

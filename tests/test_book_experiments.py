@@ -219,10 +219,11 @@ def test_bands_of_the_ten_predictions():
         size = np.abs(ends - 100 * floats(predicted(sequence).velocities)).max(axis=0)
         wide |= {(sequence, ball): part for ball, part in enumerate(size)}
         (line,) = (x for x in FIGURES.printed("ten").splitlines() if x.startswith(sequence + " "))
+        if sequence == "CDADB":  # its third ball has a range of its own
+            told = [FIGURES.glued[name] for name in ("band-low", "band-high")]
+            assert ends[:, 2] == pytest.approx([float(end) for end in told], abs=0.9)
+            line, size = line.removesuffix(f"; ball 3: {' to '.join(told)}"), np.delete(size, 2)
         assert float(line.split()[-1]) == pytest.approx(size.max(), rel=0.08, abs=0.08)
-        if sequence == "CDADB":
-            told = [float(FIGURES.glued[name]) for name in ("band-low", "band-high")]
-            assert ends[:, 2] == pytest.approx(told, abs=0.9)
     assert max(wide, key=wide.get) == ("CDADB", 2)
     assert sorted(wide.values())[-2] == pytest.approx(float(FIGURES.glued["band"]), abs=0.08)
 
