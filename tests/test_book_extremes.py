@@ -90,6 +90,8 @@ def test_exercises():
     """Masses 1, 1/4, 1: tan of the angle is 3/4, and 180 / 36.87 is 4.88; a border by trace."""
     assert math.sqrt(0.25 * 2.25) == 0.75
     assert number(glued["quarter"]) == math.ceil(math.pi / math.atan(0.75)) - 1 == 4
+    dots = points(MAPS.figures["fig-maps-wedge"].axes[0], marker="o")[0]
+    assert len(dots) == 4  # the walls that the path crosses
     assert glued["border-times"] == f"{1 / x.infinite_below(0.9):.0f}"
     e1, e2, r = 0.3, 0.8, float(glued["two-border"])
     a = 1 / (1 + r)
@@ -118,12 +120,13 @@ def test_figures_show_their_column_of_a_table(figure, part, column):
     assert shows(figures[figure].axes, values)
 
 
-def test_fig_extremes_map_shows_the_worst_excess():
-    axes = MAPS.figures["fig-maps-digits"].axes[1:8:2]
+def test_fig_extremes_map_shows_the_fewest_digits():
+    axes = MAPS.figures["fig-maps-digits"].axes[:4]
     for ax, shape in zip(axes, ("middle", "striker", "last", "taper"), strict=True):
         rows = [row for row in stored("map", shape=shape) if int(row["compared"])]
-        worst = max(float(row["own"]) for row in rows if float(row["condition"]) > 0)
-        assert ax.collections[0].get_array().max() == pytest.approx(worst)
+        errors = [float(row["error"]) for row in rows if float(row["condition"]) <= 1e12]
+        least = -math.log10((max(errors) + 0.5) * 2.0**-52)
+        assert ax.collections[0].get_array().min() == pytest.approx(least)
 
 
 def test_fig_extremes_count_by_the_wedge_and_edge_by_the_eigenvalues():
@@ -145,7 +148,7 @@ def calm(row, pairs, middle):
 def test_fig_extremes_shortest_as_drawn():
     """The least of all ratios; the textbook's outcome jumps there, too."""
     rows = [r for r in stored("shortest", spread="0") if int(r["balls"])]
-    (ax,) = CHAPTER.figures["fig-extremes-shortest"].axes
+    ax, _ = CHAPTER.figures["fig-extremes-shortest"].axes
     (line,) = points(ax)
     least, middle = {}, set()
     for r in rows:
@@ -153,9 +156,12 @@ def test_fig_extremes_shortest_as_drawn():
         least[e] = min(least.get(e, 99), balls)
         if 0.1 <= float(r["ratio"]) <= 0.2:
             middle.add(e)
-    np.testing.assert_array_equal(line, sorted(least.items()))
-    bars = [bar.get_y() for bar in ax.patches]
-    np.testing.assert_array_equal(bars, line[:, 1])
+    np.testing.assert_array_equal(np.add(line, [0, 0.5]), sorted(least.items()))
+    field = np.reshape(ax.collections[0].get_array(), (18, -1)).T
+    for (e, _), drawn in zip(line, field[: len(line)], strict=True):
+        balls = [int(r["balls"]) for r in stored("shortest", spread="0", restitution=f"{e:g}")]
+        share = [100 * np.mean([0 < one <= n for one in balls]) for n in range(3, 21)]
+        np.testing.assert_allclose(drawn, share)
     assert CHAPTER.glued["middle"] == "0.1 to 0.2"
     assert float(CHAPTER.glued["middle-e"]) == max(middle)
     every = sorted({float(r["restitution"]) for r in stored("shortest", spread="0")})
