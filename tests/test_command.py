@@ -572,6 +572,7 @@ def test_one_wrong_film_of_several(folder, capsys):
         (f"{BAC} --level", 2, "give --length or --period of the pendulums, or --level: one"),
         ("film film.txt --set BAC --masses 1,1,1", 2, "give --length or --period of the pendulum"),
         (f"{BAC} --window 0.01", 1, "no moment has 4 marks of every ball within 0.01 s"),
+        (f"{BAC} --position-unit px --scale 0", 1, "--scale = 0.0; must be above 0"),
         (f"{BAC} --position-unit px", 2, "--position-unit px and --scale, pixels in a metre, go t"),
         (f"{BAC} wide.txt --shot 1", 2, "--shot names one film; several have the names of their f"),
         (BAC.replace("BAC", "CAB"), 1, "track 1 is named B, --set CAB has C there"),

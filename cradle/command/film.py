@@ -13,12 +13,12 @@ from cradle.command.console import format_options, plotted, show
 from cradle.command.describe import UNITS, numbers_of, one_or_all, pendulum_length, swing_options
 from cradle.input.values import ABOVE_ZERO, one_number
 
-_SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "px": 1.0}
 
 
 def _marks(command: Callable[..., None]) -> Callable[..., None]:
     """Add what says how a program has written marks; see `_read_as`."""
-    unit = click.option("--position-unit", type=click.Choice([*_SIZES, "px"]),
+    unit = click.option("--position-unit", type=click.Choice(list(_SIZES)),
                         help="Of positions, where the file does not say it [m].")  # fmt: skip
     scale = click.option("--scale", type=float, help="Pixels in a metre.")
     slower = click.option("--slower", default=1.0,
@@ -26,13 +26,13 @@ def _marks(command: Callable[..., None]) -> Callable[..., None]:
     return unit(scale(slower(command)))
 
 
-def _read_as(unit: str | None, scale: float | None, slower: float) -> dict[str, float]:
+def _read_as(position_unit: str | None, scale: float | None, slower: float) -> dict[str, float]:
     """Return what `read_tracker` is told of a file."""
     one_number("--slower", slower, *ABOVE_ZERO)
-    if (unit == "px") != (scale is not None):
+    pixels = one_number("--scale", 1.0 if scale is None else scale, *ABOVE_ZERO)
+    if (position_unit == "px") != (scale is not None):
         raise click.UsageError("--position-unit px and --scale, pixels in a metre, go together")
-    size = _SIZES[unit or "m"] if scale is None else 1.0 / one_number("--scale", scale, *ABOVE_ZERO)
-    return {"time_scale": 1.0 / slower, "unit": size}
+    return {"time_scale": 1.0 / slower, "unit": _SIZES[position_unit or "m"] / pixels}
 
 
 @click.command()
@@ -142,9 +142,8 @@ def _velocities(
               help="Draw film and fit to a file.")  # fmt: skip
 @format_options
 def fit_swing(
-    file: Path, position_unit: str | None, scale: float | None, slower: float,
-    masses: list[float] | None, ratio: list[float] | None, known: Sequence[str],
-    reading: float | None, plot: str | None, as_json: bool, as_csv: bool,
+    file: Path, masses: list[float] | None, ratio: list[float] | None, known: Sequence[str],
+    reading: float | None, plot: str | None, as_json: bool, as_csv: bool, **marks: Any,
 ) -> None:  # fmt: skip
     """Period, damping, restitution and gap of a cradle, from marks of some seconds.
 
@@ -158,9 +157,8 @@ def fit_swing(
     """
     from cradle import ImpulseCorrelation, fit
     from cradle.command.fit import named
-    from cradle.fit.swings import UNITS
 
-    tracks = fit.read_tracker(file, **_read_as(position_unit, scale, slower))
+    tracks = fit.read_tracker(file, **_read_as(**marks))
     law = ImpulseCorrelation(one_or_all(ratio or [0.0]))
     given = {name: value for name, (value, _) in map(named, known)}
     film = fit.frames(tracks)
@@ -170,9 +168,7 @@ def fit_swing(
     if not (as_json or as_csv):
         click.echo(found.summary())
         return
-    rows = [{"name": name, "value": one.value, "unit": UNITS[name].strip(),
-             **dict(zip(("low", "high"), found.intervals[name], strict=True))}
-            for name, one in found.estimates.items()]  # fmt: skip
-    extra = {name: getattr(found, name) for name in
-             ("reading", "chi_square", "degrees_of_freedom", "correlation", "poor")}  # fmt: skip
-    show(rows, extra, "", as_json, as_csv)
+    rows = [{"name": name, "value": found.values[name], "low": low, "high": high}
+            for name, (low, high) in found.intervals.items()]  # fmt: skip
+    kept = "reading", "chi_square", "degrees_of_freedom", "correlation", "poor"
+    show(rows, {name: getattr(found, name) for name in kept}, "", as_json, as_csv)
