@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from commands import call, examples, swing_film
+from commands import call, examples
 from shots import columns, outcome
 from tqdm import tqdm
 
@@ -68,8 +68,6 @@ def folder(tmp_path, monkeypatch):
     film = (DATA / "video_synthetic.txt").read_text(encoding="utf-8")
     (tmp_path / "film.txt").write_text(film, encoding="utf-8")
     (tmp_path / "wide.txt").write_text(film, encoding="utf-16")
-    marks = swing_film(np.arange(0, 2, 1 / 30), slower=8)
-    (tmp_path / "swing.txt").write_text(marks, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(runtime.VARIABLE, "plain")
     return tmp_path

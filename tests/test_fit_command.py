@@ -2,14 +2,12 @@
 
 import json
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
-from commands import call, swing_film
+from commands import call
 
-from cradle import ImpulseCorrelation
 from cradle.command.solve import main
-from cradle.fit import fit_swing, frames, ratio, read_shots, read_tracker, restitution
+from cradle.fit import ratio, read_shots, restitution
 from cradle.tables import data_folder
 
 
@@ -105,31 +103,3 @@ def test_momentum_that_is_lost_is_marked(shots):
     wrong = (shots / "shots.csv").read_text().replace("0.053,", "0.064,")
     (shots / "wrong.csv").write_text(wrong)
     assert words in call("fit wrong.csv")
-
-
-# --- a whole swing -------------------------------------------------------------------------------
-
-
-def test_a_swing_is_fitted_as_a_tracker_exports_it(tmp_path):
-    """In mm and slowed; what was given comes back, and is drawn."""
-    times = np.arange(0, 3, 1 / 50)
-    file, plot = tmp_path / "swing.txt", tmp_path / "swing.svg"
-    file.write_text(swing_film(times, slower=8, unit=1e-3), encoding="utf-8")
-    line = f"fit-swing {file} --position-unit mm --slower 8 --masses 1,2 --known damping=0"
-    told = json.loads(call(f"{line} --plot {plot} --json"))
-    found = {row["name"]: row["value"] for row in told["rows"]}
-    assert found["period"] == pytest.approx(0.9, rel=1e-6)
-    assert found["restitution"] == pytest.approx(0.95, abs=1e-6)
-    assert found["gaps"] == pytest.approx(1e-4, rel=1e-3)
-    assert plot.read_text(encoding="utf-8").startswith("<?xml")
-    seconds, seen = frames(read_tracker(file, time_scale=1 / 8, unit=1e-3))
-    np.testing.assert_allclose(seconds, times, atol=1e-6)
-    assert np.argwhere(np.isnan(seen)).tolist() == [[20, 1], [31, 0]]
-    fit = fit_swing(seconds, seen, ImpulseCorrelation(0), masses=[1, 2], known={"damping": 0})
-    assert call(line) == f"{fit.summary()}\n"
-    assert told["degrees_of_freedom"] == fit.degrees_of_freedom
-    table = [one.split(",") for one in call(f"{line} --csv").splitlines()]
-    assert table[0] == ["name", "value", "low", "high"]
-    assert [row[0] for row in table[1:]] == ["period", "restitution", "gaps"]
-    for row in table[1:]:
-        assert [float(x) for x in row[2:]] == list(fit.intervals[row[0]])

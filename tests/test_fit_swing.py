@@ -16,7 +16,7 @@ from cradle import (
     SpeedDependent,
     swing,
 )
-from cradle.fit import fit_swing
+from cradle.fit import fit_swing, frames, read_tracker
 from cradle.fit.swings import _Film
 
 LAW = ImpulseCorrelation(0.1)
@@ -277,3 +277,23 @@ def test_refused(changes, words):
     given = {"times": WAYS, "positions": PLACES, "model": LAW} | changes
     with pytest.raises(ValueError, match=words):
         fit_swing(**given)
+
+
+def test_a_film_as_a_tracker_exports_it(tmp_path):
+    """Two unlike balls, in mm and slowed, two marks missing: what was given comes back."""
+    times, hanging = np.arange(0, 3, 1 / 50), Pendulums(9.81 * (0.45 / np.pi) ** 2, gaps=1e-4)
+    chain, law = Chain([1, 2], [0, 0], 0.95), ImpulseCorrelation(0)
+    places = swing(chain, law, [-0.03, 0], times, pendulums=hanging).positions
+    marks = [[f"{1000 * x:.7g}" for x in row] for row in np.add(places, [0.5, 0.53])]
+    marks[20][1] = marks[31][0] = ""
+    lines = [f"{8 * t:.6g}\t{a}\t{b}" for t, (a, b) in zip(times, marks, strict=True)]
+    file = tmp_path / "swing.txt"
+    file.write_text("\n".join(["t\tA/x\tB/x", *lines]), encoding="utf-8")
+    seconds, seen = frames(read_tracker(file, time_scale=1 / 8, unit=1e-3))
+    np.testing.assert_allclose(seconds, times, atol=1e-6)
+    assert np.argwhere(np.isnan(seen)).tolist() == [[20, 1], [31, 0]]
+    assert not np.nanmedian(seen, axis=0).any()
+    values = fit_swing(seconds, seen, law, masses=[1, 2], known={"damping": 0}).values
+    assert values["period"] == pytest.approx(0.9, rel=1e-6)
+    assert values["restitution"] == pytest.approx(0.95, abs=1e-6)
+    assert values["gaps"] == pytest.approx(1e-4, rel=1e-3)

@@ -1,38 +1,16 @@
-"""`cradle film`: from marks in films to rows of the table of shots; `cradle fit-swing`: a swing."""
+"""`cradle film`: from marks in films to rows of the table of shots."""
 
 import csv
 import sys
 import warnings
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from cradle.command.console import format_options, plotted, show
-from cradle.command.describe import UNITS, numbers_of, one_or_all, pendulum_length, swing_options
-from cradle.input.values import ABOVE_ZERO, one_number
+from cradle.command.describe import UNITS, numbers_of, pendulum_length, swing_options
 
-_SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "px": 1.0}
-
-
-def _marks(command: Callable[..., None]) -> Callable[..., None]:
-    """Add what says how a program has written marks; see `_read_as`."""
-    unit = click.option("--position-unit", type=click.Choice(list(_SIZES)),
-                        help="Of positions, where the file does not say it [m].")  # fmt: skip
-    scale = click.option("--scale", type=float, help="Pixels in a metre.")
-    slower = click.option("--slower", default=1.0,
-                          help="8 if 240 pictures a second play at 30 [1].")  # fmt: skip
-    return unit(scale(slower(command)))
-
-
-def _read_as(position_unit: str | None, scale: float | None, slower: float) -> dict[str, float]:
-    """Return what `read_tracker` is told of a file."""
-    one_number("--slower", slower, *ABOVE_ZERO)
-    pixels = one_number("--scale", 1.0 if scale is None else scale, *ABOVE_ZERO)
-    if (position_unit == "px") != (scale is not None):
-        raise click.UsageError("--position-unit px and --scale, pixels in a metre, go together")
-    return {"time_scale": 1.0 / slower, "unit": _SIZES[position_unit or "m"] / pixels}
+_SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
 
 @click.command()
@@ -45,8 +23,11 @@ def _read_as(position_unit: str | None, scale: float | None, slower: float) -> d
 @click.option("--unit", type=click.Choice(list(UNITS)), help="Of masses [kg].")
 @swing_options("or --period, or --level")
 @click.option("--level", is_flag=True, help="The balls do not hang: they roll on a level track.")
-@_marks
+@click.option("--position-unit", type=click.Choice([*_SIZES, "px"]),
+              help="Of positions, where the file does not say it [m].")  # fmt: skip
+@click.option("--scale", type=float, help="Pixels in a metre.")
 @click.option("--window", type=float, help="Time used before and after, s [the longest that fits].")
+@click.option("--slower", default=1.0, help="8 if 240 pictures a second play at 30 [1].")
 @click.option("--header", is_flag=True, help="Print the names of the columns too.")
 def film(
     files: tuple[Path, ...], name: str, shot: str | None, masses: list[float], unit: str | None,
@@ -67,23 +48,26 @@ def film(
     """
     from cradle.fit.parameters import parameter_key
     from cradle.fit.shots import COLUMNS
-    from cradle.input.values import checked_masses
+    from cradle.input.values import ABOVE_ZERO, checked_masses, one_number
 
     length, window = pendulum_length(length, period), options["window"]
-    for option, value in {"length": length, "window": window}.items():
+    given = {"length": length, "window": window, "--slower": slower, "--scale": scale}
+    for option, value in given.items():
         if value is not None:
             one_number(option, value, *ABOVE_ZERO)
-    read = _read_as(position_unit, scale, slower)
     if shot is not None and len(files) > 1:
         raise click.UsageError("--shot names one film; several have the names of their files")
     if (length is None) != level:
         raise click.UsageError("give --length or --period of the pendulums, or --level: one")
+    if (position_unit == "px") != (scale is not None):
+        raise click.UsageError("--position-unit px and --scale, pixels in a metre, go together")
+    size = _SIZES[position_unit or "m"] if scale is None else 1.0 / scale
     types = parameter_key(name)
     kilograms = checked_masses([UNITS[unit or "kg"] * mass for mass in masses]).tolist()
     writer, wrong = csv.writer(sys.stdout, lineterminator="\n"), []
     for file in files:
         try:
-            told, one = _velocities(file, types, masses, length, read, **options)
+            told, one = _velocities(file, types, masses, length, 1.0 / slower, size, **options)
         except (ValueError, OSError) as reason:  # the other films may be right
             named = str(reason).startswith(file.name)
             wrong.append(str(reason) if named else f"{file.name}: {reason}")
@@ -106,14 +90,14 @@ def film(
 
 def _velocities(
     file: Path, types: tuple[str, ...], masses: list[float], length: float | None,
-    read: dict[str, float], window: float | None,
+    time_scale: float, size: float, window: float | None,
 ) -> tuple[str, Any]:  # fmt: skip
     """Return what was warned of, and the velocities in one film, of balls of these types."""
     import numpy as np
 
     from cradle.fit import read_tracker, velocities_from_tracks
 
-    tracks = read_tracker(file, **read)
+    tracks = read_tracker(file, time_scale=time_scale, unit=size)
     if not len(types) == len(masses) == len(tracks):
         there = f"{file.name} has {len(tracks)} tracks, --set {len(types)} types and --masses"
         raise ValueError(f"{there} {len(masses)} masses; must be as many")
@@ -128,47 +112,3 @@ def _velocities(
         warnings.simplefilter("always")
         found = velocities_from_tracks(tracks, length=length, window=window)
     return "".join(f"; {one.message}" for one in told), found
-
-
-@click.command()
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@_marks
-@click.option("--masses", callback=numbers_of, help="Masses, left to right: 53,45,53 [equal].")
-@click.option("--ratio", callback=numbers_of, help="One, or one per inner ball [0: in pairs].")
-@click.option("--known", multiple=True, metavar="NAME=VALUE",
-              help="Not to be fitted: period, damping, restitution or gaps.")  # fmt: skip
-@click.option("--reading", type=float, help="Standard error of a place, m [as the fit leaves it].")
-@click.option("--plot", type=click.Path(dir_okay=False), callback=plotted,
-              help="Draw film and fit to a file.")  # fmt: skip
-@format_options
-def fit_swing(
-    file: Path, masses: list[float] | None, ratio: list[float] | None, known: Sequence[str],
-    reading: float | None, plot: str | None, as_json: bool, as_csv: bool, **marks: Any,
-) -> None:  # fmt: skip
-    """Period, damping, restitution and gap of a cradle, from marks of some seconds.
-
-    FILE is exported by Tracker, Kinovea, Logger Pro or Capstone, one track a ball, left to right.
-    It begins soon after some balls were let go, while the others rest.
-
-    \b
-    Examples:
-      cradle fit-swing swing.txt
-      cradle fit-swing swing.txt --slower 8 --known damping=0 --plot fit.png
-    """
-    from cradle import ImpulseCorrelation, fit
-    from cradle.command.fit import named
-
-    tracks = fit.read_tracker(file, **_read_as(**marks))
-    law = ImpulseCorrelation(one_or_all(ratio or [0.0]))
-    given = {name: value for name, (value, _) in map(named, known)}
-    film = fit.frames(tracks)
-    found = fit.fit_swing(*film, law, reading=reading, masses=masses, known=given)
-    if plot is not None:
-        found.plot()[0].get_figure().savefig(plot, format=Path(plot).suffix[1:] or "png")
-    if not (as_json or as_csv):
-        click.echo(found.summary())
-        return
-    rows = [{"name": name, "value": found.values[name], "low": low, "high": high}
-            for name, (low, high) in found.intervals.items()]  # fmt: skip
-    kept = "reading", "chi_square", "degrees_of_freedom", "correlation", "poor"
-    show(rows, {name: getattr(found, name) for name in kept}, "", as_json, as_csv)

@@ -18,7 +18,7 @@ from cradle import ImpactNotCertified, ImpactNotFinished, collide
 from cradle.advice.choice import made
 from cradle.command.console import format_options, plotted, show
 from cradle.command.describe import chain_options, described
-from cradle.command.film import film, fit_swing
+from cradle.command.film import film
 from cradle.command.fit import fit, template
 from cradle.command.recommend import recommend
 from cradle.command.swing import swing
@@ -128,7 +128,7 @@ def solve(plot: str | None, as_json: bool, as_csv: bool, **options: Any) -> None
     show(rows, extra, "\n".join(words for words in told if told[words]), as_json, as_csv)
 
 
-for verb in (film, fit, fit_swing, recommend, swing, template):
+for verb in (film, fit, recommend, swing, template):
     main.add_command(verb)
 
 
