@@ -155,9 +155,7 @@ def way_to_end(k, tally):
     closes = k.u.real > 0.0
     if k.rate.real == 0.0 or (k.slope.real >= 0.0 and k.u.real >= 0.0):
         return NEVER, ZERO
-    if k.q.real <= 0.0:
-        if not closes:
-            return NEVER, ZERO
+    if k.q.real <= 0.0:  # it closes, else it would have ended
         speed = times(k.e, k.u)
     else:
         now = times(k.u, k.u)

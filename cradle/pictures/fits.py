@@ -28,10 +28,8 @@ def draw_fit(fit: Fit, name: str | None, axes: Sequence[Axes] | None) -> Sequenc
     if axes is None:
         _, axes = plt.subplots(2, 1, figsize=(5.6, 7), layout="constrained")
     draw_likelihood(estimate, axes[0])
-    if data := [one for one in fit.shots.sets if estimate.key in fitted_keys(one.types)]:
-        _draw_data(fit, data[0], axes[1])
-    else:
-        axes[1].set_axis_off()
+    data = next(one for one in fit.shots.sets if estimate.key in fitted_keys(one.types))
+    _draw_data(fit, data, axes[1])
     return axes
 
 
