@@ -172,7 +172,7 @@ def neighbours_stay(cluster, total, part, number, n, state):
         done = minus(k.a, then.a) if k.u.real > 0.0 else minus(k.q, then.q)
         way = times(times(k.x, share), scaled(plus(k.u, speed), 0.5))
         k.y = plus(way, times(minus(done, straight), complex(squares, 0.0)))
-        if k.active == 1 and k.u.real < 0.0 and k.q.real + k.y.real <= 0.0:
+        if k.u.real < 0.0 and k.q.real + k.y.real <= 0.0:
             return False
     return True
 

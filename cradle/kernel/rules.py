@@ -51,7 +51,7 @@ def keep_closed(i, low, high, ball, contact, tally):
     if ball[far].turn == -b.turn or k.u.real != 0.0 or k.w != 0.0:
         return
     one = ball[far].m
-    onward = ball[far].ratio if low < far <= high and ball[far].turn == b.turn else ZERO
+    onward = ball[far].ratio if low < far <= high else ZERO
     both = plus(one, times(b.m, minus(ONE, onward)))
     nominal, bound = b.ratio.real * both.real, one.real
     if nominal * LIMITS.rounded >= bound:
@@ -213,5 +213,5 @@ def segment(first, n, run, ball, contact, tally):
         k.due = 1 if late <= LIMITS.tie * max(k.age, sure) else 0
         if k.due == 0:
             second = least(second, k.until)
-    if less(reach, second) and second.real < math.inf:
+    if second.real < math.inf:
         tally.margin = min(tally.margin, minus(second, reach).real / second.real)
