@@ -265,7 +265,10 @@ def test_fig_three_triangle_and_extended():
     expected = [(0, u), (ends / (1 + e[0]), 0), (ends, -e[0] * u)]
     np.testing.assert_allclose(line, expected, **CLOSE)
     shown = panel("three_balls", "fig-own-three-extended")
-    path, impulses = solved(THREE, 0.15)
+    v[1] = 0.15
+    g *= 0.85
+    ends *= 0.85
+    path, impulses = solved((m, v, e), 0.15)
     bend = [0.15 * ends, v[1] + 0.85 * g - v[2] - 0.15 * ends / m[2]]
     np.testing.assert_allclose(
         shown["closing speed $u_3$"],
