@@ -120,13 +120,15 @@
       if (text) printed.textContent += text;
       if (found) show(check, found);
       if (broken) results[check].textContent = "an error: no answer";
-      if (error) {
-        wrong.textContent = error.trim();
-        if (line) mark(line);
-      }
+      const empty = line && error?.includes("NotImplementedError");
+      if (error && !empty) wrong.textContent = error.trim();
+      if (error && line) mark(line);
       if (!done) return;
       const passed = list.querySelectorAll(".passed").length;
-      stop(error ? `An error${line ? ` in line ${line}` : ""}.` : `${passed} of ${checks.length} checks passed.`);
+      if (empty) {
+        results.forEach((result) => (result.textContent = ""));
+        stop(`Write your lines at line ${line}.`);
+      } else stop(error ? `An error${line ? ` in line ${line}` : ""}.` : `${passed} of ${checks.length} checks passed.`);
     }
     // The line of an error is selected, so that it is seen.
     function mark(line) {
