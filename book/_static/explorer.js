@@ -353,11 +353,23 @@
       const { pictures } = this.panels;
       if (pictures) pictures.node.hidden = scenery.covered;
       this.host.classList.toggle("covered", scenery.covered);
+      this.calm(this.page && scenery.covered && scenery.guessing === "once");
       for (const panel of Object.values(this.panels))
         if (!panel?.node.hidden) panel?.show({ ...scenery, loud: this.audio }, this.box, this.stageBox);
       this.stage.lay(scenery.setting, this.stageBox());
       this.link.href = `explorer.html#${this.state.fragment()}`;
       this.writeAddress();
+    }
+
+    // Until the first hit of its own page a reader sees little more than the cradle and the guess.
+    // When all else comes, the cradle stays where it is on the screen.
+    calm(on) {
+      const { classList } = this.host;
+      if (classList.contains("calm") === on) return;
+      const top = () => this.stage.svg.getBoundingClientRect().top;
+      const before = top();
+      classList.toggle("calm", on);
+      if (!on && !this.full) scrollBy({ top: top() - before, behavior: "instant" });
     }
 
     resume(scenery) {

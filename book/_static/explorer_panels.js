@@ -40,7 +40,7 @@
             full,
           ]),
     );
-    function show({ scene, covered }) {
+    function show({ scene }) {
       full.textContent = document.fullscreenElement ? "Leave full screen" : "Full screen";
       const at = scenes.findIndex(({ key }) => key === scene);
       list.show(scene);
@@ -48,9 +48,7 @@
       const { text: said, link } = scenes[at] ?? { text: "" };
       const more = link ? [" ", make("a", { href: link.address }, link.words)] : [];
       // It tells the answer: it is there unseen, so that nothing below it moves when it comes.
-      const told = make("span", { class: "said-of-scene" }, said, ...more);
-      const later = "After the hit these lines say what the scene shows.";
-      text.replaceChildren(...(covered && said ? [make("span", { class: "later" }, later)] : []), told);
+      text.replaceChildren(make("span", { class: "said-of-scene" }, said, ...more));
     }
     return { node: make("div", { class: "scenes" }, walk, chains ? "" : text), show };
   }
@@ -183,6 +181,7 @@
     const sliders = settingSliders(act, parts.has("half") ? 0.5 : 1); // the largest ratio
     const wanted = { count, scope, material, law, ...sliders };
     const has = (name) => parts.has({ forward: "ratio", backward: "ratio", gap: "law" }[name] ?? name);
+    sliders.ratio.node.classList.add("of-ratio");
     const nodes = Object.keys(wanted)
       .filter(has)
       .map((name) => wanted[name].node);
@@ -250,7 +249,7 @@
     const told = make("p", { class: "note guessed" });
     const second = make(level, {});
     const caption = make("p", {});
-    const legend = make("details", { class: "note" }, make("summary", {}, "How to read these two bars"), caption);
+    const legend = make("details", { class: "note" }, make("summary", {}, "How to read the bars"), caption);
     const balance = make("div", { class: "balance" }, second, momentum, energy, legend);
     const node = make(
       "div",
@@ -270,6 +269,7 @@
       title.textContent = covered ? "Your guess (m/s)" : `${when} ${explorer.hitName(number)} (m/s)`;
       second.textContent = covered ? "Momentum and energy of your guess" : "Momentum and energy";
       caption.textContent =
+        (covered ? "" : "Velocities: dashed outlines are those before the hit. ") +
         "Momentum: ball by ball, from 0 to the dashed line; a ball that goes back (lower row) steps back. Energy: 100\u00a0% is " +
         `what there was before the hit; grey is ${covered ? "what you have not given away" : "lost, or stored in the contacts"}.`;
       const ghost = guess?.open && guess.touched && number === 0 ? { guess: guess.values } : {};
@@ -280,6 +280,8 @@
       momentum.innerHTML = now ? explorer.momentum(box(momentum), setting, hit.before, now) : "";
       energy.innerHTML = now ? explorer.energy(box(energy), setting, hit.before, now) : "";
       handles.show(state, box(bars));
+      // A guess that has not begun has given nothing away yet.
+      node.classList.toggle("unbegun", Boolean(covered && !guess.touched));
       told.textContent = guess && number === 0 ? explorer.guessInWords(state) : "";
     }
     return { node, show };

@@ -13,7 +13,7 @@
     [1, "Send the last ball off faster than the striker came.", ({ last }) => last > 1.2],
     [2, "Lose more than half of the energy, and let the last ball leave with more than half of the striker's speed.",
       ({ masses, before, v, last }) => kept(masses, before, v) < 0.5 && last > 0.5],
-    [3, "Stop the striker dead, with every ratio at least 0.1.",
+    [3, "Stop the striker dead, with ratio 0.1 or more.",
       ({ v, setting }) => explorer.law(setting) === "rule" && Math.abs(v[0]) < STILL && Math.min(...setting.forward, ...setting.backward) >= 0.1],
     [3, "Lose no energy, and make exactly two balls come back.",
       ({ masses, before, v }) => kept(masses, before, v) > 1 - 1e-4 && back(v) === 2],
