@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from chains import uniform
+from chains import striking, uniform
 from real_cradles import SLOWER, first_strikes
 from scipy.special import ndtri
 from stored import read
 
 from cradle import (
-    Chain,
     ImpulseCorrelation,
     SequentialCollisions,
     SpringChain,
@@ -76,7 +75,7 @@ def spheres(strikers):
 
     def law(behind_2, behind_3, behind_4, loss):
         gaps = [30.0] * (strikers - 1) + [0.0, *(behind_2, behind_3, behind_4)[strikers - 1 :]]
-        return SpringChain(gaps=gaps, viscosity=loss, accuracy=1e-6)
+        return SpringChain(gaps=gaps, viscosity=loss, accuracy=1e-5)
 
     return law
 
@@ -122,8 +121,8 @@ def test_gaps_of_none():
     def law(gap):
         return SpringChain(gaps=[0.0, gap])
 
-    chain = Chain([1.0] * 3, [1.0, 0.0, 0.0])
-    shots = Shots((shot_set("three", chain.velocities, collide(chain, law(0.0)).velocities, 1e-5),))
+    after = collide(striking(), law(0.0)).velocities
+    shots = Shots((shot_set("three", [1.0, 0, 0], after, 1e-5),))
     found = fit_law(shots, law, {"gap": (0, 2)})
     assert found.values["gap"] == pytest.approx(0.0, abs=1e-7)
     low, high = found.intervals["gap"]
@@ -196,20 +195,20 @@ def test_errors_far_too_small_are_no_endless_search():
 
 
 def test_intervals_hold_the_truth():
-    """In 95 of 100 experiments, give or take six."""
+    """In 38 of 40 experiments, give or take three, but not in all."""
     held = 0
-    for seed in range(100):
+    for seed in range(40):
         shots = Shots((simulated("AAA", [1.0] * 3, 0.9, 0.15, 0.02, seed, count=3),))
         ranges = {"forward": (0, 0.5)}
         fit = fit_law(shots, ImpulseCorrelation, ranges, restitution=0.9, starts=4)
         low, high = fit.intervals["forward"]
         held += low <= 0.15 <= high
-    assert 89 <= held <= 99
+    assert 35 <= held <= 39
 
 
 def test_a_level_stretch_is_one_minimum():
     """Balls far apart: from some gap on nothing changes."""
-    after = collide(Chain([1, 1, 1], [1, 0, 0]), SpringChain(gaps=[0, 10.0])).velocities
+    after = collide(striking(), SpringChain(gaps=[0, 10.0])).velocities
     shots = Shots((shot_set("AAA", [1.0, 0, 0], after, 0.01),))
     law = lambda gap: SpringChain(gaps=[0.0, gap])  # noqa: E731
     fit = fit_law(shots, law, {"gap": (0.0, 20.0)}, starts=8)

@@ -1,11 +1,12 @@
 """The named cases of the rules: R2 to R9, exact zeros, ties, and infinite sequences."""
 
-import mpmath
+from decimal import localcontext
+
 import numpy as np
 import pytest
 from chains import local_orders
 from delicate import CHAINS, chains_of, seen
-from truth import solve
+from truth import meaning, solve
 
 from cradle import Chain, ImpulseCorrelation, collide, textbook
 
@@ -20,8 +21,9 @@ def agrees(trace, atol=1e-13):
     """Compare with fifty digits (and in every event, if none collapsed); return that outcome."""
     chain, model = trace.chain, trace.model
     own = (part.tolist() for part in (chain.masses, chain.velocities, chain.restitution))
-    with mpmath.workdps(50):
-        exact = solve(*own, model.forward, model.backward, meeting=model.meeting)
+    with localcontext(prec=50):
+        ratios = {"forward": model.forward, "backward": model.backward, "meeting": model.meeting}
+        exact = solve(*own, **ratios, number=meaning)
         after = [float(v) for v in exact.velocities]
         impulses = [float(p) for p in exact.impulses]
     np.testing.assert_allclose(trace.velocities, after, rtol=0, atol=atol)
