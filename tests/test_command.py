@@ -405,6 +405,7 @@ def test_what_was_fitted_is_no_check():
     assert len(answer["chi_square"]) == 2
     assert [row["name"] for row in answer["rows"]] == ["AB", "AC", "ABA"]
     text = call(line)
+    assert "no ratio is fitted" not in text
     assert "the set was part of the fit: this is no check\n" in text
     header = ["ball", "type", "velocity", "lower", "upper", "measured", "error"]
     assert header in [line.split() for line in text.splitlines()]

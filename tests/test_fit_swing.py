@@ -61,7 +61,7 @@ def two_balls():
 def test_two_balls_by_closed_form():
     """Touching balls: the mean is a cosine, and the distance shrinks by e each half swing."""
     e, period, size = 0.9, 1.1, 0.04
-    times = np.arange(0, 5, 0.03)
+    times = np.arange(0, 3, 0.03)
     wave = size * np.cos(2 * np.pi * times / period)
     apart = e ** np.floor(2 * times / period + 0.5) * np.abs(wave)
     places = np.stack([-wave - apart, -wave + apart], axis=1) / 2
@@ -191,7 +191,7 @@ def test_film_without_an_impact_tells_no_restitution():
 def test_a_law_that_does_not_fit_is_said_and_intervals_grow():
     """A constant loss of speed, and a tracker that wanders."""
     true = TRUE | {"restitution": 1.0}
-    times, places = filmed(true, [-0.03, 0, 0, 0, 0], 6, 60, 2e-4, 3, LOSS)
+    times, places = filmed(true, [-0.03, 0, 0, 0, 0], 4, 60, 2e-4, 3, LOSS)
     fit = fit_swing(times, places + wander(places.shape, 3e-4, 60, 3), LAW)
     assert fit.poor
     assert fit.correlation > 0.3

@@ -104,7 +104,7 @@ def same(one, other):
 @needs_numba
 def test_compiled_and_plain_traces_are_equal_to_the_last_bit(plain):
     finished = 0
-    for chain, options in mixed_chains(1, 250):
+    for chain, options in mixed_chains(1, 125):
         plain(False)
         assert runtime.chosen() is runtime.compiled()
         done, one = outcome(chain, options)
@@ -114,7 +114,7 @@ def test_compiled_and_plain_traces_are_equal_to_the_last_bit(plain):
         assert done == also_done
         finished += done
         same(one, other)
-    assert finished > 225
+    assert finished > 112
 
 
 @needs_numba
@@ -440,7 +440,7 @@ LONG = np.ones(30), np.eye(30)[0], np.full(29, 0.9), np.full(28, 0.1), np.full(2
 @pytest.mark.parametrize("effort", [1, 1000])
 def test_pauses_do_not_change_a_bit(plain, monkeypatch, on, effort):
     plain(on)
-    cases = [(LONG, {"max_events": 10**6}), *mixed_chains(5, 40)]
+    cases = [(LONG, {"max_events": 10**6}), *mixed_chains(5, 12)]
     expected = [outcome(*case) for case in cases]
     monkeypatch.setattr(drive, "_EFFORT", {False: effort, True: effort})
     for case, (done, trace) in zip(cases, expected, strict=True):
