@@ -573,13 +573,9 @@ def test_ctrl_c_works_at_once(work, wish):
         except KeyboardInterrupt:
             print(time.process_time() - begun)
     """
-    with subprocess.Popen(
-        [sys.executable, "-c", code],
-        env={**os.environ, runtime.VARIABLE: wish},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+    options = {"env": os.environ | {runtime.VARIABLE: wish}, "text": True}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", code], **options, **pipes) as process:
         try:
             assert process.stdout.readline() == "begins\n"
             begun = time.perf_counter()
