@@ -1,5 +1,7 @@
 """The measured cradles: readings agree, spheres are spheres, stored fits fit as they state."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import real_cradles
@@ -116,8 +118,7 @@ def test_strikers_that_come_one_by_one():
 @pytest.mark.parametrize("row", SWINGS, ids=lambda row: row["law"])
 def test_stored_fits_of_the_half_minute(row):
     p = [float(row[key]) for key in real_swing.COLUMNS[1:6]]
-    run = real_swing.swung(row["law"], p, MEAN[1])
-    found = real_swing.peaks()
+    run, found = swung(row["law"], row["law"]), real_swing.peaks()
     chi = (real_swing.misfits(run, p[3], found) ** 2).sum(axis=1)
     assert chi == pytest.approx([float(row["chi_places"]), float(row["chi_times"])], rel=1e-2)
     (places, times), stored = real_swing.turns(run, p[3], found), turns_of(row["law"])
@@ -125,6 +126,13 @@ def test_stored_fits_of_the_half_minute(row):
     # A tenth of the error of reading: where a ball turns twice, the digits of a machine choose.
     assert (np.abs(stored["x_m"] - places) < 0.1 * found[4]).all()
     assert (np.abs(stored["t_s"] - times) < 0.1 * found[3]).all()
+
+
+@cache
+def swung(law, fitted):
+    """The run of a law with the numbers that were fitted to another one, or to it."""
+    (row,) = (row for row in SWINGS if row["law"] == fitted)
+    return real_swing.swung(law, [float(row[key]) for key in real_swing.COLUMNS[1:6]], MEAN[1])
 
 
 def turns_of(law):
@@ -135,9 +143,7 @@ def turns_of(law):
 
 def test_with_gaps_a_ratio_changes_nothing_in_half_a_minute():
     law = "constant restitution"
-    (row,) = read("cradle_fits.csv", law=law)
-    p = [float(row[key]) for key in real_swing.COLUMNS[1:6]]
-    pairs, ratio = (real_swing.swung(x, p, MEAN[1]) for x in (law, law + ", ratio"))
+    pairs, ratio = (swung(x, law) for x in (law, law + ", ratio"))
     assert np.abs(pairs.positions - ratio.positions).max() < 1e-9
     assert read("cradle_turns.csv", law=law + ", ratio") == [
         {**x, "law": law + ", ratio"} for x in read("cradle_turns.csv", law=law)
