@@ -203,7 +203,7 @@ def test_bands_of_the_ten_predictions():
         pairs = [sequence[i : i + 2] for i in range(len(sequence) - 1)]
         triplets = [sequence[i : i + 3] for i in range(len(sequence) - 2)]
         found = []
-        for _ in range(1000):
+        for _ in range(500):
             off = {}  # of an entry, wherever the chain uses it
 
             def entry(name, value, off=off):
