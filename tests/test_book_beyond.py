@@ -251,16 +251,6 @@ def test_ratios_that_differ_from_ball_to_ball_give_the_springs():
     assert rough == [f"{a:.2f}" for a in ratios]
 
 
-def test_these_ratios_miss_springs_when_two_strike():
-    """With backward ratios as they are, and as the mirror image asks."""
-    ratios = [float(a) for a in CHAPTER.glued["along-five"].split(", ")]
-    springs = collide(Chain(*struck(5, 2), 1), SpringChain(1.0)).velocities
-    for name, backward in (("two-miss", ratios), ("two-mirrored", ratios[::-1])):
-        options = {"backward": backward, "excess": "saturate"}
-        after = post_impact_velocities(*struck(5, 2), 1.0, ratios, **options)
-        CHAPTER.tells({name: np.abs(after - springs).max()})
-
-
 def test_two_strikers_have_no_closed_form():
     """Four balls fly off at the stored ratio, and the leader is faster in a longer row."""
     leaders = []
