@@ -41,6 +41,7 @@
       this.host = host;
       const { scene, parts, picture, guess, answers } = host.dataset;
       this.page = parts === undefined;
+      this.bare = this.page && !location.hash; // nobody was sent to a scene
       this.parts = new Set((parts ?? ALL_PARTS).split(" "));
       // Who follows a link to a setting wants to see it.
       const linked = this.page && location.hash.includes("=");
@@ -353,7 +354,7 @@
       const { pictures } = this.panels;
       if (pictures) pictures.node.hidden = scenery.covered;
       this.host.classList.toggle("covered", scenery.covered);
-      this.calm(this.page && scenery.covered && scenery.guessing === "once");
+      this.calm(this.bare && scenery.covered && scenery.guessing === "once");
       for (const panel of Object.values(this.panels))
         if (!panel?.node.hidden) panel?.show({ ...scenery, loud: this.audio }, this.box, this.stageBox);
       this.stage.lay(scenery.setting, this.stageBox());

@@ -181,7 +181,7 @@
     const sliders = settingSliders(act, parts.has("half") ? 0.5 : 1); // the largest ratio
     const wanted = { count, scope, material, law, ...sliders };
     const has = (name) => parts.has({ forward: "ratio", backward: "ratio", gap: "law" }[name] ?? name);
-    sliders.ratio.node.classList.add("of-ratio");
+    sliders.ratio.node.dataset.of = "ratio"; // it is there before the first hit, too
     const nodes = Object.keys(wanted)
       .filter(has)
       .map((name) => wanted[name].node);
