@@ -30,7 +30,6 @@ from cradle.fit import (
     read_shots,
     read_tracker,
     restitution,
-    speeds_from_heights,
     velocities_from_tracks,
 )
 from cradle.fit.parameters import chi_squares, pair_keys, ratio_keys, triplet_keys
@@ -222,12 +221,6 @@ def test_restitution_of_exact_data_and_its_error():
     error = sigma / np.sqrt(seen * np.square(speeds).sum())
     ((low, high),) = one.intervals
     assert (high - low) / (2 * np.sqrt(RISE)) == pytest.approx(error, rel=1e-3)
-
-
-def test_heights():
-    speed, sigma = speeds_from_heights([0.05, -0.05, 0.0], 0.001, 10.0)
-    np.testing.assert_allclose(speed, [1, -1, 0])
-    np.testing.assert_allclose(sigma, [np.sqrt(1.02) - 1] * 2 + [np.sqrt(0.02)])
 
 
 # --- ratio -------------------------------------------------------------------------------------

@@ -9,16 +9,16 @@ to its film: period, damping, restitution, gap.
 """
 
 from cradle.fit.estimate import ratio, restitution
-from cradle.fit.film import Velocities, speeds_from_heights, velocities_from_tracks
+from cradle.fit.film import Velocities, velocities_from_tracks
 from cradle.fit.laws import LawFit, fit_law
 from cradle.fit.result import Estimate, Fit, Prediction
 from cradle.fit.search import Mode
 from cradle.fit.shots import Shots, ShotSet, read_shots
 from cradle.fit.swings import SwingFit, fit_swing
-from cradle.fit.tracks import Tracks, frames, read_tracker
+from cradle.fit.tracks import Track, Tracks, frames, read_tracker
 
 __all__ = [
-    "Estimate", "Fit", "LawFit", "Mode", "Prediction", "ShotSet", "Shots", "SwingFit", "Tracks",
-    "Velocities", "fit_law", "fit_swing", "frames", "ratio", "read_shots", "read_tracker",
-    "restitution", "speeds_from_heights", "velocities_from_tracks",
+    "Estimate", "Fit", "LawFit", "Mode", "Prediction", "ShotSet", "Shots", "SwingFit", "Track",
+    "Tracks", "Velocities", "fit_law", "fit_swing", "frames", "ratio", "read_shots", "read_tracker",
+    "restitution", "velocities_from_tracks",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Velocities of balls around an impact, from their positions or from heights."""
+"""Velocities of balls around an impact, from their positions."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from cradle.fit.tracks import Track
-from cradle.input.values import ABOVE_ZERO, ArrayLike, Vector, checked, one_number, whole_number
+from cradle.input.values import ABOVE_ZERO, Vector, one_number, whole_number
 from cradle.trace import compared_as_objects
 
 _GRAVITY = 9.81
@@ -31,35 +31,6 @@ class Velocities(NamedTuple):
     probability: float  #: Chance that marks bend at least as much if the motion fitted is right.
     #: Marks off by more than chance allows, each as (ball from 0, time in s, by how much in m).
     strays: tuple[_Stray, ...] = ()
-
-
-def speeds_from_heights(
-    heights: ArrayLike, sigma: float, gravity: float = _GRAVITY
-) -> tuple[Vector, Vector]:
-    """Turn drop or rise heights of hanging balls into velocities, as the paper did.
-
-    Parameters
-    ----------
-    heights : array_like
-        Above the lowest point, m; negative for a ball that swings to the left.
-    sigma, gravity : float
-        Standard error of a height, m, and g, m/s^2; above 0, else a ValueError is raised.
-
-    Returns
-    -------
-    velocities, sigma : ndarray
-        m/s, in the shape of `heights`; the error is that towards larger speeds, so finite at rest.
-
-    Examples
-    --------
-    >>> [values.round(3).tolist() for values in speeds_from_heights([0.051, 0.0], 0.001)]
-    [[1.0, 0.0], [0.01, 0.14]]
-    """
-    h = checked("heights", heights)
-    error = one_number("sigma", sigma, *ABOVE_ZERO)
-    g = one_number("gravity", gravity, *ABOVE_ZERO)
-    speed = np.sqrt(2 * g * np.abs(h))
-    return np.sign(h) * speed, np.sqrt(2 * g * (np.abs(h) + error)) - speed
 
 
 def velocities_from_tracks(
