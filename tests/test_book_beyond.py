@@ -67,7 +67,7 @@ def test_stored_elastic_rows_have_the_closed_form():
 
 
 @needs_numba
-@pytest.mark.parametrize("ratio", [0.0, 0.15, 0.3, 0.5])
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.15, 0.3, 0.45, 0.5])
 def test_longest_rows_again(ratio):
     stored = find("elastic", ratio=ratio)
     balls = int(max(row["balls"] for row in stored)) if stored else 1000
@@ -249,6 +249,16 @@ def test_ratios_that_differ_from_ball_to_ball_give_the_springs():
     np.testing.assert_allclose(after, HERTZ["five equal"], rtol=0, atol=2e-4)
     rough = CHAPTER.glued["along-rough"].replace(" and", ",").split(", ")
     assert rough == [f"{a:.2f}" for a in ratios]
+
+
+def test_these_ratios_miss_springs_when_two_strike():
+    """With backward ratios as they are, and as the mirror image asks."""
+    ratios = [float(a) for a in CHAPTER.glued["along-five"].split(", ")]
+    springs = collide(Chain(*struck(5, 2), 1), SpringChain(1.0)).velocities
+    for name, backward in (("two-miss", ratios), ("two-mirrored", ratios[::-1])):
+        options = {"backward": backward, "excess": "saturate"}
+        after = post_impact_velocities(*struck(5, 2), 1.0, ratios, **options)
+        CHAPTER.tells({name: np.abs(after - springs).max()})
 
 
 def test_two_strikers_have_no_closed_form():

@@ -16,7 +16,11 @@ from cradle import (
     Chain,
     ImpulseCorrelation,
     collide,
+    paper_chain,
+    paper_sequences,
+    ratio_table,
 )
+from cradle.closed_form import back_impact_line
 
 TESTS = Path(__file__).parent
 BOOK = TESTS.parent / "book"
@@ -93,6 +97,25 @@ def test_different_parameters_with_one_outcome():
     assert (
         GLUED["ambiguous"] == "(" + ", ".join(f"{v:.6f}" for v in outcome).replace("-", "−") + ")"
     )
+
+
+def test_counts_of_triplets_and_sequences():
+    assert number(GLUED["without-d"]) == sum("D" not in name for name in paper_sequences()) == 8
+    several = 0
+    for triplet in ratio_table().triplet:
+        chain, model = paper_chain(triplet, excess="saturate")
+        balls = chain.masses.tolist(), [1, 0, 0], chain.restitution.tolist()
+        ratios = list(model.forward), list(model.backward)
+        several += max(truth.solve(*balls, *ratios).collisions) > 1
+    assert number(GLUED["several"]) == several == 8
+
+
+def test_ends_of_eq_44_and_factors_of_eq_14():
+    """By the closed form, and the ratios of a soft second spring."""
+    assert float(GLUED["eq-44-r1"]) == pytest.approx(back_impact_line(0, 0.5, 0.5, 0.15), abs=6e-4)
+    assert back_impact_line(float(GLUED["eq-44-r2"]), 0.5, 0.5, 0.15) == pytest.approx(0, abs=1e-3)
+    soft = math.pi**2 / 8
+    CHAPTER.tells({"loss-factor": soft - 0.5, "effective-factor": soft - 1})
 
 
 def test_eq_34_error_beyond_its_range():

@@ -126,7 +126,7 @@ def test_table_2_most_open_entries():
         near = min(TABLE_2.ratio[triplet], TABLE_2.bound[triplet])
         if distance(triplet, far) <= 0.01:
             return far
-        for _ in range(14):  # to less than a ten-thousandth
+        for _ in range(30):
             middle = (near + far) / 2
             near, far = (middle, far) if distance(triplet, middle) <= 0.01 else (near, middle)
         return near
@@ -203,7 +203,7 @@ def test_bands_of_the_ten_predictions():
         pairs = [sequence[i : i + 2] for i in range(len(sequence) - 1)]
         triplets = [sequence[i : i + 3] for i in range(len(sequence) - 2)]
         found = []
-        for _ in range(500):
+        for _ in range(1000):
             off = {}  # of an entry, wherever the chain uses it
 
             def entry(name, value, off=off):

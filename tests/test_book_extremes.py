@@ -281,6 +281,22 @@ def test_a_light_ball_amplifies_by_half_the_number_of_its_impacts():
     assert number(told["heavy-grown"]) == pytest.approx(1e-9 * max(grown[0], grown[2]), rel=0.2)
 
 
+def test_the_table_of_the_inventory():
+    """Verdicts of the judge, all of whose chains are in two lines; no warning is missing."""
+    told = Chapter("extremes_inventory").glued
+    rows = read("judge.csv")
+    judged, longer = number(told["judged"]), number(told["longer"])
+    assert judged + longer == sum(int(n) for r in rows for k, n in r.items() if k != "family")
+    short = "right", "wrong", "other reading", "open", "unfinished"
+    assert judged == sum(int(r[word]) for r in rows for word in short)
+    assert number(told["wrong"]) == sum(int(r["wrong"]) for r in rows)
+    assert number(told["refused"]) == sum(int(r["unfinished"]) for r in rows)
+    assert told["unlike"] == said(sum(int(r["unlike them"]) for r in rows))
+    assert int(told["given-up"]) == sum(int(r["given up"]) for r in rows)
+    assert int(told["not-judged"]) == sum(int(r["nobody knows"]) for r in rows)
+    assert int(told["rest"]) == sum(int(r["left"]) for r in stored("finish"))
+
+
 def test_the_thresholds_of_the_inventory():
     """Typed here, and by what chains on both sides of those meet that a user can cross."""
     printed = Chapter("extremes_inventory").printed("inventory-limits-table")

@@ -15,11 +15,23 @@ from cradle import (
 )
 
 
+@pytest.mark.parametrize("name", ["forward", "backward"])
+@pytest.mark.parametrize("length", [1, 3])
+def test_wrong_number_of_ratios(name, length):
+    options = {"forward": 0.1, name: [0.1] * length}
+    with pytest.raises(ValueError, match=f"^{name} has {length} values; 4 balls need 2"):
+        collide(Chain([1] * 4, [1, 0, 0, 0], 1), ImpulseCorrelation(**options))
+    with pytest.raises(ValueError, match=rf"^{name} has shape \({length},\); must be .* 4 balls"):
+        post_impact_velocities([1] * 4, [1, 0, 0, 0], 1, **options)
+
+
 def test_two_balls_take_one_number_or_none():
     for ratio in (0.3, []):
         after = collide(Chain([1, 3], [1, 0], 0.5), ImpulseCorrelation(ratio)).velocities
         np.testing.assert_allclose(after, [0.25 - 0.375, 0.25 + 0.125], atol=1e-16)
         np.testing.assert_array_equal(post_impact_velocities([1, 3], [1, 0], 0.5, ratio), after)
+    with pytest.raises(ValueError, match="forward has 1 values; 2 balls need 0"):
+        collide(Chain([1, 3], [1, 0], 0.5), ImpulseCorrelation([0.3]))
 
 
 BEYOND = [

@@ -18,7 +18,7 @@ def test_against_small_steps_of_time(e, exponent):
     found = collide(chain, EnergyDistribution(k, exponent)).velocities
     coarse, fine = (
         abs(strike(chain.masses, [1, 0, 0], e, steps, k, exponent)[0] - found).max()
-        for steps in (100, 1600)
+        for steps in (200, 3200)
     )
     assert coarse > 4 * fine
     assert fine < 2e-3

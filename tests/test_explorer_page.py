@@ -25,7 +25,7 @@ def test_swing_of_the_page(still):
     Rounding differs, grows from hit to hit and may decide a tie: few hits, all balls in motion.
     """
     tab = still()
-    for setting in settings(12):
+    for setting in settings(24):
         run = swung(setting, 3)
         hits, places = tab.evaluate(
             """([setting, times]) => {

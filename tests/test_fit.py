@@ -79,7 +79,10 @@ def good():
         (lambda t: t["after"].__setitem__(3, np.nan), "row 4, column after = nan; must be finite"),
         (lambda t: t["ball"].__setitem__(1, 3), r"row 1, column ball: set AB, shot 0 has balls"),
         (lambda t: t["ball"].__setitem__(1, 1.5), "row 2, column ball: 1.5; must be 1, 2"),
-        (lambda t: t["mass"].__setitem__(2, 0.05), "row 3, column mass: 0.05; balls of type A"),
+        (
+            lambda t: t["mass"].__setitem__(2, 0.05),
+            "row 3, column mass: 0.05; balls of type A",
+        ),
         (lambda t: t["type"].__setitem__(3, "C"), "row 4, column type: 'C'; ball 2 of set AB"),
         (lambda t: t["before"].__setitem__(0, -1.0), "row 1, column before: .*no balls approach"),
         (lambda t: t["sigma"].__setitem__(2, 0.0), "row 3, column sigma = 0.0; must be above 0"),
@@ -87,7 +90,10 @@ def good():
         (lambda t: t.update(Sigma=t.pop("sigma")), "Sigma: write Sigma in small letters"),
         (lambda t: t["set"].append("AB"), "columns have different lengths"),
         (lambda t: t.update({k: [] for k in t}), "the table has no rows"),
-        (lambda t: [t.update({f"{k}1": t.pop(k)}) for k in [*t]], "no column of s.* `cradle film`"),
+        (
+            lambda t: [t.update({f"{k}1": t.pop(k)}) for k in [*t]],
+            "no column of set, .* `cradle film`",
+        ),
     ],
 )
 def test_wrong_tables_are_refused_by_row_and_column(change, message):
@@ -533,21 +539,28 @@ def test_balls_are_in_the_order_of_the_titles(tmp_path):
         ("a,b\n1,2\n3,4\n", "export.txt has no column of positions: a line of titles must begin"),
         ("", "export.txt has no column of positions"),
         ("t,y\n0,1\n", "export.txt has no column of positions"),
-        ("t,A,B\n0,1,2\n", "and Capstone do; if each column is a ball, write A/x, B/x"),
+        (
+            "t,A,B\n0,1,2\n",
+            "t or Time and name x too, as Tracker, Kinovea, Logger Pro "
+            "and Capstone do; if each column is a ball, write A/x, B/x",
+        ),
         ("t,x\n0,1\n0,1000,-0,05\n", "line 3: 4 values under 2 titles (between commas, decimals n"),
         ("A\nt\tx\n0\t1\n1\there\n", "export.txt, line 4, column x: 'here'; must be a number"),
         ("A\nt\tx\n0\t1\n1\tinf\n", "export.txt, line 4, column x: 'inf'; must be a number"),
         ("#T X Y\n0:00:00:03 1.0 2.0\n", "line 2, column T: '0:00:00:03'; must be a number"),
         ('t,x\n"0,0",1\n', "line 2, column t: '0,0'; must be a number, its decimals after a point"),
-        ("Time (s) Run #1,Position (m) Run #1,Time (s) Run #2,Position (m) Run #2\n0,1,0,2\n",
-         "one ball follows the other, write its name, '# A', above; or columns named A/x, B/x"),
+        (
+            "Time (s) Run #1,Position (m) Run #1,Time (s) Run #2,Position (m) Run #2\n0,1,0,2\n",
+            "the times of Position do not rise; where one ball follows the other, write its name, "
+            "'# A', above; or columns named A/x, B/x",
+        ),
         ("t,x\n0,1\n0,2\n", "the times of track do not rise; where one ball follows the other"),
         ("t,x (px)\n0,1\n", "line 2, column x: px; say how large a pixel is, in m: unit"),
         ("t (frames),x\n0,1\n", "column t: unit 'frames'; must be in s, ms, m, cm, mm or px"),
         ("t,x\n0,1\n33,1\n", "marks 33 s apart; if the times are in ms, divide time_scale by"),
         ("t;x\n0;1,5\n0,1;2.5\n", "decimals with a comma in line 2 and with a point in line 3"),
     ],
-)  # fmt: skip
+)
 def test_exports_that_are_refused(tmp_path, text, message):
     (tmp_path / "export.txt").write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=re.escape(message)):

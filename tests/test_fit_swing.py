@@ -61,7 +61,7 @@ def two_balls():
 def test_two_balls_by_closed_form():
     """Touching balls: the mean is a cosine, and the distance shrinks by e each half swing."""
     e, period, size = 0.9, 1.1, 0.04
-    times = np.arange(0, 3, 0.03)
+    times = np.arange(0, 5, 0.03)
     wave = size * np.cos(2 * np.pi * times / period)
     apart = e ** np.floor(2 * times / period + 0.5) * np.abs(wave)
     places = np.stack([-wave - apart, -wave + apart], axis=1) / 2
@@ -134,11 +134,9 @@ def test_five_balls_of_which_some_are_hidden():
     seen = np.random.default_rng(2).random(places.shape) < 0.9
     fit = fit_swing(times, np.where(seen, places, np.nan), LAW)
     assert held(fit, TRUE, 2) == {*NUMBERS}
+    other = fit_swing(times, np.where(seen, places, 9.0), LAW, seen=seen)
+    assert other.intervals == fit.intervals
     assert (np.isfinite(fit.residuals) == seen).all()
-    known = {"free": [], "known": fit.values}
-    nan = fit_swing(times, np.where(seen, places, np.nan), LAW, **known)
-    told = fit_swing(times, np.where(seen, places, 9.0), LAW, seen=seen, **known)
-    np.testing.assert_array_equal(told.residuals, nan.residuals)
 
 
 def test_three_balls_pulled():
@@ -191,7 +189,7 @@ def test_film_without_an_impact_tells_no_restitution():
 def test_a_law_that_does_not_fit_is_said_and_intervals_grow():
     """A constant loss of speed, and a tracker that wanders."""
     true = TRUE | {"restitution": 1.0}
-    times, places = filmed(true, [-0.03, 0, 0, 0, 0], 4, 60, 2e-4, 3, LOSS)
+    times, places = filmed(true, [-0.03, 0, 0, 0, 0], 6, 60, 2e-4, 3, LOSS)
     fit = fit_swing(times, places + wander(places.shape, 3e-4, 60, 3), LAW)
     assert fit.poor
     assert fit.correlation > 0.3

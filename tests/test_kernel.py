@@ -13,13 +13,12 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from decimal import Decimal
 from pathlib import Path
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
 import tqdm
 from chains import random_chains, with_ends
-from kernels import needs_numba, runtimes
+from kernels import needs_numba
 from plain import solve
 
 from cradle import (
@@ -104,7 +103,7 @@ def same(one, other):
 @needs_numba
 def test_compiled_and_plain_traces_are_equal_to_the_last_bit(plain):
     finished = 0
-    for chain, options in mixed_chains(1, 125):
+    for chain, options in mixed_chains(1, 250):
         plain(False)
         assert runtime.chosen() is runtime.compiled()
         done, one = outcome(chain, options)
@@ -114,7 +113,7 @@ def test_compiled_and_plain_traces_are_equal_to_the_last_bit(plain):
         assert done == also_done
         finished += done
         same(one, other)
-    assert finished > 112
+    assert finished > 225
 
 
 @needs_numba
@@ -385,17 +384,12 @@ def test_the_wish_for_a_kernel_is_one_of_two_words(monkeypatch, large):
 HOME = "USERPROFILE" if sys.platform == "win32" else "HOME"
 
 
-@pytest.fixture
-def no_folder(monkeypatch):
-    """No variable that names a folder for compiled code."""
-    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
-        monkeypatch.delenv(name, raising=False)
-
-
-@pytest.mark.usefixtures("fresh_runtime", "no_folder")
+@pytest.mark.usefixtures("fresh_runtime")
 @pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "LOCALAPPDATA", HOME])
 def test_compiled_code_stays_out_of_the_package(monkeypatch, tmp_path, variable):
     """A wheel or a source distribution built afterwards would take it along."""
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv(variable, str(tmp_path))
     package = Path(runtime.__file__).parent
     before = set(package.rglob("*"))
@@ -406,10 +400,15 @@ def test_compiled_code_stays_out_of_the_package(monkeypatch, tmp_path, variable)
     assert set(package.rglob("*")) == before
 
 
-@pytest.mark.usefixtures("fresh_runtime", "no_folder")
+@pytest.mark.usefixtures("fresh_runtime")
 def test_a_user_without_a_home_has_no_folder(monkeypatch):
-    unknown = RuntimeError("Could not determine home directory.")
-    monkeypatch.setattr(Path, "expanduser", Mock(side_effect=unknown))
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+
+    def unknown(_):
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "expanduser", unknown)
     assert runtime._stored() is None
 
 
@@ -436,11 +435,11 @@ def test_no_function_is_inlined_that_is_meant_to_stand_apart():
 LONG = np.ones(30), np.eye(30)[0], np.full(29, 0.9), np.full(28, 0.1), np.full(28, 0.1)
 
 
-@runtimes
+@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
 @pytest.mark.parametrize("effort", [1, 1000])
 def test_pauses_do_not_change_a_bit(plain, monkeypatch, on, effort):
     plain(on)
-    cases = [(LONG, {"max_events": 10**6}), *mixed_chains(5, 12)]
+    cases = [(LONG, {"max_events": 10**6}), *mixed_chains(5, 40)]
     expected = [outcome(*case) for case in cases]
     monkeypatch.setattr(drive, "_EFFORT", {False: effort, True: effort})
     for case, (done, trace) in zip(cases, expected, strict=True):
@@ -479,7 +478,7 @@ def test_the_same_bits_if_it_goes_on_compiled_midway(monkeypatch):
         assert one.tobytes() == other.tobytes()
 
 
-@runtimes
+@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
 def test_a_path_grows_with_its_impact(plain, on):
     """Longer than the room made first; the same as in room enough from the start."""
     plain(on)
@@ -499,7 +498,7 @@ def test_a_path_grows_with_its_impact(plain, on):
     assert impulses == trace.path_impulses.tolist()
 
 
-@runtimes
+@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
 def test_the_path_is_kept_if_asked_for_or_up_to_a_bound(plain, on, monkeypatch):
     plain(on)
     chain, model = Chain(*LONG[:3]), ImpulseCorrelation(*LONG[3:])
@@ -534,7 +533,7 @@ def test_a_path_holds_ten_million_numbers_unless_asked_for(monkeypatch):
             collide(chain, SequentialCollisions())
 
 
-@runtimes
+@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
 def test_progress_of_one_long_impact_is_shown(plain, capsys, on, monkeypatch):
     plain(on)
     monkeypatch.setattr(drive, "_EFFORT", {False: 1000, True: 1000})
@@ -573,9 +572,13 @@ def test_ctrl_c_works_at_once(work, wish):
         except KeyboardInterrupt:
             print(time.process_time() - begun)
     """
-    options = {"env": os.environ | {runtime.VARIABLE: wish}, "text": True}
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    with subprocess.Popen([sys.executable, "-c", code], **options, **pipes) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        env={**os.environ, runtime.VARIABLE: wish},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
         try:
             assert process.stdout.readline() == "begins\n"
             begun = time.perf_counter()

@@ -212,11 +212,11 @@ def springs(y, span, m, k, pendulums, viscosity=0.0, **options):
 )
 def test_two_balls_at_a_time_are_the_limit_of_stiff_springs(m, x, pendulums):
     """With a contact time that goes to zero like k^(-2/5), so does the difference."""
-    times = np.linspace(0, 1.5, 16)
+    times = np.linspace(0, 2, 21)
     run = swing(Chain(m, np.zeros(len(m)), 1), ImpulseCorrelation(0), x, times, pendulums=pendulums)
     assert len(run.impacts) >= 3
     y, exact = [*x, *np.zeros(len(m))], {"t_eval": times, "rtol": 1e-10, "atol": 1e-14}
-    ways = [springs(y, (0, 1.5), m, k, pendulums, max_step=0.01, **exact) for k in (1e7, 1e9, 1e11)]
+    ways = [springs(y, (0, 2), m, k, pendulums, max_step=0.01, **exact) for k in (1e7, 1e9, 1e11)]
     apart = [np.abs(way[: len(m)].T - run.positions).max() / 0.02 for way in ways]
     assert apart[2] < 0.005
     for coarse, fine in zip(apart, apart[1:]):
@@ -452,6 +452,12 @@ def test_rounding_draws_nothing_apart_that_swings_alike(m, length, damping):
     assert run.together == tuple(range(len(m) - 1))
 
 
+def test_a_run_that_stands_still_says_so(monkeypatch):
+    monkeypatch.setattr(SmallAngleFlight, "next_meeting", lambda *_: (0.0, [0], [1]))
+    with pytest.raises(RuntimeError, match=r"does not get beyond t = 0\.0 s: contacts \[0\] close"):
+        swing(balls(3), ImpulseCorrelation(0), [0.0] * 3, [1.0])
+
+
 @pytest.mark.parametrize("e", [0.5, 0.9])
 def test_near_balls_of_any_angle_cost_what_their_time_costs(monkeypatch, e):
     """Lossy balls end up close to each other: the search for their meetings must not creep.
@@ -529,6 +535,13 @@ def test_balls_that_meet_now_need_not_swing_once_more(decay):
             assert abs(first_fall(level, [(wave, complex(-decay, 1.0))], False, 9.0)) < 1e-12
 
 
+def test_an_integration_that_fails_is_no_motion(monkeypatch):
+    monkeypatch.setattr(FullFlight, "_rate", lambda *of: -1e3 * of[-1] ** 2)
+    with pytest.raises(RuntimeError, match="the integration of the pendulums failed: Required"):
+        swing(balls(2), ImpulseCorrelation(0), [-0.05, 0.0], [1.0],
+              pendulums=Pendulums(0.1, angle="full"))  # fmt: skip
+
+
 @pytest.fixture
 def looked(monkeypatch):
     """The polynomials whose roots are sought."""
@@ -597,31 +610,26 @@ def pushed(join):
     return lambda m, v, *rest: join(m, v * (1.0 + 1e-9), *rest)
 
 
-UNSOUND = "not certified: at t = .* "
-LOST = f"{UNSOUND}a flight has made or lost"
+LOST = "a flight has made or lost"
 #: Where something is broken, how, in which words it is refused, and how the balls hang.
 BROKEN = [
     (SmallAngleFlight, "next_meeting", lambda _: lambda *_: (math.inf, [], []),
-     rf"{UNSOUND}balls overlap by 0\.0", {}),
-    (SmallAngleFlight, "next_meeting", lambda _: lambda *_: (0.0, [0], [1]),
-     r"does not get beyond t = 0\.0 s: contacts \[0\] close", {}),
-    (FullFlight, "_rate", lambda _: lambda *of: -1e3 * of[-1] ** 2,
-     "the integration of the pendulums failed: Required", {"angle": "full"}),
+     r"balls overlap by 0\.0", {}),
     (SmallAngleFlight, "at", faster(3e-10), LOST, {}),
     (SmallAngleFlight, "at", faster(0.02), LOST, {"damping": 0.1}),
     (SmallAngleFlight, "at", faster(-3e-10), f"{LOST} -", {}),
     (FullFlight, "at", faster(3e-10), LOST, {"angle": "full"}),
     (FullFlight, "at", faster(0.02), LOST, {"angle": "full", "damping": 0.1}),
-    (swinging, "common_velocities", pushed, f"{UNSOUND}impacts have made or lost", {}),
+    (swinging, "common_velocities", pushed, "impacts have made or lost", {}),
     # Balls that part slowly are taken for resting: momentum is kept, energy is not.
-    (swinging, "RESTING", lambda _: 0.8, f"{UNSOUND}.*J are made or lost beside the impa", {}),
+    (swinging, "RESTING", lambda _: 0.8, "J are made or lost beside the impacts", {}),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("where", "name", "how", "words", "hanging"), BROKEN)
 def test_an_unsound_swing_is_refused(monkeypatch, where, name, how, words, hanging):
     monkeypatch.setattr(where, name, how(getattr(where, name)))
-    with pytest.raises(RuntimeError, match=words):
+    with pytest.raises(RuntimeError, match=f"not certified: at t = .* {words}"):
         swing(balls(3), ImpulseCorrelation(0.2), [-0.02, 0, 0], [0.1, 1.0],
               pendulums=Pendulums(**hanging))  # fmt: skip
 
@@ -631,7 +639,7 @@ def test_a_strike_that_makes_energy_is_refused(monkeypatch):
     parted = TimedTrace._until_apart
     far = np.array([-0.01, 0.01])
     monkeypatch.setattr(TimedTrace, "_until_apart", lambda trace: (parted(trace)[0], far))
-    with pytest.raises(RuntimeError, match=LOST):
+    with pytest.raises(RuntimeError, match=f"not certified: at t = .* {LOST}"):
         swing(balls(2), SpringChain(1e10), [-0.02, 0], [0.5])
 
 
