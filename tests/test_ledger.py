@@ -191,3 +191,17 @@ def write_tolerances():
 
 if __name__ == "__main__":
     write_tolerances()
+
+
+def test_reading_the_paper_counts_the_equations_of_the_ledger():
+    """The page says at its start how many stand, and which ones are corrected."""
+    words = (ROOT / "book" / "reading.md").read_text(encoding="utf-8").partition("These pages")[0]
+    verdicts = {row["item"]: row["status"] for row in ROWS if row["item"].startswith("Eq.")}
+    equal = sum(status == "derived, equal" for status in verdicts.values())
+    assert f"Of the {len(verdicts)} numbered equations of the paper, {equal} come out" in words
+    corrected = [item[4:] for item, status in verdicts.items() if status == "derived, corrected"]
+    assert "Six are corrected" in words
+    assert len(corrected) == 6
+    listed = words.partition("corrected")[2].partition("hypothesis")[0]
+    assert re.findall(r"<eq-p(\d+)>", listed) == [*corrected, "16"]
+    assert verdicts["Eq. 16"] == "hypothesis"
