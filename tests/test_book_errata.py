@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import truth
 from chapters import Chapter, floats, number
+from march import march
 from test_book_n_balls import READINGS, outcome
 
 from cradle import (
@@ -18,7 +19,6 @@ from cradle import (
     collide,
     paper_chain,
     paper_sequences,
-    ratio_table,
 )
 from cradle.closed_form import back_impact_line
 
@@ -99,15 +99,20 @@ def test_different_parameters_with_one_outcome():
     )
 
 
-def test_counts_of_triplets_and_sequences():
+def test_counts_of_sequences():
     assert number(GLUED["without-d"]) == sum("D" not in name for name in paper_sequences()) == 8
-    several = 0
-    for triplet in ratio_table().triplet:
-        chain, model = paper_chain(triplet, excess="saturate")
-        balls = chain.masses.tolist(), [1, 0, 0], chain.restitution.tolist()
-        ratios = list(model.forward), list(model.backward)
-        several += max(truth.solve(*balls, *ratios).collisions) > 1
-    assert number(GLUED["several"]) == several == 8
+
+
+def test_groups_of_balls():
+    """By the reference rules with ratios, and one collision after the other with none (R6)."""
+    for name, first in ("ABCCAB", 1), ("BCACBA", 0):
+        chain, model = paper_chain(name, excess="saturate")
+        balls = chain.masses.tolist(), chain.velocities.tolist(), chain.restitution.tolist()
+        ratios = [list(side) for side in model.ratios(len(chain))]
+        for label, given in (f"group-{name}-ratio", ratios), (f"group-{name}", [0.0, 0.0]):
+            spread = np.ptp(exact(*balls, *given)[first:])
+            shown = number(GLUED[label]) if label in GLUED else 0.0
+            assert shown == pytest.approx(spread, rel=0.06, abs=1e-9), label
 
 
 def test_ends_of_eq_44_and_factors_of_eq_14():
@@ -150,8 +155,30 @@ def test_r7_hold_that_drives_on():
     assert GLUED["chatter"] == f"(−{(3 - 1) / 4}, {2 / 4}, {2 / 4}, {2 / 4})"
     chatter = np.array([-0.5, 0.5, 0.5, 0.5])
     assert GLUED["hold-apart"] == f"{abs(held - chatter).max():.2f}"
+    assert float(GLUED["hold-bound"]) == pytest.approx(1 / (1 + 1 - 0.3), abs=5e-4)
     ends = [outcome(way).velocities for way in READINGS.values()]
     assert GLUED["readings"] == f"{np.ptp(ends, axis=0).max():.2f}"
+
+
+def test_a_bound_that_falls_leaves_no_choice():
+    """Ratios within Eq. 53 that come to exceed it: held is what ever smaller steps tend to."""
+    chain, model = paper_chain("ABCCAB")
+    rows = [
+        (chain.masses, chain.velocities, chain.restitution, *model.ratios(6)),
+        ([1.8, 0.3, 0.8, 1.5], [1, 0, 0, 0], [0.5] * 3, [0.728, 0.01], [0.1] * 2),
+        ([2.7, 0.4, 2, 0.4, 2.2], [1, 0, 0, 0, 0], [1] * 4, [0.852, 0.14, 0.845], [0.1] * 3),
+        ([2.1, 0.3, 1.2, 1.5, 1.6], [1, 0, 0, 0, 0], [0.9] * 4, [0.809, 0.31, 0.489], [0.1] * 3),
+    ]
+    for masses, velocities, restitution, *ratios in rows:
+        trace = collide(Chain(masses, velocities, restitution), ImpulseCorrelation(*ratios))
+        assert trace.saturated
+        given = [list(map(float, x)) for x in (masses, velocities, restitution, *ratios)]
+        far, near = (
+            abs(march(*given, steps=steps, hold=False).velocities - trace.velocities).max()
+            for steps in (1000, 16_000)
+        )
+        assert near < far / 4
+        assert near < 2e-4
 
 
 def test_r7_square_root_at_the_bound():
