@@ -17,7 +17,7 @@ ITEMS = (
 VERDICTS = {
     "derived, equal",
     "derived, corrected",
-    "reproduced",
+    "copied",
     "reproduced, differs",
     "reproduced in part",
     "schematic",
@@ -123,7 +123,7 @@ def test_numbers_of_differences_are_computed():
         words = re.sub(r"\{[^}]*\}|\(1 - alpha\)", "", row["difference"])
         assert not re.search(r"\d", words), row["item"]
         assert "{" not in row["difference"] or row["difference"] not in shown, row["item"]
-    assert "0.734 gamma" in shown
+    assert "0.734 γ" in shown
     assert "0.0006 m/s" in shown
 
 
