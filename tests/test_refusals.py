@@ -202,6 +202,10 @@ SPRINGS = [
         {"gaps": 1e12},
         "gaps[0] = 1000000000000.0; must at this accuracy be at most 1",
     ),
+    (
+        {"gaps": [0, 3e7], "accuracy": 1e-6},
+        "gaps[1] = 30000000.0; must at this accuracy be at most 1e+07 times 0.758 m",
+    ),
     ({"gaps": [0, 1e-20]}, "gaps[1] = 1e-20; must be 0, or 1e-12 of 0.758 m, that is (m u^2"),
     ({"gaps": [0, -3]}, "gaps[1] = -3.0; must be a lean of at most 0.758 m, that is (m"),
     ({"accuracy": 1e-13}, "accuracy = 1e-13; must lie in [1e-12, 0.02]"),

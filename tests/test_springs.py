@@ -331,6 +331,10 @@ def test_far_scales_and_what_the_impact_does_not_reach():
     usual = spring_velocities([1, 2, 1], [1, 0, 0])
     far = spring_velocities(np.ldexp([1.0, 2, 1], 400), np.ldexp([1.0, 0, 0], -300), 1e-140)
     np.testing.assert_allclose(np.ldexp(far, 300), usual, rtol=0, atol=1e-14)
+    # The square of the speed times m / k is too small or too large for a double.
+    for mass, speed, k in (1e-250, 1e-40, 1.0), (1e250, 1e-30, 1e-200), (1.0, 1e-200, 1e-100):
+        far = spring_velocities(mass * np.array([1.0, 2, 1]), [speed, 0, 0], k)
+        np.testing.assert_allclose(far / speed, usual, rtol=0, atol=1e-13)
     assert spring_velocities([1, 2, 3], [-1, 0, 0.5]).tolist() == [-1, 0, 0.5]
     trace = collide(Chain([1] * 5, [0.7, 0.1, 1.1, 1.1, 1.1]), SpringChain())
     assert trace.velocities[2:].tolist() == [1.1, 1.1, 1.1]
@@ -338,6 +342,17 @@ def test_far_scales_and_what_the_impact_does_not_reach():
     trace = collide(Chain([1, 2, 3], [-1, 0, 0]), SpringChain())
     assert (trace.path.tolist(), trace.times.tolist()) == ([[-1, 0, 0]], [0])
     assert (trace.events, trace.durations.any(), trace.evaluations) == ((), False, 0)
+
+
+def test_the_front_of_a_wave_is_watched_from_where_it_is_felt(monkeypatch):
+    """Ahead of it compressions fall by powers: watched as well, they would make long rows slow."""
+    monkeypatch.setenv("CRADLE_KERNEL", "plain")
+    n = 60
+    ones, out = np.ones((1, n - 1)), job.motions(1, n)
+    law = kinks.Law(1.5, 1e-2, 1e7)
+    row = kinks.Springs(np.ones((1, n)), np.eye(n)[:1], ones, 0 * ones, 0 * ones)
+    job.follow(row, law, out)
+    assert out.steps[0] < 3.5 * n
 
 
 def test_leading_axes_broadcast():

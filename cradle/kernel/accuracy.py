@@ -44,8 +44,8 @@ WIDEST, NARROWEST, BLURRED = 1e9, 1e-12, 1e13
 
 
 def refuse(wrong, rule, place, clock):
-    """Note the first rule that is broken, and where first."""
-    if wrong and not 0 < clock.rule <= rule:
+    """Note the rule that is first found broken, and where."""
+    if wrong and clock.rule == 0:
         clock.rule, clock.place = rule, place
 
 
