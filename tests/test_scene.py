@@ -477,11 +477,16 @@ def test_the_figures_draw_the_tables():
             found.append(np.array([balls(row) for row in rows]))
     ends = [100 * one[-1].sum() for one in found]
     np.testing.assert_allclose([line[0, 0] for line in points(ax, 1)], ends, atol=1e-9)
-    (ax,) = figures["fig-scene-who"].axes
-    for line, one in zip(points(ax, 4), found, strict=True):
-        share = 100 * one.max(axis=1) / one.sum(axis=1)
-        np.testing.assert_allclose(line[: len(share), 0], share, atol=1e-9)
-        assert np.isnan(line[len(share) :, 0]).all()
+    (ax,) = figures["fig-scene-moves"].axes
+    ideal = [run(*HERTZ)[k - 1] for k in (1, 5, 20, 50)]
+    laws = ("springs", "as it is")
+    drawn = [(law, name) for law in laws for name in ENGINES]
+    for line, (law, name) in zip(points(ax, 4), drawn, strict=True):
+        rows = stored("laws", run=name, law=law, setting="fine", pulled=1)
+        for x, row, other in zip(line[:, 0], map(balls, rows), ideal):
+            off = np.sqrt(row / row.sum()) - np.sqrt(other / other.sum())
+            assert x == pytest.approx(100 * abs(off).max(), abs=1e-9)
+        assert np.isnan(line[len(rows) :, 0]).all()
 
 
 #: Engines and settings that let one pair collide after the other at gaps of 10 µm.
@@ -494,8 +499,15 @@ def test_judged_by_the_film(pulled: int):
     """After the first strike: the film, laws by other routes, and engines with tiny gaps."""
     seen = first_strikes(4)[pulled][0]
     struck = [1.0] * pulled + [0.0] * (5 - pulled)
+    (fit,) = (
+        row["parameters"].split() for row in read("film_fits.csv")
+        if row["law"] == "spheres, three gaps, A" and row["strikers"] == "apart"
+        and (row["fitted"], row["reading"]) == ("both", "4")
+    )  # fmt: skip
+    lossy = {"gaps": [3, 0, 0, 3], "loss": float(fit[-1])}
     for name, v in (
         ("film-springs", integrated([1] * 5, struck)),
+        ("film-lossy", integrated([1] * 5, struck, **lossy)),
         ("film-apart", integrated([1] * 5, struck, gaps=[3, 0, 0, 3])),
         ("film-ratio", np.array(solve([1] * 5, struck, 1, scenes.RATIO).velocities, float)),
     ):
