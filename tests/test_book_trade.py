@@ -3,6 +3,7 @@
 import re
 import types
 
+import engines
 import numpy as np
 import parts
 import pytest
@@ -112,6 +113,21 @@ def test_fig_trade_engines_textbook_answers():
             letter = {"three equal": "S", "light middle": "F"}.get(scene)
         if letter is not None:
             assert "".join(key for key in near if near[key]) == letter, (name, placement, scene)
+
+
+def test_engines_table_of_settings():
+    """Steps in ms and iterations, default and refined, as the script sets them."""
+    lines = ENGINES_PAGE.printed("engines-settings").splitlines()[2:]
+    for engine, line in zip(engines.ENGINES, lines, strict=True):
+        both = engine.default, engine.refined
+        steps = ", ".join(f"{1000 * setting['step']:.3g}" for setting in both)
+        iterations = ", ".join(str(setting.get("iterations", "–")) for setting in both)
+        told = iterations.replace("–, –", "–")
+        assert re.match(rf"{engine.name} .* {steps} +{told} ", line), engine.name
+    rapier, mujoco = engines.ENGINES[3:]
+    assert f"{rapier.refined['num_internal_pgs_iterations']} inner" in lines[3]
+    assert f"{mujoco.refined['steps_a_contact']} steps a contact" in lines[4]
+    assert f"(default: {mujoco.default['steps_a_contact']})" in lines[4]
 
 
 def test_engines_table_of_words():
