@@ -26,7 +26,7 @@ BLOCKS = {
     section.partition("\n")[0]: re.findall(r"```(\w+)\n(.*?)```", section, re.DOTALL)
     for section in SECTIONS
 }
-ONE, SPHERES, MANY, ENGINE, WEB, FIT, EXERCISES = BLOCKS
+ONE, ADVICE, SPHERES, MANY, ENGINE, WEB, FIT, EXERCISES = BLOCKS
 #: Python that prints, and what the page shows of it.
 PAIRS = {
     title: [(code, told) for (kind, code), (_, told) in zip(parts, parts[1:]) if kind == "python"]
@@ -42,7 +42,7 @@ def printed(code):
     return said.getvalue()
 
 
-@pytest.mark.parametrize("title", [ONE, SPHERES, MANY])
+@pytest.mark.parametrize("title", [ONE, ADVICE, SPHERES, MANY])
 def test_plain_blocks(title):
     ((code, told),) = PAIRS[title]
     assert printed(code) == told
@@ -51,8 +51,8 @@ def test_plain_blocks(title):
 def test_every_block_is_run_here():
     kinds = {title: " ".join(kind for kind, _ in parts) for title, parts in BLOCKS.items()}
     plain = "python text"
-    assert [*kinds.values()][:4] == [plain] * 4
-    assert [*kinds.values()][4:] == ["sh html text", "sh python text python text sh", ""]
+    assert [*kinds.values()][:5] == [plain] * 5
+    assert [*kinds.values()][5:] == ["sh html text", "sh python text python text sh", ""]
 
 
 def test_answers_of_the_first_exercise():
