@@ -1,5 +1,6 @@
 """The command line: tables, formats, exit codes, and every example of its help."""
 
+import contextlib
 import csv
 import functools
 import io
@@ -103,7 +104,7 @@ def test_tasks_without_a_solution():
     """The command by which their answers are found; only the last one has a back impact."""
     text = (DATA.parent / "book" / "instructors.md").read_text(encoding="utf-8")
     tasks = re.findall(r"(?m)^\| \d \| ([\d, ]+) \| ([\d/, ]+) \| ([\d/]+) \|$", text)
-    collisions = []
+    collisions, velocities = [], []
     for task in tasks:
         rows = [[float(Fraction(number)) for number in numbers.split(", ")] for numbers in task]
         found = textbook.solve(rows[0], [1, 0, 0], rows[1] * (2 // len(rows[1])), rows[2])
@@ -111,7 +112,15 @@ def test_tasks_without_a_solution():
         told = json.loads(call(f"solve --masses {m} --restitution {e} --ratio {a} --json"))
         assert [row["after"] for row in told["rows"]] == pytest.approx(found.velocities, abs=1e-14)
         collisions.append(told["collisions"])
+        velocities.append([float(v) for v in found.velocities])
     assert collisions == [[1, 1]] * 5 + [[2, 1]]
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        exec(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1], {})
+    answers = [
+        [float(v) for v in line.strip("[]").split()] for line in said.getvalue().splitlines()
+    ]
+    np.testing.assert_allclose(answers, velocities, rtol=0, atol=5.1e-5)
 
 
 # --- what is assumed ---------------------------------------------------------------------------
