@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, least_squares, minimize, minimize_scalar
 from scipy.special import gammaincc, ndtri
 from stored import numbers, read
+from truth import solve
 
 from cradle import (
     Chain,
@@ -224,9 +225,34 @@ def test_the_row_before_the_first_strike_and_the_slower_strikers():
     v, error = (100 * t[name][use] for name in ("before", "sigma_before"))
     least = minimize_scalar(lambda mean: (((v - mean) / error) ** 2).sum())
     CHAPTER.tells({"row-chi": least.fun, "row-least": v.max(), "row-most": v.min()})
+    for release, name in (2, "two"), (3, "three"):
+        use = (t["reading"] == 4) & (t["release"] == release)
+        use &= (t["strike"] == 1) & (t["striker"] == 0)
+        ends = GLUED[f"row-{name}"].replace("−", "-").split(" to ")
+        v = 100 * t["before"][use]
+        assert [float(x) for x in ends] == pytest.approx([v.max(), v.min()], abs=0.051)
     speed = float(GLUED["striker"])
     CHAPTER.tells({"row-opens": 0.001 * 1000 * speed, "slower": real_cradles.SLOWER})
     assert float(GLUED["striker-slow"]) == pytest.approx(real_cradles.SLOWER * speed, abs=0.01)
+
+
+def test_two_of_the_balls_as_solid_steel():
+    """Hertz: the pressure from the largest force alone; the depth from the energy."""
+    radius, speed, modulus = 0.01109, float(GLUED["striker"]), 210e9 / (2 * (1 - 0.3**2))
+    energy = 0.25 * 0.0448 * speed**2
+    stiffness = 4 / 3 * modulus * np.sqrt(radius / 2)
+    depth = (5 / 2 * energy / stiffness) ** 0.4
+    force = stiffness * depth**1.5
+    pressure = (6 * force * modulus**2 / (np.pi**3 * (radius / 2) ** 2)) ** (1 / 3)
+    CHAPTER.tells({"depth": 1e6 * depth, "pressure": 1e-9 * pressure})
+    v = [spheres([1, *[0] * n], [0] * n, 0) for n in (2, 4)]
+    # Of elastic balls by the formulas of the ratio: v1 = -a/(2 - a) for three.
+    CHAPTER.tells({"touch-hit": 2 * -v[0][0] / (1 - v[0][0])})
+    found = least_squares(
+        lambda a: solve([1] * 5, [1, 0, 0, 0, 0], 1, a.tolist(), number=float).velocities - v[1],
+        [0.13, 0.15, 0.2],
+    )
+    CHAPTER.tells({"touch-in-row": found.x[2]})
 
 
 def test_gaps_and_the_distance_of_the_strikers():
@@ -291,6 +317,10 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
         told |= {f"far-{name}-least": min(r[column] for r in far)}
     gaps = [1e3 * unit * row["gap_4"] for row in far]
     CHAPTER.tells(told | {"far-gap": max(gaps), "far-gap-least": min(gaps)})
+    for k, shown in zip((2, 3, 4), GLUED["far-gaps"].split(" / "), strict=True):
+        of_all = [1e3 * unit * row[f"gap_{k}"] for row in far]
+        ends = [float(x) for x in shown.split(" to ")]
+        assert ends == pytest.approx([min(of_all), max(of_all)], abs=0.06)
     assert 0 <= float(GLUED["far-sum"]) - max(r["both"] + r["three"] for r in far) < 1
     # What the text says of distances: where gaps fit, and where they fail.
     good = [unit * r["apart"] for r in far if r["both"] < 2.5 and r["three"] < 6.2]
