@@ -31,8 +31,14 @@ def test_error_of_a_line_by_least_squares():
         return 0.4 * math.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1])
 
     assert f"{error(12, 240):.0f}" == GLUED["error"]
-    assert f"{error(16, 60):.1f}" == GLUED["error-long"]
-    assert f"{error(16, 60) / 7:.1f}" == "0.2"  # percent of 0.7 m/s, as the text says
+    # Of a pendulum, for a quarter of its swing.
+    omega = math.sqrt(9.81 / 0.3)
+    for rate in (60, 240):
+        t = np.arange(0, math.pi / 2 / omega, 1 / rate)
+        matrix = np.stack([np.ones(len(t)), np.sin(omega * t) / omega], axis=1)
+        one = 0.4 * math.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1])
+        assert f"{one:.1f}" == GLUED[f"error-{rate}"]
+        assert f"{one / 7:.1f}" == GLUED[f"error-part-{rate}"]
 
 
 def test_third_digit_by_the_closed_form():
