@@ -19,20 +19,20 @@ def _within(values: Vector, low: float, high: float) -> bool:
 class Chain:
     """A straight chain of balls at the instant before an impact.
 
-    Velocities are positive to the right; contact c joins balls c and c + 1.  Neighbours touch
-    unless they move apart (closing speed below zero).  A wrong value or length raises a
-    `ValueError` that names it and the rule.
+    Velocities are positive to the right; contact c joins balls c and c + 1.  Neighbours that move
+    apart do not touch; all others do.  A wrong value or length raises a `ValueError` that names it.
 
     Parameters
     ----------
     masses, velocities : array_like, shape (N,)
-        kg, above 0, and m/s, left to right; N >= 2.
+        Of the N >= 2 balls from left to right: kg, above 0, and m/s.
     restitution : float or array_like, shape (N - 1,)
-        Energetic coefficient of restitution of each contact, 0 or 1e-30 to 1 (Stronge, 1990).
-        If left out, 1: elastic balls, that lose nothing.
+        Energetic coefficient of restitution of each contact (Stronge, 1990), from 1e-30 to 1, or 0.
+        If left out, it is 1: the balls are elastic and lose nothing.
 
     Examples
     --------
+    >>> from cradle import Chain
     >>> Chain(masses=[1, 1, 1], velocities=[1, 0, 0])
     Chain(masses=[1.0, 1.0, 1.0], velocities=[1.0, 0.0, 0.0], restitution=[1.0, 1.0])
     """

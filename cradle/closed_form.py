@@ -48,9 +48,9 @@ def three_balls(
 ) -> Vector:
     """Return velocities after one collision per contact of three balls (equations 22 to 33), m/s.
 
-    The result has the shape (..., 3); where the radical of Eq. 30 is not real, balls 2 and 3 are
-    NaN.  Where the equations hold, `one_collision_each` tells.  A `ValueError` is raised if a shape
-    is wrong, or a value is no real number; whether values are in range is not checked.
+    The result has the shape (..., 3); where the root in Eq. 30 is not real, balls 2 and 3 are NaN.
+    `one_collision_each` tells where the equations hold.  A `ValueError` is raised if a shape is
+    wrong or a value is no real number; whether values are in range is not checked.
 
     Parameters
     ----------
@@ -61,6 +61,7 @@ def three_balls(
 
     Examples
     --------
+    >>> from cradle.closed_form import three_balls
     >>> three_balls([1, 1, 1], [1, 0, 0], [1, 1], [0.0, 0.5]).round(3)
     array([[ 0.   ,  0.   ,  1.   ],
            [-0.333,  0.667,  0.667]])
@@ -78,6 +79,7 @@ def final_impulses(
 
     Examples
     --------
+    >>> from cradle.closed_form import final_impulses
     >>> final_impulses([1, 1, 1], [1, 0, 0], [1, 1], 0.0)
     (np.float64(1.0), np.float64(1.0))
     """
@@ -94,6 +96,7 @@ def one_collision_each(
 
     Examples
     --------
+    >>> from cradle.closed_form import one_collision_each
     >>> one_collision_each([1, 1, 1], [1, 0, 0], [1, 1], [0.1, 0.6])
     array([ True, False])
     """
@@ -118,6 +121,7 @@ def largest_ratios(
 
     Examples
     --------
+    >>> from cradle.closed_form import largest_ratios
     >>> [bound.tolist() for bound in largest_ratios([1, 1, 1, 1], [0.5, 0.5], [0.5, 0.5])]
     [[0.6666666666666666, 0.5], [0.5, 0.6666666666666666]]
     """
@@ -149,6 +153,7 @@ def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLi
 
     Examples
     --------
+    >>> from cradle.closed_form import back_impact_line
     >>> float(back_impact_line(1.0, 0.5, 0.5, 0.15).round(4))
     0.8275
     """
@@ -166,6 +171,7 @@ def first_ball_stops(e2: float, ratio: float) -> float:
 
     Examples
     --------
+    >>> from cradle.closed_form import first_ball_stops
     >>> first_ball_stops(0.5, 0.15)
     1.7
     """
@@ -179,6 +185,7 @@ def middle_ball_stops(e3: float, ratio: float) -> float:
 
     Examples
     --------
+    >>> from cradle.closed_form import middle_ball_stops
     >>> round(middle_ball_stops(0.5, 0.15), 6)
     0.442608
     """

@@ -26,6 +26,7 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
 
     Examples
     --------
+    >>> from cradle.measures import bouncing_pattern
     >>> bouncing_pattern([[-0.1, 0.1, 0.9], [0.1, 0.2, 0.7], [-0.3, -0.1, 0.8]]).tolist()
     [1, 2, 3]
     """
@@ -40,9 +41,9 @@ def bouncing_pattern(velocities: ArrayLike) -> NDArray[np.int64]:
 class Condition(NamedTuple):
     """How much an outcome amplifies relative changes of its inputs; see `condition_number`."""
 
-    number: float  # relative change of the outcome over relative change of the inputs
-    most: str  # the input that contributes most
-    same_events: bool  # whether the sequence of events stayed the same throughout
+    number: float  #: Relative change of the outcome over relative change of the inputs.
+    most: str  #: The input that contributes most.
+    same_events: bool  #: Whether the sequence of events stayed the same throughout.
 
 
 def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Condition:
@@ -56,12 +57,12 @@ def condition_number(chain: Chain, model: Model, step: float = 1e-6) -> Conditio
     1.6).  A number of 1000 says: inputs known to seven digits give an outcome known to about four.
     Where `same_events` is False, a change within `step` leads to other events, and the outcome may
     jump; ask again with the accuracy of your own inputs as the step.  Zeros are not moved, and only
-    one input at a time; so an edge that takes several, or a ball set in motion, is not seen.
+    one input at a time: a jump that takes two changes, or a ball at rest to move, is not seen.
 
     Examples
     --------
-    At its bound (Eq. 34) a ratio acts through a square root, so its sixth digit counts:
-
+    >>> from cradle import Chain, ImpulseCorrelation
+    >>> from cradle.measures import condition_number
     >>> found = condition_number(Chain([1, 1, 1], [1, 0, 0]), ImpulseCorrelation(0.5))
     >>> print(f"{found.number:.2g}", found.most, found.same_events)
     2.4e+03 forward[0] True
@@ -103,15 +104,16 @@ def effective_ratio(trace: Trace) -> float:
     """Return the constant ratio that gives the outcome of an impact of three balls.
 
     It lies between 0 and its bound (Eq. 34) and acts in both directions, as in
-    `ImpulseCorrelation(ratio)`; in a direction with a smaller bound it is held at that.  If several
-    ranges of ratios give the outcome within 1e-6 of the fastest closing speed, it is in the lowest.
+    ``ImpulseCorrelation(ratio)``; in a direction with a smaller bound it is held at that.  If
+    several ratios give the outcome within 1e-6 of the fastest closing speed, it is the lowest.
     Outcomes that lose no energy differ by one number, so that one ratio often suffices; with losses
     there is in general none, and the `ValueError` names the one that comes nearest.  Other than
     three balls, and balls of which none approach, raise a `ValueError` too.
 
     Examples
     --------
-    >>> from cradle import SpringChain
+    >>> from cradle import Chain, SpringChain, collide
+    >>> from cradle.measures import effective_ratio
     >>> round(effective_ratio(collide(Chain([1, 1, 1], [1, 0, 0]), SpringChain(1.0))), 6)
     0.132503
     """
@@ -167,12 +169,13 @@ def conserving_outcomes(
     and 2, and mu and M the reduced masses of both, energy keeps the point (M^(1/2) w, mu^(1/2) s)
     on a circle about the origin; the angle is counted there from the first axis.
 
-    The masses, kg, and the velocities before the impact, m/s, have the shape (3,), the angles, rad,
-    (K,); if left out, 181 from end to end.  The angles and the velocities there, shape (K, 3), are
-    returned.  Other values and an angle off the arc raise a `ValueError`.
+    Give masses, kg, and velocities before the impact, m/s, of shape (3,); and angles, rad, of shape
+    (K,), or none for 181 from end to end.  Returned are the angles and the velocities there, shape
+    (K, 3).  Wrong values and an angle off the arc raise a `ValueError`.
 
     Examples
     --------
+    >>> from cradle.measures import conserving_outcomes
     >>> angles, outcomes = conserving_outcomes([1, 1, 1], [1, 0, 0])
     >>> outcomes[[0, -1]].round(3) + 0.0
     array([[ 0.   ,  0.   ,  1.   ],
@@ -195,12 +198,13 @@ def conserving_outcomes(
 def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
     """Return the angle of an outcome on the arc of `conserving_outcomes`, rad.
 
-    Arguments are as there, with the velocities after the impact.  The angle is 0 where all balls
-    have one velocity, and off the arc where their velocities are not in order.
+    Give masses, kg, and velocities after the impact, m/s, of shape (3,).  The angle is 0 if all
+    balls have one velocity, and off the arc if their velocities are not in order.
 
     Examples
     --------
     >>> from math import degrees
+    >>> from cradle.measures import conserving_angle
     >>> round(degrees(conserving_angle([1, 1, 1], [-1 / 3, 2 / 3, 2 / 3])), 6)
     60.0
     """

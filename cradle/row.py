@@ -32,7 +32,7 @@ Pairs = Sequence[Sequence[float]]
 
 
 class Bodies(Protocol):
-    """What a row asks of an engine, in the plane of the centres: two numbers, the second one up."""
+    """The adapter that you write for your engine; places have two numbers, the second one up."""
 
     def motion(self) -> tuple[Pairs, Pairs]:
         """Return the positions and the velocities of the N centres, m and m/s."""
@@ -53,38 +53,40 @@ class Row(Alone):
     Parameters
     ----------
     bodies : Bodies
-        The engine's adapter.  The engine must not collide these balls with each other.
+        The adapter of the engine, which must not collide these balls with each other itself.
     chain, model : Chain, Model
         Masses and restitution from left to right, and the impact law.  A mass is what resists a
         push at the centre: for a ball that is one piece with its arm, the moment of inertia about
         the pivot over the square of the arm.
     radii : float or array_like, shape (N,)
-        Of the balls, m; above 0.
+        Radii of the balls, m; above 0.
     pivots : array_like, shape (N, 2), optional
         Where the strings end, m, in the order of the row; a string takes up the part of an impulse
         that is at right angles to the ball's arc.  Without pivots the balls are free.
     touching, resting : float, optional
-        Neighbours are struck together, as if they touched, if they meet, or if their gap is at most
-        `touching`, m, and they close or part no faster than `resting`, m/s.  Balls that close more
-        slowly go on together.  If left out, r / 1000 and sqrt(a r) / 100, r the smallest radius.
+        Neighbours count as touching, and are struck together, if they meet, or if their gap is at
+        most `touching`, m, and they close or part no faster than `resting`, m/s.  Slower balls go
+        on together.  If left out, r / 1000 and sqrt(a r) / 100, with the smallest radius r.
     acceleration : float
-        That of gravity, a, m/s^2, or the most by which anything draws neighbours closer; above 0.
+        a, m/s^2, above 0: that of gravity, or the most by which anything draws neighbours closer.
 
     Attributes
     ----------
     on_hit : callable, optional
-        Called with each `Hit` of a step, when the step is made: set it to play a sound.
+        Your function, called after each step with every `Hit` of it: to play a sound, say.
     impacts, time : int, float
-        How many impacts were solved so far, and for how long the row has been stepped, s.
+        How many impacts were solved so far, and how much time was stepped, s.
 
     Notes
     -----
-    A step never waits for a compiler: unless `cradle.warm_up` was called before, an impact of five
-    balls takes a millisecond or two.  Any unit of length will do if the acceleration has it too.
+    A step never waits for a compiler: unless `warm_up` was called before, an impact of five balls
+    takes a millisecond or two.  Any unit of length will do if the acceleration has it too.
 
     Examples
     --------
+    >>> import numpy as np
     >>> from cradle import Chain, ImpulseCorrelation
+    >>> from cradle.row import Row
     >>> class Free:  # an engine
     ...     x, v = np.array([[-1, 0], [0, 0], [0.2, 0]]), np.array([[2.0, 0], [0, 0], [0, 0]])
     ...     def motion(self):

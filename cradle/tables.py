@@ -43,6 +43,7 @@ def ball_masses() -> Mapping[str, float]:
 
     Examples
     --------
+    >>> from cradle.tables import ball_masses
     >>> ball_masses()["D"]
     0.166
     """
@@ -56,6 +57,7 @@ def paper_sequences() -> Mapping[str, int]:
 
     Examples
     --------
+    >>> from cradle import paper_sequences
     >>> list(paper_sequences())
     ['BABC', 'BABB', 'BABA', 'BBCB', 'CDAB', 'CDADB', 'ABCCA', 'ABACA', 'ABCCAB', 'BCACBA']
     """
@@ -68,6 +70,7 @@ def restitution_table() -> "pd.DataFrame":
 
     Examples
     --------
+    >>> from cradle import restitution_table
     >>> print(restitution_table())
              A     B     C     D
     ball
@@ -88,6 +91,7 @@ def ratio_table() -> "pd.DataFrame":
 
     Examples
     --------
+    >>> from cradle import ratio_table
     >>> table = ratio_table()
     >>> print(table[~table.admissible].round(4).to_string(index=False))
     triplet  ratio  bound  admissible
@@ -118,10 +122,11 @@ def paper_chain(
         Ball types, first ball first: at least two letters out of "A" to "D"; other values raise a
         `ValueError` or a `TypeError`.
     speed, excess, meeting
-        Velocity of the first ball, m/s; the other two as for `ImpulseCorrelation`.
+        Velocity of the first ball, m/s; the other two are as for `ImpulseCorrelation`.
 
     Examples
     --------
+    >>> from cradle import paper_chain
     >>> chain, model = paper_chain("CDAB", speed=0.5)
     >>> chain.restitution.tolist()                            # CD, DA, AB
     [0.3, 0.94, 0.53]

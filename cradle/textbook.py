@@ -235,6 +235,7 @@ def solve(
 
     Examples
     --------
+    >>> from cradle.textbook import solve
     >>> solve([1, 1, 1], [1, 0, 0], 1, 0.5).events
     [('maximum_compression', 0), ('end', 0), ('end', 1)]
     """

@@ -38,32 +38,32 @@ class Trace:
     Attributes
     ----------
     velocities, impulses : ndarray, shapes (N,) and (N - 1,)
-        Velocities after the impact, m/s, and total impulse of each contact, N s.
+        Velocities after the impact, m/s, and the total impulse of each contact, N s.
     absorbed : ndarray, shape (N - 1,)
-        Work that each contact absorbed in compression, J, over all its collisions.  Where an
-        infinite sequence was taken to its limit their sum is exact, each one good to 1e-4.
+        Work that each contact absorbed in compression, J, over all its collisions.  If the impact
+        collapsed, the sum of these is exact, and each of them is good to 1e-4.
     collisions : ndarray of int, shape (N - 1,)
         How often each contact became active.  Do not rely on collisions slower than the last digit
         of the velocities: an endless sequence may stop there, without `collapsed`.
     path, path_impulses : ndarray, shapes (K + 1, N) and (K + 1, N - 1)
-        Velocities, m/s, and impulses so far, N s, before the impact and at every event.  In between
-        they are linear, but not before a "collapse" or "repetition", nor for springs: see `curve`.
+        Velocities, m/s, and impulses so far, N s: a row before the impact and one at every event.
+        Rows are joined by straight lines, but not before a "collapse" or a "repetition", and not
+        for springs: see `curve`.
     events : tuple of Event, length K
         What happened at each row of the path but the first.
-    collapsed, saturated : bool, tuple of int
-        Whether an infinite sequence of impacts was taken to its limit; contacts that were held
-        closed at the largest admissible ratio (Eqs. 34, 53) at some time.
+    collapsed : bool
+        Whether an endless sequence of collisions was taken to its limit.
+    saturated : tuple of int
+        Contacts that were held closed for a time, at the largest admissible ratio (Eqs. 34, 53).
     margin : float
-        How close another sequence of events came: the smallest relative distance between two events
-        of one run, two meetings, or a ratio and its bound; exact ties do not count.  Below about
-        1e-12 a change of the input's last digit may change the outcome.  It is 0 in three cases: a
-        ratio lies between 0 and 1e-4, so that products of ratios may decide a tie beyond 32 digits;
-        balls are struck from both sides and those between rest, so that any motion of these changes
-        who drives (R2; if they move, the speed that would do so counts, over the fastest closing);
-        or a sequence was taken to its limit while other balls still collided.  `condition_number`
-        alone sees what hundreds of collisions amplify.  Without ratios it is not measured, and 1.
+        How near another sequence of events came, from 0 to 1: the least relative distance of two
+        events of one run, of two meetings, or of a ratio from its bound.  Exact ties do not count.
+        Below about 1e-12 a change in the last digit of the input may change the outcome.  It is 1
+        if no ratios act, and 0 in three cases that the page explains, under "What a margin says":
+        a ratio is tiny, balls at rest are struck from both sides (rule R2), or one part of the
+        chain collapsed while others still collided.
     left_out : int
-        Number of events that are missing in a path that was cut; 0 with ``record=False``.
+        Number of events missing in a path that was cut; it stays 0 with ``record=False``.
 
     Examples
     --------
@@ -95,8 +95,8 @@ class Trace:
     def to_frame(self) -> "pd.DataFrame":
         """Return the path as a table, a row for each ball at each row of the path.
 
-        Velocities are in m/s; ``left`` and ``right`` are the impulses so far of the ball's two
-        contacts, N s.  Models with a time add ``time``, s.
+        Velocities are in m/s; ``left`` and ``right`` are the impulses so far, N s, of the contacts
+        on both sides of the ball.  Models that follow time add a column ``time``, s.
 
         Examples
         --------
@@ -121,13 +121,13 @@ class Trace:
         return pd.DataFrame(table | {name: part.ravel() for name, part in parts.items()})
 
     def curve(self) -> tuple[Vector, Vector]:
-        """Return impulses (N s) and velocities (m/s), a row for each point of a drawn line."""
+        """Return impulses, N s, and velocities, m/s: a row for each point of a drawn line."""
         return self.path_impulses, self.path
 
     def plot(self, ax: "Axes | None" = None, *, contact: int | None = None) -> "Axes":
         """Draw the velocities over the impact, or the velocity-impulse diagram of a contact.
 
-        By `velocities` and `velocity_impulse` of `cradle.pictures.impacts`, with the same errors.
+        The work is done by `velocities` and `velocity_impulse` of `cradle.pictures.impacts`.
         """
         from cradle.pictures import impacts as figures
 
@@ -153,13 +153,13 @@ class Trace:
 class ImpactNotFinished(RuntimeError):
     """An impact was still going on after the largest number of steps that its model allows.
 
-    `trace` holds what was reached.  `stored` is the work that the contacts can still release, over
-    the heaviest mass times the square of the largest speed before the impact.  It is None where
-    that is not known; then `bounds` counts all energy that is not lost yet.
+    Its `trace` holds what was reached.  Its `stored` is the work that contacts can still give back,
+    in units of the heaviest mass times the square of the largest speed before the impact; or it is
+    None where that is not known, and `bounds` then counts all energy that is not lost yet.
 
     Examples
     --------
-    >>> from cradle import Chain, ImpulseCorrelation, collide
+    >>> from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide
     >>> try:
     ...     collide(Chain([1, 1, 1], [1, 0, 0], 0.9), ImpulseCorrelation(0.1, max_events=1))
     ... except ImpactNotFinished as stopped:
@@ -206,7 +206,7 @@ class ImpactNotFinished(RuntimeError):
 class ImpactNotCertified(RuntimeError):
     """An outcome failed the check that every answer has to pass, so it is not returned.
 
-    This is a defect of the solver.  Please report its `chain`, `model` and `defect` (what failed).
+    This is a defect of the solver: please report the error's `chain`, `model` and `defect`.
     """
 
     def __init__(self, chain: Any, model: Any, defect: str) -> None:

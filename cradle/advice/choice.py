@@ -51,20 +51,20 @@ _REASONS = {
 class Recommendation:
     """A model for a scene, and what to expect of it.  What was not measured is None."""
 
-    chain: Chain = field(compare=False)  #: The balls as the model takes them.
-    model: Model  #: Ready for `collide`.
-    setting: str  #: Integrator and tolerance, one call or a batch.
-    call: str  #: What to call.
+    chain: Chain = field(compare=False)  #: The balls, as the model takes them.
+    model: Model  #: The model, ready for `collide`.
+    setting: str  #: Its setting: integrator and tolerance, one call or a batch.
+    call: str  #: The call to write.
     #: Largest distance of a velocity from the exact answer of the same model on the chains of
     #: `measured_on`, as a part of the closing speed; another chain may have a few times as much.
     numerical_error: float | None
-    #: The same from Hertz springs, the theory of elastic spheres (equal ones, unless `stiffness`
-    #: says otherwise), which no setting makes smaller, and which there is not with losses.
+    #: Its distance from Hertz springs, the theory of elastic spheres (equal ones, unless
+    #: `stiffness` says otherwise): no setting makes it smaller.  With losses it is None.
     model_error: float | None
     seconds: float | None  #: Time of one impact where it was measured, to a factor of two.
-    #: The chains of these numbers, this very one or those around it, of which the worst counts.
+    #: The chains measured: this very one, or those around it, of which the worst counts.
     measured_on: tuple[str, ...]
-    reason: str  #: Why this model.
+    reason: str  #: Why it is this model.
 
     def _lines(self) -> dict[str, str]:
         """Return what is shown, by its title."""
@@ -116,28 +116,28 @@ def recommend(
     chain : Chain
         The balls, with their restitution.
     wanted : str or collection of str
-        Of "velocities", "impulses", "path", "forces", "times" (how long contacts last) and
-        "fastest ball" (which one it is).
+        One or several of "velocities", "impulses", "path", "forces", "times" (how long contacts
+        last) and "fastest ball" (which one it is).
     accuracy, model_error : float
         Largest numerical error of a velocity, as a part of the closing speed, 1e-15 to 1; and in
-        the same unit the largest distance from Hertz springs, elastic spheres, any if left out.
+        the same unit the largest distance from elastic spheres (Hertz springs), any if left out.
     impacts : int
         How many impacts of such chains are to be solved; if several, a call that takes many chains
         is recommended where a model has one (measured with 2000).
     ratios : ImpulseCorrelation, float or sequence of length N - 2, optional
         Impulse Correlation Ratios, if they are known, as a model or as its `forward`.
     stiffness : float or sequence of length N - 1, optional
-        k of the contacts of spheres (Hertz) if the material is known, N/m^(3/2); if neither forces
-        nor times are wanted, give 1 for spheres that are all alike.
+        k of the contacts of spheres, N/m^(3/2), if it is known.  For spheres that are all alike
+        give 1, unless forces or times are wanted.
 
     Notes
     -----
-    Only errors of velocities were measured, on rows that touch, struck at one end, with equal
-    springs.  For a chain between those the worst counts, and must be ten times below `accuracy`.
+    Measured were errors of velocities, on rows that touch, struck at one end, with equal springs.
+    For a chain between those the worst counts, and must be ten times below `accuracy`.
 
     Examples
     --------
-    >>> from cradle import Chain
+    >>> from cradle import Chain, recommend
     >>> chain = Chain([1, 1, 1], [1, 0, 0])
     >>> advice = recommend(chain, ("forces", "times"), accuracy=1e-3, stiffness=1e10)
     >>> advice.numerical_error <= 1e-3, advice.model_error, advice.measured_on

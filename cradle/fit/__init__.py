@@ -2,10 +2,9 @@
 
     read_shots -> restitution (pairs) -> ratio (triplets and longer chains) -> predict
 
-Measured are `shots`; `tracks` and `film` make velocities of positions.  `parameters` says how well
-values explain shots, `search` finds all that do, `estimate` fits, and `result` is what comes back.
-`laws` fits any other law to shots, such as spheres with gaps and losses, and `swings` a whole swing
-to its film: period, damping, restitution, gap.
+Modules: `shots` reads what was measured; `tracks` and `film` make velocities of positions.
+`parameters` says how well values explain shots, `search` finds all that do, `estimate` fits, and
+`result` is what comes back.  `laws` fits any other law to shots, and `swings` a whole swing.
 """
 
 from cradle.fit.estimate import ratio, restitution

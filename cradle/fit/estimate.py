@@ -21,12 +21,12 @@ Known = Mapping[str, "float | tuple[float, float]"]
 def restitution(shots: Shots) -> Fit:
     """Fit the coefficient of restitution of every pair of balls that was shot alone.
 
-    There is one estimate for each pair, named by its types in alphabetical order.  Longer sets are
-    left aside; without a set of two balls a ValueError is raised.
+    There is one estimate for each pair, named by its types in alphabetical order.  Sets of more
+    balls are not used; if there is no set of two, a ValueError is raised.
 
     Examples
     --------
-    >>> from cradle.fit import read_shots
+    >>> from cradle.fit import read_shots, restitution
     >>> from cradle.tables import data_folder
     >>> print(restitution(read_shots(data_folder() / "shots_template.csv")).summary())
     restitution AB = 0.5270 [0.5113, 0.5429], standard error 0.0081
@@ -46,7 +46,7 @@ def ratio(
     """Fit the Impulse Correlation Ratio of every triplet in shots of three balls and more.
 
     There is one estimate for each triplet and direction that is not known, between 0 and the bound
-    of three balls (Eq. 34).  Those that act in the same shots are fitted together; Ceanga and
+    of three balls (Eq. 34).  Ratios that act in the same shots are fitted together; Ceanga and
     Hurmuzlu fit one at a time (section 4.2).  A ValueError is raised if no set has three balls and
     nothing is known, a coefficient of restitution is missing, a known ratio is above its bound, or
     more than six ratios act together.
@@ -54,10 +54,10 @@ def ratio(
     Parameters
     ----------
     shots : Shots
-        Sets of two balls are left aside.
+        Sets of two balls are not used.
     restitution : Fit or mapping
-        The result of `restitution`; or for the name of each pair of neighbours its coefficient, or
-        (coefficient, standard error).
+        The result of `restitution`; or, by the names of the pairs, coefficients, or tuples of a
+        coefficient and its standard error.
     known : mapping, optional
         Ratios not to be fitted, by triplet; if given, no set needs three balls.
     progress : bool
@@ -65,7 +65,7 @@ def ratio(
 
     Examples
     --------
-    >>> from cradle.fit import read_shots
+    >>> from cradle.fit import ratio, read_shots
     >>> from cradle.tables import data_folder
     >>> shots = read_shots(data_folder() / "shots_template.csv")
     >>> fit = ratio(shots, {"AB": (0.53, 0.01)})

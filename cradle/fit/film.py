@@ -19,7 +19,7 @@ _Stray = tuple[int, float, float]
 
 @compared_as_objects
 class Velocities(NamedTuple):
-    """Velocities of N balls around an impact, from their tracks."""
+    """Velocities of N balls just before and just after an impact, from their tracks."""
 
     time: float  #: When the impact happened, s.
     before: Vector  #: Velocities before the impact, shape (N,), m/s.
@@ -28,8 +28,8 @@ class Velocities(NamedTuple):
     sigma_before: Vector  #: Standard errors of `before`, shape (N,), m/s.
     scatter: float  #: Standard deviation of the marks about the motion fitted, m.
     window: float  #: How much time on either side was used, s.
-    probability: float  #: Chance that marks bend at least as much if the motion fitted is right.
-    #: Marks off by more than chance allows, each as (ball from 0, time in s, by how much in m).
+    probability: float  #: Chance that marks are off at least as much if the motion fitted is right.
+    #: Marks off by more than chance allows: (ball, counted from 0; time, s; how far, m) of each.
     strays: tuple[_Stray, ...] = ()
 
 
@@ -41,17 +41,17 @@ def velocities_from_tracks(
 
     First the moment is fitted at which all tracks bend, then the velocity of each ball by itself on
     either side of it, so that the errors are independent.  Before the impact all balls but the
-    striker rest.  A mark that lies farther off than chance allows is named in a warning.  If there
-    are fewer than two balls or too few marks on either side, or if the marks do not lie on such a
-    motion (by chance one film in a hundred thousand), a ValueError is raised.
+    striker must rest.  A mark farther off than chance allows is named in a warning.  Fewer than two
+    balls, too few marks on either side, and marks that do not lie on such a motion raise a
+    ValueError (of right films, one in a hundred thousand is refused).
 
     Parameters
     ----------
     tracks : mapping of str to Track
-        One track a ball, left to right, from one origin.
+        One track for each ball, left to right, from one origin.
     length, scatter : float, optional
-        Of the pendulums, m (if left out, the balls roll on a level track); standard deviation of a
-        mark, m, known from many shots (if left out, that of these tracks).
+        Length of the pendulums, m (none: balls that roll on a level track); standard deviation of
+        a mark, m, if it is known from many shots (else that of these tracks is taken).
     window : float, optional
         How much time before and after the impact is used, s.  If left out, the longest one that the
         marks agree with: at most a quarter of a swing, or a quarter of a second on a track.
@@ -60,7 +60,7 @@ def velocities_from_tracks(
 
     Examples
     --------
-    >>> from cradle.fit import read_tracker
+    >>> from cradle.fit import read_tracker, velocities_from_tracks
     >>> from cradle.tables import data_folder
     >>> tracks = read_tracker(data_folder() / "video_synthetic.txt")
     >>> velocities_from_tracks(tracks, length=0.3, window=0.05).sigma.round(3).tolist()

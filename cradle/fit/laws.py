@@ -21,13 +21,13 @@ _SAME = 0.02  # minima nearer to one another than this part of each range are on
 class LawFit:
     """What shots say of the numbers of a law."""
 
-    values: Mapping[str, float | None]  #: The best of each number; None if the shots tell none.
-    #: 95 % of each, by profiles of chi-square, from the least to the largest end about any minimum.
+    values: Mapping[str, float | None]  #: Best value of each number; None if the shots tell none.
+    #: 95 % interval of each, by profiles of chi-square; it spans those about all the minima.
     intervals: Mapping[str, tuple[float, float]]
-    minima: tuple[Mapping[str, float | None], ...]  #: Others that were found to explain the shots.
-    residuals: Mapping[str, Vector]  #: Of each set, measured less computed, over the error, (K, N).
-    chi_square: float
-    degrees_of_freedom: int  #: Velocities after the impacts less numbers fitted.
+    minima: tuple[Mapping[str, float | None], ...]  #: Other values that explain the shots.
+    residuals: Mapping[str, Vector]  #: Of each set: (measured - computed) / error, shape (K, N).
+    chi_square: float  #: Lowest chi-square.
+    degrees_of_freedom: int  #: Number of velocities measured after impacts, less numbers fitted.
 
     def summary(self) -> str:
         """Return all that the fit says, as text."""
@@ -49,13 +49,13 @@ def fit_law(
 ) -> LawFit:  # fmt: skip
     """Fit the numbers of any impact law to shots, by the least chi-square that is found.
 
-    All computed velocities of a shot may be off by one factor, within the error of the velocities
-    before.  If the chance of such a chi-square is small, the law fails, and intervals mean nothing.
+    The velocities computed for a shot may all be off by one factor, within the error of those
+    before.  If the chance of the chi-square is small, the law fails and the intervals mean nothing.
 
     Parameters
     ----------
     shots : Shots
-        As of `read_shots`.
+        The data, from `read_shots`.
     law : callable, or mapping of callables by the names of the sets
         ``law(**numbers)`` returns a model.  A number named restitution is not passed to it: it is
         that of all contacts of the chain.
@@ -73,11 +73,10 @@ def fit_law(
 
     Examples
     --------
-    Three spheres, the last one a little apart; lengths in units of compression:
-
+    >>> import numpy as np
     >>> from cradle import SpringChain
-    >>> from cradle.fit import read_shots
-    >>> table = {"set": "gap", "shot": 1, "ball": [1, 2, 3], "type": "A", "mass": 1.0,
+    >>> from cradle.fit import fit_law, read_shots
+    >>> table = {"set": "apart", "shot": 1, "ball": [1, 2, 3], "type": "A", "mass": 1.0,
     ...          "before": [1.0, 0.0, 0.0], "after": [-0.037, 0.039, 0.998], "sigma_before": 0.0}
     >>> shots = read_shots({k: np.broadcast_to(x, 3) for k, x in table.items()}, sigma=0.01)
     >>> fit_law(shots, lambda gap: SpringChain(gaps=[0.0, gap]), {"gap": (0.0, 2.0)})

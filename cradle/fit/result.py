@@ -27,19 +27,19 @@ _ALL = 0.999  # a confidence set that covers more than this part of the range sa
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """One coefficient of restitution or one ratio."""
+    """What data say of one number: a coefficient of restitution, a ratio, a period."""
 
     kind: str  #: "restitution", "ratio", or "swing" for the numbers of `fit_swing`.
     key: Key  #: Types of the balls; for a swing, the name of the number.
-    value: float | None  #: Where chi-square is lowest; None if the data tell nothing.
-    #: The 95 % confidence set, (lower, upper), by profile likelihood; or several that explain all.
+    value: float | None  #: The best value, where chi-square is lowest; None if data tell nothing.
+    #: The 95 % confidence set by profile likelihood: one interval (lower, upper), or several.
     intervals: tuple[tuple[float, float], ...]
     modes: tuple[Mode, ...]  #: All minima of chi-square that were found, lowest first.
     identified: bool  #: False if the confidence set covers the whole range.
     at_bound: str  #: "lower" or "upper" if the lowest chi-square is at an end of the range, or "".
     bound: float  #: Upper end of the range; the lower one is 0.
-    grid: Vector  #: Values tried, shape (P,).
-    excess: Vector  #: Chi-square there above its lowest value, shape (P,).
+    grid: Vector  #: The P values that were tried, shape (P,).
+    excess: Vector  #: Chi-square there, less its lowest value, shape (P,).
 
     @classmethod
     def of(cls, kind: str, key: Key, bound: float, found: Scan | None) -> "Estimate":
@@ -59,12 +59,12 @@ class Estimate:
 
     @property
     def standard_error(self) -> float:
-        """Total length of the confidence set over 3.92, as is right for a bell curve."""
+        """Total length of the confidence set over 3.92: the standard error of a bell curve."""
         return sum(high - low for low, high in self.intervals) / (2.0 * float(np.sqrt(RISE)))
 
     @property
     def folded(self) -> bool:
-        """Whether chi-square is no parabola over the confidence set, which may then hold only 90 %.
+        """Whether chi-square is far from a parabola: the set may then hold 90 %, not 95.
 
         That happens near a fold, a ratio at which the order of the impact's events changes.
         """
@@ -96,23 +96,23 @@ class Group(NamedTuple):
 class Prediction:
     """Velocities predicted for N balls, with what the errors of the parameters leave open.
 
-    `lower` to `upper` holds the central 95 % of the predictions; where a confidence set of several
-    pieces makes groups of them, also what lies between the groups.
+    From `lower` to `upper` lie the central 95 % of the predictions.  If a confidence set is in
+    several pieces, predictions come in groups, and the range spans the space between them too.
     """
 
-    types: tuple[str, ...]
+    types: tuple[str, ...]  #: Types of the balls, left to right.
     median: Vector  #: Median velocities after the impact, shape (N,), m/s.
     lower: Vector  #: Lower ends, shape (N,), m/s.
     upper: Vector  #: Upper ends, shape (N,), m/s.
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return one row per ball."""
+        """Return a row for each ball, as dictionaries."""
         columns = (x.tolist() for x in (self.median, self.lower, self.upper))
         rows, names = zip(self.types, *columns, strict=True), ("type", "velocity", "lower", "upper")
         return [{"ball": k, **dict(zip(names, row, strict=True))} for k, row in enumerate(rows, 1)]
 
     def table(self) -> "pd.DataFrame":
-        """Return the rows as a table."""
+        """Return the rows as a table of pandas."""
         import pandas as pd
 
         return pd.DataFrame(self.rows()).set_index("ball")
@@ -124,14 +124,14 @@ class Prediction:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """All estimates of a fit."""
+    """All estimates of a fit; ``fit["ABC"]`` is that of the triplet ABC."""
 
     shots: Shots  #: The data.
-    estimates: Mapping[str, Estimate]  #: By the names of the parameters, such as "ABC".
+    estimates: Mapping[str, Estimate]  #: The estimates by their names, such as "ABC".
     given: Mapping[str, tuple[float, float]]  #: Coefficients of restitution, with their errors.
     groups: tuple[Group, ...]  #: Ratios that were fitted together.
-    chi_square: float  #: Its lowest value, all estimates together.
-    degrees_of_freedom: int  #: Velocities measured after impacts, less the parameters fitted.
+    chi_square: float  #: Lowest chi-square, of all estimates together.
+    degrees_of_freedom: int  #: Number of velocities measured after impacts, less numbers fitted.
     known: Mapping[str, float] = field(default_factory=dict)  #: Ratios that were not fitted.
 
     def __getitem__(self, name: str) -> Estimate:
@@ -155,7 +155,7 @@ class Fit:
         return f"Fit({shown}; {chi}{'' if self.probability > 1e-3 else ', a poor fit'})"
 
     def expected(self, shots: ShotSet) -> Vector | None:
-        """Return velocities after shots of a set by the best parameters, (K, N), m/s; or None."""
+        """Return velocities after shots of a set by the best values, (K, N), m/s; None if open."""
         best: dict[str, float | None] = {name: value for name, (value, _) in self.given.items()}
         # What acts in no shot may have any value.
         best |= {name: one.value if one.modes else 0.0 for name, one in self.estimates.items()}
@@ -178,7 +178,7 @@ class Fit:
     def summary(self) -> str:
         """Return all that the fit says, as text.
 
-        Residuals are over their errors: of each set the root mean square, and the largest.
+        Residuals, in units of their errors, are told by their root mean square and the largest.
         """
         lines = [f"{one}{'' if one.value is None else f', standard error {one.standard_error:.2g}'}"
                  f"{FOLDED * one.folded}" for one in self.estimates.values()]  # fmt: skip
@@ -201,13 +201,13 @@ class Fit:
         return "\n".join(lines)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return one row per estimate; `intervals` is its confidence set, as in `Estimate`."""
+        """Return a row for each estimate, as dictionaries, named as in `Estimate`."""
         rows = ((name, e.kind, e.value, e.intervals, len(e.modes), e.identified, e.at_bound,
                  e.bound) for name, e in self.estimates.items())  # fmt: skip
         return [dict(zip(RESULT_COLUMNS, row, strict=True)) for row in rows]
 
     def table(self) -> "pd.DataFrame":
-        """Return the rows as a table; where nothing was identified the value is missing."""
+        """Return the rows as a table of pandas; a value that the data leave open is missing."""
         import pandas as pd
 
         return pd.DataFrame(self.rows(), columns=RESULT_COLUMNS).set_index("name")

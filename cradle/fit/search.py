@@ -29,8 +29,8 @@ Found = tuple[list["Scan"], Vector, Vector, float]
 class Mode(NamedTuple):
     """A minimum of chi-square."""
 
-    value: float  #: Where it is.
-    excess: float  #: Chi-square there above the lowest.
+    value: float  #: Value of the parameter there.
+    excess: float  #: Chi-square there, less its lowest value.
 
 
 class Scan(NamedTuple):

@@ -38,12 +38,12 @@ _Row = dict[str, Any]  # cells by column, in kg and m/s, and under "where" the p
 
 @dataclass(frozen=True, eq=False)
 class ShotSet:
-    """All shots of one arrangement of N balls; K shots."""
+    """K shots of one arrangement of N balls."""
 
-    name: str
-    types: tuple[str, ...]  #: Of the N balls, left to right.
+    name: str  #: Name of the arrangement.
+    types: tuple[str, ...]  #: Types of the N balls, left to right.
     shots: tuple[str, ...]  #: Names of the K shots.
-    masses: Vector  #: Shape (N,), kg.
+    masses: Vector  #: Masses, shape (N,), kg.
     before: Vector  #: Velocities before the impact, shape (K, N), m/s.
     after: Vector  #: Velocities after the impact, shape (K, N), m/s.
     sigma: Vector  #: Standard errors of `after`, shape (K, N), m/s.
@@ -56,7 +56,7 @@ class ShotSet:
         return np.asarray(gain / np.sqrt((self.sigma**2 + self.sigma_before**2) @ self.masses**2))
 
     def mean_after(self, speed: float = 1.0) -> tuple[Vector, Vector]:
-        """Return means of the velocities after the impact, with their errors: each shape (N,), m/s.
+        """Return means of the velocities after the impact and their errors, each (N,), m/s.
 
         Each shot is scaled to one `speed` of the first ball, m/s; a ValueError is raised if a shot
         begins otherwise than with that ball striking the others at rest.
@@ -73,9 +73,9 @@ class ShotSet:
 
 @dataclass(frozen=True, eq=False)
 class Shots:
-    """Measured shots of one or several arrangements: `sets`, in the order of the table."""
+    """Measured shots of one or several arrangements; ``shots["AB"]`` is the set named AB."""
 
-    sets: tuple[ShotSet, ...]
+    sets: tuple[ShotSet, ...]  #: The sets, in the order of the table.
 
     def __getitem__(self, name: str) -> ShotSet:
         there = {one.name: one for one in self.sets}
@@ -94,7 +94,7 @@ class Shots:
         return {t: float(m) for s in self.sets for t, m in zip(s.types, s.masses, strict=True)}
 
     def without(self, *names: str) -> "Shots":
-        """Return the shots less some sets, not all of them: those are to be predicted."""
+        """Return the shots without these sets, which you may want to predict."""
         there = [one.name for one in self.sets]
         for name in (name for name in names if name not in there):
             raise ValueError(f"no set {name!r} to leave out; there are {', '.join(there)}")
@@ -106,7 +106,7 @@ class Shots:
     def momentum_check(self) -> tuple[float, int]:
         """Return chi-square of the momentum gained, and the number of shots.
 
-        Far above that number it says that masses, velocities or their errors are wrong.
+        If the first is far above the second, masses, velocities or their errors are wrong.
         """
         residuals = np.concatenate([s.momentum_residuals for s in self.sets])
         return float(residuals @ residuals), residuals.size
@@ -130,14 +130,15 @@ def read_shots(
     ----------
     source : path, open file, DataFrame or mapping of columns
         A CSV file (UTF-8, comma, one header line; lines that begin with # and empty rows are
-        skipped), a pandas DataFrame, or columns by name; see `COLUMNS`.
+        skipped), a pandas DataFrame, or columns by name.  `COLUMNS` says what each column holds.
     mass_unit, velocity_unit : {"kg", "g"}, {"m/s", "cm/s", "mm/s"}, optional
-        If left out, units are kg and m/s, and numbers that look like other units are refused.
+        If left out, kg and m/s are meant, and numbers that look like other units are refused.
     sigma : float, optional
         Standard error of all velocities, in their unit, for a table without it.
 
     Examples
     --------
+    >>> from cradle.fit import read_shots
     >>> table = {"set": ["AB", "AB"], "shot": [1, 1], "ball": [1, 2], "type": ["A", "B"],
     ...          "mass": [45, 53], "before": [1.0, 0.0], "after": [0.17, 0.70]}
     >>> shots = read_shots(table, mass_unit="g", sigma=0.01)

@@ -30,17 +30,17 @@ _CHANCE, _FAR, _PARTS = 1e-3, 3.3, (4, 6, 8, 12, 16, 24, 32)
 class SwingFit:
     """What a film of K frames says of a cradle of N balls."""
 
-    values: Mapping[str, float | None]  #: The best of each number; None if the film tells none.
-    intervals: Mapping[str, tuple[float, float]]  #: 95 % of each number.
-    estimates: Mapping[str, Estimate]  #: The same with profiles of chi-square.
-    swing: Swing  #: What fits best; its times begin with the first frame.
+    values: Mapping[str, float | None]  #: Best value of each number; None if the film tells none.
+    intervals: Mapping[str, tuple[float, float]]  #: 95 % interval of each number.
+    estimates: Mapping[str, Estimate]  #: The same, with profiles of chi-square.
+    swing: Swing  #: The swing that fits best; its times begin with the first frame.
     residuals: Vector  #: Filmed less computed, less the mean of each ball, shape (K, N), m.
-    reading: float  #: Standard error of a reading, m, as given or that of the residuals.
-    chi_square: float | None  #: Of the residuals over `reading`; None where they made it.
-    degrees_of_freedom: int  #: Readings less what was fitted to them.
-    correlation: float  #: Of a ball's residuals in successive frames, about 0 if the law fits.
+    reading: float  #: Standard error of a reading, m: as given, or that of the residuals.
+    chi_square: float | None  #: That of the residuals; None if `reading` was found from them.
+    degrees_of_freedom: int  #: Number of readings, less what was fitted to them.
+    correlation: float  #: That of a ball's residuals in successive frames: near 0 if the law fits.
     poor: bool  #: Whether the law does not fit.
-    widened: Mapping[str, float]  #: By what each interval is then widened, else 1.
+    widened: Mapping[str, float]  #: Factors by which intervals were widened as it does not fit.
 
     def summary(self) -> str:
         """Return all that the fit says, as text."""
@@ -71,18 +71,18 @@ def fit_swing(
     """Fit `swing` to a film, with one restitution and one gap for all contacts.
 
     At the first frame some balls, let go at one moment, are on their way; the others are at rest.
-    Their places and velocities then are fitted too, as is where each ball hangs.  Intervals hold
-    95 %, by profiles of chi-square (Venzon and Moolgavkar, Applied Statistics 37, 1988, 87-94).
-    Where the law fails (a large chi-square, or residuals alike from frame to frame) they are
+    Their places and velocities at that frame are fitted too, and where each ball hangs.  Intervals
+    hold 95 %, by profiles of chi-square (Venzon and Moolgavkar, Applied Statistics 37, 1988,
+    87-94).  If the law fails (a large chi-square, or residuals alike from frame to frame), they are
     widened by how much parts of the film differ (clusters: Liang and Zeger, Biometrika 73, 1986,
-    13-22).  The interval of the damping is too short where nearly all balls were pulled; one of no
+    13-22).  The interval of the damping is too short if nearly all balls were pulled; one of no
     width says that the law jumps there.  A wrong value, no ball seen on its way, and too few
     readings raise a ValueError.
 
     Parameters
     ----------
     times, positions : array_like, shapes (K,) and (K, N)
-        Of the frames, s; and of each ball, from where it hangs, m, nan where it was not seen.
+        Times of the frames, s; and each ball's place from where it hangs, m, nan if not seen.
     model : Model
         The impact law.
     seen : array_like of bool, shape (K, N) or (N,), optional
@@ -94,11 +94,13 @@ def fit_swing(
     known : mapping of str to float, optional
         Values of what is not fitted; if left out, no damping, restitution 1, no gaps.
     masses : array_like, shape (N,), optional
-        Of the balls, in any unit; if left out, they are equal.
+        Masses in any unit; if left out, they are equal.
 
     Examples
     --------
-    >>> from cradle import ImpulseCorrelation
+    >>> import numpy as np
+    >>> from cradle.fit import fit_swing
+    >>> from cradle import Chain, ImpulseCorrelation, swing
     >>> times, law = np.arange(0, 2.5, 0.05), ImpulseCorrelation(0)
     >>> film = swing(Chain([1, 1], [0, 0], 0.9), law, [-0.05, 0], times).positions
     >>> found = fit_swing(times, film, law, free=["restitution"], known={"period": 0.634374})

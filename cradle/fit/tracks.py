@@ -12,13 +12,13 @@ from cradle.input.values import ABOVE_ZERO, Vector, one_number
 
 
 class Track(NamedTuple):
-    """Marks of one ball: times in s and positions along the row in m, both of shape (T,)."""
+    """Marks of one ball in a film."""
 
-    times: Vector
-    positions: Vector
+    times: Vector  #: When it was marked, shape (T,), s.
+    positions: Vector  #: Where it was along the row, shape (T,), m.
 
 
-#: Marks of every ball, by the names of the tracks, in the order of the file.
+#: A dictionary: the `Track` of every ball by its name, in the order of the file.
 Tracks = dict[str, Track]
 
 # What programs write, by files that people published and by the source of Tracker
@@ -38,22 +38,23 @@ _UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "s": 1.0, "ms": 1e-3, "px": 1.0, "":
 def read_tracker(path: str | Path, *, time_scale: float = 1.0, unit: float = 1.0) -> Tracks:
     """Read a text file exported by Tracker, Kinovea, Logger Pro or Capstone.
 
-    Frames where a ball was not marked (no number, or NaN) are left out of its track; the tracks are
-    in the order of the titles.  Another layout raises a ValueError, and so does a cell that is no
-    number; then line and column are named.
+    The tracks come in the order of the titles; frames where a ball was not marked (no number, or
+    NaN) are left out of its track.  Another layout raises a ValueError, and so does a cell that is
+    no number; the message names line and column.
 
     Parameters
     ----------
     path : str or Path
         The file; tabs, semicolons or commas between the columns, decimals with a point or a comma.
     time_scale : float
-        True time over the time of the video: 30 / 240 where 240 frames a second are shown as 30.
+        True time over the time of the video: 30 / 240 if 240 frames a second are shown as 30.
     unit : float
-        Length of the file's unit in m, such as 0.01 or the size of a pixel, where the file does not
+        Length of the file's unit in m, such as 0.01 or the size of a pixel, if the file does not
         name it as in ``X (cm)``.
 
     Examples
     --------
+    >>> from cradle.fit import read_tracker
     >>> from cradle.tables import data_folder
     >>> tracks = read_tracker(data_folder() / "video_synthetic.txt")
     >>> {name: track.times.size for name, track in tracks.items()}
@@ -105,7 +106,7 @@ def read_tracker(path: str | Path, *, time_scale: float = 1.0, unit: float = 1.0
 def frames(tracks: Mapping[str, Track]) -> tuple[Vector, Vector]:
     """Return the times of a film and the places of its balls, as `fit_swing` takes them.
 
-    Each place is counted from the middle one of its ball, which is near where it hangs.
+    Places of a ball are counted from their median, which is near where it hangs.
 
     Parameters
     ----------
@@ -115,10 +116,11 @@ def frames(tracks: Mapping[str, Track]) -> tuple[Vector, Vector]:
     Returns
     -------
     times, positions : ndarray, shapes (K,) and (K, N)
-        s, and m, nan where a ball was not marked.
+        In s; and in m, nan where a ball was not marked.
 
     Examples
     --------
+    >>> from cradle.fit import Track, frames
     >>> tracks = {"A": Track([0, 1, 2], [0.1, 0.2, 0.4]), "B": Track([1, 2], [0.5, 0.5])}
     >>> frames(tracks)[1].round(3).tolist()
     [[-0.1, nan], [0.0, 0.0], [0.2, 0.0]]

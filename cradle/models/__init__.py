@@ -11,7 +11,7 @@ from cradle.trace import Trace
 
 
 class Model(Protocol):
-    """What every impact model offers: a rule from a chain to a path of contact impulses."""
+    """What every impact model offers: a method that solves the impact of a chain."""
 
     def solve(self, chain: Chain) -> Trace:
         """Return the path of the impact of `chain`."""
@@ -28,7 +28,7 @@ def a_model(model: object) -> None:
 def collide(
     chain: Chain, model: Model, *, record: bool | None = None, progress: bool = False
 ) -> Trace:
-    """Solve one impact; where no balls approach nothing happens, and its path has no events.
+    """Solve one impact; where no balls approach, nothing happens and the path has no events.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def collide(
         Whether to keep the path; for `ImpulseCorrelation` only.  If left out, a path of more than
         ten million numbers (2 N - 1 for each event) is cut, with a warning.
     progress : bool
-        After two seconds, show the events of `ImpulseCorrelation`, or the steps of `SpringChain`.
+        Count events (`ImpulseCorrelation`) or steps (`SpringChain`) on screen, after two seconds.
 
     Returns
     -------

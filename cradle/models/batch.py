@@ -27,7 +27,7 @@ def post_impact_velocities(
 ) -> Vector:  # fmt: skip
     """Post-impact velocities of many chains of N balls at once; leading axes broadcast.
 
-    As `collide` with `ImpulseCorrelation`, without the path; `outcomes` has the margins, too.
+    The rule is that of `ImpulseCorrelation`.  No path is kept; `outcomes` returns margins as well.
 
     Parameters
     ----------
@@ -36,8 +36,8 @@ def post_impact_velocities(
     restitution : array_like, shape (..., N - 1) or ()
         Energetic coefficients of restitution.
     forward, backward : array_like, shape (..., N - 2) or ()
-        Ratios; `backward` as `forward` if left out.  Ratios below 1e-4 but not 0 can decide a tie
-        wrongly where several of them multiply: write 0 if that is meant, and see the margins.
+        Ratios; `backward` equals `forward` if left out.  Ratios between 0 and 1e-4 can decide a tie
+        wrongly where several of them multiply: write 0 if that is meant, and look at the margins.
     meeting, excess, max_events
         As for `ImpulseCorrelation`.
     progress : bool
@@ -51,19 +51,14 @@ def post_impact_velocities(
     Raises
     ------
     ValueError, ImpactNotFinished, ImpactNotCertified
-        If a value, whose place is told, or a shape is wrong; if an impact takes more than
-        `max_events` steps (the first such chain is reported, with a note of its place); or if an
-        outcome fails the check that every answer has to pass.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583.
+        If a shape or a value is wrong (the message tells its place); if an impact takes more than
+        `max_events` steps (a note tells the place of the first such chain); or if an outcome fails
+        the check that every answer has to pass.
 
     Examples
     --------
-    The two ends of Fig. 4 in one call:
-
-    >>> post_impact_velocities([1, 1, 1], [1, 0, 0], 1, [[0.0], [0.5]]).round(3)
+    >>> from cradle import post_impact_velocities
+    >>> post_impact_velocities([1, 1, 1], [1, 0, 0], 1, [[0.0], [0.5]]).round(3)  # ends of Fig. 4
     array([[ 0.   ,  0.   ,  1.   ],
            [-0.333,  0.667,  0.667]])
     """
@@ -75,12 +70,12 @@ def post_impact_velocities(
 
 @compared_as_objects
 class Outcomes(NamedTuple):
-    """The outcomes of a batch; where an impact collapsed, collisions before its limit count."""
+    """The outcomes of a batch."""
 
-    velocities: Vector  #: after the impact, shape (..., N), m/s
-    collisions: NDArray[np.int64]  #: how often each contact became active, shape (..., N - 1)
-    collapsed: NDArray[np.bool_]  #: whether an infinite sequence was taken to its limit, (...)
-    margin: Vector  #: as `Trace.margin`; 0 where digits of the solver may decide, shape (...)
+    velocities: Vector  #: Velocities after the impact, shape (..., N), m/s.
+    collisions: NDArray[np.int64]  #: How often each contact became active, shape (..., N - 1).
+    collapsed: NDArray[np.bool_]  #: Whether the impact was taken to a limit, shape (...).
+    margin: Vector  #: As `Trace.margin`, shape (...).
 
 
 def outcomes(
@@ -94,6 +89,7 @@ def outcomes(
 
     Examples
     --------
+    >>> from cradle import outcomes
     >>> found = outcomes([1, 1, 1], [1, 0, 0], [[1, 1], [0, 0]], 0)
     >>> found.collisions[0].tolist(), found.collapsed.tolist()  # Fig. 6 is a map of such counts
     ([1, 1], [False, True])

@@ -33,31 +33,28 @@ _CHUNK = 2048  # chains at once
 
 @dataclass(frozen=True)
 class SpringChain:
-    """Balls on massless springs: the contact forces of `spring_velocities`, followed in time.
+    """Balls on massless springs (Eqs. 7-11): the contact forces, followed in time.
 
-    In the trace, `absorbed` is the energy stored at each maximum of a compression, less that at a
-    minimum between two of them.  Speeds below ``accuracy / 100`` of the fastest closing speed count
-    as none; how often balls touch so gently depends on that.
+    The laws of force are those of `spring_velocities`.  In the trace, `absorbed` is the energy that
+    a contact stores at each maximum of its compression, less that at a minimum between two maxima.
+    Speeds below ``accuracy / 100`` of the fastest closing speed count as none, so how often balls
+    touch very gently depends on the accuracy.
 
     Parameters
     ----------
     stiffness, exponent, viscosity, gaps, damping, accuracy
-        As for `spring_velocities`, of one chain; times and forces need the stiffness.
+        As for `spring_velocities`, for one chain.  Times and forces need the true stiffness.
     max_steps : int
-        Steps of one run after which the impact is given up.
+        Number of steps after which the impact is given up.
 
     Raises
     ------
     ValueError, ImpactNotFinished, ImpactNotCertified
-        As for `spring_velocities`, the last two on solving; ValueError if a restitution is below 1.
-
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, Eqs. 7-11; and as `spring_velocities`.
+        As for `spring_velocities`; a ValueError also if the chain has a restitution below 1.
 
     Examples
     --------
-    >>> from cradle import Chain, collide
+    >>> from cradle import Chain, SpringChain, collide
     >>> collide(Chain([1, 1, 1], [1, 0, 0]), SpringChain()).velocities.round(6)
     array([-0.070952,  0.076403,  0.994549])
     """
@@ -133,11 +130,10 @@ def spring_velocities(
 ) -> Vector:  # fmt: skip
     """Post-impact velocities of many chains of balls on springs; leading axes broadcast.
 
-    `spring_outcomes` has the estimated errors, too.
-    With the compression d, each contact pushes with k (d^p + A d(d^p)/dt) while that is above zero:
-    p = 1 is a linear spring, p = 3/2 the contact of two spheres, elastic or viscoelastic.  By Hunt
-    and Crossley's law it pushes with k d^p (1 + A dd/dt).  Without losses and gaps the velocities
-    depend on the ratios of the stiffnesses alone.
+    A contact whose balls are pressed together by the distance d pushes with k (d^p + A d(d^p)/dt),
+    while that is above zero: p = 1 is a linear spring, p = 3/2 the contact of two spheres, elastic
+    (A = 0) or viscoelastic.  By Hunt and Crossley it pushes with k d^p (1 + A dd/dt).  Without
+    losses and gaps only ratios of stiffnesses matter.  `spring_outcomes` adds estimated errors.
 
     Parameters
     ----------
@@ -145,15 +141,14 @@ def spring_velocities(
         kg and m/s.
     stiffness, viscosity, gaps : array_like, shape (..., N - 1) or ()
         k, N/m^p, above 0; A, s, 0 for an elastic contact; and the distance of two balls before the
-        impact, m.  Length and time are those of the contact that closes fastest: with its speed u,
-        reduced mass m and L = (m u^2 / k)^(1 / (p + 1)), A is at most .3 L / u, and a gap matters
-        where it is not small beside L.  A gap below zero is a lean, at most L: how far the strings
-        press the two together at rest, with a pull that acts until no contact pushes and no open
-        one closes.
+        impact, m.  With the speed u and the reduced mass m of the contact that closes fastest, the
+        unit of compression is L = (m u^2 / k)^(1 / (p + 1)).  A is at most .3 L / u, and a gap
+        matters if it is not small beside L.  A gap below zero, a lean, says how far strings press
+        two balls together at rest, at most L; they pull until no contact pushes and none closes.
     exponent : float
         p, from 1 to 10.
     damping : {"viscoelastic", "hunt-crossley"}
-        The law of the losses; the latter's A is in s/m, at most .9 over the fastest closing.
+        The law of the losses.  By Hunt and Crossley A is in s/m, at most 0.9 / u.
     accuracy : float
         Largest estimated error of a velocity over the fastest closing speed, 1e-12 to 0.02.
     progress : bool
@@ -167,11 +162,11 @@ def spring_velocities(
     Raises
     ------
     ValueError
-        If a value or a shape is wrong, a value is too far from the others to be resolved, or by
-        Hunt and Crossley's law a contact would pull.
+        If a value or a shape is wrong, if values are too far apart to be resolved together, or if
+        a contact would pull by Hunt and Crossley's law.
     ImpactNotFinished, ImpactNotCertified
-        If runs take more than twenty million steps or do not agree, or leans hold balls together;
-        if an outcome breaks momentum, or energy or order by more than `accuracy`.
+        If a run takes over twenty million steps, finer runs do not agree, or leans hold balls
+        together; if an outcome breaks momentum, or energy or order by more than `accuracy`.
 
     References
     ----------
@@ -180,9 +175,8 @@ def spring_velocities(
 
     Examples
     --------
-    Five equal spheres, elastic; and with losses and gaps of a tenth of the compression:
-
-    >>> for law in {}, {"viscosity": 0.05, "gaps": 0.1}:
+    >>> from cradle import spring_velocities
+    >>> for law in {}, {"viscosity": 0.05, "gaps": 0.1}:  # elastic; with losses, a little apart
     ...     spring_velocities([1] * 5, [1, 0, 0, 0, 0], **law).round(3)
     array([-0.071, -0.03 , -0.014,  0.127,  0.989])
     array([-0.003,  0.023,  0.03 ,  0.101,  0.849])
@@ -198,13 +192,14 @@ def spring_outcomes(
     exponent: float = 1.5, viscosity: ArrayLike = 0.0, gaps: ArrayLike = 0.0,
     damping: str = DAMPING[0], accuracy: float = 1e-3, progress: bool = False,
 ) -> tuple[Vector, Vector]:  # fmt: skip
-    """Velocities, m/s, shape (..., N), and estimated errors of many chains of balls on springs.
+    """Velocities of many chains of balls on springs, and their estimated errors.
 
-    Arguments are those of `spring_velocities`.  The errors are of a velocity over the fastest
-    closing speed, shape (...).
+    Arguments are those of `spring_velocities`.  Returned are the velocities, m/s, shape (..., N),
+    and the error of each chain, over its fastest closing speed, shape (...).
 
     Examples
     --------
+    >>> from cradle import spring_outcomes
     >>> velocities, errors = spring_outcomes([1] * 3, [1, 0, 0], [[1, 1], [1, 9]])
     >>> velocities.shape, (errors < 1e-3).tolist()
     ((2, 3), [True, True])
@@ -245,29 +240,24 @@ def spring_outcomes(
 
 
 def hertz_stiffness(radii: ArrayLike, young: float = 210e9, poisson: float = 0.3) -> Vector:
-    """Stiffness of the contacts of spheres, k = 2/3 E / (1 - nu^2) (R R' / (R + R'))^(1/2) (Hertz).
+    """Stiffness of the contacts of spheres by Hertz: 2/3 E / (1 - nu^2) (R R' / (R + R'))^(1/2).
 
     Parameters
     ----------
     radii : array_like, shape (..., N)
-        m, above 0.
+        R, m, above 0.
     young, poisson : float
         E, Pa, above 0, and nu, above -1 and at most 1/2; those of steel if left out.
 
     Returns
     -------
     ndarray, shape (..., N - 1)
-        k, N/m^(3/2), as `SpringChain` and `spring_velocities` take it.
-
-    References
-    ----------
-    Johnson, Contact Mechanics (1985), section 4.2.
+        k, N/m^(3/2), for `SpringChain` and `spring_velocities` (Johnson, Contact Mechanics, 1985).
 
     Examples
     --------
-    Balls with a radius of 1 cm, the last one with 2 cm:
-
-    >>> [f"{k:.3g}" for k in hertz_stiffness([0.01, 0.01, 0.02])]
+    >>> from cradle import hertz_stiffness
+    >>> [f"{k:.3g}" for k in hertz_stiffness([0.01, 0.01, 0.02])]  # steel balls
     ['1.09e+10', '1.26e+10']
     """
     r = asked.checked("radii", radii, *asked.ABOVE_ZERO)

@@ -26,12 +26,12 @@ _event = functools.cache(lambda kind, contact: Event(_KINDS[kind], contact))
 
 @dataclass(frozen=True)
 class ImpulseCorrelation:
-    """Impulse Correlation Ratio and energetic restitution (Ceanga and Hurmuzlu).
+    """The paper's rule: Impulse Correlation Ratio and energetic restitution (Eqs. 16, 47-53).
 
-    At an interior ball the impulse of the driven contact grows in proportion to that of the
-    contact that drives it.  Every contact ends when it has given back the part e^2 of the work it
-    absorbed.  Between events velocities are linear in the impulses, so no step size is needed.  A
-    value outside its range raises a `ValueError`.
+    At an interior ball one contact drives the other: for each unit of its impulse the driven one
+    receives the ratio (Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583).  A contact ends when
+    it has given back the part e^2 of the work it absorbed.  Between events velocities are linear in
+    the impulses, so no step size is needed.  A value outside its range raises a `ValueError`.
 
     Where several contacts of balls that touch approach, the leftmost one drives all the others; so
     balls that are struck from both sides and their mirror image end differently.
@@ -40,7 +40,7 @@ class ImpulseCorrelation:
     ----------
     forward, backward : float or sequence, length N - 2
         Ratio, 0 to 1, at each interior ball when its left contact drives its right one, and when
-        its right one drives its left one; `backward` as `forward` if left out.
+        its right one drives its left one.  If `backward` is left out, it equals `forward`.
     meeting : float
         Two balls may be driven towards each other by separate collisions.  Their velocities meet at
         this part, 0 to 1, of the overlap of the ranges that they run through; 1/2 as in the paper.
@@ -50,13 +50,9 @@ class ImpulseCorrelation:
     max_events : int
         Number of steps after which the impact is given up.
 
-    References
-    ----------
-    Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583, Eqs. 16, 47-53.
-
     Examples
     --------
-    >>> from cradle import Chain, collide
+    >>> from cradle import Chain, ImpulseCorrelation, collide
     >>> model = ImpulseCorrelation(forward=0.15)
     >>> collide(Chain([1, 1, 1], [1, 0, 0], [1, 1]), model).velocities.round(4).tolist()
     [-0.0811, 0.0883, 0.9928]

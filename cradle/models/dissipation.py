@@ -18,8 +18,7 @@ class DissipationTrace(Trace):
     """The outcome of an impact that has no phases: all contacts end at one instant.
 
     Here `absorbed` is the net work that each contact takes from the balls, J: its impulse times the
-    mean of its closing speeds before and after; it is below zero where a contact does work that
-    others take.
+    mean of its closing speeds before and after.  It is below zero if a contact does work on them.
     """
 
     @property
@@ -32,14 +31,14 @@ class DissipationTrace(Trace):
 class QuadraticDissipation:
     """Velocities after the impact from one convex problem (Moreau; Frémond; Cholet).
 
-    With D_c the mean of the closing speeds of contact c before and after, the velocities v make ::
+    D_c is the mean of the closing speeds of contact c before and after.  The velocities v make ::
 
         1/2 sum_i m_i (v_i - v_i^-)^2 + sum_c k_c D_c^2
 
     as small as possible while no two balls go on approaching.  So the impulse of a contact is
     ``k_c D_c``, with a reaction added where the balls would still approach; it can also hold back
-    balls that part.  Contacts that open before the impact take no part; if their balls approach
-    after it, another such problem follows.
+    balls that part.  Contacts whose balls part before the impact are left out; if these balls
+    approach after it, another such problem follows.
 
     Two balls of reduced mass mu have ``e = (kappa - 1) / (kappa + 1)`` with kappa = k / (2 mu), or
     e = 0 where kappa is below 1.  A value outside its range raises a ValueError; so does, on
@@ -52,8 +51,8 @@ class QuadraticDissipation:
         kappa of each contact, 0 to 1e9, in place of the restitution e of the chain; if left out,
         (1 + e) / (1 - e), for which e must be below 1.
     distance : float
-        kappa of a term for the outer two of three balls; it acts if neither contact opens, and its
-        impulse passes through both.
+        kappa of a further term, for the outer two of three balls.  It acts if neither contact opens
+        before the impact, and its impulse passes through both.
     max_problems : int
         Number of problems; if balls still approach after them, `ImpactNotFinished` is raised.
 
@@ -64,7 +63,7 @@ class QuadraticDissipation:
 
     Examples
     --------
-    >>> from cradle import Chain, collide
+    >>> from cradle import Chain, QuadraticDissipation, collide
     >>> three = Chain([1, 1, 1], [1, 0, 0], 1)
     >>> for model in (QuadraticDissipation(1e9), QuadraticDissipation(0, distance=1e9)):
     ...     print(collide(three, model).velocities.round(6) + 0.0)

@@ -29,9 +29,9 @@ def fastest(chain: Chain) -> tuple[int, float, float]:
 class EnergyTrace(Trace):
     """The path of an impact whose ratios of impulses change continuously; N balls, S steps."""
 
-    step_velocities: Vector  #: At each step of the integration, shape (S, N), m/s.
+    step_velocities: Vector  #: Velocities at each step of the integration, shape (S, N), m/s.
     step_impulses: Vector  #: Impulses so far at each step, shape (S, N - 1), N s.
-    evaluations: int  #: How often the ratios were evaluated.
+    evaluations: int  #: How often the proportions of the impulses were evaluated.
 
     def curve(self) -> tuple[Vector, Vector]:
         """Return impulses and velocities at the steps of the integration, and at the end."""
@@ -49,16 +49,15 @@ class EnergyDistribution:
         dP_j / dP_i = (k_j / k_i)^(1 / (1 + p)) (E_j / E_i)^(p / (1 + p))
 
     E is the energy that a contact stores.  With the closing speed u it changes by ``dE = u dP`` in
-    compression (u > 0) and by ``dE = u dP / e^2`` in release (u < 0), so it is used up when the
+    compression (u > 0) and by ``dE = u dP / e^2`` in expansion (u < 0), so it is used up when the
     part e^2 of the work absorbed has been given back.  With e = 0 it is lost at u = 0: the contact
     ends there, and closes anew if a neighbour pushes on.  A contact that has ended leaves a gap,
     which must close before it acts again.
 
-    A spring with the force ``F = k x^p`` stores ``E = k x^(p+1) / (p + 1)``, so impulses grow like
-    forces of springs, ``dP = F dt`` with a common t, where ``dx/dt = u`` in compression and
-    ``u / e^2`` in release.  The model is solved in this form, in which nothing is singular at
-    E = 0.  A value outside its range raises a ValueError; so does, on solving, a chain that does
-    not suit the values.
+    A spring with the force ``F = k x^p`` stores ``E = k x^(p+1) / (p + 1)``.  So impulses grow like
+    those of springs, ``dP = F dt`` with a common t, where ``dx/dt = u`` in compression and
+    ``u / e^2`` in expansion; in this form, regular at E = 0, the model is solved.  A value outside
+    its range raises a ValueError, and so does a chain that does not suit the values.
 
     Parameters
     ----------
@@ -70,11 +69,11 @@ class EnergyDistribution:
         Relative tolerance of the integration, 3e-14 to 0.1.  When all speeds that are left lie
         below rtol times the fastest closing speed, the impact is ended plastically.
     max_evaluations : int
-        How often the ratios may be evaluated; beyond that `ImpactNotFinished` is raised.
+        How often dP_j / dP_i may be evaluated; beyond that `ImpactNotFinished` is raised.
 
     Examples
     --------
-    >>> from cradle import Chain, collide
+    >>> from cradle import Chain, EnergyDistribution, collide
     >>> collide(Chain([1, 1, 1], [1, 0, 0], 1), EnergyDistribution(1.0)).velocities.round(6)
     array([-0.070952,  0.076403,  0.994549])
     """

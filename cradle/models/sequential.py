@@ -13,15 +13,14 @@ from cradle.trace import Event, ImpactNotFinished, Trace
 
 @dataclass(frozen=True)
 class SequentialCollisions:
-    """One collision of two balls after another (Johnson; Han and Gilmore's second answer).
+    """One collision of two balls after another (Eq. 6): Han and Gilmore's second answer.
 
-    While two balls collide the contacts beside them get no impulse, as with
-    ``ImpulseCorrelation(0)``, which solves it (Johnson, Int. J. Mech. Eng. Educ. 4 (1976); Han and
-    Gilmore, J. Mech. Design 115 (1993) 412-422; Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001)
-    575-583, Eq. 6).  Afterwards either of these contacts may collide; one between two collisions
-    waits until both have ended.  Collisions that do not touch have no common clock: which of them
-    ends first is decided by rule R8 of the book's chapter 6.  A value outside its range raises a
-    `ValueError`.
+    While two balls collide, the contacts beside them get no impulse.  That is the ratio 0, and
+    ``ImpulseCorrelation(0)`` solves it (Johnson, Int. J. Mech. Eng. Educ. 4 (1976); Han and
+    Gilmore, J. Mech. Design 115 (1993) 412-422).  Afterwards either of these contacts may collide;
+    one between two collisions waits until both have ended.  Collisions that share no ball have no
+    common clock: which of them ends first is decided by rule R8 of the book's chapter 6.  A value
+    outside its range raises a `ValueError`.
 
     Parameters
     ----------
@@ -33,7 +32,7 @@ class SequentialCollisions:
 
     Examples
     --------
-    >>> from cradle import Chain, collide
+    >>> from cradle import Chain, SequentialCollisions, collide
     >>> chain = Chain([1, 2, 1], [1, 0, -1], 1)
     >>> for order in ("left", "right"):
     ...     print(collide(chain, SequentialCollisions(order)).velocities.round(3).tolist())
@@ -75,17 +74,17 @@ class SequentialCollisions:
 
 @dataclass(frozen=True)
 class FusedChain:
-    """The balls on either side of the struck contact move as one body: Han and Gilmore's first.
+    """The balls on each side of the struck contact move as one body (Eq. 5).
 
-    One contact approaches.  All balls on its left and all on its right collide like two bodies,
-    with the restitution of that contact (Eq. 5; references as for `SequentialCollisions`).  This is
-    the largest admissible ratio at every ball (Eq. 53), so it is solved by
-    ``ImpulseCorrelation(1, excess="saturate")``.  If a second contact approaches or one opens, it
-    is not clear which balls are one body, and a `ValueError` is raised.
+    This is Han and Gilmore's first answer (cited at `SequentialCollisions`).  All balls on the left
+    of the contact that closes, and all on its right, collide like two bodies, with the restitution
+    of that contact.  That is the largest admissible ratio at every ball (Eq. 53), and
+    ``ImpulseCorrelation(1, excess="saturate")`` solves it.  If a second contact closes or one
+    opens, it is not clear which balls are one body, and a `ValueError` is raised.
 
     Examples
     --------
-    >>> from cradle import Chain, collide
+    >>> from cradle import Chain, FusedChain, collide
     >>> collide(Chain([1, 1, 1], [1, 0, 0], 1), FusedChain()).velocities.round(3).tolist()
     [-0.333, 0.667, 0.667]
     """

@@ -27,14 +27,14 @@ class SpeedDependent:
     In one impact each contact has one restitution: e(u) at its largest closing speed during the
     impact.  That speed depends on the restitution, so the impact is solved again until both agree;
     ``trace.chain`` has the restitution found.  The chain given must have restitution 1.  Errors are
-    those of `model`; if 50 runs do not agree, or the path is cut, an `ImpactNotFinished`.
+    those of `model`; if 50 runs do not agree or the path is cut, `ImpactNotFinished` is raised.
 
     Parameters
     ----------
     model : Model
-        The law, such as `SequentialCollisions`.
+        The impact law, such as `SequentialCollisions`.
     restitution : callable
-        From u above 0 to e in [0, 1], for all contacts: `ConstantLoss`, `ViscousLoss`, a function.
+        Takes u above 0, returns e in [0, 1]: `ConstantLoss`, `ViscousLoss` or your own function.
 
     Examples
     --------
@@ -76,7 +76,7 @@ class SpeedDependent:
 
 @dataclass(frozen=True)
 class ConstantLoss:
-    """Restitution ``e = max(0, 1 - speed / u)``: balls part by `speed` slower than they close, m/s.
+    """Restitution ``max(0, 1 - speed / u)``: balls part by `speed`, m/s, slower than they close.
 
     Examples
     --------
@@ -102,9 +102,9 @@ class ViscousLoss:
     Parameters
     ----------
     viscosity, stiffness, exponent : float
-        A, s, k, N/m^p, and p, as for `spring_velocities`.
+        A in s, k in N/m^p, and p, as for `spring_velocities`.
     masses : sequence of two floats
-        kg.
+        Masses of the two balls, kg.
 
     Examples
     --------
@@ -149,9 +149,8 @@ def viscosity_from(
     """Viscosity of contacts whose pairs of balls, alone, have a restitution at a stated speed.
 
     Such balls lose more the faster they close (except viscoelastic ones with p = 1), so a
-    restitution belongs to one speed.  In a contact's own units it depends on the viscosity alone,
-    which is searched for; by Hunt and Crossley's law it depends on A times the speed, whatever the
-    masses, k and p.  Leading axes broadcast.
+    restitution belongs to one speed.  The viscosity that gives it is found by a search.  By Hunt
+    and Crossley's law restitution depends on A times the speed only.  Leading axes broadcast.
 
     Parameters
     ----------
@@ -160,14 +159,14 @@ def viscosity_from(
     speed : float
         Closing speed, m/s, above 0.
     masses : array_like, shape (..., N)
-        kg.
+        Masses, kg.
     stiffness, exponent, damping
         As for `spring_velocities`.
 
     Returns
     -------
     ndarray, shape (..., N - 1)
-        A, s or s/m, as `SpringChain` and `spring_velocities` take it.
+        A in s, or s/m by Hunt and Crossley, for `SpringChain` and `spring_velocities`.
 
     Raises
     ------
@@ -181,9 +180,8 @@ def viscosity_from(
 
     Examples
     --------
-    Steel balls of 45 g that part from each other with 97 % of .3 m/s:
-
-    >>> viscosity_from(0.97, speed=0.3, masses=[0.045] * 3, stiffness=1e10).round(9)
+    >>> from cradle import viscosity_from
+    >>> viscosity_from(0.97, speed=0.3, masses=[0.045] * 3, stiffness=1e10).round(9)  # steel
     array([4.93e-07, 4.93e-07])
     """
     from scipy.optimize import brentq

@@ -47,26 +47,24 @@ def refused(clock: Any, law: Law, place: Sequence[int], chain: Springs) -> Value
 class TimedTrace(EnergyTrace):
     """The path of an impact that has a time, by curves; N balls, K events, S steps.
 
-    The outcome has the accuracy asked for; the way is less exact near a closing or an opening.
+    The outcome has the accuracy asked for; its path is less exact near a closing or an opening.
 
     Attributes
     ----------
     times, forces : ndarray, shapes (K + 1,) and (K + 1, N - 1)
-        Time of each row of the path, s, from 0 on; and contact forces there, N.  With losses a
-        force is largest before the compression is: `step_forces.max(axis=0)`.
+        Time of each row of the path, s, from 0 on; and contact forces there, N.  The largest force
+        is ``step_forces.max(axis=0)``: with losses it comes before the largest compression.
     durations : ndarray, shape (N - 1,)
         Time that each contact was closed, over all its collisions, s.
     step_times, step_forces, step_velocities, step_impulses : ndarray, (S,) and (S, N - 1 or N)
-        The curves at the steps: s, N, m/s, and N s so far.
+        The curves, at the steps of the solver: time, s; forces, N; velocities, m/s; impulses, N s.
     evaluations, error : int and float
-        Steps of all runs; estimated error of a velocity, relative to the fastest closing.
+        Steps of all runs; estimated error of a velocity, over the fastest closing speed.
 
     Examples
     --------
-    The duration of a contact of two balls on a linear spring is pi sqrt(mu / k):
-
     >>> from cradle import Chain, SpringChain, collide
-    >>> collide(Chain([2, 2], [1, 0]), SpringChain(1.0, exponent=1)).durations.round(6)
+    >>> collide(Chain([2, 2], [1, 0]), SpringChain(1.0, exponent=1)).durations.round(6)  # pi
     array([3.141593])
     """
 

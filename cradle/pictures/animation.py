@@ -41,25 +41,25 @@ def animate_swing(
 ) -> "Animation":  # fmt: skip
     """Show one swing or several, one below the other or in columns, by the same clock.
 
-    A run without a duration, another number of labels than of runs, and a number out of range
-    raise a ValueError.
+    A run of no duration, other than one label a run, and a wrong number raise a ValueError.
 
     Parameters
     ----------
     runs : Swing or sequence of Swing
-        Their times are the keyframes, with the impacts in between: twenty in a swing suffice.
+        Their times and impacts are the keyframes: twenty times in each swing suffice.
     labels, alt : sequence of str, str
-        A line of text above each; what the picture shows, for those who do not see it.
+        A line of text above each run; and what the picture shows, for those who do not see it.
     speed : float
         1 plays in real time, less in slow motion.
     still : float
-        What print and readers who ask for less motion see, s after the first of the times.
+        The moment that print shows, and readers who ask for less motion; s after the first time.
     columns : int
-        How many stand side by side.
+        How many runs stand side by side.
 
     Examples
     --------
     >>> from cradle import Chain, ImpulseCorrelation, swing
+    >>> from cradle.pictures.animation import animate_swing
     >>> run = swing(Chain([1] * 3, [0] * 3), ImpulseCorrelation(0), [-0.03, 0, 0], [0, 0.1, 0.2])
     >>> animate_swing(run).svg.count("@keyframes")
     3
@@ -132,10 +132,10 @@ def _swing(
 
 @dataclass(frozen=True)
 class Animation:
-    """A moving picture: `svg`, and the same as a figure of matplotlib with the moves of its parts.
+    """A moving picture: its text `svg`, and a `figure` of matplotlib with the `moves` of its parts.
 
-    A notebook shows it with a box to tick for a pause.  In a page it is part of the page, not an
-    image file: browsers tell image files neither that they are printed nor that they should pause.
+    A notebook shows it with a box to tick for a pause.  Put the text itself into a web page: an
+    image file would not stop for print or for readers who ask for less motion.
     """
 
     svg: str
@@ -155,9 +155,9 @@ class Animation:
         return f"Animation({len(self.svg.encode()) / 1000:.0f} kB)"
 
     def save(self, path: str | Path) -> None:
-        """Write ``.svg``, ``.html``, a film ``.gif`` or ``.mp4``, or the still as ``.png``.
+        """Write a file by the end of its name: .svg, .html, .gif, .mp4, or .png for the still.
 
-        If `path` ends otherwise, or a film needs a program that is missing, a ValueError is raised.
+        Another end, or a film that needs a program that is missing, raises a ValueError.
         """
         file = Path(path)
         kind = file.suffix.lower()

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from cradle.input.values import ArrayLike, Vector, must_be, whole_number
 from cradle.trace import Trace
 
-#: Colours of Okabe and Ito, told apart by colour-blind readers; in an order of changing lightness.
+#: Colours of Okabe and Ito, which colour-blind readers can tell apart, in changing lightness.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 
 _DASHES: tuple[Any, ...] = (
@@ -34,10 +34,11 @@ EVENT_STYLES = {
 
 
 def ball_style(ball: int) -> dict[str, Any]:
-    """Return colour and dash of a ball from 0, for `Axes.plot`; they repeat after seven balls.
+    """Return the colour and dash of a ball for `Axes.plot`; they repeat after seven balls.
 
     Examples
     --------
+    >>> from cradle.pictures.impacts import ball_style
     >>> ball_style(0)
     {'color': '#0072B2', 'linestyle': 'solid'}
     """
@@ -73,12 +74,12 @@ def _lines(ax: Axes | None, over: str, x: Vector, path: Vector, balls: Sequence[
 def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     """Draw the velocities of all balls against the progress of the impact.
 
-    For springs they are curves: lines join the steps of the integration.  Without `ax` new axes are
-    made.
+    Those of springs are curves.  Without `ax` new axes are made.
 
     Examples
     --------
     >>> from cradle import collide, paper_chain
+    >>> from cradle.pictures.impacts import velocities
     >>> ax = velocities(collide(*paper_chain("AAA")))
     >>> [line.get_label() for line in ax.get_lines()]
     ['$v_1$', '$v_2$', '$v_3$']
@@ -99,14 +100,15 @@ def velocity_impulse(
 
     It shows the velocities of the contact's two balls against its impulse (sections 2.3, 2.4, 3.2).
     Where other contacts act while this one rests, its impulse does not grow, and a velocity jumps.
-    Markers and letters show the contact's events (`EVENT_STYLES`); with several collisions the
-    letter carries a number.  Contact c joins balls c and c + 1; one that is not there is refused by
-    a ValueError.  With `other` an upper axis shows the impulse of that contact, as by
-    `impulse_axis`.  Without `ax` new axes are made.
+    Markers and letters show the contact's events, as the legend says; after several collisions the
+    letters carry numbers.  A contact that the chain does not have raises a ValueError.  With
+    `other`, an upper axis shows the impulse of that contact (see `impulse_axis`).  Without `ax` new
+    axes are made.
 
     Examples
     --------
     >>> from cradle import collide, paper_chain
+    >>> from cradle.pictures.impacts import velocity_impulse
     >>> ax = velocity_impulse(collide(*paper_chain("AAA")), 1, other=0)
     >>> [line.get_label() for line in ax.get_lines()[:2]]
     ['$v_2$', '$v_3$']
@@ -158,14 +160,15 @@ def impulse_axis(
 ) -> Axes:
     """Add an upper axis with another contact's impulse to a diagram, and return its axes.
 
-    The two do not grow in proportion: each tick stands where the path of the impact has it.
-    `contact` is that of the lower axis, as drawn by `velocity_impulse`; `values` are the impulses
-    to mark, N s: if left out, those at the events, two where the lower contact rests.  A contact
-    that is not there is refused by a ValueError.
+    The two impulses do not grow in proportion: each tick stands where the path of the impact has
+    it.  `contact` is that of the lower axis, as drawn by `velocity_impulse`; `values` are the
+    impulses to mark, N s.  If left out, they are those at the events, two where the lower contact
+    rests.  A contact that the chain does not have raises a ValueError.
 
     Examples
     --------
     >>> from cradle import Chain, ImpulseCorrelation, collide
+    >>> from cradle.pictures.impacts import impulse_axis, velocity_impulse
     >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.5))
     >>> upper = impulse_axis(trace, 1, 0, velocity_impulse(trace, 1), values=[0, 1, 4 / 3])
     >>> upper.get_xticks().round(4).tolist()

@@ -199,12 +199,13 @@ def follow(
 
 @functools.cache
 def warm_up() -> None:
-    """Compile both loops, or load them compiled, if numba is there: then nothing waits for them.
+    """Compile the solvers, or load them compiled, if numba is there, so that no later call waits.
 
-    The first time on a machine takes up to a minute, afterwards a second.
+    The first time on a machine this takes up to a minute, afterwards a second.
 
     Examples
     --------
+    >>> from cradle import warm_up
     >>> warm_up()
     """
     one, still, apart, none = np.ones((1, 2)), np.zeros((1, 2)), np.ones((1, 1)), np.zeros((1, 1))

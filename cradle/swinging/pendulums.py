@@ -20,18 +20,19 @@ class Pendulums:
     Parameters
     ----------
     length, gravity : float or (length) array_like of shape (N,)
-        From each pivot to the centre of its ball, m; m/s^2.  Both above 0.
+        From each pivot to the centre of its ball, m; and g, m/s^2.  Both above 0.
     gaps : float or array_like of shape (N - 1,)
         Between the surfaces of neighbours at rest, m; 0 if they just touch.
     damping : float or array_like of shape (N,)
         Rate at which a ball's amplitude decays, 1/s; for `swing` below the frequency sqrt(g/l).
     angle : {"small", "full"}
-        "small" pendulums swing too fast: by 1 % at 0.4 rad, by 7 % at 1 rad.  "full" ones need
-        equal lengths and one damping, so that contacts stay horizontal; their gaps are counted
-        along the arcs, right near the lowest point, and let them reach a quarter of a circle.
+        "small": harmonic swings, too fast by 1 % at 0.4 rad, 7 % at 1 rad.  "full": true swings, of
+        equal lengths and one damping, so that contacts stay horizontal; gaps then are counted along
+        the arcs, right near the lowest point, and let balls go aside by a quarter of a circle.
 
     Examples
     --------
+    >>> from cradle import Pendulums
     >>> Pendulums(length=0.1).natural_frequency(5).round(3).tolist()
     [9.905, 9.905, 9.905, 9.905, 9.905]
     """

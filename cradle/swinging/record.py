@@ -14,13 +14,13 @@ from cradle.trace import Trace, compared_as_objects
 class Impact(NamedTuple):
     """One impact of a swing."""
 
-    time: float  #: s since the release
-    contacts: tuple[int, ...]  #: those that touched, in stretches with an approaching one
-    positions: Vector  #: where the balls were, shape (N,), m
-    before: Vector  #: velocities just before, shape (N,), m/s
-    after: Vector  #: velocities just after, shape (N,), m/s
-    energy_loss: float  #: what the contacts kept back, J
-    traces: tuple[Trace, ...]  #: one of each chain that collided; see `Trace.left_out`
+    time: float  #: When it happened, s since the release.
+    contacts: tuple[int, ...]  #: All contacts of the groups of touching balls that collided.
+    positions: Vector  #: Where the balls were, shape (N,), m.
+    before: Vector  #: Velocities just before, shape (N,), m/s.
+    after: Vector  #: Velocities just after, shape (N,), m/s.
+    energy_loss: float  #: Energy that the contacts kept back, J.
+    traces: tuple[Trace, ...]  #: What `collide` returned for each group of touching balls.
 
     def __repr__(self) -> str:
         speeds = f"before={as_text(self.before)}, after={as_text(self.after)}"
@@ -33,7 +33,7 @@ class Swing:
 
     Examples
     --------
-    >>> from cradle import ImpulseCorrelation, swing
+    >>> from cradle import Chain, ImpulseCorrelation, swing
     >>> run = swing(Chain([1, 1], [-1, 0], 1), ImpulseCorrelation(0), [0, 0], [0, 0.5])
     >>> run
     Swing(2 times to 0.5 s, 1 impacts, ended by times)
@@ -44,13 +44,13 @@ class Swing:
     chain: Chain
     model: Any
     pendulums: Pendulums
-    times: Vector  #: s since the release, shape (T,); those asked for, up to the end of the run
-    positions: Vector  #: along each ball's arc from its lowest point, shape (T, N), m
-    velocities: Vector  #: shape (T, N), m/s; after an impact at that instant
-    impacts: tuple[Impact, ...]  #: in the order in which they happened
-    ended: str  #: what ended the run, "times" or "impacts" (`max_impacts`)
-    end: float  #: when it ended, s
-    together: tuple[int, ...]  #: contacts whose balls moved together at the end
+    times: Vector  #: The times asked for, up to the end of the run; s since the release, (T,).
+    positions: Vector  #: Places along each ball's arc from its lowest point, shape (T, N), m.
+    velocities: Vector  #: Velocities, after an impact at that instant, shape (T, N), m/s.
+    impacts: tuple[Impact, ...]  #: All impacts, in the order in which they happened.
+    ended: str  #: What ended the run: "times", or "impacts" (`max_impacts`).
+    end: float  #: When the run ended, s.
+    together: tuple[int, ...]  #: Contacts whose balls moved together at the end.
 
     @property
     def energy(self) -> Vector:

@@ -18,9 +18,9 @@ import numpy as np
 from cradle.input.values import NDArray, Vector
 from cradle.swinging.pendulums import mean
 
-#: Speeds below this part of the swing's speed are none, as they carry 1e-20 of its energy.
+#: Balls whose relative speed is below this part of the swing's speed rest against each other.
 RESTING = 1e-10
-#: Gaps below this part of the swing's size are none.
+#: Balls whose gap is below this part of the swing's size touch.
 NEAR = 1e-12
 
 

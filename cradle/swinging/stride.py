@@ -32,12 +32,12 @@ Plane = NDArray[np.complexfloating[Any, Any]]
 class Hit(NamedTuple):
     """One impact of a row, as `Row.on_hit` is told of it."""
 
-    time: float  #: s, of the steps since the row was made
-    balls: range  #: those that touched each other
-    before: Vector  #: their velocities along the row, from left to right, m/s
-    after: Vector  #: the same after the impact, m/s
-    loudest: int  #: the contact of the largest impulse, that of this ball and the next one
-    impulse: float  #: of that contact, N s
+    time: float  #: When it happened, s of steps since the row was made.
+    balls: range  #: The balls that took part; they touched each other.
+    before: Vector  #: Their velocities along the row just before, left to right, m/s.
+    after: Vector  #: Their velocities just after, m/s.
+    loudest: int  #: The contact with the largest impulse: that of this ball and the next one.
+    impulse: float  #: The impulse of that contact, N s.
 
 
 #: What the contacts of a step do to the balls' own velocities, m/s: all of it, and the part that,

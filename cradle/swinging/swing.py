@@ -30,25 +30,25 @@ def swing(
     chain: Chain, model: Model, positions: ArrayLike, times: ArrayLike, *,
     pendulums: Pendulums | None = None, max_impacts: int = 100_000,
 ) -> Swing:  # fmt: skip
-    """Let a cradle swing.
+    """Let a cradle swing: pendulums between impacts, and the impacts by any law.
 
     Parameters
     ----------
     chain : Chain
         Masses, restitution, and the velocities at the release (usually zeros).
     model : Model
-        The impact law, such as `ImpulseCorrelation`.  Where a part of the chain collides alone, the
-        law keeps that part's values, with ``excess="saturate"`` if it has that field.  Impacts take
-        no time, except those of `SpringChain`, which sees the gaps that close meanwhile; if its
-        contacts last some .01 rad of the swing, or a strike .1 rad, they take none either.
+        The impact law, such as `ImpulseCorrelation`.  If a part of the chain collides alone, the
+        law is used with the values of that part, and with ``excess="saturate"`` if it has that
+        field.  Impacts take no time.  Those of `SpringChain` do, and gaps may close meanwhile: if
+        with w = sqrt(g/l) a contact lasts less than about 0.01 / w, and a strike less than 0.1 / w.
     positions : array_like, shape (N,)
         Where the balls are released, along their arcs from their lowest points, m; positive to the
         right.  At most a quarter of a circle; with ``angle="full"`` and no gaps less than half one.
     times : array_like, shape (T,)
-        When to report positions and velocities, s since the release; rising, from 0 on.  During a
-        strike that takes time those at its end are reported.
+        When to report positions and velocities, s since the release; rising, from 0 on.  At times
+        within a strike that takes time, those at its end are reported.
     pendulums : Pendulums, optional
-        How the balls hang; small angles, 0.1 m, no gaps, no damping if left out.
+        How the balls hang; if left out, at 0.1 m, without gaps and damping, for small angles.
     max_impacts : int
         End the run after this number of impacts.
 
@@ -60,17 +60,15 @@ def swing(
         If a value is wrong, balls overlap, a ball at small angles swings farther aside than it may
         be released, or the model cannot treat an impact.
     RuntimeError
-        If contacts open and close without end at one instant, or the check of all flights and
-        instants fails: balls pass each other or go over the top, energy or momentum is not kept.
+        If contacts open and close without end at one instant; or if the check of the whole run
+        fails: balls pass each other or go over the top, energy or momentum is not kept.
 
     Examples
     --------
-    Two balls are pulled back, and two fly off:
-
-    >>> from cradle import ImpulseCorrelation
+    >>> from cradle import Chain, ImpulseCorrelation, swing
     >>> balls = Chain([1] * 5, [0] * 5, 1)
     >>> run = swing(balls, ImpulseCorrelation(0), [-0.02, -0.02, 0, 0, 0], [0, 0.3])
-    >>> abs(run.positions[-1] * 1000).round(1).tolist()
+    >>> abs(run.positions[-1] * 1000).round(1).tolist()  # two pulled back, two fly off
     [0.0, 0.0, 0.0, 19.7, 19.7]
     """
     n = len(must_be(Chain, "chain", chain))
