@@ -25,7 +25,7 @@ class Chain:
     Parameters
     ----------
     masses, velocities : array_like, shape (N,)
-        Of the N >= 2 balls from left to right: kg, above 0, and m/s.
+        Masses, kg, above 0, and velocities, m/s, of two or more balls from left to right.
     restitution : float or array_like, shape (N - 1,)
         Energetic coefficient of restitution of each contact (Stronge, 1990), from 1e-30 to 1, or 0.
         If left out, it is 1: the balls are elastic and lose nothing.

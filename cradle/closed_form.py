@@ -73,7 +73,7 @@ def three_balls(
 def final_impulses(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, ratio: ArrayLike
 ) -> tuple[Vector, Vector]:
-    """Return the final impulses tau_2 and tau_3 of `three_balls`, N s, shapes (...) (Eqs. 24, 30).
+    """Return the final impulses of `three_balls`, N s, shapes (...) (equations 24 and 30).
 
     Arguments and errors are those of `three_balls`; where its balls 2 and 3 are NaN, tau_3 is.
 
@@ -89,9 +89,9 @@ def final_impulses(
 def one_collision_each(
     masses: ArrayLike, velocities: ArrayLike, restitution: ArrayLike, ratio: ArrayLike
 ) -> NDArray[np.bool_]:
-    """Tell where three balls collide once per contact, so that Eqs. 30-33 hold (Eqs. 34, 43, 44).
+    """Tell where three balls collide once per contact, so that equations 30 to 33 hold.
 
-    Contact 2-3 must still close when contact 1-2 ends, and ball 2 not fall back on ball 1.
+    Contact 2-3 must still close when contact 1-2 ends, ball 2 not fall back (Eqs. 34, 43, 44).
     Arguments and errors are those of `three_balls`; the answer, shape (...), is False for its NaN.
 
     Examples
@@ -145,7 +145,7 @@ def largest_ratios(
 
 
 def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLike) -> Vector:
-    """Mass ratio r1 = m2/m1 at and below which ball 2 falls back on ball 1 (Eq. 44, Fig. 6).
+    """Mass ratio r1 = m2/m1 at and below which ball 2 falls back on ball 1 (equation 44, figure 6).
 
     The arguments broadcast: the mass ratio r2 = m2/m3, at least 0, the restitution of the two
     contacts, e2 at least 1e-30, and the forward ratio, all 0 to 1; others raise a `ValueError`.
@@ -165,7 +165,7 @@ def back_impact_line(r2: ArrayLike, e2: ArrayLike, e3: ArrayLike, ratio: ArrayLi
 
 
 def first_ball_stops(e2: float, ratio: float) -> float:
-    """Mass ratio r1 = m2/m1 at which ball 1 is left at rest (Eq. 45).
+    """Mass ratio r1 = m2/m1 at which ball 1 is left at rest (equation 45).
 
     The restitution of contact 1-2 is 1e-30 to 1, the forward ratio 0 to 1; else a `ValueError`.
 
@@ -179,7 +179,7 @@ def first_ball_stops(e2: float, ratio: float) -> float:
 
 
 def middle_ball_stops(e3: float, ratio: float) -> float:
-    """Mass ratio r2 = m2/m3 at which ball 2 is left at rest (Eq. 46).
+    """Mass ratio r2 = m2/m3 at which ball 2 is left at rest (equation 46).
 
     The restitution of contact 2-3 and the forward ratio are 0 to 1; else a `ValueError`.
 

@@ -32,7 +32,7 @@ def data_folder() -> "Traversable":
 
 @cache
 def table_rows(name: str) -> tuple[dict[str, str], ...]:
-    """Return the rows of a file of the data, texts by column."""
+    """Return the rows of a data file, such as "benchmarks.csv", as texts by column."""
     with (data_folder() / name).open(encoding="utf-8") as file:
         return tuple(csv.DictReader(file))
 

@@ -70,7 +70,7 @@ def post_impact_velocities(
 
 @compared_as_objects
 class Outcomes(NamedTuple):
-    """The outcomes of a batch."""
+    """What `outcomes` returns: velocities after the impacts, collisions, margins."""
 
     velocities: Vector  #: Velocities after the impact, shape (..., N), m/s.
     collisions: NDArray[np.int64]  #: How often each contact became active, shape (..., N - 1).

@@ -33,7 +33,7 @@ _CHUNK = 2048  # chains at once
 
 @dataclass(frozen=True)
 class SpringChain:
-    """Balls on massless springs (Eqs. 7-11): the contact forces, followed in time.
+    """Balls on massless springs (equations 7-11): the contact forces, followed in time.
 
     The laws of force are those of `spring_velocities`.  In the trace, `absorbed` is the energy that
     a contact stores at each maximum of its compression, less that at a minimum between two maxima.

@@ -26,7 +26,7 @@ _event = functools.cache(lambda kind, contact: Event(_KINDS[kind], contact))
 
 @dataclass(frozen=True)
 class ImpulseCorrelation:
-    """The paper's rule: Impulse Correlation Ratio and energetic restitution (Eqs. 16, 47-53).
+    """The paper's rule: Impulse Correlation Ratio and energetic restitution (equations 16, 47-53).
 
     At an interior ball one contact drives the other: for each unit of its impulse the driven one
     receives the ratio (Ceanga and Hurmuzlu, J. Appl. Mech. 68 (2001) 575-583).  A contact ends when

@@ -15,7 +15,7 @@ _LARGEST, _LIGHTEST = 1e9, 1e-6  # beyond these the equations of a problem keep 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DissipationTrace(Trace):
-    """The outcome of an impact that has no phases: all contacts end at one instant.
+    """The trace of an impact by `QuadraticDissipation`: all contacts end at one instant.
 
     Here `absorbed` is the net work that each contact takes from the balls, J: its impulse times the
     mean of its closing speeds before and after.  It is below zero if a contact does work on them.

@@ -27,7 +27,7 @@ def fastest(chain: Chain) -> tuple[int, float, float]:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class EnergyTrace(Trace):
-    """The path of an impact whose ratios of impulses change continuously; N balls, S steps."""
+    """The trace of an impact by `EnergyDistribution`, with its curves at S steps."""
 
     step_velocities: Vector  #: Velocities at each step of the integration, shape (S, N), m/s.
     step_impulses: Vector  #: Impulses so far at each step, shape (S, N - 1), N s.

@@ -13,7 +13,7 @@ from cradle.trace import Event, ImpactNotFinished, Trace
 
 @dataclass(frozen=True)
 class SequentialCollisions:
-    """One collision of two balls after another (Eq. 6): Han and Gilmore's second answer.
+    """One collision of two balls after another (equation 6): Han and Gilmore's second answer.
 
     While two balls collide, the contacts beside them get no impulse.  That is the ratio 0, and
     ``ImpulseCorrelation(0)`` solves it (Johnson, Int. J. Mech. Eng. Educ. 4 (1976); Han and
@@ -74,7 +74,7 @@ class SequentialCollisions:
 
 @dataclass(frozen=True)
 class FusedChain:
-    """The balls on each side of the struck contact move as one body (Eq. 5).
+    """The balls on each side of the struck contact move as one body (equation 5).
 
     This is Han and Gilmore's first answer (cited at `SequentialCollisions`).  All balls on the left
     of the contact that closes, and all on its right, collide like two bodies, with the restitution

@@ -45,7 +45,7 @@ def refused(clock: Any, law: Law, place: Sequence[int], chain: Springs) -> Value
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class TimedTrace(EnergyTrace):
-    """The path of an impact that has a time, by curves; N balls, K events, S steps.
+    """The trace of an impact that takes time: forces and curves; N balls, K events, S steps.
 
     The outcome has the accuracy asked for; its path is less exact near a closing or an opening.
 

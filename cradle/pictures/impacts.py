@@ -96,7 +96,7 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
 def velocity_impulse(
     trace: Trace, contact: int, ax: Axes | None = None, *, other: int | None = None
 ) -> Axes:
-    """Draw the velocity-impulse diagram of one contact, as in the paper's Figs. 3, 5 and 8.
+    """Draw the velocity-impulse diagram of one contact, as in the paper's figures 3, 5 and 8.
 
     It shows the velocities of the contact's two balls against its impulse (sections 2.3, 2.4, 3.2).
     Where other contacts act while this one rests, its impulse does not grow, and a velocity jumps.

@@ -29,7 +29,7 @@ class Impact(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Swing:
-    """A swing of N balls at T times, and its impacts; `chain`, `model`, `pendulums` as given.
+    """What `swing` returns: N balls at T times, and the impacts; `chain`, `model` as given.
 
     Examples
     --------
