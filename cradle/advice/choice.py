@@ -53,16 +53,16 @@ class Recommendation:
 
     chain: Chain = field(compare=False)  #: The balls, as the model takes them.
     model: Model  #: The model, ready for `collide`.
-    setting: str  #: Its setting: integrator and tolerance, one call or a batch.
+    setting: str  #: Its setting, that is integrator and tolerance, one call or a batch.
     call: str  #: The call to write.
     #: Largest distance of a velocity from the exact answer of the same model on the chains of
     #: `measured_on`, as a part of the closing speed; another chain may have a few times as much.
     numerical_error: float | None
     #: Its distance from Hertz springs, the theory of elastic spheres (equal ones, unless
-    #: `stiffness` says otherwise): no setting makes it smaller.  With losses it is None.
+    #: `stiffness` says otherwise); no setting makes it smaller.  With losses it is None.
     model_error: float | None
     seconds: float | None  #: Time of one impact where it was measured, to a factor of two.
-    #: The chains measured: this very one, or those around it, of which the worst counts.
+    #: The chains measured, this very one or those around it, of which the worst counts.
     measured_on: tuple[str, ...]
     reason: str  #: Why it is this model.
 

@@ -29,7 +29,7 @@ class Velocities(NamedTuple):
     scatter: float  #: Standard deviation of the marks about the motion fitted, m.
     window: float  #: How much time on either side was used, s.
     probability: float  #: Chance that marks are off at least as much if the motion fitted is right.
-    #: Marks off by more than chance allows: (ball, counted from 0; time, s; how far, m) of each.
+    #: Marks off by more than chance allows, each as (ball, from 0; time, s; how far off, m).
     strays: tuple[_Stray, ...] = ()
 
 

@@ -25,7 +25,7 @@ class LawFit:
     #: 95 % interval of each, by profiles of chi-square; it spans those about all the minima.
     intervals: Mapping[str, tuple[float, float]]
     minima: tuple[Mapping[str, float | None], ...]  #: Other values that explain the shots.
-    residuals: Mapping[str, Vector]  #: Of each set: (measured - computed) / error, shape (K, N).
+    residuals: Mapping[str, Vector]  #: By sets, (measured - computed) / error, shape (K, N).
     chi_square: float  #: Lowest chi-square.
     degrees_of_freedom: int  #: Number of velocities measured after impacts, less numbers fitted.
 

@@ -32,7 +32,7 @@ class Estimate:
     kind: str  #: "restitution", "ratio", or "swing" for the numbers of `fit_swing`.
     key: Key  #: Types of the balls; for a swing, the name of the number.
     value: float | None  #: The best value, where chi-square is lowest; None if data tell nothing.
-    #: The 95 % confidence set by profile likelihood: one interval (lower, upper), or several.
+    #: The 95 % confidence set by profile likelihood, one interval (lower, upper) or several.
     intervals: tuple[tuple[float, float], ...]
     modes: tuple[Mode, ...]  #: All minima of chi-square that were found, lowest first.
     identified: bool  #: False if the confidence set covers the whole range.

@@ -35,10 +35,10 @@ class SwingFit:
     estimates: Mapping[str, Estimate]  #: The same, with profiles of chi-square.
     swing: Swing  #: The swing that fits best; its times begin with the first frame.
     residuals: Vector  #: Filmed less computed, less the mean of each ball, shape (K, N), m.
-    reading: float  #: Standard error of a reading, m: as given, or that of the residuals.
+    reading: float  #: Standard error of a reading, m, as given or that of the residuals.
     chi_square: float | None  #: That of the residuals; None if `reading` was found from them.
     degrees_of_freedom: int  #: Number of readings, less what was fitted to them.
-    correlation: float  #: That of a ball's residuals in successive frames: near 0 if the law fits.
+    correlation: float  #: Of a ball's residuals in successive frames, near 0 if the law fits.
     poor: bool  #: Whether the law does not fit.
     widened: Mapping[str, float]  #: Factors by which intervals were widened as it does not fit.
 

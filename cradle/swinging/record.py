@@ -48,7 +48,7 @@ class Swing:
     positions: Vector  #: Places along each ball's arc from its lowest point, shape (T, N), m.
     velocities: Vector  #: Velocities, after an impact at that instant, shape (T, N), m/s.
     impacts: tuple[Impact, ...]  #: All impacts, in the order in which they happened.
-    ended: str  #: What ended the run: "times", or "impacts" (`max_impacts`).
+    ended: str  #: What ended the run, "times" or "impacts" (`max_impacts`).
     end: float  #: When the run ended, s.
     together: tuple[int, ...]  #: Contacts whose balls moved together at the end.
 

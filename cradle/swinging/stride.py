@@ -36,7 +36,7 @@ class Hit(NamedTuple):
     balls: range  #: The balls that took part; they touched each other.
     before: Vector  #: Their velocities along the row just before, left to right, m/s.
     after: Vector  #: Their velocities just after, m/s.
-    loudest: int  #: The contact with the largest impulse: that of this ball and the next one.
+    loudest: int  #: The contact with the largest impulse, that of this ball and the next one.
     impulse: float  #: The impulse of that contact, N s.
 
 
