@@ -59,12 +59,12 @@ class Estimate:
 
     @property
     def standard_error(self) -> float:
-        """Total length of the confidence set over 3.92: the standard error of a bell curve."""
+        """Total length of the confidence set over 3.92, which is right for a bell curve."""
         return sum(high - low for low, high in self.intervals) / (2.0 * float(np.sqrt(RISE)))
 
     @property
     def folded(self) -> bool:
-        """Whether chi-square is far from a parabola: the set may then hold 90 %, not 95.
+        """Whether chi-square is far from a parabola, so that the set may hold 90 %, not 95.
 
         That happens near a fold, a ratio at which the order of the impact's events changes.
         """
