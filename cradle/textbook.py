@@ -1,7 +1,7 @@
 """The rules of an impact, to be read first: how a chain of touching balls parts.
 
-Rules R1 to R8 of the book's chapter on N balls, in numbers of any type: floats, or what `number` of
-`solve` makes.  R9 is left out: endless impacts go on to the last digits, or to an `EventLimit`.
+Rules R1 to R8 of the book, in numbers of any type: floats, or what `number` of `solve` makes.  R9
+is left out: endless impacts go on to the last digits, or to an `EventLimit`.
 
 Contact c joins balls c and c + 1.  Its closing speed u = v[c] - v[c + 1] is above 0 in compression.
 Inside a run there is no time, only progress: velocities are linear and works quadratic in it, every

@@ -247,7 +247,7 @@ def test_letters_of_the_chapters_have_one_line_on_the_notation_page():
     # The modes of chapter 2 stand beside it.
     beside = nbformat.read(BOOK / "reading_compliance.ipynb", as_version=4).cells
     (words["modes"],) = (cell.source for cell in beside if cell.id == "compliance-modes")
-    book_wide = words.pop("notation").partition("## Letters of single pages")[0]
+    book_wide = words.pop("notation")
     rows = re.findall(r"(?m)^\| ([^|]*\$[^|]*) \|", book_wide)
     symbols = [symbol.strip() for row in rows for symbol in re.split(r",|\$", row)]
     symbols = [symbol.removeprefix("\\ ") for symbol in symbols if symbol]
