@@ -55,7 +55,7 @@ def three_balls(
     Parameters
     ----------
     masses, velocities : array_like, shape (..., 3)
-        kg, above 0, and m/s, with v1 > v2 >= v3.
+        Masses, kg, above 0, and velocities before the impact, m/s, with v1 > v2 >= v3.
     restitution, ratio : array_like, shapes (..., 2) and (...)
         e2 and e3, and the forward Impulse Correlation Ratio alpha, 0 to 1.
 
@@ -115,7 +115,7 @@ def largest_ratios(
     Parameters
     ----------
     masses : array_like, shape (..., N)
-        kg, above 0; N >= 2.
+        Masses of two or more balls, kg, above 0.
     forward, backward : array_like, shape (..., N - 2)
         Ratios at the interior balls, 0 to 1; their bounds are returned, each ball's in its place.
 

@@ -32,7 +32,7 @@ def post_impact_velocities(
     Parameters
     ----------
     masses, velocities : array_like, shape (..., N)
-        kg and m/s.
+        Masses, kg, and velocities before the impact, m/s.
     restitution : array_like, shape (..., N - 1) or ()
         Energetic coefficients of restitution.
     forward, backward : array_like, shape (..., N - 2) or ()

@@ -138,7 +138,7 @@ def spring_velocities(
     Parameters
     ----------
     masses, velocities : array_like, shape (..., N)
-        kg and m/s.
+        Masses, kg, and velocities before the impact, m/s.
     stiffness, viscosity, gaps : array_like, shape (..., N - 1) or ()
         k, N/m^p, above 0; A, s, 0 for an elastic contact; and the distance of two balls before the
         impact, m.  With the speed u and the reduced mass m of the contact that closes fastest, the

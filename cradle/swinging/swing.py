@@ -39,8 +39,8 @@ def swing(
     model : Model
         The impact law, such as `ImpulseCorrelation`.  If a part of the chain collides alone, the
         law is used with the values of that part, and with ``excess="saturate"`` if it has that
-        field.  Impacts take no time.  Those of `SpringChain` do, and gaps may close meanwhile: if
-        with w = sqrt(g/l) a contact lasts less than about 0.01 / w, and a strike less than 0.1 / w.
+        field.  Only impacts by `SpringChain` take time, so that gaps may close meanwhile; beyond
+        about .01 / w a contact and .1 / w a strike they take none either, with w = sqrt(g/l).
     positions : array_like, shape (N,)
         Where the balls are released, along their arcs from their lowest points, m; positive to the
         right.  At most a quarter of a circle; with ``angle="full"`` and no gaps less than half one.
