@@ -1,11 +1,10 @@
 """The rules of an impact, to be read first: how a chain of touching balls parts.
 
 Rules R1 to R8 of the book, in numbers of any type: floats, or what `number` of `solve` makes.  R9
-is left out: endless impacts go on to the last digits, or to an `EventLimit`.
-
-Contact c joins balls c and c + 1.  Its closing speed u = v[c] - v[c + 1] is above 0 in compression.
-Inside a run there is no time, only progress: velocities are linear and works quadratic in it, every
-event is the root of a formula.  Of numbers six tenths of the digits tell a `tie` from a difference.
+is left out: endless impacts go on to the last digits, or to an `EventLimit`.  Contact c joins balls
+c and c + 1.  Its closing speed u = v[c] - v[c + 1] is above 0 in compression.  Inside a run there
+is no time, only progress: velocities are linear and works quadratic in it, every event is the root
+of a formula.  Of numbers six tenths of the digits tell a `tie` from a difference.
 """
 
 import math
