@@ -74,3 +74,11 @@ def test_what_the_pages_list_is_there():
     rows = re.findall(r"(?m)^\| (`.*?) \|", inside)
     listed = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
     assert sorted(listed) == sorted([*tops, *cradle.kernel.ROOMS])
+
+
+def test_every_word_of_the_glossary_leads_to_the_place_that_explains_it():
+    words = re.split(r"\n(?=\S)", text(BOOK / "glossary.md").split(":sorted:")[1].split("```")[0])
+    told = [entry for entry in words if "\n  " in entry]
+    assert len(told) > 60
+    place = r"\{(?:ref|doc|eq|term)\}"
+    assert [entry for entry in told if not re.search(place, entry.split("\n  ", 1)[1])] == []
