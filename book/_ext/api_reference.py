@@ -20,6 +20,7 @@ HOMES = (
     "cradle.tables",
     "cradle.pictures.impacts",
     "cradle.pictures.animation",
+    "cradle.pictures.fits",
     "cradle.textbook",
 )
 

@@ -75,7 +75,7 @@ def _draw_data(fit: Fit, shots: ShotSet, ax: Axes) -> None:
 
 
 def draw_swing(run: Swing, residuals: Vector, axes: Sequence[Axes] | None) -> Sequence[Axes]:
-    """Draw film and swing, and the residuals; see `SwingFit.plot`."""
+    """Draw a film and the swing fitted to it, and the residuals, m; see `SwingFit.plot`."""
     if axes is None:
         _, axes = plt.subplots(2, 1, figsize=(5.6, 6), layout="constrained", sharex=True)
     times, places, rest = run.times, 1000 * run.positions, 1000 * residuals
