@@ -99,8 +99,8 @@ def fit_swing(
     Examples
     --------
     >>> import numpy as np
-    >>> from cradle.fit import fit_swing
     >>> from cradle import Chain, ImpulseCorrelation, swing
+    >>> from cradle.fit import fit_swing
     >>> times, law = np.arange(0, 2.5, 0.05), ImpulseCorrelation(0)
     >>> film = swing(Chain([1, 1], [0, 0], 0.9), law, [-0.05, 0], times).positions
     >>> found = fit_swing(times, film, law, free=["restitution"], known={"period": 0.634374})
