@@ -123,7 +123,11 @@ def test_fig_beyond_map():
 def test_fig_beyond_front():
     """Above: the closed form for any length; below: a leader that slows down with every ball."""
     upper, lower = CHAPTER.figures["fig-beyond-front"].axes
-    for k, line in enumerate(points(upper)):
+    drawn = {k: [] for k in range(3)}
+    for number_of, line in enumerate(points(upper)):  # three of marks, two of the formula
+        drawn[number_of % 3].append(line)
+    assert [len(lines) for lines in drawn.values()] == [2, 2, 1]
+    for k, line in ((k, line) for k, lines in drawn.items() for line in lines):
         expected = [[*ends(ratio)[[2, 1]], 0][k] for ratio in line[:, 0]]
         # Near 1/2 the root is steep.
         np.testing.assert_allclose(line[:-1, 1], expected[:-1], rtol=0, atol=1e-12)
@@ -214,14 +218,16 @@ def test_fig_beyond_stability():
 
 def test_fig_beyond_springs():
     """Ratios by the leader and by the striker; tails and fronts."""
-    front, tail = CHAPTER.figures["fig-beyond-springs"].axes
+    along, tail = CHAPTER.figures["fig-beyond-springs"].axes
+    told = [float(a) for a in CHAPTER.glued["along-five"].split(", ")]
+    np.testing.assert_allclose(points(along)[0], list(zip((2, 3, 4), told)), atol=5.1e-5)
     best = float(CHAPTER.glued["ratio-leader"])
-    row = Chain(*struck(40), 1)
-    expected = [collide(row, SpringChain(1.0, exponent)).velocities for exponent in (1.5, 1.0)]
-    expected.append(np.concatenate([ends(best)[:1], np.zeros(37), ends(best)[1:]]))
-    for k, (v, off) in enumerate(zip(expected, (0, 0, 2e-4), strict=True)):
-        np.testing.assert_allclose(points(front)[k][:, 1], v[:-7:-1], rtol=0, atol=off)
+    spheres = collide(Chain(*struck(40), 1), SpringChain(1.0)).velocities
+    expected = spheres, np.concatenate([ends(best)[:1], np.zeros(5)])
+    for k, (v, off) in enumerate(zip(expected, (0, 2e-4), strict=True)):
         np.testing.assert_allclose(points(tail)[k][:, 1], v[:6], rtol=0, atol=off)
+    # A ratio that gives the leader is nearly right for the next balls, too.
+    assert abs(spheres[-2] - ends(best)[1]) < 0.03
     last, first, second = column(
         find("springs", exponent=1.5), "last", "first", "second_last"
     ).T  # fmt: skip
