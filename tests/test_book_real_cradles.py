@@ -144,6 +144,30 @@ def test_fig_off_and_the_table_of_three_laws():
         assert (int(both[1]), int(third[1])) == (8 - (k > 0) * 4, 4)
         if k:
             assert GLUED["both-" + ("ratios", "gaps")[k - 1]] == both[0]
+    # The other laws, strikers one by one, as they are stored.
+    file = {
+        "spheres, loss": "touching spheres, A",
+        "the same, masses": "touching spheres, A, four masses",
+        "one gap, loss": "spheres, one gap, A",
+        "pairs": "pairs, e",
+        "energy law": "energy law (Hertz), e",
+        "one ratio": "one ratio, e",
+        "one ratio, masses": "one ratio, e, four masses",
+        "ratios each way": "three ratios each way, e",
+        "ratios, four e": "three ratios, four e",
+        "ratios, masses": "three ratios, e, four masses",
+    }
+    lines = READING.printed("films-table").splitlines()[-len(file) :]
+    for line, (name, stored) in zip(lines, file.items(), strict=True):
+        row = FITS[stored, "apart", "both", "4"]
+        given, both, third = re.fullmatch(
+            name + r" +(\d+) +(\S+\u202f/\u202f\d+) +(\S+)\u202f/\u202f4", line.strip()
+        ).groups()
+        assert len(row["parameters"].split()) == int(given)
+        value, free = both.split("\u202f/\u202f")
+        assert int(free) == 8 - int(given)
+        sums = (value, chi_square(row)), (third, float(row["chi_three"]))
+        assert all(abs(float(x) - y) < (0.06 if y < 30 else 0.51) for x, y in sums)
     CHAPTER.tells({"times": sums_of("ratios") / sums_of("gaps")})
 
 
@@ -278,6 +302,11 @@ def test_gaps_and_the_distance_of_the_strikers():
         least = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": 0.02})
         assert float(anew) == pytest.approx(least.fun, abs=0.15)
         assert (float(test) > 30) == (which != "both, second")
+    tests, gaps = ([line.split()[k] for line in lines] for k in (5, 3))
+    assert AUDITS["four-miss"] == f"{tests[0]} and {tests[2]}"
+    assert AUDITS["four-pass"] == tests[1]
+    assert float(AUDITS["three-ratios"]) == pytest.approx(sums_of("ratios"), abs=0.51)
+    assert [AUDITS["gap-least"], AUDITS["gap-most"]] == [min(gaps), max(gaps)]
 
 
 def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
