@@ -228,6 +228,35 @@ def test_bands_of_the_ten_predictions():
     assert sorted(wide.values())[-2] == pytest.approx(float(FIGURES.glued["band"]), abs=0.08)
 
 
+def test_backward_ratios_and_half_a_gram():
+    """In the second solver: backward ratios of zero or one, and masses within their rounding."""
+    beside = Chapter("reading_table_2").glued
+    change = {}
+    for sequence in paper_sequences():
+        chain, model = paper_chain(sequence, excess="saturate")
+        given = [list(x) for x in (chain.masses, chain.velocities, chain.restitution)]
+        for other in (0.0, 1.0):
+            backward = [other] * len(model.backward)
+            impact = textbook.solve(*given, list(model.forward), backward)
+            off = np.array(impact.velocities, float) - floats(predicted(sequence).velocities)
+            change[other, sequence] = np.abs(off).max()
+    for other, name in ((0.0, "backward"), (1.0, "backward-most")):
+        most = max(size for (value, _), size in change.items() if value == other)
+        assert float(beside[f"experiments-{name}"]) == pytest.approx(most, abs=10**-2 / 2)
+    assert max(change, key=change.get) == (1.0, beside["experiments-backward-chain"])
+    assert float(beside["experiments-backward"]) == pytest.approx(
+        max(size for (value, _), size in change.items() if value == 0), abs=6e-4
+    )
+    chain, model = paper_chain("ABCCA", excess="saturate")
+    masses = [m + {"A": 5e-4, "C": -5e-4}.get(k, 0) for k, m in zip("ABCCA", chain.masses)]
+    rest = chain.velocities, chain.restitution, model.forward, model.backward
+    v = textbook.solve(masses, *map(list, rest)).velocities
+    ahead = float(v[4]) - float(v[3])
+    assert float(beside["experiments-half-gram-ahead"]) == pytest.approx(ahead, abs=6e-4)
+    bound = masses[4] / (masses[4] + masses[3])
+    assert float(beside["experiments-half-gram-bound"]) == pytest.approx(bound, abs=6e-4)
+
+
 def test_what_a_prediction_hangs_on():
     """By how much a change of 0.01 moves a velocity, in the second solver."""
     first, other, ratios = [], [], {}
