@@ -153,30 +153,6 @@ def test_fig_patterns_parameters():
         np.testing.assert_allclose(r1, eq_44(r2, e, a), rtol=1e-12)
 
 
-def test_fig_patterns_wedge():
-    """Each arrow is one cycle on from the one before; the last one left has no further cycle."""
-    for number, r in enumerate((0.12, 0.06)):
-        share = 1 / (1 + r)  # of the outer ball in the mass of a pair
-        arrows = panel("reading_patterns", "fig-patterns-wedge", number)
-        stays = arrows.pop("stays", None)
-        v = np.array([1.0, 0.0, 0.0])  # masses 1/r, 1, 1/r
-        for place, arrow in enumerate(arrows.values()):
-            closing = -np.diff(v)
-            np.testing.assert_allclose(arrow[1], closing / np.linalg.norm(closing), **CLOSE)
-            happens = closing[0] > 0
-            for pair, part in ((0, share), (1, 1 - share)):
-                gap = v[pair] - v[pair + 1]
-                happens &= gap > 0
-                v[pair] -= 1.5 * gap * (1 - part)
-                v[pair + 1] += 1.5 * gap * part
-            assert happens == (number == 1 or place < len(arrows) - 1)
-        assert (stays is not None) == ((1 + r) ** 2 <= 1.125)  # (1 + e)^2 / 4e
-    # The direction that stays: the arrows come near it from above and do not pass it.
-    slopes = [arrow[1, 1] / arrow[1, 0] for arrow in arrows.values()]
-    assert sorted(slopes, reverse=True) == slopes
-    assert slopes[-1] > stays[1, 1] / stays[1, 0] > slopes[-1] - 0.05
-
-
 def test_fig_patterns_micro():
     top = panel("reading_patterns", "fig-patterns-count")
     low = panel("patterns", "fig-patterns-micro")
