@@ -196,7 +196,6 @@ def test_fig_8_drawn():
     ("chapter", "figure", "chain", "ratio"),
     [
         ("multiple_impacts", "fig-own-multiple-work", ([1] * 3, [1, 0.8, 0], 0.25), 0.15),
-        ("reading_n_balls", "fig-own-n-balls-work", ([1] * 4, [1, 0.5, 0, 0], 1), 0.1),
     ],
 )
 def test_works_are_areas(chapter, figure, chain, ratio):
