@@ -355,6 +355,40 @@ def test_the_front_of_a_wave_is_watched_from_where_it_is_felt(monkeypatch):
     assert out.steps[0] < 3.5 * n
 
 
+def test_balls_that_fly_apart_far_faster_than_others_close():
+    """Their energy bounds a frequency, by a power that no double holds."""
+    for speed in (1e9, 1e15):
+        v = spring_velocities([1e9, 1, 1, 1e9], [-speed, 1, 0, speed], exponent=10)
+        assert v == pytest.approx([-speed, 0, 1, speed], rel=1e-15, abs=1e-3)
+
+
+def test_a_step_has_half_the_digits_of_a_double(monkeypatch):
+    """The last ones of a power may depend on the machine, and the outcome would with them."""
+    monkeypatch.setenv(runtime.VARIABLE, "plain")
+    steps, aim = [], control.aim
+
+    def aimed(n, law, s, clock):
+        aim(n, law, s, clock)
+        steps.append(clock.h)
+
+    monkeypatch.setattr(control, "aim", aimed)
+    for p in (1.0, 1.2, 1.5, 2.2):
+        spring_velocities([1, 2], [1, 0], exponent=p, accuracy=1e-2)
+    assert [(math.frexp(h)[0] * 2**27) % 1 for h in steps] == [0, 0, 0, 0]
+
+
+@needs_numba
+def test_a_run_that_is_compared_has_a_step_much_finer_than_the_one_before(monkeypatch):
+    """Else the two agree by nearness; long rows, in which balls collide often, show it."""
+    monkeypatch.setenv(runtime.VARIABLE, "compiled")
+    m, k = (magnitudes(np.random.default_rng(21), 1, (60, n)) for n in (20, 19))
+    v = np.tile(np.eye(20)[0], (60, 1))
+    exact = spring_velocities(m, v, k, accuracy=1e-8)
+    for accuracy in (1e-2, 1e-3):
+        off = abs(spring_velocities(m, v, k, accuracy=accuracy) - exact).max()
+        assert off < 0.5 * accuracy
+
+
 def test_leading_axes_broadcast():
     v = np.array([[1.0, 0, 0], [1.0, 0.5, 0], [0, 0, -1.0]])
     found = spring_velocities(np.ones((2, 1, 3)), v, [1.0, 2.0], gaps=[[[0.1, 0]], [[0.0, 0]]])

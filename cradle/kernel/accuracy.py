@@ -32,7 +32,7 @@ ENOUGH, COARSE, SPARE = 0.2, 0.5, 1.05
 # C, at least, without losses and with them, and for each radian of a ball, on average; the largest
 # step, in radians.
 HARD, LOST, SWING, WHOLE = 0.01, 0.022, 0.0027, 0.8
-# Kinks beyond two of each contact, and radians, from which runs are compared; in long rows more.
+# Kinks beyond two of each contact, and with leans radians, from which runs are compared.
 OFTEN, LONG = 4.0, 30.0
 TRIALS = 16  # runs of a chain, each finer than the one before
 DAMPED = 0.5  # step times A times the square of a frequency, at most
@@ -164,7 +164,7 @@ def judge(n, law, change, s, clock):
     radians = clock.steps * phase / max(used, 1)
     swung = max(1.0, (0.75 if clock.lossy else 1.0) * SWING * radians / clock.hard)
     off = phase / clock.eta * math.sqrt(math.sqrt(swung))
-    often = many > clock.often + 0.1 * (n - 1) or radians > LONG
+    often = many > clock.often or (clock.leans > 0 and radians > LONG)
     compare = often or clock.leans > 0
     told, ratio = math.inf, clock.coarser / clock.h
     if ratio > 0.0:

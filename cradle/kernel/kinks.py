@@ -135,7 +135,7 @@ def zetas(p, theta):
     """Return Hurwitz's zeta(-p, theta) and zeta(-p - 1, theta)."""
     one = two = 0.0
     x = theta
-    while x < 2.0 or x < p:
+    while x < 2.0:
         term = x * grade(p, x)
         one += term
         two += x * term
