@@ -270,18 +270,31 @@ def test_fig_three_triangle_and_extended():
     line = panel("three_balls", "fig-own-three-triangle")["closing speed $u_2$"]
     expected = [(0, u), (ends / (1 + e[0]), 0), (ends, -e[0] * u)]
     np.testing.assert_allclose(line, expected, **CLOSE)
-    shown = panel("three_balls", "fig-own-three-extended")
-    v[1] = 0.15
-    g *= 0.85
-    ends *= 0.85
-    path, impulses = solved((m, v, e), 0.15)
-    bend = [0.15 * ends, v[1] + 0.85 * g - v[2] - 0.15 * ends / m[2]]
-    np.testing.assert_allclose(
-        shown["closing speed $u_3$"],
-        np.column_stack([impulses[:, 1], path[:, 1] - path[:, 2]]), **CLOSE
-    )  # fmt: skip
-    extended = [(0, g + v[1] - v[2]), bend]
-    np.testing.assert_allclose(shown["second piece, extended"], extended, **CLOSE)
+    for number, speed in enumerate((0, 0.15)):  # of ball 2: the example, and in general
+        start = np.array([1, speed, 0])
+        push = ends * (1 - speed)  # tau_2^f
+        path, impulses = solved((m, start, e), 0.15)
+        line = np.column_stack([impulses[:, 1], path[:, 1] - path[:, 2]])
+        shown = panel("three_balls", "fig-own-three-extended", number)
+        np.testing.assert_allclose(shown["closing speed $u_3$"], line, **CLOSE)
+        bend = [0.15 * push, speed + 0.85 * push / m[1] - 0.15 * push / m[2]]
+        extended = [(0, speed + push / m[1]), bend]
+        np.testing.assert_allclose(shown["second piece, extended"], extended, **CLOSE)
+    # What the axes say: the impulses of the text, and G.
+    top = drawn("three_balls")["fig-own-three-extended"].axes[0]
+    done = textbook.solve(*THREE, 0.15).impulses[1]
+    told = [text.get_text().rpartition("\n")[2] for text in top.get_xticklabels()]
+    assert set(told[1:]) == {f"{x:.3f}" for x in (0.15 * ends, g / 2, done)}
+    assert top.get_yticklabels()[1].get_text() == f"{g:.3f}"
+
+
+def test_rings_of_the_opening_figure():
+    """Where each contact is compressed most its two balls are equally fast: Eqs. 22 and 28."""
+    ax = drawn("three_balls")["fig-own-three-opening"].axes[0]
+    rings = [line.get_xydata()[0] for line in ax.get_lines() if line.get_marker() == "o"]
+    tau_2c, push = 1 / 1.85, 1.9 / 1.85
+    expected = [(1.15 * tau_2c, 1 - tau_2c), (1.5 * push, push / 2)]
+    np.testing.assert_allclose(rings, expected, **CLOSE)
 
 
 def test_fig_4_ends():
