@@ -224,11 +224,13 @@ def test_equal_springs():
     loss, contact = first_loss(1)
     minus_2, minus_3 = printed_10_and_11(1, 1, loss)
     tau_2, tau_3 = springs(1, 1).y[6:, -1]
+    v2, v3 = minus_3 - minus_2, -minus_3  # then; Eqs. 2 and 3
     ratio = constant_ratio(velocities)
     assert ratio == pytest.approx(0.230498292, rel=0, abs=1e-8)
     table = ratio_table().set_index("triplet").ratio
     CHAPTER.tells(
         dict(zip(("v1", "v2", "v3"), velocities))
+        | {"loss-v2": v2, "loss-v3": v3}
         | {"loss": loss, "ratio-loss": minus_3 / minus_2, "ratio-end": tau_3 / tau_2}
         | {"AAA": f"{table['AAA']:.3f}", "effective": ratio, "linear-ratio": ratio},
         off=1e-8,

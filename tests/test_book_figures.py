@@ -206,8 +206,10 @@ def test_fig_compliance_ratio():
             if name.startswith(r"$\gamma$ = "):
                 gamma = float(name.rpartition("=")[2])
                 loss, _ = first_loss(gamma)
-                for part, value in line[::40]:
-                    minus_2, minus_3 = printed_10_and_11(gamma, 1, part * loss)
+                assert line[-1, 0] == pytest.approx(1 if number else loss, rel=1e-9)
+                for at, value in line[::40]:
+                    time = at * loss if number else at
+                    minus_2, minus_3 = printed_10_and_11(gamma, 1, time)
                     expected = minus_3 / minus_2 / gamma**number
                     # The printed forms subtract nearly equal numbers at the start.
                     assert value == pytest.approx(expected, rel=1e-8, abs=1e-10), name
