@@ -17,7 +17,7 @@ def test_the_first_page_is_guessed(still):
     host = tab.locator(".cradle-explorer")
     for value in expected[np.abs(expected) > 0.05]:
         assert f"{abs(value):.2f}" not in host.inner_text()
-    answer = tab.locator(".admonition", has_text="The answer to the task")
+    answer = tab.locator(".admonition", has_text="Answer: two balls pulled back")
     assert tab.locator(".question p").last.is_hidden()
     assert answer.is_hidden()
     for ball, key, times in ((5, "ArrowRight", 18), (1, "ArrowLeft", 2)):

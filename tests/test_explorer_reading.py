@@ -655,13 +655,18 @@ def test_scenes_do_what_their_texts_say(still):
     thirds = [-1 / 3, 2 / 3, 2 / 3]
     for key, expected in (("one", [0, 0, 0, 0, 1]), ("two", [0, 0, 0, 1, 1]), ("three", thirds)):
         np.testing.assert_allclose(after[key], expected, atol=1e-6 * (key == "three"))
-    # Steel balls: in percent; of all rows of five with one ball pulled back "small" is nearest,
+    # Steel balls: in m/s; of all rows of five with one ball pulled back "small" is nearest,
     # and at no ratio of the slider balls 2 and 3 come back. Above one half it holds contacts.
     steel = collide(Chain([1] * 5, [1, 0, 0, 0, 0]), SpringChain()).velocities
-    for key, shares in (("one", steel), ("example", after["example"])):
-        text = scenes[key]["text"].replace("\N{MINUS SIGN}", "-")
-        said = re.search(r"leave with (.*) and (.*) %", text)
-        assert [*map(int, said[1].split(", ")), int(said[2])] == np.rint(100 * shares).tolist()
+    text = scenes["one"]["text"].replace("\N{MINUS SIGN}", "-")
+    said = re.search(r"leave with (.*) and (.*) m/s", text)
+    assert [*said[1].split(", "), said[2]] == [f"{v:.2f}" for v in steel]
+    # What the first scene says of its two other ratios.
+    example = scenes["example"]["setting"]
+    alone, both = (collide(*chain_of(example | {"forward": [a]})).velocities for a in (0, 0.5))
+    np.testing.assert_allclose(alone, [0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(both, thirds, atol=1e-6)
+    assert both[0] < after["example"][0] < 0
     rows = {
         key: np.abs(after[key] - steel).max()
         for key, scene in scenes.items()

@@ -62,17 +62,16 @@ def equal(
 
 
 @cache
-def shares(count: int, ratio: float | None = None) -> str:
-    """Return what equal balls get of the striker's speed, in percent. No ratio: steel."""
-    from cradle import Chain, ImpulseCorrelation, SpringChain, collide
+def speeds(count: int) -> str:
+    """Return how equal steel balls leave if the striker comes at 1 m/s."""
+    from cradle import Chain, SpringChain, collide
 
-    model = SpringChain() if ratio is None else ImpulseCorrelation(ratio)
     chain = Chain([1] * count, [1] + [0] * (count - 1))
     *others, last = (
-        f"{100 * v:.0f}".replace("-", "\N{MINUS SIGN}")
-        for v in collide(chain, model).velocities
+        f"{v:.2f}".replace("-", "\N{MINUS SIGN}")
+        for v in collide(chain, SpringChain()).velocities
     )
-    return f"{', '.join(others)} and {last} %"
+    return f"{', '.join(others)} and {last} m/s"
 
 
 #: The link after the texts that speak of steel balls; its address is seen from the explorer's page.
@@ -90,17 +89,16 @@ def story() -> list[dict[str, Any]]:
     meeting["speeds"] = [1.0, 0.5, 0.0, 0.0]
     told = [
         ("example", "The example of this book", equal(3, 0.15), "inside",
-         "One ball strikes two that touch. While ball 2 is being pushed, it passes a part of the "
-         "push on: this part is the ratio, here 0.15. The balls leave with "
-         f"{shares(3, 0.15)} of the striker's speed. Move the ratio: at 0 ball 3 leaves alone; at "
-         "0.5 balls 2 and 3 leave together, and ball 1 comes back faster."),
+         "While ball 2 is being pushed, it passes a part of the push on: this part is the ratio, "
+         "here 0.15. Move it: at 0 ball 3 leaves alone; at 0.5 balls 2 and 3 leave together, and "
+         "ball 1 comes back faster."),
         ("one", "Pull back one ball", equal(5, 0.0), "inside",
          "Now five balls. One strikes, and one leaves at the other end. This is the toy of the "
          "textbooks: the balls collide one pair after the other. In the paper's terms, the ratio "
          "is 0. "
          "Steel balls that touch do not do this: "
          "if contacts push by Hertz's law and lose no energy, balls 1 to 5 leave with "
-         f"{shares(5)} of the striker's speed."),
+         f"{speeds(5)}."),
         ("two", "Pull back two balls", equal(5, 0.0, 2), "inside",
          "Two balls strike, and two leave. The ratio is still 0. Pull back three, and one of them "
          "never stops."),

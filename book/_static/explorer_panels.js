@@ -247,10 +247,8 @@
     const [bars, momentum, energy] = [1, 2, 3].map(() => make("div", { class: "plot" }));
     const handles = panels.handles(act);
     const told = make("p", { class: "note guessed" });
-    const second = make(level, {});
-    const caption = make("p", {});
-    const legend = make("details", { class: "note" }, make("summary", {}, "How to read the bars"), caption);
-    const balance = make("div", { class: "balance" }, second, momentum, energy, legend);
+    const named = (words, plot) => make("div", { class: "named" }, make("span", {}, words), plot);
+    const balance = make("div", { class: "balance" }, named("momentum", momentum), named("energy", energy));
     const node = make(
       "div",
       { class: "outcome" },
@@ -267,11 +265,6 @@
       const { setting, hit, number, now, part, guess, covered } = state;
       const when = asked ? "Before" : part < 1 ? "During" : "After";
       title.textContent = covered ? "Your guess (m/s)" : `${when} ${explorer.hitName(number)} (m/s)`;
-      second.textContent = covered ? "Momentum and energy of your guess" : "Momentum and energy";
-      caption.textContent =
-        (covered ? "" : "Velocities: dashed outlines are those before the hit. ") +
-        "Momentum: ball by ball, from 0 to the dashed line; a ball that goes back (lower row) steps back. Energy: 100\u00a0% is " +
-        `what there was before the hit; grey is ${covered ? "what you have not given away" : "lost, or stored in the contacts"}.`;
       const ghost = guess?.open && guess.touched && number === 0 ? { guess: guess.values } : {};
       const drawn = covered ? { span: explorer.guessReach(setting).span, gap: 1.1 } : ghost;
       // The numbers of a guess stand where the outlines of the velocities before would be.

@@ -168,7 +168,7 @@
         (explorer.presentRatio(shown.setting, sweep.inner) === null
           ? "Level lines: the present outcome, whose ratios differ from ball to ball."
           : "Dashed line: the present ratio. Drag it.") +
-        (held ? " Grey: a ratio is above its largest value, and held at it." : "") +
+        (held ? " Grey: a ratio is above its bound, and held there." : "") +
         (refused ? ` At ${refused} ratios the hit takes more events than the page computes.` : "");
     }
     function resume(box) {

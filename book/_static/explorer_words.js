@@ -99,10 +99,8 @@
         const pairs = answer.saturated.map((c) => `of balls ${c + 1} and ${c + 2}`);
         said.push(
           pairs.length > 1
-            ? `Ratios are above their largest values: the contacts ${list(pairs)} are held ` +
-                "closed, as with the largest ratios."
-            : `A ratio is above its largest value: the contact ${pairs[0]} is held closed, ` +
-                "as with the largest ratio.",
+            ? `Ratios are above their bounds, and held there: at the contacts ${list(pairs)}.`
+            : `A ratio is above its bound, and held there: at the contact ${pairs[0]}.`,
         );
       }
     }
