@@ -179,8 +179,16 @@ def test_events_are_those_of_the_chapter(still):
     trace = collide(*chain_of(tab.drawn()))
     told = re.search(r"velocities(.*)m/s", Chapter("multiple_impacts").printed("example-code"))[1]
     assert [float(v) for v in told.split()] == trace.velocities.round(3).tolist()
+    for button in "Next hit", "Let go":  # nothing is told before there is an answer
+        tab.push(button)
+        tab.drawn()
+        assert tab.state("covered")
+        assert not tab.state("clock.playing")
+        assert "Choose an answer first." in tab.inner_text(".cradle-explorer")
+    tab.choose("4")
     tab.push("Next hit")
     tab.drawn()
+    assert "Choose an answer first." not in tab.inner_text(".cradle-explorer")
     rows = [
         (row, f"contact {c + 1}\u2011{c + 2} {'closes' if kind == 'close' else 'ends'}")
         for row, (kind, c) in enumerate(trace.events, start=1)
@@ -191,6 +199,19 @@ def test_events_are_those_of_the_chapter(still):
         tab.locator(".events button").nth(number).click()
         tab.drawn()
         assert tab.bars() == trace.path[row].round(2).tolist()
+
+
+def test_the_first_hit_stays_beside_its_text(still):
+    """The balls swing on; the pictures and numbers stay those of the chapter."""
+    tab = still(chapter="n_balls", stopped=True)
+    tab.later(50)
+    after = collide(Chain([1] * 4, [1, 0.5, 0, 0], 1), ImpulseCorrelation(0.15)).velocities
+    tab.push("Let go", 1000)
+    for _ in range(4):
+        tab.later(1000)
+    assert tab.state("clock.time") > tab.evaluate("cradleExplorer.Swing.time(1)")
+    assert (tab.state("clock.playing"), tab.state("view.number")) == (True, 0)
+    assert tab.bars()[: len(after)] == after.round(2).tolist()
 
 
 def test_a_contact_waits_at_ratio_zero(still):

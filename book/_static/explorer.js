@@ -50,7 +50,8 @@
       // An answer of a few is known once it is told; speeds can be guessed again, on a page of its
       // own by a button.
       const again = answers || this.page ? "" : guessing;
-      this.state = new State({ scene, picture, guessing, again });
+      const [asks, first] = [answers !== undefined, "first" in this.host.dataset];
+      this.state = new State({ scene, picture, guessing, again, asks, first });
       this.visible = true;
       this.pointed = false; // whether a pointer has chosen what has the focus
       this.box = this.box.bind(this);
@@ -104,7 +105,13 @@
       this.host.setAttribute("aria-label", "live cradle");
       if (this.page) this.host.tabIndex = -1; // a click on it gives it the keys
       this.stage = new Stage(cradle, this.pulling());
-      explorer.data.palette.forEach((colour, ball) => {
+    }
+
+    // Each ball has a colour of its own; with `data-kinds` each kind of ball, as in a figure beside it.
+    paint({ letters }) {
+      explorer.data.palette.forEach((own, ball, palette) => {
+        const kind = "kinds" in this.host.dataset ? "ABCD".indexOf(letters[ball] ?? "-") : -1;
+        const colour = palette[kind] ?? own;
         // Black lines take the colour of the text, as in all figures of the book.
         const shown = colour === "#000000" ? "var(--pst-color-text-base, #000)" : colour;
         this.host.style.setProperty(`--ball-${ball}`, shown);
@@ -159,7 +166,7 @@
         back: on(() => state.pullBack()),
         slow: on(() => Object.assign(clock, { slow: !clock.slow, inside: null })),
         guess: on((ball, value) => state.guess(ball, value)),
-        answer: on((answer) => (view.guess.answer = answer)),
+        answer: on((answer) => state.answer(answer)),
         guessing: on(() => {
           state.guessing = state.guessing === "always" ? "" : "always";
           this.lecture = false;
@@ -354,6 +361,7 @@
       const { pictures } = this.panels;
       if (pictures) pictures.node.hidden = scenery.covered;
       this.host.classList.toggle("covered", scenery.covered);
+      this.paint(scenery.setting);
       this.calm(this.bare && scenery.covered && scenery.guessing === "once");
       for (const panel of Object.values(this.panels))
         if (!panel?.node.hidden) panel?.show({ ...scenery, loud: this.audio }, this.box, this.stageBox);

@@ -8,6 +8,7 @@
   const REST = 0.5; // seconds before the balls are let go again
   const LOOK = 1.2; // seconds that the balls wait after a hit that was guessed
   const GUESS = "Guess, then press Let go. The answer appears at the hit.";
+  const CHOOSE = "Choose an answer first.";
 
   const { chapters, scenes } = explorer.data;
   const named = (key) => [...scenes, ...chapters].find((scene) => scene.key === key);
@@ -15,10 +16,11 @@
   class State {
     // `picture`: which one to show instead of that of a scene; `guessing`: whether the outcome is
     // covered until the reader has seen the balls move, this "once", "always", or not at all ("");
-    // `again`: what it is once the balls are pulled back.
-    constructor({ scene, picture, guessing = "", again = "" }) {
+    // `again`: what it is once the balls are pulled back; `asks`: whether a guess is one of some
+    // answers; `first`: whether the pictures stay at the first hit while the balls swing on.
+    constructor({ scene, picture, guessing = "", again = "", asks = false, first = false }) {
       this.picture = picture;
-      Object.assign(this, { guessing, again });
+      Object.assign(this, { guessing, again, asks, first });
       this.clock = { time: 0, playing: false, slow: false, inside: null, guessed: false, wait: 0 };
       this.view = {
         scene: "", // a key, or none for a setting of the reader's own
@@ -89,6 +91,18 @@
       const { guess } = this.view;
       guess.values = guess.values.map((old, k) => (k === ball ? value : old));
       guess.touched = true;
+    }
+
+    answer(answer) {
+      this.view.notice = "";
+      this.view.guess.answer = answer;
+    }
+
+    // Return whether a hit may be seen; who has not answered yet is told to.
+    mayMove() {
+      const answered = !this.asks || !this.covered || Boolean(this.view.guess.answer);
+      if (!answered) this.view.notice = CHOOSE;
+      return answered;
     }
 
     cover() {
@@ -185,11 +199,13 @@
 
     play() {
       const { clock } = this;
+      if (!this.mayMove()) return;
       this.follow();
       clock.playing = !clock.playing && this.swing.positions(clock.time) !== null;
     }
 
     step() {
+      if (!this.mayMove()) return;
       const number = this.swing.latest(Math.max(this.clock.time, 0)) + 1;
       Object.assign(this.clock, { time: Swing.time(number), playing: false, inside: null });
       this.follow();
@@ -216,7 +232,7 @@
       const next = swing.latest(clock.time) + 1;
       clock.time += seconds * (clock.slow ? SLOW : 1);
       if (clock.time < Swing.time(next)) return false;
-      const opened = this.open();
+      const opened = this.open() || (this.first && next === 0);
       clock.guessed = opened || (clock.guessed && !clock.slow);
       const { status, happened } = swing.hit(next);
       if (status !== "finished") {
