@@ -48,9 +48,10 @@ def test_fig_patterns_three():
         for ball, line in enumerate(panel("patterns", "fig-patterns-three", number).values()):
             places = 0.6 * ball + np.array([-1.0 * (ball == 0), 0, 2 * v[ball]])
             np.testing.assert_allclose(line, np.column_stack([places, [-1, 0, 2]]), **CLOSE)
-    chart = drawn("patterns")["fig-patterns-three"].axes[3]
+    (chart,) = drawn("patterns")["fig-p6"].axes
     shown = [line.get_xydata().tolist() for line in chart.get_lines()]
-    assert shown == [[[r2, r1]] for r1, r2 in points]
+    for r1, r2 in points:
+        assert [[r2, r1]] in shown
 
 
 def test_one_point_of_the_map_with_a_pencil():
@@ -85,6 +86,15 @@ def test_fig_6_drawn():
     np.testing.assert_allclose(shown["Eq. (45): $v_1^+ = 0$"], [(rest_2, 1.7), (3.2, 1.7)])
     np.testing.assert_allclose(shown["Eq. (46): $v_2^+ = 0$"], [(rest_2, 1.7), (rest_2, 3.2)])
     np.testing.assert_allclose(shown["all three meet"], [(rest_2, 1.7)])
+    for number in (4, 5):  # a further collision sets in
+        for r2, r1 in shown[f"{number} collisions"][60::40]:
+            for side, expected in ((1 - 1e-6, number), (1 + 1e-6, number - 1)):
+                if r1 > 0.01:
+                    assert by_turns(r1 * side, r2, 0.5, 0.15)[0] == expected
+    (endless,) = (area for area in ax.collections if area.get_label() == "endless")
+    corner = endless.get_paths()[0].vertices
+    for r2, r1 in corner[(corner[:, 0] > 0.001) & (corner[:, 1] > 0.01)][::7]:
+        assert r1 == pytest.approx(edge(r2, 0.5, 0.15), abs=1e-3)
     # Shaded: where balls 1 and 2 go back.
     shades = [x.get_paths()[0] for x in ax.collections if getattr(x, "filled", False)]
     assert len(shades) == 2
