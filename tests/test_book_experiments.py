@@ -283,10 +283,10 @@ def test_what_a_prediction_hangs_on():
     assert sorted(ratios.values())[-2] < 0.01
     FIGURES.tells(
         {
-            "by-first-least": min(first),
-            "by-first-most": max(first),
-            "by-other-most": max(other),
-            "by-ratio-most": ratios[worst],
+            "by-first-least": 100 * min(first),
+            "by-first-most": 100 * max(first),
+            "by-other-most": 100 * max(other),
+            "by-ratio-most": 100 * ratios[worst],
         }
     )
     assert FIGURES.glued["ratios-all"] == str(len(ratios))
