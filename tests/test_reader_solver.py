@@ -151,7 +151,7 @@ def test_right_wrong_and_endless(editor, solver):
 
 def test_a_browser_without_a_language(editor):
     """WebKit without a locale says "C", for which browsers have no calendar."""
-    assert told(editor(), "Write your lines at line 7.") == (0, 0)  # Python is loaded
+    assert told(editor(), "Write your lines at line 8.") == (0, 0)  # Python is loaded
     answers = editor.tab.evaluate(
         """async () => {
           const prelude = 'Object.defineProperty(navigator, "language", { value: "C" });\\n';
@@ -175,7 +175,7 @@ def test_each_piece_keeps_what_was_written(editor):
     tab = editor.tab
     area = tab.locator(".reader-solver textarea")
     first = area.input_value()
-    assert told(editor(), "Write your lines at line 7.") == (0, 0)
+    assert told(editor(), "Write your lines at line 8.") == (0, 0)
     area.fill("mine:")
     area.press("End")
     area.press("Enter")

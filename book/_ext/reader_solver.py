@@ -23,6 +23,12 @@ HERE = Path(__file__).parent
 PLACE = '<div class="reader-solver"'
 #: The functions that the page builds up.
 PIECES = ("rates", "way_to_event", "three_balls")
+#: What each of them computes, told where the reader's lines come.
+TOLD = {
+    "rates": "Eqs. 16 to 19; the bound is Eq. 34",
+    "way_to_event": "-u/u'; in expansion 2W/(R-u), R^2 = u^2 - 2u'W",
+    "three_balls": "the loop: Eqs. 20, 21, 23 and 29",
+}
 #: Title; masses, velocities, restitution, ratio. The page's own example is put in front.
 CASES = (
     ("Equal balls, ratio 0: one leaves", ([1, 1, 1], [1, 0, 0], [1, 1], 0)),
@@ -66,7 +72,8 @@ def without(solver: str, piece: str) -> str:
     first = function.body[told]
     rows = solver.splitlines()
     rows[first.lineno - 1 : function.end_lineno] = [
-        '    raise NotImplementedError("Your lines come here.")'
+        f"    # {TOLD[piece]}",
+        '    raise NotImplementedError("Your lines come here.")',
     ]
     return "\n".join(rows) + "\n"
 
