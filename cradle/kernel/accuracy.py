@@ -164,7 +164,7 @@ def judge(n, law, change, s, clock):
     radians = clock.steps * phase / max(used, 1)
     swung = max(1.0, (0.75 if clock.lossy else 1.0) * SWING * radians / clock.hard)
     off = phase / clock.eta * math.sqrt(math.sqrt(swung))
-    often = many > clock.often or (clock.leans > 0 and radians > LONG)
+    often = many > clock.often
     compare = often or clock.leans > 0
     told, ratio = math.inf, clock.coarser / clock.h
     if ratio > 0.0:
@@ -173,7 +173,7 @@ def judge(n, law, change, s, clock):
     error = off * off * off * math.sqrt(off)
     if off <= 1.0 and compare:
         error = max(error, told, 0.25 * clock.told)
-    clock.told = told if ratio > 0.0 or (clock.leans and often) else 0.0
+    clock.told = told if ratio > 0.0 or (clock.leans and (often or radians > LONG)) else 0.0
     clock.error = law.accuracy * error
     if not error > 1.0:
         return False
