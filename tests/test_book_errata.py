@@ -11,7 +11,9 @@ import pytest
 import truth
 from chapters import Chapter, floats, number
 from march import march
+from scipy.optimize import brentq
 from test_book_n_balls import READINGS, outcome
+from turns import by_turns, edge
 
 from cradle import (
     Chain,
@@ -87,6 +89,18 @@ def test_entries_are_numbered_as_they_stand_and_short():
     first = TEXT[TEXT.index("## The six that matter") : TEXT.index("## What a program needs")]
     assert len(re.findall(r"^\*\*\d+\*\* · ", first, flags=re.MULTILINE)) == 6
     assert max(len(words.split()) for *_, words in entries) <= 40
+
+
+def test_where_the_sequences_of_a_light_ball_become_infinite():
+    """By the map of turns, followed turn after turn; and where the solver sees no end any more."""
+    border = brentq(lambda r: edge(r, 0.5, 0.15) - r, 0.04, 0.06, xtol=1e-7)
+    CHAPTER.tells({"edge": border})
+    seen = float(GLUED["solver-edge"])
+    assert 100 < by_turns(seen, seen, 0.5, 0.15)[0] < 200
+    for r, collapsed in (seen - 1e-4, True), (seen + 1e-4, False):
+        trace = collide(Chain([1, r, 1], [1, 0, 0], 0.5), ImpulseCorrelation(0.15))
+        assert trace.collapsed == collapsed
+        assert np.ptp(trace.velocities) < 1e-12
 
 
 def test_different_parameters_with_one_outcome():
