@@ -56,7 +56,7 @@ def test_an_array_of_floats_is_not_copied():
     assert numbers("x", array) is array
 
 
-WHOLE = "must be real numbers, one shape, none masked"
+WHOLE = "must be real numbers"
 REFUSED = [
     (True, f"x = True; {WHOLE}"),
     ([0.5, True], "x[1] = True; must be a real number"),

@@ -239,6 +239,22 @@ def test_balls_let_go_together_strike_as_one():
     assert said not in call("swing 3 --steps 2 --pull 2 --model sequential")
 
 
+def test_a_stiffness_that_is_not_given_is_told_of():
+    """Where it matters: between unequal balls, and for gaps, which close during a strike or not."""
+    for line, said in (
+        ("solve --masses 1,8,1", "equally stiff contacts (--stiffness)"),
+        ("swing 3 --steps 2 --gaps 1e-7", "strikes are over before a gap closes (--stiffness)"),
+    ):
+        assert said in call(line)
+        assert said not in call(f"{line} --stiffness 1e9")
+    assert "equally stiff" not in call("solve 3") + call("solve --masses 1,8,1 --ratio 0.1")
+
+
+def test_a_path_that_nobody_sees_is_not_kept():
+    """Of a part of it Python warns, which here is an error."""
+    assert call("solve 2000 --ratio 0.3 --csv").count("\n") == 2001
+
+
 def test_a_long_swing_is_told_of(monkeypatch, capsys):
     def stop(*_, **__):
         raise ValueError("enough")
@@ -539,8 +555,13 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("solve --masses 1,1,1 --model ratio", 2, "ratios need --ratio, such as 0.1"),
         ("solve --masses 1,1,1 --model spheres --ratio 0.1", 2, "--model spheres has no ratios"),
         ("solve ABCCA --model sequential --saturate", 2, "--model sequential has no ratios"),
-        ("solve --masses 1,1,1 --ratio 0.6", 1, "--ratio, value 1: 0.6; at ball 2 it must"),
-        ("solve --masses 1,1,1 --ratio 0 --backward 1", 1, "--backward, value 1: 1.0; at ball 2 "),
+        ("solve DBB", 1, "cradle: the ratio of ball 2 is 0.71; it must not exceed 0.5"),
+        (
+            "solve --masses 1,1,1 --ratio 0.6",
+            1,
+            "the ratio of ball 2 is 0.6; it must not exceed 0.5 (Eq. 53):",
+        ),
+        ("solve --masses 1,1,1 --ratio 0 --backward 1", 1, "the backward ratio of ball 2 is 1.0; "),
         ("solve --masses 1,1,1 --ratio 0.1,0.1", 1, "--ratio has 2 values; 3 balls need 1"),
         ("swing --masses 1,1,1 --by 5", 1, "--by = 5.0; must be above 0 and at most a quarter"),
         (

@@ -110,7 +110,7 @@ CHAINS = [
     ),
     ({"masses": [1, [2, 3], 4]}, "masses[1] has shape (2,), masses[0] has (); must have one shape"),
     ({"velocities": [1j, 0, 0]}, "velocities[0] = 1j; must be a real number"),
-    ({"restitution": "1"}, "restitution = '1'; must be real numbers, one shape"),
+    ({"restitution": "1"}, "restitution = '1'; must be real numbers"),
 ]
 
 BATCH = [

@@ -104,7 +104,7 @@ function refuseExcess(m, forward, backward) {
     const bound = shown(Number(bounds[name][at].toPrecision(6))).replace(/\.0$/, "");
     throw new Error(
       `${name}[${at}] = ${shown(ratios[at])}; at ball ${at + 1}, counted from 0, it must not exceed ` +
-        `${bound} (Eq. 53${mirrored}): a larger ratio would make a contact pull; ` +
+        `${bound} (Eq. 53${mirrored}): above it a driven contact opens; ` +
         "saturate: true holds the contact closed instead",
     );
   }

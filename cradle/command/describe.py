@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import click
+import numpy as np
 
 import cradle
 from cradle.advice.choice import made, own_viscosity
@@ -146,8 +147,10 @@ def described(
             law = cradle.EnergyDistribution(one_or_all(stiffness or [1.0]))
             kind = "spheres that lose much, by the energy law"
         assumed += [f"the balls collide as {kind} (--model, --ratio)"] if bare else []
-    alike = (chain.velocities[1:] == chain.velocities[:-1]) & (chain.velocities[1:] != 0.0)
-    assumed += as_one(bool(alike.any()), gaps, model)
+        alike = stiffness is not None or np.ptp(chain.masses) == 0.0
+        assumed += [] if alike else ["equally stiff contacts (--stiffness)"]
+    as_fast = (chain.velocities[1:] == chain.velocities[:-1]) & (chain.velocities[1:] != 0.0)
+    assumed += as_one(bool(as_fast.any()), gaps, model)
     return Described(chain, taken, law, tuple(assumed), letters)
 
 

@@ -98,7 +98,8 @@ def fit(
     left = [one.name for one in shots.sets if one not in used.sets]
     extra |= {"momentum_chi_square": momentum, "shots": count, "without": left}
     poor = " (a poor fit: the errors do not explain the differences)"
-    quality = [f"fit: chi-square {one.chi_square:.1f} of {one.degrees_of_freedom}"
+    quality = [f"fit of {'ratios' if one is last else 'restitution'}: chi-square "
+               f"{one.chi_square:.1f} of {one.degrees_of_freedom}"
                f"{poor * (one.probability <= 1e-3)}" for one in fits]  # fmt: skip
     notes = ["fit: no ratio is fitted; those of --known are taken as they are"]
     notes *= bool(known and not last.estimates)

@@ -46,6 +46,9 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"the coefficient of restitution of (\S+) is not known": rf"\g<0>: {_SHOOT}",
     r"the ratio of (\S+) is not known": r"\g<0> (--known \1=RATIO)",
     r"(restitution|known)\['(.+?)'\](?:\[\d\])? = ": r"--\1 \2: ",
+    r"\b(?:for|(back))ward\[\d+\] = (\S+); at ball (\d+), counted from 0, it": lambda found: (
+        f"the {'backward ' * bool(found[1])}ratio of ball {int(found[3]) + 1} is {found[2]}; it"
+    ),
     r"\bforward\b(?=\[| = | has)": "ratio",
     _ROW + r"\[(\d+)\] = ": lambda found: f"--{found[1]}, value {int(found[2]) + 1}: ",
     _ROW + r" has shape \((\d+),\);[^:]*: ": r"--\1, \2 given: ",
@@ -94,7 +97,8 @@ def solve(plot: str | None, as_json: bool, as_csv: bool, **options: Any) -> None
     """
     given = described(**options)
     chain = given.chain
-    trace = collide(given.taken, given.model, progress=True)
+    drawn = plot or not isinstance(given.model, cradle.ImpulseCorrelation)
+    trace = collide(given.taken, given.model, record=None if drawn else False, progress=True)
     if plot:
         from matplotlib.figure import Figure
 
@@ -134,7 +138,7 @@ for verb in (film, fit, recommend, swing, template):
 
 @main.command(name="warm-up")
 def warm_up() -> None:
-    """Compile both loops now, so that long work starts at once later.
+    """Compile the solvers now, by ratios and of spheres, so that long work starts at once later.
 
     Small work is never compiled, and need not wait for this.
     """

@@ -77,7 +77,7 @@ def _as_float(name: str, at: tuple[int, ...], cell: Any) -> float:
     except OverflowError:
         value = math.inf
     except (TypeError, ValueError):
-        rule = "must be a real number" if at else "must be real numbers, one shape, none masked"
+        rule = f"must be {'a real number' if at else 'real numbers'}"
         known = type(cell).__module__.startswith(("builtins", "numpy"))
         what = "" if known else f" ({type(cell).__module__}.{type(cell).__qualname__})"
         raise refusal(name, at, f" = {shown(cell)}{what}; {rule}") from None

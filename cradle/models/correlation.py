@@ -155,7 +155,7 @@ def check_values(bounded: bool, *values: ArrayLike) -> None:
             at, mirrored = tuple(np.argwhere(above)[0]), ", mirrored" * (name == "backward")
             rule = (
                 f"at ball {at[-1] + 1}, counted from 0, it must not exceed {float(bound[at]):.6g} "
-                f"(Eq. 53{mirrored}): a larger ratio would make a contact pull; excess='saturate' "
+                f"(Eq. 53{mirrored}): above it a driven contact opens; excess='saturate' "
                 "holds the contact closed instead"
             )
             asked.refuse_where(name, given, above, rule)
