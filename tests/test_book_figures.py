@@ -132,6 +132,11 @@ def test_fig_flight():
     alt = cell.metadata.mystnb.image.alt
     outcomes = [after(EQUAL, ratio) for ratio in (0, 0.15, 0.5)]
     assert len(moves) == 9
+    ways = re.findall(r'<line id="w(\d)(\d)" x1="(.*?)" x2="(.*?)"', picture)
+    assert len(ways) == 9
+    for row, ball, start, end in ways:
+        expected = 220 * outcomes[int(row)][int(ball)]
+        assert float(end) - float(start) == pytest.approx(expected, abs=0.006)
     for row, ball, start, end in moves:
         row, ball = int(row), int(ball)
         speed = outcomes[row][ball]
