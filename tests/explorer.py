@@ -78,6 +78,10 @@ class Tab:
         self.locator(".choice label", has_text=re.compile(f"^{re.escape(words)}$")).click()
         return self.drawn()
 
+    def unfold(self):
+        """Open the fold of what is set more rarely."""
+        self.locator(".settings summary").click()
+
     def typed(self, label: str, text: str, key: str = "Enter"):
         """Type into the box beside a slider, end with a key, and return the box."""
         box = self.get_by_label(f"{label}, as a number", exact=True)

@@ -280,7 +280,8 @@ def test_two_cradles_side_by_side(still):
     """The other one has its own ratio, or what was kept; both are the solver's."""
     tab = still("#speeds=1,0,0&forward=0.3")
     kept = tab.drawn()["after"]
-    other = ".outcome > div:not(.drawn) .plot >> nth=0 >> css="
+    tab.unfold()
+    other = ".outcome > div:not(.drawn, .balance) .plot >> nth=0 >> css="
     three = Chain([1] * 3, [1, 0, 0])
     for label, expected in (
         ("ratio 0.15", collide(three, ImpulseCorrelation(0.15)).velocities),

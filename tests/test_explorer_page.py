@@ -1,11 +1,13 @@
 """The live explorer as a reader meets it: the built page, opened from its file in a browser."""
 
+import re
+
 import numpy as np
 import pytest
 from explorer import SETTING, chain_of, same_outcome, settings
 from pages import colour, contrast, show
 
-from cradle import Chain, Pendulums, paper_chain, swing
+from cradle import Chain, ImpulseCorrelation, Pendulums, collide, paper_chain, swing
 from cradle.tables import paper_sequences
 
 
@@ -205,6 +207,54 @@ def test_sliders_change_the_outcome(still):
         )
 
 
+def test_momentum_and_energy_add_up(still):
+    """Arrows from zero to the momentum before; shares of the energy named, and their sum."""
+    tab = still("#speeds=1,0,0,0,0&masses=1,2,1,1,3&forward=0.2&restitution=0.8")
+    setting = tab.drawn()
+    masses, before, after = (np.array(setting[name]) for name in ("masses", "speeds", "after"))
+    momentum, energy = tab.locator(".balance .plot").all()
+    arrows = re.findall(r"M([\d.]+) [\d.]+H[\d.]+L([\d.]+) .*?--ball-(\d)", momentum.inner_html())
+    order = [*np.flatnonzero(after > 0), *np.flatnonzero(after < 0)]
+    assert [int(ball) for *_, ball in arrows] == order
+    ends = np.cumsum([0, *(masses * after)[order]])
+    zero, told = (float(x) for x in re.findall(r'd="M([\d.]+) 0V', momentum.inner_html()))
+    unit = (told - zero) / (masses @ before)
+    drawn = [[float(x) for x in places] for *places, _ in arrows]
+    np.testing.assert_allclose(drawn, zero + unit * np.stack([ends[:-1], ends[1:]], 1), atol=0.02)
+    shares = masses * after**2 / (masses @ before**2)
+    named = "".join(
+        f" ball {ball}: {100 * share:.0f}\u00a0%," for ball, share in enumerate(shares, 1)
+    )
+    in_all = f"{100 * shares.sum():.0f}\u00a0%"
+    label = energy.locator("svg").get_attribute("aria-label")
+    assert label == f"Kinetic energy:{named[:-1]}; in all {in_all} of that before the hit"
+    assert tab.inner_text(".balance small") == f"total {in_all}"
+    largest = shares.argmax()
+    assert f"ball {largest + 1}: {100 * shares[largest]:.0f}\u00a0%" in energy.inner_text()
+
+
+@pytest.mark.parametrize(
+    ("fragment", "said"),
+    [
+        ("speeds=1,0,0&forward=0.7", " (held at 0.5)"),
+        ("speeds=1,0,0&forward=0.5", ""),
+        ("speeds=1,0,0,0,0&forward=0.7", " (held at 0.5 to 0.67)"),
+        ("speeds=1,0,0,0&masses=1,2,0.5,1&forward=0.6&backward=0.1", None),
+        ("scene=ABCCAB", None),
+    ],
+)
+def test_a_ratio_above_its_bound_says_what_is_in_force(still, fragment, said):
+    """The outcome is that of the ratios which the page names."""
+    tab = still("#" + fragment)
+    setting = tab.drawn()
+    held = tab.evaluate(f"cradleExplorer.ratiosInForce({SETTING})")
+    same = collide(chain_of(setting)[0], ImpulseCorrelation(held["forward"], held["backward"]))
+    np.testing.assert_allclose(same.velocities, setting["after"], rtol=0, atol=1e-9)
+    if said is not None:
+        labels = tab.locator(".slider:visible label").all_text_contents()
+        assert labels[-1] == f"ratio{said}"
+
+
 OUTSIDE = "mass must lie between 0.01 and 100 kg. In force: 1 kg."
 NO_NUMBER = "{} needs a number, such as 0.5. In force: {}."
 NO_RATIO = "ratio must lie between 0 and 1. In force: 0.15."
@@ -268,6 +318,7 @@ def test_numbers_are_read_as_people_type_them(still):
 
 def test_number_material_and_sweep(still):
     tab = still("#scene=small")
+    tab.unfold()
     for group, name in (("number of balls", "3"), ("material", "D")):
         row = tab.get_by_role("radiogroup", name=group, exact=True)
         row.locator("label", has_text=name).click()
@@ -275,7 +326,7 @@ def test_number_material_and_sweep(still):
     assert setting["letters"] == "DDD"
     assert setting["masses"] == [0.166] * 3
     assert same_outcome(setting)
-    tab.click("label:has-text('All ratios')")
+    tab.click("label:has-text('Each ratio')")
     tab.drawn()
     assert tab.locator(".drags-x polyline").count() == 3
     x, y = tab.grab(".drags-x svg")

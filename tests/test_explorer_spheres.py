@@ -102,7 +102,7 @@ def test_a_reader_chooses_spheres(still):
     assert apart[2] != touching[2]
     setting = tab.state("setting")
     assert (setting["law"], setting["gap"]) == ("spheres", 3.5)
-    tab.choose("All ratios")
+    tab.choose("Each ratio")
     assert "There is no ratio here" in tab.inner_text(".pictures")
     again = still("#" + tab.state("fragment()"))
     assert again.drawn()["after"] == apart

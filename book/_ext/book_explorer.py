@@ -115,8 +115,8 @@ def story() -> list[dict[str, Any]]:
          "Energy and momentum do not say what three balls do. Move the ratio from one half to 0: "
          "both textbook answers are here, and everything between them."),
         ("losses", "With losses", equal(5, 0.15, e=0.9), "inside",
-         "Each contact gives back less than it took. Let the balls swing for a while: they end up "
-         "swinging together, as real ones do."),
+         "Now two balls part more slowly than they met. Let the balls swing for a while: they end "
+         "up swinging together, as real ones do."),
         ("light", "A light ball in the middle", light, "inside",
          "A ball of three hundredths of the mass rattles between its heavy neighbours: one hit, a "
          "dozen collisions. Make it lighter still, and count them."),

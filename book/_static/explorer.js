@@ -89,7 +89,7 @@
       const guessed = "guess" in this.host.dataset && !this.page;
       const outcome = (here) => (here ? node("outcome") : "");
       const left = make("div", { class: "left" }, stages, outcome(guessed), node("run"), node("words"));
-      this.panels.settings.node.append(node("beside"));
+      if (beside) this.panels.settings.rarer.append(beside.node);
       const right = make("div", { class: "right" }, outcome(!guessed), node("pictures"), node("tasks"));
       this.link = make("a", { href: "explorer.html" }, "Open in the full explorer");
       this.host.replaceChildren(

@@ -142,7 +142,7 @@
 
   // --- the map --------------------------------------------------------------------------------
 
-  const CELLS = 180;
+  const CELLS = 360;
   let square; // the order of all maps
   const LARGEST = 3; // of both axes, as in the paper's Fig. 6
 
@@ -196,18 +196,21 @@
       return JSON.stringify(others);
     }
 
-    // Paint what is known, in the colours given for 0, 1, 2, 3 balls that go back; the last one
-    // shades cells with an odd number of collisions.
+    // Paint what has become known, in the colours given for 0, 1, 2, 3 balls that go back; the last
+    // one shades cells with an odd number of collisions.
     paint(canvas, fills) {
-      canvas.width = CELLS;
-      canvas.height = CELLS;
       const pen = canvas.getContext("2d", { willReadFrequently: true });
-      const [plain, shaded] = shades(pen, fills);
-      const image = pen.createImageData(CELLS, CELLS);
+      if (this.fills !== String(fills)) {
+        Object.assign(canvas, { width: CELLS, height: CELLS });
+        const image = pen.createImageData(CELLS, CELLS);
+        Object.assign(this, { fills: String(fills), shades: shades(pen, fills), image, painted: 0 });
+      }
+      const { image, points } = this;
+      const [plain, shaded] = this.shades;
       const pixels = new Uint32Array(image.data.buffer);
-      const { done, order, values } = this.points;
-      for (const { k, row, column, size } of order.slice(0, done)) {
-        const { pattern, odd } = values[k];
+      for (; this.painted < points.done; this.painted += 1) {
+        const { k, row, column, size } = points.order[this.painted];
+        const { pattern, odd } = points.values[k];
         const [rows, columns] = [row, column].map((at) => Math.min(at + size, CELLS));
         const fill = pattern < 0 ? 0 : (odd ? shaded : plain)[pattern]; // none where there is no answer
         for (let line = row; line < rows; line += 1) {

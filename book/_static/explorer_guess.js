@@ -1,7 +1,7 @@
 // What the reader says before the balls move: bars that are drawn by hand, or one of some answers.
 (function (explorer) {
   "use strict";
-  const { controls, fixed, kinetic, sum } = explorer;
+  const { controls, fixed, kept, percent, sum } = explorer;
   const { choice, make } = controls;
   const STEP = 0.05; // of the fastest ball's speed
 
@@ -58,22 +58,20 @@
     return { node, show };
   }
 
-  const share = (part, whole) => `${fixed((100 * part) / whole, 0)}\u00a0%`;
-
   // What a guess says: while it is drawn, and once it is known how the balls leave.
   function inWords({ setting, hit, guess, now }) {
     const { masses } = setting;
     const momentum = (row) => sum(row.map((v, ball) => masses[ball] * v));
     if (!guess.open) {
       const before = momentum(hit.before);
-      const moves = Math.abs(before) > 1e-9 ? `${share(momentum(now), before)} of the momentum and ` : "";
-      const energy = share(sum(kinetic(masses, now)), sum(kinetic(masses, hit.before)));
+      const moves = Math.abs(before) > 1e-9 ? `${percent(momentum(now) / before)} of the momentum and ` : "";
+      const energy = percent(kept(masses, hit.before, now));
       return `Your bars have ${moves}${energy} of the energy before the hit.`;
     }
     if (!guess.touched || !hit.after) return "";
     const off = hit.after.map((v, ball) => Math.abs(v - guess.values[ball]));
     const worst = off.indexOf(Math.max(...off));
-    return `Outlined: your guess. It is off by at most ${fixed(off[worst])} m/s, at ball ${worst + 1}.`;
+    return `Solid outlines: your guess. It is off by at most ${fixed(off[worst])} m/s, at ball ${worst + 1}.`;
   }
 
   // The question above an explorer in a chapter, its answers, and the task that comes after.

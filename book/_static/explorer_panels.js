@@ -93,16 +93,16 @@
     };
   }
 
+  const RATIOS = {
+    ratio: { words: "ratio", directions: ["forward", "backward"] },
+    forward: { words: "ratio, pushed from the left", directions: ["forward"] },
+    backward: { words: "ratio, pushed from the right", directions: ["backward"] },
+  };
+
   function settingSliders(act, most) {
     const [lightest, heaviest] = LIMITS.masses;
-    const ratio = (words, directions) =>
-      slider({
-        words,
-        low: 0,
-        high: most,
-        step: 0.01,
-        input: (value) => act.ratio(value, directions),
-      });
+    const ratio = ({ words, directions }) =>
+      slider({ words, low: 0, high: most, step: 0.01, input: (value) => act.ratio(value, directions) });
     const [slowest, fastest] = LIMITS.speeds;
     return {
       speed: slider({
@@ -130,9 +130,9 @@
         step: 0.01,
         input: act.restitution,
       }),
-      ratio: ratio("ratio", ["forward", "backward"]),
-      forward: ratio("ratio, pushed from the left", ["forward"]),
-      backward: ratio("ratio, pushed from the right", ["backward"]),
+      ratio: ratio(RATIOS.ratio),
+      forward: ratio(RATIOS.forward),
+      backward: ratio(RATIOS.backward),
       gap: slider({ words: "gaps", low: 0, high: 100, step: 0.1, unit: "µm", input: act.gap }),
       stiffness: slider({
         words: "stiffness quotient",
@@ -179,12 +179,14 @@
       ],
     });
     const sliders = settingSliders(act, parts.has("half") ? 0.5 : 1); // the largest ratio
-    const wanted = { count, scope, material, law, ...sliders };
+    const wanted = { count, scope, law, ...sliders };
     const has = (name) => parts.has({ forward: "ratio", backward: "ratio", gap: "law" }[name] ?? name);
     sliders.ratio.node.dataset.of = "ratio"; // it is there before the first hit, too
     const nodes = Object.keys(wanted)
       .filter(has)
       .map((name) => wanted[name].node);
+    // Where there is much, the rarer things are folded.
+    const rarer = parts.has("beside") && make("details", {}, make("summary", {}, "More: the paper's balls, a second cradle"), material.node);
     let offered = 0;
     function show({ setting, scope: chosen }) {
       const { balls, contacts, inner } = concerned(setting, chosen);
@@ -210,6 +212,7 @@
       const one = chosen !== "all";
       const chosenLaw = explorer.law(setting);
       law.show(chosenLaw);
+      const held = explorer.ratiosInForce(setting);
       const ratios = (row) => (one && chosenLaw === "rule" ? inner.map((k) => row[k]) : []);
       const both = inner.flatMap((k) => [setting.forward[k], setting.backward[k]]);
       const rows = {
@@ -226,8 +229,15 @@
       const restitution = chosenLaw === "spheres" ? "restitution at 1 m/s" : "restitution";
       const pair = one && contacts.length ? `, balls ${contacts[0] + 1} and ${contacts[0] + 2}` : "";
       sliders.restitution.rename(restitution + pair);
+      // A ratio above its bound looks so, and says what is in force.
+      for (const [name, { words, directions }] of Object.entries(RATIOS)) {
+        const over = directions.flatMap((way) => inner.flatMap((k) => (setting[way][k] - held[way][k] > 1e-9 ? [held[way][k]] : [])));
+        const bounds = new Set([Math.min(...over), Math.max(...over)].map((bound) => +bound.toFixed(2)));
+        sliders[name].rename(words + (over.length ? ` (held at ${[...bounds].join(" to ")})` : ""));
+        sliders[name].node.classList.toggle("over", over.length > 0);
+      }
     }
-    return { node: make("div", { class: "settings" }, ...nodes), show };
+    return { node: make("div", { class: "settings" }, ...nodes, rarer || ""), rarer, show };
   }
 
   // --- the outcome of a hit -----------------------------------------------------------------------
@@ -247,16 +257,17 @@
     const [bars, momentum, energy] = [1, 2, 3].map(() => make("div", { class: "plot" }));
     const handles = panels.handles(act);
     const told = make("p", { class: "note guessed" });
-    const named = (words, plot) => make("div", { class: "named" }, make("span", {}, words), plot);
-    const balance = make("div", { class: "balance" }, named("momentum", momentum), named("energy", energy));
+    const inAll = make("small", {});
+    const named = (plot, ...words) => make("div", { class: "named" }, make("span", {}, ...words), plot);
+    const balance = make("div", { class: "balance" }, named(momentum, "momentum"), named(energy, "energy ", inAll));
     const node = make(
       "div",
       { class: "outcome" },
       title,
       make("div", { class: "drawn" }, bars, handles.node),
+      balance,
       told,
       other ?? "",
-      balance,
     );
     function show(seen, box) {
       // Who chooses an answer draws no bars: until then all is as before the hit.
@@ -272,9 +283,8 @@
       bars.innerHTML = now ? explorer.bars(box(bars), setting, before, now, drawn) : "";
       momentum.innerHTML = now ? explorer.momentum(box(momentum), setting, hit.before, now) : "";
       energy.innerHTML = now ? explorer.energy(box(energy), setting, hit.before, now) : "";
+      inAll.textContent = now ? `total ${explorer.percent(explorer.kept(setting.masses, hit.before, now))}` : "";
       handles.show(state, box(bars));
-      // A guess that has not begun has given nothing away yet.
-      node.classList.toggle("unbegun", Boolean(covered && !guess.touched));
       told.textContent = guess && number === 0 ? explorer.guessInWords(state) : "";
     }
     return { node, show };

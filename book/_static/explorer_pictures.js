@@ -1,9 +1,14 @@
-// The panel with one of three pictures: a hit from the inside, all ratios, or all mass ratios.
+// The panel with one of three pictures: a hit from the inside, its outcome for each ratio, or which
+// balls go back for each two ratios of masses.
 (function (explorer) {
   "use strict";
   const { RegionMap, Sweep, controls, panels } = explorer;
   const { button, choice, make, select } = controls;
-  const TITLES = { inside: "Inside the hit", sweep: "All ratios", map: "Mass ratios" };
+  const TABS = {
+    inside: ["Inside the hit", "velocities from its start to its end"],
+    sweep: ["Each ratio", "the outcome for each ratio from 0 to 1"],
+    map: ["Who goes back", "of three balls, for any two ratios of their masses"],
+  };
   // Milliseconds of each frame for sweeps and maps.
   const BUDGET = 7;
   const LISTED = 12; // events as buttons
@@ -81,7 +86,8 @@
       offered = count;
     }
     function legend(record, chosen) {
-      if (chosen === "all") return "Dashed line: where the hit is now.";
+      if (chosen === "all")
+        return "From left to right the hit goes on. Impulse, force times time, is its clock. Dashed line: now.";
       const kinds = new Set(
         record.events.filter((event) => event.contact === chosen).map(({ kind }) => kind),
       );
@@ -92,7 +98,7 @@
       if (offered !== count) offer(count);
       contact.show(String(chosen));
       scrub.hidden = !record;
-      drawn = record && explorer.diagram(box(plot), record, chosen);
+      drawn = record && explorer.diagram(box(plot, 6.5), record, chosen);
       plot.innerHTML = drawn ? drawn.svg : "";
       if (record) note.textContent = legend(record, chosen);
       else
@@ -119,7 +125,7 @@
     };
   }
 
-  // --- all ratios -----------------------------------------------------------------------------------
+  // --- the outcome for each ratio -----------------------------------------------------------------------------------
 
   function sweepPicture(act) {
     const plot = make("div", { class: "plot drags-x" });
@@ -311,7 +317,7 @@
     const names = Object.keys(makers).filter((name) => parts.has(name));
     if (!names.length) return null;
     const pictures = Object.fromEntries(names.map((name) => [name, makers[name](act, parts)]));
-    const options = names.map((value) => ({ value, text: TITLES[value] }));
+    const options = names.map((value) => ({ value, text: TABS[value][0], title: TABS[value][1] }));
     const tabs = choice({ words: "picture", options, choose: act.picture, hidden: true });
     tabs.node.classList.add("tabs");
     tabs.node.hidden = names.length < 2;

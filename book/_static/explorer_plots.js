@@ -14,6 +14,7 @@
   };
 
   const px = (value) => Math.round(value * 100) / 100;
+  const percent = (share) => `${fixed(100 * share, 0)}\u00a0%`;
   const colour = (ball) => `var(--ball-${ball})`;
 
   // Letters on a ball's colour: black or white, whichever has more contrast (WCAG 2: relative
@@ -129,13 +130,15 @@
     return { row, x: (value) => px(left + (value / largest - low) * scale) };
   }
 
-  // Velocities as bars, to the left and to the right as the balls move. Thin outlines show the
-  // velocities before, `guess` what the reader has drawn.
+  // Velocities as bars, to the left and to the right as the balls move. Dashed outlines show the
+  // velocities before, and the longest one says so where it has room; `guess` is what the reader has
+  // drawn.
   function bars(box, setting, before, now, { guess = [], span, gap = 0.35 } = {}) {
     const { width, em } = box;
     const count = now.length;
     const { row, x } = barPlaces(box, span ?? [...before, ...now, ...guess]);
     const parts = [];
+    const longest = before.findIndex((v) => Math.abs(v) === Math.max(...before.map(Math.abs)));
     for (let ball = 0; ball < count; ball += 1) {
       const top = px((ball + 0.5) * row - 0.625 * em);
       const bar = (value, how) =>
@@ -152,30 +155,36 @@
       const at = x(now[ball]) + (leftwards ? -gap : gap) * em;
       const end = leftwards ? 'text-anchor="end" class="number"' : 'class="number"';
       parts.push(text(at, top + em, fixed(now[ball]), end));
+      const way = Math.sign(before[ball]);
+      const far = (value) => way * (x(value) - x(0));
+      const taken = Math.max(0, far(now[ball]) + (leftwards === way < 0 ? 3 * em : 0), far(guess[ball] ?? 0));
+      if (ball === longest && far(before[ball]) - taken > 4 * em)
+        parts.push(text(x(before[ball]) - 2.2 * way * em, top + 0.9 * em, "before", 'text-anchor="middle" class="small"'));
     }
     parts.push(`<path class="zero" d="M${x(0)} 0V${px(count * row)}"/>`);
     const words = `Velocities in m/s: ${now.map((v, ball) => `ball ${ball + 1} ${fixed(v)}`).join(", ")}`;
     return picture({ width, height: count * row + 0.2 * em }, words, parts.join(""));
   }
 
-  // Momentum, ball by ball, each from where the one before has ended: to the right, or back. One
-  // mark is zero, the other the momentum before the hit, where the last one has to end.
+  // Momentum as arrows, end to end: from zero those of balls that go to the right, then, in the row
+  // below, back by those that go to the left. They have to end at the mark of the momentum before.
   function momentum(box, setting, before, now) {
     const { width, em } = box;
     const of = (row) => row.map((v, ball) => setting.masses[ball] * v);
-    const ends = of(now).reduce((all, p) => [...all, all[all.length - 1] + p], [0]);
-    const total = sum(of(before));
-    const [low, high] = [Math.min(0, total, ...ends), Math.max(0, total, ...ends)];
+    const parts = of(now).map((p, ball) => ({ p, ball }));
+    const [right, left] = [parts.filter(({ p }) => p > 0), parts.filter(({ p }) => p < 0)];
+    const [total, last, most] = [of(before), of(now), right.map(({ p }) => p)].map(sum);
+    const [low, high] = [Math.min(0, total, last), Math.max(0, total, most)];
     const x = (p) => px(1.7 * em + ((p - low) / Math.max(high - low, 1e-9)) * (width - 3.4 * em));
-    const thick = 0.55 * em;
-    const pieces = ends.slice(1).map((end, ball) => {
-      const [from, to] = [x(ends[ball]), x(end)];
-      const back = to < from;
-      const y = px(back ? 0.5 * em + thick : 0.5 * em);
-      return (
-        `<rect x="${Math.min(from, to)}" y="${y}" width="${px(Math.abs(to - from))}" ` +
-        `height="${px(thick)}" fill="${colour(ball)}"/>`
-      );
+    const thick = 0.6 * em;
+    let end = 0;
+    const pieces = [...right, ...left].map(({ p, ball }) => {
+      const from = x(end);
+      const to = x((end += p));
+      const tip = px(to - Math.sign(p) * Math.min(Math.abs(to - from), 0.4 * em));
+      const y = px(0.4 * em + (p < 0 ? thick : 0));
+      const half = px(thick / 2);
+      return `<path d="M${from} ${y}H${tip}L${to} ${y + half}L${tip} ${y + 2 * half}H${from}z" fill="${colour(ball)}"/>`;
     });
     const below = em + 2 * thick;
     const height = below + 1.1 * em;
@@ -183,7 +192,6 @@
     const name = (p, words) => text(p, below + 0.85 * em, words, 'text-anchor="middle" class="small"');
     const apart = Math.abs(x(total) - x(0)) > 2.4 * em;
     const names = apart ? name(x(0), "0") + name(x(total), "before") : name(x(0), "0, before");
-    const last = ends[ends.length - 1];
     return picture(
       { width, height },
       `Momentum: ${fixed(last)}, before the hit ${fixed(total)} kg m/s`,
@@ -191,41 +199,29 @@
     );
   }
 
-  // Where the kinetic energy is: one share for each ball, and what is stored or lost. A guess may
-  // have more than there was: then a line marks the energy before.
+  // Where the kinetic energy is: one share for each ball. A dashed outline holds the energy before; a
+  // guess may have more.
   function energy(box, setting, before, now) {
     const { width, em } = box;
     const total = sum(kinetic(setting.masses, before));
     const shares = kinetic(setting.masses, now).map((share) => (total > 0 ? share / total : 0));
-    const gone = total > 0 ? Math.max(0, 1 - sum(shares)) : 0;
     const height = 1.5 * em;
-    const whole = Math.max(1, sum(shares) - 1e-9);
+    const unit = width / Math.max(1, sum(shares) - 1e-9);
     let x = 0;
-    const piece = (share, how, label, fill) => {
-      const wide = (share / whole) * width;
+    const named = shares.map((share, ball) => `ball ${ball + 1}: ${percent(share)}`);
+    const parts = shares.map((share, ball) => {
+      const wide = share * unit;
+      const label = [named[ball], named[ball].slice(5)].find((words) => wide > 0.5 * em * (words.length + 1));
+      const how = `text-anchor="middle" fill="${letters(ball)}"`;
       const part =
-        `<rect x="${px(x)}" y="0" width="${px(wide)}" height="${px(height)}" ${how}/>` +
-        (wide > 2.6 * em
-          ? text(x + wide / 2, 1.1 * em, label, `text-anchor="middle" ${fill}`)
-          : "");
+        `<rect x="${px(x)}" y="0" width="${px(wide)}" height="${px(height)}" fill="${colour(ball)}" class="part"/>` +
+        (label ? text(x + wide / 2, 1.1 * em, label, how) : "");
       x += wide;
       return part;
-    };
-    const percent = (share) => `${fixed(100 * share, 0)}\u00a0%`;
-    const parts = shares.map((share, ball) =>
-      piece(share, `fill="${colour(ball)}" class="part"`, percent(share), `fill="${letters(ball)}"`),
-    );
-    parts.push(piece(gone, 'class="gone"', percent(gone), ""));
-    if (whole > 1.0005) {
-      const at = px(width / whole);
-      parts.push(`<path class="limit" d="M${at} ${px(-0.3 * em)}V${px(height + 0.3 * em)}"/>`);
-    }
-    const words = shares.map((share, ball) => `ball ${ball + 1} ${percent(share)}`).join(", ");
-    return picture(
-      { width, height },
-      `Kinetic energy: ${words}; not in motion: ${percent(gone)}`,
-      parts.join(""),
-    );
+    });
+    parts.push(`<rect class="before" width="${px(unit)}" height="${px(height)}"/>`);
+    const words = `Kinetic energy: ${named.join(", ")}; in all ${percent(sum(shares))} of that before the hit`;
+    return picture({ width, height }, words, parts.join(""));
   }
 
   // Sum of all impulses at each row of a record's path.
@@ -369,6 +365,7 @@
     energy,
     momentum,
     names,
+    percent,
     picture,
     polyline,
     progress,

@@ -122,6 +122,18 @@
     return { ...setting, ...Object.fromEntries(rows) };
   }
 
+  // The ratios that the solver goes by: none above its largest, which depends on the ratio at the
+  // next ball, so that the last one is known first.
+  function ratiosInForce({ masses, forward, backward }) {
+    let held = { forward, backward };
+    forward.forEach(() => {
+      const most = globalThis.cradle.largestRatios(masses, held.forward, held.backward);
+      const least = (row, bounds) => row.map((ratio, k) => Math.min(ratio, bounds[k]));
+      held = { forward: least(forward, most.forward), backward: least(backward, most.backward) };
+    });
+    return held;
+  }
+
   function withLaw(setting, chosen) {
     const { law: _, gap: __, stiffness: ___, ...rest } = setting;
     const [number, usual] = NUMBER[chosen] ?? [];
@@ -293,6 +305,7 @@ print(run)
     plain,
     pulled,
     python,
+    ratiosInForce,
     resized,
     stiffnesses,
     toFragment,

@@ -2,12 +2,11 @@
 // was set, the velocities after the first hit, and the record of it.
 (function (explorer) {
   "use strict";
-  const { controls, kinetic, panels, sum } = explorer;
+  const { controls, kept, panels } = explorer;
   const { make } = controls;
   const STILL = 0.005; // of the fastest ball's speed
 
   const back = (v) => v.filter((speed) => speed < -STILL).length;
-  const kept = (masses, before, after) => sum(kinetic(masses, after)) / sum(kinetic(masses, before));
   const TASKS = [
     [1, "Make the last two balls leave alike.", ({ v, last }) => last > 0.1 && Math.abs(v.at(-2) - last) < STILL],
     [1, "Send the last ball off faster than the striker came.", ({ last }) => last > 1.2],

@@ -49,6 +49,8 @@
   const kinetic = (masses, velocities) => masses.map((m, ball) => 0.5 * m * velocities[ball] ** 2);
   const sum = (row) => row.reduce((total, value) => total + value, 0);
 
+  const kept = (masses, before, after) => sum(kinetic(masses, after)) / (sum(kinetic(masses, before)) || 1);
+
   // `number` counts from 0.
   function hitName(number) {
     return number === 0 ? "the first hit" : `hit ${number + 1}`;
@@ -57,16 +59,12 @@
   function noAnswer(status, setting) {
     if (status === "lossy")
       return "Spheres that lose so much are not followed here: choose a restitution of 0.65 or more.";
-    if (status === "unfinished" && explorer.law(setting) !== "rule")
-      return (
-        "To follow the contact forces of this hit takes more steps than a page should compute " +
-        "between two pictures. The Python package has no such limit."
-      );
+    const many =
+      explorer.law(setting) === "rule"
+        ? `This hit takes more than ${explorer.EVENTS} events, more`
+        : "To follow the contact forces of this hit takes more steps";
     if (status === "unfinished")
-      return (
-        `This hit takes more than ${explorer.EVENTS} events, more than a page should compute ` +
-        "between two pictures. The Python package has no such limit."
-      );
+      return `${many} than a page should compute between two pictures. The Python package has no such limit.`;
     return "The solver's answer did not pass its own checks, so none is shown.";
   }
 
@@ -78,15 +76,14 @@
       if (hit.before.every((v) => v === 0)) return "No ball is pulled back. Drag one to a side.";
       return "The balls swing together: none strikes another.";
     }
-    const before = sum(kinetic(masses, hit.before));
-    const lost = 1 - sum(kinetic(masses, hit.after)) / before;
+    const lost = 1 - kept(masses, hit.before, hit.after);
     const percent = lost < 0.0005 ? "Less than 0.1" : fixed(100 * lost, lost < 0.1 ? 1 : 0);
     // Contact forces are followed to five digits.
-    const kept = Math.abs(lost) < (explorer.law(setting) === "rule" ? 1e-9 : 1e-4);
+    const all = Math.abs(lost) < (explorer.law(setting) === "rule" ? 1e-9 : 1e-4);
     const said = [
       `Before ${hitName(number)}, ${motions(hit.before)}.`,
       `After it, ${motions(hit.after)}.`,
-      kept ? "All energy is kept." : `${percent}\u00a0% of the energy is lost.`,
+      all ? "All energy is kept." : `${percent}\u00a0% of the energy is lost.`,
     ];
     if (answer) {
       const total = sum(answer.collisions);
@@ -110,6 +107,7 @@
   Object.assign(explorer, {
     fixed,
     hitName,
+    kept,
     kinetic,
     outcomeInWords: outcome,
     sum,
