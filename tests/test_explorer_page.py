@@ -236,18 +236,18 @@ def test_momentum_and_energy_add_up(still):
 @pytest.mark.parametrize(
     ("fragment", "said"),
     [
-        ("speeds=1,0,0&forward=0.7", " (held at 0.5)"),
+        ("speeds=1,0,0&forward=0.7", " (bound 0.5)"),
         ("speeds=1,0,0&forward=0.5", ""),
-        ("speeds=1,0,0,0,0&forward=0.7", " (held at 0.5 to 0.67)"),
+        ("speeds=1,0,0,0,0&forward=0.7", " (bound 0.5 to 0.67)"),
         ("speeds=1,0,0,0&masses=1,2,0.5,1&forward=0.6&backward=0.1", None),
         ("scene=ABCCAB", None),
     ],
 )
-def test_a_ratio_above_its_bound_says_what_is_in_force(still, fragment, said):
-    """The outcome is that of the ratios which the page names."""
+def test_a_ratio_above_its_bound_says_so(still, fragment, said):
+    """One ball strikes others at rest: what comes out is that of the bound."""
     tab = still("#" + fragment)
     setting = tab.drawn()
-    held = tab.evaluate(f"cradleExplorer.ratiosInForce({SETTING})")
+    held = tab.evaluate(f"cradleExplorer.boundedRatios({SETTING})")
     same = collide(chain_of(setting)[0], ImpulseCorrelation(held["forward"], held["backward"]))
     np.testing.assert_allclose(same.velocities, setting["after"], rtol=0, atol=1e-9)
     if said is not None:

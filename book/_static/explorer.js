@@ -90,12 +90,12 @@
       const outcome = (here) => (here ? node("outcome") : "");
       const left = make("div", { class: "left" }, stages, outcome(guessed), node("run"), node("words"));
       if (beside) this.panels.settings.rarer.append(beside.node);
-      const right = make("div", { class: "right" }, outcome(!guessed), node("pictures"), node("tasks"));
+      const right = make("div", { class: "right" }, outcome(!guessed), node("pictures"));
       this.link = make("a", { href: "explorer.html" }, "Open in the full explorer");
       this.host.replaceChildren(
         node("question"),
         node("scenes"),
-        make("div", { class: "desk" }, left, node("settings"), right),
+        make("div", { class: "desk" }, left, node("settings"), right, node("tasks")),
         this.panels.question?.after ?? "",
         node("share"),
         this.page ? "" : make("p", { class: "more" }, this.link),

@@ -212,7 +212,7 @@
       const one = chosen !== "all";
       const chosenLaw = explorer.law(setting);
       law.show(chosenLaw);
-      const held = explorer.ratiosInForce(setting);
+      const bounded = explorer.boundedRatios(setting);
       const ratios = (row) => (one && chosenLaw === "rule" ? inner.map((k) => row[k]) : []);
       const both = inner.flatMap((k) => [setting.forward[k], setting.backward[k]]);
       const rows = {
@@ -229,11 +229,11 @@
       const restitution = chosenLaw === "spheres" ? "restitution at 1 m/s" : "restitution";
       const pair = one && contacts.length ? `, balls ${contacts[0] + 1} and ${contacts[0] + 2}` : "";
       sliders.restitution.rename(restitution + pair);
-      // A ratio above its bound looks so, and says what is in force.
+      // A ratio above its bound looks so. (Where two balls push one, more than the bound may count.)
       for (const [name, { words, directions }] of Object.entries(RATIOS)) {
-        const over = directions.flatMap((way) => inner.flatMap((k) => (setting[way][k] - held[way][k] > 1e-9 ? [held[way][k]] : [])));
+        const over = directions.flatMap((way) => inner.map((k) => bounded[way][k]).filter((bound, k) => setting[way][inner[k]] - bound > 1e-9));
         const bounds = new Set([Math.min(...over), Math.max(...over)].map((bound) => +bound.toFixed(2)));
-        sliders[name].rename(words + (over.length ? ` (held at ${[...bounds].join(" to ")})` : ""));
+        sliders[name].rename(words + (over.length ? ` (bound ${[...bounds].join(" to ")})` : ""));
         sliders[name].node.classList.toggle("over", over.length > 0);
       }
     }

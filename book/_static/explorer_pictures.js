@@ -87,7 +87,7 @@
     }
     function legend(record, chosen) {
       if (chosen === "all")
-        return "From left to right the hit goes on. Impulse, force times time, is its clock. Dashed line: now.";
+        return "The hit goes on from left to right; impulse, force times time, is its clock. Dashed: now.";
       const kinds = new Set(
         record.events.filter((event) => event.contact === chosen).map(({ kind }) => kind),
       );

@@ -122,9 +122,9 @@
     return { ...setting, ...Object.fromEntries(rows) };
   }
 
-  // The ratios that the solver goes by: none above its largest, which depends on the ratio at the
-  // next ball, so that the last one is known first.
-  function ratiosInForce({ masses, forward, backward }) {
+  // The ratios, none above its bound, which depends on the ratio at the next ball: the last one is
+  // known first.
+  function boundedRatios({ masses, forward, backward }) {
     let held = { forward, backward };
     forward.forEach(() => {
       const most = globalThis.cradle.largestRatios(masses, held.forward, held.backward);
@@ -298,6 +298,7 @@ print(run)
     NONE,
     all,
     atRest,
+    boundedRatios,
     equal,
     fromFragment,
     law,
@@ -305,7 +306,6 @@ print(run)
     plain,
     pulled,
     python,
-    ratiosInForce,
     resized,
     stiffnesses,
     toFragment,
