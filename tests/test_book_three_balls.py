@@ -222,6 +222,17 @@ def test_fig_3_every_marked_impulse_and_velocity():
     np.testing.assert_allclose(trace.velocities, floats(solve(*EXAMPLE).velocities), **CLOSE)
 
 
+def test_energy_that_the_example_loses():
+    """By the velocities of the independent solver; the two parts from its path."""
+    m, v, *_ = EXAMPLE
+    after = floats(solve(*EXAMPLE).velocities)
+    lost = 500 * (np.dot(m, np.square(v)) - np.dot(m, np.square(after)))  # mJ
+    trace = run(*EXAMPLE)
+    parts = [1000 * work(trace, k, at(trace, "end", k)) for k in (0, 1)]
+    assert sum(parts) == pytest.approx(lost, rel=1e-12)
+    CHAPTER.tells({f"three-balls-lost{k}": x for k, x in zip(("", "-2", "-3"), (lost, *parts))})
+
+
 def test_fig_4_curves():
     ratio = np.linspace(0, 0.5, 501)
     outcome = post_impact_velocities([1, 1, 1], [1, 0, 0], 1, ratio[:, None])
@@ -255,7 +266,7 @@ def test_one_outcome_belongs_to_many_parameters():
             a = mpmath.mpf(ratio)
             e = losses(1 - target[0], target[2], a, mpmath.sqrt)
             assert floats(e) == pytest.approx(printed, abs=5.1e-7)
-            assert " ".join(f"{x:.6f}" for x in printed) in CHAPTER.printed("ambiguity")
+            assert " ".join(f"{x:.3f}" for x in floats(e)) in CHAPTER.printed("ambiguity")
             again = solve([1, 1, 1], [1, 0, 0], list(e), a).velocities
             assert max(abs(x - y) for x, y in zip(again, target)) < mpmath.mpf(10) ** -45
     # At the ends of the range one of the two is 1; beyond them it would have to be larger.
