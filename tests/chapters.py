@@ -79,9 +79,13 @@ def code(chapter: str) -> list:
 
 
 def shown(chapter: str) -> list:
-    """Return the code cells that a reader sees without opening a fold."""
+    """Return the code cells that a reader sees without opening a fold, and those he may write."""
     hidden = {"hide-input", "hide-cell", "remove-cell"}
-    return [cell for cell in code(chapter) if not hidden & set(cell.metadata.get("tags", ()))]
+    return [
+        cell
+        for cell in code(chapter)
+        if "solution" in (tags := set(cell.metadata.get("tags", ()))) or not hidden & tags
+    ]
 
 
 def parsed(cell) -> ast.Module:

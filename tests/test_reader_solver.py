@@ -1,6 +1,7 @@
 """The reader's own solver: the lines of its page, right, wrong, endless and broken."""
 
 import operator
+import re
 import sys
 
 import numpy as np
@@ -10,8 +11,7 @@ from pages import PATIENCE
 import reader_solver  # isort: skip
 import solver_numpy  # isort: skip  (both are found by way of pyproject.toml)
 
-RUN, STOP = ".reader-solver button >> nth=0", ".reader-solver button >> nth=1"
-TOLD = ".reader-solver .told"
+WHOLE = ".reader-solver:not([data-piece])"
 
 
 @pytest.fixture(scope="module")
@@ -52,49 +52,63 @@ def test_the_page_s_lines_pass(solver, monkeypatch):
 
 
 def test_a_piece_is_left_to_the_reader(solver):
-    for piece in reader_solver.PIECES:
-        rest = reader_solver.without(solver, piece)
-        compile(rest, piece, "exec")
-        assert f"def {piece}(" in rest
-        assert rest.count('raise NotImplementedError("Your lines come here.")') == 1
-        assert len(rest) < len(solver)
+    texts = reader_solver.texts(reader_solver.cells())
+    assert texts.pop("") == {"own": solver, "rest": ""}
+    assert [*texts] == [*reader_solver.PIECES]
+    for piece, text in texts.items():
+        own, rest = text["own"], text["rest"]
+        compile(own, piece, "exec")
+        assert f"def {piece}(" in own
+        assert own.count('raise NotImplementedError("Your lines come here.")') == 1
+        assert len(own) < len(reader_solver.parts(reader_solver.cells())[piece])
+        for other in reader_solver.PIECES:
+            assert (f"def {other}(" in rest) == (other != piece) != (f"def {other}(" in own)
     with pytest.raises(ValueError, match="defines not each of"):
         reader_solver.lines(["def rates():\n    pass"])
 
 
-@pytest.fixture
-def editor(visit):
-    """Open the page and return what types lines and presses Run; no other page is asked for."""
-    tab = visit(chapter="own_solver")
-    asked = []
-    tab.on("request", lambda request: asked.append(request.url))
+class Editor:
+    """One of the editors of the page: types lines, presses Run, reads what is told."""
 
-    def run(lines: str | None = None):
+    def __init__(self, tab, place=WHOLE):
+        self.tab, self.host, self.place = tab, tab.locator(place), place
+        self.area = self.host.locator("textarea")
+
+    def __call__(self, lines: str | None = None):
         if lines is not None:
-            tab.locator(".reader-solver textarea").fill(lines)
-        tab.click(RUN)
-        return tab
+            self.area.fill(lines)
+        self.host.locator("button").first.click()
+        return self
 
-    run.tab, run.asked = tab, asked
-    return run
+    def stop(self):
+        self.host.locator("button").nth(1).click()
+        return self
+
+    def told(self, words: str) -> tuple[int, int]:
+        """Wait for these words, and return how many checks have passed and how many have not."""
+        self.tab.wait_for_function(
+            "([told, words]) => document.querySelector(told).textContent.includes(words)",
+            arg=[f"{self.place} .told", words],
+        )
+        return tuple(self.host.locator(f".{kind}").count() for kind in ("passed", "missed"))
 
 
-def told(tab, words: str) -> tuple[int, int]:
-    """Wait for these words, and return how many checks have passed and how many have not."""
-    tab.wait_for_function(
-        f"(words) => document.querySelector('{TOLD}').textContent.includes(words)", arg=words
-    )
-    return tuple(tab.locator(f".reader-solver .{kind}").count() for kind in ("passed", "missed"))
+@pytest.fixture
+def page(visit):
+    """Open the page, and keep what it asks for."""
+    tab = visit(chapter="own_solver")
+    tab.asked = []
+    tab.on("request", lambda request: tab.asked.append(request.url))
+    return tab
 
 
-def test_right_wrong_and_endless(editor, solver):
+def test_right_wrong_and_endless(page, solver):
     """Nothing is loaded before the click; what is right passes, the rest is told with its line."""
-    tab = editor.tab
-    assert not any("solver_python" in url for url in editor.asked)
-    tab.check(".reader-solver input[value='']")
-    assert tab.locator(".reader-solver textarea").input_value() == solver
-    assert told(editor(), "5 of 5 checks passed") == (5, 0)
-    assert sum("solver_python" in url for url in editor.asked) == 1
+    tab, editor = page, Editor(page)
+    assert not any("solver_python" in url for url in tab.asked)
+    assert editor.area.input_value() == solver
+    assert editor().told("5 of 5 checks passed") == (5, 0)
+    assert sum("solver_python" in url for url in tab.asked) == 1
     # Each wrong line is noticed by the checks that it concerns.
     for right, wrong, passed in (
         ("min(a, bound)", "a", 4),
@@ -102,9 +116,9 @@ def test_right_wrong_and_endless(editor, solver):
         ("np.square(e)", "np.array(e)", 2),
     ):
         assert solver.count(right) == 1
-        counts = told(editor(solver.replace(right, wrong)), f"{passed} of 5 checks passed")
+        counts = editor(solver.replace(right, wrong)).told(f"{passed} of 5 checks passed")
         assert counts == (passed, 5 - passed)
-        assert "cradle has" in tab.locator(".reader-solver .missed").first.inner_text()
+        assert "cradle has" in editor.host.locator(".missed").first.inner_text()
     # Errors name their line, and select it.
     lost = solver.index("p2, p3 = push")
     for broken, error in (
@@ -113,21 +127,19 @@ def test_right_wrong_and_endless(editor, solver):
         (solver.replace("p2, p3 = push", "import random"), "No module named 'random'"),
     ):
         line = solver[:lost].count("\n") + 1
-        assert told(editor(broken), f"An error in line {line}.") == (0, 0)
-        words = tab.locator(".reader-solver .wrong").inner_text()
+        assert editor(broken).told(f"An error in line {line}.") == (0, 0)
+        words = editor.host.locator(".wrong").inner_text()
         assert error in words
         assert f"Line {line}" in words
         chosen = "(node) => node.value.slice(node.selectionStart, node.selectionEnd)"
-        assert (
-            tab.locator(".reader-solver textarea").evaluate(chosen) == broken.split("\n")[line - 1]
-        )
+        assert editor.area.evaluate(chosen) == broken.split("\n")[line - 1]
     # An error in one check leaves the others; a hint says what may be missing.
     some = solver.replace(
         "    v = np.array(v, dtype",
         "    m[1] == 2 and m[7]\n    v = np.array(v, dtype",
     )
-    assert told(editor(some), "An error in line") == (4, 0)
-    assert tab.locator(".reader-solver li p:has-text('an error: no answer')").count() == 1
+    assert editor(some).told("An error in line") == (4, 0)
+    assert editor.host.locator("li p:has-text('an error: no answer')").count() == 1
     for right, wrong, hint in (
         ("    return push, np", "    push, np", "Is a return missing?"),
         (
@@ -136,23 +148,22 @@ def test_right_wrong_and_endless(editor, solver):
             "calls itself without end",
         ),
     ):
-        told(editor(solver.replace(right, wrong)), "An error")
-        assert hint in tab.locator(".reader-solver .wrong").inner_text()
+        editor(solver.replace(right, wrong)).told("An error")
+        assert hint in editor.host.locator(".wrong").inner_text()
     # What is printed is shown, and a loop without end is stopped; then all goes on.
     editor("print('here')\nwhile True:\n    pass")
-    tab.wait_for_selector(".reader-solver .printed:has-text('here')", timeout=PATIENCE)
-    told(tab, "press Stop")
-    tab.click(STOP)
-    assert told(tab, "Stopped.") == (0, 0)
-    assert told(editor(solver), "5 of 5 checks passed") == (5, 0)
+    tab.wait_for_selector(f"{WHOLE} .printed:has-text('here')", timeout=PATIENCE)
+    editor.told("press Stop")
+    assert editor.stop().told("Stopped.") == (0, 0)
+    assert editor(solver).told("5 of 5 checks passed") == (5, 0)
     nothing = "def three_balls(*given):\n    return [(0, 0, [float('nan')] * 3)]"
-    assert told(editor(nothing), "0 of 5") == (0, 5)
+    assert editor(nothing).told("0 of 5") == (0, 5)
 
 
-def test_a_browser_without_a_language(editor):
+def test_a_browser_without_a_language(page):
     """WebKit without a locale says "C", for which browsers have no calendar."""
-    assert told(editor(), "Write your lines at line 8.") == (0, 0)  # Python is loaded
-    answers = editor.tab.evaluate(
+    assert Editor(page)().told("5 of 5 checks passed") == (5, 0)  # Python is loaded
+    answers = page.evaluate(
         """async () => {
           const prelude = 'Object.defineProperty(navigator, "language", { value: "C" });\\n';
           const code = new Blob([prelude, globalThis.cradlePython], { type: "text/javascript" });
@@ -171,17 +182,37 @@ def test_a_browser_without_a_language(editor):
     assert answers[-1] == {"done": True}
 
 
-def test_each_piece_keeps_what_was_written(editor):
-    tab = editor.tab
-    area = tab.locator(".reader-solver textarea")
-    first = area.input_value()
-    assert told(editor(), "Write your lines at line 8.") == (0, 0)
-    area.fill("mine:")
-    area.press("End")
-    area.press("Enter")
-    assert area.input_value() == "mine:\n    "
-    tab.check(".reader-solver input[value=three_balls]")
-    assert "def three_balls" in area.input_value() != first
-    tab.check(".reader-solver input[value=rates]")
-    assert area.input_value() == "mine:\n    "
-    assert tab.locator(".reader-solver .count").inner_text() == "1\n2"
+@pytest.mark.parametrize("piece", reader_solver.PIECES)
+def test_a_piece_by_itself(page, piece):
+    """Empty, right, broken in the reader's lines, and wrong where only the page's lines notice."""
+    editor = Editor(page, f".reader-solver[data-piece={piece}]")
+    right = reader_solver.parts(reader_solver.cells())[piece]
+    stub = editor.area.input_value()
+    begin = 1 + stub[: stub.index("raise NotImplementedError")].count("\n")
+    assert editor.host.locator("ol").is_hidden()
+    assert editor().told(f"Write your lines at line {begin}.") == (0, 0)
+    assert editor.host.locator("ol").is_hidden()
+    with_numpy = f"import numpy as np\n{right}"
+    assert editor(with_numpy).told("5 of 5 checks passed") == (5, 0)
+    assert editor.host.locator("ol").is_visible()
+    assert editor(f"{with_numpy}\nx = (1,").told("An error") == (0, 0)
+    assert "SyntaxError" in editor.host.locator(".wrong").inner_text()
+    nothing = re.sub(r"return .*", "return None", with_numpy)
+    assert editor(nothing).told("An error.") == (0, 0)  # no line of the reader's
+    words = editor.host.locator(".wrong").inner_text()
+    assert "Is a return missing?" in words
+    assert "Line" not in words
+
+
+def test_each_editor_keeps_what_was_written(page):
+    one, other = (
+        Editor(page, f".reader-solver[data-piece={name}]") for name in ("rates", "three_balls")
+    )
+    before = other.area.input_value()
+    one.area.fill("mine:")
+    one.area.press("End")
+    one.area.press("Enter")
+    assert one.area.input_value() == "mine:\n    "
+    assert other.area.input_value() == before
+    assert "def three_balls" in before
+    assert one.host.locator(".count").inner_text() == "1\n2"

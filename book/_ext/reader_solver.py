@@ -1,8 +1,9 @@
 """Sphinx extension: the reader's own solver of three balls, run in the page.
 
-A page asks for it by `<div class="reader-solver"></div>`. The editor holds the lines of the
-page's shown cells, read from its notebook, so there is no second copy of them. What comes out is
-compared with `cradle`, asked here.
+A page asks for it by `<div class="reader-solver" data-piece="rates"></div>`. The editor holds this
+function without what the reader is to write, and without `data-piece` the whole program. All lines
+are read from the page's notebook, so there is no second copy of them. What comes out is compared
+with `cradle`, asked here.
 
 Python runs in the browser by Brython, which comes from PyPI. Interpreter, `math` and the little of
 numpy that the lines use are one script, loaded when the reader first presses Run. It holds a text
@@ -13,6 +14,7 @@ be stopped.
 import ast
 import json
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +25,13 @@ HERE = Path(__file__).parent
 PLACE = '<div class="reader-solver"'
 #: The functions that the page builds up.
 PIECES = ("rates", "way_to_event", "three_balls")
+#: What they need.
+HEAD = "import numpy as np"
 #: What each of them computes, told where the reader's lines come.
 TOLD = {
     "rates": "Eqs. 16 to 19; the bound is Eq. 34",
     "way_to_event": "-u/u'; in expansion 2W/(R-u), R^2 = u^2 - 2u'W",
-    "three_balls": "the loop: Eqs. 20, 21, 23 and 29",
+    "three_balls": "To the next event: Eqs. 20, 21, 23 and 29",
 }
 #: Title; masses, velocities, restitution, ratio. The page's own example is put in front.
 CASES = (
@@ -49,33 +53,64 @@ def cells() -> list[str]:
     ]
 
 
-def lines(codes: list[str]) -> str:
-    """Return the page's solver: the cells that define its pieces."""
+def parts(codes: list[str]) -> dict[str, str]:
+    """Return the cells that define the pieces of the page's solver, by the name of the piece."""
     wanted = re.compile(rf"^def ({'|'.join(PIECES)})\(", re.MULTILINE)
-    parts = [code.strip() for code in codes if wanted.search(code)]
-    solver = "\n\n\n".join(["import numpy as np", *parts]) + "\n"
-    if sorted(wanted.findall(solver)) != sorted(PIECES):
+    found = [
+        (name, code.strip())
+        for code in codes
+        for name in wanted.findall(code)
+    ]
+    if sorted(name for name, _ in found) != sorted(PIECES):
         raise ValueError(
             f"book/own_solver.ipynb defines not each of {PIECES} once"
         )
-    return solver
+    return dict(found)
 
 
-def without(solver: str, piece: str) -> str:
-    """Return the solver with the body of one function left to the reader."""
+def joined(codes: Iterable[str]) -> str:
+    """Return cells as one program."""
+    return "\n\n\n".join([HEAD, *codes]) + "\n"
+
+
+def lines(codes: list[str]) -> str:
+    """Return the page's solver: the cells that define its pieces."""
+    return joined(parts(codes).values())
+
+
+def without(code: str, piece: str) -> str:
+    """Return lines with the body of one function, or that of its loop, left to the reader."""
     (function,) = (
         node
-        for node in ast.parse(solver).body
+        for node in ast.parse(code).body
         if isinstance(node, ast.FunctionDef) and node.name == piece
     )
     told = ast.get_docstring(function) is not None
-    first = function.body[told]
-    rows = solver.splitlines()
-    rows[first.lineno - 1 : function.end_lineno] = [
-        f"    # {TOLD[piece]}",
-        '    raise NotImplementedError("Your lines come here.")',
+    left = function.body[told:]
+    for node in function.body:
+        if isinstance(node, ast.While):
+            left = node.body
+    margin = " " * left[0].col_offset
+    rows = code.splitlines()
+    rows[left[0].lineno - 1 : left[-1].end_lineno] = [
+        f"{margin}# {TOLD[piece]}",
+        f'{margin}raise NotImplementedError("Your lines come here.")',
     ]
     return "\n".join(rows) + "\n"
+
+
+def texts(codes: list[str]) -> dict[str, dict[str, str]]:
+    """Return what each editor begins with, by its piece, and the lines that are run after it."""
+    pieces = parts(codes)
+    found = {"": {"own": lines(codes), "rest": ""}}
+    for piece, code in pieces.items():
+        own = without(code, piece)
+        rest = [other for name, other in pieces.items() if name != piece]
+        found[piece] = {
+            "own": f"{HEAD}\n\n\n{own}" if "np." in code else own,
+            "rest": joined(rest),
+        }
+    return found
 
 
 def example(codes: list[str]) -> tuple[list[float], list[float], list[float], float]:  # fmt: skip
@@ -115,9 +150,7 @@ def checks(codes: list[str]) -> list[dict[str, Any]]:
 def data() -> dict[str, Any]:
     """Return what the page shows: the texts to begin with, and the checks."""
     codes = cells()
-    solver = lines(codes)
-    texts = {piece: without(solver, piece) for piece in PIECES}
-    return {"texts": {**texts, "": solver}, "checks": checks(codes)}
+    return {"texts": texts(codes), "checks": checks(codes)}
 
 
 def interpreter() -> str:

@@ -8,6 +8,7 @@
     [/recursion|Previous line repeated/i, "A function calls itself without end."],
   ];
   let said = 0;
+  let rows = 0; // lines of the reader; what follows are the page's
 
   const say = (text) => {
     if (said < MOST) postMessage({ printed: String(text).slice(0, MOST - said) });
@@ -25,7 +26,7 @@
     let line = null;
     const kept = trace.filter((row) => {
       const [, file, number] = place.exec(row) ?? [];
-      if (file) own = file.endsWith(`#${FILE}`) || file === FILE;
+      if (file) own = (file.endsWith(`#${FILE}`) || file === FILE) && +number <= rows;
       if (file && own) line = +number;
       return own || /^\S/.test(row);
     });
@@ -37,7 +38,8 @@
 
   const run = (code, name) => $B.runPythonSource(code, name);
 
-  onmessage = ({ data: { code, checks } }) => {
+  onmessage = ({ data: { code, rest = "", checks } }) => {
+    rows = code.split("\n").length;
     $B.use_VFS = true;
     $B.update_VFS(modules);
     const only = $B.finders.VFS; // modules come from nowhere else, so nothing is asked of a network
@@ -46,7 +48,7 @@
     try {
       $B.pythonToAST(code, FILE); // is it Python at all?
       console.log = say; // where `print` writes
-      run(code, FILE);
+      run(`${code}\n\n\n${rest}`, FILE);
       let first = null; // error of a check: the others are made all the same
       checks.forEach(({ given }, number) => {
         const asked = given.map((value) => JSON.stringify(value)).join(", ");

@@ -1,4 +1,4 @@
-// The reader's own solver of three balls: an editor, a button, five checks. The lines run in a worker
+// The reader's own solver of three balls, in pieces: an editor, a button, five checks. The lines run in a worker
 // with Brython, which is loaded at the first press (book/_ext/reader_solver.py writes it), so an
 // endless loop holds up nothing and can be stopped.
 (function (data) {
@@ -33,8 +33,8 @@
     expected.every((v, ball) => found[ball] !== null && Math.abs(found[ball] - v) <= SAME);
 
   function solver(host) {
-    const drafts = { ...texts };
-    let piece = Object.keys(texts)[0];
+    const piece = host.dataset.piece ?? "";
+    const { own, rest } = texts[piece];
     let worker = null;
     let slow = 0;
 
@@ -45,12 +45,11 @@
       autocapitalize: "off",
       autocomplete: "off",
       wrap: "off",
-      "aria-label": "your solver, in Python",
+      "aria-label": `your ${piece || "solver"}, in Python`,
       oninput: () => number(),
       onkeydown: (event) => key(event),
     });
     function number() {
-      drafts[piece] = editor.value;
       const rows = editor.value.split("\n").length;
       editor.rows = rows;
       count.textContent = Array.from({ length: rows }, (_, k) => k + 1).join("\n");
@@ -66,21 +65,6 @@
       }
       event.preventDefault();
     }
-    function take(name) {
-      piece = name;
-      editor.value = drafts[name];
-      number();
-    }
-    const choices = Object.keys(texts).map((name) =>
-      make(
-        "label",
-        {},
-        make("input", { type: "radio", name: "solver-piece", value: name, onchange: () => take(name) }),
-        name ? make("code", {}, name) : "nothing: the page's lines, to be changed",
-      ),
-    );
-    choices[0].firstChild.checked = true;
-
     // --- what comes out -------------------------------------------------------------------------
     const start = make("button", { type: "button", class: "main", onclick: () => run() }, "Run");
     const halt = make("button", { type: "button", onclick: () => stop("Stopped.") }, "Stop");
@@ -90,7 +74,7 @@
     const results = checks.map(() => make("p", {}));
     const list = make(
       "ol",
-      {},
+      { hidden: "" },
       ...checks.map(({ title, given: [masses, velocities, restitution, ratio] }, k) => {
         const asked =
           `masses ${row(masses)} kg; velocities ${row(velocities)} m/s; ` +
@@ -126,7 +110,7 @@
       if (!done) return;
       const passed = list.querySelectorAll(".passed").length;
       if (empty) {
-        results.forEach((result) => (result.textContent = ""));
+        list.hidden = true;
         stop(`Write your lines at line ${line}.`);
       } else stop(error ? `An error${line ? ` in line ${line}` : ""}.` : `${passed} of ${checks.length} checks passed.`);
     }
@@ -156,7 +140,8 @@
       URL.revokeObjectURL(address);
       worker.onmessage = ({ data }) => hear(data);
       worker.onerror = ({ message }) => hear({ error: message, done: true });
-      worker.postMessage({ code: editor.value, checks });
+      worker.postMessage({ code: editor.value, rest, checks });
+      list.hidden = false;
       halt.disabled = false;
       told.textContent = "running \u2026";
       slow = setTimeout(() => {
@@ -165,17 +150,16 @@
     }
 
     host.replaceChildren(
-      make("div", { role: "radiogroup", "aria-label": "Which piece do you write?" },
-        "Which piece do you write? ", ...choices),
       make("div", { class: "editor" }, count, editor),
       make("div", { class: "run" }, start, halt, told),
       wrong,
       printed,
       list,
-    ); // prettier-ignore
+    );
     host.classList.add("live");
     halt.disabled = true;
-    take(piece);
+    editor.value = own;
+    number();
   }
 
   document.querySelectorAll(".reader-solver").forEach(solver);
