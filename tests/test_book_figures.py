@@ -80,6 +80,15 @@ def test_six_events_at_equal_distances():
     (lens,) = upper.child_axes
     for ball, line in zip((1, 2), lens.get_lines()):
         np.testing.assert_allclose(line.get_ydata(), path[:, ball], **CLOSE)
+    # Dots: two neighbours are equally fast, between the events where that happens.
+    dots = upper.get_lines()[-1].get_xydata()
+    kinds = [(row, c) for row, (kind, c) in enumerate(done.events, 1) if kind[0] == "m"]
+    assert [int(x) for x, _ in dots] == [np.searchsorted(rows, row) - 1 for row, _ in kinds]
+    for (x, y), (row, c) in zip(dots, kinds, strict=True):
+        assert [np.interp(x, range(7), path[:, ball]) for ball in (c, c + 1)] == pytest.approx(
+            [y, y], abs=1e-12
+        )
+        assert y == pytest.approx(done.path[row][c], abs=1e-12)
     found = {}
     for bar in bars.collections:
         if bar.get_label() == "_child0":  # the dotted lines of the events
