@@ -48,7 +48,7 @@ def test_fig_patterns_three():
         for ball, line in enumerate(panel("patterns", "fig-patterns-three", number).values()):
             places = 0.6 * ball + np.array([-1.0 * (ball == 0), 0, 2 * v[ball]])
             np.testing.assert_allclose(line, np.column_stack([places, [-1, 0, 2]]), **CLOSE)
-    (chart,) = drawn("patterns")["fig-p6"].axes
+    chart = drawn("patterns")["fig-p6"].axes[0]
     shown = [line.get_xydata().tolist() for line in chart.get_lines()]
     for r1, r2 in points:
         assert [[r2, r1]] in shown
@@ -78,7 +78,7 @@ def eq_44(r2, e=0.5, a=0.15):
 
 
 def test_fig_6_drawn():
-    (ax,) = drawn("patterns")["fig-p6"].axes
+    ax, enlarged = drawn("patterns")["fig-p6"].axes
     shown = lines(ax)
     r2, r1 = shown["Eq. (44): back impact"].T
     np.testing.assert_allclose(r1, eq_44(r2), rtol=1e-13)
@@ -95,14 +95,23 @@ def test_fig_6_drawn():
     corner = endless.get_paths()[0].vertices
     for r2, r1 in corner[(corner[:, 0] > 0.001) & (corner[:, 1] > 0.01)][::7]:
         assert r1 == pytest.approx(edge(r2, 0.5, 0.15), abs=1e-3)
+    for number in range(4, 9):  # and more of them in the corner
+        for r2, r1 in lines(enlarged)[f"{number} collisions"][40:110:25]:
+            for side, expected in ((1 - 1e-6, number), (1 + 1e-6, number - 1)):
+                assert r1 > 0.01
+                assert by_turns(r1 * side, r2, 0.5, 0.15)[0] == expected
     # Shaded: where balls 1 and 2 go back.
-    shades = [x.get_paths()[0] for x in ax.collections if getattr(x, "filled", False)]
-    assert len(shades) == 2
-    for r1 in np.linspace(0.15, 3.05, 8):
-        for r2 in np.linspace(0.15, 3.05, 8):
-            v = by_turns(r1, r2, 0.5, 0.15)[1]
-            shown = [path.contains_point((r2, r1)) for path in shades]
-            assert shown == [v[0] < 0, v[1] < 0], (r1, r2)
+    back = set()
+    for chart, right, top in ((ax, 3.05, 3.05), (enlarged, 0.29, 1.05)):
+        shades = [x.get_paths()[0] for x in chart.collections if getattr(x, "filled", False)]
+        assert len(shades) == 2
+        for r1 in np.linspace(0.15, top, 8):
+            for r2 in np.linspace(right / 20, right, 8):
+                v = by_turns(r1, r2, 0.5, 0.15)[1]
+                shown = [path.contains_point((r2, r1)) for path in shades]
+                assert shown == [v[0] < 0, v[1] < 0], (r1, r2)
+                back |= {(chart is enlarged, sum(shown))}
+    assert len(back) == 6  # none, ball 1, both: in either
 
 
 def test_fig_patterns_turns():
