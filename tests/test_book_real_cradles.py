@@ -339,7 +339,10 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
     assert min(rows, key=lambda row: row["both"]) in near
     told["far-test"] = worst = max(r["three"] for r in far)
     told["doubt-films"] = np.exp(worst / 2) / (1 + worst / 2)  # four degrees of freedom
-    passed = [r for r in far if gammaincc(2, r["three"] / 2) > 0.05]
+    passed = [
+        r for r in far
+        if gammaincc(2, r["three"] / 2) > 0.05 and gammaincc(1.5, r["both"] / 2) > 0.05
+    ]  # fmt: skip
     told["pass-least"], *_, told["pass-most"] = sorted(r["three"] for r in passed)
     gaps = [1e3 * unit * row["gap_4"] for row in far]
     CHAPTER.tells(told | {"far-gap": max(gaps), "far-gap-least": min(gaps)})
@@ -350,7 +353,9 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
     # What the text says of distances: where gaps pass, and where they are in doubt.
     for row in far:
         mm = unit * row["apart"]
-        assert (row in passed) == (mm < 0.2 or 0.4 < mm < 1.1)
+        assert (row in passed) == (mm < 0.175 or 0.4 < mm < 1.1)
+        assert (gammaincc(2, row["three"] / 2) > 0.05) == (mm < 0.2 or 0.4 < mm < 1.1)
+        assert (gammaincc(1.5, row["both"] / 2) > 0.05) == (not 0.175 < mm < 0.4)
     for ax, column in zip(
         CHAPTER.figures["fig-real-distance"].axes, ("both", "three"), strict=True
     ):

@@ -177,7 +177,7 @@ GIVEN = {
     "n_balls": "0.1 0.15 0.5 1.5 4.5",
     "experiments": "0.001 0.01 0.5",  # a step, and what is small beside it
     "toy": "0.9 0.95 0.97 0.975 0.99",
-    "real_cradles": "0.1 0.2 0.4 1.1 22.2 25.3 44.8",  # errors, sizes, frames, grams
+    "real_cradles": "0.1 0.17 0.2 0.4 1.1 22.2 25.3 44.8",  # errors, sizes, frames, grams
     "recipe": "0.62",
     "scene": "0.1 0.97",  # a step, and a restitution of the run
     "measure": "0.2 0.35 0.5 0.7 1.4 1.5 2.54 3.84",
