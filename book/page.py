@@ -1,10 +1,8 @@
 """What the notebooks of the book share and a reader need not see: numbers and drawings."""
 
 import ast
-import inspect
 import json
 import re
-import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from IPython.display import Markdown, display
+from IPython.display import display
 from matplotlib.axes import Axes
 from myst_nb import glue
 
@@ -154,40 +152,6 @@ def show(
     `options` are those that `to_string` and `to_html` share.
     """
     display(_Table(frame, index=index, **options))
-
-
-def listing(*functions: object, width: int = 80) -> Markdown:
-    """Show the source of functions as it stands in the package, so that text and code agree.
-
-    Where a line is wider than the page, its comment goes on a line of its own.
-    """
-    lines: list[str] = []
-    for function in functions:
-        if lines:
-            lines += ["", ""]
-        for line in (
-            textwrap.dedent(inspect.getsource(function))
-            .rstrip()
-            .splitlines()
-        ):
-            lines += _narrow(line, width)
-    return Markdown("```python\n" + "\n".join(lines) + "\n```")
-
-
-def _narrow(line: str, width: int) -> list[str]:
-    """Break a comment or a docstring of one line, and nothing else."""
-    indent = " " * (len(line) - len(line.lstrip()))
-    code, mark, comment = line.partition("# ")
-    if len(line) <= width:
-        return [line]
-    if mark:
-        above = textwrap.wrap(comment, width - len(indent) - 2)
-        return [f"{indent}# {part}" for part in above] + (
-            [code.rstrip()] if code.strip() else []
-        )
-    if '"""' in line:
-        return textwrap.wrap(line, width, subsequent_indent=indent)
-    return [line]
 
 
 def name_lines(ax: Axes, *, side: str = "right", apart: float = 11) -> None:

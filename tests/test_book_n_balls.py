@@ -14,7 +14,7 @@ from cradle import Chain, ImpulseCorrelation, collide, paper_chain, paper_sequen
 from cradle.closed_form import largest_ratios
 
 FIG_8 = Chain([1] * 4, [1, 0.5, 0, 0], 1)
-CHAPTER, READING = Chapter("n_balls"), Chapter("reading_n_balls")
+CHAPTER, RULES, SOLVER = (Chapter(name) for name in ("n_balls", "reading_rules", "reading_solver"))
 
 
 def random_chain(seed, n):
@@ -101,7 +101,7 @@ def test_eq_53_at_the_bound_the_rest_is_one_body(n):
 
 
 def test_end_progress_is_as_exact_as_its_arguments():
-    rows = READING.printed("root-errors").splitlines()[2:]
+    rows = SOLVER.printed("root-errors").splitlines()[2:]
     errors = {number(row.split()[0]): [number(x) for x in row.split()[1:]] for row in rows}
     assert all(ours < 3e-16 for _, ours in errors.values())
     # The school formula loses as many digits as Q is small.
@@ -160,6 +160,19 @@ def test_fig_8_path():
     )
 
 
+def test_rounds_of_fig_8():
+    """They lead through the ends and closings of the path, one or two rounds for each."""
+    lines = [line.split() for line in RULES.printed("r8-rounds").splitlines()[1:]]
+    exact = truth.solve([1] * 4, [1, "0.5", 0, 0], 1, "0.1")
+    told = {"end": "ends", "close": "closes"}
+    turns = [(f"{c + 1}-{c + 2}", told[kind]) for kind, c in exact.events if kind in told]
+    assert [tuple(line[-2:]) for line in lines] == turns
+    rounds = [int(word.strip(",")) for line in lines for word in line[: 1 + line[0].endswith(",")]]
+    assert rounds == [*range(1, 2 * len(turns))]
+    (met,) = [line for line in lines if "5" in line[1:-2]]
+    assert met[-2:] == ["2-3", "closes"]
+
+
 def contact_work(trace, c, row):
     """Work done on contact c up to a row of the path, by the trapezoidal rule (exact here)."""
     u = trace.path[: row + 1, c] - trace.path[: row + 1, c + 1]
@@ -168,7 +181,7 @@ def contact_work(trace, c, row):
 
 def test_three_readings():
     """Who drives after a meeting: in the example, and in the ten chains."""
-    table = pd.read_csv(io.StringIO(READING.printed("readings-table")), sep=r"\s+")
+    table = pd.read_csv(io.StringIO(RULES.printed("readings-table")), sep=r"\s+")
     for ratio, spread, turned_about in (
         ("0.1", "n-balls-spread-fig8", "n-balls-mirror-fig8"),
         ("0.15", "n-balls-spread", "n-balls-mirror-off"),
@@ -178,11 +191,11 @@ def test_three_readings():
             for name, expected in ends.items():
                 np.testing.assert_allclose(table.loc[name], expected, atol=6e-5)
         most = np.ptp([*ends.values()], axis=0).max()
-        assert READING.glued[spread] == f"{most:.2f}"
+        assert RULES.glued[spread] == f"{most:.2f}"
         start = [1] * 4, [0, 0, "-0.5", -1], 1
         seen = floats(outcome(READINGS["both"], ratio, start).velocities)
         mirror = abs(seen[::-1] + ends["both"]).max()
-        assert READING.glued[turned_about] == f"{mirror:.3f}"
+        assert RULES.glued[turned_about] == f"{mirror:.3f}"
         assert 0.15 < max(mirror, most) < 0.2  # "up to a fifth" in the chapter on the problem
     assert CHAPTER.glued["n-balls-spread"] == f"{most:.2f}"
 
@@ -196,7 +209,7 @@ def test_three_readings():
         ]
         turned[name] = np.ptp([floats(end.velocities) for end in ends], axis=0).max()
     assert {name for name, size in turned.items() if size > 0} == {"ABCCAB", "BCACBA"}
-    for chapter, name in (READING, "n-balls-ten-spread"), (Chapter("experiments"), "turned"):
+    for chapter, name in (RULES, "n-balls-ten-spread"), (Chapter("experiments"), "turned"):
         chapter.tells({name: max(turned.values())})
     assert max(turned.values()) < 0.005  # "less than half a hundredth"
 
@@ -206,7 +219,7 @@ def test_the_jump_of_a_start():
     both = READINGS["both"]
     ends = [floats(outcome(both, "0.15", ([1] * 4, [1, moved, 0, -1], 1)).velocities)
             for moved in ("-1e-9", "1e-9")]  # fmt: skip
-    assert READING.glued["n-balls-start-jump"] == f"{np.ptp(ends, axis=0).max():.3f}"
+    assert RULES.glued["n-balls-start-jump"] == f"{np.ptp(ends, axis=0).max():.3f}"
 
 
 def test_events_of_two_runs_that_meet():
@@ -231,10 +244,10 @@ def test_meeting_chooses_a_velocity_of_the_overlap():
         met.append(float(exact.path[exact.events.index(("close", 1)) + 1][1]))
     told = {f"n-balls-{name}": v for name, v in zip(("low", "mid", "high"), met, strict=True)}
     CHAPTER.tells(told)
-    assert CHAPTER.glued["n-balls-move-fig8"] == READING.glued["n-balls-move-fig8"]
+    assert CHAPTER.glued["n-balls-move-fig8"] == RULES.glued["n-balls-move-fig8"]
     assert np.ptp(ends, axis=0).max() <= float(CHAPTER.glued["n-balls-move-fig8"]) + 5e-4
     ends = [truth.solve(*chain, "0.1", meeting=k / 40, number=float).velocities for k in range(41)]
-    READING.tells({"n-balls-move-paper": np.ptp(floats(np.ravel(ends)).reshape(41, 4), 0).max()})
+    RULES.tells({"n-balls-move-paper": np.ptp(floats(np.ravel(ends)).reshape(41, 4), 0).max()})
 
 
 def test_answers_of_the_live_cradle():
@@ -290,9 +303,9 @@ def test_fig_8_meeting_moves_two_of_ten_sequences():
             np.testing.assert_allclose(ends[-1], exact.velocities, atol=1e-12)
         moved[name] = np.ptp(ends, axis=0).max()
     assert {name for name, size in moved.items() if size > 0} == {"ABCCAB", "BCACBA"}
-    for chapter, name in (READING, "n-balls-ten-move"), (Chapter("experiments"), "moved"):
+    for chapter, name in (RULES, "n-balls-ten-move"), (Chapter("experiments"), "moved"):
         chapter.tells({name: max(moved.values())})
-    lines = [row.split() for row in READING.printed("meeting-cell").splitlines()[3:]]
+    lines = [row.split() for row in RULES.printed("meeting-cell").splitlines()[3:]]
     stored = {row[0]: number(row[-1]) for row in lines}
     assert stored == pytest.approx({k: v for k, v in moved.items() if v > 0}, rel=0.02)
-    assert READING.glued["n-balls-unmoved"] == "eight"
+    assert RULES.glued["n-balls-unmoved"] == "eight"

@@ -1,9 +1,7 @@
-"""Numbers as the pages of the book write them, and listings that say what the file says."""
+"""Numbers as the pages of the book write them."""
 
 import pytest
-from page import aligned, below, count, listing, people, said
-
-from cradle.textbook import Impact
+from page import aligned, below, count, people, said
 
 
 @pytest.mark.parametrize(
@@ -40,12 +38,3 @@ def test_counts_and_small_whole_numbers_are_words():
 def test_a_row_of_velocities():
     assert aligned([-1 / 3, 2 / 3, -1e-9]) == " -0.333  0.667  0.000"
     assert aligned([1], digits=1) == "  1.0"
-
-
-def test_a_listing_keeps_every_line_of_code():
-    text = listing(Impact.ratios_in_force, Impact.end).data
-    assert max(map(len, text.splitlines())) < 100
-    code = [line.partition("#")[0].strip() for line in text.splitlines()]
-    for line in ("def end(self, c: int) -> None:", "return ratio, bound"):
-        assert line in code
-    assert '"""R4' in text

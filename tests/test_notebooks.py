@@ -200,7 +200,9 @@ GIVEN = {
     "reading_three_balls": "0.1 0.5 0.6 0.75",
     "reading_multiple_impacts": "0.1 0.15 0.2 0.25 0.8",
     "reading_patterns": "0.003 0.01 0.1 0.15 0.3475 0.348 0.5 0.999",
-    "reading_n_balls": "0.01 0.1 0.15 0.2 0.3 0.5 0.7 0.8 1.75",
+    "reading_n_balls": "0.1 0.5",
+    "reading_rules": "0.1 0.15 0.2 0.5 0.8",
+    "reading_solver": "0.01 0.1 0.3 0.5 0.7",
     "reading_table_2": "0.171 0.17121",
     "reading_real_cradles": "0.01 1.28",  # errors of c and of a scale
     "observations": "0.02 0.05 0.15 0.71 0.9 0.95 0.98 0.99 22.17 44.756",
