@@ -2,6 +2,7 @@
 
 import math
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -122,6 +123,29 @@ def test_fig_patterns_turns():
         for zeta, drawn_value in line[::50]:
             x, _, y, a = turn(zeta, r, 0.5, 0.15)
             assert drawn_value == pytest.approx(a * y / (y - x), rel=1e-9)
+
+
+def test_fig_patterns_turn():
+    """Work and momentum of the new contact, phase by phase, and its end if it went on alone."""
+    shown = panel("reading_patterns", "fig-patterns-turn")
+    new, old, alone = (shown[name] for name in ("new contact", "old contact", "alone"))
+    assert (new[:, 0] == old[:, 0]).all()
+    a, e, r = 0.4, 0.5, 0.5
+    push = np.diff(new[:, 0]), np.diff(new[:, 1]), np.diff(old[:, 1])
+    moved = {  # by unit impulse of the new contact: its u and that of the old one
+        0: (1 / a - 1 - r, 1 - (1 + r) / a),
+        1: (-1 - r, 1),
+        2: (a - 1 - r, 1 - a * (1 + r)),
+    }
+    for k, (own, other) in moved.items():
+        assert push[1][k] == pytest.approx(own * push[0][k], rel=1e-12)
+        assert push[2][k] == pytest.approx(other * push[0][k], rel=1e-12)
+    for line in (new, np.vstack([new[:3], alone[1]])):  # e^2 of the work taken in is given back
+        (zero,) = [t + u * (s - t) / (u - w) for (t, u), (s, w) in pairwise(line) if u > 0 > w]
+        taken = new[1, 1] * zero / 2
+        steps = [(zero, 0.0), *line[2:]]
+        back = -sum((s - t) * (u + w) / 2 for (t, u), (s, w) in pairwise(steps))
+        assert back == pytest.approx(e**2 * taken, rel=1e-12)
 
 
 def test_fig_patterns_corner():
