@@ -136,6 +136,23 @@ def test_table_2_most_open_entries():
     assert 0.03 < np.median(list(width.values())) < 0.04
 
 
+def test_entries_by_heights():
+    """Where heights within half a millimetre end, if not at the ends of the range."""
+    told = {t: AS_MEASURED.glued[f"open-{t.lower()}-h"] for t in ("AAA", "BAD", "BBD", "CBD")}
+
+    def heights(triplet, ratio):
+        v = outcome(triplet, ratio)
+        return v * abs(v) / (2 * 9.81)
+
+    for triplet, words in told.items():
+        low, high = map(float, words.partition(" or ")[0].split(" to "))
+        asked = heights(triplet, TABLE_2.ratio[triplet])
+        for inside, outside in ((low + 0.006, low - 0.006), (high - 0.006, high + 0.006)):
+            assert np.abs(heights(triplet, inside) - asked).max() <= 5e-4
+            if outside > 0:
+                assert np.abs(heights(triplet, outside) - asked).max() > 5e-4
+
+
 def test_why_two_entries_are_open():
     """Ball 2 slows down to the velocity of ball 1 while it pushes D; the two leave together."""
     names = [AS_MEASURED.glued[place] for place in ("widest", "second")]

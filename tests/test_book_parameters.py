@@ -38,7 +38,10 @@ CHANGES = {
     "forces": [{"masses": [1, 2, 1]}],
     "laws": [{"ratio": 0}, {"ratio": 0.4}],
     "extremes": [{"ratio": 0}, {"ratio": 0.3}],
-    "table_2": [{"velocity_error": 0.05}, {"velocity_error": 0.001}],
+    "table_2": [
+        {"velocity_error": 0.05, "height_error": 0.0002},
+        {"velocity_error": 0.001},
+    ],
     "beyond": [{"ratio": 0, "restitution": 0.9}, {"ratio": 0.5, "restitution": 1}],
     "experiments": [
         {"ratio": 0},
