@@ -33,7 +33,7 @@ GLUED = CHAPTER.glued
 READING = Chapter("reading_real_cradles")
 AUDITS = READING.glued
 #: The appendix has what the chapter leaves out of these films.
-APPENDIX = Chapter("observations")
+APPENDIX, HALF = Chapter("observations"), Chapter("observations_half")
 TOLD = APPENDIX.glued
 FITS = {
     (row["law"], row["strikers"], row["fitted"], row["reading"]): row
@@ -60,7 +60,7 @@ MODELS = (
 def rows(cell):
     """Numbers at the end of each line of a printed table of the appendix, by the words before."""
     found = {}
-    for line in APPENDIX.printed(cell).splitlines()[1:]:
+    for line in HALF.printed(cell).splitlines()[1:]:
         words, numbers = re.fullmatch(r"(.*?)((?:\s+-?\d+(?:\.\d+)?)*)", line.strip()).groups()
         if numbers:
             found[" ".join(words.split())] = [float(x) for x in numbers.split()]
@@ -763,7 +763,7 @@ def test_swing_of_the_mean():
     # Air alone: the drag of Stokes for slow oscillations, over twice the mass.
     layer = np.sqrt(2 * 1.8e-5 / 1.2 * period / (2 * np.pi))
     air = 3 * np.pi * 1.8e-5 * 0.01109 * (1 + 0.01109 / layer) / 0.044756
-    assert float(TOLD["air"]) == pytest.approx(damping / air, rel=0.06)
+    assert float(HALF.glued["air"]) == pytest.approx(damping / air, rel=0.06)
 
 
 def test_fig_half():
@@ -774,12 +774,12 @@ def test_fig_half():
         assert marked(top, marker) == pytest.approx(
             np.column_stack([time[own], 1000 * np.abs(place[own])])
         )
-    assert len(time) == int(TOLD["turns"])
+    assert len(time) == int(HALF.glued["turns"])
     shown = rows("runs")
     for row in read("cradle_fits.csv"):
         expected = [float(row["chi_places"]), float(row["chi_times"])]
         assert shown[row["law"]][1:] == pytest.approx(expected, rel=0.02)
-    places, times = APPENDIX.figures["fig-real-left"].axes
+    places, times = HALF.figures["fig-real-left"].axes
     for law, marker in (("constant loss", "."), ("constant restitution", "o")):
         for ax, sum_ in zip((places, times), shown[law][1:], strict=True):
             drawn = marked(ax, marker)
@@ -788,7 +788,7 @@ def test_fig_half():
             assert sum_ > 2 * len(time)  # no law is right
             assert (drawn[time > 24, 1] ** 2).mean() > 4  # in the end every fit is off
     rms = [np.sqrt(sum_ / len(time)) for sum_ in shown["constant loss"][1:]]
-    APPENDIX.tells({"off-places": rms[0], "clock": rms[1]})
+    HALF.tells({"off-places": rms[0], "clock": rms[1]})
     # Where an outer ball turns within a window, the curve in its colour has that place.
     colours = [ball_style(k)["color"] for k in range(5)]
     row = read("cradle_fits.csv", law="constant loss")[0]
