@@ -280,7 +280,12 @@ def test_fig_trade_total_drawn():
             text = next(times)
             assert text.xy == (x, y)
             assert float(text.get_text()) == pytest.approx(time, rel=0.05)
-    assert next(times, None) is None
+    *asked, words = times  # over the dots of this package
+    assert words.get_text() == "asked for (%):"
+    said = {float(text.get_text()) / 100: text.xy[0] for text in asked}
+    assert said == pytest.approx({
+        row[4]: 100 * row[3] for row in rows if row[:2] == ("5 equal", "this package")
+    })  # fmt: skip
 
 
 SIX = "6 random, two decades"
@@ -329,6 +334,8 @@ def test_the_table_of_advice():
     assert told["off-ratios"] == f"{one:.0f} to {other:.0f}"
     half = integrated([1] * 5, np.eye(5)[0], gaps=0.5 * DEPTH)
     assert told["off-pairs"] == f"{100 * np.abs(half - np.eye(5)[4]).max():.1f}"
+    half = integrated([1] * 5, [1, 1, 0, 0, 0], gaps=0.5 * DEPTH)
+    assert told["off-pairs-two"] == f"{100 * np.abs(half - [0, 0, 0, 1, 1]).max():.1f}"
     touching = integrated([1] * 5, np.eye(5)[0])
     assert told["off-pairs-touch"] == f"{100 * np.abs(touching - np.eye(5)[4]).max():.0f}"
     energy = [r["microseconds"] for r in find("energy", chain="ABCCA")]
@@ -394,6 +401,13 @@ def test_who_arrives_together():
         v = integrated([1] * 5, [1, 1, 0, 0, 0], loss=0, gaps=[gap, 0, 0, 0])
         off = 100 * np.abs(v - seen).max()
         assert float(CHAPTER.glued[f"film-two-{name}"]) == pytest.approx(off, abs=0.51)
+    for name, lost in (("lossy", loss), ("elastic", 0)):
+        near, wide = (
+            integrated(m, [1, 1, 0, 0, 0], loss=lost, gaps=[depths * DEPTH, 0, 0, 0])
+            for depths in (3, 10)
+        )
+        changed = 100 * np.abs(near - wide).max()
+        assert float(CHAPTER.glued[f"three-{name}"]) == pytest.approx(changed, abs=0.06)
     m, v = [1] * 10, [1, 1] + [0] * 8
     loss = viscosity_from(0.9, speed=1, masses=m)
     for name, ball, depths in (
@@ -435,6 +449,9 @@ def test_the_film_by_the_printed_calls():
             fitted["energy law (Hertz), e"], 3, False
         ),
     }
+    three_apart = integrated(m, slower * v, loss=other, gaps=[far, far, 0, gaps[2]]) / slower
+    off = 100 * np.abs(three_apart - seen).max()
+    assert float(by_law()[NAMES["gaps"]][2]) == pytest.approx(off, abs=0.1)
     for name, velocities in found.items():
         off = 100 * np.abs(velocities - seen).max()
         told = CHAPTER.glued["call-toy"] if name == "toy" else by_law()[NAMES[name]][4]
