@@ -296,6 +296,28 @@ def test_energy_left():
     assert max(own) > 200
 
 
+def test_bullet_as_it_is_gains():
+    (_, fifth) = stored("laws", run="Bullet", law="as it is", setting="fine", pulled=1)
+    assert fifth["stroke"] == "5"
+    assert Chapter("scene").glued["bullet-five"] == f"{balls(fifth).sum():.1f}"
+
+
+def test_the_best_of_each_column_is_bold():
+    """In the first table: the least error and time, the most energy of those that gain none."""
+    chapter = Chapter("scene")
+    text = chapter.cells["scene-question"].source
+    lines = [line.split(" | ")[1:] for line in text.splitlines() if "{glue:text}" in line]
+    *remedies, own = (line for line in lines if len(line) == 6)
+    assert "**" not in "".join(own)
+    columns = list(zip(*remedies, strict=True))
+    assert len(columns) == 6
+    for place, column in enumerate(columns):
+        said = [chapter.glued[re.search("scene-([^`]+)`", cell)[1]] for cell in column]
+        first = [float(value.split("–")[0]) for value in said]
+        best = max(first) if place == 4 else min(first)
+        assert [cell.startswith("**") for cell in column] == [value == best for value in first]
+
+
 def test_the_judge_of_outer_balls_apart():
     """Gaps of three depths; its first stroke is the impact that the law of the row computes."""
     _, angles, rates = scenes.on_springs(2, 1.5, apart=scenes.APART)
