@@ -118,12 +118,11 @@ def test_fig_trade_engines_textbook_answers():
 
 def test_engines_table_of_settings():
     """Steps in ms and iterations, default and refined, as the script sets them."""
-    lines = ENGINES_PAGE.printed("engines-settings").splitlines()[2:]
+    lines = ENGINES_PAGE.printed("engines-settings").splitlines()[-5:]
     for engine, line in zip(engines.ENGINES, lines, strict=True):
         both = engine.default, engine.refined
-        steps = ", ".join(f"{1000 * setting['step']:.3g}" for setting in both)
-        iterations = ", ".join(str(setting.get("iterations", "–")) for setting in both)
-        told = iterations.replace("–, –", "–")
+        steps = " +".join(f"{1000 * setting['step']:.3g}" for setting in both)
+        told = " +".join(str(setting.get("iterations", "–")) for setting in both)
         assert re.match(rf"{engine.name} .* {steps} +{told} ", line), engine.name
     rapier, mujoco = engines.ENGINES[3:]
     assert f"{rapier.refined['num_internal_pgs_iterations']} inner" in lines[3]
@@ -141,9 +140,10 @@ def test_engines_table_of_words():
             answers = {}
             for scene in (*ELASTIC, "ABCCA"):
                 (row,) = find("engine", f"refined, {placement}", model=name, chain=scene)
-                pairs = off(row, sequential(scene)) < 0.01
-                one = off(row, fused(scene)) < 0.01
-                answers[scene] = "pairs" if pairs else "one body" if one else "neither"
+                far = {"pairs": off(row, sequential(scene)), "one body": off(row, fused(scene))}
+                near = min(far, key=far.get)
+                nearly = f"nearly {near}" if far[near] < 0.05 else "neither"
+                answers[scene] = near if far[near] < 0.01 else nearly
             told = list(answers.values())
             most = max(told, key=told.count)
             others = [f"{k}: {v}" for k, v in answers.items() if v != most]
@@ -218,10 +218,13 @@ DRAWN = {
 
 @pytest.mark.parametrize("figure", DRAWN)
 def test_figures_show_the_table(figure):
-    """Of engines the striker's velocity, where they were measured in scenes of three balls on."""
+    """Of engines the striker's velocity, in scenes of three balls on; of a light ball its own."""
     rows, column = DRAWN[figure]
     rows = [row for row in rows if not row["chain"].startswith("two")]
-    values = [row[column][0] if column == "velocities" else row[column] for row in rows]
+    values = [
+        row[column][int(row["chain"] == "light middle")] if column == "velocities" else row[column]
+        for row in rows
+    ]
     assert len(values) > 5
     assert shows(ENGINES_PAGE.figures[figure].axes, values)
 
