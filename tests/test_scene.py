@@ -472,9 +472,9 @@ def test_the_recipe_tells_where_the_energy_is():
         assert parts[0] < 0.6, (name, setting)
         assert parts[1] > 0.95, (name, setting)
     scene = Chapter("scene").glued
-    film = {k: sorted(int(scene[f"film-{k}-{n}"]) for n in (1, 2)) for k in ("apart", "pairs")}
-    assert chapter.glued["off-row"] == "{} to {}".format(*film["apart"])
-    assert chapter.glued["off-pairs"] == str(film["pairs"][1])
+    for n in (1, 2):
+        assert chapter.glued[f"off-row-{n}"] == scene[f"film-apart-{n}"]
+        assert chapter.glued[f"off-pairs-{n}"] == scene[f"film-pairs-{n}"]
     assert chapter.glued["off-three"] == scene["apart-three"]
     # Three depths between the outer balls and the others, or ten.
     depth = (5 * 0.5 / 4) ** 0.4
@@ -485,8 +485,15 @@ def test_the_recipe_tells_where_the_energy_is():
         for v in ([1.0, 0, 0, 0, 0], [1.0, 1.0, 0, 0, 0])
     )  # fmt: skip
     assert float(chapter.glued["wider"]) == pytest.approx(100 * wider, abs=0.051)
-    end = run(*HERTZ)[49]
-    assert chapter.glued["one"] == f"{100 * end.max() / end.sum():.0f}"
+    end = by_law("Hertz springs", "springs, outer apart", "alone", 1)[-1]
+    assert chapter.glued["single-judge"] == f"{100 * end.max() / end.sum():.0f}"
+    for column, name in ((1, "own"), (2, "row")):
+        parts = sorted(int(row[column]) for row in rows)
+        assert chapter.glued[f"single-{name}"] == f"{parts[0]} to {parts[-1]}"
+    for setting, name in (("fine", "milliseconds"), ("default", "milliseconds-default")):
+        times = [1e3 * float(row["seconds"])
+                 for row in stored("costs", how="mended", setting=setting, pulled=1)]  # fmt: skip
+        assert chapter.glued[name] == f"{min(times):.0f} to {max(times):.0f}"
 
 
 def test_the_figures_draw_the_tables():
