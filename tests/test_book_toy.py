@@ -200,6 +200,13 @@ def test_fig_toy_inside_and_film():
     shown = [xy[-1, 1] for xy in panel("toy", "fig-toy-inside").values()]
     expected = strokes(2, [1, 0, 0, 0, 0])[1]
     np.testing.assert_allclose(shown, expected, atol=1e-9)
+    # The three turns of the pushes are the fastest moments of balls 4, 3 and 2.
+    curves = list(panel("toy", "fig-toy-inside").values())
+    ax = drawn("toy")["fig-toy-inside"].axes[0]
+    marks = [line.get_xdata()[0] for line in ax.get_lines() if len(line.get_xdata()) == 2]
+    fastest = [xy[xy[:, 1].argmin(), 0] for xy in curves[3:0:-1]]
+    np.testing.assert_allclose(marks, fastest, atol=1e-9)
+    assert [text.get_text() for text in ax.texts][:4] == ["5→4", "4→3", "3→2", "2→1"]
     film = CHAPTER.cells["film"].outputs[0].data["text/html"]
     for row, ratio in enumerate((0, RATIO, 0.5)):
         v = strokes(1, [1, 0, 0, 0, 0], ratio=ratio)[0]
