@@ -414,7 +414,6 @@ def test_who_arrives_together():
     m, v = [1] * 10, [1, 1] + [0] * 8
     loss = viscosity_from(0.9, speed=1, masses=m)
     for name, ball, depths in (
-        ("three-depths", 8, 3), ("ten-depths", 8, 10),
         ("ninth-ten", 9, 10), ("ninth-thousand", 9, 1000),
     ):  # fmt: skip
         found = integrated(m, v, loss=loss, gaps=[depths * DEPTH] + [0] * 8)[ball - 1]
