@@ -362,7 +362,7 @@ def test_pairs_are_for_equal_balls():
     pairs = post_impact_velocities(rows, np.eye(5)[0], 1, 0)
     off = np.abs(pairs - [flown(m) for m in rows]).max(axis=1)
     assert (off > 0.05).mean() == pytest.approx(0.1, abs=0.015)
-    assert CHAPTER.glued["pairs-worst"] == f"{100 * off.max():.0f} %"
+    assert CHAPTER.glued["pairs-worst"] == f"{100 * off.max():.0f}"
 
 
 def test_one_impact_in_a_call():
