@@ -189,6 +189,20 @@ def test_fig_extremes_shortest_as_drawn():
     assert np.abs(off).max() > 1e-4
 
 
+def test_rows_as_lossy_as_the_papers_balls_do_not_jump():
+    """A few of those that the page tries, by the textbook over fifty digits."""
+    assert (CHAPTER.glued["low-balls"], CHAPTER.glued["low-e"]) == ("4 to 7", "0.05")
+    for balls, e, ratio in ((7, "0.05", "0.45"), (7, "0.3", "0.25"), (6, "0.375", "0.05")):
+        ends = []
+        for part in (Decimal(0), Decimal("1e-12")):
+            signs = [1 + part * (-1) ** k for k in range(balls)]
+            kept = [Decimal(e) * sign for sign in signs[1:]]
+            with localcontext(prec=50):
+                end = solve(signs, [1] + [0] * (balls - 1), kept, ratio, number=Decimal)
+            ends.append(floats(end.velocities))
+        assert np.abs(ends[1] - ends[0]).max() < float(CHAPTER.glued["calm"]) * 1e-12
+
+
 def test_unequal_rows_lose_what_the_table_says():
     """More than twenty balls at small ratios: two digits, but for one group of the longest."""
     told, lost = CHAPTER.glued, {}
