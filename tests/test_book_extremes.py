@@ -105,16 +105,14 @@ def test_exercises():
         ("fig-maps-unequal", "unequal", "median"),
         ("fig-maps-growth", "growth", "largest"),
         ("fig-maps-edges", "edges", "distance"),
-        ("fig-maps-count", "elastic", "impacts"),
         ("fig-extremes-edge", "limits", "edge"),
     ],
 )
 def test_figures_show_their_column_of_a_table(figure, part, column):
     """What is infinite or below 1e-15 is not drawn as it stands, and of some tables only a part."""
     equal = {"size": "1e-12", "spread": "0"}
-    some = {"elastic": {"ratio": "0"}, "limits": {"ratio": "0"}, "growth": equal}.get(part, {})
-    rows = [row for row in stored(part, **some) if int(row.get("unfinished", 0)) < 12]
-    values = floats(row[column] for row in rows)
+    some = {"limits": {"ratio": "0"}, "growth": equal}.get(part, {})
+    values = floats(row[column] for row in stored(part, **some))
     values = values[np.isfinite(values) & (values > 1e-15)]
     assert len(values) > 5
     figures = CHAPTER.figures | MAPS.figures
@@ -130,11 +128,17 @@ def test_fig_extremes_map_shows_the_fewest_digits():
         assert ax.collections[0].get_array().min() == pytest.approx(least)
 
 
-def test_fig_extremes_count_by_the_wedge_and_edge_by_the_eigenvalues():
-    wedge, *_ = points(MAPS.figures["fig-maps-count"].axes[0])
-    for light, impacts in wedge:
+def test_impacts_by_the_wedge_and_fig_extremes_edge_by_the_eigenvalues():
+    rows = stored("elastic", ratio="0")
+    for row in rows:
+        light = 10 ** -float(row["power"])
         walls = math.ceil(math.pi / math.atan(math.sqrt(light * (2 + light)))) - 1
-        assert impacts == pytest.approx(walls, abs=1.001)
+        assert int(row["impacts"]) == pytest.approx(walls, abs=1.001)
+    assert number(glued["most"]) == max(int(row["impacts"]) for row in rows)
+    assert int(glued["tried"]) == len(rows) > 40
+    # A ratio slows the light ball down: by a root.
+    fewer = 100 * (1 - math.sqrt(1 - float(glued["other"])))
+    assert int(glued["fewer"]) == pytest.approx(fewer, abs=0.6)
     theory, *_ = points(MAPS.figures["fig-extremes-edge"].axes[0])
     for e, border in theory[::30]:
         assert border == pytest.approx(x.infinite_below(e), rel=1e-9)
@@ -311,6 +315,12 @@ def test_the_table_of_the_inventory():
     assert number(told["wrong"]) == sum(int(r["wrong"]) for r in rows)
     assert number(told["refused"]) == sum(int(r["unfinished"]) for r in rows)
     assert told["unlike"] == said(sum(int(r["unlike them"]) for r in rows))
+    faint = [r for r in rows if r["family"] in ("tiny ratios", "small ratios")]
+    plain = sum(int(r["unlike them"]) for r in rows if r not in faint)
+    assert (told["unlike-plain"], plain) == ("three", 3)
+    warned = sum(int(r[word]) for r in faint for word in short)
+    assert number(told["warned"]) == warned
+    assert told["alarm"] == said(round(100 * sum(int(r["wrong"]) for r in faint) / warned))
     assert int(told["given-up"]) == sum(int(r["given up"]) for r in rows)
     assert int(told["not-judged"]) == sum(int(r["nobody knows"]) for r in rows)
     assert int(told["rest"]) == sum(int(r["left"]) for r in stored("finish"))
