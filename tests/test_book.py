@@ -286,6 +286,18 @@ def test_code_in_tables_breaks_at_its_joints(html: Path):
     assert any("<wbr>" not in piece for piece in plain)
 
 
+def test_every_reference_names_the_pages_that_cite_it(html: Path):
+    page = (html / "book" / "references.html").read_text(encoding="utf-8")
+    entries = re.findall(r'(?s)<div class="citation" id="(\w+)".*?>(.*?)</div>', page)
+    assert len(entries) > 60
+    for key, entry in entries:
+        cited = entry.split('class="cited"')[1]
+        assert "fn-bracket" not in entry
+        for name in re.findall(r'href="(\w+\.html)"', cited) or [""]:
+            there = (html / "book" / name).read_text(encoding="utf-8")
+            assert f'references.html#{key}"' in there, (key, name)
+
+
 def test_the_reference_tells_every_field(html: Path):
     """Whole: what stands before a colon would be taken for a type."""
     text = "".join(page.read_text(encoding="utf-8") for page in (html / "book").glob("api_*.html"))

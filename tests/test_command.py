@@ -114,13 +114,23 @@ def test_tasks_without_a_solution():
         collisions.append(told["collisions"])
         velocities.append([float(v) for v in found.velocities])
     assert collisions == [[1, 1]] * 5 + [[2, 1]]
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said):
-        exec(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1], {})
-    answers = [
-        [float(v) for v in line.strip("[]").split()] for line in said.getvalue().splitlines()
-    ]
-    np.testing.assert_allclose(answers, velocities, rtol=0, atol=5.1e-5)
+    program = re.search(r"```python\n(.*?)```", text, re.DOTALL)[1]
+    for student in range(10):  # of each one again: only the last task has a back impact
+        said, ran = io.StringIO(), {}
+        with contextlib.redirect_stdout(said):
+            exec(program.replace("student = 0 ", f"student = {student} "), ran)
+        assert ran["student"] == student
+        assert (ran["trace"].collisions == [2, 1]).all()
+        lines = said.getvalue().splitlines()
+        answers = [[float(v) for v in re.split(r"[\[\]\s]+", line) if v] for line in lines]
+        for k, ((masses, e, a), (used, *after)) in enumerate(zip(ran["tasks"], answers)):
+            assert used == pytest.approx(a * (1 - student / 40), abs=5.1e-5)
+            e = [e] * 2 if np.isscalar(e) else e
+            found = textbook.solve(masses, [1, 0, 0], e, [a * (1 - student / 40)])
+            assert after == pytest.approx([float(v) for v in found.velocities], abs=5.1e-5)
+            assert sum(kind == "end" for kind, _ in found.events) == 2 + (k == 5)
+            if student == 0:
+                assert after == pytest.approx(velocities[k], abs=5.1e-5)
 
 
 # --- what is assumed ---------------------------------------------------------------------------

@@ -14,6 +14,7 @@ r"""Sphinx extension: what Jupyter Book leaves to be put right in the pages.
 - In such a table numbers and their heads stand at the right, words at the left, and a minus is one.
 - In a table a name of the code breaks after a point, a bracket or a comma, and nowhere else.
 - Figures of the appendices carry a letter: Fig. A.1.
+- The list of references says, in place of a number, which pages cite each.
 - The summary of what is folded is read as it is written; a box is called by its title, and opens
   for a link into it. A notebook is kept, not shown.
 - A page that is linked from elsewhere shows a title, a sentence and a picture.
@@ -305,6 +306,31 @@ def break_code_in_tables(
                 literal += nodes.inline("", piece, classes=["nowrap"])
 
 
+def lead_back(app: Sphinx, doctree: nodes.document, page: str) -> None:
+    """Say in the list of references which pages cite each; nobody cites its number."""
+    listed = list(doctree.findall(nodes.citation))
+    if not listed:
+        return
+    domain = app.env.get_domain("cite")
+    keys = {one.citation_id: one.key for one in domain.citations}
+    citing: dict[str, dict[str, None]] = {}
+    for ref in domain.citation_refs:
+        for target in ref.targets:
+            citing.setdefault(target.key, {})[ref.docname] = None
+    for entry in listed:
+        for number in list(entry.findall(nodes.label)):
+            number.parent.remove(number)
+        pages = nodes.inline(classes=["cited"])
+        for name in citing[keys[entry["ids"][0]]]:
+            pages += nodes.Text(", " if pages.children else " Cited in: ")
+            address = app.builder.get_relative_uri(page, name)
+            title = app.env.titles[name].astext()
+            pages += nodes.reference(
+                "", title, refuri=address, internal=True
+            )
+        entry[-1] += [pages, nodes.Text(".")]
+
+
 def number_equations(app: Sphinx, env: BuildEnvironment) -> list[str]:
     r"""Count only equations that show a number of ours: Sphinx counts the paper's, too.
 
@@ -397,6 +423,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("doctree-resolved", keep_punctuation)
     app.connect("doctree-resolved", mend_tables_of_pandas)
     app.connect("doctree-resolved", break_code_in_tables)
+    app.connect("doctree-resolved", lead_back)
     # After Sphinx has numbered all figures.
     app.connect("env-get-updated", number_equations, priority=890)
     app.connect("env-get-updated", letter_figures, priority=900)
