@@ -48,12 +48,13 @@ CHANGES = {
         {"ratio": 1, "sequence": "BCACBA", "triplet": "CAC"},
     ],
 }
-#: Of each chapter all but the first run belong to the weekly tests.
+#: All but the first run of a chapter belong to the weekly tests, as do chapters that take longest.
+LONG = ("toy", "beyond", "multiple_impacts")
 RUNS = [
     pytest.param(
         chapter, changes,
         id=f"{chapter}-{changes}",
-        marks=[pytest.mark.exhaustive] * (changes is not runs[0]),
+        marks=[pytest.mark.exhaustive] * (changes is not runs[0] or chapter in LONG),
     )
     for chapter, runs in CHANGES.items()
     for changes in runs
