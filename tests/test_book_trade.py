@@ -363,6 +363,10 @@ def test_pairs_are_for_equal_balls():
     off = np.abs(pairs - [flown(m) for m in rows]).max(axis=1)
     assert (off > 0.05).mean() == pytest.approx(0.1, abs=0.015)
     assert CHAPTER.glued["pairs-worst"] == f"{100 * off.max():.0f}"
+    m = [2, 0.5, 2, 1, 0.5]
+    gaps = [5 * (5 * 0.4 / 4) ** 0.4] * 4
+    apart = integrated(m, np.eye(5)[0], gaps=gaps) - post_impact_velocities(m, np.eye(5)[0], 1, 0)
+    CHAPTER.tells({"pairs-corner": 100 * np.abs(apart).max()})
 
 
 def test_one_impact_in_a_call():
