@@ -142,7 +142,7 @@
 
   // --- the map --------------------------------------------------------------------------------
 
-  const CELLS = 360;
+  const CELLS = 240;
   let square; // the order of all maps
   const LARGEST = 3; // of both axes, as in the paper's Fig. 6
 
