@@ -133,7 +133,7 @@ def recommend(
     Notes
     -----
     Measured were errors of velocities, on rows that touch, struck at one end, with equal springs.
-    For a chain between those the worst counts, and must be ten times below `accuracy`.
+    For a chain between those the worst error counts, and must be at most a tenth of `accuracy`.
 
     Examples
     --------
