@@ -79,7 +79,7 @@ def code(chapter: str) -> list:
 
 
 def shown(chapter: str) -> list:
-    """Return the code cells that a reader sees without opening a fold, and those he may write."""
+    """Return the code cells that a reader sees without opening a fold, or is to write."""
     hidden = {"hide-input", "hide-cell", "remove-cell"}
     return [
         cell

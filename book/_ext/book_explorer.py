@@ -124,7 +124,7 @@ def story() -> list[dict[str, Any]]:
          "The first ball comes in at full speed, the second at half of it: Fig. 8 of the paper. "
          "Two stretches of the row are in contact at once, until the gap between them closes too."),
         ("map", "Who bounces back?", equal(3, 0.15, e=0.5), "map",
-         "Which balls come back depends on two ratios of masses. Drag the point over the map, "
+         "Which balls come back depends on two quotients of masses. Drag the point over the map, "
          "which is Fig. 6 of the paper."),
     ]  # fmt: skip
     return [

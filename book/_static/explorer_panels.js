@@ -231,7 +231,9 @@
       sliders.restitution.rename(restitution + pair);
       // A ratio above its bound looks so. (Where two balls push one, more than the bound may count.)
       for (const [name, { words, directions }] of Object.entries(RATIOS)) {
-        const over = directions.flatMap((way) => inner.map((k) => bounded[way][k]).filter((bound, k) => setting[way][inner[k]] - bound > 1e-9));
+        const over = directions.flatMap((way) =>
+          inner.filter((k) => setting[way][k] - bounded[way][k] > 1e-9).map((k) => bounded[way][k]),
+        );
         const bounds = new Set([Math.min(...over), Math.max(...over)].map((bound) => +bound.toFixed(2)));
         sliders[name].rename(words + (over.length ? ` (bound ${[...bounds].join(" to ")})` : ""));
         sliders[name].node.classList.toggle("over", over.length > 0);

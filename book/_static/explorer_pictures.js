@@ -1,5 +1,5 @@
 // The panel with one of three pictures: a hit from the inside, its outcome for each ratio, or which
-// balls go back for each two ratios of masses.
+// balls go back for any two quotients of masses.
 (function (explorer) {
   "use strict";
   const { RegionMap, Sweep, controls, panels } = explorer;
@@ -7,7 +7,7 @@
   const TABS = {
     inside: ["Inside the hit", "velocities from its start to its end"],
     sweep: ["Each ratio", "the outcome for each ratio from 0 to 1"],
-    map: ["Who goes back", "of three balls, for any two ratios of their masses"],
+    map: ["Who goes back", "of three balls, for any two quotients of their masses"],
   };
   // Milliseconds of each frame for sweeps and maps.
   const BUDGET = 7;
