@@ -138,9 +138,8 @@ def aim(n, law, s, clock):
     eta = min(clock.eta, 0.7 if clock.lossy else WHOLE)
     top = highest(n, law.p, s)
     h = (eta if eta >= ENOUGH else COARSE) / math.sqrt(top)
-    clock.damped = DAMPED / max(clock.lossy, 1e-300)
     # Half its digits, rounded down: the last ones of a power may depend on the machine.
-    h = min(h, clock.damped / top) * (1.0 - 1e-8)
+    h = min(h, DAMPED / max(clock.lossy, 1e-300) / top) * (1.0 - 1e-8)
     clock.h = h * 134217729.0 - (h * 134217729.0 - h)
     # Balls that strings hold together after all swing for ever, or with losses long.
     most = (6e4 if clock.lossy else 2e4) / accuracy**0.25
@@ -181,7 +180,7 @@ def judge(n, law, change, s, clock):
     if off <= 1.0:
         finer = math.sqrt(2.0) if clock.lossy or (ratio == 0.0 and not clock.leans) else 2.0
     clock.coarser = clock.h if off <= (1.0 if clock.leans else 2.0) else 0.0
-    clock.h = min(clock.h / finer, clock.damped / clock.top)
+    clock.h /= finer
     clock.trial += 1
     return True
 

@@ -90,7 +90,6 @@ class Clock:
     row: int  # of the record, to be written next
     h: float  # step,
     eta: float  # what it times a frequency may be, at most,
-    damped: float  # and times the square of a frequency, for the losses
     most: float  # steps of a run
     trial: int  # number of the run,
     hard: float  # error over the fourth power of a step, at least
