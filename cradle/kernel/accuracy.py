@@ -118,12 +118,10 @@ def highest(n, p, s):
     for i in range(n):
         a = s[i]
         energy += 0.5 * (p + 1.0) * a.start * a.start / a.w
-        if a.lean > 0.0:
-            energy += a.k * a.lean * a.lean * grade(p, a.lean)
         both = (left + a.k) * a.w
         part = max(part, both * both * grade(p, a.w))
         left = a.k
-    # Where powers would overflow the runs tell.
+    # Where powers would overflow, and where strings press, the runs tell.
     bound = p * (part * grade(p, min(energy, 1e15))) ** (1.0 / (p + 1.0))
     return bound if bound > 0.0 else 1.0
 
