@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from cradle.input.values import Vector
 from cradle.swinging.pendulums import TIE, Hanging, mean
@@ -23,7 +24,10 @@ Wave = tuple[complex, complex]
 Fall = tuple[float, complex, complex]
 _ROUNDING = 1e-11  # below this part of what it is made of a force is a rounding error
 _RTOL = 1e-12
-_DEGREE = 14  # of the polynomials: the next term of a swing in a radian is below 1e-17
+# Nodes of polynomials in [-1, 1], and what makes terms of values there; of degree 14, as the next
+# term of a swing in a radian is below 1e-17.
+_NODES: Vector = chebyshev.chebpts1(15)
+_TERMS: Vector = np.asarray(np.linalg.inv(chebyshev.chebvander(_NODES, 14)))
 
 
 def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -> float:
@@ -64,8 +68,6 @@ def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -
 
 def _search(level: float, waves: list[Wave], parting: bool, horizon: float) -> float:
     """Return the same by all roots of polynomials that follow a radian to the last digit."""
-    from numpy.polynomial.chebyshev import chebroots, chebtrim  # slow to import
-
     c, rate = np.array(waves).T
     size, radian = np.abs(c), 1.0 / float(np.abs(rate).max())
     if (left := float(size.sum())) > level > 0.0 > (decay := float(rate.real.max())):
@@ -80,14 +82,13 @@ def _search(level: float, waves: list[Wave], parting: bool, horizon: float) -> f
     noise = 4e-16 * (abs(level) + left)
     # How far it may lie below its values at nodes, an eighth of a radian apart.
     dip = float(size @ np.abs(rate) ** 2) * (radian / 8.0) ** 2 / 8.0
-    nodes, inverse = _nodes()
     for k in range(math.ceil(horizon / radian)):
         begin, told_by = k * radian, rise if parting and k == 0 else value
-        values = told_by(begin + 0.5 * radian * (1.0 + nodes))
+        values = told_by(begin + 0.5 * radian * (1.0 + _NODES))
         if values.min() > dip:
             continue
-        terms = inverse @ values
-        roots = chebroots(chebtrim(terms, 1e-15 * np.abs(terms).max()))
+        terms = _TERMS @ values
+        roots = chebyshev.chebroots(chebyshev.chebtrim(terms, 1e-15 * np.abs(terms).max()))
         real = np.sort(roots.real[(roots.imag == 0.0) & (np.abs(roots.real) < 1.0)])
         marks = begin + 0.5 * radian * (1.0 + np.array([-1.0, *real, 1.0]))
         below = told_by(0.5 * (marks[1:] + marks[:-1])) < -noise
@@ -95,15 +96,6 @@ def _search(level: float, waves: list[Wave], parting: bool, horizon: float) -> f
             # A contact that is to part and does not closes a moment later.
             return float(marks[below.argmax()]) or TIE * radian * parting
     return math.inf
-
-
-@functools.cache
-def _nodes() -> tuple[Vector, Vector]:
-    """Return the nodes of the polynomials in [-1, 1], and what makes terms of values there."""
-    from numpy.polynomial.chebyshev import chebpts1, chebvander  # slow to import
-
-    nodes: Vector = chebpts1(_DEGREE + 1)
-    return nodes, np.asarray(np.linalg.inv(chebvander(nodes, _DEGREE)))
 
 
 @functools.lru_cache(64)

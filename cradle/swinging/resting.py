@@ -26,8 +26,7 @@ NEAR = 1e-12
 
 def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the first ball of each stretch of marked contacts, and the one after its last."""
-    marked = np.zeros(len(contacts) + 2, dtype=bool)
-    marked[1:-1] = contacts
+    marked = np.concatenate([[False], contacts, [False]])
     edges = np.flatnonzero(marked[1:] != marked[:-1])
     return [(first, end + 1) for first, end in edges.reshape(-1, 2).tolist()]
 
