@@ -4,7 +4,6 @@ A refusal names the value, its place and the rule: `masses[1] = -1.0; must be ab
 """
 
 import math
-import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NewType, TypeVar
@@ -62,9 +61,9 @@ def _usual(values: Sequence[Any]) -> bool:
 
 
 def _is_masked(value: Any) -> bool:
-    """Tell whether anything is masked, without loading `numpy.ma` if nobody else has."""
-    ma = sys.modules.get("numpy.ma")
-    return ma is not None and bool(ma.is_masked(value))
+    """Tell whether anything is masked, as `numpy.ma` would, without loading it."""
+    mask = getattr(value, "_mask", False)
+    return mask is not False and bool(np.any(mask))
 
 
 def _as_float(name: str, at: tuple[int, ...], cell: Any) -> float:
