@@ -85,12 +85,11 @@ class Chain:
         return f"Chain({', '.join(values)})"
 
     def _repr_html_(self) -> str:
-        columns = {
+        return as_html({
             "mass (kg)": self.masses,
             "velocity (m/s)": self.velocities + 0.0,  # no -0
             "restitution with the next": self.restitution,
-        }
-        return as_html(columns)
+        })  # fmt: skip
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Chain):

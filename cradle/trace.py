@@ -136,14 +136,13 @@ class Trace:
         return figures.velocity_impulse(self, contact, ax)
 
     def _repr_html_(self) -> str:
-        columns = {
+        return as_html({
             "mass (kg)": self.chain.masses,
             "before (m/s)": self.chain.velocities + 0.0,
             "after (m/s)": without_rounding(self.velocities),
             "impulse with the next (N s)": without_rounding(self.impulses),
             "collisions with the next": self.collisions,
-        }
-        return as_html(columns)
+        })  # fmt: skip
 
     def __repr__(self) -> str:
         counts = f"collisions={self.collisions.tolist()}, collapsed={self.collapsed}"

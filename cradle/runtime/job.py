@@ -37,10 +37,6 @@ _ENDLESS = 2**62  # no limit
 _ROUND = 5  # events of a contact in one round: end, close, collapse, maximum, repetition
 
 
-class Stopped(Exception):
-    """Another thread has failed, or the user has had enough."""
-
-
 _kept = threading.local()  # a thread's work areas, for its next call
 
 
@@ -104,9 +100,7 @@ class Job:
         """Solve the chains, up to the first that is not FINISHED, or until `stop` is set."""
         # It calls `pause` whenever the event loop pauses.
         resumed, rows = False, len(self.outputs.v)
-        while self.next < rows:
-            if stop is not None and stop.is_set():
-                raise Stopped
+        while self.next < rows and not (stop and stop.is_set()):
             kernel = runtime.chosen(self.large)
             if self.compiled is not (kernel is not plain):
                 self._begin(kernel is not plain)
@@ -175,9 +169,7 @@ def follow(
     compiled: bool | None = None
     pages = np.empty((0 if record is None else _PAGES + 2, 4, n))
     clock: Any = None
-    while k < rows and status in (FINISHED, PAUSED):
-        if stop is not None and stop.is_set():
-            raise Stopped
+    while k < rows and status in (FINISHED, PAUSED) and not (stop and stop.is_set()):
         kernel = runtime.chosen(large, "follow")
         if compiled is not (kernel is not plain):
             # A chain that has begun plain begins anew.
