@@ -46,26 +46,26 @@ def swing(
         raise click.UsageError("--output draws a film; --json, --csv and --steps are of tables")
     options["sequence"] = options["sequence"] or (None if options["masses"] else "5")
     length = describe.pendulum_length(options.pop("length"), options.pop("period"))
-    hanging = cradle.Pendulums(0.3 if length is None else length, gaps=one_or_all(gaps or [0.0]),
+    length = 0.3 if length is None else length
+    hanging = cradle.Pendulums(length, gaps=one_or_all(gaps or [0.0]),
                                damping=one_or_all(damping or [0.0]))  # fmt: skip
-    if 0.0 < by < math.inf:  # the speed of the first strike, to which a restitution belongs
-        options["speed"] = by * float(hanging.natural_frequency(2)[0])
-    given = described(**options)
-    chain = given.taken
-    far = float(hanging.reach(len(chain))[0])
+    far, frequency = float(hanging.reach(1)[0]), math.sqrt(hanging.gravity / length)
     rule = f"must be above 0 and at most a quarter of a circle of that --length, {far:.4g} m"
     one_number("--by", by, rule, 0.0, far, open_low=True)
+    options["speed"] = by * frequency  # of the first strike, to which a restitution belongs
+    given = described(**options)
+    chain = given.taken
     one_number("--seconds", seconds, *ABOVE_ZERO)
     steps = whole_number("--steps", 20 if steps is None else steps)
     if output:
         from cradle.pictures.animation import animate_swing  # what is missing is said before work
 
         # Twenty keyframes a swing.
-        steps = math.ceil(20 * seconds * hanging.natural_frequency(len(chain))[0] / math.tau)
+        steps = math.ceil(20 * seconds * frequency / math.tau)
     places = _released(pull or [1.0], by, len(chain))
     balls = cradle.Chain(chain.masses, [0.0] * len(chain), chain.restitution)
     times = [seconds * k / steps for k in range(steps + 1)]
-    if (count := seconds * hanging.natural_frequency(2)[0] / math.tau) > 2000:
+    if (count := seconds * frequency / math.tau) > 2000:
         click.echo(f"cradle: {count:.3g} swings take a while (--seconds)", err=True)
     run = cradle.swing(balls, given.model, places, times, pendulums=hanging)
     rows = [
