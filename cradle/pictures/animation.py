@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D
@@ -167,21 +167,16 @@ class Animation:
         elif kind == ".png":
             self.show(None)
             self.figure.savefig(file, dpi=144)
-        elif kind == ".gif":
-            self._film(PillowWriter(RATE), file, 72)
-        elif kind != ".mp4":
+        elif kind not in (".gif", ".mp4"):
             raise ValueError(f"path = {str(path)!r}; must end in .svg, .html, .gif, .mp4 or .png")
-        elif not FFMpegWriter.isAvailable():
+        elif kind == ".mp4" and not FFMpegWriter.isAvailable():
             raise ValueError(f"{file} needs the program ffmpeg, which is not here; .gif does not")
         else:
-            self._film(FFMpegWriter(RATE), file, 144)
-
-    def _film(self, writer: AbstractMovieWriter, file: Path, dpi: float) -> None:
-        duration = max((float(move.times[-1]) for move in self.moves), default=0.0)
-        with writer.saving(self.figure, str(file), dpi):
-            for k in range(max(1, round(RATE * duration))):
-                self.show(k / RATE)
-                writer.grab_frame()
+            writer, dpi = (PillowWriter, 72) if kind == ".gif" else (FFMpegWriter, 144)
+            count = max(1, round(RATE * max(float(move.times[-1]) for move in self.moves)))
+            show: Any = self.show
+            film = FuncAnimation(self.figure, show, np.arange(count) / RATE)
+            film.save(file, writer(RATE), dpi=dpi)
 
     def show(self, time: float | None) -> None:
         """Bring every part of the figure to where it is at a time, s; None is the still."""
