@@ -22,7 +22,6 @@ def numbers_of(_: click.Context, __: click.Parameter, value: str | None) -> list
         raise click.BadParameter(f"{value!r}; write numbers with commas between") from None
 
 
-# What describes a chain of balls and its impact law.
 _CHAIN = (
     click.Argument(["sequence"], required=False),
     click.Option(["--speed"], type=float, help="Velocity of the first ball, m/s [1]."),

@@ -136,13 +136,11 @@ class Path:
         record: list[Any] = []
         clock = follow(chain, law, out, record=record)[2]
         pages = np.concatenate(record)
-        #: The units.
         self.mass, self.speed, self.length = (float(clock[x]) for x in ("mass", "speed", "length"))
         h, loss = clock["h"], chain.loss[0] * self.speed / (1.0 if law.hunt else self.length)
         self.p, self.w, self.early = law.p, self.mass / chain.m[0], (not law.hunt) * law.p * loss
         self.k = chain.k[0] / clock["stiffness"]
-        #: Velocities after the impact.
-        self.last, pages = pages[-1, 1], pages[:-1]
+        self.last, pages = pages[-1, 1], pages[:-1]  # velocities after the impact
         v, y, f = pages[:, 1], pages[:, 2, :-1], pages[:, 3, :-1]
         #: Times, compressions, and whether contacts are closed, at the start and at the nodes.
         self.t, self.y, self.closed = pages[:, 0, 0], y, f > 0.0
@@ -160,7 +158,6 @@ class Path:
         u = v[:, :-1] - v[:, 1:]
         rate, damping = slope * u, grip * u
         v[1:] -= h**2 / 12.0 * self.driven(rate)[1:]
-        #: Velocities, accelerations, forces.
         self.v, self.force = v, np.maximum(push + damping, 0.0)
         self.a = self.driven(held + damping)
 
