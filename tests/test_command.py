@@ -292,6 +292,7 @@ def test_gaps_and_damping_of_a_swing():
     run = swing.swing(Chain([1, 1], [0, 0]), model, [-0.02, 0], times, pendulums=hanging)
     assert len(run.impacts) == 1
     np.testing.assert_array_equal([[row["ball 1"], row["ball 2"]] for row in rows], run.positions)
+    assert "time" in call("swing 3 --damping 0.1,0.1,0.2 --ratio 0.1 --seconds 0.4 --csv")
 
 
 @pytest.mark.parametrize(("name", "begins"), [("toy.gif", b"GIF89a"), ("toy.svg", b"<svg")])

@@ -393,7 +393,9 @@ def rows():
     yield from ((Pendulums, given, words) for given, words in PENDULUMS)
     yield from ((springs, options, words) for options, words in SPRINGS)
     leans = {"gaps": [[0, 0], [0, -3]]}, "gaps[1, 1] = -3.0; must be a lean"
-    for options, words in (*SPRINGS[:-1], leans):
+    faint, slow = {"masses": 1e-323 * ONES}, {"velocities": [1e-301, 0, 0], "exponent": 1}
+    beyond = "stiffness[0] = 1.0; its time, or the mass it moves, is beyond floats: choose"
+    for options, words in (*SPRINGS[:-1], leans, (faint, beyond), (slow, beyond)):
         yield spring_velocities, {"masses": ONES, "velocities": [1, 0, 0], **options}, words
     for call in (collide, condition_number):
         yield from ((call, (THREE, thing), words) for thing, words in NO_MODELS)

@@ -39,6 +39,7 @@ DAMPED = 0.5  # step times A times the square of a frequency, at most
 SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
 LONGEST, MOST_HUNT = 0.3, 0.9  # A, in contact times, and in one over the closing speed
 TINY = 1e-300  # the least depth, and one over the largest
+WHOLE_MASS = 2.0**-1022  # a lighter one has lost digits
 # The widest gap and the narrowest, in depths; the widest whose last digit is below this accuracy.
 WIDEST, NARROWEST, BLURRED = 1e9, 1e-12, 1e13
 
@@ -77,7 +78,7 @@ def measure(n, chain, law, s, clock):
         clock.length = size**part
     else:
         clock.length = clock.mass**part / chain.k[at] ** part * clock.speed ** (2.0 * part)
-    if not TINY <= clock.length <= 1.0 / TINY:
+    if clock.mass < WHOLE_MASS or not TINY <= clock.length <= 1.0 / TINY:
         refuse(True, QUICK, at, clock)
         return
     widest = min(WIDEST, BLURRED * law.accuracy)

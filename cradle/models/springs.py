@@ -31,7 +31,8 @@ def refused(clock: Any, law: Law, place: Sequence[int], chain: Springs) -> Value
     name, values, words = {
         limits.LIGHT: ("masses", chain.m, f"{least} heaviest ball of its chain"),
         limits.SOFT: ("stiffness", chain.k, f"{least} stiffest contact of its chain"),
-        limits.QUICK: ("stiffness", chain.k, "its time is beyond floats: choose other units"),
+        limits.QUICK: ("stiffness", chain.k, "its time, or the mass it moves, is beyond "
+                       "floats: choose other units"),
         limits.LATE: ("viscosity", chain.loss, f"{late} of the fastest closing; was it found for "
                       "this stiffness, speed and damping?"),
         PULLS: ("viscosity", chain.loss, "must be lower: this contact would pull"),
