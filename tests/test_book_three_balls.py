@@ -8,7 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import uniform
-from chapters import Chapter, code, floats, numbers, panel, shown
+from chapters import Chapter, code, floats, number, numbers, panel, shown
 from chapters import run as run_cells
 from truth import solve
 
@@ -308,6 +308,18 @@ def test_the_readers_solver_against_the_reference_solver():
         if cell.id in ("rates", "ways", "loop")
     )
     assert lines < 65
+
+
+def test_an_impact_without_end_by_momentum():
+    """All three go on as one; the program, which stops before, is off by as much as it says."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        names = run_cells(shown("own_solver"), {})
+    for name, middle in (("tenth", 0.1), ("fiftieth", 0.02)):
+        path = names["three_balls"]([1, middle, 1], [1, 0, 0], [0.3, 0.3], 0)
+        assert len(path) == 300
+        off = np.abs(path[-1][2] - 1 / (2 + middle)).max()
+        told = float(f"{off:.0e}")
+        assert number(PROGRAM.glued[f"own-solver-off-{name}"]) == pytest.approx(told, rel=1e-9)
 
 
 def test_what_the_page_says_of_the_program():

@@ -90,7 +90,12 @@ class Editor:
             "([told, words]) => document.querySelector(told).textContent.includes(words)",
             arg=[f"{self.place} .told", words],
         )
-        return tuple(self.host.locator(f".{kind}").count() for kind in ("passed", "missed"))
+        return self.counted("ol")
+
+    def counted(self, place: str) -> tuple[int, int]:
+        """How many impacts (ol) or single calls (ul) have passed, and how many have not."""
+        kinds = "passed", "missed"
+        return tuple(self.host.locator(f"{place} .{kind}").count() for kind in kinds)
 
 
 @pytest.fixture
@@ -160,6 +165,34 @@ def test_right_wrong_and_endless(page, solver):
     assert editor(nothing).told("0 of 5") == (0, 5)
 
 
+@pytest.mark.parametrize(
+    ("piece", "right", "wrong", "missed", "words"),
+    [
+        ("rates", "min(a, bound)", "a", [1], "expected 0.25, 1; \u22120.25, \u22120.25, 1"),
+        ("rates", "min(a, bound)", "1.0", [0, 1], "expected 1, 0.15; \u22121, 0.85, 0.15"),
+        ("way_to_event", "return inf", "return 9.0", [4], "9 came out; expected inf"),
+        ("three_balls", "dv * way", "dv", [0], "came out; expected 0.4"),
+    ],
+)
+def test_single_calls_tell_what_is_wrong(page, piece, right, wrong, missed, words):
+    editor = Editor(page, f".reader-solver[data-piece={piece}]")
+    lines = "import numpy as np\n" + reader_solver.parts(reader_solver.cells())[piece]
+    assert lines.count(right) == 1
+    editor(lines.replace(right, wrong)).told("of 5 checks passed")
+    kinds = editor.host.locator("ul p").evaluate_all("all => all.map((p) => p.className)")
+    assert [k for k, kind in enumerate(kinds) if kind == "missed"] == missed
+    assert words in editor.host.locator("ul").inner_text()
+
+
+@pytest.mark.parametrize("kind", ["list", "tuple"])
+def test_lists_in_the_place_of_arrays(page, kind):
+    editor = Editor(page, ".reader-solver[data-piece=rates]")
+    lines = reader_solver.parts(reader_solver.cells())["rates"]
+    lists = lines.replace("return push, np.array", f"return {kind}(push), {kind}")
+    editor(f"import numpy as np\n{lists}").told("An error")
+    assert "Make it one: np.array" in editor.host.locator(".wrong").inner_text()
+
+
 def test_a_browser_without_a_language(page):
     """WebKit without a locale says "C", for which browsers have no calendar."""
     assert Editor(page)().told("5 of 5 checks passed") == (5, 0)  # Python is loaded
@@ -172,7 +205,7 @@ def test_a_browser_without_a_language(page):
           await new Promise((done) => {
             worker.onerror = ({ message }) => done(heard.push(message));
             worker.onmessage = ({ data }) => heard.push(data) && data.done && done();
-            worker.postMessage({ code: "print(6 * 7)", checks: [] });
+            worker.postMessage({ code: "print(6 * 7)", asked: [] });
           });
           worker.terminate();
           return heard;
@@ -195,6 +228,7 @@ def test_a_piece_by_itself(page, piece):
     with_numpy = f"import numpy as np\n{right}"
     assert editor(with_numpy).told("5 of 5 checks passed") == (5, 0)
     assert editor.host.locator("ol").is_visible()
+    assert editor.counted("ul") == (len(reader_solver.CALLS[piece]), 0)
     assert editor(f"{with_numpy}\nx = (1,").told("An error") == (0, 0)
     assert "SyntaxError" in editor.host.locator(".wrong").inner_text()
     nothing = re.sub(r"return .*", "return None", with_numpy)

@@ -2,8 +2,8 @@
 
 A page asks for it by `<div class="reader-solver" data-piece="rates"></div>`. The editor holds this
 function without what the reader is to write, and without `data-piece` the whole program. All lines
-are read from the page's notebook, so there is no second copy of them. What comes out is compared
-with `cradle`, asked here.
+are read from the page's notebook, so there is no second copy of them. Single calls are compared
+with what the page's own lines give, and whole impacts with `cradle`, asked here.
 
 Python runs in the browser by Brython, which comes from PyPI. Interpreter, `math` and the little of
 numpy that the lines use are one script, loaded when the reader first presses Run. It holds a text
@@ -30,8 +30,26 @@ HEAD = "import numpy as np"
 #: What each of them computes, told where the reader's lines come.
 TOLD = {
     "rates": "Eqs. 16 to 19; the bound is Eq. 34",
-    "way_to_event": "-u/u'; in expansion 2W/(R-u), R^2 = u^2 - 2u'W",
+    "way_to_event": "One way for each phase",
     "three_balls": "To the next event: Eqs. 20, 21, 23 and 29",
+}
+#: Calls of each of them that are checked first.
+CALLS = {
+    "rates": (
+        "rates([1, 1, 1], 0.15, [True, True], 0)",
+        "rates([1, 3, 1], 0.5, [True, True], 1)",
+        "rates([1, 2, 1], 0.15, [False, True], 1)",
+    ),
+    "way_to_event": (
+        'way_to_event("compression", 1, -2, 0)',
+        'way_to_event("expansion", 0, -2, 0.16)',
+        'way_to_event("expansion", 0, -2, 0)',
+        'way_to_event("idle", -1, 4, 0)',
+        'way_to_event("idle", -1, -4, 0)',
+    ),
+    "three_balls": (
+        "three_balls([1, 1, 1], [1, 0, 0], [0.9, 0.8], 0.15)[1][2:]",
+    ),
 }
 #: Title; masses, velocities, restitution, ratio. The page's own example is put in front.
 CASES = (
@@ -124,6 +142,24 @@ def example(codes: list[str]) -> tuple[list[float], list[float], list[float], fl
     )
 
 
+def calls(codes: list[str]) -> dict[str, list[dict[str, Any]]]:
+    """Return the first calls of each piece, and the rows of numbers that the page's lines give."""
+    names: dict[str, Any] = {}
+    exec(lines(codes), names)
+
+    def rows(found: Any) -> list[list[float]]:
+        several = found if isinstance(found, tuple) else [[found]]
+        return [[float(value) for value in row] for row in several]
+
+    return {
+        piece: [
+            {"asked": call, "expected": rows(eval(call, names))}
+            for call in several
+        ]
+        for piece, several in CALLS.items()
+    }
+
+
 def checks(codes: list[str]) -> list[dict[str, Any]]:
     """Return what is asked of the reader's solver, and the answers of `cradle`."""
     from cradle import Chain, ImpulseCorrelation, collide
@@ -150,7 +186,11 @@ def checks(codes: list[str]) -> list[dict[str, Any]]:
 def data() -> dict[str, Any]:
     """Return what the page shows: the texts to begin with, and the checks."""
     codes = cells()
-    return {"texts": texts(codes), "checks": checks(codes)}
+    return {
+        "texts": texts(codes),
+        "calls": calls(codes),
+        "checks": checks(codes),
+    }
 
 
 def interpreter() -> str:

@@ -5,6 +5,7 @@
   const FILE = "lines";
   const HINTS = [
     [/NoneType/, "Is a return missing? A function without one gives None."],
+    [/'(list|tuple)'|multiply sequence/, "Is a list in the place of an array? Make it one: np.array(...)."],
     [/recursion|Previous line repeated/i, "A function calls itself without end."],
   ];
   let said = 0;
@@ -38,7 +39,10 @@
 
   const run = (code, name) => $B.runPythonSource(code, name);
 
-  onmessage = ({ data: { code, rest = "", checks } }) => {
+  // What is asked has one number, or rows of them.
+  const ROWS = "found = repr([[float(v) for v in row] for row in (rows if hasattr(rows, '__len__') else [[rows]])])";
+
+  onmessage = ({ data: { code, rest = "", asked } }) => {
     rows = code.split("\n").length;
     $B.use_VFS = true;
     $B.update_VFS(modules);
@@ -50,9 +54,8 @@
       console.log = say; // where `print` writes
       run(`${code}\n\n\n${rest}`, FILE);
       let first = null; // error of a check: the others are made all the same
-      checks.forEach(({ given }, number) => {
-        const asked = given.map((value) => JSON.stringify(value)).join(", ");
-        const ask = `import ${FILE}\nfound = repr([float(v) for v in ${FILE}.three_balls(${asked})[-1][2]])`;
+      asked.forEach((call, number) => {
+        const ask = `from ${FILE} import *\nrows = ${call}\n${ROWS}`;
         try {
           const check = run(ask, `check_${number}`);
           postMessage({ number, found: String($B.module_getattr(check, "found")) });

@@ -1,9 +1,9 @@
-// The reader's own solver of three balls, in pieces: an editor, a button, five checks. The lines run in a worker
+// The reader's own solver of three balls, in pieces: an editor, a button, single calls and five impacts. The lines run in a worker
 // with Brython, which is loaded at the first press (book/_ext/reader_solver.py writes it), so an
 // endless loop holds up nothing and can be stopped.
 (function (data) {
   "use strict";
-  const { texts, checks } = data;
+  const { texts, calls, checks } = data;
   const PYTHON = document.currentScript.src.replace(/solver\.js.*/, "solver_python.js");
   const SAME = 1e-9; // m/s
   const LONG = 4000; // milliseconds after which a run may be endless
@@ -25,12 +25,14 @@
       document.head.append(script);
     }));
 
-  const shown = (v) => (v === null ? "no number" : String(+v.toPrecision(6) + 0));
+  const shown = (v) => (v === null ? "no number" : Number.isFinite(v) ? String(+v.toPrecision(6) + 0) : "inf");
   const row = (values) => values.map(shown).join(", ").replaceAll("-", "\u2212");
-  const numbers = (text) => JSON.parse(text.replace(/-?(nan|inf)/g, "null"));
+  const rows = (all) => all.map(row).join("; ");
+  const numbers = (text) => JSON.parse(text.replace(/-?nan/g, "null").replaceAll("inf", "1e999"));
+  const same = (v, w) => v === w || (v !== null && Math.abs(v - w) <= SAME);
   const agrees = (found, expected) =>
     found.length === expected.length &&
-    expected.every((v, ball) => found[ball] !== null && Math.abs(found[ball] - v) <= SAME);
+    expected.every((w, k) => (Array.isArray(w) ? agrees(found[k], w) : same(found[k], w)));
 
   function solver(host) {
     const piece = host.dataset.piece ?? "";
@@ -71,26 +73,45 @@
     const told = make("span", { class: "told", role: "status" });
     const printed = make("pre", { class: "printed", "aria-label": "what your lines print" });
     const wrong = make("pre", { class: "wrong", role: "alert" });
-    const results = checks.map(() => make("p", {}));
+    // First single calls of the reader's function, then whole impacts.
+    const first = calls[piece] ?? [];
+    const asked = [
+      ...first,
+      ...checks.map(({ given, expected }) => ({
+        asked: `[three_balls(${given.map((value) => JSON.stringify(value)).join(", ")})[-1][2]]`,
+        expected: [expected],
+        unit: " m/s",
+      })),
+    ];
+    const results = asked.map(() => make("p", {}));
+    const single = make(
+      "ul",
+      { hidden: "" },
+      ...first.map(({ asked }, k) => make("li", {}, make("code", {}, asked), results[k])),
+    );
     const list = make(
       "ol",
       { hidden: "" },
       ...checks.map(({ title, given: [masses, velocities, restitution, ratio] }, k) => {
-        const asked =
+        const words =
           `masses ${row(masses)} kg; velocities ${row(velocities)} m/s; ` +
           `restitution ${row(restitution)}; ratio ${ratio}`;
-        return make("li", {}, make("b", {}, `${title}. `), asked, results[k]);
+        return make("li", {}, make("b", {}, `${title}. `), words, results[first.length + k]);
       }),
     );
 
-    function show(check, text) {
-      const { expected } = checks[check];
+    function show(number, text) {
+      const { expected, unit = "" } = asked[number];
       const found = numbers(text);
       const passed = agrees(found, expected);
-      results[check].className = passed ? "passed" : "missed";
-      results[check].textContent = passed
-        ? `\u2713 passed: ${row(expected)} m/s`
-        : `not yet: ${row(found)} m/s came out; cradle has ${row(expected)} m/s`;
+      results[number].className = passed ? "passed" : "missed";
+      results[number].textContent = passed
+        ? `\u2713 passed: ${rows(expected)}${unit}`
+        : `not yet: ${rows(found)}${unit} came out; ${unit ? "cradle has" : "expected"} ${rows(expected)}${unit}`;
+    }
+    function reveal(is) {
+      single.hidden = !is || !first.length;
+      list.hidden = !is;
     }
     function stop(words) {
       worker?.terminate();
@@ -110,7 +131,7 @@
       if (!done) return;
       const passed = list.querySelectorAll(".passed").length;
       if (empty) {
-        list.hidden = true;
+        reveal(false);
         stop(`Write your lines at line ${line}.`);
       } else stop(error ? `An error${line ? ` in line ${line}` : ""}.` : `${passed} of ${checks.length} checks passed.`);
     }
@@ -140,8 +161,8 @@
       URL.revokeObjectURL(address);
       worker.onmessage = ({ data }) => hear(data);
       worker.onerror = ({ message }) => hear({ error: message, done: true });
-      worker.postMessage({ code: editor.value, rest, checks });
-      list.hidden = false;
+      worker.postMessage({ code: editor.value, rest, asked: asked.map(({ asked }) => asked) });
+      reveal(true);
       halt.disabled = false;
       told.textContent = "running \u2026";
       slow = setTimeout(() => {
@@ -154,6 +175,7 @@
       make("div", { class: "run" }, start, halt, told),
       wrong,
       printed,
+      single,
       list,
     );
     host.classList.add("live");
