@@ -1,8 +1,10 @@
-"""Draw the pictures of README.md from the solver: `python book/draw_readme.py`."""
+"""Draw the pictures of README.md and of own_code.md: `python book/draw_readme.py`."""
 
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide, swing
@@ -11,6 +13,9 @@ from cradle.pictures.animation import Animation, animate_swing
 
 PICTURE = Path(__file__).parent / "_static" / "cradle.png"
 FILM = PICTURE.with_name("toy.svg")
+PLOT = PICTURE.with_name("plot.svg")
+#: Inches that fit a phone.
+SIZE = 3.97, 3
 
 
 def draw() -> Figure:
@@ -57,7 +62,18 @@ def film() -> Animation:
     return animate_swing(run, speed=0.5)
 
 
+def plot() -> Axes:
+    """Draw the first block of own_code.md."""
+    chain = Chain(masses=[1, 1, 1], velocities=[1, 0, 0], restitution=0.95)
+    ax = collide(chain, ImpulseCorrelation(0.15)).plot()
+    ax.figure.set_size_inches(SIZE)
+    return ax
+
+
 if __name__ == "__main__":
     # No version and no date inside: the same picture at every run.
     draw().savefig(PICTURE, dpi=200, metadata={"Software": None})
     film().save(FILM)
+    with mpl.rc_context({"svg.hashsalt": "cradle"}):
+        nothing = {"Creator": None, "Date": None}
+        plot().figure.savefig(PLOT, metadata=nothing)

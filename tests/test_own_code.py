@@ -12,11 +12,20 @@ import types
 from collections import namedtuple
 from pathlib import Path
 
+import draw_readme
+import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 from chapters import numbers
 from script import Script
 
-from cradle import Chain, ImpulseCorrelation, collide, textbook
+from cradle import (
+    Chain,
+    ImpulseCorrelation,
+    collide,
+    hertz_stiffness,
+    textbook,
+)
 from cradle.tables import data_folder
 
 ROOT = Path(__file__).parents[1]
@@ -52,7 +61,50 @@ def test_every_block_is_run_here():
     kinds = {title: " ".join(kind for kind, _ in parts) for title, parts in BLOCKS.items()}
     plain = "python text"
     assert [*kinds.values()][:5] == [plain] * 5
-    assert [*kinds.values()][5:] == ["sh html text", "sh python text python text sh", ""]
+    assert [*kinds.values()][5:] == ["sh html text", "sh python text python text text sh", ""]
+
+
+def test_fig_own_code_plot():
+    """The stored picture has the lines that the first block draws, which lead to what it prints."""
+    ((code, told),) = PAIRS[ONE]
+    files = [draw_readme.PLOT.read_text(encoding="utf-8")]
+    printed(code)
+    (ax,) = plt.gcf().axes
+    ax.figure.set_size_inches(draw_readme.SIZE)
+    file = io.StringIO()
+    ax.figure.savefig(file, format="svg")
+    files.append(file.getvalue())
+    plt.close(ax.figure)
+    assert [round(float(line.get_ydata()[-1]), 3) for line in ax.lines] == numbers(told)
+    stored, made = (
+        re.findall(r'd="([^"]*)"[^>]*?stroke: #(\w{6}); stroke-w', svg) for svg in files
+    )
+    assert len({colour for _, colour in stored} & {"0072b2", "d55e00", "009e73"}) == 3
+    assert [colour for _, colour in stored] == [colour for _, colour in made]
+    for (one, _), (other, _) in zip(stored, made):
+        np.testing.assert_allclose(numbers(one), numbers(other), atol=0.01)
+
+
+def test_spheres_with_losses_have_no_need_of_their_stiffness():
+    ((code, told),) = PAIRS[ADVICE]
+    assert code.count("stiffness=1)") == 1
+    assert printed(code.replace("stiffness=1)", "stiffness=1e10)")) == told
+
+
+def test_another_material():
+    section = next(section for section in SECTIONS if section.startswith(SPHERES))
+    (call,) = re.findall(r"`(hertz_stiffness\(radii, .*?\))`", section)
+    found = eval(call, {"radii": [0.01, 0.01], "hertz_stiffness": hertz_stiffness})
+    assert found == pytest.approx(2 / 3 * 70e9 / (1 - 0.33**2) * 0.005**0.5)
+
+
+def test_the_ratio_from_the_right_is_that_from_the_left():
+    (_, html) = BLOCKS[WEB][1]
+    assert "backward: the same" in html
+    both = [{"forward": 0.15}, {"forward": 0.15, "backward": 0.15}]
+    chain = Chain([1, 1, 1], [0, 0, -1], 0.95)
+    one, other = (collide(chain, ImpulseCorrelation(**given)).velocities for given in both)
+    assert one.tolist() == other.tolist()
 
 
 def test_answers_of_the_first_exercise():
@@ -179,6 +231,7 @@ def test_a_fit_and_a_film(tmp_path, monkeypatch):
             subprocess.run([sys.executable, "-m", "cradle", *given], stdout=out, check=True)
 
     first, last = [code for kind, code in BLOCKS[FIT] if kind == "sh"]
+    pair = BLOCKS[FIT][-2][1]
     run(first)
     for code, told in PAIRS[FIT]:
         assert printed(code) == told
@@ -186,6 +239,11 @@ def test_a_fit_and_a_film(tmp_path, monkeypatch):
     table = Path("shots.csv").read_text(encoding="utf-8").splitlines()
     with pytest.raises(ValueError, match="restitution has no 'AC', which set BAC needs"):
         printed(PAIRS[FIT][0][0])
+    with Path("shots.csv").open("a", encoding="utf-8") as file:
+        file.write(pair)
+    fits = printed(PAIRS[FIT][0][0])
+    assert "restitution AC = 0.3" in fits
+    assert "ratio BAC = 0.08" in fits
     lines = [line for line in table if line[0] != "#"]
     rows = [row for row in csv.DictReader(lines) if row["set"] == "BAC"]
     before, after, error = map(numbers, PAIRS[FIT][1][1].splitlines())
