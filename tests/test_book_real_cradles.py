@@ -33,7 +33,7 @@ GLUED = CHAPTER.glued
 READING = Chapter("reading_real_cradles")
 AUDITS = READING.glued
 #: The appendix has what the chapter leaves out of these films.
-APPENDIX, HALF = Chapter("observations"), Chapter("observations_half")
+APPENDIX, HALF = Chapter("observations_film"), Chapter("observations_half")
 TOLD = APPENDIX.glued
 FITS = {
     (row["law"], row["strikers"], row["fitted"], row["reading"]): row
