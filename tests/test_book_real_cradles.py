@@ -758,9 +758,12 @@ def test_fig_half():
     for row in read("cradle_fits.csv"):
         expected = [float(row["chi_places"]), float(row["chi_times"])]
         assert shown[row["law"]][1:] == pytest.approx(expected, rel=0.02)
-    places, times = HALF.figures["fig-real-left"].axes
-    for law, marker in (("constant loss", "."), ("constant restitution", "o")):
-        for ax, sum_ in zip((places, times), shown[law][1:], strict=True):
+    panels = HALF.figures["fig-real-left"].axes  # a row of places, a row of times
+    for k, (law, marker) in enumerate((("constant loss", "."), ("constant restitution", "o"))):
+        assert panels[k].get_title() == law
+        for ax, sum_ in zip(panels[k::2], shown[law][1:], strict=True):
+            assert ax.get_ylim()[0] < marked(ax, marker)[:, 1].min()
+            assert ax.get_ylim()[1] > marked(ax, marker)[:, 1].max()
             drawn = marked(ax, marker)
             assert drawn[:, 0] == pytest.approx(time)
             assert (drawn[:, 1] ** 2).sum() == pytest.approx(sum_, abs=0.6)
