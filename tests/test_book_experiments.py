@@ -182,6 +182,21 @@ def test_landing_five_equal_balls():
     assert line.split()[2:] == [f"{v + 0.0:.2f}" for v in found.round(2)]
 
 
+@pytest.mark.parametrize(("page", "start"), [("table_2", ""), ("reading_table_2", "experiments-")])
+def test_cad_and_dad_would_fit_each_others_place(page, start):
+    """As parts of the bounds, which are the same for both: of balls A and the last one."""
+    told, part = Chapter(page).glued, TABLE_2.ratio / TABLE_2.bound
+    assert TABLE_2.bound["CAD"] == TABLE_2.bound["DAD"]
+    for ball, high in (("C", True), ("D", False)):
+        shown = re.findall(r"[\d.]+", told[f"{start}with-{ball.lower()}"])
+        expected = [part[f"{ball}A{last}"] for last in "ABC"]
+        assert [float(x) for x in shown] == pytest.approx(expected, abs=6e-3)
+        odd = float(told[f"{start}{ball.lower()}ad"])
+        assert odd == pytest.approx(part[f"{ball}AD"], abs=6e-3)
+        assert all(x > 0.7 if high else x < 0.5 for x in expected)
+        assert odd < 0.2 if high else odd > 0.9
+
+
 FIGURES, AS_MEASURED = Chapter("experiments"), Chapter("table_2")
 
 
