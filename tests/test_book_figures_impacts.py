@@ -116,7 +116,7 @@ def test_fig_6_drawn():
 
 
 def test_fig_patterns_turns():
-    for name, line in panel("reading_patterns", "fig-patterns-turns").items():
+    for name, line in panel("reading_counting", "fig-patterns-turns").items():
         r = float(re.search(r"r = ([\d.]+)", name)[1])
         if "border" in name:
             r, _ = last_with(lambda r: edge(r, 0.5, 0.15) > r, 0.03, 0.08)
@@ -127,7 +127,7 @@ def test_fig_patterns_turns():
 
 def test_fig_patterns_turn():
     """Work and momentum of the new contact, phase by phase, and its end if it went on alone."""
-    shown = panel("reading_patterns", "fig-patterns-turn")
+    shown = panel("reading_counting", "fig-patterns-turn")
     new, old, alone = (shown[name] for name in ("new contact", "old contact", "alone"))
     assert (new[:, 0] == old[:, 0]).all()
     a, e, r = 0.4, 0.5, 0.5
@@ -149,7 +149,7 @@ def test_fig_patterns_turn():
 
 
 def test_fig_patterns_corner():
-    left, right = drawn("reading_patterns")["fig-patterns-corner"].axes[:2]
+    left, right = drawn("reading_counting")["fig-patterns-corner"].axes[:2]
     log = np.geomspace(0.005, 3, 241)
     log = np.sqrt(log[1:] * log[:-1])
     (mesh,) = [x for x in left.collections if hasattr(x, "get_coordinates")]
@@ -197,7 +197,7 @@ def test_fig_patterns_parameters():
 
 
 def test_fig_patterns_micro():
-    top = panel("reading_patterns", "fig-patterns-count")
+    top = panel("reading_counting", "fig-patterns-count")
     low = panel("patterns", "fig-patterns-micro")
     r, first = low["$v_1^+$"][:, 0], 4000 - len(low["$v_2^+$"])
     low["$v_2^+$"] = np.vstack([np.full((first, 2), np.nan), low["$v_2^+$"]])

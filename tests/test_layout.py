@@ -354,7 +354,7 @@ def with_equations(visit, chapter: str, width: int):
 
 def test_equations_wait_until_they_are_seen(visit):
     """At first those in sight are set, and a voice can read all of them; on paper all are set."""
-    tab = with_equations(visit, "reading_patterns", 390)
+    tab = with_equations(visit, "reading_counting", 390)
     count = "document.querySelectorAll('mjx-container{}').length"
     everything, first = (tab.evaluate(count.format(end)) for end in ("", " > svg"))
     assert everything > 100
