@@ -212,7 +212,12 @@ def test_table_of_limits():
         tau = -np.array([printed_10_and_11(float(gamma), 1, t) for t in np.linspace(0, loss, 1500)])
         worst = [abs(tau[:, 1] - a * tau[:, 0]).max() / tau[-1, 1] for a in (float(gamma), 0.5)]
         # Three digits are printed.
+        dashes = ["–" in shown[k] for k in (1, 2)]  # each limit on its side of gamma = 1
+        assert dashes == [float(gamma) > 1, float(gamma) < 1]
         for printed, exact in zip(shown, (tau[-1, 1] / tau[-1, 0], *worst), strict=True):
+            if printed == "–":
+                continue
+            assert len(printed.lstrip("0.")) == 3
             unit = 10.0 ** (math.floor(math.log10(exact)) - 2)
             assert float(printed) == pytest.approx(exact, rel=1e-3, abs=0.5 * max(unit, exact > 99))
 
