@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 from chains import ELASTIC
-from chapters import points
 from stored import numbers
 from truth import solve
 
@@ -51,8 +50,3 @@ def fused(scene):
     rest = m[1:].sum()
     first = (m[0] - e[0] * rest) / (m[0] + rest)
     return np.array([first] + [(1 + e[0]) * m[0] / (m[0] + rest)] * (len(m) - 1))
-
-
-def marks(ax):
-    """Points drawn one at a time."""
-    return np.array([line[0] for line in points(ax, 1)])
