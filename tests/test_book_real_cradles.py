@@ -89,7 +89,7 @@ def test_velocities_of_the_models_by_the_fitting_script():
             assert 100 * (row[1] - 1) == pytest.approx(off[-1], abs=0.06)
     touch = parameters("three ratios, e", "together", "both")
     v = 100 * real_cradles.ratios(touch[:3], touch[3], 2, False)
-    CHAPTER.tells({"together-five": v[4]})
+    CHAPTER.tells({"together-five": v[4], "three-e": RATIOS[3]})
     last, error = (100 * x[-1] for x in first_strikes(4)[2])
     assert GLUED["leave-five"] == f"{last:.1f} ± {error:.1f}"
     assert last + 4 * error < v[4]
@@ -142,8 +142,7 @@ def test_fig_off_and_the_table_of_three_laws():
         assert float(both[0]) == pytest.approx(sums[0] + sums[1], rel=2e-3, abs=0.06)
         assert float(third[0]) == shown[2]
         assert (int(both[1]), int(third[1])) == (8 - (k > 0) * 4, 4)
-        if k:
-            assert GLUED["both-" + ("ratios", "gaps")[k - 1]] == both[0]
+        assert GLUED["both-" + ("touching", "ratios", "gaps")[k]] == both[0]
     # The other laws, strikers one by one, as they are stored.
     file = {
         "spheres, loss": "touching spheres, A",
@@ -344,17 +343,14 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
             assert off @ off == pytest.approx(chi, rel=2e-3, abs=0.02)
     assert reach["apart"] is None
     near, far = ([r for r in rows if (unit * r["apart"] < 0.095) == side] for side in (True, False))
-    told = {"near-both": min(r["both"] for r in near), "near-test": min(r["three"] for r in near)}
     assert min(rows, key=lambda row: row["both"]) in near
-    told["far-test"] = worst = max(r["three"] for r in far)
-    told["doubt-films"] = np.exp(worst / 2) / (1 + worst / 2)  # four degrees of freedom
+    worst = max(r["three"] for r in far)
+    doubt = np.exp(worst / 2) / (1 + worst / 2)  # four degrees of freedom
+    CHAPTER.tells({"far-test": worst, "doubt-films": doubt})
     passed = [
         r for r in far
         if gammaincc(2, r["three"] / 2) > 0.05 and gammaincc(1.5, r["both"] / 2) > 0.05
     ]  # fmt: skip
-    told["pass-least"], *_, told["pass-most"] = sorted(r["three"] for r in passed)
-    gaps = [1e3 * unit * row["gap_4"] for row in far]
-    CHAPTER.tells(told | {"far-gap": max(gaps), "far-gap-least": min(gaps)})
     for k, shown in zip((2, 3, 4), GLUED["far-gaps"].split(" / "), strict=True):
         of_all = [1e3 * unit * row[f"gap_{k}"] for row in far]
         ends = [float(x) for x in shown.split(" to ")]
@@ -365,6 +361,27 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
         assert (row in passed) == (mm < 0.175 or 0.4 < mm < 1.1)
         assert (gammaincc(2, row["three"] / 2) > 0.05) == (mm < 0.2 or 0.4 < mm < 1.1)
         assert (gammaincc(1.5, row["both"] / 2) > 0.05) == (not 0.175 < mm < 0.4)
+    lines = CHAPTER.printed("distance-table").splitlines()[1:]
+    doubtful = [[r for r in far if r not in passed and (unit * r["apart"] > 1) == wide]
+                for wide in (False, True)]  # fmt: skip
+    pass_near, pass_far = ([r for r in passed if (unit * r["apart"] > 0.3) == wide]
+                           for wide in (False, True))  # fmt: skip
+    groups = (near, pass_near, doubtful[0], pass_far, doubtful[1])
+    for line, group in zip(lines, groups, strict=False):
+        *shown, words = re.search(
+            r" (\S+) to (\S+) +(\S+) to (\S+) +([a-z ]+)$", line.rstrip()
+        ).groups()
+        expected = [end(r[c] for r in group) for c in ("both", "three") for end in (min, max)]
+        assert [float(x) for x in shown] == pytest.approx(expected, abs=0.051)
+        right = "miss the test" if group is near else "doubtful"
+        assert words == ("pass" if all(r in passed for r in group) else right)
+    both = chi_square(FITS["three ratios, e", "apart", "both", "4"])
+    assert lines[5].split()[2:] == [
+        f"{both:.1f}",
+        f"{sums_of('ratios'):.1f}",
+        *["miss", "the", "test"],
+    ]
+    assert GLUED["both-ratios"] == lines[5].split()[2]
     for ax, column in zip(
         CHAPTER.figures["fig-real-distance"].axes, ("both", "three"), strict=True
     ):
@@ -502,7 +519,6 @@ def test_gaps_and_not_ratios_predict_the_third_release():
     for name, law in (("gaps", gaps), ("ratios", ratios)):  # after the factor c
         v = law / 100
         left = real_cradles.misfits(lambda _, v=v: v, {3: (film / 100, error / 100)}, (3,))[:5]
-        CHAPTER.tells({f"{name}-three": abs(left[2])}, off=0.02)
         assert name == "ratios" or (abs(left) < 1).tolist()[:2] == [True, True]
         assert name == "ratios" or abs(left).argmax() == 2
     CHAPTER.tells({"slow-off": np.abs(ratios - film)[:2].max(), "slow-error": error[:2].max()})
@@ -529,10 +545,8 @@ def test_the_first_two_of_three_strikers_did_not_come_as_one():
     assert min(float(GLUED["pair-ratio"]), float(GLUED["pair-gap"])) > 100 * (film + 4 * error)[-1]
     # One by one is kindest to ratios: nothing else comes near.
     two = collide(Chain([1] * 5, [1, *pair], e), SequentialCollisions()).velocities
-    together = {"two-as-one": two, "all-as-one": real_cradles.ratios([*p], e, 3, False)}
-    for name, v in together.items():
+    for v in (two, real_cradles.ratios([*p], e, 3, False)):
         off = real_cradles.misfits(lambda _, v=v: v, {3: (film, error)}, (3,))
-        CHAPTER.tells({f"{name}-ratio": off @ off})
         assert off @ off > 5 * sums_of("ratios")
     unit = (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
     least = float(GLUED["pair-um"]) * 1e-6 / unit
