@@ -100,8 +100,8 @@ def test_solve_agrees_with_the_solver():
     assert ends == pytest.approx(after.tolist(), abs=5.1e-5)
 
 
-def test_tasks_without_a_solution():
-    """The command by which their answers are found; only the last one has a back impact."""
+def test_tasks_for_tests_and_marks():
+    """Their answers, printed and by the command; only the last one has a back impact."""
     text = (DATA.parent / "book" / "instructors.md").read_text(encoding="utf-8")
     tasks = re.findall(r"(?m)^\| \d \| ([\d, ]+) \| ([\d/, ]+) \| ([\d/]+) \|$", text)
     collisions, velocities = [], []
@@ -121,6 +121,8 @@ def test_tasks_without_a_solution():
             exec(program.replace("student = 0 ", f"student = {student} "), ran)
         assert ran["student"] == student
         assert (ran["trace"].collisions == [2, 1]).all()
+        if student == 0:
+            assert f"```text\n{said.getvalue()}```" in text
         lines = said.getvalue().splitlines()
         answers = [[float(v) for v in re.split(r"[\[\]\s]+", line) if v] for line in lines]
         for k, ((masses, e, a), (used, *after)) in enumerate(zip(ran["tasks"], answers)):
