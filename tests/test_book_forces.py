@@ -24,6 +24,23 @@ def test_zeta_is_hurwitzs():
             assert zeta(q, x) == pytest.approx(float(mpmath.zeta(-q, x)), abs=1e-7)
 
 
+def test_fig_kink():
+    """Below: Hurwitz's zeta, from mpmath. Above: bars and curve, whose areas differ by it."""
+    above, below = CHAPTER.figures["fig-own-forces-kink"].axes
+    _, curve, dot = (line.get_xydata() for line in below.get_lines())
+    (theta, marked), (at, off) = dot[0], curve.T
+    assert off == pytest.approx([float(mpmath.zeta(-1.5, x)) for x in [1, *at[1:]]], abs=1e-6)
+    assert marked == pytest.approx(np.interp(theta, at, off), abs=1e-5)
+    force, nodes = (line.get_xydata() for line in above.get_lines())
+    assert nodes[:, 0] == pytest.approx(theta + np.arange(3))
+    kicks = sum(bar.get_width() * bar.get_height() for bar in above.patches)
+    end = nodes[-1, 0]
+    assert force[-1] == pytest.approx([end, end**1.5])
+    difference = kicks - np.trapezoid(force[:, 1], force[:, 0])
+    of_end = end**0.5 / 8 + end**-1.5 / 1920
+    assert difference == pytest.approx(marked + of_end, abs=2e-5)
+
+
 def test_the_curves_have_their_orders():
     shown = panel("forces", "fig-own-forces")
     for label, order, name in zip(
@@ -90,8 +107,7 @@ def test_laws_of_loss_in_a_row():
     first, second = (
         optimize.brentq(lambda e, x=1.5 * (1 - meant): closed(x, e), 0.3, 1) for meant in (0.9, 0.8)
     )
-    lowest = optimize.brentq(lambda e: closed(0.9, e), 0.3, 1)
-    CHAPTER.tells({"hunt-first": first, "hunt-second": second, "hunt-lowest": lowest})
+    CHAPTER.tells({"hunt-first": first, "hunt-second": second})
     a = optimize.brentq(lambda x: closed(x, 0.9), 0.1, 0.2)
     spheres = optimize.brentq(lambda x: integrated([1, 1], [1, 0], 1, 1.5, x) @ [-1, 1] - 0.9,
                               0.01, 0.3, xtol=1e-6)  # fmt: skip
