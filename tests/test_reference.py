@@ -82,3 +82,11 @@ def test_every_word_of_the_glossary_leads_to_the_place_that_explains_it():
     assert len(told) > 60
     place = r"\{(?:ref|doc|eq|term)\}"
     assert [entry for entry in told if not re.search(place, entry.split("\n  ", 1)[1])] == []
+
+
+def test_each_letter_above_the_glossary_leads_to_its_first_word():
+    bar, words = text(BOOK / "glossary.md").split(":sorted:")
+    first = {}
+    for word in sorted(re.findall(r"(?m)^(\S.*)\n  ", words), key=str.lower):
+        first.setdefault(word[0].upper(), word)
+    assert re.findall(r"\{term\}`(.) <(.+)>`", bar) == list(first.items())
