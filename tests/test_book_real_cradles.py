@@ -788,6 +788,7 @@ def test_fig_half():
     # Where an outer ball turns within a window, the curve in its colour has that place.
     colours = [ball_style(k)["color"] for k in range(5)]
     row = read("cradle_fits.csv", law="constant loss")[0]
+    HALF.tells({"lost": 1000 * float(row["loss"])})
     fit = [float(row[name]) for name in real_swing.COLUMNS[1:6]]
     run = real_swing.swung("constant loss", fit, real_swing.common()[1])
     for ax in windows:
