@@ -172,6 +172,17 @@ def test_fig_6_is_not_kept_for_other_parameters():
     assert back_impact_line(0.5, 0.4, 0.4, 0.5) < 1 / 0.5 - 1
 
 
+@pytest.mark.parametrize(("r2", "pattern"), [(0.5, "I"), (0.1, "III")])
+def test_fig_6_above_eq_44_with_a_small_backward_ratio(r2, pattern):
+    """There it does not act, but an equal one would be above its bound: the ratio exceeds e."""
+    chain = Chain([0.5, 1, 1 / r2], [1, 0, 0], 0.4)
+    trace = collide(chain, ImpulseCorrelation(0.5, 0.0))
+    assert trace.collisions.tolist() == [1, 1]
+    assert (trace.velocities < 0).tolist() == [True, pattern == "III", False]
+    with pytest.raises(ValueError, match="backward"):
+        collide(chain, ImpulseCorrelation(0.5))
+
+
 @pytest.fixture(scope="module")
 def light():
     return collide(Chain([100, 1, 100], [1, 0, 0], 1), ImpulseCorrelation(ALPHA))
