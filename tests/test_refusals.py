@@ -394,8 +394,11 @@ def rows():
     yield from ((springs, options, words) for options, words in SPRINGS)
     leans = {"gaps": [[0, 0], [0, -3]]}, "gaps[1, 1] = -3.0; must be a lean"
     faint, slow = {"masses": 1e-323 * ONES}, {"velocities": [1e-301, 0, 0], "exponent": 1}
-    beyond = "stiffness[0] = 1.0; its time, or the mass it moves, is beyond floats: choose"
-    for options, words in (*SPRINGS[:-1], leans, (faint, beyond), (slow, beyond)):
+    beyond = "masses[0] = 1e-323; its reduced mass with masses[1] = 1e-323 is beyond the range of"
+    huge = {"masses": 1.2e308 * ONES, "velocities": [1e-10, 0, 0]}
+    sums = beyond.replace("1e-323", "1.2e+308")
+    late = "stiffness[0] = 1.0; its time is beyond floats: choose other units"
+    for options, words in (*SPRINGS[:-1], leans, (faint, beyond), (huge, sums), (slow, late)):
         yield spring_velocities, {"masses": ONES, "velocities": [1, 0, 0], **options}, words
     for call in (collide, condition_number):
         yield from ((call, (THREE, thing), words) for thing, words in NO_MODELS)

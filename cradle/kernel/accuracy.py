@@ -24,8 +24,9 @@ from cradle.kernel.state import (
     door,
 )
 
-# Why a chain is refused: a value that is none, too quick, light, soft, lossy, wide, narrow, deep.
-VALUE, QUICK, LIGHT, SOFT, LATE, WIDE, NARROW, DEEP = 1, 2, 3, 4, 5, 6, 7, 8
+# Why a chain is refused: a value that is none, too quick, light, soft, lossy, wide, narrow, deep;
+# or a reduced mass that has lost digits.  (9 is PULLS.)
+VALUE, QUICK, LIGHT, SOFT, LATE, WIDE, NARROW, DEEP, REDUCED = 1, 2, 3, 4, 5, 6, 7, 8, 10
 # A step times the largest frequency from which on a run shows whether it was short enough; a
 # coarser one that only measures the frequency; and what it may measure too little.
 ENOUGH, COARSE, SPARE = 0.2, 0.5, 1.05
@@ -39,7 +40,7 @@ DAMPED = 0.5  # step times A times the square of a frequency, at most
 SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
 LONGEST, MOST_HUNT = 0.3, 0.9  # A, in contact times, and in one over the closing speed
 TINY = 1e-300  # the least depth, and one over the largest
-WHOLE_MASS = 2.0**-1022  # a lighter one has lost digits
+NORMAL = 2.0**-1022  # a smaller number has lost digits
 # The widest gap and the narrowest, in depths; the widest whose last digit is below this accuracy.
 WIDEST, NARROWEST, BLURRED = 1e9, 1e-12, 1e13
 
@@ -59,7 +60,7 @@ def measure(n, chain, law, s, clock):
     for i in range(n):
         refuse(not (0.0 < m[i] < math.inf and abs(v[i]) < math.inf), VALUE, i, clock)
         energy += m[i] * v[i] * v[i]
-        momentum += 2.0 * m[i] * abs(v[i])
+        momentum += 2.0 * (m[i] * abs(v[i]))
         heavy = max(heavy, m[i])
         if i < n - 1:
             known = 0.0 < chain.k[i] < math.inf and 0.0 <= chain.loss[i] < math.inf
@@ -78,8 +79,9 @@ def measure(n, chain, law, s, clock):
         clock.length = size**part
     else:
         clock.length = clock.mass**part / chain.k[at] ** part * clock.speed ** (2.0 * part)
-    if clock.mass < WHOLE_MASS or not TINY <= clock.length <= 1.0 / TINY:
-        refuse(True, QUICK, at, clock)
+    refuse(clock.mass < NORMAL, REDUCED, at, clock)
+    refuse(not TINY <= clock.length <= 1.0 / TINY, QUICK, at, clock)
+    if clock.rule > 0:
         return
     widest = min(WIDEST, BLURRED * law.accuracy)
     rate = clock.speed if law.hunt else clock.speed / clock.length

@@ -13,7 +13,6 @@ from cradle.input.values import ArrayLike, Vector
 from cradle.kernel.kinks import Law, Springs
 from cradle.kernel.state import FINISHED, REFUSED, UNFINISHED, UNSOUND
 from cradle.models.batch import fail, in_order, rows_of, shaped
-from cradle.models.energy import fastest
 from cradle.models.springs import COARSEST, FINEST, MOST_STEPS, TimedTrace, refused
 from cradle.runtime.job import DEFECTS, LARGE, follow, motions
 from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
@@ -80,7 +79,6 @@ class SpringChain:
         n = len(asked.must_be(Chain, "chain", chain))
         rule = "must be 1 for SpringChain, whose losses are its viscosity: see viscosity_from"
         asked.refuse_where("restitution", chain.restitution, chain.restitution < 1.0, rule)
-        fastest(chain)  # is within the range of floats
         contacts = (asked.row_of(name, getattr(self, name), n - 1, n) for name in _RULES)
         # As arrays that may be written to: else all would be compiled a second time.
         row = Springs(*(row[None].copy() for row in (chain.masses, chain.velocities, *contacts)))

@@ -12,6 +12,9 @@ from cradle.input import values as asked
 from cradle.input.values import Vector
 from cradle.trace import Event, ImpactNotFinished, Trace
 
+#: Why a chain is refused whose quickest contact moves too small a mass; other ball, its mass.
+BEYOND = "its reduced mass with masses{} = {!r} is beyond the range of floats: choose other units"
+
 
 def fastest(chain: Chain) -> tuple[int, float, float]:
     """Return the contact that closes fastest, its reduced mass and its speed, 1 if none moves."""
@@ -20,8 +23,7 @@ def fastest(chain: Chain) -> tuple[int, float, float]:
     left, right = chain.masses[c : c + 2].tolist()
     mass = left / (left + right) * right
     if mass < np.finfo(np.float64).tiny:
-        rule = f"its reduced mass with masses[{c + 1}] = {right!r} is beyond the range of floats"
-        raise ValueError(f"masses[{c}] = {left!r}; {rule}: choose other units")
+        raise ValueError(f"masses[{c}] = {left!r}; {BEYOND.format([c + 1], right)}")
     return c, mass, abs(float(u[c])) or 1.0
 
 

@@ -10,7 +10,7 @@ from cradle.input.values import Vector, refusal
 from cradle.kernel import accuracy as limits
 from cradle.kernel.forces import PULLS
 from cradle.kernel.kinks import Law, Motions, Springs
-from cradle.models.energy import EnergyTrace
+from cradle.models.energy import BEYOND, EnergyTrace
 from cradle.runtime.job import follow
 from cradle.trace import Event
 
@@ -28,11 +28,14 @@ def refused(clock: Any, law: Law, place: Sequence[int], chain: Springs) -> Value
         late = f"must be at most {part / clock['speed']:.3g} s/m, {part} over the speed"
     widest = min(limits.WIDEST, limits.BLURRED * law.accuracy)
     least = f"must be at least {limits.SMALLEST} of the"
+    at = int(clock["place"])
+    after = min(at + 1, chain.m.shape[1] - 1)
+    beyond = BEYOND.format([*place, after], float(chain.m[0, after]))
     name, values, words = {
         limits.LIGHT: ("masses", chain.m, f"{least} heaviest ball of its chain"),
         limits.SOFT: ("stiffness", chain.k, f"{least} stiffest contact of its chain"),
-        limits.QUICK: ("stiffness", chain.k, "its time, or the mass it moves, is beyond "
-                       "floats: choose other units"),
+        limits.QUICK: ("stiffness", chain.k, "its time is beyond floats: choose other units"),
+        limits.REDUCED: ("masses", chain.m, beyond),
         limits.LATE: ("viscosity", chain.loss, f"{late} of the fastest closing; was it found for "
                       "this stiffness, speed and damping?"),
         PULLS: ("viscosity", chain.loss, "must be lower: this contact would pull"),
@@ -40,7 +43,6 @@ def refused(clock: Any, law: Law, place: Sequence[int], chain: Springs) -> Value
         limits.NARROW: ("gaps", chain.gap, f"must be 0, or {limits.NARROWEST} of {of}"),
         limits.DEEP: ("gaps", chain.gap, f"must be a lean of at most {of}"),
     }[int(clock["rule"])]  # fmt: skip
-    at = int(clock["place"])
     return refusal(name, (*place, at), f" = {float(values[0, at])!r}; {words}")
 
 
