@@ -1,6 +1,6 @@
-// The reader's own solver of three balls, in pieces: an editor, a button, single calls and five impacts. The lines run in a worker
-// with Brython, which is loaded at the first press (book/_ext/reader_solver.py writes it), so an
-// endless loop holds up nothing and can be stopped.
+// The reader's own solver of three balls, in pieces: an editor, a button, single calls and five
+// impacts. The lines run in a worker with Brython, which is loaded at the first press
+// (book/_ext/reader_solver.py writes it), so an endless loop holds up nothing and can be stopped.
 (function (data) {
   "use strict";
   const { texts, calls, checks } = data;
