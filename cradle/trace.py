@@ -90,7 +90,7 @@ class Trace:
     @property
     def energy_loss(self) -> float:
         """Kinetic energy lost, in joules; each contact keeps back (1 - e^2) of what it absorbed."""
-        return float(np.sum((1.0 - self.chain.restitution**2) * self.absorbed))
+        return float(((1.0 - self.chain.restitution**2) * self.absorbed).sum())
 
     def to_frame(self) -> "pd.DataFrame":
         """Return the path as a table, a row for each ball at each row of the path.

@@ -119,7 +119,7 @@ class ImpulseCorrelation:
             chain, self, results.v[0], results.p, results.a, results.hits[0],
             written.velocities[: kept + 1], written.impulses[: kept + 1], tuple(events),
             collapsed=bool(results.collapsed[0]),
-            saturated=tuple(np.flatnonzero(results.held).tolist()),
+            saturated=tuple(results.held.nonzero()[0].tolist()),
             margin=float(results.margin[0]),
             left_out=count - kept if kept else 0,  # without a record not all are counted
         )  # fmt: skip

@@ -1,5 +1,6 @@
 """How the balls hang."""
 
+import functools
 from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
@@ -62,6 +63,7 @@ class Pendulums:
         """Return `length`, `gaps` or `damping` for each of `size` balls or contacts."""
         return asked.row_of(name, getattr(self, name), size, size + (name == "gaps"))
 
+    @functools.lru_cache(64)  # asked for at each flight
     def reach(self, size: int) -> Vector:
         """Return how far each of `size` balls may be pulled aside, m along its arc."""
         # Above its pivot a string is slack; on a rod a ball would stand at the top.
@@ -72,9 +74,10 @@ class Pendulums:
         """Return where the balls are, m, or refuse that one is so far aside."""
         reach = self.reach(len(x))
         beyond = np.abs(x) > reach
-        most = "half" if reach[0] > 2.0 * self.row("length", len(x))[0] else "a quarter of"
-        far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most} a circle"
-        asked.refuse_where(f"{when}positions", x, beyond, f"must be within {far}")
+        if beyond.any():
+            most = "half" if reach[0] > 2.0 * self.row("length", len(x))[0] else "a quarter of"
+            far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most} a circle"
+            asked.refuse_where(f"{when}positions", x, beyond, f"must be within {far}")
         return x
 
     def natural_frequency(self, size: int) -> Vector:
@@ -105,6 +108,7 @@ class Hanging:
         self.fastest = float(self.frequency.max())
         self.tie = TIE / self.fastest  # events nearer than this are one, s
 
+    @functools.lru_cache(1024)
     def offsets(self, first: int, last: int) -> Vector:
         """Return how far the balls of a body hang from its first one, where they touch, m."""
         return np.concatenate([[0.0], np.cumsum(self.gaps[first : last - 1])])
