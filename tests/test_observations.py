@@ -114,7 +114,7 @@ def test_every_reference_is_cited():
     )
     cited = set(",".join(re.findall(r"\{cite:\w\}`([\w,]+)`", text)).split(","))
     assert cited == keys
-    related = (BOOK / "related.md").read_text(encoding="utf-8")
+    related = (BOOK / "related.ipynb").read_text(encoding="utf-8")
     assert len(set(re.findall(r"\{cite:t\}`(\w+)`", related))) >= 30
 
 

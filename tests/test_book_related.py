@@ -1,0 +1,100 @@
+"""What book/related.ipynb draws and its chart says, by second routes."""
+
+import math
+
+import numpy as np
+import pytest
+from chapters import Chapter, floats
+from energy_law import strike
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, minimize
+from truth import solve
+
+CHAPTER = Chapter("related")
+E = 0.8
+
+
+def forces(loss):
+    """Three viscous spheres, stepped in time: velocities afterwards."""
+
+    def rate(_, y):
+        pressed, closing = np.maximum(y[:2], 0), -np.diff(y[2:])
+        push = np.maximum(pressed**1.5 + 1.5 * loss * np.sqrt(pressed) * closing, 0)
+        return np.concatenate([closing, -np.diff(push, prepend=0, append=0)])
+
+    bounds = {"rtol": 1e-10, "atol": 1e-12, "max_step": 0.01}
+    return solve_ivp(rate, (0, 20), [0, 0, 1, 0, 0], **bounds).y[2:, -1]
+
+
+def restitution(loss):
+    """Two viscous spheres of reduced mass 1/2 that meet at the speed 1."""
+
+    def rate(_, y):
+        x = max(y[0], 0)
+        return [y[1], -2 * max(x**1.5 + 1.5 * loss * math.sqrt(x) * y[1], 0)]
+
+    bounds = {"rtol": 1e-10, "atol": 1e-12, "max_step": 0.01}
+    return -solve_ivp(rate, (0, 10), [0, 1], **bounds).y[1, -1]
+
+
+def one_body(e):
+    """Ball 1 against a body of two: momentum, and Newton's rule."""
+    together = (1 + e) / 3
+    return [1 - 2 * together, together, together]
+
+
+def convex(e):
+    """The least change and dissipation of velocities in order."""
+    c, before = (1 + e) / (1 - e), np.array([1.0, 0, 0])
+    order = {"type": "ineq", "fun": np.diff}
+
+    def cost(v):
+        return ((v - before) ** 2).sum() / 2 + c * (np.diff(before + v) ** 2).sum() / 4
+
+    return minimize(cost, [0.3, 0.3, 0.4], constraints=[order], tol=1e-14).x
+
+
+def rigid(e, ratio):
+    return floats(solve([1] * 3, [1, 0, 0], e, ratio).velocities)
+
+
+def test_fig_related_outcomes():
+    """Every ball of six laws, without and with losses."""
+    loss = brentq(lambda loss: restitution(loss) - E, 0.05, 0.2, xtol=1e-7)
+    panels = CHAPTER.figures["fig-related-outcomes"].axes
+    names = [label.get_text() for label in panels[0].get_yticklabels()]
+    assert panels[1].get_title() == f"restitution {E}"
+    for ax, e in zip(panels, (1, E), strict=True):
+        expected = {
+            "pairs": rigid(e, 0),
+            "ratio 0.15": rigid(e, 0.15),
+            "energy law": strike([1] * 3, [1, 0, 0], e, 3000)[0],
+            "forces": forces(loss if e < 1 else 0),
+            "convex": convex(e) if e < 1 else one_body(1),
+            "one body": one_body(e),
+        }
+        assert names == list(expected)
+        shown = {line.get_label(): line.get_xydata()[0] for line in ax.get_lines()}
+        written = {tuple(text.xy): text.get_text() for text in ax.texts}
+        for row, (name, after) in enumerate(expected.items()):
+            for ball, v in enumerate(after, 1):
+                x, y = shown[f"{name}, {ball}"]
+                assert x == pytest.approx(v, abs=1e-3)
+                assert round(y) == row
+                assert written[x, y] == str(ball)
+        # What the text says of them.
+        pair = np.abs(np.subtract(expected["energy law"], expected["forces"])).max()
+        assert pair < 1e-3 if e == 1 else pair > 0.03
+        apart = [
+            np.abs(np.subtract(expected[one], expected[other])).max()
+            for k, one in enumerate(names)
+            for other in names[:k]
+        ]
+        assert e == 1 or min(apart) > 0.01
+    # Between pairs and one body: the ends of the ratio.
+    np.testing.assert_allclose(rigid(1, 0), [0, 0, 1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(rigid(1, 0.5), one_body(1), rtol=0, atol=1e-9)
+
+
+def test_border_of_endless_collisions():
+    assert 7 - 4 * math.sqrt(3) == pytest.approx(0.072, abs=5e-4)
