@@ -82,7 +82,10 @@ def test_fig_related_outcomes():
                 assert x == pytest.approx(v, abs=1e-3)
                 assert round(y) == row
                 assert written[x, y] == str(ball)
-        # What the text says of them.
+        # What the text, and the words for those who do not see it, say of them.
+        first = {name: after[0] for name, after in expected.items()}
+        assert max(first, key=first.get) == "pairs"
+        assert min(first.values()) == pytest.approx(first["one body"], abs=1e-6)
         pair = np.abs(np.subtract(expected["energy law"], expected["forces"])).max()
         assert pair < 1e-3 if e == 1 else pair > 0.03
         apart = [
