@@ -200,7 +200,7 @@ def test_fig_problem_family():
             "Eq. 34": lambda x: 1 + 0 * x,
             "$1+X$": lambda x: 1 + x,
             "$1+(1+e_3)X$": lambda x: 1 + 1.5 * x,
-            "$(1+X)^2$: radical real below": lambda x: (1 + x) ** 2,
+            "$(1+X)^2$": lambda x: (1 + x) ** 2,
         }, {"rtol": 1e-14}),
     ],
 )  # fmt: skip
@@ -322,13 +322,31 @@ def test_fig_4_ends():
 
 
 def test_fig_three_ranges():
-    shown = panel("reading_three_balls", "fig-own-three-ranges")
-    for state, low, high in (
-        ("still closes", 0, 1), ("already opens", 1, 1.5), ("ends first", 1.5, math.inf),
-    ):  # fmt: skip
-        x, y = shown[f"solver: contact 2-3 {state}"].T
-        assert (y <= 1 + high * x).all()
-        assert low == 0 or (y > 1 + low * x).all()
+    """The dots: what contact 2-3 does, and by how much Eq. 30 is off, by the textbook solver."""
+    dots = panel("reading_three_balls", "fig-own-three-ranges")["the chain"]
+    _, *told = Chapter("reading_three_balls").printed("three-ranges").splitlines()
+    m, v, e = [1, 2, 1], [1, 0.5, 0], [1, 0.5]
+    for (X, part), line in zip(dots, told, strict=True):
+        ratio, *words, off = re.split(r"\s{2,}", line.strip().replace(" < ", "  < "))
+        a = float(ratio)
+        g = 2 * 0.5 / (1 - a + 2)  # tau_2^f / m2, by Eq. 24
+        assert (X, part) == pytest.approx((0.5 / g, 3 * a), rel=1e-12)
+        assert part < (1 + X) ** 2
+        done = textbook.solve(m, v, e, a)
+        before = done.events[: done.events.index(("end", 0))]
+        state = "still closes"
+        if ("maximum_compression", 1) in before:
+            state = "has ended" if ("end", 1) in before else "already opens"
+        assert words == [state]
+        assert (part > 1 + X) == (state != "still closes")
+        assert (part > 1 + 1.5 * X) == (state == "has ended")
+        last = 2 / 3 * (g + 0.5) * (1 + 0.5 * math.sqrt(1 - 3 * a / (1 + X) ** 2))  # Eq. 30
+        wrong = abs(last - done.velocities[2])
+        if state == "still closes":
+            assert off == "< 10⁻¹²"
+            assert wrong < 1e-12
+        else:
+            assert float(off) == pytest.approx(wrong, abs=5.1e-5)
 
 
 def test_fig_three_ratio():
