@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from chapters import Chapter, after, drawn, lines, panel, points, solved
+from matplotlib.colors import to_hex
 from test_book_n_balls import FIG_8, contact_work
 from turns import by_turns, edge, last_with, turn
 
@@ -177,23 +178,34 @@ def test_fig_patterns_corner():
 
 
 def test_fig_patterns_parameters():
-    cases = [(0.0, 0.15), (0.1, 0.15), (1.0, 0.15), (0.5, 0.0), (0.4, 0.5), (1.0, 0.5)]
-    coarse = np.linspace(0, 3, 151)[1:] - 0.01
-    for ax, (e, a) in zip(drawn("reading_patterns")["fig-patterns-parameters"].axes, cases):
-        some = coarse[coarse <= (1 / a - 1 if a else np.inf)]
-        mesh = ax.collections[0]
-        field = np.ma.getdata(mesh.get_array()).reshape(some.size, some.size)
-        if e == 0:
-            assert (field == 2).all()
-            continue
-        for row in range(9, some.size, 28):
-            for column in range(4, some.size, 28):
-                number, v = by_turns(some[row], some[column], e, a)
-                if number < 60 and min(abs(v[0]), abs(v[1])) > 1e-9:
-                    assert field[row, column] == bouncing_pattern(np.array(v))
+    """Areas: blue where ball 1 goes back, orange where ball 2 does; the border of the hatching."""
+    cases = [(0.5, 0.0), (1.0, 0.15), (0.1, 0.15), (0.4, 0.5)]
+    axes = drawn("reading_patterns")["fig-patterns-parameters"].axes
+    seen = set()
+    for ax, (e, a) in zip(axes, cases, strict=True):
+        shades = {
+            to_hex(shade.get_facecolor()[0]): shade.get_paths()[0]
+            for shade in ax.collections
+            if getattr(shade, "filled", False)
+        }
+        some = np.linspace(0, min(ax.get_xlim()[1], 1 / a - 1 if a else np.inf), 14)[1:-1]
+        for r1 in some:
+            for r2 in some:
+                number, v = by_turns(r1, r2, e, a)
+                if number < 60 and min(abs(v[0]), abs(v[1])) > 0.01:
+                    for speed, colour in zip(v, ("#d0e6f5", "#fae2bb")):
+                        area = shades.get(colour)
+                        assert (area and area.contains_point((r2, r1))) == (area and speed < 0)
+                        assert area or speed > 0
+                        seen |= {(colour, speed < 0)}
         (curve,) = [x.get_xydata() for x in ax.get_lines()]
         r2, r1 = curve[~np.isnan(curve[:, 1])].T
         np.testing.assert_allclose(r1, eq_44(r2, e, a), rtol=1e-12)
+        assert len(ax.patches) == (e < 1)
+        for corner in ax.patches:
+            for r2, r1 in corner.get_xy()[1:24:4]:
+                assert r1 == pytest.approx(edge(r2, e, a), rel=1e-6)
+    assert len(seen) == 4
 
 
 def test_fig_patterns_micro():

@@ -14,7 +14,7 @@ from cradle.closed_form import back_impact_line, first_ball_stops, middle_ball_s
 from cradle.measures import bouncing_pattern
 
 ALPHA, E = 0.15, 0.5
-CHAPTER = Chapter("patterns")
+CHAPTER, READING = Chapter("patterns"), Chapter("reading_patterns")
 GLUED = CHAPTER.glued
 
 
@@ -215,7 +215,9 @@ def test_fig_7_last_digit(light):
 
     slope = (middle(ALPHA + 1e-6) - middle(ALPHA - 1e-6)) / 2e-6
     assert slope == pytest.approx(11.57, abs=0.01)
+    READING.tells({"patterns-slope": slope})
     needed = brentq(lambda alpha: middle(alpha) - 0.3475, 0.15, 0.1501)
+    READING.tells({"patterns-alpha-needed": needed})
     assert needed - 0.15 == pytest.approx((0.3475 - light.velocities[1]) / slope, rel=1e-2)
     tau_2, tau_3 = (float(f"{p:.6g}") for p in light.impulses)
     assert (tau_2, tau_3) == (100.287, 99.9392)
