@@ -117,13 +117,26 @@ def test_fig_6_drawn():
 
 
 def test_fig_patterns_turns():
+    """The curves, and the turns of an impact on them; by another map."""
+    drawn_lines = drawn("reading_counting")["fig-patterns-turns"].axes[0].get_lines()
+    dots = [x.get_xydata() for x in drawn_lines if x.get_marker() == "o"]
+    found = []
     for name, line in panel("reading_counting", "fig-patterns-turns").items():
         r = float(re.search(r"r = ([\d.]+)", name)[1])
         if "border" in name:
             r, _ = last_with(lambda r: edge(r, 0.5, 0.15) > r, 0.03, 0.08)
-        for zeta, drawn_value in line[::50]:
+            assert abs(line[:, 1].min()) < 1e-4
+        for zeta, rise in line[::50]:
             x, _, y, a = turn(zeta, r, 0.5, 0.15)
-            assert drawn_value == pytest.approx(a * y / (y - x), rel=1e-9)
+            assert rise == pytest.approx(a * y / (y - x) - zeta, rel=1e-9, abs=1e-12)
+        if "none" in name or "two" in name:
+            turns = dots[len(found)]
+            assert turns[0, 0] == pytest.approx(0.5 * (0.85 + r) / 1.5, rel=1e-12)
+            np.testing.assert_allclose(turns[1:, 0], turns[:-1].sum(axis=1), **CLOSE)
+            found.append(len(turns))
+            assert (line[:, 1].min() > 0) == ("none" in name)
+            assert (turns[-1, 1] < 1e-6) == ("two" in name)
+    assert len(found) == 2
 
 
 def test_fig_patterns_turn():
@@ -150,31 +163,35 @@ def test_fig_patterns_turn():
 
 
 def test_fig_patterns_corner():
-    left, right = drawn("reading_counting")["fig-patterns-corner"].axes[:2]
-    log = np.geomspace(0.005, 3, 241)
-    log = np.sqrt(log[1:] * log[:-1])
-    (mesh,) = [x for x in left.collections if hasattr(x, "get_coordinates")]
-    number = np.ma.filled(mesh.get_array(), np.nan).reshape(240, 240)
-    for row in range(5, 240, 33):
-        for column in range(5, 240, 33):
-            turns = by_turns(log[row], log[column], 0.5, 0.15)[0]
-            shown = number[row, column]
-            assert turns > 100 if np.isnan(shown) else shown == turns
-    solid = [x.get_xydata() for x in left.get_lines() if x.get_linestyle() == "-"]
-    dots = [x.get_xydata()[0] for x in right.get_lines() if x.get_marker() == "o"]
-    (border,) = solid
+    (ax,) = drawn("reading_counting")["fig-patterns-corner"].axes
+    shades = [x.get_paths()[0] for x in ax.collections if getattr(x, "filled", False)]
+    back = set()
+    for r1 in np.geomspace(0.15, 2.9, 9):
+        for r2 in np.geomspace(0.0055, 2.5, 15):
+            v = by_turns(r1, r2, 0.5, 0.15)[1]
+            if min(abs(v[0]), abs(v[1])) > 0.003:
+                shown = [path.contains_point((r2, r1)) for path in shades]
+                assert shown == [v[0] < 0, v[1] < 0], (r1, r2)
+                back |= {tuple(shown)}
+    assert len(back) == 3
+    curves = [x for x in ax.get_lines() if x.get_marker() != "o"]
+    border, closed = [x.get_xydata() for x in curves if x.get_color() != "0.35"]
     for r2, r1 in border[:20:6]:
         assert r1 == pytest.approx(edge(r2, 0.5, 0.15), rel=1e-6)
+    np.testing.assert_allclose((1 + closed).prod(axis=1), 1.5**2 / 2, rtol=1e-6)
     # The thin borders, from the third collision on: the map of turns counts one more below.
-    thin = [x.get_xydata() for x in right.get_lines() if x.get_color() == "0.35"]
+    thin = [x.get_xydata() for x in ax.get_lines() if x.get_color() == "0.35"]
     assert len(thin) == 8
     for number, line in enumerate(thin, start=3):
         for r2, r1 in line[~np.isnan(line[:, 1])][20::60]:
             assert by_turns(r1 * (1 - 1e-7), r2, 0.5, 0.15)[0] == number
             assert by_turns(r1 * (1 + 1e-7), r2, 0.5, 0.15)[0] == number - 1
+    dots = [x.get_xydata()[0] for x in ax.get_lines() if x.get_marker() == "o"]
     assert len(dots) == 3
     for r2, r1 in dots:
         np.testing.assert_allclose(by_turns(r1, r2, 0.5, 0.15)[1][:2], 0, atol=1e-9)
+    names = [x.get_text() for x in ax.texts if x.get_text().isdigit()]
+    assert names == ["3", "4", "5", "6", "10"]
 
 
 def test_fig_patterns_parameters():
