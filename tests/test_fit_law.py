@@ -106,6 +106,20 @@ def test_two_strikes_of_the_film():
     assert found.minima == ()
 
 
+def test_of_equally_low_minima_the_one_with_the_least_numbers_comes_first():
+    """It is found last, and the other one is lower by far less than data can tell."""
+
+    def law(x):
+        near = (x - 0.6) ** 2 if x > 0.4 else (x - 0.2) ** 2 + 1e-4
+        return ImpulseCorrelation(0.1 + near)
+
+    after = post_impact_velocities([1, 1, 1], [1, 0, 0], 1.0, 0.1)
+    found = fit_law(Shots((shot_set("AAA", [1, 0, 0], after, 0.01),)), law, {"x": (0, 1)}, starts=4)
+    assert found.values["x"] == pytest.approx(0.2, abs=0.01)
+    assert [other["x"] for other in found.minima] == pytest.approx([0.6], abs=0.01)
+    assert found.chi_square < 1e-9 < 1e-6 < (found.residuals["AAA"] ** 2).sum() < 0.01
+
+
 def test_one_strike_of_the_film_is_explained_in_several_ways():
     found = fit_law(Shots((*strikes(1),)), spheres(1), GAPS)
     known = [numbers for *_, numbers in stored("spheres, three gaps, A", "one,")]
