@@ -122,18 +122,23 @@ def distance(triplet, ratio):
 def test_table_2_most_open_entries():
     """No other entry is open over more than .2; by bisection outwards from the printed ratio."""
 
-    def edge(triplet, far):
+    def edge(triplet, far, error):
         near = min(TABLE_2.ratio[triplet], TABLE_2.bound[triplet])
-        if distance(triplet, far) <= 0.01:
+        if distance(triplet, far) <= error:
             return far
         for _ in range(30):
             middle = (near + far) / 2
-            near, far = (middle, far) if distance(triplet, middle) <= 0.01 else (near, middle)
+            near, far = (middle, far) if distance(triplet, middle) <= error else (near, middle)
         return near
 
-    width = {t: edge(t, TABLE_2.bound[t]) - edge(t, 0.0) for t in TABLE_2.index}
+    def widths(error):
+        bounds = TABLE_2.bound.items()
+        return {t: edge(t, bound, error) - edge(t, 0.0, error) for t, bound in bounds}
+
+    width, twice = widths(0.01), np.median(list(widths(0.02).values()))
     assert {t for t, w in width.items() if w > 0.2} == {"BBD", "CBD"}
-    assert 0.03 < np.median(list(width.values())) < 0.04
+    middle = np.median(list(width.values()))
+    AS_MEASURED.tells({"span-median": middle, "half-span": middle / 2, "span-double": twice}, 1e-3)
 
 
 def test_entries_by_heights():
@@ -155,9 +160,8 @@ def test_entries_by_heights():
 
 def test_why_two_entries_are_open():
     """Ball 2 slows down to the velocity of ball 1 while it pushes D; the two leave together."""
-    names = [AS_MEASURED.glued[place] for place in ("widest", "second")]
-    assert sorted(names) == ["BBD", "CBD"]
-    for name in names:
+    speeds = []
+    for name in ("BBD", "CBD"):
         chain, model = paper_chain(name, excess="saturate")
         exact = solve(
             chain.masses, [1, 0, 0], list(chain.restitution), model.forward, model.backward,
@@ -170,6 +174,13 @@ def test_why_two_entries_are_open():
         assert before[0] == pytest.approx(met[0])
         assert after[0] == pytest.approx(after[1])
         assert after[0] < met[0] < after[2]
+        for ratio in np.linspace(0, TABLE_2.bound[name], 400):
+            first, second, _ = textbook.solve(
+                chain.masses, [1, 0, 0], list(chain.restitution), [ratio], model.backward
+            ).velocities
+            if float(second - first) < 1e-9:
+                speeds.append(float(first))
+    AS_MEASURED.tells({"together-low": min(speeds), "together-high": max(speeds)})
 
 
 def test_landing_five_equal_balls():
@@ -182,10 +193,10 @@ def test_landing_five_equal_balls():
     assert line.split()[2:] == [f"{v + 0.0:.2f}" for v in found.round(2)]
 
 
-@pytest.mark.parametrize(("page", "start"), [("table_2", ""), ("reading_table_2", "experiments-")])
-def test_cad_and_dad_would_fit_each_others_place(page, start):
+def test_cad_and_dad_would_fit_each_others_place():
     """As parts of the bounds, which are the same for both: of balls A and the last one."""
-    told, part = Chapter(page).glued, TABLE_2.ratio / TABLE_2.bound
+    start = "experiments-"
+    told, part = Chapter("reading_table_2").glued, TABLE_2.ratio / TABLE_2.bound
     assert TABLE_2.bound["CAD"] == TABLE_2.bound["DAD"]
     for ball, high in (("C", True), ("D", False)):
         shown = re.findall(r"[\d.]+", told[f"{start}with-{ball.lower()}"])

@@ -80,6 +80,9 @@ def test_what_the_chapter_says():
     chain = ["one_gap", "gap_of_pair", "with_own_gap", "with_own_shift", "with_own_quotient"]
     assert sorted(chain, key=rms.get, reverse=True) == chain
     assert rms["with_own_quotient"] < rms["stiffness_of_pair"] / 2 < rms["one_ratio"] / 2
+    good = {name: sum(row[name] <= 0.05 for row in rows) for name in chain}
+    assert CHAPTER.glued["scored-own-gap"] == str(good["with_own_gap"])
+    assert CHAPTER.glued["scored-few"] == str(sum(row["stiffness_of_pair"] <= 0.05 for row in rows))
     # F = k s^1.5 with s = .1 (m v^2 / k)^.4 and v = 1: F = .1^1.5 k^.4 m^.6.
     k = 4 / 3 * 210e9 / 1.82 * np.sqrt((0.135 / (4 * np.pi * 7800)) ** (1 / 3) / 2)
     told = float(CHAPTER.glued["scored-lean-force"])
