@@ -1,5 +1,6 @@
 """What the tables and figures of book/experiments.ipynb show, by truth.py and by bisection."""
 
+import itertools
 import re
 from functools import cache
 
@@ -21,6 +22,9 @@ from cradle import (
     textbook,
 )
 
+#: Of the appendix; its values are named after the chapter.
+BESIDE = Chapter("reading_table_2")
+BESIDE.glued = {name.removeprefix("experiments-"): x for name, x in BESIDE.glued.items()}
 SUSPECTS = ("DBB", "BBD", "DBC", "CBD")
 TABLE_2 = ratio_table().set_index("triplet")
 
@@ -55,6 +59,48 @@ def test_table_2_interchange_brings_b_and_c_into_line():
     # The other two interchanges that would bring B and C closer break Eq. 34.
     for triplet in ("BCD", "CCD"):
         assert TABLE_2.ratio[triplet] > TABLE_2.bound[triplet[::-1]]
+
+
+def test_no_other_two_interchanges_do_as_well():
+    """Of entries with B or C in the middle, in exact decimals: one interchange after the other."""
+    names = [x + y + z for x in "ABCD" for y in "BC" for z in "ABCD"]
+    table = {t: round(1000 * TABLE_2.ratio[t]) for t in names}
+    others = {t: t[0] + ("C" if t[1] == "B" else "B") + t[2] for t in names}
+    gap = {t: (table[t] - table[others[t]]) * (1 if t[1] == "C" else -1) for t in names}
+
+    def spread(changed):
+        """Sum of squares of the differences, and their sum, after some entries have changed."""
+        now = dict(gap)
+        for t, value in changed.items():
+            step = (value - table[t]) * (1 if t[1] == "C" else -1)
+            now[t] += step
+            now[others[t]] += step
+        found = [now[t] for t in names if t[1] == "C"]
+        return 16 * sum(x * x for x in found) - sum(found) ** 2
+
+    proposed = [("DBB", "BBD"), ("DBC", "CBD")]
+
+    def swapped(pairs):
+        return {a: table[b] for one in pairs for a, b in (one, one[::-1])}
+
+    limit, ways, found = spread(swapped(proposed)), 0, []
+    every = list(itertools.combinations(names, 2))
+    for first, second in itertools.combinations(every, 2):
+        if not {*first} & {*second}:
+            ways += 1
+            if spread(swapped([first, second])) <= limit:
+                found.append(swapped([first, second]))
+    kept = [x for x in found if all(v <= 1000 * TABLE_2.bound[t] for t, v in x.items())]
+    assert kept == [swapped([("BBD", "DBB"), ("CBD", "DBC")])]
+    BESIDE.tells({"ways": ways, "as-good": len(found), "kept": len(kept)})
+    above = {t: 100 * (a / TABLE_2.bound[t] - 1) for t, a in TABLE_2.ratio.items()}
+    above = {t: size for t, size in above.items() if size > 0}
+    assert set(above) == {"CCA", "DBB", "DBC"}
+    BESIDE.tells({"cca-percent": above["CCA"], "gross-least": above["DBB"],
+                  "gross-most": above["DBC"]})  # fmt: skip
+    alike = [gap[t] for t in names if t[1] == "C" and t[0] + "B" + t[2] not in SUSPECTS]
+    BESIDE.tells({"alike": len(alike), "alike-below": sum(x > 0 for x in alike),
+                  "alike-within": max(map(abs, alike)) / 1000})  # fmt: skip
 
 
 @pytest.mark.parametrize("triplet", SUSPECTS)
@@ -206,6 +252,12 @@ def test_cad_and_dad_would_fit_each_others_place():
         assert odd == pytest.approx(part[f"{ball}AD"], abs=6e-3)
         assert all(x > 0.7 if high else x < 0.5 for x in expected)
         assert odd < 0.2 if high else odd > 0.9
+    chain, model = paper_chain("CDADB")
+    third = [float(predicted("CDADB").velocities[2])]
+    forward, backward = ([a[0], 0.22, a[2]] for a in (model.forward, model.backward))
+    given = [list(x) for x in (chain.masses, chain.velocities, chain.restitution)]
+    third.append(float(textbook.solve(*given, forward, backward).velocities[2]))
+    assert third[0] == pytest.approx(4 * third[1], rel=0.03)
 
 
 FIGURES, AS_MEASURED = Chapter("experiments"), Chapter("table_2")
