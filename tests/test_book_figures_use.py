@@ -29,12 +29,10 @@ def test_fig_toy_models():
     axes = drawn("toy")["fig-toy-models"].axes
     shown = [[lines(ax)[f"ball {k}"] for k in range(1, 6)] for ax in axes]
     assert all(line[:3, 0].tolist() == [1, 3, 5] for panel in shown for line in panel)
-    sequential, ratio, solid, lossy = np.array(shown)[..., 1]
+    sequential, ratio, lossy = np.array(shown)[..., 1]
     for drawn_by, e, a in ((sequential, 1, 0), (ratio, 1, 0.15), (lossy, 0.97, 0.15)):
         expected = strokes(20, STRUCK, e, a)[::2].T
         np.testing.assert_allclose(drawn_by[:, :10], expected, rtol=0, atol=1e-9)
-    # A body of four by momentum.
-    np.testing.assert_allclose(solid.T, [[-0.6] + [0.4] * 4] * solid.shape[1], atol=1e-9)
 
 
 def test_fig_toy_drift():
