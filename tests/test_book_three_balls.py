@@ -296,7 +296,8 @@ def test_the_readers_solver_against_the_reference_solver():
         m, e = uniform(rng, 0.3, 3, 3), uniform(rng, 0.3, 1, 2)
         v = [1, uniform(rng, 0, 0.8), 0]
         ratio = uniform(rng, 0, 1) * min(m[2] / (m[1] + m[2]), m[0] / (m[0] + m[1]))
-        *_, (_, _, found, impulses) = names["three_balls"](m, v, e, ratio)
+        *_, (_, _, found, impulses, owed) = names["three_balls"](m, v, e, ratio)
+        np.testing.assert_allclose(owed, 0, atol=1e-14)
         exact = solve(list(m), v, list(e), ratio)
         np.testing.assert_allclose(found, floats(exact.velocities), atol=1e-10)
         np.testing.assert_allclose(impulses, floats(exact.impulses), atol=1e-10)
@@ -336,6 +337,17 @@ def test_what_the_page_says_of_the_program():
             "own-solver-ways-step": e[0] * compression,
         }
     )
+    rows = [line[6:] for line in PROGRAM.printed("solved").splitlines()[1:]]
+    rows = np.array([[float(x) for x in row.replace("-", " -").split()] for row in rows])
+    exact = solve(m, v, e, a)
+    for columns, values in ((slice(3), exact.path), (slice(3, 5), exact.path_impulses)):
+        np.testing.assert_allclose(rows[:, columns], np.array(values, float), atol=5.1e-4)
+    # Contact 1-2 owes until its end; 2-3 until its own, e^2 of what it has absorbed.
+    done = solve(m, v, [e[0], 0], a)  # what 2-3 absorbs up to its maximum compression
+    assert rows[:, 5] == pytest.approx([0, owed, 0, 0, 0], abs=5.1e-4)
+    assert rows[3, 6] == pytest.approx(e[1] ** 2 * float(done.absorbed[1]), abs=5.1e-4)
+    assert (np.diff(rows[:4, 6]) > 0).all()
+    assert rows[4, 6] == 0
     light = solve([1, "0.1", 1], [1, 0, 0], 1, "0.15")
     said = PROGRAM.printed("light")
     assert f"{len(light.path) - 1} events" in said
