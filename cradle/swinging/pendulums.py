@@ -1,6 +1,5 @@
 """How the balls hang."""
 
-import functools
 from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
@@ -63,7 +62,6 @@ class Pendulums:
         """Return `length`, `gaps` or `damping` for each of `size` balls or contacts."""
         return asked.row_of(name, getattr(self, name), size, size + (name == "gaps"))
 
-    @functools.lru_cache(64)  # asked for at each flight
     def reach(self, size: int) -> Vector:
         """Return how far each of `size` balls may be pulled aside, m along its arc."""
         # Above its pivot a string is slack; on a rod a ball would stand at the top.
@@ -74,10 +72,9 @@ class Pendulums:
         """Return where the balls are, m, or refuse that one is so far aside."""
         reach = self.reach(len(x))
         beyond = np.abs(x) > reach
-        if beyond.any():
-            most = "half" if reach[0] > 2.0 * self.row("length", len(x))[0] else "a quarter of"
-            far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most} a circle"
-            asked.refuse_where(f"{when}positions", x, beyond, f"must be within {far}")
+        most = "half" if reach[0] > 2.0 * self.row("length", len(x))[0] else "a quarter of"
+        far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most} a circle"
+        asked.refuse_where(f"{when}positions", x, beyond, f"must be within {far}")
         return x
 
     def natural_frequency(self, size: int) -> Vector:
@@ -105,13 +102,15 @@ class Hanging:
         self.gaps = pendulums.row("gaps", n - 1)
         self.frequency = pendulums.natural_frequency(n)
         self.length, self.damping = pendulums.row("length", n), pendulums.row("damping", n)
+        self.reach = pendulums.reach(n)
         self.fastest = float(self.frequency.max())
         self.tie = TIE / self.fastest  # events nearer than this are one, s
 
-    @functools.lru_cache(1024)
     def offsets(self, first: int, last: int) -> Vector:
         """Return how far the balls of a body hang from its first one, where they touch, m."""
-        return np.concatenate([[0.0], np.cumsum(self.gaps[first : last - 1])])
+        away = np.zeros(last - first)
+        self.gaps[first : last - 1].cumsum(out=away[1:])
+        return away
 
     def apart(self, x: Vector) -> Vector:
         """Return the nearest places at which no balls overlap, m; their centre stays."""

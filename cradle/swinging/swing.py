@@ -127,14 +127,15 @@ class _Run:
 
     def to_the_end(self, times: Vector, most: int) -> str:
         """Fly from event to event; return why the run ended."""
-        done, end = 0, float(times[-1])
-        idle, kind = 0, SmallAngleFlight if self.hanging.small else FullFlight
+        done, end, hanging = 0, float(times[-1]), self.hanging
+        idle, kind = 0, SmallAngleFlight if hanging.small else FullFlight
         while len(self.impacts) < most:
-            flight = kind(self.hanging, self.x, self.v, self.together, self.parting)
+            flight = kind(hanging, self.x, self.v, self.together, self.parting)
             wait, closing, opening = flight.next_meeting(left := max(end - self.t, 0.0))
             if isinstance(flight, SmallAngleFlight):  # others are certified not to go over the top
                 far = (1.0 - INSTANT) * flight.turning(min(wait, left))
-                self.pendulums.within_reach(far, f"after t = {self.t:.4g} s ")
+                if (np.abs(far) > hanging.reach).any():
+                    self.pendulums.within_reach(far, f"after t = {self.t:.4g} s ")
             later = self.t + wait
             here = int(times.searchsorted(later, side="left"))
             if here > done or later > end:
@@ -147,7 +148,7 @@ class _Run:
             known = len(self.impacts)
             self.t, self.x, self.v = later, x[0], v[0]
             self.settle(closing, opening)
-            idle = idle + 1 if wait <= self.hanging.tie and len(self.impacts) == known else 0
+            idle = idle + 1 if wait <= hanging.tie and len(self.impacts) == known else 0
             if idle > MOST_IDLE * len(self.x):
                 why = f"contacts {closing} close and {opening} open there, and none has an impact"
                 raise RuntimeError(f"the swing does not get beyond t = {self.t} s: {why}")
@@ -283,7 +284,7 @@ def certify(run: _Run, times: Vector, seen_x: Vector, seen_v: Vector) -> None:
     most += lasts[begun] * hanging.fastest * kept[begun]  # of a strike: strings are kicks
     least = -math.inf if hanging.damping.any() else -most
     overlap = (x[:, :-1] - x[:, 1:] - hanging.gaps).max(axis=-1)
-    top, far = math.inf if hanging.small else run.pendulums.reach(len(m))[0], np.abs(x).max(axis=-1)
+    top, far = math.inf if hanging.small else hanging.reach[0], np.abs(x).max(axis=-1)
     for what, at, value, low, high in (
         ("impacts have made or lost {:g} kg m/s", instants, (left - v) @ m, -push, push),
         ("{:g} J are made or lost beside the impacts", instants, kept - before, -work, work),
