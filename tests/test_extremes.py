@@ -488,6 +488,12 @@ def test_any_finite_numbers(data):
         assert x.faults(trace, finished) == []
 
 
+@pytest.mark.parametrize("name", chains_of("bounded work"))
+def test_long_rows_collapse_in_bounded_work(name):
+    _, finished = CHAINS[name].problem.attempt(20_000)
+    assert finished
+
+
 @pytest.mark.parametrize("plain", [False, True])
 @pytest.mark.parametrize("name", chains_of("found by fuzzing"))
 def test_found_by_fuzzing(name, plain, monkeypatch):
