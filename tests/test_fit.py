@@ -194,6 +194,21 @@ def test_refine_where_the_grid_is_far_above_the_minimum():
     np.testing.assert_allclose(others, [(0, 0.5)] * 2, atol=1e-15)
 
 
+def test_refine_of_a_minimum_that_no_cell_is_small_enough_for():
+    """It ends with cells of a millionth, of which the best one stands for the set."""
+    asked = []
+
+    def narrow(x):
+        asked.append(len(x))
+        assert len(asked) < 2000
+        return 1e40 * ((x - 0.3137) ** 2).sum(axis=1)
+
+    for found in refine(narrow, np.ones(2))[0]:
+        ((low, high),) = found.intervals
+        assert low < found.modes[0].value < high < low + 2e-6
+        assert found.modes[0].value == pytest.approx(0.3137, abs=1e-6)
+
+
 def test_refine_against_an_ellipse():
     matrix = 1e5 * np.array([[2.0, 1.5], [1.5, 2.0]])
     centre = np.array([0.21, 0.33])
