@@ -151,7 +151,11 @@ BAC = "film film.txt --set BAC --masses 1,1,1 --length 0.3"
             ["the first ball strikes at 1 m/s", "contacts lose no energy", "elastic sp"],
         ),
         (f"--speed 2 {LOSSY}", VISCOUS, ["strikes at 2 m/s", "viscous spheres; restitution at 2 "]),
-        ("--restitution 0.5", EnergyDistribution(), ["strikes at 1", "lose much, by the energy"]),
+        (
+            "--restitution 0.5",
+            EnergyDistribution(),
+            ["strikes at 1", "than viscous ones can, by the energy"],
+        ),
         (
             "--stiffness 1e9,2e9",
             SpringChain((1e9, 2e9)),
@@ -260,6 +264,25 @@ def test_a_stiffness_that_is_not_given_is_told_of():
         assert said in call(line)
         assert said not in call(f"{line} --stiffness 1e9")
     assert "equally stiff" not in call("solve 3") + call("solve --masses 1,8,1 --ratio 0.1")
+
+
+def test_contacts_too_soft_to_be_followed_are_told_of():
+    said = "strikes take no time"
+    assert said in call("swing 3 --steps 2 --stiffness 1e6")
+    assert said not in call("swing 3 --steps 2 --stiffness 1e11") + call("swing 3 --steps 2")
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("1,0,0,-1 --ratio 0.2", True), ("1,0,-1 --ratio 0.2", True),
+        ("1,0,0,0 --ratio 0.2", False), ("1,0,1,0 --ratio 0.2", False), ("1,0,0,-1", False),
+    ],
+)  # fmt: skip
+def test_who_drives_what_is_struck_from_both_sides(line, told):
+    """The left contact, by a rule of ours; two runs each have their own."""
+    said = call(f"solve {line.count(',') + 1} --velocities {line}")
+    assert ("driven by the left contact (rule R2)" in said) is told
 
 
 def test_a_path_that_nobody_sees_is_not_kept():

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from chapters import Chapter
+from dop853 import integrated
 from gaps import strike
 from matplotlib.figure import Figure
 
@@ -65,6 +66,22 @@ def test_what_the_readme_says_of_the_other_answers():
     assert collide(lossy, EnergyDistribution()).velocities[-1] < elastic[-1]
     with pytest.raises(ValueError, match="must be 1 for SpringChain"):
         collide(lossy, SpringChain())
+
+
+def test_where_springs_end_the_energy_law_says_something_else(root: Path):
+    """What README says of the least restitution of springs, and SciPy of springs."""
+    readme = " ".join((root / "README.md").read_text(encoding="utf-8").split())
+    found = re.search(
+        r"at ([.\d]+) the last .* leaves with (\d+) % by springs, with (\d+) %", readme
+    )
+    least, *told = map(float, found.groups())
+    loss = cradle.viscosity_from(least, speed=1, masses=[1] * 5)
+    after = collide(TOY, SpringChain(viscosity=loss)).velocities[-1]
+    other = collide(Chain([1] * 5, TOY.velocities, least), EnergyDistribution()).velocities[-1]
+    assert [round(100 * v) for v in (after, other)] == told
+    assert integrated([1] * 5, TOY.velocities, loss=loss)[-1] == pytest.approx(after, abs=1e-5)
+    with pytest.raises(ValueError, match=f"must lie in .{least}, 1"):
+        cradle.viscosity_from(least - 0.001, speed=1, masses=[1] * 5)
 
 
 def test_version_has_one_source():

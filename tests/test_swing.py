@@ -289,6 +289,7 @@ def test_elastic_balls_keep_their_energy_for_a_minute(stiffness):
     chain = Chain([0.045] * 5, [0] * 5)
     run = swing(chain, SpringChain(stiffness, accuracy=1e-6), pulled(5), [0, 20.0, 60.0])
     assert run.energy == pytest.approx(run.energy[0], rel=1e-4)
+    assert run.lasting is (stiffness == 1e10)
 
 
 def test_a_strike_that_lasts_long_is_taken_for_none():
@@ -321,6 +322,7 @@ def test_springs_too_soft_for_a_strike_collide_in_no_time():
     """Then ratios of stiffness alone count, as in `collide`."""
     runs = [swing(balls(3), SpringChain(k), pulled(3), [0.3, 0.9]) for k in (1.0, 2.0)]
     assert len(runs[0].impacts) == len(runs[1].impacts) > 1
+    assert [run.lasting for run in runs] == [False, False]
     np.testing.assert_allclose(runs[0].positions, runs[1].positions, rtol=1e-8)
 
 

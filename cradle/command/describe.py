@@ -144,12 +144,16 @@ def described(
             if gaps or (chain.restitution == 1.0).all():
                 raise  # it is not the restitution
             law = cradle.EnergyDistribution(one_or_all(stiffness or [1.0]))
-            kind = "spheres that lose much, by the energy law"
+            kind = "spheres that lose more than viscous ones can, by the energy law"
         assumed += [f"the balls collide as {kind} (--model, --ratio)"] if bare else []
         alike = stiffness is not None or np.ptp(chain.masses) == 0.0
         assumed += [] if alike else ["equally stiff contacts (--stiffness)"]
     as_fast = (chain.velocities[1:] == chain.velocities[:-1]) & (chain.velocities[1:] != 0.0)
     assumed += as_one(bool(as_fast.any()), gaps, model)
+    closing = np.flatnonzero(chain.closing_speeds > 0.0)
+    sides = closing.size > 1 and bool((chain.closing_speeds[closing[0] : closing[-1]] >= 0.0).all())
+    if sides and isinstance(law, cradle.ImpulseCorrelation):
+        assumed += ["what is struck from both sides is driven by the left contact (rule R2)"]
     return Described(chain, taken, law, tuple(assumed), letters)
 
 

@@ -81,6 +81,8 @@ def swing(
     assumed = [one for one in given.assumed if "strikes" not in one]
     if gaps and not options["stiffness"] and isinstance(given.model, cradle.SpringChain):
         together.append("strikes are over before a gap closes (--stiffness)")
+    if options["stiffness"] and not run.lasting:
+        together.append("strikes take no time: contacts so soft push for too long to follow them")
     told = given._replace(assumed=(*assumed, *together))
     extra = {"model": made(given.model), "assumed": told.assumed, "impacts": impacts}
     wide = f"; gaps {hanging.gaps} m" * bool(gaps)

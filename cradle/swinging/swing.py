@@ -40,7 +40,8 @@ def swing(
         The impact law, such as `ImpulseCorrelation`.  If a part of the chain collides alone, the
         law is used with the values of that part, and with ``excess="saturate"`` if it has that
         field.  Only impacts by `SpringChain` take time, so that gaps may close meanwhile; beyond
-        about .01 / w a contact and .1 / w a strike they take none either, with w = sqrt(g/l).
+        about .01 / w a contact and .1 / w a strike they take none either, with w = sqrt(g/l):
+        `Swing.lasting` tells.
     positions : array_like, shape (N,)
         Where the balls are released, along their arcs from their lowest points, m; positive to the
         right.  At most a quarter of a circle; with ``angle="full"`` and no gaps less than half one.
@@ -91,7 +92,8 @@ def swing(
     at = at[: len(x)]
     certify(run, at, x, v)
     together = tuple(np.flatnonzero(run.together).tolist())
-    return Swing(chain, model, hanging, at, x, v, tuple(run.impacts), ended, run.t, together)
+    impacts, lasting = tuple(run.impacts), run.lasting
+    return Swing(chain, model, hanging, at, x, v, impacts, ended, run.t, together, lasting)
 
 
 class _Run:
