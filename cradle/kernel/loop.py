@@ -1,4 +1,7 @@
-"""The event loop: rounds of events, each a closed-form root of the impulses (R8); the door."""
+"""The event loop: rounds of events, each a closed-form root of the impulses (R8); the door.
+
+Numbers of 32 digits are pairs kept in one complex number (`numbers`); `.real` is the leading one.
+"""
 
 import math
 from typing import Any, NamedTuple

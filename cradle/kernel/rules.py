@@ -1,7 +1,7 @@
 """One run: its impulse rates (R1, R6), ratios in force (R7) and straight way (R3, R8.2).
 
 Its contacts low..high have impulses, or balls that move; contacts beyond them wait, because no
-impulse that a ball could notice reaches them.
+impulse that a ball could notice reaches them.  Numbers of 32 digits are pairs (`numbers`).
 """
 
 import math
@@ -138,7 +138,8 @@ def is_clear(difference, size, tally):
 
 def is_over(c, at_zero, ball, contact):
     """R3: tell whether contact c ends: it opens, or has e = 0 and no longer closes."""
-    # `at_zero`: it is about to open; if nobody drives it, by its own push, vanishing or not (R6).
+    # `at_zero`: at closing speed zero it ends if it is about to open.  A source whose rate vanishes
+    # beside those of other sources (R6) still pushes its own balls apart.
     k = contact[c]
     if k.q.real > 0.0:
         return False
@@ -192,7 +193,7 @@ def segment(first, n, run, ball, contact, tally):
     left = low - 1 if low > 0 and contact[low - 1].active == 0 else low
     right = high + 1 if high < n - 2 and contact[high + 1].active == 0 else high
     reach = NEVER
-    sure = 0.0  # how old the closing speed of the first is
+    age_of_first = 0.0
     for c in range(left, right + 1):
         k = contact[c]
         slope, pulls = course(c, low, high, ball, contact)
@@ -204,13 +205,13 @@ def segment(first, n, run, ball, contact, tally):
         k.age = k.made / pulls if pulls > 0.0 else 0.0
         if less(k.until, reach):
             reach = k.until
-            sure = k.age
+            age_of_first = k.age
     run[first].reach = reach
     second = NEVER
     for c in range(left, right + 1):
         k = contact[c]
         late = minus(k.until, reach).real if k.until.real < math.inf else math.inf
-        k.due = 1 if late <= LIMITS.tie * max(k.age, sure) else 0
+        k.due = 1 if late <= LIMITS.tie * max(k.age, age_of_first) else 0
         if k.due == 0:
             second = least(second, k.until)
     if second.real < math.inf:
