@@ -140,13 +140,14 @@ def test_fig_patterns_turns():
 
 
 def test_fig_patterns_turn():
-    """Work and momentum of the new contact, phase by phase, and its end if it went on alone."""
+    """Work and momentum of the staying contact, phase by phase, and its end if it went on alone."""
     shown = panel("reading_counting", "fig-patterns-turn")
-    new, old, alone = (shown[name] for name in ("new contact", "old contact", "alone"))
+    names = "staying contact", "leaving contact", "alone"
+    new, old, alone = (shown[name] for name in names)
     assert (new[:, 0] == old[:, 0]).all()
     a, e, r = 0.4, 0.5, 0.5
     push = np.diff(new[:, 0]), np.diff(new[:, 1]), np.diff(old[:, 1])
-    moved = {  # by unit impulse of the new contact: its u and that of the old one
+    moved = {  # by unit impulse of the staying contact: its u and that of the leaving one
         0: (1 / a - 1 - r, 1 - (1 + r) / a),
         1: (-1 - r, 1),
         2: (a - 1 - r, 1 - a * (1 + r)),

@@ -7,7 +7,7 @@ from chains import magnitudes, uniform
 from chapters import Chapter, floats
 from scipy.optimize import brentq
 from truth import solve
-from turns import by_turns, edge, last_with
+from turns import by_turns, edge, last_with, turn
 
 from cradle import Chain, ImpulseCorrelation, collide, outcomes
 from cradle.closed_form import back_impact_line, first_ball_stops, middle_ball_stops
@@ -144,6 +144,30 @@ def test_fig_6_infinite_region(e, alpha):
         far = 1.3 * r1, r2, e, alpha
         assert bool(solved(*far).collapsed) == (by_turns(*far)[0] > 1000)
         assert solved(*far).collapsed or count(*far) == by_turns(*far)[0]
+
+
+def test_zeta_rises_in_each_cycle_and_without_losses_in_each_turn():
+    """With r1 = 1, r2 = 0.02 the first turn lowers it: a single turn need not raise it."""
+    rng, falls = np.random.default_rng(8), 0
+    for _ in range(2000):
+        r1, r2 = magnitudes(rng, 3, 2)
+        e, part = uniform(rng, 0.05, 1, 2)
+        a = part / (1 + max(r1, r2))
+        zetas = [e * (1 - a + r1) / (1 + e)]
+        for k in range(60):
+            x, limit, y, d = turn(zetas[-1], (r2, r1)[k % 2], e, a)
+            if x >= limit:
+                break
+            zetas.append(d * y / (y - x))
+        falls += zetas[1:2] < zetas[:1] and len(zetas) > 1
+        assert (np.diff(zetas[::2]) > -1e-14).all()
+        b, r = 1 - a * (1 + r1), r1
+        for zeta in np.linspace(0, (b + b**0.5) / (1 + r), 12)[:-1]:
+            x, _, y, d = turn(zeta, r, 1, a)
+            assert d * y / (y - x) > zeta
+    assert falls > 50
+    x, _, y, d = turn(2 / 3, 0.02, 0.5, 0)
+    assert d * y / (y - x) < 2 / 3
 
 
 def test_fig_6_is_not_kept_for_other_parameters():
