@@ -15,7 +15,7 @@ from test_book_compliance import (
     printed_10_and_11,
 )
 
-from cradle import textbook
+from cradle import Chain, ImpulseCorrelation, collide, textbook
 
 EQUAL = [1, 1, 1], [1, 0, 0], 1
 THREE = [1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.9, 0.8]  # of three_balls, ratio 0.15
@@ -181,6 +181,26 @@ def test_fig_problem_family():
         assert line.startswith(f"ratio {ratio:g} ")
         speeds = [float(x) for x in line.partition("[")[2].rstrip("]").split()]
         np.testing.assert_allclose(speeds, after(EQUAL, ratio), rtol=0, atol=5.1e-4)
+
+
+def test_fig_own_problem_bend():
+    """The line is the solver's path; each end by its own definition; the grey triangle."""
+    (ax,) = drawn("reading_problem")["fig-own-problem-bend"].axes
+    shown = {line.get_label(): line.get_xydata() for line in ax.get_lines()}
+    trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.2))
+    path = np.column_stack([trace.path_impulses[:, 1], trace.path[:, 1] - trace.path[:, 2]])
+    (impulse, speed), (end, last), (full, lowest) = shown["$u_3$"][1], path[-1], shown["$u_3$"][2]
+    for at, u in path:
+        assert u == pytest.approx(np.interp(at, *shown["$u_3$"].T), abs=1e-12)
+    (zero, closing), (by_impulses, _) = shown["by speeds"][0], shown["by impulses"][0]
+    assert closing == pytest.approx(0, abs=1e-12)  # as before the impact
+    assert by_impulses == pytest.approx(2 * zero) == pytest.approx(full)
+    np.testing.assert_allclose(shown["by work"][0], (end, last), rtol=1e-12)
+    assert impulse == pytest.approx(0.2 * trace.impulses[0])
+    grey = ax.patches[0].get_xy()[:3]
+    missing = abs(np.linalg.det([grey[1] - grey[0], grey[2] - grey[0]])) / 2
+    work = impulse * speed / 2 + (zero - impulse) * speed / 2
+    assert work + missing == pytest.approx(full * -lowest / 4)
 
 
 @pytest.mark.parametrize(
