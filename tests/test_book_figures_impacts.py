@@ -197,7 +197,7 @@ def test_fig_patterns_corner():
 
 def test_fig_patterns_parameters():
     """Areas: blue where ball 1 goes back, orange where ball 2 does; the border of the hatching."""
-    cases = [(0.5, 0.0), (1.0, 0.15), (0.1, 0.15), (0.4, 0.5)]
+    cases = [(0.5, 0.15), (1.0, 0.15), (0.1, 0.15), (0.4, 0.5)]
     axes = drawn("reading_patterns")["fig-patterns-parameters"].axes
     seen = set()
     for ax, (e, a) in zip(axes, cases, strict=True):
