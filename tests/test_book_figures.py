@@ -132,6 +132,22 @@ def test_velocity_impulse_diagrams(chapter, figure, chain, contact):
         np.testing.assert_allclose(shown[f"$v_{ball + 1}$"], expected, rtol=0, atol=1e-10)
 
 
+def test_fig_p5_who_acts_and_who_drives():
+    strip = drawn("reading_multiple_impacts")["fig-p5"].axes[3]
+    bars = {
+        (round(box.x0 + 0.5), 1 - round((box.y0 + box.y1) / 2))
+        for bar in strip.collections
+        for box in [bar.get_paths()[0].get_extents()]
+    }
+    _, impulses = solved(FIVE, 0.15)
+    pushes = np.diff(impulses, axis=0)
+    acts = [tuple(row) for row in pushes > 1e-12]
+    acts = [row for row, before in zip(acts, [None, *acts]) if row != before]
+    assert bars == {(k, c) for k, row in enumerate(acts, 1) for c in (0, 1) if row[c]}
+    arrows = [(text.xy[0], text.xy[1] < text.xyann[1]) for text in strip.texts]
+    assert arrows == [(1, True), (3, False), (5, True)]  # dtau_3 = a dtau_2: down
+
+
 def test_fig_flight():
     """Start, end and words of the moving picture; its description, too."""
     cell = Chapter("intro").cells["flight"]
