@@ -227,14 +227,18 @@ def test_fig_patterns_parameters():
 
 
 def test_fig_patterns_micro():
-    top = panel("reading_counting", "fig-patterns-count")
+    counts = {
+        a: panel("reading_counting", "fig-patterns-count", k)[f"$a$ = {a:g}"]
+        for k, a in enumerate((0.15, 0.5))
+    }
     low = panel("patterns", "fig-patterns-micro")
     r, first = low["$v_1^+$"][:, 0], 4000 - len(low["$v_2^+$"])
     low["$v_2^+$"] = np.vstack([np.full((first, 2), np.nan), low["$v_2^+$"]])
-    np.testing.assert_allclose(top["estimate"][:, 1], np.pi * np.sqrt(0.85 / (2 * r)), rtol=1e-12)
     for k in range(100, 4000, 350):
         for a in (0.15, 0.5):
-            assert top[f"$a$ = {a:g}"][k, 1] == by_turns(r[k], r[k], 1, a)[0]
+            estimate = np.pi * np.sqrt((1 - a) / (2 * r[k]))
+            quotient = by_turns(r[k], r[k], 1, a)[0] / estimate
+            assert counts[a][k] == pytest.approx([r[k], quotient], rel=1e-12)
         v = by_turns(r[k], r[k], 1, 0.15)[1]
         for ball in range(3) if k >= first else (0, 2):
             assert low[f"$v_{ball + 1}^+$"][k, 1] == pytest.approx(v[ball], abs=1e-10)
