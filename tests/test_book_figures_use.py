@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from chapters import drawn, floats, lines, panel
+from chapters import drawn, floats, lines
 from stored import DATA
 from test_book_toy import strokes
 from truth import solve
@@ -36,7 +36,12 @@ def test_fig_toy_models():
 
 
 def test_fig_toy_drift():
-    shown = panel("toy", "fig-toy-drift")
+    axes = drawn("toy")["fig-toy-drift"].axes
+    assert [ax.get_title() for ax in axes] == [f"e = {e:g}" for e in (0.9, 0.95, 0.99)]
+    assert all(
+        label[-len(ax.get_title()) :] == ax.get_title() for ax in axes for label in lines(ax)
+    )
+    shown = {label: line for ax in axes for label, line in lines(ax).items()}
     assert len(shown) == 6
     for e in (0.9, 0.95, 0.99):
         five, two = shown[f"five, e = {e:g}"], shown[f"two, e = {e:g}"]

@@ -169,6 +169,11 @@ def test_first_stroke_of_the_minute_of_steel(row, gap, loss):
     after = real_cradles.spheres(np.eye(5)[0], [0, *[gap / unit] * 3], loss)
     swings = [line.get_ydata()[0] for line in drawn("toy")["fig-toy-steel"].axes[row].lines]
     assert swings == pytest.approx(after, abs=2e-3)
+    if not gap:  # the pale lines go on where the others end
+        pale = drawn("toy")["fig-toy-steel"].axes[row].collections[0].get_segments()
+        ends = [line.get_xydata()[-1] for line in drawn("toy")["fig-toy-steel"].axes[row].lines]
+        assert np.array([way[0] for way in pale]) == pytest.approx(np.array(ends))
+        assert {len(way) for way in pale} == {77}
     if loss:
         left, right = real_cradles.spheres([1.0, 0.0], [0.0], loss)
         assert glued("steel-restitution") == pytest.approx(right - left, abs=5e-3)
