@@ -114,6 +114,11 @@ def test_chi_square_ball_by_ball():
     assert float(TOLD["scaled"]) == pytest.approx(scaled.sum(), abs=2)
     assert float(GLUED["sum"]) == pytest.approx(c.fun, abs=2)
     assert float(TOLD["scaled"]) + float(TOLD["paid"]) == pytest.approx(c.fun, abs=2)
+    CHAPTER.tells({"shift-c": c.x}, off=2e-4)
+    CHAPTER.tells({"shift": 100 * (1 - c.x)}, off=0.02)
+    assert float(GLUED["shift-cost"]) == pytest.approx(((c.x - 1) / 0.01) ** 2, abs=0.6)
+    assert GLUED["shift-left"] == TOLD["scaled"]
+    assert float(GLUED["shift-left"]) + float(GLUED["shift-cost"]) == float(GLUED["sum"])
     top, bottom = (1e4 + float(TOLD[name]) for name in ("c-top", "c-bottom"))
     assert top / bottom == pytest.approx(c.x, abs=6e-4)
     assert TOLD["sum"] == GLUED["sum"]
@@ -425,9 +430,10 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
         r for r in far
         if gammaincc(2, r["three"] / 2) > 0.05 and gammaincc(1.5, r["both"] / 2) > 0.05
     ]  # fmt: skip
-    for k, shown in zip((2, 3, 4), GLUED["far-gaps"].split(" / "), strict=True):
+    for k, shown in zip((2, 3, 4), GLUED["far-gaps"].split(", "), strict=True):
         of_all = [1e3 * unit * row[f"gap_{k}"] for row in far]
-        ends = [float(x) for x in shown.split(" to ")]
+        assert shown.endswith(f" µm behind ball {k}")
+        ends = [float(x) for x in shown.split(" µm")[0].split(" to ")]
         assert ends == pytest.approx([min(of_all), max(of_all)], abs=0.06)
     # What the text says of distances: where gaps pass, and where they are in doubt.
     for row in far:
