@@ -64,6 +64,12 @@ def test_the_work_for_an_error():
         more, beyond = points[-1]
         work *= (more / work) ** (np.log(error / within) / np.log(beyond / within))
         assert CHAPTER.glued[name.replace("_", "-")] == f"{work:.0f}"
+    # Each ring is where its number says, on the line of a thousandth.
+    (ax,) = CHAPTER.figures["fig-own-forces"].axes
+    rings = [ring.get_offsets()[0].tolist() for ring in ax.collections]
+    three = [CHAPTER.glued[f"{name}-work"] for name in ("verlet", "better", "corrected")]
+    assert rings == [[float(work), 1e-3] for work in three]
+    assert {*three} < {text.get_text() for text in ax.texts}
 
 
 def test_the_rule_is_per_cents_from_spheres():
