@@ -185,6 +185,8 @@ def test_table_2_most_open_entries():
     assert {t for t, w in width.items() if w > 0.2} == {"BBD", "CBD"}
     middle = np.median(list(width.values()))
     AS_MEASURED.tells({"span-median": middle, "half-span": middle / 2, "span-double": twice}, 1e-3)
+    # DAA's second piece lies apart: it has two.
+    assert int(AS_MEASURED.glued["fine"]) == sum(w < 0.01 for t, w in width.items() if t != "DAA")
 
 
 def test_entries_by_heights():
