@@ -29,9 +29,14 @@ PIECES = ("rates", "way_to_event", "three_balls")
 HEAD = "import numpy as np"
 #: What each of them computes, told where the reader's lines come.
 TOLD = {
-    "rates": "Eqs. 16 to 19; the bound is Eq. 34",
-    "way_to_event": "One way for each phase",
-    "three_balls": "To the next event: Eqs. 20, 21, 23 and 29",
+    "rates": ("Eqs. 16 to 19; the bound is Eq. 34",),
+    "way_to_event": ("One way for each phase",),
+    "three_balls": (
+        "Who acts? Ask rates: push, dv",
+        "The nearer event: way_to_event, twice",
+        "v, tau, owed: Eqs. 20, 21, 23, 29",
+        "A row of path; next phase, driver",
+    ),
 }
 #: Calls of each of them that are checked first.
 CALLS = {
@@ -111,7 +116,7 @@ def without(code: str, piece: str) -> str:
     margin = " " * left[0].col_offset
     rows = code.splitlines()
     rows[left[0].lineno - 1 : left[-1].end_lineno] = [
-        f"{margin}# {TOLD[piece]}",
+        *(f"{margin}# {line}" for line in TOLD[piece]),
         f'{margin}raise NotImplementedError("Your lines come here.")',
     ]
     return "\n".join(rows) + "\n"
