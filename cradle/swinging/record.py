@@ -51,7 +51,7 @@ class Swing:
     ended: str  #: What ended the run, "times" or "impacts" (`max_impacts`).
     end: float  #: When the run ended, s.
     together: tuple[int, ...]  #: Contacts whose balls moved together at the end.
-    lasting: bool  #: Whether strikes took time, by contact forces that are stiff enough.
+    lasting: bool = False  #: Whether strikes took time, by contact forces that are stiff enough.
 
     @property
     def energy(self) -> Vector:
