@@ -79,10 +79,11 @@ def swing(
     # How fast the first ball strikes follows from the pull.
     together = describe.as_one(max(pull or [1.0]) > 1, gaps, options["model"])
     assumed = [one for one in given.assumed if "strikes" not in one]
-    if gaps and not options["stiffness"] and isinstance(given.model, cradle.SpringChain):
-        together.append("strikes are over before a gap closes (--stiffness)")
-    if options["stiffness"] and not run.lasting:
-        together.append("strikes take no time: contacts so soft push for too long to follow them")
+    if isinstance(given.model, cradle.SpringChain):
+        if gaps and not options["stiffness"]:
+            together.append("strikes are over before a gap closes (--stiffness)")
+        if options["stiffness"] and not run.lasting:
+            together.append("strikes take no time: contacts so soft push for too long to follow")
     told = given._replace(assumed=(*assumed, *together))
     extra = {"model": made(given.model), "assumed": told.assumed, "impacts": impacts}
     wide = f"; gaps {hanging.gaps} m" * bool(gaps)
