@@ -2,12 +2,13 @@
 
 import math
 
+import convex
 import numpy as np
 import pytest
 from chapters import Chapter, floats
+from dop853 import integrated
 from energy_law import strike
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq, minimize
+from scipy.optimize import brentq
 from truth import solve
 
 CHAPTER = Chapter("related")
@@ -15,43 +16,20 @@ E = 0.8
 
 
 def forces(loss):
-    """Three viscous spheres, stepped in time: velocities afterwards."""
-
-    def rate(_, y):
-        pressed, closing = np.maximum(y[:2], 0), -np.diff(y[2:])
-        push = np.maximum(pressed**1.5 + 1.5 * loss * np.sqrt(pressed) * closing, 0)
-        return np.concatenate([closing, -np.diff(push, prepend=0, append=0)])
-
-    bounds = {"rtol": 1e-10, "atol": 1e-12, "max_step": 0.01}
-    return solve_ivp(rate, (0, 20), [0, 0, 1, 0, 0], **bounds).y[2:, -1]
+    """Three viscous spheres, by SciPy."""
+    return integrated([1] * 3, [1, 0, 0], loss=loss)
 
 
 def restitution(loss):
-    """Two viscous spheres of reduced mass 1/2 that meet at the speed 1."""
-
-    def rate(_, y):
-        x = max(y[0], 0)
-        return [y[1], -2 * max(x**1.5 + 1.5 * loss * math.sqrt(x) * y[1], 0)]
-
-    bounds = {"rtol": 1e-10, "atol": 1e-12, "max_step": 0.01}
-    return -solve_ivp(rate, (0, 10), [0, 1], **bounds).y[1, -1]
+    """Two viscous spheres that meet at the speed 1."""
+    first, second = integrated([1] * 2, [1, 0], loss=loss)
+    return second - first
 
 
 def one_body(e):
     """Ball 1 against a body of two: momentum, and Newton's rule."""
     together = (1 + e) / 3
     return [1 - 2 * together, together, together]
-
-
-def convex(e):
-    """The least change and dissipation of velocities in order."""
-    c, before = (1 + e) / (1 - e), np.array([1.0, 0, 0])
-    order = {"type": "ineq", "fun": np.diff}
-
-    def cost(v):
-        return ((v - before) ** 2).sum() / 2 + c * (np.diff(before + v) ** 2).sum() / 4
-
-    return minimize(cost, [0.3, 0.3, 0.4], constraints=[order], tol=1e-14).x
 
 
 def rigid(e, ratio):
@@ -70,7 +48,7 @@ def test_fig_related_outcomes():
             "ratio 0.15": rigid(e, 0.15),
             "energy law": strike([1] * 3, [1, 0, 0], e, 3000)[0],
             "forces": forces(loss if e < 1 else 0),
-            "convex": convex(e) if e < 1 else one_body(1),
+            "convex": convex.strike(e) if e < 1 else one_body(1),
             "one body": one_body(e),
         }
         assert names == list(expected)

@@ -49,6 +49,7 @@ def test_minute():
     CHAPTER.tells({"period": PERIOD, "impacts": f"{impacts}", "strike": STRIKE})
     energy = f"{0.5 * G / LENGTH * BACK**2:.4f} J"
     assert CHAPTER.printed("minute").count(energy) == 2
+    assert "assert abs(after / before - 1) < 1e-12" in CHAPTER.cells["minute"].source
 
 
 def test_several():

@@ -68,15 +68,6 @@ class Pendulums:
         part = 0.5 if self.angle == "small" or np.any(self.gaps) else 1.0 - 2.0**-20
         return part * np.pi * self.row("length", size)
 
-    def within_reach(self, x: Vector, when: str = "") -> Vector:
-        """Return where the balls are, m, or refuse that one is so far aside."""
-        reach = self.reach(len(x))
-        beyond = np.abs(x) > reach
-        most = "half" if reach[0] > 2.0 * self.row("length", len(x))[0] else "a quarter of"
-        far = f"{reach[beyond.argmax()]:.4g} m: pendulums of this length reach {most} a circle"
-        asked.refuse_where(f"{when}positions", x, beyond, f"must be within {far}")
-        return x
-
     def natural_frequency(self, size: int) -> Vector:
         """Return sqrt(g/l) of each of `size` balls, rad/s."""
         frequency: Vector = np.sqrt(self.gravity / self.row("length", size))
@@ -111,6 +102,16 @@ class Hanging:
         away = np.zeros(last - first)
         self.gaps[first : last - 1].cumsum(out=away[1:])
         return away
+
+    def within_reach(self, x: Vector, when: str = "") -> None:
+        """Refuse that a ball is farther aside than it may be, m."""
+        beyond = np.abs(x) > self.reach
+        if beyond.any():
+            most = "half" if self.reach[0] > 2.0 * self.length[0] else "a quarter of"
+            far = f"{self.reach[beyond.argmax()]:.4g} m: pendulums of this length reach"
+            asked.refuse_where(
+                f"{when}positions", x, beyond, f"must be within {far} {most} a circle"
+            )
 
     def apart(self, x: Vector) -> Vector:
         """Return the nearest places at which no balls overlap, m; their centre stays."""

@@ -86,7 +86,7 @@ def swing(
     if x.shape != (n,):
         rule = f"{n} balls need ({n},): a place for each ball"
         raise ValueError(f"positions has shape {x.shape}; {rule}")
-    run = _Run(chain, model, hanging, hanging.within_reach(x))
+    run = _Run(chain, model, hanging, x)
     ended = run.to_the_end(at, most)
     x, v = (np.concatenate(parts) for parts in zip(*run.series, strict=True))
     at = at[: len(x)]
@@ -113,8 +113,8 @@ class _Run:
 
     def __init__(self, chain: Chain, model: Model, pendulums: Pendulums, x: Vector) -> None:
         n = len(chain)
-        self.chain, self.pendulums = chain, pendulums
-        self.hanging = hanging = Hanging(pendulums, chain.masses)
+        self.chain, self.hanging = chain, (hanging := Hanging(pendulums, chain.masses))
+        hanging.within_reach(x)
         self.model = functools.cache(functools.partial(part, model, n))
         self.t, self.x, self.v = 0.0, x.copy(), chain.velocities.copy()
         self.released = float(hanging.energy(self.x, self.v))
@@ -146,8 +146,7 @@ class _Run:
             wait, closing, opening = flight.next_meeting(left := max(end - self.t, 0.0))
             if isinstance(flight, SmallAngleFlight):  # others are certified not to go over the top
                 far = (1.0 - INSTANT) * flight.turning(min(wait, left))
-                if (np.abs(far) > hanging.reach).any():
-                    self.pendulums.within_reach(far, f"after t = {self.t:.4g} s ")
+                hanging.within_reach(far, f"after t = {self.t:.4g} s ")
             later = self.t + wait
             here = int(times.searchsorted(later, side="left"))
             if here > done or later > end:
