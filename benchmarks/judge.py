@@ -5,6 +5,7 @@ Usage::
     python benchmarks/judge.py                             # a hundred chains of every family
     python benchmarks/judge.py --family losses --count 10000 --seed 7
     python benchmarks/judge.py --count 250 --seed {5001..5028} --write    # data/judge.csv, an hour
+    python benchmarks/judge.py --family wide --count 250 --seed {5001..5028} --write  # a row of it
 
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
 within 600 events, and after no more of them at twice the digits.  A float means what it prints as
@@ -44,6 +45,7 @@ class Exact(textbook.Impact):
 
     def __init__(self, *given):
         super().__init__(*given)
+        self.tie = 10 ** (6 * decimal.getcontext().prec // 10)
         wider = Decimal(1) / self.tie / self.small
         self.small, self.last_digits = self.small * wider, self.last_digits * wider
 
@@ -54,10 +56,11 @@ class Exact(textbook.Impact):
 def exact(problem, read=meaning, *, events=EVENTS, twice=False):
     """The impact by the rules alone; None if the sequence does not end within so many events.
 
-    100 digits; four times as many where products of small ratios matter; twice as many if asked.
+    100 digits; eight times as many where products of small ratios matter, twice those that the
+    package then takes for the same rules; twice as many if asked.
     """
-    tiny = any(0 < ratio < 1e-6 for ratio in (*problem.forward, *problem.backward))
-    with decimal.localcontext(prec=DIGITS * (4 if tiny else 1) * (2 if twice else 1)):
+    tiny = any(0 < ratio < 1e-4 for ratio in (*problem.forward, *problem.backward))
+    with decimal.localcontext(prec=DIGITS * (8 if tiny else 1) * (2 if twice else 1)):
         try:
             return problem.solve(textbook.solve, number=read, max_events=events, impact=Exact)
         except textbook.EventLimit:
@@ -232,6 +235,9 @@ def main():
     table = pd.DataFrame(counts, WORDS).fillna(0).astype(int).T
     print(table.to_string())
     if given.write:
+        if given.family:  # the other rows stay
+            stored = pd.read_csv(given.output / "judge.csv", index_col="family")
+            table = table.reindex(stored.index).fillna(stored).astype(int)
         table.to_csv(given.output / "judge.csv", index_label="family", lineterminator="\n")
     for name, verdict, problem in found:
         print(f"\n{name}: {verdict.word}, off by {verdict.off:.1e}\n{problem!r}")

@@ -1,4 +1,4 @@
-"""What is read off outcomes: bouncing patterns, conditioning, effective ratios, conservation."""
+"""What is read off outcomes: bouncing patterns, conditioning, effective ratios."""
 
 from dataclasses import replace
 from itertools import product
@@ -156,69 +156,3 @@ def effective_ratio(trace: Trace) -> float:
     told = f"no ratio in [0, {bound:.6g}] gives the velocities {target.tolist()}; the nearest"
     far = f"{misses.min():.3g} of the fastest closing speed"
     raise ValueError(f"{told}, {finer[misses.argmin()]:.6g}, misses by {far}")
-
-
-def conserving_outcomes(
-    masses: ArrayLike, velocities: ArrayLike, angles: ArrayLike | None = None
-) -> tuple[Vector, Vector]:
-    """Return all outcomes of three balls that keep momentum, energy and the order of the balls.
-
-    They are an arc, from v1 = v2 at angle 0 to v2 = v3 at ``arccos((m1 m3 / ((m1 + m2)
-    (m2 + m3)))^(1/2))``, 60 degrees for equal balls (Walkiewicz and Newby, Am. J. Phys. 40 (1972)
-    133-137).  With s = v2 - v1, w the velocity of ball 3 relative to the centre of mass of balls 1
-    and 2, and mu and M the reduced masses of both, energy keeps the point (M^(1/2) w, mu^(1/2) s)
-    on a circle about the origin; the angle is counted there from the first axis.
-
-    Give masses, kg, and velocities before the impact, m/s, of shape (3,); and angles, rad, of shape
-    (K,), or none for 181 from end to end.  Returned are the angles and the velocities there, shape
-    (K, 3).  Wrong values and an angle off the arc raise a `ValueError`.
-
-    Examples
-    --------
-    >>> from cradle.measures import conserving_outcomes
-    >>> angles, outcomes = conserving_outcomes([1, 1, 1], [1, 0, 0])
-    >>> outcomes[[0, -1]].round(3) + 0.0
-    array([[ 0.   ,  0.   ,  1.   ],
-           [-0.333,  0.667,  0.667]])
-    """
-    (m1, m2, m3), (s, w, pair), (one, other) = _relative(masses, velocities)
-    first, second = m1 / (m1 + m2), m2 / (m1 + m2)
-    full = float(np.arctan2(one, other * first))  # there v2 = v3
-    every = np.linspace(0.0, full, 181) if angles is None else angles
-    angle = checked("angles", every, f"must lie in [0, {full:.6g}]", 0.0, full)
-    radius = np.hypot(one * s, other * w)
-    s_after = radius * np.sin(angle) / one
-    # cos(angle) as what is missing to v2 = v3: near 90 degrees it has few digits itself.
-    w_after = first * s_after + radius * (np.sin(full - angle) / np.sin(full)) / other
-    pair = pair + m3 / (m1 + m2 + m3) * (w - w_after)
-    balls = [pair - second * s_after, pair + first * s_after, pair + w_after]
-    return angle, np.stack(balls, axis=-1)
-
-
-def conserving_angle(masses: ArrayLike, velocities: ArrayLike) -> float:
-    """Return the angle of an outcome on the arc of `conserving_outcomes`, rad.
-
-    Give masses, kg, and velocities after the impact, m/s, of shape (3,).  The angle is 0 if all
-    balls have one velocity, and off the arc if their velocities are not in order.
-
-    Examples
-    --------
-    >>> from math import degrees
-    >>> from cradle.measures import conserving_angle
-    >>> round(degrees(conserving_angle([1, 1, 1], [-1 / 3, 2 / 3, 2 / 3])), 6)
-    60.0
-    """
-    _, (s, w, _), (one, other) = _relative(masses, velocities)
-    return float(np.arctan2(one * s, other * w))
-
-
-def _relative(masses: ArrayLike, velocities: ArrayLike) -> tuple[list[float], list[float], Vector]:
-    """Return masses whose sums do not overflow; s, w and the pair's velocity; roots of mu and M."""
-    chain = Chain(masses, velocities)
-    if len(chain) != 3:
-        raise ValueError(f"masses has shape ({len(chain)},); must be (3,): three balls")
-    m1, m2, m3 = np.ldexp(chain.masses, -int(np.frexp(chain.masses.max())[1])).tolist()
-    v1, v2, v3 = chain.velocities.tolist()
-    pair = v1 + m2 / (m1 + m2) * (v2 - v1)
-    roots = np.sqrt([m1 / (m1 + m2) * m2, m3 / (m1 + m2 + m3) * (m1 + m2)])
-    return [m1, m2, m3], [v2 - v1, v3 - pair, pair], roots

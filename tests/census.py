@@ -36,7 +36,7 @@ MODELS = {
     "sequential": [cradle.SequentialCollisions(x, max_events=300) for x in ("left", "right")],
     "springs": [cradle.SpringChain(2.0, 1.5), cradle.SpringChain(1.0, 1.0)],
     "energy": [SHARES(1.0, **FEW)],
-    "quadratic": [cradle.QuadraticDissipation(distance=x, max_problems=50) for x in (0, 0.1)],
+    "quadratic": [cradle.QuadraticDissipation(max_problems=50)],
 }
 REFUSED = """
 solve ABACA --speed x; solve ABXCA; solve; solve AB --masses 1,2; solve --masses 1,-1,1

@@ -12,14 +12,13 @@ from stored import read
 from truth import solve
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide, spring_velocities
-from cradle.measures import conserving_angle
 
 CHAPTER = Chapter("laws")
 
 
 def angle(scene, v):
-    """By the law of cosines in the plane of y, without the package's own angle."""
-    m = np.array(ELASTIC[scene], float)
+    """Where outcomes lie on the arc: by the law of cosines in the plane of y = m^(1/2) v."""
+    m = np.array(ELASTIC[scene] if isinstance(scene, str) else scene, float)
     y = np.sqrt(m) * (np.asarray(v) - m @ v / m.sum())
     meeting = np.sqrt(m) * np.array([-m[2], -m[2], m[0] + m[1]])  # v1 = v2
     cosine = y @ meeting / np.linalg.norm(y) / np.linalg.norm(meeting)
@@ -104,11 +103,11 @@ def test_fig_laws_map():
         masses = np.cumprod([1, *pair])
         bound = pair[1] / (1 + pair[1])
         after = spring_velocities(masses, [1, 0, 0], accuracy=1e-10)
-        aim = conserving_angle(masses, after)
+        aim = np.radians(angle(masses, after))
         angles = []
         for ratio in np.linspace(0, bound, 701):
             trace = collide(Chain(masses, [1, 0, 0]), ImpulseCorrelation(ratio, excess="saturate"))
-            angles.append(conserving_angle(masses, trace.velocities))
+            angles.append(np.radians(angle(masses, trace.velocities)))
         crossed = np.flatnonzero(np.diff(np.sign(np.array(angles) - aim)))
         assert abs(crossed[0] / 700 * bound - told[0]) < bound / 700 + 5e-4
         assert ((i, j) in {(round(y), round(x)) for y, x in framed}) == (len(told) == 2)

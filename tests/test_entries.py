@@ -82,7 +82,7 @@ ENTRIES = {
     cradle.spring_outcomes: MANY | FORCES,
     cradle.hertz_stiffness: {"radii": [0.01, 0.01], "young": 1e9, "poisson": 0.3},
     cradle.viscosity_from: {"restitution": 0.9, "speed": 1, "masses": [1, 1], "stiffness": 1},
-    QuadraticDissipation: {"coefficients": 3, "distance": 0.0, "max_problems": 10},
+    QuadraticDissipation: {"coefficients": 3, "max_problems": 10},
     cradle.post_impact_velocities: BALLS | RATIOS | {"progress": False},
     cradle.outcomes: BALLS | RATIOS | {"progress": False},
     cradle.paper_chain: {"sequence": "ABC", "speed": 1.0, "excess": "saturate"},
@@ -113,8 +113,6 @@ ENTRIES = {
     closed_form.back_impact_line: {"r2": 1, "e2": 1, "e3": 1, "ratio": 0.1},
     closed_form.first_ball_stops: {"e2": 0.9, "ratio": 0.1},
     closed_form.middle_ball_stops: {"e3": 0.9, "ratio": 0.1},
-    measures.conserving_outcomes: {"masses": [1, 1, 1], "velocities": [1, 0, 0], "angles": [0]},
-    measures.conserving_angle: {"masses": [1, 1, 1], "velocities": [1, 0, 0]},
     animation.animate_swing: {
         "runs": RUN, "labels": ["a"], "speed": 1.0, "still": 0.0, "columns": 1, "alt": "a",
     },

@@ -43,7 +43,7 @@ def test_what_is_no_chain(model):
         "damping='viscoelastic', accuracy=1e-09, max_steps=20000000)",
         "EnergyDistribution(stiffness=(1.0, 2.0), exponent=1.0, "
         "rtol=1e-09, max_evaluations=1000000)",
-        "QuadraticDissipation(coefficients=(1.0, 2.0), distance=3.0, max_problems=10000)",
+        "QuadraticDissipation(coefficients=(1.0, 2.0), max_problems=10000)",
         "ImpulseCorrelation(forward=(0.1, 0.2), backward=0.3, meeting=0.25, excess='saturate', "
         "max_events=9)",
     ],

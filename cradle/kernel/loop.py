@@ -109,6 +109,7 @@ def prepare(n, chain, meeting, state):
     """Write the chain into the state, in units of its own, powers of two; R2."""
     ball, contact, tally = state.ball, state.contact, state.tally[0]
     largest = heaviest = 0.0
+    product = 1.0
     for i in range(n):
         largest = max(largest, abs(chain.v[i]))
         heaviest = max(heaviest, chain.m[i])
@@ -136,8 +137,8 @@ def prepare(n, chain, meeting, state):
             back = contact[c - 1].backward if c > 0 else ZERO
             k.forward = read(chain.forward[c])
             k.backward = meant(read(chain.backward[c]), ball[c + 1].m, ball[c].m, back)
-            if 0.0 < chain.forward[c] < LIMITS.faint or 0.0 < chain.backward[c] < LIMITS.faint:
-                tally.margin = 0.0
+            for ratio in (chain.forward[c], chain.backward[c]):
+                product *= ratio if 0.0 < ratio < LIMITS.faint else 1.0
         k.u = minus(ball[c].start, ball[c + 1].start)
         k.made = abs(ball[c].start.real) + abs(ball[c + 1].start.real)
         k.before = negative(k.u)
@@ -150,6 +151,8 @@ def prepare(n, chain, meeting, state):
     for c in range(n - 3, -1, -1):
         onward = contact[c + 1].forward if c < n - 3 else ZERO
         contact[c].forward = meant(contact[c].forward, ball[c + 1].m, ball[c + 2].m, onward)
+    if product < LIMITS.product:
+        tally.margin = 0.0
     forget(LOWER, state.level)
     forget(UPPER, state.level)
     start(n, state)

@@ -36,8 +36,7 @@ def post_impact_velocities(
     restitution : array_like, shape (..., N - 1) or ()
         Energetic coefficients of restitution.
     forward, backward : array_like, shape (..., N - 2) or ()
-        Ratios; `backward` equals `forward` if left out.  Ratios between 0 and 1e-4 can decide a tie
-        wrongly where several of them multiply: write 0 if that is meant, and look at the margins.
+        Ratios; `backward` equals `forward` if left out.  Tiny ones take milliseconds a chain.
     meeting, excess, max_events
         As for `ImpulseCorrelation`.
     progress : bool

@@ -50,9 +50,6 @@ class QuadraticDissipation:
     coefficients : float or sequence, length N - 1, optional
         kappa of each contact, 0 to 1e9, in place of the restitution e of the chain; if left out,
         (1 + e) / (1 - e), for which e must be below 1.
-    distance : float
-        kappa of a further term, for the outer two of three balls.  It acts if neither contact opens
-        before the impact, and its impulse passes through both.
     max_problems : int
         Number of problems; if balls still approach after them, `ImpactNotFinished` is raised.
 
@@ -65,14 +62,11 @@ class QuadraticDissipation:
     --------
     >>> from cradle import Chain, QuadraticDissipation, collide
     >>> three = Chain([1, 1, 1], [1, 0, 0], 1)
-    >>> for model in (QuadraticDissipation(1e9), QuadraticDissipation(0, distance=1e9)):
-    ...     print(collide(three, model).velocities.round(6) + 0.0)
-    [-0.333333  0.666667  0.666667]
-    [0. 0. 1.]
+    >>> collide(three, QuadraticDissipation(1e9)).velocities.round(6)
+    array([-0.333333,  0.666667,  0.666667])
     """
 
     coefficients: float | Sequence[float] | None = None
-    distance: float = field(default=0.0, kw_only=True)
     max_problems: int = field(default=10_000, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -81,7 +75,6 @@ class QuadraticDissipation:
             given = asked.number_or_row("coefficients", given, "N - 1", rule, 0.0, _LARGEST)
         vars(self).update(
             coefficients=given,
-            distance=asked.one_number("distance", self.distance, rule, 0.0, _LARGEST),
             max_problems=asked.whole_number("max_problems", self.max_problems),
         )
 
@@ -98,8 +91,6 @@ class QuadraticDissipation:
             kappa = (1.0 + e) / (1.0 - e)
         else:
             kappa = asked.row_of("coefficients", self.coefficients, n - 1, n)
-        if self.distance and n != 3:
-            raise ValueError(f"distance = {self.distance!r}; needs three balls, the chain has {n}")
         left, right = np.maximum.accumulate(m), np.maximum.accumulate(m[::-1])[::-1]
         light = m < _LIGHTEST * np.minimum(left, right)
         rule = f"must be at least {_LIGHTEST} of the heaviest ball on one of its sides for this law"
@@ -117,8 +108,7 @@ class QuadraticDissipation:
             active = (u >= 0.0) & np.isin(stretch, stretch[u > 0.0])
             for at in (np.flatnonzero(active & (stretch == k)) for k in np.unique(stretch[active])):
                 balls = slice(at[0], at[-1] + 2)
-                outer = self.distance if len(at) == 2 == n - 1 else 0.0
-                jump[balls], parting = _parted(m[balls], u[at], kappa[at], outer)
+                jump[balls], parting = _parted(m[balls], u[at], kappa[at])
                 passed[at], after[at] = -np.cumsum((m * jump)[balls])[:-1], -parting
             after = np.where(active, after, u - np.diff(jump))
             absorbed += passed * unit * 0.5 * (u + after)
@@ -138,7 +128,7 @@ class QuadraticDissipation:
         return trace
 
 
-def _parted(m: Vector, u: Vector, kappa: Vector, distance: float) -> tuple[Vector, Vector]:
+def _parted(m: Vector, u: Vector, kappa: Vector) -> tuple[Vector, Vector]:
     """Return how velocities of touching balls with closing speeds u change, and how they part."""
     from scipy.optimize import nnls
 
@@ -147,9 +137,7 @@ def _parted(m: Vector, u: Vector, kappa: Vector, distance: float) -> tuple[Vecto
     # on its left from what is on its right, in proportion to the mass on the other side.
     left, right = np.cumsum(m)[:-1], np.cumsum(m[::-1])[-2::-1]
     parted = np.where(np.tri(len(m), len(u), -1) > 0.0, left, -right) / m.sum()
-    rows = np.vstack([np.eye(len(u)), np.ones(len(u))])
-    mu = np.append(m[:-1] / (m[:-1] + m[1:]) * m[1:], m[0] / (m[0] + m[-1]) * m[-1])
     inertia = np.sqrt(m)[:, None] * parted
-    loss = np.sqrt(np.append(kappa, distance) * mu)[:, None] * rows
+    loss = np.diag(np.sqrt(kappa * (m[:-1] / (m[:-1] + m[1:]) * m[1:])))
     w, _ = nnls(np.vstack([inertia, loss]), np.concatenate([-inertia @ u, loss @ u]))
     return parted @ (u + w), w

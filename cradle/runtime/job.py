@@ -15,8 +15,9 @@ import numpy as np
 from cradle import kernel as plain
 from cradle.kernel import state as rooms
 from cradle.kernel.kinks import Clock, Law, Link, Motions, Springs
-from cradle.kernel.state import FINISHED, PAUSED
+from cradle.kernel.state import FINISHED, PAUSED, UNFINISHED, UNSOUND
 from cradle.runtime import compile as runtime
+from cradle.runtime import exact
 
 #: What an answer can break, by the number that the kernel gives.
 DEFECTS = {
@@ -99,6 +100,15 @@ class Job:
     ) -> "Job":
         """Solve the chains, up to the first that is not FINISHED, or until `stop` is set."""
         # It calls `pause` whenever the event loop pauses.
+        while self._loop(stop, pause) in (UNFINISHED, UNSOUND) and exact.answer(self, self.next):
+            self.next, self.status = self.next + 1, FINISHED
+        for k in np.flatnonzero(self.outputs.margin[: self.next] == 0.0).tolist():
+            if not (stop and stop.is_set()):
+                exact.answer(self, k)
+        return self
+
+    def _loop(self, stop: threading.Event | None, pause: Callable[[], object] | None) -> int:
+        """Let the event loop run; return how the last chain ended."""
         resumed, rows = False, len(self.outputs.v)
         while self.next < rows and not (stop and stop.is_set()):
             kernel = runtime.chosen(self.large)
@@ -117,7 +127,7 @@ class Job:
                 self._make_room(2 * len(self.state.record.kinds))
             elif not resumed and self.status != FINISHED:
                 break
-        return self
+        return self.status
 
     def _begin(self, compiled: bool) -> None:
         """Lay out the work area for one runtime; what is solved so far stays."""

@@ -1,0 +1,78 @@
+"""Chains whose ratios multiply beyond the event loop's 32 digits: the textbook, over decimals."""
+
+import math
+from decimal import Decimal, localcontext
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from cradle import textbook
+from cradle.kernel.state import LIMITS, Record
+
+_DIGITS = 400
+_EFFORT = 10_000  # balls times events, after which an impact is left to the event loop
+_KINDS = "maximum_compression", "end", "close"  # in the order of the event loop's numbers
+
+
+class Impact(textbook.Impact):
+    """The textbook's, where zero is what is so to six tenths of the digits, as ties are."""
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.tie = 10 ** (6 * _DIGITS // 10)
+        self.last_digits /= self.small * self.tie
+        self.small = Decimal(1) / self.tie
+
+
+def ratios(m: list[Decimal], given: list[Decimal]) -> list[Decimal]:
+    """R7: forward ratios; one that nothing but rounding keeps from its bound (Eq. 53) is on it."""
+    found, onward = list[Decimal](), Decimal(0)
+    for here, driven, ratio in zip(m[-2:0:-1], m[:1:-1], given[::-1], strict=True):
+        bound = driven / (driven + here * (1 - onward))
+        drawn = Decimal(1.0 / (1.0 + float(here) / float(driven) * (1.0 - float(onward))))
+        off = min(abs(float(ratio / x) - 1.0) for x in (bound, drawn))
+        found.append(bound if off < LIMITS.rounded - 1.0 else ratio)
+        onward = min(found[-1], bound)  # above its bound it is held there
+    return found[::-1]
+
+
+def certify(it: textbook.Impact, before: list[Decimal]) -> None:
+    """Raise if an outcome breaks what the event loop's certificate asks for."""
+    after, grain, heavy = it.velocities, 2 * max(map(abs, before)) * it.small, sum(it.m)
+    gained = [m * (w - v) for m, v, w in zip(it.m, before, after, strict=True)]
+    lost = -sum(p * (v + w) for p, v, w in zip(gained, before, after, strict=True)) / 2
+    kept = sum((1 - e * e) * a for e, a in zip(it.e, it.absorbed, strict=True))
+    momentum, energy = abs(sum(gained)) <= heavy * grain, min(it.absorbed) >= 0
+    ledger = abs(lost - kept) <= heavy * grain * grain * it.tie
+    if not (momentum and energy and ledger and max(v - w for v, w in pairwise(after)) <= grain):
+        raise AssertionError("the textbook breaks momentum, order, energy or ledger")
+
+
+def answer(job: Any, k: int) -> bool:
+    """Give the answer to chain k if products of small ratios may decide it, and it has an end."""
+    given = [part[k].tolist() for part in job.inputs]
+    if math.prod(x for x in (*given[3], *given[4]) if 0.0 < x < LIMITS.faint) >= LIMITS.product:
+        return False
+    with localcontext(prec=_DIGITS):
+        m, v, e, f, b = ([Decimal(repr(x)) for x in part] for part in given)  # as they print
+        f, b = ratios(m, f), ratios(m[::-1], b[::-1])[::-1]
+        most = min(_EFFORT // len(m), job.options.max_events // 2)
+        options = {"meeting": Decimal(repr(job.options.meeting)), "max_events": most}
+        try:
+            it = textbook.solve(m, v, e, f, b, number=Decimal, impact=Impact, **options)
+        except textbook.EventLimit:
+            return False
+        certify(it, v)
+    out = job.outputs
+    out.v[k], out.hits[k], out.collapsed[k], out.margin[k] = it.velocities, it.collisions, 0, 0.0
+    if len(out.p):
+        out.p[:], out.a[:] = it.impulses, it.absorbed
+        out.held[:] = [c in it.held for c in range(len(m) - 1)]
+    if job.room:
+        events = [(_KINDS.index(kind), c) for kind, c in it.events]
+        kinds, contacts = np.array(events, np.int64).reshape(-1, 2).T
+        path, impulses = (np.array(x, float) for x in (it.path, it.path_impulses))
+        job.state = job.state._replace(record=Record(kinds, contacts, path, impulses))
+        job.counts["events"] = len(kinds)
+    return True
