@@ -13,7 +13,7 @@ from problem import Problem
 
 from cradle import outcomes
 from cradle.closed_form import largest_ratios
-from cradle.kernel.state import LIMITS
+from cradle.runtime import exact as package
 
 
 @pytest.mark.parametrize("name", chains_of("the judge"))
@@ -22,12 +22,15 @@ def test_named_chain(name):
     assert judge(CHAINS[name].problem).word == "right"
 
 
-@pytest.mark.parametrize("name", chains_of("told by the margin"))
-def test_a_tie_decided_by_products_of_tiny_ratios_is_told_by_the_margin(name):
-    """Beyond 32 digits, so the answer is wrong; it does not claim to be far from another one."""
+@pytest.mark.parametrize("name", chains_of("products of tiny ratios"))
+def test_a_tie_decided_by_products_of_tiny_ratios(name):
+    """Beyond 32 digits: the textbook decides it, in decimals; the loop alone would be wrong."""
     problem = CHAINS[name].problem
-    assert judge(problem).word == "wrong"
+    assert judge(problem).word == "right"
     assert problem.collide().margin == margin(problem) == 0.0
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(package, "answer", lambda *_: False)
+        assert judge(problem).word == "wrong"
     clear = [[1e-4 if x == 1e-20 else x for x in side] for side in problem[3:5]]
     clear = problem._replace(forward=clear[0], backward=clear[1])
     assert judge(clear).word == "right"
@@ -58,20 +61,10 @@ def margin(problem):
     return outcomes(*parts, meeting=meeting, excess="saturate").margin
 
 
-def told(problem):
-    """Whether ratios are so small that products of them may decide, and the margin says so."""
-    faint = any(0.0 < ratio < LIMITS.faint for ratio in (*problem.forward, *problem.backward))
-    return faint and margin(problem) == 0.0
-
-
 def no_wrong_chain(name, count, seed, **options):
-    """Of so many chains of a family none is wrong untold, and most are right."""
+    """Of so many chains of a family none is wrong, and most are right."""
     verdicts = [(judge(problem, **options), problem) for problem in family(name, count, seed)]
-    refuted = [(verdict, problem) for verdict, problem in verdicts if verdict.word in REFUTED]
-    wrong = [
-        f"{verdict}: {problem}" for verdict, problem in refuted
-        if verdict.word == "other reading" or not told(problem)
-    ]  # fmt: skip
+    wrong = [f"{verdict}: {problem}" for verdict, problem in verdicts if verdict.word in REFUTED]
     right = sum(verdict.word == "right" for verdict, _ in verdicts)
     assert not wrong, f"{len(wrong)} of {count} chains:\n" + "\n".join(wrong)
     assert right > 0.6 * count
@@ -101,9 +94,7 @@ def test_the_stored_run():
         assert list(row) == list(court.WORDS)
         assert sum(map(int, row.values())) >= 7000, name
         assert row["other reading"] == "0", name
-        # Products of ratios of 1e-20 or 1e-8 lie below the last of 32 digits; see the named tests.
-        allowed = {"tiny ratios": 95, "losses": 1, "small ratios": 18}.get(name, 0)
-        assert int(row["wrong"]) <= allowed, name
+        assert row["wrong"] == "0", name
         assert int(row["open"]) <= 1, name
         assert int(row["right"]) > 4200, name
 
