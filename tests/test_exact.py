@@ -26,7 +26,7 @@ def always(monkeypatch):
 @pytest.mark.parametrize("name", ["generic", "at bounds", "ties"])
 def test_the_whole_trace_is_that_of_the_loop(name, request):
     """Events, path, works: where the loop is right both say the same, to rounding."""
-    traces = [p.collide() for p in family(name, 40, seed=11)]
+    traces = [p.collide() for p in family(name, 15, seed=11)]
     request.getfixturevalue("always")
     for trace in traces:
         again = collide(trace.chain, trace.model)
@@ -70,6 +70,23 @@ def test_others_of_a_batch_go_on_where_the_loop_gives_up():
     assert found.velocities[1].tolist() != batch(TIE)
 
 
+#: Long rows of equal balls, in which a closing speed of 1e-400 would be none of rounding.
+ZERO = Problem(
+    [1.0] * 8, [0, 0, 1, 0, 1, 0, -0.5, -0.5], [1.0] * 7,
+    [0, 0, 0.1, 0.1, 0, 0], [0, 0.1, 0, 0.1, 0, 0],
+)  # fmt: skip
+#: Ratios on a bound that is no float, and on one that follows from a ratio above its own.
+BOUND = Problem([1.0, 3.0, 4.0], [1.0, 0.0, 0.0], [1.0, 1.0], [4 / 7], [0.0])
+BEYOND = Problem([1.0] * 5, [1.0] + [0.0] * 4, [1.0] * 4, [0.0, 2 / 3, 1.0], [0.0] * 3)
+
+
+@pytest.mark.parametrize("problem", [ZERO, BOUND, BEYOND])
+def test_zero_and_bounds_are_those_of_the_loop(problem, request):
+    right = problem.collide().velocities
+    request.getfixturevalue("always")
+    np.testing.assert_allclose(problem.collide().velocities, right, rtol=0, atol=1e-14)
+
+
 @pytest.mark.usefixtures("always")
 def test_a_bound_is_meant_as_floats_draw_it():
     """A light ball leaves the exact one few digits; see the judge's test of this name."""
@@ -85,8 +102,8 @@ def swapped(it):
     it.velocities.reverse()  # all masses are 1: momentum and energy stay
 
 
-def pushed(it):
-    it.velocities[0] -= 1
+def slowed(it):
+    it.velocities = [sum(v * v / 8 for v in it.velocities).sqrt()] * 8  # the energy stays
 
 
 def booked_below_zero(it):
@@ -97,7 +114,7 @@ def booked_twice(it):
     it.absorbed[0] *= 2
 
 
-@pytest.mark.parametrize("change", [swapped, pushed, booked_below_zero, booked_twice])
+@pytest.mark.parametrize("change", [swapped, slowed, booked_below_zero, booked_twice])
 def test_a_wrong_outcome_is_not_returned(change, monkeypatch):
     class Wrong(package.Impact):
         def round(self):
