@@ -56,11 +56,11 @@ class Exact(textbook.Impact):
 def exact(problem, read=meaning, *, events=EVENTS, twice=False):
     """The impact by the rules alone; None if the sequence does not end within so many events.
 
-    100 digits; eight times as many where products of small ratios matter, twice those that the
-    package then takes for the same rules; twice as many if asked.
+    100 digits; five times as many where products of small ratios matter, more than the package then
+    takes for the same rules; twice as many if asked.
     """
     tiny = any(0 < ratio < 1e-4 for ratio in (*problem.forward, *problem.backward))
-    with decimal.localcontext(prec=DIGITS * (8 if tiny else 1) * (2 if twice else 1)):
+    with decimal.localcontext(prec=DIGITS * (5 if tiny else 1) * (2 if twice else 1)):
         try:
             return problem.solve(textbook.solve, number=read, max_events=events, impact=Exact)
         except textbook.EventLimit:

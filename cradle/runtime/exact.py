@@ -11,7 +11,7 @@ from cradle import textbook
 from cradle.kernel.state import LIMITS, Record
 
 _DIGITS, _ZERO = 400, Decimal("1e-240")  # six tenths of the digits tell zero from a speed
-_EFFORT = 10_000  # balls times events, after which an impact is left to the event loop
+_EFFORT = 4_000  # balls times events, after which an impact is left to the event loop
 _KINDS = "maximum_compression", "end", "close"  # in the order of the event loop's numbers
 
 
