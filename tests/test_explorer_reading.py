@@ -566,7 +566,7 @@ def test_sweeps_and_maps_share_the_frame(still):
     assert 0 < tab.evaluate(painted) < before / 3
 
 
-def test_what_takes_too_long_is_said(still, root):
+def test_what_takes_too_long_is_said(still):
     """Five light balls between two heavy ones take more events than the page computes."""
     masses = "100,0.01,0.01,0.01,0.01,0.01,100"
     fragment = f"#speeds=2,0,0,0,0,0,0&masses={masses}&restitution=0.99&forward=0.02"
@@ -575,10 +575,6 @@ def test_what_takes_too_long_is_said(still, root):
     status = tab.state("swing.hit(0).status")
     assert status == "unfinished"
     assert "more than 4000 events" in tab.inner_text(".words")
-    teachers = (root / "book" / "instructors.md").read_text(encoding="utf-8")
-    assert "After 4000 events" in teachers
-    lightest, heaviest = tab.evaluate("cradleExplorer.LIMITS.masses")
-    assert f"Masses go from {lightest} to {heaviest} kg" in teachers
     assert tab.locator(".outcome rect").count() == 0  # no stale bars
     assert tab.locator(".pictures polyline").count() == 0
     tab.push("Let go", 300)

@@ -8,6 +8,7 @@ from itertools import pairwise
 import draw_readme
 import numpy as np
 import pytest
+from chapters import numbers
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
@@ -140,6 +141,26 @@ def test_readme_film_is_the_toys(root):
     np.testing.assert_allclose(*values, atol=0.002)
     assert len(stored) < 200_000
     assert "toy.svg" in (root / "README.md").read_text(encoding="utf-8")
+
+
+def test_picture_of_the_lecture():
+    """The stored one is what the script draws: three outcomes, and each of them on the arc."""
+    made, figure = io.StringIO(), draw_readme.lecture()
+    figure.savefig(made, format="svg")
+    paths = [
+        re.findall(r'd="([^"]*)"[^>]*?stroke: #(\w{6}); stroke-w', svg)
+        for svg in (draw_readme.LECTURE.read_text(encoding="utf-8"), made.getvalue())
+    ]
+    assert [colour for _, colour in paths[0]] == [colour for _, colour in paths[1]]
+    for (one, _), (other, _) in zip(*paths, strict=True):
+        np.testing.assert_allclose(numbers(one), numbers(other), atol=0.01)
+    *panels, arc, _ = figure.axes
+    for ax, s in zip(panels, (1, np.sqrt(0.7), 0), strict=True):  # Eq. fig4
+        v = np.array([s**2 - 1, 2 - 2 * s, 2 + 2 * s]) / (3 + s**2)
+        assert [bar.get_height() for bar in ax.patches] == pytest.approx(v, abs=1e-12)
+        u = [*v[:2] - v[1:]]
+        assert any(line.get_xydata()[0] == pytest.approx(u, abs=1e-12) for line in arc.lines[3:])
+        assert u[0] ** 2 + u[0] * u[1] + u[1] ** 2 == pytest.approx(1)
 
 
 def drawn(draw):
