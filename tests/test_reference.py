@@ -80,7 +80,7 @@ def test_every_word_of_the_glossary_leads_to_the_place_that_explains_it():
     words = re.split(r"\n(?=\S)", text(BOOK / "glossary.md").split(":sorted:")[1].split("```")[0])
     told = [entry for entry in words if "\n  " in entry]
     assert len(told) > 60
-    place = r"\{(?:ref|doc|eq|term)\}"
+    place = r"\{(?:ref|numref|doc|eq|term)\}"
     assert [entry for entry in told if not re.search(place, entry.split("\n  ", 1)[1])] == []
 
 
