@@ -103,7 +103,7 @@ def test_solve_agrees_with_the_solver():
 def test_tasks_for_tests_and_marks():
     """Their answers, printed and by the command; only the last one has a back impact."""
     text = (DATA.parent / "book" / "instructors.md").read_text(encoding="utf-8")
-    tasks = re.findall(r"(?m)^\| \d \| ([\d, ]+) \| ([\d/, ]+) \| ([\d/]+) \|$", text)
+    tasks = re.findall(r"(?m)^\| ([\d, ]+) \| ([\d/, ]+) \| ([\d/]+) \|$", text)
     collisions, velocities = [], []
     for task in tasks:
         rows = [[float(Fraction(number)) for number in numbers.split(", ")] for numbers in task]
