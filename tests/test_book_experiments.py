@@ -193,18 +193,6 @@ def test_table_2_most_open_entries():
     AS_MEASURED.tells({"span-median": middle, "half-span": middle / 2, "span-double": twice}, 1e-3)
 
 
-def test_entries_by_heights():
-    """Where heights within half a millimetre end, if not at the ends of the range."""
-    told = {t: AS_MEASURED.glued[f"open-{t.lower()}-h"] for t in ("AAA", "BAD", "BBD", "CBD")}
-
-    for triplet, words in told.items():
-        low, high = map(float, words.partition(" or ")[0].split(" to "))
-        for inside, outside in ((low + 0.006, low - 0.006), (high - 0.006, high + 0.006)):
-            assert distance(triplet, inside, climb) <= 5e-4
-            if outside > 0:
-                assert distance(triplet, outside, climb) > 5e-4
-
-
 def test_why_two_entries_are_open():
     """Ball 2 slows down to the velocity of ball 1 while it pushes D; the two leave together."""
     speeds = []
