@@ -46,15 +46,15 @@ def rows(cell):
 
 def test_minute():
     impacts = math.floor((60 - PERIOD / 4) / (PERIOD / 2)) + 1
-    CHAPTER.tells({"period": PERIOD, "impacts": f"{impacts}", "strike": STRIKE})
-    energy = f"{0.5 * G / LENGTH * BACK**2:.4f} J"
-    assert CHAPTER.printed("minute").count(energy) == 2
-    assert "assert abs(after / before - 1) < 1e-12" in CHAPTER.cells["minute"].source
+    CHAPTER.tells({"strike": STRIKE, "degrees": math.degrees(math.asin(BACK / LENGTH))})
+    first, energy = CHAPTER.printed("minute").splitlines()
+    assert first == f"{impacts} impacts"
+    assert energy.endswith(": 1.000000")
 
 
 def test_several():
-    *story, two = rows("several")
-    assert story == [[0] * (5 - k) + [1] * k for k in range(1, 5)]
+    story, two = rows("several")
+    assert story == [0, 0, 0, 1, 1]
     expected = strokes(1, [1, 1, 0, 0, 0])[0]
     np.testing.assert_allclose(two, expected, rtol=0, atol=5.1e-4)
     CHAPTER.tells(dict(zip(("two-third", "two-fourth", "two-fifth"), expected[2:])))
@@ -78,8 +78,7 @@ def test_mirror():
     """The map from either side, by the independent solver."""
     one, other = strokes(20, [1, 0, 0, 0, 0]), -strokes(20, [0, 0, 0, 0, -1])[:, ::-1]
     apart = np.abs(one - other).max(axis=1)
-    found = [row for (row,) in rows("mirror")]
-    assert found[:4] == [round(x, 3) for x in apart[[0, 1, 2, 19]].tolist()]  # as printed
+    assert glued("mirror-worst") > apart.max() - 0.006
     CHAPTER.tells({"mirror-first": -other[1, 0], "mirror-next": -other[1, 1]})
 
 
@@ -207,6 +206,9 @@ def test_spread_of_the_second_stroke_at_any_angle():
     widest = BACK / LENGTH * np.abs(v).max()
     late = PERIOD / 2 * widest**2 / 16
     assert glued("spread") == pytest.approx(1e3 * late, rel=0.1)
+    contact = glued("contact-time") * 1e-6
+    assert glued("spread-times") == round(late / contact, -1)
+    assert late / 100 < contact
 
 
 def test_one_percent_and_the_ball_that_never_hangs_still():
@@ -218,24 +220,18 @@ def test_one_percent_and_the_ball_that_never_hangs_still():
     assert np.flatnonzero(always.all(axis=0)).tolist() == [glued("always") - 1]
 
 
-def test_fig_toy_inside_and_film():
-    """The curves end, and the stored film moves, as the independent solver says."""
-    shown = [xy[-1, 1] for xy in panel("toy", "fig-toy-inside").values()]
-    expected = strokes(2, [1, 0, 0, 0, 0])[1]
-    np.testing.assert_allclose(shown, expected, atol=1e-9)
-    # The three turns of the pushes are the fastest moments of balls 4, 3 and 2.
-    curves = list(panel("toy", "fig-toy-inside").values())
-    ax = drawn("toy")["fig-toy-inside"].axes[0]
-    marks = [line.get_xdata()[0] for line in ax.get_lines() if len(line.get_xdata()) == 2]
-    fastest = [xy[xy[:, 1].argmin(), 0] for xy in curves[3:0:-1]]
-    np.testing.assert_allclose(marks, fastest, atol=1e-9)
-    assert [text.get_text() for text in ax.texts][:4] == ["5→4", "4→3", "3→2", "2→1"]
-    mirrored = [xy[-1, 1] for xy in panel("toy", "fig-toy-inside", 1).values()]
-    other = -strokes(2, [0, 0, 0, 0, -1])[1, ::-1]
-    np.testing.assert_allclose(mirrored, other, atol=1e-9)
+def test_fig_toy_second_and_film():
+    """Marks of the rule, and the stored film, as the independent solver says."""
+    ways = strokes(2, [1, 0, 0, 0, 0])[1], -strokes(2, [0, 0, 0, 0, -1])[1, ::-1]
+    shown = list(panel("toy", "fig-toy-second").values())
+    for points, expected in zip(shown, ways, strict=False):
+        np.testing.assert_allclose(points[:, 0], expected, atol=1e-9)
+    assert -shown[2][:2, 0] == pytest.approx(
+        [glued("steel-second-first"), glued("steel-second-next")], abs=0.006
+    )
     film = CHAPTER.cells["film"].outputs[0].data["text/html"]
-    for row, ratio in enumerate((0, RATIO, 0.5)):
-        v = strokes(1, [1, 0, 0, 0, 0], ratio=ratio)[0]
+    for row, (ratio, e) in enumerate(((0, 1), (RATIO, 1), (RATIO, 0.9))):
+        v = strokes(1, [1, 0, 0, 0, 0], e, ratio)[0]
         for ball in range(5):
             ((frames),) = re.findall(rf"@keyframes m\w+-s{row}b{ball}\{{(.*)\}}\n", film)
             found = np.array(
