@@ -9,6 +9,7 @@ from chapters import Chapter, code, in_memory, number, panel, run
 from dop853 import integrated
 from hunt_crossley import closed, motion
 from scipy import optimize
+from stored import read
 from truth import solve
 
 CHAPTER = Chapter("forces")
@@ -70,12 +71,17 @@ def test_the_work_for_an_error():
     three = [CHAPTER.glued[f"{name}-work"] for name in ("verlet", "better", "corrected")]
     assert rings == [[float(work), 1e-3] for work in three]
     assert {*three} < {text.get_text() for text in ax.texts}
+    for name, method, asked in (
+        ("batch", "this package", "1e-03"), ("batch-rule", "the paper's rule", "")
+    ):  # fmt: skip
+        (row,) = read("forces.csv", chain="5 equal", method=method, asked=asked)
+        CHAPTER.tells({name: float(row["microseconds"])})
 
 
 def test_the_rule_is_per_cents_from_spheres():
     first = HERTZ["three equal"][0]
     ratio = -2 * first / (1 - first)
-    assert CHAPTER.glued["ratio"] == f"{ratio:.3f}"
+    assert CHAPTER.glued["ratio"] == f"{ratio:.4f}"
     done = solve([1] * 5, [1, 0, 0, 0, 0], 1, ratio, number=float)
     off = np.abs(np.array(done.velocities, float) - HERTZ["five equal"]).max()
     assert number(CHAPTER.glued["rule"]) == pytest.approx(off, abs=0.005)
