@@ -336,7 +336,7 @@ def test_what_the_page_says_of_the_program():
             "own-solver-ways-step": e[0] * compression,
         }
     )
-    rows = [line[14:] for line in PROGRAM.printed("solved").splitlines()[1:]]
+    rows = [line[8:] for line in PROGRAM.printed("solved").splitlines()[1:]]
     rows = np.array([[float(x) for x in row.replace("-", " -").split()] for row in rows])
     exact = solve(m, v, e, a)
     for columns, values in ((slice(3), exact.path), (slice(3, 5), exact.path_impulses)):
