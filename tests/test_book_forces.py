@@ -71,11 +71,20 @@ def test_the_work_for_an_error():
     three = [CHAPTER.glued[f"{name}-work"] for name in ("verlet", "better", "corrected")]
     assert rings == [[float(work), 1e-3] for work in three]
     assert {*three} < {text.get_text() for text in ax.texts}
-    for name, method, asked in (
-        ("batch", "this package", "1e-03"), ("batch-rule", "the paper's rule", "")
-    ):  # fmt: skip
-        (row,) = read("forces.csv", chain="5 equal", method=method, asked=asked)
-        CHAPTER.tells({name: float(row["microseconds"])})
+
+
+def test_fig_cost():
+    """The stored times and errors; those of the text are among them."""
+    told = {"this package": ("batch", "1e-03"), "the paper's rule": ("batch-rule", "")}
+    for method, shown in panel("forces", "fig-own-forces-cost").items():
+        rows = list(read("forces.csv", chain="5 equal", method=method))
+        assert shown == pytest.approx(
+            np.array([[float(row["microseconds"]), float(row["error"])] for row in rows])
+        )
+        if method in told:
+            name, asked = told[method]
+            (row,) = (row for row in rows if row["asked"] == asked)
+            CHAPTER.tells({name: float(row["microseconds"])})
 
 
 def test_the_rule_is_per_cents_from_spheres():
