@@ -41,7 +41,7 @@ def test_fig_related_outcomes():
     loss = brentq(lambda loss: restitution(loss) - E, 0.05, 0.2, xtol=1e-7)
     panels = CHAPTER.figures["fig-related-outcomes"].axes
     names = [label.get_text() for label in panels[0].get_yticklabels()]
-    assert panels[1].get_title() == f"restitution {E}"
+    assert panels[1].get_title(loc="left") == f"restitution {E}"
     for ax, e in zip(panels, (1, E), strict=True):
         expected = {
             "pairs": rigid(e, 0),
@@ -60,6 +60,8 @@ def test_fig_related_outcomes():
                 assert x == pytest.approx(v, abs=1e-3)
                 assert round(y) == row
                 assert written[x, y] == str(ball)
+                told = written[1.22 + 0.22 * (ball - 1), row].replace("−", "-")
+                assert float(told) == pytest.approx(v, abs=6e-3)
         # What the text, and the words for those who do not see it, say of them.
         first = {name: after[0] for name, after in expected.items()}
         assert max(first, key=first.get) == "pairs"

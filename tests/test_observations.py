@@ -50,7 +50,7 @@ def test_which_law_agrees(row):
         assert (law in yes) == agrees, law
         assert (law in no) == fails, law
         at_the_end = {law: words[row - 1] for law, *words in told("again")}[law]
-        assert at_the_end[0] in ("✓i" if agrees else "✗" if fails else "–i")
+        assert at_the_end[0] in ("✓e" if agrees else "✗" if fails else "–l")
 
 
 E = np.round(np.arange(0.71, 1, 0.02), 2)
