@@ -96,7 +96,7 @@ def test_fig_laws_map():
     single = []
     for text in ax.texts:
         j, i = text.get_position()
-        told = [float(x) for x in text.get_text().split("\nto ")]
+        told = [float(x) for x in text.get_text().split("\n…\n")]
         pair = sizes[i], sizes[j]
         assert told[0] == pytest.approx(IMPLIED[1.5, 1, *pair], abs=5.1e-4)
         assert image[i, j] == pytest.approx(IMPLIED[1.5, 1, *pair], abs=1e-9)
@@ -173,8 +173,6 @@ def test_fig_laws_paths_of_the_energy_law_and_of_the_ratio():
     CHAPTER.tells({"back": back, "ratio": 2 * back / (1 + back)})
     apart = np.abs(outcomes[0.5] - rigid(ratio, 0.5))
     assert number(CHAPTER.glued["apart"]) == pytest.approx(apart.max(), abs=1.5e-3)
-    assert apart.argmax() == 0
-    assert number(CHAPTER.glued["slow"]) == pytest.approx(outcomes[0.5][0], abs=6e-3)
 
 
 def test_convex_dissipation_keeps_the_struck_balls_together():

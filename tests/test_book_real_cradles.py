@@ -817,6 +817,10 @@ def test_swing_of_the_mean():
     layer = np.sqrt(2 * 1.8e-5 / 1.2 * period / (2 * np.pi))
     air = 3 * np.pi * 1.8e-5 * 0.01109 * (1 + 0.01109 / layer) / 0.044756
     assert float(HALF.glued["air"]) == pytest.approx(damping / air, rel=0.06)
+    # After 23 s most of the motion is that of the mean.
+    t, *x = table("cradle_trace.csv").values()
+    late = np.array(x)[:, t > 23.5]
+    assert 5 * np.nanvar(late.mean(axis=0)) > 0.8 * np.nanvar(late, axis=1).sum()
 
 
 def test_fig_half():
