@@ -52,6 +52,7 @@ def test_fig_laws_paths_ends_on_the_arc():
     order = sorted(answers, key=lambda name: angle("three equal", answers[name]))
     assert order == list(drawn)
     assert angle("three equal", fused("three equal")) == pytest.approx(60, abs=1e-6)
+    assert all(angle("three equal", answers[name]) < 15 for name in order[:4])  # near pairs
 
 
 def test_engines_on_the_arc():
