@@ -86,8 +86,6 @@ def test_energy_left_by_three_definitions():
             found = (1 - left) ** 2 + (left - pushed) ** 2 + pushed**2
             assert found == pytest.approx(energy, rel=1e-13)
     assert "at a = 1/2: 17/9" in READING.printed("problem-poisson")
-    tau_2, tau_3 = solve([1, 1, 1], [1, 0, 0], 1, 0.15).impulses
-    READING.tells({"quotient": float(tau_3 / tau_2)})
 
 
 def test_exercise_2_heavy_middle():

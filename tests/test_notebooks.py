@@ -196,7 +196,7 @@ GIVEN = {
     "extremes_maps": "0.1 0.2 0.3 0.45 0.8 0.9 36.9",
     "extremes_inventory": "0.01 0.1 0.5 0.9",
     "notation": "",
-    "reading_problem": "0.15 0.2",
+    "reading_problem": "0.2",
     "reading_compliance": "",
     "reading_three_balls": "0.5",
     "reading_multiple_impacts": "0.1 0.15 0.2 0.25 0.8",
