@@ -199,7 +199,7 @@ GIVEN = {
     "reading_problem": "0.2",
     "reading_compliance": "",
     "reading_three_balls": "0.5 0.95",
-    "reading_multiple_impacts": "0.1 0.15 0.2 0.25 0.8",
+    "reading_multiple_impacts": "0.15 0.25 0.8",
     "reading_patterns": "0.003 0.01 0.15 0.3475 0.348 0.5 0.999",
     "reading_counting": "0.15 0.4 0.5",
     "reading_n_balls": "0.1 0.5",
