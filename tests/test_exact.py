@@ -1,5 +1,7 @@
 """Chains that the textbook solves in the event loop's place, in decimals of 400 digits."""
 
+import threading
+
 import numpy as np
 import pytest
 from delicate import CHAINS
@@ -8,9 +10,10 @@ from judge import batch, exact, off, on_bounds
 from problem import Problem
 
 from cradle import ImpactNotFinished, collide, outcomes
-from cradle.kernel import loop
+from cradle.kernel import Inputs, Options, loop
 from cradle.kernel.state import LIMITS
 from cradle.runtime import exact as package
+from cradle.runtime.job import Job, outputs
 
 TIE = CHAINS["a tie decided by products of tiny ratios"].problem
 
@@ -33,6 +36,7 @@ def test_the_whole_trace_is_that_of_the_loop(name, request):
         if trace.collapsed:
             continue
         assert again.margin == 0.0
+        assert not again.collapsed
         assert again.events == trace.events
         assert again.saturated == trace.saturated
         assert again.collisions.tolist() == trace.collisions.tolist()
@@ -59,15 +63,22 @@ def test_few_steps_are_as_few_for_the_textbook():
         TIE.collide(max_events=5)
 
 
-def test_others_of_a_batch_go_on_where_the_loop_gives_up():
-    """The loop alone finds no end here, 20 steps are too few for it."""
-    model = {"meeting": TIE.meeting, "excess": "saturate"}
-    rows = [np.array([TIE[k]] * 3) for k in range(5)]
-    rows[3][1] = rows[4][1] = 0.0
-    found = outcomes(*rows, **model)
-    assert found.velocities[0].tolist() == found.velocities[2].tolist() == batch(TIE)
-    assert (found.margin[[0, 2]] == 0.0).all()
-    assert found.velocities[1].tolist() != batch(TIE)
+def test_one_that_the_loop_gets_wrong_does_not_stop_a_batch():
+    """Alone the loop would leave balls that approach: its certificate refuses that."""
+    refused = CHAINS["a certificate refuses the loop's answer"].problem
+    rows = [np.array([TIE[k], refused[k], TIE[k]]) for k in range(5)]
+    found = outcomes(*rows, excess="saturate")
+    assert found.velocities.tolist() == [batch(TIE), batch(refused), batch(TIE)]
+    assert off(refused, batch(refused), exact(refused).velocities) < 1e-14
+    assert (found.margin == 0.0).all()
+
+
+def test_a_chunk_stops_where_another_has_failed(monkeypatch):
+    asked, stop = [], threading.Event()
+    monkeypatch.setattr(package, "answer", lambda _, k: (asked.append(k), stop.set()))
+    inputs = Inputs(*(np.array([TIE[k]] * 3, float) for k in range(5)))
+    Job(inputs, outputs(3, 8), Options(0.5, 1000, bounded=False)).run(stop)
+    assert asked == [0]
 
 
 #: Long rows of equal balls, in which a closing speed of 1e-400 would be none of rounding.
@@ -80,11 +91,17 @@ BOUND = Problem([1.0, 3.0, 4.0], [1.0, 0.0, 0.0], [1.0, 1.0], [4 / 7], [0.0])
 BEYOND = Problem([1.0] * 5, [1.0] + [0.0] * 4, [1.0] * 4, [0.0, 2 / 3, 1.0], [0.0] * 3)
 
 
-@pytest.mark.parametrize("problem", [ZERO, BOUND, BEYOND])
-def test_zero_and_bounds_are_those_of_the_loop(problem, request):
-    right = problem.collide().velocities
+#: Two contacts that close on one ball at once: in decimals, not in doubles.
+DECIMAL = Problem([1.0] * 5, [1.0, 0.1, 0.2, 0.3, -1.0], [1.0] * 4, [0.1] * 3, [0.1] * 3)
+
+
+@pytest.mark.parametrize("problem", [ZERO, BOUND, BEYOND, DECIMAL])
+def test_zero_bounds_and_numbers_are_those_of_the_loop(problem, request):
+    right = problem.collide()
     request.getfixturevalue("always")
-    np.testing.assert_allclose(problem.collide().velocities, right, rtol=0, atol=1e-14)
+    again = problem.collide()
+    np.testing.assert_allclose(again.velocities, right.velocities, rtol=0, atol=1e-14)
+    assert again.saturated == right.saturated
 
 
 @pytest.mark.usefixtures("always")

@@ -30,7 +30,7 @@ def test_a_tie_decided_by_products_of_tiny_ratios(name):
     assert problem.collide().margin == margin(problem) == 0.0
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(package, "answer", lambda *_: False)
-        assert judge(problem).word == "wrong"
+        assert judge(problem).word in ("wrong", "unfinished")
     clear = [[1e-4 if x == 1e-20 else x for x in side] for side in problem[3:5]]
     clear = problem._replace(forward=clear[0], backward=clear[1])
     assert judge(clear).word == "right"

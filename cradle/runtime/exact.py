@@ -28,8 +28,8 @@ def ratios(m: list[Decimal], given: list[Decimal]) -> list[Decimal]:
     found, onward = list[Decimal](), Decimal(0)
     for here, driven, ratio in zip(m[-2:0:-1], m[:1:-1], given[::-1], strict=True):
         bound = driven / (driven + here * (1 - onward))
-        drawn = Decimal(1.0 / (1.0 + float(here) / float(driven) * (1.0 - float(onward))))
-        off = min(abs(float(ratio / x) - 1.0) for x in (bound, drawn))
+        drawn = 1.0 / (1.0 + float(here) / float(driven) * (1.0 - float(onward)))
+        off = abs(float(ratio) / drawn - 1.0)
         found.append(bound if off < LIMITS.rounded - 1.0 else ratio)
         onward = min(found[-1], bound)  # above its bound it is held there
     return found[::-1]
@@ -37,7 +37,7 @@ def ratios(m: list[Decimal], given: list[Decimal]) -> list[Decimal]:
 
 def certify(it: textbook.Impact, before: list[Decimal]) -> None:
     """Raise if an outcome breaks what the event loop's certificate asks for."""
-    after, speed, heavy = it.velocities, 10 * max(map(abs, before)), sum(it.m)
+    after, speed, heavy = it.velocities, max(map(abs, before)), sum(it.m)
     gained = [m * (w - v) for m, v, w in zip(it.m, before, after, strict=True)]
     lost = -sum(p * (v + w) for p, v, w in zip(gained, before, after, strict=True)) / 2
     kept = sum((1 - e * e) * a for e, a in zip(it.e, it.absorbed, strict=True))

@@ -15,7 +15,7 @@ import numpy as np
 from cradle import kernel as plain
 from cradle.kernel import state as rooms
 from cradle.kernel.kinks import Clock, Law, Link, Motions, Springs
-from cradle.kernel.state import FINISHED, PAUSED, UNFINISHED, UNSOUND
+from cradle.kernel.state import FINISHED, PAUSED, UNSOUND
 from cradle.runtime import compile as runtime
 from cradle.runtime import exact
 
@@ -100,7 +100,7 @@ class Job:
     ) -> "Job":
         """Solve the chains, up to the first that is not FINISHED, or until `stop` is set."""
         # It calls `pause` whenever the event loop pauses.
-        while self._loop(stop, pause) in (UNFINISHED, UNSOUND) and exact.answer(self, self.next):
+        while self._loop(stop, pause) == UNSOUND and exact.answer(self, self.next):
             self.next, self.status = self.next + 1, FINISHED
         for k in np.flatnonzero(self.outputs.margin[: self.next] == 0.0).tolist():
             if not (stop and stop.is_set()):
