@@ -59,9 +59,9 @@ class Trace:
         How near another sequence of events came, from 0 to 1: the least relative distance of two
         events of one run, of two meetings, or of a ratio from its bound.  Exact ties do not count.
         Below about 1e-12 a change in the last digit of the input may change the outcome.  It is 0
-        in three cases, which the book's reference explains: a ratio is tiny, two or more balls at
-        rest are struck from both sides (R2), or one part of the chain collapsed while others still
-        collided.  Models that `ImpulseCorrelation` does not solve leave it 1, not measured.
+        in three cases, which the book's reference explains: several ratios are tiny, two balls at
+        rest are struck from both sides, or one part collapsed while others still collided.  Models
+        that `ImpulseCorrelation` does not solve leave it 1, not measured.
     left_out : int
         Number of events missing in a path that was cut; it stays 0 with ``record=False``.
 

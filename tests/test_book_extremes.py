@@ -330,10 +330,13 @@ def test_the_thresholds_of_the_inventory():
     """Typed here, and by what chains on both sides of those meet that a user can cross."""
     printed = Chapter("extremes_inventory").printed("inventory-limits-table")
     told = re.findall(r"\b\d+⁻\S+|\d(?= roundings)", printed)
-    assert " ".join(told) == "2⁻⁸⁴ 2⁻¹²⁰ 10⁻¹⁸ 10⁻¹³ 10⁻⁴ 10⁻³⁰ 10⁻¹⁵ 4"
+    assert " ".join(told) == "2⁻⁸⁴ 2⁻¹²⁰ 10⁻¹⁸ 10⁻¹³ 10⁻⁴ 10⁻¹¹ 10⁻³⁰ 10⁻¹⁵ 4"
     rows, still = [1.0, 1.0, 1.0], [1.0, 0.5, 0.0]
-    for ratio, warned in ((0.0, False), (0.9e-4, True), (1.1e-4, False)):
-        trace = collide(Chain(rows, still, 0.5), ImpulseCorrelation(ratio))
+    for ratios, warned in (
+        ((0.0, 0.0), False), ((0.9e-4, 1e-7), True), ((1.1e-4, 1e-7), False),
+        ((0.9e-4, 1.2e-7), False), ((0.9e-4, 1.1e-4), False),
+    ):  # fmt: skip
+        trace = collide(Chain(rows, still, 0.5), ImpulseCorrelation(*ratios))
         assert (trace.margin == 0) == warned
     Chain([1, 1], [1, 0], 1.1e-30)
     with pytest.raises(ValueError, match="at least 1e-30"):

@@ -108,8 +108,7 @@ def admissible(n, chain, bounded):
 def prepare(n, chain, meeting, state):
     """Write the chain into the state, in units of its own, powers of two; R2."""
     ball, contact, tally = state.ball, state.contact, state.tally[0]
-    largest = heaviest = 0.0
-    product = 1.0
+    largest, heaviest, product = 0.0, 0.0, 1.0
     for i in range(n):
         largest = max(largest, abs(chain.v[i]))
         heaviest = max(heaviest, chain.m[i])

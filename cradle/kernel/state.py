@@ -48,8 +48,7 @@ class Limits(NamedTuple):
     doubt: float = 1e-13  # R9: speed that a jump beside a steady neighbour may leave in doubt
     kept: float = 1e-30  # R9: least part of an impulse that a ball beside such a one keeps
     window: int = 64  # R9: how many contacts to each side a snapshot holds
-    # Ratios above zero and below the first decide beyond the 32 digits if their product is below
-    # the second: such chains go to the textbook, in decimals.
+    # Of ratios below the first a product below the second may decide: the textbook's, in decimals.
     faint: float = 1e-4
     product: float = 1e-11
     lightest: float = 1e-15  # mass of the lightest ball allowed, as a part of the heaviest

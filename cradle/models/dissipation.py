@@ -61,8 +61,7 @@ class QuadraticDissipation:
     Examples
     --------
     >>> from cradle import Chain, QuadraticDissipation, collide
-    >>> three = Chain([1, 1, 1], [1, 0, 0], 1)
-    >>> collide(three, QuadraticDissipation(1e9)).velocities.round(6)
+    >>> collide(Chain([1, 1, 1], [1, 0, 0], 1), QuadraticDissipation(1e9)).velocities.round(6)
     array([-0.333333,  0.666667,  0.666667])
     """
 

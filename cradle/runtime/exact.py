@@ -23,14 +23,20 @@ class Impact(textbook.Impact):
         self.last_digits = _ZERO * max(map(abs, self.u))
 
 
+def meant(x: float) -> Decimal:
+    """Return what a float means, as `kernel.numbers.read` does: what it prints as, or its bits."""
+    printed = Decimal(repr(x))
+    short = len(printed.normalize().as_tuple().digits) <= 15 and 1e-7 <= abs(x) < 1e14
+    return printed if short else Decimal(x)
+
+
 def ratios(m: list[Decimal], given: list[Decimal]) -> list[Decimal]:
     """R7: forward ratios; one that nothing but rounding keeps from its bound (Eq. 53) is on it."""
     found, onward = list[Decimal](), Decimal(0)
     for here, driven, ratio in zip(m[-2:0:-1], m[:1:-1], given[::-1], strict=True):
         bound = driven / (driven + here * (1 - onward))
         drawn = 1.0 / (1.0 + float(here) / float(driven) * (1.0 - float(onward)))
-        off = abs(float(ratio) / drawn - 1.0)
-        found.append(bound if off < LIMITS.rounded - 1.0 else ratio)
+        found.append(bound if abs(float(ratio) / drawn - 1.0) < LIMITS.rounded - 1.0 else ratio)
         onward = min(found[-1], bound)  # above its bound it is held there
     return found[::-1]
 
@@ -53,10 +59,10 @@ def answer(job: Any, k: int) -> bool:
     if math.prod(x for x in (*given[3], *given[4]) if 0.0 < x < LIMITS.faint) >= LIMITS.product:
         return False
     with localcontext(prec=_DIGITS):
-        m, v, e, f, b = ([Decimal(repr(x)) for x in part] for part in given)  # as they print
+        m, v, e, f, b = ([meant(x) for x in part] for part in given)
         f, b = ratios(m, f), ratios(m[::-1], b[::-1])[::-1]
         most = min(_EFFORT // len(m), job.options.max_events // 2)
-        options = {"meeting": Decimal(repr(job.options.meeting)), "max_events": most}
+        options = {"meeting": meant(job.options.meeting), "max_events": most}
         try:
             it = textbook.solve(m, v, e, f, b, number=Decimal, impact=Impact, **options)
         except textbook.EventLimit:
@@ -68,9 +74,9 @@ def answer(job: Any, k: int) -> bool:
         out.p[:], out.a[:] = it.impulses, it.absorbed
         out.held[:] = [c in it.held for c in range(len(m) - 1)]
     if job.room:
-        events = [(_KINDS.index(kind), c) for kind, c in it.events]
-        kinds, contacts = np.array(events, np.int64).reshape(-1, 2).T
-        path, impulses = (np.array(x, float) for x in (it.path, it.path_impulses))
-        job.state = job.state._replace(record=Record(kinds, contacts, path, impulses))
+        kinds = np.array([_KINDS.index(kind) for kind, _ in it.events], np.int64)
+        contacts = np.array([c for _, c in it.events], np.int64)
+        path = np.array(it.path, float), np.array(it.path_impulses, float)
+        job.state = job.state._replace(record=Record(kinds, contacts, *path))
         job.counts["events"] = len(kinds)
     return True
