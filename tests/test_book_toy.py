@@ -159,24 +159,19 @@ def test_contact_of_steel_balls_in_closed_form():
     CHAPTER.tells({"contact-time": 1e6 * 2.94327 * deepest / STRIKE, "compression": 1e6 * deepest})
 
 
-@pytest.mark.parametrize(
-    ("row", "gap", "loss"), [(0, 0, 0), (1, 0.8e-6, 0), (2, 1.2e-6, 0), (3, 1.2e-6, 4e-7)]
-)
-def test_first_stroke_of_the_minute_of_steel(row, gap, loss):
+@pytest.mark.parametrize(("row", "gap"), [(0, 0), (1, 0.8e-6), (2, 1.2e-6)])
+def test_first_stroke_of_the_minute_of_steel(row, gap):
     """By SciPy, without strings: each turns a velocity into as large a swing."""
     unit = (MASS * STRIKE**2 / STIFFNESS) ** 0.4
-    loss = loss * STRIKE / unit
-    after = real_cradles.spheres(np.eye(5)[0], [0, *[gap / unit] * 3], loss)
+    after = real_cradles.spheres(np.eye(5)[0], [0, *[gap / unit] * 3], 0.0)
     swings = [line.get_ydata()[0] for line in drawn("toy")["fig-toy-steel"].axes[row].lines]
-    assert swings == pytest.approx(after, abs=2e-3)
+    assert swings == pytest.approx(after[:4], abs=2e-3)
     if not gap:  # the pale lines go on where the others end
         pale = drawn("toy")["fig-toy-steel"].axes[row].collections[0].get_segments()
         ends = [line.get_xydata()[-1] for line in drawn("toy")["fig-toy-steel"].axes[row].lines]
         assert np.array([way[0] for way in pale]) == pytest.approx(np.array(ends))
-        assert {len(way) for way in pale} == {77}
-    if loss:
-        left, right = real_cradles.spheres([1.0, 0.0], [0.0], loss)
-        assert glued("steel-restitution") == pytest.approx(right - left, abs=5e-3)
+        assert {way[0, 0] for way in pale} == {glued("steel-thin")}
+        assert glued("steel-parts") > 0.1
 
 
 def gapped(share):
@@ -211,11 +206,7 @@ def test_spread_of_the_second_stroke_at_any_angle():
     assert late / 100 < contact
 
 
-def test_one_percent_and_the_ball_that_never_hangs_still():
-    k = math.ceil(math.log(100) / (2 * math.log(1 / 0.95)))
-    five = strokes(25, [1, 0, 0, 0, 0], 0.95)
-    counted = 1 + int(np.argmax(5 * five.var(axis=1) / 0.8 < 0.01))
-    assert (glued("two-percent"), glued("five-percent")) == (k, counted)
+def test_the_ball_that_never_hangs_still():
     always = np.abs(strokes(6, [1, 1, 1, 0, 0], ratio=0.0)) > 1e-9
     assert np.flatnonzero(always.all(axis=0)).tolist() == [glued("always") - 1]
 
