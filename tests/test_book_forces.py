@@ -85,6 +85,8 @@ def test_fig_cost():
             name, asked = told[method]
             (row,) = (row for row in rows if row["asked"] == asked)
             CHAPTER.tells({name: float(row["microseconds"])})
+    (ring,) = CHAPTER.figures["fig-own-forces-cost"].axes[0].collections
+    assert f"{ring.get_offsets()[0][0]:.1f}" == CHAPTER.glued["batch"]
 
 
 def test_the_rule_is_per_cents_from_spheres():
