@@ -56,9 +56,6 @@ def test_table_2_interchange_brings_b_and_c_into_line():
     swapped = interchanged()
     assert spread(swapped) < spread(TABLE_2.ratio) / 3
     assert (swapped[list(SUSPECTS)] <= TABLE_2.bound[list(SUSPECTS)]).all()
-    # The other two interchanges that would bring B and C closer break Eq. 34.
-    for triplet in ("BCD", "CCD"):
-        assert TABLE_2.ratio[triplet] > TABLE_2.bound[triplet[::-1]]
 
 
 def test_no_other_two_interchanges_do_as_well():
@@ -92,7 +89,11 @@ def test_no_other_two_interchanges_do_as_well():
                 found.append(swapped([first, second]))
     kept = [x for x in found if all(v <= 1000 * TABLE_2.bound[t] for t, v in x.items())]
     assert kept == [swapped([("BBD", "DBB"), ("CBD", "DBC")])]
-    BESIDE.tells({"ways": ways, "as-good": len(found), "kept": len(kept)})
+    one, other = ("DBB BBD", "DCB BCD"), ("DBC CBD", "DCC CCD")
+    assert {" ".join(sorted(x)) for x in found} == {
+        " ".join(sorted(f"{a} {b}".split())) for a in one for b in other
+    }
+    BESIDE.tells({"ways": ways, "as-good": len(found)})
     above = {t: 100 * (a / TABLE_2.bound[t] - 1) for t, a in TABLE_2.ratio.items()}
     above = {t: size for t, size in above.items() if size > 0}
     assert set(above) == {"CCA", "DBB", "DBC"}
@@ -189,12 +190,13 @@ def test_table_2_most_open_entries():
     width, twice = widths(0.01, np.asarray), np.median([*widths(0.02, np.asarray).values()])
     assert {t for t, w in width.items() if w > 0.2} == {"BBD", "CBD"}
     middle = np.median(list(width.values()))
-    AS_MEASURED.tells({"half-span-h": np.median([*widths(5e-4, climb).values()]) / 2}, 1e-3)
+    high = np.median([*widths(5e-4, climb).values()])
+    AS_MEASURED.tells({"span-median-h": high, "half-span-h": high / 2}, 1e-3)
     AS_MEASURED.tells({"span-median": middle, "half-span": middle / 2, "span-double": twice}, 1e-3)
 
 
 def test_why_two_entries_are_open():
-    """Ball 2 slows down to the velocity of ball 1 while it pushes D; the two leave together."""
+    """Ball 2 slows down to ball 1 while it pushes D; R7 holds the two until they leave."""
     speeds = []
     for name in ("BBD", "CBD"):
         chain, model = paper_chain(name, excess="saturate")
@@ -207,6 +209,8 @@ def test_why_two_entries_are_open():
         before, met, after = exact.path[closes - 1], exact.path[closes], exact.path[-1]
         assert before[1] > met[1] == pytest.approx(met[0])  # ball 2 comes down to ball 1
         assert before[0] == pytest.approx(met[0])
+        assert exact.held == {0}
+        assert model.backward > TABLE_2.bound[name[::-1]]
         assert after[0] == pytest.approx(after[1])
         assert after[0] < met[0] < after[2]
         for ratio in np.linspace(0, TABLE_2.bound[name], 400):
@@ -309,24 +313,16 @@ def test_bands_of_the_ten_predictions():
 
 
 def test_backward_ratios_and_half_a_gram():
-    """In the second solver: backward ratios of zero or one, and masses within their rounding."""
+    """In the second solver: backward ratios of zero, and masses within their rounding."""
     beside = Chapter("reading_table_2").glued
-    change = {}
+    change = []
     for sequence in paper_sequences():
         chain, model = paper_chain(sequence, excess="saturate")
         given = [list(x) for x in (chain.masses, chain.velocities, chain.restitution)]
-        for other in (0.0, 1.0):
-            backward = [other] * len(model.backward)
-            impact = textbook.solve(*given, list(model.forward), backward)
-            off = np.array(impact.velocities, float) - floats(predicted(sequence).velocities)
-            change[other, sequence] = np.abs(off).max()
-    for other, name in ((0.0, "backward"), (1.0, "backward-most")):
-        most = max(size for (value, _), size in change.items() if value == other)
-        assert float(beside[f"experiments-{name}"]) == pytest.approx(most, abs=10**-2 / 2)
-    assert max(change, key=change.get) == (1.0, beside["experiments-backward-chain"])
-    assert float(beside["experiments-backward"]) == pytest.approx(
-        max(size for (value, _), size in change.items() if value == 0), abs=6e-4
-    )
+        impact = textbook.solve(*given, list(model.forward), [0.0] * len(model.backward))
+        off = np.array(impact.velocities, float) - floats(predicted(sequence).velocities)
+        change.append(np.abs(off).max())
+    assert float(beside["experiments-backward"]) == pytest.approx(max(change), abs=6e-4)
     chain, model = paper_chain("ABCCA", excess="saturate")
     masses = [m + {"A": 5e-4, "C": -5e-4}.get(k, 0) for k, m in zip("ABCCA", chain.masses)]
     rest = chain.velocities, chain.restitution, model.forward, model.backward

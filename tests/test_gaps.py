@@ -10,7 +10,6 @@ from stored import numbers, read
 from cradle import (
     Chain,
     EnergyDistribution,
-    ImpulseCorrelation,
     SequentialCollisions,
     SpringChain,
     collide,
@@ -73,7 +72,7 @@ def test_rows_of_triplets(triplet):
 
 
 def test_what_the_chapter_says():
-    """One number each beats a shared one; the force of a lean by its own formula."""
+    """One number each beats a shared one."""
     rows = numbers("gaps_triplets.csv")
     assert len(rows) == 64
     rms = {name: np.sqrt(np.mean([row[name] ** 2 for row in rows])) for name in list(rows[0])[1:]}
@@ -83,10 +82,6 @@ def test_what_the_chapter_says():
     good = {name: sum(row[name] <= 0.05 for row in rows) for name in chain}
     assert CHAPTER.glued["scored-own-gap"] == str(good["with_own_gap"])
     assert CHAPTER.glued["scored-few"] == str(sum(row["stiffness_of_pair"] <= 0.05 for row in rows))
-    # F = k s^1.5 with s = .1 (m v^2 / k)^.4 and v = 1: F = .1^1.5 k^.4 m^.6.
-    k = 4 / 3 * 210e9 / 1.82 * np.sqrt((0.135 / (4 * np.pi * 7800)) ** (1 / 3) / 2)
-    told = float(CHAPTER.glued["scored-lean-force"])
-    assert told == pytest.approx(0.1**1.5 * k**0.4 * 0.045**0.6, abs=0.5)
 
 
 def test_ratios_of_touching_spheres():
@@ -97,11 +92,5 @@ def test_ratios_of_touching_spheres():
     once = 1 - (2 / (1 - after[:, 0]) - 1) * masses[:, 1] / masses[:, 0]
     assert int(CHAPTER.glued["scored-above-spheres"]) == (listed > once).sum()
     largest = dict(zip(listed.index, once))
-    assert CHAPTER.glued["dad-spheres"].endswith(f" and {largest['DAD']:.3f}")
-    assert abs(largest["DAD"] - listed["DAD"]) < 0.004
-    for told in CHAPTER.glued["dad-spheres"].replace(" and", ",").split(", "):
-        row = masses[list(listed.index).index("DAD")]
-        held = collide(Chain(row, [1, 0, 0], 1), ImpulseCorrelation(float(told))).velocities
-        assert held == pytest.approx(after[list(listed.index).index("DAD")], abs=0.01)
     smallest = {r["triplet"]: float(r["implied"]) for r in read("gaps_triplets.csv")}
     assert all(smallest[t] < a + 1e-3 for t, a in largest.items())
