@@ -78,7 +78,7 @@ def lecture() -> Figure:
     arc.plot(*way, "--", color="0.4", lw=1)
     arc.plot(*closing[:-1].T, color="black", lw=3)
     arc.plot(1, 0, "*", color="black", ms=10)
-    arc.text(0.9, 0.15, "before", fontsize=9, ha="right")
+    arc.text(0.82, 0, "before", fontsize=9, ha="right", va="center")
     for ax, name, k in zip(panels, "ABC", (0, -1, 100), strict=True):
         ax.bar(range(1, 4), after[k], color=figures.PALETTE[:3])
         ax.axhline(0, color="black", lw=0.8)

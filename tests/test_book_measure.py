@@ -90,6 +90,12 @@ def test_frames_of_the_laboratory():
     assert next(n for n in range(3, 40) if n * (n * n - 1) >= 12 * (1 * 120 / 20) ** 2) == 8
     text = (BOOK / "instructors.md").read_text(encoding="utf-8")
     assert "At 120 frames a second and marks off by 1 mm: eight for an error of 20 mm/s" in text
+    film = Chapter("real_cradles").glued  # the numbers that a class is told
+    for told in (f"{film['slow-off']} % of", f"up to {film['pairs-off']} %"):
+        assert told in text
+    assert f"with {round(float(film['fourth']))} % of the striker's speed" in text
+    assert film["three-ratios"] == "0.05, 0.13, 0.14"
+    assert "a ratio of 0.05 to 0.15" in text
 
 
 def test_prediction_of_a_longer_row():

@@ -65,6 +65,8 @@ def test_spheres_with_losses_have_no_need_of_their_stiffness():
     ((code, told),) = PAIRS[ADVICE]
     assert code.count("stiffness=1)") == 1
     assert printed(code.replace("stiffness=1)", "stiffness=1e10)")) == told
+    spheres = collide(Chain([1] * 3, [1, 0, 0]), ImpulseCorrelation(0.13)).velocities
+    assert spheres == pytest.approx(numbers(told.splitlines()[1]), abs=3e-3)
 
 
 def test_another_material():
