@@ -814,7 +814,10 @@ def test_swing_of_the_mean():
     # Air alone: the drag of Stokes for slow oscillations, over twice the mass.
     layer = np.sqrt(2 * 1.8e-5 / 1.2 * period / (2 * np.pi))
     air = 3 * np.pi * 1.8e-5 * 0.01109 * (1 + 0.01109 / layer) / 0.044756
-    assert float(HALF.glued["air"]) == pytest.approx(damping / air, rel=0.06)
+    HALF.tells({"mean-loss": 100 * damping, "period": period})
+    slow, fast = (float(x) for x in HALF.glued["air-loss"].split(" to "))
+    assert slow == pytest.approx(100 * air, abs=6e-3)
+    assert 1.5 * slow < fast < 0.05 * 100 * damping
     # After 23 s most of the motion is that of the mean.
     t, *x = table("cradle_trace.csv").values()
     late = np.array(x)[:, t > 23.5]
@@ -879,12 +882,16 @@ def test_a_line_and_not_an_exponential():
         [float(x) for x in HALF.glued[name].split(" and ")] for name in ("line", "exponential")
     )
     t, falls, middles = table("cradle_peaks.csv"), [], []
+    (ax,) = HALF.figures["fig-half-line"].axes
+    drawn = [x.get_xydata().T for x in ax.get_lines() if x.get_ls() == "-"]
     for k, ball in enumerate((1, 5)):
         use = (t["ball"] == ball) & (t["kind"] == "flight") & (t["t_s"] < 20)
         x, size, error = t["t_s"][use], np.abs(t["x_m"][use]), t["u_x"][use]
         line = np.polyfit(x, size, 1, w=1 / error)
         least = (((size - np.polyval(line, x)) / error) ** 2).sum()
         assert lines[k] == pytest.approx(least, abs=0.51)
+        assert drawn[k][1] == pytest.approx(1000 * np.polyval(line, drawn[k][0]), rel=1e-6)
+        assert marked(ax, "os"[k]) == pytest.approx(np.column_stack([x, 1000 * size]))
         assert exponentials[k] > 5 * least
         assert int(HALF.glued["flights"]) == use.sum() - 2
         falls.append(-line[0])
