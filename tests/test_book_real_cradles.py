@@ -566,20 +566,20 @@ def test_gaps_and_not_ratios_predict_the_third_release():
         left = real_cradles.misfits(lambda _, v=v: v, {3: (film / 100, error / 100)}, (3,))[:5]
         assert name == "ratios" or (abs(left) < 1).tolist()[:2] == [True, True]
         assert name == "ratios" or abs(left).argmax() == 2
-    lines = APPENDIX.printed("test-balls").replace("−", "-").splitlines()[2:]
-    told = np.array([[float(x) for x in re.findall(r"-?[\d.]+", line)] for line in lines]).T
-    for k, v in ((0, ratios), (1, gaps)):
+    shown, told = (
+        [[float(x) for x in re.findall(r"-?[\d.]+", line)] for line in lines.splitlines()[2:]]
+        for lines in (APPENDIX.printed(f"test-{x}").replace("−", "-") for x in ("balls", "chosen"))
+    )
+    for k, v in enumerate((ratios, gaps)):
         left = real_cradles.misfits(lambda _, v=v: v / 100, {3: (film / 100, error / 100)}, (3,))
-        assert told[5 + k] == pytest.approx(left[:5], abs=0.11)
-        assert told[3 + k] == pytest.approx(film - left[:5] * error, abs=0.06)
-    assert (told[1] == np.round(film, 1)).all()
-    chosen = [re.findall(r"[\d.]+", x) for x in APPENDIX.printed("test-chosen").splitlines()[2:]]
+        right = np.array([film, error, film - left[:5] * error])
+        assert np.transpose(shown)[[1, 2, 3 + k]] == pytest.approx(right, abs=0.011)
+        assert np.transpose(shown)[5 + k] == pytest.approx(left[:5], abs=0.06)
     unit = 1e6 * (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
     kept = np.ptp(spheres([1, 0], [0], GAPS[3]))
-    for line, right in zip(
-        chosen, (RATIOS, [*(unit * x for x in GAPS[:3]), kept, 0.03 * unit]), strict=True
-    ):
-        assert [float(x) for x in line] == pytest.approx(right, abs=0.05, rel=1e-3)
+    assert told[0] == pytest.approx(RATIOS, abs=6e-4)
+    right = [*(unit * x for x in GAPS[:3]), kept, 0.03 * unit]
+    assert told[1] == pytest.approx(right, abs=0.051)
     CHAPTER.tells({"slow-off": np.abs(ratios - film)[:2].max(), "slow-error": error[:2].max()})
     assert f"{np.abs(ratios - film)[:2].min():.1f}" == GLUED["slow-off"]  # both
 
