@@ -11,7 +11,7 @@ from cradle import textbook
 from cradle.kernel.state import LIMITS, Record
 
 _DIGITS, _ZERO = 400, Decimal("1e-240")  # six tenths of the digits tell zero from a speed
-_EFFORT = 4_000  # balls times events, after which an impact is left to the event loop
+_EVENTS, _EFFORT = 600, 12_000  # most events, and balls times events: the rest is the loop's
 _KINDS = "maximum_compression", "end", "close"  # in the order of the event loop's numbers
 
 
@@ -61,7 +61,7 @@ def answer(job: Any, k: int) -> bool:
     with localcontext(prec=_DIGITS):
         m, v, e, f, b = ([meant(x) for x in part] for part in given)
         f, b = ratios(m, f), ratios(m[::-1], b[::-1])[::-1]
-        most = min(_EFFORT // len(m), job.options.max_events // 2)
+        most = min(_EVENTS, _EFFORT // len(m), job.options.max_events // 2)
         options = {"meeting": meant(job.options.meeting), "max_events": most}
         try:
             it = textbook.solve(m, v, e, f, b, number=Decimal, impact=Impact, **options)
