@@ -10,7 +10,7 @@ import numpy as np
 from cradle import textbook
 from cradle.kernel.state import LIMITS, Record
 
-_DIGITS, _ZERO = 400, Decimal("1e-240")  # six tenths of the digits tell zero from a speed
+_DIGITS, _ZERO, _SOUND = 400, Decimal("1e-240"), Decimal("1e-200")  # of speeds, and of sums
 _EVENTS, _EFFORT = 600, 12_000  # most events, and balls times events: the rest is the loop's
 _KINDS = "maximum_compression", "end", "close"  # in the order of the event loop's numbers
 
@@ -49,7 +49,7 @@ def certify(it: textbook.Impact, before: list[Decimal]) -> None:
     kept = sum((1 - e * e) * a for e, a in zip(it.e, it.absorbed, strict=True))
     momentum, order = abs(sum(gained)) / heavy, max(v - w for v, w in pairwise(after))
     ledger, energy = abs(lost - kept) / heavy, min(it.absorbed)
-    if max(momentum, order) > speed * _ZERO or ledger > speed * speed * _ZERO or energy < 0:
+    if max(momentum, order) > speed * _SOUND or ledger > speed * speed * _SOUND or energy < 0:
         raise AssertionError("the textbook breaks momentum, order, energy or ledger")
 
 
