@@ -6,7 +6,7 @@ from typing import Any
 
 from problem import case
 
-from cradle.kernel.state import LIMITS
+from cradle.kernel.state import LIMITS, UNDECIDED
 from cradle.runtime import compile as runtime
 from cradle.runtime import job as drive
 
@@ -39,7 +39,10 @@ def solve(
     state, out = area(n, False, drive._record(room, n)), drive.outputs(1, n, last=True)
     state.tally[0].room = plenty = 2**62
     options = names["Options"](meeting, max_events, False)
-    _, status = names["batch"](0, False, n, inputs, options, out, state, plenty)
+    told = n, inputs, options, out, state, plenty
+    _, status = names["batch"](0, False, *told)
+    if status == UNDECIDED:  # here the loop decides
+        _, status = names["batch"](0, True, *told)
     tally, lists = state.tally[0], {"velocities": out.v[0], "collisions": out.hits[0]}
     lists |= {"impulses": out.p, "absorbed": out.a, "held": out.held}
     return SimpleNamespace(

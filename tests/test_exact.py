@@ -22,8 +22,7 @@ TIE = CHAINS["a tie decided by products of tiny ratios"].problem
 def always(monkeypatch):
     """Take all products for tiny."""
     monkeypatch.setenv("CRADLE_KERNEL", "plain")
-    for room in (package, loop):
-        monkeypatch.setattr(room, "LIMITS", LIMITS._replace(product=2.0))
+    monkeypatch.setattr(loop, "LIMITS", LIMITS._replace(product=2.0))
 
 
 @pytest.mark.parametrize("name", ["generic", "at bounds", "ties"])
@@ -71,6 +70,13 @@ def test_one_that_the_loop_gets_wrong_does_not_stop_a_batch():
     assert found.velocities.tolist() == [batch(TIE), batch(refused), batch(TIE)]
     assert off(refused, batch(refused), exact(refused).velocities) < 1e-14
     assert (found.margin == 0.0).all()
+
+
+def test_numbers_of_many_digits_mean_their_bits():
+    """So units that are powers of two change nothing."""
+    problem = CHAINS["another tie decided by products of tiny ratios"].problem
+    scaled = [problem.in_units(2.0**power, 1.0).collide().velocities for power in range(-20, 20)]
+    assert {bytes(v) for v in scaled} == {bytes(problem.collide().velocities)}
 
 
 def test_a_chunk_stops_where_another_has_failed(monkeypatch):

@@ -161,6 +161,7 @@ function solved(chain, maxEvents, recorded) {
   let status = FINISHED;
   for (let resumed = false; ; resumed = true) {
     status = batch(0, resumed, n, inputs, options, out, state, ENDLESS)[1];
+    if (status === UNDECIDED) continue; // here the loop decides
     if (status !== PAUSED) break;
     makeRoom(state, n, 2 * state.record.kinds.length);
   }

@@ -37,7 +37,7 @@ PARTS = ("engine_numbers.js", "engine_collide.js")
 #: The part after the contact forces, and all that these need before.
 SPHERES = "engine_spheres.js"
 CODES = (
-    "FINISHED", "UNFINISHED", "REFUSED", "PAUSED", "UNSOUND",
+    "FINISHED", "UNFINISHED", "REFUSED", "PAUSED", "UNSOUND", "UNDECIDED",
     "MOMENTUM", "ORDER", "ENERGY", "LEDGER",
 )  # fmt: skip
 NUMBERS = """const max = (a, b) => (b > a ? b : a);

@@ -23,6 +23,7 @@ from cradle.kernel.state import (
     PAUSED,
     PULL,
     REFUSED,
+    UNDECIDED,
     UNFINISHED,
     UNSOUND,
     UPPER,
@@ -106,7 +107,7 @@ def admissible(n, chain, bounded):
 
 @apart
 def prepare(n, chain, meeting, state):
-    """Write the chain into the state, in units of its own, powers of two; R2."""
+    """Write the chain into the state, in its own units, powers of two; R2; tell if UNDECIDED."""
     ball, contact, tally = state.ball, state.contact, state.tally[0]
     largest, heaviest, product = 0.0, 0.0, 1.0
     for i in range(n):
@@ -150,11 +151,12 @@ def prepare(n, chain, meeting, state):
     for c in range(n - 3, -1, -1):
         onward = contact[c + 1].forward if c < n - 3 else ZERO
         contact[c].forward = meant(contact[c].forward, ball[c + 1].m, ball[c + 2].m, onward)
-    if product < LIMITS.product:
-        tally.margin = 0.0
     forget(LOWER, state.level)
     forget(UPPER, state.level)
     start(n, state)
+    if product < LIMITS.product:
+        tally.margin = 0.0
+    return product < LIMITS.product
 
 
 def impact(n, max_rounds, state):
@@ -260,7 +262,7 @@ def certify(n, v, ball, contact, tally):
 def batch(begin, resumed, n, inputs, options, out, state, effort):
     """Solve the chains of `out` from number `begin` on; return the next one's number and status."""
     # It stops at the first chain whose status is not FINISHED: PAUSED, when `effort` (contacts
-    # touched) is used up, to be `resumed` there.
+    # touched) is used up, to be `resumed` there; UNDECIDED, before its first event, likewise.
     ball, contact, tally = state.ball, state.contact, state.tally[0]
     tally.effort = effort
     for k in range(begin, len(out.v)):
@@ -270,7 +272,8 @@ def batch(begin, resumed, n, inputs, options, out, state, effort):
             )
             if not admissible(n, chain, options.bounded):
                 return k, REFUSED
-            prepare(n, chain, options.meeting, state)
+            if prepare(n, chain, options.meeting, state):
+                return k, UNDECIDED
         resumed = False
         v, hits = out.v[k], out.hits[k]
         status = impact(n, options.max_events, state)

@@ -18,8 +18,8 @@ if "door" not in globals():
     door = apart
 
 
-# Status codes.
-FINISHED, UNFINISHED, REFUSED, PAUSED, UNSOUND = 0, 1, 2, 3, 4
+# Status codes; UNDECIDED: products of tiny ratios may decide, beyond the 32 digits.
+FINISHED, UNFINISHED, REFUSED, PAUSED, UNSOUND, UNDECIDED = 0, 1, 2, 3, 4, 5
 # Kinds of event.
 MAXIMUM_COMPRESSION, END, CLOSE, COLLAPSE, REPEAT = 0, 1, 2, 3, 4
 # R9: the two levels on which cycles are looked for, ends of contacts and collapses.

@@ -1,6 +1,5 @@
 """Chains whose ratios multiply beyond the event loop's 32 digits: the textbook, over decimals."""
 
-import math
 from decimal import Decimal, localcontext
 from itertools import pairwise
 from typing import Any
@@ -54,12 +53,9 @@ def certify(it: textbook.Impact, before: list[Decimal]) -> None:
 
 
 def answer(job: Any, k: int) -> bool:
-    """Give the answer to chain k if products of small ratios may decide it, and it has an end."""
-    given = [part[k].tolist() for part in job.inputs]
-    if math.prod(x for x in (*given[3], *given[4]) if 0.0 < x < LIMITS.faint) >= LIMITS.product:
-        return False
+    """Solve chain k, which is UNDECIDED, in the loop's place; return whether it came to an end."""
     with localcontext(prec=_DIGITS):
-        m, v, e, f, b = ([meant(x) for x in part] for part in given)
+        m, v, e, f, b = ([meant(x) for x in part[k].tolist()] for part in job.inputs)
         f, b = ratios(m, f), ratios(m[::-1], b[::-1])[::-1]
         most = min(_EVENTS, _EFFORT // len(m), job.options.max_events // 2)
         options = {"meeting": meant(job.options.meeting), "max_events": most}

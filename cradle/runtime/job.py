@@ -15,7 +15,7 @@ import numpy as np
 from cradle import kernel as plain
 from cradle.kernel import state as rooms
 from cradle.kernel.kinks import Clock, Law, Link, Motions, Springs
-from cradle.kernel.state import FINISHED, PAUSED, UNSOUND
+from cradle.kernel.state import FINISHED, PAUSED, UNDECIDED
 from cradle.runtime import compile as runtime
 from cradle.runtime import exact
 
@@ -100,15 +100,6 @@ class Job:
     ) -> "Job":
         """Solve the chains, up to the first that is not FINISHED, or until `stop` is set."""
         # It calls `pause` whenever the event loop pauses.
-        while self._loop(stop, pause) == UNSOUND and exact.answer(self, self.next):
-            self.next, self.status = self.next + 1, FINISHED
-        for k in np.flatnonzero(self.outputs.margin[: self.next] == 0.0).tolist():
-            if not (stop and stop.is_set()):
-                exact.answer(self, k)
-        return self
-
-    def _loop(self, stop: threading.Event | None, pause: Callable[[], object] | None) -> int:
-        """Let the event loop run; return how the last chain ended."""
         resumed, rows = False, len(self.outputs.v)
         while self.next < rows and not (stop and stop.is_set()):
             kernel = runtime.chosen(self.large)
@@ -123,11 +114,14 @@ class Job:
             if pause is not None:
                 pause()
             resumed = self.status == PAUSED
-            if resumed and self.tally("events") > self.tally("room"):
+            if self.status == UNDECIDED:  # what has no end in decimals goes on in the loop
+                resumed = not exact.answer(self, self.next)
+                self.next, self.status = self.next + (not resumed), FINISHED
+            elif resumed and self.tally("events") > self.tally("room"):
                 self._make_room(2 * len(self.state.record.kinds))
             elif not resumed and self.status != FINISHED:
                 break
-        return self.status
+        return self
 
     def _begin(self, compiled: bool) -> None:
         """Lay out the work area for one runtime; what is solved so far stays."""
