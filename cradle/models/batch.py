@@ -36,7 +36,7 @@ def post_impact_velocities(
     restitution : array_like, shape (..., N - 1) or ()
         Energetic coefficients of restitution.
     forward, backward : array_like, shape (..., N - 2) or ()
-        Ratios; `backward` equals `forward` if left out.  Tiny ones take milliseconds a chain.
+        Ratios; `backward` equals `forward` if left out.  Several tiny ones are slow.
     meeting, excess, max_events
         As for `ImpulseCorrelation`.
     progress : bool
