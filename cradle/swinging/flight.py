@@ -175,8 +175,9 @@ class FullFlight:
         self.gravity, self.tie = hanging.gravity, hanging.tie
         self.length, self.damping = float(hanging.length[0]), float(hanging.damping[0])
         # The difference f of two neighbours obeys f'' + 2 d f' + q f = 0 with q at most g/l, so by
-        # Sturm's comparison its zeros are no closer than half a swing of the small angle: steps of
-        # a quarter of that miss none, and balls that part do not meet before.
+        # Sturm's comparison its zeros are no closer than half a swing of the small angle: no step
+        # misses one, and balls that part do not meet before.  In steps of a thirty-second part of
+        # that SciPy's interpolation is as exact as its steps.
         self.half = math.pi / math.sqrt(hanging.fastest**2 - self.damping**2)
         #: The number of each ball's body, the first ball of each, and until when none meets it.
         self.body = np.cumsum([0, *(not one for one in together)])
@@ -186,21 +187,24 @@ class FullFlight:
         self.start = np.concatenate([x[self.first], v[self.first]])
 
     def _rate(self, _: float, y: Vector) -> Vector:
-        x, v = np.split(y, 2)
-        return np.concatenate([v, -self.gravity * np.sin(x / self.length) - 2.0 * self.damping * v])
+        n, rate = len(self.first), np.empty_like(y)  # lean: this is most of what a swing costs
+        rate[:n] = y[n:]
+        rate[n:] = -self.gravity * np.sin(y[:n] / self.length) - 2.0 * self.damping * y[n:]
+        return rate
 
     def _apart(self, t: float, y: Vector) -> Vector:
         """Return how far bodies are from their neighbours; infinity where they part for long."""
         return np.where(t > self.waits, self.gaps + np.diff(y[: len(y) // 2]), np.inf)
 
-    def _integrate(self, begin: float, y: Vector, end: float, **options: Any) -> Any:
+    def _integrate(self, end: float, **options: Any) -> Any:
         from scipy.integrate import solve_ivp  # slow to import, and only needed here
 
         least = _RTOL * max(float(np.abs(self.start).max()), 1e-300)
-        known = {"method": "DOP853", "rtol": _RTOL, "atol": least, "max_step": self.half / 4.0}
-        found = solve_ivp(self._rate, (begin, end), y, **known, **options)
+        known = {"method": "DOP853", "rtol": _RTOL, "atol": least, "max_step": self.half / 32.0}
+        found = solve_ivp(self._rate, (0.0, end), self.start, dense_output=True, **known, **options)
         if found.status < 0:
             raise RuntimeError(f"the integration of the pendulums failed: {found.message}")
+        self.path = found.sol
         return found
 
     def next_meeting(self, horizon: float) -> Meeting:
@@ -212,11 +216,11 @@ class FullFlight:
         n = len(self.first)
         vars(nearest).update(terminal=True, direction=-1)
         turns = [lambda _, y, c=n + c: y[c + 1] - y[c] for c in np.flatnonzero(self.gaps)]
-        found = self._integrate(0.0, self.start, horizon, events=[nearest, *turns])
+        found = self._integrate(horizon, events=[nearest, *turns])
         # A gap may close and open again within a step: where the balls turn they overlap then.
         turned = map(zip, found.t_events[1:], found.y_events[1:])
         if missed := [t for one in turned for t, y in one if nearest(t, y) < 0.0]:
-            found = self._integrate(0.0, self.start, min(missed), events=nearest)
+            found = self._integrate(min(missed), events=nearest)
         if found.status == 0:
             return math.inf, [], []
         time, y = float(found.t[-1]), found.y[:, -1]
@@ -225,11 +229,6 @@ class FullFlight:
         return time, (self.first[1:][met] - 1).tolist(), []
 
     def at(self, times: Vector) -> tuple[Vector, Vector]:
-        """Return positions and velocities at T times since the start, shapes (T, N)."""
-        found, begin, y = [], 0.0, self.start  # SciPy's interpolation is not exact enough
-        for time in times.tolist():
-            if time > begin:
-                begin, y = time, self._integrate(begin, y, time).y[:, -1]
-            found.append(y)
-        x, v = np.split(np.array(found).reshape(len(times), len(self.start)), 2, axis=1)
+        """Return positions and velocities at T times up to the meeting, shapes (T, N)."""
+        x, v = np.split(self.path(times).T, 2, axis=1)
         return x[:, self.body], v[:, self.body]
