@@ -1,5 +1,6 @@
 """From the kernel's Python to a script: numbers, translation, and what is refused."""
 
+import ast
 import math
 import random
 import struct
@@ -169,6 +170,19 @@ def test_one_name_for_one_function(monkeypatch):
     monkeypatch.setattr(runtime, "unit", lambda *_: "def frexp(x):\n    return x")
     with pytest.raises(ValueError, match="function frexp is there twice"):
         explorer_engine.engine()
+
+
+def test_one_name_for_one_thing_in_all_rooms():
+    """They are joined to one source, where a second FAINT would overwrite the first."""
+    names = []
+    for node in ast.parse(runtime.unit()).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.append(node.name)
+        elif isinstance(node, ast.Assign):
+            names += [part.id for target in node.targets for part in ast.walk(target)
+                      if isinstance(part, ast.Name)]  # fmt: skip
+    assert len(names) > 150
+    assert {name for name in names if names.count(name) > 1} == set()
 
 
 def test_only_one_name_is_left_and_nothing_is_asked_for(source):
