@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from chains import HERTZ
 from chapters import Chapter, code, in_memory, number, panel, run
-from dop853 import integrated
-from hunt_crossley import closed, motion
+from hunt_crossley import closed
 from scipy import optimize
 from stored import read
 from truth import solve
@@ -49,22 +48,19 @@ def test_the_curves_have_their_orders():
     ):
         work, error = np.log(shown[label]).T
         assert -np.polyfit(work, error, 1)[0] == pytest.approx(order, abs=0.25)
-        assert label.endswith(f": {CHAPTER.glued[name]}")
-        assert float(CHAPTER.glued[name]) == pytest.approx(order, abs=0.25)
+        assert float(label.split()[-1]) == pytest.approx(order, abs=0.25)
+        assert name == "verlet" or label.endswith(f": {CHAPTER.glued[name]}")
 
 
 def test_the_work_for_an_error():
     shown = list(panel("forces", "fig-own-forces").values())
-    for name, which, error in (
-        ("verlet_work", 0, 1e-3), ("better_work", 1, 1e-3),
-        ("corrected_work", 2, 1e-3), ("corrected_fine", 2, 1e-5),
-    ):  # fmt: skip
-        points = shown[which].tolist()
-        while points[-1][1] <= error:
+    for name, curve in zip(("verlet", "better", "corrected"), shown, strict=True):
+        points = curve.tolist()
+        while points[-1][1] <= 1e-3:
             work, within = points.pop()
         more, beyond = points[-1]
-        work *= (more / work) ** (np.log(error / within) / np.log(beyond / within))
-        assert CHAPTER.glued[name.replace("_", "-")] == f"{work:.0f}"
+        work *= (more / work) ** (np.log(1e-3 / within) / np.log(beyond / within))
+        assert CHAPTER.glued[f"{name}-work"] == f"{work:.0f}"
     # Each ring is where its number says, on the line of a thousandth.
     (ax,) = CHAPTER.figures["fig-own-forces"].axes
     rings = [ring.get_offsets()[0].tolist() for ring in ax.collections]
@@ -92,7 +88,6 @@ def test_fig_cost():
 def test_the_rule_is_per_cents_from_spheres():
     first = HERTZ["three equal"][0]
     ratio = -2 * first / (1 - first)
-    assert CHAPTER.glued["ratio"] == f"{ratio:.4f}"
     done = solve([1] * 5, [1, 0, 0, 0, 0], 1, ratio, number=float)
     off = np.abs(np.array(done.velocities, float) - HERTZ["five equal"]).max()
     assert number(CHAPTER.glued["rule"]) == pytest.approx(off, abs=0.005)
@@ -123,19 +118,3 @@ def test_fig_loss():
     few = part < 0.12
     slope = np.polyfit(np.log(spheres[few, 0]), np.log(part[few]), 1)[0]
     assert slope == pytest.approx(0.2, abs=0.015)
-
-
-def test_laws_of_loss_in_a_row():
-    """By SciPy; and what the first terms of the restitution give by the closed form."""
-    first, second = (
-        optimize.brentq(lambda e, x=1.5 * (1 - meant): closed(x, e), 0.3, 1) for meant in (0.9, 0.8)
-    )
-    CHAPTER.tells({"hunt-first": first, "hunt-second": second})
-    a = optimize.brentq(lambda x: closed(x, 0.9), 0.1, 0.2)
-    spheres = optimize.brentq(lambda x: integrated([1, 1], [1, 0], 1, 1.5, x) @ [-1, 1] - 0.9,
-                              0.01, 0.3, xtol=1e-6)  # fmt: skip
-    for name, speed in (("hunt-row", 1), ("hunt-fast", 5)):
-        v = speed * np.eye(5)[0]
-        one = integrated([1] * 5, v, 1, 1.5, spheres)
-        other = motion(np.ones(5), v, 1.0, a, np.zeros(4), [0, 40])[0][-1]
-        CHAPTER.tells({name: abs(one - other).max() / speed}, off=1e-5)
