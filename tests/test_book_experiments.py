@@ -12,7 +12,6 @@ from chapters import Chapter, floats, lines, points
 from truth import solve
 
 from cradle import (
-    ImpulseCorrelation,
     collide,
     paper_chain,
     paper_sequences,
@@ -102,15 +101,6 @@ def test_no_other_two_interchanges_do_as_well():
     alike = [gap[t] for t in names if t[1] == "C" and t[0] + "B" + t[2] not in SUSPECTS]
     assert max(map(abs, alike)) == table["ACB"] - table["ABB"]
     BESIDE.tells({"alike": len(alike), "abb": table["ABB"] / 1000, "acb": table["ACB"] / 1000})
-    BESIDE.tells({"e-with-b": 0.53, "e-with-c": 0.31})  # Table 1, read again
-
-
-@pytest.mark.parametrize("triplet", SUSPECTS)
-def test_table_2_entries_in_doubt_hold_a_contact_only_as_printed(triplet):
-    chain, _ = paper_chain(triplet)
-    for table, held in ((TABLE_2.ratio, True), (interchanged(), False)):
-        model = ImpulseCorrelation(table[triplet], table[triplet[::-1]], excess="saturate")
-        assert bool(collide(chain, model).saturated) is held
 
 
 def test_ten_sequences_five_three_two():
@@ -178,7 +168,7 @@ def test_table_2_most_open_entries():
         near = min(TABLE_2.ratio[triplet], TABLE_2.bound[triplet])
         if distance(triplet, far, by) <= error:
             return far
-        for _ in range(30):
+        for _ in range(16):
             middle = (near + far) / 2
             fits = distance(triplet, middle, by) <= error
             near, far = (middle, far) if fits else (near, middle)
@@ -187,12 +177,12 @@ def test_table_2_most_open_entries():
     def widths(*size):
         return {t: edge(t, top, *size) - edge(t, 0.0, *size) for t, top in TABLE_2.bound.items()}
 
-    width, twice = widths(0.01, np.asarray), np.median([*widths(0.02, np.asarray).values()])
+    width = widths(0.01, np.asarray)
     assert {t for t, w in width.items() if w > 0.2} == {"BBD", "CBD"}
     middle = np.median(list(width.values()))
     high = np.median([*widths(5e-4, climb).values()])
     AS_MEASURED.tells({"span-median-h": high, "half-span-h": high / 2}, 1e-3)
-    AS_MEASURED.tells({"span-median": middle, "half-span": middle / 2, "span-double": twice}, 1e-3)
+    AS_MEASURED.tells({"span-median": middle, "half-span": middle / 2}, 1e-3)
 
 
 def test_why_two_entries_are_open():
@@ -327,8 +317,8 @@ def test_backward_ratios_and_half_a_gram():
     masses = [m + {"A": 5e-4, "C": -5e-4}.get(k, 0) for k, m in zip("ABCCA", chain.masses)]
     rest = chain.velocities, chain.restitution, model.forward, model.backward
     v = textbook.solve(masses, *map(list, rest)).velocities
-    ahead = float(v[4]) - float(v[3])
-    assert float(beside["experiments-half-gram-ahead"]) == pytest.approx(ahead, abs=6e-4)
+    last = BESIDE.printed("abcca-held").splitlines()[-1].split()[-2:]
+    assert [float(x) for x in last] == pytest.approx([float(x) for x in v[3:]], abs=6e-5)
     bound = masses[4] / (masses[4] + masses[3])
     assert float(beside["experiments-half-gram-bound"]) == pytest.approx(bound, abs=6e-4)
 
