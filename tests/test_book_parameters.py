@@ -33,7 +33,6 @@ CHANGES = {
     "patterns": [{"RATIO": 0.3, "E": 0.8}, {"RATIO": 0.5, "E": 0.3}],
     "n_balls": [{"ratio": 0}, {"ratio": 0.05}, {"ratio": 0.33}, {"ratio": 0.5}],
     "toy": [{"ratio": 0.05, "pulled_back": 0.02}, {"ratio": 0.3}],
-    "trade": [{"ratio": 0}, {"ratio": 0.4}],
     "engines": [{"step": 1 / 240}, {"step": 1e-4}],
     "forces": [{"masses": [1, 2, 1]}],
     "laws": [{"ratio": 0}, {"ratio": 0.4}],

@@ -18,12 +18,7 @@ from stored import read
 from truth import solve
 
 from cradle import (
-    Chain,
-    EnergyDistribution,
     ImpactNotCertified,
-    ImpulseCorrelation,
-    SpringChain,
-    collide,
     post_impact_velocities,
     viscosity_from,
 )
@@ -42,11 +37,6 @@ def off(row, answer):
     return np.abs(row["velocities"] - answer).max()
 
 
-def cost(rows, error, what="time_ratio"):
-    """Least time, or another price, at which an error is reached."""
-    return min(row[what] for row in rows if row["numerical_error"] <= error)
-
-
 def test_times_are_medians_and_say_what_the_text_says():
     timed = [row for row in table() if row["time_ratio"] is not None]
     assert len(timed) > 150
@@ -58,19 +48,6 @@ def test_times_are_medians_and_say_what_the_text_says():
         for how in ("compiled", "plain")
     }
     assert calls["plain"] > calls["compiled"] > 3  # a call costs more than its impact
-
-
-def test_the_cost_of_springs():
-    verlet = find("penalty", model="penalty, Hertz")
-    one_call = find("event", "compiled, one call", chain="three equal")
-    assert cost(verlet, 1e-2) < min(row["time_ratio"] for row in one_call)
-    assert cost(verlet, 1e-6) > 5 * cost(verlet, 1e-2)
-    springs = find("springs", chain="three equal", model="SpringChain, Hertz")
-    assert 1 < cost(springs, 2e-9) / cost(springs, 2e-3) < 1000
-    # Of fourth order: six digits for ten times the steps to the power 6/4, and the runs before.
-    assert cost(springs, 2e-9, "evaluations") < 100 * cost(springs, 2e-3, "evaluations")
-    # Error control spends fewer evaluations than fixed steps on many digits.
-    assert cost(springs, 1e-8, "evaluations") < cost(verlet, 1e-8, "evaluations")
 
 
 def test_fig_trade_stiffness_two_sweeps_on_one_curve():
@@ -90,30 +67,14 @@ def test_fig_trade_stiffness_two_sweeps_on_one_curve():
     assert 0.1 <= max(percent) <= 0.6
 
 
-LETTERS = {
-    "apart": dict.fromkeys(IMPULSE_ENGINES, "S"),
-    "touching": {"Box2D": "F", "Bullet": "F", "Rapier": ""},
-    "pressed": {"Chipmunk": "F", "Box2D": "F", "Bullet": "F", "Rapier": ""},
-}
-
-
-def test_fig_trade_engines_textbook_answers():
-    """The table of words: S within .01 of sequential, F of fused; all engines are measured."""
+def test_engines_all_are_measured():
+    """And in the fair test, two balls, all are right when refined."""
     rows = find("engine")
     assert {row["model"] for row in rows} == set(ENGINES)
     assert len(rows) == 5 * 2 * 3 * 6
     assert all(row["versions"] for row in rows)
-    for row in find("engine", "refined"):
-        scene, name, placement = row["chain"], row["model"], row["setting"].split(", ")[1]
-        if scene.startswith("two"):  # the fair test
-            assert row["model_error"] < 3e-3, (name, placement)
-            continue
-        near = {"S": off(row, sequential(scene)) < 0.01, "F": off(row, fused(scene)) < 0.01}
-        letter = LETTERS[placement].get(name)
-        if (name, placement) == ("Chipmunk", "touching"):
-            letter = {"three equal": "S", "light middle": "F"}.get(scene)
-        if letter is not None:
-            assert "".join(key for key in near if near[key]) == letter, (name, placement, scene)
+    two = [row for row in find("engine", "refined") if row["chain"].startswith("two")]
+    assert max(row["model_error"] for row in two) < 3e-3
 
 
 def test_engines_table_of_settings():
@@ -229,39 +190,6 @@ def test_figures_show_the_table(figure):
     assert shows(ENGINES_PAGE.figures[figure].axes, values)
 
 
-def test_fig_trade_models():
-    measured, fitted = ImpulseCorrelation(0.167), ImpulseCorrelation(0.132503287)
-    (ax,) = CHAPTER.figures["fig-trade-models"].axes
-    errors = {}
-    for line, scene in zip(points(ax, 7), ELASTIC, strict=True):
-        m = ELASTIC[scene]
-        chain, answer = Chain(m, [1] + [0] * (len(m) - 1), 1), np.array(HERTZ[scene])
-        found = [
-            collide(chain, model).velocities
-            for model in (EnergyDistribution(1.0), fitted, measured, SpringChain(1.0, 1))
-        ]
-        # The last one is the limit of the convex problem.
-        found += [sequential(scene), fused(scene), fused(scene)]
-        errors[scene] = np.abs(np.array(found) - answer).max(axis=1)
-        np.testing.assert_allclose(line[:, 0] / 100, errors[scene], rtol=0, atol=1e-6)
-        assert errors[scene][0] < 1e-8
-        assert 0.5 < errors[scene][5] < 0.7
-        assert errors[scene][2] < errors[scene][4]
-        for group, model, k in (
-            ("outcome", {"model": "SequentialCollisions"}, 4),
-            ("outcome", {"model": "FusedChain"}, 5),
-            ("event", {}, 2),
-        ):
-            for row in find(group, chain=scene, **model):
-                assert row["model_error"] == pytest.approx(errors[scene][k], abs=1e-4)
-    # One measured number takes most of the error away, for three and for five balls.
-    for scene in ("three equal", "five equal"):
-        assert errors[scene][2] < 0.4 * errors[scene][4]
-    assert errors["three equal"][1] < 1e-8
-    assert 0.04 < errors["five equal"][1] < 0.06
-    assert errors["light middle"][1] > 0.2
-
-
 METHODS = (
     "this package", "velocity Verlet", "measured ratio", "the paper's rule", "pair after pair",
     "all as one body",
@@ -358,26 +286,21 @@ def test_pairs_are_for_equal_balls():
         return v
 
     np.testing.assert_allclose(flown(np.ones(5)), np.eye(5)[4], atol=1e-12)
-    rows = 0.5 + 1.5 * np.random.default_rng(1).random((400, 5))
-    pairs = post_impact_velocities(rows, np.eye(5)[0], 1, 0)
-    off = np.abs(pairs - [flown(m) for m in rows]).max(axis=1)
-    assert (off > 0.05).mean() == pytest.approx(0.1, abs=0.015)
-    assert CHAPTER.glued["pairs-worst"] == f"{100 * off.max():.0f}"
-    m = [2, 0.5, 2, 1, 0.5]
-    gaps = [5 * (5 * 0.4 / 4) ** 0.4] * 4
-    apart = integrated(m, np.eye(5)[0], gaps=gaps) - post_impact_velocities(m, np.eye(5)[0], 1, 0)
+    m = np.array([2, 0.5, 2, 1, 0.5])
+    pairs, gaps = post_impact_velocities(m, np.eye(5)[0], 1, 0), [5 * (5 * 0.4 / 4) ** 0.4] * 4
+    assert np.abs(pairs - flown(m)).max() > 0.5
+    apart = integrated(m, np.eye(5)[0], gaps=gaps) - pairs
     CHAPTER.tells({"pairs-corner": 100 * np.abs(apart).max()})
 
 
 def test_one_impact_in_a_call():
-    """The least and the most of five balls, all laws but two."""
+    """The least and the most of five balls, by spheres, ratios and pairs."""
     calls = [
         *find("springs", "accuracy 1e-02", chain="five equal"),
         *find("springs", "accuracy 1e-03", chain="five equal"),
         *find("event", "compiled, one call with", chain="five equal"),
         *find("event", "compiled, one call, outcome", chain="five equal"),
         *find("outcome", "one call", chain="five equal", model="SequentialCollisions"),
-        *find("outcome", "one call", chain="five equal", model="FusedChain"),
     ]
     times = [row["microseconds"] for row in calls]
     assert float(CHAPTER.glued["call-least"]) == pytest.approx(min(times), rel=0.06)
@@ -408,13 +331,6 @@ def test_who_arrives_together():
         v = integrated([1] * 5, [1, 1, 0, 0, 0], loss=0, gaps=[gap, 0, 0, 0])
         off = 100 * np.abs(v - seen).max()
         assert float(CHAPTER.glued[f"film-two-{name}"]) == pytest.approx(off, abs=0.51)
-    for name, lost in (("lossy", loss), ("elastic", 0)):
-        near, wide = (
-            integrated(m, [1, 1, 0, 0, 0], loss=lost, gaps=[depths * DEPTH, 0, 0, 0])
-            for depths in (3, 10)
-        )
-        changed = 100 * np.abs(near - wide).max()
-        assert float(CHAPTER.glued[f"three-{name}"]) == pytest.approx(changed, abs=0.06)
     m, v = [1] * 10, [1, 1] + [0] * 8
     loss = viscosity_from(0.9, speed=1, masses=m)
     for name, ball, depths in (
@@ -460,7 +376,7 @@ def test_the_film_by_the_printed_calls():
     assert float(by_law()[NAMES["gaps"]][2]) == pytest.approx(off, abs=0.1)
     for name, velocities in found.items():
         off = 100 * np.abs(velocities - seen).max()
-        told = CHAPTER.glued["call-toy"] if name == "toy" else by_law()[NAMES[name]][4]
+        told = by_law()[NAMES["touching"]][2] if name == "toy" else by_law()[NAMES[name]][4]
         assert float(told) == pytest.approx(off, abs=0.1), name
 
 
