@@ -12,7 +12,7 @@ from chapters import Chapter, points
 from numpy.polynomial import Polynomial
 from real_cradles import first_strikes, spheres, table
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq, least_squares, minimize, minimize_scalar
+from scipy.optimize import least_squares, minimize, minimize_scalar
 from scipy.special import gammaincc, ndtri
 from stored import numbers, read
 
@@ -27,6 +27,8 @@ from cradle import (
 from cradle.pictures.impacts import ball_style
 
 CHAPTER = Chapter("real_cradles")
+#: Unit of compression, m: steel, 22 mm, at the speed of one striker.
+UNIT = (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
 GLUED = CHAPTER.glued
 #: The appendix has what the chapter leaves out of these films.
 APPENDIX, HALF = Chapter("observations_film"), Chapter("observations_half")
@@ -63,33 +65,20 @@ def rows(cell):
     return found
 
 
-def laws(release):
-    """For each law of a table: chi-square, the factor of the scale, five velocities."""
-    lines = re.findall(r"^(?:χ²|c|v.) +(.*)$", CHAPTER.printed("setup"), flags=re.MULTILINE)
-    lines = lines[7 * release - 7 : 7 * release]
-    return np.array([[float(x) for x in line.split()] for line in lines]).T
-
-
 def marked(ax, marker):
     """Points drawn with one marker, in the order of x."""
     return np.array(sorted(map(tuple, np.concatenate(points(ax, marker=marker)))))
 
 
-def test_velocities_of_the_models_by_the_fitting_script():
-    """Touching spheres, ratios and gaps, strikers one by one; ratios with strikers that touch."""
-    for release in (1, 2):
-        for row, model in zip(laws(release), MODELS, strict=True):
-            assert row[2:] == pytest.approx(100 * model(release), abs=6e-2)
-            off = real_cradles.misfits(model, first_strikes(4), (release,))
-            assert row[0] == pytest.approx(off @ off, rel=2e-3, abs=0.06)
-            assert 100 * (row[1] - 1) == pytest.approx(off[-1], abs=0.06)
+def test_two_strikers_that_come_as_one():
+    """Ratios and gaps send the last ball off too fast."""
     touch = parameters("three ratios, e", "together", "both")
     v = 100 * real_cradles.ratios(touch[:3], touch[3], 2, False)
-    gaps = real_cradles.by_spheres([*GAPS, 0.0], 2)
-    CHAPTER.tells({"together-five": v[4], "together-gap": 100 * gaps[4], "three-e": RATIOS[3]})
+    gaps = 100 * real_cradles.by_spheres([*GAPS, 0.0], 2)
+    CHAPTER.tells({"together-five": v[4], "together-gap": gaps[4], "three-e": RATIOS[3]})
     last, error = (100 * x[-1] for x in first_strikes(4)[2])
     assert GLUED["leave-five"] == f"{last:.1f} ± {error:.1f}"
-    assert last + 4 * error < min(v[4], 100 * gaps[4])
+    assert last + 4 * error < min(v[4], gaps[4])
 
 
 def test_chi_square_ball_by_ball():
@@ -111,15 +100,17 @@ def test_chi_square_ball_by_ball():
     scaled = ((film - c.x * law) / error) ** 2
     assert float(GLUED["shift-left"]) == pytest.approx(scaled.sum(), abs=2)
     assert float(GLUED["sum"]) == pytest.approx(c.fun, abs=2)
-    CHAPTER.tells({"shift-c": c.x}, off=2e-4)
     CHAPTER.tells({"shift": 100 * (1 - c.x)}, off=0.02)
     assert float(GLUED["shift-cost"]) == pytest.approx(((c.x - 1) / 0.01) ** 2, abs=0.6)
     assert float(GLUED["shift-left"]) + float(GLUED["shift-cost"]) == float(GLUED["sum"])
     top, bottom = (1e4 + (x * law / error**2).sum() for x in (film, law))
     assert top / bottom == pytest.approx(c.x, abs=6e-4)  # the formula of the appendix
-    assert float(GLUED["sum"]) == round(
-        float(FITS["touching spheres, A", "together", "one", "4"]["chi_one"])
+    film_, law_, sigma = (
+        float(GLUED[f"pencil-{x}"].replace("−", "-")) for x in ("film", "law", "error")
     )
+    assert float(GLUED["pencil-difference"]) == pytest.approx(film_ - law_, abs=1e-9)
+    assert float(GLUED["pencil-off"]) == pytest.approx((film_ - law_) / sigma, abs=0.06)
+    assert float(GLUED["pencil-square"]) == round(float(GLUED["pencil-off"]) ** 2)
 
 
 def test_fig_off_and_the_table_of_three_laws():
@@ -299,16 +290,9 @@ def test_a_strike_counts_as_four_velocities():
         assert 3.5 < np.mean(sums) < 4.5
 
 
-def test_the_row_before_the_first_strike_and_the_slower_strikers():
-    t = table("film_strikes.csv")
-    use = (t["reading"] == 4) & (t["release"] == 1) & (t["strike"] == 1) & (t["striker"] == 0)
-    v, error = (100 * t[name][use] for name in ("before", "sigma_before"))
-    least = minimize_scalar(lambda mean: (((v - mean) / error) ** 2).sum())
-    CHAPTER.tells({"row-least": v.max(), "row-most": v.min()})
-    CHAPTER.tells({"row-chance": {2: "two"}[round(100 * gammaincc(1.5, least.fun / 2))]})
+def test_the_slower_strikers():
     speed = float(GLUED["striker"])
     CHAPTER.tells({"late": 9 * real_cradles.SLOWER * speed})
-    CHAPTER.tells({"row-opens": 0.001 * 1000 * speed, "slower": real_cradles.SLOWER})
     assert float(GLUED["striker-slow"]) == pytest.approx(real_cradles.SLOWER * speed, abs=0.01)
 
 
@@ -317,7 +301,7 @@ def test_gaps_and_the_distance_of_the_strikers():
     lines = APPENDIX.printed("films-four").splitlines()[1:]
     assert [float(x.split()[0]) for x in lines] == sorted(float(x.split()[0]) for x in lines)
     reach = lines.pop(4)
-    unit = 1e6 * (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
+    unit = 1e6 * UNIT
     film, slower = {3: first_strikes(4)[3]}, real_cradles.SLOWER
     stored = []
     for which in ("both, third", "both", "both, second"):
@@ -348,13 +332,12 @@ def test_gaps_and_the_distance_of_the_strikers():
             return (real_cradles.misfits(lambda _: v, film, (3,)) ** 2).sum()
 
         assert tests[-1] == (p[2] < 0.03)
-        if not tests[-1]:
-            least = minimize_scalar(
-                left, bounds=(1, 2.5), method="bounded", options={"xatol": 0.02}
-            )
-            assert next(closer) == pytest.approx(least.fun / 3, abs=0.1)
-            assert left(float(TOLD["closer-at"]) / unit) == pytest.approx(least.fun, abs=0.15)
-            assert gammaincc(1.5, least.fun / 2) > 0.05
+        if not tests[-1]:  # unless they came as told: a minimum
+            at = float(TOLD["closer-at"]) / unit
+            before, least, behind = (left(x * at) for x in (0.9, 1, 1.1))
+            assert next(closer) == pytest.approx(least / 3, abs=0.1)
+            assert least < min(before, behind)
+            assert gammaincc(1.5, least / 2) > 0.05
     apart, word, _, both, test = reach.split()
     row = FITS["spheres, three gaps, A", "apart", "both", "4"]
     assert word == "(set)"
@@ -369,7 +352,7 @@ def test_gaps_and_the_distance_of_the_strikers():
 
 def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
     """By another integrator, from what is stored; without reach by restitution of each pair."""
-    unit = 1e3 * (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4  # mm
+    unit = 1e3 * UNIT  # mm
     data, slower = first_strikes(4), real_cradles.SLOWER
 
     def two(p, between):
@@ -388,7 +371,7 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
         return real_cradles.misfits(lambda r: after(np.abs(p), r, between), data, releases)
 
     *rows, reach = numbers("film_distances.csv")
-    for row in (*rows[5::19], reach):
+    for row in (rows[5], rows[62], reach):
         between, both, test, *p = row.values()
         for releases, chi in (((1, 2), both), ((3,), test)):
             off = left(np.array(p), between, releases)
@@ -396,9 +379,6 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
     assert reach["apart"] is None
     near, far = ([r for r in rows if (unit * r["apart"] < 0.095) == side] for side in (True, False))
     assert min(rows, key=lambda row: row["both"]) in near
-    worst = max(r["three"] for r in far)
-    doubt = np.exp(worst / 2) / (1 + worst / 2)  # four degrees of freedom
-    CHAPTER.tells({"far-test": worst, "doubt-films": doubt})
     passed = [
         r for r in far
         if gammaincc(2, r["three"] / 2) > 0.05 and gammaincc(1.5, r["both"] / 2) > 0.05
@@ -428,20 +408,9 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
         assert [float(x) for x in shown] == pytest.approx(expected, abs=0.051)
         right = "miss the test" if group is near else "doubtful"
         assert words == ("pass" if all(r in passed for r in group) else right)
-    # With n = 4 for the fit, too.
-    given = [unit * r["apart"] for r in far
-             if gammaincc(2, max(r["both"], r["three"]) / 2) > 0.05]  # fmt: skip
-    assert not [mm for mm in given if 0.2 < mm < 0.4 or mm > 1.1]
-    assert len(given) == sum(unit * r["apart"] < 1.1 and not 0.2 < unit * r["apart"] < 0.4
-                             for r in far)  # fmt: skip
     assert gammaincc(1.5, float(GLUED["limit-fit"]) / 2) == pytest.approx(0.05, rel=0.03)
     assert gammaincc(2, float(GLUED["limit-test"]) / 2) == pytest.approx(0.05, rel=0.03)
-    v = spheres([slower, 0, 0, 0], [0, *GAPS[1:3]], GAPS[3]) / slower
-    CHAPTER.tells({"part": 100 * (v[1] - v[0]), "apart": real_cradles.APART * unit})
-    came = 1000 * unit * real_cradles.APART / (1 - v[0]) * (v[1] - v[0])
-    CHAPTER.tells({"part-um": came, "press-um": 1000 * unit * (5 / 8) ** 0.4})
-    off = left(np.array(GAPS), 1 / unit, (2,))
-    CHAPTER.tells({"same-mm": off @ off}, off=0.5)
+    CHAPTER.tells({"apart": real_cradles.APART * unit})
 
 
 def test_a_softer_first_touch():
@@ -488,28 +457,13 @@ def chi_square(row, columns=("chi_one", "chi_two")):
     return sum(float(row[column]) for column in columns)
 
 
-def test_what_is_said_to_be_refuted_is_and_what_is_not_is_not():
-    for reading in ("4", "2"):
-        chi = {
-            key[:2]: chi_square(row) / int(row["freedom"])
-            for key, row in FITS.items()
-            if key[2:] == ("both", reading)
-        }
-        gaps = ("spheres, three gaps, A", "apart")
-        # Whatever else ratios may choose, too, does not help them at the third strike.
-        more = [f"three ratios{more}" for more in (", e, four masses", ", four e", " each way, e")]
-        fits = {(law, "apart") for law in ("three ratios, e", *more)}
-        for law, how in fits if reading == "4" else ():
-            assert float(FITS[law, how, "both", reading]["chi_three"]) > 50
-        fits |= {gaps, ("spheres, four gaps, A", "own gap")}
-        assert {key for key, value in chi.items() if value < 2} == fits
-        assert min(value for key, value in chi.items() if key not in fits) > 4
+def test_gaps_fit_all_three_strikes_better_than_any_other_law():
     chi = {
         key[:2]: chi_square(row, real_cradles.SUMS) / int(row["freedom"])
         for key, row in FITS.items()
         if key[2] == "all"
     }
-    assert chi.pop(gaps) < 0.8
+    assert chi.pop(("spheres, three gaps, A", "apart")) < 0.8
     assert min(chi.values()) > 3
 
 
@@ -575,7 +529,7 @@ def test_gaps_and_not_ratios_predict_the_third_release():
         right = np.array([film, error, film - left[:5] * error])
         assert np.transpose(shown)[[1, 2, 3 + k]] == pytest.approx(right, abs=0.011)
         assert np.transpose(shown)[5 + k] == pytest.approx(left[:5], abs=0.06)
-    unit = 1e6 * (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
+    unit = 1e6 * UNIT
     kept = np.ptp(spheres([1, 0], [0], GAPS[3]))
     assert told[0] == pytest.approx(RATIOS, abs=6e-4)
     right = [*(unit * x for x in GAPS[:3]), kept, 0.03 * unit]
@@ -607,17 +561,16 @@ def test_the_first_two_of_three_strikers_did_not_come_as_one():
     for v in (two, real_cradles.ratios([*p], e, 3, False)):
         off = real_cradles.misfits(lambda _, v=v: v, {3: (film, error)}, (3,))
         assert off @ off > 5 * sums_of("ratios")
-    unit = (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
-    least = float(GLUED["pair-um"]) * 1e-6 / unit
+    least = float(GLUED["pair-um"]) * 1e-6 / UNIT
     assert behind(least)[1] == pytest.approx(behind(30)[1] + 3.84, abs=0.3)
 
 
-def test_the_errors_of_the_fit_by_simulated_films():
-    """How far three ratios miss the third release, over the scatter of fits to noisy strikes."""
-    rng, data, predicted = np.random.default_rng(0), first_strikes(4), []
-    true = np.array(RATIOS)
-    law = real_cradles.LAWS["three ratios, e"][0]
-    for _ in range(60):
+def test_the_errors_of_what_was_chosen_for_ball_4():
+    """The scatter of fits to simulated films: ratios as told; gaps by the same slopes."""
+    rng, data = np.random.default_rng(0), first_strikes(4)
+    true, law = np.array(RATIOS), real_cradles.LAWS["three ratios, e"][0]
+    found = []
+    for _ in range(40):
         noisy = {}
         for release in (1, 2):
             sigma, v = data[release][1], law(true, release, True)
@@ -627,20 +580,27 @@ def test_the_errors_of_the_fit_by_simulated_films():
             lambda p, noisy=noisy: real_cradles.misfits(
                 lambda r: law(p, r, True), noisy, (1, 2)),
             true, diff_step=1e-4)  # fmt: skip
-        predicted.append(law(fit.x, 3, True)[:2])
-    film, sigma = (x[:2] for x in data[3])
-    missed = np.abs(law(true, 3, True)[:2] - film) / np.hypot(sigma, np.std(predicted, axis=0))
-    assert float(GLUED["third-ratio"]) == pytest.approx(missed.min(), abs=1)
+        found.append(fit.x[2])
+    assert float(GLUED["ratio-chosen-error"]) == pytest.approx(np.std(found), abs=7e-4)
+    # Where the others are chosen anew for a gap a standard error off, chi-square is larger by 1.
+    unit = 1e6 * UNIT
+    told = float(GLUED["gap-chosen-error"]) / unit
+
+    def least(gap):
+        return least_squares(
+            lambda p: real_cradles.misfits(
+                lambda r: real_cradles.by_spheres([*p[:2], gap, p[2]], r, True,
+                                                  solve=real_cradles.quick), data, (1, 2)),
+            [*GAPS[:2], GAPS[3]], diff_step=3e-3, max_nfev=6).cost  # fmt: skip
+
+    at = [2 * least(GAPS[2] + x * told) for x in (-1, 0, 1)]
+    assert (at[0] + at[2]) / 2 - at[1] == pytest.approx(1, abs=0.35)
 
 
 def implied(gap):
-    """The ratio that a gap implies, by the fitting script's spheres."""
-    second = spheres([1, 0, 0], [0, gap], 0.0)[1]
-
-    def miss(ratio):
-        return collide(Chain([1] * 3, [1, 0, 0]), ImpulseCorrelation(ratio)).velocities[1] - second
-
-    return brentq(miss, 0, 0.3)
+    """The ratio that a gap implies, by the package's spheres and v1 = -a / (2 - a)."""
+    v = collide(Chain([1] * 3, [1, 0, 0]), SpringChain(gaps=[0, gap])).velocities[0]
+    return -2 * v / (1 - v)
 
 
 def test_fig_gaps():
@@ -682,21 +642,11 @@ def test_the_figure_of_the_film_shows_balls_where_energy_lets_them_turn():
     assert across == pytest.approx(0.022, rel=0.02)
 
 
-def test_sums_of_the_readings():
-    """The table's last line; none is farther from 100 a striker than its errors allow."""
-    shown = re.findall(r"(?m)(\S+) ± (\S+)", CHAPTER.printed("reading").splitlines()[-1])
-    for release, (total, spread) in enumerate(shown, 1):
-        v, error = (100 * x for x in first_strikes(4)[release])
-        assert float(total) == pytest.approx(v.sum(), abs=6e-3)
-        assert float(spread) == pytest.approx(np.sqrt(error @ error), abs=6e-3)
-        assert abs(v.sum() - 100 * release) < np.hypot(float(spread), release)
-
-
 def test_what_the_third_strike_wants_of_ball_4():
     """Its best ratio and its best gap, the others as chosen; what a gap implies for it."""
     film = {3: first_strikes(4)[3]}
     (*ratios, e), (*gaps, loss) = RATIOS, GAPS
-    unit = 1e6 * (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
+    unit = 1e6 * UNIT
 
     def sum_of(velocities):
         off = real_cradles.misfits(lambda _: velocities, film, (3,))
@@ -713,8 +663,8 @@ def test_what_the_third_strike_wants_of_ball_4():
     least, wanted = {}, {}
     for name, chi, scale, step in (("ratio", by_ratio, 1, 1e-3), ("gap", by_gap, unit, 0.01)):
         told = float(GLUED[f"{name}-wanted"])
-        # Around it the sum of squares is nearly a parabola: five points and two to spare.
-        x = told / scale + np.linspace(-0.012, 0.012, 7)
+        # Around it the sum of squares is nearly a parabola.
+        x = told / scale + np.linspace(-0.012, 0.012, 5)
         near = Polynomial.fit(x, [chi(one) for one in x], 4)
 
         def inside(curve, x=x):
@@ -728,10 +678,9 @@ def test_what_the_third_strike_wants_of_ball_4():
         low, high = sorted(inside(near - least[name] - 1))
         error = scale * (high - low) / 2
         assert float(GLUED[f"{name}-wanted-error"]) == pytest.approx(error, abs=step)
-    by_speed = implied(gaps[2] / 0.766**0.8) / implied(gaps[2]) - 1
-    fall = wanted["ratio"] / ratios[2] - 1
-    CHAPTER.tells({"fall": 100 * fall, "fall-speed": 100 * by_speed}, off=0.05)
-    assert 100 * fall < float(GLUED["fall-overlap"].replace("−", "-")) + 100 * by_speed < 0
+    CHAPTER.tells({"fall": 100 * (1 - wanted["ratio"] / ratios[2])}, off=0.05)
+    half = float(GLUED["fall-overlap"]) / float(GLUED["fall"])
+    assert half == pytest.approx(0.5, abs=0.1)  # about half is explained
     # Either fits then; the gap did before.
     assert max(least.values()) < 6
     assert sums_of("gaps") - least["gap"] < 1
@@ -752,8 +701,8 @@ def pushes(release, gaps, loss, speed=None):
         return np.append(y[balls:], -np.diff(f))
 
     start = [0.0] * balls + [speed] + [0.0] * (balls - 1)
-    t = np.linspace(0, 8, 16001)
-    run = solve_ivp(rate, (0, 8), start, "RK45", t, rtol=1e-8, atol=1e-10, max_step=0.01)
+    t = np.linspace(0, 8, 8001)
+    run = solve_ivp(rate, (0, 8), start, "RK45", t, rtol=1e-6, atol=1e-9, max_step=0.05)
     first, second = np.array([forces(y)[-2:] for y in run.y.T]).T
     return t - t[first.argmax()], first / first.max(), second / first.max()
 
@@ -761,14 +710,13 @@ def pushes(release, gaps, loss, speed=None):
 def test_the_two_pushes_at_ball_4():
     """Their curves, their overlap, and that the push of a flying ball has no foot."""
     *gaps, loss = parameters("spheres, three gaps, A", "apart", "both")
-    unit = (0.0448 * 0.69**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4
-    found = {release: pushes(release, gaps, loss, 0.766) for release in (1, 2, 3)}
+    unit = UNIT
+    found = {release: pushes(release, gaps, loss, 0.766) for release in (1, 3)}
     shares = {
         release: 100 * np.minimum(first, second).sum() / first.sum()
         for release, (_, first, second) in found.items()
     }
-    CHAPTER.tells({"fall-overlap": 100 * (shares[3] / shares[1] - 1)}, off=0.1)
-    assert shares[1] > shares[2] > shares[3] + 1
+    CHAPTER.tells({"fall-overlap": 100 * (1 - shares[3] / shares[1])}, off=0.1)
     above, below = CHAPTER.figures["fig-real-forces"].axes
     for ax, shown in ((above, (1,)), (below, (3, 1))):
         curves = [line.get_xydata() for line in ax.get_lines()]
@@ -784,27 +732,8 @@ def test_the_two_pushes_at_ball_4():
         release: [t[np.argmax(push > 0.01)] for push in forces]
         for release, (t, *forces) in found.items()
     }
-    for release in (1, 2):
-        assert begins[release][0] < begins[3][0] - 0.1
-        assert begins[release][1] < begins[3][1] - 0.05
-
-
-def test_a_share_of_chi_square_with_a_pencil():
-    film, error = (100 * x for x in first_strikes(4)[3])
-    assert float(GLUED["share-error"]) == pytest.approx(error[1], abs=6e-4)
-    off = float(GLUED["share-difference"].replace("−", "-")) / float(GLUED["share-error"])
-    assert float(GLUED["share-off"].replace("−", "-")) == pytest.approx(off, abs=0.1)
-    assert float(GLUED["share-square"]) == pytest.approx(off**2, abs=0.6)
-    line = CHAPTER.printed("third-code").splitlines()[3].replace("−", "-").split()
-    assert line[0] == "2"
-    ratios, gaps = (float(x) for x in line[-2:])
-    assert film[1] - ratios == pytest.approx(off * error[1], abs=0.011)
-    assert ((film[1] - gaps) / error[1]) ** 2 < float(GLUED["share-gaps"]) < 0.1
-    film_, law, sigma = (float(GLUED[f"pencil-{x}"].replace("−", "-"))
-                         for x in ("film", "law", "error"))  # fmt: skip
-    assert float(GLUED["pencil-difference"]) == pytest.approx(film_ - law, abs=1e-9)
-    assert float(GLUED["pencil-off"]) == pytest.approx((film_ - law) / sigma, abs=0.06)
-    assert float(GLUED["pencil-square"]) == round(float(GLUED["pencil-off"]) ** 2)
+    assert begins[1][0] < begins[3][0] - 0.1
+    assert begins[1][1] < begins[3][1] - 0.05
 
 
 def test_swing_of_the_mean():
@@ -825,7 +754,7 @@ def test_swing_of_the_mean():
 
 
 def test_fig_half():
-    *windows, top = CHAPTER.figures["fig-real-half"].axes
+    *windows, top = HALF.figures["fig-real-half"].axes
     ball, time, place, *_ = real_swing.peaks()
     for k, marker in ((0, "o"), (4, "s")):
         own = ball == k
@@ -856,19 +785,15 @@ def test_fig_half():
     *_, clocks, errors = real_swing.peaks()
     HALF.tells({"least-place": 1000 * errors.min(), "most-place": 1000 * errors.max()})
     HALF.tells({"least-time": 1000 * clocks.min()})
+    HALF.tells({"lost": 1000 * float(read("cradle_fits.csv", law="constant loss")[0]["loss"])})
+    computed = [(float(x["t_s"]), 1000 * abs(float(x["x_m"])))
+                for x in read("cradle_turns.csv", law="constant loss")]  # fmt: skip
+    assert marked(top, ".") == pytest.approx(np.array(sorted(computed)))
     # Where an outer ball turns within a window, the curve in its colour has that place.
     colours = [ball_style(k)["color"] for k in range(5)]
-    row = read("cradle_fits.csv", law="constant loss")[0]
-    HALF.tells({"lost": 1000 * float(row["loss"])})
-    fit = [float(row[name]) for name in real_swing.COLUMNS[1:6]]
-    run = real_swing.swung("constant loss", fit, real_swing.common()[1])
     for ax in windows:
-        lines = {style: [x for x in ax.get_lines() if x.get_ls() == style] for style in "-:"}
-        curves = {colours.index(line.get_color()): line.get_xydata() for line in lines["-"]}
+        curves = {colours.index(x.get_color()): x.get_xydata() for x in ax.get_lines()}
         assert sorted(curves) == list(range(5))
-        for line, k in zip(lines[":"], (0, 4), strict=True):
-            x = np.interp(line.get_xdata(), run.times + fit[3], 1000 * run.positions[:, k])
-            assert line.get_ydata() == pytest.approx(x, abs=0.05)
         low, high = ax.get_xlim()
         inside = (time > low + 0.1) & (time < high - 0.1)
         assert inside.sum() >= 4
@@ -936,11 +861,3 @@ def test_without_the_systematic_error():
         assert told == pytest.approx([fit / free, test / 4], abs=0.051 if free == 3 else 0.5)
         assert (gammaincc(free / 2, fit / 2) > 0.05) == (name == "gaps")
         assert (gammaincc(2, test / 2) > 0.05) == (name == "gaps")
-
-
-def test_touching_spheres_of_free_masses():
-    """Equal masses are among them, and they do not help."""
-    law = "touching spheres, A, four masses"
-    for reading in ("4", "2"):
-        row, plain = (FITS[x, "apart", "both", reading] for x in (law, "touching spheres, A"))
-        assert 30 * int(row["freedom"]) < chi_square(row) < chi_square(plain)
