@@ -227,14 +227,16 @@ def test_fig_patterns_parameters():
 
 
 def test_fig_patterns_micro():
-    counts = panel("reading_counting", "fig-patterns-count")["counted / estimate"]
+    rows = Chapter("reading_counting").printed("patterns-counts").splitlines()[1:]
+    for row, r in zip(rows, np.repeat([1e-2, 1e-4, 1e-6], 3), strict=True):
+        a, number, estimate = map(float, row.split()[1:])
+        assert number == by_turns(r, r, 1, a)[0]
+        assert estimate == pytest.approx(np.pi * np.sqrt((1 - a) / (2 * r)), abs=0.051)
     low = panel("patterns", "fig-patterns-micro")
     r, first = low["$v_1^+$"][:, 0], 4000 - len(low["$v_2^+$"])
     low["$v_2^+$"] = np.vstack([np.full((first, 2), np.nan), low["$v_2^+$"]])
     for k in range(100, 4000, 350):
-        number, v = by_turns(r[k], r[k], 1, 0.15)
-        quotient = number / (np.pi * np.sqrt(0.85 / (2 * r[k])))
-        assert counts[k] == pytest.approx([r[k], quotient], rel=1e-12)
+        _, v = by_turns(r[k], r[k], 1, 0.15)
         for ball in range(3) if k >= first else (0, 2):
             assert low[f"$v_{ball + 1}^+$"][k, 1] == pytest.approx(v[ball], abs=1e-10)
     assert r[first] < 0.01
