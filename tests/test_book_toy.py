@@ -8,7 +8,6 @@ import pytest
 import real_cradles
 from chains import HERTZ
 from chapters import Chapter, drawn, floats, number, panel
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from truth import solve
 
@@ -57,20 +56,16 @@ def test_several():
     assert story == [0, 0, 0, 1, 1]
     expected = strokes(1, [1, 1, 0, 0, 0])[0]
     np.testing.assert_allclose(two, expected, rtol=0, atol=5.1e-4)
-    CHAPTER.tells(dict(zip(("two-third", "two-fourth", "two-fifth"), expected[2:])))
+    CHAPTER.tells({"two-third": expected[2]})
 
 
 def test_strokes_and_fig_toy_models():
-    """Twenty strokes and many more; then the end of a lossy minute."""
     after = strokes(173, [1, 0, 0, 0, 0])
     for row, stroke in zip(rows("strokes"), (1, 2, 3, 20, 173), strict=True):
         np.testing.assert_allclose(row, after[stroke - 1], rtol=0, atol=5.1e-4)
     inner = 100 * (after[:, 1:4] ** 2).sum(axis=1)
     CHAPTER.tells({
         "inner-first": inner[0], "inner-twenty": inner[19], "inner-most": inner.max(),
-        "second-first": -after[1, 0], "second-next": -after[1, 1],
-        "late-fifth": after[172, 4], "late-fourth": after[172, 3],
-        "lossy-last": 1 / 5,
     })  # fmt: skip
 
 
@@ -79,15 +74,13 @@ def test_mirror():
     one, other = strokes(20, [1, 0, 0, 0, 0]), -strokes(20, [0, 0, 0, 0, -1])[:, ::-1]
     apart = np.abs(one - other).max(axis=1)
     assert glued("mirror-worst") > apart.max() - 0.006
-    CHAPTER.tells({"mirror-first": -other[1, 0], "mirror-next": -other[1, 1]})
 
 
-@pytest.mark.parametrize(("name", "e"), [("ninety", 0.9), ("ninetynine", 0.99)])
-def test_fig_toy_drift(name, e):
-    after = strokes(41, [1, 0, 0, 0, 0], e)
+def test_fig_toy_drift():
+    after = strokes(41, [1, 0, 0, 0, 0], 0.99)
     pace = (after[40].var() / after[20].var()) ** (1 / 40)
-    assert glued(f"pace-{name}") == pytest.approx(pace, abs=5.1e-4)
-    assert pace < e  # faster than two balls
+    assert glued("pace-ninetynine") == pytest.approx(pace, abs=5.1e-4)
+    assert pace < 0.99  # faster than two balls
     assert glued("left") == 20
 
 
@@ -122,41 +115,12 @@ def test_fig_inventory_resting():
     assert float(INVENTORY["opens"]) == pytest.approx(t + falls, abs=1.5e-3)
 
 
-def test_second_stroke_of_springs_by_another_integrator():
-    def rate(_, y):
-        force = 1e9 * np.maximum(y[:2] - y[1:3], 0) ** 1.5
-        return [*y[3:], -y[0] - force[0], -y[1] + force[0] - force[1], -y[2] + force[1]]
-
-    found = solve_ivp(
-        rate, (0, 2 * np.pi), [-1, 0, 0, 0, 0, 0], "RK45", rtol=1e-9, atol=1e-12, max_step=0.02
-    )  # fmt: skip
-    lines = [line.split(":")[-1].split() for line in CHAPTER.printed("springs").splitlines()]
-    stiff, touching = map(floats, lines[-2:])
-    np.testing.assert_allclose([*found.y[:3, -1]] * 2, stiff, rtol=0, atol=2e-3)
-    assert glued("second-off") == pytest.approx(np.abs(stiff[:3] - touching).max(), abs=6e-3)
-
-
-def test_second_stroke_of_steel_by_another_integrator():
-    """Strings pull all balls alike while they touch, so that only the forces count."""
-
-    def rate(_, y):
-        force = np.maximum(-np.diff(y[:5]), 0) ** 1.5
-        return [*y[5:], *np.append(0, force) - np.append(force, 0)]
-
-    def after(x, v):
-        ends = solve_ivp(rate, (0, 60), [*x, *v], "RK45", rtol=1e-10, atol=1e-12).y[:, -1]
-        return ends[:5] - 60 * ends[5:], ends[5:]  # as if they had always moved so
-
-    x, v = after(np.zeros(5), np.eye(5)[0])
-    # Half a period later all come back, at places and with velocities that are reversed.
-    start = 30.0
-    _, v = after(-x + start * v, -v)
-    CHAPTER.tells({"steel-second-first": -v[0], "steel-second-next": -v[1]}, off=1e-3)
-
-
 def test_contact_of_steel_balls_in_closed_form():
     deepest = (5 * (MASS / 2) * STRIKE**2 / (4 * STIFFNESS)) ** 0.4
-    CHAPTER.tells({"contact-time": 1e6 * 2.94327 * deepest / STRIKE, "compression": 1e6 * deepest})
+    CHAPTER.tells({"compression": 1e6 * deepest})
+    contact, late = 2.94327 * deepest / STRIKE, 1e-3 * glued("spread")
+    assert glued("spread-times") == round(late / contact, -1)
+    assert late / 100 < contact
 
 
 @pytest.mark.parametrize(("row", "gap"), [(0, 0), (1, 0.8e-6), (2, 1.2e-6)])
@@ -182,11 +146,12 @@ def gapped(share):
 
 def test_gaps_of_a_part_of_the_compression():
     touching = gapped(0)
-    for name, share in (("hundredth", 0.01), ("tenth", 0.1), ("whole", 1.0)):
+    for name, share in (("tenth", 0.1), ("whole", 1.0)):
         CHAPTER.tells({f"gap-{name}-moves": np.abs(gapped(share) - touching).max()}, off=6e-4)
         assert glued(f"gap-{name}") == pytest.approx(share * glued("compression"), rel=0.01)
-    CHAPTER.tells({"gaps-most": np.abs(np.eye(5)[4] - touching).max()}, off=1e-4)
-    assert glued("gap-tenth-moves") == pytest.approx(glued("gaps-most") / 2, rel=0.1)
+    assert glued("gap-whole-moves") == pytest.approx(
+        np.abs(np.eye(5)[4] - touching).max(), abs=6e-4
+    )
     shown = panel("toy", "fig-toy-gaps", 1) | panel("toy", "fig-toy-gaps")
     assert list(shown) == [f"ball {k}" for k in range(1, 6)]
     velocities = np.array([line[:, 1] for line in shown.values()])
@@ -201,25 +166,15 @@ def test_spread_of_the_second_stroke_at_any_angle():
     widest = BACK / LENGTH * np.abs(v).max()
     late = PERIOD / 2 * widest**2 / 16
     assert glued("spread") == pytest.approx(1e3 * late, rel=0.1)
-    contact = glued("contact-time") * 1e-6
-    assert glued("spread-times") == round(late / contact, -1)
-    assert late / 100 < contact
 
 
-def test_the_ball_that_never_hangs_still():
-    always = np.abs(strokes(6, [1, 1, 1, 0, 0], ratio=0.0)) > 1e-9
-    assert np.flatnonzero(always.all(axis=0)).tolist() == [glued("always") - 1]
+def test_two_balls_back():
+    """With losses all come to two fifths of the strikers' speed."""
+    np.testing.assert_allclose(np.abs(strokes(60, [1, 1, 0, 0, 0], 0.9)[-1]), 2 / 5, atol=1e-4)
 
 
-def test_fig_toy_second_and_film():
-    """Marks of the rule, and the stored film, as the independent solver says."""
-    ways = strokes(2, [1, 0, 0, 0, 0])[1], -strokes(2, [0, 0, 0, 0, -1])[1, ::-1]
-    shown = list(panel("toy", "fig-toy-second").values())
-    for points, expected in zip(shown, ways, strict=False):
-        np.testing.assert_allclose(points[:, 0], expected, atol=1e-9)
-    assert -shown[2][:2, 0] == pytest.approx(
-        [glued("steel-second-first"), glued("steel-second-next")], abs=0.006
-    )
+def test_fig_toy_film():
+    """The stored film, as the independent solver says."""
     film = CHAPTER.cells["film"].outputs[0].data["text/html"]
     for row, (ratio, e) in enumerate(((0, 1), (RATIO, 1), (RATIO, 0.9))):
         v = strokes(1, [1, 0, 0, 0, 0], e, ratio)[0]
