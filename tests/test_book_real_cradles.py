@@ -86,8 +86,6 @@ def test_chi_square_ball_by_ball():
     CHAPTER.tells({"shift": 100 * (1 - c.x)}, off=0.02)
     assert float(GLUED["shift-cost"]) == pytest.approx(((c.x - 1) / 0.01) ** 2, abs=0.6)
     assert float(GLUED["shift-left"]) + float(GLUED["shift-cost"]) == float(GLUED["sum"])
-    top, bottom = (1e4 + (x * law / error**2).sum() for x in (film, law))
-    assert top / bottom == pytest.approx(c.x, abs=6e-4)  # the formula of the appendix
     film_, law_, sigma = (
         float(GLUED[f"pencil-{x}"].replace("−", "-")) for x in ("film", "law", "error")
     )
@@ -280,57 +278,29 @@ def test_the_slower_strikers():
 
 
 def test_gaps_and_the_distance_of_the_strikers():
-    """Five minima; two miss the test unless the distance is chosen anew. And one as set."""
-    lines = APPENDIX.printed("films-four").splitlines()[1:]
-    assert [float(x.split()[0]) for x in lines] == sorted(float(x.split()[0]) for x in lines)
-    reach = lines.pop(4)
+    """Two near distances that fit; they miss the test unless the distance is chosen anew."""
     unit = 1e6 * UNIT
     film, slower = {3: first_strikes(4)[3]}, real_cradles.SLOWER
-    stored = []
-    for which in ("both, third", "both", "both, second"):
+    told = zip(TOLD["near"].split(" or "), TOLD["closer"].split(" and "), strict=True)
+    for which in ("both, third", "both"):
         row = FITS["spheres, four gaps, A", "own gap", which, "4"]
-        p = [float(x) for x in row["parameters"].split()]
-        stored.append((p, chi_square(row), float(row["chi_three"])))
-    curve = numbers("film_distances.csv")[:-1]
-    for before, row, behind in zip(curve, curve[1:], curve[2:]):
-        if row["both"] < min(before["both"], behind["both"]):
-            apart, both, test, *p = row.values()
-            known = [x for x in stored if x[0][4] == pytest.approx(apart, rel=0.02)]
-            assert bool(known) == (unit * apart < 200)
-            if not known:
-                stored.append(([*p, apart], both, test))
-    gaps, tests, closer = [], [], iter(map(float, TOLD["closer"].split(" and ")))
-    for line, (p, in_fit, in_test) in zip(lines, stored, strict=True):
-        apart, gap, both, test, *verdict = line.replace(",", "").split()
-        assert float(both) == pytest.approx(in_fit / 3, abs=0.051)
-        assert float(test) == pytest.approx(in_test / 4, abs=0.051 if in_test < 30 else 0.51)
-        assert float(apart) == pytest.approx(unit * p[4], abs=0.51)
-        gaps.append(unit * p[2])
-        assert float(gap) == pytest.approx(gaps[-1], abs=0.051)
-        tests.append(gammaincc(2, in_test / 2) > 0.05)
-        assert verdict == ([] if tests[-1] else ["misses"])
+        *_, gap, loss, apart = (float(x) for x in row["parameters"].split())
+        near, closer = next(told)
+        assert float(near) == pytest.approx(unit * apart, abs=0.51)
+        assert (
+            gammaincc(1.5, chi_square(row) / 2) > 0.05 > gammaincc(2, float(row["chi_three"]) / 2)
+        )
+        APPENDIX.tells({"near-gap": unit * gap})
 
-        def left(between, p=p):
-            v = spheres([slower] * 3 + [0, 0], [30, between, 0, p[2]], p[3]) / slower
+        def left(between, gap=gap, loss=loss):
+            v = spheres([slower] * 3 + [0, 0], [30, between, 0, gap], loss) / slower
             return (real_cradles.misfits(lambda _: v, film, (3,)) ** 2).sum()
 
-        assert tests[-1] == (p[2] < 0.03)
-        if not tests[-1]:  # unless they came as told: a minimum
-            at = float(TOLD["closer-at"]) / unit
-            before, least, behind = (left(x * at) for x in (0.9, 1, 1.1))
-            assert next(closer) == pytest.approx(least / 3, abs=0.1)
-            assert least < min(before, behind)
-            assert gammaincc(1.5, least / 2) > 0.05
-    apart, word, _, both, test = reach.split()
-    row = FITS["spheres, three gaps, A", "apart", "both", "4"]
-    assert word == "(set)"
-    assert float(apart) == pytest.approx(unit * real_cradles.APART, abs=0.51)
-    assert float(both) == pytest.approx(chi_square(row) / 3, abs=0.051)
-    assert float(test) == pytest.approx(float(row["chi_three"]) / 4, abs=0.051)
-    APPENDIX.tells({"gap-least": min(gaps), "gap-most": max(gaps)})
-    assert min(gaps) <= unit * GAPS[2] <= max(gaps)
-    words = {2: "two", 5: "Five"}
-    APPENDIX.tells({"four-miss": words[tests.count(False)], "four-of": words[len(gaps)]})
+        assert float(closer) == pytest.approx(
+            left(at := float(TOLD["closer-at"]) / unit) / 3, abs=0.1
+        )
+        assert left(at) < min(left(0.9 * at), left(1.1 * at))  # a minimum
+        assert gammaincc(1.5, left(at) / 2) > 0.05
 
 
 def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
@@ -387,8 +357,8 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
 
 
 def test_a_softer_first_touch():
-    """Balls that push by d^p, integrated here; the loss that fits best at the p of the text."""
-    power = float(TOLD["soft-power"])
+    """Balls that push by d^p, integrated here; the loss that fits best at about the best p."""
+    power = 1.74
 
     def struck(speeds, loss):
         n = len(speeds)
@@ -422,8 +392,7 @@ def test_a_softer_first_touch():
         lambda loss: left(loss, (1, 2)), bounds=(0, 0.03), method="bounded",
         options={"xatol": 1e-4},
     )  # fmt: skip
-    for name, value, free in (("both", best.fun, 6), ("test", left(best.x, (3,)), 4)):
-        assert float(TOLD[f"soft-{name}"]) == pytest.approx(value / free, rel=0.03)
+    assert float(TOLD["soft-both"]) == pytest.approx(best.fun / 6, rel=0.03)
 
 
 def chi_square(row, columns=("chi_one", "chi_two")):
@@ -459,12 +428,11 @@ def test_strikers_one_by_one():
 
 
 def test_one_strike_is_fitted_in_six_ways_that_predict_different_things():
-    for law, short in (("three ratios, e", "ratios"), ("spheres, three gaps, A", "gaps")):
+    for law in ("three ratios, e", "spheres, three gaps, A"):
         assert (law, "apart", "one, 7", "4") not in FITS
         sets = [FITS[law, "apart", f"one, {k}", "4"] for k in range(1, 7)]
         chi = [float(row["chi_two"]) for row in sets]
         assert max(chi) > 5 * min(chi)
-        assert TOLD[f"{short}-sets"] == "six"
 
 
 def test_gaps_and_not_ratios_predict_the_third_release():
@@ -481,19 +449,11 @@ def test_gaps_and_not_ratios_predict_the_third_release():
         assert law == pytest.approx(100 * model(3), abs=6e-3)
     assert (np.abs(gaps - film)[:2] < 0.5 * error[:2]).all()
     assert (np.abs(ratios - film)[:2] > 5 * error[:2]).all()
-    shown, told = (
-        [[float(x) for x in re.findall(r"-?[\d.]+", line)] for line in lines.splitlines()[2:]]
-        for lines in (APPENDIX.printed(f"test-{x}").replace("−", "-") for x in ("balls", "chosen"))
-    )
-    for k, v in enumerate((ratios, gaps)):
-        left = real_cradles.misfits(lambda _, v=v: v / 100, {3: (film / 100, error / 100)}, (3,))
-        right = np.array([film, error, film - left[:5] * error])
-        assert np.transpose(shown)[[1, 2, 3 + k]] == pytest.approx(right, abs=0.011)
-        assert np.transpose(shown)[5 + k] == pytest.approx(left[:5], abs=0.06)
-    kept = np.ptp(spheres([1, 0], [0], GAPS[3]))
-    assert told[0] == pytest.approx(RATIOS, abs=6e-4)
-    right = [*(1e6 * UNIT * x for x in GAPS[:3]), kept, 0.03e6 * UNIT]
-    assert told[1] == pytest.approx(right, abs=0.051)
+    for name, law in (("gaps", gaps), ("ratios", ratios)):  # after the factor c
+        v = law / 100
+        left = real_cradles.misfits(lambda _, v=v: v, {3: (film / 100, error / 100)}, (3,))[:5]
+        assert name == "ratios" or (abs(left) < 1).tolist()[:2] == [True, True]
+        assert name == "ratios" or abs(left).argmax() == 2
     CHAPTER.tells({"slow-off": np.abs(ratios - film)[:2].max(), "slow-error": error[:2].max()})
     assert f"{np.abs(ratios - film)[:2].min():.1f}" == GLUED["slow-off"]  # both
 
@@ -568,9 +528,6 @@ def test_fig_gaps():
     for gap, ratio in line[::3]:
         assert ratio == pytest.approx(implied(gap), abs=2e-5)
     assert line[0, 1] == pytest.approx(0.1325, abs=1e-4)
-    assert float(TOLD["implied"]) == pytest.approx(implied(GAPS[0]), abs=5.1e-3)
-    APPENDIX.tells({"first-ratio": RATIOS[0]})
-    assert float(TOLD["first-ratio"]) > 2 * implied(GAPS[0])
     for word, v in (("slow", 0.5), ("fast", 2.0)):  # a gap of 2 µm
         a = implied(2e-6 / ((0.0448 * v**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4))
         APPENDIX.tells({f"look-{word}": -a / (2 - a)})
@@ -706,7 +663,9 @@ def test_what_a_gap_implies_at_other_speeds():
         expected = [implied(float(gap) / (unit * v**0.8)) for v in speeds]
         assert [float(x) for x in ratios] == pytest.approx(expected, abs=6e-4)
         assert float(gap) == 0 or sorted(expected) == expected
-    APPENDIX.tells({"tenth": implied(0.1), "no-gap": implied(0), "hertz": unit * 0.69**0.8})
+    APPENDIX.tells(
+        {"tenth": implied(0.1), "no-gap": implied(0), "tenth-gap": unit * 0.69**0.8 / 10}
+    )
 
 
 def test_without_the_systematic_error():
