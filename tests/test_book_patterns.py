@@ -91,15 +91,6 @@ def test_eqs_45_46_balls_at_rest(e, alpha):
     assert abs(velocity(1, r1, 0.5 * r2, e, alpha)) > 1e-3
 
 
-def test_eq_44_ends_of_the_curve():
-    """On the axes of the map, as the chapter states them."""
-
-    def height(r2):
-        return (1 + E) * (1 + E * (1 - ALPHA * (1 + r2)) ** 0.5) / (E * (1 + r2)) - 1 - ALPHA / E
-
-    CHAPTER.tells({"end-1": height(0), "end-2": brentq(height, 1, 4)})
-
-
 def test_fig_6_patterns_and_counts_by_the_map_of_turns():
     """The solver's counts and velocities against the map, for random ratios and restitutions."""
     cases = random_cases(66, 1500)
