@@ -42,10 +42,6 @@ CHANGES = {
         {"velocity_error": 0.001},
     ],
     "beyond": [{"ratio": 0, "restitution": 0.9}, {"ratio": 0.5, "restitution": 1}],
-    "experiments": [
-        {"ratio": 0},
-        {"ratio": 1, "sequence": "BCACBA", "triplet": "CAC"},
-    ],
 }
 #: All but the first run of a chapter belong to the weekly tests, as do chapters that take longest.
 LONG = ("toy", "beyond", "multiple_impacts")
@@ -95,7 +91,7 @@ def test_every_parameter_is_changed(chapter: str):
     for name, value in stored.items():
         assert any(run_.get(name, value) != value for run_ in CHANGES[chapter]), name
     assert set(itertools.chain.from_iterable(CHANGES[chapter])) <= set(stored)
-    numbered = "problem compliance three_balls multiple_impacts patterns n_balls experiments"
+    numbered = "problem compliance three_balls multiple_impacts patterns n_balls"
     assert {"intro", *numbered.split()} <= set(CHANGES)
 
 
