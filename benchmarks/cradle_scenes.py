@@ -88,7 +88,7 @@ def scene(engine, setting, pulled, *, mend, gap=0.0, law=None):
     chosen = fine if setting == "fine" else dict(getattr(engine, setting))
     step = chosen.pop("step")
     mended_step = chosen.pop("mended_step", step)
-    bodies = program.cradle(pulled, ANGLE, mend=mend, gap=gap, **chosen)
+    bodies = program.hang(pulled, ANGLE, mend=mend, gap=gap, **chosen)
     advance = bodies.advance
     if mend:
         row, step = program.mended(bodies, MODELS["ratio"]), mended_step

@@ -31,7 +31,7 @@ class Bodies:
         self.world.Step(step, *self.iterations)
 
 
-def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=(8, 3)):
+def hang(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=(8, 3)):
     """Hang five balls and pull some of them back."""
     world = b2World(gravity=(0, -9.81), doSleep=False)
     beam = world.CreateStaticBody()
@@ -75,7 +75,7 @@ def mended(bodies, law=TOY):
 
 if __name__ == "__main__":
     warm_up()
-    row = mended(cradle())
+    row = mended(hang())
     for step in range(5001):
         if step % 500 == 0:  # how far each ball is out
             at = [x for x, _ in row.bodies.motion()[0]]

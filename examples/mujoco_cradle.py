@@ -41,7 +41,7 @@ class Bodies:
         mujoco.mj_step(self.model, self.data)
 
 
-def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, contact=0.02):
+def hang(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, contact=0.02):
     """Hang five balls and pull some of them back.
 
     MuJoCo knows no coefficient of restitution: its own contacts are springs
@@ -82,7 +82,7 @@ def mended(bodies, law=TOY):
 
 if __name__ == "__main__":
     warm_up()
-    row = mended(cradle())
+    row = mended(hang())
     for step in range(5001):
         if step % 500 == 0:  # how far each ball is out
             at = [x for x, _ in row.bodies.motion()[0]]

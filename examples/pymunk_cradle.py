@@ -31,7 +31,7 @@ class Bodies:
         self.space.step(step)
 
 
-def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=10):
+def hang(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, iterations=10):
     """Hang five balls and pull some of them back."""
     space = pymunk.Space()
     space.gravity, space.iterations = (0, -9.81), iterations
@@ -61,7 +61,7 @@ def mended(bodies, law=TOY):
 
 if __name__ == "__main__":
     warm_up()
-    row = mended(cradle())
+    row = mended(hang())
     for step in range(5001):
         if step % 500 == 0:  # how far each ball is out
             at = [x for x, _ in row.bodies.motion()[0]]

@@ -35,7 +35,7 @@ class Bodies:
         self.world.step()
 
 
-def cradle(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, **parameters):
+def hang(pulled=1, angle=ANGLE, *, mend=True, gap=0.0, **parameters):
     """Hang five balls and pull some of them back."""
     world = rapier3d.PhysicsWorld()
     world.gravity = (0.0, -9.81, 0.0)
@@ -86,7 +86,7 @@ def mended(bodies, law=TOY):
 
 if __name__ == "__main__":
     warm_up()
-    row = mended(cradle())
+    row = mended(hang())
     for step in range(5001):
         if step % 500 == 0:  # how far each ball is out
             at = [x for x, _ in row.bodies.motion()[0]]

@@ -58,7 +58,7 @@ def closed(bodies):
 
 
 def test_an_adapter_tells_and_does_what_a_row_asks(program):
-    bodies = program.cradle(pulled=2, angle=0.3)
+    bodies = program.hang(pulled=2, angle=0.3)
     x, v = motion(bodies)
     angle = np.array([-0.3, -0.3, 0, 0, 0])
     arms = program.LENGTH * np.column_stack([np.sin(angle), -np.cos(angle)])
@@ -81,7 +81,7 @@ def test_an_adapter_tells_and_does_what_a_row_asks(program):
 
 def test_one_impact_is_that_of_collide(program):
     """Velocities, and with them momentum and energy, from the model and back into the engine."""
-    bodies = program.cradle(pulled=0)
+    bodies = program.hang(pulled=0)
     row = program.mended(bodies, LAW)
     bodies.push(0, (1.5, 0.0))
     row.step(STEP)
@@ -99,8 +99,8 @@ def test_ten_strokes(program, pulled):
     """Energy, order and who moves: as `swing` has it, but for what the engine itself loses."""
     period = Pendulums(length=program.LENGTH, gravity=GRAVITY).natural_frequency(1)[0]
     duration = 10.5 * math.pi / period
-    alone = program.cradle(pulled=5)
-    bodies = program.cradle(pulled)
+    alone = program.hang(pulled=5)
+    bodies = program.hang(pulled)
     row = program.mended(bodies, LAW)
     start, started = energies(program, bodies), energies(program, alone)
     least = 0.0
@@ -129,7 +129,7 @@ def test_ten_strokes(program, pulled):
 
 def test_an_engine_alone_moves_its_balls_otherwise(program):
     """Without the mend the engine's own contacts act: with the mend they are off."""
-    own, mended = program.cradle(mend=False), program.cradle()
+    own, mended = program.hang(mend=False), program.hang()
     for _ in range(1000):
         own.advance(STEP)
         mended.advance(STEP)  # by the engine alone: the balls pass through each other
@@ -141,7 +141,7 @@ def test_an_engine_alone_moves_its_balls_otherwise(program):
 
 def test_hanging_balls_are_looked_at_every_hundredth_of_a_second(program):
     """A step with the row then costs little more than one of the engine."""
-    bodies = program.cradle(pulled=0)
+    bodies = program.hang(pulled=0)
     row = program.mended(bodies, LAW)
     looks, motion = [], bodies.motion
     bodies.motion = lambda: looks.append(1) or motion()
