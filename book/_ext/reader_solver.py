@@ -32,10 +32,12 @@ TOLD = {
     "rates": ("Eqs. 16 to 19; the bound is Eq. 34",),
     "way_to_event": ("One way for each phase",),
     "three_balls": (
-        "Who acts? Ask rates: push, dv",
-        "The nearer event: way_to_event, twice",
-        "v, tau, owed: Eqs. 20, 21, 23, 29",
-        "A row of path; next phase, driver",
+        "1 Who acts? Ask rates: push, dv",
+        "2 u and slope of both contacts",
+        "3 way_to_event, twice: the nearer",
+        "4 Work, and with it owed",
+        "5 tau, v; a row of path",
+        "6 Next phase; who drives",
     ),
 }
 #: Calls of each of them that are checked first.
