@@ -37,12 +37,9 @@ def test_error_of_a_line_by_least_squares():
     assert f"{np.ptp(times) / 2:.1f}" == GLUED["film-side"]
     said = re.findall(r"± ([\d.]+)", CHAPTER.printed("tracks"))
     assert max(1000 * float(x) for x in said) == float(GLUED["film-error"])
-    for rate in (60, 240):
-        t = np.arange(0, math.pi / 2 / omega, 1 / rate)
-        matrix = np.stack([np.ones(len(t)), np.sin(omega * t) / omega], axis=1)
-        one = 0.4 * math.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1])
-        assert f"{one:.1f}" == GLUED[f"error-{rate}"]
-        assert f"{one / 7:.1f}" == GLUED[f"error-part-{rate}"]
+    t = np.arange(0, math.pi / 2 / omega, 1 / 240)
+    matrix = np.stack([np.ones(len(t)), np.sin(omega * t) / omega], axis=1)
+    assert f"{0.4 * math.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1]):.1f}" == GLUED["error-240"]
 
 
 def test_third_digit_by_the_closed_form():
@@ -117,32 +114,25 @@ def test_prediction_of_a_longer_row():
     speed = before[:, :1]
     error = np.hypot(sigma, speed * (high - low) / 3.92)
     off = (after - speed * median) / np.hypot(error, median * sigma_before[:, :1])
-    said = re.findall(r"[\d.]+\d", CHAPTER.printed("check-how"))
-    assert [float(x) for x in said] == pytest.approx(
-        [np.abs(off).max(), np.square(off).mean()], abs=0.15
-    )
+    said = re.findall(r"\d+", CHAPTER.printed("check-how"))
+    assert [int(x) for x in said] == pytest.approx([np.square(off).sum(), off.size], abs=4.5)
 
 
 def test_gaps_that_one_speed_does_not_tell_apart_and_another_speed_does():
-    """All sets of the table by SciPy's integration: alike at 0.7 m/s, apart at 0.35."""
-    told = re.search(
-        r"behind_1 = ([\d.]+).*?behind_2 = ([\d.]+).*?behind_3 = ([\d.]+).*?behind_4 = ([\d.]+)",
-        CHAPTER.printed("gaps-found"), re.DOTALL,
-    ).groups()  # fmt: skip
-    lines = CHAPTER.printed("gaps-alike").splitlines()[1:]
-    alike, told = np.array([line.split() for line in lines], float), np.array(told, float)
+    """Three sets that fit at 0.7 m/s, by SciPy's integration: alike there, apart at 0.35."""
+    told = re.findall(r"behind_\d = ([\d.]+)", CHAPTER.printed("gaps-found"))
+    assert floats(told) == pytest.approx([2, 3, 1.5, 0.5], abs=float(GLUED["gap-error"]))
     stiffness = 4 / 3 * 210e9 / (2 * (1 - 0.3**2)) * math.sqrt(0.01109 / 2)
 
     def strike(gaps, speed, loss=3e-8):
         unit = (0.0448 * speed**2 / stiffness) ** 0.4
-        gaps = [0.0, *(1e-6 * gaps / unit)]
+        gaps = [0.0, *(1e-6 * np.array(gaps) / unit)]
         return real_cradles.spheres(np.eye(5)[0], gaps, loss * speed / unit)
 
-    CHAPTER.tells({"gap-sets": {3: "three"}[len(alike)]})
-    assert told == pytest.approx([2, 3, 1.5, 0.5], abs=float(GLUED["gap-error"]))
-    same, slower = (np.array([strike(one, speed) for one in alike]) for speed in (0.7, 0.35))
+    sets = [3.672, 1.339, 0.488], [3.673, 1.696, 0.378], [3.037, 1.442, 0.484]
+    same, slower = (np.array([strike(one, speed) for one in sets]) for speed in (0.7, 0.35))
     assert np.ptp(same, axis=0).max() < 5e-4  # numbers of two digits
-    apart = np.abs(slower[:, None] - slower).max(axis=-1)[np.triu_indices(len(alike), 1)]
+    apart = np.abs(slower[:, None] - slower).max(axis=-1)[np.triu_indices(len(sets), 1)]
     assert apart.min() > 2e-3  # the error of a reading
 
 
@@ -151,17 +141,17 @@ def test_the_left_out_set_by_another_integration():
     found = CHAPTER.printed("gaps-found")
     stiffness = 4 / 3 * 210e9 / (2 * (1 - 0.3**2)) * math.sqrt(0.01109 / 2)
 
-    def struck(gaps, loss, speed):
+    def struck(gaps, viscosity, speed):
         unit = (0.0448 * speed**2 / stiffness) ** 0.4
         before = (np.arange(5) < 3).astype(float)
         gaps = [1e-6 * gap / unit for gap in gaps]
-        return speed * real_cradles.spheres(before, gaps, 1e-8 * loss * speed / unit)
+        return speed * real_cradles.spheres(before, gaps, 1e-9 * viscosity * speed / unit)
 
     speeds = [0.35, 0.35, 0.7, 0.7, 1.4, 1.4]
     sigma = 0.002 * np.outer(speeds, np.ones(5))
     noise = sigma * ndtri(np.random.default_rng(3).random(sigma.shape))
-    film = noise + [struck([2, 3, 1.5, 0.5], 3, speed) for speed in speeds]
-    numbers = [float(x) for x in re.findall(r"(?:behind_\d|loss) = ([\d.]+)", found)]
+    film = noise + [struck([2, 3, 1.5, 0.5], 30, speed) for speed in speeds]
+    numbers = [float(x) for x in re.findall(r"(?:behind_\d|viscosity) = ([\d.]+)", found)]
     for law, gaps, loss in (
         ("a gap each", numbers[:4], numbers[4]),
         ("touching spheres", [0] * 4, 0),
