@@ -175,7 +175,7 @@ GIVEN = {
     "multiple_impacts": "0.15 0.2 0.25 0.8",
     "patterns": "0.01 0.15 0.25 0.3 0.4 0.5 0.9 2.5",
     "n_balls": "0.1 0.15 0.5 1.5 4.5",
-    "experiments": "0.001 0.01 0.5",  # a step, and what is small beside it
+    "experiments": "0.01 0.5",  # a step, and what is small beside it
     "toy": "0.9 0.975 0.99",
     "real_cradles": "0.1 0.17 0.2 0.4 1.1 25.3",  # errors, distances, frames
     "recipe": "",
