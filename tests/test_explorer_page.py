@@ -238,7 +238,7 @@ def test_momentum_and_energy_add_up(still):
     [
         ("speeds=1,0,0&forward=0.7", " (bound 0.5)"),
         ("speeds=1,0,0&forward=0.5", ""),
-        ("speeds=1,0,0,0,0&forward=0.7", " (bound 0.5 to 0.67)"),
+        ("speeds=1,0,0,0,0&forward=0.7", " (bound 0.5 to 0.667)"),
         ("speeds=1,0,0,0&masses=1,2,0.5,1&forward=0.6&backward=0.1", None),
         ("scene=ABCCAB", None),
     ],

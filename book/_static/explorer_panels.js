@@ -234,7 +234,7 @@
         const over = directions.flatMap((way) =>
           inner.filter((k) => setting[way][k] - bounded[way][k] > 1e-9).map((k) => bounded[way][k]),
         );
-        const bounds = new Set([Math.min(...over), Math.max(...over)].map((bound) => +bound.toFixed(2)));
+        const bounds = new Set([Math.min(...over), Math.max(...over)].map((bound) => +bound.toFixed(3)));
         sliders[name].rename(words + (over.length ? ` (bound ${[...bounds].join(" to ")})` : ""));
         sliders[name].node.classList.toggle("over", over.length > 0);
       }
