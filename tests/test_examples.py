@@ -1,7 +1,10 @@
 """The programs in examples/: a mended cradle in each engine, against `swing` and `collide`."""
 
+import ast
 import importlib
+import json
 import math
+import re
 import runpy
 from pathlib import Path
 
@@ -161,3 +164,27 @@ def test_the_program_runs_as_it_stands(program, capsys):
     assert table[2, 4] > 0.45
     assert np.abs(table[2, :4]).max() < 0.06
     assert np.abs(table).max() < 0.505
+
+
+@pytest.mark.parametrize("program", ["pymunk_cradle", "box2d_cradle"], indirect=True)
+def test_pairs_take_the_place_of_the_row(program, root, capsys):
+    """The page's lines, with all left out of the program that it says."""
+    page = json.loads((root / "book" / "recipe.ipynb").read_text("utf-8"))
+    text = "".join("".join(cell["source"]) for cell in page["cells"])
+    (lines,) = re.findall(r"```python\n(bodies = hang.*?)```", text, flags=re.DOTALL)
+    tree = ast.parse((EXAMPLES / f"{program.__name__}.py").read_text("utf-8"))
+    kept = [
+        part
+        for part in tree.body
+        if not isinstance(part, ast.If)
+        and "cradle" not in getattr(part, "module", "")
+        and getattr(part, "name", "") != "mended"
+        and "TOY" not in ast.unparse(part)
+    ]
+    assert len(tree.body) - len(kept) >= 4
+    exec(ast.unparse(ast.Module(kept, [])) + "\n" + lines, {})
+    table = np.array([ast.literal_eval(line) for line in capsys.readouterr().out.splitlines()])
+    assert table.shape == (11, 5)
+    np.testing.assert_allclose(table[0], [-0.5, 0, 0, 0, 0], atol=1e-3)
+    assert table[2, 4] > 0.45
+    assert np.abs(table[2, :4]).max() < 0.06
