@@ -147,42 +147,24 @@ BAC = "film film.txt --set BAC --masses 1,1,1 --length 0.3"
 @pytest.mark.parametrize(
     ("options", "model", "assumed"),
     [
-        (
-            "",
-            SpringChain(),
-            ["the first ball strikes at 1 m/s", "contacts lose no energy", "elastic sp"],
-        ),
+        ("", SpringChain(),
+         ["the first ball strikes at 1 m/s", "contacts lose no energy", "elastic sp"]),
         (f"--speed 2 {LOSSY}", VISCOUS, ["strikes at 2 m/s", "viscous spheres; restitution at 2 "]),
-        (
-            "--restitution 0.5",
-            EnergyDistribution(),
-            ["strikes at 1", "than viscous ones can, by the energy"],
-        ),
-        (
-            "--stiffness 1e9,2e9",
-            SpringChain((1e9, 2e9)),
-            ["strikes", "no energy", "elastic sphere"],
-        ),
+        ("--restitution 0.5", EnergyDistribution(),
+         ["strikes at 1", "than viscous ones can, by the energy"]),
+        ("--stiffness 1e9,2e9", SpringChain((1e9, 2e9)),
+         ["strikes", "no energy", "elastic sphere"]),
         ("--velocities 1,1,0 --ratio 0.1", ImpulseCorrelation(0.1), ["no energy", "strike as one"]),
-        (
-            "--velocities 1,1,0 --model sequential",
-            SequentialCollisions(),
-            ["contacts lose no energy"],
-        ),
-        (
-            "--velocities 1,1,0 --model spheres --stiffness 1e9 --gaps 1e-4,0",
-            SpringChain(1e9, gaps=(1e-4, 0.0)),
-            ["contacts lose no energy"],
-        ),
+        ("--velocities 1,1,0 --model sequential", SequentialCollisions(),
+         ["contacts lose no energy"]),
+        ("--velocities 1,1,0 --model spheres --stiffness 1e9 --gaps 1e-4,0",
+         SpringChain(1e9, gaps=(1e-4, 0.0)), ["contacts lose no energy"]),
         (f"--velocities 1,0,0 {LOSSY} --ratio 0.1", ImpulseCorrelation(0.1), []),
         (f"{LOSSY} --velocities 2,0,0 --model spheres", VISCOUS, []),
-        (
-            "--velocities 1,0,0 --model sequential",
-            SequentialCollisions(),
-            ["contacts lose no energy"],
-        ),
+        ("--velocities 1,0,0 --model sequential", SequentialCollisions(),
+         ["contacts lose no energy"]),
     ],
-)
+)  # fmt: skip
 def test_what_is_not_given_is_said(options, model, assumed):
     """The model is the one that is named, and each assumption is said once."""
     line = f"solve --masses 1,1,1 {options}"
@@ -210,16 +192,14 @@ def test_what_is_not_given_is_said(options, model, assumed):
         ("solve abAcA", "solve ABACA"),
         ("solve 5 --csv", "solve --masses 1,1,1,1,1 --csv"),
         ("solve 3 --unit g --ratio 0.1 --csv", "solve --masses 1,1,1 --unit g --ratio 0.1 --csv"),
-        (
-            "solve --masses 1,1 --velocities 0,\N{MINUS SIGN}1",
-            "solve --masses 1,1 --velocities 0,-1",
-        ),
+        ("solve --masses 1,1 --velocities 0,\N{MINUS SIGN}1",
+         "solve --masses 1,1 --velocities 0,-1"),
         ("swing 3 --pull 1 --csv", "swing --masses 1,1,1 --csv"),
         ("swing --ratio 0.1 --steps 3", "swing 5 --ratio 0.1 --steps 3"),
         ("swing 2 --period 2 --steps 3", f"swing 2 --length {9.81 / math.pi**2} --steps 3"),
         ("swing 2 --gaps 0.001 --csv", "swing 2 --gaps 0.001 --damping 0 --csv"),
     ],
-)
+)  # fmt: skip
 def test_short_words_mean_what_long_ones_mean(line, same):
     assert call(line) == call(same)
 
@@ -566,20 +546,14 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("solve ABXA", 1, "SEQUENCE, ball 3: 'X'; must be one of A, B, C, D"),
         ("solve a", 1, "cradle: SEQUENCE = 'A'; must name at least 2 balls"),
         ("solve ABCCA", 1, "--saturate holds the contact closed"),
-        (
-            "solve 5 --masses 1,1",
-            2,
-            "a sequence of the paper's balls, such as ABCCA; --masses, not both",
-        ),
+        ("solve 5 --masses 1,1", 2,
+         "a sequence of the paper's balls, such as ABCCA; --masses, not both"),
         ("solve", 2, "give one of: how many equal balls, such as 5; a sequence of the "),
         ("solve 5 --gaps 1e-6", 2, "--gaps need --stiffness, about 1e10 for steel"),
         ("solve 5 --ratio 0.1 --stiffness 1", 2, "--stiffness and --gaps are those of --model sph"),
         ("solve 3 --stiffness 1,-1", 1, "cradle: --stiffness, value 2: -1.0; must be above 0"),
-        (
-            "solve 3 --restitution 0.5 --stiffness 1 --gaps 1",
-            1,
-            "--restitution, value 1: 0.5; must",
-        ),
+        ("solve 3 --restitution 0.5 --stiffness 1 --gaps 1", 1,
+         "--restitution, value 1: 0.5; must"),
         ("solve 1", 1, "cradle: SEQUENCE = 1; must be a whole number, 2 to 1000000 balls"),
         (f"solve {'9' * 5000}", 1, "cradle: SEQUENCE = '9999"),
         (f"solve {'9' * 5000}", 1, "; must be a whole number, 2 to 1000000 balls"),
@@ -595,38 +569,26 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("solve --masses 1,1,1 --model spheres --ratio 0.1", 2, "--model spheres has no ratios"),
         ("solve ABCCA --model sequential --saturate", 2, "--model sequential has no ratios"),
         ("solve DBB", 1, "cradle: the ratio of ball 2 is 0.71; it must not exceed 0.5"),
-        (
-            "solve --masses 1,1,1 --ratio 0.6",
-            1,
-            "the ratio of ball 2 is 0.6; it must not exceed 0.5 (Eq. 53):",
-        ),
+        ("solve --masses 1,1,1 --ratio 0.6", 1,
+         "the ratio of ball 2 is 0.6; it must not exceed 0.5 (Eq. 53):"),
         ("solve --masses 1,1,1 --ratio 0 --backward 1", 1, "the backward ratio of ball 2 is 1.0; "),
         ("solve --masses 1,1,1 --ratio 0.1,0.1", 1, "--ratio has 2 values; 3 balls need 1"),
         ("swing --masses 1,1,1 --by 5", 1, "--by = 5.0; must be above 0 and at most a quarter"),
-        (
-            "swing 3 --pull 0.05",
-            2,
-            "--pull 0.05: it says how many of the 3 balls are pulled, 2 or 1",
-        ),
+        ("swing 3 --pull 0.05", 2,
+         "--pull 0.05: it says how many of the 3 balls are pulled, 2 or 1"),
         ("swing 3 -o toy.gif --json", 2, "--output draws a film; --json, --csv and --steps are of"),
         ("swing 3 -o toy.gif --steps 9", 2, "--output draws a film; --json, --csv and --steps "),
         ("swing 3 --pull 2,2", 2, "--pull 2.0, 2.0: it says how many of the 3 balls are pulled"),
         ("swing 3 --length 1 --period 1", 2, "give one of --length and --period"),
         ("swing 3 --gaps 1,1,1", 1, "--gaps has 3 values; 3 balls need 2, or one number"),
-        (
-            "swing 3 -o toy.bmp",
-            1,
-            "--output 'toy.bmp'; must end in .svg, .html, .gif, .mp4 or .png",
-        ),
+        ("swing 3 -o toy.bmp", 1,
+         "--output 'toy.bmp'; must end in .svg, .html, .gif, .mp4 or .png"),
         ("swing 3 -o toy", 1, "'toy'; must end in .svg, .html, .gif, .mp4 or .png"),
         ("swing --masses 1,0.1 --by 0.3 --length 0.2", 1, "after t = 0.2243 s ball 2 at 0.545"),
         ("swing --masses 1,1,1 --length 0", 1, "cradle: --length 0.0; must be above 0"),
         ("swing 3 --seconds 0", 1, "cradle: --seconds = 0.0; must be above 0"),
-        (
-            "recommend 3 --wanted 'path,fastest ball'",
-            1,
-            "Give --stiffness 1 if all contacts are equal spheres",
-        ),
+        ("recommend 3 --wanted 'path,fastest ball'", 1,
+         "Give --stiffness 1 if all contacts are equal spheres"),
         ("recommend --masses 1,1,1 --wanted path,x", 1, "--wanted 'x'; must be one of"),
         ("swing ABA --speed 2", 2, "No such option '--speed'"),
         ("solve ABA --plot a.xyz", 2, "'a.xyz'; must end in .png, .svg or .pdf"),
@@ -670,7 +632,7 @@ def test_one_wrong_film_of_several(folder, capsys):
         ("fit pairs.csv --predict ABA", 1, "the ratio of ABA is not known (--known ABA=RATIO)"),
         ("frobnicate", 2, "No such command"),
     ],
-)
+)  # fmt: skip
 @pytest.mark.usefixtures("folder")
 def test_errors_end_in_one_line_and_a_code(capsys, line, code, message):
     with pytest.raises(SystemExit) as stopped:

@@ -79,10 +79,7 @@ def good():
         (lambda t: t["after"].__setitem__(3, np.nan), "row 4, column after = nan; must be finite"),
         (lambda t: t["ball"].__setitem__(1, 3), r"row 1, column ball: set AB, shot 0 has balls"),
         (lambda t: t["ball"].__setitem__(1, 1.5), "row 2, column ball: 1.5; must be 1, 2"),
-        (
-            lambda t: t["mass"].__setitem__(2, 0.05),
-            "row 3, column mass: 0.05; balls of type A",
-        ),
+        (lambda t: t["mass"].__setitem__(2, 0.05), "row 3, column mass: 0.05; balls of type A"),
         (lambda t: t["type"].__setitem__(3, "C"), "row 4, column type: 'C'; ball 2 of set AB"),
         (lambda t: t["before"].__setitem__(0, -1.0), "row 1, column before: .*no balls approach"),
         (lambda t: t["sigma"].__setitem__(2, 0.0), "row 3, column sigma = 0.0; must be above 0"),
@@ -90,12 +87,10 @@ def good():
         (lambda t: t.update(Sigma=t.pop("sigma")), "Sigma: write Sigma in small letters"),
         (lambda t: t["set"].append("AB"), "columns have different lengths"),
         (lambda t: t.update({k: [] for k in t}), "the table has no rows"),
-        (
-            lambda t: [t.update({f"{k}1": t.pop(k)}) for k in [*t]],
-            "no column of set, .* `cradle film`",
-        ),
+        (lambda t: [t.update({f"{k}1": t.pop(k)}) for k in [*t]],
+         "no column of set, .* `cradle film`"),
     ],
-)
+)  # fmt: skip
 def test_wrong_tables_are_refused_by_row_and_column(change, message):
     table = good()
     read_shots(table)

@@ -241,21 +241,17 @@ def test_a_level_stretch_is_one_minimum():
         ({"ranges": {"forward": (0.4, 0.4)}}, r"ranges\['forward'\] = \(0.4, 0.4\); must be two"),
         ({"ranges": {"forward": (0, 0.1, 0.4)}}, r"\(0, 0.1, 0.4\); must be two numbers that rise"),
         ({"ranges": {"forward": (0.0, np.nan)}}, r"ranges\['forward'\]\[1\] = nan; must be finite"),
-        (
-            {"ranges": {"forward": (0.0, 2.0)}},
-            r"inside ranges = {'forward': \(0.0, 2.0\)} is what a law refuses: forward\[0\] = 1.0;",
-        ),
-        (
-            {"ranges": {"restitution": (0.5, 1)}, "restitution": 0.9},
-            "restitution = 0.9 is in ranges, too; leave out one of them",
-        ),
+        ({"ranges": {"forward": (0.0, 2.0)}},
+         r"inside ranges = {'forward': \(0.0, 2.0\)} is what a law refuses: forward\[0\] = 1.0;"),
+        ({"ranges": {"restitution": (0.5, 1)}, "restitution": 0.9},
+         "restitution = 0.9 is in ranges, too; leave out one of them"),
         ({"ranges": {"restitution": (0.5, 1.5)}}, r"restitution'\]\[1\] = 1.5; must lie in \[0, 1"),
         ({"law": {"ABC": ImpulseCorrelation}}, "no callable for set 'AAA'; it has {'ABC': <class"),
         ({"law": ImpulseCorrelation(0)}, "no callable for set 'AAA'; it has {'AAA': ImpulseCorr"),
         ({"restitution": 1.5}, r"restitution = 1.5; must lie in \[0, 1\]"),
         ({"starts": 0}, "starts = 0; must be a whole number, at least 1"),
     ],
-)
+)  # fmt: skip
 def test_what_is_wrong_is_named(change, words):
     shots = Shots((shot_set("AAA", [1.0, 0, 0], [0.0, 0.1, 0.9], 0.01),))
     given = {"law": ImpulseCorrelation, "ranges": {"forward": (0.0, 0.4)}} | change

@@ -104,14 +104,12 @@ CHAINS = [
     ({"restitution": 1 + 2**-52}, "restitution = 1.0000000000000002; must lie in [0, 1]"),
     ({"restitution": [1, 1e-31]}, "restitution[1] = 1e-31; must be 0 or at least 1e-30"),
     ({"restitution": [1, 1, 1]}, "restitution has shape (3,); 3 balls need () or (2,): one number"),
-    (
-        {"masses": [1, 1], "velocities": [1, 0], "restitution": [1, 1]},
-        "restitution has shape (2,); 2 balls need () or (1,): one number, or one for each contact",
-    ),
+    ({"masses": [1, 1], "velocities": [1, 0], "restitution": [1, 1]},
+     "restitution has shape (2,); 2 balls need () or (1,): one number, or one for each contact"),
     ({"masses": [1, [2, 3], 4]}, "masses[1] has shape (2,), masses[0] has (); must have one shape"),
     ({"velocities": [1j, 0, 0]}, "velocities[0] = 1j; must be a real number"),
     ({"restitution": "1"}, "restitution = '1'; must be real numbers"),
-]
+]  # fmt: skip
 
 BATCH = [
     ({"masses": [1, -1, 1]}, "masses[1] = -1.0; must be above 0"),
@@ -127,18 +125,14 @@ BATCH = [
     ({"restitution": [1, 1, 1]}, "restitution has shape (3,); must be () or (..., 2) for 3 balls"),
     ({"forward": [[0.1], [7]]}, "forward[1, 0] = 7.0; must lie in [0, 1]"),
     ({"backward": [[0.1], [7]]}, "backward[1, 0] = 7.0; must lie in [0, 1]"),
-    (
-        {"masses": np.ones((2, 3)), "velocities": np.ones((3, 3))},
-        "leading axes do not broadcast: masses (2, 3), velocities (3, 3)",
-    ),
-    (
-        {"restitution": np.ones((2, 2)), "forward": np.zeros((3, 1))},
-        "leading axes do not broadcast: masses (3,), velocities (3,), restitution (2, 2)",
-    ),
+    ({"masses": np.ones((2, 3)), "velocities": np.ones((3, 3))},
+     "leading axes do not broadcast: masses (2, 3), velocities (3, 3)"),
+    ({"restitution": np.ones((2, 2)), "forward": np.zeros((3, 1))},
+     "leading axes do not broadcast: masses (3,), velocities (3,), restitution (2, 2)"),
     # A batch without a chain is checked all the same.
     ({"masses": np.ones((0, 3)), "velocities": [np.nan, 0, 0]}, "velocities[0] = nan; must be"),
     ({"masses": np.ones((0, 3)), "forward": 2}, "forward = 2.0; must lie in [0, 1]"),
-]
+]  # fmt: skip
 
 #: Of a model, and of a batch.  Holding contacts at their bounds excuses no ratio outside 0 and 1.
 RATIOS = [
@@ -194,23 +188,16 @@ SPRINGS = [
     ({"stiffness": [1, 1e-10]}, "stiffness[1] = 1e-10; must be at least 1e-09 of the stiffest"),
     ({"exponent": 0.9}, "exponent = 0.9; must lie in [1, 10]"),
     ({"viscosity": [0.1, -0.1]}, "viscosity[1] = -0.1; must be at least 0"),
-    (
-        {"viscosity": 5.0},
-        "viscosity[0] = 5.0; must be at most 0.227 s, 0.3 (m u^2 / k)^(1 / 2.5) / u",
-    ),
-    (
-        {"gaps": 1e12},
-        "gaps[0] = 1000000000000.0; must at this accuracy be at most 1",
-    ),
-    (
-        {"gaps": [0, 3e7], "accuracy": 1e-6},
-        "gaps[1] = 30000000.0; must at this accuracy be at most 1e+07 times 0.758 m",
-    ),
+    ({"viscosity": 5.0},
+     "viscosity[0] = 5.0; must be at most 0.227 s, 0.3 (m u^2 / k)^(1 / 2.5) / u"),
+    ({"gaps": 1e12}, "gaps[0] = 1000000000000.0; must at this accuracy be at most 1"),
+    ({"gaps": [0, 3e7], "accuracy": 1e-6},
+     "gaps[1] = 30000000.0; must at this accuracy be at most 1e+07 times 0.758 m"),
     ({"gaps": [0, 1e-20]}, "gaps[1] = 1e-20; must be 0, or 1e-12 of 0.758 m, that is (m u^2"),
     ({"gaps": [0, -3]}, "gaps[1] = -3.0; must be a lean of at most 0.758 m, that is (m"),
     ({"accuracy": 1e-13}, "accuracy = 1e-13; must lie in [1e-12, 0.02]"),
     ({"max_steps": 0}, "max_steps = 0; must be a whole number, at least 1"),
-]
+]  # fmt: skip
 
 LAWS = [
     (SequentialCollisions, ("first",), "order = 'first'; must be 'left' or 'right'"),
