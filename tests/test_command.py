@@ -227,45 +227,36 @@ def test_losses_of_a_swing_belong_to_the_first_strike():
     assert f"restitution at {speed:.3g} m/s" in told["assumed"][-1]
 
 
-def test_balls_let_go_together_strike_as_one():
-    """A swing says so, unless gaps part them."""
-    said = "balls that move alike strike as one"
-    line = "swing 3 --steps 2 --ratio 0.1"
-    assert said in call(f"{line} --pull 2")
-    assert said not in call(line) + call(f"{line} --pull 2 --gaps 0.001")
-    assert "times in s; gaps 0.001 m" in call(f"{line} --pull 2 --gaps 0.001")
-    assert said not in call("swing 3 --steps 2 --pull 2 --model sequential")
+SWING = "swing 3 --steps 2"
+ALIKE, EQUAL = "balls that move alike strike as one", "equally stiff contacts (--stiffness)"
+CLOSES, SOFT = "strikes are over before a gap closes (--stiffness)", "strikes take no time"
+LEFT, NONE = "driven by the left contact (rule R2)", "no balls approach: no impact"
+#: What is told of by one line, and not by others.
+TOLD = [
+    # Of balls let go together, unless gaps part them.
+    (ALIKE, f"{SWING} --ratio 0.1 --pull 2", f"{SWING} --ratio 0.1",
+     f"{SWING} --ratio 0.1 --pull 2 --gaps 0.001", f"{SWING} --pull 2 --model sequential"),
+    ("times in s; gaps 0.001 m", f"{SWING} --ratio 0.1 --pull 2 --gaps 0.001"),
+    # A stiffness matters between unequal balls, and for gaps, which close during a strike or not.
+    (EQUAL, "solve --masses 1,8,1", "solve --masses 1,8,1 --stiffness 1e9", "solve 3",
+     "solve --masses 1,8,1 --ratio 0.1"),
+    (CLOSES, f"{SWING} --gaps 1e-7", f"{SWING} --gaps 1e-7 --stiffness 1e9"),
+    # Contacts too soft to be followed; the last line has no springs.
+    (SOFT, f"{SWING} --stiffness 1e6", f"{SWING} --stiffness 1e11", SWING,
+     f"{SWING} --stiffness 1e6 --restitution 0.5"),
+    # Who drives what is struck from both sides, by a rule of ours; two runs each have their own.
+    (LEFT, "solve 4 --velocities 1,0,0,-1 --ratio 0.2", "solve 4 --velocities 1,0,0,-1",
+     "solve 4 --velocities 1,0,0,0 --ratio 0.2", "solve 4 --velocities 1,0,1,0 --ratio 0.2"),
+    (LEFT, "solve 3 --velocities 1,0,-1 --ratio 0.2"),
+    (NONE, "solve --masses 1,1,1 --velocities -1,0,0", "solve --masses 1,1,1 --velocities 0,0,-1"),
+    ("3 equal balls of 1 g", "solve 3 --unit g"),
+]  # fmt: skip
 
 
-def test_a_stiffness_that_is_not_given_is_told_of():
-    """Where it matters: between unequal balls, and for gaps, which close during a strike or not."""
-    for line, said in (
-        ("solve --masses 1,8,1", "equally stiff contacts (--stiffness)"),
-        ("swing 3 --steps 2 --gaps 1e-7", "strikes are over before a gap closes (--stiffness)"),
-    ):
-        assert said in call(line)
-        assert said not in call(f"{line} --stiffness 1e9")
-    assert "equally stiff" not in call("solve 3") + call("solve --masses 1,8,1 --ratio 0.1")
-
-
-def test_contacts_too_soft_to_be_followed_are_told_of():
-    said = "strikes take no time"
-    assert said in call("swing 3 --steps 2 --stiffness 1e6")
-    others = ("--stiffness 1e11", "", "--stiffness 1e6 --restitution 0.5")  # no springs, the last
-    assert not [one for one in others if said in call(f"swing 3 --steps 2 {one}")]
-
-
-@pytest.mark.parametrize(
-    ("line", "told"),
-    [
-        ("1,0,0,-1 --ratio 0.2", True), ("1,0,-1 --ratio 0.2", True),
-        ("1,0,0,0 --ratio 0.2", False), ("1,0,1,0 --ratio 0.2", False), ("1,0,0,-1", False),
-    ],
-)  # fmt: skip
-def test_who_drives_what_is_struck_from_both_sides(line, told):
-    """The left contact, by a rule of ours; two runs each have their own."""
-    said = call(f"solve {line.count(',') + 1} --velocities {line}")
-    assert ("driven by the left contact (rule R2)" in said) is told
+@pytest.mark.parametrize(("words", "line", "others"), [(a, b, c) for a, b, *c in TOLD])
+def test_what_is_told_of(words, line, others):
+    assert words in call(line)
+    assert [other for other in others if words in call(other)] == []
 
 
 def test_a_path_that_nobody_sees_is_not_kept():
@@ -316,15 +307,6 @@ def test_the_papers_balls_by_another_law():
     after = collide(chain, SequentialCollisions()).velocities
     np.testing.assert_allclose([row["after"] for row in answer["rows"]], after, atol=1e-15)
     assert json.loads(call("solve AAAAA --json"))["assumed"] == []
-
-
-def test_a_number_of_balls_says_what_one_weighs():
-    assert json.loads(call("solve 3 --unit g --json"))["assumed"][0] == "3 equal balls of 1 g"
-
-
-def test_balls_that_do_not_approach_are_named():
-    assert "no balls approach: no impact" in call("solve --masses 1,1,1 --velocities -1,0,0")
-    assert "no balls approach" not in call("solve --masses 1,1,1 --velocities 0,0,-1")
 
 
 def test_contacts_that_are_held_and_limits_are_told():
