@@ -139,13 +139,19 @@ def test_five_balls_of_which_some_are_hidden():
     assert (np.isfinite(fit.residuals) == seen).all()
 
 
+THREE_PULLED = filmed(TRUE, [-0.03] * 3 + [0, 0], 2, 40, 3e-4, 3, SequentialCollisions())
+
+
+@pytest.mark.exhaustive
 def test_three_balls_pulled():
-    """By readings that overlap; each counts, or nothing says where a ball is."""
-    film = filmed(TRUE, [-0.03] * 3 + [0, 0], 2, 40, 3e-4, 3, SequentialCollisions())
-    fit = fit_swing(*film, SequentialCollisions())
+    fit = fit_swing(*THREE_PULLED, SequentialCollisions())
     assert held(fit, TRUE, 2) == {*NUMBERS}
     assert not fit.poor
-    film = _Film(*film, LAW, None, None, NUMBERS, {"period": 0.8, "gaps": 1e-4}, None)
+
+
+def test_readings_that_overlap():
+    """Each counts, or nothing says where a ball is."""
+    film = _Film(*THREE_PULLED, LAW, None, None, NUMBERS, {"period": 0.8, "gaps": 1e-4}, None)
     film.begin()
     pooled = film.swung(np.array([0.02, 0.98, -0.03, -0.031, -0.029, 0])).positions[0]
     assert pooled[:3] == pytest.approx([-0.03045, -0.03055, -0.029], abs=1e-12)
@@ -200,6 +206,7 @@ def test_a_law_that_does_not_fit_is_said_and_intervals_grow():
     assert known.summary().endswith("though widened: none")
 
 
+@pytest.mark.exhaustive
 def test_twelve_seconds_of_the_real_cradle():
     """Intervals hold what the whole film gives: by turning points, and by others."""
     film = table("cradle_trace.csv")
