@@ -104,15 +104,7 @@ def test_bounds_of_other_models(model, less, chain):
     found, after = stopped(chain, replace(model, **less)), collide(chain, model).velocities
     assert ((found.bounds[0] <= after) & (after <= found.bounds[1])).all()
     assert (found.bounds[1] - found.bounds[0] < 4.0).all()
-
-
-def test_bounds_narrow_as_the_impact_comes_to_rest():
-    chain = Chain([1, 1e-3, 1, 1e-3, 1], [1, 0, 0, 0, 0], 0.1)
-    widths = []
-    for steps in (10, 100, 1000):
-        found = stopped(chain, ImpulseCorrelation(0.1, excess="saturate", max_events=steps))
-        widths.append(np.ptp(found.bounds, axis=0).max())
-    assert widths[0] > widths[1] > widths[2] > 0.0
+    assert found.stored == 0.0 or not isinstance(model, QuadraticDissipation)
 
 
 def test_bounds_in_any_units_and_frame():
