@@ -96,6 +96,7 @@ def stored(law, fitted):
             )
 
 
+@pytest.mark.exhaustive
 def test_two_strikes_of_the_film():
     found = fit_law(
         Shots((*strikes(1, 2),)), {f"of {k}": spheres(k) for k in (1, 2)}, GAPS, starts=9
@@ -166,6 +167,14 @@ def told(values, sigma, law, ranges, **options):
     after = np.column_stack([np.full(len(values), -1.0), values])
     shots = Shots((shot_set("pair", np.tile([1.0, 0.0], (len(values), 1)), after, sigma),))
     return fit_law(shots, law, ranges, **options)
+
+
+def test_each_set_has_its_own_law():
+    """The sum (v - 1)^2 + (3 v - 1)^2 is least at 0.4."""
+    shots = [shot_set(name, [1.0, 0.0], [-1.0, 1.0], 0.1) for name in ("one", "other")]
+    laws = {"one": Given, "other": lambda v: Given(3.0 * v)}
+    found = fit_law(Shots(tuple(shots)), laws, {"v": (0, 2)}, starts=4)
+    assert found.values["v"] == pytest.approx(0.4, abs=1e-4)
 
 
 def test_a_profile_leads_to_a_lower_minimum():
