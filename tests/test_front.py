@@ -39,7 +39,8 @@ def test_the_toy_by_a_second_route(root: Path):
     sentence = readme.partition("**The last ball")[2].partition("**")[0]
     assert re.findall(r"\d+(?= %| and|,)", sentence) == ["99", "13", "7", "3", "1"]
     told = Chapter("intro").glued
-    assert [told[f"desk-{ball}"] for ball in ("last", "fourth", "back")] == ["99", "13", "7"]
+    told = [told[f"desk-{ball}"] for ball in ("last", "fourth", "back", "fourth-by-ratio")]
+    assert told == ["99", "13", "7", "9"]
     after = collide(TOY, SpringChain()).velocities
     assert (np.abs(after[::-1]) * 100).round().tolist() == [99, 13, 1, 3, 7]
     assert (after[:3] < 0).all()
@@ -50,12 +51,13 @@ def test_the_toy_by_a_second_route(root: Path):
 
 
 def test_the_ratio_of_three_spheres_on_five():
-    """The table of the landing page: spheres throw balls 2 and 3 back, a ratio leaves them."""
+    """Spheres throw balls 2 and 3 back, a ratio leaves them; ball 4."""
     back, *_ = strike([1] * 3, np.eye(3)[0], 1, 0)
     five = collide(TOY, ImpulseCorrelation(-2 * back / (1 - back))).velocities
     after = strike([1] * 5, np.eye(5)[0], 1, 0)
     assert (after[1:3] < -0.01).all()
     assert abs(five[1:3]).max() < 1e-12  # and the ratio leaves them at rest
+    Chapter("compliance").tells({"five-ratio": five[3], "five-spheres": after[3]})
 
 
 def test_what_the_readme_says_of_the_other_answers():

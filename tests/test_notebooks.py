@@ -167,7 +167,7 @@ def test_each_fault_is_seen(spoil, fault):
 # Decimals that the text may state: given by the paper, by an exercise, or chosen for an example.
 # All others are computed by a cell, and the text takes them from there ({glue:text}`...`).
 GIVEN = {
-    "intro": "0.15 1.1344902 10.1115",  # a ratio, doi
+    "intro": "0.15",
     "problem": "0.15",
     "compliance": "0.15",
     "three_balls": "0.01 0.09 0.1 0.11 0.15 0.8 0.9",
