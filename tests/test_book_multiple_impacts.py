@@ -43,13 +43,14 @@ def test_fig_5_path_and_sequence(example):
     )
 
 
+def ends_and_closings(exact):
+    return [k for k, (kind, _) in enumerate(exact.events, 1) if kind != "maximum_compression"]
+
+
 def pieces(example):
     """The six pieces of the path between changes: velocities and impulses at both ends."""
     exact, trace = solved(*example)
-    stops = [
-        0,
-        *[k for k, event in enumerate(exact.events, 1) if event[0] != "maximum_compression"],
-    ]
+    stops = [0, *ends_and_closings(exact)]
     states = np.hstack([trace.path, trace.path_impulses])
     return dict(zip("ABCDEF", pairwise(states[stops])))
 
@@ -110,11 +111,8 @@ def sequence_occurs(e, ratio):
     outcome = truth.solve((1, 1, 1), VELOCITIES, e, ratio, number=float)
     kinds = outcome.events
     here = changes(kinds) == SEQUENCE
-    early = (
-        here
-        and ("maximum_compression", 0) in kinds[kinds.index(("end", 1)) : kinds.index(("close", 1))]
-    )
-    return here, early
+    between = kinds[kinds.index(("end", 1)) : kinds.index(("close", 1))] if here else []
+    return here, ("maximum_compression", 0) in between
 
 
 def test_fig_5_region_of_the_sequence():
@@ -155,16 +153,11 @@ def test_exercises():
     """The lead of ball 2, the energy lost, and its four parts, from the reference solver's path."""
     exact, _ = solved(*EXAMPLES[0])
     path, impulses = np.array(exact.path, float), np.array(exact.path_impulses, float)
-    first, second, *_ = [
-        k for k, event in enumerate(exact.events, 1) if event[0] != "maximum_compression"
-    ]
+    first, second, *_ = ends_and_closings(exact)
     lost = 500 * (path[0] @ path[0] - path[-1] @ path[-1])  # mJ
-    CHAPTER.tells({
-        "multiple-lead": impulses[second, 1] - impulses[first, 1],
-        "multiple-tau3-1": impulses[first, 1],
-        "multiple-tau3-2": impulses[second, 1],
-        "multiple-loss": lost,
-    })  # fmt: skip
+    early, late = impulses[[first, second], 1]
+    told = {"lead": late - early, "tau3-1": early, "tau3-2": late, "loss": lost}
+    CHAPTER.tells({f"multiple-{name}": value for name, value in told.items()})
     works = [float(x) for x in re.findall(r"[\d.]+", CHAPTER.glued["multiple-works"])]
     assert (1 - 0.25**2) * sum(works) == pytest.approx(lost, abs=0.02)
     # Two balls alone and a straight line: contact 1-2 absorbs half of 0.2 m/s times its impulse.

@@ -3,6 +3,7 @@
 import contextlib
 import io
 import math
+import re
 
 import mpmath
 import numpy as np
@@ -220,6 +221,12 @@ def test_fig_3_every_marked_impulse_and_velocity():
     np.testing.assert_allclose(tau_3[4], final_impulses(*EXAMPLE)[1], **CLOSE)  # tau_3^f
     np.testing.assert_allclose(trace.path[2, 1], v[1] + (1 - ratio) * g, **CLOSE)  # v_2^*
     np.testing.assert_allclose(trace.velocities, floats(solve(*EXAMPLE).velocities), **CLOSE)
+    # The numbers that the text puts into the formulas: the right-hand sides.
+    cells = [CHAPTER.cells[f"{name}-numbers"] for name in ("first", "second", "area", "outcome")]
+    told = "".join(cell.outputs[0].data["text/latex"] for cell in cells)
+    ends = [float(x) for x in re.findall(r"=(-?[.\d]+)(?=\\text|\\\\)", told)]
+    right = [*tau_2[1:3], g, g, 0.5, tau_3[3], 0.7, tau_3[4], *trace.velocities]
+    assert ends == pytest.approx(right, abs=5.1e-4)
 
 
 def test_energy_that_the_example_loses():
@@ -349,7 +356,7 @@ def test_what_the_page_says_of_the_program():
     assert rows[4, 6] == 0
     light = solve([1, "0.1", 1], [1, 0, 0], 1, "0.15")
     said = PROGRAM.printed("light")
-    assert f"{len(light.path) - 1} events" in said
+    assert f"{len(light.path) - 1} stops" in said
     assert numbers(said) == pytest.approx(floats(light.velocities), abs=5.1e-4)
     shown_lines = panel("own_solver", "fig-own-solver-light")
     assert list(shown_lines) == [f"$v_{i}$" for i in (1, 2, 3)]
