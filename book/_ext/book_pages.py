@@ -68,7 +68,8 @@ NUMBER = re.compile(
 NEITHER = ("", "NaN", "none")
 #: An equation as MathJax will find it; of TeX, what takes the place of one letter, and of none.
 EQUATION = re.compile(
-    r'<(div|span) class="(?:amsmath )?math [^>]*(?=>(.*?)</\1>)', re.DOTALL
+    r'<(div|span) class="(?:amsmath |output text_latex )?math [^>]*(?=>(.*?)</\1>)',
+    re.DOTALL,
 )
 COMMAND, UNSEEN = re.compile(r"\\[a-zA-Z]+"), re.compile(r"[\s{}_^\\()]")
 #: Code up to where it may break: behind a point, an opening bracket or a comma.
