@@ -165,7 +165,7 @@ def test_spread_of_the_second_stroke_at_any_angle():
     v = strokes(1, [1, 0, 0, 0, 0])[0]
     widest = BACK / LENGTH * np.abs(v).max()
     late = PERIOD / 2 * widest**2 / 16
-    assert glued("spread") == pytest.approx(1e3 * late, rel=0.1)
+    assert glued("spread") == pytest.approx(1e3 * late, abs=0.06)
 
 
 def test_two_balls_back():
