@@ -4,6 +4,7 @@ import re
 from functools import cache
 from math import factorial
 
+import energy_law
 import numpy as np
 import pytest
 import real_cradles
@@ -534,6 +535,12 @@ def test_fig_gaps():
     listed = ratio_table().set_index("triplet").ratio
     above = sum(listed[3 * ball] > line[0, 1] for ball in "ABCD")
     assert TOLD["above"] == {3: "three"}[above]
+    # With loss: three spheres like BBB, and the ratio that comes closest to them.
+    v, _ = energy_law.strike([1] * 3, [1, 0, 0], 0.36, 3000)
+    ratios = np.arange(0, 0.3, 0.002)
+    misses = [np.abs(collide(Chain([1] * 3, [1, 0, 0], 0.36), ImpulseCorrelation(a)).velocities - v)
+              for a in ratios]  # fmt: skip
+    APPENDIX.tells({"lossy-e": 0.36, "lossy": ratios[np.max(misses, axis=1).argmin()]})
 
 
 def test_the_figure_of_the_film_shows_balls_where_energy_lets_them_turn():
