@@ -1,13 +1,22 @@
 """The live explorer as a reader meets it: the built page, opened from its file in a browser."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from explorer import SETTING, chain_of, same_outcome, settings
 from pages import colour, contrast, show
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, collide, paper_chain, swing
+from cradle import (
+    Chain,
+    ImpactNotFinished,
+    ImpulseCorrelation,
+    Pendulums,
+    collide,
+    paper_chain,
+    swing,
+)
 from cradle.tables import paper_sequences
 
 
@@ -231,6 +240,73 @@ def test_momentum_and_energy_add_up(still):
     assert tab.inner_text(".balance small") == f"total {in_all}"
     largest = shares.argmax()
     assert f"ball {largest + 1}: {100 * shares[largest]:.0f}\u00a0%" in energy.inner_text()
+
+
+def test_energy_in_the_contacts(still):
+    """Within a hit, event by event: what Python says that the contacts can still give back."""
+    tab = still()
+    told = """(setting) => {
+      const record = new cradleExplorer.Swing(setting).record(0);
+      const along = cradleExplorer.progress(record ?? { pathImpulses: [] });
+      const end = along.at(-1);
+      return along.map((at) => cradleExplorer.stored(setting, record, at / end));
+    }"""
+    checked = 0
+    for setting in settings(24):
+        chain, model = chain_of(setting)
+        path = collide(chain, model).path
+        energies = 0.5 * np.square(path) @ chain.masses
+        held = tab.evaluate(told, setting)
+        for limit in range(1, 40):
+            try:
+                collide(chain, replace(model, max_events=limit))
+                break
+            except ImpactNotFinished as stopped:
+                trace, stored = stopped.trace, stopped.stored
+            row = len(trace.events)
+            # Of two runs side by side one may be ahead of its last row.
+            if not np.allclose(path[row], trace.velocities, rtol=0, atol=1e-12):
+                continue
+            unit = chain.masses.max() * np.abs(chain.velocities).max() ** 2
+            assert held[row] / unit == pytest.approx(stored, abs=1e-9)
+            whole = energies[row] + held[row] + trace.energy_loss
+            assert whole == pytest.approx(energies[0], rel=1e-9)
+            checked += 1
+    assert checked > 200
+    # By contact forces: without losses, all that does not move; with them, less and less of it.
+    for law in ("springs&stiffness=2", "spheres&gap=1", "spheres&gap=1&restitution=0.9"):
+        tab.go_to("speeds=1,0,0,0&law=" + law)
+        setting = tab.drawn()
+        path, held = tab.state("swing.record(0).path"), tab.state("swing.record(0).stored")
+        masses = np.array(setting["masses"])
+        lost = 0.5 - 0.5 * np.square(path) @ masses - held
+        last = 0.5 - 0.5 * np.square(setting["after"]) @ masses
+        assert max(held) > 0.2
+        assert np.diff(lost).min() > -1e-3
+        assert -1e-3 < lost.min() <= lost.max() < last + 1e-3
+
+
+def test_the_bar_of_energy_is_whole_within_a_hit(still):
+    """What moves and what the contacts hold; afterwards nothing is in the contacts."""
+    tab = still("#speeds=1,0,0&forward=0.15")
+    for restitution, lost in ((1, False), (0.5, True)):
+        tab.go_to(f"speeds=1,0,0&forward=0.15&restitution={restitution}")
+        tab.drawn()
+        tab.act("view.part = 0.35")
+        tab.drawn()
+        bar = tab.locator(".balance .plot").last
+        moving = float(tab.inner_text(".balance small").split()[1])
+        label = bar.locator("svg").get_attribute("aria-label")
+        held = float(re.search(r"in the contacts (\d+)", label)[1])
+        assert ("in the contacts: 57" in bar.inner_text()) is not lost
+        assert (moving + held < 99) if lost else abs(moving + held - 100) <= 1
+        drawn = bar.locator(".stored").get_attribute("d")
+        start, wide = (float(x) for x in re.findall(r"M([\d.]+).*h([\d.]+)", drawn)[0])
+        assert start / wide == pytest.approx(moving / held, rel=0.05)
+        tab.act("view.part = 1")
+        tab.drawn()
+        assert bar.locator(".stored").count() == 0
+        assert tab.inner_text(".balance small").startswith("total")
 
 
 @pytest.mark.parametrize(

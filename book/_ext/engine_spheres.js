@@ -51,12 +51,13 @@ function spheresLaw({ masses, restitution }) {
 }
 
 // What happened, at every step: rows of velocities and impulses, and the events with their rows.
-function story(masses, viscosity, { mass, speed, length, h }, pages) {
+function story({ masses, viscosity, exponent }, { mass, speed, length, h }, pages) {
   const closed = viscosity.map(() => false);
   const touching = viscosity.map((_, c) => pages[0][2][c] === 0); // so far
   const collisions = viscosity.map(() => 0);
   const loss = viscosity.map((time) => time * (speed / length));
   const path = [pages[0][1]];
+  const stored = [0]; // energy in the contacts
   const events = [];
   for (const [, v, d, force] of pages.slice(1, -1)) {
     // The loop's velocities are those of half a step later, and lack the impulses of the losses.
@@ -64,6 +65,7 @@ function story(masses, viscosity, { mass, speed, length, h }, pages) {
     const before = path[path.length - 1];
     const now = v.map((x, i) => x + ((late[i - 1] ?? 0) - (late[i] ?? 0)) * (mass / masses[i]));
     const row = path.push(now) - 1;
+    stored.push(force.reduce((sum, push, c) => sum + (push > 0 ? (push * d[c]) / (exponent + 1) : 0), 0));
     for (let c = 0; c < loss.length; c += 1) {
       const turned = before[c] > before[c + 1] && now[c] <= now[c + 1];
       if (turned && (closed[c] || force[c] > 0)) events.push({ kind: "maximum_compression", contact: c, row });
@@ -76,6 +78,7 @@ function story(masses, viscosity, { mass, speed, length, h }, pages) {
     }
   }
   path.push(pages[pages.length - 1][1]);
+  stored.push(0);
   const impulses = path.map((v) => {
     let passed = 0;
     return collisions.map((count, c) => {
@@ -83,7 +86,7 @@ function story(masses, viscosity, { mass, speed, length, h }, pages) {
       return count ? passed : 0;
     });
   });
-  return { path, impulses, events, collisions };
+  return { path, impulses, stored: stored.map((energy) => energy * mass * speed ** 2), events, collisions };
 }
 
 // Return the outcome for spheres that hang apart by `gap`, m; with its events and its path if
@@ -115,9 +118,9 @@ function forces(given) {
     for (const page of room.slice(0, clock.row)) pages.push(page.map((part) => [...part]));
     clock.row = 0;
   }
-  const { path, impulses, events, collisions } = story(masses, viscosity, clock, pages);
+  const { path, impulses, stored, events, collisions } = story(given, clock, pages);
   const back = (row) => row.map((v, i) => velocities[i] + clock.speed * (v - path[0][i]));
-  return { ...answer, collisions, events, path: path.map(back), pathImpulses: impulses };
+  return { ...answer, collisions, events, path: path.map(back), pathImpulses: impulses, stored };
 }
 
 Object.assign(globalThis.cradle, { forces, spheres, spheresLaw });

@@ -275,7 +275,7 @@
       // Who chooses an answer draws no bars: until then all is as before the hit.
       const asked = seen.covered && "answers" in host.dataset;
       const state = asked ? { ...seen, covered: false, guess: null, now: seen.hit.before } : seen;
-      const { setting, hit, number, now, part, guess, covered } = state;
+      const { setting, hit, number, record, now, part, guess, covered } = state;
       const when = asked ? "Before" : part < 1 ? "During" : "After";
       title.textContent = covered ? "Your guess (m/s)" : `${when} ${explorer.hitName(number)} (m/s)`;
       const ghost = guess?.open && guess.touched && number === 0 ? { guess: guess.values } : {};
@@ -284,8 +284,11 @@
       const before = covered ? hit.before.map(() => 0) : hit.before;
       bars.innerHTML = now ? explorer.bars(box(bars), setting, before, now, drawn) : "";
       momentum.innerHTML = now ? explorer.momentum(box(momentum), setting, hit.before, now) : "";
-      energy.innerHTML = now ? explorer.energy(box(energy), setting, hit.before, now) : "";
-      inAll.textContent = now ? `total ${explorer.percent(explorer.kept(setting.masses, hit.before, now))}` : "";
+      const inside = !covered && record && part < 1;
+      const held = inside ? explorer.stored(setting, record, part) : 0;
+      energy.innerHTML = now ? explorer.energy(box(energy), setting, hit.before, now, held) : "";
+      const kinetic = now && explorer.percent(explorer.kept(setting.masses, hit.before, now));
+      inAll.textContent = now ? `${inside ? "moves" : "total"} ${kinetic}` : "";
       handles.show(state, box(bars));
       told.textContent = guess && number === 0 ? explorer.guessInWords(state) : "";
     }

@@ -199,9 +199,9 @@
     );
   }
 
-  // Where the kinetic energy is: one share for each ball. A dashed outline holds the energy before; a
-  // guess may have more.
-  function energy(box, setting, before, now) {
+  // Where the energy is: one share for each ball, and hatched what the contacts hold, J. A dashed
+  // outline holds the energy before; a guess may have more.
+  function energy(box, setting, before, now, held = 0) {
     const { width, em } = box;
     const total = sum(kinetic(setting.masses, before));
     const shares = kinetic(setting.masses, now).map((share) => (total > 0 ? share / total : 0));
@@ -219,9 +219,17 @@
       x += wide;
       return part;
     });
-    parts.push(`<rect class="before" width="${px(unit)}" height="${px(height)}"/>`);
     const words = `Kinetic energy: ${named.join(", ")}; in all ${percent(sum(shares))} of that before the hit`;
-    return picture({ width, height }, words, parts.join(""));
+    const share = percent(held / total);
+    if (held > 0) {
+      const wide = (held / total) * unit;
+      const line = `d="M${px(x)} ${px(height / 2)}h${px(wide)}" stroke-width="${px(height)}"`;
+      const label = [`in the contacts: ${share}`, `contacts: ${share}`, share].find((said) => wide > 0.5 * em * (said.length + 1));
+      parts.push(`<path class="stored" ${line}/>`);
+      if (label) parts.push(text(x + wide / 2, 1.1 * em, label, 'text-anchor="middle" class="on-stored"'));
+    }
+    parts.push(`<rect class="before" width="${px(unit)}" height="${px(height)}"/>`);
+    return picture({ width, height }, words + (held > 0 ? `; in the contacts ${share}` : ""), parts.join(""));
   }
 
   // Sum of all impulses at each row of a record's path.
@@ -231,9 +239,10 @@
   // bends; where two runs overlap, the record alone has one maximum after the other.
   function straight(record) {
     const { path, pathImpulses, events } = record;
-    if (path.length !== events.length + 1) return record; // of forces: lines are curved
+    if (record.stored) return record; // of forces: lines are curved
     const kept = (rows) => rows.filter((_, row) => events[row - 1]?.kind !== "maximum_compression");
-    return { path: kept(path), pathImpulses: kept(pathImpulses) };
+    const [, ...bends] = kept([null, ...events]);
+    return { path: kept(path), pathImpulses: kept(pathImpulses), events: bends };
   }
 
   // Velocities and impulses when the hit has come so far, from 0 to 1.
@@ -255,7 +264,30 @@
       velocities: share === 1 ? record.path[row] : between(record.path),
       impulses: between(record.pathImpulses),
       pressed: part >= 1 ? pressed.map(() => false) : pressed,
+      row,
+      share,
     };
+  }
+
+  // The energy that the contacts hold by then, J: of the work that it takes each one can give back
+  // e^2, and loses the rest. Work is impulse times mean closing speed; where that speed changes its
+  // sign, its squares share out the work.
+  function stored({ restitution }, whole, part) {
+    const record = straight(whole);
+    const { velocities, impulses, row, share } = during(whole, part);
+    if (whole.stored) return whole.stored[row - 1] + share * (whole.stored[row] - whole.stored[row - 1]);
+    const path = [...record.path.slice(0, row), velocities];
+    const along = [...record.pathImpulses.slice(0, row), impulses];
+    const held = restitution.map(() => 0);
+    for (let k = 1; k <= row; k += 1)
+      restitution.forEach((e, c) => {
+        const [u, now] = [path[k - 1], path[k]].map((v) => v[c] - v[c + 1]);
+        const push = along[k][c] - along[k - 1][c];
+        const work = (push * (u + now)) / 2;
+        const taken = u * now < 0 ? (push * Math.max(u, now) ** 2) / (2 * Math.abs(u - now)) : Math.max(work, 0);
+        held[c] = Math.max(held[c] + e * e * taken + work - taken, 0);
+      });
+    return sum(held);
   }
 
   // Where the diagram has its lines: of all balls over the sum of all impulses, or of a contact's
@@ -371,6 +403,7 @@
     progress,
     px,
     span,
+    stored,
     stroke,
     sub,
     text,
