@@ -395,6 +395,23 @@ def test_fits_and_can_be_read(still, width: int):
         assert contrast(colour(main, "color"), colour(main, "backgroundColor")) > 7
 
 
+@pytest.mark.parametrize("name", ["explorer", "intro", "three_balls", "compliance"])
+def test_what_one_moves_is_beside_what_it_changes(still, name):
+    """On a phone the sliders and the bars are on one screen; on a desk no sentence is squeezed."""
+    tab = still(chapter=name, width=390, height=844, has_touch=True, is_mobile=True)
+    tab.push("Next hit")
+    tab.drawn()
+    host = tab.locator(".cradle-explorer").first
+    first = host.locator(".outcome .drawn").bounding_box()["y"]
+    label = "stiffness quotient" if name == "compliance" else "ratio"
+    last = host.get_by_label(label, exact=True).bounding_box()
+    assert first < last["y"] + last["height"] < first + 500
+    show(tab, 1280, "light")
+    tab.drawn()
+    words, desk = (host.locator(part).bounding_box()["width"] for part in (".words", ".desk"))
+    assert words > desk * (0.5 if name == "explorer" else 0.95)
+
+
 def test_motion_is_asked_for(visit):
     lively = visit(stopped=True)
     for scene in ("", "two", "small"):  # each stands still until it is let go

@@ -182,6 +182,8 @@
     const wanted = { count, scope, law, ...sliders };
     const has = (name) => parts.has({ forward: "ratio", backward: "ratio", gap: "law" }[name] ?? name);
     sliders.ratio.node.dataset.of = "ratio"; // it is there before the first hit, too
+    for (const name of ["restitution", "ratio", "forward", "backward", "stiffness"])
+      sliders[name].node.classList.add("near"); // on a phone below the buttons
     const nodes = Object.keys(wanted)
       .filter(has)
       .map((name) => wanted[name].node);
