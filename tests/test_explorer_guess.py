@@ -131,7 +131,11 @@ def test_pictures_wait_after_a_hit_that_was_guessed(still):
     assert tab.state("clock.time") > tab.evaluate("cradleExplorer.Swing.time(1)")
     assert (tab.state("clock.playing"), tab.state("view.number")) == (True, 0)
     assert tab.locator(".outcome .drawn .guess").count() == 5
-    # Who presses a button has compared.
+    # On a page of its own who presses a button has compared.
+    tab = still("", stopped=True)
+    tab.later(50)
+    tab.push("Let go", 2500)
+    assert tab.state("view.number") == 0
     tab.push("Pause", 50)
     tab.push("Go on")
     for _ in range(3):
@@ -201,17 +205,22 @@ def test_events_are_those_of_the_chapter(still):
         assert tab.bars() == trace.path[row].round(2).tolist()
 
 
-def test_the_first_hit_stays_beside_its_text(still):
-    """The balls swing on; the pictures and numbers stay those of the chapter."""
-    tab = still(chapter="n_balls", stopped=True)
-    tab.later(50)
-    after = collide(Chain([1] * 4, [1, 0.5, 0, 0], 1), ImpulseCorrelation(0.15)).velocities
-    tab.push("Let go", 1000)
-    for _ in range(4):
-        tab.later(1000)
-    assert tab.state("clock.time") > tab.evaluate("cradleExplorer.Swing.time(1)")
-    assert (tab.state("clock.playing"), tab.state("view.number")) == (True, 0)
-    assert tab.bars()[: len(after)] == after.round(2).tolist()
+@pytest.mark.parametrize("name", ["n_balls", "problem"])
+def test_the_first_hit_stays_beside_its_text(still, name):
+    """The balls swing on; pictures and numbers stay, until the reader asks for the next hit."""
+    tab = still(chapter=name, stopped=True)
+    after = collide(*chain_of(tab.later(50))).velocities.round(2).tolist()
+    for button in ("Let go", "Pause", "Go on", "Slow motion"):
+        tab.push(button, 1000)
+        for _ in range(9):
+            tab.later(1000)
+        running = button != "Pause"
+        assert (tab.state("clock.playing"), tab.state("view.number")) == (running, 0)
+        assert tab.bars()[: len(after)] == after
+    assert tab.state("clock.time") > tab.evaluate("cradleExplorer.Swing.time(0)")
+    for number in (2, 3):
+        tab.push("Next hit", 50)
+        assert tab.inner_text(".outcome :is(h2, h3, h4)") == f"After hit {number} (m/s)"
 
 
 def test_a_contact_waits_at_ratio_zero(still):

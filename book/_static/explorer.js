@@ -50,8 +50,9 @@
       // An answer of a few is known once it is told; speeds can be guessed again, on a page of its
       // own by a button.
       const again = answers || this.page ? "" : guessing;
-      const [asks, first] = [answers !== undefined, "first" in this.host.dataset];
-      this.state = new State({ scene, picture, guessing, again, asks, first });
+      const asks = answers !== undefined;
+      // In a chapter the text beside it speaks of the first hit.
+      this.state = new State({ scene, picture, guessing, again, asks, first: !this.page });
       this.visible = true;
       this.pointed = false; // whether a pointer has chosen what has the focus
       this.box = this.box.bind(this);
@@ -164,7 +165,7 @@
         play: on(() => state.play()),
         step: on(() => state.step()),
         back: on(() => state.pullBack()),
-        slow: on(() => Object.assign(clock, { slow: !clock.slow, inside: null })),
+        slow: on(() => state.slow()),
         guess: on((ball, value) => state.guess(ball, value)),
         answer: on((answer) => state.answer(answer)),
         guessing: on(() => {

@@ -17,7 +17,8 @@
     // `picture`: which one to show instead of that of a scene; `guessing`: whether the outcome is
     // covered until the reader has seen the balls move, this "once", "always", or not at all ("");
     // `again`: what it is once the balls are pulled back; `asks`: whether a guess is one of some
-    // answers; `first`: whether the pictures stay at the first hit while the balls swing on.
+    // answers; `first`: whether the pictures stay at the first hit, while the balls swing on, until the
+    // reader asks for the next one.
     constructor({ scene, picture, guessing = "", again = "", asks = false, first = false }) {
       this.picture = picture;
       Object.assign(this, { guessing, again, asks, first });
@@ -200,17 +201,26 @@
     play() {
       const { clock } = this;
       if (!this.mayMove()) return;
-      this.follow();
+      if (!this.first) this.follow();
       clock.playing = !clock.playing && this.swing.positions(clock.time) !== null;
     }
 
     step() {
       if (!this.mayMove()) return;
-      const number = this.swing.latest(Math.max(this.clock.time, 0)) + 1;
-      Object.assign(this.clock, { time: Swing.time(number), playing: false, inside: null });
+      const { clock, view } = this;
+      // The one after that which is shown.
+      const number = (clock.guessed ? view.number : this.swing.latest(Math.max(clock.time, 0))) + 1;
+      Object.assign(clock, { time: Swing.time(number), playing: false, inside: null });
       this.follow();
       this.open();
       this.show(number);
+    }
+
+    // Slow motion, or no longer. Where the first hit is what counts, it is shown again.
+    slow() {
+      const { clock } = this;
+      Object.assign(clock, { slow: !clock.slow, inside: null });
+      if (this.first && clock.slow && !this.covered) this.restart(clock.playing);
     }
 
     // Let time pass; return whether more than positions has changed. In slow motion the clock
@@ -233,7 +243,7 @@
       clock.time += seconds * (clock.slow ? SLOW : 1);
       if (clock.time < Swing.time(next)) return false;
       const opened = this.open() || (this.first && next === 0);
-      clock.guessed = opened || (clock.guessed && !clock.slow);
+      clock.guessed = opened || (clock.guessed && (this.first || !clock.slow));
       const { status, happened } = swing.hit(next);
       if (status !== "finished") {
         Object.assign(clock, { time: Swing.time(next), playing: false });
@@ -241,7 +251,7 @@
         return true;
       }
       if (!happened) return false;
-      if (clock.slow) Object.assign(clock, { time: Swing.time(next), inside: 0 });
+      if (clock.slow && (opened || !clock.guessed)) Object.assign(clock, { time: Swing.time(next), inside: 0 });
       else if (opened) Object.assign(clock, { time: Swing.time(next), wait: LOOK });
       if (opened || !clock.guessed) this.show(next, clock.slow ? 0 : 1);
       return true;
