@@ -27,6 +27,7 @@ def test_the_first_page_is_guessed(still):
     guess = [-0.1, 0, 0, 0, 0.9]
     assert tab.state("view.guess.values") == pytest.approx(guess)
     assert "80\u00a0% of the momentum and 82\u00a0% of the energy" in host.inner_text()
+    assert "Fill both, to 100\u00a0%." in host.inner_text()
     tab.push("Next hit")
     tab.drawn()
     assert tab.bars() == expected.round(2).tolist()
@@ -80,6 +81,9 @@ def test_scene_by_scene_is_guessed(still, name, before):
         tab.push("Next hit")
         tab.drawn()
         assert not tab.state("covered")
+    tab.act("take('losses')")
+    tab.drawn()
+    assert tab.inner_text(".guessed").endswith("of energy some is lost.")
     tab.push("Guess first")
     tab.keyboard.press("ArrowRight")
     tab.drawn()

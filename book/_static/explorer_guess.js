@@ -60,13 +60,16 @@
 
   // What a guess says: while it is drawn, and once it is known how the balls leave.
   function inWords({ setting, hit, guess, now }) {
-    const { masses } = setting;
+    const { masses, restitution } = setting;
     const momentum = (row) => sum(row.map((v, ball) => masses[ball] * v));
     if (!guess.open) {
       const before = momentum(hit.before);
-      const moves = Math.abs(before) > 1e-9 ? `${percent(momentum(now) / before)} of the momentum and ` : "";
+      const share = Math.abs(before) > 1e-9 && percent(momentum(now) / before);
+      const moves = share ? `${share} of the momentum and ` : "";
       const energy = percent(kept(masses, hit.before, now));
-      return `Your bars have ${moves}${energy} of the energy before the hit.`;
+      const lossless = explorer.law(setting) === "springs" || restitution.every((e) => e === 1);
+      const aim = lossless ? "Fill both, to 100\u00a0%." : "Fill momentum, to 100\u00a0%; of energy some is lost.";
+      return `Your bars have ${moves}${energy} of the energy before the hit. ${share ? aim : ""}`;
     }
     if (!guess.touched || !hit.after) return "";
     const off = hit.after.map((v, ball) => Math.abs(v - guess.values[ball]));
