@@ -113,6 +113,25 @@ def test_a_reader_walks_on_from_a_changed_setting(still):
     assert tab.locator(".walk select").input_value() == "three"
 
 
+def test_a_scene_has_its_own_settings_alone(still):
+    """No name of another one comes up where a setting happens to be the same; a link gives it."""
+    tab = still()
+    chosen = tab.locator(".walk select")
+    for ratio, scene in (("0.5", ""), ("0.15", "example")):
+        tab.typed("ratio", ratio)
+        tab.drawn()
+        assert chosen.input_value() == scene
+    tab.typed("ratio", "0.5")
+    tab.drawn()
+    assert still("#" + tab.state("fragment()")).locator(".walk select").input_value() == "three"
+    groups = tab.evaluate(
+        """[...document.querySelectorAll('.walk optgroup')].map(
+          ({ children }) => [...children].map(({ value }) => value))"""
+    )
+    assert len(groups) == 2
+    assert all(re.fullmatch("[A-D]+", key) for key in groups[1])  # the paper's, at the end
+
+
 def test_outcome_is_said_in_words(still):
     """Polite, once the reader pauses, and the same words as on the screen."""
     tab = still("#scene=three", stopped=True)

@@ -37,7 +37,9 @@
       this.take(scene);
     }
 
-    set(setting) {
+    // A setting has the name of the scene from which one came as long as it is that of the scene; no
+    // other name comes up because a setting happens to be the same.
+    set(setting, scene = this.lastScene) {
       this.setting = setting;
       this.own = true; // the reader's, unless it comes from the list of scenes
       this.swing = new Swing(setting);
@@ -45,8 +47,8 @@
       const count = setting.masses.length;
       if (view.scope !== "all" && +view.scope >= count) view.scope = "all";
       if (view.contact !== "all" && view.contact >= count - 1) view.contact = "all";
-      view.scene = scenes.find((scene) => explorer.equal(scene.setting, setting))?.key ?? "";
-      this.lastScene = view.scene || this.lastScene;
+      this.lastScene = scene;
+      view.scene = scenes.some(({ key, setting: own }) => key === scene && explorer.equal(own, setting)) ? scene : "";
       view.notice = "";
       if (!this.guessing) view.guess = null;
       else if (!this.covered || view.guess.values.length !== count) this.cover();
@@ -150,7 +152,7 @@
         contact: "all",
       });
       this.clock.playing = false; // a lecturer speaks first
-      this.set(scene.setting);
+      this.set(scene.setting, key);
       this.own = false;
     }
 
@@ -169,7 +171,8 @@
         this.view.notice = `The address asks for what cannot be: ${error}.`;
         return undefined;
       }
-      this.set(setting);
+      // The address of a scene that was left open, or sent, leads to it again.
+      this.set(setting, scenes.find((one) => explorer.equal(one.setting, setting))?.key);
       if (["inside", "sweep", "map"].includes(picture)) this.view.picture = picture;
       return undefined;
     }
