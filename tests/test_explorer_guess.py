@@ -278,6 +278,12 @@ def test_tasks_are_judged_by_the_solver(still):
     for k, setting in enumerate(TASKS):
         tab.act(f"read('{setting}')")
         tab.drawn()
+        assert tab.locator(done).count() == k, setting  # not before the hit
+        assert tab.inner_text(".task-told") == ""
+        tab.push("Next hit")
+        tab.drawn()
+        told = tab.inner_text(".task-told")
+        assert re.fullmatch(rf"\u2713 Done: task (\d and )?{k + 1}", told)
         assert tab.locator(done).count() == k + 1, setting
         assert tab.locator(f".tasks li:nth-of-type({k + 1}).done").count() == 1, setting
     assert f"{len(TASKS)} of {len(TASKS)} done" in tab.inner_text(".tasks summary")
@@ -288,6 +294,22 @@ def test_tasks_are_judged_by_the_solver(still):
     tab.act("read('speeds=1,1,0&forward=0.5')")
     tab.drawn()
     assert not any(tab.evaluate(f"{nothing}({EXPLORER}.state)"))
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_no_other_button_comes_under_the_pointer(still, width):
+    tab = still("", width=width)
+    tab.drawn()
+    before = tab.middle("button.main")
+    tab.push("Let go")
+    tab.act("step()")
+    tab.drawn()
+    assert tab.locator(".run button:visible").count() > 4
+    after = tab.locator("button.main").bounding_box()
+    assert abs(after["x"] + after["width"] / 2 - before[0]) < after["width"] / 2 - 5
+    assert tab.evaluate(
+        "([x, y]) => document.elementFromPoint(x, y).matches('button.main')", before
+    )
 
 
 def test_two_cradles_side_by_side(still):

@@ -85,7 +85,7 @@
       };
       const node = (name) => this.panels[name]?.node ?? "";
       const cradle = make("div", { class: "cradle" });
-      const stages = make("div", { class: "stages" }, cradle, beside?.place ?? "");
+      const stages = make("div", { class: "stages" }, cradle, beside?.place ?? "", this.panels.tasks?.told ?? "");
       // What is to be guessed comes before the button that shows it.
       const guessed = "guess" in this.host.dataset && !this.page;
       const outcome = (here) => (here ? node("outcome") : "");

@@ -41,17 +41,26 @@
       make("p", {}, "Of three balls or more pull back the first, and set whatever else you like. The first hit counts."),
       make("ol", {}, ...items),
     );
-    function show({ setting, hit, number, record, covered, own }) {
-      if (own && !covered && number === 0)
-        done(setting, hit, record).forEach((now, k) => {
-          met[k] ||= now;
-          items[k].lastChild.textContent = met[k] ? "\u2713 done" : "";
-          items[k].classList.toggle("done", met[k]);
-        });
+    const told = make("p", { class: "task-told", role: "status" }); // beside the cradle
+    let judged = null; // the setting of the last hit
+    // A task is done at the hit, not by a setting that one passes.
+    function show({ setting, hit, number, record, covered, own, clock }) {
+      if (setting !== judged) told.textContent = "";
+      const over = clock.time >= explorer.Swing.time(0) && clock.inside === null;
+      if (own && over && !covered && number === 0 && setting !== judged) {
+        judged = setting;
+        const now = done(setting, hit, record).flatMap((yes, k) => (yes ? [k] : []));
+        for (const k of now) {
+          met[k] = true;
+          items[k].lastChild.textContent = "\u2713 done";
+          items[k].classList.add("done");
+        }
+        if (now.length) told.textContent = `\u2713 Done: task ${now.map((k) => k + 1).join(" and ")}`;
+      }
       const words = `(${met.filter(Boolean).length} of ${TASKS.length} done)`;
       if (count.textContent !== words) count.textContent = words;
     }
-    return { node, show };
+    return { node, told, show };
   }
 
   explorer.tasksDone = done;
