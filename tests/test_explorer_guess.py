@@ -1,5 +1,6 @@
 """Guesses, questions and tasks on the live cradles: what is covered, and what the solver says."""
 
+import itertools
 import re
 
 import numpy as np
@@ -207,6 +208,28 @@ def test_events_are_those_of_the_chapter(still):
         tab.locator(".events button").nth(number).click()
         tab.drawn()
         assert tab.bars() == trace.path[row].round(2).tolist()
+        assert float(tab.locator(".scrub input").input_value()) == number + 1
+    # Lines have their bends at equal distances, and marks stand apart.
+    for contact in ("all", "0", "1"):
+        tab.locator(".pictures select").select_option(contact)
+        tab.drawn()
+        line = tab.locator(".pictures polyline").first.get_attribute("points")
+        steps = np.diff([float(point.split(",")[0]) for point in line.split()])
+        assert steps == pytest.approx(steps[0], abs=0.02)
+        assert len(steps) == len(rows)
+        named = tab.locator(".pictures text.small").all()
+        boxes = [mark.bounding_box() for mark in named]
+        for left, right in itertools.pairwise(boxes):
+            assert left["x"] + left["width"] <= right["x"]
+    # Neighbours are equally fast where their contact is compressed most.
+    tops = tab.locator(".pictures .mark").filter(has=tab.locator("circle")).all()
+    for top in tops:
+        heights = [float(circle.get_attribute("cy")) for circle in top.locator("circle").all()]
+        assert heights == pytest.approx([heights[0]] * 2, abs=0.02)
+    # What is moved by hand comes to the event of that number.
+    tab.locator(".scrub input").fill("3")
+    tab.drawn()
+    assert tab.bars() == trace.path[rows[2][0]].round(2).tolist()
 
 
 @pytest.mark.parametrize("name", ["n_balls", "problem"])

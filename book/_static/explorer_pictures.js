@@ -57,6 +57,7 @@
 
   function insidePicture(act, parts) {
     const events = parts.has("events") ? eventList(act) : null;
+    const equal = parts.has("events"); // distances of events: the last ones of a hit are close together
     const contact = select({ words: "velocities of", options: [], choose: act.contact });
     const plot = make("div", { class: "plot" });
     const part = make("input", {
@@ -65,7 +66,7 @@
       max: 1,
       step: 0.005,
       "aria-label": "how far the hit has come",
-      oninput: () => act.part(+part.value),
+      oninput: () => act.part(equal ? explorer.partBy(shown, +part.value) : +part.value),
     });
     const scrub = make(
       "label",
@@ -77,6 +78,7 @@
     const note = make("p", { class: "note" });
     let offered = 0;
     let drawn = null;
+    let shown = null; // the record
     function offer(count) {
       const pairs = Array.from({ length: count - 1 }, (_, c) => ({
         value: String(c),
@@ -86,8 +88,9 @@
       offered = count;
     }
     function legend(record, chosen) {
+      if (chosen === "all" && equal) return "The events of the list, at equal distances. Dashed: now; all bars follow.";
       if (chosen === "all")
-        return "The hit goes on from left to right; impulse, force times time, is its clock. Dashed: now.";
+        return "The hit goes on from left to right; impulse, force times time, is its clock. Dashed: now; all bars follow.";
       const kinds = new Set(
         record.events.filter((event) => event.contact === chosen).map(({ kind }) => kind),
       );
@@ -98,7 +101,9 @@
       if (offered !== count) offer(count);
       contact.show(String(chosen));
       scrub.hidden = !record;
-      drawn = record && explorer.diagram(box(plot, 6.5), record, chosen);
+      shown = record;
+      if (record && equal) part.max = explorer.eventsBy(record, 1);
+      drawn = record && explorer.diagram(box(plot, 6.5), record, chosen, equal);
       plot.innerHTML = drawn ? drawn.svg : "";
       if (record) note.textContent = legend(record, chosen);
       else
@@ -110,12 +115,13 @@
       const { record, contact: chosen, part: now } = state;
       if (!drawn || !record) return;
       events?.show(state);
-      if (document.activeElement !== part || +part.value !== now) part.value = now;
+      const at = equal ? explorer.eventsBy(record, now) : now;
+      if (document.activeElement !== part || +part.value !== at) part.value = at;
       if (drawn.now === now) return;
       drawn.now = now;
       part.setAttribute("aria-valuetext", `${Math.round(100 * now)}\u00a0%`);
       const { em } = box(plot);
-      plot.querySelector(".now").innerHTML = explorer.dots(drawn.plot, record, chosen, now, em);
+      plot.querySelector(".now").innerHTML = explorer.dots(drawn.plot, record, chosen, now, em, equal);
     }
     return {
       node: make("div", {}, contact.node, plot, scrub, events?.node ?? "", note),
@@ -174,7 +180,7 @@
         (explorer.presentRatio(shown.setting, sweep.inner) === null
           ? "Level lines: the present outcome, whose ratios differ from ball to ball."
           : "Dashed line: the present ratio. Drag it.") +
-        (held ? " Grey: a ratio is above its bound, and held there." : "") +
+        (held ? " Grey: above its bound; the bound is used." : "") +
         (refused ? ` At ${refused} ratios the hit takes more events than the page computes.` : "");
     }
     function resume(box) {

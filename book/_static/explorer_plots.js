@@ -290,14 +290,27 @@
     return sum(held);
   }
 
-  // Where the diagram has its lines: of all balls over the sum of all impulses, or of a contact's
-  // two balls over its own impulse.
-  function lines(record, contact) {
+  // How many events have come by a part of the hit, with the fraction of the way to the next one; and
+  // the part of the hit where so many have come.
+  function eventsBy(record, part) {
+    const { row, share } = during(record, part);
+    return row - 1 + share;
+  }
+  function partBy(record, place) {
+    const along = progress(straight(record));
+    const [row, last] = [Math.floor(place), along.length - 1];
+    return row >= last ? 1 : (along[row] + (place - row) * (along[row + 1] - along[row])) / along[last];
+  }
+
+  // Where the diagram has its lines: of all balls over the sum of all impulses, of a contact's two
+  // balls over its own impulse, or with all events at `equal` distances.
+  function lines(record, contact, equal) {
     const all = contact === "all";
     const { path, pathImpulses } = straight(record);
+    const impulses = all ? progress({ pathImpulses }) : pathImpulses.map((row) => row[contact]);
     return {
       path,
-      along: all ? progress({ pathImpulses }) : pathImpulses.map((row) => row[contact]),
+      along: equal ? path.map((_, row) => row) : impulses,
       balls: all ? path[0].map((_, ball) => ball) : [contact, contact + 1],
     };
   }
@@ -305,7 +318,16 @@
   // Beyond this many events of a contact, marks hide the lines.
   const MARKED = 60;
 
-  function marks(record, contact, plot, em) {
+  // On the axis of events a maximum is between two of them.
+  function eventPlace(record, contact, row) {
+    const bends = record.events.flatMap(({ kind }, k) => (kind === "maximum_compression" ? [] : [k + 1]));
+    const before = bends.filter((bend) => bend <= row);
+    const [from, to] = [before.at(-1) ?? 0, bends[before.length] ?? row];
+    const [low, now, high] = [from, row, to].map((at) => record.pathImpulses[at][contact]);
+    return before.length + (high > low ? (now - low) / (high - low) : 0);
+  }
+
+  function marks(record, contact, plot, em, equal) {
     const events = record.events
       .map((event, k) => ({ row: k + 1, ...event }))
       .filter((event) => event.contact === contact);
@@ -316,7 +338,7 @@
     return events
       .map(({ kind, row }, k) => {
         if (kind === "close" && k > 0) collision += 1;
-        const x = plot.x(record.pathImpulses[row][contact]);
+        const x = plot.x(equal ? eventPlace(record, contact, row) : record.pathImpulses[row][contact]);
         const drawn = [contact, contact + 1].map((ball) =>
           MARKS[kind](x, plot.y(record.path[row][ball]), px(0.28 * em)),
         );
@@ -332,15 +354,15 @@
   }
 
   // The hit from the inside.
-  function diagram(box, record, contact) {
-    const { path, along, balls } = lines(record, contact);
+  function diagram(box, record, contact, equal) {
+    const { path, along, balls } = lines(record, contact, equal);
     const { em } = box;
     const shown = balls.flatMap((ball) => path.map((row) => row[ball]));
     const end = along[along.length - 1];
+    const impulse =
+      contact === "all" ? "sum of all impulses (N s)" : `impulse <tspan font-style="italic">τ</tspan>${sub(contact + 2)} (N s)`;
     const plot = axes(box, [0, end > 0 ? end : 1], span(shown), [
-      contact === "all"
-        ? "sum of all impulses (N s)"
-        : `impulse <tspan font-style="italic">τ</tspan>${sub(contact + 2)} (N s)`,
+      equal ? "event, at equal distances" : impulse,
       "velocity (m/s)",
     ]);
     const drawn = balls.map((ball) =>
@@ -358,7 +380,7 @@
         em,
       ),
     );
-    const marked = contact === "all" ? "" : marks(record, contact, plot, em);
+    const marked = contact === "all" ? "" : marks(record, contact, plot, em, equal);
     const words = `Velocities of balls ${balls.map((ball) => ball + 1).join(", ")} during the hit`;
     return {
       plot,
@@ -371,10 +393,11 @@
     [...String(number)].map((digit) => String.fromCharCode(0x2080 + +digit)).join("");
 
   // The dots that travel along the diagram's lines.
-  function dots(plot, record, contact, part, em) {
+  function dots(plot, record, contact, part, em, equal) {
     const { velocities, impulses } = during(record, part);
     const { balls } = lines(record, contact);
-    const x = plot.x(contact === "all" ? sum(impulses) : impulses[contact]);
+    const impulse = contact === "all" ? sum(impulses) : impulses[contact];
+    const x = plot.x(equal ? eventsBy(record, part) : impulse);
     return (
       `<path class="cursor" d="M${x} ${plot.top}V${plot.bottom}"/>` +
       balls
@@ -395,8 +418,10 @@
     dots,
     during,
     energy,
+    eventsBy,
     momentum,
     names,
+    partBy,
     percent,
     picture,
     polyline,
