@@ -59,7 +59,9 @@
     const play = button("", act.play, { class: "main" });
     const step = button("Next hit", act.step);
     const back = button("Pull back", act.back);
-    const slow = button("Slow motion", act.slow);
+    const slow = button("Slow motion", act.slow, {
+      title: "through each hit from the inside; a star marks a contact that is pressed",
+    });
     const more = parts.has("share")
       ? [
           button("Guess first", act.guessing, { title: "in each scene cover what comes out until the balls have moved" }),
