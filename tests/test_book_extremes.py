@@ -191,6 +191,11 @@ def test_the_condition_number_and_how_it_grows():
                     total += max([0.0, *(np.abs(side - base).max() for side in sides)])
             assert value == pytest.approx(total / np.abs(base).max() / step, rel=1e-3)
     assert 2 < found[1e-2, 1] < 5
+    told = re.findall(r": ([\d.]+), ", CHAPTER.printed("extremes-13"))
+    for kappa, ratio, name in zip(told, (0.15, 0.49), ("here", "near"), strict=True):
+        value = condition_number(chain, ImpulseCorrelation(ratio), step=1e-3).number
+        assert float(kappa) == pytest.approx(value, rel=0.02)
+        CHAPTER.tells({f"kappa-{name}": 0.1 * value}, off=0.051)
     assert found[1e-8, 1e-6] == pytest.approx(10 * found[1e-8, 1e-4], rel=0.1)
     assert found[1e-4, 1e-10] == pytest.approx(found[1e-4, 1e-6], rel=0.2)  # h reaches it
 

@@ -109,7 +109,7 @@ def test_measure_runs_with_a_reader_s_own_file(root, tmp_path, monkeypatch):
     (tmp_path / "my_shots.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     # These take longest and use none of this: fits to a synthetic row and a synthetic swing.
-    other = {"gaps-found", "gaps-told"}
+    other = {"gaps-law", "gaps-found", "gaps-told"}
     other |= {f"swing-{name}" for name in ("made", "fit", "figure", "notes")}
     assert other < {cell.id for cell in code("measure")}
     cells = [cell for cell in code("measure") if cell.id not in other]

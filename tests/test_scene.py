@@ -475,6 +475,7 @@ def test_the_recipe_tells_where_the_energy_is():
     for n in (1, 2):
         assert chapter.glued[f"off-row-{n}"] == scene[f"film-apart-{n}"]
         assert chapter.glued[f"off-pairs-{n}"] == scene[f"film-pairs-{n}"]
+        assert chapter.glued[f"off-own-{n}"].replace(" to ", "–") == scene[f"film-own-{n}"]
     assert chapter.glued["off-three"] == scene["apart-three"]
     # Three depths between the outer balls and the others, or ten.
     depth = (5 * 0.5 / 4) ** 0.4
