@@ -477,6 +477,9 @@ def test_the_recipe_tells_where_the_energy_is():
         assert chapter.glued[f"off-pairs-{n}"] == scene[f"film-pairs-{n}"]
         assert chapter.glued[f"off-own-{n}"].replace(" to ", "–") == scene[f"film-own-{n}"]
     assert chapter.glued["off-three"] == scene["apart-three"]
+    three = integrated([1] * 5, [1, 1, 1, 0, 0], gaps=[3, 3, 0, 0])
+    off = 100 * np.abs(np.abs(three) - np.abs(first_strikes(4)[3][0])).max()
+    assert chapter.glued["off-three-apart"] == f"{off:.0f}"
     # Three depths between the outer balls and the others, or ten.
     depth = (5 * 0.5 / 4) ** 0.4
     wider = max(
