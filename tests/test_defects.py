@@ -1,4 +1,4 @@
-"""Chains that went wrong once, by name."""
+"""Chains that went wrong once, by name; and families of chains like them."""
 
 import math
 from decimal import Decimal, localcontext
@@ -9,9 +9,10 @@ import pytest
 from chains import uniform
 from delicate import CHAINS, chains_of, seen
 from extreme_chains import faults, invariants
+from families import FAMILIES, family
 from problem import Problem
 
-from cradle import Chain, ImpulseCorrelation, collide, textbook
+from cradle import Chain, ImpactNotFinished, ImpulseCorrelation, collide, textbook
 
 #: Chains with one answer, the same by more digits and in floats.
 NAMED = chains_of("one answer")
@@ -147,3 +148,32 @@ def test_masses_of_fifteen_decades_are_solved_and_of_more_refused():
         squeezed(9e-16).collide()
     with pytest.raises(ValueError, match=r"^masses\[1\] = 1e-26; "):
         collide(Chain([1e-8, 1e-26, 1e-9, 1], [0, 1, 0, 0], [0, 1, 1]), ImpulseCorrelation(0.3))
+
+
+#: Chains of a family.  Products of tiny ratios take tens of milliseconds each, over decimals.
+COUNT, FEWER = 400, {"tiny ratios": 40}
+
+
+def finished(name, count, seed):
+    """Problems of a family with their traces; nearly all must finish."""
+    found = []
+    for problem in family(name, count, seed):
+        try:
+            found.append((problem, problem.collide(max_events=50_000)))
+        except ImpactNotFinished:
+            continue
+    assert len(found) > 0.9 * count
+    return found
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_invariants(name):
+    for problem, trace in finished(name, FEWER.get(name, COUNT), seed=1):
+        assert faults(trace, overlap=1e-30) == [], problem
+
+
+@pytest.mark.parametrize("name", ["ties", "ties within bounds"])
+def test_boosts_by_exact_speeds(name):
+    for problem, trace in finished(name, COUNT // 2, seed=3):
+        boosted = problem.boosted(1.5).collide(max_events=100_000)
+        assert difference(boosted.velocities - 1.5, trace.velocities) < 1e-8, problem

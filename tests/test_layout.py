@@ -279,7 +279,7 @@ def test_every_figure_has_both_colourings(html: Path):
     assert len(drawings) > 40
     assert all(path.stem.startswith("fig-") for path in drawings)  # who saves one finds it again
     maps = [path for path in drawings if "<image" in path.read_text(encoding="utf-8")]
-    assert 1 < len(maps) < 15
+    assert 2 < len(maps) < 15
     for path in maps:
         points, turned = (
             np.array([light_of(image) for image in book_figures.POINTS.findall(text)])

@@ -118,7 +118,7 @@ def test_what_is_cut_is_below_rounding():
     """The same bits for other cuts, and for none; a coarse one is seen."""
     rng = np.random.default_rng(7)
     lossy = magnitudes(rng, 1, 20).tolist(), struck(20)[1], uniform(rng, 0.9, 1.0, 19), 0.15
-    for chain in ((*struck(60), 1.0, 0.1), (*struck(60), 1.0, 0.45), lossy):
+    for chain in ((*struck(100), 1.0, 0.1), (*struck(100), 1.0, 0.45), lossy):
         stored = solve(*chain).velocities
         for cut in (2.0**-100, 2.0**-200, 0.0):
             assert solve(*chain, cut=cut).velocities == stored, cut

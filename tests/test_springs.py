@@ -19,6 +19,7 @@ from scipy.special import gamma
 
 from cradle import (
     Chain,
+    EnergyDistribution,
     ImpactNotCertified,
     ImpactNotFinished,
     SpringChain,
@@ -183,6 +184,15 @@ def test_stiffness_of_spheres_of_a_material():
     assert hertz_stiffness([0.01, 0.01])[0] == pytest.approx(1.0878e10, rel=1e-4)
 
 
+@pytest.mark.parametrize("n", [10, 20, 40])
+def test_fast_balls_of_a_long_chain(n):
+    """Hinch and Saint-Jean 1999: about 1.5 N^(1/3) balls fly off, the others rebound slowly."""
+    after = spring_velocities([1] * n, struck(n), accuracy=1e-6)
+    assert (after > 0).sum() == pytest.approx(1.5 * n ** (1 / 3), abs=0.3)
+    trace = collide(Chain([1] * n, struck(n)), SpringChain())
+    assert trace.collisions.tolist() == [1] * (n - 1)
+
+
 # --- accuracy and laws on random chains -----------------------------------------------------
 
 
@@ -289,6 +299,15 @@ def test_losses_and_leans_leave_the_fourth_order(monkeypatch, name):
     assert largest[1] <= largest[0] / 4**3.3
     if name == "opened and closed within a step":
         assert max(error(h)[0] for h in np.linspace(0.13, 0.155, 40)) <= 0.01
+
+
+@pytest.mark.parametrize("light", [1e-3, 1e-4])
+def test_a_light_ball_that_swings_often_amplifies_no_error(light):
+    """Each swing adds to the error: from some on two runs are compared."""
+    chain = striking([1, light, 1])
+    exact = collide(chain, EnergyDistribution(rtol=1e-13)).velocities
+    found = collide(chain, SpringChain(accuracy=1e-4)).velocities
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-4)
 
 
 def test_units_a_boost_and_a_mirror_change_nothing_else():

@@ -1,7 +1,8 @@
-"""The textbook's rules by themselves, and against a march by small steps."""
+"""The textbook's rules by themselves, against the package, and against a march by small steps."""
 
 import ast
 import functools
+import math
 import random
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -10,7 +11,9 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
+from chains import local_orders
 from march import march
+from problem import Problem
 from truth import EventLimit, Impact, meaning, solve
 
 from cradle import textbook
@@ -65,6 +68,38 @@ def generic(seed, n, bounded=True, light=0.3):
             backward[k] *= largest_ratios(masses, forward, backward)[1][k]
     meeting = rng.choice([0.5, 0.5, 0.0, 1.0, rng.random()])
     return (masses, velocities, restitution, forward, backward), meeting
+
+
+@functools.cache
+def compared(n, bounded):
+    """Generic chains that end soon, with what the package and the textbook make of them."""
+    found = []
+    for seed in range(150):
+        chain, meeting = generic((n, seed).__hash__(), n, bounded)
+        try:
+            plain = textbook.solve(*chain, meeting=meeting, max_events=40)
+        except EventLimit:
+            continue
+        trace = Problem(*chain, meeting).collide()
+        if not trace.collapsed and len(plain.events) < 60:
+            found.append((chain, trace, plain))
+    assert len(found) > 60
+    return found
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
+@pytest.mark.parametrize("bounded", [True, False], ids=["within bounds", "saturated"])
+def test_generic_chains_in_every_event(n, bounded):
+    held = 0
+    for chain, trace, plain in compared(n, bounded):
+        assert local_orders(trace.events, n - 1) == local_orders(plain.events, n - 1), chain
+        np.testing.assert_allclose(trace.velocities, plain.velocities, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(trace.impulses, plain.impulses, rtol=0, atol=4e-13)
+        np.testing.assert_allclose(trace.absorbed, plain.absorbed, rtol=0, atol=4e-13)
+        assert trace.collisions.tolist() == plain.collisions
+        assert trace.saturated == tuple(sorted(plain.held))
+        held += bool(plain.held)
+    assert held > 10 or bounded or n == 2
 
 
 @pytest.mark.parametrize(
@@ -198,3 +233,21 @@ def test_hold_is_not_the_limit_of_chatter_where_the_held_contact_drives_on():
     chatter = march(*chain, steps=1000, hold=False)
     assert held.velocities == pytest.approx((-0.41668, 0.18184, 0.49304, 0.74179), abs=2e-3)
     assert chatter.velocities == pytest.approx((-0.5, 0.5, 0.5, 0.5), abs=2e-3)
+
+
+def test_two_runs_that_meet():
+    """R8 for a symmetric chain, by hand: the gap closes at zero and is driven from both sides.
+
+    Outer mass m, inner mass 1, velocities (1, -d, d, -1), e = 1, ratio a; x, y are the left half's.
+    """
+    m, d, a = 0.3, 0.1, 0.2
+    x, u = 1 - d / m, 1 - d / m  # the inner balls stop at the gap after an impulse d
+    stored = d * (1 + d + u) / 2
+    k = 1 / m + 1 - a
+    p = (u + math.sqrt(u**2 + 2 * k * stored)) / k  # outer contacts: work back to zero
+    x, y = x - p / m, (1 - a) * p
+    y = -math.sqrt(y**2 + a * (1 - a) * p**2)  # the gap returns 2 a (1 - a) p^2 / 2 as well
+    assert x < y
+    found = textbook.solve([m, 1, 1, m], [1, -d, d, -1], 1, a)
+    np.testing.assert_allclose(found.velocities, [x, y, -y, -x], rtol=0, atol=1e-15)
+    assert found.collisions == march((m, 1, 1, m), (1, -d, d, -1), 1, a).collisions == [1, 1, 1]
