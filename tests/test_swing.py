@@ -464,7 +464,7 @@ def test_a_run_that_stands_still_says_so(monkeypatch):
 def test_near_balls_of_any_angle_cost_what_their_time_costs(monkeypatch, e):
     """Lossy balls end up close to each other: the search for their meetings must not creep.
 
-    A flight of half a swing takes some 400 evaluations, meetings or not, and every one 31 to begin.
+    A flight of half a swing takes some 500 evaluations, meetings or not, and every one 17 to begin.
     """
     searches, counts = [], [0]
     rate, search = FullFlight._rate, FullFlight.next_meeting

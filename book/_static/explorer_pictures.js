@@ -102,7 +102,7 @@
       contact.show(String(chosen));
       scrub.hidden = !record;
       shown = record;
-      if (record && equal) part.max = explorer.eventsBy(record, 1);
+      if (record && equal) part.max = explorer.during(record, 1).place;
       drawn = record && explorer.diagram(box(plot, 6.5), record, chosen, equal);
       plot.innerHTML = drawn ? drawn.svg : "";
       if (record) note.textContent = legend(record, chosen);
@@ -115,7 +115,7 @@
       const { record, contact: chosen, part: now } = state;
       if (!drawn || !record) return;
       events?.show(state);
-      const at = equal ? explorer.eventsBy(record, now) : now;
+      const at = equal ? explorer.during(record, now).place : now;
       if (document.activeElement !== part || +part.value !== at) part.value = at;
       if (drawn.now === now) return;
       drawn.now = now;

@@ -266,6 +266,7 @@
       pressed: part >= 1 ? pressed.map(() => false) : pressed,
       row,
       share,
+      place: row - 1 + share, // how many events have come, with the fraction of the way to the next
     };
   }
 
@@ -290,12 +291,7 @@
     return sum(held);
   }
 
-  // How many events have come by a part of the hit, with the fraction of the way to the next one; and
-  // the part of the hit where so many have come.
-  function eventsBy(record, part) {
-    const { row, share } = during(record, part);
-    return row - 1 + share;
-  }
+  // The part of the hit where so many events have come, with a fraction of the way to the next one.
   function partBy(record, place) {
     const along = progress(straight(record));
     const [row, last] = [Math.floor(place), along.length - 1];
@@ -394,10 +390,10 @@
 
   // The dots that travel along the diagram's lines.
   function dots(plot, record, contact, part, em, equal) {
-    const { velocities, impulses } = during(record, part);
+    const { velocities, impulses, place } = during(record, part);
     const { balls } = lines(record, contact);
     const impulse = contact === "all" ? sum(impulses) : impulses[contact];
-    const x = plot.x(equal ? eventsBy(record, part) : impulse);
+    const x = plot.x(equal ? place : impulse);
     return (
       `<path class="cursor" d="M${x} ${plot.top}V${plot.bottom}"/>` +
       balls
@@ -418,7 +414,6 @@
     dots,
     during,
     energy,
-    eventsBy,
     momentum,
     names,
     partBy,
