@@ -241,8 +241,18 @@ def full_screen(still):
     tab = still(width=1366, height=768, stopped=True)
     tab.later(50)
     tab.push("Full screen")
-    tab.wait_for_function(FULL)
-    return tab
+    return hear(tab, full=True)
+
+
+def hear(tab, full: bool):
+    """Wait until the page has been told of full screen, which comes after the screen is full."""
+    label = "Leave full screen" if full else "Full screen"
+    tab.wait_for_function(f"({FULL}) === {str(full).lower()}")
+    for _ in range(100):
+        tab.later(20)
+        if tab.inner_text(".full") == label:
+            return tab
+    pytest.fail(f"the button does not say {label}")
 
 
 def take(tab, scene: str):
@@ -282,8 +292,7 @@ def test_space_after_a_click_on_full_screen(still):
             before = tab.evaluate(STATE)
             tab.keyboard.press(key)
             assert tab.evaluate(STATE) == before
-            tab.wait_for_function(f"({FULL}) === {str(full).lower()}")
-            tab.later(50)
+            hear(tab, full)
 
 
 def test_keys_of_a_lecture_after_the_mouse(still):
