@@ -6,12 +6,13 @@ Usage::
     python benchmarks/judge.py --family losses --count 10000 --seed 7
     python benchmarks/judge.py --count 250 --seed {5001..5028} --write    # data/judge.csv, an hour
     python benchmarks/judge.py --family wide --count 250 --seed {5001..5028} --write  # a row of it
+    python benchmarks/judge.py --short --family wide --count 120000 --write  # data/judge_short.csv
 
 An answer is wrong if it differs by more than 1e-9 of the largest speed from an exact run that ends
 within 600 events, and after no more of them at twice the digits.  A float means what it prints as
 if that is short, see `meaning`: ties of an exact run are those of the decimals that a reader sees.
 Wrong chains are printed, as small and plain as they stay wrong.  Where the exact run has no end,
-see `second_opinion`.
+see `second_opinion`; a short run leaves out all chains that do not end within 100 events.
 """
 
 import contextlib
@@ -33,7 +34,7 @@ from truth import meaning
 from cradle import ImpactNotFinished, post_impact_velocities, textbook
 from cradle.trace import ImpactNotCertified
 
-DIGITS, EVENTS, WRONG = 100, 600, 1e-9
+DIGITS, EVENTS, SHORT, WRONG = 100, 600, 100, 1e-9
 LONGEST = 200_000  # events of the package: far beyond those of an exact run that ends
 LIMIT = 1e-6  # by which answers may differ where an infinite sequence was taken to its limit
 DOUBTFUL = ("wrong", "other reading", "open", "unfinished", "unlike them")  # printed
@@ -110,6 +111,7 @@ ENDS = ["right", "wrong", "other reading", "open", "unfinished"]
 #: Where it has no end: who agrees with the answer; "given up" has no answer.
 ENDLESS = ["as 50 digits", "unlike them", "as relations", "nobody knows", "given up"]
 WORDS = ENDS + ENDLESS
+LEFT_OUT = "endless"  # of a short run, in the place of all of these
 
 
 def batch(problem):
@@ -126,20 +128,20 @@ def single(problem):
 
 
 def judge(problem, *ask, events=EVENTS):
-    """The verdict on one chain, by the worse of its answers; "endless" if that must be others'."""
+    """The verdict on one chain, by the worse of its answers; `LEFT_OUT` if that must be others'."""
     given = [answer(problem) for answer in ask or (batch, single)]
     meant = on_bounds(problem)
     right = exact(meant, events=events)
     if right is None:
-        return Verdict("endless")
+        return Verdict(LEFT_OUT)
     if None in given:
         return Verdict("unfinished")
     far = max(off(problem, one, right.velocities) for one in given)
     if far <= WRONG:
         return Verdict("right", far)
-    again = exact(meant, twice=True)
+    again = exact(meant, events=len(right.events) + 1, twice=True)
     if again is None or len(again.events) > len(right.events):
-        return Verdict("endless")  # it ended where its digits did
+        return Verdict(LEFT_OUT)  # it ended where its digits did
     if off(problem, again.velocities, right.velocities) > WRONG:
         return Verdict("open", far)
     for other in exact(problem, Decimal), exact(problem):
@@ -196,12 +198,12 @@ def shrunk(problem, word, *ask):
     return problem
 
 
-def task(name, count, seed):
+def task(name, count, seed, short):
     """Judge some chains; counts, and those that are doubtful."""
     counts, found = Counter(), []
     for problem in family(name, count, seed):
-        verdict = judge(problem)
-        if verdict.word == "endless":
+        verdict = judge(problem, events=SHORT if short else EVENTS)
+        if verdict.word == LEFT_OUT and not short:
             verdict = second_opinion(problem)
         counts[verdict.word] += 1
         if verdict.word in DOUBTFUL:
@@ -210,11 +212,11 @@ def task(name, count, seed):
     return name, counts, found
 
 
-def run(names, count, *seeds, workers=2):
+def run(names, count, *seeds, short=False, workers=2):
     """Judge so many chains of each family for each seed; counts by family, and what is wrong."""
     counts, found = {name: Counter() for name in names}, []
     tasks = [  # each with a seed of its own
-        (name, min(TASK, count - start), seed * 1_000_003 + start)
+        (name, min(TASK, count - start), seed * 1_000_003 + start, short)
         for seed, name, start in product(seeds, names, range(0, count, TASK))
     ]
     with ProcessPoolExecutor(workers, initializer=os.nice, initargs=(10,)) as pool:
@@ -229,16 +231,21 @@ def main():
     parser.add_argument("--family", choices=JUDGED, action="append")
     parser.add_argument("--count", type=int, default=100, help="chains of each family")
     parser.add_argument("--seed", type=int, nargs="+", default=[1], help="one run for each")
-    parser.add_argument("--write", action="store_true", help="write the counts as judge.csv")
+    parser.add_argument("--short", action="store_true", help="only chains that soon end")
+    parser.add_argument("--workers", type=int, default=2, help="processes")
+    parser.add_argument("--write", action="store_true", help="write the counts, as judge*.csv")
     given = parser.parse_args()
-    counts, found = run(given.family or list(JUDGED), given.count, *given.seed)
-    table = pd.DataFrame(counts, WORDS).fillna(0).astype(int).T
+    names, short = given.family or list(JUDGED), given.short
+    counts, found = run(names, given.count, *given.seed, short=short, workers=given.workers)
+    words = [*ENDS, LEFT_OUT] if short else WORDS
+    table = pd.DataFrame(counts, words).fillna(0).astype(int).T
     print(table.to_string())
     if given.write:
-        if given.family:  # the other rows stay
-            stored = pd.read_csv(given.output / "judge.csv", index_col="family")
-            table = table.reindex(stored.index).fillna(stored).astype(int)
-        table.to_csv(given.output / "judge.csv", index_label="family", lineterminator="\n")
+        path = given.output / ("judge_short.csv" if short else "judge.csv")
+        if given.family and path.exists():  # the other rows stay
+            stored = pd.read_csv(path, index_col="family")
+            table = table.reindex(list(JUDGED)).fillna(stored).dropna().astype(int)
+        table.to_csv(path, index_label="family", lineterminator="\n")
     for name, verdict, problem in found:
         print(f"\n{name}: {verdict.word}, off by {verdict.off:.1e}\n{problem!r}")
 
