@@ -37,6 +37,7 @@ from cradle import (
     textbook,
     viscosity_from,
 )
+from cradle import swing as swung
 from cradle.command.console import text as shown
 from cradle.command.solve import main, run
 from cradle.fit import ratio, read_shots
@@ -58,6 +59,18 @@ def remembered(fit):
         return found[key]
 
     return fitted
+
+
+def swinging(size=1.0, slower=1.0):
+    """A film of three balls that swing for 1.5 s and collide by a ratio of 0.2, as text."""
+    times, chain = np.arange(0, 1.5, 0.03), Chain([45, 53, 45], [0, 0, 0], 0.9)
+    hanging = Pendulums(9.81 * (0.6 / math.tau) ** 2)
+    run = swung(chain, ImpulseCorrelation(0.2), [-0.05, 0, 0], times, pendulums=hanging)
+    places = run.positions + 0.03 * np.arange(3)
+    places += np.random.default_rng(1).normal(0, 1e-4, places.shape)
+    rows = np.column_stack([slower * times, size * places])
+    lines = ["\t".join(f"{x:.7f}" for x in row) for row in rows]
+    return "\n".join(["t\tA/x\tB/x\tC/x", *lines])
 
 
 @pytest.fixture
@@ -83,6 +96,7 @@ def folder(tmp_path, monkeypatch):
     film = (DATA / "video_synthetic.txt").read_text(encoding="utf-8")
     (tmp_path / "film.txt").write_text(film, encoding="utf-8")
     (tmp_path / "wide.txt").write_text(film, encoding="utf-16")
+    (tmp_path / "swing.txt").write_text(swinging(), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(runtime.VARIABLE, "plain")
     return tmp_path
@@ -510,6 +524,21 @@ def test_a_pendulum_does_not_swing_over_the_top(capsys):
     assert re.search(r"film.txt: \S+ m/s is unlikely; see --slower", capsys.readouterr().err)
 
 
+def test_fit_of_a_swing(folder):
+    """In pixels, and at a third of its speed; by the law of the film, and by another one."""
+    (folder / "px.txt").write_text(swinging(2000, 3), encoding="utf-8")
+    line = "fit-swing px.txt --masses 45,53,45 --position-unit px --scale 2000 --slower 3 --json"
+    line += " --known period=0.6 --known damping=0 --known gaps=0"
+    told = json.loads(call(f"{line} --ratio 0.2"))
+    (found,) = told["rows"]
+    ((low, high),) = found["intervals"]
+    assert found["name"] == "restitution"
+    assert found["value"] == pytest.approx(0.9, abs=1e-3)  # three standard errors
+    assert low < found["value"] < high < low + 2e-3
+    assert told["reading"] == pytest.approx(1e-4, rel=0.2)
+    assert [told["poor"], json.loads(call(line))["poor"]] == [False, True]
+
+
 def scaled(text, size):
     """An export with its positions in another unit."""
     *head, first = text.split("\n", 3)
@@ -604,6 +633,11 @@ def test_one_wrong_film_of_several(folder, capsys):
         (BAC.replace("BAC", "CAB"), 1, "track 1 is named B, --set CAB has C there"),
         (BAC.replace("film.txt", "wide.txt"), 1, "wide.txt is no UTF-8 text (byte 0); save"),
         (BAC.replace("BAC", "BA"), 1, "has 3 tracks, --set 2 types"),
+        ("fit-swing swing.txt --known perod=3", 1, "--known 'perod'; must be one of period, damp"),
+        ("fit-swing swing.txt --known damping=-1", 1, "--known damping: -1.0; must be at least"),
+        ("fit-swing swing.txt --reading 0", 1, "cradle: --reading 0.0; must be above 0"),
+        ("fit-swing swing.txt --scale 2", 2, "--position-unit px and --scale, pixels in a metre, "),
+        ("fit-swing swing.txt --masses 1,2", 1, "--masses has 2 values; 3 balls need 3, or one n"),
         ("recommend --masses 1,1,1 --model spheres", 2, "No such option '--model'"),
         ("fit nothing.csv", 2, "does not exist"),
         ("fit shots.csv --mass-unit g --restitution AB", 2, "write NAME=NUMBER"),

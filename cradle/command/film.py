@@ -1,21 +1,45 @@
-"""`cradle film`: from marks in films to rows of the table of shots."""
+"""`cradle film`: from marks in films to rows of the table of shots; `fit-swing`: a fit to them."""
 
 import csv
 import sys
 import warnings
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from cradle.command.describe import UNITS, numbers_of, pendulum_length, swing_options
+import cradle
+from cradle.command.console import format_options, plotted, show
+from cradle.command.describe import UNITS, numbers_of, one_or_all, pendulum_length, swing_options
+from cradle.command.fit import named_number
+from cradle.input.values import ABOVE_ZERO, checked_masses, one_number
 
 _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+def _track_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add what is to be known of a tracker's file; see `_units`."""
+    slower = click.option("--slower", default=1.0,
+                          help="8 if 240 pictures a second play at 30 [1].")  # fmt: skip
+    scale = click.option("--scale", type=float, help="Pixels in a metre.")
+    unit = click.option("--position-unit", type=click.Choice([*_SIZES, "px"]),
+                        help="Of positions, where the file does not say it [m].")  # fmt: skip
+    return unit(scale(slower(command)))
+
+
+def _units(position_unit: str | None, scale: float | None, slower: float) -> dict[str, float]:
+    """Return these options as `read_tracker` takes them."""
+    if (position_unit == "px") != (scale is not None):
+        raise click.UsageError("--position-unit px and --scale, pixels in a metre, go together")
+    size = one_number("--scale", 1.0 if scale is None else scale, *ABOVE_ZERO)
+    slower = one_number("--slower", slower, *ABOVE_ZERO)
+    return {"unit": _SIZES.get(position_unit or "m", 1.0) / size, "time_scale": 1.0 / slower}
 
 
 @click.command()
-@click.argument("files", nargs=-1, required=True,
-                type=click.Path(exists=True, dir_okay=False, path_type=Path))  # fmt: skip
+@click.argument("files", nargs=-1, required=True, type=_FILE)
 @click.option("--set", "name", required=True, help="Types of the balls, left to right: BAC.")
 @click.option("--shot", help="Name of the shot [that of the file].")
 @click.option("--masses", required=True, callback=numbers_of,
@@ -23,16 +47,13 @@ _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 @click.option("--unit", type=click.Choice(list(UNITS)), help="Of masses [kg].")
 @swing_options("or --period, or --level")
 @click.option("--level", is_flag=True, help="The balls do not hang: they roll on a level track.")
-@click.option("--position-unit", type=click.Choice([*_SIZES, "px"]),
-              help="Of positions, where the file does not say it [m].")  # fmt: skip
-@click.option("--scale", type=float, help="Pixels in a metre.")
+@_track_options
 @click.option("--window", type=float, help="Time used before and after, s [the longest that fits].")
-@click.option("--slower", default=1.0, help="8 if 240 pictures a second play at 30 [1].")
 @click.option("--header", is_flag=True, help="Print the names of the columns too.")
 def film(
     files: tuple[Path, ...], name: str, shot: str | None, masses: list[float], unit: str | None,
-    header: bool, length: float | None, period: float | None, level: bool,
-    position_unit: str | None, scale: float | None, slower: float, **options: Any,
+    header: bool, length: float | None, period: float | None, level: bool, window: float | None,
+    **options: Any,
 ) -> None:  # fmt: skip
     """Velocities from the marks in films, a film a shot.
 
@@ -48,26 +69,21 @@ def film(
     """
     from cradle.fit.parameters import parameter_key
     from cradle.fit.shots import COLUMNS
-    from cradle.input.values import ABOVE_ZERO, checked_masses, one_number
 
-    length, window = pendulum_length(length, period), options["window"]
-    given = {"length": length, "window": window, "--slower": slower, "--scale": scale}
-    for option, value in given.items():
+    length, units = pendulum_length(length, period), _units(**options)
+    for option, value in {"length": length, "window": window}.items():
         if value is not None:
             one_number(option, value, *ABOVE_ZERO)
     if shot is not None and len(files) > 1:
         raise click.UsageError("--shot names one film; several have the names of their files")
     if (length is None) != level:
         raise click.UsageError("give --length or --period of the pendulums, or --level: one")
-    if (position_unit == "px") != (scale is not None):
-        raise click.UsageError("--position-unit px and --scale, pixels in a metre, go together")
-    size = _SIZES[position_unit or "m"] if scale is None else 1.0 / scale
     types = parameter_key(name)
     kilograms = checked_masses([UNITS[unit or "kg"] * mass for mass in masses]).tolist()
     writer, wrong = csv.writer(sys.stdout, lineterminator="\n"), []
     for file in files:
         try:
-            told, one = _velocities(file, types, masses, length, 1.0 / slower, size, **options)
+            told, one = _velocities(file, types, masses, units, length, window)
         except (ValueError, OSError) as reason:  # the other films may be right
             named = str(reason).startswith(file.name)
             wrong.append(str(reason) if named else f"{file.name}: {reason}")
@@ -89,15 +105,15 @@ def film(
 
 
 def _velocities(
-    file: Path, types: tuple[str, ...], masses: list[float], length: float | None,
-    time_scale: float, size: float, window: float | None,
+    file: Path, types: tuple[str, ...], masses: list[float], units: dict[str, float],
+    length: float | None, window: float | None,
 ) -> tuple[str, Any]:  # fmt: skip
     """Return what was warned of, and the velocities in one film, of balls of these types."""
     import numpy as np
 
     from cradle.fit import read_tracker, velocities_from_tracks
 
-    tracks = read_tracker(file, time_scale=time_scale, unit=size)
+    tracks = read_tracker(file, **units)
     if not len(types) == len(masses) == len(tracks):
         there = f"{file.name} has {len(tracks)} tracks, --set {len(types)} types and --masses"
         raise ValueError(f"{there} {len(masses)} masses; must be as many")
@@ -112,3 +128,53 @@ def _velocities(
         warnings.simplefilter("always")
         found = velocities_from_tracks(tracks, length=length, window=window)
     return "".join(f"; {one.message}" for one in told), found
+
+
+@click.command(name="fit-swing")
+@click.argument("file", type=_FILE)
+@click.option("--masses", callback=numbers_of, help="Masses, left to right: 45,53,53 [equal].")
+@click.option("--ratio", callback=numbers_of, help="One, or one per inner ball: the balls collide "
+              "by ratios [one pair after the other].")  # fmt: skip
+@click.option("--known", multiple=True, metavar="NAME=VALUE", help="What is not fitted: "
+              "period=0.8, damping=0, restitution=1 or gaps=0.0001.")  # fmt: skip
+@click.option("--reading", type=float, help="Error of a mark, m [found from the residuals].")
+@_track_options
+@click.option("--plot", type=click.Path(dir_okay=False), callback=plotted,
+              help="Draw film, fit and residuals to a file.")  # fmt: skip
+@format_options
+def fit_swing(
+    file: Path, masses: list[float] | None, ratio: list[float] | None, known: Sequence[str],
+    reading: float | None, plot: str | None, as_json: bool, as_csv: bool, **options: Any,
+) -> None:  # fmt: skip
+    """Period, damping, restitution and gap of a cradle, from a film of its swing.
+
+    FILE is exported by Tracker, Kinovea, Logger Pro or Capstone, one track a ball, left to right;
+    it begins when the balls are on their way.  The intervals are those that hold 95 %.
+
+    \b
+    Examples:
+      cradle fit-swing swing.txt
+      cradle fit-swing swing.txt --masses 45,53,45 --ratio 0.1 --known damping=0 --plot swing.png
+    """
+    from cradle import fit as fits
+
+    numbers = {name: value for name, (value, _) in map(named_number, known)}
+    law: cradle.Model = cradle.SequentialCollisions()
+    if ratio is not None:
+        law = cradle.ImpulseCorrelation(one_or_all(ratio), excess="saturate")
+    times, places = fits.frames(fits.read_tracker(file, **_units(**options)))
+    found = fits.fit_swing(times, places, law, reading=reading, known=numbers, masses=masses)
+    if plot is not None:
+        from matplotlib.figure import Figure
+
+        figure = Figure((5.6, 6), layout="constrained")
+        found.plot(figure.subplots(2, sharex=True))
+        figure.savefig(plot, format=Path(plot).suffix[1:] or "png")
+    if not (as_json or as_csv):
+        told = "; one pair collides after the other (--ratio)" * (ratio is None)
+        click.echo(f"{found.summary()}\nassumed: equal gaps{told}")
+        return
+    rows = [{"name": name, "value": one.value, "intervals": one.intervals, "identified":
+             one.identified} for name, one in found.estimates.items()]  # fmt: skip
+    more = ("reading", "chi_square", "degrees_of_freedom", "correlation", "poor", "widened")
+    show(rows, {name: getattr(found, name) for name in more}, "", as_json, as_csv)

@@ -75,8 +75,8 @@ def fit(
     if predict is not None:  # what is wrong is said before the fit, not after it
         types_in_a_row(predict)
         one_number("speed", striker, *ABOVE_ZERO)
-    given = [_named(one) for one in options.pop("given")]
-    known = [(name, value) for name, (value, _) in map(_named, options["known"])]
+    given = [named_number(one) for one in options.pop("given")]
+    known = [(name, value) for name, (value, _) in map(named_number, options["known"])]
     if wrong := [one for one in options.pop("known") if ":" in one]:
         raise click.UsageError(f"{wrong[0]!r}: write TRIPLET=RATIO; a known ratio has no error")
     shots = read_shots(sys.stdin.buffer if str(file) == "-" else file, **options)
@@ -120,7 +120,7 @@ def fit(
     show(rows, extra, "\n".join(lines), as_json, as_csv, RESULT_COLUMNS)
 
 
-def _named(given: str) -> tuple[str, tuple[float, float]]:
+def named_number(given: str) -> tuple[str, tuple[float, float]]:
     """Read NAME=NUMBER or NAME=NUMBER:ERROR."""
     name, _, numbers = given.partition("=")
     value, _, error = numbers.partition(":")

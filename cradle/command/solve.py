@@ -18,7 +18,7 @@ from cradle import ImpactNotCertified, ImpactNotFinished, collide
 from cradle.advice.choice import made
 from cradle.command.console import format_options, plotted, show
 from cradle.command.describe import chain_options, described, one_or_all
-from cradle.command.film import film
+from cradle.command.film import film, fit_swing
 from cradle.command.fit import fit, template
 from cradle.command.swing import swing
 from cradle.runtime import compile as runtime
@@ -36,9 +36,11 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"see time_scale": "see --slower",
     r"say the unit of the positions": "say --position-unit cm or mm, or px and --scale",
     r"\b(sigma|known)=": r"--\1",
-    r"(?<!column )\b(wanted|accuracy|impacts|length|sigma|speed|window) = ": r"--\1 ",
+    r"(?<!column )\b(wanted|accuracy|impacts|length|sigma|speed|window|reading) = ": r"--\1 ",
     r"^path = ": "--output ",
     r"\btypes = ": "--predict ",
+    r"give known\['period'\]": "give --known period=",
+    r"free or known = ": "--known ",
     r"restitution has no '(.+?)', which set (.+) needs; it has (.*)": (
         rf"set \2 needs the restitution of \1: {_SHOOT} (there are: \3)"
     ),
@@ -165,7 +167,7 @@ def recommend(
         click.echo(f"  {'assumed:':<17}{'; '.join(assumed)}")
 
 
-for verb in (film, fit, swing, template):
+for verb in (film, fit, fit_swing, swing, template):
     main.add_command(verb)
 
 

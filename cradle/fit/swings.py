@@ -21,6 +21,8 @@ from cradle.swinging.swing import swing
 
 #: What can be fitted, with its unit.
 UNITS = {"period": " s", "damping": " 1/s", "restitution": "", "gaps": " m"}
+_LIMITS = {"period": ("must lie in [0.1, 30]", 0.1, 30.0), "damping": ("must be at least 0", 0.0),
+           "restitution": asked.PART, "gaps": ("must be at least 0", 0.0)}  # fmt: skip
 # A law fails if chi-square has a chance below the one, or residuals are alike by so many standard
 # errors; then parts of the film are compared, for these numbers of parts.
 _CHANCE, _FAR, _PARTS = 1e-3, 3.3, (4, 6, 8, 12, 16, 24, 32)
@@ -136,6 +138,8 @@ class _Film:
         free = (free,) if isinstance(free, str) else free
         for name in (*free, *known):
             asked.one_of("free or known", name, tuple(UNITS))
+        for name, value in known.items():
+            asked.one_number(f"known['{name}']", value, *_LIMITS[name])
         self.names = [name for name in UNITS if name in free and name not in known]
         self.fixed = {"damping": 0.0, "restitution": 1.0, "gaps": 0.0, **known}
         if "period" not in {*self.names, *known}:
@@ -158,8 +162,7 @@ class _Film:
         rates = np.arange(0.5, 0.5 * at.size, 0.125) * 2.0 * np.pi / np.ptp(at)
         rate = rates[scipy.signal.lombscargle(at, mean - mean.mean(), rates).argmax()]
         self.period = period = self.fixed.get("period", 2.0 * np.pi / rate)
-        name = "known['period']" if "period" in self.fixed else "the period that is seen, s,"
-        asked.one_number(name, period, "must lie in [0.1, 30]", 0.1, 30.0)
+        asked.one_number("the period that is seen, s,", period, *_LIMITS["period"])
         early = self.seen & (t <= max(period / 16.0, t[3]))[:, None]
         lines = [np.polyfit(t[some], x[some], 1) if some.sum() > 2 else np.zeros(2)
                  for some, x in zip(early.T, self.x.T, strict=True)]  # fmt: skip
