@@ -98,27 +98,24 @@ class SpringChain:
         if status == UNSOUND:
             raise ImpactNotCertified(chain, self, DEFECTS[int(clock["defect"])])
         if status == UNFINISHED:
-            raise self._unfinished(chain, out.v[0])
+            m, v, reached = chain.masses, chain.velocities, out.v[0]
+            none, impulses = np.zeros(n - 1), np.cumsum(m * (v - reached))[:-1]
+            c = np.argmax(self.stiffness / np.minimum(m[:-1], m[1:]))
+            held = "; or leans hold balls together" if np.min(self.gaps) < 0.0 else ""
+            told = (
+                f"the impact was not finished (max_steps = {self.max_steps}): contact {c}, the "
+                "quickest of the springs, makes the steps short; or balls that collide often "
+                f"amplify errors, and finer runs do not agree: a coarser accuracy may do{held}"
+            )
+            ends = np.array([v, reached]), np.array([none, impulses]), ()
+            path = Trace(chain, self, reached, impulses, none, none.astype(int), *ends, left_out=1)
+            raise ImpactNotFinished(told, path)
         trace = object.__new__(TimedTrace)
         motion = {"evaluations": int(out.steps[0]), "error": float(out.error[0])}
         # The run that follows the way writes to the same room.
         vars(trace).update(chain=chain, model=self, velocities=out.v[0].copy(), **motion)
         vars(trace)["_ran"] = row, law, out
         return trace
-
-    def _unfinished(self, chain: Chain, reached: Vector) -> ImpactNotFinished:
-        """Return the error of an impact that was given up at these velocities."""
-        m, v = chain.masses, chain.velocities
-        none, impulses = np.zeros(len(m) - 1), np.cumsum(m * (v - reached))[:-1]
-        c = np.argmax(self.stiffness / np.minimum(m[:-1], m[1:]))
-        held = "; or leans hold balls together" if np.min(self.gaps) < 0.0 else ""
-        paths = np.array([v, reached]), np.array([none, impulses])
-        return ImpactNotFinished(
-            f"the impact was not finished (max_steps = {self.max_steps}): contact {c}, the "
-            "quickest of the springs, makes the steps short; or balls that collide often amplify "
-            "errors, and finer runs do not agree: a coarser accuracy may do" + held,
-            Trace(chain, self, reached, impulses, none, none.astype(int), *paths, (), left_out=1),
-        )
 
 
 def spring_velocities(

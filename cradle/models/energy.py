@@ -16,17 +16,6 @@ from cradle.trace import Event, ImpactNotFinished, Trace
 BEYOND = "its reduced mass with masses{} = {!r} is beyond the range of floats: choose other units"
 
 
-def fastest(chain: Chain) -> tuple[int, float, float]:
-    """Return the contact that closes fastest, its reduced mass and its speed, 1 if none moves."""
-    u = chain.closing_speeds
-    c = int(u.argmax())
-    left, right = chain.masses[c : c + 2].tolist()
-    mass = left / (left + right) * right
-    if mass < np.finfo(np.float64).tiny:
-        raise ValueError(f"masses[{c}] = {left!r}; {BEYOND.format([c + 1], right)}")
-    return c, mass, abs(float(u[c])) or 1.0
-
-
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class EnergyTrace(Trace):
     """The trace of an impact by `EnergyDistribution`, with its curves at S steps."""
@@ -97,8 +86,14 @@ class EnergyDistribution:
         """Solve the impact of `chain`; see `collide`."""
         n = len(asked.must_be(Chain, "chain", chain))
         k = asked.row_of("stiffness", self.stiffness, n - 1, n)
-        c, mass, speed = fastest(chain)
-        scaled = chain.masses / mass, chain.closing_speeds / speed, k / k[c]
+        # In units of the contact that closes fastest; its speed is 1 if none moves.
+        u = chain.closing_speeds
+        c = int(u.argmax())
+        left, right = chain.masses[c : c + 2].tolist()
+        mass, speed = left / (left + right) * right, abs(float(u[c])) or 1.0
+        if mass < np.finfo(np.float64).tiny:
+            raise ValueError(f"masses[{c}] = {left!r}; {BEYOND.format([c + 1], right)}")
+        scaled = chain.masses / mass, u / speed, k / k[c]
         process, reason = _Process(*scaled, chain.restitution, self), ""
         try:
             process.run()
