@@ -5,7 +5,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -96,18 +96,6 @@ def swing(
     return Swing(chain, model, hanging, at, x, v, impacts, ended, run.t, together, lasting)
 
 
-class Instant(NamedTuple):
-    """An event, as the certificate asks for it."""
-
-    time: float
-    came: Vector  # where the balls came to be, and were put
-    placed: Vector
-    before: Vector  # their velocities as they came, struck, and at last
-    struck: Vector
-    left: Vector
-    lasts: float  # how long it takes, until the next instant
-
-
 class _Run:
     """The event loop: settle what touches, fly to the next event."""
 
@@ -122,7 +110,9 @@ class _Run:
         self.impacts: list[Impact] = []
         self.series: list[tuple[Vector, Vector]] = []
         self.size = max(float(np.abs(x).max()), self.speed / float(hanging.frequency.min()))
-        self.instants: list[Instant] = []
+        # Events, as the certificate asks for them: when; where the balls came to be, and were put;
+        # their velocities as they came, struck, and at last; how long it takes until the next one.
+        self.instants: list[tuple[float, Vector, Vector, Vector, Vector, Vector, float]] = []
         distance = hanging.gaps + np.diff(x)
         if (distance < -TIE * self.size).any():
             c = int(np.argmin(distance))
@@ -180,8 +170,8 @@ class _Run:
             self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
         duration, way, kicked = self.collide(groups, v)
         if duration:  # of contact forces: what strings pull is half a kick before, half after
-            self.instants.append(Instant(self.t, x, x, v, v, v, duration))
-            self.instants.append(Instant(self.t, x, self.x, kicked, self.v, self.v, duration))
+            self.instants.append((self.t, x, x, v, v, v, duration))
+            self.instants.append((self.t, x, self.x, kicked, self.v, self.v, duration))
             x = hanging.apart(self.x + way)  # but for what is left of a compression, far too little
             v = self.v = self.v + 0.5 * duration * hanging.accelerations(x, self.v)
             self.t, self.x = self.t + duration, x
@@ -190,7 +180,7 @@ class _Run:
         self.freed[opening] = self.t  # what opens rests no more in this instant, whatever happens
         kept = touching & (self.t - self.freed > hanging.tie)
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
-        self.instants.append(Instant(self.t, x, self.x, v, struck, self.v, 0.0))
+        self.instants.append((self.t, x, self.x, v, struck, self.v, 0.0))
         if resting.any():
             alone = hanging.accelerations(self.x, self.v)
             resting = pressed(hanging.masses, alone, resting, 1e-12 * self.speed * hanging.fastest)
