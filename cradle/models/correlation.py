@@ -91,28 +91,27 @@ class ImpulseCorrelation:
             from tqdm import tqdm
 
             with tqdm(unit=" events", delay=2.0) as bar:
-                job.run(pause=lambda: bar.update(job.tally("events") - bar.n))
+                job.run(pause=lambda: bar.update(int(job.counts["events"]) - bar.n))
         else:
             job.run()
         if job.status == REFUSED:
             raise_refused(options.bounded, *own)
         trace = self._trace(chain, job)
         if job.status == UNFINISHED:
-            steps = f"max_events = {self.max_events} steps, {job.tally('events')} events"
+            steps = f"max_events = {self.max_events} steps, {job.counts['events']} events"
             told = f"the impact was not finished after {steps}"
-            heaviest = np.ldexp(chain.masses.max(), -job.tally("mass_shift"))
-            fastest = np.ldexp(np.abs(chain.velocities).max(), -job.tally("shift"))
-            over_largest = float(job.stored() / (heaviest * fastest * fastest))
-            raise ImpactNotFinished(told, trace, over_largest)
+            heaviest = np.ldexp(chain.masses.max(), -int(job.counts["mass_shift"]))
+            fastest = np.ldexp(np.abs(chain.velocities).max(), -int(job.counts["shift"]))
+            raise ImpactNotFinished(told, trace, job.stored() / float(heaviest * fastest * fastest))
         if job.status == UNSOUND:
-            raise ImpactNotCertified(chain, self, DEFECTS[job.tally("defect")])
+            raise ImpactNotCertified(chain, self, DEFECTS[int(job.counts["defect"])])
         return trace
 
     def _trace(self, chain: Chain, job: Job) -> Trace:
         """Return what the event loop left."""
         results, written = job.outputs, job.state.record
         written.velocities[0] = chain.velocities
-        count = job.tally("events")
+        count = int(job.counts["events"])
         kept = min(count, len(written.kinds))
         events = map(_event, written.kinds[:kept].tolist(), written.contacts[:kept].tolist())
         return Trace(

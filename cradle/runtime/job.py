@@ -117,7 +117,7 @@ class Job:
             if self.status == UNDECIDED:  # what has no end in decimals goes on in the loop
                 resumed = not exact.answer(self, self.next)
                 self.next, self.status = self.next + (not resumed), FINISHED
-            elif resumed and self.tally("events") > self.tally("room"):
+            elif resumed and self.counts["events"] > self.counts["room"]:
                 self._make_room(2 * len(self.state.record.kinds))
             elif not resumed and self.status != FINISHED:
                 break
@@ -133,13 +133,9 @@ class Job:
         if compiled not in areas or len(areas[compiled].ball) != self.n:
             areas[compiled] = _area(self.n, compiled, _record(0, self.n))
         self.state = areas[compiled]
-        counts = self.state.tally[0]
-        self.counts = counts if compiled else vars(counts)
+        tally = self.state.tally[0]
+        self.counts = tally if compiled else vars(tally)  # of the impact at hand
         self._make_room(64 + _ROUND * self.n)
-
-    def tally(self, name: str) -> Any:
-        """Return a count of the impact at hand."""
-        return self.counts[name].item() if self.compiled else self.counts[name]
 
     def stored(self) -> float:
         """Return the work that contacts can still release, in the kernel's own units."""
