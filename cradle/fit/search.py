@@ -61,11 +61,10 @@ def scan(function: Function, upper: Vector) -> Found:
     def over(at: float) -> float:
         return float(function(np.array([[at]]))[0]) - lowest - RISE
 
-    def end(k: int) -> float:
-        root = scipy.optimize.brentq
-        return float(x[k - (k > 0)] if k in (0, x.size) else root(over, x[k - 1], x[k]))
-
-    ends = [end(k) for k in np.flatnonzero(np.diff(inside)).tolist()]
+    ends = [
+        float(x[k - (k > 0)]) if k in (0, x.size) else scipy.optimize.brentq(over, x[k - 1], x[k])
+        for k in np.flatnonzero(np.diff(inside)).tolist()
+    ]
     found = Scan(modes, tuple(zip(ends[::2], ends[1::2], strict=True)), grid, excess)
     return [found], points, np.exp(-0.5 * excess) * cells, lowest
 
