@@ -72,10 +72,8 @@ class QuadraticDissipation:
         rule, given = f"must lie in [0, {_LARGEST:g}]", self.coefficients
         if given is not None:
             given = asked.number_or_row("coefficients", given, "N - 1", rule, 0.0, _LARGEST)
-        vars(self).update(
-            coefficients=given,
-            max_problems=asked.whole_number("max_problems", self.max_problems),
-        )
+        most = asked.whole_number("max_problems", self.max_problems)
+        vars(self).update(coefficients=given, max_problems=most)
 
     def solve(self, chain: Chain) -> DissipationTrace:
         """Solve the impact of `chain`; see `collide`."""
