@@ -57,7 +57,6 @@ _OPTIONS: dict[str, str | Callable[[re.Match[str]], str]] = {
     r"positions\[(\d+)\] = ": lambda found: f"ball {int(found[1]) + 1} at ",
     r"\bsequence = ": "SEQUENCE = ",
     r"sequence\[(\d+)\] = ": lambda found: f"SEQUENCE, ball {int(found[1]) + 1}: ",
-    r"at ball (\d+), counted from 0,": lambda found: f"at ball {int(found[1]) + 1}",
 }
 
 

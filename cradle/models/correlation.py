@@ -96,25 +96,12 @@ class ImpulseCorrelation:
             job.run()
         if job.status == REFUSED:
             raise_refused(options.bounded, *own)
-        trace = self._trace(chain, job)
-        if job.status == UNFINISHED:
-            steps = f"max_events = {self.max_events} steps, {job.counts['events']} events"
-            told = f"the impact was not finished after {steps}"
-            heaviest = np.ldexp(chain.masses.max(), -int(job.counts["mass_shift"]))
-            fastest = np.ldexp(np.abs(chain.velocities).max(), -int(job.counts["shift"]))
-            raise ImpactNotFinished(told, trace, job.stored() / float(heaviest * fastest * fastest))
-        if job.status == UNSOUND:
-            raise ImpactNotCertified(chain, self, DEFECTS[int(job.counts["defect"])])
-        return trace
-
-    def _trace(self, chain: Chain, job: Job) -> Trace:
-        """Return what the event loop left."""
         results, written = job.outputs, job.state.record
         written.velocities[0] = chain.velocities
         count = int(job.counts["events"])
         kept = min(count, len(written.kinds))
         events = map(_event, written.kinds[:kept].tolist(), written.contacts[:kept].tolist())
-        return Trace(
+        trace = Trace(
             chain, self, results.v[0], results.p, results.a, results.hits[0],
             written.velocities[: kept + 1], written.impulses[: kept + 1], tuple(events),
             collapsed=bool(results.collapsed[0]),
@@ -122,6 +109,15 @@ class ImpulseCorrelation:
             margin=float(results.margin[0]),
             left_out=count - kept if kept else 0,  # without a record not all are counted
         )  # fmt: skip
+        if job.status == UNFINISHED:
+            steps = f"max_events = {self.max_events} steps, {count} events"
+            told = f"the impact was not finished after {steps}"
+            heaviest = np.ldexp(chain.masses.max(), -int(job.counts["mass_shift"]))
+            fastest = np.ldexp(np.abs(chain.velocities).max(), -int(job.counts["shift"]))
+            raise ImpactNotFinished(told, trace, job.stored() / float(heaviest * fastest * fastest))
+        if job.status == UNSOUND:
+            raise ImpactNotCertified(chain, self, DEFECTS[int(job.counts["defect"])])
+        return trace
 
 
 def check_options(meeting: float, excess: str, max_events: int) -> None:
