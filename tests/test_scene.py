@@ -275,31 +275,30 @@ def test_springs_in_the_row_are_elastic_spheres_in_every_engine(pulled: int):
 def test_energy_left():
     """After fifty strokes, in percent, one and two lifted."""
     glued = Chapter("scene").glued
-    for law, name in (
-        ("springs", "springs"), ("ratio", "ratio"), ("springs, outer apart", "apart"),
+    for law, setting, name in (
+        ("springs", "fine", "springs"), ("springs", "default", "springs-default"),
+        ("ratio", "fine", "ratio"), ("springs, outer apart", "fine", "apart"),
     ):  # fmt: skip
-        for setting, end in (("fine", ""), ("default", "-default")):
-            left = [
-                100 * by_law(engine, law, setting, pulled)[-1].sum()
-                for engine in ENGINES for pulled in (1, 2)
-            ]  # fmt: skip
-            assert glued[f"least-{name}{end}"] == f"{min(left):.0f}"
+        left = [
+            100 * by_law(engine, law, setting, pulled)[-1].sum()
+            for engine in ENGINES for pulled in (1, 2)
+        ]  # fmt: skip
+        assert glued[f"least-{name}"] == f"{min(left):.0f}"
     pairs = [
         100 * with_tiny_gaps(name, "fine", pulled)[1][-1]
         for name in ("Chipmunk", "Box2D") for pulled in (1, 2)
     ]  # fmt: skip
     assert glued["least-pairs"] == f"{min(pairs):.0f}"
-    own = [
-        100 * balls(row).sum() for row in stored("laws", law="as it is", setting="fine", stroke=50)
-    ]
-    assert glued["least-own"] == f"{min(own):.0f}–{max(own):.0f}"
-    assert max(own) > 200
+    rows = stored("laws", law="as it is", setting="fine", stroke=50)
+    (least, first), *_, (most, last) = sorted((100 * balls(row).sum(), row["run"]) for row in rows)
+    assert glued["least-own"] == f"{least:.0f}–{most:.0f}"
+    assert (first, last) == ("Box2D", "MuJoCo")
 
 
 def test_bullet_as_it_is_gains():
     (_, fifth) = stored("laws", run="Bullet", law="as it is", setting="fine", pulled=1)
     assert fifth["stroke"] == "5"
-    assert Chapter("scene").glued["bullet-five"] == f"{balls(fifth).sum():.1f}"
+    assert balls(fifth).sum() > 2
 
 
 def test_the_best_of_each_column_is_bold():
@@ -561,7 +560,7 @@ def test_who_arrives_together_by_the_film():
     for name, gaps, back in (
         ("film-springs-2", [0] * 4, 2), ("film-single-two", [30, 0, 0, 0], 2),
         ("apart-three", [3, 0, 0, 3], 3), ("touch-three", [0] * 4, 3),
-        ("single-three", [5, 5, 0, 0], 3),
+        ("single-three", [3, 3, 0, 0], 3),
     ):  # fmt: skip
         v = integrated([1] * 5, [1.0] * back + [0.0] * (5 - back), gaps=gaps)
         off = 100 * np.abs(v - first_strikes(4)[back][0]).max()
