@@ -135,7 +135,6 @@ def test_fig_inventory_time():
         assert 0.9 < slope < 1.1
     longest = find("elastic", balls=100_000.0)
     assert column(longest, "cpu_seconds").max() < 1.0  # a long chain in a second
-    assert number(CHAPTER.glued["longest"]) == 100_000
     assert LIMITS.cut == 2.0**-120  # as the text has it
 
 
@@ -175,12 +174,15 @@ def test_fig_beyond_stability():
             assert rows[-1]["orders"] == rows[-1]["chains"]
             assert rows[-1]["kept"] <= 2
     finite = find("losses", collapsed=0.0)
+    rows_99 = [row for row in finite if row["restitution"] == 0.99]
     assert column(finite, "spread").max() < 2e-3
     assert column([row for row in finite if row["restitution"] > 0.9], "spread").max() < 2e-5
     assert (column(finite, "fast_least") == column(finite, "fast_most")).all()
     assert CHAPTER.glued["fast-same"] == "all"
     assert number(CHAPTER.glued["loss-rows"]) == len(finite)
-    assert number(CHAPTER.glued["copies"]) == finite[0]["chains"] - 1
+    fewer = [row["balls"] for row in rows_99 if row["kept"] < row["balls"]]
+    assert number(CHAPTER.glued["unsafe"]) == min(fewer) == 20
+    assert max(row["spread"] for row in rows_99) < 2e-5  # nearly five digits
     # A change of masses that is not a rounding error: the leader stays, others do not.
     masses, velocities = np.ones((9, 120)), struck(120)[1]
     masses[1:] *= 1 + 1e-15 * uniform(np.random.default_rng(5), -1, 1, (8, 120))
