@@ -5,7 +5,7 @@ import mpmath
 import numpy as np
 import pytest
 from chains import HERTZ
-from chapters import Chapter, code, in_memory, number, panel, run
+from chapters import Chapter, code, in_memory, panel, run
 from hunt_crossley import closed
 from scipy import optimize
 from stored import read
@@ -71,16 +71,21 @@ def test_the_work_for_an_error():
 
 def test_fig_cost():
     """The stored times and errors; those of the text are among them."""
-    told = {"this package": ("batch", "1e-03"), "the paper's rule": ("batch-rule", "")}
+    told = {
+        ("this package", "1e-03"): "batch",
+        ("velocity Verlet", "1e-03"): "batch-verlet",
+        ("velocity Verlet", "1e-04"): "batch-verlet-four",
+    }
     for method, shown in panel("forces", "fig-own-forces-cost").items():
         rows = list(read("forces.csv", chain="5 equal", method=method))
         assert shown == pytest.approx(
             np.array([[float(row["microseconds"]), float(row["error"])] for row in rows])
         )
-        if method in told:
-            name, asked = told[method]
-            (row,) = (row for row in rows if row["asked"] == asked)
-            CHAPTER.tells({name: float(row["microseconds"])})
+        for row in rows:
+            if name := told.get((method, row["asked"])):
+                CHAPTER.tells({name: float(row["microseconds"])})
+                few = 10.0 ** -(4 if "four" in name or name == "batch" else 3)
+                assert float(row["error"]) < (1.3 if name == "batch" else 1) * few
     (ring,) = CHAPTER.figures["fig-own-forces-cost"].axes[0].collections
     assert f"{ring.get_offsets()[0][0]:.1f}" == CHAPTER.glued["batch"]
 
@@ -90,7 +95,6 @@ def test_the_rule_is_per_cents_from_spheres():
     ratio = -2 * first / (1 - first)
     done = solve([1] * 5, [1, 0, 0, 0, 0], 1, ratio, number=float)
     off = np.abs(np.array(done.velocities, float) - HERTZ["five equal"]).max()
-    assert number(CHAPTER.glued["rule"]) == pytest.approx(off, abs=0.005)
     (line,) = [
         line.get_ydata()[0]
         for line in CHAPTER.figures["fig-own-forces"].axes[0].get_lines()
