@@ -123,7 +123,7 @@ def shown() -> Iterator[bytes]:
     for trace in (cradle.collide(*scene) for scene in scenes):
         yield told([trace, trace.chain, trace.to_frame().to_json(double_precision=15)])
         yield told(impacts.velocities(trace))
-        yield told(impacts.velocity_impulse(trace, 1, other=0))
+        yield told(impacts.velocity_impulse(trace, 1))
     still, times = cradle.Chain([1] * 3, [0] * 3), np.linspace(0, 2, 21)
     run = cradle.swing(still, MODELS["sequential"][0], [-0.02, 0, 0], times)
     yield told([run, run.impacts, run.positions, run.velocities])

@@ -45,7 +45,7 @@ from cradle.closed_form import (
 from cradle.fit import read_tracker, velocities_from_tracks
 from cradle.measures import bouncing_pattern, condition_number, effective_ratio
 from cradle.pictures.animation import animate_swing
-from cradle.pictures.impacts import impulse_axis, velocity_impulse
+from cradle.pictures.impacts import velocity_impulse
 
 NAN, INF, ONES = np.nan, np.inf, np.ones(3)
 PAIR = {"masses": [1, 1], "velocities": [1, 0]}
@@ -347,8 +347,7 @@ OTHERS = [
     ),
     (recommend, ([1, 1, 1],), "chain is a list; must be a Chain"),
     (TRACE.plot, {"contact": 4}, "contact = 4; must be a whole number, 0 to 1"),
-    (velocity_impulse, {"trace": TRACE, "contact": 0, "other": -1}, "other = -1; must be a whole"),
-    (impulse_axis, (TRACE, 2, 0, None), "contact = 2; must be a whole number, 0 to 1"),
+    (velocity_impulse, {"trace": TRACE, "contact": -1}, "contact = -1; must be a whole number, 0 to"),
     (animate_swing, ([],), "runs has no swing, or one without a duration"),
     (animate_swing, (RUN, ["a", "b"]), "labels has 2 lines; 1 swings need as many"),
 ]  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from cradle.input.values import ArrayLike, Vector, must_be, whole_number
+from cradle.input.values import Vector, must_be, whole_number
 from cradle.trace import Trace
 
 #: Colours of Okabe and Ito, which colour-blind readers can tell apart, in changing lightness.
@@ -93,23 +93,20 @@ def velocities(trace: Trace, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def velocity_impulse(
-    trace: Trace, contact: int, ax: Axes | None = None, *, other: int | None = None
-) -> Axes:
+def velocity_impulse(trace: Trace, contact: int, ax: Axes | None = None) -> Axes:
     """Draw the velocity-impulse diagram of one contact, as in the paper's figures 3, 5 and 8.
 
     It shows the velocities of the contact's two balls against its impulse (sections 2.3, 2.4, 3.2).
     Where other contacts act while this one rests, its impulse does not grow, and a velocity jumps.
     Markers and letters show the contact's events, as the legend says; after several collisions the
-    letters carry numbers.  A contact that the chain does not have raises a ValueError.  With
-    `other`, an upper axis shows the impulse of that contact (see `impulse_axis`).  Without `ax` new
-    axes are made.
+    letters carry numbers.  A contact that the chain does not have raises a ValueError.  Without
+    `ax` new axes are made.
 
     Examples
     --------
     >>> from cradle import collide, paper_chain
     >>> from cradle.pictures.impacts import velocity_impulse
-    >>> ax = velocity_impulse(collide(*paper_chain("AAA")), 1, other=0)
+    >>> ax = velocity_impulse(collide(*paper_chain("AAA")), 1)
     >>> [line.get_label() for line in ax.get_lines()[:2]]
     ['$v_2$', '$v_3$']
     """
@@ -117,8 +114,6 @@ def velocity_impulse(
     impulses, path = trace.curve()
     ax = _lines(ax, _impulse(contact), impulses[:, contact], path, (contact, contact + 1))
     _mark_events(trace, contact, ax)
-    if other is not None:
-        impulse_axis(trace, contact, other, ax)
     return ax
 
 
@@ -153,55 +148,3 @@ def _mark_events(trace: Trace, contact: int, ax: Axes) -> None:
     beside = 3 if ax.figure.bbox.width > 5 * ax.figure.dpi else 1
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=beside,
               frameon=False)  # fmt: skip
-
-
-def impulse_axis(
-    trace: Trace, contact: int, other: int, ax: Axes, values: ArrayLike | None = None
-) -> Axes:
-    """Add an upper axis with another contact's impulse to a diagram, and return its axes.
-
-    The two impulses do not grow in proportion: each tick stands where the path of the impact has
-    it.  `contact` is that of the lower axis, as drawn by `velocity_impulse`; `values` are the
-    impulses to mark, N s.  If left out, they are those at the events, two where the lower contact
-    rests.  A contact that the chain does not have raises a ValueError.
-
-    Examples
-    --------
-    >>> from cradle import Chain, ImpulseCorrelation, collide
-    >>> from cradle.pictures.impacts import impulse_axis, velocity_impulse
-    >>> trace = collide(Chain([1, 1, 1], [1, 0, 0], 1), ImpulseCorrelation(0.5))
-    >>> upper = impulse_axis(trace, 1, 0, velocity_impulse(trace, 1), values=[0, 1, 4 / 3])
-    >>> upper.get_xticks().round(4).tolist()
-    [0.0, 0.5, 0.6667]
-    """
-    contact, other = _contact(trace, "contact", contact), _contact(trace, "other", other)
-    if values is None:
-        places, labels = _event_ticks(*trace.path_impulses[:, [contact, other]].T)
-    else:
-        impulses, _ = trace.curve()
-        marked = np.atleast_1d(np.asarray(values, float))
-        places = np.interp(marked, impulses[:, other], impulses[:, contact]).tolist()
-        labels = [f"{value:.3g}" for value in marked]
-    above = ax.twiny()
-    above.set_xlim(ax.get_xlim())
-    above.set_xticks(places, labels, fontsize=9)
-    above.set_xlabel(_impulse(other))
-    return above
-
-
-def _event_ticks(lower: Vector, upper: Vector) -> tuple[list[float], list[str]]:
-    """Place and label ticks at the events: ends and jumps first, others where there is room."""
-    groups: dict[float, list[float]] = {}
-    for x, value in zip(lower.tolist(), upper.tolist(), strict=True):
-        groups.setdefault(x, []).append(value)
-    ends = (float(lower[0]), float(lower[-1]))
-    jumps = {x: group[-1] - group[0] for x, group in groups.items()}
-    # Labels nearer than this would overlap; that of a jump is two numbers wide.
-    widths = {x: 0.07 * ends[1] * (2.5 if jump else 1.0) for x, jump in jumps.items()}
-    kept: list[float] = []
-    for x in sorted(groups, key=lambda x: (x not in ends, -jumps[x])):
-        if all(abs(x - taken) > (widths[x] + widths[taken]) / 2 for taken in kept):
-            kept.append(x)
-    kept.sort()
-    words = [list(dict.fromkeys(f"{groups[x][end]:.3g}" for end in (0, -1))) for x in kept]
-    return kept, [" → ".join(both) for both in words]
