@@ -20,10 +20,11 @@ PAPER = [("end", 0), ("close", 0), ("end", 1), ("close", 1), ("end", 0), ("end",
 
 def test_fig_sequence_map():
     """Above all areas: no forward impact; one of them: the sequence of Fig. 5."""
-    areas = {
-        area.get_label(): area.get_paths()[0]
-        for area in drawn("multiple_impacts")["fig-own-sequence"].axes[0].collections
-    }
+    ax = drawn("multiple_impacts")["fig-own-sequence"].axes[0]
+    areas = {area.get_label(): area.get_paths()[0] for area in ax.collections}
+    for ratio, e in panel("multiple_impacts", "fig-own-sequence")["2-3 drives"][5::9]:
+        behind = [textbook.solve([1] * 3, [0, -0.8, -1], e + d, ratio) for d in (-1e-3, 1e-3)]
+        assert [sum(done.collisions) > 3 for done in behind] == [True, False]
     assert len(areas) == 3
     for row in range(7, 120, 14):  # e; below, the textbook solver would have no limit to go to
         for column in range(3, 120, 9):
