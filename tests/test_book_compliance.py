@@ -235,8 +235,8 @@ def test_equal_springs():
     assert ratio == pytest.approx(0.230498292, rel=0, abs=1e-8)
     table = ratio_table().set_index("triplet").ratio
     CHAPTER.tells(
-        {"v1": velocities[0], "AAA": f"{table['AAA']:.3f}"}
-        | {"effective": ratio, "linear-ratio": ratio},
+        {"first-quotient": tau_3_loss / tau_2_loss, "last-quotient": tau_3 / tau_2}
+        | {"linear-ratio": ratio, "AAA": f"{table['AAA']:.3f}"},
         off=1e-8,
     )
     _, touch, first, last = CHAPTER.printed("equal-springs").splitlines()
