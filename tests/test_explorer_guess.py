@@ -67,11 +67,15 @@ def test_scene_by_scene_is_guessed(still, name, before):
     pressed = button.get_attribute
     tab.drawn()
     assert (tab.state("covered"), pressed("aria-pressed")) == (True, "false")
-    assert not button.is_visible()  # before the first hit there is little more than the cradle
+    # Before the first hit there is little more than the cradle; after it, a step to take.
+    assert not button.is_visible()
+    assert not tab.locator(".slider:visible, .next:visible").count()
     for _ in range(before):
         tab.act("step()")
         tab.drawn()
         assert button.is_visible()
+        assert "Move the ratio to 0" in tab.inner_text(".next")
+        assert tab.get_by_label("ratio", exact=True).is_visible()
     tab.push(name)
     tab.wait_for_function("document.querySelector('.run [aria-pressed=true]')")
     for _ in range(3):

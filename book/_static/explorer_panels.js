@@ -16,7 +16,7 @@
     const options = [
       { entries: [{ value: "", text: "a setting of your own" }] },
       { group: "The story", entries: entries(scenes.filter((scene) => !scene.paper)) },
-      { group: "The paper's ten chains", entries: entries(scenes.filter((scene) => scene.paper)) },
+      { group: "The paper's ten chains (letters: kinds of ball)", entries: entries(scenes.filter((scene) => scene.paper)) },
     ];
     const list = select({
       words: chains ? "Chain" : "Scene",
@@ -183,7 +183,6 @@
     const sliders = settingSliders(act, parts.has("half") ? 0.5 : 1); // the largest ratio
     const wanted = { count, scope, law, ...sliders };
     const has = (name) => parts.has({ forward: "ratio", backward: "ratio", gap: "law" }[name] ?? name);
-    sliders.ratio.node.dataset.of = "ratio"; // it is there before the first hit, too
     for (const name of ["restitution", "ratio", "forward", "backward", "stiffness"])
       sliders[name].node.classList.add("near"); // on a phone below the buttons
     const nodes = Object.keys(wanted)
@@ -263,6 +262,7 @@
     const [bars, momentum, energy] = [1, 2, 3].map(() => make("div", { class: "plot" }));
     const handles = panels.handles(act);
     const told = make("p", { class: "note guessed" });
+    const next = make("p", { class: "next" }, host.dataset.next ?? ""); // a step to take after the first hit
     const inAll = make("small", {});
     const named = (plot, ...words) => make("div", { class: "named" }, make("span", {}, ...words), plot);
     const balance = make("div", { class: "balance" }, named(momentum, "momentum"), named(energy, "energy ", inAll));
@@ -273,6 +273,7 @@
       make("div", { class: "drawn" }, bars, handles.node),
       balance,
       told,
+      next,
       other ?? "",
     );
     function show(seen, box) {
@@ -295,6 +296,7 @@
       inAll.textContent = now ? `${inside ? "moves" : "total"} ${kinetic}` : "";
       handles.show(state, box(bars));
       told.textContent = guess && number === 0 ? explorer.guessInWords(state) : "";
+      next.hidden = !host.dataset.next || covered || seen.from !== host.dataset.scene;
     }
     return { node, show };
   }

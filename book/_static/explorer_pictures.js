@@ -90,7 +90,7 @@
     function legend(record, chosen) {
       if (chosen === "all" && equal) return "The events of the list, at equal distances. Dashed: now; all bars follow.";
       if (chosen === "all")
-        return "The hit goes on from left to right; impulse, force times time, is its clock. Dashed: now; all bars follow.";
+        return "From left to right: the impulse given so far (force times time), which runs like a clock. Dashed: the instant that all bars show.";
       const kinds = new Set(
         record.events.filter((event) => event.contact === chosen).map(({ kind }) => kind),
       );
