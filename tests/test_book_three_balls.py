@@ -232,25 +232,12 @@ def test_energy_that_the_example_loses():
     parts = [1000 * work(trace, k, at(trace, "end", k)) for k in (0, 1)]
     assert sum(parts) == pytest.approx(lost, rel=1e-12)
     # The numbers that the text puts into the formulas: the right-hand sides.
-    names = "first", "second", "area", "outcome", "loss"
-    cells = [CHAPTER.cells[f"{name}-numbers"] for name in names]
+    cells = [CHAPTER.cells[f"{x}-numbers"] for x in "first second area outcome loss".split()]
     told = "".join(cell.outputs[0].data["text/latex"] for cell in cells)
     ends = [float(x) for x in re.findall(r"=(-?[.\d]+)(?=\\text|\\\\)", told)]
     tau_2, tau_3 = trace.path_impulses.T  # g is the final tau_2
-    v_1, v_2, v_3 = trace.velocities
-    right = [
-        *tau_2[1:3],
-        *tau_2[2:4],
-        0.5,
-        tau_3[3],
-        0.7,
-        tau_3[4],
-        v_1,
-        trace.path[2, 1],
-        v_2,
-        v_3,
-    ]
-    right += [x / 1000 for x in (*parts, lost)]
+    right = [*tau_2[1:3], *tau_2[2:4], 0.5, tau_3[3], 0.7, tau_3[4], trace.velocities[0]]
+    right += [trace.path[2, 1], *trace.velocities[1:], *np.divide([*parts, lost], 1000)]
     assert ends == pytest.approx(right, abs=5.1e-4)
 
 

@@ -67,8 +67,7 @@ def test_scene_by_scene_is_guessed(still, name, before):
     pressed = button.get_attribute
     tab.drawn()
     assert (tab.state("covered"), pressed("aria-pressed")) == (True, "false")
-    # Before the first hit there is little more than the cradle; after it, a step to take.
-    assert not button.is_visible()
+    assert not button.is_visible()  # before the first hit there is little more than the cradle
     assert not tab.locator(".slider:visible, .next:visible").count()
     for _ in range(before):
         tab.act("step()")
