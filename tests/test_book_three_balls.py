@@ -232,7 +232,7 @@ def test_energy_that_the_example_loses():
     parts = [1000 * work(trace, k, at(trace, "end", k)) for k in (0, 1)]
     assert sum(parts) == pytest.approx(lost, rel=1e-12)
     # The numbers that the text puts into the formulas: the right-hand sides.
-    cells = [CHAPTER.cells[f"{x}-numbers"] for x in "first second area outcome loss".split()]
+    cells = [CHAPTER.cells[f"{x}-numbers"] for x in ["first", "second", "area", "outcome", "loss"]]
     told = "".join(cell.outputs[0].data["text/latex"] for cell in cells)
     ends = [float(x) for x in re.findall(r"=(-?[.\d]+)(?=\\text|\\\\)", told)]
     tau_2, tau_3 = trace.path_impulses.T  # g is the final tau_2
