@@ -130,6 +130,10 @@ def test_first_stroke_of_the_minute_of_steel(row, gap):
     after = real_cradles.spheres(np.eye(5)[0], [0, *[gap / unit] * 3], 0.0)
     swings = [line.get_ydata()[0] for line in drawn("toy")["fig-toy-steel"].axes[row].lines]
     assert swings == pytest.approx(after[:4], abs=2e-3)
+    if gap == 0.8e-6:  # one panel above the other, strokes to the right
+        x, ball_2 = drawn("toy")["fig-toy-steel"].axes[row].lines[1].get_data()
+        over = x >= glued("steel-over")
+        assert max(ball_2[(x > 40) & ~over]) < 0 < min(ball_2[over])
     if not gap:  # the pale lines go on where the others end
         pale = drawn("toy")["fig-toy-steel"].axes[row].collections[0].get_segments()
         ends = [line.get_xydata()[-1] for line in drawn("toy")["fig-toy-steel"].axes[row].lines]

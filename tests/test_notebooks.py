@@ -180,7 +180,7 @@ GIVEN = {
     "real_cradles": "0.1 0.17 0.2 0.4 1.1 25.3",  # errors, distances, frames
     "recipe": "",
     "scene": "0.1 0.97",  # a step, and a restitution of the run
-    "measure": "0.2 0.5 0.7 1.4 1.5 3.84",
+    "measure": "0.1 0.2 0.5 0.7 1.4 1.5 3.84",
     "table_2": "0.001 0.01 0.129 0.215 0.22 0.390 0.462 0.710 0.755 0.782",
     "forces": "0.5 0.9",  # what laws of loss are set to
     "trade": "",
@@ -206,7 +206,7 @@ GIVEN = {
     "reading_solver": "0.01 0.1 0.3 0.5 0.7",
     "reading_table_2": "0.22 0.390 0.710 0.755",
     "observations": "0.05 0.15 0.71 0.9 0.95 0.99",
-    "observations_film": "0.1 0.2 0.5",  # a distance, an error, a speed
+    "observations_film": "0.2 0.5",  # an error, a speed
     "observations_half": "0.02 1.28 22.2 44.8",  # errors of a gap and of a scale; mm, grams
     "ledger": "",
 }
