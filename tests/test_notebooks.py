@@ -177,7 +177,7 @@ GIVEN = {
     "n_balls": "0.1 0.15 0.5 1.5 4.5",
     "experiments": "0.01 0.5",  # a step, and what is small beside it
     "toy": "0.9 0.975 0.99",
-    "real_cradles": "0.1 0.17 0.2 0.4 1.1 25.3",  # errors, distances, frames
+    "real_cradles": "0.01 0.1 0.17 0.2 0.4 1.1 25.3",  # errors, distances, frames
     "recipe": "",
     "scene": "0.1 0.97",  # a step, and a restitution of the run
     "measure": "0.1 0.2 0.5 0.7 1.4 1.5 3.84",
@@ -205,7 +205,7 @@ GIVEN = {
     "reading_rules": "0.1 0.15 0.2 0.5 0.8",
     "reading_solver": "0.01 0.1 0.3 0.5 0.7",
     "reading_table_2": "0.22 0.390 0.710 0.755",
-    "observations": "0.05 0.15 0.71 0.9 0.95 0.99",
+    "observations": "0.15 0.71 0.9 0.95 0.99",
     "observations_film": "0.2 0.5",  # an error, a speed
     "observations_half": "0.02 1.28 22.2 44.8",  # errors of a gap and of a scale; mm, grams
     "ledger": "",
