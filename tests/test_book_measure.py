@@ -19,7 +19,7 @@ GLUED = CHAPTER.glued | TABLE.glued
 
 
 def test_every_page_that_shows_data_calls_them_synthetic():
-    for name in ("fig-tracks", "fig-fit", "swing-figure"):
+    for name in ("fig-tracks", "fig-fit"):
         caption = CHAPTER.cells[name].metadata.mystnb.figure.caption
         assert "synthetic" in caption.lower(), name
 

@@ -245,10 +245,6 @@ def test_the_verdict_against_the_systematic_error():
             tail = np.exp(-half) * sum(half**k / factorial(k) for k in range(4))
             films = {"joint": 1e6, "rough": 100}[name] * tail
             CHAPTER.tells({f"{name}-chance": {4: "four"}[round(films)]})
-            if name == "joint":
-                digits, power = TOLD["lenient"].split("·")  # eleven degrees of freedom
-                assert power == "10⁻⁵"
-                assert float(digits) == pytest.approx(1e5 * gammaincc(5.5, half), abs=0.5)
 
 
 def test_a_strike_counts_as_four_velocities():

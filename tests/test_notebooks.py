@@ -176,7 +176,7 @@ GIVEN = {
     "patterns": "0.01 0.15 0.25 0.3 0.4 0.5 0.9 2.5",
     "n_balls": "0.1 0.15 0.5 1.5 4.5",
     "experiments": "0.01 0.5",  # a step, and what is small beside it
-    "toy": "0.9 0.975 0.99",
+    "toy": "0.975 0.99",
     "real_cradles": "0.01 0.1 0.17 0.2 0.4 1.1 25.3",  # errors, distances, frames
     "recipe": "",
     "scene": "0.1 0.97",  # a step, and a restitution of the run
