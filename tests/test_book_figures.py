@@ -29,7 +29,7 @@ OTHERS = {
     *("fig-p1", "fig-p2", "fig-p9", "fig-own-notation-chain", "fig-own-notation-ratio"),
     *("fig-own-multiple-rules", "fig-own-solver-phases"),
     *("fig-flight", "fig-recipe-film", "fig-toy-film"),
-    *("fig-measure-swing", "fig-p10", "fig-p11", "fig-p12"),
+    *("fig-p10", "fig-p11", "fig-p12"),
 }
 
 
