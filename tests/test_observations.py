@@ -130,7 +130,6 @@ def test_a_gap_decides():
 
     assert float(verdicts()[3]["spheres"].split()[1]) == pytest.approx(least(0.95), abs=6e-3)
     assert shown("more") + shown("less") == pytest.approx([least(0.9), least(0.99)], abs=6e-3)
-    assert [r for r, row in verdicts().items() if row["pairs"] == "at any gap"] == [3]
 
 
 def test_fig_gap():
