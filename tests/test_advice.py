@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from chains import ELASTIC, HERTZ, magnitudes, striking, uniform, within_bounds
 from dop853 import integrated
-from energy_law import strike
 from stored import read
 from truth import in_fifty_digits
 
@@ -34,7 +33,7 @@ from cradle.advice.measured import evidence, measured_chain, rows
 
 #: Numbers of the table may come from another version of SciPy, and errors near rounding vary.
 SLACK, ROUNDING = 2.0, 2.0**-50
-LOSSY, LOST = (Chain([1, 1, 1], [1, 0, 0], e) for e in (0.9, 0.5))
+LOSSY, LOST = (Chain([1, 1, 1], [1, 0, 0], e) for e in (0.9, 0.2))
 THREE, FIVE, LIGHT = (striking(ELASTIC[name]) for name in ELASTIC)
 ABCCA, TABLES = paper_chain("ABCCA", excess="saturate")
 
@@ -56,26 +55,22 @@ def between(number, spread, seed=7):
 
 
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-5, 1e-8])
-@pytest.mark.parametrize("name", [*ELASTIC, "ABCCA"])
+@pytest.mark.parametrize("name", list(ELASTIC))
 def test_the_cheapest_setting_of_the_table(name, accuracy):
     """Springs against velocities from another program, too; its last digit is the ninth."""
-    chain = ABCCA if name == "ABCCA" else striking(ELASTIC[name])
-    group, law = ("energy", "EnergyDistribution") if name == "ABCCA" else ("springs", "SpringChain")
+    chain = striking(ELASTIC[name])
     advice = recommend(chain, accuracy=accuracy, stiffness=1.0)
-    fit = [row for row in read("benchmarks.csv", group=group, model=f"{law}, Hertz", chain=name)
-           if float(row["numerical_error"]) <= accuracy]  # fmt: skip
+    measured = read("benchmarks.csv", group="springs", model="SpringChain, Hertz", chain=name)
+    fit = [row for row in measured if float(row["numerical_error"]) <= accuracy]
     row = min(fit, key=lambda row: float(row["time_ratio"]))
     assert advice.setting == row["setting"]
     assert advice.numerical_error == float(row["numerical_error"])
     assert advice.seconds == pytest.approx(1e-6 * float(row["microseconds"]), rel=0.5)
     assert advice.measured_on == (name,)
     setting = float(row["setting"].replace(",", "").split()[1])
-    if name == "ABCCA":
-        assert advice.model == EnergyDistribution(1.0, rtol=setting)
-    else:
-        assert advice == recommend(chain, accuracy=accuracy, stiffness=1.0, model_error=0.0)
-        assert advice.model == SpringChain(1.0, accuracy=setting)
-        assert off(chain, advice, HERTZ[name]) <= SLACK * advice.numerical_error + 1e-9
+    assert advice == recommend(chain, accuracy=accuracy, stiffness=1.0, model_error=0.0)
+    assert advice.model == SpringChain(1.0, accuracy=setting)
+    assert off(chain, advice, HERTZ[name]) <= SLACK * advice.numerical_error + 1e-9
 
 
 def test_springs_among_the_measured_chains():
@@ -126,16 +121,11 @@ def test_events_against_fifty_digits():
 
 
 def test_losses_and_no_ratios():
-    """Against small steps of time, and at more digits against a finer tolerance."""
+    """Against a finer tolerance."""
     advice = recommend(LOST, "impulses", accuracy=1e-3, stiffness=1.0)
     assert isinstance(advice.model, EnergyDistribution)
-    balls = LOST.masses / LOST.masses[0], LOST.velocities, LOST.restitution
-    steps = [strike(*balls, count)[0] for count in (1000, 2000)]
-    answer, own = 2 * steps[1] - steps[0], np.abs(steps[1] - steps[0]).max()
-    assert own < 1e-3
-    assert off(LOST, advice, answer) <= 1e-3 + own
     for m, rng in between(4, 1.15):
-        chain = striking(m, [0.5, *uniform(rng, 0.3, 1.0, len(m) - 2)])
+        chain = striking(m, [0.2, *uniform(rng, 0.3, 1.0, len(m) - 2)])
         finer = collide(chain, EnergyDistribution(rtol=1e-12)).velocities
         for accuracy in (1e-2, 1e-5):
             advice = recommend(chain, accuracy=accuracy, stiffness=1.0)
@@ -158,14 +148,14 @@ def test_losses_that_viscous_springs_can_have():
             assert np.abs(after - answer).max() <= 0.3 * accuracy
             assert (advice.model_error, "five lossy" in advice.measured_on) == (None, True)
             assert advice.numerical_error * 10 <= accuracy
-    five = striking([1] * 5, 0.63)
+    five = striking([1] * 5, 0.49)
     law = recommend(five, stiffness=1)
     springs, energy = collide(law.chain, law.model), collide(five, EnergyDistribution())
     apart = f"balls by {springs.velocities[-1] - energy.velocities[-1]:.2f} of the closing speed"
-    assert apart.replace("0.", ".") in recommend(striking([1] * 5, 0.62), stiffness=1).reason
-    with pytest.raises(ValueError, match=r"restitution\[0\] = 0.5; must lie in \[0.624, 1\]"):
+    assert apart.replace("0.", ".") in recommend(striking([1] * 5, 0.47), stiffness=1).reason
+    with pytest.raises(ValueError, match=r"restitution\[0\] = 0.2; must lie in \[0.479, 1\]"):
         recommend(LOST, "forces", stiffness=1)
-    heavy = striking([1, 1, 200, 200], [1, 1, 0.7])  # slower than the first by far
+    heavy = striking([1, 1, 200, 200], [1, 1, 0.6])  # slower than the first by far
     with pytest.raises(ValueError, match=r"viscosity\[2\] = .*; must be at most"):
         recommend(heavy, "forces", stiffness=1)
     assert isinstance(recommend(heavy, stiffness=1).model, EnergyDistribution)
@@ -214,7 +204,7 @@ def test_the_fastest_ball():
             assert len(advice.measured_on) == 1
             after = np.abs(collide(chain, advice.model).velocities)
             assert after.argmax() == np.abs(answer).argmax()
-    assert isinstance(recommend(ABCCA, "fastest ball", stiffness=1).model, EnergyDistribution)
+    assert isinstance(recommend(LOST, "fastest ball", stiffness=1).model, EnergyDistribution)
     chain = striking([1.0, 0.08, 2.16, 0.93, 0.84])
     advice = recommend(chain, "fastest ball")
     assert advice.measured_on == ()

@@ -29,7 +29,7 @@ def test_the_package_agrees_to_five_digits(spheres):
     for n in (2, 3, 4, 5, 7) * 8:
         masses = magnitudes(rng, 1, n).tolist()
         velocities = np.sort(uniform(rng, -2, 2, n))[::-1].tolist()
-        restitution, gap = rng.choice([1, 0.97, 0.9], n - 1), float(rng.choice([0, 1e-6, 1e-5]))
+        restitution, gap = rng.choice([1, 0.9, 0.8], n - 1), float(rng.choice([0, 1e-6, 1e-5]))
         answer, law = asked(spheres, masses, velocities, restitution, gap)
         assert answer["status"] == "finished"
         expected = spring_velocities(masses, velocities, **law, gaps=gap, accuracy=1e-7)
@@ -37,7 +37,7 @@ def test_the_package_agrees_to_five_digits(spheres):
         np.testing.assert_allclose(answer["velocities"], expected, rtol=0, atol=1e-5 * fastest)
 
 
-@pytest.mark.parametrize("e", [0.97, 0.8, 0.66])
+@pytest.mark.parametrize("e", [0.97, 0.66, 0.5])
 @pytest.mark.parametrize("masses", [[1.0, 1.0], [0.05, 2.0]])
 def test_the_restitution_is_that_of_two_balls_at_one_metre_a_second(spheres, e, masses):
     """And the stiffness Hertz's, of steel."""
@@ -84,7 +84,7 @@ def test_linear_springs(spheres, still):
 
 
 def test_what_has_no_answer_says_so(spheres):
-    assert asked(spheres, [1.0, 1.0], [1.0, 0.0], 0.5)[0] == {"status": "lossy"}
+    assert asked(spheres, [1.0, 1.0], [1.0, 0.0], 0.2)[0] == {"status": "lossy"}
     light = asked(spheres, [1.0, 1e-9, 1.0], [1.0, 0.0, 0.0])[0]
     assert light == {"status": "unfinished"}
     apart = asked(spheres, [1.0, 1.0], [0.0, 1.0], record=True)[0]
@@ -111,5 +111,5 @@ def test_a_reader_chooses_spheres(still):
     assert "law = glue; must be rule or spheres or springs" in refused.inner_text(".words")
     lossy = still("#speeds=1,0,0&law=spheres&restitution=0.2")
     lossy.drawn()
-    assert "choose a restitution of 0.65" in lossy.inner_text(".words")
+    assert "choose a restitution of 0.5" in lossy.inner_text(".words")
     assert lossy.state("setting")["restitution"] == [0.2, 0.2]

@@ -36,9 +36,9 @@ HARD, LOST, SWING, WHOLE = 0.01, 0.022, 0.0027, 0.8
 # Kinks beyond two of each contact, and with leans radians, from which runs are compared.
 OFTEN, LONG = 4.0, 30.0
 TRIALS = 16  # runs of a chain, each finer than the one before
-DAMPED = 0.5  # step times A times the square of a frequency, at most
+DAMPED = 0.25  # step times A times the square of a frequency, at most
 SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
-LONGEST, MOST_HUNT = 0.3, 0.9  # A, in contact times, and in one over the closing speed
+LONGEST, MOST_HUNT = 0.5, 1.5  # A, in contact times, and in one over the closing speed
 TINY = 1e-300  # the least depth, and one over the largest
 NORMAL = 2.0**-1022  # a smaller number has lost digits
 # The widest gap and the narrowest, in depths; the widest whose last digit is below this accuracy.

@@ -171,7 +171,7 @@ def viscosity_from(
     Raises
     ------
     ValueError
-        If a value is wrong, or a restitution so low (below .624 for viscoelastic spheres, .620 by
+        If a value is wrong, or a restitution so low (below .479 for viscoelastic spheres, .488 by
         Hunt and Crossley) that it takes more viscosity than contacts may have.
 
     References
@@ -189,7 +189,7 @@ def viscosity_from(
     p, hunt = SpringChain(1.0, exponent, damping=damping).exponent, damping == DAMPING[1]
     u = asked.one_number("speed", speed, *asked.ABOVE_ZERO)
     part, most = (parting_hunt, MOST_HUNT) if hunt else (lambda a: parting(a, p), LONGEST)
-    least = part(most)
+    least = math.ceil(1000.0 * part(most)) / 1000.0
     rule = f"must lie in [{least:.3f}, 1]: less takes more viscosity than contacts may have"
     given: dict[str, asked.ArrayLike] = {"masses": asked.checked_masses(masses)}
     given |= {"restitution": asked.checked("restitution", restitution, rule, least, 1.0)}
@@ -231,4 +231,6 @@ def parting_hunt(viscosity: float) -> float:
     def left(e: float) -> float:
         return float(quad(lambda u: u / (1.0 + viscosity * u), -e, 1.0, epsabs=1e-13)[0])
 
-    return float(brentq(left, 0.0, 1.0, xtol=1e-14))
+    # By the integral's closed form 1 - A e is at least z exp(-z), with z = 1 + A.
+    most = (1.0 - (1.0 + viscosity) * math.exp(-1.0 - viscosity)) / max(viscosity, 0.5)
+    return float(brentq(left, 0.0, min(1.0, most), xtol=1e-14))
