@@ -91,14 +91,24 @@ def plotted(context: click.Context, option: click.Parameter, path: str | None) -
     return path
 
 
-def plot_fits(fits: Sequence[Any], path: str) -> None:
-    """Draw every identified estimate to a file."""
+def save(path: str, size: tuple[float, float], draw: Callable[[Any], object]) -> None:
+    """Save a figure of this size in inches, on which `draw` draws."""
     from matplotlib.figure import Figure
 
+    figure = Figure(size, layout="constrained")
+    draw(figure)
+    figure.savefig(path, format=Path(path).suffix[1:] or "png")
+
+
+def plot_fits(fits: Sequence[Any], path: str) -> None:
+    """Draw every identified estimate to a file."""
     drawn = [(one, name) for one in fits for name, e in one.estimates.items() if e.identified]
     if not drawn:
         raise ValueError("nothing was identified; there is nothing to draw")
-    figure = Figure((9, 3.9 * len(drawn)), layout="constrained")
-    for (one, name), row in zip(drawn, figure.subplots(len(drawn), 2, squeeze=False), strict=True):
-        one.plot(name, row)
-    figure.savefig(path, format=Path(path).suffix[1:] or "png")
+
+    def draw(figure: Any) -> None:
+        rows = figure.subplots(len(drawn), 2, squeeze=False)
+        for (one, name), row in zip(drawn, rows, strict=True):
+            one.plot(name, row)
+
+    save(path, (9, 3.9 * len(drawn)), draw)

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 import cradle
-from cradle.command.console import format_options, plotted, show
+from cradle.command.console import format_options, plotted, save, show
 from cradle.command.describe import UNITS, numbers_of, one_or_all, pendulum_length, swing_options
 from cradle.command.fit import named_number
 from cradle.input.values import ABOVE_ZERO, checked_masses, one_number
@@ -165,11 +165,7 @@ def fit_swing(
     times, places = fits.frames(fits.read_tracker(file, **_units(**options)))
     found = fits.fit_swing(times, places, law, reading=reading, known=numbers, masses=masses)
     if plot is not None:
-        from matplotlib.figure import Figure
-
-        figure = Figure((5.6, 6), layout="constrained")
-        found.plot(figure.subplots(2, sharex=True))
-        figure.savefig(plot, format=Path(plot).suffix[1:] or "png")
+        save(plot, (5.6, 6), lambda figure: found.plot(figure.subplots(2, sharex=True)))
     if not (as_json or as_csv):
         told = "; one pair collides after the other (--ratio)" * (ratio is None)
         click.echo(f"{found.summary()}\nassumed: equal gaps{told}")

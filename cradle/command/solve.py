@@ -8,7 +8,6 @@ import re
 import sys
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import click
@@ -16,7 +15,7 @@ import click
 import cradle
 from cradle import ImpactNotCertified, ImpactNotFinished, collide
 from cradle.advice.choice import made
-from cradle.command.console import format_options, plotted, show
+from cradle.command.console import format_options, plotted, save, show
 from cradle.command.describe import chain_options, described, one_or_all
 from cradle.command.film import film, fit_swing
 from cradle.command.fit import fit, template
@@ -100,11 +99,7 @@ def solve(plot: str | None, as_json: bool, as_csv: bool, **options: Any) -> None
     drawn = plot or not isinstance(given.model, cradle.ImpulseCorrelation)
     trace = collide(given.taken, given.model, record=None if drawn else False, progress=True)
     if plot:
-        from matplotlib.figure import Figure
-
-        figure = Figure((7, 4.3), layout="constrained")
-        trace.plot(figure.subplots())
-        figure.savefig(plot, format=Path(plot).suffix[1:] or "png")
+        save(plot, (7, 4.3), lambda figure: trace.plot(figure.subplots()))
     rows = [
         {"ball": k + 1, "type": given.letters[k], "mass": float(chain.masses[k]),
          "before": float(chain.velocities[k]), "after": float(trace.velocities[k]) + 0.0}
