@@ -28,6 +28,10 @@ def test_the_first_page_is_guessed(still):
     assert tab.state("view.guess.values") == pytest.approx(guess)
     assert "80\u00a0% of the momentum and 82\u00a0% of the energy" in host.inner_text()
     assert "Fill both, to 100\u00a0%." in host.inner_text()
+    for ball, value in ((0, 0), (4, 1), (0, -0.1), (4, 0.9)):
+        tab.act(f"guess({ball}, {value})")
+        tab.drawn()
+        assert ("Both are kept." in host.inner_text()) == (value == 1)
     tab.push("Next hit")
     tab.drawn()
     assert tab.bars() == expected.round(2).tolist()
@@ -55,6 +59,15 @@ def test_the_first_page_is_guessed(still):
     after = tab.drawn()["after"]
     assert tab.bars() == np.round(after, 2).tolist()
     assert tab.get_by_role("button", name="Guess again").is_enabled()
+
+
+def test_the_next_step_is_for_one_striker(still):
+    tab = still("")
+    for speed in (0, -1):
+        tab.evaluate(f"{EXPLORER}.state.pull([[1, {speed}]])")
+        tab.act("step()")
+        tab.drawn()
+        assert tab.locator(".next:visible").count() == (speed == 0)
 
 
 @pytest.mark.parametrize(
@@ -306,6 +319,10 @@ def test_tasks_are_judged_by_the_solver(still):
         "(({setting, swing, record}) => cradleExplorer.tasksDone(setting, swing.hit(0), record))"
     )
     tab.act("read('speeds=1,1,0&forward=0.5')")
+    tab.drawn()
+    assert not any(tab.evaluate(f"{nothing}({EXPLORER}.state)"))
+    # Nor do three balls that stick together: they collide again and again, and leave alike.
+    tab.act("read('speeds=1,0,0&restitution=0')")
     tab.drawn()
     assert not any(tab.evaluate(f"{nothing}({EXPLORER}.state)"))
 

@@ -68,7 +68,9 @@
       const moves = share ? `${share} of the momentum and ` : "";
       const energy = percent(kept(masses, hit.before, now));
       const lossless = explorer.law(setting) === "springs" || restitution.every((e) => e === 1);
-      const aim = lossless ? "Fill both, to 100\u00a0%." : "Fill momentum, to 100\u00a0%; of energy some is lost.";
+      const full = "100\u00a0%";
+      let aim = lossless ? `Fill both, to ${full}.` : `Fill momentum, to ${full}; of energy some is lost.`;
+      if (lossless && share === full && energy === full) aim = "Both are kept. Other guesses keep both, too.";
       return `Your bars have ${moves}${energy} of the energy before the hit. ${share ? aim : ""}`;
     }
     if (!guess.touched || !hit.after) return "";

@@ -296,7 +296,8 @@
       inAll.textContent = now ? `${inside ? "moves" : "total"} ${kinetic}` : "";
       handles.show(state, box(bars));
       told.textContent = guess && number === 0 ? explorer.guessInWords(state) : "";
-      next.hidden = !host.dataset.next || covered || seen.from !== host.dataset.scene;
+      const struck = seen.from === host.dataset.scene && hit.before.slice(1).every((v) => v === 0);
+      next.hidden = !host.dataset.next || covered || !struck;
     }
     return { node, show };
   }

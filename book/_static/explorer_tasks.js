@@ -7,16 +7,18 @@
   const STILL = 0.005; // of the fastest ball's speed
 
   const back = (v) => v.filter((speed) => speed < -STILL).length;
+  const whole = ({ masses, before, v }) => kept(masses, before, v) > 1 - 1e-4;
   const TASKS = [
-    [1, "Make the last two balls leave at the same speed.", ({ v, last }) => last > 0.1 && Math.abs(v.at(-2) - last) < STILL],
+    [1, "Lose no energy, and make the last two balls leave at the same speed.",
+      (hit) => whole(hit) && hit.last > 0.1 && Math.abs(hit.v.at(-2) - hit.last) < STILL],
     [1, "Send the last ball off faster than the striker came.", ({ last }) => last > 1.2],
     [2, "Lose more than half of the energy, and let the last ball leave with more than half of the striker's speed.",
       ({ masses, before, v, last }) => kept(masses, before, v) < 0.5 && last > 0.5],
     [3, "Stop the striker dead, with ratio 0.1 or more. (After chapter 3 you can do this with a pencil.)",
       ({ v, setting }) => explorer.law(setting) === "rule" && Math.abs(v[0]) < STILL && Math.min(...setting.forward, ...setting.backward) >= 0.1],
-    [3, "Lose no energy, and make exactly two balls come back.",
-      ({ masses, before, v }) => kept(masses, before, v) > 1 - 1e-4 && back(v) === 2],
-    [3, "Make balls 1 and 2 collide ten times in one hit.", ({ record }) => record.collisions[0] >= 10],
+    [3, "Lose no energy, and make exactly two balls come back.", (hit) => whole(hit) && back(hit.v) === 2],
+    [3, "Lose no energy, and make balls 1 and 2 collide ten times in one hit.",
+      (hit) => whole(hit) && hit.record.collisions[0] >= 10],
   ]; // prettier-ignore
 
   // Whether each task is done by the first hit: one ball, the first, strikes others at rest.
