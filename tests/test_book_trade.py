@@ -217,25 +217,15 @@ SIX = "6 random, two decades"
 
 
 def by_law():
-    """The table of laws: one, two and three lifted, three as one, where it agrees, and the time."""
-    line = re.compile(r"\s*(\S.*?)" + r" +([\d.]+)" * 4 + r" +(none|[1-3, ]*[1-3]) +(.*)")
+    """The table of laws: one, two, three lifted, its slow balls, three as one, where it agrees."""
+    line = re.compile(r"\s*(\S.*?)" + r" +([\d.]+)" * 5 + r" +(none|[1-3, ]*[1-3])")
     found = (line.fullmatch(x).groups() for x in CHAPTER.printed("trade-film").splitlines()[1:])
     return {" ".join(law.split()): columns for law, *columns in found}
 
 
 def test_the_table_of_advice():
-    """Its times and the distances from spheres are the stored ones."""
-    told, table = CHAPTER.glued, by_law()
-    for law, chain, method in (
-        ("spheres nothing", "5 equal", "this package"),
-        ("spheres with losses A", "5 equal, A = .03", "this package"),
-        ("one ratio a, e", "5 equal", METHODS[3]),
-        ("three ratios a, b, c, e", "5 equal", METHODS[3]), ("pairs e", "5 equal", METHODS[4]),
-    ):  # fmt: skip
-        row = next(r for r in read("forces.csv", chain=chain, method=method)
-                   if r["asked"] in ("", "1e-03"))  # fmt: skip
-        time = float(table[law][-1])
-        assert time == pytest.approx(float(row["microseconds"]), rel=0.06)
+    """The distances from spheres are the stored ones."""
+    told = CHAPTER.glued
     off = {r["method"]: 100 * float(r["error"]) for r in read("forces.csv", chain="5 equal")}
     one, other = (off[law] for law in ("measured ratio", METHODS[3]))
     assert told["off-ratios"] == f"{one:.0f} to {other:.0f}"
@@ -250,8 +240,6 @@ def test_the_table_of_advice():
     k = hertz_stiffness([0.011] * 2)
     pressed = collide(Chain([0.045] * 2, [0.7, 0]), SpringChain(k)).forces.max() / k[0]
     CHAPTER.tells({"toy-depth": 1e6 * pressed ** (2 / 3)})
-    energy = [r["microseconds"] for r in find("energy", chain="ABCCA")]
-    assert table["energy law e"][-1].split() == [f"{min(energy) / 1000:.0f}", "000"]
 
 
 def test_pairs_are_for_equal_balls():
@@ -275,21 +263,6 @@ def test_pairs_are_for_equal_balls():
     apart = integrated(m, np.eye(5)[0], gaps=gaps)
     for name, end in (("corner", -1), ("leftmost", 0)):
         CHAPTER.tells({f"pairs-{name}": 100 * np.abs(apart - flown(m, end)).max()})
-
-
-def test_one_impact_in_a_call():
-    """The least and the most of five balls, by spheres, ratios and pairs."""
-    calls = [
-        *find("springs", "accuracy 1e-02", chain="five equal"),
-        *find("springs", "accuracy 1e-03", chain="five equal"),
-        *find("event", "compiled, one call with", chain="five equal"),
-        *find("event", "compiled, one call, outcome", chain="five equal"),
-        *find("outcome", "one call", chain="five equal", model="SequentialCollisions"),
-    ]
-    times = [row["microseconds"] for row in calls]
-    assert float(CHAPTER.glued["call-least"]) == pytest.approx(min(times), rel=0.06)
-    most = CHAPTER.glued["call-most"].removesuffix(" µs")
-    assert float(most) == pytest.approx(max(times), rel=0.06)
 
 
 def test_who_arrives_together():
@@ -372,7 +345,7 @@ def test_the_film_by_the_printed_calls():
     assert float(by_law()[NAMES["gaps"]][2]) == pytest.approx(off, abs=0.1)
     for name, velocities in found.items():
         off = 100 * np.abs(velocities - seen).max()
-        told = by_law()[NAMES["touching"]][2] if name == "toy" else by_law()[NAMES[name]][3]
+        told = by_law()[NAMES["touching"]][2] if name == "toy" else by_law()[NAMES[name]][4]
         assert float(told) == pytest.approx(off, abs=0.1), name
 
 
@@ -401,6 +374,8 @@ def test_laws_beside_the_film():
         "energy law (Hertz), e": "energy", "one ratio, e": "one", "three ratios, e": "three",
         "spheres, three gaps, A": "gaps",
     }  # fmt: skip
+    errors = 100 * film[3][1]
+    CHAPTER.tells({"film-slow": errors[:2].max(), "film-fast": errors[2:].min()}, off=0.051)
     assert list(by_law()) == [NAMES[name] for name in laws.values()]
     for law, name in laws.items():
         if law == "spheres, nothing":
@@ -414,10 +389,11 @@ def test_laws_beside_the_film():
         for lifted in (1, 2, 3):
             v = real_cradles.LAWS[law][0](p, lifted, True)
             off.append(100 * np.abs(v - film[lifted][0]).max())
-        shown = [float(x) for x in by_law()[NAMES[name]][:3]]
+        off.append(100 * np.abs(v - film[3][0])[:2].max())
+        shown = [float(x) for x in by_law()[NAMES[name]][:4]]
         assert shown == pytest.approx(off, abs=0.051)
         within = [str(k) for k, x in enumerate(chi, 1) if x < 9.488]  # 95 %, four degrees
-        assert by_law()[NAMES[name]][4] == (", ".join(within) or "none")
+        assert by_law()[NAMES[name]][5] == (", ".join(within) or "none")
         if name in ("pairs", "touching"):
             CHAPTER.tells({f"film-{name}": max(off)}, off=0.051)
 
