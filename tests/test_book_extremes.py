@@ -159,7 +159,7 @@ def test_fig_extremes_shortest_as_drawn():
     assert (told["lossy"], told["springs-rows"]) == ("0.6", "5 to 40")
     many = min(n for e, n in least.items() if e > 0.6)
     assert (told["least"], told["many"]) == (said(min(least.values())), said(many))
-    assert float(told["break-size"]) == float(f"{max(float(r['largest']) for r in rows):.0e}")
+    assert told["percent"] == f"{100 * max(float(r['largest']) for r in rows):.1g}"
     for name, low in ("last", 0), ("last-near", float(told["last-e"])):
         most = max(float(r["last"]) for r in rows if float(r["restitution"]) >= low)
         assert told[name] == said(most, 1)
