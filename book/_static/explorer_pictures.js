@@ -90,7 +90,7 @@
     function legend(record, chosen) {
       if (chosen === "all" && equal) return "The events of the list, at equal distances. Dashed: now; all bars follow.";
       if (chosen === "all")
-        return "From left to right: the impulse given so far (force times time), which runs like a clock. Dashed: the instant that all bars show.";
+        return "Impulse (force times time) is the clock here. Dashed: the instant that all bars show.";
       const kinds = new Set(
         record.events.filter((event) => event.contact === chosen).map(({ kind }) => kind),
       );
