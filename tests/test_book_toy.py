@@ -73,6 +73,7 @@ def test_mirror():
     """The map from either side, by the independent solver."""
     one, other = strokes(20, [1, 0, 0, 0, 0]), -strokes(20, [0, 0, 0, 0, -1])[:, ::-1]
     apart = np.abs(one - other).max(axis=1)
+    CHAPTER.tells({"mirror-second": apart[1]})
     assert glued("mirror-worst") > apart.max() - 0.006
 
 
