@@ -65,7 +65,9 @@ def test_two_strikers_that_come_as_one():
     slower, apart = real_cradles.SLOWER, real_cradles.APART
     second, third, *_ = spheres([slower, 0, 0, 0], [0, *GAPS[1:3]], GAPS[3]) / slower
     still = apart * (third - second) / (1 - second)
-    CHAPTER.tells({"parts": 100 * (third - second), "still": 1e6 * UNIT * still})
+    CHAPTER.tells({"still": 1e6 * UNIT * still})
+    left, right = spheres([slower, 0], [0], GAPS[3]) / slower
+    CHAPTER.tells({"loss-e": right - left})
 
 
 def test_chi_square_ball_by_ball():
@@ -76,9 +78,9 @@ def test_chi_square_ball_by_ball():
     assert film == pytest.approx(seen, abs=6e-3)
     assert error == pytest.approx(sigma, abs=6e-4)
     by_pencil = (film - law) / error
-    assert off == pytest.approx(by_pencil, abs=0.1)
-    assert square == pytest.approx(by_pencil**2, rel=0.02, abs=0.1)
-    assert float(GLUED["plain"]) == pytest.approx((by_pencil**2).sum(), abs=2)
+    assert off == pytest.approx(by_pencil, abs=0.01)
+    assert square == pytest.approx(by_pencil**2, rel=1e-3, abs=0.06)
+    assert float(GLUED["plain"]) == pytest.approx((by_pencil**2).sum(), abs=0.6)
     c = minimize_scalar(
         lambda c: (((film - c * law) / error) ** 2).sum() + ((c - 1) / 0.01) ** 2, bounds=(0.8, 1.2)
     )
@@ -425,22 +427,21 @@ def test_strikers_one_by_one():
 
 def test_gaps_and_not_ratios_predict_the_third_release():
     film, error = (100 * x for x in first_strikes(4)[3])
-    shown, touching, ratios, gaps = np.array(
-        re.findall(
-            r"(\S+) ± \S+ +(\S+) +(\S+) +(\S+)\n",
-            CHAPTER.printed("third-code").replace("−", "-"),
-        ),
-        float,
-    ).T
+    lines = re.findall(r"(?m)^\d +(.*)$", CHAPTER.printed("third-code").replace("−", "-"))
+    shown, sigma, *laws = np.array([line.split() for line in lines], float).T
+    _, ratios, gaps, _ = laws
     assert shown == pytest.approx(film, abs=6e-3)
+    pairs = cache(lambda release: real_cradles.ratios(
+        [0] * 3, *parameters("pairs, e", "apart", "both"), release, True))  # fmt: skip
     *_, plain, shifted = CHAPTER.printed("third-code").splitlines()
-    for k, (law, model) in enumerate(zip((touching, ratios, gaps), MODELS, strict=True)):
+    for k, (law, model) in enumerate(zip(laws, (*MODELS, pairs), strict=True)):
         by_pencil, off = (
-            ((law - film) / error) ** 2,
+            ((law - shown) / sigma) ** 2,
             real_cradles.misfits(model, first_strikes(4), (3,)),
         )
-        assert float(plain.split()[1 + k]) == pytest.approx(by_pencil.sum(), rel=0.02)
-        assert float(shifted.split()[2 + k]) == pytest.approx(off @ off, rel=0.01)
+        total = by_pencil.sum()
+        assert abs(float(plain.split()[1 + k]) - total) < (0.06 if total < 100 else 0.51)
+        assert float(shifted.split()[1 + k]) == pytest.approx(off @ off, rel=0.01)
         assert law == pytest.approx(100 * model(3), abs=6e-3)
     assert (np.abs(gaps - film)[:2] < 0.5 * error[:2]).all()
     assert (np.abs(ratios - film)[:2] > 5 * error[:2]).all()

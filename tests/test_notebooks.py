@@ -177,7 +177,7 @@ GIVEN = {
     "n_balls": "0.1 0.15 0.5 1.5 4.5",
     "experiments": "0.01 0.5",  # a step, and what is small beside it
     "toy": "0.975 0.99",
-    "real_cradles": "0.01 0.1 0.17 0.2 0.4 1.1 25.3",  # errors, distances, frames
+    "real_cradles": "0.01 0.1 0.2 0.4 25.3",  # errors, distances, frames
     "recipe": "",
     "scene": "0.1 0.97",  # a step, and a restitution of the run
     "measure": "0.3 0.35 0.5 0.7 1.4 1.5 3.84",
