@@ -38,6 +38,7 @@ DIGITS, EVENTS, SHORT, WRONG = 100, 600, 100, 1e-9
 LONGEST = 200_000  # events of the package: far beyond those of an exact run that ends
 LIMIT = 1e-6  # by which answers may differ where an infinite sequence was taken to its limit
 DOUBTFUL = ("wrong", "other reading", "open", "unfinished", "unlike them")  # printed
+ROUNDINGS = 5 * Decimal(2) ** -52  # four, and that of comparing them
 TASK = 50  # chains of one task of the pool
 
 
@@ -54,7 +55,21 @@ class Exact(textbook.Impact):
         self.events.append((kind, c))
 
 
-def exact(problem, read=meaning, *, events=EVENTS, twice=False):
+class InForce(Exact):
+    """The same, with R7 as it is meant: a ratio that roundings keep from a bound is on it.
+
+    Of any bound, whenever it comes into force; `on_bounds` sees those of the start alone.
+    """
+
+    def ratios_in_force(self, inner):
+        kept, self.small = self.small, ROUNDINGS
+        try:
+            return super().ratios_in_force(inner)
+        finally:
+            self.small = kept
+
+
+def exact(problem, read=meaning, *, events=EVENTS, twice=False, impact=Exact):
     """The impact by the rules alone; None if the sequence does not end within so many events.
 
     100 digits; five times as many where products of small ratios matter, more than the package then
@@ -63,7 +78,7 @@ def exact(problem, read=meaning, *, events=EVENTS, twice=False):
     tiny = any(0 < ratio < 1e-4 for ratio in (*problem.forward, *problem.backward))
     with decimal.localcontext(prec=DIGITS * (5 if tiny else 1) * (2 if twice else 1)):
         try:
-            return problem.solve(textbook.solve, number=read, max_events=events, impact=Exact)
+            return problem.solve(textbook.solve, number=read, max_events=events, impact=impact)
         except textbook.EventLimit:
             return None
 
@@ -144,6 +159,9 @@ def judge(problem, *ask, events=EVENTS):
         return Verdict(LEFT_OUT)  # it ended where its digits did
     if off(problem, again.velocities, right.velocities) > WRONG:
         return Verdict("open", far)
+    held = exact(problem, impact=InForce)
+    if held and (far := max(off(problem, one, held.velocities) for one in given)) <= WRONG:
+        return Verdict("right", far)
     for other in exact(problem, Decimal), exact(problem):
         if other and max(off(problem, one, other.velocities) for one in given) <= WRONG:
             return Verdict("other reading", far)

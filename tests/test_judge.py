@@ -5,6 +5,7 @@ from decimal import Decimal
 from pathlib import Path
 
 import judge as court
+import numpy as np
 import pytest
 from delicate import CHAINS, chains_of
 from families import JUDGED, family
@@ -158,6 +159,28 @@ def test_a_bound_counts_on_what_is_in_force_beyond():
     assert judge(problem).word == "right"
     as_it_stands = [float(v) for v in exact(problem).velocities]
     assert judge(problem, lambda _: as_it_stands).word == "other reading"
+
+
+@pytest.mark.parametrize(
+    ("masses", "forward", "meeting"),
+    [
+        # Between four roundings and five from its bound, as a user may draw it.
+        ([1, 4, 0.25, 0.25, 4, 3],
+         [0.6521739130434776, 0.9666666666666666, 0.9655172413793103, 3 / 7], 0.0),
+        # On a bound that comes into force when a neighbour has ended.
+        ([1, 1, 4, 0.25, 3, 1, 1, 1, 1],
+         [0, 0.6595744680851058, 0.9677419354838709, 0.6, 0, 0, 0.25], 0.5),
+    ],
+)  # fmt: skip
+def test_a_bound_is_meant_whenever_it_comes_into_force(masses, forward, meeting):
+    n = len(masses)
+    problem = Problem(
+        masses, np.eye(n)[0].tolist(), [1.0] * (n - 1), forward, [0.0] * (n - 2), meeting
+    )
+    assert judge(problem).word == "right"
+    fixed = exact(on_bounds(problem)).velocities
+    assert off(problem, batch(problem), fixed) > court.WRONG
+    assert judge(problem, answering(2e-9)).word == "wrong"
 
 
 def test_a_wrong_chain_is_shrunk():
