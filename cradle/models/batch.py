@@ -189,8 +189,14 @@ def in_order(
 
 def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
     """Return some rows of `array` broadcast to the leading shape."""
-    # By their places, without making the others: a copy, as compiled code is made for arrays that
-    # may be written to.
-    lead = lead or (1,)
-    places = np.unravel_index(np.arange(rows.start, rows.stop), lead)
-    return np.broadcast_to(array, (*lead, array.shape[-1]))[places]
+    size, count = array.shape[-1], rows.stop - rows.start
+    if array.size == size:
+        part = array.reshape(1, size) if count == 1 else array.reshape(1, size).repeat(count, 0)
+    elif array.shape[:-1] == lead and array.flags.c_contiguous:
+        part = array.reshape(-1, size)[rows]
+    else:
+        # Without making the others.
+        full = np.broadcast_to(array, (*lead, size))
+        return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
+    # Compiled code is made for arrays that may be written to; it writes to no input.
+    return part if part.flags.writeable and part.flags.c_contiguous else part.copy()

@@ -180,9 +180,10 @@ def call(door: Callable[..., Any], *arguments: Any) -> Any:
     global _spent
     if door in (plain.batch, plain.follow):
         begun = time.perf_counter()
-        found = door(*arguments)
-        _spent += time.perf_counter() - begun
-        return found
+        try:
+            return door(*arguments)
+        finally:
+            _spent += time.perf_counter() - begun
     try:
         return door(*arguments)
     except Exception as error:  # half a file can raise anything; the kernel itself nothing
