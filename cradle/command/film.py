@@ -170,7 +170,6 @@ def fit_swing(
         told = "; one pair collides after the other (--ratio)" * (ratio is None)
         click.echo(f"{found.summary()}\nassumed: equal gaps{told}")
         return
-    rows = [{"name": name, "value": one.value, "intervals": one.intervals, "identified":
-             one.identified} for name, one in found.estimates.items()]  # fmt: skip
+    rows = [one.row() for one in found.estimates.values()]
     more = ("reading", "chi_square", "degrees_of_freedom", "correlation", "poor", "widened")
     show(rows, {name: getattr(found, name) for name in more}, "", as_json, as_csv)

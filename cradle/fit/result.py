@@ -74,6 +74,12 @@ class Estimate:
         sides = self.value - float(near.min()), float(near.max()) - self.value
         return len(self.intervals) > 1 or max(sides) > SKEW * min(sides)
 
+    def row(self) -> dict[str, Any]:
+        """Return the row of this estimate in a table."""
+        row = (self.name, self.kind, self.value, self.intervals, len(self.modes), self.identified,
+               self.at_bound, self.bound)  # fmt: skip
+        return dict(zip(RESULT_COLUMNS, row, strict=True))
+
     def __str__(self) -> str:
         if self.value is None:
             return f"{self.kind} {self.name}: not identified"
@@ -202,9 +208,7 @@ class Fit:
 
     def rows(self) -> list[dict[str, Any]]:
         """Return a row for each estimate, as dictionaries, named as in `Estimate`."""
-        rows = ((name, e.kind, e.value, e.intervals, len(e.modes), e.identified, e.at_bound,
-                 e.bound) for name, e in self.estimates.items())  # fmt: skip
-        return [dict(zip(RESULT_COLUMNS, row, strict=True)) for row in rows]
+        return [one.row() for one in self.estimates.values()]
 
     def table(self) -> "pd.DataFrame":
         """Return the rows as a table of pandas; a value that the data leave open is missing."""
