@@ -6,7 +6,7 @@ import judge
 import long_chains
 import numpy as np
 import pytest
-from chains import HERTZ
+from chains import HERTZ, uniform
 from chapters import Chapter, number, points
 from kernels import needs_numba
 from problem import Problem
@@ -166,6 +166,13 @@ def test_fig_beyond_stability():
         for row in find("losses", restitution=e, ratio=0.0, collapsed=0.0):
             kept = ((1 + e) / 2) ** (row["balls"] - 1)
             np.testing.assert_allclose(row["last"], kept, rtol=1e-9)
+    for e in (0.99, 0.999):
+        for row in find("losses", restitution=e, ratio=0.0):
+            assert row["kept"] == row["balls"]
+        for ratio in (0.1, 0.3, 0.45):
+            rows = find("losses", restitution=e, ratio=ratio)
+            assert rows[-1]["orders"] == rows[-1]["chains"]
+            assert rows[-1]["kept"] <= 2
     finite = find("losses", collapsed=0.0)
     rows_99 = [row for row in finite if row["restitution"] == 0.99]
     assert column(finite, "spread").max() < 2e-3
@@ -176,6 +183,13 @@ def test_fig_beyond_stability():
     fewer = [row for row in rows_99 if row["kept"] < row["balls"]]
     assert number(CHAPTER.glued["unsafe"]) == min(column(fewer, "balls")) == 20
     assert column(fewer, "ratio").all()
+    # A change of masses that is not a rounding error: the leader stays, others do not.
+    masses, velocities = np.ones((9, 120)), struck(120)[1]
+    masses[1:] *= 1 + 1e-15 * uniform(np.random.default_rng(5), -1, 1, (8, 120))
+    after = outcomes(masses, velocities, 0.99, 0.3).velocities
+    off = np.abs(after / after[0] - 1).max(axis=0)
+    assert off[-1] < 1e-4
+    assert off[1:-2].max() > 1e-3
 
 
 def test_fig_beyond_springs():
@@ -195,6 +209,7 @@ def test_fig_beyond_springs():
     CHAPTER.tells({"leader-asks": best, "ratio-three": by_leader[0]})
     CHAPTER.tells({"striker-hertz": spheres[0], "striker-ratio": ends(best)[0]})
     assert number(CHAPTER.glued["back-hertz"]) == (spheres < -0.01).sum() == rows[-1]["back"]
+    assert (np.diff(by_leader[:8]) > 0).all()
 
 
 def test_ratios_that_differ_from_ball_to_ball_give_the_springs_for_one_strike():

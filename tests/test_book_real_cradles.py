@@ -425,6 +425,14 @@ def test_strikers_one_by_one():
         assert drawn == pytest.approx([speed for speed in v if abs(speed) > 0.02], abs=2e-3)
 
 
+def test_one_strike_is_fitted_in_six_ways_that_predict_different_things():
+    for law in ("three ratios, e", "spheres, three gaps, A"):
+        assert (law, "apart", "one, 7", "4") not in FITS
+        sets = [FITS[law, "apart", f"one, {k}", "4"] for k in range(1, 7)]
+        chi = [float(row["chi_two"]) for row in sets]
+        assert max(chi) > 5 * min(chi)
+
+
 def test_gaps_and_not_ratios_predict_the_third_release():
     film, error = (100 * x for x in first_strikes(4)[3])
     lines = re.findall(r"(?m)^\d +(.*)$", CHAPTER.printed("third-code").replace("−", "-"))
