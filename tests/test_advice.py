@@ -34,7 +34,9 @@ from cradle.advice.measured import evidence, measured_chain, rows
 
 #: Numbers of the table may come from another version of SciPy, and errors near rounding vary.
 SLACK, ROUNDING = 2.0, 2.0**-50
-LOSSY, LOST = (Chain([1, 1, 1], [1, 0, 0], e) for e in (0.9, 0.45))
+LOSSY, LOST = (Chain([1, 1, 1], [1, 0, 0], e) for e in (0.9, 0.01))
+#: Its last contact is slower than the first by far: for its restitution springs have no viscosity.
+HEAVY = Chain([1, 1, 3000, 3000], [1, 0, 0, 0], [0.9, 0.9, 0.4])
 THREE, FIVE, LIGHT = (striking(ELASTIC[name]) for name in ELASTIC)
 ABCCA, TABLES = paper_chain("ABCCA", excess="saturate")
 
@@ -56,13 +58,12 @@ def between(number, spread, seed=7):
 
 
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-5, 1e-8])
-@pytest.mark.parametrize("name", [*ELASTIC, "ABCCA"])
+@pytest.mark.parametrize("name", ELASTIC)
 def test_the_cheapest_setting_of_the_table(name, accuracy):
     """Springs against velocities from another program, too; its last digit is the ninth."""
-    chain = ABCCA if name == "ABCCA" else striking(ELASTIC[name])
-    group, law = ("energy", "EnergyDistribution") if name == "ABCCA" else ("springs", "SpringChain")
+    chain = striking(ELASTIC[name])
     advice = recommend(chain, accuracy=accuracy, stiffness=1.0)
-    fit = [row for row in read("benchmarks.csv", group=group, model=f"{law}, Hertz", chain=name)
+    fit = [row for row in read("benchmarks.csv", group="springs", model="SpringChain, Hertz", chain=name)
            if float(row["numerical_error"]) <= accuracy]  # fmt: skip
     row = min(fit, key=lambda row: float(row["time_ratio"]))
     assert advice.setting == row["setting"]
@@ -70,12 +71,9 @@ def test_the_cheapest_setting_of_the_table(name, accuracy):
     assert advice.seconds == pytest.approx(1e-6 * float(row["microseconds"]), rel=0.5)
     assert advice.measured_on == (name,)
     setting = float(row["setting"].replace(",", "").split()[1])
-    if name == "ABCCA":
-        assert advice.model == EnergyDistribution(1.0, rtol=setting)
-    else:
-        assert advice == recommend(chain, accuracy=accuracy, stiffness=1.0, model_error=0.0)
-        assert advice.model == SpringChain(1.0, accuracy=setting)
-        assert off(chain, advice, HERTZ[name]) <= SLACK * advice.numerical_error + 1e-9
+    assert advice == recommend(chain, accuracy=accuracy, stiffness=1.0, model_error=0.0)
+    assert advice.model == SpringChain(1.0, accuracy=setting)
+    assert off(chain, advice, HERTZ[name]) <= SLACK * advice.numerical_error + 1e-9
 
 
 def test_springs_among_the_measured_chains():
@@ -127,15 +125,15 @@ def test_events_against_fifty_digits():
 
 def test_losses_and_no_ratios():
     """Against small steps of time, and at more digits against a finer tolerance."""
-    advice = recommend(LOST, "impulses", accuracy=1e-3, stiffness=1.0)
+    advice = recommend(HEAVY, "impulses", accuracy=1e-3, stiffness=1.0)
     assert isinstance(advice.model, EnergyDistribution)
-    balls = LOST.masses / LOST.masses[0], LOST.velocities, LOST.restitution
+    balls = HEAVY.masses, HEAVY.velocities, HEAVY.restitution
     steps = [strike(*balls, count)[0] for count in (1000, 2000)]
     answer, own = 2 * steps[1] - steps[0], np.abs(steps[1] - steps[0]).max()
     assert own < 1e-3
-    assert off(LOST, advice, answer) <= 1e-3 + own
+    assert off(HEAVY, advice, answer) <= 1e-3 + own
     for m, rng in between(4, 1.15):
-        chain = striking(m, [0.45, *uniform(rng, 0.3, 1.0, len(m) - 2)])
+        chain = striking(m, [0.01, *uniform(rng, 0.3, 1.0, len(m) - 2)])
         finer = collide(chain, EnergyDistribution(rtol=1e-12)).velocities
         for accuracy in (1e-2, 1e-5):
             advice = recommend(chain, accuracy=accuracy, stiffness=1.0)
@@ -145,8 +143,9 @@ def test_losses_and_no_ratios():
 
 def test_losses_that_viscous_springs_can_have():
     """Forces too; each pair alone parts with its restitution.  By SciPy's integrator."""
-    for m, rng in between(6, 5.0):
-        e = uniform(rng, 0.85, 1.0, len(m) - 1)
+    paper = paper_chain("ABCCA", speed=0.3)[0]
+    given = [(m, uniform(rng, 0.85, 1.0, len(m) - 1)) for m, rng in between(6, 5.0)]
+    for m, e in [*given, (paper.masses, paper.restitution)]:
         chain = striking(m, e, 0.3)
         loss = viscosity_from(e, speed=0.3, masses=m, stiffness=50.0)
         answer = integrated(m, chain.velocities, k=50.0, loss=loss)
@@ -156,19 +155,18 @@ def test_losses_that_viscous_springs_can_have():
             assert advice.model == SpringChain(50.0, viscosity=loss, accuracy=advice.model.accuracy)
             after = eval(advice.call).velocities
             assert np.abs(after - answer).max() <= 0.3 * accuracy
-            assert (advice.model_error, "five lossy" in advice.measured_on) == (None, True)
-            assert advice.numerical_error * 10 <= accuracy
-    five = striking([1] * 5, 0.49)
+            around = "five lossy" in advice.measured_on
+            assert (advice.model_error, around) == (None, m is not paper.masses)
+            assert not around or advice.numerical_error * 10 <= accuracy
+    five = striking([1] * 5, 0.02)
     law = recommend(five, stiffness=1)
     springs, energy = collide(law.chain, law.model), collide(five, EnergyDistribution())
     apart = f"balls by {springs.velocities[-1] - energy.velocities[-1]:.2f} of the closing speed"
-    assert apart.replace("0.", ".") in recommend(striking([1] * 5, 0.47), stiffness=1).reason
-    with pytest.raises(ValueError, match=r"restitution\[0\] = 0.45; must lie in \[0.479, 1\]"):
+    assert apart.replace("0.", ".") in recommend(striking([1] * 5, 0.01), stiffness=1).reason
+    with pytest.raises(ValueError, match=r"restitution\[0\] = 0.01; must lie in \[0.014, 1\]"):
         recommend(LOST, "forces", stiffness=1)
-    heavy = striking([1, 1, 200, 200], [1, 1, 0.6])  # slower than the first by far
     with pytest.raises(ValueError, match=r"viscosity\[2\] = .*; must be at most"):
-        recommend(heavy, "forces", stiffness=1)
-    assert isinstance(recommend(heavy, stiffness=1).model, EnergyDistribution)
+        recommend(HEAVY, "forces", stiffness=1)
 
 
 @pytest.mark.parametrize("name", list(ELASTIC))
@@ -214,7 +212,7 @@ def test_the_fastest_ball():
             assert len(advice.measured_on) == 1
             after = np.abs(collide(chain, advice.model).velocities)
             assert after.argmax() == np.abs(answer).argmax()
-    assert isinstance(recommend(ABCCA, "fastest ball", stiffness=1).model, EnergyDistribution)
+    assert isinstance(recommend(HEAVY, "fastest ball", stiffness=1).model, EnergyDistribution)
     chain = striking([1.0, 0.08, 2.16, 0.93, 0.84])
     advice = recommend(chain, "fastest ball")
     assert advice.measured_on == ()

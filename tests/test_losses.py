@@ -83,7 +83,7 @@ def test_a_part_of_a_swinging_row_has_its_part_of_the_inner_law():
 @pytest.mark.parametrize("exponent", [1, 1.5, 2.5])
 @pytest.mark.parametrize("u", [1e-3, 0.1, 0.7])
 def test_viscous_balls_part_as_contact_forces_say(exponent, u):
-    for viscosity in (1e-7, 1e-9):
+    for viscosity in (1e-5, 1e-7, 1e-9):
         balls = STEEL | {"exponent": exponent, "viscosity": viscosity}
         left, right = spring_velocities(velocities=[u, 0], **balls, accuracy=1e-9)
         assert ViscousLoss(**balls)(u) == pytest.approx((right - left) / u, abs=3e-9)
@@ -92,5 +92,5 @@ def test_viscous_balls_part_as_contact_forces_say(exponent, u):
 def test_a_viscous_ball_may_be_too_fast():
     law = ViscousLoss(2e-5, **STEEL)
     assert 0.5 < law(1e-2) < law(1e-3) < 1
-    with pytest.raises(ValueError, match=r"viscosity = 2e-05; must be at most \d.* at u = 1000"):
-        law(1000)
+    with pytest.raises(ValueError, match=r"viscosity = 2e-05; must be at most \d.* at u = 1e\+10"):
+        law(1e10)

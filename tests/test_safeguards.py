@@ -14,7 +14,7 @@ import pytest
 from delicate import CHAINS
 from plain import rooms, solve
 
-from cradle.kernel import cycles
+from cradle.kernel import collapse, cycles
 from cradle.kernel.state import FINISHED, NEVER, REFUSED, UNFINISHED, UNSOUND
 
 WRONG = "wrong"
@@ -117,6 +117,15 @@ def test_a_part_that_is_kept_is_never_zero():
     assert run(CHAINS[HELD_FAST].problem).status == FINISHED
     with pytest.raises(ZeroDivisionError):
         run(CHAINS[HELD_FAST].problem, kept=0.0)
+
+
+def test_balls_beside_larger_impulses_may_have_no_common_velocity():
+    """Their masses, divided by the parts that they keep, then sum up to zero: there is no limit."""
+    chain = CHAINS["a cycle of no mass"].problem
+    assert run(chain).status == FINISHED
+    without = changed(collapse, "common_velocity", "if mass.real == 0.0:", "if False:")
+    with pytest.raises(ZeroDivisionError):
+        run(chain, common_velocity=without)
 
 
 def test_balls_lighter_than_digits_can_tell_are_refused():

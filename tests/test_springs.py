@@ -214,7 +214,7 @@ def random_chains(seed, count, n, loss=0.0):
 @needs_numba
 @pytest.mark.parametrize(
     ("p", "loss"),
-    [(1.5, 0), (1.5, 0.5), (1.0, 0), (1.0, 0.2), (2.2, 0), (2.2, 0.4)],
+    [(1.5, 0), (1.5, 0.5), (1.5, 9), (1.0, 0), (1.0, 0.5), (1.0, 3), (2.2, 0), (2.2, 0.4)],
 )
 @pytest.mark.parametrize("n", [3, 5, 8])
 def test_accuracy_is_kept_on_random_chains(monkeypatch, p, loss, n):

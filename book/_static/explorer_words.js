@@ -58,7 +58,7 @@
 
   function noAnswer(status, setting) {
     if (status === "lossy")
-      return "Spheres that lose so much are not followed here: choose a restitution of 0.5 or more.";
+      return "Spheres that lose so much are not followed here: choose a restitution of 0.02 or more.";
     const many =
       explorer.law(setting) === "rule"
         ? `This hit takes more than ${explorer.EVENTS} events, more`

@@ -38,8 +38,8 @@ _REASONS = {
     "two of them, closing as fast as here, part with the restitution given; for another speed make "
     "the model anew. It takes the losses: advice.chain has restitution 1.",
     "energy": "The restitution is too low for viscous springs; the energy law shares losses out by "
-    "the energy that contacts store. How near it comes to real balls was not measured. At .49 "
-    "both can be had; they differ on the last of five equal balls by .21 of the closing speed.",
+    "the energy that contacts store. How near it comes to real balls was not measured. At .02 "
+    "both can be had; they differ on the last of five equal balls by .03 of the closing speed.",
     "outcome": "Restitution alone does not determine the impact; of the models that need no more, "
     "this one is nearest to Hertz springs. On the elastic chains measured it has the right fastest "
     "ball; on others it can be wrong.",

@@ -35,10 +35,11 @@ ENOUGH, COARSE, SPARE = 0.2, 0.5, 1.05
 HARD, LOST, SWING, WHOLE = 0.01, 0.022, 0.0027, 0.8
 # Kinks beyond two of each contact, and with leans radians, from which runs are compared.
 OFTEN, LONG = 4.0, 30.0
+STRONG = 0.5  # A from which on they are, as losses may open and press a contact at any node
 TRIALS = 16  # runs of a chain, each finer than the one before
 DAMPED = 0.25  # step times A times the square of a frequency, at most
 SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
-LONGEST, MOST_HUNT = 0.5, 1.5  # A, in contact times, and in one over the closing speed
+LONGEST, MOST_HUNT = 10.0, 10.0  # A, in contact times, and in one over the closing speed
 TINY = 1e-300  # the least depth, and one over the largest
 NORMAL = 2.0**-1022  # a smaller number has lost digits
 # The widest gap and the narrowest, in depths; the widest whose last digit is below this accuracy.
@@ -165,7 +166,7 @@ def judge(n, law, change, s, clock):
     swung = max(1.0, (0.75 if clock.lossy else 1.0) * SWING * radians / clock.hard)
     off = phase / clock.eta * math.sqrt(math.sqrt(swung))
     often = many > clock.often
-    compare = often or clock.leans > 0
+    compare = often or clock.leans > 0 or clock.lossy > STRONG
     told, ratio = math.inf, clock.coarser / clock.h
     if ratio > 0.0:
         told = (60.0 if clock.leans else 7.5) / (ratio * ratio * ratio * ratio - 1.0)
@@ -174,7 +175,7 @@ def judge(n, law, change, s, clock):
     if off <= 1.0 and compare:
         error = max(error, told, 0.25 * clock.told)
     clock.told = told if ratio > 0.0 or (clock.leans and (often or radians > LONG)) else 0.0
-    clock.error = law.accuracy * error
+    clock.error = law.accuracy * max(error, FAINT if clock.lossy else 0.0)  # what counts as none
     if not error > 1.0:
         return False
     finer = max(off * SPARE, 1.5) if compare else off * SPARE

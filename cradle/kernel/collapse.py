@@ -36,7 +36,10 @@ def change_of(c, low, high, ball, contact):
 
 @apart
 def common_velocity(first, last, left_part, right_part, ball, contact):
-    """Leave in x of contacts first..last the impulses that bring their balls to one velocity."""
+    """Leave in x of contacts first..last the impulses that bring their balls to one velocity.
+
+    Tells whether there is one: beside neighbours with larger impulses, masses are below zero.
+    """
     # A steady neighbour with h times the impulse of the contact beside it makes the ball between
     # act as one of mass m / (1 - h); the parts are these 1 - h.
     mass = momentum = speed = ZERO  # velocities count from that of the first ball
@@ -51,12 +54,15 @@ def common_velocity(first, last, left_part, right_part, ball, contact):
         momentum = plus(momentum, times(b.x, speed))
         if i <= last:
             speed = minus(speed, contact[i].u)
+    if mass.real == 0.0:
+        return False
     common = over(momentum, mass)
     impulse = speed = ZERO
     for c in range(first, last + 1):
         impulse = plus(impulse, times(ball[c].x, minus(speed, common)))
         speed = minus(speed, contact[c].u)
         contact[c].x = impulse
+    return True
 
 
 def last_chatter(c, step, n, state):

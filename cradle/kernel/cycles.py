@@ -108,7 +108,8 @@ def limit(cluster, number, state):
     left, first, last, right = cluster.left, cluster.first, cluster.last, cluster.right
     left_part = kept_part(first - 1, first, first > left, contact, memory)
     right_part = kept_part(last + 1, last, last < right, contact, memory)
-    common_velocity(first, last, left_part, right_part, ball, contact)
+    if not common_velocity(first, last, left_part, right_part, ball, contact):
+        return 0.0, math.inf, 0.0
     to_come = done = ZERO
     size = 0.0
     for c in range(first, last + 1):

@@ -154,8 +154,11 @@ def kick_lossy(h, low, high, s):
 
 
 def bring(a, time, u, h):
-    """Let the balls of an open contact fly freely for this time, at this closing speed."""
-    a.d += time * u
+    """Let the balls of an open contact fly freely for this time, at this closing speed.
+
+    One that was left pressed, or closed since, closed too slowly to be noticed: it rests.
+    """
+    a.d = min(a.d + time * u, max(a.d, 0.0))
     a.f = a.g = a.push = a.held = a.grip = a.lag = a.bend = a.bent = 0.0
     a.y, a.last = a.d, a.d - h * u
 
@@ -312,16 +315,17 @@ def run(n, law, effort, s, clock, record):
                 return REFUSED, effort
         else:
             kinks, stiff = step(p, h, low, high, s)
-        if kinks > 0:
-            pay(n, p, h, kinks, slow, lossy, s)
         clock.top, clock.stiff = max(clock.top, stiff), stiff
         a, z = s[low], s[high - 1]
-        if high < n - 1 and z.f > 0.0 and (z.y if lossy else z.d) > slow:
+        # Before kinks are paid: one that is watched from now on gets its part, but of no past.
+        if high < n - 1 and z.f > 0.0 and (lossy or z.d > slow):
             bring(s[high], time - s[high].seen, right - s[high + 1].v, h)
             high += 1
-        if low > 0 and a.f > 0.0 and (a.y if lossy else a.d) > slow:
+        if low > 0 and a.f > 0.0 and (lossy or a.d > slow):
             low -= 1
             bring(s[low], time - s[low].seen, s[low].v - left, h)
+        if kinks > 0:
+            pay(n, p, h, kinks, slow, lossy, s)
         if lossy:
             kick_lossy(h, low, high, s)
         ended = parted(n, slow, s, clock) if leans else settled(slow, low, high, s)

@@ -183,7 +183,7 @@ def turning(a, early):
     at, change = 0.5, 0.0
     d = move = 0.0
     for _ in range(5):
-        at = min(max(at - change, -0.25), 1.25)
+        at = min(max(at - change, -1.0), 1.25)
         move = a.before + at * (a.bend + 0.5 * at * a.jerk)
         d = a.last + at * (a.before + at * (0.5 * a.bend + at * a.jerk / 6.0))
         slope = move + early * (a.bend + at * a.jerk)
@@ -212,7 +212,7 @@ def pay(n, p, h, kinks, slow, lossy, s):
         again, d, early, at, end, slant = False, a.d, 0.0, 0.0, 0.0, 0.0
         if lossy:
             d, move, early = a.y, a.y - a.last, a.early / h
-            again = a.f > 0.0 and a.last > 0.0 and a.before < 0.0 and early > 0.0
+            again = a.f > 0.0 and a.last > 0.0 and early > 0.0
             if again or (a.f == 0.0 and early > 0.0):
                 at, end, slant = turning(a, early)
         j = x = 0.0

@@ -137,13 +137,13 @@ def spring_velocities(
     stiffness, viscosity, gaps : array_like, shape (..., N - 1) or ()
         k, N/m^p, above 0; A, s, 0 for an elastic contact; and the distance of two balls before the
         impact, m.  With the speed u and the reduced mass m of the contact that closes fastest, the
-        unit of compression is L = (m u^2 / k)^(1 / (p + 1)).  A is at most .3 L / u, and a gap
+        unit of compression is L = (m u^2 / k)^(1 / (p + 1)).  A is at most 10 L / u, and a gap
         matters if it is not small beside L.  A gap below zero, a lean, says how far strings press
         two balls together at rest, at most L; they pull until no contact pushes and none closes.
     exponent : float
         p, from 1 to 10.
     damping : {"viscoelastic", "hunt-crossley"}
-        The law of the losses.  By Hunt and Crossley A is in s/m, at most 0.9 / u.
+        The law of the losses.  By Hunt and Crossley A is in s/m, at most 10 / u.
     accuracy : float
         Largest estimated error of a velocity over the fastest closing speed, 1e-12 to 0.02.
     progress : bool

@@ -139,7 +139,7 @@ class ViscousLoss:
 def _kept(exponent: float) -> Any:
     """Return e over the square root, in which it is smooth, of the viscosity over the largest."""
     law: Any = np.vectorize(lambda root: parting(LONGEST * root**2, exponent))
-    return Chebyshev.interpolate(law, 24, [0.0, 1.0])
+    return Chebyshev.interpolate(law, 48, [0.0, 1.0])
 
 
 def viscosity_from(
@@ -171,7 +171,7 @@ def viscosity_from(
     Raises
     ------
     ValueError
-        If a value is wrong, or a restitution so low (below .479 for viscoelastic spheres, .488 by
+        If a value is wrong, or a restitution so low (below .014 for viscoelastic spheres, .1 by
         Hunt and Crossley) that it takes more viscosity than contacts may have.
 
     References

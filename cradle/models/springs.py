@@ -22,10 +22,10 @@ def refused(clock: Any, law: Law, place: Sequence[int], chain: Springs) -> Value
     """Return the error that says why the kernel refuses a chain, one of a batch at this place."""
     unit, part = f"(m u^2 / k)^(1 / {law.p + 1:g})", limits.LONGEST
     of = f"{clock['length']:.3g} m, that is {unit} of the fastest closing"
-    late = f"must be at most {part * clock['length'] / clock['speed']:.3g} s, {part} {unit} / u"
+    late = f"must be at most {part * clock['length'] / clock['speed']:.3g} s, {part:g} {unit} / u"
     if law.hunt:
         part = limits.MOST_HUNT
-        late = f"must be at most {part / clock['speed']:.3g} s/m, {part} over the speed"
+        late = f"must be at most {part / clock['speed']:.3g} s/m, {part:g} over the speed"
     widest = min(limits.WIDEST, limits.BLURRED * law.accuracy)
     least = f"must be at least {limits.SMALLEST} of the"
     at = int(clock["place"])
