@@ -237,7 +237,9 @@ def test_energy_that_the_example_loses():
     ends = [float(x) for x in re.findall(r"=(-?[.\d]+)(?=\\text|\\\\)", told)]
     tau_2, tau_3 = trace.path_impulses.T  # g is the final tau_2
     right = [*tau_2[1:3], *tau_2[2:4], 0.5, tau_3[3], 0.7, tau_3[4], trace.velocities[0]]
-    right += [trace.path[2, 1], *trace.velocities[1:], *np.divide([*parts, lost], 1000)]
+    right += [trace.path[2, 1], *trace.velocities[1:]]
+    right += [*trace.path_impulses.sum(axis=1)[[2, 4]]]  # events 1 and 2 in the opening figure
+    right += [*np.divide([*parts, lost], 1000)]
     assert ends == pytest.approx(right, abs=5.1e-4)
 
 
