@@ -8,8 +8,11 @@ import pytest
 import real_cradles
 from chains import HERTZ
 from chapters import Chapter, drawn, floats, number, panel
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from truth import solve
+
+from cradle import Chain, Pendulums, SpringChain, swing
 
 CHAPTER = Chapter("toy")
 INVENTORY = Chapter("extremes_inventory").glued
@@ -134,11 +137,75 @@ def test_first_stroke_of_the_minute_of_steel(row, gap):
         over = x >= glued("steel-over")
         assert max(ball_2[(x > 40) & ~over]) < 0 < min(ball_2[over])
     if not gap:  # the pale lines go on where the others end
-        pale = drawn("toy")["fig-toy-steel"].axes[row].collections[0].get_segments()
+        pale, again = (
+            one.get_segments() for one in drawn("toy")["fig-toy-steel"].axes[row].collections
+        )
         ends = [line.get_xydata()[-1] for line in drawn("toy")["fig-toy-steel"].axes[row].lines]
         assert np.array([way[0] for way in pale]) == pytest.approx(np.array(ends))
         assert {way[0, 0] for way in pale} == {glued("steel-thin")}
         assert glued("steel-parts") > 0.1
+        # Two runs begin at one place and part.
+        assert np.array([way[0] for way in again]) == pytest.approx(np.array(ends), abs=0.02)
+        apart = np.abs(np.array(pale) - np.array(again))[..., 1].max()
+        assert 0.1 < apart <= glued("steel-parts") + 0.006
+
+
+def by_energy(row):
+    """How far ball 5 swings out, from the other balls: the squares of all swings keep their sum."""
+    lines = drawn("toy")["fig-toy-steel"].axes[row].lines
+    return np.sqrt(1 - (np.array([line.get_ydata() for line in lines]) ** 2).sum(axis=0))
+
+
+def test_ball_5_of_steel():
+    touching, *gaps = (by_energy(row) for row in range(3))
+    last = int(glued("five-until")) // 2 + 1  # the first one, and each second
+    assert last == len(touching) - 1
+    least = touching[:last].min(), np.min(gaps)
+    for name, ball in zip(("touching", "gaps"), least, strict=True):
+        assert 0 < ball - glued(f"five-{name}") < 0.01
+    # The rule has ball 5 far below.
+    assert strokes(80, [1, 0, 0, 0, 0])[78, 4] < 0.8
+
+
+def test_two_runs_with_gaps_agree():
+    turns = (np.arange(100) + 1) * PERIOD / 2
+    run = swing(
+        Chain([MASS] * 5, [0] * 5), SpringChain(STIFFNESS, accuracy=1e-5),
+        [-BACK, 0, 0, 0, 0], turns, pendulums=Pendulums(length=LENGTH, gaps=0.8e-6),
+    )  # fmt: skip
+    size = np.hypot(run.positions, run.velocities * math.sqrt(LENGTH / G)) / BACK
+    found = np.copysign(size, run.positions)[::2, :4].T
+    shown = [line.get_ydata() for line in drawn("toy")["fig-toy-steel"].axes[1].lines]
+    assert 0 < np.abs(found - shown).max() <= glued("steel-agree") <= 3e-4
+
+
+def test_the_second_stroke_of_steel():
+    """Five balls on strings that push by Hertz's law, by SciPy: when ball 5 strikes, and into what."""
+    w2, unit = G / LENGTH, (MASS * STRIKE**2 / STIFFNESS) ** 0.4
+    x, v = np.zeros(5), np.eye(5)[0]  # in units of compression, of the striker's speed
+    w2 *= (unit / STRIKE) ** 2
+
+    def rate(_, y):
+        push = np.concatenate([[0], np.maximum(y[:4] - y[1:5], 0) ** 1.5, [0]])
+        return np.append(y[5:], -np.diff(push) - w2 * y[:5])
+
+    def run(x, v, time, **options):
+        return solve_ivp(rate, (0, time), [*x, *v], rtol=1e-9, atol=1e-10, max_step=0.05, **options)
+
+    y = run(x, v, 12).y[:, -1]
+    assert (np.diff(y[:5]) > 0).all()  # all apart
+    free, w = math.pi / math.sqrt(w2) - 24, math.sqrt(w2)  # on until before the second stroke
+    x = y[:5] * math.cos(w * free) + y[5:] / w * math.sin(w * free)
+    v = y[5:] * math.cos(w * free) - y[:5] * w * math.sin(w * free)
+    meet = [lambda _, y, k=k: y[k] - y[k + 1] for k in (0, 3)]
+    for one in meet:
+        one.direction = 1
+    meet[1].terminal = True
+    second = run(x, v, 40, events=meet)
+    first, last = (times[0] for times in second.t_events)
+    assert glued("steel-late") == pytest.approx(1e3 * (last - first) * unit / STRIKE, abs=0.006)
+    pressed = second.y[2, -1] - second.y[3, -1]
+    assert glued("steel-pressed") == pytest.approx(1e6 * unit * pressed, abs=0.51)
 
 
 def gapped(share):
@@ -149,7 +216,7 @@ def gapped(share):
 
 def test_gaps_of_a_part_of_the_compression():
     touching = gapped(0)
-    for name, share in (("tenth", 0.1), ("whole", 1.0)):
+    for name, share in (("hundredth", 0.01), ("tenth", 0.1), ("whole", 1.0)):
         CHAPTER.tells({f"gap-{name}-moves": np.abs(gapped(share) - touching).max()}, off=6e-4)
         assert glued(f"gap-{name}") == pytest.approx(share * glued("compression"), rel=0.01)
     assert glued("gap-whole-moves") == pytest.approx(
