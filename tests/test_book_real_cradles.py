@@ -68,6 +68,13 @@ def test_two_strikers_that_come_as_one():
     CHAPTER.tells({"still": 1e6 * UNIT * still})
     left, right = spheres([slower, 0], [0], GAPS[3]) / slower
     CHAPTER.tells({"loss-e": right - left})
+    # Two balls press each other by (5/8)^0.4 units, which grow as v^(4/5).
+    deepest = 0.625**0.4
+    CHAPTER.tells(
+        {"pressed": 1e6 * UNIT * deepest, "pressed-slow": 1e6 * UNIT * deepest * slower**0.8}
+    )
+    parts = [float(x) for x in GLUED["part"].split(", ")]
+    assert parts == pytest.approx([100 * gap / deepest for gap in GAPS[:3]], abs=0.51)
 
 
 def test_chi_square_ball_by_ball():
@@ -294,6 +301,7 @@ def test_gaps_and_the_distance_of_the_strikers():
             v = spheres([slower] * 3 + [0, 0], [30, between, 0, gap], loss) / slower
             return (real_cradles.misfits(lambda _: v, film, (3,)) ** 2).sum()
 
+        assert 25 < float(TOLD["closer-at"]) < 35  # some thirty
         at = float(TOLD["closer-at"]) / unit
         assert left(at) < min(left(0.9 * at), left(1.1 * at))  # a minimum
         assert gammaincc(1.5, left(at) / 2) > 0.05
@@ -326,7 +334,7 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
     assert min(rows, key=lambda row: row["both"]) not in far
     for k, shown in zip((2, 3, 4), GLUED["far-gaps"].split(", "), strict=True):
         of_all = [1e3 * unit * row[f"gap_{k}"] for row in far]
-        assert shown.endswith(f" µm behind ball {k}")
+        assert shown.endswith(f" µm for gap {k}‑{k + 1}")
         ends = [float(x) for x in shown.split(" µm")[0].split(" to ")]
         assert ends == pytest.approx([min(of_all), max(of_all)], abs=0.06)
     edges = (0.05, 0.095, 0.175, 0.4, 1.1, 9)
@@ -419,10 +427,60 @@ def test_strikers_one_by_one():
             push = (1 + e) / 2 * (v[c - 1] - v[c])
             v[c - 1 : c + 1] = v[c - 1] - push, v[c] + push
         stages.append(v)
-    for ax, v in zip(CHAPTER.figures["fig-real-one-by-one"].axes, stages, strict=True):
+    show_as_arrows(stages, "fig-real-one-by-one")
+
+
+def show_as_arrows(stages, figure):
+    for ax, v in zip(CHAPTER.figures[figure].axes, stages, strict=True):
         arrows = [(one.xy[0] - one.xyann[0]) for one in ax.texts if hasattr(one, "xyann")]
         drawn = [(length - 0.4 * np.sign(length)) / 0.5 for length in arrows]
         assert drawn == pytest.approx([speed for speed in v if abs(speed) > 0.02], abs=2e-3)
+
+
+def struck_twice(between):
+    """Velocities after the hit of the first of two strikers, and after both: in this order."""
+    slower = real_cradles.SLOWER
+    first = spheres([slower, 0, 0, 0], [0, *GAPS[1:3]], GAPS[3]) / slower
+    both = spheres([slower] * 2 + [0] * 3, [between, 0, *GAPS[1:3]], GAPS[3]) / slower
+    return [1, *first], both
+
+
+def test_two_strikers_one_by_one():
+    """The arrows, by the fitting script's spheres."""
+    show_as_arrows([[1, 1, 0, 0, 0], *struck_twice(real_cradles.APART)], "fig-real-two")
+
+
+def test_the_rebound_of_ball_1_against_the_distance_of_two_strikers():
+    """It rises and falls, and is that of the film at two distances, which lie where gaps pass."""
+    ax, unit = CHAPTER.figures["fig-real-rebound"].axes[0], 1e3 * UNIT  # mm
+    curve = next(line for line in ax.get_lines() if line.get_label() == "ball 1").get_xydata()
+    for distance, rebound in curve[::20]:
+        assert rebound == pytest.approx(-100 * struck_twice(distance / unit)[1][0], abs=5e-3)
+    peak = curve[:, 1].argmax()
+    assert (np.diff(curve[: peak + 1, 1]) > 0).all()
+    assert (np.diff(curve[peak:, 1]) < 1e-3).all()
+    film, error = (100 * x[0] for x in first_strikes(4)[2])
+    near, far = (float(GLUED[f"rebound-{x}"]) for x in ("near", "far"))
+    found = [np.interp(x, curve[:, 0], curve[:, 1]) for x in (near, far)]
+    assert found == pytest.approx([-film] * 2, abs=0.1)
+    assert near < curve[peak, 0] < far
+    (band,) = ax.patches
+    seen = band.get_extents().transformed(ax.transData.inverted())
+    assert (seen.y0, seen.y1) == pytest.approx((-film - 2 * error, -film + 2 * error), abs=1e-6)
+    ring = next(line for line in ax.get_lines() if line.get_marker() == "o").get_xydata()[0]
+    own = struck_twice(real_cradles.APART)[1][0]
+    assert ring == pytest.approx([real_cradles.APART * unit, -100 * own], abs=5e-3)
+    bars = [line.get_xdata() for line in ax.get_lines() if line.get_linewidth() == 4]
+    for (low, high), inside in zip(bars, (near, far), strict=True):
+        assert low < inside < high
+    for row in numbers("film_distances.csv")[:-1]:
+        distance = unit * row["apart"]
+        passes = gammaincc(2, row["three"] / 2) > 0.05 and gammaincc(1.5, row["both"] / 2) > 0.05
+        assert passes == any(low < distance <= high for low, high in bars)
+    # Far apart, ball 1 meets ball 2 alone: a pair.
+    (_, ball_2, *_), _ = struck_twice(1.0)
+    left, _ = spheres([real_cradles.SLOWER * (1 - ball_2), 0], [0], GAPS[3]) / real_cradles.SLOWER
+    assert curve[-1, 1] == pytest.approx(-100 * (left + ball_2), abs=0.02)
 
 
 def test_one_strike_is_fitted_in_six_ways_that_predict_different_things():
@@ -452,6 +510,11 @@ def test_gaps_and_not_ratios_predict_the_third_release():
         assert float(shifted.split()[1 + k]) == pytest.approx(off @ off, rel=0.01)
         assert law == pytest.approx(100 * model(3), abs=6e-3)
     assert (np.abs(gaps - film)[:2] < 0.5 * error[:2]).all()
+    shifted = real_cradles.misfits(MODELS[2], first_strikes(4), (3,))
+    CHAPTER.tells(
+        {"gap-three": (np.abs(gaps - film) / error)[2], "gap-three-shifted": abs(shifted[2])},
+        off=0.02,
+    )
     assert (np.abs(ratios - film)[:2] > 5 * error[:2]).all()
     CHAPTER.tells({"slow-off": np.abs(ratios - film)[:2].max(), "slow-error": error[:2].max()})
     assert f"{np.abs(ratios - film)[:2].min():.1f}" == GLUED["slow-off"]  # both

@@ -180,7 +180,7 @@ def test_two_runs_with_gaps_agree():
 
 
 def test_the_second_stroke_of_steel():
-    """Five balls on strings that push by Hertz's law, by SciPy: when ball 5 strikes, and into what."""
+    """Five balls on strings that push by Hertz's law, by SciPy: when ball 5 strikes a row."""
     w2, unit = G / LENGTH, (MASS * STRIKE**2 / STIFFNESS) ** 0.4
     x, v = np.zeros(5), np.eye(5)[0]  # in units of compression, of the striker's speed
     w2 *= (unit / STRIKE) ** 2
