@@ -113,7 +113,7 @@ def test_fig_beyond_front():
     assert len(written) == 3
     assert len(lines) == 6
     for ratio, fitted, marks in zip((0, 0.3, 0.45), lines[::2], lines[1::2]):
-        q = written[str(ratio) if ratio else "ratio 0"]
+        q = written[f"ratio {ratio:g}"]
         leaders = [outcomes(*struck(n), 0.99, ratio).velocities[-1] for n in lengths]
         np.testing.assert_array_equal(marks, np.transpose([lengths, leaders]))
         # The same part from ball to ball, whatever the length.
@@ -179,6 +179,17 @@ def test_fig_beyond_stability():
     assert column([row for row in finite if row["restitution"] > 0.9], "spread").max() < 2e-5
     assert (column(finite, "fast_least") == column(finite, "fast_most")).all()
     assert CHAPTER.glued["fast-same"] == "all"
+    front = [row for row in finite if row["restitution"] > 0.9 and row["ratio"] > 0]
+    assert {*column(front, "fast_least", "fast_most").ravel()} == {
+        number(CHAPTER.glued["fast-near"])
+    }
+    endless = [row for row in find("losses") if row["collapsed"]]
+    assert {(row["balls"], row["restitution"]) for row in endless} == {(100, 0.9)}
+    assert number(CHAPTER.glued["endless"]) == len(endless)
+    CHAPTER.tells({"spread-endless": column(endless, "spread").max()})
+    pairwise = find("losses", restitution=0.9, ratio=0.0)
+    unsafe = min(row["balls"] for row in pairwise if row["kept"] < row["balls"])
+    assert number(CHAPTER.glued["pairwise-unsafe"]) == unsafe
     assert number(CHAPTER.glued["loss-rows"]) == len(finite)
     fewer = [row for row in rows_99 if row["kept"] < row["balls"]]
     assert number(CHAPTER.glued["unsafe"]) == min(column(fewer, "balls")) == 20
@@ -190,6 +201,7 @@ def test_fig_beyond_stability():
     off = np.abs(after / after[0] - 1).max(axis=0)
     assert off[-1] < 1e-4
     assert off[1:-2].max() > 1e-3
+    CHAPTER.tells({"slow-change": 100 * off[1:-2].max()})
 
 
 def test_fig_beyond_springs():
@@ -197,6 +209,9 @@ def test_fig_beyond_springs():
     along, tail = CHAPTER.figures["fig-beyond-springs"].axes
     rough = CHAPTER.glued["along-rough"].replace(" and", ",").split(", ")
     assert rough == [f"{a:.2f}" for a in points(along)[0][:, 1]]
+    end = CHAPTER.glued["end-hertz"].replace(" and", ",").split(", ")
+    row_40 = find("springs", exponent=1.5, balls=40.0)[0]
+    assert end == [f"{row_40[name]:.3f}" for name in ("third_last", "second_last", "last")]
     spheres = collide(Chain(*struck(40), 1), SpringChain(1.0)).velocities
     tried = np.linspace(0, 0.5, 500_001)
     rows = find("springs", exponent=1.5)
@@ -206,7 +221,9 @@ def test_fig_beyond_springs():
     expected = spheres, np.concatenate([ends(best)[:1], np.zeros(5)])
     for k, (v, off) in enumerate(zip(expected, (0, 2e-4), strict=True)):
         np.testing.assert_allclose(points(tail)[k][:, 1], v[:6], rtol=0, atol=off)
-    CHAPTER.tells({"leader-asks": best, "ratio-three": by_leader[0]})
+    assert rows[2]["balls"] == 5
+    named = {"leader-asks": best, "ratio-three": by_leader[0], "leader-five": by_leader[2]}
+    CHAPTER.tells(named)
     CHAPTER.tells({"striker-hertz": spheres[0], "striker-ratio": ends(best)[0]})
     assert number(CHAPTER.glued["back-hertz"]) == (spheres < -0.01).sum() == rows[-1]["back"]
     assert (np.diff(by_leader[:8]) > 0).all()
@@ -225,7 +242,7 @@ def test_ratios_that_differ_from_ball_to_ball_give_the_springs_for_one_strike():
 
 
 def test_a_leader_predicted_from_shorter_rows():
-    """Exercise 2: what 20 and 40 balls say of 160."""
+    """The exercise: what 20 and 40 balls say of 160."""
     names = "leader-20", "leader-40", "kept", "guess", "solved"
     few, more, kept, guess, solved = (float(CHAPTER.glued[name]) for name in names)
     after = solve([1] * 20, struck(20)[1].tolist(), 0.99, 0.3, number=float).velocities
