@@ -160,6 +160,10 @@ def test_fig_extremes_shortest_as_drawn():
     many = min(n for e, n in least.items() if e > 0.6)
     assert (told["least"], told["many"]) == (said(min(least.values())), said(many))
     assert told["percent"] == f"{100 * max(float(r['largest']) for r in rows):.1g}"
+    worst = max(rows, key=lambda row: float(row["largest"]))
+    assert told["percent-e"] == worst["restitution"] == "0.68"
+    near = [float(r["largest"]) for r in rows if float(r["restitution"]) >= float(told["last-e"])]
+    assert told["percent-near"] == f"{100 * max(near):.1g}"
     for name, low in ("last", 0), ("last-near", float(told["last-e"])):
         most = max(float(r["last"]) for r in rows if float(r["restitution"]) >= low)
         assert told[name] == said(most, 1)
@@ -212,9 +216,15 @@ def test_fig_extremes_jump_as_drawn():
         for moves, after in (line[0], line[10], line[-1]):
             row = [1] * 5, [1, 0, 0, moves, -1], "0.98", "0.15"
             with localcontext(prec=50):
-                right = solve(*row, number=lambda x: Decimal(str(x))).velocities
+                found = solve(*row, number=lambda x: Decimal(str(x)))
+            right = found.velocities
             assert after == pytest.approx(float(right[ball]) * (1 if ball else -1), abs=1e-9)
             ends[ball, moves], left[moves] = right[ball], float(sum(v * v for v in right))
+            if not moves:
+                started = [
+                    contact for kind, contact in found.events if kind == "maximum_compression"
+                ]
+                assert said(len(started)) == CHAPTER.glued["ends-hits"]
     CHAPTER.tells({"ends-lost": 50 * (2 - left[0.0])}, off=0.5)
     five, one = (line[:, 1] for line in points(ax, 13))  # on springs: alike at rest, no step
     assert five[6] == pytest.approx(one[6], abs=1e-6)
