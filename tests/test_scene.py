@@ -4,6 +4,7 @@ import importlib.util
 import math
 import re
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -494,6 +495,16 @@ def test_the_recipe_tells_where_the_energy_is():
     rows = stored("costs", how="mended", setting="fine", pulled=1)
     times = [1e3 * float(row["seconds"]) for row in rows]
     assert chapter.glued["milliseconds"] == f"{min(times):.0f} to {max(times):.0f}"
+    rows = stored("costs", how="as it is", setting="fine", pulled=1)
+    times = [1e3 * float(row["seconds"]) for row in rows]
+    assert chapter.glued["bare"] == f"{min(times):.0f} to {max(times):.0f}"
+    more = {}  # energy lost with the row, beyond that of pendulums alone
+    for name, setting in product(ENGINES, ("default", "refined")):
+        (alone,) = stored("strokes", run=name, how="no impacts", setting=setting, stroke=50)
+        kept = by_law(name, "springs, outer apart", setting, 1)[-1].sum()
+        more[name, setting] = 100 * (balls(alone).sum() - kept)
+    assert chapter.glued["more-hasty"] == f"{more.pop(('Chipmunk', 'default')):.0f}"
+    assert chapter.glued["more"] == f"{max(more.values()):.0f}"
 
 
 def test_the_figures_draw_the_tables():
