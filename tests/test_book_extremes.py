@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from chains import uniform
 from chapters import Chapter, floats, number, points, shows
+from families import JUDGED, family
 from page import said
 from problem import Problem
 from stored import read
@@ -286,6 +287,23 @@ def test_the_table_of_the_inventory():
     assert int(told["given-up"]) == sum(int(r["given up"]) for r in rows)
     assert int(told["not-judged"]) == sum(int(r["nobody knows"]) for r in rows)
     assert int(told["rest"]) == sum(int(r["left"]) for r in stored("finish"))
+
+
+def test_families_in_which_the_textbook_solves_in_the_place_of_the_loop():
+    """Most of two families and some of two others, as the inventory says."""
+    part = {}
+    for name in JUDGED:
+        faint = [
+            math.prod(small)
+            for problem in family(name, 300)
+            if (
+                small := [x for x in map(float, problem.forward + problem.backward) if 0 < x < 1e-4]
+            )
+        ]
+        part[name] = sum(product < 1e-11 for product in faint) / 300
+    assert len(part) == 11
+    assert {name for name, some in part.items() if some > 0.5} == {"tiny ratios", "small ratios"}
+    assert {name for name, some in part.items() if 0 < some < 0.5} == {"losses", "wide"}
 
 
 def test_the_thresholds_of_the_inventory():
