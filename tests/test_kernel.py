@@ -2,6 +2,7 @@
 
 import ast
 import builtins
+import contextlib
 import functools
 import logging
 import os
@@ -18,11 +19,13 @@ import numpy as np
 import pytest
 import tqdm
 from chains import random_chains, with_ends
+from families import JUDGED, family
 from kernels import needs_numba
 from plain import solve
 
 from cradle import (
     Chain,
+    ImpactNotCertified,
     ImpactNotFinished,
     ImpulseCorrelation,
     SequentialCollisions,
@@ -125,6 +128,25 @@ def test_compiled_and_plain_batches_are_equal_to_the_last_bit(plain, n):
     plain()
     for one, other in zip(outcomes(*arguments, excess="saturate"), compiled, strict=True):
         assert one.tobytes() == other.tobytes()
+
+
+@needs_numba
+@pytest.mark.parametrize("name", JUDGED)
+@pytest.mark.parametrize("count", [6, pytest.param(600, marks=pytest.mark.exhaustive)])
+def test_compiled_and_plain_agree_on_what_the_judge_is_asked(plain, name, count):
+    """Ties, zeros, light balls; a division by zero would be an error in plain work alone."""
+    finished = 0
+    for problem in family(name, count, seed=15):
+        answers = []
+        for on in (False, True):
+            plain(on)
+            with contextlib.suppress(ImpactNotFinished, ImpactNotCertified):
+                found = problem.solve(batch, excess="saturate", max_events=300)
+                answers.append(found.tobytes())
+        assert len(answers) != 1
+        assert answers[:1] == answers[1:]
+        finished += len(answers) == 2
+    assert finished > 0
 
 
 # --- what is compiled, and when -----------------------------------------------------------------
