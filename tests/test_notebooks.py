@@ -207,7 +207,7 @@ GIVEN = {
     "reading_table_2": "0.22 0.390 0.710 0.755",
     "observations": "0.15 0.71 0.9 0.95 0.99",
     "observations_film": "0.2 0.5",  # an error, a speed
-    "observations_half": "0.02 1.28 22.2 44.8",  # errors of a gap and of a scale; mm, grams
+    "observations_half": "1.28 22.2 44.8",  # 50 pixels over 39; mm, grams
     "ledger": "",
 }
 
