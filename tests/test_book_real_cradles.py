@@ -137,6 +137,22 @@ def test_fig_off_and_the_table_of_three_laws():
         assert all(abs(float(x) - y) < (0.06 if y < 30 else 0.51) for x, y in sums)
     assert len(table_of_sums) == len(FILE) + 1 == int(TOLD["laws"]) - 1  # and a softer touch
     APPENDIX.tells({"test": sums_of("ratios") / 4, "passed": sums_of("gaps") / 4})
+    # The sums of touching spheres, and the numbers of the two laws.
+    for name, law in (("touching", "touching"), ("touching-loss", "touching, a loss")):
+        assert TOLD[name] == table_of_sums[law][1][0]
+    assert table_of_sums["touching"][1][1] == "8"
+    assert table_of_sums["touching, a loss"][1][1] == "7"
+    APPENDIX.tells({f"gap-{k + 2}": 1e6 * UNIT * GAPS[k] for k in range(3)}, off=0.005)
+    APPENDIX.tells({f"ratio-{k + 2}": RATIOS[k] for k in range(3)} | {"ratios-e": RATIOS[3]})
+    for name, there in {
+        "apart": "apart",
+        "speed": "striker",
+        "gaps-e": "loss-e",
+        "ratio-wanted": "ratio-wanted",
+        "ratio-wanted-error": "ratio-wanted-error",
+        "rough-chance": "rough-chance",
+    }.items():
+        assert TOLD[name] == GLUED[there]
 
 
 #: Laws of the appendix: as its table and its figure name them, and as the stored fits do.

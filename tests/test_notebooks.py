@@ -206,7 +206,7 @@ GIVEN = {
     "reading_solver": "0.01 0.1 0.3 0.5 0.7",
     "reading_table_2": "0.22 0.390 0.710 0.755",
     "observations": "0.15 0.71 0.9 0.95 0.99",
-    "observations_film": "0.2 0.5",  # an error, a speed
+    "observations_film": "0.1 0.2 0.5",  # a distance, an error, a speed
     "observations_half": "1.28 22.2 44.8",  # 50 pixels over 39; mm, grams
     "ledger": "",
 }
