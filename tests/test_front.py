@@ -70,20 +70,26 @@ def test_what_the_readme_says_of_the_other_answers():
         collide(lossy, SpringChain())
 
 
-def test_where_springs_end_the_energy_law_says_something_else(root: Path):
-    """What README says of the least restitution of springs, and SciPy of springs."""
+def test_springs_and_the_energy_law_with_high_losses(root: Path):
+    """What README says of both and of the least restitution of springs, and SciPy of springs."""
     readme = " ".join((root / "README.md").read_text(encoding="utf-8").split())
     found = re.search(
-        r"at ([.\d]+) the last .* leaves with (\d+) % by springs, with (\d+) %", readme
+        r"from ([.\d]+) up.* at ([.\d]+) the last .* leaves with (\d+) % by springs,"
+        r" with (\d+) % by it; at ([.\d]+) with (\d+) % and (\d+) %",
+        readme,
     )
     least, *told = map(float, found.groups())
-    loss = cradle.viscosity_from(least, speed=1, masses=[1] * 5)
-    after = collide(TOY, SpringChain(viscosity=loss)).velocities[-1]
-    other = collide(Chain([1] * 5, TOY.velocities, least), EnergyDistribution()).velocities[-1]
-    assert [round(100 * v) for v in (after, other)] == told
-    assert integrated([1] * 5, TOY.velocities, loss=loss)[-1] == pytest.approx(after, abs=1e-5)
+    for e, *percent in (told[:3], told[3:]):
+        loss = cradle.viscosity_from(e, speed=1, masses=[1] * 5)
+        after = collide(TOY, SpringChain(viscosity=loss)).velocities[-1]
+        other = collide(Chain([1] * 5, TOY.velocities, e), EnergyDistribution()).velocities[-1]
+        assert [round(100 * v) for v in (after, other)] == percent
+        assert integrated([1] * 5, TOY.velocities, loss=loss)[-1] == pytest.approx(after, abs=1e-5)
+    assert cradle.viscosity_from(least, speed=1, masses=[1] * 5).size == 4
     with pytest.raises(ValueError, match=f"must lie in .{least}, 1"):
         cradle.viscosity_from(least - 0.001, speed=1, masses=[1] * 5)
+    still = Chain([1] * 5, TOY.velocities, 0)
+    assert collide(still, EnergyDistribution()).velocities == pytest.approx(0.2)
 
 
 def test_version_has_one_source():
