@@ -11,6 +11,8 @@ from scipy import optimize
 from stored import read
 from truth import solve
 
+from cradle import viscosity_from
+
 CHAPTER = Chapter("forces")
 
 
@@ -77,13 +79,38 @@ def test_fig_cost():
         assert shown == pytest.approx(np.array(found))
         told = {
             "velocity Verlet": ("batch-verlet", "batch-verlet-four"),
-            "this package": ("batch",),
+            "this package": ("batch", "batch-four"),
         }
         for name, (time, error) in zip(told.get(method, ()), found[1:]):  # asked for 1e-3, 1e-4
             CHAPTER.tells({name: time})
             assert error < {"batch": 1.3e-4, "batch-verlet": 1e-3}.get(name, 1e-4)
+        lossy = list(read("forces.csv", chain="5 equal, A = .03", method=method))
+        label = {"velocity Verlet": "lossy-verlet", "this package": "lossy"}.get(method)
+        for asked, end in (("1e-03", ""), ("1e-04", "-four")) if label else ():
+            (row,) = (row for row in lossy if row["asked"] == asked)
+            assert float(row["error"]) < float(asked)
+            CHAPTER.tells({label + end: float(row["microseconds"])})
     (ring,) = CHAPTER.figures["fig-own-forces-cost"].axes[0].collections
     CHAPTER.tells({"batch": ring.get_offsets()[0][0]})
+
+
+def test_the_error_of_the_last_ball():
+    lines = CHAPTER.printed("forces-use").splitlines()
+    for line in lines:
+        last, error = (line.split(word)[1].split(",")[0] for word in ("last ball ", "error "))
+        off = abs(float(last) - HERTZ["five equal"][-1])
+        assert float(error) == pytest.approx(off, rel=0.5, abs=6e-7)
+    assert len(lines) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "damping"), [("least", "viscoelastic"), ("least-hunt", "hunt-crossley")]
+)
+def test_the_least_restitutions(name, damping):
+    least = float(CHAPTER.glued[name])
+    assert viscosity_from(least, speed=1, masses=[1, 1], damping=damping).size == 1
+    with pytest.raises(ValueError, match=f"must lie in .{least:.3f}, 1"):
+        viscosity_from(least - 0.001, speed=1, masses=[1, 1], damping=damping)
 
 
 def test_the_rule_is_per_cents_from_spheres():
