@@ -285,6 +285,16 @@ def test_energy_left():
             for engine in ENGINES for pulled in (1, 2)
         ]  # fmt: skip
         assert glued[f"least-{name}"] == f"{min(left):.0f}"
+    for engine in ENGINES:
+        left = min(by_law(engine, "springs", "default", pulled)[-1].sum() for pulled in (1, 2))
+        if engine in ("Bullet", "MuJoCo"):  # "keep all"
+            assert left == pytest.approx(1, abs=0.005)
+        elif engine != "Box2D":
+            assert glued[f"default-{engine.lower()}"] == f"{100 * left:.0f}"
+    for name, pulled in (("fifth", 1), ("fifths", 2)):
+        left = by_law("Box2D", "as it is", "fine", pulled)[-1].sum()
+        assert glued[name] == f"{left:.2f}"
+        assert left == pytest.approx(pulled / 5, abs=0.01)
     pairs = [
         100 * with_tiny_gaps(name, "fine", pulled)[1][-1]
         for name in ("Chipmunk", "Box2D") for pulled in (1, 2)
