@@ -273,6 +273,8 @@ def test_the_table_of_the_inventory():
     """Verdicts of the judge, all of whose chains are in two lines."""
     told = Chapter("extremes_inventory").glued
     rows = read("judge.csv")
+    right = sum(int(r["right"]) for r in read("judge_short.csv"))
+    assert 1.1 * number(told["short"]) > right > number(told["short"]) == 1e6
     judged, longer = number(told["judged"]), number(told["longer"])
     assert judged + longer == sum(int(n) for r in rows for k, n in r.items() if k != "family")
     short = "right", "wrong", "other reading", "open", "unfinished"
