@@ -87,7 +87,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile before several processes would do it at once; they find the result on disk.
+    """Compile, and list the fonts, before several processes would; they find the result on disk.
 
     Beside it, as the compiler keeps but one processor busy, the book is built if it will be needed.
     """
@@ -106,7 +106,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
             [sys.executable, Path(__file__).with_name("built_book.py"), shared.name]
         )
         session.config.add_cleanup(book.wait)
-    code = "from cradle.runtime.job import warm_up; warm_up()"
+    code = "import matplotlib.font_manager; from cradle.runtime.job import warm_up; warm_up()"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

@@ -12,7 +12,7 @@ def closed(x, e):
 
 def kept(x):
     """Restitution of two balls that close at x / A."""
-    return brentq(lambda e: closed(x, e), 1e-9, min(1.0, 0.999 / x))
+    return brentq(lambda e: closed(x, e), 1e-9, min(1.0, (1.0 - 1e-12) / x))
 
 
 def motion(m, v, k, loss, gaps, times):

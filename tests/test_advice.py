@@ -63,9 +63,8 @@ def test_the_cheapest_setting_of_the_table(name, accuracy):
     """Springs against velocities from another program, too; its last digit is the ninth."""
     chain = striking(ELASTIC[name])
     advice = recommend(chain, accuracy=accuracy, stiffness=1.0)
-    table = read("benchmarks.csv", group="springs", model="SpringChain, Hertz", chain=name)
-    fit = [row for row in table
-           if float(row["numerical_error"]) <= accuracy]  # fmt: skip
+    measured = read("benchmarks.csv", group="springs", model="SpringChain, Hertz", chain=name)
+    fit = [row for row in measured if float(row["numerical_error"]) <= accuracy]
     row = min(fit, key=lambda row: float(row["time_ratio"]))
     assert advice.setting == row["setting"]
     assert advice.numerical_error == float(row["numerical_error"])

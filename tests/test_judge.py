@@ -1,8 +1,6 @@
 """The package before the judge: the rules over decimals of 100 digits; and the judge himself."""
 
-import csv
 from decimal import Decimal
-from pathlib import Path
 
 import judge as court
 import numpy as np
@@ -11,6 +9,7 @@ from delicate import CHAINS, chains_of
 from families import JUDGED, family
 from judge import batch, exact, judge, meaning, off, on_bounds, second_opinion, shrunk
 from problem import Problem
+from stored import numbers
 
 from cradle import outcomes
 from cradle.closed_form import largest_ratios
@@ -44,7 +43,6 @@ def test_an_outcome_that_hangs_on_when_a_chatter_ends_is_told_by_the_margin():
     assert problem.collide().margin == 0.0
 
 
-DATA = Path(__file__).parents[1] / "data"
 #: Chains of each family in the tests: as many as some seconds allow.
 SAMPLE = {
     "losses": 125, "wide": 75, "generic": 200, "at bounds": 150, "extremes": 40, "ties": 60,
@@ -87,31 +85,29 @@ def test_no_family_is_left_out():
 
 
 def stored(run, words):
-    """Counts of a stored run, by family."""
-    with (DATA / run).open(encoding="utf-8") as file:
-        rows = {row.pop("family"): row for row in csv.DictReader(file)}
-    assert list(rows) == list(JUDGED)
-    assert all(list(row) == words for row in rows.values())
+    """Counts of a stored run, in the order of its families."""
+    rows = numbers(run, "family")
+    assert [row.pop("family") for row in rows] == list(JUDGED)
+    assert all(list(row) == words for row in rows)
     return rows
 
 
 def test_the_stored_run_of_short_chains():
     """A million chains end within a hundred events, of every family: all answers are right."""
     rows = stored("judge_short.csv", [*court.ENDS, court.LEFT_OUT])
-    right = {name: int(row.pop("right")) for name, row in rows.items()}
-    assert sum(right.values()) > 1_000_000
-    assert min(right.values()) > 1500
-    assert all(row.pop(court.LEFT_OUT) and {*row.values()} == {"0"} for row in rows.values())
+    right = [row["right"] for row in rows]
+    assert sum(right) > 1_000_000
+    assert min(right) > 1500
+    assert [row[word] for row in rows for word in court.ENDS[1:]] == [0] * 4 * len(JUDGED)
 
 
 def test_the_stored_run():
     """Of many chains of every family none was wrong, and most had an exact run with an end."""
-    for name, row in stored("judge.csv", court.WORDS).items():
-        assert sum(map(int, row.values())) >= 7000, name
-        assert row["other reading"] == "0", name
-        assert row["wrong"] == "0", name
-        assert int(row["open"]) <= 1, name
-        assert int(row["right"]) > 4200, name
+    for name, row in zip(JUDGED, stored("judge.csv", court.WORDS), strict=True):
+        assert sum(row.values()) >= 7000, name
+        assert row["other reading"] == row["wrong"] == 0, name
+        assert row["open"] <= 1, name
+        assert row["right"] > 4200, name
 
 
 @pytest.mark.parametrize(

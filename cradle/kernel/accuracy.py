@@ -35,7 +35,7 @@ ENOUGH, COARSE, SPARE = 0.2, 0.5, 1.05
 HARD, LOST, SWING, WHOLE = 0.01, 0.022, 0.0027, 0.8
 # Kinks beyond two of each contact, and with leans radians, from which runs are compared.
 OFTEN, LONG = 4.0, 30.0
-STRONG = 0.5  # A from which on they are, as losses may open and press a contact at any node
+STRONG = 0.5  # A from which on they are, of viscoelastic balls: it may open a contact at any node
 TRIALS = 16  # runs of a chain, each finer than the one before
 DAMPED = 0.25  # step times A times the square of a frequency, at most
 SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
@@ -166,7 +166,7 @@ def judge(n, law, change, s, clock):
     swung = max(1.0, (0.75 if clock.lossy else 1.0) * SWING * radians / clock.hard)
     off = phase / clock.eta * math.sqrt(math.sqrt(swung))
     often = many > clock.often
-    compare = often or clock.leans > 0 or clock.lossy > STRONG
+    compare = often or clock.leans > 0 or (clock.lossy > STRONG and not law.hunt)
     told, ratio = math.inf, clock.coarser / clock.h
     if ratio > 0.0:
         told = (60.0 if clock.leans else 7.5) / (ratio * ratio * ratio * ratio - 1.0)
