@@ -537,6 +537,13 @@ def test_balls_that_meet_now_need_not_swing_once_more(decay):
             assert abs(first_fall(level, [(wave, complex(-decay, 1.0))], False, 9.0)) < 1e-12
 
 
+@pytest.mark.parametrize("decay", [0.0, 0.1])
+def test_what_is_below_zero_all_the_time_falls_now(decay):
+    """As the force between balls that hang apart by a rounding and were found to move together."""
+    for wave in (1j, -1.0 + 0j, cmath.rect(1.0, 2.0)):
+        assert first_fall(-1.5, [(wave, complex(-decay, 1.0))], False, 9.0) == 0.0
+
+
 def test_an_integration_that_fails_is_no_motion(monkeypatch):
     monkeypatch.setattr(FullFlight, "_rate", lambda *of: -1e3 * of[-1] ** 2)
     with pytest.raises(RuntimeError, match="the integration of the pendulums failed: Required"):

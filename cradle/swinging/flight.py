@@ -41,8 +41,8 @@ def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -
     if parting:
         c = complex(-level, -abs(c.imag))
     if level == 0.0 or rate.real == 0.0:
-        if level >= abs(c):
-            return math.inf
+        if abs(level) >= abs(c):
+            return math.inf if level > 0.0 else 0.0
         wait = math.acos(-level / abs(c)) - cmath.phase(c)
         if not parting:
             wait %= 2.0 * math.pi
@@ -60,7 +60,7 @@ def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -
     if value(low) >= -4e-16 * (abs(level) + abs(c)):
         return math.inf
     if value(high) <= 0.0:
-        return high
+        return 0.0
     from scipy.optimize import brentq  # slow to import
 
     return float(brentq(value, high, low, xtol=1e-16, rtol=1e-15))
